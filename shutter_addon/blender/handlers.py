@@ -8,9 +8,9 @@ import bpy
 from bpy.app.handlers import persistent
 
 from ..core import revision
-from .data import inbetween_settings, preview_areas, source_media, strips, versions
-from .editing import copies, lifecycle, shown_annotations, track_region, undelete, undo_repair
-from .interface import bake_operators, inbetween_operators, sharp_frame
+from .data import data_format, inbetween_settings, preview_areas, source_media, strips, versions
+from .editing import copies, lifecycle, migrations, shown_annotations, track_region, undelete, undo_repair
+from .interface import bake_operators, inbetween_operators, newer_files, sharp_frame
 from .output import edit_feed
 from .rendering import invalidation, job_snapshots, render_job, sessions
 from .rendering.render_job import Where
@@ -34,21 +34,27 @@ def _before_load(*_):
 def _after_load(*_):
     sharp_frame.listen()
     sessions.drop_removed()  # what a render job took up while the file was loaded
-    copies.adopt()
-    lifecycle.mend()
-    lifecycle.take_over()
+    if not data_format.is_file_newer():
+        copies.adopt()
+        lifecycle.mend()
+        migrations.migrate()
     shown_annotations.follow()
+    newer_files.tell(bpy.data.scenes)
+
+
+@persistent
+def _after_import(imported, *_):
+    newer_files.tell(item.id for item in imported.import_items if item.id_type == "SCENE")
 
 
 @persistent
 def _before_save(*_):
     edit_feed.end()
     lifecycle.update()  # a script may have removed strips, since Blender last told
-    lifecycle.leave_to_user()
     sharp_frame.give_back(bpy.context)
-    for scene in bpy.data.scenes:
-        if scene.virtual_shutter.effects and scene.library is None:
-            scene.virtual_shutter.version = versions.extension()
+    if not data_format.is_file_newer():
+        lifecycle.leave_to_user()
+        data_format.stamp_saved(versions.extension())
 
 
 @persistent
@@ -102,7 +108,7 @@ def _prepare(film: int, in_job: bool) -> bool:
     invalidation.drop_lesser()
     source_media.look_again()
     source_media.rest(render_job.runs())
-    if bpy.app.background:  # in a window the last update has seen to it
+    if bpy.app.background and not data_format.is_file_newer():  # in a window the last update has seen to it
         lifecycle.mend()
         copies.adopt()
         lifecycle.follow_sources()
@@ -144,6 +150,7 @@ def _drop_frames():
 HANDLERS = {
     "load_pre": _before_load,
     "load_post": _after_load,
+    "blend_import_post": _after_import,
     "save_pre": _before_save,
     "depsgraph_update_post": _update,
     "undo_pre": _before_undo,

@@ -209,7 +209,8 @@ def test_an_older_file_is_mended(bpy, edit, effect, previews, tmp_path, monkeypa
     notes = bpy.data.annotations.new("Notes")
     previews[0].annotation, previews[1].annotation = left, notes
     effect.scene.annotation.virtual_shutter_made = effect.scene.camera.data.virtual_shutter_made = ""
-    monkeypatch.setattr(lifecycle, "leave_to_user", lambda: None)  # which older versions did not have
+    for name in ("leave_to_user", "data_format.stamp_saved"):  # which older versions did not have
+        monkeypatch.setattr(f"{lifecycle.__name__}.{name}", lambda *_: None)
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "older.blend"))
     bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "older.blend"))
     scene = bpy.data.scenes["Scene"].virtual_shutter.effects[0].scene

@@ -72,3 +72,9 @@ def test_a_pictures_note_is_read_back():
     assert edit_version.key_in(edit_version.note(VERSION.key)) == VERSION.key
     for text in ("", "mine", "virtual_shutter edit ", f"virtual_shutter edit {VERSION.key}0"):
         assert edit_version.key_in(text) is None
+
+
+def test_a_job_of_a_newer_version_is_told(tmp_path):
+    (tmp_path / job_file.NAME).write_text('{"version": 2, "edit": {"glow": 1}, "glow": [1]}')
+    with pytest.raises(job_file.JobError, match=r"is of a newer version of the extension$"):
+        job_file.read(tmp_path)

@@ -112,7 +112,7 @@ def broken(change):
         (lambda d: d.pop("window"), "window: missing"),
         (lambda d: d.update(foo=1), "recipe: unknown field foo"),
         (lambda d: d["regions"][0].update(bar=1), r"regions[0]: unknown field bar"),
-        (lambda d: d.update(version=2), "version: 2 is none of 1"),
+        (lambda d: d.update(version=2), "version: 2 is of a newer version of Virtual Shutter, this one reads 1"),
         (lambda d: d.update(version=True), "version: true is none of 1"),
         (lambda d: d.update(window=0), "window: 0 is not 1 to 256"),
         (lambda d: d.update(window=257), "window: 257 is not 1 to 256"),

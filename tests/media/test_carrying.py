@@ -220,6 +220,19 @@ def test_mattes_are_kept(carried, footage, tmp_path):
     assert (carried(0, 6, 12).read(3) == first[3]).all()
 
 
+def test_mattes_of_another_version_are_left_alone(carried, tmp_path, monkeypatch):
+    monkeypatch.setattr(carried_mattes, "VERSION", carried_mattes.VERSION + 1)
+    carried(0).read(0)
+    (kept,) = (path for path in (tmp_path / "mattes").rglob("*.png") if path.name.startswith("00000000-"))
+    before = kept.read_bytes()
+    monkeypatch.undo()
+    mattes = carried(0)
+    assert not mattes.has(0)
+    mattes.read(0)
+    assert mattes.has(0)
+    assert kept.read_bytes() == before
+
+
 def test_who_shares_a_folder_carries_once(tmp_path):
     """Two that ask at the same time: one carries, the other waits, and reads no frame."""
     both = [Footage(tmp_path) for _ in range(2)]

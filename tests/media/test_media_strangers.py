@@ -505,3 +505,15 @@ def check(source, folder, seed):
         refused = refusal(build, source, folder)
         assert "cannot be written there" in refused if refused else state(source, folder).name == "ready", seed
     assert "cannot be removed" in (refusal(inbetween_folders.purge, folder) or "cannot be removed"), seed
+
+
+def test_what_another_version_has_built_is_left_alone(source, folder, monkeypatch):
+    """A newer one, whose frames or folder may be others: it is not shown, and ours are built beside."""
+    monkeypatch.setattr(inbetween_cache, "VERSION", inbetween_cache.VERSION + 1)
+    build(source, folder)
+    newer = listed(folder)
+    monkeypatch.undo()
+    assert state(source, folder).name == "stale"
+    build(source, folder)
+    assert state(source, folder).name == "ready"
+    assert newer.items() <= listed(folder).items()

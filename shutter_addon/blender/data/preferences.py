@@ -42,7 +42,8 @@ class ShutterPreferences(bpy.types.AddonPreferences):
 def device() -> str:
     """The device that renders are wanted on, one of devices.available.CHOICES."""
     preferences = _preferences()
-    return preferences.device.lower() if preferences else "auto"
+    known = preferences.device if preferences else ""  # nor is one that a newer version has chosen
+    return known.lower() or "auto"
 
 
 def gpu_memory() -> int:

@@ -286,11 +286,12 @@ class ShutterEffect(PropertyGroup):
 
 
 class ShutterScene(PropertyGroup):
-    """Of a scene: its effects, and the version of the extension that saved it. Of an effect scene: an identity, by
-    which a copy is known."""
+    """Of a scene: its effects, the version of the extension that saved it, and the format of what it saved
+    (data_format). Of an effect scene: an identity, by which a copy is known."""
 
     effects: CollectionProperty(type=ShutterEffect)
     version: StringProperty()
+    format: IntProperty()
     identity: StringProperty()
 
 

@@ -19,6 +19,14 @@ def copy_properties(old, new) -> None:
             copy_properties(getattr(old, name), getattr(new, name))
         elif not (prop.is_readonly or prop.is_skip_save):  # what is not saved only shows another one
             store(new, name, stored(old, name))
+    _copy_unknown(old, new)
+
+
+def _copy_unknown(old, new) -> None:
+    """Copies what a newer version has stored in a property group, of which Blender knows the values alone."""
+    there = old.bl_system_properties_get() or {}
+    for name in set(there.keys()).difference(old.bl_rna.properties.keys()):
+        new.bl_system_properties_get(do_create=True)[name] = there[name]
 
 
 def is_group(struct, name: str) -> bool:

@@ -4,7 +4,7 @@ import uuid
 
 import bpy
 
-from ..data import annotations, fcurves, requirements, strips, undo
+from ..data import annotations, data_format, fcurves, requirements, strips, undo
 from ..rendering import invalidation, render_job, sessions
 from . import copies, match_source, renamed_drawings, shown_annotations, undelete
 from .add_effect import add_camera
@@ -14,11 +14,19 @@ _OLDER_NAMES = "Shutter ", "Scribbles ", "Verschluss ", "Markierungen "  # of an
 
 
 def update(updated=None) -> None:
-    """Brings the effects of all scenes in line with their strips. A second call changes nothing.
+    """Brings the effects of all scenes in line with their strips. A second call changes nothing. What a newer version
+    has saved is left to it.
 
     updated: the scene whose depsgraph is being updated, which must not go now."""
     if bpy.app.is_job_running("RENDER"):
         return
+    if not data_format.is_file_newer():
+        _tidy(updated)
+    for scene in _local_scenes():
+        invalidation.invalidate_changed(scene)
+
+
+def _tidy(updated) -> None:
     scenes = _local_scenes()
     for scene in scenes:
         _reconnect(scene)
@@ -34,8 +42,6 @@ def update(updated=None) -> None:
     _remove_left()
     if not render_job.runs():  # a film keeps its size
         follow_sources()
-    for scene in _local_scenes():
-        invalidation.invalidate_changed(scene)
 
 
 def mend() -> None:

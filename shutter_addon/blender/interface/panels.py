@@ -5,7 +5,7 @@ from bpy.app.translations import pgettext_iface as iface_
 from bpy.types import Menu, Panel, UIList
 
 from ...core.messages import EffectError
-from ..data import annotations, selection, strips
+from ..data import annotations, data_format, selection, strips
 from ..editing import bar_edits, match_source
 from ..rendering import inbetween_build, strobing
 from . import inbetween_operators
@@ -121,6 +121,8 @@ class _Shutters(Mixin):
             layout.operator("shutter.add_effect", icon="ADD")
             return
         effect = active[1]
+        if (newer := data_format.note(active[0])) is not None:
+            sentence(layout, newer, "INFO")
         if selection.in_picture(context) is None:
             sentence(layout, selection.why_unseen(active[0], active[2]), "INFO")
         _draw_live(layout, context)

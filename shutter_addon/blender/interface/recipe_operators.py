@@ -8,7 +8,7 @@ from bpy.types import Operator
 from bpy_extras.io_utils import ExportHelper, ImportHelper
 
 from ...core.recipes import recipe, recipe_file
-from ..data import recipe_import, selection
+from ..data import data_format, recipe_import, selection
 from ..output import matte_export
 from ..rendering.effect_source import FAULTS
 from .operator_bases import OfEffect, chosen_file
@@ -54,6 +54,10 @@ class SHUTTER_OT_recipe_export(OfEffect, ExportHelper, Operator):
             sentence = f"{self.filepath}: {error.strerror or error}"
             self.report({"ERROR"}, sentence)
             return {"CANCELLED"}
+        if data_format.is_newer(scene):
+            words = rpt_('Saved "{path}", without what a newer version of Virtual Shutter has added')
+            self.report({"WARNING"}, words.format(path=path))
+            return None
         self.report({"INFO"}, rpt_('Saved "{path}"').format(path=path))
         return None
 

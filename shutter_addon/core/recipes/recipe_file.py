@@ -37,6 +37,7 @@ from .recipe import (
 if TYPE_CHECKING:
     from cattrs import Converter
 
+VERSION = 1  # the newest one that is read; that of Recipe
 # Longer numbers are read as floats, which need no time for it; a whole number that counts anything is far shorter.
 _MAX_DIGITS = 300
 
@@ -79,6 +80,9 @@ def parse(text: str) -> Recipe:
         raise RecipeError(f"line {error.lineno}, column {error.colno}: not JSON ({error.msg})") from None
     except RecursionError:
         raise RecipeError("recipe: lists or objects within one another, too many") from None
+    if isinstance(data, dict) and type(version := data.get("version")) is int and version > VERSION:
+        newer = f"version: {_shown(version)} is of a newer version of Virtual Shutter, this one reads {VERSION}"
+        raise RecipeError(newer)
     converter = _converter()
     try:
         recipe = converter.structure(data, Recipe)

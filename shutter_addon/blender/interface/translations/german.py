@@ -100,6 +100,16 @@ MESSAGES = {
         "*",
         "{place}: {property} is {value}, not {low} to {high}",
     ): "{place}: {property} ist {value}, nicht {low} bis {high}",
+    (
+        "*",
+        '"{scene}" was saved by a newer version of Virtual Shutter ({version}): what this one does not know '
+        "is kept, but not shown",
+    ): "„{scene}“ wurde von einer neueren Version von Virtual Shutter gespeichert ({version}): Was diese nicht kennt, "
+    "bleibt erhalten, wird aber nicht gezeigt",
+    (
+        "*",
+        'Saved "{path}", without what a newer version of Virtual Shutter has added',
+    ): "„{path}“ gespeichert, ohne das, was eine neuere Version von Virtual Shutter hinzugefügt hat",
     ("*", "{place}: {property} is none of its choices"): "{place}: {property} ist keine der Möglichkeiten",
     (
         "*",

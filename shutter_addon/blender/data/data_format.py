@@ -1,0 +1,57 @@
+"""The format of what the extension keeps in .blend files: a number that each scene with effects carries.
+
+A file of a newer format opens: what is not known here stays as it is stored, unseen, and nothing is tidied by itself.
+"""
+
+import bpy
+from bpy.app.translations import pgettext_rpt as rpt_
+
+# Raise it with the first change after a release that older versions would not understand: a property, an item of an
+# enum, another meaning. What then becomes of older files is in editing/migrations.py.
+FORMAT = 1
+
+
+def of_file() -> int:
+    """The oldest format of the scenes that can be changed; 0: of before there were numbers, or there are no effects."""
+    return min((scene.virtual_shutter.format for scene in _holding()), default=0)
+
+
+def is_newer(scene) -> bool:
+    """Whether a scene's effects are of a newer format than is known here."""
+    return scene.virtual_shutter.format > FORMAT
+
+
+def is_file_newer() -> bool:
+    """Whether any scene that can be changed is: then nothing is written into the file but what the user changes."""
+    return any(is_newer(scene) for scene in bpy.data.scenes if scene.library is None)
+
+
+def stamp_migrated() -> None:
+    """Notes in all scenes with effects that they are of this format now."""
+    for scene in _holding():
+        if scene.virtual_shutter.format != FORMAT:
+            scene.virtual_shutter.format = FORMAT
+
+
+def stamp_saved(version: str) -> None:
+    """Notes in all scenes with effects the version of the extension that saves them, and in new ones their format. One
+    that was appended from an older file keeps its own until the file is loaded, and so migrated."""
+    for scene in _holding():
+        scene.virtual_shutter.version = version
+        if not scene.virtual_shutter.format:
+            scene.virtual_shutter.format = FORMAT
+
+
+def note(scene) -> str | None:
+    """The sentence about a scene's effects that are of a newer format; None: they are not."""
+    if not is_newer(scene):
+        return None
+    sentence = rpt_(
+        '"{scene}" was saved by a newer version of Virtual Shutter ({version}): what this one does not know '
+        "is kept, but not shown"
+    )
+    return sentence.format(scene=scene.name, version=scene.virtual_shutter.version)
+
+
+def _holding() -> list:
+    return [scene for scene in bpy.data.scenes if scene.library is None and scene.virtual_shutter.effects]

@@ -1,0 +1,174 @@
+"""Files of a newer version: they open with a sentence, and nothing of them is lost by saving. And older ones."""
+
+import json
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+import stored
+from support import picture_of, recipe, sequencer
+
+from shutter_addon.blender import command
+from shutter_addon.blender.data import data_format, preferences, property_copy
+from shutter_addon.blender.editing import lifecycle, migrations
+from shutter_addon.core.messages import EffectError
+from shutter_addon.core.recipes import recipe_file
+from shutter_addon.core.recipes.recipe import RecipeError
+
+ROOT = Path(__file__).parents[2]
+NEWER = Path(__file__).with_name("newer_version.py")
+SENTENCE = '"Edit" was saved by a newer version of Virtual Shutter (9.0.0): what this one does not know'
+
+
+def newer_version(*arguments):
+    """What a newer version finds in the file."""
+    done = subprocess.run([sys.executable, NEWER, *arguments], cwd=ROOT, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    (line,) = [line for line in done.stdout.splitlines() if line.startswith("VALUES ")]
+    return json.loads(line.removeprefix("VALUES "))
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory):
+    """An edit of a newer version, and all that it stores in it."""
+    folder = shutil.copytree(sorted((ROOT / "tests" / "saved").iterdir())[-1], tmp_path_factory.mktemp("newer") / "it")
+    path = folder / "newer.blend"
+    return path, newer_version("make", path, folder / "edit.blend")
+
+
+@pytest.fixture
+def newer(bpy, made, tmp_path, capfd):
+    """The path of a copy, that is open, and its edit."""
+    path = shutil.copytree(made[0].parent, tmp_path / "it") / made[0].name
+    capfd.readouterr()
+    bpy.ops.wm.open_mainfile(filepath=str(path))
+    return path, bpy.data.scenes["Edit"]
+
+
+def test_one_sentence_is_said(newer, capfd):
+    said = capfd.readouterr().err
+    assert said.count(SENTENCE) == said.count("newer version") == 1
+    assert said.startswith("Virtual Shutter: ")
+
+
+def test_nothing_of_it_is_lost_by_saving(bpy, newer, made):
+    path, edit = newer
+    effect = edit.virtual_shutter.effects[0]
+    assert effect.position == ""
+    bpy.context.view_layer.update()
+    for frame in (4, 1):
+        edit.frame_set(frame)
+        bpy.ops.render.render(scene=edit.name)
+    lifecycle.update()
+    bpy.ops.wm.save_mainfile()
+    after = newer_version("read", path)
+    assert list(stored.missing(made[1], after)) == []
+    assert after["scenes"]["Edit"]["effects"][0]["position"] == "SCATTERED"
+    assert after["scenes"]["Edit"]["effects"][0]["shutters"][0]["glows"] == [{"strength": 4}]
+    assert after["strips"]["Edit/regions effect"]["virtual_shutter_glow"] == "soft"
+    assert after["saved by"]["Edit"] == [data_format.FORMAT + 1, "9.0.0"]
+
+
+def test_what_is_changed_is_saved(bpy, newer):
+    path, edit = newer
+    edit.virtual_shutter.effects[0].window = 5
+    edit.virtual_shutter.effects[0].position = "END"
+    bpy.ops.wm.save_mainfile()
+    bpy.ops.wm.open_mainfile(filepath=str(path))
+    effect = bpy.data.scenes["Edit"].virtual_shutter.effects[0]
+    assert (effect.window, effect.position, effect.bl_system_properties_get()["glow"]) == (5, "END", 0.75)
+
+
+def test_a_copy_has_what_nobody_knows(newer):
+    effects = newer[1].virtual_shutter.effects
+    effects.add()
+    property_copy.copy_properties(effects[0], effects[-1])
+    kept, copied = (effects[i].bl_system_properties_get() for i in (0, -1))
+    assert copied["glow"] == kept["glow"] == 0.75
+    assert copied["position"] == kept["position"] == 3
+    halo, glows = (effects[-1].shutters[0].bl_system_properties_get()[name] for name in ("halo", "glows"))
+    assert halo["strength"] == 3
+    assert [glow["strength"] for glow in glows] == [4]
+
+
+def test_an_effect_that_needs_what_nobody_knows_is_refused_by_a_sentence(newer):
+    effect = newer[1].virtual_shutter.effects[0]
+    with pytest.raises(EffectError, match=r'^effect "Shutter": Position is none of its choices$'):
+        picture_of(effect.scene, 3)
+    effect.position = "START"
+    effect.regions[0].bl_system_properties_get(do_create=True)["kind"] = 99
+    with pytest.raises(EffectError, match=r'^region "walker": Type is none of its choices$'):
+        picture_of(effect.scene, 3)
+
+
+def test_a_recipe_of_it_says_what_it_lacks(bpy, newer, tmp_path, capfd):
+    _path, edit = newer
+    with sequencer(bpy):
+        edit.sequence_editor.active_strip = edit.sequence_editor.strips["combined effect"]
+        out = tmp_path / "recipe.json"
+        assert bpy.ops.shutter.recipe_export(filepath=str(out)) == {"FINISHED"}
+    assert recipe_file.load(out).window == 6
+    assert f'Warning: Saved "{out}", without what a newer version' in capfd.readouterr().out
+
+
+def test_an_appended_scene_of_it_is_told(bpy, edit, made, capfd):
+    with bpy.data.libraries.load(str(made[0])) as (_found, wanted):
+        wanted.scenes = ["Edit"]
+    assert capfd.readouterr().err.count(SENTENCE) == 1
+
+
+def test_the_command_says_it_and_check_refuses(bpy, newer, tmp_path, capfd):
+    path, edit = newer
+    edit.virtual_shutter.effects[0].position = "START"
+    edit.virtual_shutter.effects[0].scene.render.use_border = False
+    bpy.ops.wm.save_mainfile()
+    capfd.readouterr()
+    assert command.main(["render", str(path), "--frames", "15", "--output", str(tmp_path / "out")]) == 0
+    assert SENTENCE in capfd.readouterr().err
+    assert command.main(["check", str(path)]) == 2
+    assert "the edit was saved by version 9.0.0 of the extension" in capfd.readouterr().err
+
+
+def test_an_older_file_is_migrated_once(bpy, edit, effect, tmp_path, monkeypatch):
+    """By what is made up here: format 2 has a name with a mark."""
+    path = str(tmp_path / "older.blend")
+    bpy.ops.wm.save_as_mainfile(filepath=path)
+    assert edit.virtual_shutter.format == data_format.FORMAT
+
+    def mark():
+        for scene in bpy.data.scenes:
+            for each in scene.virtual_shutter.effects:
+                each.name += "!"
+
+    number = data_format.FORMAT + 1
+    monkeypatch.setattr(data_format, "FORMAT", number)
+    monkeypatch.setattr(migrations, "MIGRATIONS", (*migrations.MIGRATIONS, (number, mark)))
+    for _ in range(2):
+        bpy.ops.wm.open_mainfile(filepath=path)
+        group = bpy.context.scene.virtual_shutter
+        assert (group.effects[0].name, group.format) == ("Shutter!", number)
+        bpy.ops.wm.save_mainfile()
+
+
+def test_a_recipe_of_a_newer_version(tmp_path):
+    """It is not read, whatever else it holds, and nothing is written."""
+    newer = recipe(2, [1, 1]) | {"version": 2, "glow": [1], "shutters": "elsewhere"}
+    with pytest.raises(RecipeError, match=r"^version: 2 is of a newer version of Virtual Shutter"):
+        recipe_file.parse(json.dumps(newer))
+    with pytest.raises(RecipeError, match=r"^recipe: unknown field glow$"):
+        recipe_file.parse(json.dumps(recipe(2, [1, 1]) | {"glow": 1}))
+
+
+def test_a_device_that_a_newer_version_has_chosen(bpy):
+    addons = bpy.context.preferences.addons
+    addon = addons.new()
+    try:
+        addon.module = preferences.ADDON
+        addon.preferences.device = "CPU"
+        assert preferences.device() == "cpu"
+        addon.preferences.bl_system_properties_get()["device"] = 99
+        assert preferences.device() == "auto"
+    finally:
+        addons.remove(addon)

@@ -1,0 +1,86 @@
+"""What every version has saved, from 0.1.0 on, is opened by this one: nothing is lost, pictures are the same."""
+
+import json
+import shutil
+import tomllib
+from pathlib import Path
+
+import pytest
+import saved_pictures
+import stored
+
+from shutter_addon.core.recipes import recipe_file
+
+ROOT = Path(__file__).parents[2]
+SAVED = ROOT / "tests" / "saved"
+
+
+def numbers(folder):
+    return [int(part) for part in folder.name.split(".")]
+
+
+FOLDERS = sorted(SAVED.iterdir(), key=numbers)
+
+
+@pytest.fixture(params=FOLDERS, ids=lambda folder: folder.name)
+def folder(request, tmp_path):
+    """A copy of what a version has saved."""
+    return shutil.copytree(request.param, tmp_path / "saved")
+
+
+def lost(folder):
+    """What the edit that is open lacks of what the version had stored in it."""
+    return list(stored.missing(json.loads((folder / "values.json").read_text()), stored.values()))
+
+
+def test_this_version_has_kept_its_files():
+    version = tomllib.loads((ROOT / "blender_manifest.toml").read_text())["version"]
+    assert SAVED / version in FOLDERS, "run scripts/save_version.py, once for each release"
+
+
+def test_nothing_is_lost(bpy, folder, capfd):
+    edit = str(folder / "edit.blend")
+    bpy.ops.wm.open_mainfile(filepath=edit)
+    bpy.context.view_layer.update()
+    assert lost(folder) == []
+    bpy.ops.wm.save_mainfile()
+    bpy.ops.wm.open_mainfile(filepath=edit)
+    assert lost(folder) == []
+    assert "newer version" not in capfd.readouterr().err
+
+
+def test_pictures_are_the_same(bpy, folder, tmp_path, same_pixels):
+    count = 0
+    for name, frame, expected in saved_pictures.kept(folder):
+        picture = saved_pictures.rendered(folder, name, frame, tmp_path / f"{name}{frame}")
+        same_pixels(picture, expected, 1, f"{folder.name}-{name}-{frame}")
+        count += 1
+    assert count >= 7
+
+
+def test_recipes_are_read_and_written(folder):
+    for path in (path for path in folder.glob("*.json") if path.name not in ("names.json", "values.json")):
+        read = recipe_file.load(path)
+        assert recipe_file.parse(recipe_file.dump(read)) == read
+
+
+def test_what_older_versions_do_not_know_has_another_format():
+    """Else they would open it without a word, and show other pictures."""
+    before, now = json.loads((FOLDERS[-1] / "names.json").read_text()), stored.names()
+    for kind, number, where in (
+        ("properties", "format", "FORMAT of blender/data/data_format.py"),
+        ("fields", "recipe", "`version` of a Recipe"),
+    ):
+        changed = before[kind] != now[kind]
+        assert not changed or now[number] > before[number], (
+            f"raise the {where}; before a release, remove its folder of tests/saved and run scripts/save_version.py"
+        )
+
+
+def test_everything_that_is_stored_is_in_the_files(bpy):
+    bpy.ops.wm.open_mainfile(filepath=str(FOLDERS[-1] / "edit.blend"))
+    assert stored.unused() & all_of(json.loads((FOLDERS[-1] / "names.json").read_text())["properties"]) == set()
+
+
+def all_of(properties):
+    return {f"{name}.{prop}" for name, props in properties.items() for prop in props}
