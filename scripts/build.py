@@ -2,11 +2,14 @@
 
 Run by scripts/build. The manifest in the source tree has no wheels: so Blender builds, validates and links the checkout
 as it is, without a download. The zip made of it is unpacked, gets wheels and the lines that list them, and is packed
-again for each system; what belongs into a zip is said once, in the manifest.
+again for each system; what belongs into a zip is said once, in the manifest. The wheels' holders of copyright and texts
+of licences come from third_party/components.toml.
 """
 
 import argparse
 import importlib.util
+import json
+import re
 import shutil
 import subprocess
 import sys
@@ -15,17 +18,23 @@ import tomllib
 import zipfile
 from pathlib import Path
 
+import components
+import without_openssl
+
 ROOT = Path(__file__).resolve().parents[1]
 # What Blender 5.2 lacks; it brings NumPy, OpenImageIO and cattrs with attrs and typing_extensions. Nothing that it
 # brings may be in here: an extension's wheels come before Blender's own modules, for all of Blender.
 WHEELS = (
     "av==19.0.2",
+    "click==8.2.1",  # PySceneDetect requires it, before 8.3
     "glcontext==3.1.0",
     "moderngl==5.13.0",
     "opencv-contrib-python-headless==5.0.0.93",
-    "scenedetect==0.6.7.1",  # without click and platformdirs, which its command alone needs
+    "platformdirs==4.14.8",  # PySceneDetect requires it
+    "scenedetect==0.6.7.1",
     "tqdm==4.70.1",
 )
+ALSO = {"windows-x64": ("colorama==0.4.6",)}  # click and tqdm require it there
 # By Blender's name of a system, the one that pip looks for: as old as PyAV's wheels allow.
 SYSTEMS = {"linux-x64": "manylinux_2_28_x86_64", "windows-x64": "win_amd64", "macos-arm64": "macosx_14_0_arm64"}
 BLENDERS_PYTHON = "3.13"  # of official builds of 5.2
@@ -50,36 +59,38 @@ def build_without_wheels(output: Path) -> Path:
 
 def build_with_wheels(without: Path, output: Path, systems: list[str], python: str) -> list[Path]:
     """Makes a zip for each system, with wheels for a Python version, from the zip without."""
-    path = output / name("" if python == BLENDERS_PYTHON else f"-python{python}")
+    return [_build_for(without, output, system, python) for system in systems]
+
+
+def _build_for(without: Path, output: Path, system: str, python: str) -> Path:
+    suffix = "" if python == BLENDERS_PYTHON else f"-python{python}"
+    path = output / name(f"{suffix}-{system.replace('-', '_')}")
     with tempfile.TemporaryDirectory() as folder:
         stage = Path(folder)
         with zipfile.ZipFile(without) as packed:
             packed.extractall(stage)
         (stage / "wheels").mkdir()
-        for system in systems:
-            for wheel in download(system, python):
-                shutil.copy(wheel, stage / "wheels")
-        list_wheels(stage, systems)
-        extension("build", "--source-dir", stage, "--output-filepath", path, "--split-platforms")
-    made = [path.with_stem(f"{path.stem}-{system.replace('-', '_')}") for system in systems]
-    for zip_path in made:
-        extension("validate", zip_path)
-    return made
+        for wheel in download(system, python):
+            shutil.copy(without_openssl.kept(wheel), stage / "wheels")
+        wheels = sorted((stage / "wheels").iterdir())
+        components.write_texts(stage / "licenses", wheels, system)
+        complete_manifest(stage / "blender_manifest.toml", wheels, system)
+        extension("build", "--source-dir", stage, "--output-filepath", path)
+    extension("validate", path)
+    return path
 
 
 def download(system: str, python: str) -> list[Path]:
     """The wheels for a system, unmodified from PyPI; kept in build/wheels."""
     folder = ROOT / "build" / "wheels" / f"{SYSTEMS[system]}-{python}"
-    found = [list(folder.glob(f"{_file(wheel)}-*.whl")) for wheel in WHEELS]
-    if all(found):
-        return [wheel for (wheel,) in found]
-    shutil.rmtree(folder, ignore_errors=True)
+    wanted = (*WHEELS, *ALSO.get(system, ()))
+    missing = [wheel for wheel in wanted if not list(folder.glob(f"{_file(wheel)}-*.whl"))]
     options = ["--only-binary=:all:", "--no-deps", "--implementation=cp", f"--python-version={python}"]
     pip = [sys.executable, "-m", "pip", "download", "-qq", "--disable-pip-version-check"]
-    pip += [*options, f"--platform={SYSTEMS[system]}", f"--dest={folder}", *WHEELS]
-    if subprocess.run(pip, capture_output=True, check=False).returncode:
+    pip += [*options, f"--platform={SYSTEMS[system]}", f"--dest={folder}", *missing]
+    if missing and subprocess.run(pip, capture_output=True, check=False).returncode:
         fail(f"no wheels for Python {python} on {system}, or PyPI is not reached")
-    return sorted(folder.glob("*.whl"))
+    return [next(folder.glob(f"{_file(wheel)}-*.whl")) for wheel in wanted]
 
 
 def _file(wheel: str) -> str:
@@ -88,13 +99,15 @@ def _file(wheel: str) -> str:
     return f"{name.replace('-', '_')}-{version}"
 
 
-def list_wheels(stage: Path, systems: list[str]) -> None:
-    """Lists the wheels and the systems in the manifest, before its first table."""
-    path = stage / "blender_manifest.toml"
+def complete_manifest(path: Path, wheels: list[Path], system: str) -> None:
+    """Adds the wheels, their system and all holders of copyright to a manifest, before its first table."""
     head, tables = path.read_text(encoding="utf-8").split("\n[", 1)
-    wheels = sorted(f"./wheels/{wheel.name}" for wheel in (stage / "wheels").iterdir())
-    lines = [f"platforms = {systems}", "wheels = [", *(f'  "{wheel}",' for wheel in wheels), "]", ""]
-    path.write_text("\n".join([head, *lines, f"[{tables}"]), encoding="utf-8")
+    holders = [*manifest()["copyright"], *components.copyright_lines(map(components.wheel_name, wheels), system)]
+    head = re.sub(r"(?m)^copyright = \[.*\]\n", "", head)
+    lines = [f'platforms = ["{system}"]']
+    for key, values in (("wheels", [f"./wheels/{wheel.name}" for wheel in wheels]), ("copyright", holders)):
+        lines += [f"{key} = [", *(f"  {json.dumps(value, ensure_ascii=False)}," for value in values), "]"]
+    path.write_text("\n".join([head, *lines, "", f"[{tables}"]), encoding="utf-8", newline="\n")
 
 
 def make_repository(folder: Path, zips: list[Path]) -> None:

@@ -20,6 +20,7 @@ NAME = "bl_ext.user_default.virtual_shutter"
 MAKE_EDIT = ROOT / "tests" / "blender" / "installed.py"
 SYSTEM = {"linux": "linux-x64", "win32": "windows-x64", "darwin": "macos-arm64"}[sys.platform]
 WHEELS = {"av", "glcontext", "moderngl", "opencv_contrib_python_headless", "scenedetect", "tqdm"}
+REQUIRED = {"click", "platformdirs"}  # by PySceneDetect; Windows's console needs colorama besides
 RECIPE = {
     "version": 1,
     "window": 4,
@@ -29,6 +30,8 @@ RECIPE = {
         {"shutter": "Sharp", "kind": "lasso", "strokes": [[[0.4, 0.3], [0.6, 0.3], [0.5, 0.7]]]},
     ],
 }
+PURE = {("py3", "none"), ("py2.py3", "none")}
+SPDX = re.compile(" (?:AND|OR|WITH) ")
 # What Blender says by itself, on the real one's screenless machine.
 BLENDERS_OWN = ("EGL Error", "system.path")
 # Runs a command (after a folder) that sees the folder read-only; nobody else does, and nothing stays mounted.
@@ -82,6 +85,7 @@ def test_the_zip_without_wheels_holds_the_extension_alone(dist):
     assert names == sources()
     assert "wheels" not in manifest
     assert "platforms" not in manifest
+    assert len(manifest["copyright"]) == 1
 
 
 @pytest.mark.parametrize(
@@ -91,15 +95,42 @@ def test_a_zip_with_wheels_holds_those_of_its_system(dist, system, tag):
     (path,) = dist[0].glob(f"*-{system}.zip")
     names, manifest = members(path)
     wheels = {name for name in names if name.startswith("wheels/")}
-    assert names - wheels == sources()
-    assert {name.split("/")[1].split("-")[0] for name in wheels} == WHEELS
+    licences = {name for name in names if name.startswith("licenses/")}
+    assert names - wheels - licences == sources()
+    own = {"colorama"} if system == "windows_x64" else set()
+    assert {name.split("/")[1].split("-")[0] for name in wheels} == WHEELS | REQUIRED | own
     for name in wheels:
         python, abi, platform = name.removesuffix(".whl").split("-")[-3:]
         assert platform == "any" or platform.endswith(tag)
-        assert (python, abi) in {("cp313", "cp313"), ("cp312", "abi3"), ("cp37", "abi3"), ("py3", "none")}
-    generated = manifest["build"]["generated"]
-    assert generated["platforms"] == [system.replace("_", "-")]
-    assert {wheel.removeprefix("./") for wheel in generated["wheels"]} == wheels
+        assert (python, abi) in {("cp313", "cp313"), ("cp312", "abi3"), ("cp37", "abi3"), *PURE}
+    assert manifest["platforms"] == [system.replace("_", "-")]
+    assert {wheel.removeprefix("./") for wheel in manifest["wheels"]} == wheels
+
+
+@pytest.mark.parametrize(
+    ("system", "some"),
+    [
+        ("linux_x64", ["libxcb", "OpenBLAS", "Intel IPP"]),
+        ("windows_x64", ["OpenH264", "Colorama", "Intel IPP"]),
+        ("macos_arm64", ["OpenSSL", "Rubber Band", "KleidiCV"]),
+    ],
+)
+def test_a_zip_names_the_holders_and_has_the_texts_of_what_it_bundles(dist, system, some):
+    (path,) = dist[0].glob(f"*-{system}.zip")
+    names, manifest = members(path)
+    with zipfile.ZipFile(path) as packed:
+        listed = packed.read("licenses/README.txt").decode()
+    for name in ("PyAV", "OpenCV", "FFmpeg", "x264", "x265", "tqdm", *some):
+        assert any(line.endswith(f"({name})") for line in manifest["copyright"]), name
+        assert re.search(rf"^ *{re.escape(name)}\b", listed, re.MULTILINE), name
+    assert manifest["copyright"][0].endswith("Virtual Shutter developers")
+    texts = {name.removeprefix("licenses/") for name in names if name.startswith("licenses/")}
+    for wheel in manifest["wheels"]:
+        assert any(text.startswith(f"{Path(wheel).name.split('-')[0]}/LICEN") for text in texts), wheel
+    identifiers = {each for line in re.findall(r"^    Licence: (.+)$", listed, re.M) for each in SPDX.split(line)}
+    bare = {re.sub("-(only|or-later)$", "", each) for each in identifiers}
+    assert bare == {text[8:-4] for text in texts if text.startswith("LICENSE-")} | {"GPL-3.0"}
+    assert "LICENSE" in names  # the GPL, version 3
 
 
 def test_wheels_that_are_not_to_be_had_are_one_sentence(tmp_path):
@@ -311,7 +342,9 @@ def test_installed_without_wheels(blender, dist, bunny, recipe, tmp_path):
     """Pictures on Blender's own GPU or with NumPy, and a sentence where a movie needs more."""
     hidden = blender.user / "scripts" / "startup" / "hidden.py"
     hidden.parent.mkdir(parents=True)
-    hidden.write_text(f"import sys\nsys.modules |= dict.fromkeys({WHEELS | {'cv2'}})\ndef register(): pass\n")
+    hidden.write_text(
+        f"import sys\nsys.modules |= dict.fromkeys({WHEELS | REQUIRED | {'cv2'}})\ndef register(): pass\n"
+    )
     (path,) = dist[0].glob("*-no_wheels.zip")
     blender.run("--command", "extension", "validate", path)
     blender.install(path)
