@@ -1,0 +1,201 @@
+"""Bills of materials, beside what the zips hold; and what the one wheel that is changed is worth."""
+
+import base64
+import csv
+import hashlib
+import io
+import json
+import subprocess
+import sys
+import zipfile
+from pathlib import Path
+
+import lief
+import pytest
+from cyclonedx.schema import SchemaVersion
+from cyclonedx.validation.json import JsonStrictValidator
+
+ROOT = Path(__file__).parents[1]
+sys.path.insert(0, str(ROOT / "scripts"))
+
+import sbom  # noqa: E402 - scripts are no package
+import without_openssl  # noqa: E402
+
+import build  # noqa: E402
+
+LINUX = "linux-x64"
+
+
+@pytest.fixture(scope="module")
+def without(tmp_path_factory):
+    """The zip without wheels."""
+    return build.build_without_wheels(tmp_path_factory.mktemp("without"))
+
+
+@pytest.fixture(scope="module")
+def linux(without):
+    """The zip for Linux."""
+    (path,) = build.build_with_wheels(without, without.parent, [LINUX], build.BLENDERS_PYTHON)
+    return path
+
+
+@pytest.fixture(scope="module")
+def bill(linux):
+    """Its bill of materials, as text."""
+    path = linux.with_suffix(".cdx.json")
+    sbom.write(linux, path)
+    return path.read_text(encoding="utf-8")
+
+
+@pytest.fixture(scope="module")
+def opencv(linux, tmp_path_factory):
+    """OpenCV's wheel in the zip for Linux."""
+    with zipfile.ZipFile(linux) as packed:
+        (name,) = (name for name in packed.namelist() if name.startswith("wheels/opencv"))
+        return Path(packed.extract(name, tmp_path_factory.mktemp("opencv")))
+
+
+def files_of(text):
+    """What a bill of materials says of files: SHA-256 by path."""
+    listed = [each for each in json.loads(text)["components"] if each["type"] == "file"]
+    hashes = {each["name"]: each["hashes"][0]["content"] for each in listed}
+    assert len(hashes) == len(listed)
+    return hashes
+
+
+def files_in(path):
+    """A zip's files and those of its wheels, unpacked here in a way of our own: SHA-256 by path."""
+    found = {}
+    with zipfile.ZipFile(path) as packed:
+        for name in packed.namelist():
+            if name.endswith("/"):
+                continue
+            content = packed.read(name)
+            found[name] = hashlib.sha256(content).hexdigest()
+            if name.endswith(".whl"):
+                found |= {f"{name}!/{inner}": digest for inner, digest in files_in(io.BytesIO(content)).items()}
+    return found
+
+
+def test_a_bill_lists_what_the_zip_holds_file_by_file(linux, bill):
+    assert files_of(bill) == files_in(linux)
+    assert any("!/cv2/cv2.abi3.so" in name for name in files_of(bill))
+
+
+def test_a_bill_lists_wheels_and_what_they_bundle(linux, bill):
+    listed = json.loads(bill)
+    with zipfile.ZipFile(linux) as packed:
+        wheels = {name: packed.read(name) for name in packed.namelist() if name.endswith(".whl")}
+    by_reference = {each["bom-ref"]: each for each in listed["components"]}
+    for name, content in wheels.items():
+        assert by_reference[name]["hashes"][0]["content"] == hashlib.sha256(content).hexdigest()
+        assert by_reference[name]["purl"].startswith(f"pkg:pypi/{by_reference[name]['name']}@")
+        assert by_reference[name]["copyright"]
+    files = files_of(bill)
+    libraries = {each["value"] for part in by_reference.values() for each in part.get("properties", [])
+                 if each["name"] == "virtual_shutter:file"}  # fmt: skip
+    assert libraries < set(files)
+    assert {name for name in files if ".libs/" in name} == libraries
+    assert listed["metadata"]["component"]["hashes"][0]["content"] == hashlib.sha256(linux.read_bytes()).hexdigest()
+    depends = {each["ref"]: each.get("dependsOn", []) for each in listed["dependencies"]}
+    assert set(depends["virtual_shutter"]) == set(wheels)
+    assert {reference.split("!/")[1] for name in wheels for reference in depends[name]} >= {"FFmpeg", "x264", "x265"}
+
+
+def test_a_bill_is_valid(bill):
+    assert JsonStrictValidator(SchemaVersion.V1_6).validate_str(bill) is None
+    assert JsonStrictValidator(SchemaVersion.V1_6).validate_str(bill.replace('"file"', '"fille"', 1))
+
+
+def test_the_same_zip_gives_the_same_bytes_in_another_process(without, tmp_path):
+    sbom.write(without, tmp_path / "here.json")
+    command = [sys.executable, ROOT / "scripts" / "sbom.py", without, tmp_path / "there.json"]
+    subprocess.run(command, check=True, env={"TZ": "Asia/Tokyo", "PYTHONHASHSEED": "7"})
+    assert (tmp_path / "here.json").read_bytes() == (tmp_path / "there.json").read_bytes()
+    assert files_of((tmp_path / "here.json").read_text(encoding="utf-8")) == files_in(without)
+
+
+def test_a_file_that_is_added_or_changed_is_told(without, tmp_path):
+    sbom.write(without, tmp_path / "bill.json")
+    listed = files_of((tmp_path / "bill.json").read_text(encoding="utf-8"))
+    more = tmp_path / "more.zip"
+    more.write_bytes(without.read_bytes())
+    with zipfile.ZipFile(more, "a") as packed:
+        packed.writestr("shutter_addon/more.py", "more")
+    assert set(files_in(more)) - set(listed) == {"shutter_addon/more.py"}
+    sbom.write(more, tmp_path / "more.json")
+    assert files_of((tmp_path / "more.json").read_text(encoding="utf-8")) == files_in(more)
+
+
+def test_what_is_no_zip_is_one_sentence(tmp_path):
+    (tmp_path / "no.zip").write_text("no zip")
+    command = [sys.executable, ROOT / "scripts" / "sbom.py", tmp_path / "no.zip", tmp_path / "bill.json"]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert done.returncode == 2
+    assert done.stderr == f"sbom: {tmp_path / 'no.zip'}: no bill of materials: File is not a zip file\n"
+    assert not (tmp_path / "bill.json").exists()
+
+
+def test_a_wheel_without_openssl_says_what_it_holds(opencv):
+    """Its RECORD is right, its tag is a wheel's, and nothing in it asks for OpenSSL."""
+    assert opencv.name.split("-")[2] == without_openssl.TAG
+    with zipfile.ZipFile(opencv) as packed:
+        files = {name: packed.read(name) for name in packed.namelist()}
+    (about,) = (content for name, content in files.items() if name.endswith(".dist-info/WHEEL"))
+    assert f"\nBuild: {without_openssl.TAG}\n" in about.decode()
+    (record,) = (name for name in files if name.endswith(".dist-info/RECORD"))
+    rows = {name: (digest, size) for name, digest, size in csv.reader(io.StringIO(files[record].decode()))}
+    assert rows.keys() == files.keys()
+    for name, content in files.items():
+        digest = base64.urlsafe_b64encode(hashlib.sha256(content).digest()).rstrip(b"=").decode()
+        assert rows[name] == ((f"sha256={digest}", str(len(content))) if name != record else ("", ""))
+        if ".libs/" in name:
+            library = lief.ELF.parse(io.BytesIO(content))
+            versions = {
+                each.name for need in library.symbols_version_requirement for each in need.get_auxiliary_symbols()
+            }
+            assert not any(each.startswith("OPENSSL") for each in versions), name
+            assert not any(each.startswith(("libssl", "libcrypto")) for each in (Path(name).name, *library.libraries))
+
+
+def test_the_same_wheel_gives_the_same_without_openssl(tmp_path):
+    """Of OpenCV's wheel, cut down to what is changed and some that is not."""
+    (wheel,) = (path for path in build.download(LINUX, build.BLENDERS_PYTHON) if path.name.startswith("opencv"))
+    small = tmp_path / wheel.name
+    parts = ("/libavutil-", "/libdrm-", "/libssl-", "/libcrypto-", ".dist-info/")
+    with zipfile.ZipFile(wheel) as packed, zipfile.ZipFile(small, "w") as new:
+        for member in packed.infolist():
+            if any(part in member.filename for part in parts):
+                new.writestr(member, packed.read(member))
+    assert without_openssl.has_openssl(small)
+    made = []
+    for folder in (tmp_path / "one", tmp_path / "two"):
+        folder.mkdir()
+        made.append(without_openssl.take_out(small, folder))
+    assert made[0].read_bytes() == made[1].read_bytes()
+    assert not without_openssl.has_openssl(made[0])
+    before, after = (files_in(path) for path in (small, made[0]))
+    told = {name.rsplit("/", 1)[1].split("-")[0] for name in before if before[name] != after.get(name)}
+    assert told == {"libavutil", "libssl", "libcrypto", "WHEEL", "RECORD"}
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="the wheel is Linux's")
+def test_opencv_works_without_its_openssl(opencv, bunny, tmp_path):
+    """Flow is found and films are read; an encrypted address is not opened, and ends nothing."""
+    with zipfile.ZipFile(opencv) as packed:
+        packed.extractall(tmp_path)
+    code = f"""
+import sys; sys.path.insert(0, {str(tmp_path)!r})
+import socket, cv2, numpy
+assert cv2.__file__.startswith({str(tmp_path)!r})
+noise = numpy.random.default_rng(0).random((64, 64), numpy.float32)
+print(cv2.optflow.createOptFlow_DeepFlow().calc(noise, noise, None).shape)
+print(cv2.VideoCapture({str(bunny)!r}, cv2.CAP_FFMPEG).read()[1].shape)
+with socket.create_server(("127.0.0.1", 0)) as server:
+    for scheme in ("https", "rtmps", "tls"):
+        address = f"{{scheme}}://127.0.0.1:{{server.getsockname()[1]}}/film.mp4"
+        print(cv2.VideoCapture(address, cv2.CAP_FFMPEG).isOpened())
+print("libssl" in open("/proc/self/maps").read())
+"""
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.split("\n")[:-1] == ["(64, 64, 2)", "(720, 1280, 3)", "False", "False", "False", "False"]
