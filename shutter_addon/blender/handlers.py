@@ -2,12 +2,13 @@
 an effect ends."""
 
 import inspect
+import sys
 from functools import partial
 
 import bpy
 from bpy.app.handlers import persistent
 
-from ..core import revision
+from ..core import revision, told
 from .data import data_format, inbetween_settings, preview_areas, source_media, strips, versions
 from .editing import copies, lifecycle, migrations, shown_annotations, track_region, undelete, undo_repair
 from .interface import bake_operators, inbetween_operators, newer_files, sharp_frame
@@ -147,6 +148,17 @@ def _drop_frames():
         strips.invalidate(scene)
 
 
+_hooks: list = []  # what Python called with errors that nobody caught before it called ours: one, or none
+
+
+def _uncaught(kind, error, trace) -> None:
+    """Keeps errors of the extension for Copy Report. Blender has Python print whatever operators, panels, handlers and
+    timers raise, which calls this: there is no other place that all of them pass."""
+    if told.is_ours(error):
+        told.exception(error)
+    _hooks[-1](kind, error, trace)
+
+
 HANDLERS = {
     "load_pre": _before_load,
     "load_post": _after_load,
@@ -167,6 +179,9 @@ HANDLERS = {
 def register():
     for name, function in HANDLERS.items():
         getattr(bpy.app.handlers, name).append(function)
+    if not _hooks:
+        _hooks.append(sys.excepthook)
+        sys.excepthook = _uncaught
     # Those that the sequencer keeps from before lack the effects; while this registers, Blender's data cannot be had.
     bpy.app.timers.register(_drop_frames)
 
@@ -176,6 +191,8 @@ def unregister():
         getattr(bpy.app.handlers, name).remove(function)
     if bpy.app.timers.is_registered(_drop_frames):
         bpy.app.timers.unregister(_drop_frames)
+    if sys.excepthook is _uncaught:  # else somebody who came after us calls it still
+        sys.excepthook = _hooks.pop()
     edit_feed.end()
     sessions.forget()
     source_media.forget()

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import bpy
 
+from ...core import told
 from ...core.farm import chunks, job_file
 from ...core.farm.edit_version import EditVersion
 from ...core.frames import frame_ranges
@@ -20,7 +21,7 @@ from ...media.files import stamp
 from ..data import missing_media, versions
 from ..devices import machine
 from ..editing import saved_edit
-from ..output import edit_check, film_join, film_output, output_space, shared_frames
+from ..output import edit_check, error_report, film_join, film_output, output_space, shared_frames
 from ..output.edit_check import EffectCheck
 from ..output.output_space import Need, in_units
 from ..rendering import render_settings
@@ -46,7 +47,9 @@ def add(commands) -> None:
         "--inbetweens-later", action="store_true", help="in-between frames may be missing: they are built after this"
     )
     command_line.add_device(parser)
-    option("--json", action="store_true", help="print one JSON object")
+    printed = parser.add_mutually_exclusive_group()
+    printed.add_argument("--json", action="store_true", help="print one JSON object")
+    printed.add_argument("--report", action="store_true", help="print what a report of an error needs, without names")
     parser.set_defaults(run=run)
 
 
@@ -57,7 +60,14 @@ def run(arguments) -> None:
     frames = range(first, last + 1)
     with render_settings.using(render_settings.RenderSettings(arguments.device, gpu_memory=arguments.gpu_memory)):
         report = _report(arguments, scene, frames, saved_edit.version(scene, arguments.edit, opened))
-    command_line.tell(json.dumps(report, indent=1) if arguments.json else "\n".join(_lines(report)))
+        if arguments.report:
+            for found in (*report["notes"], *report["faults"]):
+                told.record(found)
+            command_line.tell(error_report.text(scene))
+        elif arguments.json:
+            command_line.tell(json.dumps(report, indent=1))
+        else:
+            command_line.tell("\n".join(_lines(report)))
     for fault in report["faults"]:
         print(signed(fault), file=sys.stderr)
     if report["faults"]:

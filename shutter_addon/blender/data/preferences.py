@@ -37,6 +37,7 @@ class ShutterPreferences(bpy.types.AddonPreferences):
     def draw(self, _context):
         self.layout.prop(self, "device")
         self.layout.prop(self, "gpu_memory")
+        self.layout.operator("shutter.copy_report", icon="COPYDOWN")
 
 
 def device() -> str:

@@ -18,7 +18,7 @@ from bpy.props import (
 )
 from bpy.types import PropertyGroup
 
-from ...core import revision
+from ...core import revision, told
 from ...core.messages import EffectError
 from ...core.model.limits import (
     MAX_BAR,
@@ -75,6 +75,7 @@ def _fit(change, effect, context):
         change(effect)
     except EffectError as error:
         sentence = str(error)
+        told.record(sentence)
         if bpy.app.background:
             print(sentence, file=sys.stderr)
         else:

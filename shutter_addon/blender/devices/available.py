@@ -66,9 +66,11 @@ def is_known(wanted: str) -> bool:
 
 
 class OpenGL(NamedTuple):
-    """The name of an OpenGL 4.3 context's renderer and the bytes that its textures may take, or why there is none."""
+    """The names of an OpenGL 4.3 context's renderer and of its driver, and the bytes that its textures may take, or why
+    there is none."""
 
     name: str = ""
+    driver: str = ""
     memory: int | None = None
     lacking: str | None = None
 
@@ -88,7 +90,7 @@ def _tried() -> OpenGL:
     except NoDeviceError as error:
         return OpenGL(lacking=str(error))
     device.release()
-    return OpenGL(device.name, device.budget.limit)
+    return OpenGL(device.name, device.driver, device.budget.limit)
 
 
 def _blender_in_background() -> bool:

@@ -11,7 +11,7 @@ from ...core.messages import EffectError
 from ..data import selection, strips
 from ..editing import baked_strips
 from ..output import bake_job, baked_film, film_output
-from .operator_bases import UNDOABLE, OfEffect, redraw, refused
+from .operator_bases import UNDOABLE, OfEffect, redraw, refused, report_error
 from .panel_parts import WithEffect, sentence
 
 TICK = 0.5  # seconds from one look at the job to the next
@@ -56,7 +56,7 @@ class SHUTTER_OT_bake(OfEffect, Operator):
                 return None
             _running.append(bake_job.start(scene, effect, strip, film))
         except (film_output.OutputError, OSError) as error:
-            self.report({"ERROR"}, film_output.in_words(error, film.place))
+            report_error(self, film_output.in_words(error, film.place))
             return {"CANCELLED"}
         bpy.app.timers.register(_look, first_interval=TICK)
         return {"CANCELLED"}  # nothing has changed yet that could be undone

@@ -15,7 +15,7 @@ from ..data import inbetween_settings, selection, strips
 from ..data.choices import INBETWEENS
 from ..rendering import inbetween_build, strobing
 from ..rendering.effect_source import FAULTS
-from .operator_bases import UNDOABLE, OfEffect, redraw, refused
+from .operator_bases import UNDOABLE, OfEffect, redraw, refused, report_error, report_warning
 
 TICK = 0.25  # seconds
 _RUNS = n_("In-between frames are being built; Esc stops that")
@@ -129,7 +129,7 @@ class _Building(_OfInbetweens):
         try:
             self._build = inbetween_build.start(scene, effect, strip, self._wanted)
         except FAULTS as error:
-            self.report({"ERROR"}, str(error))
+            report_error(self, str(error))
             return False
         _show_start(context)
         return True
@@ -162,13 +162,13 @@ class _Building(_OfInbetweens):
         try:
             state = self._build.result()
         except FAULTS as error:
-            self.report({"ERROR"}, str(error))
+            report_error(self, str(error))
             return {"CANCELLED"}
         if state.name == "ready":
             self.report({"INFO"}, rpt_("In-between frames are built"))
             return self._built()
         sentence = rpt_("Stopped: {done} of {total} are built")
-        self.report({"WARNING"}, sentence.format(done=state.done, total=state.total))
+        report_warning(self, sentence.format(done=state.done, total=state.total))
         return {"CANCELLED"}
 
     def _built(self):
@@ -238,12 +238,12 @@ class SHUTTER_OT_inbetween_purge(_OfInbetweens, Operator):
         try:
             freed, left = inbetween_build.purge(effect, strips.source_of(scene, effect, strip))
         except FAULTS as error:
-            self.report({"ERROR"}, str(error))
+            report_error(self, str(error))
             return {"CANCELLED"}
         self.report({"INFO"}, rpt_("Removed {size}").format(size=size_in_words(freed)))
         for place, count in left:
             sentence = rpt_('"{folder}": other files stay there ({count})')
-            self.report({"WARNING"}, messages.sentence(sentence.format(folder=place, count=count)))
+            report_warning(self, messages.sentence(sentence.format(folder=place, count=count)))
         return None
 
 

@@ -17,7 +17,7 @@ from ..data import matte_strips, recipe_import, selection, strips
 from ..data.choices import RAMPS
 from ..editing import outline_masks, region_edits, time_map
 from ..output import matte_export
-from .operator_bases import OfRegion, OfShutter, chosen_file, has_room, refused
+from .operator_bases import OfRegion, OfShutter, chosen_file, has_room, refused, report_error
 
 
 class _AddsRegion(OfShutter):
@@ -155,7 +155,7 @@ class SHUTTER_OT_matte_export(OfRegion, ImportHelper, Operator):
             count = matte_export.save(scene, effect, strip, region, folder, word)
         except OSError as error:
             sentence = f"{folder}: {error.strerror or error}"
-            self.report({"ERROR"}, sentence)
+            report_error(self, sentence)
             return {"CANCELLED"}
         self.report({"INFO"}, rpt_('Saved {count} pictures in "{folder}"').format(count=count, folder=folder))
         return None

@@ -5,6 +5,7 @@ from typing import Any
 from bpy.app.translations import pgettext_rpt as rpt_
 from bpy.props import EnumProperty
 
+from ...core import told
 from ...core.recipes import recipe
 from ..data import selection, strips
 from ..editing import collection_edits
@@ -26,6 +27,18 @@ def redraw(context) -> None:
         for area in window.screen.areas:
             if area.type in {"SEQUENCE_EDITOR", "PROPERTIES", "DOPESHEET_EDITOR", "GRAPH_EDITOR"}:
                 area.tag_redraw()
+
+
+def report_error(operator, sentence: str) -> None:
+    """Reports a sentence that is already translated; Copy Report has it, without what it names."""
+    told.record(sentence)
+    operator.report({"ERROR"}, sentence)
+
+
+def report_warning(operator, sentence: str) -> None:
+    """As report_error, of what has been done in part or otherwise."""
+    told.record(sentence)
+    operator.report({"WARNING"}, sentence)
 
 
 class OfEffect(Mixin):
@@ -54,7 +67,7 @@ class OfEffect(Mixin):
         try:
             result = self.change(context, selection.active(context)[1])
         except FAULTS as error:
-            self.report({"ERROR"}, str(error))
+            report_error(self, str(error))
             result = {"CANCELLED"}
         redraw(context)
         return result or {"FINISHED"}

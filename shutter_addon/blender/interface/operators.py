@@ -22,7 +22,19 @@ from ..editing import (
 )
 from ..rendering.effect_source import FAULTS
 from . import icons, sharp_frame
-from .operator_bases import UNDOABLE, Move, OfEffect, OfRegion, OfShutter, OfStrokes, has_room, redraw, refused
+from .operator_bases import (
+    UNDOABLE,
+    Move,
+    OfEffect,
+    OfRegion,
+    OfShutter,
+    OfStrokes,
+    has_room,
+    redraw,
+    refused,
+    report_error,
+    report_warning,
+)
 
 
 class SHUTTER_OT_add_effect(Operator):
@@ -58,7 +70,7 @@ def effect_added(operator, context) -> bool:
     try:
         strip, effect = add_effect.add_effect(scene, source)
     except FAULTS as error:
-        operator.report({"ERROR"}, str(error))
+        report_error(operator, str(error))
         return False
     shutter_edits.start(effect)
     selection.choose(scene, strip)
@@ -85,7 +97,7 @@ class SHUTTER_OT_match_source(OfEffect, Operator):
     def change(self, _context, effect):
         for strip, neighbor in match_source.match(effect):
             sentence = rpt_('"{neighbor}" is in the way: "{strip}" has not the whole range of its source')
-            self.report({"WARNING"}, sentence.format(neighbor=neighbor.name, strip=strip.name))
+            report_warning(self, sentence.format(neighbor=neighbor.name, strip=strip.name))
 
 
 class SHUTTER_OT_copy_modifiers(OfEffect, Operator):
@@ -232,7 +244,7 @@ class SHUTTER_OT_bars_unkey(OfShutter, Operator):
 
     def change(self, _context, effect):
         if not bar_edits.unkey_bars(effect, effect.active_shutter):
-            self.report({"WARNING"}, "No bar has a keyframe at the current frame")
+            report_warning(self, rpt_("No bar has a keyframe at the current frame"))
             return {"CANCELLED"}
         return None
 
@@ -256,7 +268,7 @@ class SHUTTER_OT_bar_set(OfShutter, Operator):
         try:
             bars = bar_edits.bars_now(effect, effect.active_shutter)
         except EffectError as error:
-            self.report({"ERROR"}, str(error))
+            report_error(self, str(error))
             return {"CANCELLED"}
         self.weight = bars[min(self.bar, len(bars)) - 1]
         title = iface_("Bar {number}").format(number=self.bar)
@@ -269,7 +281,7 @@ class SHUTTER_OT_bar_set(OfShutter, Operator):
     def change(self, context, effect):
         weights = bar_edits.bars_now(effect, effect.active_shutter)
         if self.bar > len(weights):
-            self.report({"ERROR"}, rpt_("The shutter has {count} bars").format(count=len(weights)))
+            report_error(self, rpt_("The shutter has {count} bars").format(count=len(weights)))
             return {"CANCELLED"}
         weights[self.bar - 1] = self.weight
         bar_edits.paint(effect, effect.active_shutter, weights, bar_edits.auto_key(context))

@@ -11,7 +11,7 @@ from ..data import selection, strips
 from ..editing import outline_drawings, outline_masks, track_region
 from ..rendering import outline_carrying
 from ..rendering.effect_source import FAULTS
-from .operator_bases import UNDOABLE, Mixin, OfRegion, OfStrokes, redraw, refused
+from .operator_bases import UNDOABLE, Mixin, OfRegion, OfStrokes, redraw, refused, report_error, report_warning
 from .preview import show_carried
 
 _TICK = 0.1  # seconds from one look at what is carried to the next
@@ -50,7 +50,7 @@ class _Carries(Mixin):
         try:
             return step(*arguments)
         except FAULTS as error:
-            self.report({"ERROR"}, str(error))
+            report_error(self, str(error))
             return {"CANCELLED"}
 
     def _begin(self, context, waits: bool):
@@ -86,7 +86,7 @@ class _Carries(Mixin):
         if is_stopped:
             return {"CANCELLED"}
         if (failure := outline_carrying.failure(self._file)) is not None:
-            self.report({"ERROR"}, failure)
+            report_error(self, failure)
             return {"CANCELLED"}
         return self._tried(self.carried, context)
 
@@ -155,7 +155,7 @@ class SHUTTER_OT_outline_draw(OfOutline, Operator):
         region = selection.active_region(effect)
         curves = outline_drawings.curves_now(scene, effect, strip, effect.active_region)
         if not curves:
-            self.report({"WARNING"}, rpt_("The outline encloses nothing at the current frame"))
+            report_warning(self, rpt_("The outline encloses nothing at the current frame"))
             return {"CANCELLED"}
         outline_drawings.draw(effect, strip, region, curves, scene.frame_current)
         return None
@@ -171,7 +171,7 @@ class SHUTTER_OT_outline_it(OfStrokes, Operator):
     def change(self, context, effect):
         scene, _effect, strip = selection.active(context)
         if not outline_drawings.outline_it(scene, effect, strip, effect.active_region):
-            self.report({"WARNING"}, "No subject is told from what is around it")
+            report_warning(self, rpt_("No subject is told from what is around it"))
             return {"CANCELLED"}
         return None
 

@@ -11,7 +11,7 @@ from ...media import outlining
 from ..data import annotations, geometry, preview_areas, selection
 from ..editing import outline_drawings, track_region
 from . import drawing, sharp_frame
-from .operator_bases import redraw
+from .operator_bases import redraw, report_error, report_warning
 from .outline_operators import OfOutline
 
 _COLOR = (0.2, 0.9, 1.0, 0.9)
@@ -30,14 +30,14 @@ class SHUTTER_OT_outline_points(OfOutline, Operator):
         scene, effect, strip = selection.active(context)
         areas = [area for window, area in preview_areas.previews(context) if window == context.window]
         if not areas:
-            self.report({"WARNING"}, "Open a sequencer with a preview to draw")
+            report_warning(self, rpt_("Open a sequencer with a preview to draw"))
             return {"CANCELLED"}
         self._area = context.area if context.area in areas else areas[0]
         try:
             self._picture = outline_drawings.picture_now(scene, effect, strip)
             outlining.along_edges(self._picture, np.zeros(2), np.zeros(2))  # that it can, before anything is drawn
         except UserError as error:
-            self.report({"ERROR"}, str(error))
+            report_error(self, str(error))
             return {"CANCELLED"}
         self._target, self._frame = track_region.Target.of(effect, effect.active_region), scene.frame_current
         self._strip, self._ways, self._next, self._is_down = strip.name, [], np.zeros((0, 2)), False
@@ -51,7 +51,7 @@ class SHUTTER_OT_outline_points(OfOutline, Operator):
         return {"RUNNING_MODAL"}
 
     def execute(self, _context):
-        self.report({"WARNING"}, "Open a sequencer with a preview to draw")  # it is drawn with a mouse alone
+        report_warning(self, rpt_("Open a sequencer with a preview to draw"))  # it is drawn with a mouse alone
         return {"CANCELLED"}
 
     def modal(self, context, event):
@@ -94,7 +94,7 @@ class SHUTTER_OT_outline_points(OfOutline, Operator):
     def _closed(self, context):
         """The curve becomes one of the drawing at this frame."""
         if len(self._ways) < 3:
-            self.report({"WARNING"}, "A curve has three points at least")
+            report_warning(self, rpt_("A curve has three points at least"))
             return {"RUNNING_MODAL"}
         _scene, effect, strip = self._there()
         region = effect.regions[self._target.index]
@@ -105,7 +105,7 @@ class SHUTTER_OT_outline_points(OfOutline, Operator):
         try:
             outline_drawings.add(effect, strip, region, curve[steps > 0], self._frame)
         except UserError as error:
-            self.report({"ERROR"}, str(error))
+            report_error(self, str(error))
             return self._ended(context, {"CANCELLED"})
         return self._ended(context, {"FINISHED"})
 

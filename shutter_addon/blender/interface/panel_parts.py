@@ -2,6 +2,7 @@
 
 import bpy
 
+from ...core import told
 from ..data import selection
 from . import drawing
 from .operator_bases import Mixin
@@ -15,6 +16,8 @@ _MOST_ROWS = 5  # of a list; the rest is scrolled to
 
 def sentence(layout, words: str, icon: str = "NONE", room: float = 1.0, is_quiet: bool = False) -> None:
     """A sentence, already translated, in as many lines as the panel's width takes; room: its share of that width."""
+    if icon == "ERROR":
+        told.shown(words)
     unit, region = drawing.ui_scale(), bpy.context.region
     width = room * (region.width if region else 300 * unit) - (_MARGIN + (_ICON if icon != "NONE" else 0)) * unit
     column = layout.column(align=True)

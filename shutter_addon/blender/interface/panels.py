@@ -14,6 +14,7 @@ from .operator_bases import Mixin
 from .option_panels import Inbetween, Options
 from .panel_parts import WithEffect, draw_list, sentence
 from .region_panels import Camera, Follow, Regions, Track, Transform, draw_followed_motion, draw_tracked, draw_tracking
+from .report_operators import Report
 
 # Beyond this a column of numbers helps nobody: the bar editor and the Graph Editor do.
 _MOST_NUMBERS = 64
@@ -319,6 +320,7 @@ _PANELS = {
     "_options": (Options, ""),
     "_inbetween": (Inbetween, ""),
     "_bake": (Bake, ""),
+    "_report": (Report, ""),
 }
 
 

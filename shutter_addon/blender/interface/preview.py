@@ -10,7 +10,7 @@ from bpy.app.translations import pgettext_rpt as rpt_
 from bpy.props import BoolProperty, EnumProperty, FloatProperty, FloatVectorProperty, PointerProperty
 from bpy.types import PropertyGroup
 
-from ...core import stopping
+from ...core import stopping, told
 from ...core.model.frame_state import FrameState
 from ...media import MediaError
 from ...media.errors import NotBuiltError
@@ -209,6 +209,7 @@ def _show_picture(context, quad: Quad, shown: Shown, wanted: Drawing, say) -> No
     previews.was_drawn()
     _tell_carrying(say)
     for sentence in pictures.shortages(renderer, request):
+        told.shown(sentence)
         say(sentence)
     # What it measures would take from what runs.
     if context.space_data.show_overlays and is_still and not previews.may_be_late():
@@ -290,6 +291,7 @@ def _tell_carrying(say) -> None:
     """Has mattes carried that the picture lacks, and says so."""
     fault, progress = outline_carrying.begin(show_carried), outline_carrying.progress()
     if fault is not None:
+        told.shown(fault)
         say(rpt_("Shutter: {fault}").format(fault=fault))
     if progress is not None:
         done, total = progress
@@ -308,6 +310,7 @@ def show_carried() -> None:
 
 def _tell_fault(error: Exception, say) -> None:
     """Says why there is no picture."""
+    told.shown(error)
     if isinstance(error, NotBuiltError) and inbetween_build.running() is None:
         button = Button("shutter.smooth_streaks", iface_("Build"), {"factor": str(error.factor)})
         say(rpt_("In-between frames are missing"), button)

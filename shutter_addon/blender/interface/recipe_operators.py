@@ -11,7 +11,7 @@ from ...core.recipes import recipe, recipe_file
 from ..data import data_format, recipe_import, selection
 from ..output import matte_export
 from ..rendering.effect_source import FAULTS
-from .operator_bases import OfEffect, chosen_file
+from .operator_bases import OfEffect, chosen_file, report_error
 
 
 class SHUTTER_OT_recipe_import(OfEffect, ImportHelper, Operator):
@@ -28,7 +28,7 @@ class SHUTTER_OT_recipe_import(OfEffect, ImportHelper, Operator):
             path = Path(chosen_file(self))
             recipe_import.apply(scene, effect, strip, recipe_file.load(path), path.parent)
         except (recipe.RecipeError, *FAULTS) as error:
-            self.report({"ERROR"}, str(error))
+            report_error(self, str(error))
             return {"CANCELLED"}
         return None
 
@@ -48,11 +48,11 @@ class SHUTTER_OT_recipe_export(OfEffect, ExportHelper, Operator):
             path = chosen_file(self)
             recipe_file.save(matte_export.recipe_for(scene, effect, strip, Path(path)), path)
         except (recipe.RecipeError, *FAULTS) as error:
-            self.report({"ERROR"}, str(error))
+            report_error(self, str(error))
             return {"CANCELLED"}
         except OSError as error:
             sentence = f"{self.filepath}: {error.strerror or error}"
-            self.report({"ERROR"}, sentence)
+            report_error(self, sentence)
             return {"CANCELLED"}
         if data_format.is_newer(scene):
             words = rpt_('Saved "{path}", without what a newer version of Virtual Shutter has added')

@@ -22,7 +22,17 @@ from ..editing import (
     tripod,
 )
 from ..rendering.effect_source import FAULTS
-from .operator_bases import Mixin, OfEffect, OfRegion, OfShutter, OfStrokes, redraw, refused
+from .operator_bases import (
+    Mixin,
+    OfEffect,
+    OfRegion,
+    OfShutter,
+    OfStrokes,
+    redraw,
+    refused,
+    report_error,
+    report_warning,
+)
 
 # Seconds of work from one look at the window to the next, at least and at most, and between two looks at its thread.
 _TICK, _MOST, _PATIENCE = 0.05, 0.1, 0.02
@@ -73,7 +83,7 @@ class _Tracks(Mixin):
             self._begin(context, None if math.isinf(seconds) else _PATIENCE)
             goes_on = self._go_on(seconds)
         except FAULTS as error:
-            self.report({"ERROR"}, str(error))
+            report_error(self, str(error))
             return {"CANCELLED"}
         if not goes_on:
             return self._finish(context)
@@ -109,7 +119,7 @@ class _Tracks(Mixin):
             if not is_stopped and self._target.effect() is not None:
                 self.ended(context)
         except FAULTS as error:
-            self.report({"ERROR"}, str(error))
+            report_error(self, str(error))
             if not self._done:
                 return {"CANCELLED"}
         redraw(context)
@@ -151,7 +161,7 @@ class _Tracks(Mixin):
         except FAULTS as error:
             if not self._done:
                 raise
-            self.report({"WARNING"}, str(error))
+            report_warning(self, str(error))
         return False
 
     def _go_to(self, frame: int):
@@ -177,7 +187,11 @@ class _Tracks(Mixin):
         for frame, fault, is_fault in track_region.stops(effect, self._target.index):
             if frame in self._frames:
                 sentence = rpt_("Tracking stopped at frame {frame}: {fault}")
-                self.report({"WARNING" if is_fault else "INFO"}, sentence.format(frame=frame, fault=fault))
+                words = sentence.format(frame=frame, fault=fault)
+                if is_fault:
+                    report_warning(self, words)
+                else:
+                    self.report({"INFO"}, words)
 
 
 class _OfCamera:

@@ -8,6 +8,7 @@ from typing import Any
 import bpy
 import numpy as np
 
+from ...core import told
 from ...core.messages import of_file, signed
 from ...core.stopping import StoppedError
 from ..data.strips import ENGINE
@@ -69,6 +70,7 @@ class VirtualShutterEngine(bpy.types.RenderEngine):
         return self.test_break() or render_job.stopping()
 
     def _say(self, message: str) -> None:
+        told.record(message)
         if bpy.app.background:
             say(message)
         else:
@@ -87,6 +89,7 @@ def in_words(error: BaseException) -> str:
         return "the render was stopped"
     if isinstance(error, OSError) and error.filename:
         return of_file(error)
+    told.exception(error)
     traceback.print_exception(error)
     return f"internal error: {error!r}"
 
@@ -99,6 +102,7 @@ def fail(engine: Any, sentence: str) -> None:
         render_job.fail(sentence)
         render_job.cancel(engine.test_break)
     else:
+        told.shown(sentence)
         engine.report({"ERROR"}, signed(sentence))
 
 

@@ -17,6 +17,7 @@ from typing import Any
 
 import bpy
 
+from ...core import told
 from ...core.messages import sentence, signed
 from ..data.property_copy import for_a_while
 from ..data.strips import ENGINE
@@ -217,6 +218,7 @@ def fail(text: str) -> None:
     """Says why the render that runs has to end; only the first sentence counts."""
     if _job.failure is None:
         _job.failure = text
+        told.record(text)
         _job.tell(text)
 
 

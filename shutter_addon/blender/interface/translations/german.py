@@ -1422,6 +1422,18 @@ MESSAGES = {
         "*",
         'the strip that was baked is gone; its film is "{path}"',
     ): "der Strip, der gebacken wurde, ist nicht mehr da; sein Film ist „{path}“",
+    # Reports
+    ("Operator", "Copy Report"): "Bericht kopieren",
+    ("*", "Report"): "Bericht",
+    (
+        "*",
+        "Copy versions, device, kinds and numbers of the edit, and last errors: no names, no paths. Nothing is sent",
+    ): "Versionen, Gerät, Arten und Zahlen des Schnitts und die letzten Fehler kopieren: keine Namen, keine Pfade. "
+    "Nichts wird gesendet",
+    ("*", "Report copied: paste it into your message, and read it before you send it"): "Bericht kopiert: "
+    "in die Nachricht einfügen, und vor dem Senden lesen",
+    ("*", "Without a window there is no clipboard: use the command check with --report"): "Ohne Fenster gibt es keine "
+    "Zwischenablage: der Befehl check mit --report gibt den Bericht aus",
     # Devices
     ("Virtual Shutter", "Render Device"): "Rendergerät",
     (

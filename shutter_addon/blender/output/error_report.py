@@ -1,0 +1,106 @@
+"""What a report of an error should have in it, as short Markdown: versions, the device, what the edit is made of, and
+the last errors and warnings. Nothing in it names what is the user's: no strip, no scene, no file, no folder."""
+
+import importlib
+import os
+import platform
+import re
+import tomllib
+from collections.abc import Iterator
+from contextlib import suppress
+
+import bpy
+import gpu
+
+from ...compute.benchmark import processor
+from ...core import templates, told
+from ...devices.budget import MEGABYTE, machine_memory
+from ...devices.device import NoDeviceError
+from ..data import preferences, versions
+from ..devices import available, machine
+from ..rendering import render_settings
+from . import edit_structure
+
+# What the extension uses, by the names that it is imported by.
+PACKAGES = {
+    "NumPy": "numpy",
+    "OpenImageIO": "OpenImageIO",
+    "PyAV": "av",
+    "OpenCV": "cv2",
+    "moderngl": "moderngl",
+    "PySceneDetect": "scenedetect",
+}
+
+
+def text(scene) -> str:
+    """The report; scene: whose sequencer is shown, or None. On the main thread."""
+    lines = ["### Virtual Shutter: report of an error", "", *_versions(), *_device()]
+    lines += ["", "Edit", "", *(edit_structure.lines(scene) if scene else ["- none"])]
+    return "\n".join([*lines, "", "Last errors and warnings", "", *(_sentences() or ["- none"]), ""])
+
+
+def _versions() -> Iterator[str]:
+    app = bpy.app
+    yield f"- Virtual Shutter: {versions.extension()}, {_zip()}"
+    yield f"- Blender: {app.version_string}, {_decoded(app.build_branch)} {_decoded(app.build_hash)}"
+    yield f"- System: {platform.platform()}; {'no window' if app.background else 'with a window'}"
+    yield f"- Python: {platform.python_version()}"
+    yield f"- Packages: {', '.join(f'{name} {_version(module)}' for name, module in PACKAGES.items())}"
+
+
+def _zip() -> str:
+    """Which of the extension's zips this is: those for a system list their wheels in the manifest."""
+    manifest = tomllib.loads(versions.MANIFEST.read_text(encoding="utf-8"))
+    if wheels := manifest.get("wheels"):
+        return f"zip for {', '.join(manifest.get('platforms', ['any system']))} with {len(wheels)} wheels"
+    return "zip without wheels, or a checkout"
+
+
+def _version(module: str) -> str:
+    try:
+        return str(getattr(importlib.import_module(module), "__version__", "of unknown version"))
+    except ModuleNotFoundError as error:
+        return "missing" if error.name == module else f"lacks {error.name}"
+    except Exception as error:  # a library of another system, or another Python
+        return f"cannot be imported ({type(error).__name__})"
+
+
+def _device() -> Iterator[str]:
+    with suppress(SystemError):  # in the background, where nobody has called gpu.init()
+        backend = machine.BACKENDS.get(gpu.platform.backend_type_get(), "unknown")
+        driver = f"{gpu.platform.renderer_get()}, {gpu.platform.vendor_get()}, {gpu.platform.version_get()}"
+        yield f"- Blender's GPU: {backend}, {driver}"
+    wanted = render_settings.wanted()
+    if wanted not in ("blender", "cpu"):  # else it is left alone
+        opengl = available.opengl()
+        yield f"- OpenGL 4.3: {without_paths(opengl.lacking or f'{opengl.name}, {opengl.driver}')}"
+    try:
+        kind, lesser = available.choose(wanted)
+        because = f"; {without_paths(lesser)}" if lesser else ""
+        yield f"- Renders: {available.name(kind)} ({kind}), {wanted} is wanted{because}"
+    except NoDeviceError as error:
+        yield f"- Renders: nothing, {wanted} is wanted; {without_paths(str(error))}"
+    most, memory = render_settings.memory().limit // MEGABYTE, machine_memory()
+    yield f"- GPU memory: {most} MB may be taken, {preferences.gpu_memory() or 'nothing'} is set in the preferences"
+    in_all = "unknown" if memory is None else f"{memory / (1 << 30):.1f} GB"
+    yield f"- Processor: {processor()}, {os.cpu_count()} logical cores; memory: {in_all}"
+
+
+def without_paths(words: str) -> str:
+    """What a driver or a library says, without the paths that it may name: all from the first one's beginning to the
+    last one's end, as folders may have spaces in their names."""
+    return re.sub(r"(?<!\w)(?:[A-Za-z]:)?[\\/~](?:.*[\\/])?\S*", "(path)", words)
+
+
+def _sentences() -> list[str]:
+    """The oldest first; where each was raised, when it was told last, and how often."""
+    return [
+        f"- {each.seconds:.0f} s: {each.text if each.is_plain else templates.plain(each.text)}"
+        + (f" [{each.place}]" if each.place else "")
+        + (f" × {each.times}" if each.times > 1 else "")
+        for each in told.last()
+    ]
+
+
+def _decoded(words: bytes) -> str:
+    return words.decode("utf-8", "replace")
