@@ -73,7 +73,7 @@ def _of_strip(strip) -> Iterator[str]:
     changes = {
         "muted": strip.mute,
         "reversed": getattr(strip, "use_reverse_frames", False),
-        f"strobe {getattr(strip, 'strobe', 1):g}": getattr(strip, "strobe", 1) != 1,
+        f"strobe {getattr(strip, 'strobe', 1):g}": getattr(strip, "strobe", 1) > 1,
         f"{retimed} retiming keys": retimed > 0,
         f"{len(strip.modifiers)} modifiers": len(strip.modifiers) > 0,
         "baked": bool(strip.virtual_shutter_bake.identity),
@@ -89,7 +89,7 @@ def _of_source(scene, effect, strip) -> Iterator[str]:
         yield "- Source: none"
         return
     parts = sum(other.virtual_shutter_source == effect.source for other in scene.sequence_editor.strips_all)
-    yield f"- Source: {', '.join(_of_strip(source))}; in {parts} parts"
+    yield f"- Source: {', '.join(_of_strip(source))}; parts: {parts}"
     try:
         spec = source_media.spec(source)
         with closing(spec.open()) as medium:

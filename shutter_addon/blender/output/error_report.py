@@ -35,14 +35,22 @@ PACKAGES = {
 def text(scene) -> str:
     """The report; scene: whose sequencer is shown, or None. On the main thread."""
     lines = ["### Virtual Shutter: report of an error", "", *_versions(), *_device()]
-    lines += ["", "Edit", "", *(edit_structure.lines(scene) if scene else ["- none"])]
+    lines += ["", "Edit", "", *_edit(scene)]
     return "\n".join([*lines, "", "Last errors and warnings", "", *(_sentences() or ["- none"]), ""])
+
+
+def _edit(scene) -> list[str]:
+    try:
+        return edit_structure.lines(scene) if scene else ["- none"]
+    except Exception as error:  # an edit that is reported may be broken in any way
+        told.exception(error)
+        return ["- cannot be told: see the last error"]
 
 
 def _versions() -> Iterator[str]:
     app = bpy.app
     yield f"- Virtual Shutter: {versions.extension()}, {_zip()}"
-    yield f"- Blender: {app.version_string}, {_decoded(app.build_branch)} {_decoded(app.build_hash)}"
+    yield f"- Blender: {app.version_string}, build {_decoded(app.build_branch)} {_decoded(app.build_hash)}"
     yield f"- System: {platform.platform()}; {'no window' if app.background else 'with a window'}"
     yield f"- Python: {platform.python_version()}"
     yield f"- Packages: {', '.join(f'{name} {_version(module)}' for name, module in PACKAGES.items())}"

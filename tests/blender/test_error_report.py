@@ -1,0 +1,285 @@
+"""Copy Report: what it says is so, and it names nothing, whatever is called by a name and whatever went wrong."""
+
+import ast
+import json
+import os
+import re
+import shutil
+import sys
+import tomllib
+from pathlib import Path
+
+import numpy as np
+import pytest
+from support import recipe, sequencer, write_frames
+
+NAME = "Qanarix"
+ROOT = Path(__file__).parents[2]
+
+
+@pytest.fixture(autouse=True)
+def _nothing_told():
+    from shutter_addon.core import told
+
+    told.forget()
+    yield
+    told.forget()
+
+
+@pytest.fixture
+def named(bpy, edit, tmp_path, monkeypatch):
+    """An edit in which all that can have a name has the same, folders and the user's own included: scene, effect,
+    effect strip."""
+    from shutter_addon.blender.data import recipe_import, selection
+    from shutter_addon.blender.editing import add_effect
+    from shutter_addon.core.recipes import recipe_file
+
+    home = tmp_path / NAME
+    for variable, value in {"HOME": home, "USERPROFILE": home, "USER": NAME, "LOGNAME": NAME, "USERNAME": NAME}.items():
+        monkeypatch.setenv(variable, str(value))
+    first = write_frames(home / "in", np.zeros((6, 24, 40, 3), dtype=np.uint8), NAME)
+    source = edit.sequence_editor.strips.new_image(NAME, str(first), 1, 1)
+    for number in range(2, 7):
+        source.elements.append(f"{NAME}{number:04d}.png")
+    edit.render.resolution_x, edit.render.resolution_y, edit.frame_end = 40, 24, 6
+    strip, effect = add_effect.add_effect(edit, source)
+    line = {"shutter": "S1", "kind": "line", "width": 0.1, "strokes": [[[0.2, 0.2], [0.3, 0.8]]]}
+    ramp = {"shutter": "S0", "kind": "ramp", "ramp": "radial"}
+    data = recipe(4, {1: [1, 1, 1, 1], 5: [1, 0, 0, 0]}, [0, 0, 1, 0], regions=[line, line, ramp])
+    recipe_import.apply(edit, effect, strip, recipe_file.parse(json.dumps(data)))
+    edit.timeline_markers.new(NAME, frame=2)
+    edit[NAME] = NAME
+    for item in (effect, *effect.shutters, *effect.regions, strip, source, *edit.sequence_editor.channels):
+        item.name = NAME
+    shutil.copy(first, home / f"{NAME}.png")
+    bpy.data.images.load(str(home / f"{NAME}.png"))
+    bpy.data.masks.new(NAME)
+    for collection in (bpy.data.scenes, bpy.data.annotations, bpy.data.actions, bpy.data.worlds, bpy.data.objects):
+        for item in collection:
+            item.name = NAME
+    for region in list(effect.regions)[:2]:
+        layer = effect.scene.annotation.layers[region.layer]
+        layer.info = NAME
+        region.layer = layer.info
+    bpy.ops.wm.save_as_mainfile(filepath=str(home / f"{NAME}.blend"), copy=False, compress=False)
+    selection.choose(edit, strip)
+    return edit, effect, strip
+
+
+def report(edit):
+    from shutter_addon.blender.output import error_report
+
+    text = error_report.text(edit)
+    assert NAME.lower() not in text.lower()
+    assert str(Path.home()) not in text
+    assert "/" not in re.sub(r"\b\w+(/\w+)+\.py:\d+", "", text.partition("Edit")[2])
+    return text
+
+
+def line(text, start):
+    return next(line for line in text.splitlines() if line.strip().startswith(start))
+
+
+def test_versions_and_device_are_those_that_there_are(bpy, edit):
+    import av
+    import cv2
+
+    from shutter_addon.blender.devices import available
+
+    text = report(edit)
+    manifest = tomllib.loads((ROOT / "blender_manifest.toml").read_text(encoding="utf-8"))
+    assert (
+        line(text, "- Virtual Shutter")
+        == f"- Virtual Shutter: {manifest['version']}, zip without wheels, or a checkout"
+    )
+    assert bpy.app.version_string in line(text, "- Blender:")
+    assert bpy.app.build_hash.decode() in line(text, "- Blender:")
+    assert ".".join(map(str, sys.version_info[:3])) in line(text, "- Python:")
+    packages = line(text, "- Packages:")
+    assert f"NumPy {np.__version__}" in packages
+    assert f"PyAV {av.__version__}" in packages
+    assert f"OpenCV {cv2.__version__}" in packages
+    kind, lesser = available.choose("auto")
+    assert f"- Renders: {available.name(kind)} ({kind}), auto is wanted" in text
+    assert (lesser or "") in text
+    assert f"{os.cpu_count()} logical cores" in text
+
+
+def test_a_package_that_is_missing_and_one_that_is_broken(edit, tmp_path, monkeypatch):
+    from shutter_addon.blender.output import error_report
+
+    (tmp_path / "broken.py").write_text("import not_there_either")
+    (tmp_path / "foreign.py").write_text(f"raise ImportError('{NAME}.so: wrong ELF class')")
+    monkeypatch.syspath_prepend(str(tmp_path))
+    monkeypatch.setattr(error_report, "PACKAGES", {"A": "not_there", "B": "broken", "C": "foreign"})
+    assert line(report(edit), "- Packages:") == (
+        "- Packages: A missing, B lacks not_there_either, C cannot be imported (ImportError)"
+    )
+
+
+def test_the_zip_with_wheels_says_so(edit, tmp_path, monkeypatch):
+    from shutter_addon.blender.data import versions
+
+    manifest = tmp_path / "blender_manifest.toml"
+    words = 'version = "1.2.3"\nplatforms = ["linux-x64"]\nwheels = ["./wheels/a.whl", "./wheels/b.whl"]\n'
+    manifest.write_text(words)
+    monkeypatch.setattr(versions, "MANIFEST", manifest)
+    assert line(report(edit), "- Virtual Shutter") == "- Virtual Shutter: 1.2.3, zip for linux-x64 with 2 wheels"
+
+
+def test_what_the_edit_is_made_of(named):
+    edit, effect, strip = named
+    text = report(edit)
+    assert f"- Frames: {edit.frame_start} to 6, at {edit.frame_current}; 40×24 at 100 %, 24 fps" in text
+    assert "- Strips: 1 IMAGE, 1 SCENE" in text
+    assert "view Standard" in line(text, "- Colors:")
+    assert line(text, "- Options:").startswith("- Options: window 4, position START, interpolation DISPLACEMENT")
+    assert line(text, "- Strip:").startswith(f"- Strip: SCENE in channel {strip.channel}, frames 1 to 6")
+    assert "- Footage: png, 3 channels of uint8, 40×24, no rate, 6 frames, read as uint8, alpha opaque" in text
+    assert "- Shutters: 2" in text
+    assert "  - 1 × AVERAGE, 4 bars, moves with NOTHING, length FRAMES, 8 keys" in text
+    assert "  - 1 × AVERAGE, 4 bars, moves with NOTHING, length FRAMES, 0 keys" in text
+    assert "- Regions: 3" in text
+    assert "  - 2 × LINE, shutter 2, 1 drawings, 1 strokes, 0 keys" in text
+    assert "  - 1 × RAMP, shutter 1, RADIAL, blend OVER, 0 keys" in text
+    assert "- Keys: 8 of the effect, 0 of the camera" in text
+    assert "Cannot be shown" not in text
+    effect.shutters[1].combine, effect.regions[0].is_layer = "LIGHTEST", True
+    strip.mute = True
+    source = next(strip for strip in edit.sequence_editor.strips_all if strip.type == "IMAGE")
+    source.use_reverse_frames, source.strobe = True, 3
+    text = report(edit)
+    assert "  - 1 × LIGHTEST, 4 bars" in text
+    assert "  - 1 × LINE, shutter 2, 1 drawings, 1 strokes, layer, 0 keys" in text
+    assert line(text, "- Strip:").endswith(", muted")
+    assert "reversed, strobe 3; parts: 1" in line(text, "- Source:")
+
+
+def test_a_movie(bpy, edit):
+    from shutter_addon.blender.editing import add_effect
+
+    film = ROOT / "assets" / "bigbuckbunny.mp4"
+    add_effect.add_effect(edit, edit.sequence_editor.strips.new_movie("film", str(film), 1, 1))
+    found = line(report(edit), "- Footage:")
+    assert re.search(
+        r"mp4.*, h264 \(\w+\), yuv420p, 1280×720, 2[45] fps, 132 frames, read as uint8, alpha opaque", found
+    )
+
+
+def test_after_several_errors_it_names_nothing(bpy, named, tmp_path):
+    """Reports of operators, a film that fails, and an error that nobody expected."""
+    from shutter_addon.blender.editing import bar_edits
+
+    edit, effect, strip = named
+    folder, ops = tmp_path / NAME, bpy.ops.shutter
+
+    def surprised(*_arguments):
+        raise KeyError(f"{folder}/{NAME}")
+
+    with sequencer(bpy), pytest.MonkeyPatch.context() as patch:
+        assert fails(ops.recipe_import, filepath=str(folder / "gone.json"))
+        assert fails(ops.bar_set, bar=7)
+        effect.scene.camera = None
+        assert fails(ops.recipe_export, filepath=str(folder / NAME / "no" / "folder.json"))
+        patch.setattr(bar_edits, "paint", surprised)
+        assert fails(ops.bar_set, bar=1)
+        for file in (folder / "in").iterdir():
+            file.unlink()
+        edit.sequence_editor.active_strip = next(each for each in edit.sequence_editor.strips_all if each != strip)
+        for _ in range(2):
+            assert fails(ops.add_effect)
+    edit.render.filepath = str(folder / "out")
+    bpy.ops.render.render(animation=True, scene=edit.name)
+    text = report(edit)
+    assert "no such file in" in line(text, "- Footage:")
+    told = text.partition("Last errors and warnings")[2]
+    assert "The shutter has 4 bars" in told
+    assert "gone" not in told
+    assert re.search(r"- \d+ s: KeyError \[blender/interface/operators\.py:\d+ change < .*execute\]", told)
+    assert re.search(r"- \d+ s: \{path.name\}: no such file in .* \[media/files\.py:\d+\] × 3", told)
+
+
+def test_an_edit_that_is_broken_beyond_all_that_is_foreseen_has_a_report(named, monkeypatch):
+    from shutter_addon.blender.output import edit_structure
+
+    def surprised(*_arguments):
+        raise KeyError(NAME)
+
+    monkeypatch.setattr(edit_structure, "_of_region", surprised)  # private: whatever of it fails
+    text = report(named[0])
+    assert "- cannot be told: see the last error" in text
+    assert re.search(r"KeyError \[blender/output/edit_structure\.py:\d+ \S+ < ", text)
+
+
+def test_names_of_another_colour_configuration_are_somebodys(edit, monkeypatch):
+    from shutter_addon.blender.data import colour_configuration
+
+    monkeypatch.setattr(colour_configuration, "name", lambda: "0123abcd")
+    assert "view (of another configuration), look (of another" in line(report(edit), "- Colors:")
+
+
+def test_paths_are_taken_from_what_drivers_say():
+    from shutter_addon.blender.output.error_report import without_paths
+
+    for told, expected in {
+        f"no OpenGL 4.3: /home/Jane {NAME} Doe/lib x/libGL.so is missing": "no OpenGL 4.3: (path) is missing",
+        rf"cannot load C:\Users\Jane {NAME}\gl.dll": "cannot load (path)",
+        f"see ~/{NAME}": "see (path)",
+        "RTX 3080/PCIe/SSE2, 4.6": "RTX 3080/PCIe/SSE2, 4.6",
+    }.items():
+        assert without_paths(told) == expected
+
+
+def test_without_a_window_the_button_says_where_the_report_is(bpy, edit):
+    with pytest.raises(RuntimeError, match="use the command check with --report"):
+        bpy.ops.shutter.copy_report()
+
+
+@pytest.mark.usefixtures("named")
+def test_the_command(tmp_path, capsys):
+    """It has the edit's faults as well."""
+    from shutter_addon.blender import command
+    from shutter_addon.core import told
+
+    next((tmp_path / NAME / "in").iterdir()).unlink()
+    told.forget()
+    blend = tmp_path / NAME / f"{NAME}.blend"
+    assert command.main(["check", str(blend), "--device", "cpu", "--report"]) == 2
+    text = capsys.readouterr().out.partition("### Virtual Shutter")[2]
+    assert NAME not in text
+    assert str(tmp_path) not in text
+    assert "- Renders: NumPy (cpu), cpu is wanted" in text
+    assert "- Strips: 1 IMAGE, 1 SCENE" in text
+    assert "s: {path.name}: no such file in" in text.partition("Last errors")[2]
+    assert command.main(["check", str(blend), "--report", "--json"]) == 2
+
+
+def test_whatever_a_panel_shows_as_an_error_is_kept(bpy):
+    from unittest.mock import MagicMock
+
+    from shutter_addon.blender.interface import panel_parts
+    from shutter_addon.core import told
+
+    for icon in ("NONE", "INFO", "ERROR", "ERROR"):
+        panel_parts.sentence(MagicMock(), f"All bars are zero, {icon}", icon)
+    assert [(each.text, each.times) for each in told.last()] == [("All bars are zero, ERROR", 1)]
+
+
+def test_no_operator_reports_an_error_past_the_report():
+    """All go through operator_bases.report_error and report_warning."""
+    found = []
+    for path in (ROOT / "shutter_addon" / "blender" / "interface").glob("*.py"):
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.Call) and getattr(node.func, "attr", "") == "report":
+                kinds = {each.value for each in ast.walk(node.args[0]) if isinstance(each, ast.Constant)}
+                found += [path.name] if kinds != {"INFO"} else []
+    assert found == ["operator_bases.py"] * 2
+
+
+def fails(call, **given):
+    """Whether an operator has told an error."""
+    try:
+        call(**given)
+    except RuntimeError:
+        return True
+    return False
