@@ -127,10 +127,12 @@ def test_the_zip_with_wheels_says_so(edit, tmp_path, monkeypatch):
     assert line(report(edit), "- Virtual Shutter") == "- Virtual Shutter: 1.2.3, zip for linux-x64 with 2 wheels"
 
 
-def test_what_the_edit_is_made_of(named):
+def test_what_the_edit_is_made_of(bpy, named):
     edit, effect, strip = named
     text = report(edit)
     assert f"- Frames: {edit.frame_start} to 6, at {edit.frame_current}; 40×24 at 100 %, 24 fps" in text
+    blender, extension = ".".join(map(str, bpy.data.version)), edit.virtual_shutter.version
+    assert f"- Saved: by Blender {blender}, version {extension} of the extension" in text
     assert "- Strips: 1 IMAGE, 1 SCENE" in text
     assert "view Standard" in line(text, "- Colors:")
     assert line(text, "- Options:").startswith("- Options: window 4, position START, interpolation DISPLACEMENT")

@@ -6,6 +6,7 @@ from functools import partial
 
 import bpy
 
+from ...core import told
 from ...core.messages import sentence, signed
 from ..data import data_format
 
@@ -15,6 +16,7 @@ def tell(scenes: Iterable) -> None:
     words = next(filter(None, map(data_format.note, scenes)), None)
     if words is None:
         return
+    told.record(words)
     if bpy.app.background:
         print(signed(words), file=sys.stderr)
     else:  # while a file is loaded, its windows are not there yet

@@ -11,7 +11,7 @@ from ...core.recipes import recipe, recipe_file
 from ..data import data_format, recipe_import, selection
 from ..output import matte_export
 from ..rendering.effect_source import FAULTS
-from .operator_bases import OfEffect, chosen_file, report_error
+from .operator_bases import OfEffect, chosen_file, report_error, report_warning
 
 
 class SHUTTER_OT_recipe_import(OfEffect, ImportHelper, Operator):
@@ -56,7 +56,7 @@ class SHUTTER_OT_recipe_export(OfEffect, ExportHelper, Operator):
             return {"CANCELLED"}
         if data_format.is_newer(scene):
             words = rpt_('Saved "{path}", without what a newer version of Virtual Shutter has added')
-            self.report({"WARNING"}, words.format(path=path))
+            report_warning(self, words.format(path=path))
             return None
         self.report({"INFO"}, rpt_('Saved "{path}"').format(path=path))
         return None

@@ -1,5 +1,6 @@
 """What an edit is made of, in kinds and numbers: no names, no paths, for a report of an error."""
 
+import re
 from collections import Counter
 from collections.abc import Iterable, Iterator
 from contextlib import closing
@@ -30,6 +31,9 @@ def _of_scene(scene) -> Iterator[str]:
     render, view = scene.render, scene.view_settings
     size = f"{render.resolution_x}×{render.resolution_y} at {render.resolution_percentage} %"
     yield f"- Frames: {scene.frame_start} to {scene.frame_end}, at {scene.frame_current}; {size}, {_rate(render)} fps"
+    saved = scene.virtual_shutter.version
+    by = saved if re.fullmatch(r"[\d.]{1,20}", saved) else "none"  # a script may have written anything there
+    yield f"- Saved: by Blender {'.'.join(map(str, bpy.data.version))}, version {by} of the extension"
     yield f"- Output: {render.image_settings.file_format}, {render.image_settings.color_depth} bits"
     colours = {
         "display": scene.display_settings.display_device,
