@@ -3,7 +3,6 @@
 import argparse
 import os
 import signal
-import threading
 from contextlib import suppress
 
 from ...core.messages import sentence
@@ -33,7 +32,7 @@ def run(arguments) -> None:
     scene.frame_set(scene.frame_current)  # what drivers and keys say, once
     if arguments.attached:
         arguments.source.unlink(missing_ok=True)
-        threading.Thread(target=_end_with_parent, daemon=True).start()
+        os.set_blocking(0, False)
     effect, strip = _effect_strip(scene, arguments.strip)
     film = baked_film.film_of(scene, effect, strip, baked_film.KINDS[arguments.format], arguments.output)
     total = len(film.frames)
@@ -48,17 +47,18 @@ def run(arguments) -> None:
             moved(done - finished)
             finished = done
             command_line.tell(f"{done} of {total}")
+            if arguments.attached:
+                _end_with_parent()
 
         baked_film.render(scene, effect, strip, film, told)
     command_line.tell(str(film.place))
 
 
 def _end_with_parent() -> None:
-    """Stops this process as Ctrl-C does, once nobody holds the other end of its input: touches no bpy."""
-    with suppress(OSError):
-        while os.read(0, 1):
-            pass
-    os.kill(os.getpid(), signal.SIGTERM)
+    """Stops this process as Ctrl-C does, if nobody holds the other end of its input any more."""
+    with suppress(OSError):  # there is nothing to read, as somebody does
+        if not os.read(0, 1):
+            os.kill(os.getpid(), signal.SIGTERM)
 
 
 def _effect_strip(scene, name: str):
