@@ -1,7 +1,7 @@
 """Everything that touches bpy: properties, engine, strips, commands."""
 
 from . import handlers
-from .data import preferences, properties
+from .data import main_thread, preferences, properties
 from .interface import (
     bake_operators,
     bar_editor,
@@ -33,6 +33,7 @@ from .rendering import engine
 
 # Blender gets the `classes` of each, and loses its `TIMERS`; all else that it gets, `register` and `unregister` know.
 _modules = (
+    main_thread,
     translations,
     preferences,
     properties,

@@ -18,6 +18,7 @@ import gpu
 
 from ...devices.paging import PagedDevice
 from ...devices.passes import Pass
+from ..data import main_thread
 from .blender_gpu import BlenderDevice, has_context
 
 # Seconds of the main thread that calls take at once, if none takes longer: as many as all else took, within these.
@@ -149,8 +150,12 @@ def _called(function: Callable) -> Future:
     with _lock:
         if not _main.looks:
             _main.looks = True
-            bpy.app.timers.register(_look, persistent=True)
+            main_thread.soon(_begin_to_look)
     return done
+
+
+def _begin_to_look() -> None:
+    bpy.app.timers.register(_look, persistent=True)
 
 
 def _keep_looking() -> None:

@@ -19,6 +19,7 @@ import bpy
 
 from ...core import told
 from ...core.messages import sentence, signed
+from ..data import main_thread
 from ..data.property_copy import for_a_while
 from ..data.strips import ENGINE
 
@@ -107,7 +108,7 @@ def end(scene: Any, alone: bool) -> None:
         if bpy.app.background:
             _remove_spent()
         else:  # what Blender keeps belongs to its main thread
-            bpy.app.timers.register(lambda: _PATIENCE if bpy.app.is_job_running("RENDER") else _remove_spent())
+            main_thread.soon(lambda: bpy.app.timers.register(_remove_spent_then))
         if _job.failure is not None and alone and bpy.app.background:
             leave(BAD_INPUT)
 
@@ -186,7 +187,7 @@ def on_main_thread(function: Callable, ended: Callable[[], bool] | None = None) 
                 results.append((False, error))
             done.set()
 
-    bpy.app.timers.register(call)
+    main_thread.soon(call)
     while not done.wait(_PATIENCE):
         if ended() and chance.acquire(blocking=False):
             return None
@@ -199,7 +200,7 @@ def on_main_thread(function: Callable, ended: Callable[[], bool] | None = None) 
 def soon(function: Callable[[], None]) -> None:
     """Has a function called on the main thread: at once, if this is it."""
     if where() in (Where.JOB, Where.WAITED_FOR):
-        bpy.app.timers.register(function)
+        main_thread.soon(function)
     else:
         function()
 
@@ -264,6 +265,14 @@ def _cancel() -> None:
             bpy.ops.render.render(scene=scene.name)
     finally:
         _job.cancelling = False
+
+
+def _remove_spent_then() -> float | None:
+    """A timer, until the job has ended."""
+    if bpy.app.is_job_running("RENDER"):
+        return _PATIENCE
+    _remove_spent()
+    return None
 
 
 def _remove_spent() -> None:

@@ -1,0 +1,36 @@
+"""Functions that other threads have Blender's main thread call, where its data and its operators belong.
+
+They wait in a queue for a timer, as Blender's manual has it: a timer itself may be registered on the main thread alone,
+as Blender goes through its list of them without a lock."""
+
+import queue
+import traceback
+from collections.abc import Callable
+
+import bpy
+
+_TICK = 0.02  # seconds from one look at the queue to the next
+_calls: queue.SimpleQueue[Callable[[], None]] = queue.SimpleQueue()
+
+
+def soon(function: Callable[[], None]) -> None:
+    """Has the main thread of a window call a function, after those before it; for any thread."""
+    _calls.put(function)
+
+
+def _call() -> float:
+    """A timer, which is there as long as the extension is."""
+    for _ in range(_calls.qsize()):
+        try:
+            _calls.get_nowait()()
+        except Exception:  # Blender would end the timer
+            traceback.print_exc()
+    return _TICK
+
+
+TIMERS = (_call,)
+
+
+def register():
+    if not bpy.app.background:
+        bpy.app.timers.register(_call, first_interval=_TICK, persistent=True)
