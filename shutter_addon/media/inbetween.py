@@ -8,7 +8,7 @@ import os
 import tempfile
 import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from concurrent.futures import FIRST_COMPLETED, ThreadPoolExecutor, as_completed, wait
+from concurrent.futures import FIRST_COMPLETED, as_completed, wait
 from contextlib import suppress
 from functools import partial
 from itertools import islice
@@ -17,7 +17,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..core import stopping
+from ..core import stopping, threads
 from ..core.farm.claims import Claims
 from ..core.frames.frame_source import FrameSource
 from . import cuts, flow
@@ -325,7 +325,7 @@ def _note_kind(kind: str, cache: InbetweenCache, pair: int) -> bool:
 def _in_parallel(tasks: Iterable[Callable[[], bool]], workers: int) -> Iterator[bool]:
     """Runs tasks in threads, and yields their results. The next task is taken only when a thread is free, since a task
     holds its frames in memory."""
-    with ThreadPoolExecutor(workers) as pool:
+    with threads.pool(workers) as pool:
         running = set()
         for task in tasks:
             running.add(pool.submit(task))

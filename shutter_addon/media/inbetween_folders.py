@@ -3,13 +3,12 @@
 import json
 import os
 from collections.abc import Callable, Iterator
-from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from functools import partial
 from pathlib import Path
 from typing import NamedTuple
 
-from ..core import atomic_write
+from ..core import atomic_write, threads
 from ..core.farm import claims
 from ..core.frames.frame_source import FrameSource
 from .errors import MediaError
@@ -175,7 +174,7 @@ def _remove(top: Folder, name: str, left: Callable[[Path, int], None]) -> int:
             checks = read_checks(cache)
             if checks.unreadable:
                 raise checks.unreadable[0]
-            with ThreadPoolExecutor(READERS) as pool:
+            with threads.pool(READERS) as pool:
                 names = [entry.name for entry in _pictures(cache, checks)]
                 freed = sum(pool.map(partial(_remove_picture, cache, checks), names))
             freed += sum(place.remove(file) for place, file in _other_files(cache, checks))

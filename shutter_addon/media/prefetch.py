@@ -5,7 +5,7 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from ..core import stopping
+from ..core import stopping, threads
 from ..core.frames.frame_source import FrameSource
 from ..core.frames.planes import Planes, as_rgba
 from .errors import MediaError
@@ -81,8 +81,7 @@ class PrefetchSource(SourceWrapper):
 
     def _wake(self) -> None:
         if self._thread is None:
-            self._thread = threading.Thread(target=self._decode, name="Virtual Shutter", daemon=True)
-            self._thread.start()
+            self._thread = threads.daemon(self._decode)
         self._changed.notify_all()
 
     def _drop(self) -> None:

@@ -3,13 +3,13 @@
 import hashlib
 import os
 import tomllib
-from concurrent.futures import ThreadPoolExecutor
 from functools import partial
 from itertools import groupby
 from pathlib import Path
 
 import bpy
 
+from ...core import threads
 from ...core.farm.edit_version import EditVersion, Footage
 from ...media import MediaError, inbetween_cache
 from ...media.files import stamp
@@ -88,7 +88,7 @@ def _footage(files: list[Path]) -> Footage:
 def digests(files: list[Path]) -> list[bytes | None]:
     """Digests of the contents of files that are read together; None for one that is missing, or cannot be read."""
     whole = inbetween_cache.WHOLE if len(files) <= _FEW else _BLOCKS
-    with ThreadPoolExecutor(_READERS) as pool:
+    with threads.pool(_READERS) as pool:
         return list(pool.map(partial(_digest, whole=whole), files))
 
 

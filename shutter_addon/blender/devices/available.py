@@ -2,7 +2,6 @@
 
 import threading
 from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
 from functools import cache, partial
 from typing import Any, NamedTuple
 
@@ -12,6 +11,7 @@ from bpy.app.translations import pgettext_rpt as rpt_
 
 from ...compute.gpu import GPUCompositor
 from ...compute.renderer import open_compositor, open_gl
+from ...core import threads
 from ...devices.device import NoDeviceError
 from .blender_gpu import BlenderDevice, opens_in_background
 from .gpu_relay import RelayedDevice
@@ -80,8 +80,7 @@ def opengl() -> OpenGL:
     """What is known of OpenGL 4.3. It is tried once.
 
     On a thread of its own: where Blender's context is current, another one cannot always be."""
-    with ThreadPoolExecutor(1) as thread:
-        return thread.submit(_tried).result()
+    return threads.start(_tried).result()
 
 
 def _tried() -> OpenGL:

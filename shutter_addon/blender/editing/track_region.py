@@ -16,7 +16,7 @@ import numpy as np
 from bpy.app.translations import pgettext_n as n_
 from bpy.app.translations import pgettext_rpt as rpt_
 
-from ...core import revision, stopping
+from ...core import revision, threads
 from ...core.messages import EffectError, translated
 from ...core.model import limits, motions, presence
 from ...core.model.frame_state import Options
@@ -278,11 +278,11 @@ def _standing(moving: Any, here: Tracked) -> Any:
 
 
 def _followed(follow: Callable, patience: float | None) -> Iterator[Tracked | None]:
-    """What `follow` gives, a function as tracking.follow, found by a thread beside Blender (stopping.beside); its
+    """What `follow` gives, a function as tracking.follow, found by a thread beside Blender (threads.beside); its
     sentences are in the user's language."""
     with translated(rpt_):
         try:
-            with closing(stopping.beside(_each(follow), patience)) as steps:
+            with closing(threads.beside(_each(follow), patience)) as steps:
                 yield from steps
         except tracking.TrackingError as error:
             raise EffectError(rpt_(str(error))) from None

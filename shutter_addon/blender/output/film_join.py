@@ -4,13 +4,13 @@ import re
 import sys
 import tempfile
 from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager, nullcontext
 from pathlib import Path
 
 import bpy
 import numpy as np
 
+from ...core import threads
 from ...core.frames import frame_ranges
 from ...core.messages import signed
 from ...media import image_writing, rendered_pictures
@@ -146,7 +146,7 @@ def say_what_is_left_out(folder: Path, frames: tuple[int, int]) -> None:
 def _common(paths: list[Path], looked: Callable, size: tuple[int, int], key: str) -> RenderedPicture:
     """What all pictures are; looked: called after each. OutputError: one is broken, unlike the first, or of another
     edit than that of `key`."""
-    pool = ThreadPoolExecutor()
+    pool = threads.pool()
     first: RenderedPicture | None = None
     try:
         for path, picture in zip(paths, pool.map(rendered_pictures.read, paths), strict=True):

@@ -7,10 +7,10 @@ from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
+from ...core import threads
 from ...core.frames.frame_source import FrameSource
 from ...core.messages import EffectError
 from ...core.model.shutters import ShutterError
-from ...core.stopping import in_thread
 from ...media import MediaError, inbetween_folders
 from ...media.inbetween import build, estimate
 from ..data import inbetween_settings, snapshot, source_media, strips
@@ -66,7 +66,7 @@ def _known(spec: source_media.SourceSpec) -> tuple:
     if spec.key not in _media:
         medium = spec.open()
         medium.close()
-        _media[spec.key] = medium, in_thread(_estimated, medium)
+        _media[spec.key] = medium, threads.start(_estimated, medium)
     _trim(_media)
     return _media[spec.key]
 
@@ -100,7 +100,7 @@ class Build:
         self.scene = effect.scene.session_uid
         self.done, self.total = 0, medium.count - 1 if pairs is None else len(pairs)
         self._stopped = threading.Event()
-        self.future = in_thread(self._build, _builds.left, medium, pairs)
+        self.future = threads.start(self._build, _builds.left, medium, pairs)
 
     def _build(self, before: Any, medium: FrameSource, pairs: list[int] | None) -> Any:
         wait(before)

@@ -12,9 +12,8 @@ from typing import Any
 
 import bpy
 
-from ...core import stopping
+from ...core import stopping, threads
 from ...core.messages import UserError
-from ...core.stopping import in_thread
 from ...media.carried_mattes import CarriedFile
 from ..data import preview_areas
 
@@ -41,7 +40,7 @@ class _Carrying:
         drawn = {frame for frame, _curves in self.file.drawings}
         self.frames.sort(key=lambda frame: (frame not in drawn, frame))
         self.soon = len(drawn & set(self.frames))
-        self.future = in_thread(self._carry)
+        self.future = threads.start(self._carry)
 
     def _carry(self) -> None:
         with stopping.once(self.ended.is_set), closing(self.file.open()) as mattes:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable, Iterable
-from concurrent.futures import Future, ThreadPoolExecutor
+from concurrent.futures import Executor, Future
 from contextlib import suppress
 from typing import TYPE_CHECKING, Any
 
@@ -13,6 +13,7 @@ from bpy.app.translations import pgettext_rpt as rpt_
 
 from ...compute.renderer import Renderer
 from ...compute.request import Request
+from ...core import threads
 from ...core.messages import translated
 from ...core.model.frame_state import FrameState
 from ...core.pixels import following, layering, timeline_exposure
@@ -47,7 +48,7 @@ class RenderSession:
         self._choose, self._ask_others, self._late = choose, ask_others, late
         self._asks = False  # others for room, in the middle of a picture
         self._chosen: tuple[str, str | None] | None = None
-        self._executor: ThreadPoolExecutor | None = None
+        self._executor: Executor | None = None
         self._compositor: Future | None = None
         self._renderers: dict[int, tuple[SourceKey, Renderer]] = {}
         self._requests: dict[int, tuple[Snapshot, float, Request]] = {}  # by scene: the last one
@@ -75,7 +76,7 @@ class RenderSession:
         ended = threading.Event()
         if self.threaded:
             if self._executor is None:
-                self._executor = ThreadPoolExecutor(1, "Virtual Shutter")
+                self._executor = threads.pool(1)
             with suppress(RuntimeError):  # Python ends, and its threads take no more work
                 future = self._executor.submit(broken_off, ended.is_set, function, *arguments)
                 return Work(future, ended, self.device == "relayed")

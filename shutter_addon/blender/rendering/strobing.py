@@ -17,13 +17,13 @@ from bpy.app.translations import pgettext_rpt as rpt_
 
 from ...compute.renderer import Renderer
 from ...compute.request import Request
+from ...core import threads
 from ...core.frames.frame_source import FrameSource
 from ...core.messages import translated
 from ...core.model import shutters
 from ...core.model.frame_state import FrameState
 from ...core.model.motions import Similarity
 from ...core.pixels import compositor
-from ...core.stopping import in_thread
 from ...media import MediaError, inbetween, steps
 from ...media.cuts import ShotSource
 from ..data import inbetween_settings
@@ -218,7 +218,7 @@ def advance() -> bool:
     ended, _measuring.job = _measuring.job is not None, None
     if _measuring.wanted is not None:
         _stopped.clear()
-        _measuring.job, _measuring.wanted = in_thread(_measuring.wanted), None
+        _measuring.job, _measuring.wanted = threads.start(_measuring.wanted), None
     return ended
 
 

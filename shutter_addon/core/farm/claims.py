@@ -17,6 +17,8 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Self
 
+from .. import threads
+
 PATIENCE = 120.0  # seconds without a change after which a claim counts as abandoned
 BEAT = 10.0  # seconds from one touch to the next; network drives may show it up to a minute later
 
@@ -37,15 +39,16 @@ class Claims:
         self._held: dict[str, int] = {}  # the generation of each claim
         self._seen: dict[Path, tuple] = {}  # what others' claims look like, and since when
         self._lock, self._ended = threading.Lock(), threading.Event()
-        self._thread = threading.Thread(target=self._touch, name="Virtual Shutter claims", daemon=True)
+        self._thread: threading.Thread | None = None
 
     def __enter__(self) -> Self:
-        self._thread.start()
+        self._thread = threads.daemon(self._touch)
         return self
 
     def __exit__(self, *_: object) -> None:
         self._ended.set()
-        self._thread.join()
+        if self._thread is not None:
+            self._thread.join()
         for name in list(self._held):
             self.release(name)
 
