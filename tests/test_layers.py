@@ -108,3 +108,29 @@ import shutter_addon.media, shutter_addon.compute.renderer, shutter_addon.comput
 def test_the_extensions_root_imports_lazily():
     root = ast.parse((PACKAGE.parent / "__init__.py").read_text(encoding="utf-8"))
     assert not any(isinstance(node, ast.Import | ast.ImportFrom) for node in root.body)
+
+
+STARTERS = {"Thread", "Timer", "ThreadPoolExecutor", "ProcessPoolExecutor", "start_new_thread", "to_thread", "Process"}
+
+
+def test_one_module_starts_threads():
+    """Locks, events and futures may be anywhere; a thread's type may be told, from `threading` by its name."""
+    found = []
+    for path in PACKAGE.rglob("*.py"):
+        tree = ast.parse(path.read_text(encoding="utf-8"))
+        made = {ast.unparse(node.func).split(".")[-1] for node in ast.walk(tree) if isinstance(node, ast.Call)}
+        taken = {name.name for node in ast.walk(tree) if isinstance(node, ast.ImportFrom) for name in node.names}
+        if (made | taken) & STARTERS or {"multiprocessing", "asyncio", "_thread"} & set(imported(path)):
+            found.append(path.relative_to(PACKAGE).as_posix())
+    assert found == ["core/threads.py"]
+
+
+def test_the_page_has_every_use_of_threads():
+    """The table of docs/developers.md, by its first column."""
+    page = (PACKAGE.parent / "docs" / "developers.md").read_text(encoding="utf-8")
+    section = page.partition("\n## Threads\n")[2].partition("\n## ")[0]
+    rows = [line.split("|")[1] for line in section.splitlines() if line.startswith("| `")]
+    told = {place for row in rows for place in re.findall(r"`([\w/]+\.py)`", row)}
+    uses = re.compile(r"\bthreads\.(start|pool|daemon|beside)\(")
+    files = {path.relative_to(PACKAGE).as_posix(): path.read_text(encoding="utf-8") for path in PACKAGE.rglob("*.py")}
+    assert told == {place for place, text in files.items() if uses.search(text)}

@@ -17,12 +17,21 @@ ROOT = Path(__file__).parents[2]
 @pytest.fixture(scope="session")
 def bpy():
     import bpy
+    import thread_guard
 
     from shutter_addon import blender
 
     blender.register()
+    thread_guard.on()
     yield bpy
     blender.unregister()
+
+
+@pytest.fixture(autouse=True)
+def _no_data_on_threads():
+    yield
+    if "thread_guard" in sys.modules:  # by the fixture `bpy`
+        assert not sys.modules["thread_guard"].faults()
 
 
 @pytest.fixture

@@ -12,6 +12,9 @@ from pathlib import Path
 
 import bpy
 
+sys.path.append(str(Path(__file__).parents[1]))
+import thread_guard
+
 OUT = Path(os.environ.get("SHUTTER_PICTURES", "/tmp/shutter-window"))
 STEP = 0.25  # seconds that Blender gets for events and redraws
 _seen = []
@@ -39,6 +42,7 @@ def video_editing_opened():
 def play(story, seconds=STEP):
     """Runs a story step by step; quits Blender with its end or its first failure."""
     OUT.mkdir(parents=True, exist_ok=True)
+    thread_guard.on()
     steps, handled = story(), False
 
     def step():
@@ -71,6 +75,7 @@ def _tell(fault):
 
 
 def _finish(fault):
+    fault = fault or "\n".join(thread_guard.faults())
     _tell(fault)
     if fault:
         print(fault, file=sys.stderr, flush=True)

@@ -156,13 +156,7 @@ class RenderSession:
 
     def weights(self, request: Request, stopped: Callable[[], bool] = never) -> list[np.ndarray]:
         """Coefficients (h, w) of all shutters, and then the mattes of all layers, in blocks as large."""
-        return self.run(self._weights, request, stopped=stopped)
-
-    def _weights(self, request: Request) -> list[np.ndarray]:
-        renderer = self.renderer(request.source)
-        block = request.state.options.aggregate
-        mattes = [block_means(matte, block) for matte in renderer.layer_mattes(request)]
-        return [*renderer.coefficients(request), *mattes]
+        return self.run(_weights, self.renderer(request.source), request, stopped=stopped)
 
     def renderer(
         self, key: SourceKey, say: Callable[[str], None] = print, stopped: Callable[[], bool] = never
@@ -261,6 +255,12 @@ class RenderSession:
         except NoDeviceError:
             pass  # met again when a picture is asked for
         self.forget()
+
+
+def _weights(renderer: Renderer, request: Request) -> list[np.ndarray]:
+    block = request.state.options.aggregate
+    mattes = [block_means(matte, block) for matte in renderer.layer_mattes(request)]
+    return [*renderer.coefficients(request), *mattes]
 
 
 def _in_blocks(state: FrameState, divisor: int) -> FrameState:

@@ -1,0 +1,38 @@
+"""Threads of the extension touch nothing of Blender; all tests here are watched for it (thread_guard)."""
+
+import thread_guard
+
+
+def test_a_render_works_on_threads_that_touch_no_data(bpy, edit, render, effect):
+    thread_guard.seen.clear()
+    render(edit, [1, 2])
+    assert {"media/prefetch.py: PrefetchSource._decode", "compute/renderer.py: Renderer.picture"} <= thread_guard.seen
+    assert not thread_guard.faults()
+
+
+def test_data_on_a_thread_are_found(bpy, effect):
+    from shutter_addon.blender.data import inbetween_settings, selection
+    from shutter_addon.core import threads
+
+    inbetween_settings.factor(effect)
+    assert not thread_guard.faults()
+    threads.start(inbetween_settings.factor, effect).result()
+    found = thread_guard.faults()
+    assert "blender/data/inbetween_settings.py: factor runs on a thread" in found
+    assert any("factor has effect" in fault for fault in found)
+    threads.start(selection.active, bpy.context).exception()
+    assert any("has context" in fault for fault in thread_guard.faults())
+
+
+def test_calls_of_blender_on_a_thread_are_found(bpy):
+    """From modules that never import it, too."""
+    import gpu
+
+    from shutter_addon.blender.rendering import device_work
+    from shutter_addon.core import stopping, threads
+
+    functions = bpy.app.translations.pgettext_rpt, bpy.app.timers.is_registered, bpy.data.scenes.get, gpu.types.Buffer
+    for function in functions:
+        threads.start(device_work.broken_off, stopping.never, function, "Shutter").exception()
+        found = [fault.partition(" calls ")[0] for fault in thread_guard.faults()]
+        assert found == ["blender/rendering/device_work.py: broken_off"], function

@@ -1,0 +1,111 @@
+"""What runs on the extension's own threads (core/threads.py): no function of its part that knows Blender, but those
+that were read and found to touch nothing of it; and nowhere a value of Blender's data, nor a call of its modules.
+
+Blender's own threads, which call the engine and handlers, are Blender's to care for."""
+
+import os
+import sys
+import threading
+
+import bpy
+import gpu
+
+_TOOL = 3  # of sys.monitoring's, one for nobody in particular
+_PACKAGE = "shutter_addon"
+_OURS = "Virtual Shutter"  # how the names of our threads begin
+_DATA = (bpy.types.bpy_struct, bpy.types.bpy_prop_collection, bpy.types.bpy_prop_array)
+_MODULES = "bpy", "_bpy", "gpu", "bl_math", "mathutils"
+# By files below blender/: what runs on our threads, and touches no bpy data.
+REVIEWED: dict[str, set[str]] = {
+    "commands/inbetween_command.py": {"_build.<lambda>"},
+    "data/source_media.py": {"SourceSpec.open"},
+    "data/versions.py": {"_digest"},
+    "devices/available.py": {"_tried"},
+    "editing/track_region.py": {"_each", "_follow_drawn", "track.<lambda>"},
+    "rendering/device_work.py": {"broken_off"},
+    "rendering/effect_source.py": {"source_index"},
+    "rendering/inbetween_build.py": {"Build._build", "Build._update", "_estimated"},
+    "rendering/outline_carrying.py": {"_Carrying._carry"},
+    "rendering/session.py": {"RenderSession.forget.<lambda>", "_weights"},
+    "rendering/strobing.py": {"_measure_cost", "_measure_motion"},
+}
+
+seen: set[str] = set()  # functions that were called on our threads
+_faults: dict[str, None] = {}
+
+
+def on() -> None:
+    """From now on, on all threads."""
+    events, monitoring = sys.monitoring.events, sys.monitoring
+    monitoring.use_tool_id(_TOOL, "thread_guard")
+    monitoring.register_callback(_TOOL, events.PY_START, _started)
+    monitoring.register_callback(_TOOL, events.PY_RETURN, _returned)
+    monitoring.register_callback(_TOOL, events.CALL, _called)
+    monitoring.set_events(_TOOL, events.PY_START | events.PY_RETURN | events.CALL)
+
+
+def faults() -> list[str]:
+    """What was found since the last call."""
+    found = list(_faults)
+    _faults.clear()
+    return found
+
+
+def _is_ours() -> bool:
+    return threading.current_thread().name.startswith(_OURS)
+
+
+def _started(code, _offset):
+    if (path := _below(code.co_filename)) is None:
+        return sys.monitoring.DISABLE
+    if _is_ours():
+        name = code.co_qualname.replace(".<locals>", "")
+        seen.add(f"{path}: {name}")
+        room, _, file = path.partition("/")
+        if room == "blender" and name not in REVIEWED.get(file, ()):
+            _faults[f"{path}: {name} runs on a thread"] = None
+        _look(path, sys._getframe(1))
+    return None
+
+
+def _returned(code, _offset, _value):
+    if (path := _below(code.co_filename)) is None:
+        return sys.monitoring.DISABLE
+    if _is_ours():
+        _look(path, sys._getframe(1))
+    return None
+
+
+def _called(code, _offset, function, _argument):
+    if (path := _below(code.co_filename)) is None:
+        return sys.monitoring.DISABLE
+    if _is_ours() and _is_blenders(function):
+        _faults[f"{path}: {code.co_qualname} calls {function} on a thread"] = None
+    return None
+
+
+def _is_blenders(function) -> bool:
+    module = str(getattr(function, "__module__", None)).split(".")[0]
+    name = str(getattr(function, "__name__", ""))
+    owner = getattr(function, "__self__", None)
+    is_method = isinstance(owner, _DATA) or type(function).__name__ == "bpy_func" or name.startswith("pgettext")
+    return is_method or module in _MODULES or any(function is kind for kind in vars(gpu.types).values())
+
+
+_known: dict[str, str | None] = {}
+
+
+def _below(file: str) -> str | None:
+    """A file's place in the package."""
+    if file not in _known:
+        _before, package, below = file.replace(os.sep, "/").rpartition(f"/{_PACKAGE}/")
+        _known[file] = below if package else None
+    return _known[file]
+
+
+def _look(path: str, frame) -> None:
+    for name, value in frame.f_locals.items():
+        held = getattr(value, "__dict__", None)
+        for each in (value, *(held.values() if type(held) is dict else ())):
+            if isinstance(each, _DATA):
+                _faults[f"{path}: {frame.f_code.co_qualname} has {name}, {type(each)}, on a thread"] = None
