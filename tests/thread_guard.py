@@ -20,7 +20,36 @@ REVIEWED: dict[str, set[str]] = {
     "commands/inbetween_command.py": {"_build.<lambda>"},
     "data/source_media.py": {"SourceSpec.open"},
     "data/versions.py": {"_digest"},
-    "devices/available.py": {"_tried"},
+    "data/main_thread.py": {"soon"},
+    "devices/available.py": {"<lambda>", "_tried"},
+    "devices/blender_gpu.py": {
+        "BlenderDevice.__init__",
+        "BlenderDevice._cleared",
+        "BlenderDevice.freeing",
+        "BlenderDevice.read",
+        "BlenderDevice.run",
+        "BlenderDevice.run.<genexpr>",
+        "BlenderDevice.send",
+        "BlenderDevice.write",
+        "_buffer",
+        "_exchanged",
+        "_packed",
+        "unpacking",
+    },
+    "devices/gpu_relay.py": {
+        "RelayedDevice.__init__",
+        "RelayedDevice._dispatch",
+        "RelayedDevice._free",
+        "RelayedDevice._make",
+        "RelayedDevice._read",
+        "RelayedDevice._send",
+        "RelayedDevice._wait_for",
+        "RelayedDevice.current",
+        "RelayedDevice.release",
+        "_called",
+        "_keep_looking",
+        "ask",
+    },
     "editing/track_region.py": {"_each", "_follow_drawn", "track.<lambda>"},
     "rendering/device_work.py": {"broken_off"},
     "rendering/effect_source.py": {"source_index"},
@@ -85,9 +114,11 @@ def _called(code, _offset, function, _argument):
 
 
 def _is_blenders(function) -> bool:
+    owner = getattr(function, "__self__", None)
+    if function is gpu.types.Buffer or owner is gpu.platform or owner is gpu.capabilities:
+        return False  # which hold memory of their own, and tell what never changes
     module = str(getattr(function, "__module__", None)).split(".")[0]
     name = str(getattr(function, "__name__", ""))
-    owner = getattr(function, "__self__", None)
     is_method = isinstance(owner, _DATA) or type(function).__name__ == "bpy_func" or name.startswith("pgettext")
     return is_method or module in _MODULES or any(function is kind for kind in vars(gpu.types).values())
 

@@ -1,5 +1,6 @@
 """Masks at any frame, against Blender's own Mask strip."""
 
+import ctypes
 import random
 from contextlib import contextmanager
 from itertools import product
@@ -278,17 +279,116 @@ def test_reading_leaves_the_mask_as_it_is(bpy, mask, mask_editor, clip, edit):
     assert mask_reading.mask_at(mask, 5) == shapes[0]
 
 
-def test_another_blender_is_refused(bpy, mask, mask_editor, clip):
-    """As if what lies behind a layer's name lay farther on."""
+@pytest.fixture
+def other_blender(monkeypatch):
+    """Makes the description of one of Blender's records that of another version: a field renamed, all moved."""
+    from shutter_addon.blender.data import struct_dna
+
+    def described(record, name="", new="", moved=0):
+        parsed = struct_dna.parsed
+
+        def other(blend):
+            records = parsed(blend)
+            size, places = records[record]
+            changed = {field.replace(name, new) if name else field: place + moved for field, place in places.items()}
+            return records | {record: (size + moved, changed)}
+
+        monkeypatch.setattr(struct_dna, "parsed", other)
+        forget()
+
+    def forget():
+        for known in (struct_dna.record, struct_dna._description):
+            known.cache_clear()
+
+    yield described
+    monkeypatch.undo()
+    forget()
+
+
+@pytest.fixture
+def moving(bpy, edit, mask, mask_editor, clip):
+    """The mask, with a spline that has shape keys at frames 5 and 30, at frame 30."""
+    spline = draw(mask.layers.new(name="L"), blob(random.Random(2), 5), 0.05)
+    with mask_editor(clip(40, 30), mask):
+        for frame in (5, 30):
+            edit.frame_set(frame)
+            spline.points[0].co = (frame / 50, 0.5)
+            spline.points[0].select = True
+            bpy.ops.mask.shape_key_insert()
+    return mask
+
+
+def first_x(mask, frame):
+    from shutter_addon.blender.data import mask_reading
+
+    return mask_reading.mask_at(mask, frame).layers[0].splines[0].points[0][1][0]
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        ("MaskLayer", "splines_shapes", "shapes"),
+        ("MaskLayer", "name[64]", "name[66]"),
+        ("MaskLayerShape", "*data", "*values"),
+        ("MaskLayerShape", "int frame", "float frame"),
+    ],
+)
+def test_another_blender_shows_the_current_frame(moving, edit, other_blender, change):
+    from shutter_addon.blender.data import mask_reading
+
+    assert first_x(moving, 5) == pytest.approx(0.1)
+    assert mask_reading.moves(moving)
+    other_blender(*change)
+    assert first_x(moving, 5) == pytest.approx(0.6)
+    assert mask_reading.mask_at(moving, 5).is_current
+    assert not mask_reading.moves(moving)
+    edit.frame_set(5)
+    assert first_x(moving, 30) == pytest.approx(0.1)
+
+
+def test_a_layer_that_is_not_what_the_api_says(moving):
+    """Nothing of it is followed."""
+    from shutter_addon.blender.data import mask_reading
+
+    layer = moving.layers[0]
+    for changed in (
+        {"as_pointer": lambda: layer.as_pointer() + 8},
+        {"name": "other"},
+        {"splines": [*layer.splines, Like(layer.splines[0], as_pointer=lambda: 8)]},
+    ):
+        assert mask_reading.mask_at(Like(moving, layers=[Like(layer, **changed)]), 5).is_current
+    assert not mask_reading.mask_at(moving, 5).is_current
+
+
+def test_what_lies_elsewhere_in_another_blender_is_read_there(moving, other_blender):
+    """As if a new field of eight bytes came first in the records of layers."""
+    from shutter_addon.blender.data import mask_reading, struct_dna
+
+    other_blender("MaskLayer", moved=8)
+    size = struct_dna.record("MaskLayer", "char name[64]").itemsize
+    layer = moving.layers[0]
+    grown = ctypes.create_string_buffer(bytes(8) + struct_dna.memory(layer.as_pointer(), size - 8))
+    there = Like(moving, layers=[Like(layer, as_pointer=lambda: ctypes.addressof(grown))])
+    assert first_x(there, 5) == pytest.approx(0.1)
+    assert first_x(there, 17.5) == pytest.approx(0.35)
+    assert mask_reading.mask_at(moving, 5).is_current
+
+
+def test_parents_in_another_blender_are_refused(bpy, mask, mask_editor, clip, edit, other_blender):
     from shutter_addon.blender.data import mask_reading
     from shutter_addon.core.messages import EffectError
 
-    layer = mask.layers.new(name="L")
-    draw(layer, blob(random.Random(2), 5))
+    clip = clip(40, 30)
+    spline = draw(mask.layers.new(name="L"), blob(random.Random(2), 5))
+    clip.tracking.tracks.active = clip.tracking.tracks.new(name="T", frame=1)
+    with mask_editor(clip, mask):
+        for point in spline.points:
+            point.select = True
+        assert bpy.ops.mask.parent_set() == {"FINISHED"}
     mask_reading.mask_at(mask, 5)
-    moved = Like(layer, as_pointer=lambda: layer.as_pointer() + 8)
-    with pytest.raises(EffectError, match='mask "M": it cannot be read in this version of Blender'):
-        mask_reading.mask_at(Like(mask, layers=[moved]), 5)
+    other_blender("MaskParent", "parent_orig", "origin")
+    with pytest.raises(EffectError, match='mask "M": the parents of its points cannot be read in this version'):
+        mask_reading.mask_at(mask, 5)
 
 
 @pytest.mark.parametrize("value", [float("nan"), float("inf"), 1e20])

@@ -31,8 +31,8 @@ def test_calls_of_blender_on_a_thread_are_found(bpy):
     from shutter_addon.blender.rendering import device_work
     from shutter_addon.core import stopping, threads
 
-    functions = bpy.app.translations.pgettext_rpt, bpy.app.timers.is_registered, bpy.data.scenes.get, gpu.types.Buffer
-    for function in functions:
+    timers, texts, scenes = bpy.app.timers, bpy.app.translations, bpy.data.scenes
+    for function in (timers.is_registered, texts.pgettext_rpt, scenes.get, gpu.types.GPUTexture):
         threads.start(device_work.broken_off, stopping.never, function, "Shutter").exception()
         found = [fault.partition(" calls ")[0] for fault in thread_guard.faults()]
         assert found == ["blender/rendering/device_work.py: broken_off"], function

@@ -51,8 +51,9 @@ def test_keys_out_of_order(bpy):
     assert not are_retiming_keys(keys_of(bpy, [(0.0, 0.0), (30.0, 0.6), (29.0, 0.5), (51.0, 1.0)]), [0, 30, 29, 51])
 
 
-def test_another_layout_is_said(bpy, edit, tmp_path):
-    """As if the numbers lay four bytes farther on."""
+@pytest.mark.parametrize("keys", [2, 3])
+def test_another_layout(bpy, edit, tmp_path, keys):
+    """As if the numbers lay four bytes farther on. What the first and the last key show is known all the same."""
     from shutter_addon.blender.data import strip_timing
     from shutter_addon.core.messages import EffectError
 
@@ -61,12 +62,18 @@ def test_another_layout_is_said(bpy, edit, tmp_path):
     for file in sorted(first.parent.iterdir())[1:]:
         source.elements.append(file.name)
     source.right_handle = 21
-    source.retiming_keys.add(timeline_frame=1)
+    for frame in (1, 11)[: keys - 1]:
+        source.retiming_keys.add(timeline_frame=frame)
     source.retiming_keys[-1].timeline_frame = 52
-    assert [key.index for key in strip_timing.timing_of(source).keys] == [0, 51]
+    known = strip_timing.timing_of(source)
+    assert [key.index for key in known.keys] == {2: [0, 51], 3: [0, 10, 51]}[keys]
     moved = [Like(key, as_pointer=lambda key=key: key.as_pointer() + 4) for key in source.retiming_keys]
+    other = Like(source, retiming_keys=moved)
+    if keys == 2:
+        assert strip_timing.timing_of(other) == known
+        return
     with pytest.raises(EffectError, match='strip "images": its retiming keys cannot be read'):
-        strip_timing.timing_of(Like(source, retiming_keys=moved))
+        strip_timing.timing_of(other)
 
 
 def test_a_still_of_a_million_frames_takes_no_time(bpy, edit, tmp_path):

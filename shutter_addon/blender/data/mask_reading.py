@@ -1,14 +1,15 @@
 """Blender's masks as plain data at any of their frames, whatever frame Blender itself is at.
 
 Python's API has neither the shape keys of a mask nor where its parents were when they got their children: both are read
-from Blender's memory, and checked against what the API has.
+from Blender's memory (struct_dna), and checked against what the API has. Where shape keys cannot be read, a mask is
+taken as Blender has it at its current frame.
 """
 
-import ctypes
 from bisect import bisect_right
 from collections.abc import Callable, Iterator
-from itertools import chain, pairwise
-from typing import Any
+from contextlib import suppress
+from itertools import chain
+from typing import Any, NamedTuple
 
 import bpy
 import numpy as np
@@ -18,6 +19,7 @@ from ...core.masks import mask_handles, mask_outlines
 from ...core.masks.mask import MaskLayer, MaskShape, MaskSpline
 from ...core.messages import EffectError
 from . import fcurves
+from .struct_dna import LayoutError, memory, read, record, text
 
 # Coordinates that are farther off are no mask of any picture.
 _FARTHEST = 1e4
@@ -25,50 +27,50 @@ _FARTHEST = 1e4
 _SHAPE_NUMBERS = 8
 
 
-class _Layer(ctypes.Structure):
-    """How MaskLayer begins."""
-
-    _fields_ = (
-        *(("next", ctypes.c_void_p), ("prev", ctypes.c_void_p), ("name", ctypes.c_char * 64)),
-        *(("first_spline", ctypes.c_void_p), ("last_spline", ctypes.c_void_p)),
-        *(("first_shape", ctypes.c_void_p), ("last_shape", ctypes.c_void_p)),
-    )
+def _layer_record() -> np.dtype:
+    return record("MaskLayer", "char name[64]", "ListBase splines", "ListBase splines_shapes")
 
 
-class _Shape(ctypes.Structure):
-    """How MaskLayerShape begins."""
-
-    _fields_ = (
-        *(("next", ctypes.c_void_p), ("prev", ctypes.c_void_p), ("data", ctypes.POINTER(ctypes.c_float))),
-        *(("points", ctypes.c_int), ("frame", ctypes.c_int)),
-    )
+def _shape_record() -> np.dtype:
+    links = "MaskLayerShape *next", "MaskLayerShape *prev"
+    return record("MaskLayerShape", *links, "float *data", "int tot_vert", "int frame")
 
 
-class _Parent(ctypes.Structure):
-    """MaskParent: where the track was (in mask space), or the plane's corners (in the clip)."""
+def _parent_record() -> np.dtype:
+    """Where the track was (in mask space), or the plane's corners (in the clip)."""
+    names = "char parent[64]", "char sub_parent[64]"
+    return record("MaskParent", "ID *id", *names, "float parent_orig[2]", "float parent_corners_orig[4][2]")
 
-    _fields_ = (
-        *(("id_type", ctypes.c_int), ("type", ctypes.c_int), ("id", ctypes.c_void_p)),
-        *(("object", ctypes.c_char * 64), ("track", ctypes.c_char * 64)),
-        *(("origin", ctypes.c_float * 2), ("corners", ctypes.c_float * 8)),
-    )
+
+class _Shape(NamedTuple):
+    """A shape key: its frame, how many points it has, and where their numbers lie."""
+
+    frame: int
+    points: int
+    address: int
+
+    @property
+    def numbers(self) -> np.ndarray:
+        """(points, 8) float32."""
+        size = self.points * _SHAPE_NUMBERS * np.dtype(np.float32).itemsize
+        return np.frombuffer(memory(self.address, size), np.float32).reshape(-1, _SHAPE_NUMBERS)
 
 
 def mask_at(mask: bpy.types.Mask, frame: float) -> MaskShape:
     """A mask at one of its frames: shape keys, handles, parents and the layers' animated opacity are evaluated.
 
-    EffectError: its points or opacities are no usable numbers, or it cannot be read in this version of Blender.
+    EffectError: its points or opacities are no usable numbers, or its parents cannot be read in this Blender.
     """
     layers = [layer for layer in mask.layers if not layer.hide_render]
-    return MaskShape(tuple(_layer_at(mask, layer, frame) for layer in layers))
+    shown = tuple(_layer_at(mask, layer, frame) for layer in layers)
+    return MaskShape(shown, is_current=any(_shapes(layer) is None for layer in layers))
 
 
 def motion(mask: bpy.types.Mask) -> Iterator[tuple]:
-    """What lets a mask differ from frame to frame, F-curves apart: its shape keys, and the markers of its parents.
-    EffectError: as `mask_at`."""
+    """What lets a mask differ from frame to frame, F-curves apart: its shape keys, and the markers of its parents."""
     for layer in mask.layers:
-        for shape in _shapes(mask, layer):
-            yield shape.frame, np.ctypeslib.as_array(shape.data, (shape.points, _SHAPE_NUMBERS)).tobytes()
+        for shape in _shapes(layer) or ():
+            yield shape.frame, shape.numbers.tobytes()
     for track in _tracks(mask):
         place = ("corners", 8) if isinstance(track, bpy.types.MovieTrackingPlaneTrack) else ("co", 2)
         yield tuple(numbers.tobytes() for numbers in _markers(track, *place))
@@ -86,8 +88,8 @@ def _tracks(mask: bpy.types.Mask) -> Iterator[Any]:
 
 def key_frames(mask: bpy.types.Mask) -> list[float]:
     """The frames of a mask at which something is said of it: shape keys, keys of its F-curves, markers of its parents,
-    of these every tenth. EffectError: as `mask_at`."""
-    keyed = {float(shape.frame) for layer in mask.layers for shape in _shapes(mask, layer)}
+    of these every tenth."""
+    keyed = {float(shape.frame) for layer in mask.layers for shape in _shapes(layer) or ()}
     keyed |= set(fcurves.key_frames(fcurves.curves_under(mask, "")))
     for track in _tracks(mask):
         keyed |= {float(marker.frame) for marker in list(track.markers)[::10]}
@@ -95,12 +97,12 @@ def key_frames(mask: bpy.types.Mask) -> list[float]:
 
 
 def moves(mask: bpy.types.Mask) -> bool:
-    """Whether a mask may differ from frame to frame. EffectError: as `mask_at`."""
+    """Whether a mask may differ from frame to frame."""
     return bool(fcurves.curves_under(mask, "")) or next(motion(mask), None) is not None
 
 
 def _layer_at(mask, layer, frame: float) -> MaskLayer:
-    keyed = _keyed_points(mask, layer, frame)
+    keyed = _keyed_points(layer, frame)
     splines, at = [], 0
     for spline in layer.splines:
         count = len(spline.points)
@@ -171,12 +173,12 @@ def _checked(mask, numbers) -> np.ndarray:
     return numbers
 
 
-def _keyed_points(mask, layer, frame: float) -> np.ndarray | None:
-    """The points of all splines of a layer (n, 8) by its shape keys; None where it has none that fit.
+def _keyed_points(layer, frame: float) -> np.ndarray | None:
+    """The points of all splines of a layer (n, 8) by its shape keys; None where it has none that fit, or that can be
+    read.
 
-    Shape keys are held before the first and behind the last. EffectError: not in this Blender.
-    """
-    shapes = _shapes(mask, layer)
+    Shape keys are held before the first and behind the last."""
+    shapes = _shapes(layer)
     if not shapes:
         return None
     place = bisect_right([shape.frame for shape in shapes], frame)
@@ -184,52 +186,61 @@ def _keyed_points(mask, layer, frame: float) -> np.ndarray | None:
     count = sum(len(spline.points) for spline in layer.splines)
     if before.points != count or after.points != count:
         return None
-    first, last = (np.ctypeslib.as_array(s.data, (count, _SHAPE_NUMBERS)).astype(np.float64) for s in (before, after))
+    first, last = (shape.numbers.astype(np.float64) for shape in (before, after))
     share = (frame - before.frame) / max(after.frame - before.frame, 1) if frame > before.frame else 0.0
     return first + (last - first) * share
 
 
-def _shapes(mask, layer) -> list[_Shape]:
-    """The shape keys of a layer, in order, from Blender's memory. EffectError: not in this Blender."""
+def _shapes(layer) -> list[_Shape] | None:
+    """The shape keys of a layer, in order, from Blender's memory; None: they cannot be read in this Blender. No address
+    is followed before the record that has it was found to be what the API says, or what leads there."""
     if not layer.splines:
         return []
-    raw = _Layer.from_address(layer.as_pointer())
+    try:
+        kind, raw = _shape_record(), read(_layer_record(), layer.as_pointer())
+    except LayoutError:
+        return None
     ends = layer.splines[0].as_pointer(), layer.splines[-1].as_pointer()
-    known = raw.name == layer.name.encode() and (raw.first_spline, raw.last_spline) == ends
-    shapes, before, address = [], None, raw.first_shape if known else None
-    while address and known:
-        shapes.append(_Shape.from_address(address))
-        known = shapes[-1].prev == before and shapes[-1].points >= 0 and bool(shapes[-1].data)
-        before, address = address, shapes[-1].next
-    ascending = all(a.frame < b.frame for a, b in pairwise(shapes))
-    if not (known and ascending and raw.last_shape == before):
-        raise _unreadable(mask)
-    return shapes
+    if text(raw["name"]) != layer.name.encode() or tuple(raw["splines"].tolist()) != ends:
+        return None
+    shapes: list[_Shape] = []
+    (address, last), before = raw["splines_shapes"].tolist(), 0
+    while address:
+        following, previous, data, points, frame = read(kind, address).tolist()
+        ascends = not shapes or shapes[-1].frame < frame
+        if previous != before or points < 0 or not data or not ascends:
+            return None
+        shapes.append(_Shape(frame, points, data))
+        before, address = address, following
+    return shapes if last == before else None
 
 
-def _unreadable(mask) -> EffectError:
-    return EffectError(rpt_('mask "{mask}": it cannot be read in this version of Blender').format(mask=mask.name))
-
-
-def _families(mask, spline) -> list[tuple[bpy.types.MaskParent, _Parent, list[int]]]:
+def _families(mask, spline) -> list[tuple[bpy.types.MaskParent, np.void, list[int]]]:
     """The tracks of clips that are parents of a spline's points: each as Python has it, as it lies in memory, and the
     indices of its children. EffectError: not in this Blender."""
     children: dict = {}
     for index, point in enumerate(spline.points):
-        memory = ctypes.string_at(point.parent.as_pointer(), ctypes.sizeof(_Parent))
-        children.setdefault(memory, []).append(index)
-    families = []
-    for memory, here in children.items():
-        parent, raw = spline.points[here[0]].parent, _Parent.from_buffer_copy(memory)
+        if point.parent.id is not None and point.parent.id_type == "MOVIECLIP":
+            raw = _parent_of(mask, point.parent)
+            children.setdefault(raw.tobytes(), (point.parent, raw, []))[2].append(index)
+    return list(children.values())
+
+
+def _parent_of(mask, parent) -> np.void:
+    """EffectError: it cannot be read in this Blender."""
+    with suppress(LayoutError):
+        raw = read(_parent_record(), parent.as_pointer())
         names = parent.parent.encode(), parent.sub_parent.encode()
-        if raw.id != (parent.id and parent.id.as_pointer()) or (raw.object, raw.track) != names:
-            raise _unreadable(mask)
-        if parent.id is not None and parent.id_type == "MOVIECLIP":
-            families.append((parent, raw, here))
-    return families
+        if raw["id"] == parent.id.as_pointer() and (text(raw["parent"]), text(raw["sub_parent"])) == names:
+            return raw
+    sentence = rpt_(
+        'mask "{mask}": the parents of its points cannot be read in this version of Blender, but a film of its Mask'
+        " strip can be the matte"
+    )
+    raise EffectError(sentence.format(mask=mask.name))
 
 
-def _parent_matrix(parent, raw: _Parent, frame: float) -> np.ndarray:
+def _parent_matrix(parent, raw: np.void, frame: float) -> np.ndarray:
     """How a track (3, 3) has moved its children since they got it, in mask space; no motion where there is none."""
     clip, matrix = parent.id, np.eye(3)
     tracked = clip.tracking.objects.get(parent.parent)
@@ -240,7 +251,7 @@ def _parent_matrix(parent, raw: _Parent, frame: float) -> np.ndarray:
         track = tracked.tracks.get(parent.sub_parent)
         if track is not None and len(track.markers):
             at = _between_markers(track, "co", 2, frame - clip.frame_start + 1, _halved) + track.offset
-            matrix[:2, 2] = mask_handles.moved(at, to_mask) - raw.origin
+            matrix[:2, 2] = mask_handles.moved(at, to_mask) - raw["parent_orig"]
         return matrix
     track = tracked.plane_tracks.get(parent.sub_parent)
     if track is None or not len(track.markers):
@@ -250,7 +261,7 @@ def _parent_matrix(parent, raw: _Parent, frame: float) -> np.ndarray:
     if clip.size[0] and to_mask[0, 0] < 1:
         # Blender takes the inverse for pictures higher than wide, where planes move their children less than they do.
         to_mask = np.linalg.inv(to_mask)
-    return to_mask @ mask_handles.homography(np.reshape(raw.corners, (4, 2)), now) @ np.linalg.inv(to_mask)
+    return to_mask @ mask_handles.homography(raw["parent_corners_orig"], now) @ np.linalg.inv(to_mask)
 
 
 def _between_markers(track, name: str, size: int, frame: float, find: Callable) -> np.ndarray:

@@ -1,12 +1,13 @@
 """How a source strip lies on the timeline, with its retiming keys, of which Blender's Python API gives a part."""
 
-import ctypes
+from contextlib import suppress
 
 from bpy.app.translations import pgettext_rpt as rpt_
 
 from ...core.frames.retiming import RetimingKey, StripTiming, are_retiming_keys
 from ...core.messages import EffectError
 from . import source_media
+from .struct_dna import LayoutError, read, record
 
 _FIELDS = (
     *("name", "content_start", "content_end", "content_trim_start", "content_trim_end", "left_handle"),
@@ -27,20 +28,19 @@ def timing_of(strip) -> StripTiming:
 
 
 def _retiming_keys(strip) -> list[RetimingKey]:
-    """The strip's retiming keys from Blender's memory: Python gets their timeline frames, but not what they show.
-
-    Of a clip strip it gets none at all.
-    SeqRetimingKey begins with double strip_frame_index, int flag, float retiming_factor. EffectError: not in this
-    Blender.
-    """
-
-    class Raw(ctypes.Structure):
-        _fields_ = (("index", ctypes.c_double), ("flag", ctypes.c_int), ("factor", ctypes.c_float))
-
+    """The strip's retiming keys from Blender's memory: Python gets their timeline frames, but not what they show. Of a
+    clip strip it gets none at all. EffectError: not in this Blender."""
     shown = list(getattr(strip, "retiming_keys", ()))
-    raw = [Raw.from_address(key.as_pointer()) for key in shown]
-    keys = [RetimingKey(key.index, key.flag, key.factor) for key in raw]
-    if not are_retiming_keys(keys, [key.timeline_frame - strip.content_start for key in shown]):
-        sentence = rpt_('strip "{strip}": its retiming keys cannot be read in this version of Blender')
-        raise EffectError(sentence.format(strip=strip.name))
-    return keys
+    indices = [float(key.timeline_frame - strip.content_start) for key in shown]
+    with suppress(LayoutError):
+        kind = record("SeqRetimingHandle", "double strip_frame_index", "int flag", "float retiming_factor")
+        keys = [RetimingKey(*read(kind, key.as_pointer()).tolist()) for key in shown]
+        if are_retiming_keys(keys, indices):
+            return keys
+    if len(shown) <= 2:  # the first and the last, which show the content's start and its end
+        return [RetimingKey(index, 0, factor) for index, factor in zip(indices, (0.0, 1.0), strict=False)]
+    sentence = rpt_(
+        'strip "{strip}": its retiming keys cannot be read in this version of Blender; keys of Source Time can take'
+        " their place"
+    )
+    raise EffectError(sentence.format(strip=strip.name))

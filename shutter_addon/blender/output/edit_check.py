@@ -22,7 +22,7 @@ from ...media import MediaError, cuts
 from ...media.carried_mattes import CarriedMattes
 from ...media.files import check_file
 from ..data import effect_version, requirements, selection, snapshot, source_media, strips
-from ..rendering import effect_source, job_snapshots
+from ..rendering import effect_source, job_snapshots, pictures
 from ..rendering.render_context import RenderContext
 from ..rendering.render_settings import RenderSettings
 from ..rendering.session import RenderSession
@@ -226,7 +226,7 @@ def _look_at_mattes(check: EffectCheck, source, requests: dict[float, Request]) 
 
 
 def _notes(check: EffectCheck, requests: dict[float, Request]) -> list[str]:
-    notes = []
+    notes = list({sentence: None for request in requests.values() for sentence in pictures.unread(request)})
     if (package := cuts.missing_package()) and any(each.state.options.stop_at_cuts for each in requests.values()):
         notes.append(f"no cuts are found, and exposures run across them: the Python package {package} is missing")
     if lacking := sum(check.mattes.values()):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from itertools import chain
 from pathlib import Path
 
 import numpy as np
@@ -68,7 +69,26 @@ def _say_of_cuts(say: Callable[[str], None]) -> None:
 
 
 def shortages(renderer: Renderer, request: Request) -> list[str]:
-    """Sentences about what is slow in pictures as requested, for the GPU has no room."""
+    """Sentences about what pictures as requested lack: masks at other frames than Blender's own; and, where the GPU has
+    no room, speed."""
+    return [*unread(request), *_slow(renderer, request)]
+
+
+def unread(request: Request) -> list[str]:
+    """A sentence where the shapes of masks cannot be read at the frame of the picture."""
+    layers = request.state.layers.mattes if request.state.layers else ()
+    mattes = [matte for matte in chain(request.state.mattes, *layers) if matte is not None]
+    if not any(getattr(matte.content, "is_current", False) for matte in mattes):
+        return []
+    return [
+        rpt_(
+            "The shape keys of masks cannot be read in this version of Blender: mattes have them as at the current"
+            " frame"
+        )
+    ]
+
+
+def _slow(renderer: Renderer, request: Request) -> list[str]:
     if not renderer.shortages:
         return []
     source = renderer.source

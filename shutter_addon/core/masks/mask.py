@@ -75,9 +75,12 @@ class MaskLayer:
 
 @dataclass(frozen=True)
 class MaskShape:
-    """A mask as it stands at one frame: the layers that are rendered, from the lowest up."""
+    """A mask as it stands at one frame: the layers that are rendered, from the lowest up.
+
+    is_current: whether it may be that of Blender's current frame in place of the wanted one"""
 
     layers: tuple[MaskLayer, ...]
+    is_current: bool = False
 
     def values(self, width: int, height: int) -> np.ndarray:
         """What it covers of a picture: (height, width) float32, 0 to 1, the top row first."""

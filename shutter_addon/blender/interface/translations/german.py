@@ -156,12 +156,21 @@ MESSAGES = {
     ): "Maske „{mask}“: ein Punkt, eine weiche Kante oder eine Deckkraft ist keine brauchbare Zahl",
     (
         "*",
-        'mask "{mask}": it cannot be read in this version of Blender',
-    ): "Maske „{mask}“ ist in dieser Version von Blender nicht lesbar",
+        'mask "{mask}": the parents of its points cannot be read in this version of Blender, but a film of its Mask'
+        " strip can be the matte",
+    ): "Maske „{mask}“: die Eltern ihrer Punkte sind in dieser Version von Blender nicht lesbar, aber ein Film ihres"
+    " Maskenstreifens kann die Matte sein",
     (
         "*",
-        'strip "{strip}": its retiming keys cannot be read in this version of Blender',
-    ): "Streifen „{strip}“: seine Retiming-Schlüssel sind in dieser Version von Blender nicht lesbar",
+        "The shape keys of masks cannot be read in this version of Blender: mattes have them as at the current frame",
+    ): "Die Formschlüssel von Masken sind in dieser Version von Blender nicht lesbar: Matten haben sie wie beim"
+    " aktuellen Bild",
+    (
+        "*",
+        'strip "{strip}": its retiming keys cannot be read in this version of Blender; keys of Source Time can take'
+        " their place",
+    ): "Streifen „{strip}“: seine Retiming-Schlüssel sind in dieser Version von Blender nicht lesbar; Schlüssel der"
+    " Quellzeit können an ihre Stelle treten",
     (
         "*",
         'strip "{strip}" is not as long as its clip: retimed clips are not supported',

@@ -1,0 +1,118 @@
+"""How Blender's records lie in its memory, as the Blender that runs says itself.
+
+Every .blend file ends with a description of all records (SDNA), which Blender writes of itself, and whose places and
+sizes its compiler has compared with the memory's (dna_verify.cc). A file of nothing else is written once and read.
+"""
+
+import ctypes
+import math
+import re
+import struct
+import tempfile
+from functools import cache
+from itertools import accumulate
+from pathlib import Path
+
+import bpy
+import numpy as np
+
+_POINTER = 8  # bytes
+_NUMBERS = {"short": "i2", "int": "i4", "float": "f4", "double": "f8"}
+_FIELD = re.compile(r"(\w+) (\**)(\w+)((?:\[\d+\])*)")  # float *corners[4][2]
+
+
+class LayoutError(Exception):
+    """The Blender that runs has no such record, or does not tell."""
+
+
+@cache
+def record(name: str, *fields: str) -> np.dtype:
+    """The type of a record of Blender's memory with some of its fields, under their names: numbers, addresses
+    (uintp), text (bytes) and lists ("first" and "last"). LayoutError: it is another one in this Blender.
+
+    fields: as Blender declares them, `float corners[4][2]`"""
+    size, places = _description().get(name, (0, {}))
+    parts = [match for field in fields if (match := _FIELD.fullmatch(field)) and field in places]
+    if len(parts) < len(fields):
+        raise LayoutError(name)
+    return np.dtype(
+        {
+            "names": [part[3] for part in parts],
+            "formats": [_format(part[1], part[2], part[4]) for part in parts],
+            "offsets": [places[field] for field in fields],
+            "itemsize": size,
+        }
+    )
+
+
+def read(kind: np.dtype, address: int) -> np.void:
+    """A record (`record`) at an address in Blender's memory."""
+    return np.frombuffer(memory(address, kind.itemsize), kind)[0]
+
+
+def memory(address: int, size: int) -> bytes:
+    """A copy of that many bytes of Blender's memory."""
+    return ctypes.string_at(address, size)
+
+
+def text(field: bytes) -> bytes:
+    """What a field of text says."""
+    return field.partition(b"\0")[0]
+
+
+def _format(kind: str, stars: str, dimensions: str):
+    shape = tuple(map(int, re.findall(r"\d+", dimensions)))
+    if stars:
+        return np.uintp, shape
+    if kind == "char":
+        return f"S{math.prod(shape)}"
+    return (record(kind, "void *first", "void *last") if kind == "ListBase" else _NUMBERS[kind]), shape
+
+
+@cache
+def _description() -> dict[str, tuple[int, dict[str, int]]]:
+    """Of each record its size, and by its fields as they are declared where these lie, in bytes."""
+    try:
+        with tempfile.TemporaryDirectory(prefix="virtual_shutter_dna_", ignore_cleanup_errors=True) as folder:
+            file = Path(folder, "dna.blend")
+            bpy.data.libraries.write(str(file), set(), compress=False)
+            return parsed(file.read_bytes())
+    except (OSError, RuntimeError, ValueError, IndexError, struct.error) as error:
+        raise LayoutError(str(error)) from None
+
+
+def parsed(blend: bytes) -> dict[str, tuple[int, dict[str, int]]]:
+    """The description at the end of an uncompressed .blend file, see `_description`. ValueError, IndexError,
+    struct.error: there is none."""
+    data = memoryview(blend)[blend.rindex(b"SDNANAME") + 4 :]
+    names, at = _words(data, 0)
+    kinds, at = _words(data, at)
+    sizes = struct.unpack_from(f"<{len(kinds)}H", data, at + 4)
+    at += 4 + -(-len(kinds) // 2) * 4
+    (count,) = struct.unpack_from("<i", data, at + 4)
+    at += 8
+    records = {}
+    for _ in range(count):
+        own, number = struct.unpack_from("<2H", data, at)
+        fields = list(struct.iter_unpack("<2H", data[at + 4 : at + 4 + 4 * number]))
+        at += 4 + 4 * number
+        lengths = [_length(names[name], sizes[kind]) for kind, name in fields]
+        declared = [f"{kinds[kind]} {names[name]}" for kind, name in fields]
+        records[kinds[own]] = sizes[own], dict(zip(declared, accumulate(lengths, initial=0), strict=False))
+        if sum(lengths) != sizes[own]:
+            raise ValueError(kinds[own])
+    return records
+
+
+def _words(data: memoryview, at: int) -> tuple[list[str], int]:
+    """The words behind a mark and their number, and where the next mark begins."""
+    (count,) = struct.unpack_from("<i", data, at + 4)
+    words = bytes(data[at + 8 :]).split(b"\0", count)[:count]
+    end = at + 8 + sum(map(len, words)) + count
+    return [word.decode() for word in words], -(-end // 4) * 4
+
+
+def _length(name: str, size: int) -> int:
+    """Bytes of a field: the size of its type, or a pointer's, as often as its dimensions say."""
+    one = _POINTER if name.startswith(("*", "(*")) else size
+    return one * math.prod(map(int, re.findall(r"\[(\d+)\]", name)))
