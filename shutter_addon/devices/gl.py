@@ -32,6 +32,8 @@ FORMATS = {
     "rgba16ui": (4, "u2", np.uint16),
     "rgba32ui": (4, "u4", np.uint32),
 }
+# OpenGL functions that are called by ctypes, see _gl.
+_CALLED = "glUseProgram", "glDispatchCompute", "glFinish"
 # Of GL_NVX_gpu_memory_info, which Mesa's drivers have as well: all memory of the GPU, in kB.
 _TOTAL_MEMORY = 0x9048
 # Of GL_ATI_meminfo: what is free for textures, in kB, the first of four numbers.
@@ -65,12 +67,15 @@ def _egl() -> ctypes.CDLL:
 
 @cache
 def _gl(name: str) -> Callable[..., Any]:
-    """An OpenGL function without a result. ctypes releases Python's lock while it runs: other threads go on."""
+    """An OpenGL function without a result. ctypes releases Python's lock while it runs: other threads go on.
+    NoDeviceError: there is none."""
     if sys.platform == "win32":
         return getattr(ctypes.windll.opengl32, name)  # of OpenGL 1.1; others are not there
     find = _egl().eglGetProcAddress
     find.restype, find.argtypes = ctypes.c_void_p, [ctypes.c_char_p]
-    return ctypes.CFUNCTYPE(None)(find(name.encode()))
+    if not (address := find(name.encode())):  # to call that would end the process
+        raise NoDeviceError(f"no {name}")
+    return ctypes.CFUNCTYPE(None)(address)
 
 
 def _memory(context: moderngl.Context, renderer: str) -> int | None:
@@ -104,6 +109,8 @@ class GLDevice(PagedDevice):
         try:
             with _kept_context():
                 self._context = moderngl.create_context(standalone=True, require=430, **backend)
+                for name in _CALLED if _EGL else ():  # so that a lack is met here, and in no picture
+                    _gl(name)
                 with self._context:  # not current afterwards, so that another thread can use it
                     info = self._context.info
                     self.budget.tell(_memory(self._context, info["GL_RENDERER"]))

@@ -1,6 +1,8 @@
 """What is written to a device is what it holds, to the bit."""
 
 import inspect
+import sys
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -111,3 +113,17 @@ def test_moderngl_leaves_blenders_context_current(blender_device):
     texture = blender_device.texture(4, 4, 1, "rgba8")
     blender_device.write(texture, frame)
     assert np.array_equal(blender_device.read(texture)[0], frame)
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="elsewhere none is called by its address")
+def test_a_lack_of_functions_is_met_before_pictures(monkeypatch):
+    """As where a driver's EGL finds none: to call nothing would end Blender."""
+    from shutter_addon.devices import gl
+
+    egl = gl._egl()  # the library, in whose place another comes
+    names = "eglGetCurrentSurface", "eglGetCurrentDisplay", "eglGetCurrentContext", "eglMakeCurrent"
+    other = SimpleNamespace(eglGetProcAddress=lambda _name: None, **{name: getattr(egl, name) for name in names})
+    monkeypatch.setattr(gl, "_egl", lambda: other)  # the one way to a library without functions
+    gl._gl.cache_clear()  # as when Blender starts
+    with pytest.raises(NoDeviceError, match="no glUseProgram"):
+        gl.GLDevice()
