@@ -1,13 +1,14 @@
 """Masks at any frame, against Blender's own Mask strip."""
 
 import ctypes
+import json
 import random
 from contextlib import contextmanager
 from itertools import product
 
 import numpy as np
 import pytest
-from support import Like, write_frames
+from support import Like, picture_of, recipe, write_frames
 
 AVERAGE = 0.5  # what a picture may differ by, in 8-bit levels: Blender cuts off fractions
 ASTRAY = 0.001  # share of pixels that may differ by more than 8 levels
@@ -297,7 +298,7 @@ def other_blender(monkeypatch):
         forget()
 
     def forget():
-        for known in (struct_dna.record, struct_dna._description):
+        for known in (struct_dna.record, struct_dna.described):
             known.cache_clear()
 
     yield described
@@ -389,6 +390,28 @@ def test_parents_in_another_blender_are_refused(bpy, mask, mask_editor, clip, ed
     other_blender("MaskParent", "parent_orig", "origin")
     with pytest.raises(EffectError, match='mask "M": the parents of its points cannot be read in this version'):
         mask_reading.mask_at(mask, 5)
+
+
+def test_a_picture_of_another_blender(bpy, moving, effect, edit, other_blender, tmp_path):
+    """It is made, and what it lacks is said: once in renders."""
+    from shutter_addon.blender.data import recipe_import, strips
+    from shutter_addon.core.recipes import recipe_file
+
+    scene, effect, strip = strips.find_effect(effect.scene)
+    ramp = {"name": "m", "shutter": "S1", "kind": "ramp", "ramp": "linear"}
+    text = json.dumps(recipe(2, [1, 0], [0, 1], regions=[ramp]))
+    recipe_import.apply(scene, effect, strip, recipe_file.parse(text))
+    one = effect.regions[0]
+    one.kind, one.matte, one.mask = "MATTE", "MASK", moving
+    said = []
+    assert picture_of(strip.scene, 3, said.append) is not None
+    assert not said
+    other_blender("MaskLayerShape", "int frame", "float frame")
+    for frame in (4, 5):
+        assert picture_of(strip.scene, frame, said.append) is not None
+    assert [sentence.partition(":")[0] for sentence in said] == [
+        "The shape keys of masks cannot be read in this version of Blender"
+    ]
 
 
 @pytest.mark.parametrize("value", [float("nan"), float("inf"), 1e20])

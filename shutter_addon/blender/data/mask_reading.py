@@ -61,9 +61,9 @@ def mask_at(mask: bpy.types.Mask, frame: float) -> MaskShape:
 
     EffectError: its points or opacities are no usable numbers, or its parents cannot be read in this Blender.
     """
-    layers = [layer for layer in mask.layers if not layer.hide_render]
-    shown = tuple(_layer_at(mask, layer, frame) for layer in layers)
-    return MaskShape(shown, is_current=any(_shapes(layer) is None for layer in layers))
+    layers = [(layer, _shapes(layer)) for layer in mask.layers if not layer.hide_render]
+    shown = tuple(_layer_at(mask, layer, shapes or [], frame) for layer, shapes in layers)
+    return MaskShape(shown, is_current=any(shapes is None for _layer, shapes in layers))
 
 
 def motion(mask: bpy.types.Mask) -> Iterator[tuple]:
@@ -101,8 +101,8 @@ def moves(mask: bpy.types.Mask) -> bool:
     return bool(fcurves.curves_under(mask, "")) or next(motion(mask), None) is not None
 
 
-def _layer_at(mask, layer, frame: float) -> MaskLayer:
-    keyed = _keyed_points(layer, frame)
+def _layer_at(mask, layer, shapes: list[_Shape], frame: float) -> MaskLayer:
+    keyed = _keyed_points(layer, shapes, frame)
     splines, at = [], 0
     for spline in layer.splines:
         count = len(spline.points)
@@ -173,12 +173,9 @@ def _checked(mask, numbers) -> np.ndarray:
     return numbers
 
 
-def _keyed_points(layer, frame: float) -> np.ndarray | None:
-    """The points of all splines of a layer (n, 8) by its shape keys; None where it has none that fit, or that can be
-    read.
-
-    Shape keys are held before the first and behind the last."""
-    shapes = _shapes(layer)
+def _keyed_points(layer, shapes: list[_Shape], frame: float) -> np.ndarray | None:
+    """The points of all splines of a layer (n, 8) by its shape keys, which are held before the first and behind the
+    last; None where it has none that fit."""
     if not shapes:
         return None
     place = bisect_right([shape.frame for shape in shapes], frame)

@@ -31,7 +31,7 @@ def record(name: str, *fields: str) -> np.dtype:
     (uintp), text (bytes) and lists ("first" and "last"). LayoutError: it is another one in this Blender.
 
     fields: as Blender declares them, `float corners[4][2]`"""
-    size, places = _description().get(name, (0, {}))
+    size, places = described().get(name, (0, {}))
     parts = [match for field in fields if (match := _FIELD.fullmatch(field)) and field in places]
     if len(parts) < len(fields):
         raise LayoutError(name)
@@ -70,8 +70,9 @@ def _format(kind: str, stars: str, dimensions: str):
 
 
 @cache
-def _description() -> dict[str, tuple[int, dict[str, int]]]:
-    """Of each record its size, and by its fields as they are declared where these lie, in bytes."""
+def described() -> dict[str, tuple[int, dict[str, int]]]:
+    """Of each record its size, and by its fields as they are declared where these lie, in bytes. LayoutError: Blender
+    does not tell."""
     try:
         with tempfile.TemporaryDirectory(prefix="virtual_shutter_dna_", ignore_cleanup_errors=True) as folder:
             file = Path(folder, "dna.blend")
@@ -82,7 +83,7 @@ def _description() -> dict[str, tuple[int, dict[str, int]]]:
 
 
 def parsed(blend: bytes) -> dict[str, tuple[int, dict[str, int]]]:
-    """The description at the end of an uncompressed .blend file, see `_description`. ValueError, IndexError,
+    """The description at the end of an uncompressed .blend file, see `described`. ValueError, IndexError,
     struct.error: there is none."""
     data = memoryview(blend)[blend.rindex(b"SDNANAME") + 4 :]
     names, at = _words(data, 0)
