@@ -1017,8 +1017,8 @@ MESSAGES = {
     ("Virtual Shutter", "Mattes"): "Matten",
     (
         "*",
-        "How much of each shutter a pixel gets, in the shutters' colors",
-    ): "Wie viel jedes Verschlusses ein Pixel erhält, in den Farben der Verschlüsse",
+        "How much of each shutter a pixel gets, in the shutters' colors and patterns",
+    ): "Wie viel jedes Verschlusses ein Pixel erhält, in den Farben und Mustern der Verschlüsse",
     ("*", "Split Position"): "Teilung",
     (
         "*",
