@@ -1,5 +1,7 @@
 """Patterns that tell shutters apart where colours do not; the reference of what shaders/show.glsl draws."""
 
+from collections.abc import Sequence
+
 import numpy as np
 
 COUNT = 8  # plain, rising lines, dots, falling lines, horizontal, vertical, hatched, grid
@@ -10,7 +12,7 @@ _LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
 _DARK = 0.35  # code value below which a colour gets white ink
 
 
-def marks(index: int, x, y) -> np.ndarray:
+def marks(index: int, x: np.ndarray, y: np.ndarray) -> np.ndarray:
     """Where the pattern of the shutter at an index of the list has ink: bool, as x and y, which are places of the
     screen in units of the interface, y up. The first shutter's is plain; after COUNT they begin anew."""
     across, up = _within(x, _PERIOD) < _WIDTH, _within(y, _PERIOD) < _WIDTH
@@ -20,17 +22,16 @@ def marks(index: int, x, y) -> np.ndarray:
     return patterns[index % COUNT]
 
 
-def ink(color) -> tuple[float, float, float]:
+def ink(color: Sequence[float]) -> tuple[float, float, float]:
     """The ink of a pattern on a colour (3,), both display code values."""
     return (1.0, 1.0, 1.0) if np.dot(color, _LUMINANCE) < _DARK else (0.0, 0.0, 0.0)
 
 
-def painted(color, index: int, x, y) -> np.ndarray:
+def painted(color: Sequence[float], index: int, x: np.ndarray, y: np.ndarray) -> np.ndarray:
     """A colour (3,) with a pattern at places as for `marks`: (..., 3), display code values."""
     share = STRENGTH * marks(index, x, y)[..., None]
     return (1 - share) * np.asarray(color) + share * np.array(ink(color))
 
 
-def _within(place, period: float) -> np.ndarray:
-    place = np.asarray(place, dtype=np.float64)
+def _within(place: np.ndarray, period: float) -> np.ndarray:
     return place - np.floor(place / period) * period

@@ -1,0 +1,100 @@
+"""Operators that set as numbers, in a dialog, what is dragged or pointed at in the preview."""
+
+import math
+
+from bpy.app.translations import pgettext_rpt as rpt_
+from bpy.props import FloatProperty, FloatVectorProperty, IntVectorProperty
+from bpy.types import Operator
+
+from ...core.model.limits import MAX_DEGREES, MAX_DISTANCE, MAX_SCALE
+from ..data import annotations, preview_areas, selection
+from ..editing import region_edits
+from .operator_bases import OfEffect, OfRegion
+from .region_gizmo import wants_keys
+
+
+class SHUTTER_OT_region_transform(OfRegion, Operator):
+    """Move, turn and scale the active region by numbers, as its handles in the preview do"""
+
+    bl_idname = "shutter.region_transform"
+    bl_label = "Transform Region"
+
+    location: FloatVectorProperty(
+        name="Location",
+        description="Distance from where the region was drawn, as a fraction of the picture",
+        subtype="XYZ",
+        size=2,
+        min=-MAX_DISTANCE,
+        max=MAX_DISTANCE,
+        step=1,
+    )
+    rotation: FloatProperty(
+        name="Rotation",
+        description="Rotation about the region's center",
+        subtype="ANGLE",
+        min=-math.radians(MAX_DEGREES),
+        max=math.radians(MAX_DEGREES),
+    )
+    scale: FloatProperty(
+        name="Scale", description="Scale about the region's center", default=1.0, min=-MAX_SCALE, max=MAX_SCALE
+    )
+
+    def invoke(self, context, _event):
+        region = selection.active_region(selection.active(context)[1])
+        self.location, self.rotation, self.scale = region.location, region.rotation, region.scale
+        return context.window_manager.invoke_props_dialog(self)
+
+    def draw(self, _context):
+        self.layout.use_property_split = self.layout.activate_init = True
+        for name in ("location", "rotation", "scale"):
+            self.layout.prop(self, name)
+
+    def change(self, context, effect):
+        index, region = effect.active_region, selection.active_region(effect)
+        region.location, region.rotation, region.scale = self.location, self.rotation, self.scale
+        if wants_keys(context, effect, index):
+            region_edits.key_region(effect, index)
+
+
+class SHUTTER_OT_probe_pixel(OfEffect, Operator):
+    """Probe a pixel that is named by its numbers, and not the one under the pointer"""
+
+    bl_idname = "shutter.probe_pixel"
+    bl_label = "Probe Pixel"
+    bl_options = {"REGISTER"}
+    only_seen = True
+
+    pixel: IntVectorProperty(
+        name="Pixel",
+        description="Its column from the left and its row from below, from 1",
+        subtype="XYZ",
+        size=2,
+        min=1,
+    )
+
+    def invoke(self, context, _event):
+        size = annotations.picture_size(selection.active(context)[1])
+        at = context.window_manager.virtual_shutter.probe_at
+        inside = all(0 <= place < 1 for place in at)
+        self.pixel = [int(place * n) + 1 for place, n in zip(at if inside else (0.5, 0.5), size, strict=True)]
+        return context.window_manager.invoke_props_dialog(self)
+
+    def draw(self, _context):
+        self.layout.use_property_split = self.layout.activate_init = True
+        self.layout.prop(self, "pixel")
+
+    def change(self, context, effect):
+        width, height = annotations.picture_size(effect)
+        x, y = self.pixel
+        if x > width or y > height:
+            sentence = rpt_("The picture has {width} × {height} pixels")
+            self.report({"ERROR"}, sentence.format(width=width, height=height))
+            return {"CANCELLED"}
+        live = context.window_manager.virtual_shutter
+        live.live = live.probe = True
+        live.probe_at = (x - 0.5) / width, (y - 0.5) / height
+        preview_areas.redraw(context)
+        return None
+
+
+classes = (SHUTTER_OT_region_transform, SHUTTER_OT_probe_pixel)
