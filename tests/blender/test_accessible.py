@@ -86,10 +86,10 @@ def test_a_pixel_is_probed_by_numbers(bpy, effect):
     with sequencer(bpy) as area:
         area.spaces.active.view_type = "SEQUENCER_PREVIEW"
         assert selection.in_picture(bpy.context) is not None
-        assert bpy.ops.shutter.probe_pixel(pixel=(1, 24)) == {"FINISHED"}
+        assert bpy.ops.shutter.probe_pixel(column=1, row=24) == {"FINISHED"}
         assert live.probe
         assert tuple(live.probe_at) == pytest.approx((0.5 / 40, 23.5 / 24))
         with pytest.raises(RuntimeError, match="The picture has 40 × 24 pixels"):
-            bpy.ops.shutter.probe_pixel(pixel=(41, 1))
+            bpy.ops.shutter.probe_pixel(column=41, row=1)
     assert tuple(live.probe_at) == pytest.approx((0.5 / 40, 23.5 / 24))
     live.probe = False

@@ -209,8 +209,11 @@ def _draw_header(place: Layout, shutter, index: int, words: str) -> None:
     """Above the bars: what the shutter looks like in mattes, and words."""
     unit, (left, _, _, top) = drawing.ui_scale(), place.box
     bottom = top + 4 * unit
+    start, (_, _, right, upper) = left + (_SWATCH + 6) * unit, place.frame
+    if (end := start + drawing.text_width(words) + _PAD * unit) > right:  # on footage, words would be hard to read
+        drawing.rectangles([(right, top, end, upper)], [_BACK])
     drawing.swatch(left, bottom - unit, _SWATCH * unit, shutter, index)
-    drawing.text(left + (_SWATCH + 6) * unit, bottom, words)
+    drawing.text(start, bottom, words)
 
 
 class SHUTTER_GGT_bars(GizmoGroup):

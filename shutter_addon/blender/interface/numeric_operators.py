@@ -3,7 +3,7 @@
 import math
 
 from bpy.app.translations import pgettext_rpt as rpt_
-from bpy.props import FloatProperty, FloatVectorProperty, IntVectorProperty
+from bpy.props import FloatProperty, FloatVectorProperty, IntProperty
 from bpy.types import Operator
 
 from ...core.model.limits import MAX_DEGREES, MAX_DISTANCE, MAX_SCALE
@@ -45,9 +45,12 @@ class SHUTTER_OT_region_transform(OfRegion, Operator):
         return context.window_manager.invoke_props_dialog(self)
 
     def draw(self, _context):
-        self.layout.use_property_split = self.layout.activate_init = True
-        for name in ("location", "rotation", "scale"):
-            self.layout.prop(self, name)
+        layout = self.layout
+        layout.activate_init = True  # Blender heeds it neither with a property split nor for a vector
+        layout.prop(self, "location", index=0, text="Location X")
+        layout.prop(self, "location", index=1, text="Location Y")
+        layout.prop(self, "rotation")
+        layout.prop(self, "scale")
 
     def change(self, context, effect):
         index, region = effect.active_region, selection.active_region(effect)
@@ -64,35 +67,32 @@ class SHUTTER_OT_probe_pixel(OfEffect, Operator):
     bl_options = {"REGISTER"}
     only_seen = True
 
-    pixel: IntVectorProperty(
-        name="Pixel",
-        description="Its column from the left and its row from below, from 1",
-        subtype="XYZ",
-        size=2,
-        min=1,
-    )
+    column: IntProperty(name="Column", description="Number of the pixel from the left, from 1", default=1, min=1)
+    row: IntProperty(name="Row", description="Number of the pixel from below, from 1", default=1, min=1)
 
     def invoke(self, context, _event):
         size = annotations.picture_size(selection.active(context)[1])
         at = context.window_manager.virtual_shutter.probe_at
         inside = all(0 <= place < 1 for place in at)
-        self.pixel = [int(place * n) + 1 for place, n in zip(at if inside else (0.5, 0.5), size, strict=True)]
+        self.column, self.row = (
+            int(place * n) + 1 for place, n in zip(at if inside else (0.5, 0.5), size, strict=True)
+        )
         return context.window_manager.invoke_props_dialog(self)
 
     def draw(self, _context):
-        self.layout.use_property_split = self.layout.activate_init = True
-        self.layout.prop(self, "pixel")
+        self.layout.activate_init = True
+        self.layout.prop(self, "column")
+        self.layout.prop(self, "row")
 
     def change(self, context, effect):
         width, height = annotations.picture_size(effect)
-        x, y = self.pixel
-        if x > width or y > height:
+        if self.column > width or self.row > height:
             sentence = rpt_("The picture has {width} × {height} pixels")
             self.report({"ERROR"}, sentence.format(width=width, height=height))
             return {"CANCELLED"}
         live = context.window_manager.virtual_shutter
         live.live = live.probe = True
-        live.probe_at = (x - 0.5) / width, (y - 0.5) / height
+        live.probe_at = (self.column - 0.5) / width, (self.row - 0.5) / height
         preview_areas.redraw(context)
         return None
 

@@ -546,6 +546,8 @@ MESSAGES = {
     ("*", "Rotation"): "Rotation",
     ("*", "Rotation about the region's center"): "Rotation um die Mitte der Region",
     ("Operator", "Transform Region"): "Region transformieren",
+    ("*", "Location X"): "Position X",
+    ("*", "Location Y"): "Position Y",
     (
         "*",
         "Move, turn and scale the active region by numbers, as its handles in the preview do",
@@ -1048,11 +1050,10 @@ MESSAGES = {
         "*",
         "Probe a pixel that is named by its numbers, and not the one under the pointer",
     ): "Mit der Sonde ein Pixel zeigen, das durch Zahlen benannt ist, und nicht das unter dem Zeiger",
-    ("*", "Pixel"): "Pixel",
-    (
-        "*",
-        "Its column from the left and its row from below, from 1",
-    ): "Seine Spalte von links und seine Zeile von unten, ab 1",
+    ("*", "Column"): "Spalte",
+    ("*", "Number of the pixel from the left, from 1"): "Nummer des Pixels von links, ab 1",
+    ("*", "Row"): "Zeile",
+    ("*", "Number of the pixel from below, from 1"): "Nummer des Pixels von unten, ab 1",
     (
         "*",
         "The picture has {width} × {height} pixels",
