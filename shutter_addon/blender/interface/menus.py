@@ -25,6 +25,8 @@ class SHUTTER_MT_strip(Menu):
             SHUTTER_MT_of_preview,
         ):
             layout.menu(menu.__name__)
+        layout.separator()
+        layout.operator("shutter.copy_report", icon="COPYDOWN")
 
 
 class SHUTTER_MT_of_shutter(Menu):

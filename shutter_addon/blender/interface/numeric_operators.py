@@ -9,7 +9,7 @@ from bpy.types import Operator
 from ...core.model.limits import MAX_DEGREES, MAX_DISTANCE, MAX_SCALE
 from ..data import annotations, preview_areas, selection
 from ..editing import region_edits
-from .operator_bases import OfEffect, OfRegion
+from .operator_bases import OfEffect, OfRegion, report_error
 from .region_gizmo import wants_keys
 
 
@@ -88,7 +88,7 @@ class SHUTTER_OT_probe_pixel(OfEffect, Operator):
         width, height = annotations.picture_size(effect)
         if self.column > width or self.row > height:
             sentence = rpt_("The picture has {width} × {height} pixels")
-            self.report({"ERROR"}, sentence.format(width=width, height=height))
+            report_error(self, sentence.format(width=width, height=height))
             return {"CANCELLED"}
         live = context.window_manager.virtual_shutter
         live.live = live.probe = True
