@@ -4,14 +4,17 @@
 in vec2 corner;
 in vec2 place;
 out vec2 at;
+out vec2 pixel;
 uniform mat4 ModelViewProjectionMatrix;
 
 void main() {
   at = place;
+  pixel = corner;
   gl_Position = ModelViewProjectionMatrix * vec4(corner, 0.0, 1.0);
 }
 #else
 in vec2 at;
+in vec2 pixel;
 out vec4 shown;
 uniform bool srgbTarget;  // set by Blender: what is drawn into encodes by itself
 uniform float opacity;
@@ -32,18 +35,44 @@ void main() {
 }
 
 #elif defined(COEFFICIENTS)
-// The shutters' colours in shares of a pixel's coefficients, four shutters per layer.
+// The shutters' colours, with their patterns, in shares of a pixel's coefficients, four shutters per layer.
 uniform sampler2DArray coefficients, palette;
 uniform ivec2 size;
 uniform int block, count;
+uniform float unit;  // of the interface, in the region's pixels
+
+bool is_line(float place, float period) {
+  return place - floor(place / period) * period < 1.75;
+}
+
+// Where a shutter's pattern has ink; core/pixels/patterns.py is the reference.
+bool is_marked(int index, vec2 place) {
+  bool across = is_line(place.x, 8.0), up = is_line(place.y, 8.0);
+  bool rising = is_line(place.x - place.y + 0.3, 12.0), falling = is_line(place.x + place.y + 0.3, 12.0);
+  switch (index % 8) {
+    case 1: return rising;
+    case 2: return length(place - floor(place / 8.0) * 8.0 - 4.0) < 1.8;
+    case 3: return falling;
+    case 4: return up;
+    case 5: return across;
+    case 6: return rising || falling;
+    case 7: return across || up;
+  }
+  return false;
+}
+
+vec3 painted(vec3 color, int index) {
+  float ink = dot(color, vec3(0.2126, 0.7152, 0.0722)) < 0.35 ? 1.0 : 0.0;
+  return mix(color, vec3(ink), is_marked(index, pixel / unit) ? 0.4 : 0.0);
+}
 
 void main() {
-  ivec2 pixel = ivec2(vec2(at.x, 1.0 - at.y) * vec2(size));
+  ivec2 texel = ivec2(vec2(at.x, 1.0 - at.y) * vec2(size)) / block;
   vec3 mix_of_colors = vec3(0.0);
   float sum = 0.0;
   for (int i = 0; i < count; i++) {
-    float share = max(texelFetch(coefficients, ivec3(pixel / block, i / 4), 0)[i % 4], 0.0);
-    mix_of_colors += share * texelFetch(palette, ivec3(i, 0, 0), 0).rgb;
+    float share = max(texelFetch(coefficients, ivec3(texel, i / 4), 0)[i % 4], 0.0);
+    mix_of_colors += share * painted(texelFetch(palette, ivec3(i, 0, 0), 0).rgb, i);
     sum += share;
   }
   shown = on_region(vec4(mix_of_colors / max(sum, 1e-6), 1.0) * opacity);
@@ -57,8 +86,8 @@ uniform ivec2 size;
 uniform int block;
 
 void main() {
-  ivec2 pixel = ivec2(vec2(at.x, 1.0 - at.y) * vec2(size));
-  int label = int(texelFetch(labels, ivec3(pixel / block, 0), 0).r);
+  ivec2 texel = ivec2(vec2(at.x, 1.0 - at.y) * vec2(size)) / block;
+  int label = int(texelFetch(labels, ivec3(texel, 0), 0).r);
   vec3 color = texelFetch(palette, ivec3(max(label - 1, 0), 0, 0), 0).rgb;
   shown = on_region(vec4(color, 1.0) * (label > 0 ? opacity : 0.0));
 }

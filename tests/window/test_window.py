@@ -23,6 +23,16 @@ def test_bars_between_keys_and_the_extension_disabled(tmp_path):
     assert "Traceback" not in console
 
 
+def test_an_effect_without_a_mouse(tmp_path):
+    """By Blender's search, which finds operators in menus, by numbers in dialogs, and by arrow keys."""
+    seen, console = tell("keyboard_story.py", "opengl", linked(tmp_path), packages=packages(tmp_path / "packages"))
+    assert "Traceback" not in console
+    width, height = next(entry["outline"] for entry in seen if "outline" in entry)
+    assert 100 < width < 300
+    assert 100 < height < 300
+    assert next(entry["probed"] for entry in seen if "probed" in entry) == pytest.approx([319.5, 179.5], abs=0.01)
+
+
 def test_a_mask_as_a_matte(tmp_path):
     """Drawn in Blender's mask editor, with two shape keys: shown at once, moved by a new shape key, and the same in the
     preview, in a render and by a Blender without a window. Sharp within it, long exposed without."""

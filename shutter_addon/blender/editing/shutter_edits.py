@@ -8,7 +8,8 @@ from ..data import fcurves, property_copy, validation
 from . import bar_edits, collection_edits
 from .region_edits import remove_region
 
-# Told apart on footage and by colour-blind eyes (Okabe and Ito).
+# Told apart by eyes that lack red, green or blue cones: seven by Okabe and Ito (https://jfly.uni-koeln.de/color), then
+# three that lie farthest from these to all eyes.
 COLORS = (
     (0.337, 0.706, 0.914),
     (0.902, 0.624, 0.0),
@@ -17,6 +18,9 @@ COLORS = (
     (0.941, 0.894, 0.259),
     (0.835, 0.369, 0.0),
     (0.0, 0.447, 0.698),
+    (0.647, 1.0, 0.765),
+    (0.529, 0.294, 0.176),
+    (0.529, 0.471, 1.0),
 )
 
 
@@ -35,7 +39,7 @@ def start(effect) -> None:
 
 def add_shutter(effect, name: str = "", bars=None):
     """Appends a shutter, fully open unless bars (window,) are given, and makes it the active one."""
-    color = COLORS[len(effect.shutters) % len(COLORS)]
+    color = _free_color(effect)
     weights = np.ones(validation.number(effect, "window")) if bars is None else bars
     shutter = effect.shutters.add()
     shutter.name, shutter.color = name or data_("Shutter"), color
@@ -45,14 +49,21 @@ def add_shutter(effect, name: str = "", bars=None):
     return shutter
 
 
+def _free_color(effect) -> tuple[float, float, float]:
+    """The first colour that no shutter has; where all are taken, they begin anew."""
+    used = np.array([shutter.color for shutter in effect.shutters]).reshape(-1, 3)
+    free = [color for color in COLORS if not np.isclose(used, color, atol=1e-3).all(axis=1).any()]
+    return free[0] if free else COLORS[len(used) % len(COLORS)]
+
+
 def duplicate_shutter(effect, index: int):
     """A copy of a shutter, with its keys, behind it; regions stay with the original."""
-    scene, path = effect.id_data, f"{effect.path_from_id()}.shutters"
+    scene, path, color = effect.id_data, f"{effect.path_from_id()}.shutters", _free_color(effect)
     effect.shutters.add()
     last = len(effect.shutters) - 1
     old, new = effect.shutters[index], effect.shutters[last]
     property_copy.copy_properties(old, new)
-    new.color = COLORS[last % len(COLORS)]
+    new.color = color
     fcurves.copy_curves(scene, f"{path}[{index}].", scene, f"{path}[{last}].")
     move_shutter(effect, last, index + 1)
     effect.active_shutter = index + 1

@@ -15,9 +15,10 @@ from . import drawing, gizmo_keymaps
 
 _MARGIN, _HEIGHT, _BAR = 16, 96, 16  # in units of the interface
 _PAD, _HEADER = 8, 18
+_SWATCH = 12
 _SNAP = 0.1
 _FINE = 0.1
-_THRESHOLD = 3  # pixels that make a click a drag
+_THRESHOLD = 3  # units of the interface that make a click a drag
 _BACK = (0.08, 0.08, 0.08, 0.8)
 
 
@@ -116,7 +117,9 @@ class SHUTTER_GT_bars(Gizmo):
         shutter = selection.active_shutter(effect)
         words = bar_edits.open_for(scene, effect, strip, effect.active_shutter)
         words = words or bar_edits.summary(shown.bars, shutter.combine)
-        _draw(_layout(context, shown.bars), shutter, f"{shutter.name}   {words}", *shown)
+        place = _layout(context, shown.bars)
+        _draw(place, shutter, *shown)
+        _draw_header(place, shutter, effect.active_shutter, f"{shutter.name}   {words}")
 
     def test_select(self, context, location):
         return 0 if bar_under(context, *location) is not None else -1
@@ -136,7 +139,8 @@ class SHUTTER_GT_bars(Gizmo):
 
     def modal(self, context, event, tweak):
         mouse = event.mouse_region_x, event.mouse_region_y
-        self.paints = self.paints or max(abs(a - b) for a, b in zip(mouse, self.mouse, strict=True)) >= _THRESHOLD
+        threshold = _THRESHOLD * drawing.ui_scale()
+        self.paints = self.paints or max(abs(a - b) for a, b in zip(mouse, self.mouse, strict=True)) >= threshold
         # `tweak` knows of keys that are pressed while dragging, the event of those that were held before.
         fine, snap = "PRECISE" in tweak or event.shift, "SNAP" in tweak or event.ctrl
         if self.paints and (mouse != self.mouse or snap):
@@ -177,29 +181,39 @@ def marked(boxes, combine: str, thickness: float) -> list[tuple[float, float, fl
     return [(left, start, right, start + thickness) for (left, _, right, _), start in open_ones]
 
 
-def _draw(place: Layout, shutter, words: str, values, states) -> None:
+def _draw(place: Layout, shutter, values, states) -> None:
     left, bottom, right, top = place.box
     edges = np.linspace(left, right, place.count + 1)
     heights = bottom + np.minimum(values / place.top, 1.0) * (top - bottom)
-    gap = 1.0 if edges[1] - edges[0] > 3 else 0.0
+    thin, foot = drawing.line_width(), drawing.ui_scale() * 3
+    gap = thin if edges[1] - edges[0] > 3 * thin else 0.0
     colors = _key_colors()
     drawing.rectangles([place.frame], [_BACK])
-    boxes = [(a, bottom, b - gap, max(h, bottom + 1)) for a, b, h in zip(edges, edges[1:], heights, strict=False)]
+    boxes = [(a, bottom, b - gap, max(h, bottom + thin)) for a, b, h in zip(edges, edges[1:], heights, strict=False)]
     drawing.rectangles(boxes, np.tile((*shutter.color, 0.95), (place.count, 1)))
-    marks = marked(boxes, shutter.combine, drawing.ui_scale() * 3)
+    marks = marked(boxes, shutter.combine, foot)
     drawing.rectangles(marks, np.tile((0.0, 0.0, 0.0, 0.7), (len(marks), 1)))
-    foot = drawing.ui_scale() * 3
     keyed = [i for i, state in enumerate(states) if state]
     drawing.rectangles(
-        [(edges[i], bottom - foot - 1, edges[i + 1] - gap, bottom - 1) for i in keyed],
+        [(edges[i], bottom - foot - thin, edges[i + 1] - gap, bottom - thin) for i in keyed],
         [(*colors[states[i]][:3], 1.0) for i in keyed],
     )
     ticks = range(0, place.count + 1, max(1, 4 * (place.count // 32), 4 if place.count > 8 else 1))
     drawing.rectangles(
-        [(edges[k] - 0.5, bottom - foot - 4, edges[k] + 0.5, bottom - 1) for k in ticks],
+        [(edges[k] - thin / 2, bottom - 2 * foot - thin, edges[k] + thin / 2, bottom - thin) for k in ticks],
         np.tile((1, 1, 1, 0.5), (len(ticks), 1)),
     )
-    drawing.text(left, top + drawing.ui_scale() * 4, words)
+
+
+def _draw_header(place: Layout, shutter, index: int, words: str) -> None:
+    """Above the bars: what the shutter looks like in mattes, and words."""
+    unit, (left, _, _, top) = drawing.ui_scale(), place.box
+    bottom = top + 4 * unit
+    start, (_, _, right, upper) = left + (_SWATCH + 6) * unit, place.frame
+    if (end := start + drawing.text_width(words) + _PAD * unit) > right:  # on footage, words would be hard to read
+        drawing.rectangles([(right, top, end, upper)], [_BACK])
+    drawing.swatch(left, bottom - unit, _SWATCH * unit, shutter, index)
+    drawing.text(start, bottom, words)
 
 
 class SHUTTER_GGT_bars(GizmoGroup):

@@ -9,12 +9,19 @@ import numpy as np
 from gpu_extras.batch import batch_for_shader
 from mathutils import Matrix
 
+from ...core.pixels import patterns
+
 SIZE = 11  # of texts, in points
 
 
 def ui_scale() -> float:
     """Pixels per unit of Blender's interface."""
     return bpy.context.preferences.system.ui_scale
+
+
+def line_width() -> float:
+    """Pixels of Blender's own lines: with the interface's scale, and thicker or thinner by its Line Width."""
+    return bpy.context.preferences.system.pixel_size
 
 
 def wrapped(words: str, width: float, size: float | None = None) -> list[str]:
@@ -54,15 +61,26 @@ def rectangles(boxes, colors) -> None:
     _draw("TRIS", corners, np.repeat(np.asarray(colors, dtype=np.float32), 4, axis=0), triangles)
 
 
+def swatch(left: float, bottom: float, size: float, shutter, index: int) -> None:
+    """A square of a shutter's colour and of the pattern that it has at an index of the list, as mattes show it."""
+    left, bottom = round(left), round(bottom)
+    rectangles([(left, bottom, left + size, bottom + size)], [(*shutter.color, 1.0)])
+    y, x = np.mgrid[: round(size), : round(size)]
+    inked = np.argwhere(patterns.marks(index, (x + 0.5) / ui_scale(), (y + 0.5) / ui_scale()))[:, ::-1]
+    corners = np.add(inked, (left, bottom))
+    ink = (*patterns.ink(shutter.color), patterns.STRENGTH)
+    rectangles(np.hstack([corners, corners + 1]), np.tile(ink, (len(corners), 1)))
+
+
 def lines(points, color, closed: bool = False, width: float = 1.0) -> None:
-    """A line through points (n, 2)."""
+    """A line through points (n, 2); width: in widths of Blender's own lines."""
     points = np.asarray(points, dtype=np.float32)
     if len(points) < 2:
         return
     steps = np.arange(len(points) if closed else len(points) - 1, dtype=np.int32)
     pairs = np.stack([steps, (steps + 1) % len(points)], axis=1)
     shader = gpu.shader.from_builtin("POLYLINE_UNIFORM_COLOR")
-    shader.uniform_float("lineWidth", width * ui_scale())
+    shader.uniform_float("lineWidth", width * line_width())
     shader.uniform_float("viewportSize", gpu.state.viewport_get()[2:])
     shader.uniform_float("color", color)
     gpu.state.blend_set("ALPHA")
@@ -79,7 +97,7 @@ def text(x: float, y: float, words: str, size: float = SIZE, color=(1, 1, 1, 0.9
     blf.shadow(0, 3, 0, 0, 0, 0.8)
     if until is not None:
         blf.enable(0, blf.CLIPPING)
-        blf.clipping(0, x, y - 2 * size, until, y + 4 * size)
+        blf.clipping(0, x, y - size * ui_scale(), until, y + 2 * size * ui_scale())
     blf.draw(0, words)
     blf.disable(0, blf.SHADOW)
     blf.disable(0, blf.CLIPPING)

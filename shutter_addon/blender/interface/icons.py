@@ -1,18 +1,30 @@
-"""Little pictures of the presets' bars, for menus."""
+"""Little pictures of the presets' bars, for menus, and of the patterns that mattes show, for lists."""
 
 import bpy.utils.previews
 import numpy as np
 
 from ...core.model import presets
+from ...core.pixels import patterns
 
 _SIZE, _WINDOW = 32, 8
+_UNITS = 16  # of the interface, along each side of an icon
+_LIGHT = (0.8, 0.8, 0.8)
 _collections: dict = {}  # of Blender's icons, by name
 
 
 def of(preset: str) -> int:
     """The icon of a preset; 0, which is none, in the background."""
-    icons = _collections.get("presets", {})
-    return icons[preset].icon_id if preset in icons else 0
+    return _icon("presets", preset)
+
+
+def of_pattern(index: int) -> int:
+    """The icon of the pattern that the shutter at an index of the list has; 0, which is none, in the background."""
+    return _icon("patterns", str(index % patterns.COUNT))
+
+
+def _icon(collection: str, name: str) -> int:
+    icons = _collections.get(collection, {})
+    return icons[name].icon_id if name in icons else 0
 
 
 def _drawn(bars) -> np.ndarray:
@@ -25,14 +37,27 @@ def _drawn(bars) -> np.ndarray:
     return picture
 
 
+def _painted(index: int):
+    """A pattern as a picture (size, size, 4), bottom row first."""
+    y, x = (np.mgrid[:_SIZE, :_SIZE] + 0.5) * _UNITS / _SIZE
+    picture = np.ones((_SIZE, _SIZE, 4), dtype=np.float32)
+    picture[..., :3] = patterns.painted(_LIGHT, index, x, y)
+    return picture
+
+
 def register():
-    icons = _collections["presets"] = bpy.utils.previews.new()
-    for name in presets.PRESETS:
+    _make("presets", {name: _drawn(presets.bars(name, _WINDOW)) for name in presets.PRESETS})
+    _make("patterns", {str(index): _painted(index) for index in range(patterns.COUNT)})
+
+
+def _make(collection: str, pictures: dict) -> None:
+    icons = _collections[collection] = bpy.utils.previews.new()
+    for name, picture in pictures.items():
         icon = icons.new(name)
         icon.icon_size = icon.image_size = (_SIZE, _SIZE)
-        pixels = _drawn(presets.bars(name, _WINDOW)).ravel()
-        icon.icon_pixels_float = icon.image_pixels_float = pixels
+        icon.icon_pixels_float = icon.image_pixels_float = picture.ravel()
 
 
 def unregister():
-    bpy.utils.previews.remove(_collections.pop("presets"))
+    while _collections:
+        bpy.utils.previews.remove(_collections.popitem()[1])

@@ -49,10 +49,10 @@ class SHUTTER_GT_note_button(Gizmo):
             return
         (left, bottom, right, top), button = placed
         look = context.preferences.themes[0].user_interface.wcol_tool
-        unit = drawing.ui_scale()
+        unit, thin = drawing.ui_scale(), drawing.line_width()
         with drawing.pixel_space(context.region):
             drawing.rectangles([(left, bottom, right, top)], [(*look.outline[:3], 1.0)])
-            inner = (left + 1, bottom + 1, right - 1, top - 1)
+            inner = (left + thin, bottom + thin, right - thin, top - thin)
             drawing.rectangles([inner], [(*(look.inner_sel if self.is_highlight else look.inner)[:3], 1.0)])
             color = look.text_sel if self.is_highlight else look.text
             drawing.text(left + _PAD * unit, bottom + 6 * unit, button.label, color=(*color, 1.0))

@@ -263,6 +263,7 @@ class SHUTTER_OT_bar_set(OfShutter, Operator):
 
         effect = selection.active(context)[1]
         place = bar_under(context, event.mouse_region_x, event.mouse_region_y)
+        self.is_pointed_at = place is not None
         if place is not None:
             self.bar = place + 1
         try:
@@ -271,11 +272,13 @@ class SHUTTER_OT_bar_set(OfShutter, Operator):
             report_error(self, str(error))
             return {"CANCELLED"}
         self.weight = bars[min(self.bar, len(bars)) - 1]
-        title = iface_("Bar {number}").format(number=self.bar)
+        title = iface_("Bar {number}").format(number=self.bar) if self.is_pointed_at else ""
         return context.window_manager.invoke_props_dialog(self, width=200, title=title)
 
     def draw(self, _context):
         self.layout.activate_init = True
+        if not getattr(self, "is_pointed_at", False):  # from a menu, by keys
+            self.layout.prop(self, "bar")
         self.layout.prop(self, "weight")
 
     def change(self, context, effect):

@@ -18,6 +18,8 @@ _COLOR = (0.2, 0.9, 1.0, 0.9)
 _STRIDE = 12  # units of the interface from point to point, as the pointer is dragged
 _CLOSES = 8  # units of the interface around the first point, within which a click closes the curve
 _KEYS = {"ESC", "RIGHTMOUSE", "RET", "NUMPAD_ENTER", "BACK_SPACE"}
+_ARROWS = {"LEFT_ARROW": (-1, 0), "RIGHT_ARROW": (1, 0), "DOWN_ARROW": (0, -1), "UP_ARROW": (0, 1)}
+_STEP, _FINE = 10, 1  # units of the interface that an arrow key moves the pointer by, and with Shift
 
 
 class SHUTTER_OT_outline_points(OfOutline, Operator):
@@ -44,14 +46,15 @@ class SHUTTER_OT_outline_points(OfOutline, Operator):
         sharp_frame.show(context)
         self._drawn = bpy.types.SpaceSequenceEditor.draw_handler_add(self._draw, (), "PREVIEW", "POST_PIXEL")
         sentence = rpt_(
-            "Click points around the subject, Ctrl: straight, Backspace: one less, Return: close, Esc: nothing"
+            "Click points around the subject (arrow keys, Space), Ctrl: straight, Backspace: one less, "
+            "Return: close, Esc: nothing"
         )
         context.workspace.status_text_set(sentence)
         context.window_manager.modal_handler_add(self)
         return {"RUNNING_MODAL"}
 
     def execute(self, _context):
-        report_warning(self, rpt_("Open a sequencer with a preview to draw"))  # it is drawn with a mouse alone
+        report_warning(self, rpt_("Open a sequencer with a preview to draw"))  # it is drawn in a window alone
         return {"CANCELLED"}
 
     def modal(self, context, event):
@@ -61,22 +64,37 @@ class SHUTTER_OT_outline_points(OfOutline, Operator):
             return self._ended(context, {"CANCELLED"})
         if event.type == "LEFTMOUSE" and event.value == "RELEASE":
             self._is_down = False
-        if event.type in {"MOUSEMOVE", "LEFTMOUSE"} and self._is_over(event):
+        if event.type in _ARROWS and event.value == "PRESS":
+            return self._stepped(context, event)
+        if event.type in {"MOUSEMOVE", "LEFTMOUSE", "SPACE"} and self._is_over(event):
             return self._pointed(context, event)
         return self._key(context, event) if event.type in _KEYS else {"PASS_THROUGH"}
 
     def _pointed(self, context, event):
-        """A click adds a point; dragging adds one after the other."""
+        """A click or the space bar adds a point; dragging adds one after the other."""
         point = self._on_picture(event)
-        if event.type == "LEFTMOUSE" and event.value in {"PRESS", "DOUBLE_CLICK"}:
+        if event.type in {"LEFTMOUSE", "SPACE"} and event.value in {"PRESS", "DOUBLE_CLICK"}:
             if len(self._ways) > 2 and self._apart(point, self._ways[0][0]) <= _CLOSES * drawing.ui_scale():
                 return self._closed(context)
-            self._is_down = True
+            self._is_down = event.type == "LEFTMOUSE"
             self._ways.append(self._way(point, event.ctrl))
         elif self._is_down and self._apart(point, self._ways[-1][-1]) >= _STRIDE * drawing.ui_scale():
             self._ways.append(self._way(point, event.ctrl))
         self._next = self._way(point, event.ctrl) if self._ways else np.zeros((0, 2))
         self._area.tag_redraw()
+        return {"RUNNING_MODAL"}
+
+    def _stepped(self, context, event):
+        """An arrow key moves the pointer, from elsewhere to the preview's middle first."""
+        region = preview_areas.preview_region(self._area)
+        x, y = region.x + region.width // 2, region.y + region.height // 2
+        if self._is_over(event):
+            step = round((_FINE if event.shift else _STEP) * drawing.ui_scale())
+            x, y = (
+                place + step * way
+                for place, way in zip((event.mouse_x, event.mouse_y), _ARROWS[event.type], strict=True)
+            )
+        context.window.cursor_warp(x, y)
         return {"RUNNING_MODAL"}
 
     def _key(self, context, event):

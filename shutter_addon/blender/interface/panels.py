@@ -8,7 +8,7 @@ from ...core.messages import EffectError
 from ..data import annotations, data_format, selection, strips
 from ..editing import bar_edits, match_source
 from ..rendering import inbetween_build, strobing
-from . import inbetween_operators
+from . import icons, inbetween_operators
 from .bake_operators import Bake
 from .operator_bases import Mixin
 from .option_panels import Inbetween, Options
@@ -26,6 +26,7 @@ class SHUTTER_UL_shutters(UIList):
         color = row.row(align=True)
         color.ui_units_x = 1.0
         color.prop(shutter, "color", text="")
+        row.label(text="", icon_value=icons.of_pattern(index))
         row.prop(shutter, "name", text="", emboss=False)
         if index == 0:
             hint = row.row()

@@ -40,7 +40,7 @@ VIEWS = (
     ("RESULT", "Result", "The finished picture"),
     ("SPLIT", "Split", "The source on the left of the handle, the result on its right"),
     ("SCRIBBLES", "Scribbles", "The source, and where each shutter is scribbled"),
-    ("COEFFICIENTS", "Mattes", "How much of each shutter a pixel gets, in the shutters' colors"),
+    ("COEFFICIENTS", "Mattes", "How much of each shutter a pixel gets, in the shutters' colors and patterns"),
     (
         "HOLES",
         "Holes",
@@ -366,7 +366,8 @@ def _show_coefficients(quad, effect, renderer, request) -> None:
     coefficients, block = renderer.drawn_with_layers(replace(request, quick=True))
     count = len(request.state.bars)
     textures = {"coefficients": coefficients, "palette": _palette(effect)}
-    quad.draw("COEFFICIENTS", textures, opacity=0.75, block=block, count=count, size=_size(renderer))
+    unit = float(drawing.ui_scale())
+    quad.draw("COEFFICIENTS", textures, opacity=0.75, block=block, count=count, size=_size(renderer), unit=unit)
 
 
 def _size(renderer) -> tuple[int, int]:

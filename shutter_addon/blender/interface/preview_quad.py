@@ -29,7 +29,7 @@ class Quad:
         if (low >= high).any():
             return
         corners = [(low[0], low[1]), (high[0], low[1]), (high[0], high[1]), (low[0], high[1])]
-        shader = _shader(name)
+        shader = shader_of(name)
         shader.bind()
         for sampler, texture in textures.items():
             shader.uniform_sampler(sampler, texture.gpu)
@@ -44,7 +44,8 @@ class Quad:
 _shaders: dict = {}
 
 
-def _shader(name: str):
+def shader_of(name: str):
+    """What draws by a step of shaders/show.glsl, compiled once."""
     if name not in _shaders:
         quad, shown = read_pass("show", "QUAD"), read_pass("show", name)
         between = gpu.types.GPUStageInterfaceInfo("show_interface")

@@ -106,17 +106,18 @@ def _draw(region, point, shutters, probed: probe.Probed, of_layers: list[tuple[s
     for bottom, (name, share) in zip(place.lines[len(shutters) :], of_layers, strict=True):
         drawing.text(left, bottom, name, until=right - 44 * unit)
         drawing.text(right - 38 * unit, bottom, share)
-    for bottom, shutter, share in zip(place.lines, shutters, probed.coefficients, strict=False):
-        drawing.rectangles([(left, bottom, left + 10 * unit, bottom + 10 * unit)], [(*shutter.color, 1.0)])
-        drawing.text(left + 16 * unit, bottom, shutter.name, until=right - 44 * unit)
+    for i, (bottom, shutter, share) in enumerate(zip(place.lines, shutters, probed.coefficients, strict=False)):
+        drawing.swatch(left, bottom - unit, 12 * unit, shutter, i)
+        drawing.text(left + 18 * unit, bottom, shutter.name, until=right - 44 * unit)
         drawing.text(right - 38 * unit, bottom, f"{share:.1%}")
 
 
 def _draw_bars(box, bars, color) -> None:
     left, bottom, right, top = box
     edges = np.linspace(left, right, len(bars) + 1)
-    heights = bottom + np.maximum(bars / max(1.0, bars.max()) * (top - bottom), 1)
-    gap = 1.0 if edges[1] - edges[0] > 3 else 0.0
+    thin = drawing.line_width()
+    heights = bottom + np.maximum(bars / max(1.0, bars.max()) * (top - bottom), thin)
+    gap = thin if edges[1] - edges[0] > 3 * thin else 0.0
     boxes = [(a, bottom, b - gap, height) for a, b, height in zip(edges, edges[1:], heights, strict=False)]
     drawing.rectangles(boxes, np.tile(color, (len(bars), 1)))
 

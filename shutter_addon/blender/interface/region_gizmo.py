@@ -170,10 +170,15 @@ class SHUTTER_GT_region(Gizmo):
         if cancel:
             region.location, region.rotation, region.scale = self.before
             return
-        if bar_edits.auto_key(context) or MotionKeys(effect, index, region.motion).are_made():
+        if wants_keys(context, effect, index):
             _key(context, effect, index)
             context.area.tag_redraw()  # panels show keys
         bpy.ops.ed.undo_push(message=iface_("Transform Region", contexts.operator_default))
+
+
+def wants_keys(context, effect, index: int) -> bool:
+    """Whether a region that the editor moves is keyed: Blender's Auto Keying is on, or tracking has made keys of it."""
+    return bar_edits.auto_key(context) or MotionKeys(effect, index, effect.regions[index].motion).are_made()
 
 
 def _key(context, effect, index: int) -> None:

@@ -107,7 +107,7 @@ def draw_tracked(layout, effect, index: int | None) -> None:
         column = layout.column(align=True)
         text = iface_("Confidence: {percent} %").format(percent=f"{100 * confidence:.0f}")
         column.label(text=text, icon="CHECKMARK" if confidence >= SURE else "ERROR", translate=False)
-        column.operator(look)
+        column.operator(look, text="Next Unsure Frame")
     if index is None:  # a region's gaps go from its stops on
         _draw_camera_gaps(layout, effect)
     for frame, reason, is_fault in track_region.stops(effect, index):
@@ -190,7 +190,7 @@ class Follow(_WithRegion):
             sentence(layout, iface_("The track has changed"), "ERROR")
         row = layout.row(align=True)
         row.operator("shutter.follow", icon="TRACKER")
-        row.operator("shutter.follow_update", icon="FILE_REFRESH")
+        row.operator("shutter.follow_update", text="Update", icon="FILE_REFRESH")
 
 
 def _draw_tracks(layout, region, tracking) -> None:

@@ -284,10 +284,10 @@ class SHUTTER_OT_track_look(_Looks, OfRegion, Operator):
 
 
 class SHUTTER_OT_track_camera_look(_OfCamera, _Looks, OfEffect, Operator):
-    """Go to a frame that tracking is not sure of"""
+    """Go to a frame that tracking of the camera is not sure of"""
 
     bl_idname = "shutter.track_camera_look"
-    bl_label = "Next Unsure Frame"
+    bl_label = "Next Unsure Camera Frame"
 
 
 class _Follows(Mixin):
@@ -317,7 +317,7 @@ class SHUTTER_OT_follow_update(_Follows, OfStrokes, Operator):
     """Key the active region anew by what it follows, after the track has changed"""
 
     bl_idname = "shutter.follow_update"
-    bl_label = "Update"
+    bl_label = "Update Followed Track"
 
     def key(self, scene, effect, strip):
         follow_track.update(scene, effect, strip, effect.active_region)

@@ -10,6 +10,9 @@ MESSAGES = {
     ("*", "Shutter"): "Verschluss",
     ("*", "Regions"): "Regionen",
     ("*", "Bars"): "Balken",
+    ("*", "Shutters"): "Verschlüsse",
+    ("*", "Outline"): "Umriss",
+    ("*", "Preview"): "Vorschau",
     ("*", "Transform"): "Transformation",
     ("*", "Options"): "Optionen",
     ("*", "Presets"): "Voreinstellungen",
@@ -410,7 +413,6 @@ MESSAGES = {
         "*",
         "Insert keyframes for location, rotation and scale of the active region at the current frame",
     ): "Schlüsselbilder für Position, Rotation und Skalierung der aktiven Region beim aktuellen Bild einfügen",
-    ("Operator", "Transform Region"): "Region transformieren",
     ("*", "The shutter has no region: draw one"): "Der Verschluss hat keine Region: eine zeichnen",
     ("*", "Active Region"): "Aktive Region",
     ("*", "Name of the region"): "Name der Region",
@@ -504,8 +506,10 @@ MESSAGES = {
     " Linien)",
     (
         "*",
-        "Click points around the subject, Ctrl: straight, Backspace: one less, Return: close, Esc: nothing",
-    ): "Punkte um das Motiv klicken, Strg: gerade, Rücktaste: einer weniger, Eingabe: schließen, Esc: nichts",
+        "Click points around the subject (arrow keys, Space), Ctrl: straight, Backspace: one less, "
+        "Return: close, Esc: nothing",
+    ): "Punkte um das Motiv klicken (Pfeiltasten, Leertaste), Strg: gerade, Rücktaste: einer weniger, "
+    "Eingabe: schließen, Esc: nichts",
     ("*", "A curve has three points at least"): "Eine Kurve hat mindestens drei Punkte",
     ("Operator", "Outline to Mask"): "Umriss zu Maske",
     ("Operator", "Outline from Mask"): "Umriss aus Maske",
@@ -550,6 +554,13 @@ MESSAGES = {
     ): "Abstand vom Ort, an dem die Region gezeichnet wurde, als Bruchteil des Bildes",
     ("*", "Rotation"): "Rotation",
     ("*", "Rotation about the region's center"): "Rotation um die Mitte der Region",
+    ("Operator", "Transform Region"): "Region transformieren",
+    ("*", "Location X"): "Position X",
+    ("*", "Location Y"): "Position Y",
+    (
+        "*",
+        "Move, turn and scale the active region by numbers, as its handles in the preview do",
+    ): "Die aktive Region durch Zahlen bewegen, drehen und skalieren, wie es ihre Griffe in der Vorschau tun",
     ("*", "Scale"): "Skalieren",
     ("*", "Scale about the region's center"): "Skalierung um die Mitte der Region",
     # Mattes and ramps
@@ -1026,8 +1037,8 @@ MESSAGES = {
     ("Virtual Shutter", "Mattes"): "Matten",
     (
         "*",
-        "How much of each shutter a pixel gets, in the shutters' colors",
-    ): "Wie viel jedes Verschlusses ein Pixel erhält, in den Farben der Verschlüsse",
+        "How much of each shutter a pixel gets, in the shutters' colors and patterns",
+    ): "Wie viel jedes Verschlusses ein Pixel erhält, in den Farben und Mustern der Verschlüsse",
     ("*", "Split Position"): "Teilung",
     (
         "*",
@@ -1043,6 +1054,19 @@ MESSAGES = {
         "*",
         "The pixel that is probed, in fractions of the picture from its lower left corner",
     ): "Das Pixel, das die Sonde zeigt, in Bruchteilen des Bildes von seiner unteren linken Ecke",
+    ("Operator", "Probe Pixel"): "Pixel mit Sonde zeigen",
+    (
+        "*",
+        "Probe a pixel that is named by its numbers, and not the one under the pointer",
+    ): "Mit der Sonde ein Pixel zeigen, das durch Zahlen benannt ist, und nicht das unter dem Zeiger",
+    ("*", "Column"): "Spalte",
+    ("*", "Number of the pixel from the left, from 1"): "Nummer des Pixels von links, ab 1",
+    ("*", "Row"): "Zeile",
+    ("*", "Number of the pixel from below, from 1"): "Nummer des Pixels von unten, ab 1",
+    (
+        "*",
+        "The picture has {width} × {height} pixels",
+    ): "Das Bild hat {width} × {height} Pixel",
     ("*", "Shutter: {fault}"): "Verschluss: {fault}",
     ("*", "Preview: {what}"): "Vorschau: {what}",
     ("*", "{scale} of the size"): "{scale} der Größe",
@@ -1106,6 +1130,11 @@ MESSAGES = {
     ("*", "How sure tracking was of where it is"): "Wie sicher das Verfolgen war, wo es ist",
     ("*", "Confidence: {percent} %"): "Sicherheit: {percent} %",
     ("Operator", "Next Unsure Frame"): "Nächstes unsicheres Bild",
+    ("Operator", "Next Unsure Camera Frame"): "Nächstes unsicheres Bild der Kamera",
+    (
+        "*",
+        "Go to a frame that tracking of the camera is not sure of",
+    ): "Zu einem Bild gehen, das beim Verfolgen der Kamera unsicher ist",
     ("*", "Go to a frame that tracking is not sure of"): "Zu einem Bild gehen, das beim Verfolgen unsicher ist",
     ("*", "Frame"): "Bild",
     (
@@ -1282,6 +1311,7 @@ MESSAGES = {
         "Key the active region by a track of a movie clip, from where the region is at this frame",
     ): "Der aktiven Region Schlüsselbilder nach einer Spur eines Filmclips geben, von ihrem Ort in diesem Bild aus",
     ("Operator", "Update"): "Aktualisieren",
+    ("Operator", "Update Followed Track"): "Gefolgte Spur aktualisieren",
     (
         "*",
         "Key the active region anew by what it follows, after the track has changed",

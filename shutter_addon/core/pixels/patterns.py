@@ -1,0 +1,37 @@
+"""Patterns that tell shutters apart where colours do not; the reference of what shaders/show.glsl draws."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+COUNT = 8  # plain, rising lines, dots, falling lines, horizontal, vertical, hatched, grid
+STRENGTH = 0.4  # of the ink, over a shutter's colour
+_PERIOD, _SLANTED, _WIDTH, _RADIUS = 8.0, 12.0, 1.75, 1.8  # in units of the interface
+_OFF = 0.3  # no pixel's middle lies on an edge of a line, where rounding would decide
+_LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
+_DARK = 0.35  # code value below which a colour gets white ink
+
+
+def marks(index: int, x: np.ndarray, y: np.ndarray) -> np.ndarray:
+    """Where the pattern of the shutter at an index of the list has ink: bool, as x and y, which are places of the
+    screen in units of the interface, y up. The first shutter's is plain; after COUNT they begin anew."""
+    across, up = _within(x, _PERIOD) < _WIDTH, _within(y, _PERIOD) < _WIDTH
+    rising, falling = _within(x - y + _OFF, _SLANTED) < _WIDTH, _within(x + y + _OFF, _SLANTED) < _WIDTH
+    apart = np.hypot(_within(x, _PERIOD) - _PERIOD / 2, _within(y, _PERIOD) - _PERIOD / 2)
+    patterns = across & False, rising, apart < _RADIUS, falling, up, across, rising | falling, across | up
+    return patterns[index % COUNT]
+
+
+def ink(color: Sequence[float]) -> tuple[float, float, float]:
+    """The ink of a pattern on a colour (3,), both display code values."""
+    return (1.0, 1.0, 1.0) if np.dot(color, _LUMINANCE) < _DARK else (0.0, 0.0, 0.0)
+
+
+def painted(color: Sequence[float], index: int, x: np.ndarray, y: np.ndarray) -> np.ndarray:
+    """A colour (3,) with a pattern at places as for `marks`: (..., 3), display code values."""
+    share = STRENGTH * marks(index, x, y)[..., None]
+    return (1 - share) * np.asarray(color) + share * np.array(ink(color))
+
+
+def _within(place: np.ndarray, period: float) -> np.ndarray:
+    return place - np.floor(place / period) * period

@@ -1,0 +1,95 @@
+"""Every operator says what it does, is found by Blender's search, and does by numbers and keys what a mouse drags."""
+
+from types import SimpleNamespace
+
+import pytest
+from support import sequencer
+
+from shutter_addon.blender.data import selection
+
+
+class Recorder:
+    """Stands for Blender's layout, which only a window has: it notes the operators and menus that are put into it."""
+
+    def __init__(self):
+        self.operators, self.menus = [], []
+
+    def operator(self, name, **_look):
+        self.operators.append(name)
+        return SimpleNamespace()
+
+    def operator_menu_enum(self, name, _property, **_look):
+        return self.operator(name)
+
+    def menu(self, name, **_look):
+        self.menus.append(name)
+
+    menu_contents = menu
+
+    def separator(self):
+        pass
+
+    def prop(self, data, name, **_look):
+        assert name in data.bl_rna.properties
+
+    prop_menu_enum = prop
+
+
+@pytest.fixture(scope="module")
+def operators(bpy):
+    """By name: what Blender has of each of the extension's operators."""
+    return {f"shutter.{name}": getattr(bpy.ops.shutter, name).get_rna_type() for name in dir(bpy.ops.shutter)}
+
+
+def in_menu(bpy, name: str) -> list[str]:
+    """The operators of a menu and of all that open from it."""
+    recorder = Recorder()
+    getattr(bpy.types, name).draw(SimpleNamespace(layout=recorder), bpy.context)
+    return recorder.operators + [operator for menu in recorder.menus for operator in in_menu(bpy, menu)]
+
+
+def test_every_operator_has_a_name_of_its_own_and_a_description(operators):
+    assert len({rna.name for rna in operators.values()}) == len(operators)
+    for name, rna in operators.items():
+        assert rna.name, name
+        assert rna.description != rna.name, name
+        assert len(rna.description.split()) >= 4, name
+
+
+def test_every_operator_is_in_the_menu_of_strips_which_blenders_search_reads(bpy, effect, operators):
+    from shutter_addon.blender.interface import menus
+
+    assert set(in_menu(bpy, "SHUTTER_MT_strip")) == set(operators)
+    recorder = Recorder()
+    entry = bpy.types.SEQUENCER_MT_strip.draw._draw_funcs[-1]  # Blender tells of what was appended nowhere else
+    entry(SimpleNamespace(layout=recorder), bpy.context)
+    assert recorder.menus == [menus.SHUTTER_MT_strip.__name__]
+
+
+def test_a_region_is_moved_by_numbers_and_keyed_where_blender_keys_by_itself(bpy, effect, edit):
+    from shutter_addon.blender.data import fcurves
+    from shutter_addon.blender.editing import region_edits
+
+    region = region_edits.add_matte(effect, effect.shutters[1], "RAMP")
+    values = {"location": (0.25, -0.5), "rotation": 0.5, "scale": 2.0}
+    assert bpy.ops.shutter.region_transform(**values) == {"FINISHED"}
+    assert tuple(region.location) == (0.25, -0.5)
+    assert (region.rotation, region.scale) == (0.5, 2.0)
+    assert not list(fcurves.curves_under(edit, region.path_from_id()))
+    edit.tool_settings.use_keyframe_insert_auto = True
+    bpy.ops.shutter.region_transform(**values)
+    assert len(list(fcurves.curves_under(edit, region.path_from_id()))) == 4
+
+
+def test_a_pixel_is_probed_by_numbers(bpy, effect):
+    live = bpy.context.window_manager.virtual_shutter
+    with sequencer(bpy) as area:
+        area.spaces.active.view_type = "SEQUENCER_PREVIEW"
+        assert selection.in_picture(bpy.context) is not None
+        assert bpy.ops.shutter.probe_pixel(column=1, row=24) == {"FINISHED"}
+        assert live.probe
+        assert tuple(live.probe_at) == pytest.approx((0.5 / 40, 23.5 / 24))
+        with pytest.raises(RuntimeError, match="The picture has 40 × 24 pixels"):
+            bpy.ops.shutter.probe_pixel(column=41, row=1)
+    assert tuple(live.probe_at) == pytest.approx((0.5 / 40, 23.5 / 24))
+    live.probe = False

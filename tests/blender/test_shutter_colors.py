@@ -1,0 +1,68 @@
+"""New shutters have colours that colour-blind eyes tell apart."""
+
+import numpy as np
+import pytest
+from skimage import color
+
+# What is left of linear light for eyes that lack a kind of cones: Machado, Oliveira and Fernandes, "A Physiologically-
+# based Model for Simulation of Color Vision Deficiency", 2009, severity 1.
+EYES = {
+    "all cones": np.eye(3),
+    "protanopia": [[0.152286, 1.052583, -0.204868], [0.114503, 0.786281, 0.099216], [-0.003882, -0.048116, 1.051998]],
+    "deuteranopia": [[0.367322, 0.860646, -0.227968], [0.280085, 0.672501, 0.047413], [-0.01182, 0.04294, 0.968881]],
+    "tritanopia": [[1.255528, -0.076749, -0.178779], [-0.078411, 0.930809, 0.147602], [0.004733, 0.691367, 0.3039]],
+}
+APART = 10.0  # of CIEDE2000: about 1 is just seen with both side by side
+ON_FOOTAGE = 8.0
+FOOTAGE = (0.0, 0.0, 0.0), (0.5, 0.5, 0.5), (1.0, 1.0, 1.0)
+
+
+def seen(colors, eyes) -> np.ndarray:
+    """Display code values (n, 3) as those eyes see them: CIELAB (n, 3)."""
+    colors = np.asarray(colors, dtype=np.float64)
+    linear = np.where(colors <= 0.04045, colors / 12.92, ((colors + 0.055) / 1.055) ** 2.4)
+    linear = np.clip(linear @ np.transpose(EYES[eyes]), 0, 1)
+    return color.rgb2lab(np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * linear ** (1 / 2.4) - 0.055))
+
+
+@pytest.fixture(scope="module")
+def colors(bpy):
+    from shutter_addon.blender.editing import shutter_edits
+
+    return shutter_edits.COLORS
+
+
+def closest(first, second) -> float:
+    return color.deltaE_ciede2000(first[:, None], second[None]).min()
+
+
+@pytest.mark.parametrize("eyes", EYES)
+def test_colours_are_told_apart(colors, eyes):
+    lab = seen(colors, eyes)
+    assert all(closest(lab[[i]], lab[:i]) >= APART for i in range(1, len(lab)))
+
+
+@pytest.mark.parametrize("eyes", EYES)
+def test_colours_are_told_from_black_grey_and_white_of_footage(colors, eyes):
+    assert closest(seen(colors, eyes), seen(FOOTAGE, eyes)) >= ON_FOOTAGE
+
+
+def test_red_and_green_would_not_be_told_apart_without_red_cones():
+    """The simulation finds what it is to find."""
+    red, green = seen([(0.6, 0.2, 0.1), (0.37, 0.32, 0.1)], "protanopia")
+    assert color.deltaE_ciede2000(red, green) < APART
+
+
+def test_new_shutters_have_colours_that_no_other_has(effect):
+    from shutter_addon.blender.editing import shutter_edits
+
+    for _ in range(4):
+        shutter_edits.add_shutter(effect)
+    shutter_edits.duplicate_shutter(effect, 1)
+    shutter_edits.remove_shutter(effect, 0)
+    shutter_edits.add_shutter(effect)
+    while len(effect.shutters) < len(shutter_edits.COLORS):
+        shutter_edits.duplicate_shutter(effect, 0)
+    assert len({tuple(shutter.color) for shutter in effect.shutters}) == len(shutter_edits.COLORS)
+    shutter_edits.add_shutter(effect)
+    assert any(np.allclose(effect.shutters[-1].color, color, atol=1e-6) for color in shutter_edits.COLORS)

@@ -1,0 +1,128 @@
+"""What previews show of mattes: the shutters' colours with their patterns, the same by both renderers and by NumPy."""
+
+import numpy as np
+import pytest
+
+from shutter_addon.core.pixels import patterns
+from shutter_addon.devices.passes import read_pass
+
+WIDTH, HEIGHT, BLOCK, SHUTTERS, OPACITY = 48, 36, 4, 9, 0.75
+LEVEL = 1 / 255
+PLACES = [(0, 0), (WIDTH, 0), (0, HEIGHT), (WIDTH, HEIGHT)]
+CORNERS = [(0.0, 0.0), (1.0, 0.0), (0.0, 1.0), (1.0, 1.0)]
+TO_CLIP = np.array([[2 / WIDTH, 0, 0, -1], [0, 2 / HEIGHT, 0, -1], [0, 0, 1, 0], [0, 0, 0, 1]], dtype=np.float32)
+
+
+@pytest.fixture(scope="module")
+def given():
+    """Colours (S, 3), the first two dark, and coefficients (H / BLOCK, W / BLOCK, S), top row first; some texels are of
+    one shutter alone, as most are."""
+    random = np.random.default_rng(1)
+    colors = random.uniform(0.5, 1, (SHUTTERS, 3))
+    colors[1:3] = (0.1, 0.2, 0.3), (0.3, 0.1, 0)
+    shares = random.uniform(0, 1, (HEIGHT // BLOCK, WIDTH // BLOCK, SHUTTERS))
+    shares[:SHUTTERS, :9] = np.eye(SHUTTERS)[:, None]
+    return colors.astype(np.float32), (shares / shares.sum(axis=2, keepdims=True)).astype(np.float32)
+
+
+def layers(shares) -> np.ndarray:
+    """(layer, H, W, 4) of four shutters each."""
+    padded = np.pad(shares, ((0, 0), (0, 0), (0, -SHUTTERS % 4)))
+    return np.ascontiguousarray(np.moveaxis(padded.reshape(*shares.shape[:2], -1, 4), 2, 0))
+
+
+def by_numpy(colors, shares, unit) -> np.ndarray:
+    """(H, W, 3), bottom row first, as pictures of a GPU are."""
+    y, x = np.mgrid[:HEIGHT, :WIDTH] + 0.5
+    full = np.repeat(np.repeat(shares[::-1], BLOCK, axis=0), BLOCK, axis=1)
+    return sum(full[..., [i]] * patterns.painted(colors[i], i, x / unit, y / unit) for i in range(SHUTTERS))
+
+
+def by_moderngl(colors, shares, unit) -> np.ndarray:
+    import moderngl
+
+    context = moderngl.create_context(standalone=True, require=430, backend="egl")
+    sources = read_pass("show", "QUAD").source, read_pass("show", "COEFFICIENTS").source
+    program = context.program(vertex_shader=sources[0], fragment_shader=sources[1])
+    data = layers(shares)
+    palette = np.ones((1, 1, SHUTTERS, 4), dtype=np.float32)
+    palette[..., :3] = colors
+    for place, values in enumerate((data, palette)):
+        size = values.shape[2], values.shape[1], values.shape[0]
+        context.texture_array(size, 4, values.tobytes(), dtype="f4").use(place)
+    program["size"], program["block"], program["count"] = (WIDTH, HEIGHT), BLOCK, SHUTTERS
+    program["unit"], program["opacity"], program["srgbTarget"] = unit, OPACITY, False
+    program["ModelViewProjectionMatrix"].write(TO_CLIP.T.tobytes())
+    corners = np.hstack([PLACES, CORNERS]).astype(np.float32)
+    target = context.simple_framebuffer((WIDTH, HEIGHT), 4, dtype="f4")
+    target.use()
+    shape = context.vertex_array(program, [(context.buffer(corners.tobytes()), "2f 2f", "corner", "place")])
+    shape.render(moderngl.TRIANGLE_STRIP)
+    picture = np.frombuffer(target.read(components=4, dtype="f4"), np.float32).reshape(HEIGHT, WIDTH, 4)
+    context.release()
+    return picture
+
+
+def by_blender(colors, shares, unit) -> np.ndarray:
+    import gpu
+    from gpu_extras.batch import batch_for_shader
+    from mathutils import Matrix
+
+    from shutter_addon.blender.interface import preview_quad
+
+    data = layers(shares)
+    palette = np.ones((1, 1, SHUTTERS, 4), dtype=np.float32)
+    palette[..., :3] = colors
+    kept = {}  # what is drawn with is not freed before
+    target = gpu.types.GPUOffScreen(WIDTH, HEIGHT, format="RGBA32F")
+    with target.bind(), gpu.matrix.push_pop(), gpu.matrix.push_pop_projection():
+        gpu.matrix.load_identity()
+        gpu.matrix.load_projection_matrix(Matrix(TO_CLIP.tolist()))
+        shader = preview_quad.shader_of("COEFFICIENTS")
+        shader.bind()
+        for name, values in (("coefficients", data), ("palette", palette)):
+            buffer = gpu.types.Buffer("FLOAT", values.size, values.reshape(-1))
+            size = values.shape[2], values.shape[1]
+            texture = kept[name] = gpu.types.GPUTexture(size, layers=values.shape[0], format="RGBA32F", data=buffer)
+            shader.uniform_sampler(name, texture)
+        shader.uniform_int("size", (WIDTH, HEIGHT))
+        shader.uniform_int("block", BLOCK)
+        shader.uniform_int("count", SHUTTERS)
+        shader.uniform_float("unit", unit)
+        shader.uniform_float("opacity", OPACITY)
+        gpu.state.blend_set("NONE")
+        batch_for_shader(shader, "TRI_STRIP", {"corner": PLACES, "place": CORNERS}).draw(shader)
+        read = gpu.state.active_framebuffer_get().read_color(0, 0, WIDTH, HEIGHT, 4, 0, "FLOAT")
+    picture = np.array(read.to_list()).reshape(HEIGHT, WIDTH, 4)
+    target.free()
+    preview_quad.free()
+    return picture
+
+
+@pytest.mark.parametrize("unit", [1.0, 1.5, 2.0])
+@pytest.mark.parametrize("renderer", [by_moderngl, by_blender])
+def test_a_renderer_draws_the_reference(request, given, renderer, unit):
+    if renderer is by_blender:
+        request.getfixturevalue("blender_device")
+    colors, shares = given
+    picture, expected = renderer(colors, shares, unit), by_numpy(colors, shares, unit)
+    assert np.abs(picture[..., :3] - OPACITY * expected).max() <= LEVEL
+    assert np.abs(picture[..., 3] - OPACITY).max() <= LEVEL
+
+
+def test_patterns_differ_and_leave_most_of_the_colour():
+    y, x = np.mgrid[:48, :48] + 0.5
+    drawn = [patterns.marks(i, x, y) for i in range(patterns.COUNT)]
+    assert not drawn[0].any()
+    assert all(0.1 < marks.mean() < 0.45 for marks in drawn[1:])
+    for i, marks in enumerate(drawn):
+        assert all((marks != other).mean() > 0.1 for other in drawn[:i])
+    assert (patterns.marks(patterns.COUNT + 1, x, y) == drawn[1]).all()
+
+
+@pytest.mark.parametrize("unit", [1.0, 2.0])
+def test_patterns_grow_with_the_interface(unit):
+    """A line is as wide at any scale of the interface, in its units."""
+    x = np.arange(96) + 0.5
+    starts = np.diff(patterns.marks(5, x / unit, np.zeros(96)).astype(int)) == 1
+    assert np.diff(np.flatnonzero(starts)).tolist() == [8 * unit] * (len(np.flatnonzero(starts)) - 1)

@@ -1,0 +1,93 @@
+"""An effect without a mouse: by Blender's search, numbers and arrow keys; the pointer lies over the preview and is not
+moved. Run inside Blender, by test_window.py."""
+
+# ruff: noqa: E402 (Blender finds the helpers once it knows their folder)
+import os
+import sys
+from pathlib import Path
+
+sys.path[:0] = [str(Path(__file__).parent)]
+sys.path.append(os.environ["SHUTTER_PACKAGES"])  # OpenCV, which a Blender of a distribution need not have
+
+import bpy
+import driver
+import story
+
+
+def found(words, condition):
+    """Blender's search runs what it finds first."""
+    with driver.override("PREVIEW"):
+        bpy.ops.wm.search_menu("INVOKE_DEFAULT")
+    yield 0.8
+    driver.text(words)
+    yield 0.8
+    driver.shot(words.replace(" ", "_"))
+    driver.key("Return")
+    yield from driver.until(condition, f'"{words}" is found and done')
+
+
+def typed(*words):
+    """Into the fields of a dialog, whose first one is being edited, one after the other; Return closes it."""
+    yield 0.6
+    for k, number in enumerate(words):
+        if k:
+            driver.key("Tab")
+            yield 0.2
+        driver.key("ctrl+a")
+        driver.text(number)
+        yield 0.2
+    driver.shot(f"typed_{words[-1]}")
+    driver.key("Return")
+    yield 0.3
+    driver.key("Return")
+
+
+def outlined():
+    """Four points by arrow keys and the space bar; Return closes the curve."""
+    effect = story.effect()
+    with driver.override("PREVIEW"):
+        bpy.ops.shutter.draw("EXEC_DEFAULT", True, new=True, kind="OUTLINE")
+        bpy.ops.wm.tool_set_by_id(name="builtin.select_box")
+    yield 0.5
+    yield from found("outline from points", lambda: bpy.context.window_manager.windows[0].modal_operators)
+    for arrow in ("Right", "Up", "Left", "Down"):
+        driver.key("space")
+        yield 0.3
+        for _ in range(6):
+            driver.key(arrow)
+            yield 0.1
+    driver.shot("points")
+    driver.key("Return")
+    layer = effect.scene.annotation.layers[effect.regions[-1].layer]
+    yield from driver.until(lambda: any(drawing.strokes for drawing in layer.frames), "the curve is drawn")
+    points = [tuple(point.co[:2]) for point in layer.frames[0].strokes[0].points]
+    x, y = zip(*points, strict=True)
+    driver.saw(outline=[max(x) - min(x), max(y) - min(y)])
+
+
+def told():
+    yield from story.opened()
+    yield from story.movie_added()
+    story.edit().sequence_editor.active_strip = story.edit().sequence_editor.strips[0]
+    region = story.preview()
+    driver.move(region, region.width / 2, region.height / 2)
+    yield 0.5
+    yield from found("add shutter strip", lambda: len(story.edit().virtual_shutter.effects))
+    yield 0.5
+    yield from found("set bar weight", lambda: True)
+    yield from typed("3", "0.25")
+    yield from driver.until(lambda: story.effect().shutters[1].bars[2].weight == 0.25, "the bar is set")
+    yield from outlined()
+    yield from found("transform region", lambda: True)
+    yield from typed("0.1")
+    yield from driver.until(lambda: abs(story.effect().regions[-1].location[0] - 0.1) < 1e-6, "the region is moved")
+    yield from found("probe pixel", lambda: True)
+    yield from typed("320", "180")
+    live = bpy.context.window_manager.virtual_shutter
+    yield from driver.until(lambda: live.probe, "the probe is on")
+    driver.saw(probed=[live.probe_at[0] * 1280, live.probe_at[1] * 720])
+    driver.shot("probe")
+
+
+if __name__ == "__main__":
+    driver.play(told)
