@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from fractions import Fraction
+from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -85,6 +86,16 @@ def open_channel(
     if _is_movie(path, files):
         return _opened_channel(path, channel, stream)
     return SequenceChannel(path, channel, files=files)
+
+
+@cache
+def has_pyav() -> bool:
+    """Whether PyAV decodes movies; else a second Blender does, where one is lent."""
+    try:
+        from . import movie  # noqa: F401
+    except ImportError:
+        return False
+    return True
 
 
 def _is_movie(path: Path, files: Sequence[str | Path] | None) -> bool:

@@ -38,6 +38,11 @@ def picture(context: RenderContext, snapshot: Snapshot, frame: float, detail: De
     if (weights := context.settings.weights) is not None:
         place = weights / f"{round(frame - snapshot.first + 1):04d}.exr"
         _write_weights(place, snapshot, frame, session.weights(request, context.stopped))
+    if renderer.source.by_blender:
+        _say_once(
+            rpt_("a second Blender decodes movies, which is slow: install the zip that is made for your system"),
+            context.say,
+        )
     made = session.picture(request, context.stopped)
     for sentence in shortages(renderer, request):
         _say_once(sentence, context.say)
