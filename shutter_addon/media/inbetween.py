@@ -113,12 +113,9 @@ def build(
     the same for any chunks and any interruptions. The source must not be used elsewhere meanwhile. Returns how far the
     build came. MediaError: a package is missing, or a frame cannot be read or written, and finished pairs are kept; or
     the source was written to meanwhile."""
-    if package := cuts.missing_package():
-        raise MediaError(
-            f"in-between frames need the Python package {package}; "
-            "install the zip of Virtual Shutter that is made for your system"
-        )
-    between = between or flow.between
+    if between is None:
+        flow.check()
+        between = flow.between
     cache = InbetweenCache(source, folder, factor, method)
     pairs = _pairs(source, frames) if pairs is None else pairs
     cache.prepare()

@@ -5,7 +5,7 @@ from bpy.app.translations import pgettext_iface as iface_
 from bpy.app.translations import pgettext_n as n_
 
 from ...devices.device import NoDeviceError
-from ...media import cuts, opening
+from ...media import opening
 from ..data import selection, source_media, strips
 from ..devices import available
 from ..rendering import inbetween_build, render_settings, sessions
@@ -28,10 +28,6 @@ class Options(WithEffect):
         column.active = any(region.is_layer for region in effect.regions)
         for name in ("decontaminate", "plate_reach"):
             column.prop(effect, name)
-        package = effect.stop_at_cuts and cuts.missing_package()
-        if package:
-            text = iface_("Cuts are not found: the Python package {package} is missing").format(package=package)
-            sentence(layout, text, "ERROR")
         layout.prop(effect, "use_source_time")
         column = layout.column()
         column.active = effect.use_source_time

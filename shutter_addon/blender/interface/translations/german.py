@@ -899,10 +899,6 @@ MESSAGES = {
     ): "Belichtungen enden an den Schnitten der Quelle wie an den Enden des Clips",
     (
         "*",
-        "Cuts are not found: the Python package {package} is missing",
-    ): "Schnitte werden nicht gefunden: das Python-Paket {package} fehlt",
-    (
-        "*",
         "Movies: a second Blender decodes them, which is slow",
     ): "Filme: ein zweites Blender dekodiert sie, was langsam ist",
     ("*", "Default at Edge"): "Standard am Rand",
