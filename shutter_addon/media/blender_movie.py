@@ -27,10 +27,10 @@ class BlenderMovie(FrameSource):
     def __init__(self, path: str | Path, *, deinterlace: bool = False):
         self.path = check_file(path)
         check_name(self.path.absolute())
-        self._deinterlace = bool(deinterlace)
-        self.options = {"stream": 0, "deinterlace": self._deinterlace}
+        self.options = {"stream": 0, "deinterlace": bool(deinterlace)}
+        self._movie = decoding_child.Movie(self.path, bool(deinterlace))
         try:
-            about, _ = decoding_child.ask(self.path.absolute(), self._deinterlace, "about")
+            about = self._movie.about()
         except MediaError as error:
             raise MediaError(f"{self.path.name}: cannot be read as a movie ({error})") from None
         self.width, self.height = about["size"]
@@ -47,7 +47,7 @@ class BlenderMovie(FrameSource):
     def read(self, index: int) -> np.ndarray:
         check_index(self, index)
         try:
-            _, frame = decoding_child.ask(self.path.absolute(), self._deinterlace, index)
+            frame = self._movie.frame(index)
         except MediaError as error:
             raise MediaError(f"frame {index} of {self.path.name} cannot be decoded: {error}") from None
         if frame is None or frame.shape != (self.height, self.width, 4) or frame.dtype != self.dtype:
@@ -55,7 +55,7 @@ class BlenderMovie(FrameSource):
         return frame
 
     def close(self) -> None:
-        decoding_child.ask(self.path.absolute(), self._deinterlace, "close")
+        self._movie.close()
 
 
 class BlenderMovieChannel(BlenderMovie):

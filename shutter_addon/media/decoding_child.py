@@ -3,6 +3,7 @@ as blender/data/decoding_process.py says, and ends with this one, or some time a
 
 from __future__ import annotations
 
+import itertools
 import json
 import subprocess
 import threading
@@ -20,6 +21,7 @@ _ENDING = 5  # seconds after which a process that does not end is killed
 
 _command: list[str] | None = None
 _process: subprocess.Popen[bytes] | None = None
+_numbers = itertools.count()
 _asking = threading.Lock()  # one question at a time, from any thread
 
 
@@ -40,12 +42,28 @@ def is_lent() -> bool:
     return _command is not None
 
 
-def ask(path: Path, deinterlace: bool, wanted: str | int) -> tuple[dict, np.ndarray | None]:
-    """What the process says, and a frame, of new memory, where it is asked for one. MediaError: why there is none,
-    without a name."""
-    question = json.dumps({"path": str(path), "deinterlace": deinterlace, "wanted": wanted}).encode() + b"\n"
+class Movie:
+    """A movie that can be asked for. The process opens it when it is, for itself and no other one of the same file."""
+
+    def __init__(self, path: Path, deinterlace: bool):
+        self._known = {"number": next(_numbers), "path": str(path.absolute()), "deinterlace": deinterlace}
+
+    def about(self) -> dict:
+        """What decoding_process.Movie.about has. MediaError: why it cannot be read, without its name."""
+        return _ask(self._known | {"wanted": "about"})[0]
+
+    def frame(self, index: int) -> np.ndarray | None:
+        """A frame, of new memory. MediaError: why it cannot be decoded."""
+        return _ask(self._known | {"wanted": index})[1]
+
+    def close(self) -> None:
+        _ask(self._known | {"wanted": "close"})
+
+
+def _ask(wanted: dict) -> tuple[dict, np.ndarray | None]:
+    question = json.dumps(wanted).encode() + b"\n"
     with _asking:
-        if wanted == "close" and (_process is None or _process.poll() is not None):
+        if wanted["wanted"] == "close" and (_process is None or _process.poll() is not None):
             return {}, None
         for _ in range(2):  # it may have ended for want of work, or with another movie
             try:

@@ -15,8 +15,9 @@ import numpy as np
 import pytest
 from footage import COUNT, cut_file, make_movie, number, picture
 
-from shutter_addon.media import MediaError, decoding_child, open_source
+from shutter_addon.media import MediaError, decoding_child, flow, inbetween, open_source
 from shutter_addon.media.blender_movie import BlenderMovie, BlenderMovieChannel, frame_rate
+from shutter_addon.media.inbetween import InbetweenSource
 from shutter_addon.media.opening import open_channel
 
 ROOT = Path(__file__).parents[2]
@@ -108,8 +109,11 @@ def test_arrays_belong_to_the_caller_and_a_closed_movie_is_read_again(movies):
     first = source.read(3)
     kept = first.copy()
     first[:] = 7
-    source.close()
-    source.close()
+    with BlenderMovie(source.path) as other:
+        source.close()
+        source.close()
+        for index in (1, 2, 3):
+            assert np.array_equal(other.read(index), source.read(index))
     assert np.array_equal(source.read(3), kept)
     source.close()
 
@@ -199,6 +203,21 @@ def test_a_blender_that_does_not_answer_is_one_sentence(coloured, command, reaso
     sentence = rf"^bt709\.mp4: cannot be read as a movie \(the Blender that decodes it {reason}\)$"
     with pytest.raises(MediaError, match=sentence):
         BlenderMovie(coloured["bt709.mp4"])
+
+
+def test_in_between_frames_that_are_built_already_are_used(coloured, tmp_path, monkeypatch):
+    """Without PyAV and OpenCV, and what is not built is refused, before anything is written."""
+    path = coloured["bt709.mp4"]
+    with open_source(path) as by_pyav:
+        inbetween.build(by_pyav, tmp_path, 2, "quick")
+        built = InbetweenSource(by_pyav, tmp_path, 2, "quick").read(1)
+    monkeypatch.setattr(flow, "cv2", None)
+    with BlenderMovie(path) as source:
+        assert inbetween.build(source, tmp_path, 2, "quick").name == "ready"
+        assert np.array_equal(InbetweenSource(source, tmp_path, 2, "quick").read(1), built)
+        with pytest.raises(MediaError, match=r"^in-between frames need the Python package opencv"):
+            inbetween.build(source, tmp_path / "none", 2, "quick")
+    assert not (tmp_path / "none").exists()
 
 
 @linux

@@ -1,7 +1,8 @@
 """What a second Blender runs to decode movies: it answers on its output what it is asked on its input, until that ends.
 
-Blender runs it as a script, no part of the extension there. A question is a line of JSON: `path` and
-`deinterlace` of a movie, and `wanted`, which is "about", "close", or a frame's index. An answer is a line of JSON, and
+Blender runs it as a script, no part of the extension there. A question is a line of JSON: `number`,
+`path` and `deinterlace` of a movie, and `wanted`, which is "about", "close", or a frame's index; a file may be open
+several times, by several numbers. An answer is a line of JSON, and
 as many bytes behind it as its `bytes` says. Before the first comes a line that reads as the script's last argument.
 """
 
@@ -97,38 +98,42 @@ class Movies:
     """Those that are open, the one that was asked for last at the end."""
 
     def __init__(self) -> None:
-        self._open: dict[tuple[str, bool], Movie] = {}
+        self._open: dict[int, Movie] = {}
+
+    @property
+    def last(self) -> Movie:
+        return next(reversed(self._open.values()))
 
     def __len__(self) -> int:
         return len(self._open)
 
-    def get(self, path: str, deinterlace: bool) -> Movie:
+    def get(self, number: int, path: str, deinterlace: bool) -> Movie:
         """It, opened if it is not."""
-        movie = self._open.pop((path, deinterlace), None) or Movie(path, deinterlace)
+        movie = self._open.pop(number, None) or Movie(path, deinterlace)
         while len(self._open) >= OPENED:
-            self.close(*next(iter(self._open)))
-        self._open[path, deinterlace] = movie
+            self.close(next(iter(self._open)))
+        self._open[number] = movie
         return movie
 
-    def close(self, path: str, deinterlace: bool) -> None:
+    def close(self, number: int) -> None:
         """Closes it, if it is open."""
-        if movie := self._open.pop((path, deinterlace), None):
+        if movie := self._open.pop(number, None):
             movie.close()
 
 
-def _answer(movies: Movies, path: str, deinterlace: bool, wanted: str | int) -> tuple[dict, np.ndarray | None]:
-    """The line and the bytes that are an answer."""
+def _answer(movies: Movies, wanted: str | int, **which) -> tuple[dict, np.ndarray | None]:
+    """The line and the bytes that are an answer. which: what Movies.get takes"""
     try:
         if wanted == "close":
-            movies.close(path, deinterlace)
+            movies.close(which["number"])
             return {}, None
-        movie = movies.get(path, deinterlace)
+        movie = movies.get(**which)
         if wanted == "about":
             return movie.about(), None
         frame = movie.frame(int(wanted))
         return {"shape": frame.shape, "dtype": frame.dtype.name}, frame
     except (RuntimeError, MemoryError) as error:
-        movies.close(path, deinterlace)
+        movies.close(which["number"])
         return {"error": " ".join(str(error).split()) or "there is no memory for it"}, None
 
 
@@ -160,7 +165,7 @@ def main() -> None:
         if frame is not None:
             answers.write(frame.data)
             answers.flush()
-            movies.get(question["path"], question["deinterlace"]).read_on()
+            movies.last.read_on()
 
 
 if __name__ == "__main__":
