@@ -12,7 +12,7 @@ from ..core.frames.frame_source import FrameSource
 from . import decoding_child
 from .channels import CHANNELS, no_channel
 from .errors import MediaError
-from .files import check_file, check_index, check_name, check_size
+from .files import OTHER, check_file, check_index, check_name, check_size, is_other
 
 _FLOAT_ERROR = 2**-23  # relative, of a number that Blender has as a float
 
@@ -47,6 +47,8 @@ class BlenderMovie(FrameSource):
     def read(self, index: int) -> np.ndarray:
         check_index(self, index)
         try:
+            if is_other(self.path):  # in the place of the file that was there
+                raise MediaError(OTHER)
             frame = self._movie.frame(index)
         except MediaError as error:
             raise MediaError(f"frame {index} of {self.path.name} cannot be decoded: {error}") from None

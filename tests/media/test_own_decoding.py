@@ -4,6 +4,7 @@ import os
 import random
 import select
 import signal
+import struct
 import subprocess
 import sys
 from concurrent.futures import ThreadPoolExecutor
@@ -11,9 +12,10 @@ from contextlib import ExitStack
 from fractions import Fraction
 from pathlib import Path
 
+import av
 import numpy as np
 import pytest
-from footage import COUNT, cut_file, make_movie, number, picture
+from footage import COUNT, cut_file, damage_frame, make_movie, number, picture, save_image
 
 from shutter_addon.media import MediaError, decoding_child, flow, inbetween, open_source
 from shutter_addon.media.blender_movie import BlenderMovie, BlenderMovieChannel, frame_rate
@@ -144,6 +146,55 @@ def test_what_is_no_movie_is_one_sentence(movies, tmp_path):
         with pytest.raises(MediaError, match=rf"^{path.name}: {reason}"):
             BlenderMovie(path)
     assert_same(movies["b_frames.mp4"][0])
+
+
+def hostile(folder, movies):
+    """Files that are no movies, or hardly. Blender may read some of them, as PyAV does."""
+    sound, still = folder / "sound.mp4", folder / "still.mp4"
+    with av.open(str(sound), "w") as out:
+        stream = out.add_stream("aac", rate=8000, layout="mono")
+        frame = av.AudioFrame.from_ndarray(np.zeros((1, 1024), np.float32), format="fltp", layout="mono")
+        frame.sample_rate = 8000
+        out.mux(stream.encode(frame))
+        out.mux(stream.encode())
+    save_image(folder / "still.png", picture(1)).rename(still)
+    absurd = make_movie(folder / "absurd.avi", "ffv1", 5)
+    data = absurd.read_bytes()
+    where = data.index(b"strf") + 12
+    absurd.write_bytes(data[:where] + struct.pack("<2i", 30000, 20000) + data[where + 8 :])
+    noise = folder / "noise.mkv"
+    noise.write_bytes(np.random.default_rng(3).bytes(9000))
+    head = cut_file(movies["open.mkv"][0], folder / "head.mkv", 0.12)
+    damaged = damage_frame(movies["b_frames.mp4"][0], folder / "damaged.mp4", 9)
+    raw = make_movie(folder / "raw.h264", "libx264", format="h264")
+    return sound, still, absurd, noise, head, damaged, raw, cut_file(movies["open.mkv"][0], folder / "cut.mkv", 0.5)
+
+
+def test_hostile_files_are_pictures_or_one_sentence_and_all_else_goes_on(movies, tmp_path):
+    refused = {}
+    for path in hostile(tmp_path, movies):
+        try:
+            with BlenderMovie(path) as source:
+                for index in (0, source.count // 2, source.count - 1):
+                    assert source.read(index).shape == (source.height, source.width, 4)
+        except MediaError as error:
+            refused[path.name] = str(error)
+    assert [*refused] == ["sound.mp4", "still.mp4", "absurd.avi", "noise.mkv", "head.mkv", "raw.h264"]
+    for name, sentence in refused.items():
+        begins = f"{name}: cannot be read as a movie (Blender ", f"{name}: its length is unknown"
+        assert sentence.startswith(begins), sentence
+    assert_same(movies["b_frames.mp4"][0])
+
+
+@linux
+def test_a_pipe_in_the_place_of_a_movie_that_was_read(tmp_path):
+    path = make_movie(tmp_path / "a.mp4", "libx264", 3)
+    with BlenderMovie(path) as source:
+        source.close()
+        path.unlink()
+        os.mkfifo(path)
+        with pytest.raises(MediaError, match=r"^frame 1 of a\.mp4 cannot be decoded: is no file, but a pipe"):
+            source.read(1)
 
 
 def test_frame_rates_are_those_of_films():
