@@ -18,6 +18,7 @@ import pytest
 ROOT = Path(__file__).parents[1]
 NAME = "bl_ext.user_default.virtual_shutter"
 MAKE_EDIT = ROOT / "tests" / "blender" / "installed.py"
+LACKING = ROOT / "tests" / "blender" / "lacking.py"
 SYSTEM = {"linux": "linux-x64", "win32": "windows-x64", "darwin": "macos-arm64"}[sys.platform]
 WHEELS = {"av", "glcontext", "moderngl", "opencv_contrib_python_headless", "scenedetect", "tqdm"}
 REQUIRED = {"click", "platformdirs"}  # by PySceneDetect; Windows's console needs colorama besides
@@ -26,7 +27,7 @@ RECIPE = {
     "window": 4,
     "shutters": [{"name": "Long", "bars": [1, 1, 1, 1]}, {"name": "Sharp", "bars": [1, 0, 0, 0]}],
     "regions": [
-        {"shutter": "Long", "strokes": [[[0.1, 0.1], [0.1, 0.9]]]},
+        {"name": "R", "shutter": "Long", "strokes": [[[0.1, 0.1], [0.1, 0.9]]]},
         {"shutter": "Sharp", "kind": "lasso", "strokes": [[[0.4, 0.3], [0.6, 0.3], [0.5, 0.7]]]},
     ],
 }
@@ -213,13 +214,14 @@ except NoDeviceError as error:
     assert forced.startswith("the Python package moderngl cannot be loaded")
 
 
-def test_cuts_are_found_without_what_pyscenedetects_command_needs():
-    code = (
-        "from shutter_addon.media import cuts\nprint(cuts.missing_package())\nprint('scenedetect._cli' in sys.modules)"
-    )
-    assert without(["click", "platformdirs"], code).split() == ["None", "False"]
-    assert without(["scenedetect"], code).split()[0] == "scenedetect"
-    assert without(["cv2"], code).split()[0] == "opencv-contrib-python-headless"
+def test_pyscenedetect_finds_cuts_without_what_its_command_needs():
+    code = """
+from shutter_addon.media import cuts
+print(cuts.has_pyscenedetect(), 'scenedetect._cli' in sys.modules)
+"""
+    assert without(["click", "platformdirs"], code).split() == ["True", "False"]
+    for package in ("scenedetect", "cv2"):
+        assert without([package], code).split()[0] == "False"
 
 
 def test_pyscenedetect_is_loaded_where_cuts_are_looked_for():
@@ -339,7 +341,8 @@ def test_installed_with_wheels(blender, blenders_python, bunny, recipe, tmp_path
 
 
 def test_installed_without_wheels(blender, dist, bunny, recipe, tmp_path):
-    """Pictures on Blender's own GPU or with NumPy, and a sentence where a movie needs more."""
+    """Pictures and a movie on Blender's own GPU or with NumPy, with a sentence of what is slow; and sentences, and
+    nothing else, of what needs a package."""
     hidden = blender.user / "scripts" / "startup" / "hidden.py"
     hidden.parent.mkdir(parents=True)
     hidden.write_text(
@@ -348,21 +351,32 @@ def test_installed_without_wheels(blender, dist, bunny, recipe, tmp_path):
     (path,) = dist[0].glob("*-no_wheels.zip")
     blender.run("--command", "extension", "validate", path)
     blender.install(path)
-    frames = tmp_path / "frames"
-    checkout_renders(bunny, recipe, frames, "1:5")
-    edit, first = tmp_path / "edit.blend", frames / "0001.png"
-    blender.run("-b", "--python-exit-code", 1, "--python", MAKE_EDIT, "--", first, recipe, edit, NAME)
-    cuts = "Virtual Shutter: Stop at Cuts finds none, and exposures run across them: the Python package"
-    borrowed = "composing on Blender's own GPU"
-    blender.run("-b", edit, "-o", tmp_path / "real" / "####", "-s", 1, "-e", 2, "-a", says=[borrowed, cuts])
-    command, options = ("--command", "shutter", "render"), ("--recipe", recipe, "--output", tmp_path / "real")
-    blender.run(*command, first, *options, "--frames", 3, "--device", "gpu", says=[cuts])
+    frames, edits = tmp_path / "frames", tmp_path / "edits"
+    checkout_renders(bunny, recipe, frames, "1:4")
+    borrowed, decoded = "composing on Blender's own GPU", "Virtual Shutter: a second Blender decodes movies"
+    edits.mkdir()
+    for footage, says in ((frames / "0001.png", []), (bunny, [decoded])):
+        edit, real = edits / f"{footage.stem}.blend", tmp_path / f"real_{footage.stem}"
+        blender.run("-b", "--python-exit-code", 1, "--python", MAKE_EDIT, "--", footage, recipe, edit, NAME)
+        blender.run("-b", edit, "-o", real / "####", "-s", 1, "-e", 2, "-a", says=[borrowed, *says])
+        command, options = ("--command", "shutter", "render"), (footage, "--recipe", recipe, "--output", real)
+        blender.run(*command, *options, "--frames", 3, "--device", "gpu", says=says)
     numpy = "composing with NumPy, which is slow"
-    blender.run(*command, first, *options, "--frames", 4, says=[numpy, cuts], environment=NO_OPENGL)
-    checkout_renders(first, recipe, tmp_path / "ours", "1:4")
-    assert_alike(tmp_path / "real", tmp_path / "ours", 4)
-    sentence = "Virtual Shutter: bigbuckbunny.mp4: movies need the Python package PyAV"
-    blender.run(*command, bunny, *options, code=2, says=[sentence])
+    blender.run(*command, *options, "--frames", 4, says=[numpy, decoded], environment=NO_OPENGL)
+    assert_alike(real, frames, 4)
+    checkout_renders(frames / "0001.png", recipe, tmp_path / "ours", "1:3")
+    assert_alike(tmp_path / "real_0001", tmp_path / "ours", 3)
+    assert "ALL SAY SO" in blender.run("-b", edit, "--python-exit-code", 1, "--python", LACKING, "--", tmp_path, NAME)
+    for words, says in (
+        (
+            ("track", bunny, "--recipe", recipe, "--region", "R", "--frame", 2),
+            "tracking needs the Python package opencv",
+        ),
+        (("inbetween", bunny, "--factor", 2, "--frames", "1:2"), "in-between frames need the Python package"),
+    ):
+        place = ("--output", tmp_path / "out") if words[0] == "track" else ("--cache", tmp_path / "out")
+        blender.run("--command", "shutter", *words, *place, code=2, says=[says])
+        assert not (tmp_path / "out").exists()
     blender.remove()
 
 

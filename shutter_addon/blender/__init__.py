@@ -1,7 +1,7 @@
 """Everything that touches bpy: properties, engine, strips, commands."""
 
 from . import handlers
-from .data import main_thread, preferences, properties
+from .data import main_thread, movie_decoding, preferences, properties
 from .interface import (
     bake_operators,
     bar_editor,
@@ -39,6 +39,7 @@ _modules = (
     translations,
     preferences,
     properties,
+    movie_decoding,
     engine,
     icons,
     sharp_frame,

@@ -1,5 +1,5 @@
-"""Cuts within a source, found by PySceneDetect, and frames that repeat the one before: decisions about few neighbouring
-frames, made of a small picture of each; and a source that knows where its shots end."""
+"""Cuts within a source, found by PySceneDetect or as it finds them, and frames that repeat the one before: decisions
+about few neighbouring frames, made of a small picture of each; and a source that knows where its shots end."""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ import numpy as np
 from ..core.frames import light
 from ..core.frames.frame_source import FrameSource
 from ..core.frames.planes import Planes, as_rgba
+from . import plain_cuts
 from .errors import MediaError
 from .source import SourceWrapper
 
@@ -85,18 +86,17 @@ def _blocks(length: int, most: int) -> tuple[np.ndarray, np.ndarray]:
 
 
 @cache
-def missing_package() -> str | None:
-    """The Python package without which no cuts can be found; None where they can. The first call loads PySceneDetect,
-    which takes some 0.2 s."""
+def has_pyscenedetect() -> bool:
+    """Whether PySceneDetect finds cuts; else plain_cuts does. The first call loads it, which takes some 0.2 s."""
     try:
         import scenedetect.detectors  # noqa: F401
-    except ImportError as error:
-        return "opencv-contrib-python-headless" if error.name == "cv2" else "scenedetect"
-    return None
+    except ImportError:  # a package without wheels: it needs OpenCV as well
+        return False
+    return True
 
 
 def is_cut(before: list[Signature], after: list[Signature]) -> bool:
-    """Whether there is a cut between the frames before[-1] and after[0]. There must be no `missing_package`.
+    """Whether there is a cut between the frames before[-1] and after[0].
 
     before, after: signatures of up to NEIGHBOURS successive frames on each side, fewer at the clip's ends alone.
     There is one where PySceneDetect's HashDetector finds that the pictures have nothing in common, its ContentDetector
@@ -140,13 +140,15 @@ def _shared(picture: Signature, down: int, right: int) -> Signature:
 
 def _differ(before: Signature, after: Signature, least: float, share: float = 1.0) -> bool:
     """Whether brightness changes by that share of what a cut changes, and by no fewer levels than `least`."""
-    from scenedetect.detectors import ContentDetector
-
     threshold = max(share * CHANGE * min(max(before.mean(), after.mean()) / GREY, 1.0), least)
     # PySceneDetect rounds both pictures first, which moves their mean difference by 1 at most. Most neighbours are far
     # below the threshold, and need not be asked about, which takes long.
     if np.abs(_brightness(before) - _brightness(after)).mean() + 1 < threshold:
         return False
+    if not has_pyscenedetect():
+        return plain_cuts.change(_whole(before), _whole(after)) >= threshold
+    from scenedetect.detectors import ContentDetector
+
     return _finds(ContentDetector(threshold, min_scene_len=0, luma_only=True), [before, after], 1)
 
 
@@ -156,6 +158,8 @@ def _brightness(picture: Signature) -> np.ndarray:
 
 
 def _unlike(before: Signature, after: Signature, apart: float) -> bool:
+    if not has_pyscenedetect():
+        return plain_cuts.unlike(_whole(before), _whole(after), BITS) >= apart
     from scenedetect.detectors import HashDetector
 
     return _finds(HashDetector(apart, BITS, min_scene_len=0), [before, after], 1)
@@ -163,21 +167,28 @@ def _unlike(before: Signature, after: Signature, apart: float) -> bool:
 
 def _stands_out(before: list[Signature], after: list[Signature]) -> bool:
     """Whether from before[0] to after[0] more changes than between neighbours; both lists lead away from there."""
-    from scenedetect.detectors import AdaptiveDetector
-
     before, after = before[: WINDOW + 1], after[: WINDOW + 1]
     # Held pictures stand for those that are not there, and their changes, of zero, must not count in the mean.
     known = len(before) + len(after) - 2
     ratio = RATIO * 2 * WINDOW / known if known else RATIO
     before, after = ([*side, *[side[-1]] * (WINDOW + 1 - len(side))] for side in (before, after))
+    pictures = [*before[::-1], *after]
+    if not has_pyscenedetect():
+        return plain_cuts.stands_out(list(map(_whole, pictures)), WINDOW + 1, ratio, NOISE)
+    from scenedetect.detectors import AdaptiveDetector
+
     detector = AdaptiveDetector(ratio, min_scene_len=0, window_width=WINDOW, min_content_val=NOISE, luma_only=True)
-    return _finds(detector, [*before[::-1], *after], WINDOW + 1)
+    return _finds(detector, pictures, WINDOW + 1)
 
 
 def _finds(detector: SceneDetector, pictures: list[Signature], index: int) -> bool:
     """Whether a fresh detector finds a cut before that picture, of all."""
-    whole = (np.rint(picture[..., ::-1]).clip(0, 255).astype(np.uint8) for picture in pictures)  # OpenCV has BGR
+    whole = (_whole(picture)[..., ::-1].copy() for picture in pictures)  # OpenCV has BGR
     return index in [cut for i, picture in enumerate(whole) for cut in detector.process_frame(i, picture)]
+
+
+def _whole(picture: Signature) -> np.ndarray:
+    return np.rint(picture).clip(0, 255).astype(np.uint8)
 
 
 def _moving(pictures: list[Signature]) -> list[Signature]:
@@ -220,7 +231,7 @@ def _most(a: Signature, b: Signature) -> float:
 
 
 class ShotSource(SourceWrapper):
-    """A source that knows where its shots end: a source itself. Where PySceneDetect is missing it has one.
+    """A source that knows where its shots end: a source itself.
 
     step: every step-th frame is one that was filmed. Cuts are looked for in these alone; those between two of them
     belong to the nearer, the middle one to the first, as InbetweenSource has it.
@@ -289,9 +300,7 @@ class ShotSource(SourceWrapper):
         self._source.close()
 
     def _after(self, low: int, high: int) -> range:
-        """The filmed frames that begin between the frames from `low` to `high`; none where cuts cannot be found."""
-        if missing_package():
-            return range(0)
+        """The filmed frames that begin between the frames from `low` to `high`."""
         first, last = (self._filmed(min(max(i, 0), self.count - 1)) for i in (low, high))
         return range(first + 1, last + 1)
 

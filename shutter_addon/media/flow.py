@@ -27,6 +27,12 @@ HALF_MAX = 65504  # the largest value of a half float, which infinite samples co
 ALIKE = 8  # levels of 255 by which the ends of a vector may differ before another flow is believed more
 
 
+def check() -> None:
+    """MediaError: OpenCV is missing, or has no contributed modules."""
+    if not hasattr(cv2, "optflow"):  # another add-on may bring an OpenCV without it
+        raise lacks_opencv("in-between frames need")
+
+
 def between(
     first: np.ndarray,
     second: np.ndarray,
@@ -43,9 +49,8 @@ def between(
     transfer, alpha: how samples are encoded, as FrameSource says; the new frames are encoded alike
 
     What only one of the frames shows is taken from it, all else is mixed in linear light.
-    Raises MediaError at the first frame where OpenCV is missing, or has no contributed modules."""
-    if not hasattr(cv2, "optflow"):  # another add-on may bring an OpenCV without it
-        raise lacks_opencv("in-between frames need")
+    Raises what `check` raises at the first frame."""
+    check()
     ends = [_encoded(frame, transfer, alpha) for frame in (first, second)]
     luma = [_luma(end) for end in ends]
     paths = [_Paths(luma, flow) for flow in METHODS[method]]

@@ -111,16 +111,14 @@ def build(
     After a build that was killed, the next one goes on where that was. Several processes may build in the same folder,
     and share the pairs: one that another is building is waited for, and built here if that one is killed. The files are
     the same for any chunks and any interruptions. The source must not be used elsewhere meanwhile. Returns how far the
-    build came. MediaError: a package is missing, or a frame cannot be read or written, and finished pairs are kept; or
-    the source was written to meanwhile."""
-    if package := cuts.missing_package():
-        raise MediaError(
-            f"in-between frames need the Python package {package}; "
-            "install the zip of Virtual Shutter that is made for your system"
-        )
-    between = between or flow.between
+    build came. MediaError: a package that is needed is missing, or a frame cannot be read or written, and finished
+    pairs are kept; or the source was written to meanwhile."""
     cache = InbetweenCache(source, folder, factor, method)
     pairs = _pairs(source, frames) if pairs is None else pairs
+    cache.load()
+    if between is None and not cache.finished().issuperset(pairs):
+        flow.check()
+    between = between or flow.between
     cache.prepare()
     done, left = 0, list(pairs)
     with Claims(cache.folder) as claims:

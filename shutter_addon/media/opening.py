@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from fractions import Fraction
+from functools import cache
 from pathlib import Path
-from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
 from ..core.frames.frame_source import FrameSource
+from . import decoding_child
+from .blender_movie import BlenderMovie, BlenderMovieChannel
 from .color import in_colorspace
 from .errors import MediaError
 from .files import check_file
@@ -17,6 +19,8 @@ from .sequence import IMAGE_SUFFIXES, SequenceChannel, SequenceSource
 
 if TYPE_CHECKING:
     from .movie import MovieChannel
+
+Size = tuple[int, int]  # width and height
 
 
 def open_source(
@@ -30,7 +34,7 @@ def open_source(
     alpha: str | None = None,
     deinterlace: bool = False,
     divisor: int = 1,
-    size: tuple[int, int] | None = None,
+    size: Size | None = None,
 ) -> FrameSource:
     """Opens a movie, or the image sequence that starts with the file `path`. MediaError: it cannot be read.
 
@@ -45,10 +49,9 @@ def open_source(
     size: what the frames of an opaque movie are fitted to, width and height, in place of `divisor`
     """
     path = Path(path)
+    source: FrameSource
     if _is_movie(path, files):
-        movies = _movies(path)
-        source: FrameSource
-        source = movies.MovieSource(path, stream=stream, deinterlace=deinterlace, divisor=divisor, size=size)
+        source = _opened_movie(path, stream=stream, deinterlace=deinterlace, divisor=divisor, size=size)
     else:
         source = smaller(SequenceSource(path, files=files, fps=fps, alpha=alpha), divisor)
     try:
@@ -75,28 +78,56 @@ def with_proxy(source: FrameSource, path: str | Path, **options: Any) -> FrameSo
 
 def open_channel(
     path: str | Path, channel: str, *, files: Sequence[str | Path] | None = None, stream: int = 0
-) -> SequenceChannel | MovieChannel:
+) -> SequenceChannel | MovieChannel | BlenderMovieChannel:
     """Opens what `open_source` opens, for one channel alone. MediaError: it cannot be read, or has no such channel.
 
     channel: one of channels.CHANNELS, or the name of a channel of the images' own; files, stream: see open_source"""
     path = Path(path)
     if _is_movie(path, files):
-        return _movies(path).MovieChannel(path, channel, stream=stream)
+        return _opened_channel(path, channel, stream)
     return SequenceChannel(path, channel, files=files)
+
+
+@cache
+def has_pyav() -> bool:
+    """Whether PyAV decodes movies; else a second Blender does, where one is lent."""
+    try:
+        from . import movie  # noqa: F401
+    except ImportError:
+        return False
+    return True
 
 
 def _is_movie(path: Path, files: Sequence[str | Path] | None) -> bool:
     return files is None and path.suffix.lower() not in IMAGE_SUFFIXES
 
 
-def _movies(path: Path) -> ModuleType:
-    """The module that reads movies. MediaError: this one cannot be read, for want of PyAV."""
+def _opened_movie(path: Path, *, stream: int, deinterlace: bool, divisor: int, size: Size | None) -> FrameSource:
+    """See open_source. Only PyAV's frames are fitted to a size."""
     try:
-        from . import movie
-    except ImportError as error:  # a package without wheels, or one for another system
-        check_file(path)
-        raise MediaError(
-            f"{path.name}: movies need the Python package PyAV ({error}); "
-            "install the zip of Virtual Shutter that is made for your system, or use an image sequence"
-        ) from None
-    return movie
+        from .movie import MovieSource
+    except ImportError as error:
+        _check_lent(path, stream, error)
+        return smaller(BlenderMovie(path, deinterlace=deinterlace), divisor)
+    return MovieSource(path, stream=stream, deinterlace=deinterlace, divisor=divisor, size=size)
+
+
+def _opened_channel(path: Path, channel: str, stream: int) -> MovieChannel | BlenderMovieChannel:
+    try:
+        from .movie import MovieChannel
+    except ImportError as error:
+        _check_lent(path, stream, error)
+        return BlenderMovieChannel(path, channel)
+    return MovieChannel(path, channel, stream=stream)
+
+
+def _check_lent(path: Path, stream: int, error: ImportError) -> None:
+    """MediaError: without PyAV (a package without wheels, or one for another system) that movie cannot be read."""
+    if decoding_child.is_lent() and stream == 0:
+        return
+    check_file(path)
+    what = f"video stream {stream} of a movie needs" if decoding_child.is_lent() else "movies need"
+    raise MediaError(
+        f"{path.name}: {what} the Python package PyAV ({error}); "
+        "install the zip of Virtual Shutter that is made for your system, or use an image sequence"
+    ) from None

@@ -319,15 +319,6 @@ def test_beyond_a_cut_no_in_between_frame_is_needed(edit, check, tmp_path):
     assert "as if there were no cuts" in later["notes"][0]
 
 
-def test_without_the_package_that_finds_cuts(noise, check, monkeypatch):
-    from shutter_addon.media import cuts
-
-    monkeypatch.setattr(cuts, "missing_package", lambda: "scenedetect")
-    _, found, report = check()
-    assert (found, len(report["notes"])) == ([], 1)
-    assert "the Python package scenedetect is missing" in report["notes"][0]
-
-
 def test_plain_strips(noise, check, tmp_path):
     edit = now()[0]
     editor = edit.sequence_editor

@@ -91,19 +91,6 @@ def test_a_window_stops_at_a_cut(command, tmp_path, same_pixels):
     same_pixels(read_picture(tmp_path / "off" / "0005.png"), levels(linear(frames[4:8]).mean(axis=0)), 1)
 
 
-def test_without_pyscenedetect_it_says_once_that_no_cut_is_found(command, noise, tmp_path):
-    hidden = tmp_path / "hidden"
-    hidden.mkdir()
-    (hidden / "sitecustomize.py").write_text("import sys\nsys.modules['scenedetect'] = None\n")
-    said = "Stop at Cuts finds none, and exposures run across them: the Python package scenedetect is missing"
-    for stops in (True, False):
-        data = recipe(4, np.ones(4)) | {"stop_at_cuts": stops}
-        arguments = (noise[0], "--output", tmp_path / str(stops), "--frames", "1:3")
-        done = command(*arguments, recipe=data, env={"PYTHONPATH": str(hidden)})
-        assert done.stderr.count(said) == stops
-        assert len(list((tmp_path / str(stops)).iterdir())) == 3
-
-
 def test_a_keyed_delta_stays_one_sharp_frame(command, noise, tmp_path, same_pixels):
     first, frames = noise
     data = recipe(9, {1: still(9), 9: still(9, 8)})

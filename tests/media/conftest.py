@@ -5,7 +5,7 @@ from pathlib import Path
 
 import av
 import pytest
-from footage import ugly_movies
+from footage import coloured_movies, deinterlaced_movies, ugly_movies
 
 
 @pytest.fixture(scope="session")
@@ -18,6 +18,18 @@ def bunny():
 def movies(tmp_path_factory):
     """{name: (path, numbers)} of footage.ugly_movies."""
     return ugly_movies(tmp_path_factory.mktemp("movies"))
+
+
+@pytest.fixture(scope="session")
+def coloured(tmp_path_factory):
+    """{name: path} of footage.coloured_movies."""
+    return dict(coloured_movies(tmp_path_factory.mktemp("coloured")))
+
+
+@pytest.fixture(scope="session")
+def deinterlaced(tmp_path_factory):
+    """{name: path} of footage.deinterlaced_movies."""
+    return dict(deinterlaced_movies(tmp_path_factory.mktemp("deinterlaced")))
 
 
 @pytest.fixture(scope="session")

@@ -144,6 +144,58 @@ def save_image(path, array, samples="uint8", **attributes):
     return path
 
 
+LOSSLESS = {"qp": "0", "preset": "ultrafast"}
+CLEAR = {"pictures": [see_through(n) for n in range(3)], "array_format": "rgba"}
+
+
+def tags(space, span=1, curve=1, primaries=1):
+    return {"colorspace": space, "color_range": span, "color_trc": curve, "color_primaries": primaries}
+
+
+def coloured_movies(folder):
+    """Movies in many formats, three frames each."""
+
+    def movie(name, codec, pix_fmt, **more):
+        return name, make_movie(folder / name, codec, 3, pix_fmt=pix_fmt, **more)
+
+    yield movie("bt709.mp4", "libx264", "yuv420p", options=LOSSLESS, tags=tags(1))
+    yield movie("bt601.mp4", "libx264", "yuv420p", options=LOSSLESS, tags=tags(5, 1, 6, 5))
+    yield movie("full_range.mp4", "libx264", "yuv420p", options=LOSSLESS, tags=tags(1, 2))
+    yield movie("jpeg_range.mp4", "libx264", "yuvj420p", options=LOSSLESS)
+    yield movie("yuv444.mp4", "libx264", "yuv444p", options=LOSSLESS)
+    yield movie("mjpeg.avi", "mjpeg", "yuvj420p")
+    yield movie("rgb.mkv", "ffv1", "bgr0")
+    yield movie("gray.mkv", "ffv1", "gray")
+    yield movie("odd.avi", "mpeg4", "yuv420p", size=(33, 17))
+    yield movie("ten_bits.mp4", "libx264", "yuv420p10le", options=LOSSLESS)
+    yield movie("bt2020.mkv", "ffv1", "yuv420p10le", tags=tags(9, 1, 14, 9))
+    yield movie("prores.mov", "prores_ks", "yuv422p10le")
+    yield movie("rgb48.mkv", "ffv1", "rgb48le")
+    yield movie("alpha.mov", "qtrle", "argb", **CLEAR)
+    yield movie("alpha_png.mov", "png", "rgba", **CLEAR)
+    yield movie("alpha.webm", "libvpx-vp9", "yuva420p", options={"lossless": "1"}, **CLEAR)
+    yield movie("alpha_deep.mov", "png", "rgba64be", **CLEAR)
+    yield movie("alpha_prores.mov", "prores_ks", "yuva444p10le", options={"profile": "4444"}, **CLEAR)
+    for degrees in (90, 180, 270):
+        name = f"turned_{degrees}.mp4"
+        yield name, rotate_movie(folder / "bt709.mp4", folder / name, degrees)
+    yield "turned_deep.mp4", rotate_movie(folder / "ten_bits.mp4", folder / "turned_deep.mp4", 90)
+
+
+def deinterlaced_movies(folder):
+    """Movies that Blender deinterlaces in each of its ways."""
+    for name, codec, pix_fmt, more in [
+        ("fields_420.avi", "mpeg4", "yuv420p", {}),
+        ("fields_422.mkv", "ffv1", "yuv422p", {}),
+        ("fields_444.mp4", "libx264", "yuv444p", {"options": LOSSLESS}),
+        ("blur_size.avi", "mpeg4", "yuv420p", {"size": (130, 66)}),
+        ("blur_rgb.mkv", "ffv1", "bgr0", {}),
+        ("blur_deep.mkv", "ffv1", "yuv420p10le", {}),
+        ("blur_alpha.mov", "qtrle", "argb", CLEAR),
+    ]:
+        yield name, make_movie(folder / name, codec, 2, pix_fmt=pix_fmt, **more)
+
+
 def ugly_movies(folder):
     """{name: (path, the number that each frame shall show, or None where only Blender knows)}."""
     h264 = {"bf": "3", "g": "12"}

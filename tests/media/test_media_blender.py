@@ -3,12 +3,10 @@
 import numpy as np
 import pytest
 from blender_pictures import blender
-from footage import make_movie, picture, rotate_movie, save_image, see_through
+from footage import make_movie, picture, save_image, see_through, tags
 
 from shutter_addon.media import open_source
 
-LOSSLESS = {"qp": "0", "preset": "ultrafast"}
-CLEAR = {"pictures": [see_through(n) for n in range(3)], "array_format": "rgba"}
 RGB, RGBA = picture(5) / np.float32(255), see_through(5) / np.float32(255)
 STRAIGHT = {"oiio__UnassociatedAlpha": 1}
 ASSOCIATED = np.dstack([RGBA[..., :3] * RGBA[..., 3:], RGBA[..., 3]])
@@ -35,54 +33,6 @@ IMAGES = (
     "clear.bmp clear.webp plain.jp2 clear.jp2 plain.sgi clear.sgi pair.exr "
     "whole.exr plain_layer.exr first_layer.exr no_combined.exr xyz.exr"
 )
-
-
-def tags(space, span=1, curve=1, primaries=1):
-    return {"colorspace": space, "color_range": span, "color_trc": curve, "color_primaries": primaries}
-
-
-def coloured_movies(folder):
-    """Movies in many formats, three frames each."""
-
-    def movie(name, codec, pix_fmt, **more):
-        return name, make_movie(folder / name, codec, 3, pix_fmt=pix_fmt, **more)
-
-    yield movie("bt709.mp4", "libx264", "yuv420p", options=LOSSLESS, tags=tags(1))
-    yield movie("bt601.mp4", "libx264", "yuv420p", options=LOSSLESS, tags=tags(5, 1, 6, 5))
-    yield movie("full_range.mp4", "libx264", "yuv420p", options=LOSSLESS, tags=tags(1, 2))
-    yield movie("jpeg_range.mp4", "libx264", "yuvj420p", options=LOSSLESS)
-    yield movie("yuv444.mp4", "libx264", "yuv444p", options=LOSSLESS)
-    yield movie("mjpeg.avi", "mjpeg", "yuvj420p")
-    yield movie("rgb.mkv", "ffv1", "bgr0")
-    yield movie("gray.mkv", "ffv1", "gray")
-    yield movie("odd.avi", "mpeg4", "yuv420p", size=(33, 17))
-    yield movie("ten_bits.mp4", "libx264", "yuv420p10le", options=LOSSLESS)
-    yield movie("bt2020.mkv", "ffv1", "yuv420p10le", tags=tags(9, 1, 14, 9))
-    yield movie("prores.mov", "prores_ks", "yuv422p10le")
-    yield movie("rgb48.mkv", "ffv1", "rgb48le")
-    yield movie("alpha.mov", "qtrle", "argb", **CLEAR)
-    yield movie("alpha_png.mov", "png", "rgba", **CLEAR)
-    yield movie("alpha.webm", "libvpx-vp9", "yuva420p", options={"lossless": "1"}, **CLEAR)
-    yield movie("alpha_deep.mov", "png", "rgba64be", **CLEAR)
-    yield movie("alpha_prores.mov", "prores_ks", "yuva444p10le", options={"profile": "4444"}, **CLEAR)
-    for degrees in (90, 180, 270):
-        name = f"turned_{degrees}.mp4"
-        yield name, rotate_movie(folder / "bt709.mp4", folder / name, degrees)
-    yield "turned_deep.mp4", rotate_movie(folder / "ten_bits.mp4", folder / "turned_deep.mp4", 90)
-
-
-def deinterlaced_movies(folder):
-    """Movies that Blender deinterlaces in each of its ways."""
-    for name, codec, pix_fmt, more in [
-        ("fields_420.avi", "mpeg4", "yuv420p", {}),
-        ("fields_422.mkv", "ffv1", "yuv422p", {}),
-        ("fields_444.mp4", "libx264", "yuv444p", {"options": LOSSLESS}),
-        ("blur_size.avi", "mpeg4", "yuv420p", {"size": (130, 66)}),
-        ("blur_rgb.mkv", "ffv1", "bgr0", {}),
-        ("blur_deep.mkv", "ffv1", "yuv420p10le", {}),
-        ("blur_alpha.mov", "qtrle", "argb", CLEAR),
-    ]:
-        yield name, make_movie(folder / name, codec, 2, pix_fmt=pix_fmt, **more)
 
 
 def images(folder):
@@ -141,7 +91,7 @@ def images(folder):
 
 
 @pytest.fixture(scope="module")
-def compared(tmp_path_factory, movies, bunny, blender_config):
+def compared(tmp_path_factory, movies, coloured, deinterlaced, bunny, blender_config):
     """compared(name): (a source, what Blender says of the file and shows). One Blender session renders all."""
     folder = tmp_path_factory.mktemp("blender")
     files, options, jobs = {}, {}, {}
@@ -154,9 +104,9 @@ def compared(tmp_path_factory, movies, bunny, blender_config):
     for name, (path, _) in movies.items():
         job(name, path, list(range(open_source(path).count)), movie=True)
     job("bunny", bunny, [0, 1, 60, 131], movie=True)
-    for name, path in coloured_movies(folder):
+    for name, path in coloured.items():
         job(name, path, [0, 2], movie=True)
-    for name, path in deinterlaced_movies(folder):
+    for name, path in deinterlaced.items():
         job(name, path, [0, 1], {"deinterlace": True}, movie=True, deinterlace=True)
     for name, path in images(folder):
         job(name, path, [0], depth="16")

@@ -1,6 +1,5 @@
 """Cuts and repeated frames: films, pieces of them joined at known places, and what looks like a cut and is none."""
 
-import subprocess
 import sys
 from pathlib import Path
 from types import SimpleNamespace
@@ -31,10 +30,14 @@ def noise(count: int, seed: int, pace: int = 1) -> np.ndarray:
 
 
 def decided(decide, frames, transfer="srgb") -> list[int]:
+    """Decided by PySceneDetect, and without it alike."""
     pictures = [signature(frame, transfer) for frame in frames]
-    return [
-        i for i in range(1, len(pictures)) if decide(pictures[max(i - NEIGHBOURS, 0) : i], pictures[i : i + NEIGHBOURS])
-    ]
+    sides = [(pictures[max(i - NEIGHBOURS, 0) : i], pictures[i : i + NEIGHBOURS]) for i in range(1, len(pictures))]
+    found = [i for i, (before, after) in enumerate(sides, 1) if decide(before, after)]
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(media_cuts, "has_pyscenedetect", lambda: False)
+        assert [i for i, (before, after) in enumerate(sides, 1) if decide(before, after)] == found
+    return found
 
 
 def cuts(*parts, **kind) -> list[int]:
@@ -243,27 +246,6 @@ def test_frames_that_nobody_reads_are_let_go(film):
             shots.around(index, index, index + 3)
             low, high = index - NEIGHBOURS * step, index + 3 + NEIGHBOURS * step
             assert all(low <= i <= high for i in shots.handed())
-
-
-def test_without_pyscenedetect_the_whole_clip_is_one_shot():
-    code = """
-import sys
-sys.modules["scenedetect"] = None
-import numpy as np
-from shutter_addon.media import MediaError, cuts, inbetween
-class Frames:
-    count, transfer, alpha = 20, "srgb", "opaque"
-shots = cuts.ShotSource(Frames())
-print(cuts.missing_package(), shots.around(3, 0, 19), shots.lacking(3, 0, 19))
-try:
-    inbetween.build(Frames(), "nowhere", 4, "quick")
-except MediaError as error:
-    print(error)
-"""
-    done = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True)
-    shots, refusal = done.stdout.splitlines()
-    assert shots == "scenedetect range(0, 20) set()"
-    assert refusal.startswith("in-between frames need the Python package scenedetect; install the zip")
 
 
 def test_footage_that_moves_hard_has_no_cuts_and_joined_footage_has_all():

@@ -508,7 +508,7 @@ def slow(*frames):
         time.sleep(0.01)
         yield picture
 
-cuts.missing_package()  # loads PySceneDetect
+cuts.has_pyscenedetect()  # loads PySceneDetect
 print("ready", flush=True)
 sys.stdin.readline()
 build(open_source(sys.argv[1]), sys.argv[2], between=slow)

@@ -45,9 +45,8 @@ def frame(number, speed=8):
 def prepared():
     """The extension, whose panel of in-between frames is open and others are not, in a saved file with an effect."""
     driver.enable()
-    part("media.flow").between = slow_blend
-    cuts = part("media.cuts")  # as optical flow, they need OpenCV; there are none in this film
-    cuts.missing_package, cuts.may_be_cut, cuts.is_cut = lambda: None, lambda *_: False, lambda *_: False
+    flow = part("media.flow")  # which needs OpenCV
+    flow.check, flow.between = lambda: None, slow_blend
     for name, closed in (("regions", True), ("options", True), ("inbetween", False)):
         panel = getattr(bpy.types, f"SEQUENCER_PT_shutter_{name}")
         bpy.utils.unregister_class(panel)

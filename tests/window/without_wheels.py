@@ -1,13 +1,16 @@
-"""The extension without any wheel, on pictures: Blender's GPU shows them, and renders them for another thread.
+"""The extension without any wheel, on pictures: Blender's GPU shows them, and renders them for another thread. Then on
+a movie, which a second Blender decodes.
 
 Run in a Blender with a window, the checkout linked as an extension."""
 
 # ruff: noqa: E402 (Blender finds the helpers once it knows their folders)
+import os
 import sys
 from pathlib import Path
 from unittest.mock import Mock
 
-sys.modules |= dict.fromkeys(("av", "glcontext", "moderngl", "tqdm"))  # None: there is no such module
+WHEELS = "av", "cv2", "glcontext", "moderngl", "scenedetect", "tqdm"
+sys.modules |= dict.fromkeys(WHEELS)  # None: there is no such module
 sys.path[:0] = [str(Path(__file__).parent), str(Path(__file__).parents[1] / "blender")]
 
 import bpy
@@ -33,6 +36,10 @@ def add_effect():
     strip = strips.new_image("Noise", str(first), 1, 1)
     for path in sorted(first.parent.iterdir())[1:]:
         strip.elements.append(path.name)
+    add_shutter(strip)
+
+
+def add_shutter(strip):
     edit_now().sequence_editor.active_strip = strip
     area = area_of("SEQUENCE_EDITOR", "SEQUENCER")
     window = bpy.context.window_manager.windows[0]
@@ -96,7 +103,25 @@ def story():
     job = support.read_picture(OUT / "job.png")[..., :3] / 255
     light = np.where(job <= 0.04045, job / 12.92, ((job + 0.055) / 1.055) ** 2.4)
     assert np.abs(light - shown[..., :3]).max() < 0.01, np.abs(light - shown[..., :3]).max()
+    yield from movie_shown()
     saw(said=said)
+
+
+def movie_shown():
+    """With a still frame for a shutter, an effect is the movie itself."""
+    strip = edit_now().sequence_editor.strips.new_movie("Movie", os.environ["SHUTTER_FOOTAGE"], 5, 30)
+    edit_now().frame_set(60)
+    yield 1.0
+    yield from rendered()
+    plain = support.read_picture(OUT / "job.png")[..., :3]
+    assert plain.std() > 20, "there is a movie"
+    add_shutter(strip)
+    edit_now().virtual_shutter.effects[1].window = 1
+    yield 1.0
+    shot("movie")
+    yield from rendered()
+    shown = support.read_picture(OUT / "job.png")[..., :3]
+    assert np.abs(shown - plain).max() <= 1, np.abs(shown - plain).max()
 
 
 play(story)

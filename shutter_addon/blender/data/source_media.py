@@ -162,7 +162,7 @@ def _spec(strip, key: tuple) -> SourceSpec:
         "deinterlace": strip.type == "MOVIE" and strip.use_deinterlace,
     }
     return SourceSpec(
-        key=key, path=path(0), files=None if _is_movie(strip) else tuple(path(i) for i in range(count)), options=options
+        key=key, path=path(0), files=None if is_movie(strip) else tuple(path(i) for i in range(count)), options=options
     )
 
 
@@ -180,10 +180,11 @@ def files(strip) -> list[Path]:
 
 def first_frame(strip) -> int:
     """Which frame of the medium is the first of the strip's content."""
-    return strip.clip.frame_offset if strip.type == "MOVIECLIP" and _is_movie(strip) else 0
+    return strip.clip.frame_offset if strip.type == "MOVIECLIP" and is_movie(strip) else 0
 
 
-def _is_movie(strip) -> bool:
+def is_movie(strip) -> bool:
+    """Whether a movie, image or clip strip reads a movie."""
     return strip.type == "MOVIE" or (strip.type == "MOVIECLIP" and strip.clip.source == "MOVIE")
 
 

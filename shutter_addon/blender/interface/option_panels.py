@@ -5,8 +5,8 @@ from bpy.app.translations import pgettext_iface as iface_
 from bpy.app.translations import pgettext_n as n_
 
 from ...devices.device import NoDeviceError
-from ...media import cuts
-from ..data import selection
+from ...media import opening
+from ..data import selection, source_media, strips
 from ..devices import available
 from ..rendering import inbetween_build, render_settings, sessions
 from ..rendering.effect_source import FAULTS
@@ -28,10 +28,6 @@ class Options(WithEffect):
         column.active = any(region.is_layer for region in effect.regions)
         for name in ("decontaminate", "plate_reach"):
             column.prop(effect, name)
-        package = effect.stop_at_cuts and cuts.missing_package()
-        if package:
-            text = iface_("Cuts are not found: the Python package {package} is missing").format(package=package)
-            sentence(layout, text, "ERROR")
         layout.prop(effect, "use_source_time")
         column = layout.column()
         column.active = effect.use_source_time
@@ -39,6 +35,7 @@ class Options(WithEffect):
         if effect.use_source_time and effect.inbetween == "1":
             sentence(column, iface_("No in-between frames: the nearest source frame is shown"), "INFO")
         _draw_devices(layout)
+        _draw_decoding(layout, *selection.active(context))
 
 
 def _draw_devices(layout):
@@ -58,6 +55,15 @@ def _draw_devices(layout):
         return
     for text, device in ((iface_("Preview: {device}"), preview), (iface_("Renders: {device}"), render)):
         sentence(column, text.format(device=device))
+
+
+def _draw_decoding(layout, scene, effect, strip) -> None:
+    """What decodes the effect's movie, where that is not PyAV."""
+    source = strips.nearest_source(scene, effect, strip)
+    if source is not None and source_media.is_movie(source) and not opening.has_pyav():
+        column = layout.column()
+        column.active = False
+        sentence(column, iface_("Movies: a second Blender decodes them, which is slow"))
 
 
 def _ask_for_opengl() -> None:

@@ -18,7 +18,7 @@ from ...core.frames import frame_ranges
 from ...core.messages import UserError
 from ...core.model.frame_state import FrameState
 from ...core.model.mattes import FileFrame
-from ...media import MediaError, cuts
+from ...media import MediaError
 from ...media.carried_mattes import CarriedMattes
 from ...media.files import check_file
 from ..data import effect_version, requirements, selection, snapshot, source_media, strips
@@ -115,7 +115,7 @@ def _effect(session: RenderSession, shown: tuple, compositor, find_cuts: bool) -
         _look_at_frames(check, renderer, requests, find_cuts)
         _look_at_mattes(check, source, requests)
         check.needs = _needs(source, requests, compositor)
-        check.notes += _notes(check, requests)
+        check.notes += _notes(check, requests, renderer.source)
     return check
 
 
@@ -225,10 +225,10 @@ def _look_at_mattes(check: EffectCheck, source, requests: dict[float, Request]) 
             check.faults.append(str(error))
 
 
-def _notes(check: EffectCheck, requests: dict[float, Request]) -> list[str]:
+def _notes(check: EffectCheck, requests: dict[float, Request], source) -> list[str]:
     notes = list({sentence: None for request in requests.values() for sentence in pictures.unread(request)})
-    if (package := cuts.missing_package()) and any(each.state.options.stop_at_cuts for each in requests.values()):
-        notes.append(f"no cuts are found, and exposures run across them: the Python package {package} is missing")
+    if source.by_blender:
+        notes.append("a second Blender decodes movies, which is slow: the Python package PyAV is missing")
     if lacking := sum(check.mattes.values()):
         notes.append(f"{lacking} mattes of outlines are not carried yet: the first render does that, frame by frame")
     if check.needs and check.needs.sends:

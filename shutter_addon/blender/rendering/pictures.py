@@ -14,7 +14,6 @@ from ...compute.renderer import Renderer
 from ...compute.request import Request
 from ...core.stopping import StoppedError
 from ...devices.budget import MEGABYTE
-from ...media import cuts
 from ...media.image_writing import write_exr
 from ..data import consistency
 from ..data.snapshot import Snapshot
@@ -33,11 +32,14 @@ def picture(context: RenderContext, snapshot: Snapshot, frame: float, detail: De
         raise StoppedError
     session, request = context.session, context.request(snapshot, frame, detail)
     renderer = context.renderer(request)  # meanwhile the window may close it: it would be opened again
-    if request.state.options.stop_at_cuts:
-        _say_of_cuts(context.say)
     if (weights := context.settings.weights) is not None:
         place = weights / f"{round(frame - snapshot.first + 1):04d}.exr"
         _write_weights(place, snapshot, frame, session.weights(request, context.stopped))
+    if renderer.source.by_blender:
+        _say_once(
+            rpt_("a second Blender decodes movies, which is slow: install the zip that is made for your system"),
+            context.say,
+        )
     made = session.picture(request, context.stopped)
     for sentence in shortages(renderer, request):
         _say_once(sentence, context.say)
@@ -60,12 +62,6 @@ def _say_once(sentence: str, say: Callable[[str], None]) -> None:
     if sentence not in _said:
         _said.add(sentence)
         say(sentence)
-
-
-def _say_of_cuts(say: Callable[[str], None]) -> None:
-    if package := cuts.missing_package():
-        sentence = f"Stop at Cuts finds none, and exposures run across them: the Python package {package} is missing"
-        _say_once(sentence, say)
 
 
 def shortages(renderer: Renderer, request: Request) -> list[str]:

@@ -51,6 +51,7 @@ class FrameSource(ABC):
     step: every step-th frame was filmed, from the first on
     shots: what knows where its shots end; None: it is one shot
     from_proxy: whether frames are read from a proxy, as far as it has them
+    by_blender: whether a second Blender decodes them, for want of PyAV
     """
 
     path: Path
@@ -67,6 +68,7 @@ class FrameSource(ABC):
     step: int = 1
     shots: ShotFinder | None = None
     from_proxy: bool = False
+    by_blender: bool = False
 
     @property
     def files(self) -> list[Path]:

@@ -82,6 +82,10 @@ MESSAGES = {
     " NumPy rechnet sie, und das ist langsam",
     (
         "*",
+        "a second Blender decodes movies, which is slow: install the zip that is made for your system",
+    ): "ein zweites Blender dekodiert Filme, und das ist langsam: installieren Sie die Zip-Datei für Ihr System",
+    (
+        "*",
         "View > Render Sequencer Animation cannot use Blender's own GPU, as Render > Render Animation can",
     ): "Ansicht > Sequencer-Animation rendern kann Blenders eigene GPU nicht nutzen, anders als Rendern > Animation"
     " rendern",
@@ -906,8 +910,8 @@ MESSAGES = {
     ): "Belichtungen enden an den Schnitten der Quelle wie an den Enden des Clips",
     (
         "*",
-        "Cuts are not found: the Python package {package} is missing",
-    ): "Schnitte werden nicht gefunden: das Python-Paket {package} fehlt",
+        "Movies: a second Blender decodes them, which is slow",
+    ): "Filme: ein zweites Blender dekodiert sie, was langsam ist",
     ("*", "Default at Edge"): "Standard am Rand",
     (
         "*",

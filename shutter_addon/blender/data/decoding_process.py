@@ -1,0 +1,173 @@
+"""What a second Blender runs to decode movies: it answers on its output what it is asked on its input, until that ends.
+
+Blender runs it as a script, no part of the extension there. A question is a line of JSON: `number`,
+`path` and `deinterlace` of a movie, and `wanted`, which is "about", "close", or a frame's index; a file may be open
+several times, by several numbers. An answer is a line of JSON, and
+as many bytes behind it as its `bytes` says. Before the first comes a line that reads as the script's last argument.
+"""
+
+import contextlib
+import faulthandler
+import json
+import os
+import sys
+
+import bpy
+import numpy as np
+
+OPENED = 6  # movies that are open at a time, at most
+IDLE = 30  # seconds without an open movie after which it ends
+
+
+class Movie:
+    """A movie that is open. Its frames are counted from 0."""
+
+    def __init__(self, path: str, deinterlace: bool):
+        self._path = path
+        self._ahead: tuple[int, np.ndarray] | None = None
+        self._last, self._onward = -2, False
+        self._image = bpy.data.images.load(path)
+        self._image.use_deinterlace = deinterlace
+        self._image.colorspace_settings.is_data = True  # or it makes light of deep samples
+        # An image's pixels are those of the frame that was looked at last, and a texture can be told which that is.
+        self._look = bpy.data.textures.new("look", "IMAGE")
+        self._look.image = self._image
+
+    def close(self) -> None:
+        bpy.data.textures.remove(self._look)
+        bpy.data.images.remove(self._image)
+
+    def about(self) -> dict:
+        """What it says of itself; frames are as many as a strip of it has. RuntimeError: it is no movie."""
+        if self._image.source != "MOVIE":
+            raise RuntimeError("Blender knows no such movie")
+        frame = self._pixels(0)
+        strips = bpy.context.scene.sequence_editor_create().strips
+        strip = strips.new_movie("movie", self._path, 1, 1)
+        try:
+            return {
+                "size": tuple(self._image.size),
+                "count": strip.content_duration,
+                "fps": strip.elements[0].orig_fps,
+                "alpha": self._image.depth in (32, 128),
+                "deep": frame.dtype == np.uint16,
+                "audio": _has_sound(self._path),
+            }
+        finally:
+            strips.remove(strip)
+
+    def frame(self, index: int) -> np.ndarray:
+        """A frame's _pixels, which may have been decoded already."""
+        found = self._ahead[1] if self._ahead and self._ahead[0] == index else self._pixels(index)
+        self._onward, self._last, self._ahead = index == self._last + 1, index, None
+        return found
+
+    def read_on(self) -> None:
+        """Decodes the next frame, if frames are asked for in order."""
+        if self._onward and self._ahead is None:
+            with contextlib.suppress(RuntimeError, MemoryError):
+                self._ahead = self._last + 1, self._pixels(self._last + 1)
+
+    def _pixels(self, index: int) -> np.ndarray:
+        """RGBA (H, W, 4), top row first, uint8 or, of deeper movies, uint16. RuntimeError: it cannot be decoded."""
+        self._look.image_user.frame_current = index + 1
+        self._look.evaluate((0, 0, 0))
+        width, height = self._image.size
+        if not self._image.has_data or not width * height:
+            raise RuntimeError("Blender cannot decode it")
+        samples = np.empty((height, width, 4), np.float32)
+        self._image.pixels.foreach_get(samples.reshape(-1))
+        if not self._image.is_float:
+            levels = np.empty(samples.shape, np.uint8)
+            # Level b is b / 255: so much more than b comes out that what is cut off is all behind the point.
+            return np.multiply(samples[::-1], np.float32(255.5), out=levels, casting="unsafe")
+        np.nan_to_num(samples, copy=False)
+        return np.rint(samples[::-1].clip(0, 1) * 65535).astype(np.uint16)
+
+
+def _has_sound(path: str) -> bool:
+    try:
+        import aud
+
+        return aud.Sound(path).specs[1] > 0
+    except Exception:  # of a file without, or a Blender that was built without
+        return False
+
+
+class Movies:
+    """Those that are open, the one that was asked for last at the end."""
+
+    def __init__(self) -> None:
+        self._open: dict[int, Movie] = {}
+
+    @property
+    def last(self) -> Movie:
+        return next(reversed(self._open.values()))
+
+    def __len__(self) -> int:
+        return len(self._open)
+
+    def get(self, number: int, path: str, deinterlace: bool) -> Movie:
+        """It, opened if it is not."""
+        movie = self._open.pop(number, None) or Movie(path, deinterlace)
+        while len(self._open) >= OPENED:
+            self.close(next(iter(self._open)))
+        self._open[number] = movie
+        return movie
+
+    def close(self, number: int) -> None:
+        """Closes it, if it is open."""
+        if movie := self._open.pop(number, None):
+            movie.close()
+
+
+def _answer(movies: Movies, wanted: str | int, **which) -> tuple[dict, np.ndarray | None]:
+    """The line and the bytes that are an answer. which: what Movies.get takes"""
+    try:
+        if wanted == "close":
+            movies.close(which["number"])
+            return {}, None
+        movie = movies.get(**which)
+        if wanted == "about":
+            return movie.about(), None
+        frame = movie.frame(int(wanted))
+        return {"shape": frame.shape, "dtype": frame.dtype.name}, frame
+    except (RuntimeError, MemoryError) as error:
+        movies.close(which["number"])
+        return {"error": " ".join(str(error).split()) or "there is no memory for it"}, None
+
+
+def main() -> None:
+    """Answers until its input ends."""
+    # Whatever else Blender prints would be taken for an answer.
+    questions, answers = (os.fdopen(os.dup(number), mode) for number, mode in ((0, "rb"), (1, "wb")))
+    null = os.open(os.devnull, os.O_RDWR)
+    os.dup2(null, 1)
+    if sys.platform == "win32":
+        import msvcrt
+
+        for stream in (questions, answers):
+            msvcrt.setmode(stream.fileno(), os.O_BINARY)
+    bpy.context.preferences.system.memory_cache_limit = 1  # megabyte: of frames, but for the last one
+    movies = Movies()
+    answers.write(f"\n{sys.argv[-1]}\n".encode())
+    while True:
+        answers.flush()
+        if not movies:  # a watch that needs no thread of Python's: it ends the process
+            faulthandler.dump_traceback_later(IDLE, exit=True, file=null)
+        if not (line := questions.readline()):
+            return
+        faulthandler.cancel_dump_traceback_later()
+        question = json.loads(line)
+        said, frame = _answer(movies, **question)
+        said["bytes"] = 0 if frame is None else frame.nbytes
+        answers.write(json.dumps(said).encode() + b"\n")
+        if frame is not None:
+            answers.write(frame.data)
+            answers.flush()
+            movies.last.read_on()
+
+
+if __name__ == "__main__":
+    with contextlib.suppress(BrokenPipeError):  # nobody waits for an answer any more
+        main()

@@ -1,0 +1,26 @@
+"""Lends Blender's own decoding of movies to the media layer, for where PyAV is missing."""
+
+import sys
+from pathlib import Path
+
+import bpy
+
+from ...media import decoding_child
+
+_SCRIPT = Path(__file__).with_name("decoding_process.py")
+
+
+def _command() -> list[str]:
+    """What runs that script in a Blender of its own, which has nothing of the user's, and asks no network."""
+    if not bpy.app.binary_path:  # Blender as a library
+        return [sys.executable, str(_SCRIPT)]
+    alone = ["--background", "--factory-startup", "--offline-mode", "-noaudio"]
+    return [bpy.app.binary_path, *alone, "--python", str(_SCRIPT), "--"]
+
+
+def register() -> None:
+    decoding_child.lend(_command())
+
+
+def unregister() -> None:
+    decoding_child.lend(None)

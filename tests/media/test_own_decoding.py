@@ -1,0 +1,344 @@
+"""Movies that a second Blender decodes, beside the same ones by PyAV; and that Blender's life."""
+
+import os
+import random
+import select
+import signal
+import struct
+import subprocess
+import sys
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import ExitStack
+from fractions import Fraction
+from pathlib import Path
+
+import av
+import numpy as np
+import pytest
+from footage import COUNT, cut_file, damage_frame, make_movie, number, picture, save_image
+
+from shutter_addon.media import MediaError, decoding_child, flow, inbetween, open_source
+from shutter_addon.media.blender_movie import BlenderMovie, BlenderMovieChannel, frame_rate
+from shutter_addon.media.inbetween import InbetweenSource
+from shutter_addon.media.opening import open_channel
+
+ROOT = Path(__file__).parents[2]
+FOLDER = ROOT / "shutter_addon" / "blender" / "data"
+SCRIPT = FOLDER / "decoding_process.py"
+SAID = ["path", "width", "height", "count", "fps", "dtype", "transfer", "alpha", "options", "has_audio"]
+# Levels of 65535: of RGB with 16 bits, Blender's own way to floats loses so many.
+DEEP = 33
+linux = pytest.mark.skipif(not sys.platform.startswith("linux"), reason="looks at processes as Linux shows them")
+
+
+@pytest.fixture(autouse=True)
+def _lent():
+    """Blender as a library decodes; one process for all tests that lend no other."""
+    if decoding_child._command != [sys.executable, str(SCRIPT)]:  # nobody else is told which it is
+        decoding_child.lend([sys.executable, str(SCRIPT)])
+
+
+@pytest.fixture(autouse=True, scope="module")
+def _ended():
+    yield
+    decoding_child.lend(None)
+
+
+def process():
+    """The process that decodes."""
+    return decoding_child._process.pid  # nobody else is told which it is
+
+
+def assert_same(path, *, deinterlace=False):
+    """A movie says the same of itself, and has the same frames, whoever decodes it, also backwards."""
+    with (
+        open_source(path, deinterlace=deinterlace) as by_pyav,
+        BlenderMovie(path, deinterlace=deinterlace) as by_blender,
+    ):
+        assert {name: getattr(by_blender, name) for name in SAID} == {name: getattr(by_pyav, name) for name in SAID}
+        for index in [*range(by_pyav.count), *range(by_pyav.count - 1, -1, -5)]:
+            ours, theirs = by_blender.read(index), by_pyav.read(index)
+            most = np.abs(ours.astype(int) - theirs).max()
+            assert most <= (DEEP if theirs.dtype == np.uint16 else 0), (path.name, index, most)
+
+
+def test_ugly_movies_are_those_that_pyav_decodes(movies):
+    for path, _numbers in movies.values():
+        assert_same(path)
+
+
+def test_colours_depths_alpha_and_turned_movies_are_those_that_pyav_decodes(coloured):
+    for path in coloured.values():
+        assert_same(path)
+
+
+def test_deinterlaced_movies_are_those_that_pyav_decodes(deinterlaced):
+    for path in deinterlaced.values():
+        assert_same(path, deinterlace=True)
+
+
+def test_any_order_gives_the_same_frames(movies):
+    path, numbers = movies["open.mkv"]
+    order = random.Random(4).choices(range(COUNT), k=80)
+    with BlenderMovie(path) as source:
+        assert [number(source.read(index)) for index in order] == [numbers[index] for index in order]
+
+
+def test_more_movies_than_are_open_at_a_time_and_names_of_all_kinds(tmp_path):
+    names = ["a b.mp4", "Größe.mp4", "映画 ().mp4", "-x.mp4", "'q'.mp4", "%04d#1.mp4", "10.mp4", "11.mp4", "12.mp4"]
+    with ExitStack() as opened:
+        sources = []
+        for place, name in enumerate(names):
+            pictures = [picture(20 * place + n) for n in range(3)]
+            path = make_movie(tmp_path / name, "libx264", pictures=pictures, options={"qp": "0"})
+            sources.append(opened.enter_context(BlenderMovie(path)))
+        for index in (0, 1, 2):
+            assert [number(source.read(index)) for source in sources] == [20 * n + index for n in range(len(names))]
+
+
+def test_threads_ask_at_the_same_time(movies):
+    def read(name):
+        with BlenderMovie(movies[name][0]) as source:
+            return [number(source.read(index)) for index in range(source.count)]
+
+    names = ["b_frames.mp4", "open.mkv", "mpeg4.mp4", "ntsc.mov"]
+    with ThreadPoolExecutor(4) as threads:
+        assert list(threads.map(read, names)) == [movies[name][1] for name in names]
+
+
+def test_arrays_belong_to_the_caller_and_a_closed_movie_is_read_again(movies):
+    source = BlenderMovie(movies["b_frames.mp4"][0])
+    first = source.read(3)
+    kept = first.copy()
+    first[:] = 7
+    with BlenderMovie(source.path) as other:
+        source.close()
+        source.close()
+        for index in (1, 2, 3):
+            assert np.array_equal(other.read(index), source.read(index))
+    assert np.array_equal(source.read(3), kept)
+    source.close()
+
+
+def test_another_file_in_its_place_is_one_sentence(tmp_path):
+    path = make_movie(tmp_path / "a.mp4", "libx264", 3)
+    with BlenderMovie(path) as source:
+        source.close()
+        path.write_bytes(make_movie(tmp_path / "b.mp4", "libx264", 3, size=(64, 32)).read_bytes())
+        with pytest.raises(MediaError, match=r"^frame 1 of a\.mp4 cannot be decoded: the file is another one now$"):
+            source.read(1)
+        with pytest.raises(IndexError):
+            source.read(3)
+
+
+def test_what_is_no_movie_is_one_sentence(movies, tmp_path):
+    text, empty = tmp_path / "text.mp4", tmp_path / "empty.mp4"
+    text.write_text("Hello.\n" * 50)
+    empty.touch()
+    cut = cut_file(movies["b_frames.mp4"][0], tmp_path / "cut.mp4", 0.5)
+    for path, reason in [
+        (text, r"cannot be read as a movie \(Blender "),
+        (cut, r"cannot be read as a movie \(Blender "),
+        (empty, "file is empty"),
+        (tmp_path / "none.mp4", "no such file"),
+        (tmp_path, "is a folder"),
+    ]:
+        with pytest.raises(MediaError, match=rf"^{path.name}: {reason}"):
+            BlenderMovie(path)
+    assert_same(movies["b_frames.mp4"][0])
+
+
+def hostile(folder, movies):
+    """Files that are no movies, or hardly. Blender may read some of them, as PyAV does."""
+    sound, still = folder / "sound.mp4", folder / "still.mp4"
+    with av.open(str(sound), "w") as out:
+        stream = out.add_stream("aac", rate=8000, layout="mono")
+        frame = av.AudioFrame.from_ndarray(np.zeros((1, 1024), np.float32), format="fltp", layout="mono")
+        frame.sample_rate = 8000
+        out.mux(stream.encode(frame))
+        out.mux(stream.encode())
+    save_image(folder / "still.png", picture(1)).rename(still)
+    absurd = make_movie(folder / "absurd.avi", "ffv1", 5)
+    data = absurd.read_bytes()
+    where = data.index(b"strf") + 12
+    absurd.write_bytes(data[:where] + struct.pack("<2i", 30000, 20000) + data[where + 8 :])
+    noise = folder / "noise.mkv"
+    noise.write_bytes(np.random.default_rng(3).bytes(9000))
+    head = cut_file(movies["open.mkv"][0], folder / "head.mkv", 0.12)
+    damaged = damage_frame(movies["b_frames.mp4"][0], folder / "damaged.mp4", 9)
+    raw = make_movie(folder / "raw.h264", "libx264", format="h264")
+    return sound, still, absurd, noise, head, damaged, raw, cut_file(movies["open.mkv"][0], folder / "cut.mkv", 0.5)
+
+
+def test_hostile_files_are_pictures_or_one_sentence_and_all_else_goes_on(movies, tmp_path):
+    refused = {}
+    for path in hostile(tmp_path, movies):
+        try:
+            with BlenderMovie(path) as source:
+                for index in (0, source.count // 2, source.count - 1):
+                    assert source.read(index).shape == (source.height, source.width, 4)
+        except MediaError as error:
+            refused[path.name] = str(error)
+    assert [*refused] == ["sound.mp4", "still.mp4", "absurd.avi", "noise.mkv", "head.mkv", "raw.h264"]
+    for name, sentence in refused.items():
+        begins = f"{name}: cannot be read as a movie (Blender ", f"{name}: its length is unknown"
+        assert sentence.startswith(begins), sentence
+    assert_same(movies["b_frames.mp4"][0])
+
+
+@linux
+def test_a_pipe_in_the_place_of_a_movie_that_was_read(tmp_path):
+    path = make_movie(tmp_path / "a.mp4", "libx264", 3)
+    with BlenderMovie(path) as source:
+        source.close()
+        path.unlink()
+        os.mkfifo(path)
+        with pytest.raises(MediaError, match=r"^frame 1 of a\.mp4 cannot be decoded: is no file, but a pipe"):
+            source.read(1)
+
+
+def test_frame_rates_are_those_of_films():
+    odd = Fraction(25, 2), Fraction(100, 7), Fraction(2997, 50)
+    for rate in (25, 24, Fraction(30000, 1001), Fraction(24000, 1001), Fraction(120000, 1001), *odd):
+        assert frame_rate(float(np.float32(rate))) == rate
+
+
+@pytest.fixture
+def _no_pyav(monkeypatch):
+    monkeypatch.setitem(sys.modules, "shutter_addon.media.movie", None)
+
+
+def test_channels_are_those_that_pyav_decodes(coloured):
+    for name in ("bt709.mp4", "alpha_png.mov", "ten_bits.mp4", "gray.mkv"):
+        for channel in ("luminance", "red", "green", "blue", "alpha"):
+            with open_channel(coloured[name], channel) as theirs, BlenderMovieChannel(coloured[name], channel) as ours:
+                one, other = ours.read(1), theirs.read(1)  # PyAV's luminance of grey pictures is their luma
+                assert one.shape == other.shape or (name, channel) == ("gray.mkv", "luminance")
+                assert not one.size or np.abs(one.astype(int) - other).max() == 0
+    with pytest.raises(MediaError, match=r"^gray\.mkv: has no channel depth, but luminance"):
+        BlenderMovieChannel(coloured["gray.mkv"], "depth")
+
+
+@pytest.mark.usefixtures("_no_pyav")
+def test_without_pyav_movies_are_opened_so(coloured):
+    with open_source(coloured["bt709.mp4"], divisor=2) as source:
+        assert (source.by_blender, source.width, source.height) == (True, 64, 32)
+        assert source.read(0).shape == (32, 64, 4)
+    with open_channel(coloured["bt709.mp4"], "red") as channel:
+        assert channel.read(0).shape == (64, 128, 1)
+    for opened in (
+        lambda **which: open_source(coloured["bt709.mp4"], **which),
+        lambda **which: open_channel(coloured["bt709.mp4"], "red", **which),
+    ):
+        with pytest.raises(MediaError, match=r"^bt709\.mp4: video stream 1 of a movie needs the Python package PyAV"):
+            opened(stream=1)
+
+
+@pytest.mark.usefixtures("_no_pyav")
+def test_without_a_blender_movies_are_refused(coloured):
+    decoding_child.lend(None)
+    with pytest.raises(MediaError, match=r"^bt709\.mp4: movies need the Python package PyAV"):
+        open_source(coloured["bt709.mp4"])
+
+
+@pytest.mark.parametrize(
+    ("command", "reason"),
+    [
+        (["/nowhere/blender"], "cannot be started: No such file or directory"),
+        ([sys.executable, "-c", "pass"], "has ended"),
+        ([sys.executable, "-c", "import sys; print(sys.argv[-1])"], "has ended"),
+    ],
+)
+def test_a_blender_that_does_not_answer_is_one_sentence(coloured, command, reason):
+    decoding_child.lend(command)
+    sentence = rf"^bt709\.mp4: cannot be read as a movie \(the Blender that decodes it {reason}\)$"
+    with pytest.raises(MediaError, match=sentence):
+        BlenderMovie(coloured["bt709.mp4"])
+
+
+def test_in_between_frames_that_are_built_already_are_used(coloured, tmp_path, monkeypatch):
+    """Without PyAV and OpenCV, and what is not built is refused, before anything is written."""
+    path = coloured["bt709.mp4"]
+    with open_source(path) as by_pyav:
+        inbetween.build(by_pyav, tmp_path, 2, "quick")
+        built = InbetweenSource(by_pyav, tmp_path, 2, "quick").read(1)
+    monkeypatch.setattr(flow, "cv2", None)
+    with BlenderMovie(path) as source:
+        assert inbetween.build(source, tmp_path, 2, "quick").name == "ready"
+        assert np.array_equal(InbetweenSource(source, tmp_path, 2, "quick").read(1), built)
+        with pytest.raises(MediaError, match=r"^in-between frames need the Python package opencv"):
+            inbetween.build(source, tmp_path / "none", 2, "quick")
+    assert not (tmp_path / "none").exists()
+
+
+@linux
+def test_a_blender_that_was_killed_is_followed_by_another(movies):
+    path, numbers = movies["b_frames.mp4"]
+    with BlenderMovie(path) as source:
+        source.read(0)
+        os.kill(process(), signal.SIGKILL)
+        assert number(source.read(4)) == numbers[4]
+
+
+def assert_ends(pid):
+    """The process ends within some seconds, or has ended."""
+    try:
+        handle = os.pidfd_open(pid)
+    except ProcessLookupError:
+        return
+    assert select.select([handle], [], [], 20)[0], "it goes on"
+    os.close(handle)
+
+
+PARENT = """
+import sys
+from shutter_addon.media import decoding_child
+from shutter_addon.media.blender_movie import BlenderMovie
+decoding_child.lend([sys.executable, sys.argv[1]])
+source = BlenderMovie(sys.argv[2])
+print(decoding_child._process.pid, flush=True)
+sys.stdin.read()
+"""
+
+
+@linux
+def test_it_ends_with_the_process_that_asked_however_that_ends(movies):
+    for end in (signal.SIGKILL, None):
+        command = [sys.executable, "-c", PARENT, SCRIPT, movies["b_frames.mp4"][0]]
+        with subprocess.Popen(command, cwd=ROOT, stdin=subprocess.PIPE, stdout=subprocess.PIPE) as parent:
+            pid = int(parent.stdout.readline())
+            if end is not None:
+                parent.send_signal(end)
+            parent.stdin.close()
+        assert_ends(pid)
+
+
+@linux
+def test_it_ends_some_time_after_the_last_movie_was_closed_and_begins_again(movies):
+    code = f"import sys; sys.path[:0] = [{str(FOLDER)!r}]; import decoding_process as d; d.IDLE = 0.5; d.main()"
+    decoding_child.lend([sys.executable, "-c", code])
+    path, numbers = movies["b_frames.mp4"]
+    source, other = BlenderMovie(path), BlenderMovie(movies["open.mkv"][0])
+    first = process()
+    source.close()
+    assert number(other.read(3)) == movies["open.mkv"][1][3]
+    assert process() == first
+    other.close()
+    assert_ends(first)
+    assert number(source.read(4)) == numbers[4]
+    assert process() != first
+    source.close()
+
+
+@linux
+def test_memory_stays_bounded(bunny):
+    def resident():
+        return int(Path(f"/proc/{process()}/statm").read_text().split()[1]) * 4096
+
+    with BlenderMovie(bunny) as source:
+        for index in range(15):
+            source.read(index)
+        before = resident()
+        for index in range(15, 75):
+            source.read(index)
+        assert resident() - before < 20 * source.read(0).nbytes  # 60 kept ones would be 240, as floats
