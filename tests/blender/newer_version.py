@@ -48,7 +48,7 @@ def make(path: str, saved: str) -> None:
     alone = scene.virtual_shutter.effects.add()
     alone.name, alone.scene = "shown otherwise", bpy.data.scenes.new("Unshown")
     effect.scene.render.use_border, effect.scene.camera = True, None
-    scene.sequence_editor.strips["regions effect"].frame_start += 100
+    scene.sequence_editor.strips["regions effect"].content_start += 100
     for each in bpy.data.scenes:
         each.virtual_shutter.format = data_format.FORMAT if each.virtual_shutter.effects else 0
     scene.virtual_shutter.version = versions.extension()
