@@ -49,10 +49,10 @@ def name(suffix: str) -> str:
     return f"{manifest()['id']}-{manifest()['version']}{suffix}.zip"
 
 
-def build_without_wheels(output: Path) -> Path:
+def build_without_wheels(output: Path, source: Path = ROOT) -> Path:
     """Makes the zip that works with what Blender brings."""
     path = output / name("-no_wheels")
-    extension("build", "--source-dir", ROOT, "--output-filepath", path)
+    extension("build", "--source-dir", source, "--output-filepath", path)
     extension("validate", path)
     return path
 

@@ -1,0 +1,145 @@
+"""A release in one folder, which is a repository that Blender subscribes to as well: the zips, their index, notes,
+checksums, and what is in each zip.
+
+Run by scripts/release. The same commit gives the same bytes: all is built from what is committed, and dated by it.
+"""
+
+import argparse
+import hashlib
+import json
+import os
+import re
+import subprocess
+import sys
+import tarfile
+import tempfile
+import time
+import zipfile
+from pathlib import Path
+
+import build
+import sbom
+
+# Systems that Blender knows and that have no wheels.
+OTHERS = ("linux-arm64", "macos-x64", "windows-arm64")
+
+
+def git(*arguments: str) -> str:
+    done = subprocess.run(["git", *arguments], cwd=build.ROOT, capture_output=True, text=True, check=False)
+    if done.returncode:
+        fail(f"git {arguments[0]}: {done.stderr.strip() or 'it failed'}")
+    return done.stdout.strip()
+
+
+def notes(version: str) -> str:
+    """What the changelog says of a version."""
+    text = (build.ROOT / "CHANGELOG.md").read_text(encoding="utf-8")
+    section = re.search(rf"(?ms)^## {re.escape(version)}$(.*?)(?=^## |\Z)", text)
+    if section is None or not section[1].strip():
+        fail(f"CHANGELOG.md says nothing of version {version}")
+    return section[1].strip() + "\n"
+
+
+def committed(folder: Path) -> Path:
+    """The files of the commit alone, in a folder: a checkout may hold more, which git ignores and a zip would not."""
+    packed = folder / "source.tar"
+    git("archive", "--format=tar", f"--output={packed}", "HEAD")
+    with tarfile.open(packed) as archive:
+        archive.extractall(folder / "source", filter="data")
+    return folder / "source"
+
+
+def normalise(path: Path, date: int) -> None:
+    """Packs a zip anew: sorted, all files dated alike, in seconds since 1970, with the same modes. Without compression,
+    which differs from zlib to zlib; wheels are compressed themselves."""
+    with zipfile.ZipFile(path) as packed:
+        files = {name: packed.read(name) for name in sorted(packed.namelist())}
+    with zipfile.ZipFile(path, "w", zipfile.ZIP_STORED) as packed:
+        for name, data in files.items():
+            file = zipfile.ZipInfo(name, time.gmtime(date)[:6])
+            file.create_system, file.external_attr = 3, 0o100644 << 16  # as on Linux
+            packed.writestr(file, data)
+    build.extension("validate", path)
+
+
+def write_index(folder: Path, date: int) -> None:
+    """The index of the zips in a folder, by Blender; sorted, dated alike, and with the zip without wheels for those
+    systems alone that have no other: Blender is to be offered one zip. The page offers all to whoever looks at it."""
+    build.extension("server-generate", "--repo-dir", folder, "--html")
+    index, page = folder / "index.json", folder / "index.html"
+    listed = json.loads(index.read_text(encoding="utf-8"))
+    for zipped in listed["data"]:
+        zipped.setdefault("platforms", list(OTHERS))
+    listed["data"].sort(key=lambda zipped: zipped["archive_url"])
+    write(index, json.dumps(listed, indent=2) + "\n")
+    head, *rows = re.split(r"(?m)^(?=  <tr>$)", page.read_text(encoding="utf-8"))
+    rows[-1], end = re.split(r"(?m)^(?=</table>$)", rows[-1])
+    names, *zips = rows
+    day = time.strftime("%Y-%m-%d, %H:%M", time.gmtime(date))
+    write(page, "".join([head, names, *sorted(zips), re.sub(r"Built [\d-]+, [\d:]+", f"Built {day}", end)]))
+
+
+def write_checksums(folder: Path) -> None:
+    """SHA-256 of all files in a folder, as `sha256sum --check SHA256SUMS` reads it."""
+    files = sorted(folder.iterdir())
+    lines = [f"{hashlib.sha256(path.read_bytes()).hexdigest()}  {path.name}\n" for path in files]
+    write(folder / "SHA256SUMS", "".join(lines))
+
+
+def write(path: Path, text: str) -> None:
+    path.write_text(text, encoding="utf-8", newline="\n")
+
+
+def make(folder: Path, systems: list[str], text: str) -> None:
+    """Puts all of a release into a folder; text: its notes."""
+    date = int(git("log", "-1", "--format=%ct"))
+    with tempfile.TemporaryDirectory() as stage:
+        without = build.build_without_wheels(folder, committed(Path(stage)))
+        zips = [without, *build.build_with_wheels(without, folder, systems, build.BLENDERS_PYTHON)]
+    for path in zips:
+        normalise(path, date)
+        sbom.write(path, path.with_suffix(".cdx.json"))
+    write_index(folder, date)
+    write(folder / "release-notes.md", text)
+    write_checksums(folder)
+
+
+def fail(sentence: str) -> None:
+    print(f"release: {sentence}", file=sys.stderr)
+    sys.exit(2)
+
+
+def arguments() -> argparse.Namespace:
+    about = "Tests, then makes all that belongs to a release in one folder. A relative DIR is in the project's folder."
+    parser = argparse.ArgumentParser("scripts/release", description=about)
+    parser.add_argument("--output", type=Path, metavar="DIR", help="a new folder; default: dist/VERSION")
+    parser.add_argument("--version", metavar="X.Y.Z", help="the version that is meant; another one is refused")
+    parser.add_argument("--system", action="append", choices=build.SYSTEMS, help="these alone; may be given again")
+    parser.add_argument("--no-tests", action="store_true", help="where they have passed before")
+    return parser.parse_args()
+
+
+def main() -> None:
+    options, version = arguments(), build.manifest()["version"]
+    output = (options.output or build.ROOT / "dist" / version).resolve()
+    if options.version not in (None, version):
+        fail(f"this is version {version}, not {options.version}")
+    if git("status", "--porcelain"):
+        fail("there are changes that are not committed")
+    text = notes(version)
+    if output.exists():
+        fail(f"{output} is there already")
+    if not options.no_tests and subprocess.run([build.ROOT / "scripts" / "test"], check=False).returncode:
+        fail("the tests fail")
+    output.parent.mkdir(parents=True, exist_ok=True)
+    with tempfile.TemporaryDirectory(prefix=".release-", dir=output.parent) as folder:
+        made = Path(folder) / output.name
+        made.mkdir()
+        make(made, options.system or list(build.SYSTEMS), text)
+        os.replace(made, output)
+    for path in sorted(output.iterdir()):
+        print(f"{path.stat().st_size / 1e6:7.2f} MB  {path}")
+
+
+if __name__ == "__main__":
+    main()
