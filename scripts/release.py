@@ -20,8 +20,8 @@ from pathlib import Path
 import build
 import sbom
 
-# Systems that Blender knows and that have no wheels.
-OTHERS = ("linux-arm64", "macos-x64", "windows-arm64")
+# Those that Blender knows.
+SYSTEMS = ("linux-arm64", "linux-x64", "macos-arm64", "macos-x64", "windows-arm64", "windows-x64")
 
 
 def git(*arguments: str) -> str:
@@ -68,8 +68,9 @@ def write_index(folder: Path, date: int) -> None:
     build.extension("server-generate", "--repo-dir", folder, "--html")
     index, page = folder / "index.json", folder / "index.html"
     listed = json.loads(index.read_text(encoding="utf-8"))
+    taken = {system for zipped in listed["data"] for system in zipped.get("platforms", ())}
     for zipped in listed["data"]:
-        zipped.setdefault("platforms", list(OTHERS))
+        zipped.setdefault("platforms", [system for system in SYSTEMS if system not in taken])
     listed["data"].sort(key=lambda zipped: zipped["archive_url"])
     write(index, json.dumps(listed, indent=2) + "\n")
     head, *rows = re.split(r"(?m)^(?=  <tr>$)", page.read_text(encoding="utf-8"))
