@@ -15,6 +15,9 @@ import pytest
 hypothesis.settings.register_profile("shutter", deadline=None)
 hypothesis.settings.load_profile("shutter")
 
+# What is deprecated fails programs that tests start, too: Pythons by this, Blenders with the option of real_blender.
+os.environ["PYTHONWARNINGS"] = "error::DeprecationWarning,error::PendingDeprecationWarning"
+
 ROOT = Path(__file__).parents[1]
 LONG = "window", "farm", "differential"
 
@@ -35,7 +38,7 @@ def real_blender():
     """The command that runs a real Blender, as a list."""
     if not os.environ.get("BLENDER"):
         pytest.skip("NO REAL BLENDER: set BLENDER to the command that runs one")
-    return shlex.split(os.environ["BLENDER"])
+    return [*shlex.split(os.environ["BLENDER"]), "--python-use-system-env"]
 
 
 @pytest.fixture(scope="session")

@@ -2,7 +2,6 @@
 
 import json
 import os
-import shlex
 import subprocess
 import sys
 from pathlib import Path
@@ -122,13 +121,11 @@ def user_folder(tmp_path_factory):
 
 
 @pytest.fixture
-def blender(user_folder):
+def blender(real_blender, user_folder):
     """Runs the real Blender that the environment names, with the extension enabled."""
-    if not os.environ.get("BLENDER"):
-        pytest.skip("NO REAL BLENDER: set BLENDER to the command that runs one")
 
     def run(*arguments):
-        command = [*shlex.split(os.environ["BLENDER"]), "-b", "--factory-startup", "--addons", EXTENSION]
+        command = [*real_blender, "-b", "--factory-startup", "--addons", EXTENSION]
         return subprocess.run(
             [*command, *map(str, arguments)],
             env=os.environ | {"BLENDER_USER_RESOURCES": str(user_folder)},

@@ -2,6 +2,8 @@
 
 import ast
 import re
+import subprocess
+import sys
 from pathlib import Path
 
 ROOT = Path(__file__).parents[2]
@@ -60,3 +62,31 @@ def test_uses_are_found(bpy, tmp_path):
     for name in shared:
         path.write_text(f"edit.{name} = item.clip.{name}")
         assert not list(uses(path, strips - shared, shared)), name
+
+
+# Uses what Blender deprecates of a strip, and then what Python does.
+USES = """
+import warnings, bpy
+strip = bpy.context.scene.sequence_editor_create().strips.new_effect("strip", "COLOR", 1, 1, length=9)
+name = next(prop.identifier for prop in strip.bl_rna.properties if prop.is_deprecated)
+for use in (lambda: getattr(strip, name), lambda: warnings.warn("soon", PendingDeprecationWarning)):
+    try:
+        use()
+    except (Warning, SystemError):  # Blender gives the value beside the exception, which Python takes for a fault
+        print("REFUSED")
+"""
+REFUSED = "REFUSED\nREFUSED\n"
+
+
+def test_what_is_deprecated_fails(bpy, edit, capsys):
+    exec(USES, {})
+    assert capsys.readouterr().out == REFUSED
+
+
+def test_what_is_deprecated_fails_in_children():
+    done = subprocess.run([sys.executable, "-c", USES], capture_output=True, text=True, check=True)
+    assert done.stdout.endswith(REFUSED)
+
+
+def test_what_is_deprecated_fails_in_a_real_blender(blender):
+    assert REFUSED in blender("--python-expr", USES).stdout

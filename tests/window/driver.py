@@ -8,12 +8,17 @@ import os
 import subprocess
 import sys
 import traceback
+import warnings
 from pathlib import Path
 
 import bpy
 
 sys.path.append(str(Path(__file__).parents[1]))
 import thread_guard
+
+# Blender ignores the environment's filters unless it gets an option, which the command that opens it need not take.
+for deprecated in (DeprecationWarning, PendingDeprecationWarning):
+    warnings.simplefilter("error", deprecated)
 
 OUT = Path(os.environ.get("SHUTTER_PICTURES", "/tmp/shutter-window"))
 STEP = 0.25  # seconds that Blender gets for events and redraws
