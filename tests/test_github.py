@@ -1,0 +1,129 @@
+"""The workflows for GitHub's runners: their commands, with nothing downloaded or installed, for each of the systems."""
+
+import os
+import re
+import runpy
+import shlex
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+yaml = pytest.importorskip("yaml", reason="NO WORKFLOWS: install PyYAML")
+ROOT = Path(__file__).parents[1]
+WORKFLOWS = {path.stem: yaml.safe_load(path.read_text()) for path in (ROOT / ".github" / "workflows").glob("*.yml")}
+JOBS = {f"{name}-{job}": jobs for name, flow in WORKFLOWS.items() for job, jobs in flow["jobs"].items()}
+SYSTEMS = JOBS["test-installed"]["strategy"]["matrix"]["include"]
+# Linux's renders with the library, which takes its time.
+LIBRARY = '[ "$SYSTEM" != linux-x64 ] || { shift 2; exec "$PYTHON_IS" -m shutter_addon "$@"; }'
+STAND_INS = {
+    "sudo": "true",
+    "curl": 'touch "$4"',  # --fail --location --output FILE
+    "hdiutil": 'mkdir -p "$3/Blender.app/Contents/MacOS"; cp "$BLENDER_IS" "$3/Blender.app/Contents/MacOS/Blender"',
+    "unzip": 'mkdir -p "$4/blender"; cp "$BLENDER_IS" "$4/blender/blender.exe"',  # -q FILE -d FOLDER
+    "tar": 'cp "$BLENDER_IS" "$7/blender"',  # --extract --file FILE --strip-components 1 --directory FOLDER
+    "python": 'echo "python $*" >>"$TOLD"; [ "$1" = -m ] || exec "$PYTHON_IS" "$@"',
+    "blender": f'echo "blender $*" >>"$TOLD"; if [ "$2" = shutter ]; then {LIBRARY}; else test -f "$7"; fi',
+    "jq": "echo https://cdn.example.org/blender.tar.xz",
+}
+
+
+def commands(job):
+    return "\n".join(step["run"] for step in job["steps"] if "run" in step)
+
+
+def run(lines, folder, environment):
+    """Runs a job's commands as its shell does; what they told of Python and Blender."""
+    programs, told = folder / "programs", folder / "told"
+    programs.mkdir()
+    for name, text in STAND_INS.items():
+        (programs / name).write_text(f"#!/bin/sh\n{text}\n")
+        (programs / name).chmod(0o755)
+    own = {"PATH": f"{programs}:{os.environ['PATH']}", "TOLD": str(told), "PYTHON_IS": sys.executable}
+    environment = os.environ | environment | own | {"BLENDER_IS": str(programs / "blender")}
+    shell = ["bash", "--noprofile", "--norc", "-e", "-o", "pipefail"]
+    done = subprocess.run(shell, input=lines, env=environment, cwd=folder, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    return [shlex.split(line) for line in told.read_text().splitlines()]
+
+
+@pytest.fixture
+def checkout(tmp_path):
+    """The project without what commands write; they leave nothing in this one."""
+    folder = tmp_path / "checkout"
+    folder.mkdir()
+    for path in ROOT.iterdir():
+        if path.name not in (".git", "build", "dist", "out", "scripts"):
+            (folder / path.name).symlink_to(path)
+    (folder / "scripts").mkdir()
+    (folder / "scripts" / "build.py").write_text('import sys; assert sys.argv[1] == "--system"\n' + ZIPPED)
+    return folder
+
+
+ZIPPED = """
+import pathlib
+pathlib.Path("dist").mkdir()
+pathlib.Path(f"dist/virtual_shutter-0.1.0-{sys.argv[2].replace('-', '_')}.zip").touch()
+"""
+
+
+@pytest.mark.parametrize("system", SYSTEMS, ids=lambda system: system["system"])
+def test_the_commands_of_a_system(checkout, system):
+    environment = {name: system[name.lower()] for name in ("SYSTEM", "ARCHIVE")} | {"BLENDER": system["program"]}
+    told = run(commands(JOBS["test-installed"]), checkout, environment)
+    install, render = (words for words in told if words[0] == "blender")
+    assert install[1:4] == ["--command", "extension", "install-file"]
+    assert install[-1] == f"dist/virtual_shutter-0.1.0-{system['system'].replace('-', '_')}.zip"
+    assert render[1:4] == ["--command", "shutter", "render"]
+    assert system["system"] != "linux-x64" or len(list((checkout / render[-1]).iterdir())) == 3
+    assert [words[2] for words in told if words[:2] == ["python", "-m"]] == ["pip", *["pytest"] * 3]
+
+
+def test_the_commands_of_the_daily_build(checkout):
+    told = run(commands(JOBS["test-daily"]), checkout, JOBS["test-daily"]["env"])
+    assert [words[2] for words in told] == ["pip", "pip", "pytest", "pytest"]
+
+
+# Blender's own parser of an extension's commands.
+EXTENSION = """
+import argparse, sys, bpy
+from bl_pkg import bl_extension_cli
+parser = argparse.ArgumentParser()
+bl_extension_cli.cli_extension_args_install_file(parser.add_subparsers())
+assert parser.parse_args(sys.argv[1:]).file
+"""
+
+
+def test_what_blender_and_the_builder_are_given_is_understood():
+    (line,) = lines_with('"$BLENDER" --command extension')
+    subprocess.run([sys.executable, "-c", EXTENSION, *shlex.split(line)[3:]], check=True)
+    known = runpy.run_path(str(ROOT / "scripts" / "build.py"))["SYSTEMS"]
+    assert [system["system"] for system in SYSTEMS] == ["linux-x64", "macos-arm64", "windows-x64"] == sorted(known)
+
+
+def lines_with(word):
+    return [
+        line.strip() for job in JOBS.values() for line in commands(job).splitlines() if line.strip().startswith(word)
+    ]
+
+
+def test_the_tests_that_are_asked_for_are_there():
+    for line in lines_with("python -m pytest"):
+        words = shlex.split(line)[3:]
+        assert all((ROOT / word).exists() for word in words if word.startswith("tests/")), line
+    name = re.search(r"-k (\w+)", "\n".join(lines_with("python -m pytest")))[1]
+    assert f"def {name}(" in (ROOT / "tests" / "test_package.py").read_text()
+
+
+def test_actions_and_variables_are_known():
+    for name, job in JOBS.items():
+        uses = {step["uses"] for step in job["steps"] if "uses" in step}
+        assert uses <= {"actions/checkout@v4", "actions/setup-python@v5", "actions/upload-artifact@v4"}, name
+        text = commands(job)
+        given = {*WORKFLOWS[name.partition("-")[0]].get("env", {}), *job.get("env", {}), "GITHUB_REF_NAME", "url"}
+        assert set(re.findall(r"\$\{?([A-Za-z_]\w*)", text)) <= given, name
+        assert "${{" not in text
+        assert job["timeout-minutes"] <= 360
+    assert WORKFLOWS["release"]["permissions"] == {"contents": "write"}
+    assert WORKFLOWS["test"]["permissions"] == {"contents": "read"}
