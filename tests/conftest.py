@@ -17,6 +17,7 @@ hypothesis.settings.load_profile("shutter")
 
 # What is deprecated fails programs that tests start, too: Pythons by this, Blenders with the option of real_blender.
 os.environ["PYTHONWARNINGS"] = "error::DeprecationWarning,error::PendingDeprecationWarning"
+os.environ["PYTHONNOUSERSITE"] = "1"  # which that option would let in, too
 
 ROOT = Path(__file__).parents[1]
 LONG = "window", "farm", "differential"

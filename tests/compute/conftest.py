@@ -1,17 +1,39 @@
-"""The devices."""
+"""The devices. With SHUTTER_NO_GPU in the environment, tests that need one which is not there are skipped."""
+
+import os
 
 import pytest
+
+from shutter_addon.devices.device import NoDeviceError
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_setup():
+    return (yield from _skipped_without())
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_call():
+    return (yield from _skipped_without())
+
+
+def _skipped_without():
+    try:
+        return (yield)
+    except NoDeviceError as error:
+        if not os.environ.get("SHUTTER_NO_GPU"):
+            raise
+        pytest.skip(f"NO GPU: {error}")
 
 
 @pytest.fixture(scope="session")
 def blender_device():
     """Blender's own GPU, without a window."""
     pytest.importorskip("bpy")
-    import gpu
+    from shutter_addon.blender.devices.blender_gpu import BlenderDevice, opens_in_background
 
-    gpu.init()
-    from shutter_addon.blender.devices.blender_gpu import BlenderDevice
-
+    if not opens_in_background():
+        raise NoDeviceError("Blender's own does not open")
     device = BlenderDevice()
     yield device
     device.release()

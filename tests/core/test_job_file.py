@@ -60,7 +60,7 @@ def test_a_damaged_file_is_told(tmp_path, content):
         job_file.read(tmp_path)
 
 
-@pytest.mark.parametrize("make", [os.mkfifo, os.mkdir])
+@pytest.mark.parametrize("make", [getattr(os, "mkfifo", os.mkdir), os.mkdir])
 def test_what_is_no_file_is_told(tmp_path, make):
     """A pipe would be waited for without end."""
     make(tmp_path / job_file.NAME)

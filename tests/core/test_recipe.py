@@ -428,6 +428,7 @@ def test_a_file_with_a_byte_order_mark(tmp_path):
     assert recipe_file.load(tmp_path / "r.json") == recipe_file.parse(json.dumps(EXAMPLE))
 
 
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="no pipes by name")
 def test_what_is_no_file(tmp_path):
     """A pipe that nobody writes to, a device without an end, more than a recipe can be, names that no file has."""
     os.mkfifo(tmp_path / "pipe")

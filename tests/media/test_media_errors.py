@@ -81,6 +81,7 @@ def in_time():
 OTHER = "is no file, but a pipe, a socket or a device"
 
 
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="no pipes by name")
 @pytest.mark.usefixtures("in_time")
 @pytest.mark.parametrize("name", ["clip.mp4", "frame_1.png"])
 def test_a_pipe_or_a_device(tmp_path, name):
@@ -91,6 +92,7 @@ def test_a_pipe_or_a_device(tmp_path, name):
     assert sentence(tmp_path / name) == f"{name}: {OTHER}"
 
 
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="no pipes by name")
 @pytest.mark.usefixtures("in_time")
 def test_a_pipe_among_the_files_of_a_sequence(tmp_path):
     for n in range(3):
@@ -103,6 +105,7 @@ def test_a_pipe_among_the_files_of_a_sequence(tmp_path):
         assert bad == {1: f"a_1.png: {OTHER}"}
 
 
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="no pipes by name")
 @pytest.mark.usefixtures("in_time")
 def test_a_pipe_in_the_place_of_a_movie_that_was_read(tmp_path, movies):
     path = tmp_path / "clip.mp4"

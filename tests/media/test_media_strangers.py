@@ -19,6 +19,9 @@ from test_media_inbetween import COUNT, FACTOR, blend, build, footage, kept, ope
 
 from shutter_addon.media import MediaError, inbetween_cache, inbetween_folders, open_source
 
+if os.name != "posix":
+    pytest.skip("pipes, sockets and devices by name, alarms: of POSIX systems only", allow_module_level=True)
+
 
 @pytest.fixture(autouse=True)
 def in_time():
