@@ -76,7 +76,10 @@ def write_matte(folder: Path, root: str, name: str) -> None:
     scene = bpy.context.scene
     scene.view_layers[0].use_pass_cryptomatte_asset = True
     tree = bpy.data.node_groups.new("Matte", "CompositorNodeTree")
-    scene.compositing_node_group = tree
+    if hasattr(scene, "compositor_effects"):  # from Blender 5.3 on
+        scene.compositor_effects.new("Matte").node_group = tree
+    else:
+        scene.compositing_node_group = tree
     picked, output = (tree.nodes.new(f"CompositorNode{kind}") for kind in ("CryptomatteV2", "OutputFile"))
     picked.source, picked.scene = "RENDER", scene
     picked.layer_name, picked.matte_id = f"{scene.view_layers[0].name}.CryptoAsset", root

@@ -175,7 +175,11 @@ def with_half_the_size(bpy, edit, strip):
 
 
 def with_compositing(bpy, edit, strip):
-    strip.scene.compositing_node_group = bpy.data.node_groups.new("Nodes", "CompositorNodeTree")
+    tree = bpy.data.node_groups.new("Nodes", "CompositorNodeTree")
+    if hasattr(strip.scene, "compositor_effects"):  # from Blender 5.3 on
+        strip.scene.compositor_effects.new("Nodes").node_group = tree
+    else:
+        strip.scene.compositing_node_group = tree
     strip.scene.render.use_compositing = True
 
 

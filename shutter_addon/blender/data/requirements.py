@@ -32,10 +32,16 @@ def settings(strip):
     yield scene.render, "engine", ENGINE
     yield scene.render, "resolution_percentage", 100
     yield scene.render, "use_border", False
-    if scene.compositing_node_group is not None:
+    if _composites(scene):
         yield scene.render, "use_compositing", False
     if not any(layer.use for layer in scene.view_layers):
         yield scene.view_layers[0], "use", True
+
+
+def _composites(scene) -> bool:
+    """Blender 5.3 has a list of effects in place of one tree, and calls that deprecated."""
+    effects = getattr(scene, "compositor_effects", None)
+    return scene.compositing_node_group is not None if effects is None else len(effects) > 0
 
 
 def camera(strip):
