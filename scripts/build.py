@@ -86,7 +86,8 @@ def download(system: str, python: str) -> list[Path]:
     wanted = (*WHEELS, *ALSO.get(system, ()))
     missing = [wheel for wheel in wanted if not list(folder.glob(f"{_file(wheel)}-*.whl"))]
     options = ["--only-binary=:all:", "--no-deps", "--implementation=cp", f"--python-version={python}"]
-    pip = [sys.executable, "-m", "pip", "download", "-qq", "--disable-pip-version-check"]
+    # Warnings are for who works on pip, and where they are errors it does not start.
+    pip = [sys.executable, "-W", "ignore", "-m", "pip", "download", "-qq", "--disable-pip-version-check"]
     pip += [*options, f"--platform={SYSTEMS[system]}", f"--dest={folder}", *missing]
     if missing and subprocess.run(pip, capture_output=True, check=False).returncode:
         fail(f"no wheels for Python {python} on {system}, or PyPI is not reached")

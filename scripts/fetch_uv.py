@@ -47,7 +47,19 @@ def wheel_for(system, machine):
 
 def by_pip():
     """The wheel, as bytes, by this Python's pip; None where pip is missing or does not get it."""
-    command = [sys.executable, "-m", "pip", "download", "--no-deps", "--only-binary", ":all:", "--retries", "1"]
+    command = [
+        sys.executable,
+        "-W",
+        "ignore",
+        "-m",
+        "pip",
+        "download",
+        "--no-deps",
+        "--only-binary",
+        ":all:",
+        "--retries",
+        "1",
+    ]
     with tempfile.TemporaryDirectory() as folder:
         subprocess.run([*command, "--dest", folder, f"uv=={VERSION}"], capture_output=True, check=False)
         return next((path.read_bytes() for path in Path(folder).glob("*.whl")), None)
