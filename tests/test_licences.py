@@ -13,10 +13,9 @@ from packaging.utils import canonicalize_name
 ROOT = Path(__file__).parents[1]
 sys.path.insert(0, str(ROOT / "scripts"))
 
+import build  # noqa: E402
 import components  # noqa: E402 - scripts are no package
 import without_openssl  # noqa: E402
-
-import build  # noqa: E402
 
 DATA = components.DATA
 OPENCV = "opencv_contrib_python_headless"

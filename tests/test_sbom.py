@@ -18,10 +18,9 @@ from cyclonedx.validation.json import JsonStrictValidator
 ROOT = Path(__file__).parents[1]
 sys.path.insert(0, str(ROOT / "scripts"))
 
+import build  # noqa: E402
 import sbom  # noqa: E402 - scripts are no package
 import without_openssl  # noqa: E402
-
-import build  # noqa: E402
 
 LINUX = "linux-x64"
 
