@@ -114,11 +114,11 @@ def texture_handler():
 
     def draw():
         region = bpy.context.region
-        corners = [(0, 0), (region.width, 0), (region.width, region.height), (0, region.height)]
+        corners = [(0, 0), (region.width, 0), (0, region.height), (region.width, region.height)]
         shader.bind()
         shader.uniform_sampler("image", texture)
-        places = [(0, 0), (1, 0), (1, 1), (0, 1)]
-        batch_for_shader(shader, "TRI_FAN", {"pos": corners, "texCoord": places}).draw(shader)
+        places = [(0, 0), (1, 0), (0, 1), (1, 1)]
+        batch_for_shader(shader, "TRI_STRIP", {"pos": corners, "texCoord": places}).draw(shader)
 
     return draw
 

@@ -28,7 +28,7 @@ class Quad:
         low, high = np.maximum(self._low, (left, 0)), np.minimum(self._high, (right, 1))
         if (low >= high).any():
             return
-        corners = [(low[0], low[1]), (high[0], low[1]), (high[0], high[1]), (low[0], high[1])]
+        corners = [(low[0], low[1]), (high[0], low[1]), (low[0], high[1]), (high[0], high[1])]  # as strips have them
         shader = shader_of(name)
         shader.bind()
         for sampler, texture in textures.items():
@@ -37,7 +37,7 @@ class Quad:
             (shader.uniform_float if isinstance(value, float) else shader.uniform_int)(constant, value)
         where = {"corner": self.on_region(corners).tolist(), "place": corners}
         gpu.state.blend_set("ALPHA_PREMULT")
-        batch_for_shader(shader, "TRI_FAN", where).draw(shader)
+        batch_for_shader(shader, "TRI_STRIP", where).draw(shader)
         gpu.state.blend_set("NONE")
 
 
