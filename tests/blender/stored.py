@@ -13,7 +13,7 @@ from shutter_addon.core.recipes import recipe, recipe_file
 PREFIX = "virtual_shutter"
 OWNERS = {"Strip": bpy.types.Strip, "Annotation": bpy.types.Annotation}  # beside scenes; IDs' own are in both
 NEVER_EQUAL = {"format", "version"}  # of a scene: who has saved it last
-_BLENDERS_NAME = bpy.types.PropertyGroup.bl_rna.properties["name"].description  # which nothing of ours uses
+_BLENDERS_NAME = "Unique name used in the code"  # begins what Blender says of each group's own, which nothing uses
 
 
 def values() -> dict:
@@ -98,7 +98,7 @@ def _default(prop):
 
 def _stored(props, prefix: str = "") -> list:
     own = [prop for prop in props if prop.identifier != "rna_type" and prop.identifier.startswith(prefix)]
-    return [prop for prop in own if not (prop.is_skip_save or prop.description == _BLENDERS_NAME)]
+    return [prop for prop in own if not (prop.is_skip_save or prop.description.startswith(_BLENDERS_NAME))]
 
 
 def _properties(props, prefix: str = "") -> dict[str, list[str]]:

@@ -66,7 +66,7 @@ def test_nothing_of_it_is_lost_by_saving(bpy, newer, made):
     after = newer_version("read", path)
     assert list(stored.missing(made[1], after)) == []
     assert after["scenes"]["Edit"]["effects"][0]["position"] == "SCATTERED"
-    assert after["scenes"]["Edit"]["effects"][0]["shutters"][0]["glows"] == [{"strength": 4}]
+    assert after["scenes"]["Edit"]["effects"][0]["shutters"][0]["glows"][0]["strength"] == 4
     assert after["strips"]["Edit/regions effect"]["virtual_shutter_glow"] == "soft"
     assert after["saved by"]["Edit"] == [data_format.FORMAT + 1, "9.0.0"]
 

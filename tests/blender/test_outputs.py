@@ -220,12 +220,15 @@ def test_equal_pixels_are_equal_files(command, frames, tmp_path, ending):
 @pytest.mark.skipif(os.geteuid() != 0, reason="only root mounts a small disk")
 @pytest.mark.parametrize("free", [0, 16384])
 def test_a_saved_edit_on_a_full_disk(command, frames, tmp_path, free):
-    """What stood there stays, and the sentence names the reason."""
+    """What stood there stays, and the sentence names the reason, as far as Blender tells it."""
+    import bpy
+
+    reason = "no space left" if bpy.app.version < (5, 3) else "failed to write blendfile"
     with small_disk(tmp_path / "disk", 2 << 20) as disk:
         edit = disk / "edit.blend"
         edit.write_bytes(b"mine")
         (disk / "filler").write_bytes(bytes((2 << 20) - 8192 - free))
-        refused(command(frames, "--save", edit, recipe=STILL, check=False), "edit.blend", "no space left")
+        refused(command(frames, "--save", edit, recipe=STILL, check=False), "edit.blend", reason)
         assert edit.read_bytes() == b"mine"
         assert sorted(path.name for path in disk.iterdir()) == ["edit.blend", "filler"]
         (disk / "filler").unlink()

@@ -8,9 +8,9 @@ import bpy
 from . import colour_configuration, fcurves, strips
 
 # Of Blender's dither and colours no other versions are known to the bit.
-_KNOWN_TO = (5, 3)
+_KNOWN_TO = (5, 4)
 _PLAIN_STRIP = {
-    **{"blend_alpha": 1.0, "color_multiply": 1.0, "color_saturation": 1.0, "strobe": 0.0, "scene_input": "CAMERA"},
+    **{"blend_alpha": 1.0, "color_multiply": 1.0, "color_saturation": 1.0, "scene_input": "CAMERA"},
     **dict.fromkeys(("use_flip_x", "use_flip_y", "use_float", "use_reverse_frames", "multiply_alpha"), False),
 }
 _PLAIN_TRANSFORM = {"scale_x": 1.0, "scale_y": 1.0, "offset_x": 0.0, "offset_y": 0.0, "rotation": 0.0}
@@ -38,6 +38,7 @@ def hides(scene: Any, strip: Any) -> bool:
         and has(strip, _PLAIN_STRIP)
         and has(strip.transform, _PLAIN_TRANSFORM)
         and has(strip.crop, _UNCROPPED)
+        and strip.strobe <= 1  # of new strips 0 in Blender 5.2, 1 in 5.3: both show all frames
         and not strip.modifiers
         and not strip.retiming_keys
         and has(size, _WHOLE)
