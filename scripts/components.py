@@ -187,6 +187,11 @@ a test compares with what the wheels hold; do not change it by hand.
   reverse engineering and changes, which the GPL does not allow to forbid. It cannot be taken out of the modules. All
   OpenCV packages on PyPI for these systems have it; a build without it (`WITH_IPP=OFF`) would have to be made and
   published for each system. The zip for macOS and the one without wheels do not have it.
+- **Sources** of the libraries within the wheels are named by the wheels' makers, not by a version each; who passes the
+  zips on has to be able to give those of what is under the GPL and LGPL.
+
+## What is taken out
+
 - **OpenSSL 1.1.1k** comes with OpenCV's wheel for Linux, for the network protocols of that wheel's own FFmpeg. Its old
   licence has an advertising clause, with which the GPL is incompatible. So `scripts/build` takes it out
   (`scripts/without_openssl.py`): in the zips that wheel has the build tag `1noopenssl`, and its FFmpeg opens no
