@@ -42,7 +42,7 @@ uniform int block, count;
 uniform float unit;  // of the interface, in the region's pixels
 
 bool is_line(float place, float period) {
-  return place - floor(place / period) * period < 1.75;
+  return place - floor(place / period) * period < 1.7;
 }
 
 // Where a shutter's pattern has ink; core/pixels/patterns.py is the reference.

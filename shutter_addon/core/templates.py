@@ -20,26 +20,11 @@ _LEAST = 5  # letters of a template: what has fewer fits anything
 _DEEP = 4  # sentences within each other
 _NUMBER = r"-?\d{1,9}(?:\.\d{1,6})?"
 # What counts is called in templates, and names never are.
-_COUNTS = frozenset(
-    {
-        *(
-            "angle",
-            "count",
-            "degrees",
-            "done",
-            "factor",
-            "first",
-            "frame",
-            "frames",
-            "height",
-            "index",
-            "last",
-            "least",
-        ),
-        *("left", "limit", "longest", "milliseconds", "most", "number", "percent", "points", "share", "size", "stream"),
-        *("time", "total", "unsure", "width", "window"),
-    }
+_WORDS = (
+    "angle count degrees done factor first frame frames height index last least left limit "
+    "longest milliseconds most number percent points share size stream time total unsure width window"
 )
+_COUNTS = frozenset(_WORDS.split())
 # What libraries say of files without naming one, as media.decode.reason has it.
 _FOREIGN = ("invalid data found when processing input", "end of file", "decoder not found", "unknown format")
 

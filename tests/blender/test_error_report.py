@@ -209,7 +209,7 @@ def test_an_edit_that_is_broken_beyond_all_that_is_foreseen_has_a_report(named, 
 
     monkeypatch.setattr(edit_structure, "_of_region", surprised)  # private: whatever of it fails
     text = report(named[0])
-    assert "- cannot be told: see the last error" in text
+    assert "- the rest cannot be told: see the last error" in text
     assert re.search(r"KeyError \[blender/output/edit_structure\.py:\d+ \S+ < ", text)
 
 

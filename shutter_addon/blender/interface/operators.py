@@ -262,7 +262,8 @@ class SHUTTER_OT_bar_set(OfShutter, Operator):
         from .bar_editor import bar_under
 
         effect = selection.active(context)[1]
-        place = bar_under(context, event.mouse_region_x, event.mouse_region_y)
+        is_clicked = event.value == "DOUBLE_CLICK"  # else it comes from a menu, wherever the pointer rests
+        place = bar_under(context, event.mouse_region_x, event.mouse_region_y) if is_clicked else None
         self.is_pointed_at = place is not None
         if place is not None:
             self.bar = place + 1

@@ -20,9 +20,9 @@ _SWITCHES = ("stop_at_cuts", "decontaminate", "border", "use_source_time")
 def lines(scene) -> list[str]:
     """Of a scene and its effects, as Markdown."""
     found = [*_of_scene(scene)]
-    for strip in strips.effect_strips(scene):
+    for number, strip in enumerate(strips.effect_strips(scene), 1):
         effect = strips.effect_of(scene, strip.scene)
-        found += ["", f"Effect {strips.effect_strips(scene).index(strip) + 1}", ""]
+        found += ["", f"Effect {number}", ""]
         found += _of_effect(scene, effect, strip) if effect else ["- its data are gone"]
     return found
 

@@ -6,7 +6,7 @@ import os
 import platform
 import re
 import tomllib
-from collections.abc import Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import suppress
 
 import bpy
@@ -34,17 +34,20 @@ PACKAGES = {
 
 def text(scene) -> str:
     """The report; scene: whose sequencer is shown, or None. On the main thread."""
-    lines = ["### Virtual Shutter: report of an error", "", *_versions(), *_device()]
-    lines += ["", "Edit", "", *_edit(scene)]
+    lines = ["### Virtual Shutter: report of an error", "", *_told(_versions), *_told(_device)]
+    lines += ["", "Edit", "", *_told(lambda: edit_structure.lines(scene) if scene else ["- none"])]
     return "\n".join([*lines, "", "Last errors and warnings", "", *(_sentences() or ["- none"]), ""])
 
 
-def _edit(scene) -> list[str]:
+def _told(part: Callable[[], Iterable[str]]) -> list[str]:
+    """The lines of a part: what is reported may be broken in any way, the edit as well as a driver."""
+    lines: list[str] = []
     try:
-        return edit_structure.lines(scene) if scene else ["- none"]
-    except Exception as error:  # an edit that is reported may be broken in any way
+        lines.extend(part())
+    except Exception as error:
         told.exception(error)
-        return ["- cannot be told: see the last error"]
+        lines.append("- the rest cannot be told: see the last error")
+    return lines
 
 
 def _versions() -> Iterator[str]:

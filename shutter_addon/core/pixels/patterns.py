@@ -6,8 +6,8 @@ import numpy as np
 
 COUNT = 8  # plain, rising lines, dots, falling lines, horizontal, vertical, hatched, grid
 STRENGTH = 0.4  # of the ink, over a shutter's colour
-_PERIOD, _SLANTED, _WIDTH, _RADIUS = 8.0, 12.0, 1.75, 1.8  # in units of the interface
-_OFF = 0.3  # no pixel's middle lies on an edge of a line, where rounding would decide
+_PERIOD, _SLANTED, _WIDTH, _RADIUS = 8.0, 12.0, 1.7, 1.8  # in units of the interface
+_OFF = 0.3  # with it and that width no pixel's middle lies on a line's edge, where rounding would decide
 _LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
 _DARK = 0.35  # code value below which a colour gets white ink
 
