@@ -39,9 +39,19 @@ def by_numpy(colors, shares, unit) -> np.ndarray:
 
 
 def by_moderngl(colors, shares, unit) -> np.ndarray:
+    from shutter_addon.devices.gl import GLDevice
+
+    device = GLDevice()  # which leaves Blender's context current afterwards
+    try:
+        with device.current():
+            return _drawn(device._context, colors, shares, unit)  # private: no pass of the device's draws
+    finally:
+        device.release()
+
+
+def _drawn(context, colors, shares, unit) -> np.ndarray:
     import moderngl
 
-    context = moderngl.create_context(standalone=True, require=430, backend="egl")
     sources = read_pass("show", "QUAD").source, read_pass("show", "COEFFICIENTS").source
     program = context.program(vertex_shader=sources[0], fragment_shader=sources[1])
     data = layers(shares)
@@ -58,9 +68,7 @@ def by_moderngl(colors, shares, unit) -> np.ndarray:
     target.use()
     shape = context.vertex_array(program, [(context.buffer(corners.tobytes()), "2f 2f", "corner", "place")])
     shape.render(moderngl.TRIANGLE_STRIP)
-    picture = np.frombuffer(target.read(components=4, dtype="f4"), np.float32).reshape(HEIGHT, WIDTH, 4)
-    context.release()
-    return picture
+    return np.frombuffer(target.read(components=4, dtype="f4"), np.float32).reshape(HEIGHT, WIDTH, 4)
 
 
 def by_blender(colors, shares, unit) -> np.ndarray:
