@@ -25,6 +25,7 @@ LACKING = [
     ("line", "tripod", {}, TRACKING),
     ("line", "panning_shot", {}, TRACKING),
     ("line", "find_readout", {}, f"the readout is found by {OUTLINE}"),
+    ("line", "rolling_shutter", {}, INBETWEEN),
     ("line", "outline_it", {}, f"outlines are proposed by {OUTLINE}"),
     ("line", "smooth_streaks", {"factor": "4"}, INBETWEEN),
     ("line", "bake", {"file_format": "MOVIE"}, BAKE),

@@ -18,7 +18,7 @@ from bpy.app.translations import pgettext_rpt as rpt_
 from ...core.messages import EffectError
 from ...core.model import shutters
 from ...core.model.frame_state import Options
-from ...media import readout
+from ...media import flow, readout
 from ...media.cuts import ShotSource
 from ..data import inbetween_settings, sampled, snapshot, source_media, strips, validation
 from ..data.consistency import bars
@@ -88,11 +88,14 @@ def repair(scene: Any, effect: Any, strip: Any, share: float, side: str) -> None
     """Repairs the readout of an effect's source, or changes the repair that it has.
 
     share: as Repair.readout, 0 to 1; side: likewise
-    EffectError: there is no room for it, and nothing has changed. MediaError: the footage cannot be read."""
+    EffectError: there is no room for it. MediaError: the footage cannot be read, or its in-between frames cannot be
+    built. Nothing has changed then."""
     backward = _is_backward(scene, effect, strip)
     known = of(effect)
     if known is None:
         _check_room(effect)
+    if inbetween_settings.factor(effect) == 1:  # what is built already is there without OpenCV
+        flow.check()
     _make_room(effect)
     effect.position, effect.interpolation = "CENTER", "DISPLACEMENT"
     step, shown = inbetween_settings.factor(effect), _shown(effect)[backward]
