@@ -114,7 +114,8 @@ def test_a_recipe_of_it_says_what_it_lacks(bpy, newer, tmp_path, capfd):
 
 
 def test_an_appended_scene_of_it_is_told(bpy, edit, made, capfd):
-    with bpy.data.libraries.load(str(made[0])) as (_found, wanted):
+    load = bpy.data.libraries.load(str(made[0]))
+    with pytest.warns(UserWarning, match="does not contain"), load as (_found, wanted):
         wanted.scenes = ["not there", "Edit"]
     assert capfd.readouterr().err.count(SENTENCE) == 1
 
