@@ -3,6 +3,8 @@
 A file of a newer format opens: what is not known here stays as it is stored, unseen, and nothing is tidied by itself.
 """
 
+from collections.abc import Iterable
+
 import bpy
 from bpy.app.translations import pgettext_rpt as rpt_
 
@@ -51,14 +53,21 @@ def stamp_saved(version: str) -> None:
         scene.virtual_shutter.version = version
 
 
-def note(scene) -> str | None:
-    """The sentence about a scene's effects that are of a newer format; None: they are not."""
-    if not is_newer(scene):
+def note(scenes: Iterable) -> str | None:
+    """The sentence about the first of these scenes whose effects are of a newer format; None: there is none."""
+    scene = next(filter(is_newer, scenes), None)
+    if scene is None:
         return None
-    sentence = rpt_(
-        '"{scene}" was saved by a newer version of Virtual Shutter ({version}): what this one does not know '
-        "is kept, but not shown"
-    )
+    if scene.library is not None:  # it is left alone in any case
+        sentence = rpt_(
+            '"{scene}" was saved by a newer version of Virtual Shutter ({version}): what this one does not know '
+            "is kept, but not shown"
+        )
+    else:
+        sentence = rpt_(
+            '"{scene}" was saved by a newer version of Virtual Shutter ({version}): what this one does not know '
+            "is kept, but not shown, and no effect in this file follows strips that you move, copy or delete"
+        )
     return sentence.format(scene=scene.name, version=scene.virtual_shutter.version)
 
 
