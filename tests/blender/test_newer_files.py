@@ -120,6 +120,17 @@ def test_an_appended_scene_of_it_is_told(bpy, edit, made, capfd):
     assert capfd.readouterr().err.count(SENTENCE) == 1
 
 
+def test_a_linked_scene_of_it_stops_nothing(bpy, edit, made, capfd):
+    """What is linked is left alone in any case; an appended one has all effects of the file left alone."""
+    for link in (True, False):
+        with bpy.data.libraries.load(str(made[0]), link=link) as (_found, wanted):
+            wanted.scenes = ["Edit"]
+        said = capfd.readouterr().err
+        assert SENTENCE in said
+        assert data_format.is_file_newer() == ("no effect in this file follows strips" in said) == (not link)
+    assert SENTENCE in data_format.note([edit, *bpy.data.scenes])
+
+
 def test_the_command_says_it_and_check_refuses(bpy, newer, tmp_path, capfd):
     path, edit = newer
     edit.virtual_shutter.effects[0].position = "START"
