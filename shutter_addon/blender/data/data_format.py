@@ -54,10 +54,12 @@ def stamp_saved(version: str) -> None:
 
 
 def note(scenes: Iterable) -> str | None:
-    """The sentence about the first of these scenes whose effects are of a newer format; None: there is none."""
-    scene = next(filter(is_newer, scenes), None)
-    if scene is None:
+    """The sentence about the first of these scenes whose effects are of a newer format, linked ones last; None: none
+    is."""
+    newer = sorted(filter(is_newer, scenes), key=lambda scene: scene.library is not None)
+    if not newer:
         return None
+    scene = newer[0]
     if scene.library is not None:  # it is left alone in any case
         sentence = rpt_(
             '"{scene}" was saved by a newer version of Virtual Shutter ({version}): what this one does not know '
