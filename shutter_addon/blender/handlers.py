@@ -45,7 +45,8 @@ def _after_load(*_):
 
 @persistent
 def _after_import(imported, *_):
-    newer_files.tell(item.id for item in imported.import_items if item.id_type == "SCENE")
+    items = [item for item in imported.import_items if item.id_type == "SCENE"]
+    newer_files.tell(item.id for item in items if item.id is not None)  # a name that was asked for may not be there
 
 
 @persistent

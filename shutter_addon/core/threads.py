@@ -10,6 +10,7 @@ from collections.abc import Callable, Generator, Iterable
 from concurrent.futures import Future, ThreadPoolExecutor
 from typing import Any, TypeVar
 
+from . import told
 from .stopping import check, once
 
 T = TypeVar("T")
@@ -31,10 +32,19 @@ def pool(workers: int | None = None) -> ThreadPoolExecutor:
 
 
 def daemon(function: Callable[..., Any], *arguments: Any) -> threading.Thread:
-    """A thread that calls a function, which goes on until it is told to end. Python ends without it."""
-    thread = threading.Thread(target=function, args=arguments, name=_NAME, daemon=True)
+    """A thread that calls a function, which goes on until it is told to end. Python ends without it, and prints what it
+    raises."""
+    thread = threading.Thread(target=_noting, args=(function, *arguments), name=_NAME, daemon=True)
     thread.start()
     return thread
+
+
+def _noting(function: Callable[..., Any], *arguments: Any) -> None:
+    try:
+        function(*arguments)
+    except Exception as error:  # that nobody expected: others find no way to whoever waits
+        told.exception(error)
+        raise
 
 
 def beside(steps: Iterable[T], patience: float | None) -> Generator[T | None, None, None]:

@@ -347,6 +347,23 @@ def test_another_blender_shows_the_current_frame(moving, edit, other_blender, ch
     assert first_x(moving, 30) == pytest.approx(0.1)
 
 
+def test_a_blender_that_tells_nothing_is_asked_once(moving, other_blender, monkeypatch):
+    """What it tells is written to a file, and masks are read at every frame."""
+    from shutter_addon.blender.data import mask_reading, struct_dna
+
+    asked = []
+
+    def none(blend):
+        asked.append(blend)
+        raise ValueError
+
+    other_blender("MaskLayer")
+    monkeypatch.setattr(struct_dna, "parsed", none)
+    assert mask_reading.mask_at(moving, 5).is_current
+    assert mask_reading.mask_at(moving, 6).is_current
+    assert len(asked) == 1
+
+
 def test_a_layer_that_is_not_what_the_api_says(moving):
     """Nothing of it is followed."""
     from shutter_addon.blender.data import mask_reading

@@ -12,7 +12,7 @@ from support import picture_of, recipe, sequencer
 
 from shutter_addon.blender import command
 from shutter_addon.blender.data import data_format, preferences, property_copy
-from shutter_addon.blender.editing import lifecycle, migrations
+from shutter_addon.blender.editing import lifecycle, migrations, undelete
 from shutter_addon.core.messages import EffectError
 from shutter_addon.core.recipes import recipe_file
 from shutter_addon.core.recipes.recipe import RecipeError
@@ -114,9 +114,22 @@ def test_a_recipe_of_it_says_what_it_lacks(bpy, newer, tmp_path, capfd):
 
 
 def test_an_appended_scene_of_it_is_told(bpy, edit, made, capfd):
-    with bpy.data.libraries.load(str(made[0])) as (_found, wanted):
-        wanted.scenes = ["Edit"]
+    load = bpy.data.libraries.load(str(made[0]))
+    with pytest.warns(UserWarning, match="does not contain"), load as (_found, wanted):
+        wanted.scenes = ["not there", "Edit"]
     assert capfd.readouterr().err.count(SENTENCE) == 1
+
+
+def test_a_linked_scene_of_it_stops_nothing(bpy, edit, made, capfd):
+    """What is linked is left alone in any case; an appended one has all effects of the file left alone."""
+    for link in (True, False):
+        with bpy.data.libraries.load(str(made[0]), link=link) as (_found, wanted):
+            wanted.scenes = ["Edit"]
+        said = capfd.readouterr().err
+        assert SENTENCE in said
+        assert data_format.is_file_newer() == ("no effect in this file follows strips" in said) == (not link)
+    scenes = sorted(bpy.data.scenes, key=lambda scene: scene.library is None)
+    assert "no effect in this file" in data_format.note(scenes)
 
 
 def test_the_command_says_it_and_check_refuses(bpy, newer, tmp_path, capfd):
@@ -150,6 +163,39 @@ def test_an_older_file_is_migrated_once(bpy, edit, effect, tmp_path, monkeypatch
         group = bpy.context.scene.virtual_shutter
         assert (group.effects[0].name, group.format) == ("Shutter!", number)
         bpy.ops.wm.save_mainfile()
+
+
+def test_an_effect_has_its_format_from_the_start(bpy, edit, effect):
+    """Autosave tells nobody."""
+    assert edit.virtual_shutter.format == data_format.FORMAT
+
+
+def test_what_is_made_of_older_effects_is_older(bpy, edit, effect):
+    """Pasted into another edit, deleted and brought back: and saving makes nothing newer."""
+    edit.virtual_shutter.format = 0
+    copied = edit.copy()
+    other = bpy.data.scenes.new("Other")
+    other.sequence_editor_create().strips.new_scene("pasted", effect.scene, 2, 1)
+    lifecycle.update()
+    undelete.keep(edit, edit.virtual_shutter.effects[0])
+    empty = bpy.data.scenes.new("Empty")
+    undelete.restore(empty, edit.virtual_shutter.effects[0].identity)
+    data_format.stamp_saved("9")
+    assert [len(scene.virtual_shutter.effects) for scene in (copied, other, empty)] == [1, 1, 1]
+    assert [scene.virtual_shutter.format for scene in (edit, copied, other, empty)] == [0, 0, 0, 0]
+    data_format.stamp_migrated()
+    assert {scene.virtual_shutter.format for scene in (edit, copied, other, empty)} == {data_format.FORMAT}
+
+
+def test_an_effect_that_is_added_makes_nothing_older_or_newer(newer):
+    edit = newer[1]
+    number = edit.virtual_shutter.format
+    assert number > data_format.FORMAT
+    data_format.new_effect(edit, data_format.FORMAT)
+    assert edit.virtual_shutter.format == data_format.of_file() == number
+    edit.virtual_shutter.format = 0
+    data_format.new_effect(edit, data_format.FORMAT)
+    assert edit.virtual_shutter.format == 0
 
 
 def test_a_recipe_of_a_newer_version(tmp_path):

@@ -203,14 +203,27 @@ def test_undo_shows_the_scribbles_again(bpy, edit, effect, previews):
     assert previews[0].annotation == edit.virtual_shutter.effects[0].scene.annotation is not None
 
 
+@pytest.mark.parametrize("has_effect", [False, True])
+def test_a_drawing_of_the_user_survives_an_autosave(bpy, edit, request, tmp_path, monkeypatch, has_effect):
+    """Nothing is marked before it, and the file is not of an older version for that."""
+    if has_effect:
+        request.getfixturevalue("effect")
+    with sequencer(bpy) as area:
+        area.spaces.active.annotation = bpy.data.annotations.new("Shutter of mine")
+        monkeypatch.setattr(lifecycle, "leave_to_user", lambda: None)
+        bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "autosave.blend"))
+    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "autosave.blend"))
+    assert "Shutter of mine" in bpy.data.annotations
+
+
 def test_an_older_file_is_mended(bpy, edit, effect, previews, tmp_path, monkeypatch):
     """One that was saved with the annotation of a deleted effect, before such were marked."""
     left = bpy.data.annotations.new("Shutter deleted.mp4")
     notes = bpy.data.annotations.new("Notes")
     previews[0].annotation, previews[1].annotation = left, notes
     effect.scene.annotation.virtual_shutter_made = effect.scene.camera.data.virtual_shutter_made = ""
-    for name in ("leave_to_user", "data_format.stamp_saved"):  # which older versions did not have
-        monkeypatch.setattr(f"{lifecycle.__name__}.{name}", lambda *_: None)
+    edit.virtual_shutter.format = 0
+    monkeypatch.setattr(lifecycle, "leave_to_user", lambda: None)  # which older versions did not have
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "older.blend"))
     bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "older.blend"))
     scene = bpy.data.scenes["Scene"].virtual_shutter.effects[0].scene

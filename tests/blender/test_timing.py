@@ -52,9 +52,10 @@ def test_keys_out_of_order(bpy):
 
 
 @pytest.mark.parametrize("keys", [2, 3])
-def test_another_layout(bpy, edit, tmp_path, keys):
-    """As if the numbers lay four bytes farther on. What the first and the last key show is known all the same."""
-    from shutter_addon.blender.data import strip_timing
+def test_another_layout(bpy, edit, tmp_path, monkeypatch, keys):
+    """One that is not known, where what the first and the last key show is known all the same; and one by which the
+    numbers are others than Python has, as if they lay four bytes farther on."""
+    from shutter_addon.blender.data import strip_timing, struct_dna
     from shutter_addon.core.messages import EffectError
 
     first = write_frames(tmp_path / "in", np.zeros((20, 8, 8, 3), dtype=np.uint8))
@@ -69,11 +70,18 @@ def test_another_layout(bpy, edit, tmp_path, keys):
     assert [key.index for key in known.keys] == {2: [0, 51], 3: [0, 10, 51]}[keys]
     moved = [Like(key, as_pointer=lambda key=key: key.as_pointer() + 4) for key in source.retiming_keys]
     other = Like(source, retiming_keys=moved)
-    if keys == 2:
-        assert strip_timing.timing_of(other) == known
-        return
     with pytest.raises(EffectError, match='strip "images": its retiming keys cannot be read'):
         strip_timing.timing_of(other)
+
+    def unknown(*_):
+        raise struct_dna.LayoutError
+
+    monkeypatch.setattr(strip_timing, "record", unknown)
+    if keys == 2:
+        assert strip_timing.timing_of(source) == known
+        return
+    with pytest.raises(EffectError, match='strip "images": its retiming keys cannot be read'):
+        strip_timing.timing_of(source)
 
 
 def test_a_still_of_a_million_frames_takes_no_time(bpy, edit, tmp_path):

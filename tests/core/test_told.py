@@ -2,7 +2,7 @@ import threading
 
 import pytest
 
-from shutter_addon.core import told
+from shutter_addon.core import threads, told
 from shutter_addon.media.errors import MediaError
 from shutter_addon.media.files import check_file
 
@@ -75,3 +75,14 @@ def test_films_tell_from_their_own_threads():
     for thread in threads:
         thread.join()
     assert [each.times for each in told.last()] == [800]
+
+
+def test_what_a_thread_raises_that_nobody_waits_for(monkeypatch):
+    """It is printed all the same, as Python does."""
+    printed = []
+    monkeypatch.setattr(threading, "excepthook", lambda raised: printed.append(raised.exc_type))
+    threads.daemon(check_file, lambda: "a name").join()
+    assert printed == [TypeError]
+    (kept,) = told.last()
+    assert (kept.text, kept.is_plain) == ("TypeError", True)
+    assert "check_file" in kept.place

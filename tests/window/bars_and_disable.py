@@ -148,12 +148,25 @@ def disabled(before):
     assert not (held := traces.forget()), held
 
 
+def calls_wait():
+    """What other threads ask of the main one while the extension is disabled is done once it is enabled again."""
+    made = []
+    part("data.main_thread").soon(lambda: made.append("asked"))
+    addon_utils.disable(traces.NAME)
+    yield 0.3
+    assert not made
+    enable()
+    yield 0.3
+    assert made == ["asked"]
+
+
 def story():
     bpy.ops.wm.read_homefile(app_template="Video_Editing")
     yield 1.0
     before = traces.traces()
     enable()
     yield 0.5
+    yield from calls_wait()
     add_effect()
     yield from disabled(before)  # at once: the tab of the sidebar is still to be chosen
     enable()

@@ -3,6 +3,8 @@
 A file of a newer format opens: what is not known here stays as it is stored, unseen, and nothing is tidied by itself.
 """
 
+from collections.abc import Iterable
+
 import bpy
 from bpy.app.translations import pgettext_rpt as rpt_
 
@@ -12,8 +14,9 @@ FORMAT = 1
 
 
 def of_file() -> int:
-    """The oldest format of the scenes that can be changed; 0: of before there were numbers, or there are no effects."""
-    return min((scene.virtual_shutter.format for scene in _holding()), default=0)
+    """The oldest format of the effects that can be changed, 0: of before there were numbers; this one, if there are
+    none."""
+    return min((scene.virtual_shutter.format for scene in _holding()), default=FORMAT)
 
 
 def is_newer(scene) -> bool:
@@ -26,6 +29,16 @@ def is_file_newer() -> bool:
     return any(is_newer(scene) for scene in bpy.data.scenes if scene.library is None)
 
 
+def new_effect(scene, number: int):
+    """Adds an effect to a scene, which is noted to be of the oldest format of its effects: autosave tells nobody.
+
+    number: the format of what the effect is filled with, FORMAT if it is new. A newer scene stays so."""
+    group = scene.virtual_shutter
+    if not is_newer(scene):
+        group.format = min(number, group.format if group.effects else FORMAT)
+    return group.effects.add()
+
+
 def stamp_migrated() -> None:
     """Notes in all scenes with effects that they are of this format now."""
     for scene in _holding():
@@ -34,22 +47,29 @@ def stamp_migrated() -> None:
 
 
 def stamp_saved(version: str) -> None:
-    """Notes in all scenes with effects the version of the extension that saves them, and in new ones their format. One
-    that was appended from an older file keeps its own until the file is loaded, and so migrated."""
+    """Notes in all scenes with effects the version of the extension that saves them. Their format stays: one that was
+    appended from an older file has its own until the file is loaded, and so migrated."""
     for scene in _holding():
         scene.virtual_shutter.version = version
-        if not scene.virtual_shutter.format:
-            scene.virtual_shutter.format = FORMAT
 
 
-def note(scene) -> str | None:
-    """The sentence about a scene's effects that are of a newer format; None: they are not."""
-    if not is_newer(scene):
+def note(scenes: Iterable) -> str | None:
+    """The sentence about the first of these scenes whose effects are of a newer format, linked ones last; None: none
+    is."""
+    newer = sorted(filter(is_newer, scenes), key=lambda scene: scene.library is not None)
+    if not newer:
         return None
-    sentence = rpt_(
-        '"{scene}" was saved by a newer version of Virtual Shutter ({version}): what this one does not know '
-        "is kept, but not shown"
-    )
+    scene = newer[0]
+    if scene.library is not None:  # it is left alone in any case
+        sentence = rpt_(
+            '"{scene}" was saved by a newer version of Virtual Shutter ({version}): what this one does not know '
+            "is kept, but not shown"
+        )
+    else:
+        sentence = rpt_(
+            '"{scene}" was saved by a newer version of Virtual Shutter ({version}): what this one does not know '
+            "is kept, but not shown, and no effect in this file follows strips that you move, copy or delete"
+        )
     return sentence.format(scene=scene.name, version=scene.virtual_shutter.version)
 
 

@@ -4,7 +4,7 @@ They wait in a queue for a timer, as Blender's manual has it: a timer itself may
 as Blender goes through its list of them without a lock."""
 
 import queue
-import traceback
+import sys
 from collections.abc import Callable
 
 import bpy
@@ -24,7 +24,7 @@ def _call() -> float:
         try:
             _calls.get_nowait()()
         except Exception:  # Blender would end the timer
-            traceback.print_exc()
+            sys.excepthook(*sys.exc_info())  # as Blender does, which prints it and keeps ours (handlers)
     return _TICK
 
 

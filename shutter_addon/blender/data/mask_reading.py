@@ -2,7 +2,7 @@
 
 Python's API has neither the shape keys of a mask nor where its parents were when they got their children: both are read
 from Blender's memory (struct_dna), and checked against what the API has. Where shape keys cannot be read, a mask is
-taken as Blender has it at its current frame.
+taken as Blender has it when it is read, at whatever frame that is.
 """
 
 from bisect import bisect_right

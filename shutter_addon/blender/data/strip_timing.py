@@ -1,7 +1,5 @@
 """How a source strip lies on the timeline, with its retiming keys, of which Blender's Python API gives a part."""
 
-from contextlib import suppress
-
 from bpy.app.translations import pgettext_rpt as rpt_
 
 from ...core.frames.retiming import RetimingKey, StripTiming, are_retiming_keys
@@ -32,13 +30,15 @@ def _retiming_keys(strip) -> list[RetimingKey]:
     clip strip it gets none at all. EffectError: not in this Blender."""
     shown = list(getattr(strip, "retiming_keys", ()))
     indices = [float(key.timeline_frame - strip.content_start) for key in shown]
-    with suppress(LayoutError):
+    try:
         kind = record("SeqRetimingHandle", "double strip_frame_index", "int flag", "float retiming_factor")
+    except LayoutError:
+        if len(shown) <= 2:  # the first and the last, which show the content's start and its end
+            return [RetimingKey(index, 0, factor) for index, factor in zip(indices, (0.0, 1.0), strict=False)]
+    else:
         keys = [RetimingKey(*read(kind, key.as_pointer()).tolist()) for key in shown]
         if are_retiming_keys(keys, indices):
             return keys
-    if len(shown) <= 2:  # the first and the last, which show the content's start and its end
-        return [RetimingKey(index, 0, factor) for index, factor in zip(indices, (0.0, 1.0), strict=False)]
     sentence = rpt_(
         'strip "{strip}": its retiming keys cannot be read in this version of Blender; keys of Source Time can take'
         " their place"

@@ -71,15 +71,15 @@ def _format(kind: str, stars: str, dimensions: str):
 
 @cache
 def described() -> dict[str, tuple[int, dict[str, int]]]:
-    """Of each record its size, and by its fields as they are declared where these lie, in bytes. LayoutError: Blender
-    does not tell."""
+    """Of each record its size, and by its fields as they are declared where these lie, in bytes. None at all: Blender
+    does not tell, and is not asked again, as masks are read at every frame."""
     try:
         with tempfile.TemporaryDirectory(prefix="virtual_shutter_dna_", ignore_cleanup_errors=True) as folder:
             file = Path(folder, "dna.blend")
             bpy.data.libraries.write(str(file), set(), compress=False)
             return parsed(file.read_bytes())
-    except (OSError, RuntimeError, ValueError, IndexError, struct.error) as error:
-        raise LayoutError(str(error)) from None
+    except (OSError, RuntimeError, ValueError, IndexError, struct.error):
+        return {}
 
 
 def parsed(blend: bytes) -> dict[str, tuple[int, dict[str, int]]]:

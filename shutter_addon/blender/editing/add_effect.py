@@ -6,7 +6,7 @@ import bpy
 from bpy.app.translations import pgettext_data as data_
 
 from ...core.model.limits import MAX_FRAME
-from ..data import annotations, source_media
+from ..data import annotations, data_format, source_media
 from ..data.strips import ENGINE, effect_of, origin, overlap
 
 _COLOR = "COLOR_06"
@@ -35,7 +35,7 @@ def add_effect(scene, source):
     # Through a transparent picture the plain source would show. An opaque one stays: mute the effect to see it.
     if medium.alpha != "opaque" and not source.mute:
         source.mute = source.virtual_shutter_muted = True
-    effect = scene.virtual_shutter.effects.add()
+    effect = data_format.new_effect(scene, data_format.FORMAT)
     effect.name, effect.scene, effect.source, effect.start = (
         strip.name,
         effect_scene,

@@ -9,7 +9,7 @@ from typing import Any
 import bpy
 
 from ...core.model.limits import MAX_FRAME
-from ..data import fcurves, strips, undo
+from ..data import data_format, fcurves, strips, undo
 from ..data.property_copy import copy_properties
 
 
@@ -66,7 +66,7 @@ def _settle(scene, effect, parts: dict) -> None:
 
 def _duplicate(old_scene, path: str, scene, parts, origin: float, effect_scene) -> None:
     """A copy of the effect at `path`, for these strips and their scene."""
-    new = scene.virtual_shutter.effects.add()
+    new = data_format.new_effect(scene, old_scene.virtual_shutter.format)
     old = old_scene.path_resolve(path)  # adding to a collection moves its items in memory
     copy_properties(old, new)
     new.scene = effect_scene

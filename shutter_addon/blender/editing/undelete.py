@@ -7,7 +7,7 @@ from typing import Any
 
 import bpy
 
-from ..data import annotations, fcurves, property_copy
+from ..data import annotations, data_format, fcurves, property_copy
 from . import add_effect
 
 _MOST = 64
@@ -27,6 +27,7 @@ def keep(scene, effect) -> None:
     _effects.pop(effect_scene.virtual_shutter.identity, None)  # the newest are the last
     _effects[effect_scene.virtual_shutter.identity] = {
         "scene": (effect_scene.name, (effect_scene.render.resolution_x, effect_scene.render.resolution_y)),
+        "format": scene.virtual_shutter.format,
         "effect": _plain(effect),
         "curves": curves,
         "layers": [_plain(layer) for layer in effect_scene.annotation.layers] if effect_scene.annotation else [],
@@ -48,7 +49,7 @@ def restore(scene, identity: str):
         if made.virtual_shutter_made == identity and made.library is None:
             made.virtual_shutter_made = annotations.GONE  # of the scene before, which somebody removed
     effect_scene = add_effect.new_effect_scene(scene, identity, *data["scene"])
-    effect = scene.virtual_shutter.effects.add()
+    effect = data_format.new_effect(scene, data["format"])
     _fill(effect, data["effect"])
     effect.scene = effect_scene
     for plain in data["curves"]:

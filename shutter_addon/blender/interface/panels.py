@@ -123,7 +123,7 @@ class _Shutters(Mixin):
             layout.operator("shutter.add_effect", icon="ADD")
             return
         effect = active[1]
-        if (newer := data_format.note(active[0])) is not None:
+        if (newer := data_format.note([active[0], *bpy.data.scenes])) is not None:
             sentence(layout, newer, "INFO")
         if selection.in_picture(context) is None:
             sentence(layout, selection.why_unseen(active[0], active[2]), "INFO")

@@ -65,7 +65,7 @@ def _say_once(sentence: str, say: Callable[[str], None]) -> None:
 
 
 def shortages(renderer: Renderer, request: Request) -> list[str]:
-    """Sentences about what pictures as requested lack: masks at other frames than Blender's own; and, where the GPU has
+    """Sentences about what pictures as requested lack: masks as at their frame; and, where the GPU has
     no room, speed."""
     return [*unread(request), *_slow(renderer, request)]
 
@@ -78,7 +78,7 @@ def unread(request: Request) -> list[str]:
         return []
     return [
         rpt_(
-            "The shape keys of masks cannot be read in this version of Blender: mattes have them as at the current"
+            "The shape keys of masks cannot be read in this version of Blender: mattes may have them as at another"
             " frame"
         )
     ]

@@ -77,7 +77,7 @@ class MaskLayer:
 class MaskShape:
     """A mask as it stands at one frame: the layers that are rendered, from the lowest up.
 
-    is_current: whether it may be that of Blender's current frame in place of the wanted one"""
+    is_current: whether it may be that of the frame at which Blender was when it was read, in place of the wanted one"""
 
     layers: tuple[MaskLayer, ...]
     is_current: bool = False

@@ -115,6 +115,13 @@ MESSAGES = {
     "bleibt erhalten, wird aber nicht gezeigt",
     (
         "*",
+        '"{scene}" was saved by a newer version of Virtual Shutter ({version}): what this one does not know '
+        "is kept, but not shown, and no effect in this file follows strips that you move, copy or delete",
+    ): "„{scene}“ wurde von einer neueren Version von Virtual Shutter gespeichert ({version}): Was diese nicht kennt, "
+    "bleibt erhalten, wird aber nicht gezeigt, und kein Effekt dieser Datei folgt Streifen, die verschoben, kopiert "
+    "oder gelöscht werden",
+    (
+        "*",
         'Saved "{path}", without what a newer version of Virtual Shutter has added',
     ): "„{path}“ gespeichert, ohne das, was eine neuere Version von Virtual Shutter hinzugefügt hat",
     ("*", "{place}: {property} is none of its choices"): "{place}: {property} ist keine der Möglichkeiten",
@@ -169,9 +176,9 @@ MESSAGES = {
     " Maskenstreifens kann die Matte sein",
     (
         "*",
-        "The shape keys of masks cannot be read in this version of Blender: mattes have them as at the current frame",
-    ): "Die Formschlüssel von Masken sind in dieser Version von Blender nicht lesbar: Matten haben sie wie beim"
-    " aktuellen Bild",
+        "The shape keys of masks cannot be read in this version of Blender: mattes may have them as at another frame",
+    ): "Die Formschlüssel von Masken sind in dieser Version von Blender nicht lesbar: Matten haben sie womöglich"
+    " wie bei einem anderen Bild",
     (
         "*",
         'strip "{strip}": its retiming keys cannot be read in this version of Blender; keys of Source Time can take'
