@@ -199,7 +199,8 @@ a test compares with what the wheels hold; do not change it by hand.
 
 ## What is in the zips
 
-Versions are what the names of files and the builds say: of files that is often the version of a library's interface.
+Versions are what the names of files and the builds say; one that is read from a file's name is often that of the
+library's interface (ABI). Where no system is named, it is in the zips for all three.
 A wheel's version is in `scripts/build.py`. Licences and holders of libraries whose texts the wheels lack are as their
 makers' projects say, and were not read out of the very sources that the wheels were built of.
 

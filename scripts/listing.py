@@ -16,7 +16,7 @@ from gallery.item import HERE, ROOT, Shot
 from scripts.gallery import render
 
 SIZE, ICON = (1920, 1080), 256
-FRAME, EXPOSED = 40, 24  # of the footage, from that frame on
+FRAME, EXPOSED = 40, range(27, 54)  # of the footage, which is exposed around that frame
 # The pendulum's disc in the frame, in fractions of its height: its middle from the left and the top, and its radius.
 DISC = (0.94, 0.575, 0.262)
 
@@ -41,7 +41,7 @@ def main() -> int:
 def _blacken_unseen(folder: Path) -> None:
     """Writes the frames that the picture does not show, which else take Cycles as long as those that it does."""
     folder.mkdir(parents=True, exist_ok=True)
-    for frame in set(range(1, pendulum.COUNT + 1)) - set(range(FRAME, FRAME + EXPOSED)):
+    for frame in set(range(1, pendulum.COUNT + 1)) - set(EXPOSED):
         stills.save(np.zeros((*SIZE[::-1], 3), np.float32), folder / f"{frame:04}.png")
 
 
