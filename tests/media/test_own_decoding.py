@@ -17,8 +17,9 @@ import numpy as np
 import pytest
 from footage import COUNT, cut_file, damage_frame, make_movie, number, picture, save_image
 
-from shutter_addon.media import MediaError, decoding_child, flow, inbetween, open_source
+from shutter_addon.media import MediaError, decoding_child, flow, inbetween, open_source, opening
 from shutter_addon.media.blender_movie import BlenderMovie, BlenderMovieChannel, frame_rate
+from shutter_addon.media.file_kind import file_kind
 from shutter_addon.media.inbetween import InbetweenSource
 from shutter_addon.media.opening import open_channel
 
@@ -206,6 +207,10 @@ def test_frame_rates_are_those_of_films():
 @pytest.fixture
 def _no_pyav(monkeypatch):
     monkeypatch.setitem(sys.modules, "shutter_addon.media.movie", None)
+    monkeypatch.setitem(sys.modules, "av", None)
+    opening.missing_pyav.cache_clear()
+    yield
+    opening.missing_pyav.cache_clear()
 
 
 def test_channels_are_those_that_pyav_decodes(coloured):
@@ -224,6 +229,7 @@ def test_without_pyav_movies_are_opened_so(coloured):
     with open_source(coloured["bt709.mp4"], divisor=2) as source:
         assert (source.by_blender, source.width, source.height) == (True, 64, 32)
         assert source.read(0).shape == (32, 64, 4)
+    assert file_kind(coloured["bt709.mp4"]) == "a movie, read by a second Blender"
     with open_channel(coloured["bt709.mp4"], "red") as channel:
         assert channel.read(0).shape == (64, 128, 1)
     for opened in (
@@ -239,6 +245,7 @@ def test_without_a_blender_movies_are_refused(coloured):
     decoding_child.lend(None)
     with pytest.raises(MediaError, match=r"^bt709\.mp4: movies need the Python package PyAV"):
         open_source(coloured["bt709.mp4"])
+    assert file_kind(coloured["bt709.mp4"]) == "a movie, which takes PyAV to read"
 
 
 @pytest.mark.parametrize(
