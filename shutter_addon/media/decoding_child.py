@@ -13,11 +13,13 @@ from typing import IO, NoReturn
 
 import numpy as np
 
+from ..core import threads
 from .errors import MediaError
 
 READY = "Virtual Shutter decodes"  # a line, before which a Blender prints what it likes
+STARTING = 60  # seconds after which a process that is not ready is killed
+ENDING = 5  # seconds after which one that does not end is
 _PIPE = 1 << 20  # bytes, where a pipe's size can be chosen: of 64 KB, a frame takes twice as long
-_ENDING = 5  # seconds after which a process that does not end is killed
 
 _command: list[str] | None = None
 _process: subprocess.Popen[bytes] | None = None
@@ -30,11 +32,17 @@ class _EndedError(Exception):
 
 
 def lend(command: list[str] | None) -> None:
-    """Says what starts the process, whose last argument will be READY; None: nothing does. One that runs is ended."""
+    """Says what starts the process, whose last argument will be READY; None: nothing does. One that runs is ended,
+    without the answer that somebody may be waiting for, if that takes long."""
     global _command
-    with _asking:
-        _end()
-        _command = command
+    _command = command
+    if _asking.acquire(timeout=ENDING):
+        try:
+            _end()
+        finally:
+            _asking.release()
+    elif (process := _process) is not None:
+        process.kill()  # whoever waits is told so by its pipe, and ends it
 
 
 def is_lent() -> bool:
@@ -57,24 +65,35 @@ class Movie:
         return _ask(self._known | {"wanted": index})[1]
 
     def close(self) -> None:
-        _ask(self._known | {"wanted": "close"})
+        """Where no process runs, it is open nowhere."""
+        with _asking, suppress(MediaError):
+            if _process is not None:
+                _answer(self._known | {"wanted": "close"})
 
 
 def _ask(wanted: dict) -> tuple[dict, np.ndarray | None]:
-    question = json.dumps(wanted).encode() + b"\n"
     with _asking:
-        if wanted["wanted"] == "close" and (_process is None or _process.poll() is not None):
-            return {}, None
         for _ in range(2):  # it may have ended for want of work, or with another movie
-            try:
-                return _answer(question)
-            except (_EndedError, OSError, ValueError):
-                _end()
+            if (answer := _answer(wanted)) is not None:
+                return answer
     _fail("the Blender that decodes it has ended")
 
 
-def _answer(question: bytes) -> tuple[dict, np.ndarray | None]:
-    process = _process or _started()
+def _answer(wanted: dict) -> tuple[dict, np.ndarray | None] | None:
+    """None: the process has ended."""
+    try:
+        return _asked(_process or _started(), json.dumps(wanted).encode() + b"\n")
+    except (_EndedError, OSError, ValueError):
+        _end()
+        return None
+    except MediaError:
+        raise
+    except BaseException:  # an interrupt, say: what is still to come would be taken for the next answer
+        _kill()
+        raise
+
+
+def _asked(process: subprocess.Popen[bytes], question: bytes) -> tuple[dict, np.ndarray | None]:
     assert process.stdin is not None
     assert process.stdout is not None
     process.stdin.write(question)
@@ -98,7 +117,7 @@ def _line(stream: IO[bytes]) -> bytes:
 
 
 def _started() -> subprocess.Popen[bytes]:
-    """MediaError: it cannot be."""
+    """MediaError: it cannot be. _EndedError: it ended before it was ready."""
     global _process
     if _command is None:
         _fail("no Blender decodes it any more")
@@ -108,7 +127,6 @@ def _started() -> subprocess.Popen[bytes]:
             stdin=subprocess.PIPE,  # which ends with this process, and with that the other one
             stdout=subprocess.PIPE,
             stderr=subprocess.DEVNULL,
-            pipesize=_PIPE,
             # What stops this process by the keyboard is not for the other one: a frame that is read comes whole.
             start_new_session=True,
             creationflags=getattr(subprocess, "CREATE_NO_WINDOW", 0),
@@ -116,9 +134,32 @@ def _started() -> subprocess.Popen[bytes]:
     except OSError as error:
         _fail(f"the Blender that decodes it cannot be started: {error.strerror or error}")
     assert _process.stdout is not None
-    while _line(_process.stdout).strip() != READY.encode():
-        pass
+    _enlarge(_process.stdout)
+    try:  # by a thread, as Windows waits for no pipe for some time only
+        threads.start(_wait, _process.stdout).result(STARTING)
+    except TimeoutError:
+        _kill()
+        _fail(f"the Blender that decodes it is not ready after {STARTING} seconds")
     return _process
+
+
+def _enlarge(pipe: IO[bytes]) -> None:
+    """Not every system can, and Linux refuses it to a user who has many large pipes."""
+    with suppress(ImportError, AttributeError, OSError):
+        import fcntl
+
+        fcntl.fcntl(pipe, fcntl.F_SETPIPE_SZ, _PIPE)
+
+
+def _wait(stream: IO[bytes]) -> None:
+    while _line(stream).strip() != READY.encode():
+        pass
+
+
+def _kill() -> None:
+    if _process is not None:
+        _process.kill()
+    _end()
 
 
 def _end() -> None:
@@ -131,7 +172,7 @@ def _end() -> None:
             assert stream is not None
             stream.close()
     try:
-        process.wait(_ENDING)
+        process.wait(ENDING)
     except subprocess.TimeoutExpired:
         process.kill()
         process.wait()

@@ -2,6 +2,7 @@
 
 from pathlib import Path
 
+from . import decoding_child
 from .errors import MediaError
 
 
@@ -10,7 +11,7 @@ def file_kind(path: Path, stream: int = 0) -> str:
     try:
         return _image_kind(path) or _movie_kind(path, stream)
     except ImportError:
-        return "a movie, which takes PyAV to read"
+        return "a movie, read by a second Blender" if decoding_child.is_lent() else "a movie, which takes PyAV to read"
     except (OSError, ValueError, IndexError, RuntimeError):  # av.error.FFmpegError is one of them, whatever it is
         raise MediaError("the footage cannot be read") from None
 

@@ -89,13 +89,14 @@ def open_channel(
 
 
 @cache
-def has_pyav() -> bool:
-    """Whether PyAV decodes movies; else a second Blender does, where one is lent."""
+def missing_pyav() -> str:
+    """Why PyAV does not decode movies, in Python's words, so that a second Blender does, where one is lent; "": it
+    does."""
     try:
-        from . import movie  # noqa: F401
-    except ImportError:
-        return False
-    return True
+        from .movie import MovieSource  # noqa: F401
+    except ImportError as error:
+        return str(error)
+    return ""
 
 
 def _is_movie(path: Path, files: Sequence[str | Path] | None) -> bool:
@@ -104,30 +105,30 @@ def _is_movie(path: Path, files: Sequence[str | Path] | None) -> bool:
 
 def _opened_movie(path: Path, *, stream: int, deinterlace: bool, divisor: int, size: Size | None) -> FrameSource:
     """See open_source. Only PyAV's frames are fitted to a size."""
-    try:
-        from .movie import MovieSource
-    except ImportError as error:
-        _check_lent(path, stream, error)
+    if missing_pyav():
+        _check_lent(path, stream)
         return smaller(BlenderMovie(path, deinterlace=deinterlace), divisor)
+    from .movie import MovieSource
+
     return MovieSource(path, stream=stream, deinterlace=deinterlace, divisor=divisor, size=size)
 
 
 def _opened_channel(path: Path, channel: str, stream: int) -> MovieChannel | BlenderMovieChannel:
-    try:
-        from .movie import MovieChannel
-    except ImportError as error:
-        _check_lent(path, stream, error)
+    if missing_pyav():
+        _check_lent(path, stream)
         return BlenderMovieChannel(path, channel)
+    from .movie import MovieChannel
+
     return MovieChannel(path, channel, stream=stream)
 
 
-def _check_lent(path: Path, stream: int, error: ImportError) -> None:
+def _check_lent(path: Path, stream: int) -> None:
     """MediaError: without PyAV (a package without wheels, or one for another system) that movie cannot be read."""
     if decoding_child.is_lent() and stream == 0:
         return
     check_file(path)
     what = f"video stream {stream} of a movie needs" if decoding_child.is_lent() else "movies need"
     raise MediaError(
-        f"{path.name}: {what} the Python package PyAV ({error}); "
+        f"{path.name}: {what} the Python package PyAV ({missing_pyav()}); "
         "install the zip of Virtual Shutter that is made for your system, or use an image sequence"
-    ) from None
+    )

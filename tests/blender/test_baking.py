@@ -540,6 +540,16 @@ def test_a_bake_ends_with_the_blender_that_began_it(bpy, film):
         job.end()
 
 
+def test_nothing_is_rendered_for_a_blender_that_has_ended_before(film, tmp_path):
+    film()
+    words = ["bake", str(tmp_path / "edit.blend"), "--strip=Shutter", "--attached"]
+    command = [sys.executable, "-m", "shutter_addon", *words]
+    said = subprocess.run(command, cwd=ROOT, stdin=subprocess.DEVNULL, capture_output=True, text=True)
+    assert said.returncode == film_output.INTERRUPTED, said.stderr
+    assert " of " not in said.stdout
+    assert not list(tmp_path.rglob("*.mp4"))
+
+
 def test_a_transparent_source_beside_another_bake_is_shown(bpy, film, tmp_path):
     scene, _effect, _strip = film(4)
     bake(bpy)

@@ -17,8 +17,9 @@ import numpy as np
 import pytest
 from footage import COUNT, cut_file, damage_frame, make_movie, number, picture, save_image
 
-from shutter_addon.media import MediaError, decoding_child, flow, inbetween, open_source
+from shutter_addon.media import MediaError, decoding_child, flow, inbetween, open_source, opening
 from shutter_addon.media.blender_movie import BlenderMovie, BlenderMovieChannel, frame_rate
+from shutter_addon.media.file_kind import file_kind
 from shutter_addon.media.inbetween import InbetweenSource
 from shutter_addon.media.opening import open_channel
 
@@ -206,6 +207,10 @@ def test_frame_rates_are_those_of_films():
 @pytest.fixture
 def _no_pyav(monkeypatch):
     monkeypatch.setitem(sys.modules, "shutter_addon.media.movie", None)
+    monkeypatch.setitem(sys.modules, "av", None)
+    opening.missing_pyav.cache_clear()
+    yield
+    opening.missing_pyav.cache_clear()
 
 
 def test_channels_are_those_that_pyav_decodes(coloured):
@@ -224,6 +229,7 @@ def test_without_pyav_movies_are_opened_so(coloured):
     with open_source(coloured["bt709.mp4"], divisor=2) as source:
         assert (source.by_blender, source.width, source.height) == (True, 64, 32)
         assert source.read(0).shape == (32, 64, 4)
+    assert file_kind(coloured["bt709.mp4"]) == "a movie, read by a second Blender"
     with open_channel(coloured["bt709.mp4"], "red") as channel:
         assert channel.read(0).shape == (64, 128, 1)
     for opened in (
@@ -239,6 +245,7 @@ def test_without_a_blender_movies_are_refused(coloured):
     decoding_child.lend(None)
     with pytest.raises(MediaError, match=r"^bt709\.mp4: movies need the Python package PyAV"):
         open_source(coloured["bt709.mp4"])
+    assert file_kind(coloured["bt709.mp4"]) == "a movie, which takes PyAV to read"
 
 
 @pytest.mark.parametrize(
@@ -254,6 +261,110 @@ def test_a_blender_that_does_not_answer_is_one_sentence(coloured, command, reaso
     sentence = rf"^bt709\.mp4: cannot be read as a movie \(the Blender that decodes it {reason}\)$"
     with pytest.raises(MediaError, match=sentence):
         BlenderMovie(coloured["bt709.mp4"])
+
+
+SILENT = [sys.executable, "-c", "import time; time.sleep(600)"]
+
+
+def test_a_blender_that_is_never_ready_is_killed_and_one_sentence(coloured, monkeypatch):
+    monkeypatch.setattr(decoding_child, "STARTING", 0.3)
+    decoding_child.lend(SILENT)
+    with pytest.raises(MediaError, match=r"\(the Blender that decodes it is not ready after 0\.3 seconds\)$"):
+        BlenderMovie(coloured["bt709.mp4"])
+    assert decoding_child._process is None  # nobody else is told whether one runs
+
+
+def test_nobody_waits_for_an_answer_that_does_not_come(coloured, monkeypatch):
+    """Who lends no Blender any more, as the extension that is switched off, least of all."""
+    decoding_child.lend(SILENT)
+    with ThreadPoolExecutor(1) as threads:
+        asked = threads.submit(BlenderMovie, coloured["bt709.mp4"])
+        while decoding_child._process is None:  # nobody else is told whether one runs
+            assert not asked.done()
+        monkeypatch.setattr(decoding_child, "ENDING", 0.1)
+        decoding_child.lend(None)
+        with pytest.raises(MediaError, match=r"\(no Blender decodes it any more\)$"):
+            asked.result(20)
+
+
+def test_where_no_pipe_may_be_enlarged_movies_are_read(movies, monkeypatch):
+    """As on Linux, for a user who has many large ones."""
+    fcntl = pytest.importorskip("fcntl", reason="other systems have no such call")
+
+    def refused(*_):
+        raise PermissionError
+
+    monkeypatch.setattr(fcntl, "fcntl", refused)
+    decoding_child.lend(None)
+    decoding_child.lend([sys.executable, str(SCRIPT)])
+    path, numbers = movies["b_frames.mp4"]
+    with BlenderMovie(path) as source:
+        assert number(source.read(2)) == numbers[2]
+
+
+LEAVING = """
+import json, os, sys, time
+open(sys.argv[1], "a").write("begun ")
+print(sys.argv[-1], flush=True)
+sys.stdin.readline()
+about = {"size": [8, 8], "count": 2, "fps": 25, "alpha": False, "deep": False, "audio": False, "bytes": 0}
+print(json.dumps(about), flush=True)
+for number in (0, 1):
+    os.close(number)
+time.sleep(600)
+"""
+
+
+def test_no_blender_is_begun_to_close_a_movie(coloured, tmp_path, monkeypatch):
+    """Nor does a movie of one that cannot be asked any more fail to be closed."""
+    begun = tmp_path / "begun"
+    decoding_child.lend([sys.executable, "-c", LEAVING, str(begun)])
+    source = BlenderMovie(coloured["bt709.mp4"])
+    monkeypatch.setattr(decoding_child, "ENDING", 0.1)
+    source.close()
+    source.close()
+    assert begun.read_text() == "begun "
+
+
+class InterruptedTestError(BaseException):
+    """As KeyboardInterrupt."""
+
+
+INTERRUPTING = f"""
+import os, signal, sys
+sys.path[:0] = [{str(FOLDER)!r}]
+import decoding_process
+answer = decoding_process._answer
+
+def interrupting(movies, wanted, **which):
+    if wanted == 3:
+        os.kill(os.getppid(), signal.SIGUSR1)
+        while not os.path.exists(sys.argv[1]):
+            pass
+    return answer(movies, wanted, **which)
+
+decoding_process._answer = interrupting
+decoding_process.main()
+"""
+
+
+@linux
+def test_an_answer_that_nobody_waited_for_is_not_the_next_one(movies, tmp_path):
+    def interrupt(*_):
+        (tmp_path / "interrupted").touch()
+        raise InterruptedTestError
+
+    before = signal.signal(signal.SIGUSR1, interrupt)
+    decoding_child.lend([sys.executable, "-c", INTERRUPTING, str(tmp_path / "interrupted")])
+    path, numbers = movies["b_frames.mp4"]
+    try:
+        with BlenderMovie(path) as source:
+            assert number(source.read(1)) == numbers[1]
+            with pytest.raises(InterruptedTestError):
+                source.read(3)
+            assert number(source.read(7)) == numbers[7]
+    finally:
+        signal.signal(signal.SIGUSR1, before)
 
 
 def test_in_between_frames_that_are_built_already_are_used(coloured, tmp_path, monkeypatch):

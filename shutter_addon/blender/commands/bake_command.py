@@ -2,10 +2,10 @@
 
 import argparse
 import os
-import signal
 from contextlib import suppress
 
 from ...core.messages import sentence
+from ...core.stopping import StoppedError
 from ..data import strips
 from ..editing import saved_edit
 from ..output import baked_film, film_output
@@ -35,6 +35,17 @@ def run(arguments) -> None:
         os.set_blocking(0, False)
     effect, strip = _effect_strip(scene, arguments.strip)
     film = baked_film.film_of(scene, effect, strip, baked_film.KINDS[arguments.format], arguments.output)
+    try:
+        _render(arguments, scene, effect, strip, film)
+    except StoppedError:
+        raise film_output.InterruptedRenderError(f"{film.place}: stopped") from None
+    command_line.tell(str(film.place))
+
+
+def _render(arguments, scene, effect, strip, film: baked_film.Film) -> None:
+    """StoppedError: it was begun by a Blender that has ended."""
+    if arguments.attached:
+        _check_parent()
     total = len(film.frames)
     with (
         render_settings.using(render_settings.RenderSettings(arguments.device, gpu_memory=arguments.gpu_memory)),
@@ -48,17 +59,16 @@ def run(arguments) -> None:
             finished = done
             command_line.tell(f"{done} of {total}")
             if arguments.attached:
-                _end_with_parent()
+                _check_parent()
 
         baked_film.render(scene, effect, strip, film, told)
-    command_line.tell(str(film.place))
 
 
-def _end_with_parent() -> None:
-    """Stops this process as Ctrl-C does, if nobody holds the other end of its input any more."""
+def _check_parent() -> None:
+    """StoppedError: nobody holds the other end of this process's input any more."""
     with suppress(OSError):  # there is nothing to read, as somebody does
         if not os.read(0, 1):
-            os.kill(os.getpid(), signal.SIGTERM)
+            raise StoppedError
 
 
 def _effect_strip(scene, name: str):

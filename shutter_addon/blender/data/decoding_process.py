@@ -1,9 +1,9 @@
 """What a second Blender runs to decode movies: it answers on its output what it is asked on its input, until that ends.
 
-Blender runs it as a script, no part of the extension there. A question is a line of JSON: `number`,
-`path` and `deinterlace` of a movie, and `wanted`, which is "about", "close", or a frame's index; a file may be open
-several times, by several numbers. An answer is a line of JSON, and
-as many bytes behind it as its `bytes` says. Before the first comes a line that reads as the script's last argument.
+Blender runs it as a script, no part of the extension there. A question is a line of JSON: `number`, `path` and
+`deinterlace` of a movie, and `wanted`, which is "about", "close", or a frame's index; a file may be open several times,
+by several numbers. An answer is a line of JSON, and as many bytes behind it as its `bytes` says. Before the first comes
+a line that reads as the script's last argument.
 """
 
 import contextlib

@@ -3,12 +3,13 @@
 import bpy
 from bpy.app.translations import pgettext_iface as iface_
 from bpy.app.translations import pgettext_n as n_
+from bpy.app.translations import pgettext_rpt as rpt_
 
 from ...devices.device import NoDeviceError
 from ...media import opening
 from ..data import selection, source_media, strips
 from ..devices import available
-from ..rendering import inbetween_build, render_settings, sessions
+from ..rendering import inbetween_build, pictures, render_settings, sessions
 from ..rendering.effect_source import FAULTS
 from . import inbetween_operators
 from .panel_parts import WithEffect, sentence
@@ -60,10 +61,10 @@ def _draw_devices(layout):
 def _draw_decoding(layout, scene, effect, strip) -> None:
     """What decodes the effect's movie, where that is not PyAV."""
     source = strips.nearest_source(scene, effect, strip)
-    if source is not None and source_media.is_movie(source) and not opening.has_pyav():
+    if source is not None and source_media.is_movie(source) and opening.missing_pyav():
         column = layout.column()
         column.active = False
-        sentence(column, iface_("Movies: a second Blender decodes them, which is slow"))
+        sentence(column, rpt_(pictures.SLOW_DECODING))
 
 
 def _ask_for_opengl() -> None:

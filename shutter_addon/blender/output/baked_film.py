@@ -108,7 +108,8 @@ def _check(scene: Any, effect: Any, strip: Any, kind: Kind) -> None:
 
 
 def render(scene: Any, effect: Any, strip: Any, film: Film, told: Callable[[int], object]) -> None:
-    """Renders what is missing of a film. told: called with the number of frames that are there.
+    """Renders what is missing of a film. told: called with the number of frames that are there, and may
+    raise StoppedError.
 
     One of FAULTS, OutputError, OSError: it cannot be made. InterruptedRenderError: it was stopped. What is finished
     stays, and the next call goes on from there."""

@@ -228,7 +228,7 @@ def _look_at_mattes(check: EffectCheck, source, requests: dict[float, Request]) 
 def _notes(check: EffectCheck, requests: dict[float, Request], source) -> list[str]:
     notes = list({sentence: None for request in requests.values() for sentence in pictures.unread(request)})
     if source.by_blender:
-        notes.append("a second Blender decodes movies, which is slow: the Python package PyAV is missing")
+        notes.append(pictures.SLOW_DECODING)
     if lacking := sum(check.mattes.values()):
         notes.append(f"{lacking} mattes of outlines are not carried yet: the first render does that, frame by frame")
     if check.needs and check.needs.sends:

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import OpenImageIO
+from bpy.app.translations import pgettext_n as n_
 from bpy.app.translations import pgettext_rpt as rpt_
 
 from ...compute.renderer import Renderer
@@ -20,6 +21,8 @@ from ..data.snapshot import Snapshot
 from . import render_settings
 from .effect_source import FULL, Detail
 from .render_context import RenderContext
+
+SLOW_DECODING = n_("a second Blender decodes movies, which is slow: install the zip that is made for your system")
 
 _said: set[str] = set()  # what is said once
 
@@ -36,10 +39,7 @@ def picture(context: RenderContext, snapshot: Snapshot, frame: float, detail: De
         place = weights / f"{round(frame - snapshot.first + 1):04d}.exr"
         _write_weights(place, snapshot, frame, session.weights(request, context.stopped))
     if renderer.source.by_blender:
-        _say_once(
-            rpt_("a second Blender decodes movies, which is slow: install the zip that is made for your system"),
-            context.say,
-        )
+        _say_once(rpt_(SLOW_DECODING), context.say)
     made = session.picture(request, context.stopped)
     for sentence in shortages(renderer, request):
         _say_once(sentence, context.say)

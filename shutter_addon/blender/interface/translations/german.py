@@ -915,10 +915,6 @@ MESSAGES = {
         "*",
         "Exposures end at the source's cuts as they do at the clip's ends",
     ): "Belichtungen enden an den Schnitten der Quelle wie an den Enden des Clips",
-    (
-        "*",
-        "Movies: a second Blender decodes them, which is slow",
-    ): "Filme: ein zweites Blender dekodiert sie, was langsam ist",
     ("*", "Default at Edge"): "Standard am Rand",
     (
         "*",
