@@ -140,6 +140,64 @@ def test_wheels_that_are_not_to_be_had_are_one_sentence(tmp_path):
     assert done.stderr == f"build: no wheels for Python 3.x on {SYSTEM}, or PyPI is not reached\n"
 
 
+DOWNLOAD = "import sys, build; print(*build.download(sys.argv[1], build.BLENDERS_PYTHON), sep='\\n')"
+
+
+def downloading(root, offered):
+    """A process that gets the wheels of this system, of a folder in place of PyPI."""
+    environment = os.environ | {"PIP_NO_INDEX": "1", "PIP_FIND_LINKS": str(offered)}
+    command, pipe = [sys.executable, "-c", DOWNLOAD, SYSTEM], subprocess.PIPE
+    return subprocess.Popen(command, env=environment, cwd=root / "scripts", stdout=pipe, stderr=pipe, text=True)
+
+
+@pytest.fixture
+def offered(dist, tmp_path):
+    """A folder of this system's wheels, as they are on PyPI."""
+    (tmp_path / "offered").mkdir()
+    with downloading(ROOT, "none") as process:
+        for path in map(Path, process.stdout.read().split()):
+            shutil.copy(path, tmp_path / "offered")
+    return tmp_path / "offered"
+
+
+@pytest.fixture
+def bare(tmp_path):
+    """A project that has downloaded nothing."""
+    for name in ("scripts", "third_party"):
+        shutil.copytree(ROOT / name, tmp_path / "bare" / name)
+    shutil.copy(ROOT / "blender_manifest.toml", tmp_path / "bare")
+    return tmp_path / "bare"
+
+
+def test_two_that_download_at_once_get_whole_wheels(offered, bare):
+    both = [downloading(bare, offered), downloading(bare, offered)]
+    for process in both:
+        said, _ = process.communicate()
+        assert process.returncode == 0
+        assert {path.name: path.read_bytes() for path in map(Path, said.split())} == {
+            path.name: path.read_bytes() for path in offered.iterdir()
+        }
+
+
+def test_a_wheel_that_is_not_the_known_one_is_refused(offered, bare):
+    (wheel,) = offered.glob("tqdm-*.whl")
+    whole = wheel.read_bytes()
+    with zipfile.ZipFile(wheel, "a") as packed:
+        packed.writestr("tqdm/more.py", "")
+    with downloading(bare, offered) as process:
+        said = process.stderr.read()
+    assert said == f"build: third_party/wheels.sha256 does not know {wheel.name} as it was downloaded\n"
+    assert process.returncode == 2
+    assert not list((bare / "build" / "wheels").iterdir())
+    wheel.write_bytes(whole)
+    with downloading(bare, offered) as process:
+        kept = next(path for path in map(Path, process.stdout.read().split()) if path.name == wheel.name)
+    kept.write_bytes(whole[:1000])  # as an interrupted copy leaves it
+    with downloading(bare, offered) as process:
+        assert kept.name in process.stdout.read()
+    assert kept.read_bytes() == whole
+
+
 def test_a_repository_is_no_output_folder(tmp_path):
     done = built("--output", tmp_path, "--repository", tmp_path)
     assert done.returncode == 2
