@@ -46,7 +46,8 @@ def project(tmp_path_factory):
     """A project of its own, committed: this one as it is now, without what no release needs, of another version."""
     folder = tmp_path_factory.mktemp("release") / "project"
     shutil.copytree(ROOT, folder, ignore=NEEDLESS)
-    shutil.copy(ROOT / ".gitignore", folder)
+    for name in (".gitattributes", ".gitignore"):
+        shutil.copy(ROOT / name, folder)
     manifest = folder / "blender_manifest.toml"
     version, text = manifest.read_text().partition('\nversion = "')[::2]
     manifest.write_text(f'{version}\nversion = "{VERSION}"{text.partition(chr(34))[2]}')
@@ -107,9 +108,11 @@ def test_all_that_belongs_to_a_release(released):
 
 
 def test_the_same_commit_gives_the_same_bytes(released, copy, tmp_path):
-    """Another folder, umask, time zone, order and time of files; and what a checkout has besides."""
-    shutil.rmtree(copy / "shaders")
-    git(copy, "checkout", "shaders")
+    """Another folder, umask, time zone, order and time of files, ends of lines; and what a checkout has besides."""
+    git(copy, "config", "core.autocrlf", "true")
+    for folder in ("shaders", "third_party"):
+        shutil.rmtree(copy / folder)
+        git(copy, "checkout", folder)
     (copy / "shutter_addon" / "old.blend1").touch()
     for number, path in enumerate(sorted(copy.rglob("*.py"))):
         os.utime(path, (number * 1e6, number * 1e6))
@@ -210,8 +213,14 @@ def test_a_folder_that_is_there_is_kept(copy, tmp_path):
     assert not list((tmp_path / "there").iterdir())
 
 
+@pytest.fixture
+def some_blender(monkeypatch):
+    """What the tests of a release are given; these do not run it."""
+    monkeypatch.setenv("BLENDER", "blender")
+
+
 @pytest.mark.parametrize("passes", [True, False])
-def test_the_tests_are_run_before(copy, passes):
+def test_the_tests_are_run_before(copy, some_blender, passes):
     (copy / "scripts" / "test").write_text(f"#!/bin/sh\ntest ! -e dist && exit {0 if passes else 1}\n")
     commit(copy)
     if not passes:
@@ -220,6 +229,27 @@ def test_the_tests_are_run_before(copy, passes):
     done = run(copy, "--system", SYSTEM)
     assert done.returncode == 0, done.stderr
     assert (copy / "dist" / VERSION / "SHA256SUMS").is_file()
+
+
+@pytest.mark.parametrize(
+    ("meanwhile", "sentence"),
+    [
+        ("touch shutter_addon/new.py", "there are changes that are not committed"),
+        ("git commit --quiet --allow-empty --message More", "another commit was checked out while the tests ran"),
+    ],
+)
+def test_what_is_released_is_what_was_tested(copy, some_blender, monkeypatch, meanwhile, sentence):
+    for name, value in AUTHOR.items():
+        monkeypatch.setenv(name, value)
+    (copy / "scripts" / "test").write_text(f"#!/bin/sh\n{meanwhile}\n")
+    commit(copy)
+    refused(copy, sentence)
+
+
+def test_tests_without_a_blender_are_refused(copy, monkeypatch):
+    monkeypatch.delenv("BLENDER", raising=False)
+    needed = "set BLENDER to the command that runs a Blender in which the zips are tested, or give --no-tests"
+    refused(copy, needed)
 
 
 def test_a_release_is_whole_or_not_at_all(copy):
