@@ -100,7 +100,9 @@ def test_a_bill_lists_wheels_and_what_they_bundle(system, zips, bills):
                  if each["name"] == "virtual_shutter:file"}  # fmt: skip
     assert libraries < set(files)
     assert {name for name in files if re.search(r"\.(dy)?libs/|/opencv_videoio_ffmpeg", name)} == libraries
-    assert listed["metadata"]["component"]["hashes"][0]["content"] == hashlib.sha256(zips[system].read_bytes()).hexdigest()
+    assert (
+        listed["metadata"]["component"]["hashes"][0]["content"] == hashlib.sha256(zips[system].read_bytes()).hexdigest()
+    )
     depends = {each["ref"]: each.get("dependsOn", []) for each in listed["dependencies"]}
     assert set(depends["virtual_shutter"]) == set(wheels)
     assert {reference.split("!/")[1] for name in wheels for reference in depends[name]} >= {"FFmpeg", "x264", "x265"}
