@@ -14,6 +14,7 @@ from pathlib import Path
 import numpy as np
 import OpenImageIO
 import pytest
+from fresh import INSTALL, PACKAGES
 
 ROOT = Path(__file__).parents[1]
 NAME = "bl_ext.user_default.virtual_shutter"
@@ -318,7 +319,7 @@ class Installation:
         return done.stdout
 
     def install(self, path):
-        self.run("--command", "extension", "install-file", "-r", "user_default", "-e", path)
+        self.run(*INSTALL, path)
         assert self.files() == {*members(path)[0]}
 
     def files(self):
@@ -387,12 +388,12 @@ def test_installed_with_wheels(blender, blenders_python, bunny, recipe, tmp_path
     blender.run("--command", "extension", "validate", path)
     blender.install(path)
     files = blender.files()
-    edit, wheels = tmp_path / "edit.blend", ["av", "moderngl", "glcontext", "tqdm", "cv2", "scenedetect"]
+    edit = tmp_path / "edit.blend"
     write = f"try: open({str(blender.extension / 'written')!r}, 'w')\nexcept OSError: print('CANNOT BE WRITTEN')"
     with blender.read_only():
         said = blender.run("-b", "--python-expr", write)
         assert "CANNOT BE WRITTEN" in said or os.name != "posix"
-        blender.run("-b", "--python-exit-code", 1, "--python", MAKE_EDIT, "--", bunny, recipe, edit, NAME, *wheels)
+        blender.run("-b", "--python-exit-code", 1, "--python", MAKE_EDIT, "--", bunny, recipe, edit, NAME, *PACKAGES)
         blender.run("-b", edit, "-o", tmp_path / "real" / "####", "-s", 3, "-e", 5, "-a")
     checkout_renders(bunny, recipe, tmp_path / "ours", "3:5")
     assert_alike(tmp_path / "real", tmp_path / "ours", 3)
@@ -405,9 +406,7 @@ def test_installed_without_wheels(blender, dist, bunny, recipe, tmp_path):
     nothing else, of what needs a package."""
     hidden = blender.user / "scripts" / "startup" / "hidden.py"
     hidden.parent.mkdir(parents=True)
-    hidden.write_text(
-        f"import sys\nsys.modules |= dict.fromkeys({WHEELS | REQUIRED | {'cv2'}})\ndef register(): pass\n"
-    )
+    hidden.write_text(f"import sys\nsys.modules |= dict.fromkeys({REQUIRED | {*PACKAGES}})\ndef register(): pass\n")
     (path,) = dist[0].glob("*-no_wheels.zip")
     blender.run("--command", "extension", "validate", path)
     blender.install(path)

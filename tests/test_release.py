@@ -11,6 +11,7 @@ import zipfile
 from pathlib import Path
 
 import pytest
+from fresh import installed
 
 ROOT = Path(__file__).parents[1]
 SYSTEM = {"linux": "linux-x64", "win32": "windows-x64", "darwin": "macos-arm64"}[sys.platform]
@@ -180,16 +181,9 @@ def test_the_index_is_the_same_wherever_and_whenever_it_is_made(released, projec
 def test_blender_installs_a_zip_in_its_normal_form(released, real_blender, tmp_path):
     (path,) = released.glob("*-no_wheels.zip")
     shutil.copy(path, tmp_path)
-    command = [*real_blender, "--command", "extension", "install-file", "-r", "user_default", "-e"]
-    environment = os.environ | {"BLENDER_USER_RESOURCES": str(tmp_path / "user")}
-    (tmp_path / "user").mkdir()
-    done = subprocess.run(
-        [*command, tmp_path / path.name], env=environment, capture_output=True, text=True, check=False
-    )
-    assert done.returncode == 0, done.stdout + done.stderr
-    installed = tmp_path / "user" / "extensions" / "user_default" / "virtual_shutter"
+    extension = installed(real_blender, tmp_path / path.name, tmp_path / "user")
     with zipfile.ZipFile(path) as packed:
-        assert all((installed / name).read_bytes() == packed.read(name) for name in packed.namelist())
+        assert all((extension / name).read_bytes() == packed.read(name) for name in packed.namelist())
 
 
 def test_what_is_not_committed_is_refused(copy):
