@@ -7,6 +7,7 @@ of licences come from third_party/components.toml.
 """
 
 import argparse
+import hashlib
 import importlib.util
 import json
 import re
@@ -38,6 +39,9 @@ ALSO = {"windows-x64": ("colorama==0.4.6",)}  # click and tqdm require it there
 # By Blender's name of a system, the one that pip looks for: as old as PyAV's wheels allow.
 SYSTEMS = {"linux-x64": "manylinux_2_28_x86_64", "windows-x64": "win_amd64", "macos-arm64": "macosx_14_0_arm64"}
 BLENDERS_PYTHON = "3.13"  # of official builds of 5.2
+# SHA-256 of each wheel by its file's name: for that Python, and for 3.14, which Blenders of distributions have. A wheel
+# for another one gets its line, by `sha256sum`, once somebody has looked at it.
+HASHES = dict(line.split()[::-1] for line in (ROOT / "third_party" / "wheels.sha256").read_text().splitlines())
 
 
 def manifest() -> dict:
@@ -81,23 +85,39 @@ def _build_for(without: Path, output: Path, system: str, python: str) -> Path:
 
 
 def download(system: str, python: str) -> list[Path]:
-    """The wheels for a system, unmodified from PyPI; kept in build/wheels."""
+    """The wheels for a system, as PyPI has them; kept in build/wheels."""
     folder = ROOT / "build" / "wheels" / f"{SYSTEMS[system]}-{python}"
     wanted = (*WHEELS, *ALSO.get(system, ()))
-    missing = [wheel for wheel in wanted if not list(folder.glob(f"{_file(wheel)}-*.whl"))]
+    if missing := [wheel for wheel in wanted if _kept(folder, wheel) is None]:
+        folder.parent.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryDirectory(dir=folder.parent) as half:  # builds beside each other see whole wheels alone
+            _fetch(missing, Path(half), system, python)
+            folder.mkdir(exist_ok=True)
+            for path in Path(half).iterdir():
+                path.replace(folder / path.name)
+    return [_kept(folder, wheel) for wheel in wanted]
+
+
+def _kept(folder: Path, wheel: str) -> Path | None:
+    """A wheel in a folder; None where it is not there, or is not what is known of it."""
+    name, version = wheel.split("==")
+    return next(filter(_known, folder.glob(f"{name.replace('-', '_')}-{version}-*.whl")), None)
+
+
+def _known(path: Path) -> bool:
+    return HASHES.get(path.name) == hashlib.sha256(path.read_bytes()).hexdigest()
+
+
+def _fetch(wheels: list[str], folder: Path, system: str, python: str) -> None:
+    """Downloads wheels into a folder, and ends the program where they are not to be had or others than are known."""
     options = ["--only-binary=:all:", "--no-deps", "--implementation=cp", f"--python-version={python}"]
     # Warnings are for who works on pip, and where they are errors it does not start.
     pip = [sys.executable, "-W", "ignore", "-m", "pip", "download", "-qq", "--disable-pip-version-check"]
-    pip += [*options, f"--platform={SYSTEMS[system]}", f"--dest={folder}", *missing]
-    if missing and subprocess.run(pip, capture_output=True, check=False).returncode:
+    pip += [*options, f"--platform={SYSTEMS[system]}", f"--dest={folder}", *wheels]
+    if subprocess.run(pip, capture_output=True, check=False).returncode:
         fail(f"no wheels for Python {python} on {system}, or PyPI is not reached")
-    return [next(folder.glob(f"{_file(wheel)}-*.whl")) for wheel in wanted]
-
-
-def _file(wheel: str) -> str:
-    """How a wheel's file name begins."""
-    name, version = wheel.split("==")
-    return f"{name.replace('-', '_')}-{version}"
+    if others := [path.name for path in sorted(folder.iterdir()) if not _known(path)]:
+        fail(f"third_party/wheels.sha256 does not know {', '.join(others)} as it was downloaded")
 
 
 def complete_manifest(path: Path, wheels: list[Path], system: str) -> None:

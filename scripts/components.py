@@ -12,6 +12,8 @@ from email.message import Message
 from email.parser import BytesParser
 from pathlib import Path
 
+import without_openssl
+
 ROOT = Path(__file__).resolve().parents[1]
 TEXTS = ROOT / "third_party"
 PAGE = ROOT / "docs" / "licences.md"
@@ -117,7 +119,8 @@ def write_texts(folder: Path, wheels: list[Path], system: str) -> None:
         (folder / f"LICENSE-{licence}.txt").write_bytes((TEXTS / f"LICENSE-{licence}.txt").read_bytes())
     about = "What comes with Virtual Shutter, in the folder wheels. Texts that are named by their SPDX identifier are\n"
     about += "here as LICENSE-*.txt; that of the GPL, version 3, is LICENSE, beside this folder.\n"
-    (folder / "README.txt").write_text("\n".join([about, *entries]), encoding="utf-8", newline="\n")
+    modified = [notice for path in sorted(wheels) if (notice := without_openssl.notice(path.name))]
+    (folder / "README.txt").write_text("\n".join([about, *modified, *entries]), encoding="utf-8", newline="\n")
 
 
 def copy_texts(wheel: Path, folder: Path) -> list[str]:

@@ -47,21 +47,10 @@ def wheel_for(system, machine):
 
 def by_pip():
     """The wheel, as bytes, by this Python's pip; None where pip is missing or does not get it."""
-    command = [
-        sys.executable,
-        "-W",
-        "ignore",
-        "-m",
-        "pip",
-        "download",
-        "--no-deps",
-        "--only-binary",
-        ":all:",
-        "--retries",
-        "1",
-    ]
+    pip = [sys.executable, "-W", "ignore", "-m", "pip", "download"]
+    options = ["--no-deps", "--only-binary=:all:", "--retries=1"]
     with tempfile.TemporaryDirectory() as folder:
-        subprocess.run([*command, "--dest", folder, f"uv=={VERSION}"], capture_output=True, check=False)
+        subprocess.run([*pip, *options, "--dest", folder, f"uv=={VERSION}"], capture_output=True, check=False)
         return next((path.read_bytes() for path in Path(folder).glob("*.whl")), None)
 
 

@@ -1,7 +1,8 @@
 """A release in one folder, which is a repository that Blender subscribes to as well: the zips, their index, notes,
 checksums, and what is in each zip.
 
-Run by scripts/release. The same commit gives the same bytes: all is built from what is committed, and dated by it.
+Run by scripts/release. The same commit gives the same bytes, with the same versions of Blender as a library, lief,
+cyclonedx-python-lib and zlib: all is built from what is committed, and dated by it.
 """
 
 import argparse
@@ -40,10 +41,17 @@ def notes(version: str) -> str:
     return section[1].strip() + "\n"
 
 
-def committed(folder: Path) -> Path:
-    """The files of the commit alone, in a folder: a checkout may hold more, which git ignores and a zip would not."""
+def commit() -> str:
+    """The commit that is checked out; a checkout with changes is refused."""
+    if git("status", "--porcelain"):
+        fail("there are changes that are not committed")
+    return git("rev-parse", "HEAD")
+
+
+def committed(commit: str, folder: Path) -> Path:
+    """The files of a commit alone, in a folder: a checkout may hold more, which git ignores and a zip would not."""
     packed = folder / "source.tar"
-    git("archive", "--format=tar", f"--output={packed}", "HEAD")
+    git("archive", "--format=tar", f"--output={packed}", commit)
     with tarfile.open(packed) as archive:
         archive.extractall(folder / "source", filter="data")
     return folder / "source"
@@ -91,11 +99,21 @@ def write(path: Path, text: str) -> None:
     path.write_text(text, encoding="utf-8", newline="\n")
 
 
-def make(folder: Path, systems: list[str], text: str) -> None:
-    """Puts all of a release into a folder; text: its notes."""
-    date = int(git("log", "-1", "--format=%ct"))
+def test(released: str) -> None:
+    """Has scripts/test pass, with a commit checked out before and after; it installs the zips in a Blender."""
+    if not os.environ.get("BLENDER"):
+        fail("set BLENDER to the command that runs a Blender in which the zips are tested, or give --no-tests")
+    if subprocess.run([build.ROOT / "scripts" / "test"], check=False).returncode:
+        fail("the tests fail")
+    if commit() != released:
+        fail("another commit was checked out while the tests ran")
+
+
+def make(folder: Path, commit: str, systems: list[str], text: str) -> None:
+    """Puts all of a release of a commit into a folder; text: its notes."""
+    date = int(git("log", "-1", "--format=%ct", commit))
     with tempfile.TemporaryDirectory() as stage:
-        without = build.build_without_wheels(folder, committed(Path(stage)))
+        without = build.build_without_wheels(folder, committed(commit, Path(stage)))
         zips = [without, *build.build_with_wheels(without, folder, systems, build.BLENDERS_PYTHON)]
     for path in zips:
         normalise(path, date)
@@ -125,18 +143,16 @@ def main() -> None:
     output = (options.output or build.ROOT / "dist" / version).resolve()
     if options.version not in (None, version):
         fail(f"this is version {version}, not {options.version}")
-    if git("status", "--porcelain"):
-        fail("there are changes that are not committed")
-    text = notes(version)
+    released, text = commit(), notes(version)
     if output.exists():
         fail(f"{output} is there already")
-    if not options.no_tests and subprocess.run([build.ROOT / "scripts" / "test"], check=False).returncode:
-        fail("the tests fail")
+    if not options.no_tests:
+        test(released)
     output.parent.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory(prefix=".release-", dir=output.parent) as folder:
         made = Path(folder) / output.name
         made.mkdir()
-        make(made, options.system or list(build.SYSTEMS), text)
+        make(made, released, options.system or list(build.SYSTEMS), text)
         os.replace(made, output)
     for path in sorted(output.iterdir()):
         print(f"{path.stat().st_size / 1e6:7.2f} MB  {path}")

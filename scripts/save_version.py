@@ -2,7 +2,7 @@
 
     .venv/bin/python scripts/save_version.py
 
-It is run once for each release, before that. A folder that is there is never written again: it is what that version has
+It is run before each release. A folder that is there is never written again: it is what that version has
 saved. One whose version nobody has yet may be removed and made anew.
 
     edit.blend      an edit with everything that the extension stores, its footage beside it
@@ -14,7 +14,6 @@ saved. One whose version nobody has yet may be removed and made anew.
 from __future__ import annotations
 
 import json
-import shutil
 import sys
 import tempfile
 import tomllib
@@ -41,11 +40,11 @@ def main() -> None:
         _fail(f"{folder.relative_to(ROOT)}: is there already, and stays what that version has saved")
     blender.register()
     bpy.context.preferences.filepaths.save_version = 0  # no edit.blend1
-    with tempfile.TemporaryDirectory() as temporary:
+    SAVED.mkdir(exist_ok=True)
+    with tempfile.TemporaryDirectory(prefix=".", dir=SAVED) as temporary:
         made = Path(temporary) / "saved"
         make(made)
-        SAVED.mkdir(exist_ok=True)
-        shutil.copytree(made, folder)
+        made.rename(folder)
     size = sum(path.stat().st_size for path in folder.rglob("*") if path.is_file())
     print(f"{folder.relative_to(ROOT)}: {size / 1000:.0f} kB")
 

@@ -176,6 +176,9 @@ def make(path: Path) -> None:
     _bake(scene, scene.sequence_editor.strips["baked effect"])
     _add_other_regions(scene, scene.virtual_shutter.effects[3], footage)
     bpy.ops.file.make_paths_relative()
+    for space in (space for screen in bpy.data.screens for area in screen.areas for space in area.spaces):
+        if space.type == "FILE_BROWSER" and space.params:
+            space.params.directory = b"//"  # else it is this machine's home
     bpy.ops.wm.save_as_mainfile(filepath=str(path), compress=True)
 
 

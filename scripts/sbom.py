@@ -25,7 +25,7 @@ from cyclonedx.model.license import LicenseExpression
 from cyclonedx.output import make_outputter
 from cyclonedx.schema import OutputFormat, SchemaVersion
 from packageurl import PackageURL
-from without_openssl import TAG
+from without_openssl import notice
 
 WITHIN = "!/"  # between a wheel's path in the zip and a file's path in the wheel
 
@@ -86,17 +86,18 @@ def _wheel(path: str, packed: zipfile.ZipFile, system: str) -> tuple[Component, 
     with zipfile.ZipFile(io.BytesIO(content)) as wheel:
         says = components.metadata(wheel)
         libraries = components.libraries(wheel.namelist())
-    changed = Pedigree(notes="OpenSSL 1.1.1 is taken out of the wheel on PyPI, by scripts/without_openssl.py")
+    changed = notice(path[7:])
+    file = {} if changed else {"file_name": path[7:]}  # a changed one is not on PyPI
     component = Component(
         name=says["Name"],
         version=says["Version"],
         type=ComponentType.LIBRARY,
         bom_ref=path,
-        purl=PackageURL("pypi", name=says["Name"].lower(), version=says["Version"], qualifiers={"file_name": path[7:]}),
+        purl=PackageURL("pypi", name=says["Name"].lower(), version=says["Version"], qualifiers=file),
         licenses=[LicenseExpression(its["licence"])],
         copyright="\n".join(its["copyright"]),
         hashes=[_hash(_sha256(content))],
-        pedigree=changed if f"-{TAG}-" in path else None,
+        pedigree=Pedigree(notes=changed) if changed else None,
     )
     bundled = []
     for part in components.parts(name, system):

@@ -9,13 +9,16 @@ that is an OpenSSL that can make nothing (NULL), and it opens no such address.
 import base64
 import hashlib
 import io
+import json
 import tempfile
 import zipfile
+import zlib
 from pathlib import Path
 
 import lief
 
 TAG = "1noopenssl"  # the wheel's build tag: it is no longer the one on PyPI
+CHANGED = "2026-11-26"  # when what is done here was changed last
 _STAND_IN = "sched_yield"
 
 
@@ -41,7 +44,8 @@ def kept(wheel: Path) -> Path:
     """The wheel without its OpenSSL, where it has one, else as it is. Kept beside it: packing it takes ten seconds."""
     if not has_openssl(wheel):
         return wheel
-    made_by = hashlib.sha256(Path(__file__).read_bytes()).hexdigest()[:8]
+    makers = f"lief {lief.__version__}, zlib {zlib.ZLIB_RUNTIME_VERSION}, "  # both decide on the bytes
+    made_by = hashlib.sha256(makers.encode() + Path(__file__).read_bytes()).hexdigest()[:8]
     folder = wheel.parent / f"{TAG}-{made_by}"
     found = list(folder.glob(f"{wheel.name.split('-')[0]}-{wheel.name.split('-')[1]}-*.whl"))
     if found:
@@ -61,10 +65,27 @@ def is_openssl(member: str) -> bool:
     return Path(member).name.startswith(("libssl-", "libcrypto-")) and ".so.1.1" in member
 
 
+def notice(wheel: str) -> str:
+    """What has been changed in a wheel of that file name, when and by whom, as the LGPL and Apache's licence ask for;
+    "" of a wheel that is as PyPI has it."""
+    if f"-{TAG}-" not in wheel:
+        return ""
+    return f"""\
+MODIFIED: {wheel} is not the wheel that its makers
+have published on PyPI, which is {wheel.replace(f"-{TAG}-", "-")}.
+The Virtual Shutter developers changed it on {CHANGED}, by scripts/without_openssl.py of Virtual Shutter's source code:
+  OpenSSL 1.1.1 (libssl, libcrypto) is taken out;
+  FFmpeg's libavformat and libavutil no longer ask for it;
+  its bill of materials (sboms/auditwheel.cdx.json), WHEEL and RECORD say so.
+"""
+
+
 def _changed(member: str, content: bytes, gone: list[str]) -> bytes:
     if member.endswith(".dist-info/WHEEL"):
         head, tags = content.split(b"Tag:", 1)
         return head + f"Build: {TAG}\nTag:".encode() + tags
+    if member.endswith(".cdx.json"):
+        return _without_components(content)
     if ".so" in Path(member).name and any(name.encode() in content for name in gone):
         return _without_libraries(content, gone)
     return content
@@ -82,6 +103,18 @@ def _without_libraries(content: bytes, gone: list[str]) -> bytes:
         library.remove_library(name)
         library.remove_version_requirement(name)
     return bytes(library.write_to_bytes())
+
+
+def _without_components(content: bytes) -> bytes:
+    """A bill of materials, by auditwheel, that no longer lists OpenSSL."""
+    bill = json.loads(content)
+    gone = {each["bom-ref"] for each in bill["components"] if each["name"].startswith("openssl")}
+    bill["components"] = [each for each in bill["components"] if each["bom-ref"] not in gone]
+    bill["dependencies"] = [each for each in bill["dependencies"] if each["ref"] not in gone]
+    for each in bill["dependencies"]:
+        if "dependsOn" in each:
+            each["dependsOn"] = [needed for needed in each["dependsOn"] if needed not in gone]
+    return json.dumps(bill).encode()
 
 
 def _line(name: str, content: bytes) -> str:

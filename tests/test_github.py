@@ -25,12 +25,18 @@ STAND_INS = {
     "tar": 'cp "$BLENDER_IS" "$7/blender"',  # --extract --file FILE --strip-components 1 --directory FOLDER
     "python": 'echo "python $*" >>"$TOLD"; [ "$1" = -m ] || exec "$PYTHON_IS" "$@"',
     "blender": f'echo "blender $*" >>"$TOLD"; if [ "$2" = shutter ]; then {LIBRARY}; else test -f "$7"; fi',
+    "gh": 'echo "gh $*" >>"$TOLD"',
     "jq": "echo https://cdn.example.org/blender.tar.xz",
 }
 
 
+RUNNERS = ("GITHUB_ENV", "GITHUB_REF_NAME", "GITHUB_WORKSPACE", "RUNNER_TEMP")
+# What a step writes for those after it.
+GIVEN_ON = '\nset -a; . "$GITHUB_ENV"; set +a\n'
+
+
 def commands(job):
-    return "\n".join(step["run"] for step in job["steps"] if "run" in step)
+    return "".join(step["run"] + GIVEN_ON for step in job["steps"] if "run" in step)
 
 
 def run(lines, folder, environment):
@@ -40,8 +46,10 @@ def run(lines, folder, environment):
     for name, text in STAND_INS.items():
         (programs / name).write_text(f"#!/bin/sh\n{text}\n")
         (programs / name).chmod(0o755)
+    (folder / "given").touch()
     own = {"PATH": f"{programs}:{os.environ['PATH']}", "TOLD": str(told), "PYTHON_IS": sys.executable}
-    environment = os.environ | environment | own | {"BLENDER_IS": str(programs / "blender")}
+    own |= {"GITHUB_ENV": str(folder / "given"), "GITHUB_WORKSPACE": str(folder)}
+    environment = os.environ | {"BLENDER": ""} | environment | own | {"BLENDER_IS": str(programs / "blender")}
     shell = ["bash", "--noprofile", "--norc", "-e", "-o", "pipefail"]
     done = subprocess.run(shell, input=lines, env=environment, cwd=folder, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
@@ -70,7 +78,7 @@ pathlib.Path(f"dist/virtual_shutter-0.1.0-{sys.argv[2].replace('-', '_')}.zip").
 
 @pytest.mark.parametrize("system", SYSTEMS, ids=lambda system: system["system"])
 def test_the_commands_of_a_system(checkout, system):
-    environment = {name: system[name.lower()] for name in ("SYSTEM", "ARCHIVE")} | {"BLENDER": system["program"]}
+    environment = {name: system[name.lower()] for name in ("SYSTEM", "ARCHIVE", "PROGRAM")}
     told = run(commands(JOBS["test-installed"]), checkout, environment)
     install, render = (words for words in told if words[0] == "blender")
     assert install[1:4] == ["--command", "extension", "install-file"]
@@ -78,11 +86,44 @@ def test_the_commands_of_a_system(checkout, system):
     assert render[1:4] == ["--command", "shutter", "render"]
     assert system["system"] != "linux-x64" or len(list((checkout / render[-1]).iterdir())) == 3
     assert [words[2] for words in told if words[:2] == ["python", "-m"]] == ["pip", *["pytest"] * 3]
+    assert_blender_is_given(checkout)
+
+
+def assert_blender_is_given(folder):
+    """By a path from which tests run it wherever they do, and which has no Windows's backslashes in it."""
+    path = (folder / "given").read_text().removeprefix("BLENDER=").rstrip("\n")
+    assert path.startswith("/")
+    assert os.access(path, os.X_OK)
 
 
 def test_the_commands_of_the_daily_build(checkout):
     told = run(commands(JOBS["test-daily"]), checkout, JOBS["test-daily"]["env"])
     assert [words[2] for words in told] == ["pip", "pip", "pytest", "pytest"]
+    assert_blender_is_given(checkout)
+
+
+def test_windows_path_to_blender_is_one_for_a_posix_shell(tmp_path):
+    (line,) = (line for line in lines_with("echo ") if "$PROGRAM" in line)
+    environment = {"GITHUB_WORKSPACE": "D:\\a\\b", "PROGRAM": "blender.exe", "GITHUB_ENV": str(tmp_path / "given")}
+    subprocess.run(["bash", "-c", line], env=environment, check=True)
+    assert (tmp_path / "given").read_text() == "BLENDER=D:/a/b/blender.exe\n"
+
+
+def test_the_commands_of_a_release(checkout, tmp_path):
+    """It has a Blender, and the checkout is as clean as a release asks for."""
+    (checkout / "scripts" / "release").write_text(
+        '#!/bin/sh\necho "release $*" >>"$TOLD"; ls -A >"$RUNNER_TEMP/files"\n'
+    )
+    (checkout / "scripts" / "release").chmod(0o755)
+    (tmp_path / "temporary").mkdir()
+    before, job = {path.name for path in checkout.iterdir()}, JOBS["release-release"]
+    environment = {"GITHUB_REF_NAME": "v0.1.0", "RUNNER_TEMP": str(tmp_path / "temporary"), "ARCHIVE": "blender.tar.xz"}
+    release, publish = run(commands(job), checkout, environment)
+    assert release == ["release", "--version", "0.1.0", "--output", "dist/release"]
+    assert publish[:4] == ["gh", "release", "create", "v0.1.0"]
+    assert_blender_is_given(checkout)
+    files = set((tmp_path / "temporary" / "files").read_text().split("\n")) - {"", "programs", "given", "told"}
+    assert files == before
 
 
 # Blender's own parser of an extension's commands.
@@ -95,7 +136,8 @@ assert parser.parse_args(sys.argv[1:]).file
 """
 
 
-def test_what_blender_and_the_builder_are_given_is_understood():
+def test_what_blender_and_the_builder_are_given_is_understood(monkeypatch):
+    monkeypatch.syspath_prepend(ROOT / "scripts")
     (line,) = lines_with('"$BLENDER" --command extension')
     subprocess.run([sys.executable, "-c", EXTENSION, *shlex.split(line)[3:]], check=True)
     known = runpy.run_path(str(ROOT / "scripts" / "build.py"))["SYSTEMS"]
@@ -121,7 +163,8 @@ def test_actions_and_variables_are_known():
         uses = {step["uses"] for step in job["steps"] if "uses" in step}
         assert uses <= {"actions/checkout@v4", "actions/setup-python@v5", "actions/upload-artifact@v4"}, name
         text = commands(job)
-        given = {*WORKFLOWS[name.partition("-")[0]].get("env", {}), *job.get("env", {}), "GITHUB_REF_NAME", "url"}
+        later = re.findall(r'echo "(\w+)=.*" >>"\$GITHUB_ENV"', text)
+        given = {*WORKFLOWS[name.partition("-")[0]].get("env", {}), *job.get("env", {}), "url", *RUNNERS, *later}
         assert set(re.findall(r"\$\{?([A-Za-z_]\w*)", text)) <= given, name
         assert "${{" not in text
         assert job["timeout-minutes"] <= 360

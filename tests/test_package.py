@@ -14,6 +14,7 @@ from pathlib import Path
 import numpy as np
 import OpenImageIO
 import pytest
+from fresh import INSTALL, PACKAGES
 
 ROOT = Path(__file__).parents[1]
 NAME = "bl_ext.user_default.virtual_shutter"
@@ -140,6 +141,64 @@ def test_wheels_that_are_not_to_be_had_are_one_sentence(tmp_path):
     assert done.stderr == f"build: no wheels for Python 3.x on {SYSTEM}, or PyPI is not reached\n"
 
 
+DOWNLOAD = "import sys, build; print(*build.download(sys.argv[1], build.BLENDERS_PYTHON), sep='\\n')"
+
+
+def downloading(root, offered):
+    """A process that gets the wheels of this system, of a folder in place of PyPI."""
+    environment = os.environ | {"PIP_NO_INDEX": "1", "PIP_FIND_LINKS": str(offered)}
+    command, pipe = [sys.executable, "-c", DOWNLOAD, SYSTEM], subprocess.PIPE
+    return subprocess.Popen(command, env=environment, cwd=root / "scripts", stdout=pipe, stderr=pipe, text=True)
+
+
+@pytest.fixture
+def offered(dist, tmp_path):
+    """A folder of this system's wheels, as they are on PyPI."""
+    (tmp_path / "offered").mkdir()
+    with downloading(ROOT, "none") as process:
+        for path in map(Path, process.stdout.read().split()):
+            shutil.copy(path, tmp_path / "offered")
+    return tmp_path / "offered"
+
+
+@pytest.fixture
+def bare(tmp_path):
+    """A project that has downloaded nothing."""
+    for name in ("scripts", "third_party"):
+        shutil.copytree(ROOT / name, tmp_path / "bare" / name)
+    shutil.copy(ROOT / "blender_manifest.toml", tmp_path / "bare")
+    return tmp_path / "bare"
+
+
+def test_two_that_download_at_once_get_whole_wheels(offered, bare):
+    both = [downloading(bare, offered), downloading(bare, offered)]
+    for process in both:
+        said, _ = process.communicate()
+        assert process.returncode == 0
+        assert {path.name: path.read_bytes() for path in map(Path, said.split())} == {
+            path.name: path.read_bytes() for path in offered.iterdir()
+        }
+
+
+def test_a_wheel_that_is_not_the_known_one_is_refused(offered, bare):
+    (wheel,) = offered.glob("tqdm-*.whl")
+    whole = wheel.read_bytes()
+    with zipfile.ZipFile(wheel, "a") as packed:
+        packed.writestr("tqdm/more.py", "")
+    with downloading(bare, offered) as process:
+        said = process.stderr.read()
+    assert said == f"build: third_party/wheels.sha256 does not know {wheel.name} as it was downloaded\n"
+    assert process.returncode == 2
+    assert not list((bare / "build" / "wheels").iterdir())
+    wheel.write_bytes(whole)
+    with downloading(bare, offered) as process:
+        kept = next(path for path in map(Path, process.stdout.read().split()) if path.name == wheel.name)
+    kept.write_bytes(whole[:1000])  # as an interrupted copy leaves it
+    with downloading(bare, offered) as process:
+        assert kept.name in process.stdout.read()
+    assert kept.read_bytes() == whole
+
+
 def test_a_repository_is_no_output_folder(tmp_path):
     done = built("--output", tmp_path, "--repository", tmp_path)
     assert done.returncode == 2
@@ -260,7 +319,7 @@ class Installation:
         return done.stdout
 
     def install(self, path):
-        self.run("--command", "extension", "install-file", "-r", "user_default", "-e", path)
+        self.run(*INSTALL, path)
         assert self.files() == {*members(path)[0]}
 
     def files(self):
@@ -329,12 +388,12 @@ def test_installed_with_wheels(blender, blenders_python, bunny, recipe, tmp_path
     blender.run("--command", "extension", "validate", path)
     blender.install(path)
     files = blender.files()
-    edit, wheels = tmp_path / "edit.blend", ["av", "moderngl", "glcontext", "tqdm", "cv2", "scenedetect"]
+    edit = tmp_path / "edit.blend"
     write = f"try: open({str(blender.extension / 'written')!r}, 'w')\nexcept OSError: print('CANNOT BE WRITTEN')"
     with blender.read_only():
         said = blender.run("-b", "--python-expr", write)
         assert "CANNOT BE WRITTEN" in said or os.name != "posix"
-        blender.run("-b", "--python-exit-code", 1, "--python", MAKE_EDIT, "--", bunny, recipe, edit, NAME, *wheels)
+        blender.run("-b", "--python-exit-code", 1, "--python", MAKE_EDIT, "--", bunny, recipe, edit, NAME, *PACKAGES)
         blender.run("-b", edit, "-o", tmp_path / "real" / "####", "-s", 3, "-e", 5, "-a")
     checkout_renders(bunny, recipe, tmp_path / "ours", "3:5")
     assert_alike(tmp_path / "real", tmp_path / "ours", 3)
@@ -347,9 +406,7 @@ def test_installed_without_wheels(blender, dist, bunny, recipe, tmp_path):
     nothing else, of what needs a package."""
     hidden = blender.user / "scripts" / "startup" / "hidden.py"
     hidden.parent.mkdir(parents=True)
-    hidden.write_text(
-        f"import sys\nsys.modules |= dict.fromkeys({WHEELS | REQUIRED | {'cv2'}})\ndef register(): pass\n"
-    )
+    hidden.write_text(f"import sys\nsys.modules |= dict.fromkeys({REQUIRED | {*PACKAGES}})\ndef register(): pass\n")
     (path,) = dist[0].glob("*-no_wheels.zip")
     blender.run("--command", "extension", "validate", path)
     blender.install(path)

@@ -11,6 +11,7 @@ import zipfile
 from pathlib import Path
 
 import pytest
+from fresh import installed
 
 ROOT = Path(__file__).parents[1]
 SYSTEM = {"linux": "linux-x64", "win32": "windows-x64", "darwin": "macos-arm64"}[sys.platform]
@@ -46,7 +47,8 @@ def project(tmp_path_factory):
     """A project of its own, committed: this one as it is now, without what no release needs, of another version."""
     folder = tmp_path_factory.mktemp("release") / "project"
     shutil.copytree(ROOT, folder, ignore=NEEDLESS)
-    shutil.copy(ROOT / ".gitignore", folder)
+    for name in (".gitattributes", ".gitignore"):
+        shutil.copy(ROOT / name, folder)
     manifest = folder / "blender_manifest.toml"
     version, text = manifest.read_text().partition('\nversion = "')[::2]
     manifest.write_text(f'{version}\nversion = "{VERSION}"{text.partition(chr(34))[2]}')
@@ -107,9 +109,11 @@ def test_all_that_belongs_to_a_release(released):
 
 
 def test_the_same_commit_gives_the_same_bytes(released, copy, tmp_path):
-    """Another folder, umask, time zone, order and time of files; and what a checkout has besides."""
-    shutil.rmtree(copy / "shaders")
-    git(copy, "checkout", "shaders")
+    """Another folder, umask, time zone, order and time of files, ends of lines; and what a checkout has besides."""
+    git(copy, "config", "core.autocrlf", "true")
+    for folder in ("shaders", "third_party"):
+        shutil.rmtree(copy / folder)
+        git(copy, "checkout", folder)
     (copy / "shutter_addon" / "old.blend1").touch()
     for number, path in enumerate(sorted(copy.rglob("*.py"))):
         os.utime(path, (number * 1e6, number * 1e6))
@@ -177,16 +181,9 @@ def test_the_index_is_the_same_wherever_and_whenever_it_is_made(released, projec
 def test_blender_installs_a_zip_in_its_normal_form(released, real_blender, tmp_path):
     (path,) = released.glob("*-no_wheels.zip")
     shutil.copy(path, tmp_path)
-    command = [*real_blender, "--command", "extension", "install-file", "-r", "user_default", "-e"]
-    environment = os.environ | {"BLENDER_USER_RESOURCES": str(tmp_path / "user")}
-    (tmp_path / "user").mkdir()
-    done = subprocess.run(
-        [*command, tmp_path / path.name], env=environment, capture_output=True, text=True, check=False
-    )
-    assert done.returncode == 0, done.stdout + done.stderr
-    installed = tmp_path / "user" / "extensions" / "user_default" / "virtual_shutter"
+    extension = installed(real_blender, tmp_path / path.name, tmp_path / "user")
     with zipfile.ZipFile(path) as packed:
-        assert all((installed / name).read_bytes() == packed.read(name) for name in packed.namelist())
+        assert all((extension / name).read_bytes() == packed.read(name) for name in packed.namelist())
 
 
 def test_what_is_not_committed_is_refused(copy):
@@ -210,8 +207,14 @@ def test_a_folder_that_is_there_is_kept(copy, tmp_path):
     assert not list((tmp_path / "there").iterdir())
 
 
+@pytest.fixture
+def some_blender(monkeypatch):
+    """What the tests of a release are given; these do not run it."""
+    monkeypatch.setenv("BLENDER", "blender")
+
+
 @pytest.mark.parametrize("passes", [True, False])
-def test_the_tests_are_run_before(copy, passes):
+def test_the_tests_are_run_before(copy, some_blender, passes):
     (copy / "scripts" / "test").write_text(f"#!/bin/sh\ntest ! -e dist && exit {0 if passes else 1}\n")
     commit(copy)
     if not passes:
@@ -220,6 +223,27 @@ def test_the_tests_are_run_before(copy, passes):
     done = run(copy, "--system", SYSTEM)
     assert done.returncode == 0, done.stderr
     assert (copy / "dist" / VERSION / "SHA256SUMS").is_file()
+
+
+@pytest.mark.parametrize(
+    ("meanwhile", "sentence"),
+    [
+        ("touch shutter_addon/new.py", "there are changes that are not committed"),
+        ("git commit --quiet --allow-empty --message More", "another commit was checked out while the tests ran"),
+    ],
+)
+def test_what_is_released_is_what_was_tested(copy, some_blender, monkeypatch, meanwhile, sentence):
+    for name, value in AUTHOR.items():
+        monkeypatch.setenv(name, value)
+    (copy / "scripts" / "test").write_text(f"#!/bin/sh\n{meanwhile}\n")
+    commit(copy)
+    refused(copy, sentence)
+
+
+def test_tests_without_a_blender_are_refused(copy, monkeypatch):
+    monkeypatch.delenv("BLENDER", raising=False)
+    needed = "set BLENDER to the command that runs a Blender in which the zips are tested, or give --no-tests"
+    refused(copy, needed)
 
 
 def test_a_release_is_whole_or_not_at_all(copy):

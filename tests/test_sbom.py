@@ -1,10 +1,11 @@
-"""Bills of materials, beside what the zips hold; and what the one wheel that is changed is worth."""
+"""Bills of materials, beside what the zips hold; and that the modified wheel works."""
 
 import base64
 import csv
 import hashlib
 import io
 import json
+import re
 import subprocess
 import sys
 import zipfile
@@ -32,24 +33,24 @@ def without(tmp_path_factory):
 
 
 @pytest.fixture(scope="module")
-def linux(without):
-    """The zip for Linux."""
-    (path,) = build.build_with_wheels(without, without.parent, [LINUX], build.BLENDERS_PYTHON)
-    return path
+def zips(without):
+    """The zips for all systems, by system."""
+    made = build.build_with_wheels(without, without.parent, list(build.SYSTEMS), build.BLENDERS_PYTHON)
+    return dict(zip(build.SYSTEMS, made, strict=True))
 
 
 @pytest.fixture(scope="module")
-def bill(linux):
-    """Its bill of materials, as text."""
-    path = linux.with_suffix(".cdx.json")
-    sbom.write(linux, path)
-    return path.read_text(encoding="utf-8")
+def bills(zips):
+    """Their bills of materials, as text."""
+    for path in zips.values():
+        sbom.write(path, path.with_suffix(".cdx.json"))
+    return {system: path.with_suffix(".cdx.json").read_text(encoding="utf-8") for system, path in zips.items()}
 
 
 @pytest.fixture(scope="module")
-def opencv(linux, tmp_path_factory):
+def opencv(zips, tmp_path_factory):
     """OpenCV's wheel in the zip for Linux."""
-    with zipfile.ZipFile(linux) as packed:
+    with zipfile.ZipFile(zips[LINUX]) as packed:
         (name,) = (name for name in packed.namelist() if name.startswith("wheels/opencv"))
         return Path(packed.extract(name, tmp_path_factory.mktemp("opencv")))
 
@@ -76,32 +77,40 @@ def files_in(path):
     return found
 
 
-def test_a_bill_lists_what_the_zip_holds_file_by_file(linux, bill):
-    assert files_of(bill) == files_in(linux)
-    assert any("!/cv2/cv2.abi3.so" in name for name in files_of(bill))
+@pytest.mark.parametrize("system", build.SYSTEMS)
+def test_a_bill_lists_what_the_zip_holds_file_by_file(system, zips, bills):
+    listed = files_of(bills[system])
+    assert listed == files_in(zips[system])
+    assert any(re.search(r"!/cv2/cv2\.(abi3\.so|pyd)$", name) for name in listed)
 
 
-def test_a_bill_lists_wheels_and_what_they_bundle(linux, bill):
-    listed = json.loads(bill)
-    with zipfile.ZipFile(linux) as packed:
+@pytest.mark.parametrize("system", build.SYSTEMS)
+def test_a_bill_lists_wheels_and_what_they_bundle(system, zips, bills):
+    listed = json.loads(bills[system])
+    with zipfile.ZipFile(zips[system]) as packed:
         wheels = {name: packed.read(name) for name in packed.namelist() if name.endswith(".whl")}
     by_reference = {each["bom-ref"]: each for each in listed["components"]}
     for name, content in wheels.items():
         assert by_reference[name]["hashes"][0]["content"] == hashlib.sha256(content).hexdigest()
         assert by_reference[name]["purl"].startswith(f"pkg:pypi/{by_reference[name]['name']}@")
+        assert ("?file_name=" in by_reference[name]["purl"]) == (without_openssl.TAG not in name)
         assert by_reference[name]["copyright"]
-    files = files_of(bill)
+    files = files_of(bills[system])
     libraries = {each["value"] for part in by_reference.values() for each in part.get("properties", [])
                  if each["name"] == "virtual_shutter:file"}  # fmt: skip
     assert libraries < set(files)
-    assert {name for name in files if ".libs/" in name} == libraries
-    assert listed["metadata"]["component"]["hashes"][0]["content"] == hashlib.sha256(linux.read_bytes()).hexdigest()
+    assert {name for name in files if re.search(r"\.(dy)?libs/|/opencv_videoio_ffmpeg", name)} == libraries
+    assert (
+        listed["metadata"]["component"]["hashes"][0]["content"] == hashlib.sha256(zips[system].read_bytes()).hexdigest()
+    )
     depends = {each["ref"]: each.get("dependsOn", []) for each in listed["dependencies"]}
     assert set(depends["virtual_shutter"]) == set(wheels)
     assert {reference.split("!/")[1] for name in wheels for reference in depends[name]} >= {"FFmpeg", "x264", "x265"}
 
 
-def test_a_bill_is_valid(bill):
+@pytest.mark.parametrize("system", build.SYSTEMS)
+def test_a_bill_is_valid(system, bills):
+    bill = bills[system]
     assert JsonStrictValidator(SchemaVersion.V1_6).validate_str(bill) is None
     assert JsonStrictValidator(SchemaVersion.V1_6).validate_str(bill.replace('"file"', '"fille"', 1))
 
@@ -175,7 +184,37 @@ def test_the_same_wheel_gives_the_same_without_openssl(tmp_path):
     assert not without_openssl.has_openssl(made[0])
     before, after = (files_in(path) for path in (small, made[0]))
     told = {name.rsplit("/", 1)[1].split("-")[0] for name in before if before[name] != after.get(name)}
-    assert told == {"libavutil", "libssl", "libcrypto", "WHEEL", "RECORD"}
+    assert told == {"libavutil", "libssl", "libcrypto", "auditwheel.cdx.json", "WHEEL", "RECORD"}
+
+
+def test_the_zip_says_first_that_the_wheel_is_modified(zips, opencv):
+    """And what in it: all of it, and nothing else."""
+    said = {}
+    for system, path in zips.items():
+        with zipfile.ZipFile(path) as packed:
+            said[system] = packed.read("licenses/README.txt").decode()
+    assert [system for system, text in said.items() if "modified" in text.lower()] == [LINUX]
+    (original,) = (path for path in build.download(LINUX, build.BLENDERS_PYTHON) if path.name.startswith("opencv"))
+    (paragraph,) = (each for each in said[LINUX].split("\n\n")[:2] if each.startswith("MODIFIED: "))
+    assert paragraph.startswith(f"MODIFIED: {opencv.name} is not the wheel")
+    for words in (original.name, "scripts/without_openssl.py", "The Virtual Shutter developers changed it on 20"):
+        assert words in paragraph
+    before, after = files_in(original), files_in(opencv)
+    changed = {Path(name).name for name in before.keys() | after.keys() if before.get(name) != after.get(name)}
+    parts = {re.split(r"-[0-9a-f]{8}\.", name)[0] for name in changed}
+    assert parts == {"libssl", "libcrypto", "libavformat", "libavutil", "auditwheel.cdx.json", "WHEEL", "RECORD"}
+    assert all(part in paragraph for part in parts)
+
+
+def test_no_bill_of_materials_in_a_wheel_names_openssl(opencv):
+    with zipfile.ZipFile(opencv) as packed:
+        bills = {name: packed.read(name).decode() for name in packed.namelist() if name.endswith(".json")}
+    (listed,) = (json.loads(text) for text in bills.values())
+    assert not any("openssl" in text.lower() for text in bills.values())
+    assert {"libgfortran", "libdrm"} < {each["name"] for each in listed["components"]}
+    references = {each["bom-ref"] for each in listed["components"]}
+    assert {each["ref"] for each in listed["dependencies"]} == references
+    assert {needed for each in listed["dependencies"] for needed in each.get("dependsOn", [])} < references
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="the wheel is Linux's")

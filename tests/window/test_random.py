@@ -8,15 +8,14 @@ import sys
 import numpy as np
 import OpenImageIO
 import pytest
-from telling import NO_NETWORK, ROOT, installed, linked, needs_window, tell
+from fresh import PACKAGES, installed
+from telling import NO_NETWORK, ROOT, linked, needs_window, tell
 
 pytestmark = needs_window
 
 SEEDS = os.environ.get("SHUTTER_SEEDS", "1").split(",")
 STEPS = os.environ.get("SHUTTER_STEPS", "40")
 COUNT, TOLERANCE = 30, 1
-# What a distribution's Blender has for its own Python, and an official one has not.
-PACKAGES = "av cv2 glcontext moderngl scenedetect tqdm"
 
 
 def pixels(path):
@@ -68,13 +67,13 @@ def zips(tmp_path_factory, blenders_python):
     return folder
 
 
-@pytest.mark.parametrize(("kind", "hidden"), [("linux_x64", ""), ("no_wheels", PACKAGES)])
+@pytest.mark.parametrize(("kind", "hidden"), [("linux_x64", ""), ("no_wheels", " ".join(PACKAGES))])
 @pytest.mark.parametrize("seed", SEEDS)
 def test_random_operators_of_a_zip(seed, kind, hidden, zips, footage, real_blender, tmp_path):
     """Installed in a Blender that has never seen the extension, without a network."""
     (path,) = zips.glob(f"*{kind}.zip")
     given = {"footage": footage / "frames" / "0001.png", "recipe": footage / "recipe.json", "hidden": hidden}
-    folder = installed(tmp_path, path, real_blender)
-    seen, console = tell("random_story.py", "opengl", folder, before=NO_NETWORK, **given, seed=seed, steps=STEPS)
+    installed([*NO_NETWORK, *real_blender], path, tmp_path / "user")
+    seen, console = tell("random_story.py", "opengl", tmp_path, before=NO_NETWORK, **given, seed=seed, steps=STEPS)
     assert "Traceback" not in console
     assert_right(seen, footage, tmp_path)

@@ -9,9 +9,12 @@ import sys
 from pathlib import Path
 from unittest.mock import Mock
 
-WHEELS = "av", "cv2", "glcontext", "moderngl", "scenedetect", "tqdm"
-sys.modules |= dict.fromkeys(WHEELS)  # None: there is no such module
-sys.path[:0] = [str(Path(__file__).parent), str(Path(__file__).parents[1] / "blender")]
+TESTS = Path(__file__).parents[1]
+sys.path[:0] = [str(TESTS / "window"), str(TESTS / "blender"), str(TESTS)]
+
+from fresh import PACKAGES
+
+sys.modules |= dict.fromkeys(PACKAGES)  # None: there is no such module
 
 import bpy
 import numpy as np
