@@ -22,6 +22,11 @@ import build
 import sbom
 
 # Those that Blender knows.
+OTHER_PYTHONS = (
+    "3.12",
+    "3.14",
+    "3.15",
+)  # of Blenders that distributions built; the zips with wheels are for official ones
 SYSTEMS = ("linux-arm64", "linux-x64", "macos-arm64", "macos-x64", "windows-arm64", "windows-x64")
 
 
@@ -38,7 +43,8 @@ def notes(version: str) -> str:
     section = re.search(rf"(?ms)^## {re.escape(version)}$(.*?)(?=^## |\Z)", text)
     if section is None or not section[1].strip():
         fail(f"CHANGELOG.md says nothing of version {version}")
-    return section[1].strip() + "\n"
+    # Pages that are linked from there are none of the release's files.
+    return re.sub(r"\[([^\]]+)\]\((?!https:)[^)]+\)", r"\1", section[1]).strip() + "\n"
 
 
 def commit() -> str:
@@ -72,14 +78,16 @@ def normalise(path: Path, date: int) -> None:
 
 def write_index(folder: Path, date: int) -> None:
     """The index of the zips in a folder, by Blender; sorted, dated alike, and with the zip without wheels for those
-    systems alone that have no other: Blender is to be offered one zip. The page offers all to whoever looks at it."""
+    systems and Pythons alone that have no other: Blender is to be offered one zip. The page offers all to whoever looks
+    at it."""
     build.extension("server-generate", "--repo-dir", folder, "--html")
     index, page = folder / "index.json", folder / "index.html"
     listed = json.loads(index.read_text(encoding="utf-8"))
     taken = {system for zipped in listed["data"] for system in zipped.get("platforms", ())}
-    for zipped in listed["data"]:
-        zipped.setdefault("platforms", [system for system in SYSTEMS if system not in taken])
-    listed["data"].sort(key=lambda zipped: zipped["archive_url"])
+    for zipped in [zipped for zipped in listed["data"] if "platforms" not in zipped]:
+        zipped["platforms"] = [system for system in SYSTEMS if system not in taken]
+        listed["data"].append({**zipped, "platforms": sorted(taken), "python_versions": list(OTHER_PYTHONS)})
+    listed["data"].sort(key=lambda zipped: (zipped["archive_url"], zipped["platforms"]))
     write(index, json.dumps(listed, indent=2) + "\n")
     head, *rows = re.split(r"(?m)^(?=  <tr>$)", page.read_text(encoding="utf-8"))
     rows[-1], end = re.split(r"(?m)^(?=</table>$)", rows[-1])
@@ -144,6 +152,8 @@ def main() -> None:
     if options.version not in (None, version):
         fail(f"this is version {version}, not {options.version}")
     released, text = commit(), notes(version)
+    if not (build.ROOT / "tests" / "saved" / version).is_dir():
+        fail(f"tests/saved/{version} is missing: run scripts/save_version.py")
     if output.exists():
         fail(f"{output} is there already")
     if not options.no_tests:

@@ -53,6 +53,9 @@ def project(tmp_path_factory):
     version, text = manifest.read_text().partition('\nversion = "')[::2]
     manifest.write_text(f'{version}\nversion = "{VERSION}"{text.partition(chr(34))[2]}')
     (folder / "CHANGELOG.md").write_text(CHANGELOG)
+    saved = folder / "tests" / "saved" / VERSION / "edit.blend"
+    saved.parent.mkdir(parents=True)
+    saved.write_bytes(b"what the version saves")
     git(folder.parent, "init", folder)
     commit(folder)
     return with_wheels(folder)
@@ -152,7 +155,8 @@ def test_the_index_offers_one_zip_to_each_system(released):
     for system in ("linux-arm64", "linux-x64", "macos-arm64", "macos-x64", "windows-arm64", "windows-x64"):
         kind = wheels if system == SYSTEM else "no_wheels"
         assert offered(system) == [f"./virtual_shutter-{VERSION}-{kind}.zip"]
-    assert offered(SYSTEM, (3, 12, 0)) == []
+    for python in ((3, 12, 0), (3, 14, 0)):
+        assert offered(SYSTEM, python) == [f"./virtual_shutter-{VERSION}-no_wheels.zip"]
 
 
 def test_the_index_is_the_same_wherever_and_whenever_it_is_made(released, project, monkeypatch, tmp_path):
@@ -195,6 +199,12 @@ def test_a_version_that_the_changelog_lacks_is_refused(copy):
     (copy / "CHANGELOG.md").write_text(CHANGELOG.replace(f"## {VERSION}\n", "## 0.0.70\n"))
     commit(copy)
     refused(copy, f"CHANGELOG.md says nothing of version {VERSION}")
+
+
+def test_a_version_that_has_kept_nothing_is_refused(copy):
+    shutil.rmtree(copy / "tests" / "saved")
+    commit(copy)
+    refused(copy, f"tests/saved/{VERSION} is missing: run scripts/save_version.py")
 
 
 def test_another_version_than_is_meant_is_refused(copy):
