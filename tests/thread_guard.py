@@ -56,7 +56,9 @@ REVIEWED: dict[str, set[str]] = {
     "rendering/effect_source.py": {"source_index"},
     "rendering/inbetween_build.py": {"Build._build", "Build._update", "_estimated"},
     "rendering/outline_carrying.py": {"_Carrying._carry"},
-    "rendering/session.py": {"RenderSession.forget.<lambda>", "_weights"},
+    "rendering/render_job.py": {"where"},
+    "rendering/session.py": {"RenderSession._ask", "RenderSession.forget.<lambda>", "_weights"},
+    "rendering/sessions.py": {"_ask_window"},
     "rendering/strobing.py": {"_measure_cost", "_measure_motion"},
 }
 

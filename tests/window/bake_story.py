@@ -12,7 +12,8 @@ import driver
 from given_edit import edit, opened
 
 LAST, FRAME = 40, 20
-UNBAKE, STOP = 20, 20  # where they stand, in pixels above the sidebar's lower edge
+REPORT = 36  # the height of what stands below the panel
+UNBAKE, STOP = 20 + REPORT, 20 + REPORT  # where they stand, in pixels above the sidebar's lower edge
 
 
 def strip(name):
@@ -71,7 +72,7 @@ def begun():
     edit().frame_end = LAST
     edit().frame_set(FRAME)
     bpy.ops.wm.save_as_mainfile(filepath=str(driver.OUT / "edit.blend"))
-    yield from clicked(13)  # the panel opens
+    yield from clicked(13 + REPORT)  # the panel opens
 
 
 def told():
