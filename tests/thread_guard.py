@@ -54,7 +54,7 @@ REVIEWED: dict[str, set[str]] = {
     "editing/track_region.py": {"_each", "_follow_drawn", "track.<lambda>"},
     "rendering/device_work.py": {"broken_off"},
     "rendering/effect_source.py": {"source_index"},
-    "rendering/inbetween_build.py": {"Build._build", "Build._update", "_estimated"},
+    "rendering/inbetween_build.py": {"Build._build", "Build._update", "Build.stop", "_estimated", "running"},
     "rendering/outline_carrying.py": {"_Carrying._carry"},
     "rendering/render_job.py": {"where"},
     "rendering/session.py": {"RenderSession._ask", "RenderSession.forget.<lambda>", "_weights"},

@@ -104,12 +104,14 @@ def test_what_a_job_takes_away_meanwhile_is_not_missed(film, monkeypatch, look):
 
     edit, _source, effect, strip = film
     found, looks, closed, close = session.RenderSession(lambda: ("cpu", None), None), iter(range(9)), [], Renderer.close
+    is_closed = threading.Event()  # on the session's thread, for which nobody waits
 
     def note(renderer):
         if (
             renderer.compositor.name == "NumPy"
         ):  # on its thread, the other session may still close what tests before had
             closed.append(renderer)
+            is_closed.set()
         close(renderer)
 
     monkeypatch.setattr(Renderer, "close", note)
@@ -128,6 +130,7 @@ def test_what_a_job_takes_away_meanwhile_is_not_missed(film, monkeypatch, look):
         found.begin_next(taken, frame, RenderContext(found, RenderSettings()))
     found.keep({Job()})
     assert next(looks) == look + 1
+    assert is_closed.wait(30)
     assert len(closed) == 1
 
 
