@@ -185,7 +185,8 @@ def first_frame(strip) -> int:
 
 def is_movie(strip) -> bool:
     """Whether a movie, image or clip strip reads a movie."""
-    return strip.type == "MOVIE" or (strip.type == "MOVIECLIP" and strip.clip.source == "MOVIE")
+    clip = strip.clip if strip.type == "MOVIECLIP" else None
+    return strip.type == "MOVIE" or (clip is not None and clip.source == "MOVIE")
 
 
 def _alpha(strip) -> str | None:
