@@ -21,12 +21,9 @@ from pathlib import Path
 import build
 import sbom
 
+# Of Blenders that distributions built: the zips with wheels are for official ones.
+OTHER_PYTHONS = ["3.12", "3.14", "3.15"]
 # Those that Blender knows.
-OTHER_PYTHONS = (
-    "3.12",
-    "3.14",
-    "3.15",
-)  # of Blenders that distributions built; the zips with wheels are for official ones
 SYSTEMS = ("linux-arm64", "linux-x64", "macos-arm64", "macos-x64", "windows-arm64", "windows-x64")
 
 
@@ -86,7 +83,7 @@ def write_index(folder: Path, date: int) -> None:
     taken = {system for zipped in listed["data"] for system in zipped.get("platforms", ())}
     for zipped in [zipped for zipped in listed["data"] if "platforms" not in zipped]:
         zipped["platforms"] = [system for system in SYSTEMS if system not in taken]
-        listed["data"].append({**zipped, "platforms": sorted(taken), "python_versions": list(OTHER_PYTHONS)})
+        listed["data"].append({**zipped, "platforms": sorted(taken), "python_versions": OTHER_PYTHONS})
     listed["data"].sort(key=lambda zipped: (zipped["archive_url"], zipped["platforms"]))
     write(index, json.dumps(listed, indent=2) + "\n")
     head, *rows = re.split(r"(?m)^(?=  <tr>$)", page.read_text(encoding="utf-8"))
