@@ -5,8 +5,9 @@ A file of a newer format opens: what is not known here stays as it is stored, un
 
 from collections.abc import Iterable
 
-import bpy
 from bpy.app.translations import pgettext_rpt as rpt_
+
+from . import strips
 
 # Raise it with the first change after a release that older versions would not understand: a property, an item of an
 # enum, another meaning. What then becomes of older files is in editing/migrations.py.
@@ -26,7 +27,7 @@ def is_newer(scene) -> bool:
 
 def is_file_newer() -> bool:
     """Whether any scene that can be changed is: then nothing is written into the file but what the user changes."""
-    return any(is_newer(scene) for scene in bpy.data.scenes if scene.library is None)
+    return any(map(is_newer, strips.local_scenes()))
 
 
 def new_effect(scene, number: int):
@@ -74,4 +75,4 @@ def note(scenes: Iterable) -> str | None:
 
 
 def _holding() -> list:
-    return [scene for scene in bpy.data.scenes if scene.library is None and scene.virtual_shutter.effects]
+    return [scene for scene in strips.local_scenes() if scene.virtual_shutter.effects]

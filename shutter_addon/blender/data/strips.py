@@ -32,6 +32,11 @@ def effect_strips(scene) -> list:
     ]
 
 
+def local_scenes() -> list:
+    """The scenes that can be changed: linked ones cannot."""
+    return [scene for scene in bpy.data.scenes if scene.library is None]
+
+
 def shown_scenes(scene) -> list:
     """The scene, and those that its Scene strips show."""
     shown, new = [], [scene]

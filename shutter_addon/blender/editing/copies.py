@@ -16,7 +16,7 @@ from ..data.property_copy import copy_properties
 def adopt() -> None:
     """Gives every effect strip that is a copy a scene, an effect and keys of its own; keys follow moved strips."""
     taken = set()
-    for scene in [scene for scene in bpy.data.scenes if scene.library is None]:  # linked ones cannot be changed
+    for scene in strips.local_scenes():
         for effect_scene, parts in _groups(scene).items():
             effect = strips.effect_of(scene, effect_scene)
             if effect is None:  # Blender copied the scene with its strip, or the strip is pasted from another scene

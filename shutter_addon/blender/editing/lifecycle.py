@@ -22,12 +22,12 @@ def update(updated=None) -> None:
         return
     if not data_format.is_file_newer():
         _tidy(updated)
-    for scene in _local_scenes():
+    for scene in strips.local_scenes():
         invalidation.invalidate_changed(scene)
 
 
 def _tidy(updated) -> None:
-    scenes = _local_scenes()
+    scenes = strips.local_scenes()
     for scene in scenes:
         _reconnect(scene)
     mend()
@@ -46,7 +46,7 @@ def _tidy(updated) -> None:
 
 def mend() -> None:
     """Undoes what would leave effects out of the picture: their camera deleted, another engine, and the like."""
-    for scene in _local_scenes():
+    for scene in strips.local_scenes():
         for strip in strips.own_strips(scene):
             if strip.scene is not None and strip.scene.library is None:
                 _mend(strip)
@@ -89,7 +89,7 @@ def _unmarked() -> list:
 
 def follow_sources() -> None:
     """Gives each effect scene the rate of the scene whose effect it shows, and its source's size."""
-    for scene in _local_scenes():
+    for scene in strips.local_scenes():
         match_source.follow(scene)
 
 
@@ -98,10 +98,6 @@ def forget() -> None:
     renamed_drawings.forget()
     match_source.forget()
     shown_annotations.forget()
-
-
-def _local_scenes() -> list:
-    return [scene for scene in bpy.data.scenes if scene.library is None]  # linked ones cannot be changed
 
 
 def _reconnect(scene) -> None:
@@ -121,8 +117,8 @@ def _effect_scenes() -> list:
     """The scenes that were made for effects, and can be changed."""
     return [
         scene
-        for scene in bpy.data.scenes
-        if scene.library is None and scene.render.engine == strips.ENGINE and scene.virtual_shutter.identity
+        for scene in strips.local_scenes()
+        if scene.render.engine == strips.ENGINE and scene.virtual_shutter.identity
     ]
 
 
@@ -232,7 +228,7 @@ def _identify() -> None:
             effect_scene.virtual_shutter.identity = uuid.uuid4().hex
         taken.add(effect_scene.virtual_shutter.identity)
         _claim(effect_scene.annotation, effect_scene.virtual_shutter.identity)
-    for scene in _local_scenes():
+    for scene in strips.local_scenes():
         for strip in strips.effect_strips(scene):
             if strip.virtual_shutter_effect != strip.scene.virtual_shutter.identity:
                 strip.virtual_shutter_effect = strip.scene.virtual_shutter.identity

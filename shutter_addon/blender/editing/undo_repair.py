@@ -10,10 +10,9 @@ from ..data import strips
 
 def find_lost() -> None:
     """Gives each scene's action, and the scenes of its effects, where undo lost them."""
-    for scene in bpy.data.scenes:
-        if scene.library is None:
-            _find_action(scene)
-            _find_effects(scene)
+    for scene in strips.local_scenes():
+        _find_action(scene)
+        _find_effects(scene)
 
 
 def _find_action(scene) -> None:

@@ -302,8 +302,8 @@ def show_carried() -> None:
     """Previews are made anew, with what was carried."""
     outline_drawings.carried()
     sessions.WINDOW.keep(set())
-    for scene in bpy.data.scenes:
-        if scene.library is None and scene.virtual_shutter.effects:
+    for scene in strips.local_scenes():
+        if scene.virtual_shutter.effects:
             strips.invalidate(scene)
     preview_areas.redraw(bpy.context)
 
