@@ -10,6 +10,8 @@ import threading
 import bpy
 import gpu
 
+_MAIN = threading.main_thread().ident
+_EVENTS = sys.monitoring.events
 _TOOL = 3  # of sys.monitoring's, one for nobody in particular
 _PACKAGE = "shutter_addon"
 _OURS = "Virtual Shutter"  # how the names of our threads begin
@@ -68,12 +70,12 @@ _faults: dict[str, None] = {}
 
 def on() -> None:
     """From now on, on all threads."""
-    events, monitoring = sys.monitoring.events, sys.monitoring
+    monitoring = sys.monitoring
     monitoring.use_tool_id(_TOOL, "thread_guard")
-    monitoring.register_callback(_TOOL, events.PY_START, _started)
-    monitoring.register_callback(_TOOL, events.PY_RETURN, _returned)
-    monitoring.register_callback(_TOOL, events.CALL, _called)
-    monitoring.set_events(_TOOL, events.PY_START | events.PY_RETURN | events.CALL)
+    monitoring.register_callback(_TOOL, _EVENTS.PY_START, _started)
+    monitoring.register_callback(_TOOL, _EVENTS.PY_RETURN, _returned)
+    monitoring.register_callback(_TOOL, _EVENTS.CALL, _called)
+    monitoring.set_events(_TOOL, _EVENTS.PY_START)
 
 
 def faults() -> list[str]:
@@ -84,6 +86,8 @@ def faults() -> list[str]:
 
 
 def _is_ours() -> bool:
+    if threading.get_ident() == _MAIN:  # most are called there
+        return False
     return threading.current_thread().name.startswith(_OURS)
 
 
@@ -91,6 +95,8 @@ def _started(code, _offset):
     if (path := _below(code.co_filename)) is None:
         return sys.monitoring.DISABLE
     if _is_ours():
+        # Of what runs on the main thread alone, calls and returns would cost the tests a quarter of their time.
+        sys.monitoring.set_local_events(_TOOL, code, _EVENTS.PY_RETURN | _EVENTS.CALL)
         name = code.co_qualname.replace(".<locals>", "")
         seen.add(f"{path}: {name}")
         room, _, file = path.partition("/")
@@ -100,20 +106,15 @@ def _started(code, _offset):
     return None
 
 
-def _returned(code, _offset, _value):
-    if (path := _below(code.co_filename)) is None:
-        return sys.monitoring.DISABLE
+def _returned(_code, _offset, _value):
     if _is_ours():
-        _look(path, sys._getframe(1))
-    return None
+        frame = sys._getframe(1)
+        _look(_below(frame.f_code.co_filename), frame)
 
 
 def _called(code, _offset, function, _argument):
-    if (path := _below(code.co_filename)) is None:
-        return sys.monitoring.DISABLE
     if _is_ours() and _is_blenders(function):
-        _faults[f"{path}: {code.co_qualname} calls {function} on a thread"] = None
-    return None
+        _faults[f"{_below(code.co_filename)}: {code.co_qualname} calls {function} on a thread"] = None
 
 
 def _is_blenders(function) -> bool:
