@@ -21,6 +21,7 @@ for deprecated in (DeprecationWarning, PendingDeprecationWarning):
     warnings.simplefilter("error", deprecated)
 
 OUT = Path(os.environ.get("SHUTTER_PICTURES", "/tmp/shutter-window"))
+_QUICK = "-define", "png:compression-level=1"  # a third of the time, for a tenth more bytes
 STEP = 0.25  # seconds that Blender gets for events and redraws
 _seen = []
 _texts = 0  # characters of the last text in the status bar
@@ -101,7 +102,7 @@ def seen_so_far():
 def shot(name):
     """A picture of the screen."""
     path = OUT / f"{name}.png"
-    subprocess.run(["import", "-window", "root", str(path)], check=True)
+    subprocess.run(["import", "-window", "root", *_QUICK, str(path)], check=True)
     return path
 
 
