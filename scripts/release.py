@@ -108,7 +108,8 @@ def test(released: str) -> None:
     """Has scripts/test pass, with a commit checked out before and after; it installs the zips in a Blender."""
     if not os.environ.get("BLENDER"):
         fail("set BLENDER to the command that runs a Blender in which the zips are tested, or give --no-tests")
-    if subprocess.run([build.ROOT / "scripts" / "test"], check=False).returncode:
+    environment = os.environ | {"SHUTTER_BACKENDS": "both"}
+    if subprocess.run([build.ROOT / "scripts" / "test"], env=environment, check=False).returncode:
         fail("the tests fail")
     if commit() != released:
         fail("another commit was checked out while the tests ran")

@@ -26,6 +26,12 @@ needs_window = pytest.mark.skipif(
 )
 
 
+def backends(usual):
+    """What a story of the interface is told on, which looks the same on both of Blender's backends: on one for each
+    commit, on both for a release. What is about the GPU is told on both."""
+    return ["opengl", "vulkan"] if os.environ.get("SHUTTER_BACKENDS") == "both" else [usual]
+
+
 def linked(folder):
     """The folder, whose Blender has the checkout for an extension."""
     extension = folder / "user" / "extensions" / "user_default" / "virtual_shutter"

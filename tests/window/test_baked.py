@@ -6,12 +6,12 @@ import shutil
 import numpy as np
 import pytest
 from screens import pixels
-from telling import ROOT, linked, needs_window, tell
+from telling import ROOT, backends, linked, needs_window, tell
 
 pytestmark = needs_window
 
 
-@pytest.mark.parametrize("backend", ["opengl", "vulkan"])
+@pytest.mark.parametrize("backend", backends("vulkan"))
 def test_an_effect_is_baked_and_brought_back(backend, tmp_path):
     line = {"shutter": "Sharp", "kind": "line", "width": 0.03, "strokes": [[[0.462, 0.65], [0.468, 0.565]]]}
     shutters = [{"name": "Long", "bars": [1] * 16}, {"name": "Sharp", "bars": [0] * 8 + [1] + [0] * 7}]

@@ -11,7 +11,7 @@ import cv2
 import numpy as np
 import pytest
 from screens import apart_on_screen, assert_alike, crop, pixels
-from telling import ROOT, linked, needs_window, packages, tell
+from telling import ROOT, backends, linked, needs_window, packages, tell
 
 from shutter_addon.core.frames import light
 from shutter_addon.media import open_source
@@ -71,7 +71,7 @@ def write_film(path, pictures, crf):
     return path
 
 
-@pytest.mark.parametrize("backend", ["opengl", "vulkan"])
+@pytest.mark.parametrize("backend", backends("opengl"))
 def test_what_is_tracked_ends_with_its_track(tmp_path, backend):
     """A region counts in its shot alone, and fades where the subject is covered: elsewhere the picture is that of an
     effect without it. A camera is tracked through all shots; between them exposures become short, and long again."""
@@ -98,7 +98,7 @@ def test_what_is_tracked_ends_with_its_track(tmp_path, backend):
     assert max(values.values()) == 1
 
 
-@pytest.mark.parametrize("backend", ["opengl", "vulkan"])
+@pytest.mark.parametrize("backend", backends("vulkan"))
 def test_the_first_stroke(backend, tmp_path):
     """From an empty file to a tracked, rendered frame in twelve actions, at most five of them in the tab. Draw and the
     pen show the sharp frame, and a finished stroke the result: the stroke's subject is sharp, up to her edges."""
@@ -125,7 +125,7 @@ def test_the_first_stroke(backend, tmp_path):
     assert apart.max() > 60
 
 
-@pytest.mark.parametrize("backend", ["opengl", "vulkan"])
+@pytest.mark.parametrize("backend", backends("opengl"))
 def test_a_panning_shot(tmp_path, backend):
     """A walker before a still camera: she is sharp, and the street, which stands still, streaks. A dragged bar shows at
     once. On the other backend than that of a single stroke, to spare time."""
@@ -197,7 +197,7 @@ def test_an_outline(tmp_path):
     assert apart_on_screen(pixels(tmp_path / "7_full_quality.png"), final) <= 1
 
 
-@pytest.mark.parametrize("backend", ["opengl", "vulkan"])
+@pytest.mark.parametrize("backend", backends("vulkan"))
 def test_the_street_without_those_who_pass(tmp_path, backend):
     """Its median, behind a woman who stays sharp, in the preview as in what is rendered."""
     given = {"footage": shutil.copy(ROOT / "assets" / "walkers.mp4", tmp_path)}
@@ -274,7 +274,7 @@ def around(mask):
     return curves
 
 
-@pytest.mark.parametrize("backend", ["opengl", "vulkan"])
+@pytest.mark.parametrize("backend", backends("opengl"))
 def test_what_is_seen_is_edited_and_nothing_of_the_deleted_stays(backend, tmp_path):
     """A strip cut by K, its right half moved away: bars, strokes and tab are those of the half under the playhead. Then
     both are deleted, in four ways: no stroke stays in the picture, and undo brings it back."""

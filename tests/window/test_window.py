@@ -4,7 +4,7 @@ import cv2
 import numpy as np
 import pytest
 from screens import TOLERANCE, assert_alike, crop, pixels
-from telling import ROOT, linked, needs_window, packages, tell
+from telling import ROOT, backends, linked, needs_window, packages, tell
 
 from shutter_addon.media import open_source
 
@@ -221,7 +221,7 @@ def test_one_look_at_full_quality(backend, tmp_path):
     assert min(np.abs(patch - part).max() for part in parts) <= TOLERANCE
 
 
-@pytest.mark.parametrize("backend", ["opengl", "vulkan"])
+@pytest.mark.parametrize("backend", backends("opengl"))
 def test_too_few_frames_for_a_streak(backend, tmp_path):
     """Said in the preview, with a button that builds what the strip needs, by which the steps go; undone and redone."""
     given = {"packages": packages(tmp_path / "packages")}
@@ -237,7 +237,7 @@ def test_too_few_frames_for_a_streak(backend, tmp_path):
     assert detail(after) < 0.8 * detail(before)
 
 
-@pytest.mark.parametrize("backend", ["opengl", "vulkan"])
+@pytest.mark.parametrize("backend", backends("vulkan"))
 def test_a_rolling_shutter_is_repaired(backend, tmp_path):
     """Found from the menu, the in-between frames by the note's button: the pole stands upright. Undone, it leans."""
     given = {"packages": packages(tmp_path / "packages")}
@@ -264,7 +264,7 @@ def lean(picture):
     return np.ptp(middles)
 
 
-@pytest.mark.parametrize("backend", ["opengl", "vulkan"])
+@pytest.mark.parametrize("backend", backends("vulkan"))
 def test_what_is_needed_first_is_above_the_fold(backend, tmp_path):
     """In the default layout; the region's shutter is chosen there by the story. And no sentence beneath is cut."""
     given = {"packages": packages(tmp_path / "packages")}
