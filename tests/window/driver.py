@@ -110,14 +110,18 @@ def shot_when_shown(name):
     """A picture of the screen once it shows what Blender has been told: it draws late where the machine is busy, and
     Vulkan presents later still; generator: yield from it. A new text in the status bar, which redraws nothing else, is
     drawn with all that waits to be."""
+    before = _status_bar()
+    # An operator that draws writes its own text over it with its next event.
+    yield from until(lambda: _status_bar() != before, "the screen shows what is drawn", 30, _tell_status)
+    shot(name)
+
+
+def _tell_status():
     global _texts
     _texts = _texts % 20 + 1
-    before = _status_bar()
     window = bpy.context.window_manager.windows[0]
     with bpy.context.temp_override(window=window):
         window.workspace.status_text_set("#" * _texts)
-    yield from until(lambda: _status_bar() != before, "the screen shows what is drawn", 30)
-    shot(name)
 
 
 def _status_bar():
