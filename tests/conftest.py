@@ -20,7 +20,7 @@ os.environ["PYTHONWARNINGS"] = "error::DeprecationWarning,error::PendingDeprecat
 os.environ["PYTHONNOUSERSITE"] = "1"  # which that option would let in, too
 
 ROOT = Path(__file__).parents[1]
-LONG = "window", "farm", "differential"
+LONG = "window", "farm", "differential", "tests"
 
 
 def pytest_collection_modifyitems(items):
