@@ -66,11 +66,13 @@ REVIEWED: dict[str, set[str]] = {
 
 seen: set[str] = set()  # functions that were called on our threads
 _faults: dict[str, None] = {}
+_reviewed_alone = True
 
 
-def on() -> None:
-    """From now on, on all threads."""
-    monitoring = sys.monitoring
+def on(reviewed_alone: bool = True) -> None:
+    """From now on, on all threads. reviewed_alone: whether other functions than those of REVIEWED are faults."""
+    global _reviewed_alone
+    _reviewed_alone, monitoring = reviewed_alone, sys.monitoring
     monitoring.use_tool_id(_TOOL, "thread_guard")
     monitoring.register_callback(_TOOL, _EVENTS.PY_START, _started)
     monitoring.register_callback(_TOOL, _EVENTS.PY_RETURN, _returned)
@@ -95,26 +97,25 @@ def _started(code, _offset):
     if (path := _below(code.co_filename)) is None:
         return sys.monitoring.DISABLE
     if _is_ours():
-        # Of what runs on the main thread alone, calls and returns would cost the tests a quarter of their time.
+        # Not for all functions: calls and returns on the main thread would double what this costs the tests.
         sys.monitoring.set_local_events(_TOOL, code, _EVENTS.PY_RETURN | _EVENTS.CALL)
         name = code.co_qualname.replace(".<locals>", "")
         seen.add(f"{path}: {name}")
         room, _, file = path.partition("/")
-        if room == "blender" and name not in REVIEWED.get(file, ()):
+        if _reviewed_alone and room == "blender" and name not in REVIEWED.get(file, ()):
             _faults[f"{path}: {name} runs on a thread"] = None
-        _look(path, sys._getframe(1))
+        _look(code, sys._getframe(1).f_locals)
     return None
 
 
-def _returned(_code, _offset, _value):
+def _returned(code, _offset, _value):
     if _is_ours():
-        frame = sys._getframe(1)
-        _look(_below(frame.f_code.co_filename), frame)
+        _look(code, sys._getframe(1).f_locals)
 
 
 def _called(code, _offset, function, _argument):
     if _is_ours() and _is_blenders(function):
-        _faults[f"{_below(code.co_filename)}: {code.co_qualname} calls {function} on a thread"] = None
+        _fault(code, f"calls {function}")
 
 
 def _is_blenders(function) -> bool:
@@ -138,9 +139,13 @@ def _below(file: str) -> str | None:
     return _known[file]
 
 
-def _look(path: str, frame) -> None:
-    for name, value in frame.f_locals.items():
+def _look(code, variables) -> None:
+    for name, value in variables.items():
         held = getattr(value, "__dict__", None)
         for each in (value, *(held.values() if type(held) is dict else ())):
             if isinstance(each, _DATA):
-                _faults[f"{path}: {frame.f_code.co_qualname} has {name}, {type(each)}, on a thread"] = None
+                _fault(code, f"has {name}, {type(each)},")
+
+
+def _fault(code, words: str) -> None:
+    _faults[f"{_below(code.co_filename)}: {code.co_qualname} {words} on a thread"] = None

@@ -48,7 +48,7 @@ def video_editing_opened():
 def play(story, seconds=STEP):
     """Runs a story step by step; quits Blender with its end or its first failure."""
     OUT.mkdir(parents=True, exist_ok=True)
-    thread_guard.on()
+    thread_guard.on(reviewed_alone=False)  # which functions run on a thread depends on how fast the machine is
     steps, handled = story(), False
 
     def step():
@@ -81,8 +81,7 @@ def _tell(fault):
 
 
 def _finish(fault):
-    # Which functions run on a thread depends on how fast the machine is; none may hold Blender's data or call it.
-    fault = fault or "\n".join(each for each in thread_guard.faults() if not each.endswith("runs on a thread"))
+    fault = fault or "\n".join(thread_guard.faults())
     _tell(fault)
     if fault:
         print(fault, file=sys.stderr, flush=True)
