@@ -125,10 +125,16 @@ def test_the_first_stroke(backend, tmp_path):
     assert apart.max() > 60
 
 
+def between_notes_and_bars(folder, seen):
+    """The preview of each step, above the bar editor and below notes, which come when they are known."""
+    shown = {entry["step"]: crop(folder, entry) for entry in seen if "step" in entry}
+    return {name: picture[len(picture) // 6 : len(picture) * 3 // 4] for name, picture in shown.items()}
+
+
 @pytest.mark.parametrize("backend", backends("opengl"))
 def test_a_panning_shot(tmp_path, backend):
     """A walker before a still camera: she is sharp, and the street, which stands still, streaks. A dragged bar shows at
-    once. On the other backend than that of a single stroke, to spare time."""
+    once."""
     footage = ROOT / "assets" / "walkers.mp4"
     given = {"footage": shutil.copy(footage, tmp_path), "packages": packages(tmp_path / "packages")}
     seen, console = tell("panning_story.py", backend, linked(tmp_path), **given)
@@ -137,10 +143,8 @@ def test_a_panning_shot(tmp_path, backend):
     still = [0, 0, 0, 1, 0, 0, 0, 0]
     assert facts["panned"] == [["Long", "REGION", "Sharp", [1] * 8], ["Sharp", "NOTHING", "", still]]
     assert facts["way"] == ["LOCATION", 6]
-    steps = {entry["step"]: crop(tmp_path, entry) for entry in seen if "step" in entry}
-    height = steps["2_tracked"].shape[0]
-    between = slice(height // 6, height * 3 // 4)  # the bar editor, and above notes, which come when they are known
-    tracked, panned, back, bars = (steps[name][between] for name in sorted(steps))
+    steps = between_notes_and_bars(tmp_path, seen)
+    tracked, panned, back, bars = (steps[name] for name in sorted(steps))
     assert np.abs(tracked - panned).max() > 100
     assert_alike(back, panned, tmp_path / "back_difference.png")
     assert np.abs(bars - back).max() > 30
@@ -161,13 +165,10 @@ def test_a_layer(tmp_path):
     assert "Traceback" not in console
     facts = {name: entry[name] for entry in seen for name in entry}
     assert facts["bars"] == {"Long": [1] * 8, "Sharp": [0, 0, 0, 1, 0, 0, 0, 0]}
-    steps = {entry["step"]: crop(tmp_path, entry) for entry in seen if "step" in entry}
-    height = steps["2_tracked"].shape[0]
-    # Below the note of too few frames, which comes when it is measured, and above the bar editor.
-    above = {name: picture[120 : height * 3 // 4] for name, picture in steps.items()}
-    assert_alike(above["5_again"], above["3_layer"], tmp_path / "again_difference.png")
-    assert_alike(above["4_undone"], above["2_tracked"], tmp_path / "undone_difference.png")
-    assert np.abs(above["3_layer"] - above["2_tracked"]).max() > 60
+    steps = between_notes_and_bars(tmp_path, seen)
+    assert_alike(steps["5_again"], steps["3_layer"], tmp_path / "again_difference.png")
+    assert_alike(steps["4_undone"], steps["2_tracked"], tmp_path / "undone_difference.png")
+    assert np.abs(steps["3_layer"] - steps["2_tracked"]).max() > 60
     with open_source(given["footage"]) as source:
         apart = np.abs(pixels(tmp_path / "final_0070.png") - source.read(69)[..., :3])
     x, y = facts["stroke"]
