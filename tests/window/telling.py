@@ -27,8 +27,8 @@ needs_window = pytest.mark.skipif(
 
 
 def backends(usual):
-    """What a story of the interface is told on, which looks the same on both of Blender's backends: on one for each
-    commit, on both for a release. What is about the GPU is told on both."""
+    """Those of Blender's backends on which a story of the interface is told, which looks the same on both: one for each
+    commit, both for a release."""
     return ["opengl", "vulkan"] if os.environ.get("SHUTTER_BACKENDS") == "both" else [usual]
 
 
