@@ -44,7 +44,6 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 from shutter_addon.compute import (
     composition_passes,
     cpu,
-    cpu_window,
     diffusion,
     diffusion_gpu,
     edge_diffusion,
@@ -476,7 +475,7 @@ class HostCase(Case):
     def _open(self, window: int) -> None:
         self.compositor = cpu.CPUCompositor()
         self.window = self.compositor.window(self.source, window)
-        self.whole = self.frames = cpu_window.TiledFrames(self.source, window)
+        self.whole = self.frames = cpu.HostWindow(self.source)
 
     def compose(self, method: str) -> None:
         if method in ("ours", "follow", "layer", *COMBINED):

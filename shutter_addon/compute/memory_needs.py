@@ -8,7 +8,6 @@ from ..core.frames.frame_source import FrameSource
 from ..devices.budget import Budget
 from ..devices.device import Device, Holder, NoDeviceError
 from ..devices.paging import TEXEL_BYTES
-from . import cpu_window
 from .layer_frames import WeightedFrames
 from .weighted_window import open_any
 from .window import beside
@@ -95,8 +94,6 @@ def of_numpy_window(source: FrameSource, kind: Kind) -> Needs:
     if kind.layers:
         frames = {id(read): read for read in (source, *_read(source, kind.layers))}
         return Needs(0, sum(kind.window * frame_bytes(read) for read in frames.values()), False)
-    if cpu_window.TiledSums.fit(source, kind.window) and kind.summed and not kind.moved:
-        return Needs(0, 12 * source.width * source.height * (kind.window + 1), False)
     return Needs(0, kind.window * frame_bytes(source), False)
 
 

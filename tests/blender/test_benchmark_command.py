@@ -9,7 +9,7 @@ import pytest
 
 from shutter_addon.blender import command as program
 from shutter_addon.blender.devices import machine
-from shutter_addon.compute import benchmark, cpu, cpu_window
+from shutter_addon.compute import benchmark, cpu
 from shutter_addon.devices.device import NoDeviceError
 
 TINY = "--sizes", "40x24,64x36", "--windows", "3,8"
@@ -69,9 +69,7 @@ def test_a_row_of_the_table():
 
 def test_a_wrong_picture_is_seen(monkeypatch):
     """A device that mixes up its frames, as a faulty driver might."""
-    wrong = np.float32([[[9000]]] * 3)
-    monkeypatch.setattr(cpu_window.TiledSums, "light", lambda self, tile, position: wrong)
-    monkeypatch.setattr(cpu_window.TiledSums, "light_between", lambda self, tile, origin, x: x * wrong)
+    monkeypatch.setattr(cpu, "linear", lambda frame, source: np.full(frame.shape, 0.2, np.float32))
     assert benchmark.measure(cpu.CPUCompositor(), (40, 24), 8)["error"] > 10
 
 

@@ -12,7 +12,7 @@ from cases import KINDS, make
 from compare import PICTURE, DifferenceError, can_be_a_film, check, check_films, open_devices, within
 from reference import DEFAULTS, layers_at, picture, shown
 
-from shutter_addon.compute import cpu, cpu_window, plates
+from shutter_addon.compute import cpu, plates
 from shutter_addon.core.frames import light
 from shutter_addon.core.model import keyframes, mattes, scribbles, shutters
 from shutter_addon.core.pixels import combined, compositor, following, layering, trails
@@ -123,7 +123,7 @@ FAULTS = {
     "another curve": (light, "to_linear", lambda code: np.sign(code) * np.abs(code) ** 2.2),
     "an edge twice": (compositor, "source_frames", lambda *given: twice(*given)),
     "nothing followed": (following, "followed", lambda effect, state, *_: state),
-    "a dull filter": (cpu_window, "resampled", lambda planes, x, y, sharp: resampled(planes, x, y, sharp=False)),
+    "a dull filter": (compositor, "seen", lambda frame, places, sharp: seen(frame, places, sharp=False)),
     "trails of no length": (trails, "with_length", lambda bars, *_: (bars, len(bars))),
     "edges passed over": (cpu.Solver, "solve", lambda solver, labels, count, *_, warm: solve(solver, labels, count)),
     "mattes in another order": (mattes, "blended", lambda c, shown, values: blended(c, shown[::-1], values[::-1])),
@@ -143,7 +143,7 @@ FAULTS = {
 }
 eased, source_frames, solve = keyframes.eased, compositor.source_frames, cpu.Solver.solve
 blended, ramp_values, coverage = mattes.blended, mattes.Ramp.values, mattes.coverage
-rasterise, resampled = scribbles.rasterise, cpu_window.resampled
+rasterise, seen = scribbles.rasterise, compositor.seen
 
 
 def mean(values, weights):

@@ -115,15 +115,21 @@ def _bends(levels: np.ndarray, start: np.ndarray, end: np.ndarray) -> np.ndarray
 
 
 def weights(start: np.ndarray, end: np.ndarray, dz: np.ndarray, window: int) -> np.ndarray:
-    """Normalised weights (…, L) of the frames from a quantile's pieces; start, end (…, K) and dz (K,).
+    """Normalised weights (…, L) of the frames from a quantile's pieces; start, end (…, K) and dz (K,), in order.
 
     q(τ) = Q(τ + 1) − Q(τ): each piece spreads dz evenly over the time between its start and its end.
     """
-    frames = np.arange(window, dtype=np.float64)
-    x0, x1 = start[..., None], end[..., None]
-    # A time never passes slower than its level (slope ≥ 1), so x1 − x0 ≥ dz > 0.
-    share = (np.clip(x1, frames, frames + 1) - np.clip(x0, frames, frames + 1)) / (x1 - x0)
-    return np.einsum("...kl,k->...l", share, dz)
+    pixels = tuple(range(start.ndim - 1))
+    begun, over = start.min(axis=pixels), end.max(axis=pixels)
+    levels = np.zeros((*start.shape[:-1], window + 1))
+    for time in range(1, window + 1):
+        # The pieces that are over everywhere, and those that have begun somewhere.
+        first, last = np.searchsorted(over, time, "right"), np.searchsorted(begun, time, "left")
+        some = slice(first, last)
+        # A time never passes slower than its level (slope ≥ 1), so end − start ≥ dz > 0.
+        passed = (time - start[..., some]) / (end[..., some] - start[..., some])
+        levels[..., time] = dz[:first].sum() + np.clip(passed, 0, 1) @ dz[some]
+    return np.diff(levels, axis=-1)
 
 
 def mix_exposure(shutters: ArrayLike, coefficients: ArrayLike) -> np.ndarray:

@@ -86,6 +86,7 @@ def compose(
     present: ArrayLike,
     coefficients: ArrayLike,
     moves: tuple[np.ndarray, np.ndarray] | None = None,
+    sharp: bool | None = None,
 ) -> np.ndarray:
     """The picture (H, W, 4) float64, scene-linear and premultiplied: F = e(q) · ∫ V(t + ⌊Q⁻¹(z)⌋) dz (§3.1, §3.4.1); or
     what core.pixels.combined makes of the same frames. Of shutters that combine in several ways, each way makes a
@@ -96,14 +97,17 @@ def compose(
     coefficients: (N, H, W), Σ = 1.
     moves: turns and shifts (L, N) of each frame for each shutter (FrameState.following): a frame is not taken at x, but
     at Σ cᵢ Wᵢ(x), or by value interpolation mixed of those at each Wᵢ(x). None: nothing is followed.
+    sharp: how frames are seen there (`seen`); None: sharp where all of them are opaque.
     """
+    if sharp is None:
+        sharp = all((frame[..., 3] == 1).all() for frame in frames)
     coefficients, present = np.asarray(coefficients, dtype=np.float64), np.asarray(present)
     if len(state.groups) == 1:
-        return _composed(state, frames, present, coefficients, moves)
+        return _composed(state, frames, present, coefficients, moves, sharp)
     total = np.zeros((*coefficients.shape[1:], 4))
     for chosen, share, own in ways(state, coefficients):
         moved = None if moves is None else (moves[0][:, chosen], moves[1][:, chosen])
-        total += share[..., None] * _composed(state.of(chosen), frames, present, own, moved)
+        total += share[..., None] * _composed(state.of(chosen), frames, present, own, moved, sharp)
     return total
 
 
@@ -113,23 +117,23 @@ def _composed(
     present: np.ndarray,
     coefficients: np.ndarray,
     moves: tuple[np.ndarray, np.ndarray] | None,
+    sharp: bool,
 ) -> np.ndarray:
     """As `compose`, of shutters that combine alike."""
     (combine,) = state.groups
     encoded = state.options.light == "encoded"
     frames = [_encode(frame) if encoded else frame for frame in frames]
-    opaque = all((frame[..., 3] == 1).all() for frame in frames)
     y, x = np.indices(coefficients.shape[1:])
     own = x + 1j * y
 
     def look(k: int, turns: np.ndarray | None, shifts: np.ndarray | None) -> np.ndarray:
         if turns is None or shifts is None:
             return frames[k]
-        return seen(frames[k], turns[k] * own + shifts[k], sharp=opaque)
+        return seen(frames[k], turns[k] * own + shifts[k], sharp=sharp)
 
     total = np.zeros((*x.shape, 4))
     for weights, *moved in _exposed(state, coefficients, present, moves):
-        for k in range(len(frames)):
+        for k in np.flatnonzero(weights.any(axis=(0, 1))).tolist():
             total = total + weights[..., k, None] * look(k, *moved)
     if combine.mode == "average":
         gain = np.einsum("n,nhw->hw", state.gains, coefficients)[..., None]
@@ -172,7 +176,10 @@ def _samples(
         mixed: list = [None] if moves is None else [np.einsum("ln,nhw->lhw", part, coefficients) for part in moves]
         turns, shifts = [mixed[0]], [mixed[-1]]
     samples = []
-    for k in np.flatnonzero(present).tolist():
+    counted = weights.any(axis=(0, 1, 2))
+    if combine.threshold is not None:
+        counted[options.before] = True
+    for k in np.flatnonzero(counted & present).tolist():
         looks = [look(k, *moved) for moved in zip(turns, shifts, strict=True)]
         weight = weights[..., k].sum(axis=0)
         light_ = sum(own[..., k, None] * sight for own, sight in zip(weights, looks, strict=True))
