@@ -70,7 +70,7 @@ class CarriedFile:
     def open(self) -> CarriedMattes:
         """MediaError: the footage cannot be read, or OpenCV is missing."""
         if not carrying.is_possible():
-            raise lacks_opencv("outlines are carried by")
+            raise lacks_opencv("outlines are tracked by")
         return CarriedMattes(self.footage.open(), self.drawings, self.folder)
 
 

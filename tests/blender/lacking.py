@@ -30,10 +30,10 @@ LACKING = [
     ("line", "smooth_streaks", {"factor": "4"}, INBETWEEN),
     ("line", "bake", {"file_format": "MOVIE"}, BAKE),
     ("outline", "track", {}, TRACKING),
-    ("outline", "outline_carry", {}, f"outlines are carried by {OUTLINE}"),
-    ("outline", "outline_needed", {}, f"outlines are carried by {OUTLINE}"),
-    ("outline", "outline_mask", {}, f"outlines are carried by {OUTLINE}"),
-    ("outline", "outline_draw", {}, f"outlines are carried by {OUTLINE}"),
+    ("outline", "outline_carry", {}, f"outlines are tracked by {OUTLINE}"),
+    ("outline", "outline_needed", {}, f"outlines are tracked by {OUTLINE}"),
+    ("outline", "outline_mask", {}, f"outlines are tracked by {OUTLINE}"),
+    ("outline", "outline_draw", {}, f"outlines are tracked by {OUTLINE}"),
 ]
 KINDS = {
     "line": {"strokes": [[[0.2, 0.2], [0.6, 0.9]]]},

@@ -239,7 +239,7 @@ def test_outlines(noise, check, tmp_path, monkeypatch):
     monkeypatch.setattr(carrying, "carried", None)
     code, sentences, report = check()
     assert (code, sentences) == (0, [])
-    assert f"{FRAMES} mattes of outlines are not carried yet" in " ".join(report["notes"])
+    assert f"{FRAMES} mattes of outlines are not tracked yet" in " ".join(report["notes"])
     monkeypatch.setattr("shutter_addon.blender.output.output_space.free", lambda _folder: 10)
     code, sentences, _report = check()
     assert code == 2

@@ -244,10 +244,10 @@ def test_painted_bars_are_keyed_if_asked(effect):
 
 
 def test_a_summary_in_words():
-    assert bar_edits.summary(np.ones(8)) == "Angle 360°, light of 8 frames"
-    assert bar_edits.summary([1, 0, 0, 0]) == "Angle 90°, light of 1 frame"
-    assert bar_edits.summary([0.5, 0.5]) == "Angle 360°, light of 1 frame"
-    assert bar_edits.summary(np.float32([0.1] * 10)) == "Angle 360°, light of 1 frame"
+    assert bar_edits.summary(np.ones(8)) == "360° (8 of 8 frames)"
+    assert bar_edits.summary([1, 0, 0, 0]) == "90° (1 of 4 frames)"
+    assert bar_edits.summary([0.5, 0.5]) == "360° (2 of 2 frames)"
+    assert bar_edits.summary(np.float32([0.1] * 10)) == "360° (10 of 10 frames)"
     assert "never opens" in bar_edits.summary([0, 0])
     assert bar_edits.summary([1, 0.5, 0, 0], "MEDIAN") == "Median of 2 frames"
     assert bar_edits.summary([0, 1], "LIGHTEST") == "Lightest of 1 frame"

@@ -62,7 +62,7 @@ def test_texts_are_in_blenders_style(bpy):
         assert message[0] == message[0].upper(), message
         if context in {"Operator", messages.CONTEXT}:
             words = message.split()
-            assert all(word[0] == word[0].upper() or word in {"to", "from"} for word in words), message
+            assert all(word[0] == word[0].upper() or word in {"to", "from", "by"} for word in words), message
 
 
 def test_a_german_blender_shows_them(blender, tmp_path):

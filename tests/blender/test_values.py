@@ -168,18 +168,18 @@ IMPOSSIBLE = {
     "channel": (lambda e: raw(ramp(e, "MATTE", matte="STRIP", strip_name="images"), "channel", 9), "Channel is none"),
     "offset": (lambda e: raw(image(e), "offset", 2**31 - 1), 'region "Ramp": Offset is 2.147484e+09, not'),
     "timing": (lambda e: raw(image(e), "timing", 5), 'region "Ramp": Frames Of is none of its choices'),
-    "follow": (lambda e: raw(e.shutters[0], "follow", 9), 'shutter "Long": Move With is none of its choices'),
+    "follow": (lambda e: raw(e.shutters[0], "follow", 9), 'shutter "Long": Exposure Moves With is none of its choices'),
     "length": (
         lambda e: follow_camera(e) or raw(e.shutters[0], "length", 7),
-        'shutter "Long": Length is none of its choices',
+        'shutter "Long": Exposure Length is none of its choices',
     ),
     "trail": (
         lambda e: follow_camera(e) or raw(e.shutters[0], "trail", -1.0),
-        'shutter "Long": Trail Length is -1, not 0 to 1000',
+        'shutter "Long": Distance is -1, not 0 to 1000',
     ),
     "keyed nan trail": (
         lambda e: follow_camera(e) or key(e.shutters[0], "trail", (1, NAN), (9, NAN)),
-        'shutter "Long": Trail Length is nan',
+        'shutter "Long": Distance is nan',
     ),
     "camera": (
         lambda e: follow_camera(e) or raw(e.camera, "location", [0.0, NAN]),

@@ -130,7 +130,7 @@ def undone_meanwhile():
     """The build is no step of undo, and goes on."""
     bpy.ops.ed.undo_push(message="Factor")
     story.effect().border = False
-    bpy.ops.ed.undo_push(message="Default at Edge")
+    bpy.ops.ed.undo_push(message="Keep Edges Default")
     yield from building_begun()
     driver.key("ctrl+z")
     yield from driver.until(lambda: story.effect().border, "the border is back")

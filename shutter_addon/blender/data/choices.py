@@ -89,8 +89,8 @@ KINDS = (
 
 
 BETWEEN = (
-    ("CARRIED", "Carried", "The footage's own motion carries the outline from both drawings"),
-    ("STRAIGHT", "Straight", "Curves go straight from one drawing to the next"),
+    ("CARRIED", "Tracked", "The outline follows the footage's own motion from both drawings"),
+    ("STRAIGHT", "Linear", "Curves go straight from one drawing to the next"),
 )
 
 
@@ -160,9 +160,9 @@ COMBINES = (
 )
 
 LENGTHS = (
-    ("FRAMES", "Bars", "The bars say for how many frames the shutter is open"),
+    ("FRAMES", "Frames", "The bars say for how many frames the shutter is open"),
     ("TIMELINE", "Timeline", "The bars are the exposure of one frame of the timeline, however fast the footage runs"),
-    ("MOTION", "Motion", "The shutter is open while what it follows moves by a set length; the bars are the shape"),
+    ("MOTION", "Distance", "The shutter is open while what it follows moves by a set distance; the bars are the shape"),
 )
 
 SIDES = (

@@ -125,7 +125,7 @@ class Shutter(PropertyGroup):
         options=UNKEYED,
     )
     bars: CollectionProperty(type=ShutterBar)
-    follow: choice("Move With", "What the exposure moves with", FOLLOWS)
+    follow: choice("Exposure Moves With", "What the exposure moves with", FOLLOWS)
     follow_region: StringProperty(
         name="Moved With", description="Name of the region that the exposure moves with", update=changed
     )
@@ -142,9 +142,9 @@ class Shutter(PropertyGroup):
         update=changed,
         options=UNKEYED,
     )
-    length: choice("Length", "What says how long the exposure is", LENGTHS)
+    length: choice("Exposure Length", "What says how long the exposure is", LENGTHS, translation_context=CONTEXT)
     trail: _number(
-        "Trail Length",
+        "Distance",
         "How far what is followed moves while the shutter is open, as a fraction of the picture's height",
         0.1,
         MAX_DISTANCE,
@@ -223,7 +223,7 @@ class ShutterEffect(PropertyGroup):
         update=changed,
     )
     plate_reach: IntProperty(
-        name="Clean Plate",
+        name="Background Search",
         description="Frames before and after the shown one in which what lies behind layers is looked for, "
         "where no exposed frame shows it",
         default=48,
@@ -234,13 +234,13 @@ class ShutterEffect(PropertyGroup):
         options=UNKEYED,
     )
     decontaminate: BoolProperty(
-        name="Decontaminate",
+        name="Clean Edges",
         description="Give layers, and what lies behind them, their own colors in the mixed pixels at their edges",
         default=True,
         update=changed,
     )
     border: BoolProperty(
-        name="Default at Edge",
+        name="Keep Edges Default",
         description="Make the picture's edge a scribble of the default shutter, so that a stroke alone acts locally",
         update=changed,
     )
@@ -266,7 +266,7 @@ class ShutterEffect(PropertyGroup):
     inbetween_method: choice("Method", "How in-between frames are made", METHODS)
     inbetween_place: choice("Place", "Where in-between frames lie", PLACES)
     use_source_time: BoolProperty(
-        name="Use Source Time",
+        name="Custom Time",
         description="Show the source at the time that is set here, in place of the strip's own timing",
         update=changed,
         options=UNKEYED,

@@ -99,7 +99,7 @@ class _Tracked:
         options=UNKEYED,
     )
     track_ends: BoolProperty(
-        name="End with Track",
+        name="Fade Out When Lost",
         description="Track keys a region's opacity, or the camera's influence, so that it fades where the track ends; "
         "a region ends with its shot",
         default=True,
@@ -142,7 +142,7 @@ class ShutterRegion(_Tracked, PropertyGroup):
     shutter: StringProperty(name="Shutter", description="Name of the shutter that holds in the region", update=changed)
     layer: StringProperty(name="Layer", description="Annotation layer that holds the strokes", update=changed)
     kind: choice("Type", "What says where the shutter holds", KINDS, translation_context=CONTEXT)
-    between: choice("Between", "What gives the matte between two drawings", BETWEEN)
+    between: choice("In Between", "What gives the matte between two drawings", BETWEEN)
     matte: choice("From", "What the matte is", MATTE_SOURCES)
     image: PointerProperty(
         name="File",

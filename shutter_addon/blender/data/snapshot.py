@@ -202,7 +202,7 @@ def carried_outline(scene, effect, strip, index: int, frames: Frames) -> tuple[A
     timeline frames show. EffectError, MediaError: it is straight, or has no source."""
     region = effect.regions[index]
     if validation.word(region, "between") == "STRAIGHT":
-        raise EffectError(rpt_("{place}: a straight outline is not carried").format(place=validation.place(region)))
+        raise EffectError(rpt_("{place}: a linear outline is not tracked").format(place=validation.place(region)))
     sampling = _Sampling.of(Curves(scene), effect, strip, frames)
     return _outlines(sampling, region, _drawings(sampling, index)).file, _source_frames(sampling)
 

@@ -15,19 +15,17 @@ from ..rendering import effect_source, invalidation, render_context
 
 
 def summary(weights, combine: str = "AVERAGE") -> str:
-    """A shutter's bars (L,) in words: its angle, and how many frames' light it gathers; or how many frames it combines
-    otherwise (choices.COMBINES)."""
-    light = shutters.exposure(weights)
-    if not light:
+    """A shutter's bars (L,) in words: its angle, and how many of the frames that is; or how many it combines otherwise
+    (choices.COMBINES)."""
+    if not shutters.exposure(weights):
         return iface_("All bars are zero: the shutter never opens")
     if combine != "AVERAGE":
         name, count = next(name for word, name, _ in COMBINES if word == combine), np.count_nonzero(weights)
         words = iface_("{combine} of 1 frame") if count == 1 else iface_("{combine} of {count} frames")
         return words.format(combine=iface_(name), count=count)
-    angle, frames = f"{shutters.open_angle(weights):.0f}", f"{light:.3g}"
-    if frames == "1":
-        return iface_("Angle {angle}°, light of 1 frame").format(angle=angle)
-    return iface_("Angle {angle}°, light of {frames} frames").format(angle=angle, frames=frames)
+    angle, window = shutters.open_angle(weights), len(weights)
+    words = iface_("{angle}° ({frames} of {window} frames)")
+    return words.format(angle=f"{angle:.0f}", frames=f"{angle / 360 * window:.3g}", window=window)
 
 
 def open_for(scene, effect, strip, index: int) -> str | None:

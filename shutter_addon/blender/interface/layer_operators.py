@@ -20,7 +20,7 @@ class SHUTTER_OT_clean_trail(OfRegion, Operator):
     """Have the active region leave a trail before all else, which stays sharp"""
 
     bl_idname = "shutter.clean_trail"
-    bl_label = "Clean Trail"
+    bl_label = "Trail"
 
     def change(self, context, effect):
         layer_presets.clean_trail(effect, effect.active_region, bar_edits.auto_key(context))

@@ -79,7 +79,7 @@ class _Carries(Mixin):
             outline_carrying.stop()
             show_carried()
         elif progress is not None:
-            sentence = rpt_("Carrying the outline: {done} of {total} frames, Esc to stop")
+            sentence = rpt_("Tracking the outline: {done} of {total} frames, Esc to stop")
             context.workspace.status_text_set(sentence.format(done=progress[0], total=progress[1]))
             return {"PASS_THROUGH"}
         self.cancel(context)
@@ -97,14 +97,14 @@ class _Carries(Mixin):
 
 
 class SHUTTER_OT_outline_carry(_Carries, OfOutline, Operator):
-    """Carry the active outline to all frames of its strip now (Esc stops and keeps what is carried)"""
+    """Track the active outline through its strip now (Esc stops and keeps the tracked frames)"""
 
     bl_idname = "shutter.outline_carry"
-    bl_label = "Carry Outline"
+    bl_label = "Track Outline"
 
 
 class SHUTTER_OT_outline_needed(_Carries, OfOutline, Operator):
-    """Go to the frame between two drawings at which the outline is least sure, carrying it first"""
+    """Go to the frame between two drawings at which the outline is least sure, tracking it first"""
 
     bl_idname = "shutter.outline_needed"
     bl_label = "Next Drawing Needed"
@@ -123,7 +123,7 @@ class SHUTTER_OT_outline_needed(_Carries, OfOutline, Operator):
 
 
 class SHUTTER_OT_outline_mask(_Carries, OfOutline, Operator):
-    """Make a Blender mask with shape keys of the active outline, carrying it first"""
+    """Make a Blender mask with shape keys of the active outline, tracking it first"""
 
     bl_idname = "shutter.outline_mask"
     bl_label = "Outline to Mask"
@@ -131,7 +131,7 @@ class SHUTTER_OT_outline_mask(_Carries, OfOutline, Operator):
 
     step: IntProperty(
         name="Every",
-        description="Frames from one shape key to the next between drawings of a carried outline; 0 for drawings alone",
+        description="Frames from one shape key to the next between drawings of a tracked outline; 0 for drawings alone",
         default=5,
         min=0,
         soft_max=50,
@@ -145,7 +145,7 @@ class SHUTTER_OT_outline_mask(_Carries, OfOutline, Operator):
 
 
 class SHUTTER_OT_outline_draw(OfOutline, Operator):
-    """Make the outline that is carried to the current frame a drawing of its own, to be mended"""
+    """Make the outline that is tracked to the current frame a drawing of its own, to be mended"""
 
     bl_idname = "shutter.outline_draw"
     bl_label = "Insert Outline Drawing"
@@ -165,7 +165,7 @@ class SHUTTER_OT_outline_it(OfStrokes, Operator):
     """Make the active region an outline of the subject that its strokes run over, or go around, at this frame"""
 
     bl_idname = "shutter.outline_it"
-    bl_label = "Outline It"
+    bl_label = "Find Outline"
     only_seen = True
 
     def change(self, context, effect):

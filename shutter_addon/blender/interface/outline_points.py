@@ -26,7 +26,7 @@ class SHUTTER_OT_outline_points(OfOutline, Operator):
     """Draw a curve of the active outline point by point, along the picture's edges (Ctrl for straight lines)"""
 
     bl_idname = "shutter.outline_points"
-    bl_label = "Outline from Points"
+    bl_label = "Draw by Points"
 
     def invoke(self, context, _event):
         scene, effect, strip = selection.active(context)

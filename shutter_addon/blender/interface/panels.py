@@ -247,7 +247,7 @@ def _draw_strobing(layout, effect) -> None:
 class _Move(WithEffect):
     """What the exposure moves with, and what says how long it is."""
 
-    bl_label = "Move With"
+    bl_label = "Exposure Moves With"
     bl_options = {"DEFAULT_CLOSED"}
 
     def draw(self, context):

@@ -295,7 +295,7 @@ def _tell_carrying(say) -> None:
         say(rpt_("Shutter: {fault}").format(fault=fault))
     if progress is not None:
         done, total = progress
-        say(rpt_("Carrying the outline: {done} of {total} frames").format(done=done, total=total))
+        say(rpt_("Tracking the outline: {done} of {total} frames").format(done=done, total=total))
 
 
 def show_carried() -> None:

@@ -238,7 +238,7 @@ class SHUTTER_OT_tripod(_OfCamera, _Tracks, OfShutter, Operator):
     """Expose for long as if the camera had stood still (tracks the camera unless it has keys)"""
 
     bl_idname = "shutter.tripod"
-    bl_label = "Tripod"
+    bl_label = "Stabilize Exposure"
 
     direction = "BOTH"
 

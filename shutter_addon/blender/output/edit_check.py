@@ -230,7 +230,7 @@ def _notes(check: EffectCheck, requests: dict[float, Request], source) -> list[s
     if source.by_blender:
         notes.append(pictures.SLOW_DECODING)
     if lacking := sum(check.mattes.values()):
-        notes.append(f"{lacking} mattes of outlines are not carried yet: the first render does that, frame by frame")
+        notes.append(f"{lacking} mattes of outlines are not tracked yet: the first render does that, frame by frame")
     if check.needs and check.needs.sends:
         notes.append("the GPU has no room for all frames of an exposure: every picture sends them anew, which is slow")
     return notes

@@ -25,8 +25,7 @@ MESSAGES = {
     ("*", "default"): "Standard",
     ("*", "Frame {number}"): "Bild {number}",
     ("*", "and {count} more, in the bar editor"): "und {count} weitere, im Balkeneditor",
-    ("*", "Angle {angle}°, light of 1 frame"): "Winkel {angle}°, Licht von 1 Bild",
-    ("*", "Angle {angle}°, light of {frames} frames"): "Winkel {angle}°, Licht von {frames} Bildern",
+    ("*", "{angle}° ({frames} of {window} frames)"): "{angle}° ({frames} von {window} Bildern)",
     ("*", "Open for {frames} of {window} frames here"): "Hier {frames} von {window} Bildern lang offen",
     ("*", "All bars are zero: the shutter never opens"): "Alle Balken sind null: Der Verschluss öffnet nie",
     # Names of what is new
@@ -441,45 +440,44 @@ MESSAGES = {
     ("*", "All that the strokes enclose"): "Alles, was die Striche umschließen",
     (
         "*",
-        "Carrying the outline: {done} of {total} frames",
-    ): "Der Umriss wird mitgeführt: {done} von {total} Frames",
+        "Tracking the outline: {done} of {total} frames",
+    ): "Der Umriss wird verfolgt: {done} von {total} Frames",
     ("Virtual Shutter", "Outline"): "Umriss",
     (
         "*",
         "What closed curves enclose, to the pixel: a matte that is drawn",
     ): "Was geschlossene Kurven umschließen, auf den Pixel genau: eine gezeichnete Matte",
-    ("*", "Between"): "Dazwischen",
+    ("*", "In Between"): "Dazwischen",
     ("*", "What gives the matte between two drawings"): "Woraus die Matte zwischen zwei Zeichnungen entsteht",
-    ("*", "Carried"): "Mitgeführt",
+    ("*", "Tracked"): "Verfolgt",
     (
         "*",
-        "The footage's own motion carries the outline from both drawings",
-    ): "Die Bewegung im Material selbst führt den Umriss von beiden Zeichnungen mit",
-    ("*", "Straight"): "Gerade",
+        "The outline follows the footage's own motion from both drawings",
+    ): "Der Umriss folgt von beiden Zeichnungen aus der Bewegung im Material selbst",
     (
         "*",
         "Curves go straight from one drawing to the next",
     ): "Kurven gehen gerade von einer Zeichnung zur nächsten",
     (
         "*",
-        "Carrying the outline: {done} of {total} frames, Esc to stop",
-    ): "Der Umriss wird mitgeführt: {done} von {total} Frames, Esc hält an",
+        "Tracking the outline: {done} of {total} frames, Esc to stop",
+    ): "Der Umriss wird verfolgt: {done} von {total} Frames, Esc hält an",
     ("*", "Shutter Outline"): "Shutter-Umriss",
-    ("Operator", "Carry Outline"): "Umriss mitführen",
+    ("Operator", "Track Outline"): "Umriss verfolgen",
     (
         "*",
-        "Carry the active outline to all frames of its strip now (Esc stops and keeps what is carried)",
-    ): "Den aktiven Umriss jetzt in alle Frames seines Streifens mitführen (Esc hält an und behält, was da ist)",
+        "Track the active outline through its strip now (Esc stops and keeps the tracked frames)",
+    ): "Den aktiven Umriss jetzt durch seinen Streifen verfolgen (Esc hält an und behält die verfolgten Bilder)",
     ("Operator", "Next Drawing Needed"): "Nächste nötige Zeichnung",
     (
         "*",
-        "Go to the frame between two drawings at which the outline is least sure, carrying it first",
-    ): "Zum Frame zwischen zwei Zeichnungen gehen, in dem der Umriss am unsichersten ist; er wird vorher mitgeführt",
+        "Go to the frame between two drawings at which the outline is least sure, tracking it first",
+    ): "Zum Frame zwischen zwei Zeichnungen gehen, in dem der Umriss am unsichersten ist; er wird vorher verfolgt",
     ("Operator", "Insert Outline Drawing"): "Umrisszeichnung einfügen",
     (
         "*",
-        "Make the outline that is carried to the current frame a drawing of its own, to be mended",
-    ): "Den Umriss, der zum aktuellen Frame mitgeführt ist, zu einer eigenen Zeichnung machen, um ihn auszubessern",
+        "Make the outline that is tracked to the current frame a drawing of its own, to be mended",
+    ): "Den Umriss, der zum aktuellen Frame verfolgt ist, zu einer eigenen Zeichnung machen, um ihn auszubessern",
     (
         "*",
         "Frame {frame}: the outline is sure by {share:.0f} %",
@@ -492,7 +490,7 @@ MESSAGES = {
     ("*", "The outline encloses nothing at the current frame"): "Der Umriss umschließt im aktuellen Frame nichts",
     ("*", "The region is no outline"): "Die Region ist kein Umriss",
     ("*", 'strip "{strip}" is scaled to nothing'): "Streifen „{strip}“ ist zu nichts skaliert",
-    ("*", "{place}: a straight outline is not carried"): "{place}: Ein gerader Umriss wird nicht mitgeführt",
+    ("*", "{place}: a linear outline is not tracked"): "{place}: Ein linearer Umriss wird nicht verfolgt",
     ("Operator", "Mend Outline"): "Umriss ausbessern",
     ("*", "Folder"): "Ordner",
     ("*", "Format"): "Format",
@@ -508,8 +506,8 @@ MESSAGES = {
     ("*", "Float, in the channel Y"): "Fließkomma, im Kanal Y",
     ("*", "The region is no matte, ramp or outline"): "Die Region ist keine Matte, keine Rampe und kein Umriss",
     ("*", 'Saved {count} pictures in "{folder}"'): "{count} Bilder in „{folder}“ gespeichert",
-    ("Operator", "Outline It"): "Umreißen",
-    ("Operator", "Outline from Points"): "Umriss aus Punkten",
+    ("Operator", "Find Outline"): "Umriss finden",
+    ("Operator", "Draw by Points"): "Punktweise zeichnen",
     (
         "*",
         "Draw a curve of the active outline point by point, along the picture's edges (Ctrl for straight lines)",
@@ -526,8 +524,8 @@ MESSAGES = {
     ("Operator", "Outline from Mask"): "Umriss aus Maske",
     (
         "*",
-        "Make a Blender mask with shape keys of the active outline, carrying it first",
-    ): "Aus dem aktiven Umriss eine Blender-Maske mit Formschlüsseln machen; zuvor wird er mitgeführt",
+        "Make a Blender mask with shape keys of the active outline, tracking it first",
+    ): "Aus dem aktiven Umriss eine Blender-Maske mit Formschlüsseln machen; zuvor wird er verfolgt",
     (
         "*",
         "Make an outline of the active shutter that is drawn at each key of a mask",
@@ -535,8 +533,8 @@ MESSAGES = {
     ("*", "Every"): "Jedes",
     (
         "*",
-        "Frames from one shape key to the next between drawings of a carried outline; 0 for drawings alone",
-    ): "Bilder von einem Formschlüssel zum nächsten zwischen den Zeichnungen eines mitgeführten Umrisses; 0 nur für die"
+        "Frames from one shape key to the next between drawings of a tracked outline; 0 for drawings alone",
+    ): "Bilder von einem Formschlüssel zum nächsten zwischen den Zeichnungen eines verfolgten Umrisses; 0 nur für die"
     " Zeichnungen",
     ("*", 'Made the mask "{mask}"'): "Maske „{mask}“ gemacht",
     ("*", "Nothing is drawn in the outline"): "Im Umriss ist nichts gezeichnet",
@@ -899,12 +897,12 @@ MESSAGES = {
         "*",
         "Expose the region by itself, before all else, which is exposed without it: it leaves no ghost",
     ): "Die Region für sich belichten, vor allem anderen, das ohne sie belichtet wird: kein Geisterbild bleibt",
-    ("*", "Decontaminate"): "Farben trennen",
+    ("*", "Clean Edges"): "Saubere Kanten",
     (
         "*",
         "Give layers, and what lies behind them, their own colors in the mixed pixels at their edges",
     ): "Ebenen und was hinter ihnen liegt behalten in den gemischten Pixeln an ihren Rändern ihre eigenen Farben",
-    ("*", "Clean Plate"): "Leerer Hintergrund",
+    ("*", "Background Search"): "Hintergrundsuche",
     (
         "*",
         "Frames before and after the shown one in which what lies behind layers is looked for, "
@@ -915,7 +913,7 @@ MESSAGES = {
         "*",
         "Exposures end at the source's cuts as they do at the clip's ends",
     ): "Belichtungen enden an den Schnitten der Quelle wie an den Enden des Clips",
-    ("*", "Default at Edge"): "Standard am Rand",
+    ("*", "Keep Edges Default"): "Rand bleibt Standard",
     (
         "*",
         "Make the picture's edge a scribble of the default shutter, so that a stroke alone acts locally",
@@ -1187,7 +1185,7 @@ MESSAGES = {
     ("*", "Not tracked: from frame {first} on"): "Nicht verfolgt: ab Bild {first}",
     ("*", "Not tracked: up to frame {last}"): "Nicht verfolgt: bis Bild {last}",
     ("*", "Not tracked: frames {first} to {last}"): "Nicht verfolgt: Bilder {first} bis {last}",
-    ("*", "End with Track"): "Mit der Verfolgung enden",
+    ("*", "Fade Out When Lost"): "Ausblenden, wenn verloren",
     (
         "*",
         "Track keys a region's opacity, or the camera's influence, so that it fades where the track ends; "
@@ -1213,7 +1211,7 @@ MESSAGES = {
         "Key the camera by what the regions leave free, up to your own keys (Esc stops and keeps the tracked frames)",
     ): "Der Kamera Schlüsselbilder nach allem geben, was die Regionen frei lassen, bis zu eigenen Schlüsselbildern "
     "(Esc hält an und behält die verfolgten Bilder)",
-    ("Operator", "Tripod"): "Stativ",
+    ("Operator", "Stabilize Exposure"): "Belichtung stabilisieren",
     (
         "*",
         "Expose for long as if the camera had stood still (tracks the camera unless it has keys)",
@@ -1238,7 +1236,7 @@ MESSAGES = {
         "*",
         "Keep the active region sharp before all else, which is exposed for long and without it",
     ): "Die aktive Region scharf vor alles andere stellen, das lange und ohne sie belichtet wird",
-    ("Operator", "Clean Trail"): "Saubere Spur",
+    ("Operator", "Trail"): "Bewegungsspur",
     (
         "*",
         "Have the active region leave a trail before all else, which stays sharp",
@@ -1273,12 +1271,13 @@ MESSAGES = {
         "*",
         "Name of the region that the exposure moves with",
     ): "Name der Region, mit der sich die Belichtung bewegt",
-    ("*", "Length"): "Länge",
+    ("Virtual Shutter", "Exposure Length"): "Belichtungslänge",
+    ("Virtual Shutter", "Timeline"): "Zeitleiste",
+    ("Virtual Shutter", "Distance"): "Strecke",
     (
         "*",
         "The bars are the exposure of one frame of the timeline, however fast the footage runs",
     ): "Die Balken sind die Belichtung eines Bildes der Zeitleiste, wie schnell das Material auch läuft",
-    ("*", "Motion"): "Bewegung",
     ("*", "What says how long the exposure is"): "Was sagt, wie lang die Belichtung ist",
     (
         "*",
@@ -1286,10 +1285,10 @@ MESSAGES = {
     ): "Die Balken sagen, wie viele Bilder lang der Verschluss offen ist",
     (
         "*",
-        "The shutter is open while what it follows moves by a set length; the bars are the shape",
-    ): "Der Verschluss ist offen, während sich das, womit er sich mitbewegt, um eine gegebene Länge bewegt; "
+        "The shutter is open while what it follows moves by a set distance; the bars are the shape",
+    ): "Der Verschluss ist offen, während sich das, womit er sich mitbewegt, um eine gegebene Strecke bewegt; "
     "die Balken sind die Form",
-    ("*", "Trail Length"): "Länge der Spur",
+    ("*", "Distance"): "Strecke",
     (
         "*",
         "How far what is followed moves while the shutter is open, as a fraction of the picture's height",
@@ -1310,7 +1309,7 @@ MESSAGES = {
         "*",
         '{place}: there is no region "{region}" to follow',
     ): "{place}: Es gibt keine Region „{region}“, der zu folgen wäre",
-    ("*", "Move With"): "Bewegen mit",
+    ("*", "Exposure Moves With"): "Belichtung bewegt sich mit",
     ("*", "Follow Track"): "Einer Spur folgen",
     ("Operator", "Follow Track"): "Einer Spur folgen",
     (
@@ -1386,7 +1385,7 @@ MESSAGES = {
     ("*", "Choose a file"): "Eine Datei wählen",
     ("*", 'Saved "{path}"'): "„{path}“ gespeichert",
     # Source time
-    ("*", "Use Source Time"): "Quellzeit verwenden",
+    ("*", "Custom Time"): "Eigene Zeit",
     (
         "*",
         "Show the source at the time that is set here, in place of the strip's own timing",
