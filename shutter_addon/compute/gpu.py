@@ -10,14 +10,14 @@ import numpy as np
 
 from ..core.frames.frame_source import FrameSource
 from ..core.model.combining import AVERAGE, Combine
-from ..core.model.frame_state import Options
+from ..core.model.frame_state import Following, FrameState, Options
 from ..core.pixels import compositor
 from ..core.pixels.shown_levels import Display
 from ..devices.device import Device, NoDeviceError, Texture
 from ..devices.llvmpipe import MOST_ITERATIONS
 from ..devices.named_textures import NamedTextures
 from ..devices.passes import Pass
-from . import cpu
+from . import cpu, window_frames
 from .composition_passes import (
     EDGES,
     LEVELS,
@@ -122,6 +122,15 @@ def _threshold(combine: Combine, options: Options) -> dict[str, Any]:
     if combine.threshold is None:
         return {}
     return {"threshold": (combine.threshold, max(combine.softness, 1e-6) / 2), "shown": options.before}
+
+
+def _in_window(state: FrameState, chosen: tuple[int, ...]) -> FrameState:
+    """Return the state of some shutters alone, which still follow if any does: the window holds whole frames then."""
+    part, following = state.of(chosen), state.following
+    if following is None or part.following is not None:
+        return part
+    still = np.ones((1, len(chosen)), complex)
+    return replace(part, following=Following(following.first, still, 0 * still))
 
 
 class Solver:
@@ -322,7 +331,7 @@ class GPUCompositor:
         groups = list(state.groups.values())
         for number, chosen in enumerate(groups):
             selected, share = self._selected(coefficients.handle, chosen, len(state.bars))
-            part = replace(request, state=state.of(chosen), levels=False)
+            part = replace(request, state=_in_window(state, chosen), levels=False)
             drawn = self.draw(window, part, Coefficients(selected, coefficients.block))
             levels = request.levels and number == len(groups) - 1
             images = {"part": drawn, "share": share, "mixed": window.mixed()}
@@ -350,8 +359,7 @@ class GPUCompositor:
         cannot find; and of those that take more iterations than a device has."""
         host, source, options = cpu.CPUCompositor(), window.source, request.state.options
         frames = host.window(source, options.window, True)
-        within = compositor.window_positions(options, request.index, request.direction)
-        frames.load(within[slice(*request.state.open_span)], options, window.shot)
+        frames.load(window_frames.positions(request, window.shot), options, window.shot)
         values = self.coefficients(coefficients.handle, len(request.state.bars))
         made = host.draw(frames, request, Coefficients(values, coefficients.block))
         frames.release()

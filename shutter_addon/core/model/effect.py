@@ -102,7 +102,7 @@ class Moves:
         return Placement((x, y), float(self.rotation.at(frame)), float(self.scale.at(frame)))
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Subject:
     """What the exposure of a shutter may follow: a part of the picture that moves, or all of it."""
 
@@ -123,7 +123,7 @@ class Subject:
         return motions.PICTURE
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Region(Subject):
     """A scribble of a shutter that moves.
 
@@ -157,7 +157,7 @@ class Region(Subject):
         return self.drawings.corners(frame, self.placement(frame))
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class MatteRegion(Subject):
     """A region whose shutter gets coefficients by a matte. It moves about the picture's centre: that places a ramp, and
     says of any other matte how what it covers moves.
@@ -192,7 +192,7 @@ class MatteRegion(Subject):
         )
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class OutlineRegion(MatteRegion):
     """A region whose matte is what closed curves enclose. It moves about their centre, which says how what they enclose
     moves, and does not move them.
