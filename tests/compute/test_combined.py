@@ -64,6 +64,18 @@ def test_ways_are_mixed(device, interpolation, direction):
     check(device, footage(rng), moment, 9, direction)
 
 
+@pytest.mark.parametrize("edges", ["hold", "shorten"])
+@pytest.mark.parametrize("index", [9, 19])
+@pytest.mark.parametrize("kind", [{}, {"dtype": np.uint16}, {"alpha": "straight"}], ids=["8 bits", "16 bits", "alpha"])
+def test_ways_of_which_one_follows(device, edges, index, kind):
+    """The others are seen in the same window of whole frames."""
+    rng = np.random.default_rng(4)
+    moment = combining(rng, AVERAGE, DARKEST, MEDIAN, MODES["threshold"], edges=edges)
+    turns, shifts = np.ones((20, 4), complex), np.zeros((20, 4), complex)
+    shifts[:, 1] = np.arange(20) * (0.7 - 0.3j)
+    check(device, footage(rng, **kind), dataclasses.replace(moment, following=Following(0, turns, shifts)), index)
+
+
 @pytest.mark.parametrize("edges", ["hold", "mirror", "shorten"])
 @pytest.mark.parametrize("mode", ["threshold", "darkest", "median"])
 @pytest.mark.parametrize("index", [0, 19])
