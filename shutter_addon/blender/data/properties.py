@@ -125,6 +125,9 @@ class Shutter(PropertyGroup):
         options=UNKEYED,
     )
     bars: CollectionProperty(type=ShutterBar)
+    # The preset that it was given last, and the effect's position then (consistency.preset_of).
+    preset: StringProperty(options={"HIDDEN"})
+    preset_position: StringProperty(options={"HIDDEN"})
     follow: choice("Move With", "What the exposure moves with", FOLLOWS)
     follow_region: StringProperty(
         name="Moved With", description="Name of the region that the exposure moves with", update=changed
@@ -194,7 +197,13 @@ class ShutterEffect(PropertyGroup):
         options=UNKEYED,
         translation_context=CONTEXT,
     )
-    position: choice("Position", "Where the frames that are exposed lie around the shown one", POSITIONS, options=KEYED)
+    position: choice(
+        "Position",
+        "Where the frames that are exposed lie around the shown one",
+        POSITIONS,
+        update=_lengthened,
+        options=KEYED,
+    )
     interpolation: choice(
         "Interpolation", "How shutters blend, in the picture and between keyframes", INTERPOLATIONS, options=KEYED
     )
