@@ -61,7 +61,7 @@ def _recolored(shutter, _context):
     consistency.color_layers(selection.effect_of_item(shutter), shutter)
 
 
-def _lengthened(effect, context):
+def _window_changed(effect, context):
     _fit(consistency.fit_bars, effect, context)
 
 
@@ -125,9 +125,6 @@ class Shutter(PropertyGroup):
         options=UNKEYED,
     )
     bars: CollectionProperty(type=ShutterBar)
-    # The preset that it was given last, and the effect's position then (consistency.preset_of).
-    preset: StringProperty(options={"HIDDEN"})
-    preset_position: StringProperty(options={"HIDDEN"})
     follow: choice("Move With", "What the exposure moves with", FOLLOWS)
     follow_region: StringProperty(
         name="Moved With", description="Name of the region that the exposure moves with", update=changed
@@ -179,6 +176,10 @@ class Shutter(PropertyGroup):
         MAX_THRESHOLD,
     )
 
+    # The preset that it was given last, and the effect's position then (consistency.preset_of).
+    preset: StringProperty(options={"HIDDEN"})
+    preset_position: StringProperty(options={"HIDDEN"})
+
 
 class ShutterEffect(PropertyGroup):
     name: StringProperty(name="Name", description="Name of the effect", default="Shutter")
@@ -193,7 +194,7 @@ class ShutterEffect(PropertyGroup):
         default=8,
         min=1,
         max=MAX_WINDOW,
-        update=_lengthened,
+        update=_window_changed,
         options=UNKEYED,
         translation_context=CONTEXT,
     )
@@ -201,7 +202,7 @@ class ShutterEffect(PropertyGroup):
         "Position",
         "Where the frames that are exposed lie around the shown one",
         POSITIONS,
-        update=_lengthened,
+        update=_window_changed,
         options=KEYED,
     )
     interpolation: choice(
