@@ -222,6 +222,7 @@ def _add_other_regions(scene: Any, effect: Any, footage: Path) -> None:
         moving.track_all_keys, moving.track_ends = True, False
         moving.location, moving.rotation, moving.scale = (0.1, -0.2), 0.3, 1.1
     effect.camera.influence, effect.shutters[0].trail = 0.6, 0.4
+    effect.shutters[1].preset, effect.shutters[1].preset_position = "STILL", "START"
     effect.source_time, effect.active_shutter, effect.active_region = 7.5, 1, 2
     effect.camera.stops.add().frame = 4
     effect.name, effect.inbetween_place = "Carried", "USER"

@@ -256,9 +256,11 @@ def test_a_summary_in_words():
 @given(st.integers(1, 24), st.sampled_from([(1, 1), (2, 4), (3, 3), (4, 2)]), st.booleans())
 @settings(suppress_health_check=[HealthCheck.function_scoped_fixture], max_examples=20)
 def test_another_window_keeps_shape_and_share_of_light(effect, window, shape, closed):
+    """Edited ones: test_kept_presets.py has the others."""
     from shutter_addon.core.model import shutters
 
-    bar_edits.set_bars(effect.shutters[0], np.repeat([1.0, 0.25][: 2 - closed] + [0.0] * closed, 4))
+    for shutter in effect.shutters:
+        bar_edits.set_bars(shutter, np.repeat([1.0, 0.25][: 2 - closed] + [0.0] * closed, 4))
     before = [consistency.bars(shutter) for shutter in effect.shutters]
     effect.window = window
     for shutter, old in zip(effect.shutters, before, strict=True):

@@ -54,7 +54,7 @@ def build(source, folder, **more):
 @pytest.fixture
 def add(bpy, edit):
     """Puts an effect of the factor on an image strip of files from frame 1 on; shutter: its bars."""
-    from shutter_addon.blender.editing import add_effect, shutter_edits
+    from shutter_addon.blender.editing import add_effect, bar_edits, shutter_edits
 
     def added(first, count, bars, **options):
         source = edit.sequence_editor.strips.new_image("film", str(first), 1, 1)
@@ -64,7 +64,8 @@ def add(bpy, edit):
         edit.render.resolution_x, edit.render.resolution_y = 40, 24
         effect.inbetween = str(FACTOR)
         effect.window = len(bars)
-        shutter_edits.add_shutter(effect, "S", bars)
+        shutter_edits.add_shutter(effect, "S")
+        bar_edits.paint(effect, 0, bars)
         for name, value in options.items():
             setattr(effect, name, value)
         return source, strip, effect

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from support import request, write_frames
-from test_region_tracking import active, call, drawn, new_source, picture
+from test_region_tracking import SIZE, active, call, centre, drawn, new_source, picture
 
 from shutter_addon.blender.editing import region_edits, shutter_edits
 from shutter_addon.blender.rendering import sessions
@@ -54,7 +54,7 @@ def test_another_region_keeps_its_shutter(bpy, region):
     effect.active_shutter, effect.active_region = 1, 0
     call(bpy, "clean_trail")
     assert [each.shutter for each in effect.regions] == ["Subject", "Sharp"]
-    assert bars(effect)["Sharp"] == [1] + [0] * 7
+    assert bars(effect)["Sharp"] == STILL, "the frames lie around the shown one now, which it goes on to show"
 
 
 def test_what_followed_follows_no_more(bpy, region):
@@ -83,6 +83,20 @@ def test_a_layer_is_rendered(bpy, edit, region):
     assert {len(state.shapes) for state in layers.scribbles} == {1}
     active(bpy)[1].regions[0].is_layer = False
     assert request(*active(bpy), 20).state.layers is None
+
+
+def test_the_subject_has_the_same_pixels_with_more_frames(bpy, edit, region, render):
+    """The README's minute: Sharp Subject, then Frames raised."""
+    region.location = (centre(12) - centre(0)) / SIZE * (1, -1)
+    call(bpy, "sharp_subject")
+    eight = render(edit, [23])[23][..., :3]
+    active(bpy)[1].window = 24
+    more = render(edit, [23])[23][..., :3]
+    x, y = centre(12).astype(int)
+    inside = np.s_[y - 12 : y + 12, x - 12 : x + 12]
+    assert np.abs(eight[inside] - picture(12)[inside]).mean() < 2
+    assert np.abs(more[inside] - eight[inside]).max() <= 1
+    assert np.abs(more - eight).mean() > 0.5, "all else runs together for longer"
 
 
 def test_without_a_region_there_is_no_subject(bpy, edit, region):

@@ -26,7 +26,7 @@ def film(pixels):
 def add(bpy, edit, tmp_path):
     """Puts an effect of shutters with these bars on a film that moves by pixels a frame: edit, effect, strip."""
     from shutter_addon.blender.data import selection
-    from shutter_addon.blender.editing import add_effect, shutter_edits
+    from shutter_addon.blender.editing import add_effect, bar_edits, shutter_edits
     from shutter_addon.blender.rendering import strobing
 
     strobing.forget()
@@ -40,7 +40,8 @@ def add(bpy, edit, tmp_path):
         strip, effect = add_effect.add_effect(edit, source)
         effect.window = len(bars[0])
         for i, each in enumerate(bars):
-            shutter_edits.add_shutter(effect, f"S{i}", each)
+            shutter_edits.add_shutter(effect, f"S{i}")
+            bar_edits.paint(effect, i, each)
         for name, value in options.items():
             setattr(effect, name, value)
         selection.choose(edit, strip)

@@ -2,6 +2,7 @@ import numpy as np
 import pytest
 
 from shutter_addon.core.model import presets, shutters
+from shutter_addon.core.model.frame_state import Options
 
 
 @pytest.mark.parametrize("name", presets.PRESETS)
@@ -44,3 +45,27 @@ def test_presets_have_parameters_of_their_own():
     assert presets.bars("LAST", 3).tolist() == [0, 0, 1]
     with pytest.raises(KeyError):
         presets.bars("NOPE", 6)
+
+
+@pytest.mark.parametrize("position", ["start", "center", "end"])
+@pytest.mark.parametrize("window", [1, 2, 3, 8, 10, 32, 256])
+@pytest.mark.parametrize("step", [1, 2, 4, 8, 16])
+def test_a_still_frame_is_the_shown_one_with_its_in_between_frames(position, window, step):
+    before = Options(window, position, step=step).before
+    bars = presets.bars("STILL", window, position, step)
+    assert np.flatnonzero(bars).tolist() == list(range(before, min(before + step, window)))
+    assert set(bars) <= {0, 1}
+
+
+@pytest.mark.parametrize("name", presets.PRESETS)
+@pytest.mark.parametrize("position", ["start", "center", "end"])
+@pytest.mark.parametrize("window", [1, 2, 3, 8, 10, 32, 256])
+def test_with_in_between_frames_every_preset_is_a_shutter(name, position, window):
+    for step in (2, 4, 8, 16):
+        assert len(shutters.check_bars(presets.bars(name, window, position, step))) == window
+
+
+@pytest.mark.parametrize("name", ["TWO_CUTS", "CUTS", "STUTTER", "ANGLE_90", "ANGLE_360"])
+def test_with_in_between_frames_it_is_open_for_the_same_times(name):
+    assert presets.bars(name, 32, step=4).tolist() == np.repeat(presets.bars(name, 8), 4).tolist()
+    assert [np.flatnonzero(presets.bars(end, 32, step=4)).tolist() for end in ("FIRST", "LAST")] == [[0], [31]]

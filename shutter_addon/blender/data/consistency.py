@@ -6,7 +6,7 @@ import numpy as np
 from bpy.app.translations import pgettext_rpt as rpt_
 
 from ...core.messages import EffectError
-from ...core.model import limits, shutters
+from ...core.model import limits, presets, shutters
 from . import fcurves, inbetween_settings, strips, validation
 from .annotations import layer_of
 from .selection import active_region, active_shutter
@@ -85,14 +85,17 @@ def bars(shutter) -> np.ndarray:
 
 
 def fit_bars(effect) -> None:
-    """After a change of the window's length: all shutters, their keys as well, keep their shape and share of light."""
+    """After a change of the window's length or its position: shutters that keep to a preset have its bars again, all
+    others, their keys as well, keep their shape and share of light."""
     for index, shutter in enumerate(effect.shutters):
-        if len(shutter.bars) not in (0, effect.window):
+        is_made = _made_again(effect, index, effect.window, effect.bars_per_frame)
+        if not is_made and len(shutter.bars) not in (0, effect.window):
             _change_bars(effect, index, lambda old: shutters.resample(old, effect.window))
 
 
 def fit_factor(effect) -> None:
-    """After a change of the factor of in-between frames: the bars, keyed ones as well, stand for the same times.
+    """After a change of the factor of in-between frames: the bars, keyed ones as well, stand for the same times, or are
+    a preset's again.
 
     EffectError: it would take too many bars; the factor is put back, and nothing has changed. Or a value that no effect
     can have is in the way."""
@@ -112,9 +115,37 @@ def fit_factor(effect) -> None:
         count = effect.window * factor // effect.bars_per_frame
         sentence = rpt_("{factor}× in-between frames take {count} bars; a shutter has {most} at most")
         raise EffectError(sentence.format(factor=factor, count=count, most=shutters.MAX_WINDOW)) from None
+    # Presets would be open beyond a window that ends within a source frame.
+    is_whole = window * effect.bars_per_frame == effect.window * factor
     for index in range(len(effect.shutters)):
-        _change_bars(effect, index, multiplied)
+        if not (is_whole and _made_again(effect, index, window, factor)):
+            _change_bars(effect, index, multiplied)
     effect.bars_per_frame, effect.window = factor, window
+
+
+def preset_of(effect, index: int) -> str:
+    """The preset that a shutter keeps to, a key of presets.PRESETS: the one that it was given last, as long as its bars
+    are just those. "": none, as they were edited, or are keyed."""
+    shutter, weights = effect.shutters[index], bars(effect.shutters[index])
+    if shutter.preset not in presets.PRESETS or not weights.size:
+        return ""
+    position, step = shutter.preset_position.lower(), max(effect.bars_per_frame, 1)
+    made = presets.bars(shutter.preset, len(weights), position, step).astype(np.float32)
+    path = f"{effect.path_from_id()}.shutters[{index}].bars["
+    is_kept = np.array_equal(weights, made) and not fcurves.curves_under(effect.id_data, path)
+    return shutter.preset if is_kept else ""
+
+
+def _made_again(effect, index: int, window: int, step: int) -> bool:
+    """Gives a shutter that keeps to a preset its bars for a window, with `step` of them for a filmed frame; any other
+    one forgets which it was given. Whether it keeps to one."""
+    shutter = effect.shutters[index]
+    shutter.preset = preset_of(effect, index)
+    if shutter.preset:
+        shutter.preset_position = effect.position
+        made = presets.bars(shutter.preset, window, effect.position.lower(), max(step, 1))
+        _change_bars(effect, index, lambda _old: made)
+    return bool(shutter.preset)
 
 
 def _change_bars(effect, index: int, change: Callable[[np.ndarray], np.ndarray]) -> None:

@@ -61,7 +61,7 @@ def _recolored(shutter, _context):
     consistency.color_layers(selection.effect_of_item(shutter), shutter)
 
 
-def _lengthened(effect, context):
+def _window_changed(effect, context):
     _fit(consistency.fit_bars, effect, context)
 
 
@@ -176,6 +176,10 @@ class Shutter(PropertyGroup):
         MAX_THRESHOLD,
     )
 
+    # The preset that it was given last, and the effect's position then (consistency.preset_of).
+    preset: StringProperty(options={"HIDDEN"})
+    preset_position: StringProperty(options={"HIDDEN"})
+
 
 class ShutterEffect(PropertyGroup):
     name: StringProperty(name="Name", description="Name of the effect", default="Shutter")
@@ -190,11 +194,17 @@ class ShutterEffect(PropertyGroup):
         default=8,
         min=1,
         max=MAX_WINDOW,
-        update=_lengthened,
+        update=_window_changed,
         options=UNKEYED,
         translation_context=CONTEXT,
     )
-    position: choice("Position", "Where the frames that are exposed lie around the shown one", POSITIONS, options=KEYED)
+    position: choice(
+        "Position",
+        "Where the frames that are exposed lie around the shown one",
+        POSITIONS,
+        update=_window_changed,
+        options=KEYED,
+    )
     interpolation: choice(
         "Interpolation", "How shutters blend, in the picture and between keyframes", INTERPOLATIONS, options=KEYED
     )

@@ -1,12 +1,9 @@
 """What one click makes of a subject that is drawn, or has a matte: it becomes a layer, which leaves no ghost."""
 
-import numpy as np
 from bpy.app.translations import pgettext_data as data_
 
-from ...core.model import presets
-from ...core.model.frame_state import Options
-from ..data import consistency, inbetween_settings, validation
-from . import bar_edits, region_edits, shutter_edits
+from ..data import consistency
+from . import region_edits, shutter_edits
 
 SMOOTHNESS = 6  # frames before and after each: half a second in all
 
@@ -14,16 +11,16 @@ SMOOTHNESS = 6  # frames before and after each: half a second in all
 def sharp_subject(effect, index: int, key: bool = False) -> None:
     """A region is sharp before all else, which is exposed for a whole window around the frame. key: keys the bars."""
     place = _as_layer(effect, index)
-    bar_edits.paint(effect, place, still(effect), key)
-    bar_edits.paint(effect, 0, _long(effect), key)
+    shutter_edits.apply_preset(effect, place, "STILL", key)
+    shutter_edits.apply_preset(effect, 0, "ANGLE_360", key)
 
 
 def clean_trail(effect, index: int, key: bool = False) -> None:
     """A region leaves a trail, over a whole window around the frame, before all else, which is sharp. key: keys the
     bars."""
     place = _as_layer(effect, index)
-    bar_edits.paint(effect, place, _long(effect), key)
-    bar_edits.paint(effect, 0, still(effect), key)
+    shutter_edits.apply_preset(effect, place, "ANGLE_360", key)
+    shutter_edits.apply_preset(effect, 0, "STILL", key)
 
 
 def panning_shot(effect, index: int, key: bool = False) -> None:
@@ -37,19 +34,6 @@ def panning_shot(effect, index: int, key: bool = False) -> None:
     default.follow_region = region.name
     # Turns and scales of a small subject are unsure, and whirl what is far from it; and a camera on its head has mass.
     default.follow_motion, default.follow_smooth = "LOCATION", SMOOTHNESS
-
-
-def still(effect) -> np.ndarray:
-    """Bars (L,) that are open for the shown frame alone, with the in-between frames that belong to it."""
-    window, step = validation.number(effect, "window"), inbetween_settings.factor(effect)
-    first = Options(window, position=validation.word(effect, "position").lower(), step=step).before
-    bars = np.zeros(window)
-    bars[first : first + step] = 1
-    return bars
-
-
-def _long(effect) -> np.ndarray:
-    return presets.bars("ANGLE_360", validation.number(effect, "window"))
 
 
 def _as_layer(effect, index: int) -> int:

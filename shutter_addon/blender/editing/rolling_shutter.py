@@ -147,10 +147,9 @@ def _make_room(effect) -> None:
 
 def _begin(effect):
     """The two shutters, the first of which is the default, and the ramp; which is returned."""
-    window = validation.number(effect, "window")
-    earlier = shutter_edits.add_shutter(effect, data_("Earlier"), np.eye(window)[0])
+    earlier = shutter_edits.add_shutter(effect, data_("Earlier"))
     shutter_edits.move_shutter(effect, list(effect.shutters).index(earlier), 0)
-    later = shutter_edits.add_shutter(effect, data_("Later"), np.eye(window)[-1])
+    later = shutter_edits.add_shutter(effect, data_("Later"))
     return region_edits.add_matte(effect, later, "RAMP", data_("Rolling Shutter"), ramp="LINEAR")
 
 

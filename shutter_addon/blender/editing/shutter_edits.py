@@ -33,20 +33,29 @@ def start(effect) -> None:
     With the border, the first scribble is sharp around itself; without, it would be the only one, and hold everywhere.
     """
     effect.border = True
-    add_shutter(effect, data_("Long"), presets.bars("ANGLE_360", effect.window))
-    add_shutter(effect, data_("Sharp"), presets.bars("STILL", effect.window))
+    add_shutter(effect, data_("Long"))
+    add_shutter(effect, data_("Sharp"), "STILL")
 
 
-def add_shutter(effect, name: str = "", bars=None):
-    """Appends a shutter, fully open unless bars (window,) are given, and makes it the active one."""
+def add_shutter(effect, name: str = "", preset: str = "ANGLE_360"):
+    """Appends a shutter, fully open unless another preset is given, and makes it the active one. EffectError: the
+    window has no length, and nothing has changed."""
     color = _free_color(effect)
-    weights = np.ones(validation.number(effect, "window")) if bars is None else bars
+    validation.number(effect, "window")
     shutter = effect.shutters.add()
     shutter.name, shutter.color = name or data_("Shutter"), color
-    for weight in weights:
-        shutter.bars.add().weight = weight
     effect.active_shutter = len(effect.shutters) - 1
+    apply_preset(effect, effect.active_shutter, preset)
     return shutter
+
+
+def apply_preset(effect, index: int, preset: str, key: bool = False) -> None:
+    """Gives a shutter the bars of a preset, which it keeps to (consistency.preset_of); key: keys them at the current
+    frame. EffectError: the window has no length, and nothing has changed."""
+    shutter, window = effect.shutters[index], validation.number(effect, "window")
+    shutter.preset, shutter.preset_position = preset, effect.position
+    weights = presets.bars(preset, window, effect.position.lower(), max(effect.bars_per_frame, 1))
+    bar_edits.paint(effect, index, weights, key)
 
 
 def _free_color(effect) -> tuple[float, float, float]:
@@ -73,10 +82,10 @@ def duplicate_shutter(effect, index: int):
 def follow(effect, index: int, subject: str, key: bool) -> None:
     """Has a shutter follow its region ("REGION") or the camera ("CAMERA"), open for a whole window that lies around the
     frame; key: keys the bars at the current frame. EffectError: the window has no length, and nothing has changed."""
-    shutter, bars = effect.shutters[index], presets.bars("ANGLE_360", validation.number(effect, "window"))
+    apply_preset(effect, index, "ANGLE_360", key)
+    shutter = effect.shutters[index]
     shutter.follow, shutter.length, effect.position = subject, "FRAMES", "CENTER"
     shutter.follow_motion, shutter.follow_smooth = "SCALE", 0
-    bar_edits.paint(effect, index, bars, key)
 
 
 def remove_shutter(effect, index: int) -> None:

@@ -1,9 +1,7 @@
 """A time map: every pixel shows its own moment of the window, as a ramp or a matte says."""
 
-import numpy as np
 from bpy.app.translations import pgettext_data as data_
 
-from ..data import validation
 from . import region_edits, shutter_edits
 
 
@@ -12,9 +10,8 @@ def add(effect, ramp: str):
     a ramp from one to the other; the ramp's region, which is the active one then.
 
     ramp: one of properties.RAMPS. EffectError: the window has no length, and nothing has changed."""
-    window = validation.number(effect, "window")
-    first = shutter_edits.add_shutter(effect, data_("First"), np.eye(window)[0])
+    first = shutter_edits.add_shutter(effect, data_("First"), "FIRST")
     shutter_edits.move_shutter(effect, list(effect.shutters).index(first), 0)
-    last = shutter_edits.add_shutter(effect, data_("Last"), np.eye(window)[-1])
+    last = shutter_edits.add_shutter(effect, data_("Last"), "LAST")
     effect.interpolation = "DISPLACEMENT"
     return region_edits.add_matte(effect, last, "RAMP", data_("Time Map"), ramp=ramp)

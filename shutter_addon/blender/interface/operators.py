@@ -9,7 +9,7 @@ from bpy.types import Operator
 
 from ...core.messages import EffectError
 from ...core.model import presets
-from ..data import annotations, consistency, preview_areas, selection, strips, validation
+from ..data import annotations, consistency, preview_areas, selection, strips
 from ..data.choices import CONTEXT, DRAWN
 from ..editing import (
     add_effect,
@@ -222,8 +222,7 @@ class SHUTTER_OT_preset(OfShutter, Operator):
     preset: EnumProperty(name="Preset", items=_presets, translation_context=CONTEXT)
 
     def change(self, context, effect):
-        weights = presets.bars(self.preset, validation.number(effect, "window"))
-        bar_edits.paint(effect, effect.active_shutter, weights, bar_edits.auto_key(context))
+        shutter_edits.apply_preset(effect, effect.active_shutter, self.preset, bar_edits.auto_key(context))
 
 
 class SHUTTER_OT_bars_key(OfShutter, Operator):

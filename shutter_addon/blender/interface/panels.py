@@ -5,7 +5,9 @@ from bpy.app.translations import pgettext_iface as iface_
 from bpy.types import Menu, Panel, UIList
 
 from ...core.messages import EffectError
-from ..data import annotations, data_format, selection, strips
+from ...core.model import presets
+from ..data import annotations, consistency, data_format, selection, strips
+from ..data.choices import CONTEXT
 from ..editing import bar_edits, match_source
 from ..rendering import inbetween_build, strobing
 from . import icons, inbetween_operators
@@ -135,7 +137,9 @@ class _Shutters(Mixin):
         if (shutter := selection.active_shutter(effect)) is None:
             return
         row = layout.row(align=True)
-        row.menu("SHUTTER_MT_presets", icon="PRESET")
+        preset = consistency.preset_of(effect, effect.active_shutter)
+        label = iface_(presets.PRESETS[preset][0], CONTEXT) if preset else None
+        row.menu("SHUTTER_MT_presets", text=label, icon="PRESET", translate=False)
         row.operator("shutter.bars_key", text="", icon="KEY_HLT")
         row.operator("shutter.bars_unkey", text="", icon="KEY_DEHLT")
         layout.use_property_split = True

@@ -61,7 +61,7 @@ def stutter(window: int, every: int = 4) -> np.ndarray:
 
 # name: (label, description, bars of a window). "Custom" is no preset: it is whatever the bars are.
 PRESETS: dict[str, tuple[str, str, Callable[[int], np.ndarray]]] = {
-    "STILL": ("Still Frame", "One sharp frame", still),
+    "STILL": ("Still Frame", "The shown frame alone", still),
     "ANGLE_45": ("45°", "Open for an eighth of the frames", partial(angle, degrees=45.0)),
     "ANGLE_90": ("90°", "Open for a quarter of the frames", partial(angle, degrees=90.0)),
     "ANGLE_180": ("180°", "Open for half of the frames, as film cameras are", angle),
@@ -81,7 +81,16 @@ PRESETS: dict[str, tuple[str, str, Callable[[int], np.ndarray]]] = {
 }
 
 
-def bars(name: str, window: int) -> np.ndarray:
-    """Bars (L,) of the preset `name`. KeyError: no such preset."""
+# Of whole filmed frames, in-between frames included. All others count every frame of the window.
+_FILMED = {"STILL", "TWO_CUTS", "CUTS", "STUTTER"}
+
+
+def bars(name: str, window: int, position: str = "start", step: int = 1) -> np.ndarray:
+    """Bars (L,) of the preset `name`; position, step: as frame_state.Options has them. KeyError: no such preset."""
     _label, _description, make = PRESETS[name]
-    return make(window)
+    if name not in _FILMED:
+        return make(window)
+    filmed = -(-window // step)
+    shown = {"center": (filmed - 1) // 2, "end": filmed - 1}.get(position, 0)
+    weights = np.repeat(still(filmed, shown) if name == "STILL" else make(filmed), step)
+    return weights[-window:] if position == "end" else weights[:window]

@@ -273,7 +273,7 @@ MESSAGES = {
     ): "Dem aktiven Verschluss die Balken einer Voreinstellung geben",
     ("Virtual Shutter", "Preset"): "Voreinstellung",
     ("Virtual Shutter", "Still Frame"): "Standbild",
-    ("*", "One sharp frame"): "Ein scharfes Bild",
+    ("*", "The shown frame alone"): "Nur das gezeigte Bild",
     ("Virtual Shutter", "45°"): "45°",
     ("*", "Open for an eighth of the frames"): "Ein Achtel der Bilder lang offen",
     ("Virtual Shutter", "90°"): "90°",

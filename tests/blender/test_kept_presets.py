@@ -1,0 +1,167 @@
+"""A shutter keeps to its preset while Frames, Position and in-between frames change, until its bars are edited."""
+
+import itertools
+
+import numpy as np
+import pytest
+
+from shutter_addon.blender.data import consistency, recipe_import, selection, strips
+from shutter_addon.blender.editing import bar_edits, copies, layer_presets, region_edits, shutter_edits, time_map
+from shutter_addon.core.model import presets, shutters
+from shutter_addon.core.model.frame_state import Options
+from shutter_addon.core.recipes import recipe
+
+WINDOWS = 1, 2, 8, 32, 256
+
+
+def bars(effect, index=1):
+    return consistency.bars(effect.shutters[index])
+
+
+def opened(effect, index=1):
+    return np.flatnonzero(bars(effect, index)).tolist()
+
+
+def made(name, effect):
+    weights = presets.bars(name, effect.window, effect.position.lower(), int(effect.inbetween))
+    return pytest.approx(weights, abs=1e-7)
+
+
+@pytest.mark.parametrize("name", presets.PRESETS)
+@pytest.mark.parametrize("position", ["START", "CENTER", "END"])
+def test_it_is_what_the_preset_makes_however_it_came_there(effect, name, position):
+    shutter_edits.apply_preset(effect, 1, name)
+    for window in (*WINDOWS, 8, 1, 32):
+        effect.window = window
+        assert bars(effect) == made(name, effect)
+    effect.position = position
+    assert bars(effect) == made(name, effect)
+    for factor, window in itertools.product("248", (32, 1, 2, 10)):
+        effect.inbetween = factor
+        effect.window = window
+        assert bars(effect) == made(name, effect)
+        assert consistency.preset_of(effect, 1) == name
+
+
+@pytest.mark.parametrize("factor", ["1", "2", "4", "8", "16"])
+def test_the_still_frame_is_the_shown_one(effect, factor):
+    """Whatever changes, in whatever order."""
+    rng = np.random.default_rng(int(factor))
+    effect.inbetween = factor
+    for _ in range(40):
+        effect.window = int(rng.choice(WINDOWS))
+        effect.position = rng.choice(["START", "CENTER", "END"])
+        options = Options(effect.window, effect.position.lower(), step=int(factor))
+        assert opened(effect) == list(range(options.before, min(options.before + int(factor), effect.window)))
+
+
+def test_shutters_of_one_frame_stay_so(bpy, effect):
+    time_map.add(effect, "LINEAR")
+    for window in (32, 2, 1, 256):
+        effect.window = window
+        by_name = {shutter.name: opened(effect, i) for i, shutter in enumerate(effect.shutters)}
+        assert by_name == {"First": [0], "Long": list(range(window)), "Sharp": [0], "Last": [window - 1]}
+
+
+def test_still_frame_after_sharp_subject_opens_the_shown_one(bpy, effect):
+    region_edits.add_region(effect, effect.shutters[1])
+    layer_presets.sharp_subject(effect, 0)
+    assert opened(effect) == [3]
+    effect.active_shutter = 1
+    assert bpy.ops.shutter.preset("EXEC_DEFAULT", True, preset="STILL") == {"FINISHED"}
+    assert opened(effect) == [3]
+    effect.window = 24
+    assert opened(effect) == [11]
+
+
+def by_hand(effect):
+    bar_edits.paint(effect, 1, np.eye(8)[3])
+
+
+def by_number(_effect):
+    import bpy
+
+    bpy.ops.shutter.bar_set("EXEC_DEFAULT", True, bar=4, weight=0.5)
+
+
+def by_script(effect):
+    effect.shutters[1].bars[7].weight = 0.25
+
+
+def by_keys(effect):
+    bar_edits.key_bars(effect, 1)
+
+
+def by_recipe(effect):
+    parts = [recipe.Shutter("A", bars=[1.0] * 8), recipe.Shutter("B", bars=[1.0, *[0.0] * 7])]
+    scene, _, strip = strips.find_effect(effect.scene)
+    recipe_import.apply(scene, effect, strip, recipe.Recipe(version=1, window=8, shutters=parts))
+
+
+@pytest.mark.parametrize("edited", [by_hand, by_number, by_script, by_keys, by_recipe])
+def test_what_was_edited_keeps_its_shape(effect, edited):
+    """Even if it is the preset's bars by chance on the way."""
+    assert consistency.preset_of(effect, 1) == "STILL"
+    edited(effect)
+    assert consistency.preset_of(effect, 1) == ""
+    before = bars(effect)
+    effect.position = "CENTER"
+    assert bars(effect).tolist() == before.tolist()
+    for window in (1, 32):
+        before = shutters.resample(bars(effect), window)
+        effect.window = window
+        assert bars(effect) == pytest.approx(before, abs=1e-6)
+
+
+def test_a_box_by_hand_is_no_still_frame_after_a_window_of_one(effect):
+    bar_edits.paint(effect, 1, np.ones(8))
+    effect.window = 1
+    effect.window = 8
+    assert bars(effect).tolist() == [1] * 8
+
+
+def test_undone_edits_are_none(bpy, effect):
+    bpy.ops.ed.undo_push(message="before")
+    by_hand(effect)
+    bpy.ops.ed.undo_push(message="painted")
+    effect.window = 24
+    bpy.ops.ed.undo_push(message="Frames")
+    bpy.ops.ed.undo()
+    bpy.ops.ed.undo()
+    effect = selection.active(bpy.context)[1]
+    effect.window = 24
+    assert opened(effect) == [0]
+
+
+def test_copies_keep_to_it_too(edit, effect):
+    shutter_edits.duplicate_shutter(effect, 1)
+    effect.window = 24
+    assert opened(effect, 2) == [0]
+    edit.sequence_editor.strips.new_scene("copy", effect.scene, 5, 200)
+    copies.adopt()
+    copy = edit.virtual_shutter.effects[1]
+    copy.position = "END"
+    assert opened(copy) == opened(copy, 2) == [23]
+    assert opened(edit.virtual_shutter.effects[0]) == [0]
+
+
+def test_where_the_position_is_keyed_it_is_that_of_the_frame(edit, effect):
+    path = f"{effect.path_from_id()}.position"
+    for frame, position in ((1, "START"), (9, "END")):
+        effect.position = position
+        edit.keyframe_insert(path, frame=frame)
+    edit.frame_set(1)
+    shutter_edits.apply_preset(effect, 1, "STILL")
+    edit.frame_set(9)
+    assert opened(effect) == [0], "keys change no bars"
+    effect.window = 24
+    assert opened(effect) == [23]
+
+
+def test_a_window_that_ends_within_a_frame_is_open_for_the_same_time(effect):
+    effect.inbetween = "8"
+    effect.window = 12
+    effect.inbetween = "1"
+    assert bars(effect, 0).tolist() == [1, 0.5]
+    assert bars(effect).tolist() == [1, 0]
+    assert [consistency.preset_of(effect, i) for i in range(2)] == ["", "STILL"]
