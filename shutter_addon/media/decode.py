@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import heapq
 import math
+import struct
 from collections.abc import Generator, Iterator
 from fractions import Fraction
 from pathlib import Path
@@ -14,6 +15,7 @@ from av.container import InputContainer
 from av.packet import Packet
 from av.video.codeccontext import VideoCodecContext
 from av.video.frame import PictureType
+from av.video.reformatter import ColorRange
 from av.video.stream import VideoStream
 
 from .errors import MediaError
@@ -40,8 +42,19 @@ class File(NamedTuple):
     codec: VideoCodecContext
 
 
+class Tags(NamedTuple):
+    """What Blender takes from a file before it decodes a frame, and keeps for all of them.
+
+    colorspace: matrix of YUV, by its number in ITU-T H.273; is_full: whether samples are of full range
+    turns: quarter turns counter-clockwise by which pictures are stored"""
+
+    colorspace: int
+    is_full: bool
+    turns: int
+
+
 class FrameReader:
-    """A file's video stream. Time stamps are in units of time_base; `start` is the stream's own.
+    """A file's video stream, with its `tags`. Time stamps are in units of time_base; `start` is the stream's own.
 
     Memory: the frame on screen, its successor, and what the decoder holds. Not for two threads at once.
     """
@@ -137,6 +150,7 @@ class FrameReader:
         self._container = av.open(str(self._path))
         stream = _video_stream(self._container, self._path.name, self._number)
         self.time_base, self.start = fraction(stream.time_base), stream.start_time or 0
+        self.tags = _tags(stream.codec_context)  # the decoder will write those of frames over them
         return self._begin(File(self._container, stream, _decoder(stream, self._threads)), seeking=False)
 
     def _begin(self, file: File, seeking: bool) -> _Run:
@@ -293,6 +307,21 @@ def reason(error: Exception) -> str:
     """What libav says of an error, for use inside a sentence."""
     text = (getattr(error, "strerror", None) or str(error)).strip()
     return text[:1].lower() + text[1:]
+
+
+def _tags(codec: VideoCodecContext) -> Tags:
+    # libswscale takes what it does not know for BT.601.
+    space = {1: 1, 4: 4, 7: 7, 9: 9, 10: 9}.get(int(codec.colorspace), 5)
+    return Tags(space, codec.color_range == ColorRange.JPEG, _turns(codec.coded_side_data.get("display_matrix")))
+
+
+def _turns(display_matrix: bytes | None) -> int:
+    """FFmpeg's av_display_rotation_get, in quarter turns; 0 where the matrix is empty or lacking."""
+    if display_matrix is None or len(display_matrix) != 36:
+        return 0
+    a, b, _, c, d, *_ = struct.unpack("=9i", display_matrix)
+    across, down = math.hypot(a, c), math.hypot(b, d)
+    return round(math.atan2(b / down, a / across) / (math.pi / 2)) % 4 if across and down else 0
 
 
 def _video_stream(container: InputContainer, name: str, number: int) -> VideoStream:

@@ -33,6 +33,7 @@ from .reduced import reduced, reduced_size
 # Blender's choice for YUV to RGB; libswscale's defaults are a level too dark and smear colours.
 SCALER = "neighbor+accurate_rnd+full_chroma_int"
 REDUCER = "area+accurate_rnd+full_chroma_int"  # the same, where frames become smaller
+_UNSPECIFIED = 2  # in ITU-T H.273
 _PLANAR_420 = frozenset({"yuv420p", "yuvj420p"})
 _PLANAR_YUV = re.compile(r"yuv[aj]?4\d\dp(\d+le)?")
 
@@ -79,7 +80,8 @@ class MovieSource(FrameSource):
             raise MediaError(f"{self.path.name}: its length is unknown; put it into an MP4 or MKV file first")
         self.has_audio = bool(file.container.streams.audio)
         self._step = float(1 / (self.fps * self._reader.time_base))
-        self._turns = -round(first.rotation / 90) % 4
+        self._tags = tags = self._reader.tags
+        self._turns, self._range = tags.turns, ColorRange.JPEG if tags.is_full else ColorRange.MPEG
         filmed = first.width, first.height
         size = self._fitted_to or tuple(reduced_size(length, self._divisor) for length in filmed)
         self.width, self.height = size[::-1] if self._turns % 2 else size
@@ -114,7 +116,12 @@ class MovieSource(FrameSource):
 
     def _frame(self, index: int) -> av.VideoFrame:
         check_index(self, index)
-        return self._reader.frame_at(self._reader.start + _round(index * self._step), self._step)
+        frame = self._reader.frame_at(self._reader.start + _round(index * self._step), self._step)
+        if not frame.format.is_rgb:
+            frame.colorspace, frame.color_range = self._tags.colorspace, self._range
+        # Light is converted later; libavfilter refuses frames with values that it does not know.
+        frame.color_primaries = frame.color_trc = _UNSPECIFIED
+        return frame
 
     @contextmanager
     def _named(self, index: int) -> Iterator[None]:
@@ -132,7 +139,7 @@ class MovieSource(FrameSource):
             return None
         if (frame.width, frame.height) != self._size or self._scaler != SCALER:
             return None
-        return matrix(frame.colorspace, frame.format.name == "yuvj420p" or frame.color_range == ColorRange.JPEG)
+        return matrix(frame.colorspace, frame.format.name == "yuvj420p" or self._tags.is_full)
 
     def _pixels(self, frame: av.VideoFrame) -> np.ndarray:
         by_fields = self._deinterlace and has_fields(frame)

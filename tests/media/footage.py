@@ -182,6 +182,48 @@ def coloured_movies(folder):
     yield "turned_deep.mp4", rotate_movie(folder / "ten_bits.mp4", folder / "turned_deep.mp4", 90)
 
 
+# Codecs whose frames bear tags of their own: encoder, pixels, options, and what writes BT.709, BT.601 or nothing there.
+_PRORES = "prores_metadata=color_primaries={0}:color_trc={0}:colorspace={1}"
+TAGGED = {
+    "mov": ("prores_ks", "yuv422p10le", {}, _PRORES, ("bt709", "smpte170m", "unknown")),
+    "mkv": ("prores_ks", "yuv422p10le", {}, _PRORES, ("bt709", "smpte170m", "unknown")),
+    "webm": ("libvpx-vp9", "yuv420p", {"lossless": "1"}, "vp9_metadata=color_space={1}", ("bt709", "bt601", "unknown")),
+}
+# The container's matrix, and which of the names above the frames have.
+TAGS = {"both": (1, 0), "container": (1, 2), "frames": (2, 0), "neither": (2, 2), "contradicting": (1, 1)}
+
+
+def tagged_movies(folder):
+    """Movies whose container and whose frames say what their colours are: both, either, neither, or not the same."""
+    for ending, (codec, pix_fmt, options, bits, names) in TAGGED.items():
+        for which, (space, own) in TAGS.items():
+            plain, path = folder / f"plain.{ending}", folder / f"{which}.{ending}"
+            make_movie(plain, codec, 3, pix_fmt=pix_fmt, options=options, tags=tags(space, 1, space, space))
+            primaries = "unknown" if names[own] == "unknown" else "bt709"
+            yield path.name, _with_tags_in_frames(plain, path, bits.format(primaries, names[own]))
+
+
+def movies_of_every_matrix(folder):
+    """H.264 whose frames name each matrix of ITU-T H.273, known to libswscale or not."""
+    plain = make_movie(folder / "plain.ts", "libx264", 3, options=LOSSLESS)
+    bits = "h264_metadata=colour_primaries=1:transfer_characteristics=1:matrix_coefficients={}"
+    for space in range(16):
+        yield f"matrix_{space}.ts", _with_tags_in_frames(plain, folder / f"matrix_{space}.ts", bits.format(space))
+
+
+def _with_tags_in_frames(plain, path, bits):
+    """A copy of a movie, its container as it is, its packets through FFmpeg's bitstream filter."""
+    with av.open(str(plain)) as source, av.open(str(path), "w") as out:
+        stream = source.streams.video[0]
+        copied = out.add_stream_from_template(stream)
+        filtered = av.bitstream.BitStreamFilterContext(bits, stream)
+        for packet in source.demux(stream):
+            for made in filtered.filter(packet if packet.size else None):
+                made.stream = copied
+                out.mux(made)
+    return path
+
+
 def deinterlaced_movies(folder):
     """Movies that Blender deinterlaces in each of its ways."""
     for name, codec, pix_fmt, more in [

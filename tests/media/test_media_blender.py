@@ -3,7 +3,17 @@
 import numpy as np
 import pytest
 from blender_pictures import blender
-from footage import make_movie, picture, save_image, see_through, tags
+from footage import (
+    TAGGED,
+    TAGS,
+    make_movie,
+    movies_of_every_matrix,
+    picture,
+    save_image,
+    see_through,
+    tagged_movies,
+    tags,
+)
 
 from shutter_addon.media import open_source
 
@@ -106,6 +116,8 @@ def compared(tmp_path_factory, movies, coloured, deinterlaced, bunny, blender_co
     job("bunny", bunny, [0, 1, 60, 131], movie=True)
     for name, path in coloured.items():
         job(name, path, [0, 2], movie=True)
+    for name, path in (*tagged_movies(folder), *movies_of_every_matrix(folder)):
+        job(name, path, [0, 2], movie=True)
     for name, path in deinterlaced.items():
         job(name, path, [0, 1], {"deinterlace": True}, movie=True, deinterlace=True)
     for name, path in images(folder):
@@ -172,6 +184,17 @@ def test_8_bit_movies_are_blenders_bit_for_bit(compared, name):
 )
 def test_others_differ_by_rounding_only(compared, name):
     assert largest_error(compared, name) < 0.7
+
+
+@pytest.mark.parametrize("tags", TAGS)
+@pytest.mark.parametrize("ending", TAGGED)
+def test_colours_are_those_that_blender_takes_from_the_file(compared, tags, ending):
+    assert largest_error(compared, f"{tags}.{ending}") < 0.7
+
+
+@pytest.mark.parametrize("space", range(16))
+def test_every_matrix_is_blenders(compared, space):
+    assert largest_error(compared, f"matrix_{space}.ts") < 0.01
 
 
 @pytest.mark.parametrize("name", ["alpha_deep.mov", "alpha_prores.mov"])
