@@ -16,9 +16,6 @@ from .panel_parts import WithEffect, draw_list, sentence
 from .region_panels import Camera, Follow, Regions, Track, Transform, draw_followed_motion, draw_tracked, draw_tracking
 from .report_operators import Report
 
-# Beyond this a column of numbers helps nobody: the bar editor and the Graph Editor do.
-_MOST_NUMBERS = 64
-
 
 class SHUTTER_UL_shutters(UIList):
     def draw_item(self, _context, layout, effect, shutter, _icon, _active, _property, index):
@@ -267,26 +264,6 @@ class _Move(WithEffect):
             draw_tracking(layout, None)
 
 
-class _Bars(WithEffect):
-    bl_label = "Bars"
-    bl_options = {"DEFAULT_CLOSED"}
-
-    def draw(self, context):
-        effect = selection.active(context)[1]
-        shutter = selection.active_shutter(effect)
-        if shutter is None:
-            return
-        layout = self.layout
-        layout.use_property_split = True
-        column = layout.column(align=True)
-        label = iface_("Frame {number}")
-        for k, bar in enumerate(shutter.bars[:_MOST_NUMBERS]):
-            column.prop(bar, "weight", text=label.format(number=k + 1), translate=False, slider=True)
-        if len(shutter.bars) > _MOST_NUMBERS:
-            more = iface_("and {count} more, in the bar editor").format(count=len(shutter.bars) - _MOST_NUMBERS)
-            sentence(column, more)
-
-
 class _InProperties:
     bl_space_type = "PROPERTIES"
     bl_region_type = "WINDOW"
@@ -317,7 +294,6 @@ _PANELS = {
     "_track": (Track, "_regions"),
     "_follow": (Follow, "_regions"),
     "_camera": (Camera, ""),
-    "_bars": (_Bars, ""),
     "_options": (Options, ""),
     "_inbetween": (Inbetween, ""),
     "_bake": (Bake, ""),
