@@ -16,6 +16,8 @@ MESSAGES = {
     ("*", "Transform"): "Transformation",
     ("*", "Options"): "Optionen",
     ("*", "Presets"): "Voreinstellungen",
+    ("*", "Notes"): "Hinweise",
+    ("*", 'Exposure of "{shutter}"'): "Belichtung von „{shutter}“",
     ("*", "Shutter Specials"): "Verschluss-Spezialmenü",
     ("*", "Shutter Bars"): "Verschlussbalken",
     ("*", "Shutter Region"): "Verschlussregion",
