@@ -3,11 +3,9 @@
 import bpy
 from bpy.app.translations import pgettext_iface as iface_
 from bpy.app.translations import pgettext_n as n_
-from bpy.app.translations import pgettext_rpt as rpt_
 
-from ...media import opening
-from ..data import selection, source_media, strips
-from ..rendering import inbetween_build, pictures
+from ..data import selection
+from ..rendering import inbetween_build
 from ..rendering.effect_source import FAULTS
 from . import inbetween_operators
 from .panel_parts import WithEffect, sentence
@@ -33,16 +31,6 @@ class Options(WithEffect):
         column.prop(effect, "source_time")
         if effect.use_source_time and effect.inbetween == "1":
             sentence(column, iface_("No in-between frames: the nearest source frame is shown"), "INFO")
-        _draw_decoding(layout, *selection.active(context))
-
-
-def _draw_decoding(layout, scene, effect, strip) -> None:
-    """What decodes the effect's movie, where that is not PyAV."""
-    source = strips.nearest_source(scene, effect, strip)
-    if source is not None and source_media.is_movie(source) and opening.missing_pyav():
-        column = layout.column()
-        column.active = False
-        sentence(column, rpt_(pictures.SLOW_DECODING))
 
 
 class Inbetween(WithEffect):

@@ -22,7 +22,6 @@ from .region_panels import (
     Regions,
     Track,
     Transform,
-    draw_followed_motion,
     draw_tracked,
     draw_tracking,
     tracking_icon,
@@ -288,7 +287,8 @@ class _Move(WithEffect):
         if shutter.follow == "REGION":
             layout.prop_search(shutter, "follow_region", effect, "regions", text="Region")
         if shutter.follow != "NOTHING":
-            draw_followed_motion(layout, shutter)
+            for name in ("follow_motion", "follow_smooth"):
+                layout.prop(shutter, name)
         if shutter.follow == "CAMERA":
             draw_tracking(layout, None)
 

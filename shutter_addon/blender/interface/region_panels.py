@@ -13,12 +13,6 @@ from . import track_operators
 from .panel_parts import WithEffect, draw_list, sentence
 
 
-def draw_followed_motion(layout, shutter) -> None:
-    """What of a motion is followed, and how smoothly."""
-    for name in ("follow_motion", "follow_smooth"):
-        layout.prop(shutter, name)
-
-
 class Regions(WithEffect):
     bl_label = "Regions"
 
