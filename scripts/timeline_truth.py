@@ -9,7 +9,7 @@ exposure, motion blur with a shutter of 0.5, of the same scene whose clock runs 
 
 Where both begin: *Position: Start* has the exposure begin with the shown frame, which is a moment, as Cycles' does with
 the shutter at START. Four frames of eight are open at full speed, which are four copies and no streak: with in-between
-frames at 8× they are 32. The rows "no in-betweens" are without, "bars" with *Length: Bars*.
+frames at 8× they are 32. The rows "no in-betweens" are without, "bars" with *Exposure Length: Frames*.
 
 A white rod runs over black along the bottom, 4 pixels a frame of 320. The light of its streak has a second moment, of
 which the length of an evenly lit one comes, once the still rod's is taken off. Printed are SSIM (Wang et al. 2004) of

@@ -16,7 +16,9 @@ import story
 import strobing_story
 
 SCALES = 1.0, 1.5
-TRIPOD, ROW = "bpy.ops.shutter.tripod()", 27  # the row below it is so much lower, in units of the interface
+LAST = "bpy.ops.shutter.outline_it()"  # the last row of what edits a region that is drawn
+SHUTTER = 96  # the row with the region's shutter is so much higher, in units of the interface
+NOTES = 52, 45  # the button of the notes, from the right and from above
 LANGUAGES = "en_US", "de_DE"
 
 
@@ -74,21 +76,28 @@ def seen(name):
         lambda: (found := strobing_story.note()) and found.seconds, "the note says what it takes", 30
     )
     found = yield from buttons()
-    sidebar = story.sidebar()
-    below = found[TRIPOD] + round(ROW * bpy.context.preferences.system.ui_scale)
-    yield from shutter_chosen(sidebar, below)
-    left, bottom = driver.screen(sidebar, 0, 0)
+    sidebar, unit = story.sidebar(), bpy.context.preferences.system.ui_scale
+    if LAST in found:
+        yield from shutter_chosen(sidebar, found[LAST] - round(SHUTTER * unit))
     driver.move(story.preview(), 100, story.preview().height + 12)
     yield 1.0
-    yield from driver.shot_when_shown(name)
-    crop = [left, bottom - sidebar.height + 1, sidebar.width, sidebar.height]
-    driver.saw(step=name, crop=crop, buttons=found, below=below)
+    yield from driver.shot_when_shown(f"{name}_tab")
+    right, down = (round(unit * place) for place in NOTES)
+    driver.click(sidebar, sidebar.width - right, sidebar.height - down)
+    yield 1.0
+    driver.shot(name)
+    left, top = driver.screen(sidebar, sidebar.width - right, sidebar.height - down)
+    driver.saw(step=name, crop=[round(left - 190 * unit), round(top + 30 * unit), round(340 * unit), round(100 * unit)])
+    driver.saw(buttons=found, scale=unit)
+    driver.key("Escape")
+    driver.move(story.preview(), 100, story.preview().height + 12)
+    yield 1.0
 
 
 def shutter_chosen(sidebar, down):
-    """The active region's, by the menu in the row below Tripod."""
+    """The active region's, by the menu in the row of its type."""
     assert down < sidebar.height, "it is below the fold"
-    driver.move(sidebar, sidebar.width * 0.7, sidebar.height - down)
+    driver.move(sidebar, sidebar.width * 0.3, sidebar.height - down)
     yield 0.5
     driver.xdotool("click", 1)
     yield 1.0

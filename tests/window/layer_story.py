@@ -11,16 +11,15 @@ import bpy
 import driver
 import one_stroke_story
 import story
-from one_stroke_story import FRAME, TRACK, sidebar
+from one_stroke_story import FRAME, PRESETS, sidebar
 from panning_story import played
 
 SHOWN = range(60, 82)
-SHARP_SUBJECT = TRACK + 80  # where it stands in the sidebar, in pixels below its upper edge
 
 
 def clicked():
     """One click makes it, one undo takes it back."""
-    driver.click(sidebar(), sidebar().width * 0.3, sidebar().height - SHARP_SUBJECT)
+    driver.click(sidebar(), sidebar().width * 0.2, sidebar().height - PRESETS)
     yield from driver.until(lambda: one_stroke_story.region().is_layer, "the region is a layer", 20)
     driver.saw(bars={s.name: [round(bar.weight, 3) for bar in s.bars] for s in story.effect().shutters})
     yield from story.seen("3_layer")

@@ -16,14 +16,14 @@ import first_stroke_story
 import numpy as np
 import story
 from first_stroke_story import acted, gone_to, on_preview
-from one_stroke_story import part, region, sidebar
+from one_stroke_story import PRESETS, part, region, sidebar
 
 # By frame of the movie, curves in fractions of the picture around the player; and at which frames they are drawn.
 TRUTH = {int(frame): curves for frame, curves in json.loads(Path(os.environ["SHUTTER_TRUTH"]).read_text()).items()}
 DRAWN = 1, 21, 41
 SIZE = 448, 256
 # Where they stand in the sidebar, in pixels below its upper edge.
-BESIDE_DRAW, NEXT_NEEDED, SHARP_SUBJECT = 142, 193, 273
+BESIDE_DRAW, NEXT_NEEDED = 142, 355
 
 
 def begun():
@@ -102,7 +102,7 @@ def shown_curves():
 
 
 def layered():
-    driver.click(sidebar(), sidebar().width * 0.3, sidebar().height - SHARP_SUBJECT)
+    driver.click(sidebar(), sidebar().width * 0.2, sidebar().height - PRESETS)
     acted("click on Sharp Subject", in_tab=True)
     yield from driver.until(lambda: region().is_layer, "the region is a layer", 20)
     yield from story.seen("5_layer")

@@ -11,10 +11,9 @@ import bpy
 import driver
 import one_stroke_story
 import story
-from one_stroke_story import FRAME, TRACK, sidebar
+from one_stroke_story import FRAME, PRESETS, sidebar
 
 SHOWN = range(60, 82)
-PANNING_SHOT = TRACK + 26  # where it stands in the sidebar, in pixels below its upper edge
 
 
 def shutters():
@@ -26,7 +25,7 @@ def shutters():
 
 def clicked():
     """The button in the sidebar."""
-    driver.click(sidebar(), sidebar().width * 0.45, sidebar().height - PANNING_SHOT)
+    driver.click(sidebar(), sidebar().width * 0.45, sidebar().height - PRESETS)
 
 
 def escaped():

@@ -7,7 +7,6 @@ Run in a Blender with a window, the checkout linked as an extension."""
 import os
 import sys
 from pathlib import Path
-from unittest.mock import Mock
 
 TESTS = Path(__file__).parents[1]
 sys.path[:0] = [str(TESTS / "window"), str(TESTS / "blender"), str(TESTS)]
@@ -64,25 +63,8 @@ def rendered():
     yield from until(lambda: not bpy.app.is_job_running("RENDER"), "its job ends")  # the file is written by then
 
 
-def devices_named():
-    """A panel makes no OpenGL context while it is drawn, and names the devices a moment later."""
-    opengl, layout = part("devices.available").opengl, Mock()
-    opengl.cache_clear()
-    panels = part("interface.option_panels")
-    panels._draw_devices(layout)  # the rest of its panel asks more of a layout
-    assert not layout.mock_calls
-    assert not opengl.cache_info().currsize
-    yield from until(lambda: opengl.cache_info().currsize, "OpenGL is tried", 10)
-    labels = []
-    sentence, panels.sentence = panels.sentence, lambda _layout, words: labels.append(words.partition(": ")[0])
-    panels._draw_devices(layout)  # likewise
-    panels.sentence = sentence
-    assert labels == ["Preview", "Renders"], labels
-
-
 def story():
     yield from video_editing_opened()
-    yield from devices_named()
     edit = edit_now()
     edit.render.resolution_x, edit.render.resolution_y, edit.render.dither_intensity = 64, 36, 0
     edit.view_settings.view_transform = "Standard"

@@ -60,11 +60,6 @@ def name(kind: str) -> str:
     return opengl().name if kind == "opengl" else gpu.platform.renderer_get()
 
 
-def is_known(wanted: str) -> bool:
-    """Whether `choose` answers at once: it makes no OpenGL context for that."""
-    return wanted in ("blender", "cpu") or opengl.cache_info().currsize > 0
-
-
 class OpenGL(NamedTuple):
     """The names of an OpenGL 4.3 context's renderer and of its driver, and the bytes that its textures may take, or why
     there is none."""

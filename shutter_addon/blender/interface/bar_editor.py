@@ -19,7 +19,6 @@ _SWATCH = 12
 _SNAP = 0.1
 _FINE = 0.1
 _THRESHOLD = 3  # units of the interface that make a click a drag
-_BACK = (0.08, 0.08, 0.08, 0.8)
 
 
 @dataclass(frozen=True)
@@ -188,7 +187,7 @@ def _draw(place: Layout, shutter, values, states) -> None:
     thin, foot = drawing.line_width(), drawing.ui_scale() * 3
     gap = thin if edges[1] - edges[0] > 3 * thin else 0.0
     colors = _key_colors()
-    drawing.rectangles([place.frame], [_BACK])
+    drawing.rectangles([place.frame], [drawing.BACK])
     boxes = [(a, bottom, b - gap, max(h, bottom + thin)) for a, b, h in zip(edges, edges[1:], heights, strict=False)]
     drawing.rectangles(boxes, np.tile((*shutter.color, 0.95), (place.count, 1)))
     marks = marked(boxes, shutter.combine, foot)
@@ -211,7 +210,7 @@ def _draw_header(place: Layout, shutter, index: int, words: str) -> None:
     bottom = top + 4 * unit
     start, (_, _, right, upper) = left + (_SWATCH + 6) * unit, place.frame
     if (end := start + drawing.text_width(words) + _PAD * unit) > right:  # on footage, words would be hard to read
-        drawing.rectangles([(right, top, end, upper)], [_BACK])
+        drawing.rectangles([(right, top, end, upper)], [drawing.BACK])
     drawing.swatch(left, bottom - unit, _SWATCH * unit, shutter, index)
     drawing.text(start, bottom, words)
 

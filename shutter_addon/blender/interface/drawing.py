@@ -12,6 +12,7 @@ from mathutils import Matrix
 from ...core.pixels import patterns
 
 SIZE = 11  # of texts, in points
+BACK = (0.08, 0.08, 0.08, 0.8)  # behind texts and bars, so that they are read over any footage
 
 
 def ui_scale() -> float:
@@ -101,6 +102,13 @@ def text(x: float, y: float, words: str, size: float = SIZE, color=(1, 1, 1, 0.9
     blf.draw(0, words)
     blf.disable(0, blf.SHADOW)
     blf.disable(0, blf.CLIPPING)
+
+
+def plated(x: float, y: float, words: str) -> None:
+    """As `text`, on a dark plate."""
+    pad = 4 * ui_scale()
+    rectangles([(x - pad, y - pad - 1, x + text_width(words) + pad, y + SIZE * ui_scale() + pad)], [BACK])
+    text(x, y, words)
 
 
 def text_width(words: str, size: float = SIZE) -> float:

@@ -15,6 +15,7 @@ from ..data import inbetween_settings, selection, strips
 from ..data.choices import INBETWEENS
 from ..rendering import inbetween_build, strobing
 from ..rendering.effect_source import FAULTS
+from .note_buttons import Button
 from .operator_bases import UNDOABLE, OfEffect, redraw, refused, report_error, report_warning
 
 TICK = 0.25  # seconds
@@ -84,9 +85,10 @@ def strobing_in_words(exposure: strobing.Strobing) -> str:
     )
 
 
-def smoothing_in_words(exposure: strobing.Strobing) -> str | None:
+def smoothing(exposure: strobing.Strobing) -> Button | None:
     """What helps against that; None: nothing does."""
-    return iface_("{factor}× In-Between Frames").format(factor=exposure.factor) if exposure.factor else None
+    label = iface_("{factor}× In-Between Frames").format(factor=exposure.factor)
+    return Button("shutter.smooth_streaks", label, {"factor": str(exposure.factor)}) if exposure.factor else None
 
 
 class _OfInbetweens(OfEffect):

@@ -14,7 +14,7 @@ OPERATORS = "shutter.full_quality", "shutter.smooth_streaks"
 
 @dataclass(frozen=True)
 class Button:
-    """operator: one of OPERATORS; values: of its properties"""
+    """operator: in previews one of OPERATORS; label: in panels, empty for the operator's; values: of its properties"""
 
     operator: str
     label: str

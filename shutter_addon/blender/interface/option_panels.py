@@ -1,15 +1,11 @@
-"""Panels of what an effect is made with: its options, devices and in-between frames."""
+"""Panels of what an effect is made with: its options and in-between frames."""
 
 import bpy
 from bpy.app.translations import pgettext_iface as iface_
 from bpy.app.translations import pgettext_n as n_
-from bpy.app.translations import pgettext_rpt as rpt_
 
-from ...devices.device import NoDeviceError
-from ...media import opening
-from ..data import selection, source_media, strips
-from ..devices import available
-from ..rendering import inbetween_build, pictures, render_settings, sessions
+from ..data import selection
+from ..rendering import inbetween_build
 from ..rendering.effect_source import FAULTS
 from . import inbetween_operators
 from .panel_parts import WithEffect, sentence
@@ -35,41 +31,6 @@ class Options(WithEffect):
         column.prop(effect, "source_time")
         if effect.use_source_time and effect.inbetween == "1":
             sentence(column, iface_("No in-between frames: the nearest source frame is shown"), "INFO")
-        _draw_devices(layout)
-        _draw_decoding(layout, *selection.active(context))
-
-
-def _draw_devices(layout):
-    """What composes; in a window, which alone has a preview."""
-    if bpy.app.background:
-        return
-    if not available.is_known(render_settings.wanted()):  # it is asked for beside drawing
-        if not bpy.app.timers.is_registered(_ask_for_opengl):
-            bpy.app.timers.register(_ask_for_opengl)
-        return
-    column = layout.column(align=True)
-    column.active = False
-    try:
-        preview, render = sessions.device_names()
-    except NoDeviceError as error:
-        sentence(column, str(error), "ERROR")
-        return
-    for text, device in ((iface_("Preview: {device}"), preview), (iface_("Renders: {device}"), render)):
-        sentence(column, text.format(device=device))
-
-
-def _draw_decoding(layout, scene, effect, strip) -> None:
-    """What decodes the effect's movie, where that is not PyAV."""
-    source = strips.nearest_source(scene, effect, strip)
-    if source is not None and source_media.is_movie(source) and opening.missing_pyav():
-        column = layout.column()
-        column.active = False
-        sentence(column, rpt_(pictures.SLOW_DECODING))
-
-
-def _ask_for_opengl() -> None:
-    available.opengl()
-    _redraw()
 
 
 class Inbetween(WithEffect):
@@ -138,4 +99,4 @@ def _redraw() -> None:
     inbetween_operators.redraw_panels(bpy.context)
 
 
-TIMERS = _redraw, _ask_for_opengl
+TIMERS = (_redraw,)

@@ -9,7 +9,7 @@ from .operator_bases import Mixin
 
 # Units of the interface beside a sentence in a panel: margins and the tabs of a sidebar; its icon.
 _MARGIN, _ICON = 64, 20
-
+WIDEST = 360  # units of the interface that a sentence takes at most, as a popover does
 
 _MOST_ROWS = 5  # of a list; the rest is scrolled to
 
@@ -19,7 +19,10 @@ def sentence(layout, words: str, icon: str = "NONE", room: float = 1.0, is_quiet
     if icon == "ERROR":
         told.shown(words)
     unit, region = drawing.ui_scale(), bpy.context.region
-    width = room * (region.width if region else 300 * unit) - (_MARGIN + (_ICON if icon != "NONE" else 0)) * unit
+    width = (
+        room * min(region.width if region else 300 * unit, WIDEST * unit)
+        - (_MARGIN + (_ICON if icon != "NONE" else 0)) * unit
+    )
     column = layout.column(align=True)
     column.active = not is_quiet
     for i, line in enumerate(drawing.wrapped(words, width)):

@@ -1,5 +1,7 @@
 """Panels, lists and menus: in the Properties editor's Strip tab, and as a tab in the sequencer's sidebar."""
 
+from collections.abc import Iterator
+
 import bpy
 from bpy.app.translations import pgettext_iface as iface_
 from bpy.types import Menu, Panel, UIList
@@ -12,14 +14,21 @@ from ..editing import bar_edits, match_source
 from ..rendering import inbetween_build, strobing
 from . import icons, inbetween_operators
 from .bake_operators import Bake
+from .note_buttons import Button
 from .operator_bases import Mixin
 from .option_panels import Inbetween, Options
-from .panel_parts import WithEffect, draw_list, sentence
-from .region_panels import Camera, Follow, Regions, Track, Transform, draw_followed_motion, draw_tracked, draw_tracking
+from .panel_parts import WIDEST, WithEffect, draw_list, sentence
+from .region_panels import (
+    Camera,
+    Follow,
+    Regions,
+    Track,
+    Transform,
+    draw_tracked,
+    draw_tracking,
+    tracking_icon,
+)
 from .report_operators import Report
-
-# Beyond this a column of numbers helps nobody: the bar editor and the Graph Editor do.
-_MOST_NUMBERS = 64
 
 
 class SHUTTER_UL_shutters(UIList):
@@ -104,6 +113,8 @@ class SHUTTER_MT_shutters(Menu):
 
     def draw(self, _context):
         layout = self.layout
+        layout.menu("SHUTTER_MT_presets", icon="PRESET")
+        layout.separator()
         layout.operator("shutter.shutter_duplicate", icon="DUPLICATE")
         layout.operator("shutter.shutter_move", text="Move Up", icon="TRIA_UP").direction = "UP"
         layout.operator("shutter.shutter_move", text="Move Down", icon="TRIA_DOWN").direction = "DOWN"
@@ -125,15 +136,31 @@ class _Shutters(Mixin):
             layout.operator("shutter.add_effect", icon="ADD")
             return
         effect = active[1]
-        if (newer := data_format.note([active[0], *bpy.data.scenes])) is not None:
-            sentence(layout, newer, "INFO")
-        if selection.in_picture(context) is None:
-            sentence(layout, selection.why_unseen(active[0], active[2]), "INFO")
         _draw_live(layout, context)
         draw_list(layout, effect, "shutter", effect.shutters, "SHUTTER_MT_shutters")
-        _draw_tools(layout, effect)
-        _draw_source(layout, effect)
-        _draw_strobing(layout, effect)
+        row = layout.row(align=True)
+        row.operator("shutter.draw", icon="GREASEPENCIL")
+        row.operator("shutter.erase")
+        row.menu("SHUTTER_MT_regions", text="", icon="DOWNARROW_HLT")
+        draw_tracking(layout, effect.active_region)
+        row = layout.row(align=True)
+        for button in ("sharp_subject", "panning_shot", "clean_trail"):
+            row.operator(f"shutter.{button}")
+
+
+class _Exposure(WithEffect):
+    """What the active shutter makes of the frames."""
+
+    bl_label = ""
+
+    def draw_header(self, context):
+        if (shutter := selection.active_shutter(selection.active(context)[1])) is not None:
+            words = iface_('Exposure of "{shutter}"').format(shutter=shutter.name)
+            self.layout.label(text=words, translate=False)
+
+    def draw(self, context):
+        layout, active = self.layout, selection.active(context)
+        effect = active[1]
         if (shutter := selection.active_shutter(effect)) is None:
             return
         row = layout.row(align=True)
@@ -144,38 +171,12 @@ class _Shutters(Mixin):
         row.operator("shutter.bars_unkey", text="", icon="KEY_DEHLT")
         layout.use_property_split = True
         layout.prop(effect, "window")
+        layout.prop(shutter, "length")
+        if shutter.length == "MOTION" and shutter.follow != "NOTHING":
+            layout.prop(shutter, "trail")
         _draw_combine(layout, shutter)
-        if selection.active_region(effect) is not None:
-            draw_tracked(layout, effect, effect.active_region)
-        if shutter.follow == "CAMERA":
-            draw_tracked(layout, effect, None)
+        layout.operator("shutter.tripod", icon="CON_CAMERASOLVER")
         _draw_bars(layout, active)
-
-
-def _draw_tools(layout, effect) -> None:
-    """What is done with the picture, and whose the active region is."""
-    row = layout.row(align=True)
-    row.operator("shutter.draw", icon="GREASEPENCIL")
-    row.operator("shutter.erase")
-    row.menu("SHUTTER_MT_regions", text="", icon="DOWNARROW_HLT")
-    draw_tracking(layout, effect.active_region)
-    region = selection.active_region(effect)
-    if region is not None and region.kind == "OUTLINE":
-        row = layout.row(align=True)
-        row.operator("shutter.outline_carry")
-        row.operator("shutter.outline_needed")
-    row = layout.row(align=True)
-    row.operator("shutter.panning_shot", icon="CON_FOLLOWTRACK")
-    row.operator("shutter.tripod", icon="CON_CAMERASOLVER")
-    if region is not None:
-        row = layout.split(factor=0.4)
-        label = row.row()
-        label.alignment = "RIGHT"
-        label.label(text="Shutter")
-        row.operator_menu_enum("shutter.region_assign", "shutter", text=region.shutter, translate=False)
-    row = layout.row(align=True)
-    row.operator("shutter.sharp_subject", icon="RENDERLAYERS")
-    row.operator("shutter.clean_trail", icon="CURVE_PATH")
 
 
 def _draw_combine(layout, shutter) -> None:
@@ -202,10 +203,9 @@ def _draw_bars(layout, active) -> None:
         sentence(layout, str(error), "ERROR")
         return
     is_open = bool(bars.any())
-    summary = bar_edits.summary(bars, effect.shutters[effect.active_shutter].combine)
-    sentence(layout, summary, "NONE" if is_open else "ERROR", is_quiet=is_open)
-    if words := bar_edits.open_for(scene, effect, strip, effect.active_shutter):
-        sentence(layout, words, is_quiet=True)
+    words = bar_edits.open_for(scene, effect, strip, effect.active_shutter)
+    words = words or bar_edits.summary(bars, effect.shutters[effect.active_shutter].combine)
+    sentence(layout, words, "NONE" if is_open else "ERROR", is_quiet=is_open)
 
 
 def _draw_live(layout, context):
@@ -218,38 +218,66 @@ def _draw_live(layout, context):
     view.active = live.live
     view.prop(live, "view", text="")
     view.prop(live, "probe", text="", icon="EYEDROPPER")
+    notes = row.row(align=True)
+    effect = selection.active(context)[1]
+    found = {tracking_icon(effect, index) for index in _tracked(effect)} | {"INFO" for _note in _notes(context)}
+    notes.enabled = bool(found - {None})
+    notes.alert = "ERROR" in found
+    notes.popover("SHUTTER_PT_notes", text="", icon="ERROR" if notes.alert else "INFO")
 
 
-def _draw_source(layout, effect):
-    """What the effect does not have from its source, and the way to it."""
-    if (shown := match_source.shown(effect)) is None:
-        return
-    if shown.differences:
-        what = ", ".join(iface_(word) for word in shown.differences)
-        column = layout.column(align=True)
-        sentence(column, iface_("Differs from its source: {what}").format(what=what), "INFO")
-        column.operator("shutter.match_source")
-    if shown.lacks_modifiers:
-        column = layout.column(align=True)
-        sentence(column, iface_("Modifiers of the source do not reach the effect"), "INFO")
-        column.operator("shutter.copy_modifiers")
-    if shown.has_effects:
-        words = iface_("Effect strips on the source do not reach the effect: make the Shutter strip their input")
-        sentence(layout, words, "INFO")
+def _notes(context) -> Iterator[tuple[str, Button | None]]:
+    """What is to be said of the active effect, and the button that helps; one without a label has its operator's."""
+    scene, effect, strip = selection.active(context)
+    if (newer := data_format.note([scene, *bpy.data.scenes])) is not None:
+        yield newer, None
+    if selection.in_picture(context) is None:
+        yield selection.why_unseen(scene, strip), None
+    if (shown := match_source.shown(effect)) is not None:
+        if shown.differences:
+            what = ", ".join(iface_(word) for word in shown.differences)
+            yield iface_("Differs from its source: {what}").format(what=what), Button("shutter.match_source", "")
+        if shown.lacks_modifiers:
+            words = iface_("Modifiers of the source do not reach the effect")
+            yield words, Button("shutter.copy_modifiers", "")
+        if shown.has_effects:
+            words = iface_("Effect strips on the source do not reach the effect: make the Shutter strip their input")
+            yield words, None
+    if (exposure := strobing.last(effect)) is not None and inbetween_build.running() is None:
+        yield inbetween_operators.strobing_in_words(exposure), inbetween_operators.smoothing(exposure)
 
 
-def _draw_strobing(layout, effect) -> None:
-    """That the exposure that the preview shows has too few frames, and the button that helps."""
-    if (exposure := strobing.last(effect)) is None or inbetween_build.running() is not None:
-        return
-    column = layout.column(align=True)
-    sentence(column, inbetween_operators.strobing_in_words(exposure), "INFO")
-    if (words := inbetween_operators.smoothing_in_words(exposure)) is not None:
-        column.operator("shutter.smooth_streaks", text=words, translate=False).factor = str(exposure.factor)
+def _tracked(effect) -> list[int | None]:
+    """What may have been tracked of what the tab shows (selection.moving)."""
+    region = [effect.active_region] if selection.active_region(effect) is not None else []
+    shutter = selection.active_shutter(effect)
+    return region + ([None] if shutter is not None and shutter.follow == "CAMERA" else [])
+
+
+class SHUTTER_PT_notes(Panel):
+    """What there is to say of the effect: apart, so that no button moves as it comes and goes."""
+
+    bl_label = "Notes"
+    bl_space_type = "TOPBAR"
+    bl_region_type = "HEADER"
+    bl_ui_units_x = WIDEST // 20
+
+    def draw(self, context):
+        layout, effect = self.layout, selection.active(context)[1]
+        for words, button in _notes(context):
+            column = layout.column(align=True)
+            sentence(column, words, "INFO")
+            if button is not None:
+                text = {"text": button.label, "translate": False} if button.label else {}
+                drawn = column.operator(button.operator, **text)
+                for name, value in button.values.items():
+                    setattr(drawn, name, value)
+        for index in _tracked(effect):
+            draw_tracked(layout, effect, index)
 
 
 class _Move(WithEffect):
-    """What the exposure moves with, and what says how long it is."""
+    """What the exposure moves with."""
 
     bl_label = "Exposure Moves With"
     bl_options = {"DEFAULT_CLOSED"}
@@ -259,36 +287,14 @@ class _Move(WithEffect):
         if (shutter := selection.active_shutter(effect)) is None:
             return
         layout.use_property_split = True
-        layout.prop(shutter, "length")
         layout.prop(shutter, "follow")
         if shutter.follow == "REGION":
             layout.prop_search(shutter, "follow_region", effect, "regions", text="Region")
         if shutter.follow != "NOTHING":
-            if shutter.length == "MOTION":
-                layout.prop(shutter, "trail")
-            draw_followed_motion(layout, shutter)
+            for name in ("follow_motion", "follow_smooth"):
+                layout.prop(shutter, name)
         if shutter.follow == "CAMERA":
             draw_tracking(layout, None)
-
-
-class _Bars(WithEffect):
-    bl_label = "Bars"
-    bl_options = {"DEFAULT_CLOSED"}
-
-    def draw(self, context):
-        effect = selection.active(context)[1]
-        shutter = selection.active_shutter(effect)
-        if shutter is None:
-            return
-        layout = self.layout
-        layout.use_property_split = True
-        column = layout.column(align=True)
-        label = iface_("Frame {number}")
-        for k, bar in enumerate(shutter.bars[:_MOST_NUMBERS]):
-            column.prop(bar, "weight", text=label.format(number=k + 1), translate=False, slider=True)
-        if len(shutter.bars) > _MOST_NUMBERS:
-            more = iface_("and {count} more, in the bar editor").format(count=len(shutter.bars) - _MOST_NUMBERS)
-            sentence(column, more)
 
 
 class _InProperties:
@@ -315,13 +321,13 @@ class _InSidebar:
 # By the end of its name, what each panel draws, and in which other one it lies.
 _PANELS = {
     "": (_Shutters, None),
-    "_move": (_Move, ""),
     "_regions": (Regions, ""),
     "_transform": (Transform, "_regions"),
     "_track": (Track, "_regions"),
     "_follow": (Follow, "_regions"),
+    "_exposure": (_Exposure, ""),
+    "_move": (_Move, "_exposure"),
     "_camera": (Camera, ""),
-    "_bars": (_Bars, ""),
     "_options": (Options, ""),
     "_inbetween": (Inbetween, ""),
     "_bake": (Bake, ""),
@@ -361,6 +367,7 @@ classes = (
     SHUTTER_MT_presets,
     SHUTTER_MT_regions,
     SHUTTER_MT_shutters,
+    SHUTTER_PT_notes,
     *_panels("STRIP_PT_shutter", _InProperties),
     *_panels("SEQUENCER_PT_shutter", _InSidebar),
 )

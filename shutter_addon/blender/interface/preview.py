@@ -247,7 +247,7 @@ def _tell_detail(wanted: Drawing, size: tuple[int, int], is_still: bool, say) ->
 def _tell_strobing(looked: strobing.Looked, place: int, say) -> None:
     """Says, in that place among what is said, that the exposure has too few frames, and gives the way to more."""
     if looked.known is not None and inbetween_build.running() is None:
-        say(inbetween_operators.strobing_in_words(looked.known), _smoothing(looked.known), place)
+        say(inbetween_operators.strobing_in_words(looked.known), inbetween_operators.smoothing(looked.known), place)
     if looked.is_new and not bpy.app.timers.is_registered(_redraw_panels):
         bpy.app.timers.register(_redraw_panels)  # which may have been drawn before
     if looked.is_busy:
@@ -258,11 +258,6 @@ def _tell_strobing(looked: strobing.Looked, place: int, say) -> None:
 
 def _redraw_panels() -> None:
     inbetween_operators.redraw_panels(bpy.context)
-
-
-def _smoothing(known: strobing.Strobing) -> Button | None:
-    label = inbetween_operators.smoothing_in_words(known)
-    return Button("shutter.smooth_streaks", label, {"factor": str(known.factor)}) if label else None
 
 
 def _measure() -> float | None:
@@ -411,7 +406,7 @@ class _Notes:
             lines = drawing.wrapped(sentence, right - left, drawing.SIZE)
             for i, line in enumerate(lines):
                 y -= high if button and i + 1 == len(lines) else 18 * unit
-                drawing.text(left, y, line)
+                drawing.plated(left, y, line)
             if button is not None:
                 x = left + drawing.text_width(lines[-1]) + 10 * unit
                 if x + note_buttons.width(button) > right:  # below the sentence

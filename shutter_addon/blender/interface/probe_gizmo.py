@@ -14,7 +14,6 @@ from ..rendering import effect_source, previews, probe, render_context
 from . import drawing
 
 _WIDTH, _HEIGHT, _LINE, _PAD, _APART = 180, 64, 17, 8, 14  # in units of the interface
-_BACK = (0.08, 0.08, 0.08, 0.85)
 _MARK = (1.0, 1.0, 1.0, 0.9)
 
 
@@ -100,7 +99,7 @@ def _draw(region, point, shutters, probed: probe.Probed, of_layers: list[tuple[s
     (x, y), arm = point, 6 * unit
     drawing.lines([(x - arm, y), (x + arm, y)], _MARK, width=1)
     drawing.lines([(x, y - arm), (x, y + arm)], _MARK, width=1)
-    drawing.rectangles([place.frame], [_BACK])
+    drawing.rectangles([place.frame], [drawing.BACK])
     _draw_bars(place.bars, probed.bars, (*(probed.coefficients @ colors), 0.95))
     left, _, right, _ = place.bars
     for bottom, (name, share) in zip(place.lines[len(shutters) :], of_layers, strict=True):

@@ -13,12 +13,6 @@ from . import track_operators
 from .panel_parts import WithEffect, draw_list, sentence
 
 
-def draw_followed_motion(layout, shutter) -> None:
-    """What of a motion is followed, and how smoothly."""
-    for name in ("follow_motion", "follow_smooth"):
-        layout.prop(shutter, name)
-
-
 class Regions(WithEffect):
     bl_label = "Regions"
 
@@ -28,33 +22,37 @@ class Regions(WithEffect):
         shutter = selection.active_shutter(effect)
         own = [region for region in effect.regions if shutter and region.shutter == shutter.name]
         draw_list(layout, effect, "region", own)
-        layout.use_property_split = True
-        layout.prop(effect, "edge_aware")
         region = selection.active_region(effect)
+        if region is not None:
+            row = layout.row(align=True)
+            row.operator_menu_enum("shutter.region_assign", "shutter", text=region.shutter, translate=False)
+            row.prop(region, "kind", text="")
+        layout.use_property_split = True
+        if region is None or region.kind not in strips.LAID:
+            layout.prop(effect, "edge_aware")
         if region is None:
             return
-        try:
-            validation.check_region(region)
-        except EffectError as error:
-            sentence(layout, str(error), "ERROR")
-        layout.prop(region, "kind")
         if region.kind == "LINE":
             layout.prop(region, "width")
         elif region.kind == "OUTLINE":
             layout.prop(region, "between")
-            layout.operator("shutter.outline_points")
-            layout.operator("shutter.outline_draw")
-            layout.operator("shutter.outline_mask")
         elif region.kind == "RAMP":
             layout.prop(region, "ramp")
         elif region.kind == "MATTE":
             _draw_matte(layout, matte_look.look(scene, effect, strip, region), region)
-        if region.kind not in strips.MATTES:
-            layout.operator("shutter.outline_it")
         if region.kind not in strips.LAID:
             layout.prop(region, "opacity")
-        else:
+        if region.kind not in strips.MATTES:
+            row = layout.row(align=True)
+            row.operator("shutter.outline_it")
+            row.operator("shutter.outline_needed")
+            row.menu("SHUTTER_MT_of_outline", text="", icon="DOWNARROW_HLT")
+        if region.kind in strips.LAID:
             _draw_blend(layout, region)
+        try:
+            validation.check_region(region)
+        except EffectError as error:
+            sentence(layout, str(error), "ERROR")
 
 
 def _draw_matte(layout, look, region) -> None:
@@ -81,7 +79,7 @@ def _draw_matte(layout, look, region) -> None:
 
 def _draw_blend(layout, region) -> None:
     """How a matte or a ramp lies over what is beneath."""
-    for name in ("invert", "blend", "opacity", "feather"):
+    for name in ("opacity", "feather", "invert", "blend"):
         row = layout.row()
         row.active = name != "blend" or not region.is_layer  # a layer lies before all of them
         row.prop(region, name)
@@ -97,6 +95,17 @@ def draw_tracking(layout, index: int | None) -> None:
             track, text=("Track Camera" if index is None else "Track") if direction == "BOTH" else "", icon=icon
         )
         button.direction = direction
+    row.operator(f"{track}_look", text="", icon="VIEWZOOM")
+
+
+def tracking_icon(effect, index: int | None) -> str | None:
+    """Of what `draw_tracked` draws; None: nothing."""
+    confidence = track_region.confidence_at(effect, index, effect.id_data.frame_current)
+    stops = track_region.stops(effect, index)
+    if confidence is None and not stops:
+        return None
+    is_unsure = (confidence is not None and confidence < SURE) or any(is_fault for _, _, is_fault in stops)
+    return "ERROR" if is_unsure else "INFO"
 
 
 def draw_tracked(layout, effect, index: int | None) -> None:

@@ -36,12 +36,6 @@ WAITED_FOR = RenderSession(lambda: available.choose(render_settings.wanted(), wi
 SESSIONS = OFFSCREEN, WINDOW, WAITED_FOR
 
 
-def device_names() -> tuple[str, str]:
-    """What the preview of a window is composed on, and its renders, as these call themselves. NoDeviceError: there is
-    none for renders as the user wants it."""
-    return available.name("blender"), available.name(available.choose(render_settings.wanted())[0])
-
-
 def of_render() -> RenderSession:
     """That of the render which runs on this thread."""
     if render_job.where() is not Where.WAITED_FOR:

@@ -16,6 +16,8 @@ MESSAGES = {
     ("*", "Transform"): "Transformation",
     ("*", "Options"): "Optionen",
     ("*", "Presets"): "Voreinstellungen",
+    ("*", "Notes"): "Hinweise",
+    ("*", 'Exposure of "{shutter}"'): "Belichtung von „{shutter}“",
     ("*", "Shutter Specials"): "Verschluss-Spezialmenü",
     ("*", "Shutter Bars"): "Verschlussbalken",
     ("*", "Shutter Region"): "Verschlussregion",
@@ -23,8 +25,6 @@ MESSAGES = {
     ("Operator", "Shutter"): "Verschluss",
     ("Operator", "Insert Keyframes"): "Schlüsselbilder hinzufügen",
     ("*", "default"): "Standard",
-    ("*", "Frame {number}"): "Bild {number}",
-    ("*", "and {count} more, in the bar editor"): "und {count} weitere, im Balkeneditor",
     ("*", "{angle}° ({frames} of {window} frames)"): "{angle}° ({frames} von {window} Bildern)",
     ("*", "Open for {frames} of {window} frames here"): "Hier {frames} von {window} Bildern lang offen",
     ("*", "All bars are zero: the shutter never opens"): "Alle Balken sind null: Der Verschluss öffnet nie",
@@ -1505,6 +1505,4 @@ MESSAGES = {
         " what there is, and half of the machine's memory at most",
     ): "Megabyte des GPU-Speichers, die Einzelbilder und Ergebnisse belegen dürfen, ab dem nächsten Rendern. 0: drei"
     " Viertel des vorhandenen und höchstens die Hälfte des Arbeitsspeichers",
-    ("*", "Preview: {device}"): "Vorschau: {device}",
-    ("*", "Renders: {device}"): "Renderbilder: {device}",
 }
