@@ -8,6 +8,7 @@ import pytest
 from support import noise_film, picture_of, recipe, sequencer, write_frames
 
 LEVELS = 1
+SELECTED = 1 << 4  # SEQ_KEY_SELECTED in a retiming key's flag, behind a double: Python cannot select one
 
 
 @pytest.fixture(scope="module")
@@ -171,13 +172,64 @@ def test_speed_transitions_and_freeze_frames(bpy, edit, render, effect_on, movie
     source.retiming_keys.add(timeline_frame=31)
     source.retiming_keys[-1].timeline_frame = 120
     edit.sequence_editor.active_strip, source.show_retiming_keys = source, True
-    # Python cannot select a retiming key: SEQ_KEY_SELECTED in its flag, behind a double.
-    ctypes.c_int.from_address(source.retiming_keys[1].as_pointer() + 8).value |= 1 << 4
+    ctypes.c_int.from_address(source.retiming_keys[1].as_pointer() + 8).value |= SELECTED
     with sequencer(bpy) as area, bpy.context.temp_override(region=area.regions[-1]):
         getattr(bpy.ops.sequencer, operator)(duration=10)
     assert len(source.retiming_keys) == 4
     strip, _ = effect_on(source)
     check(edit, render, [strip], range(1, source.right_handle))
+
+
+@pytest.fixture
+def retime(bpy, edit):
+    """Works on a strip's retiming keys, the chosen one of them, by Blender's operators, which know where strips lie."""
+
+    def run(operator, strip, chosen=None, **options):
+        for i, key in enumerate(strip.retiming_keys):
+            flag = ctypes.c_int.from_address(key.as_pointer() + 8)
+            flag.value = flag.value & ~SELECTED | SELECTED * (i == chosen)
+        for each in edit.sequence_editor.strips_all:
+            each.select = each == strip
+        edit.sequence_editor.active_strip, strip.show_retiming_keys = strip, True
+        with sequencer(bpy) as area, bpy.context.temp_override(region=area.regions[-1]):
+            assert getattr(bpy.ops.sequencer, f"retiming_{operator}")(**options) == {"FINISHED"}
+
+    return run
+
+
+def test_retimed_strips_that_are_not_the_first(edit, render, effect_on, movie, retime):
+    """Set Speed; keys, one with a transition; then cut both ways, moved, trimmed, and moved into a meta."""
+    new_movie(edit, movie)
+    slow, ramp = new_movie(edit, movie, 81), new_movie(edit, movie, 241)
+    retime("segment_speed_set", slow, speed=50.0)
+    assert slow.right_handle == 201
+    for frame in (256, 281):
+        ramp.retiming_keys.add(timeline_frame=frame)
+    retime("segment_speed_set", ramp, 2, speed=40.0)
+    retime("transition_add", ramp, 1, duration=8)
+    assert len(ramp.retiming_keys) == 5
+    (slow_effect, _), (ramp_effect, _) = effect_on(slow), effect_on(ramp)
+    check(edit, render, [slow_effect, ramp_effect], [*range(81, 201), *range(241, ramp.right_handle)])
+    slow_effect.split(121, "SOFT"), slow.split(121, "SOFT")
+    for strip in (ramp, ramp_effect):
+        strip.content_start += 7
+    ramp.left_handle = ramp_effect.left_handle = 255
+    effects = [strip for strip in edit.sequence_editor.strips if strip.type == "SCENE"]
+    assert len(effects) == 3
+    frames = [*range(81, 201), *range(255, ramp.right_handle)]
+    check(edit, render, effects, frames)
+    meta = edit.sequence_editor.strips.new_meta("Meta", 5, 255)
+    for strip in (ramp, ramp_effect):
+        strip.move_to_meta(meta)
+    check(edit, render, effects, frames)
+
+
+def test_half_of_a_retimed_strip_that_was_cut_hard(edit, render, effect_on, movie, retime):
+    new_movie(edit, movie)
+    source = new_movie(edit, movie, 81)
+    retime("segment_speed_set", source, speed=150.0)
+    right = source.split(101, "HARD")
+    check(edit, render, [effect_on(strip)[0] for strip in (source, right)], range(81, right.right_handle, 3))
 
 
 def test_images(edit, render, effect_on, images):

@@ -181,14 +181,10 @@ MESSAGES = {
     " wie bei einem anderen Bild",
     (
         "*",
-        'strip "{strip}": its retiming keys cannot be read in this version of Blender; keys of Source Time can take'
-        " their place",
-    ): "Streifen „{strip}“: seine Retiming-Schlüssel sind in dieser Version von Blender nicht lesbar; Schlüssel der"
-    " Quellzeit können an ihre Stelle treten",
-    (
-        "*",
-        'strip "{strip}" is not as long as its clip: retimed clips are not supported',
-    ): "Streifen „{strip}“ ist nicht so lang wie sein Clip: Clips mit geänderter Zeit werden nicht unterstützt",
+        'strip "{strip}": its retiming keys cannot be read in this version of Blender, so it is shown at an even speed;'
+        " keys of Source Time can take their place",
+    ): "Streifen „{strip}“: seine Retiming-Schlüssel sind in dieser Version von Blender nicht lesbar, darum läuft er"
+    " gleichmäßig; Schlüssel der Quellzeit können an ihre Stelle treten",
     ("*", 'strip "{strip}" has no files'): "Streifen „{strip}“ hat keine Dateien",
     ("*", 'strip "{strip}" has no clip'): "Streifen „{strip}“ hat keinen Clip",
     (
