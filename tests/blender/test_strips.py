@@ -273,6 +273,33 @@ def test_the_window_counts_source_frames_in_playing_order(edit, render, effect_o
     assert [shown[f][0, 0, 0] for f in (1, 10, 19)] == pytest.approx([12 * 17 + 5, 12 * 8 + 5, 5], abs=1)
 
 
+def test_streaks_of_a_new_effect_keep_their_length_up_to_the_clips_ends(edit, render, effect_on, images):
+    """What is sharp stays the shown frame; a recipe that does not say "slide" holds."""
+    from shutter_addon.blender.editing import add_effect, shutter_edits
+    from shutter_addon.core.frames import light
+
+    def mean(*frames):
+        return light.to_encoded(light.to_linear(np.array([12 * f + 5 for f in frames]) / 255).mean()) * 255
+
+    edit.render.resolution_x = edit.render.resolution_y = 32
+    _, effect = add_effect.add_effect(edit, new_images(edit, images))
+    shutter_edits.start(effect)
+    effect.window, effect.position = 5, "CENTER"
+    for index, bars in enumerate(([1] * 5, [0, 0, 1, 0, 0])):
+        for bar, weight in zip(effect.shutters[index].bars, bars, strict=True):
+            bar.weight = weight
+    shown = render(edit, [1, 2, 10, 19, 20])
+    middles = {1: range(5), 2: range(5), 10: range(7, 12), 19: range(15, 20), 20: range(15, 20)}
+    assert {f: picture[0, 0, 0] for f, picture in shown.items()} == pytest.approx(
+        {f: mean(*around) for f, around in middles.items()}, abs=1
+    )
+    effect.shutters.move(1, 0)
+    assert render(edit, [20])[20][0, 0, 0] == pytest.approx(mean(19), abs=1)
+    effect.shutters.move(1, 0)
+    effect.edges = "HOLD"
+    assert render(edit, [20])[20][0, 0, 0] == pytest.approx(mean(17, 18, 19, 19, 19), abs=1)
+
+
 def test_the_window_reaches_past_a_trim(edit, render, effect_on, images):
     source = new_images(edit, images)
     source.right_handle = 6

@@ -64,7 +64,7 @@ def test_ways_are_mixed(device, interpolation, direction):
     check(device, footage(rng), moment, 9, direction)
 
 
-@pytest.mark.parametrize("edges", ["hold", "mirror", "shorten"])
+@pytest.mark.parametrize("edges", ["hold", "mirror", "shorten", "slide"])
 @pytest.mark.parametrize("mode", ["threshold", "darkest", "median"])
 @pytest.mark.parametrize("index", [0, 19])
 def test_ends_of_the_clip(device, edges, mode, index):

@@ -33,6 +33,7 @@ _LEFT_OUT = {
     "SourceSpec": {"key"},
     "MatteFile": {"stamp"},
     "CarriedFile": {"folder"},
+    "Options": {"slid"},
     "Shutter": {"name", "color"},
     "Region": {"name"},
     "MatteRegion": {"name"},

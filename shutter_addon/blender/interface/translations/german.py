@@ -880,6 +880,11 @@ MESSAGES = {
     ("*", "Play the clip backward beyond its ends"): "Den Clip jenseits seiner Enden rückwärts abspielen",
     ("Virtual Shutter", "Shorten"): "Kürzen",
     ("*", "Leave out what lies beyond the clip's ends"): "Weglassen, was jenseits der Enden des Clips liegt",
+    ("Virtual Shutter", "Slide"): "Verschieben",
+    (
+        "*",
+        "Move an exposure into the clip, by as many frames as it reaches beyond its ends",
+    ): "Eine Belichtung in den Clip schieben, um so viele Bilder, wie sie über seine Enden hinausreicht",
     ("*", "Matte Resolution"): "Mattenauflösung",
     (
         "*",
