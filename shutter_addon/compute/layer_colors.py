@@ -130,7 +130,7 @@ class LayerColors:
 
         return plates.plate(
             covered,
-            (other for other in plates.nearest_frames(frame, near) if other != frame),
+            (other for other in plates.nearest_frames(frame, near, self._options.step) if other != frame),
             self.linear_part,
             lambda other: self._mattes.behind(layers, other),
             motion,

@@ -210,7 +210,7 @@ class LayeredRenderer:
         near = range(max(request.index - reach, shot.start), min(request.index + reach + 1, shot.stop))
         picture, self._kinds = plates.plate(
             holes,
-            plates.nearest_frames(request.index, near),
+            plates.nearest_frames(request.index, near, request.state.options.step),
             self._colors.linear_part,
             lambda frame: self.mattes.behind(layers, frame),
             lambda frame: self._colors.motion(request.index, frame),

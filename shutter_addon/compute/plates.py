@@ -17,10 +17,11 @@ TAKEN_SHARE = 1 - 1 / 64
 OPEN, TAKEN, FILLED = 0, 1, 2
 
 
-def nearest_frames(index: int, frames: range) -> Iterable[int]:
-    """Source frames in the order in which a plate is taken from them: those nearest to frame `index`, of two the
-    earlier."""
-    return sorted(frames, key=lambda frame: (abs(frame - index), frame))
+def nearest_frames(index: int, frames: range, step: int) -> Iterable[int]:
+    """The filmed ones of source frames, every step-th, in the order in which a plate is taken from them: those nearest
+    to frame `index`, of two the earlier. In-between frames are made of these, and may not be there."""
+    filmed = (frame for frame in frames if frame % step == 0)
+    return sorted(filmed, key=lambda frame: (abs(frame - index), frame))
 
 
 def plate(

@@ -85,6 +85,7 @@ class Renderer:
 
     def _composed(self, request: Request) -> Any:
         wanted_later = self._want(request)
+        request = self.slid(request)
         drawn = self._with_layers(request) if request.state.layers else self._plain(request)
         self.source.want(wanted_later)
         return drawn
@@ -192,8 +193,15 @@ class Renderer:
         """See window_frames.shot_of."""
         return window_frames.shot_of(request, self.source, self._beside(request), known=known)
 
+    def slid(self, request: Request, *, known: bool = False) -> Request:
+        """See window_frames.slid. known: as for `shot`."""
+        if request.state.options.edges != "slide":
+            return request
+        return window_frames.slid(request, self.shot(request, known=known))
+
     def needed(self, request: Request, *, known: bool = True) -> set[int]:
         """The source frames at window_frames.positions, and those that guide the diffusion. known: as for `shot`."""
+        request = self.slid(request, known=known)
         shot = self.shot(request, known=known)
         return window_frames.exposed_frames(request, shot).union(self._guiding(request, shot))
 
@@ -205,6 +213,7 @@ class Renderer:
             held = self._layered.held if self._layered else ()
         elif self._window and self._kind == self._kind_for(request):
             held = self._window.held
+        request = self.slid(request, known=True)
         unread, handed = window_frames.looked_for_cuts(request, self.source, self._beside(request))
         shot = self.shot(request, known=True)
         missing = window_frames.exposed_frames(request, shot).difference(held)

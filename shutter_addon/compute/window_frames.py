@@ -6,6 +6,8 @@ do.
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from ..core.frames.frame_source import FrameSource, ShotFinder
@@ -34,12 +36,22 @@ def shot_of(request: Request, source: FrameSource, beside: int, *, known: bool =
     if shots is None:
         return range(source.count)
     shot = shots.around(index, low, high, known=known)
+    moved = compositor.slid(request.state, index, request.direction, shot)
+    if moved is not request.state:
+        first, final = reach(replace(request, state=moved), beside)
+        return shots.around(index, min(low, first), max(high, final), known=known)
     last = shot.stop - 1
     if request.state.options.edges == "mirror" and (last < high) != (shot.start > low):
         # Frames mirrored at one end of the shot may lie beyond its other end.
         low, high = (min(low, 2 * last - high), high) if last < high else (low, max(high, 2 * shot.start - low))
         shot = shots.around(index, low, high, known=known)
     return shot
+
+
+def slid(request: Request, shot: range) -> Request:
+    """The request with what it exposes moved into the shot, where its edges "slide": nothing is left of that."""
+    state = compositor.slid(request.state, request.index, request.direction, shot)
+    return replace(request, state=replace(state, options=replace(state.options, edges="hold")))
 
 
 def looked_for_cuts(request: Request, source: FrameSource, beside: int) -> tuple[set[int], set[int]]:

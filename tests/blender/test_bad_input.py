@@ -182,7 +182,7 @@ def test_frames_outside_the_clip(command, frames, tmp_path, text):
 
 
 def test_a_window_longer_than_the_clip(command, frames, tmp_path):
-    for edges in ("hold", "mirror", "shorten"):
+    for edges in ("hold", "mirror", "shorten", "slide"):
         data = recipe(200, np.ones(200), edges=edges)
         command(frames, "--output", tmp_path / edges, recipe=data)
         assert len(list((tmp_path / edges).iterdir())) == 6

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from support import noise_film, recipe, write_frames
+from support import noise_film, recipe, sequencer, write_frames
 
 from shutter_addon.core.farm import job_file
 from shutter_addon.core.recipes import recipe_file
@@ -163,15 +163,43 @@ def _movie(path, count):
         container.mux(stream.encode())
 
 
-def test_a_movie_that_is_shorter_than_its_strip(edit, check, tmp_path):
+@pytest.fixture
+def film(edit, tmp_path):
+    """The strip of a movie of 9 frames, with an effect."""
     from shutter_addon.blender.editing import add_effect, shutter_edits
 
     _movie(tmp_path / "film.mp4", 9)
     edit.render.resolution_x, edit.render.resolution_y, edit.frame_end = 64, 48, 9
-    _, effect = add_effect.add_effect(
-        edit, edit.sequence_editor.strips.new_movie("m", str(tmp_path / "film.mp4"), 1, 1)
-    )
-    shutter_edits.start(effect)
+    source = edit.sequence_editor.strips.new_movie("m", str(tmp_path / "film.mp4"), 1, 1)
+    shutter_edits.start(add_effect.add_effect(edit, source)[1])
+    return source
+
+
+def test_a_movie_that_plays_slower(film, check):
+    film.retiming_keys.add(timeline_frame=1)
+    film.retiming_keys[-1].timeline_frame = 31
+    assert film.content_duration == 30
+    code, found, _ = check()
+    assert (code, found) == (0, [])
+
+
+def test_a_movie_that_keeps_its_speed(bpy, edit, check, tmp_path):
+    from shutter_addon.blender.editing import add_effect, shutter_edits
+
+    _movie(tmp_path / "film.mp4", 9)
+    edit.render.resolution_x, edit.render.resolution_y, edit.render.fps, edit.frame_end = 64, 48, 60, 9
+    with sequencer(bpy):
+        bpy.ops.sequencer.movie_strip_add(
+            filepath=str(tmp_path / "film.mp4"), frame_start=1, channel=1, sound=False, use_framerate=False
+        )
+    source = edit.sequence_editor.strips[0]
+    assert source.content_duration == 21
+    shutter_edits.start(add_effect.add_effect(edit, source)[1])
+    code, found, _ = check()
+    assert (code, found) == (0, [])
+
+
+def test_a_movie_that_is_shorter_than_its_strip(film, check, tmp_path):
     _, found, _ = check(change=lambda: _movie(tmp_path / "film.mp4", 6))
     assert found == ['"Shutter": film.mp4: has 6 frames, fewer than the 9 of strip "m"']
 

@@ -152,18 +152,13 @@ def test_what_is_not_supported_is_said(edit, clip_strip, movie):
         picture_of(strip.scene, 1)
 
 
-def test_a_retimed_clip_is_refused(bpy, edit, clip_strip, movie):
-    from shutter_addon.blender.editing import add_effect, shutter_edits
-    from shutter_addon.blender.rendering import effect_source
-
-    source = clip_strip(movie)
+@pytest.mark.parametrize("speed", [37.0, 150.0])
+def test_a_retimed_clip(bpy, edit, render, clip_strip, movie, speed):
+    """What Python is not told of: keys of a clip that is not the edit's first strip."""
+    clip_strip(movie).select = False
+    source = clip_strip(movie, 41)
     edit.sequence_editor.active_strip, source.select, source.show_retiming_keys = source, True, True
-    edit.frame_current = 5
     with sequencer(bpy) as area, bpy.context.temp_override(region=area.regions[-1]):
-        bpy.ops.sequencer.retiming_key_add(timeline_frame=5)
-        bpy.ops.sequencer.retiming_segment_speed_set(speed=50.0)
-    assert source.content_end - source.content_start > 30
-    strip, effect = add_effect.add_effect(edit, source)
-    shutter_edits.start(effect)
-    with pytest.raises(effect_source.FAULTS, match='"clip" is not as long as its clip'):
-        picture_of(strip.scene, 1)
+        bpy.ops.sequencer.retiming_segment_speed_set(speed=speed)
+    assert abs(source.content_end - source.content_start - 20) > 3
+    check(edit, render, source, range(41, source.right_handle))

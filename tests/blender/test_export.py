@@ -76,7 +76,7 @@ def valid_recipes(draw, longest=6):
         draw(st.sampled_from(["displacement", "value"])),
         draw(st.sampled_from(["linear", "encoded"])),
         draw(st.sampled_from(["normalized", "weighted"])),
-        draw(st.sampled_from(["hold", "mirror", "shorten"])),
+        draw(st.sampled_from(["hold", "mirror", "shorten", "slide"])),
         draw(st.sampled_from([1, 2, 4])),
         draw(st.booleans()),
         draw(st.booleans()),

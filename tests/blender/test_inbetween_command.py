@@ -83,6 +83,19 @@ def test_a_render_builds_what_its_frames_need(run, film, tmp_path, same_pixels):
     assert numbers(tmp_path / "virtual_shutter_inbetween") == [i for i in range(5, 20) if i % 4]
 
 
+def test_what_lies_behind_a_layer_is_sought_in_filmed_frames(run, film, tmp_path):
+    """The layer covers it while that is exposed, and has left when the layer itself is. It is seen before the exposure;
+    in-between frames are built of the exposure alone."""
+    square = [[[0.3, 0.3], [0.7, 0.3], [0.7, 0.7], [0.3, 0.7]]]
+    layer = {"name": "R", "kind": "lasso", "shutter": "S1", "strokes": square, "layer": True}
+    places = {1: -0.3, 3: 0, 4: 0, 6: 0.3}
+    layer["keys"] = [{"frame": f, "location": [x, 0], "ease": "linear"} for f, x in places.items()]
+    data = recipe(4, [1, 1, 0, 0], [0, 0, 0, 1], regions=[layer], border=True)
+    run("render", film[0], "--output", tmp_path / "out", "--frames", "3:3", "--inbetween", 4, recipe=data)
+    assert (tmp_path / "out" / "0003.png").is_file()
+    assert {number // 4 for number in numbers(tmp_path / "virtual_shutter_inbetween")} == {2, 3, 4}
+
+
 def test_chunks_are_the_whole(run, film, tmp_path):
     """Pictures and in-between frames, bit for bit; the window stops in the middle of the cut's pair."""
     first, frames = film

@@ -101,6 +101,20 @@ def test_a_window_stops_in_the_middle_of_a_cut_pair(film, add, edit, render, sam
     same_pixels(render(edit, (6,))[6][..., :3], shown(frames, range(20, 30)), 1)
 
 
+def test_at_a_cut_it_slides_by_in_betweens(film, add, edit, render, same_pixels):
+    """The shot's last filmed frame lasts as long as any."""
+    first, frames = film
+    _source, _strip, effect = add(first, COUNT, np.ones(10), edges="SLIDE")
+    last = (CUT - 1) * FACTOR
+    for frame, picture in render(edit, (3, 5, 6)).items():
+        start = min((frame - 1) * FACTOR, last + FACTOR - 10)
+        window = np.minimum(np.arange(start, start + 10), last + FACTOR // 2)
+        same_pixels(picture[..., :3], shown(frames, window), 1)
+    effect.position = "END"
+    window = np.arange(last + FACTOR // 2 + 1, last + FACTOR // 2 + 11)
+    same_pixels(render(edit, (7,))[7][..., :3], shown(frames, window), 1)
+
+
 def test_an_exposure_that_follows_takes_the_motion_between(film, add, edit, render, same_pixels):
     """By four pixels a filmed frame, so that in-between ones are seen at whole pixels; those beyond the cut are not."""
     first, frames = film

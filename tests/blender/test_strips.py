@@ -8,6 +8,7 @@ import pytest
 from support import noise_film, picture_of, recipe, sequencer, write_frames
 
 LEVELS = 1
+SELECTED = 1 << 4  # SEQ_KEY_SELECTED in a retiming key's flag, behind a double: Python cannot select one
 
 
 @pytest.fixture(scope="module")
@@ -171,13 +172,64 @@ def test_speed_transitions_and_freeze_frames(bpy, edit, render, effect_on, movie
     source.retiming_keys.add(timeline_frame=31)
     source.retiming_keys[-1].timeline_frame = 120
     edit.sequence_editor.active_strip, source.show_retiming_keys = source, True
-    # Python cannot select a retiming key: SEQ_KEY_SELECTED in its flag, behind a double.
-    ctypes.c_int.from_address(source.retiming_keys[1].as_pointer() + 8).value |= 1 << 4
+    ctypes.c_int.from_address(source.retiming_keys[1].as_pointer() + 8).value |= SELECTED
     with sequencer(bpy) as area, bpy.context.temp_override(region=area.regions[-1]):
         getattr(bpy.ops.sequencer, operator)(duration=10)
     assert len(source.retiming_keys) == 4
     strip, _ = effect_on(source)
     check(edit, render, [strip], range(1, source.right_handle))
+
+
+@pytest.fixture
+def retime(bpy, edit):
+    """Works on a strip's retiming keys, the chosen one of them, by Blender's operators, which know where strips lie."""
+
+    def run(operator, strip, chosen=None, **options):
+        for i, key in enumerate(strip.retiming_keys):
+            flag = ctypes.c_int.from_address(key.as_pointer() + 8)
+            flag.value = flag.value & ~SELECTED | SELECTED * (i == chosen)
+        for each in edit.sequence_editor.strips_all:
+            each.select = each == strip
+        edit.sequence_editor.active_strip, strip.show_retiming_keys = strip, True
+        with sequencer(bpy) as area, bpy.context.temp_override(region=area.regions[-1]):
+            assert getattr(bpy.ops.sequencer, f"retiming_{operator}")(**options) == {"FINISHED"}
+
+    return run
+
+
+def test_retimed_strips_that_are_not_the_first(edit, render, effect_on, movie, retime):
+    """Set Speed; keys, one with a transition; then cut both ways, moved, trimmed, and moved into a meta."""
+    new_movie(edit, movie)
+    slow, ramp = new_movie(edit, movie, 81), new_movie(edit, movie, 241)
+    retime("segment_speed_set", slow, speed=50.0)
+    assert slow.right_handle == 201
+    for frame in (256, 281):
+        ramp.retiming_keys.add(timeline_frame=frame)
+    retime("segment_speed_set", ramp, 2, speed=40.0)
+    retime("transition_add", ramp, 1, duration=8)
+    assert len(ramp.retiming_keys) == 5
+    (slow_effect, _), (ramp_effect, _) = effect_on(slow), effect_on(ramp)
+    check(edit, render, [slow_effect, ramp_effect], [*range(81, 201), *range(241, ramp.right_handle)])
+    slow_effect.split(121, "SOFT"), slow.split(121, "SOFT")
+    for strip in (ramp, ramp_effect):
+        strip.content_start += 7
+    ramp.left_handle = ramp_effect.left_handle = 255
+    effects = [strip for strip in edit.sequence_editor.strips if strip.type == "SCENE"]
+    assert len(effects) == 3
+    frames = [*range(81, 201), *range(255, ramp.right_handle)]
+    check(edit, render, effects, frames)
+    meta = edit.sequence_editor.strips.new_meta("Meta", 5, 255)
+    for strip in (ramp, ramp_effect):
+        strip.move_to_meta(meta)
+    check(edit, render, effects, frames)
+
+
+def test_half_of_a_retimed_strip_that_was_cut_hard(edit, render, effect_on, movie, retime):
+    new_movie(edit, movie)
+    source = new_movie(edit, movie, 81)
+    retime("segment_speed_set", source, speed=150.0)
+    right = source.split(101, "HARD")
+    check(edit, render, [effect_on(strip)[0] for strip in (source, right)], range(81, right.right_handle, 3))
 
 
 def test_images(edit, render, effect_on, images):
@@ -219,6 +271,33 @@ def test_the_window_counts_source_frames_in_playing_order(edit, render, effect_o
     effect_on(source, recipe(4, [0, 0, 1, 0]))
     shown = render(edit, [1, 10, 19])
     assert [shown[f][0, 0, 0] for f in (1, 10, 19)] == pytest.approx([12 * 17 + 5, 12 * 8 + 5, 5], abs=1)
+
+
+def test_streaks_of_a_new_effect_keep_their_length_up_to_the_clips_ends(edit, render, effect_on, images):
+    """What is sharp stays the shown frame; a recipe that does not say "slide" holds."""
+    from shutter_addon.blender.editing import add_effect, shutter_edits
+    from shutter_addon.core.frames import light
+
+    def mean(*frames):
+        return light.to_encoded(light.to_linear(np.array([12 * f + 5 for f in frames]) / 255).mean()) * 255
+
+    edit.render.resolution_x = edit.render.resolution_y = 32
+    _, effect = add_effect.add_effect(edit, new_images(edit, images))
+    shutter_edits.start(effect)
+    effect.window, effect.position = 5, "CENTER"
+    for index, bars in enumerate(([1] * 5, [0, 0, 1, 0, 0])):
+        for bar, weight in zip(effect.shutters[index].bars, bars, strict=True):
+            bar.weight = weight
+    shown = render(edit, [1, 2, 10, 19, 20])
+    middles = {1: range(5), 2: range(5), 10: range(7, 12), 19: range(15, 20), 20: range(15, 20)}
+    assert {f: picture[0, 0, 0] for f, picture in shown.items()} == pytest.approx(
+        {f: mean(*around) for f, around in middles.items()}, abs=1
+    )
+    effect.shutters.move(1, 0)
+    assert render(edit, [20])[20][0, 0, 0] == pytest.approx(mean(19), abs=1)
+    effect.shutters.move(1, 0)
+    effect.edges = "HOLD"
+    assert render(edit, [20])[20][0, 0, 0] == pytest.approx(mean(17, 18, 19, 19, 19), abs=1)
 
 
 def test_the_window_reaches_past_a_trim(edit, render, effect_on, images):

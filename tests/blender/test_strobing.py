@@ -180,7 +180,7 @@ def smoothed(bpy, monkeypatch):
 
 
 @pytest.mark.parametrize("position", ["START", "CENTER", "END"])
-@pytest.mark.parametrize("edges", ["HOLD", "MIRROR", "SHORTEN"])
+@pytest.mark.parametrize("edges", ["HOLD", "MIRROR", "SHORTEN", "SLIDE"])
 def test_all_that_the_strip_needs_is_built_and_no_more(add, smoothed, bpy, position, edges):
     from shutter_addon.blender.data import source_media, strips
 

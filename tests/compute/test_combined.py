@@ -76,7 +76,7 @@ def test_ways_of_which_one_follows(device, edges, index, kind):
     check(device, footage(rng, **kind), dataclasses.replace(moment, following=Following(0, turns, shifts)), index)
 
 
-@pytest.mark.parametrize("edges", ["hold", "mirror", "shorten"])
+@pytest.mark.parametrize("edges", ["hold", "mirror", "shorten", "slide"])
 @pytest.mark.parametrize("mode", ["threshold", "darkest", "median"])
 @pytest.mark.parametrize("index", [0, 19])
 def test_ends_of_the_clip(device, edges, mode, index):

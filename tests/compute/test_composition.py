@@ -86,6 +86,7 @@ def composed(device, source, moment, index, direction=1, shot=None, mattes=None)
     block = moment.options.aggregate
     c = c.repeat(block, 1).repeat(block, 2)[:, : source.height, : source.width].astype(np.float64)
     c /= c.sum(axis=0)
+    moment = compositor.slid(moment, index, direction, shot or range(source.count))
     indices = compositor.window_indices(moment.options, index, shot or range(source.count), direction)
     moves = moment.following and moment.following.at(indices)
     expected = compositor.compose(moment, source.linear()[np.maximum(indices, 0)], indices >= 0, c, moves)
@@ -117,7 +118,7 @@ def few_pieces(rng, window=16, **options):
     return moment
 
 
-@pytest.mark.parametrize("edges", ["hold", "mirror", "shorten"])
+@pytest.mark.parametrize("edges", ["hold", "mirror", "shorten", "slide"])
 @pytest.mark.parametrize("index", [0, 7, 19])
 @pytest.mark.parametrize("light_", ["linear", "encoded"])
 @pytest.mark.parametrize("direction", [1, -1])
@@ -138,7 +139,7 @@ def test_few_pieces_of_any_length(device, window, dtype):
     check(device, source, few_pieces(rng, window), 2)
 
 
-@pytest.mark.parametrize("edges", ["hold", "mirror", "shorten"])
+@pytest.mark.parametrize("edges", ["hold", "mirror", "shorten", "slide"])
 @pytest.mark.parametrize("position", ["start", "center", "end"])
 @pytest.mark.parametrize("index", [0, 7, 19])
 @pytest.mark.parametrize("direction", [1, -1])
@@ -147,7 +148,7 @@ def test_edges(device, edges, position, index, direction):
     check(device, footage(rng), state(rng, edges=edges, position=position), index, direction)
 
 
-@pytest.mark.parametrize("edges", ["hold", "mirror", "shorten"])
+@pytest.mark.parametrize("edges", ["hold", "mirror", "shorten", "slide"])
 def test_window_longer_than_clip(device, edges):
     rng = np.random.default_rng(3)
     check(device, footage(rng, count=3), state(rng, window=50, edges=edges, position="center"), 1)
@@ -471,7 +472,9 @@ def test_sums_lie_in_tiles_only_where_textures_are_rows(monkeypatch, rows, size)
     with device.current():
         assert device.window(source, 16).tiled == rows
     moments = [
-        state(rng, edges=edges, light=light_) for edges in ("hold", "shorten") for light_ in ("linear", "encoded")
+        state(rng, edges=edges, light=light_)
+        for edges in ("hold", "shorten", "slide")
+        for light_ in ("linear", "encoded")
     ]
     moments += [few_pieces(rng, edges="mirror"), state(rng, interpolation="value"), state(rng, count=5)]
     late = np.array([[0, 0, 1, 1], [0, 0, 0, 1.0]])  # which nothing of the shot is left for at its end
@@ -536,7 +539,7 @@ def test_history_leaves_no_trace(device):
         assert np.array_equal(Renderer(device, source).picture(Request(index, moment)), in_order[index])
 
 
-@pytest.mark.parametrize("edges", ["hold", "mirror", "shorten"])
+@pytest.mark.parametrize("edges", ["hold", "mirror", "shorten", "slide"])
 def test_running_sums_leave_no_trace(device, edges):
     """Windows that go on, go back, jump, grow, shrink and turn around, over the clip's ends and with other light."""
     rng = np.random.default_rng(24)

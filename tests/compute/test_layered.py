@@ -91,6 +91,7 @@ def formula(device, sources, moment, mattes, index=SHOWN, direction=1):  # noqa:
     block = moment.options.aggregate
     c = c.repeat(block, 1).repeat(block, 2)[:, : source.height, : source.width].astype(np.float64)
     c /= c.sum(axis=0)
+    moment = compositor.slid(moment, index, direction, range(source.count))
     indices = compositor.window_indices(moment.options, index, range(source.count), direction)
     there = indices >= 0
     parts, encoded = [each.linear() for each in sources], moment.options.light == "encoded"
@@ -137,6 +138,7 @@ def assert_near(picture, expected, where=...):
         {"exposure": "weighted"},
         {"edges": "shorten", "window": 16},
         {"edges": "mirror", "window": 16},
+        {"edges": "slide", "window": 16},
         {"aggregate": 2},
     ],
     ids=str,

@@ -43,7 +43,7 @@ def test_random_motions(device, interpolation, light, followers):  # noqa: F811
 
 
 @pytest.mark.parametrize("interpolation", ["displacement", "value"])
-@pytest.mark.parametrize("edges", ["hold", "mirror", "shorten"])
+@pytest.mark.parametrize("edges", ["hold", "mirror", "shorten", "slide"])
 @pytest.mark.parametrize(("index", "direction"), [(1, 1), (18, 1), (2, -1)])
 def test_ends_of_the_clip(device, interpolation, edges, index, direction):  # noqa: F811
     rng = np.random.default_rng(32)
@@ -54,7 +54,7 @@ def test_ends_of_the_clip(device, interpolation, edges, index, direction):  # no
     check(device, source, following(rng, source, moment, (0, 1)), index, direction)
 
 
-@pytest.mark.parametrize("edges", ["hold", "mirror", "shorten"])
+@pytest.mark.parametrize("edges", ["hold", "mirror", "shorten", "slide"])
 @pytest.mark.parametrize(("index", "direction"), [(5, 1), (12, -1), (13, 1)])
 def test_windows_end_at_cuts(device, edges, index, direction):  # noqa: F811
     """What is seen of a frame of the shot in place of one beyond, lies where that frame has it."""
@@ -168,7 +168,7 @@ def test_anything(device, seed):  # noqa: F811
         interpolation=one("displacement", "value"),
         light="linear" if alpha == "straight" else one("linear", "encoded"),
         exposure=one("normalized", "weighted"),
-        edges=one("hold", "mirror", "shorten"),
+        edges=one("hold", "mirror", "shorten", "slide"),
         position=one("start", "center", "end"),
         aggregate=one(1, 2, 4),
         step=one(1, 2),

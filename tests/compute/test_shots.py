@@ -57,7 +57,7 @@ def shots_with_between(dtype) -> FilmOfShots:
     return FilmOfShots(with_between(dtype), STEP)
 
 
-@pytest.mark.parametrize("edges", ["hold", "mirror", "shorten"])
+@pytest.mark.parametrize("edges", ["hold", "mirror", "shorten", "slide"])
 @pytest.mark.parametrize("position", ["start", "center", "end"])
 @pytest.mark.parametrize("direction", [1, -1])
 @pytest.mark.parametrize("dtype", [np.uint8, np.float32])
@@ -94,7 +94,7 @@ def test_what_was_shown_before_leaves_no_trace(device):
     index = 4
     for _ in range(60):
         index = int(np.clip(index + rng.choice([1, 1, 1, -1, -2, 6, -9]), 0, 21))
-        edges, position = rng.choice(["hold", "mirror", "shorten"]), rng.choice(["start", "center", "end"])
+        edges, position = rng.choice(["hold", "mirror", "shorten", "slide"]), rng.choice(["start", "center", "end"])
         moment = few_pieces(rng, edges=edges, position=position, stop_at_cuts=bool(rng.random() < 0.8))
         moment.bars[:, rng.integers(4, 16) :] = 0
         direction = 1 if rng.random() > 0.3 else -1
@@ -144,7 +144,7 @@ def with_between(dtype=np.uint8) -> Footage:
     return Footage(every)
 
 
-@pytest.mark.parametrize("edges", ["hold", "mirror", "shorten"])
+@pytest.mark.parametrize("edges", ["hold", "mirror", "shorten", "slide"])
 @pytest.mark.parametrize("position", ["start", "center", "end"])
 @pytest.mark.parametrize("dtype", [np.uint8, np.float32])
 def test_in_betweens_are_of_the_shot_of_the_nearer_filmed_frame(device, edges, position, dtype):
@@ -166,7 +166,7 @@ def test_cuts_are_looked_for_in_filmed_frames_alone():
     assert len(source.reads) == len(set(source.reads))
 
 
-@pytest.mark.parametrize("edges", ["hold", "mirror", "shorten"])
+@pytest.mark.parametrize("edges", ["hold", "mirror", "shorten", "slide"])
 def test_what_is_missing_is_what_is_read(device, edges):
     """Once cuts are known: as prefetching has it."""
     source, rng = film(), np.random.default_rng(47)

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from shutter_addon.core.frames import light
@@ -51,6 +51,83 @@ def test_backward():
     assert compositor.window_indices(Options(4), 5, range(10), -1).tolist() == [5, 4, 3, 2]
     assert compositor.window_indices(Options(4, edges="mirror"), 1, range(10), -1).tolist() == [1, 0, 1, 2]
     assert compositor.window_indices(Options(4, position="end"), 5, range(10), -1).tolist() == [8, 7, 6, 5]
+
+
+def exposed(moment, index, direction, shot):
+    """By shutters: how much of each frame they expose."""
+    frames = compositor.window_indices(moment.options, index, shot, direction)
+    return [
+        {f: float(bars[frames == f].sum()) for f in set(frames.tolist()) if bars[frames == f].any()}
+        for bars in moment.bars
+    ]
+
+
+def sliding(bars, **options):
+    return FrameState(Options(np.shape(bars)[1], edges="slide", position="center", **options), np.array(bars, float))
+
+
+LONG, SHARP, LATE = [1, 2, 3, 4, 5], [0, 0, 1, 0, 0], [0, 0, 0, 1, 1]
+
+
+@pytest.mark.parametrize("direction", [1, -1])
+def test_what_slides_keeps_its_length_and_what_lies_in_the_shot_its_place(direction):
+    """In a shot from frame 10 to 19, which the middle one of five frames shows."""
+    moment, shot = sliding([LONG, SHARP, LATE]), range(10, 20)
+    for index in range(12, 18):
+        assert compositor.slid(moment, index, direction, shot) is moment
+    last = compositor.slid(moment, 19 if direction > 0 else 10, direction, shot)
+    there = [
+        {f if direction > 0 else 29 - f: weight for f, weight in each.items()}
+        for each in exposed(last, 19 if direction > 0 else 10, direction, shot)
+    ]
+    assert there == [{15: 1, 16: 2, 17: 3, 18: 4, 19: 5}, {19: 1}, {18: 1, 19: 1}]
+    early = compositor.slid(moment, 11 if direction > 0 else 18, direction, shot)
+    there = [
+        {f if direction > 0 else 29 - f: weight for f, weight in each.items()}
+        for each in exposed(early, 11 if direction > 0 else 18, direction, shot)
+    ]
+    assert there == [{10: 1, 11: 2, 12: 3, 13: 4, 14: 5}, {11: 1}, {12: 1, 13: 1}]
+
+
+def test_what_is_longer_than_the_shot_covers_it_and_holds_its_end():
+    moment, shot = sliding([LONG, SHARP]), range(10, 13)
+    found = exposed(compositor.slid(moment, 12, 1, shot), 12, 1, shot)
+    assert found == [{10: 1, 11: 2, 12: 12}, {12: 1}]
+
+
+def test_the_last_filmed_frame_lasts_as_long_as_others():
+    """So that what is sharp stays so where there are in-between frames."""
+    still = sliding([[0, 0, 0, 0, 1, 1, 1, 1, 0, 0, 0, 0], [1] * 12], step=4)
+    found = exposed(compositor.slid(still, 36, 1, range(37)), 36, 1, range(37))
+    assert found == [{36: 4}, {**dict.fromkeys(range(28, 36), 1), 36: 4}]
+
+
+@settings(max_examples=200, deadline=None)
+@given(
+    st.integers(1, 9).flatmap(
+        lambda window: st.lists(
+            st.lists(st.integers(0, 2), min_size=window, max_size=window).filter(any), min_size=1, max_size=3
+        )
+    ),
+    st.sampled_from(["start", "center", "end"]),
+    st.sampled_from([1, -1]),
+    st.integers(1, 14),
+    st.integers(0, 13),
+)
+def test_whatever_slides(bars, position, direction, count, place):
+    moment = FrameState(Options(len(bars[0]), edges="slide", position=position), np.array(bars, float))
+    shot = range(20, 20 + count)
+    index = 20 + place % count
+    held = FrameState(Options(len(bars[0]), position=position), moment.bars)
+    found = exposed(compositor.slid(moment, index, direction, shot), index, direction, shot)
+    for before, after in zip(exposed(held, index, direction, range(100)), found, strict=True):
+        first, last = min(before), max(before)
+        assert sum(after.values()) == sum(before.values())
+        if last - first >= count:  # it is longer than the shot
+            continue
+        by = min(after) - first
+        assert after == {f + by: weight for f, weight in before.items()}
+        assert by == 0 if first in shot and last in shot else by == max(shot[0] - first, min(shot[-1] - last, 0))
 
 
 @given(

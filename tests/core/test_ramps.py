@@ -95,7 +95,7 @@ def test_which_frame_of_a_file_is_shown():
     assert of_timeline.at(105).index(Opened, 7) == 7
     assert of_timeline.at(105.5).index(Opened, 7) == 7
     assert of_source.at(1) == of_source.at(2)  # what does not change with the timeline is equal
-    timing = StripTiming("S", False, 0, 24.0, 101.0, 121.0, 0, 0, 101, True, 1.0)
+    timing = StripTiming("S", 0, 24.0, 101.0, 121.0, 0, 0, 101, True, 1.0)
     assert FileFrames("f", timing=timing).at(105).index(Opened, 7) == 15  # it plays in reverse
 
 

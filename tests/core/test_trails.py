@@ -126,7 +126,8 @@ def followed(source, frame, direction=1):
     effect = source.effect(SOURCE.width / SOURCE.height)
     index = frame - 1 if direction > 0 else SOURCE.count - frame
     shown = lambda other: index + direction * round(other - frame)  # noqa: E731
-    return following.followed(effect, effect.at(frame), following.Shown(frame, index, direction), SOURCE, shown), index
+    state = compositor.slid(effect.at(frame), index, direction, range(SOURCE.count), whole=True)
+    return following.followed(effect, state, following.Shown(frame, index, direction), SOURCE, shown), index
 
 
 def streak(source, frame):
@@ -157,6 +158,16 @@ def test_beyond_the_clips_ends_all_stands_still(follow, edges):
     before = np.arange(WINDOW) - state.options.before <= 0
     span = state.bars[0] / state.bars[0].max()
     assert (span[before].sum() - 0.5) * SPEEDS[-3] == pytest.approx(10, rel=0.05)
+
+
+@pytest.mark.parametrize("bars", [(1.0,) * WINDOW, (0.0,) * 11 + (1.0, 1.0) + (0.0,) * 11])
+def test_what_slides_is_as_long_at_the_clips_end_and_lies_within(bars):
+    source = accelerating(0.3, bars=bars, edges="slide")
+    assert [streak(source, frame) for frame in (45, 57, 60)] == pytest.approx([30] * 3, rel=0.06)
+    state, index = followed(source, SOURCE.count)
+    assert compositor.reach(state, index)[1] == SOURCE.count - 1
+    held, index = followed(replace(source, edges="hold"), SOURCE.count)
+    assert compositor.reach(held, index)[1] > SOURCE.count + 3
 
 
 def test_for_how_long_a_shutter_is_open_is_told():

@@ -242,7 +242,7 @@ def random_recipe(rng, count: int) -> dict:
         "interpolation": choose(rng, "displacement", "displacement", "value"),
         "light": choose(rng, "linear", "encoded"),
         "exposure": choose(rng, "normalized", "weighted"),
-        "edges": choose(rng, "hold", "mirror", "shorten"),
+        "edges": choose(rng, "hold", "mirror", "shorten", "slide"),
         "aggregate": choose(rng, 1, 1, 2, 4),
         "border": choose(rng, False, True),
         "stop_at_cuts": choose(rng, False, True),

@@ -66,7 +66,7 @@ def check(case: Case, devices: dict, folder: Path) -> dict:
     in the folder."""
     from shutter_addon.compute.renderer import Renderer
     from shutter_addon.compute.request import Request
-    from shutter_addon.core.pixels import following, layering
+    from shutter_addon.core.pixels import compositor, following, layering
     from shutter_addon.core.recipes import recipe_file
     from shutter_addon.media import open_source
     from shutter_addon.media.matte_values import MatteValues
@@ -81,9 +81,9 @@ def check(case: Case, devices: dict, folder: Path) -> dict:
                 raise DifferenceError(f"{told(case)}: another source time")
         shows = showing(recipe, case.frame, index, direction, source.count)
         effect = parsed.effect(source.width / source.height, partial(matte_file, Path(files), source))
-        state = following.followed(
-            effect, effect.at(case.frame), following.Shown(case.frame, index, direction), source, shows
-        )
+        trails = any(shutter.trail for shutter in effect.shutters)
+        state = compositor.slid(effect.at(case.frame), index, direction, range(source.count), whole=trails)
+        state = following.followed(effect, state, following.Shown(case.frame, index, direction), source, shows)
         state = layering.layered(effect, state, following.Shown(case.frame, index, direction), source, shows)
         exact = exact_coefficients(case, source, footage, index)
         layers = exact_layers(case, source, footage, index, direction)

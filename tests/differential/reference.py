@@ -420,7 +420,7 @@ def showing(recipe, frame, index, direction, count):
 def shown_times(recipe, frame, index, direction, count, more=0):
     """When the source frames that a window may show, and `more` beside it, are shown, the nearest time to a timeline
     frame: {source: time}."""
-    where, reach = positions(recipe, index, direction), 4 * recipe["window"] + more
+    where, reach = positions(recipe, index, direction, count), 4 * recipe["window"] + more
     beyond = more + (recipe["window"] if option(recipe, "edges") == "mirror" else 0)
     wanted = range(max(min(*where, index) - beyond, 0), min(max(*where, index) + beyond, count - 1) + 1)
     shows, found = showing(recipe, frame, index, direction, count), [(0.0, 0.0, index)]
@@ -472,7 +472,7 @@ def motions(recipe, frame, index, direction, count, aspect):
         return None
     times = shown_times(recipe, frame, index, direction, count)
     edges = "mirror" if option(recipe, "edges") == "mirror" else "hold"
-    seen = [at_edges(edges, place, count) for place in positions(recipe, index, direction)]
+    seen = [at_edges(edges, place, count) for place in positions(recipe, index, direction, count)]
 
     def of(shutter):
         if "follow" not in shutter:
@@ -569,11 +569,36 @@ def cubic(t):
 # Pictures
 
 
-def positions(recipe, index, direction):
+def positions(recipe, index, direction, count):
     """Which source frames the window's frames are, were the clip endless."""
     length = recipe["window"]
     before = {"start": 0, "center": (length - 1) // 2, "end": length - 1}[option(recipe, "position")]
-    return [index + direction * (k - before) for k in range(length)]
+    places = [index + direction * (k - before) for k in range(length)]
+    by = into(places, count) if option(recipe, "edges") == "slide" else 0
+    return [place + by for place in places]
+
+
+def into(places, count):
+    """By how many frames they move until all lie in the clip, or all of the clip among them."""
+    low, high = min(places), max(places)
+    inside = -low if low < 0 else min(count - 1 - high, 0)
+    around = -low if low > 0 else max(count - 1 - high, 0)
+    return inside if high - low < count else around
+
+
+def slid(recipe, bars, index, direction, count):
+    """Each shutter's bars, moved into the clip by itself, in the window that has moved as well."""
+    if option(recipe, "edges") != "slide":
+        return bars
+    length, places = recipe["window"], positions(recipe | {"edges": "hold"}, index, direction, count)
+    there = positions(recipe, index, direction, count)
+    moved = np.zeros_like(bars)
+    for own, found in zip(bars, moved, strict=True):
+        first, *_, last = [k for k in range(length) if own[k] > 0] * 2
+        by = into([places[first], places[last]], count)
+        for k in range(first, last + 1):
+            found[there.index(places[k] + by)] = own[k]
+    return moved
 
 
 def at_edges(edges, position, count):
@@ -658,7 +683,7 @@ def layer_mattes(recipe, frame, footage, index, direction, mattes, solve=None):
 
 def window_frames(recipe, index, direction, count):
     """The source frames that the window shows."""
-    seen = {at_edges(option(recipe, "edges"), place, count) for place in positions(recipe, index, direction)}
+    seen = {at_edges(option(recipe, "edges"), place, count) for place in positions(recipe, index, direction, count)}
     return seen - {None}
 
 
@@ -755,7 +780,8 @@ def exposed(recipe, frame, footage, index, direction, given, weights=None):
     blocks, aspect = mix.shape[1:], width / height
     mix = mix.reshape(len(mix), -1)
     bars = np.array([bars_at(shutter, frame, option(recipe, "interpolation")) for shutter in recipe["shutters"]])
-    where, moves = positions(recipe, index, direction), motions(recipe, frame, index, direction, count, aspect)
+    where, moves = positions(recipe, index, direction, count), motions(recipe, frame, index, direction, count, aspect)
+    bars = slid(recipe, bars, index, direction, count)
     if moves is not None:
         shown_time = np.abs(np.array(where) - index).argmin() + 0.5
         bars = np.array(
@@ -766,7 +792,15 @@ def exposed(recipe, frame, footage, index, direction, given, weights=None):
         )
     exposures = bars.sum(axis=1)
     if any("combine" in shutter for shutter in recipe["shutters"]):
-        return combined(recipe, frame, footage, [at_edges(option(recipe, "edges"), w, count) for w in where], mix, bars)
+        return combined(
+            recipe,
+            frame,
+            footage,
+            [at_edges(option(recipe, "edges"), w, count) for w in where],
+            mix,
+            bars,
+            where.index(index),
+        )
     if option(recipe, "interpolation") == "displacement":
         parts = displaced(bars, mix)[None]
     else:  # a picture of each shutter, mixed
@@ -809,12 +843,11 @@ def exposed(recipe, frame, footage, index, direction, given, weights=None):
     return np.concatenate([colour * of_pixels(gain)[..., None], alpha], axis=-1), left, of_pixels(doubtful)
 
 
-def combined(recipe, frame, footage, frames, mix, bars):
+def combined(recipe, frame, footage, frames, mix, bars, before):
     """As `exposed`, of shutters that combine frames in several ways and follow nothing. mix: (N, n) of the blocks"""
     _, height, width, _ = footage.samples.shape
     block, exposures = option(recipe, "aggregate"), bars.sum(axis=1)
     shape = -(-height // block), -(-width // block)
-    before = {"start": 0, "center": (len(frames) - 1) // 2, "end": len(frames) - 1}[option(recipe, "position")]
 
     def of_pixels(values):
         return values.reshape(shape).repeat(block, 0).repeat(block, 1)[:height, :width]

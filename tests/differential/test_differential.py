@@ -139,6 +139,7 @@ FAULTS = {
     "the mean for the median": (combined, "weighted_median", lambda values, weights: mean(values, weights)),
     "thresholds that let all pass": (combined, "passes", lambda combine, luminance: np.ones_like(luminance)),
     "soft scribbles": (layering, "matte_of", lambda values: values),
+    "nothing slides": (compositor, "slid", lambda state, *_, **__: state),
     "not normalised": (compositor, "source_frames", lambda options, places, shot: places.clip(0, shot.stop - 1)),
 }
 eased, source_frames, solve = keyframes.eased, compositor.source_frames, cpu.Solver.solve

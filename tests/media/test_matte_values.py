@@ -55,7 +55,7 @@ def test_the_matte_of_a_filmed_frame_holds_until_the_next(index, step, offset, f
 
 
 def test_what_a_strip_of_the_edit_shows():
-    timing = StripTiming("S", False, 0, 24.0, 11.0, 16.0, 0, 0, 11, True, 1.0)
+    timing = StripTiming("S", 0, 24.0, 11.0, 16.0, 0, 0, 11, True, 1.0)
     content = FileFrames(File("a"), timing=timing)
     for frame, expected in ((11, 4), (13, 2), (2, 4), (40, 0)):
         assert np.unique(shown(MatteValues(WIDTH, HEIGHT), content.at(frame))[0]) == pytest.approx(expected / 10)

@@ -38,6 +38,7 @@ EDGES = (
     ("HOLD", "Hold", "Repeat the first or last frame beyond the clip's ends"),
     ("MIRROR", "Mirror", "Play the clip backward beyond its ends"),
     ("SHORTEN", "Shorten", "Leave out what lies beyond the clip's ends"),
+    ("SLIDE", "Slide", "Move an exposure into the clip, by as many frames as it reaches beyond its ends"),
 )
 
 

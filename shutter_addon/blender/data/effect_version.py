@@ -29,10 +29,11 @@ _FRAMES = {
 }
 # Fields that say nothing of the pictures: names, where a strip was cut, when a file was written.
 _LEFT_OUT = {
-    "StripTiming": {"name", "left_handle"},
+    "StripTiming": {"name", "left_handle", "is_known"},
     "SourceSpec": {"key"},
     "MatteFile": {"stamp"},
     "CarriedFile": {"folder"},
+    "Options": {"slid"},
     "Shutter": {"name", "color"},
     "Region": {"name"},
     "MatteRegion": {"name"},

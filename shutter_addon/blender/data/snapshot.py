@@ -26,12 +26,11 @@ from .sampled import Frames
 from .strip_timing import timing_of
 
 OPTIONS = ("position", "interpolation", "light", "exposure", "edges")
-# Sentences of core/model/effect.py and core/frames/retiming.py, which are looked up where they are passed on.
+# Sentences of core/model/effect.py, which are looked up where they are passed on.
 _CORE = (
     n_('shutter "{name}" at frame {frame}: {fault}'),
     n_('region "{name}": a point of its strokes is nowhere near the picture'),
     n_('region "{name}": more than {most} points with those before it'),
-    n_('strip "{strip}" is not as long as its clip: retimed clips are not supported'),
 )
 
 

@@ -1,11 +1,10 @@
 """How a source strip lies on the timeline, with its retiming keys, of which Blender's Python API gives a part."""
 
-from bpy.app.translations import pgettext_rpt as rpt_
+import numpy as np
 
 from ...core.frames.retiming import RetimingKey, StripTiming, are_retiming_keys
-from ...core.messages import EffectError
 from . import source_media
-from .struct_dna import LayoutError, read, record
+from .struct_dna import LayoutError, memory, read, record, text
 
 _FIELDS = (
     *("name", "content_start", "content_end", "content_trim_start", "content_trim_end", "left_handle"),
@@ -14,33 +13,34 @@ _FIELDS = (
 
 
 def timing_of(strip) -> StripTiming:
-    """The timing of a source strip, as plain data. EffectError: its retiming keys cannot be read."""
-    render, is_clip = strip.id_data.render, strip.type == "MOVIECLIP"
+    """The timing of a source strip, as plain data."""
+    render = strip.id_data.render
+    keys = retiming_keys(strip)
+    is_known = keys is not None
+    if keys is None:
+        even = RetimingKey(0.0, 0, 0.0), RetimingKey(strip.content_end - strip.content_start, 0, 1.0)
+        keys = even if len(getattr(strip, "retiming_keys", ())) > 1 else ()
     return StripTiming(
-        is_clip=is_clip,
-        first=source_media.first_frame(strip) if is_clip else 0,
+        first=source_media.first_frame(strip) if strip.type == "MOVIECLIP" else 0,
         scene_fps=render.fps / render.fps_base,
-        keys=tuple(_retiming_keys(strip)),
+        keys=keys,
+        is_known=is_known,
         **{name: getattr(strip, name) for name in _FIELDS},
     )
 
 
-def _retiming_keys(strip) -> list[RetimingKey]:
-    """The strip's retiming keys from Blender's memory: Python gets their timeline frames, but not what they show. Of a
-    clip strip it gets none at all. EffectError: not in this Blender."""
-    shown = list(getattr(strip, "retiming_keys", ()))
-    indices = [float(key.timeline_frame - strip.content_start) for key in shown]
+def retiming_keys(strip) -> tuple[RetimingKey, ...] | None:
+    """The strip's retiming keys from Blender's memory. Python gets their frames alone, in Blender 5.2 as if the strip
+    began with the first one of the edit, and of a clip strip nothing at all. None: they cannot be read."""
     try:
+        fields = "char name[64]", "SeqRetimingHandle *retiming_handles", "int retiming_handle_num"
+        held = read(record("Sequence", *fields), strip.as_pointer())
         kind = record("SeqRetimingHandle", "double strip_frame_index", "int flag", "float retiming_factor")
     except LayoutError:
-        if len(shown) <= 2:  # the first and the last, which show the content's start and its end
-            return [RetimingKey(index, 0, factor) for index, factor in zip(indices, (0.0, 1.0), strict=False)]
-    else:
-        keys = [RetimingKey(*read(kind, key.as_pointer()).tolist()) for key in shown]
-        if are_retiming_keys(keys, indices):
-            return keys
-    sentence = rpt_(
-        'strip "{strip}": its retiming keys cannot be read in this version of Blender; keys of Source Time can take'
-        " their place"
-    )
-    raise EffectError(sentence.format(strip=strip.name))
+        return None
+    if text(held["name"])[2:] != strip.name.encode():  # behind the letters SQ
+        return None
+    first, count = int(held["retiming_handles"]), int(held["retiming_handle_num"])
+    stored = np.frombuffer(memory(first, count * kind.itemsize), kind) if count else ()
+    keys = tuple(RetimingKey(*key.tolist()) for key in stored)
+    return keys if are_retiming_keys(keys) else None

@@ -31,8 +31,9 @@ def start(effect) -> None:
     """What a new effect begins with: a long shutter everywhere, and a sharp one to scribble with.
 
     With the border, the first scribble is sharp around itself; without, it would be the only one, and hold everywhere.
+    Streaks keep their length up to the clip's ends. A recipe says so itself, and older files have another default.
     """
-    effect.border = True
+    effect.border, effect.edges = True, "SLIDE"
     add_shutter(effect, data_("Long"))
     add_shutter(effect, data_("Sharp"), "STILL")
 

@@ -208,7 +208,7 @@ def _show_picture(context, quad: Quad, shown: Shown, wanted: Drawing, say) -> No
         _show_strokes(context, quad, shown, wanted)
     previews.was_drawn()
     _tell_carrying(say)
-    for sentence in pictures.shortages(renderer, request):
+    for sentence in pictures.shortages(renderer, wanted.decision.snapshot, request):
         told.shown(sentence)
         say(sentence)
     # What it measures would take from what runs.

@@ -21,7 +21,7 @@ from ...core.model.mattes import FileFrame
 from ...media import MediaError
 from ...media.carried_mattes import CarriedMattes
 from ...media.files import check_file
-from ..data import effect_version, requirements, selection, snapshot, source_media, strips
+from ..data import effect_version, requirements, selection, snapshot, source_media, strip_timing, strips
 from ..rendering import effect_source, job_snapshots, pictures
 from ..rendering.render_context import RenderContext
 from ..rendering.render_settings import RenderSettings
@@ -115,7 +115,7 @@ def _effect(session: RenderSession, shown: tuple, compositor, find_cuts: bool) -
         _look_at_frames(check, renderer, requests, find_cuts)
         _look_at_mattes(check, source, requests)
         check.needs = _needs(source, requests, compositor)
-        check.notes += _notes(check, requests, renderer.source)
+        check.notes += _notes(check, taken, requests, renderer.source)
     return check
 
 
@@ -150,7 +150,9 @@ def _look_at_footage(check: EffectCheck, effect, strip) -> bool:
     if saved != check.size:
         words = "{}×{}, but was {}×{} when the edit was saved".format(*check.size, *saved)
         check.faults.append(f"{medium.path.name}: is {words}")
-    if medium.count < source.content_duration:
+    timing = strip_timing.timing_of(source)
+    rate = min(float(medium.fps or math.inf) / timing.scene_fps, 1.0)  # the strip may keep the movie's speed
+    if not timing.keys and medium.count < int(source.content_duration * rate):
         words = f"{medium.count} frames, fewer than the {source.content_duration} of strip"
         check.faults.append(f'{medium.path.name}: has {words} "{source.name}"')
     return True
@@ -225,8 +227,8 @@ def _look_at_mattes(check: EffectCheck, source, requests: dict[float, Request]) 
             check.faults.append(str(error))
 
 
-def _notes(check: EffectCheck, requests: dict[float, Request], source) -> list[str]:
-    notes = list({sentence: None for request in requests.values() for sentence in pictures.unread(request)})
+def _notes(check: EffectCheck, taken: snapshot.Snapshot, requests: dict[float, Request], source) -> list[str]:
+    notes = list({sentence: None for request in requests.values() for sentence in pictures.unread(taken, request)})
     if source.by_blender:
         notes.append(pictures.SLOW_DECODING)
     if lacking := sum(check.mattes.values()):

@@ -5,10 +5,8 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from bpy.app.translations import pgettext_rpt as rpt_
-
 from ...core.frames import retiming
-from ...core.messages import EffectError, translated
+from ...core.messages import EffectError
 from ...devices.device import NoDeviceError
 from ...media import MediaError
 from ...media.cuts import ShotSource
@@ -79,8 +77,7 @@ def open_source(snapshot: Snapshot) -> ShotSource:
 
 
 def source_position(snapshot: Snapshot, frame: float, source: ShotSource) -> float:
-    """Where in an effect's source a timeline frame is, in frames, in-between ones counted. EffectError: as
-    source_index."""
+    """Where in an effect's source a timeline frame is, in frames, in-between ones counted."""
     if snapshot.effect.time is not None:
         return (snapshot.effect.time.at(frame)[0] - 1) * source.step
     assert snapshot.timing is not None  # of a strip without source time
@@ -96,10 +93,9 @@ def source_ends(snapshot: Snapshot, source: ShotSource) -> tuple[float, float]:
 
 def source_index(snapshot: Snapshot, frame: float, source: ShotSource) -> tuple[int, bool]:
     """Which frame of an effect's source is shown at a timeline frame, in-between frames counted, and whether the source
-    runs backward there. EffectError: it cannot be known."""
+    runs backward there."""
     if snapshot.effect.time is not None:
         time, backward = snapshot.effect.time.at(frame)
         return retiming.nearest(time - 1, source.step, source.count), backward
     assert snapshot.timing is not None  # of a strip without source time
-    with translated(rpt_):
-        return retiming.source_frame(snapshot.timing, frame, source), snapshot.timing.use_reverse_frames
+    return retiming.source_frame(snapshot.timing, frame, source), snapshot.timing.use_reverse_frames

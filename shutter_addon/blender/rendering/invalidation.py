@@ -15,6 +15,7 @@ from ...core.messages import EffectError
 from ...media import MediaError
 from ..data import fcurves, geometry, mask_reading, matte_content, matte_strips, snapshot, source_media, strips
 from ..data.snapshot import Snapshot, SourceFiles
+from ..data.strip_timing import retiming_keys
 from . import render_job, render_settings
 
 _signatures: dict[int, int] = {}  # by effect scene
@@ -197,7 +198,7 @@ def _mask(mask: Any) -> Iterator[Hashable]:
 
 def _timing(source: Any) -> Iterator[Hashable]:
     yield tuple(getattr(source, name) for name in _TIMING)
-    yield tuple(key.timeline_frame for key in getattr(source, "retiming_keys", ()))
+    yield retiming_keys(source)
 
 
 def _source(effect: Any, source: Any, looked: dict) -> Iterator[Hashable]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from itertools import chain
 from pathlib import Path
 
@@ -41,7 +41,7 @@ def picture(context: RenderContext, snapshot: Snapshot, frame: float, detail: De
     if renderer.source.by_blender:
         _say_once(rpt_(SLOW_DECODING), context.say)
     made = session.picture(request, context.stopped)
-    for sentence in shortages(renderer, request):
+    for sentence in shortages(renderer, snapshot, request):
         _say_once(sentence, context.say)
     return made
 
@@ -64,24 +64,27 @@ def _say_once(sentence: str, say: Callable[[str], None]) -> None:
         say(sentence)
 
 
-def shortages(renderer: Renderer, request: Request) -> list[str]:
-    """Sentences about what pictures as requested lack: masks as at their frame; and, where the GPU has
-    no room, speed."""
-    return [*unread(request), *_slow(renderer, request)]
+def shortages(renderer: Renderer, snapshot: Snapshot, request: Request) -> list[str]:
+    """Sentences about what pictures as requested lack: see `unread`; and, where the GPU has no room, speed."""
+    return [*unread(snapshot, request), *_slow(renderer, request)]
 
 
-def unread(request: Request) -> list[str]:
-    """A sentence where the shapes of masks cannot be read at the frame of the picture."""
+def unread(snapshot: Snapshot, request: Request) -> Iterator[str]:
+    """Sentences about what cannot be read of Blender for a picture: how strips are retimed, the shapes of masks."""
     layers = request.state.layers.mattes if request.state.layers else ()
-    mattes = [matte for matte in chain(request.state.mattes, *layers) if matte is not None]
-    if not any(getattr(matte.content, "is_current", False) for matte in mattes):
-        return []
-    return [
-        rpt_(
+    contents = [matte.content for matte in chain(request.state.mattes, *layers) if matte is not None]
+    for timing in (snapshot.timing, *(getattr(content, "timing", None) for content in contents)):
+        if timing is not None and timing.keys and not timing.is_known:
+            sentence = rpt_(
+                'strip "{strip}": its retiming keys cannot be read in this version of Blender, so it is shown at an'
+                " even speed; keys of Source Time can take their place"
+            )
+            yield sentence.format(strip=timing.name)
+    if any(getattr(content, "is_current", False) for content in contents):
+        yield rpt_(
             "The shape keys of masks cannot be read in this version of Blender: mattes may have them as at another"
             " frame"
         )
-    ]
 
 
 def _slow(renderer: Renderer, request: Request) -> list[str]:

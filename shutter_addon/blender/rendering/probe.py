@@ -41,7 +41,7 @@ def at(renderer: Renderer, request: Request, point: Sequence[float]) -> Probed |
     holes = renderer.holes if request.state.layers else None
     return Probed(
         coefficients=coefficients,
-        bars=compositor.mixed_shutter(request.state, coefficients),
+        bars=compositor.mixed_shutter(renderer.slid(request, known=True).state, coefficients),
         layers=tuple(float(matte[row, column]) for matte in renderer.layer_mattes(request)),
         hole=plates.OPEN if holes is None else int(holes[row, column]),
     )

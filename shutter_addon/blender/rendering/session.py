@@ -16,7 +16,7 @@ from ...compute.request import Request
 from ...core import threads
 from ...core.messages import translated
 from ...core.model.frame_state import FrameState
-from ...core.pixels import following, layering, timeline_exposure
+from ...core.pixels import compositor, following, layering, timeline_exposure
 from ...core.pixels.matte_grid import block_means
 from ...core.stopping import never
 from ...devices.device import NoDeviceError
@@ -112,6 +112,8 @@ class RenderSession:
 
             ends = source_ends(snapshot, source)
             state = timeline_exposure.exposed(snapshot.effect, state, shown, position, ends)
+            trails = any(shutter.trail for shutter in snapshot.effect.shutters)
+            state = compositor.slid(state, index, direction, range(source.count), whole=trails)
             state = following.followed(snapshot.effect, state, shown, source, shown_at)
             state = layering.layered(snapshot.effect, state, shown, source, shown_at)
         request = Request(

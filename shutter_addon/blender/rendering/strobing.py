@@ -123,7 +123,8 @@ def smooth(height: int) -> float:
 def _ways(renderer: Renderer, request: Request) -> dict[int, list[tuple[Similarity, Similarity]]]:
     """By pairs of filmed frames, each by its first, over which a shutter stays open that is seen: where the points of
     the shown picture lie in the two, in heights of the picture, for each of these shutters."""
-    state, source = request.state, renderer.source
+    request, source = renderer.slid(request, known=True), renderer.source
+    state = request.state
     options, count = state.options, state.options.step
     ways: dict[int, list[tuple[Similarity, Similarity]]] = {}
     shot = renderer.shot(request, known=True)
@@ -199,8 +200,10 @@ def pairs(snapshot: Snapshot, medium: FrameSource, settings: inbetween_settings.
         places = compositor.window_positions(options, index, -1 if backward else 1)
         if options.edges == "mirror":  # at a cut, on the other side of it
             places = np.arange(places.min() - options.window, places.max() + options.window + 1)
-        elif options.edges == "hold" and not has_trails:
+        elif options.edges != "shorten" and not has_trails:
             places = places[slice(*shutters.open_span(bars))]
+        if options.edges == "slide":  # at an end, or a cut that is not known yet
+            places = np.append(places, np.arange(index - len(places) + 1, index + len(places)))
         shown = compositor.source_frames(options, np.append(places, index), range(source.count))
         needed.update((shown[(shown >= 0) & (shown % factor > 0)] // factor).tolist())
     return sorted(needed)

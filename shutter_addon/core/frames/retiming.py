@@ -10,12 +10,8 @@ from typing import Protocol
 
 import numpy as np
 
-from ..messages import EffectError
-
 # eSeqRetimingKeyFlag: the key starts a smooth transition between two speeds.
 _TRANSITION_IN = 1 << 0
-# Of factors, which are float32.
-_CLOSE = 1e-4
 
 
 @dataclass(frozen=True)
@@ -31,12 +27,12 @@ class RetimingKey:
 class StripTiming:
     """How a source strip lies on the timeline; the fields have Blender's names, and its frames of the timeline.
 
-    is_clip: whether it is a movie clip strip, whose first frame of the medium is `first`
+    first: the frame of the medium that is the content's first
     scene_fps: frames per second of the edit
-    keys: the retiming keys, as Blender has them (are_retiming_keys)"""
+    keys: the retiming keys, as Blender has them (are_retiming_keys)
+    is_known: whether these could be read; otherwise it is taken to play evenly"""
 
     name: str
-    is_clip: bool
     first: int
     scene_fps: float
     content_start: float
@@ -47,6 +43,7 @@ class StripTiming:
     use_reverse_frames: bool
     strobe: float
     keys: tuple[RetimingKey, ...] = ()
+    is_known: bool = True
 
 
 class Medium(Protocol):
@@ -62,14 +59,9 @@ def source_frame(strip: StripTiming, frame: float, medium: Medium) -> int:
     """Frame of the medium that a source strip shows at a timeline frame.
 
     Trims, cuts, playback rate, retiming keys, reversed frames and strobe as Blender's sequencer applies them. Where
-    there are frames between filmed ones, it is the nearest of all, which Blender knows nothing of. EffectError: how the
-    strip is retimed cannot be known.
+    there are frames between filmed ones, it is the nearest of all, which Blender knows nothing of.
     """
     length, rate = _content(strip, medium)
-    if strip.is_clip and abs(length / rate - (strip.content_end - strip.content_start)) > 1:
-        raise EffectError(
-            'strip "{strip}" is not as long as its clip: retimed clips are not supported', strip=strip.name
-        )
 
     def position(time: float) -> np.float32:
         return _position(strip, rate, length, time)
@@ -77,8 +69,6 @@ def source_frame(strip: StripTiming, frame: float, medium: Medium) -> int:
     first = strip.content_trim_start + strip.first
     if medium.step > 1:
         return nearest(first + float(position(frame)), medium.step, medium.count)
-    if strip.is_clip:  # Blender takes the whole part
-        return first + int(position(frame))
     # Blender rounds a position to the nearest frame, but caches the result by the position's whole part. So a slow
     # strip that plays forward shows, for all positions with one whole part, the frame nearest to the first of them.
     whole = int(position(frame))
@@ -90,7 +80,7 @@ def source_frame(strip: StripTiming, frame: float, medium: Medium) -> int:
 
 def source_position(strip: StripTiming, frame: float, medium: Medium) -> float:
     """Where in the medium a strip is at a timeline frame, in frames, in-between ones counted; source_frame has one of
-    those that are beside it. EffectError: how the strip is retimed cannot be known."""
+    those that are beside it."""
     length, rate = _content(strip, medium)
     position = float(_position(replace(strip, strobe=1.0), rate, length, frame))
     return (strip.content_trim_start + strip.first + position) * medium.step
@@ -137,21 +127,10 @@ def _playback_rate(strip: StripTiming, length: int, rate: float) -> float:
     return rate if abs(natural / rate - shown) < abs(natural - shown) or int(natural / rate) == shown else 1.0
 
 
-def are_retiming_keys(keys: list[RetimingKey], indices: list[float]) -> bool:
-    """Whether keys are as Blender has them: from the first frame on, which shows the content's start, to the last one,
-    which shows its end, in order, and where Python sees them. indices: whole frames behind the content's start."""
-    if not keys and not indices:
-        return True
-    factors = [key.factor for key in keys]
-    return (
-        len(keys) == len(indices)
-        and all(abs(key.index - index) <= 1 for key, index in zip(keys, indices, strict=True))
-        and all(first.index <= second.index for first, second in pairwise(keys))
-        and all(-_CLOSE <= factor <= 1 + _CLOSE for factor in factors)
-        and abs(keys[0].index) <= _CLOSE
-        and abs(factors[0]) <= _CLOSE
-        and (len(keys) == 1 or abs(factors[-1] - 1) <= _CLOSE)
-    )
+def are_retiming_keys(keys: Sequence[RetimingKey]) -> bool:
+    """Whether keys can be Blender's: numbers, in the order of their frames."""
+    numbers = [number for key in keys for number in (key.index, key.factor)]
+    return all(map(math.isfinite, numbers)) and all(a.index <= b.index for a, b in pairwise(keys))
 
 
 def retimed(keys: Sequence[RetimingKey], position: float | np.float32) -> np.float32:

@@ -17,7 +17,7 @@ from .mattes import Matte
 Interpolation = Literal["displacement", "value"]
 Light = Literal["linear", "encoded"]
 Exposure = Literal["normalized", "weighted"]
-Edges = Literal["hold", "mirror", "shorten"]
+Edges = Literal["hold", "mirror", "shorten", "slide"]
 Position = Literal["start", "center", "end"]
 
 
@@ -30,6 +30,7 @@ class Options:
     plate_reach: how many frames before and after the shown one are looked through for what lies behind layers
     decontaminate: whether layers, and what lies behind them, have their own colours in the mixed pixels at their edges
     step: frames for each filmed one: 1, or the factor of in-between frames
+    slid: how many frames later the window lies than its position says (core.pixels.compositor.slid)
     """
 
     window: int
@@ -45,13 +46,14 @@ class Options:
     plate_reach: int = 48
     decontaminate: bool = True
     step: int = 1
+    slid: int = 0
 
     @property
     def before(self) -> int:
         """How many frames of the window lie before the shown filmed frame. That one is `step` frames long."""
         filmed = -(-self.window // self.step)
         center, end = (filmed - 1) // 2 * self.step, max(self.window - self.step, 0)
-        return {"start": 0, "center": center, "end": end}[self.position]
+        return {"start": 0, "center": center, "end": end}[self.position] - self.slid
 
     @property
     def reach(self) -> int:

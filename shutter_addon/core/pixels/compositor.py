@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -16,6 +17,8 @@ from . import combined
 # By how much of a frame the window's earlier ones are preferred, where the nearest frame is shown: of two that are as
 # near, rounding must not choose, for devices round differently.
 CLOSE = 1e-3
+# Of an exposure: rounding may leave as much in a bar that is closed.
+_CLOSED = 1e-9
 
 
 def window_positions(options: Options, index: int, direction: int = 1) -> np.ndarray:
@@ -39,11 +42,36 @@ def origin(options: Options, index: int, direction: int = 1) -> int:
     return (index if direction > 0 else index + options.step - 1) - direction * options.before
 
 
+def slid(state: FrameState, index: int, direction: int, shot: range, *, whole: bool = False) -> FrameState:
+    """The state whose edges "slide", with the bars of shutters that reach beyond the ends of `shot` moved back into it,
+    each shutter's by no more frames than it has to; one that is longer than the shot covers it, and goes beyond.
+
+    whole: the window moves even if no bars do, as trails may become as long as it is. Else it moves with them, as it
+    has no room for all otherwise"""
+    options = state.options
+    first, last_filmed = origin(options, index, direction), (shot.stop - 1) // options.step * options.step
+    ends = shot.start, last_filmed + options.step - 1  # a filmed frame lasts until the next one
+    low, high = sorted(direction * (end - first) for end in ends)
+
+    def way(start: int, stop: int) -> int:
+        return sorted((0, low - start, high + 1 - stop))[1]
+
+    spans = [shutters.open_span(bars > _CLOSED * bars.sum()) for bars in state.bars]
+    if options.edges != "slide" or not (whole or any(way(*span) for span in spans)):
+        return state
+    moved, by = np.zeros_like(state.bars), way(0, options.window)
+    for new, bars, (start, stop) in zip(moved, state.bars, spans, strict=True):
+        place = start + way(start, stop) - by
+        new[place : place + stop - start] = bars[start:stop]
+    return replace(state, bars=moved, options=replace(options, slid=options.slid + by))
+
+
 def source_frames(options: Options, positions: np.ndarray, shot: range) -> np.ndarray:
     """The frames that are seen at `positions` by a window that shows those of `shot` alone; −1: none.
 
     shot: range(count) for a whole clip, or the frames between two of its cuts.
-    Past its ends "hold" repeats the last frame, "mirror" plays back from it without showing it twice.
+    Past its ends "hold" repeats the last frame, as "slide" does where bars are not moved (`slid`); "mirror" plays back
+    from it without showing it twice.
     "shorten" leaves frames out, but keeps the nearest when all lie outside.
     """
     first, count = shot.start, len(shot)

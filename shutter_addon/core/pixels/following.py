@@ -133,6 +133,8 @@ def _with_trails(
 def seen(options: Options, index: int, direction: int, count: int) -> range:
     """The source frames that a window may show, wherever its shot ends."""
     positions = compositor.window_positions(options, index, direction)
+    if options.edges == "slide" and options.stop_at_cuts:  # a cut may lie on either side
+        positions = index + np.array([-1, 1]) * (options.window + options.step)
     beyond = options.window if options.edges == "mirror" else 0
     low, high = min(positions.min(), index) - beyond, max(positions.max(), index) + beyond
     return range(max(int(low), 0), min(int(high), count - 1) + 1)

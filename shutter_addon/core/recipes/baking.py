@@ -69,7 +69,7 @@ def baked(
         time=_time(effect.time, shown) if effect.time else [],
         camera=_camera(effect.camera, shown),
         camera_influence=_number(effect.camera.influence, shown),
-        **{name: value for name, value in asdict(options).items() if name not in ("step", "edge_aware")},
+        **{name: value for name, value in asdict(options).items() if name not in ("step", "slid", "edge_aware")},
     )
     return recipe_file.parse(recipe_file.dump(sampled))
 

@@ -338,7 +338,7 @@ class Recipe:
     @property
     def options(self) -> Options:
         """The options that have no keys."""
-        names = Options.__dataclass_fields__.keys() - {"step", "edge_aware"}
+        names = Options.__dataclass_fields__.keys() - {"step", "slid", "edge_aware"}
         return Options(**{name: getattr(self, name) for name in names}, step=self.inbetween)
 
     def effect(self, aspect: float, files: MatteFiles = _no_file) -> effect.Effect:

@@ -180,14 +180,10 @@ MESSAGES = {
     " wie bei einem anderen Bild",
     (
         "*",
-        'strip "{strip}": its retiming keys cannot be read in this version of Blender; keys of Source Time can take'
-        " their place",
-    ): "Streifen „{strip}“: seine Retiming-Schlüssel sind in dieser Version von Blender nicht lesbar; Schlüssel der"
-    " Quellzeit können an ihre Stelle treten",
-    (
-        "*",
-        'strip "{strip}" is not as long as its clip: retimed clips are not supported',
-    ): "Streifen „{strip}“ ist nicht so lang wie sein Clip: Clips mit geänderter Zeit werden nicht unterstützt",
+        'strip "{strip}": its retiming keys cannot be read in this version of Blender, so it is shown at an even speed;'
+        " keys of Source Time can take their place",
+    ): "Streifen „{strip}“: seine Retiming-Schlüssel sind in dieser Version von Blender nicht lesbar, darum läuft er"
+    " gleichmäßig; Schlüssel der Quellzeit können an ihre Stelle treten",
     ("*", 'strip "{strip}" has no files'): "Streifen „{strip}“ hat keine Dateien",
     ("*", 'strip "{strip}" has no clip'): "Streifen „{strip}“ hat keinen Clip",
     (
@@ -882,6 +878,11 @@ MESSAGES = {
     ("*", "Play the clip backward beyond its ends"): "Den Clip jenseits seiner Enden rückwärts abspielen",
     ("Virtual Shutter", "Shorten"): "Kürzen",
     ("*", "Leave out what lies beyond the clip's ends"): "Weglassen, was jenseits der Enden des Clips liegt",
+    ("Virtual Shutter", "Slide"): "Verschieben",
+    (
+        "*",
+        "Move an exposure into the clip, by as many frames as it reaches beyond its ends",
+    ): "Eine Belichtung in den Clip schieben, um so viele Bilder, wie sie über seine Enden hinausreicht",
     ("*", "Matte Resolution"): "Mattenauflösung",
     (
         "*",
