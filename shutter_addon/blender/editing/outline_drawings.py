@@ -103,6 +103,13 @@ def picture_now(scene, effect, strip) -> np.ndarray:
         return flow.displayed(samples, source.transfer, source.alpha)
 
 
+def nearest(effect, index: int, frame: int) -> int:
+    """The timeline frame of a region's drawing that is nearest to a frame; that itself, where there is none."""
+    layer = layer_of(effect, effect.regions[index])
+    drawn = [drawing.frame_number for drawing in layer.frames] if layer else []
+    return min(drawn, key=lambda each: abs(each - frame), default=frame)
+
+
 def outline_it(scene, effect, strip, index: int) -> bool:
     """Makes a region the outline of the subject that its strokes run over, or are drawn around, at the current frame;
     what was drawn at other frames of an outline stays. Whether there is one. EffectError, MediaError: there are no

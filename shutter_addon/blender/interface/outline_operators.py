@@ -168,8 +168,16 @@ class SHUTTER_OT_outline_it(OfStrokes, Operator):
     bl_label = "Outline It"
     only_seen = True
 
+    frame: IntProperty(
+        name="Frame",
+        description="Timeline frame of the strokes; without one, the current frame",
+        options={"SKIP_SAVE"},
+    )
+
     def change(self, context, effect):
         scene, _effect, strip = selection.active(context)
+        if self.properties.is_property_set("frame"):
+            scene.frame_set(self.frame)
         if not outline_drawings.outline_it(scene, effect, strip, effect.active_region):
             report_warning(self, rpt_("No subject is told from what is around it"))
             return {"CANCELLED"}

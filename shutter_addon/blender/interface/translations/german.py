@@ -1130,8 +1130,22 @@ MESSAGES = {
     ("*", "Tracking: {done} of {total} frames, Esc to stop"): "Verfolgt: {done} von {total} Bildern, Esc hält an",
     (
         "*",
-        "Frames {first} to {last} are tracked, {unsure} of them unsure",
-    ): "Bilder {first} bis {last} sind verfolgt, {unsure} davon unsicher",
+        "Frames {first} to {last} are tracked",
+    ): "Bilder {first} bis {last} sind verfolgt",
+    (
+        "*",
+        "Track lost the subject at frame {frame}: drag it right there, or outline it",
+    ): "Verfolgen verlor das Motiv bei Bild {frame}: dort zurechtziehen oder umreißen",
+    (
+        "*",
+        "From frame {frame} on, near and far move differently, or too little is seen: Tripod cannot hold all still",
+    ): "Ab Bild {frame} bewegen sich Nahes und Fernes verschieden, oder zu wenig ist zu sehen: "
+    "Stativ kann nicht alles still halten",
+    ("Operator", "Outline This Subject"): "Dieses Motiv umreißen",
+    (
+        "*",
+        "Timeline frame of the strokes; without one, the current frame",
+    ): "Bild der Zeitleiste mit den Strichen; ohne eines das aktuelle",
     ("*", "Tracking stopped at frame {frame}: {fault}"): "Das Verfolgen hielt bei Bild {frame} an: {fault}",
     ("*", "Confidence"): "Sicherheit",
     ("*", "How sure tracking was of where it is"): "Wie sicher das Verfolgen war, wo es ist",
