@@ -104,7 +104,7 @@ class SHUTTER_OT_outline_carry(_Carries, OfOutline, Operator):
 
 
 class SHUTTER_OT_outline_needed(_Carries, OfOutline, Operator):
-    """Go to the frame between two drawings at which the outline is least sure, carrying it first"""
+    """Go to the middle of the frames at which the outline is least sure, carrying it first"""
 
     bl_idname = "shutter.outline_needed"
     bl_label = "Next Drawing Needed"
@@ -113,7 +113,7 @@ class SHUTTER_OT_outline_needed(_Carries, OfOutline, Operator):
         scene, effect, strip = selection.active(context)
         needed = outline_drawings.next_needed(scene, effect, strip, self._target.index)
         if needed.frame is None:
-            self.report({"INFO"}, rpt_("The outline is sure by 75 % or more at all frames between its drawings"))
+            self.report({"INFO"}, rpt_("The outline is sure by 75 % or more at all frames"))
             return {"CANCELLED"}
         scene.frame_set(needed.frame)
         sentence = rpt_("Frame {frame}: the outline is sure by {share:.0f} %")

@@ -473,8 +473,8 @@ MESSAGES = {
     ("Operator", "Next Drawing Needed"): "Nächste nötige Zeichnung",
     (
         "*",
-        "Go to the frame between two drawings at which the outline is least sure, carrying it first",
-    ): "Zum Frame zwischen zwei Zeichnungen gehen, in dem der Umriss am unsichersten ist; er wird vorher mitgeführt",
+        "Go to the middle of the frames at which the outline is least sure, carrying it first",
+    ): "Zur Mitte der Frames gehen, in denen der Umriss am unsichersten ist; er wird vorher mitgeführt",
     ("Operator", "Insert Outline Drawing"): "Umrisszeichnung einfügen",
     (
         "*",
@@ -486,9 +486,8 @@ MESSAGES = {
     ): "Frame {frame}: Der Umriss ist zu {share:.0f} % sicher",
     (
         "*",
-        "The outline is sure by 75 % or more at all frames between its drawings",
-    ): "Der Umriss ist in allen Frames zwischen seinen Zeichnungen zu 75 % oder mehr sicher",
-    ("*", "Draw the outline at two frames first"): "Zeichnen Sie den Umriss zuerst in zwei Frames",
+        "The outline is sure by 75 % or more at all frames",
+    ): "Der Umriss ist in allen Frames zu 75 % oder mehr sicher",
     ("*", "The outline encloses nothing at the current frame"): "Der Umriss umschließt im aktuellen Frame nichts",
     ("*", "The region is no outline"): "Die Region ist kein Umriss",
     ("*", 'strip "{strip}" is scaled to nothing'): "Streifen „{strip}“ ist zu nichts skaliert",
