@@ -27,7 +27,6 @@ _AROUND = 0.05  # widths of the picture around its place within which it is soug
 # a frame keeps of the trust where they are not; how far they may be off, in lengths of the part, and the share of them
 # that may not be.
 _BACK, _TRACED, _UNTRACED, _ASTRAY, _AGREEING = 8, 0.1, 0.85, 0.15, 0.5
-_SAME = 0.005  # of the picture's size, within which two motions are the same
 _KEPT = 0.999  # so much of the trust a step keeps at most
 _BRIEF, _LEFT = 8, 3  # so many unsure frames between sure ones are more than a moment, and at the end of a track
 _REPEATED = 0.3  # what a part is worth that looks like what is beside it
@@ -37,12 +36,10 @@ _NONE = np.zeros(0, complex)
 class Sighting(NamedTuple):
     """Where something is in a picture: its motion from the first one, and how sure that is, 0 to 1.
 
-    step: how sure the motion is from the picture that this one was compared with
     held: (n,) complex, the corners in the picture that tell it"""
 
     motion: Similarity
     confidence: float
-    step: float = 1.0
     held: np.ndarray = _NONE
 
 
@@ -114,10 +111,10 @@ class PartPursuit:
         if match and sure >= SURE:
             self._first.learn(match)
         if match and sure >= _FADING:
-            return Sighting(match.motion, sure, sure, match.held)
+            return Sighting(match.motion, sure, match.held)
         later = self._by_later_look(picture, guess)
         if later is None:
-            return Sighting(match.motion, sure, sure, match.held) if match and sure >= _LOST else None
+            return Sighting(match.motion, sure, match.held) if match and sure >= _LOST else None
         points = self._first.points
         if sure < SURE and np.abs(later.motion(points) - guess(points)).max() > 1:
             # from there the first look may be near enough
@@ -126,8 +123,7 @@ class PartPursuit:
                 match, sure = again, confidence(again, picture)
         if match is None or sure < min(SURE, later.confidence):
             return later
-        is_same = np.abs(later.motion(points) - match.motion(points)).max() <= _SAME * max(picture.shape)
-        return Sighting(match.motion, sure, max(sure, later.step) if is_same else sure, match.held)
+        return Sighting(match.motion, sure, match.held)
 
     def _by_later_look(self, picture: np.ndarray, guess: Similarity) -> Sighting | None:
         if self._look.part is self._first:
@@ -153,7 +149,7 @@ class PartPursuit:
             for guess in (from_there, look.part.seek(picture, from_there, radius)):
                 match = look.part.find(picture, guess, self._motion) if guess else None
                 if match and (sure := confidence(match, picture)) >= _AGAIN:
-                    sightings.append(Sighting(match.motion.after(look.motion), look.worth * sure, sure, match.held))
+                    sightings.append(Sighting(match.motion.after(look.motion), look.worth * sure, match.held))
         return max(sightings, key=lambda each: each.confidence, default=None)
 
     def _leaves(self, picture: np.ndarray) -> bool:
@@ -179,7 +175,7 @@ class _Look:
         for way, share in ways:
             match = self.part.find(picture, guess, way)
             if match and (sure := confidence(match, picture)) >= _LOST:
-                return Sighting(match.motion.after(self.motion), share * self.worth * sure, share * sure, match.held)
+                return Sighting(match.motion.after(self.motion), share * self.worth * sure, match.held)
         return None
 
 

@@ -237,24 +237,16 @@ class Part:
         close = np.hypot(*(again - start).T) < _THERE_AND_BACK
         return _plane(there) + self._origin, forth.ravel().astype(bool) & back.ravel().astype(bool) & close.ravel()
 
-    def likeness(self, picture: np.ndarray, motion: Similarity, other: np.ndarray, there: Similarity) -> float:
-        """Correlation of what the part is said to be in two pictures, each after a motion, as far as it lies in them;
-        both smaller."""
+    def _likeness(self, picture: np.ndarray, motion: Similarity) -> float:
+        """Correlation of the part's pixels with those in another picture, as far as they lie in it; both smaller."""
         x, y, width, height = self.box
         share = min(1.0, _SOUGHT / max(width, height))
         size = max(1, round(share * width)), max(1, round(share * height))
         small = Similarity(share, -share * complex(x, y))
-        ways = [matrix(small.after(way.inverse())) for way in (motion, there)]
-        first, second = (cv2.warpAffine(each, way, size) for each, way in zip((picture, other), ways, strict=True))
-        inside = np.ones(picture.shape, np.uint8)
-        weight = cv2.warpAffine(self.weight, matrix(small), size)
-        for way in ways:
-            weight = weight * cv2.warpAffine(inside, way, size)
-        return correlation(first, second, weight)
-
-    def _likeness(self, picture: np.ndarray, motion: Similarity) -> float:
-        """Correlation of the part's pixels with those in another picture."""
-        return self.likeness(self._whole, Similarity(), picture, motion)
+        there = matrix(small.after(motion.inverse()))
+        first, weight = (cv2.warpAffine(each, matrix(small), size) for each in (self._whole, self.weight))
+        inside = cv2.warpAffine(np.ones(picture.shape, np.uint8), there, size)
+        return correlation(first, cv2.warpAffine(picture, there, size), weight * inside)
 
 
 def traced(pictures: Sequence[np.ndarray], points: np.ndarray, step: np.ndarray) -> np.ndarray:
