@@ -7,6 +7,7 @@ has passed: what a window shows at once is right, what it comes back to after a 
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Callable, Collection, Iterator, Sequence
 from dataclasses import replace
 
@@ -26,6 +27,11 @@ GOES_ON = "the picture is too unlike those before, and it goes on from here"
 
 _ANEW = 0.6  # below this confidence the last frame is compared as well, and becomes the anchor if that is surer
 _LEAST = 0.12  # below it nothing was found
+# Frames from one look to the next by which it is seen whether a motion explains the picture; cells of its width and its
+# height; heights of the picture that they may be off; the share of them that may be off more, and from which on nothing
+# is sure.
+_SPAN, _CELLS, _OFF, _FEW, _MOST = 8, 8, 0.008, 0.3, 0.6
+_FADING = 0.9  # what a frame keeps of the doubt in the one before
 _MARGIN = 0.02  # heights of the picture about a region, where corners may be those of its edge
 
 
@@ -126,6 +132,8 @@ class _Pursuit:
         """part_at: what of a frame stands still; TrackingError: too little"""
         self._part_at, self._footage, self._motion = part_at, footage, motion
         self._anchor = part_at(frame), frame, Similarity()  # with the motion from the first frame to it
+        self._older = deque([self._anchor], 2)  # looks from some time ago
+        self._doubt = 0.0  # whether a motion explains what is seen
         self._last = frame, Similarity()  # where it was found last
         self._speed = Similarity()
 
@@ -142,7 +150,23 @@ class _Pursuit:
             return None
         self._speed = sighting.motion.after(known.inverse()) if abs(frame - before) == 1 else Similarity()
         self._last = frame, sighting.motion
-        return sighting
+        self._doubt = max(1 - self._explained(picture, frame, sighting.motion), _FADING * self._doubt)
+        return sighting._replace(confidence=max((1 - self._doubt) * sighting.confidence, _LEAST))
+
+    def _explained(self, picture: np.ndarray, frame: int, motion: Similarity) -> float:
+        """How far a motion is that of all that is seen, up to 1: by the cells of a frame some time ago that are not
+        where it has them. What moves by itself fills few of them; where the camera moves through a scene, many."""
+        part, _, known = self._older[0]
+        points, off = part.astray(picture, motion.after(known.inverse()))
+        if abs(frame - self._older[-1][1]) >= _SPAN and (anchor := self._anchor_at(frame, motion)):
+            self._older.append(anchor)
+        columns, rows = (
+            np.floor(side / length * _CELLS)
+            for side, length in ((points.real, picture.shape[1]), (points.imag, picture.shape[0]))
+        )
+        cells = columns + _CELLS * rows
+        astray = [np.median(off[cells == cell]) > _OFF * picture.shape[0] for cell in np.unique(cells)]
+        return float(np.clip((_MOST - np.mean(astray)) / (_MOST - _FEW), 0, 1)) if astray else 1.0
 
     def _compared(self, picture: np.ndarray, anchor: tuple[Part, int, Similarity]) -> Sighting:
         """The surer one of two looks: where it would be if it went on, and where it was last."""

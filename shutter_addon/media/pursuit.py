@@ -23,22 +23,24 @@ _DRIFT, _LEAST = 0.95, 0.1  # what a later look is worth beside the one before i
 _SHIFTED = 0.6  # what a location is worth where rotation and scale could not be found
 _FADING = 0.6  # below it another frame is taken to compare with beside the first
 _AROUND = 0.05  # widths of the picture around its place within which it is sought at least
-# Frames after which what is found is compared with what was; correlations from which on that tells nothing against it,
-# and below which all.
-_BACK, _STEADY, _OTHER = 4, 0.65, 0.35
-_SAME = 0.005  # of the picture's size, within which two motions are the same
-_STEP, _KEPT = 0.2, 0.998  # a step that is as sure keeps so much of the trust
+# Frames through which the corners of what is found are traced back; the share of them that has to be traced, and what
+# a frame keeps of the trust where they are not; how far they may be off, in lengths of the part, and the share of them
+# that may not be.
+_BACK, _TRACED, _UNTRACED, _ASTRAY, _AGREEING = 8, 0.1, 0.85, 0.15, 0.5
+_KEPT = 0.999  # so much of the trust a step keeps at most
+_BRIEF, _LEFT = 8, 3  # so many unsure frames between sure ones are more than a moment, and at the end of a track
 _REPEATED = 0.3  # what a part is worth that looks like what is beside it
+_NONE = np.zeros(0, complex)
 
 
 class Sighting(NamedTuple):
     """Where something is in a picture: its motion from the first one, and how sure that is, 0 to 1.
 
-    step: how sure the motion is from the picture that this one was compared with"""
+    held: (n,) complex, the corners in the picture that tell it"""
 
     motion: Similarity
     confidence: float
-    step: float = 1.0
+    held: np.ndarray = _NONE
 
 
 class PartPursuit:
@@ -75,18 +77,32 @@ class PartPursuit:
         self._speed = sighting.motion.after(self._known.inverse()) if not missed else Similarity()
         self._trust = self._trusted(picture, sighting, goes_on=not missed)
         self._known, self._missed = sighting.motion, 0
+        if missed:
+            self._seen.clear()
         self._seen.append((picture, sighting.motion, sighting.confidence))
         return Sighting(sighting.motion, self._trust)
 
     def _trusted(self, picture: np.ndarray, sighting: Sighting, goes_on: bool) -> float:
-        """How sure it is that it is there. A comparison with how it looked first tells that by itself. Others tell that
-        what was followed goes on: so does what has slipped onto something else, but not onto what looked like it
-        shortly before. goes_on: it was found in the picture before."""
-        before, motion, _worth = self._seen[0]
-        alike = self._first.likeness(before, motion, picture, sighting.motion)
-        steady = float(np.clip((alike - _OTHER) / (_STEADY - _OTHER), 0, 1))
-        kept = _KEPT * self._trust * steady * min(sighting.step / _STEP, 1.0)
-        return max(kept if goes_on else 0.0, sighting.confidence)
+        """How sure it is that it is the part. What goes on is as sure as before, as far as its corners come from there.
+        It is as sure as it is like the first look where they do, unless that was lost and is seen elsewhere, too.
+        goes_on: it was found in the picture before."""
+        held = self._held(picture, sighting) if goes_on else None
+        kept = _KEPT * self._trust * (_UNTRACED if held is None else held) if goes_on else 0.0
+        if sighting.confidence <= kept or (held is not None and held < 1):
+            return kept
+        was_lost = sighting.confidence >= SURE and (self._trust < SURE or not goes_on)
+        return kept if was_lost and self._first.lookalike(picture, sighting.motion) else sighting.confidence
+
+    def _held(self, picture: np.ndarray, sighting: Sighting) -> float | None:
+        """The share, up to 1, of the corners by which it was found that have come from where it was some pictures
+        before: what has slipped onto something else comes from elsewhere. None: hardly any can be traced."""
+        pictures, back = [picture, *(each[0] for each in reversed(self._seen))], sighting.motion.inverse()
+        step = self._known.after(back)(sighting.held) - sighting.held
+        traced = registration.traced(pictures, sighting.held, step)
+        off = np.abs(traced - self._seen[0][1].after(back)(sighting.held))[np.isfinite(traced)]
+        if len(off) < _TRACED * len(traced):
+            return None
+        return min(float((off < _ASTRAY * max(self._first.box[2:])).mean()) / _AGREEING, 1.0)
 
     def _near(self, picture: np.ndarray, guess: Similarity) -> Sighting | None:
         """As `next`, near to a guess: as it looked first or, if that is not sure, as it looked later."""
@@ -95,10 +111,10 @@ class PartPursuit:
         if match and sure >= SURE:
             self._first.learn(match)
         if match and sure >= _FADING:
-            return Sighting(match.motion, sure, sure)
+            return Sighting(match.motion, sure, match.held)
         later = self._by_later_look(picture, guess)
         if later is None:
-            return Sighting(match.motion, sure, sure) if match and sure >= _LOST else None
+            return Sighting(match.motion, sure, match.held) if match and sure >= _LOST else None
         points = self._first.points
         if sure < SURE and np.abs(later.motion(points) - guess(points)).max() > 1:
             # from there the first look may be near enough
@@ -107,8 +123,7 @@ class PartPursuit:
                 match, sure = again, confidence(again, picture)
         if match is None or sure < min(SURE, later.confidence):
             return later
-        is_same = np.abs(later.motion(points) - match.motion(points)).max() <= _SAME * max(picture.shape)
-        return Sighting(match.motion, sure, max(sure, later.step) if is_same else sure)
+        return Sighting(match.motion, sure, match.held)
 
     def _by_later_look(self, picture: np.ndarray, guess: Similarity) -> Sighting | None:
         if self._look.part is self._first:
@@ -134,7 +149,7 @@ class PartPursuit:
             for guess in (from_there, look.part.seek(picture, from_there, radius)):
                 match = look.part.find(picture, guess, self._motion) if guess else None
                 if match and (sure := confidence(match, picture)) >= _AGAIN:
-                    sightings.append(Sighting(match.motion.after(look.motion), look.worth * sure, sure))
+                    sightings.append(Sighting(match.motion.after(look.motion), look.worth * sure, match.held))
         return max(sightings, key=lambda each: each.confidence, default=None)
 
     def _leaves(self, picture: np.ndarray) -> bool:
@@ -160,7 +175,7 @@ class _Look:
         for way, share in ways:
             match = self.part.find(picture, guess, way)
             if match and (sure := confidence(match, picture)) >= _LOST:
-                return Sighting(match.motion.after(self.motion), share * self.worth * sure, share * sure)
+                return Sighting(match.motion.after(self.motion), share * self.worth * sure, match.held)
         return None
 
 
@@ -173,6 +188,18 @@ def confidence(match: Match | None, picture: np.ndarray) -> float:
     likeness = max(match.likeness, 0.0)
     factors = likeness / 0.6, match.share / (0.9 - 0.6 * likeness), match.visible / 0.6
     return float(np.prod([min(factor, 1.0) for factor in factors])) / (1 + (error / 0.7) ** 2)
+
+
+def lost(frames: np.ndarray, sure: np.ndarray) -> int | None:
+    """The frame of a track at which its subject was lost: at the first of its unsure stretches that lasts, the end from
+    which it was tracked; None: nowhere.
+
+    frames: (n,) ascending; sure: (n,) confidence"""
+    ends = np.flatnonzero(np.diff(np.concatenate([[False], sure < SURE, [False]])))
+    for first, end in ends.reshape(-1, 2):
+        if end - first >= (_BRIEF if first > 0 and end < len(frames) else _LEFT):
+            return int(frames[first if first else end - 1])
+    return None
 
 
 def distinctness(part: Part, width: int) -> float:

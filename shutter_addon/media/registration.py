@@ -6,7 +6,9 @@ Equal pictures give equal results, whatever the number of threads.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from typing import Any, get_args
 
 import numpy as np
@@ -32,6 +34,9 @@ _THERE_AND_BACK = 1.0  # pixels from where a corner started that it may come bac
 _HYPOTHESES = 300
 _SOUGHT = 64  # pixels to which a part is made smaller to be sought, or compared as a whole
 ALIKE = 0.6  # the correlation from which on something else may be taken for a part
+_NOWHERE = -2.0  # in place of a correlation, where no part has room
+_RIVAL = 0.85  # of its own likeness, from which on something else may be it as well
+_TRACED = 13  # side of the windows by which points are traced through pictures
 _NOISE = 16.0  # levels² of contrast that noise may have: they make no two pictures unlike
 # Beyond these the motion between two pictures is none that a film has.
 _MOST_SCALE, _MOST_TURN = 1.5, 0.8
@@ -66,7 +71,8 @@ class Match:
     share: of the corners' weight, of those that lie in the picture, that moves so
     visible: share of the corners' weight that lies in the picture
     error: pixels by which the part's farthest point is expected to be off
-    likeness: correlation of its pixels with those found, −1 to 1"""
+    likeness: correlation of its pixels with those found, −1 to 1
+    held: where the corners that agree are in the other picture"""
 
     motion: Similarity
     agreeing: np.ndarray
@@ -74,6 +80,7 @@ class Match:
     share: float
     visible: float
     error: float
+    held: np.ndarray
     likeness: float = 0.0
 
 
@@ -115,12 +122,29 @@ class Part:
     def seek(self, picture: np.ndarray, known: Similarity, radius: float) -> Similarity | None:
         """Where in a picture its pixels are most alike, turned and scaled as in `known`, within a radius of pixels of
         where that puts it: a guess for `find`. None: there is no room for it in the picture."""
+        scores, alone, around = self._scores(picture, known, radius)
+        _, likeness, _, best = cv2.minMaxLoc(scores)
+        return None if likeness <= _NOWHERE else around.inverse().after(Similarity(1, complex(*best))).after(alone)
+
+    def lookalike(self, picture: np.ndarray, known: Similarity) -> bool:
+        """Whether something elsewhere in a picture looks nearly as much like it as what `known` takes it to."""
+        scores, _, _ = self._scores(picture, known, max(picture.shape))
+        y, x = (length // 2 for length in scores.shape)
+        apart = [max(1, round(_SOUGHT / 2 * length / max(self.box[2:]))) for length in self.box[2:]]
+        own = np.s_[max(y - apart[1], 0) : y + apart[1] + 1, max(x - apart[0], 0) : x + apart[0] + 1]
+        here, scores[own] = scores[own].max(), _NOWHERE
+        return bool(scores.max() > max(_RIVAL * here, ALIKE))
+
+    def _scores(
+        self, picture: np.ndarray, known: Similarity, radius: float
+    ) -> tuple[np.ndarray, Similarity, Similarity]:
+        """How like it places in a picture are, in its middle that where `known` has it, _NOWHERE beyond the picture;
+        the motions to the part by itself, and around its known place, both made smaller."""
         x, y, width, height = self.box
         middle = complex(x + width / 2, y + height / 2)
         extent = abs(known.turn) * max(width, height)
         share = min(1.0, _SOUGHT / extent)
         side = max(8, round(share * extent))
-        # the part by itself, and around its known place, both made smaller
         half = complex(side, side) / 2
         alone = Similarity(share * known.turn, half - share * known.turn * middle)
         room = int(side + 2 * share * radius)
@@ -132,10 +156,7 @@ class Part:
         scores = cv2.matchTemplate(place, look, cv2.TM_CCOEFF_NORMED, mask=weight)
         fits = cv2.erode(inside, np.ones((side, side), np.uint8), anchor=(0, 0), borderValue=0)
         fits = fits[: scores.shape[0], : scores.shape[1]].astype(bool) & np.isfinite(scores)
-        if not fits.any():
-            return None
-        _, _, _, best = cv2.minMaxLoc(np.where(fits, scores, -1))
-        return around.inverse().after(Similarity(1, complex(*best))).after(alone)
+        return np.where(fits, scores, np.float32(_NOWHERE)), alone, around
 
     def rival(self, radius: float) -> float:
         """How like it something beside it looks, up to 1: the highest correlation with its own picture displaced by up
@@ -154,6 +175,18 @@ class Part:
         _, hills = cv2.connectedComponents((scores > ALIKE).astype(np.uint8))
         others = (hills > 0) & (hills != hills[room, room])
         return float(scores[others].max(initial=0.0))
+
+    def astray(self, picture: np.ndarray, known: Similarity) -> tuple[np.ndarray, np.ndarray]:
+        """Its corners that are found in a picture, around where a motion has them: where they were in its own, and how
+        many pixels each has moved otherwise."""
+        size = self._picture.shape[::-1]
+        back = cv2.warpAffine(picture, matrix(known, self._origin), size, flags=cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP)
+        moved, good = self._flow(back)
+        there = known(self.points)
+        good &= (
+            (there.real >= 0) & (there.real < picture.shape[1]) & (there.imag >= 0) & (there.imag < picture.shape[0])
+        )
+        return self.points[good], np.abs(moved - self.points)[good]
 
     def again(self, picture: np.ndarray, motion: Similarity) -> Part | None:
         """The part as it looks in another picture after a motion; None: it is not in it."""
@@ -183,13 +216,15 @@ class Part:
         change, agreeing = fitted
         off = np.abs(change(self.points) - moved)
         error = _expected_error(self.points[agreeing], off[agreeing], weights[agreeing], self._ends, motion)
+        found = guess.after(change)
         return Match(
-            motion=guess.after(change),
+            motion=found,
             agreeing=agreeing,
             seen=seen,
             share=float(weights[agreeing].sum() / weights.sum()),
             visible=float(weights.sum() / total),
             error=error,
+            held=found(self.points[agreeing]),
         )
 
     def _flow(self, picture: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -202,24 +237,43 @@ class Part:
         close = np.hypot(*(again - start).T) < _THERE_AND_BACK
         return _plane(there) + self._origin, forth.ravel().astype(bool) & back.ravel().astype(bool) & close.ravel()
 
-    def likeness(self, picture: np.ndarray, motion: Similarity, other: np.ndarray, there: Similarity) -> float:
-        """Correlation of what the part is said to be in two pictures, each after a motion, as far as it lies in them;
-        both smaller."""
+    def _likeness(self, picture: np.ndarray, motion: Similarity) -> float:
+        """Correlation of the part's pixels with those in another picture, as far as they lie in it; both smaller."""
         x, y, width, height = self.box
         share = min(1.0, _SOUGHT / max(width, height))
         size = max(1, round(share * width)), max(1, round(share * height))
         small = Similarity(share, -share * complex(x, y))
-        ways = [matrix(small.after(way.inverse())) for way in (motion, there)]
-        first, second = (cv2.warpAffine(each, way, size) for each, way in zip((picture, other), ways, strict=True))
-        inside = np.ones(picture.shape, np.uint8)
-        weight = cv2.warpAffine(self.weight, matrix(small), size)
-        for way in ways:
-            weight = weight * cv2.warpAffine(inside, way, size)
-        return correlation(first, second, weight)
+        there = matrix(small.after(motion.inverse()))
+        first, weight = (cv2.warpAffine(each, matrix(small), size) for each in (self._whole, self.weight))
+        inside = cv2.warpAffine(np.ones(picture.shape, np.uint8), there, size)
+        return correlation(first, cv2.warpAffine(picture, there, size), weight * inside)
 
-    def _likeness(self, picture: np.ndarray, motion: Similarity) -> float:
-        """Correlation of the part's pixels with those in another picture."""
-        return self.likeness(self._whole, Similarity(), picture, motion)
+
+def traced(pictures: Sequence[np.ndarray], points: np.ndarray, step: np.ndarray) -> np.ndarray:
+    """Where points (n,) of the first picture are in the last one, by flow from each picture to the next; NaN: lost.
+
+    step: (n,) how they may move up to the second picture; they go on like that, more or less"""
+    places = np.full(len(points), complex(np.nan, np.nan))
+    options: dict[str, Any] = {
+        "winSize": (_TRACED, _TRACED),
+        "maxLevel": _LEVELS,
+        "flags": cv2.OPTFLOW_USE_INITIAL_FLOW,
+    }
+    left = np.arange(len(points))
+    reach = _SOUGHT + len(pictures) * int(np.abs(step).max())
+    low = [max(int(side.min()) - reach, 0) for side in (points.imag, points.real)]
+    high = [int(side.max()) + reach for side in (points.imag, points.real)]
+    pictures = [np.ascontiguousarray(each[low[0] : high[0], low[1] : high[1]]) for each in pictures]
+    points = points - complex(low[1], low[0])
+    for first, second in pairwise(pictures):
+        there, good, _ = cv2.calcOpticalFlowPyrLK(first, second, _pairs(points), _pairs(points + step), **options)
+        again, back, _ = cv2.calcOpticalFlowPyrLK(second, first, there, _pairs(points), **options)
+        close = (good & back).ravel().astype(bool) & (np.abs(_plane(again) - points) < _THERE_AND_BACK)
+        if not close.any():
+            return places
+        left, step, points = left[close], (_plane(there) - points)[close], _plane(there)[close]
+    places[left] = points + complex(low[1], low[0])
+    return places
 
 
 def correlation(first: np.ndarray, second: np.ndarray, weight: np.ndarray) -> float:
@@ -328,7 +382,7 @@ def _plane(pairs: np.ndarray) -> np.ndarray:
 
 
 def _pairs(points: np.ndarray) -> np.ndarray:
-    return np.stack([points.real, points.imag], axis=-1).astype(np.float32)[:, None]
+    return np.stack([points.real, points.imag], axis=-1).astype(np.float32, order="C").reshape(-1, 1, 2)
 
 
 def matrix(motion: Similarity, origin: complex = 0) -> np.ndarray:

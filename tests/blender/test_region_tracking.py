@@ -478,7 +478,7 @@ def test_the_next_unsure_frame(bpy, region):
     assert track_region.next_unsure(effect, 0, 11) == 14, "the worst of its stretch"
     assert track_region.next_unsure(effect, 0, 14) == 17
     assert track_region.next_unsure(effect, 0, 17) is None
-    assert track_region.unsure_among(effect, 0, range(11, 17)) == 3
+    assert track_region.lost(effect, 0) is None, "it lasts for a moment"
 
 
 def test_what_the_editor_keys_is_sure(bpy, edit, region):
@@ -691,7 +691,7 @@ def test_a_gap_in_a_track_is_bridged_and_unsure(bpy, edit, region, clip):
     effect = active(bpy)[1]
     assert track_region.next_unsure(effect, 0, 11) == 18
     assert track_region.next_unsure(effect, 0, 18) is None
-    assert track_region.unsure_among(effect, 0, range(11, 31)) == 2
+    assert track_region.lost(effect, 0) is None
 
 
 def test_a_changed_track_is_followed_anew(bpy, edit, region, clip, does):

@@ -209,3 +209,25 @@ def everywhere():
 def test_what_cannot_be_tracked_is_one_sentence(source, regions, start, fault):
     with pytest.raises(tracking.TrackingError, match=f"^{fault}$"):
         tracked(source, regions, start)
+
+
+@pytest.mark.parametrize("share", [0.5, 1.0])
+def test_near_and_far_that_move_differently_are_not_sure(share):
+    """The lower half is nearer: for a camera that walks past two planes, or around a ground."""
+    source, _truth = film(24)
+    rows = np.arange(HEIGHT, dtype=np.float32)[:, None] / HEIGHT - 0.5
+    depth = np.broadcast_to(np.where(rows > 0, 1, 0) if share < 1 else rows, (HEIGHT, WIDTH)).astype(np.float32)
+    y, x = np.mgrid[:HEIGHT, :WIDTH].astype(np.float32)
+    for n, frame in enumerate(source.frames):
+        source.frames[n] = cv2.remap(frame, x + 3 * n * depth, y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REFLECT)
+    found, _ = tracked(source)
+    assert [n for n in found if n > 8 and found[n].confidence >= pursuit.SURE] == []
+    frames = sorted(found)
+    assert pursuit.lost(np.array(frames), np.array([found[n].confidence for n in frames])) <= 8
+
+
+def test_a_camera_that_shakes_and_pans_is_sure():
+    for pan in (0, 4):
+        source, _truth = film(24, pan)
+        found, _ = tracked(source)
+        assert min(each.confidence for each in found.values()) > 0.8

@@ -268,6 +268,66 @@ def test_a_subject_without_corners_is_never_sure(subject, ground):
     assert sure(tracked) == {4}
 
 
+def figures(ground, ways, bends=0.0):
+    """A film of figures that look alike, the later ones in front; by frame, how far each is from its picture's place.
+    bends: pixels by which its rows sway, each otherwise at another time"""
+    frames, (y, x) = [], np.mgrid[:HEIGHT, :WIDTH].astype(np.float32)
+    mottled = cv2.GaussianBlur(np.random.default_rng(5).normal(0, 1, (HEIGHT, WIDTH, 3)).astype(np.float32), (0, 0), 2)
+    subject = 128 + 45 * mottled / mottled.std()
+    for n in range(40):
+        sway = x + np.float32(bends) * (np.sin(y / 14 + n / 3) - np.sin(y / 14)) * min(n / 10, 1)
+        look, mask = (cv2.remap(each, sway, y, cv2.INTER_LINEAR) for each in (subject, ellipse(MIDDLE, (20, 60))))
+        frame = ground.astype(np.float32)
+        for way in ways:
+            over = warped(mask, motion(way(n)), cv2.BORDER_CONSTANT)[..., None]
+            frame = (1 - over) * frame + over * warped(look, motion(way(n)))
+        frame += np.random.default_rng(n).normal(0, 2, frame.shape)
+        frames.append(np.clip(np.rint(frame), 0, 255).astype(np.uint8))
+    return Film(frames)
+
+
+UPRIGHT = [np.array([[0.43, 0.36], [0.45, 0.5], [0.43, 0.64]])]
+
+
+def test_a_jump_onto_a_lookalike_is_told(ground):
+    """It is right up to where the one in front covers the subject, and follows that then: at full confidence, if one
+    looked at the picture alone."""
+    ways = (lambda n: 5.0 * n - 110), (lambda n: 90 - 5.0 * n)
+    source = figures(ground, ways)
+    lain = region("line", drawn=UPRIGHT, location=(-110 / WIDTH, 0.0))
+    tracked, _faults = followed(source, "line", 0, region=lain)
+    off = {n: abs(each.placement.location[0] * WIDTH - ways[0](n)) for n, each in tracked.items()}
+    wrong = {n for n in off if off[n] > 20}
+    assert len(wrong) > 10, "it has jumped"
+    assert sure(tracked) >= set(range(min(wrong) - 3))
+    assert not wrong & sure(tracked)
+    frames = sorted(tracked)
+    assert abs(pursuit.lost(np.array(frames), np.array([tracked[n].confidence for n in frames])) - min(wrong)) <= 3
+
+
+def test_a_subject_that_bends_is_not_lost(ground):
+    """It soon looks unlike the frame in which it was drawn."""
+    source = figures(ground, [lambda n: 4.0 * n - 80], bends=3.0)
+    tracked, faults = followed(source, "line", 0, region=region("line", drawn=UPRIGHT, location=(-80 / WIDTH, 0.0)))
+    assert not faults
+    assert max(abs(each.placement.location[0] * WIDTH - 4.0 * n + 80) for n, each in tracked.items()) < 12
+    assert len(sure(tracked)) >= 38
+
+
+@pytest.mark.parametrize(
+    ("sure", "expected"),
+    [
+        ([1.0] * 20, None),
+        ([1.0] * 5 + [0.2] * 7 + [1.0] * 8, None),  # covered for a moment
+        ([1.0] * 5 + [0.2] * 8 + [1.0] * 7, 15),
+        ([1.0] * 17 + [0.2] * 3, 27),
+        ([0.2] * 4 + [1.0] * 16, 13),  # backward
+    ],
+)
+def test_where_a_subject_is_lost(sure, expected):
+    assert pursuit.lost(np.arange(10, 30), np.array(sure)) == expected
+
+
 @pytest.mark.parametrize("kind", EVERY)
 def test_a_pattern_that_repeats_itself_is_never_sure(ground, kind):
     """Shaded checks that go by so quickly that the next period is nearer than their own place."""

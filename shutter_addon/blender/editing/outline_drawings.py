@@ -3,6 +3,7 @@
 Annotations have no key types in Blender 5.2: a drawing that was made and one's own look alike in the Dope Sheet.
 """
 
+from bisect import bisect
 from contextlib import closing
 from functools import lru_cache
 from typing import Any, NamedTuple
@@ -103,6 +104,13 @@ def picture_now(scene, effect, strip) -> np.ndarray:
         return flow.displayed(samples, source.transfer, source.alpha)
 
 
+def nearest(effect, index: int, frame: int) -> int:
+    """The timeline frame of a region's drawing that is nearest to a frame; that itself, where there is none."""
+    layer = layer_of(effect, effect.regions[index])
+    drawn = [drawing.frame_number for drawing in layer.frames] if layer else []
+    return min(drawn, key=lambda each: abs(each - frame), default=frame)
+
+
 def outline_it(scene, effect, strip, index: int) -> bool:
     """Makes a region the outline of the subject that its strokes run over, or are drawn around, at the current frame;
     what was drawn at other frames of an outline stays. Whether there is one. EffectError, MediaError: there are no
@@ -140,19 +148,20 @@ def carried_frames(scene, effect, strip, index: int) -> tuple[Any, dict[int, int
 
 
 def next_needed(scene, effect, strip, index: int) -> Needed:
-    """The frame of the strip at which the outline is least sure between two drawings, of those to which it is carried.
-    EffectError, MediaError: nothing is carried."""
+    """Where in the strip a drawing of an outline that is carried helps most: of the stretches between drawings, and
+    beyond the first and the last, in the one that is least sure altogether; there, where as much of the doubt lies
+    before it as behind it. EffectError, MediaError: nothing is carried."""
     file, shown = carried_frames(scene, effect, strip, index)
-    if len(file.drawings) < 2:
-        raise EffectError(rpt_("Draw the outline at two frames first"))
-    first, last = file.drawings[0][0], file.drawings[-1][0]
-    drawn = {frame for frame, _curves in file.drawings}
-    worst = Needed(frame=None, confidence=SURE)
+    drawn = [number for number, _curves in file.drawings]
+    stretches: dict[int, list[tuple[int, int, float]]] = {}
     with closing(file.open()) as mattes:
-        for frame, number in shown.items():
-            if number in drawn or not first < number < last:
-                continue
-            confidence = mattes.confidence(number)
-            if confidence is not None and confidence < worst.confidence:
-                worst = Needed(frame=frame, confidence=confidence)
-    return worst
+        for number, frame in sorted({number: frame for frame, number in shown.items()}.items()):
+            sure = mattes.confidence(number) or 0.0  # None: too far from all drawings
+            if number not in drawn and sure < SURE:
+                stretches.setdefault(bisect(drawn, number), []).append((number, frame, sure))
+    if not stretches:
+        return Needed(frame=None, confidence=SURE)
+    worst = max(stretches.values(), key=lambda stretch: sum(1 - sure for *_, sure in stretch))
+    doubts = np.cumsum([1 - sure for *_, sure in worst])
+    _number, frame, sure = worst[int(np.searchsorted(doubts, doubts[-1] / 2))]
+    return Needed(frame=frame, confidence=sure)

@@ -236,10 +236,18 @@ def next_unsure(effect, index: int | None, frame: float) -> int | None:
     return int(frames[begins[0] + confidence[begins[0] : begins[0] + stretch].argmin()])
 
 
-def unsure_among(effect, index: int | None, frames) -> int:
-    """Of how many of these timeline frames tracking was not sure."""
-    known, confidence = MotionKeys(effect, index, "LOCATION").confidence()
-    return int((np.isin(known, list(frames)) & (confidence < pursuit.SURE)).sum())
+def lost(effect, index: int | None) -> tuple[int, str] | None:
+    """The timeline frame from which on tracking is not sure for long, and what it says of that, in the user's language;
+    None: there is none."""
+    frame = pursuit.lost(*MotionKeys(effect, index, "LOCATION").confidence())
+    if frame is None:
+        return None
+    words = rpt_("Track lost the subject at frame {frame}: drag it right there, or outline it")
+    if index is None:
+        words = rpt_(
+            "From frame {frame} on, near and far move differently, or too little is seen: Tripod cannot hold all still"
+        )
+    return frame, words.format(frame=frame)
 
 
 def _region(scene, effect, strip, index, frames, here: Tracked) -> _Subject:

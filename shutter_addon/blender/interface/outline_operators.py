@@ -104,7 +104,7 @@ class SHUTTER_OT_outline_carry(_Carries, OfOutline, Operator):
 
 
 class SHUTTER_OT_outline_needed(_Carries, OfOutline, Operator):
-    """Go to the frame between two drawings at which the outline is least sure, tracking it first"""
+    """Go to the middle of the frames at which the outline is least sure, tracking it first"""
 
     bl_idname = "shutter.outline_needed"
     bl_label = "Next Drawing Needed"
@@ -113,7 +113,7 @@ class SHUTTER_OT_outline_needed(_Carries, OfOutline, Operator):
         scene, effect, strip = selection.active(context)
         needed = outline_drawings.next_needed(scene, effect, strip, self._target.index)
         if needed.frame is None:
-            self.report({"INFO"}, rpt_("The outline is sure by 75 % or more at all frames between its drawings"))
+            self.report({"INFO"}, rpt_("The outline is sure by 75 % or more at all frames"))
             return {"CANCELLED"}
         scene.frame_set(needed.frame)
         sentence = rpt_("Frame {frame}: the outline is sure by {share:.0f} %")
@@ -168,8 +168,16 @@ class SHUTTER_OT_outline_it(OfStrokes, Operator):
     bl_label = "Find Outline"
     only_seen = True
 
+    frame: IntProperty(
+        name="Frame",
+        description="Timeline frame of the strokes; without one, the current frame",
+        options={"SKIP_SAVE"},
+    )
+
     def change(self, context, effect):
         scene, _effect, strip = selection.active(context)
+        if self.properties.is_property_set("frame"):
+            scene.frame_set(self.frame)
         if not outline_drawings.outline_it(scene, effect, strip, effect.active_region):
             report_warning(self, rpt_("No subject is told from what is around it"))
             return {"CANCELLED"}

@@ -8,7 +8,7 @@ from ...core.messages import EffectError
 from ...media.pursuit import SURE
 from ..data import matte_look, selection, strips, validation
 from ..data.choices import CONTEXT
-from ..editing import follow_track, track_region
+from ..editing import follow_track, outline_drawings, track_region
 from . import track_operators
 from .panel_parts import WithEffect, draw_list, sentence
 
@@ -109,7 +109,7 @@ def tracking_icon(effect, index: int | None) -> str | None:
 
 
 def draw_tracked(layout, effect, index: int | None) -> None:
-    """How sure tracking of a region or the camera was of the current frame, and where it stopped."""
+    """How sure tracking of a region or the camera was of the current frame, where it was lost, and where it stopped."""
     look = "shutter.track_camera_look" if index is None else "shutter.track_look"
     confidence = track_region.confidence_at(effect, index, effect.id_data.frame_current)
     if confidence is not None:
@@ -119,12 +119,19 @@ def draw_tracked(layout, effect, index: int | None) -> None:
         column.operator(look, text="Next Unsure Frame")
     if index is None:  # a region's gaps go from its stops on
         _draw_camera_gaps(layout, effect)
-    for frame, reason, is_fault in track_region.stops(effect, index):
+    lost = track_region.lost(effect, index)
+    faults = [(*lost, True)] if lost else []
+    faults += track_region.stops(effect, index)
+    for frame, reason, is_fault in faults:
         row = layout.row(align=True)
         sentence(row, reason, "ERROR" if is_fault else "INFO", room=0.85)
         place = row.row()
         place.ui_units_x = 2.5
         place.operator(look, text=str(frame), translate=False).frame = frame
+    wrong = [frame for frame, _reason, is_fault in faults if is_fault]
+    if wrong and index is not None and effect.regions[index].kind not in strips.LAID:
+        button = layout.operator("shutter.outline_it", text="Outline This Subject")
+        button.frame = outline_drawings.nearest(effect, index, wrong[0])
 
 
 def _draw_camera_gaps(layout, effect) -> None:

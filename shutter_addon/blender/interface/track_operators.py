@@ -180,10 +180,13 @@ class _Tracks(Mixin):
     def _tell(self):
         if (effect := self._target.effect()) is None or not self._done:
             return
-        sentence = rpt_("Frames {first} to {last} are tracked, {unsure} of them unsure")
-        unsure = track_region.unsure_among(effect, self._target.index, self._done)
+        sentence = rpt_("Frames {first} to {last} are tracked")
         first, last = min(self._done | {self._start}), max(self._done | {self._start})
-        self.report({"INFO"}, sentence.format(first=first, last=last, unsure=unsure))
+        self.report({"INFO"}, sentence.format(first=first, last=last))
+        lost = track_region.lost(effect, self._target.index)
+        if lost and lost[0] in self._frames:
+            report_warning(self, lost[1])
+            return
         for frame, fault, is_fault in track_region.stops(effect, self._target.index):
             if frame in self._frames:
                 sentence = rpt_("Tracking stopped at frame {frame}: {fault}")

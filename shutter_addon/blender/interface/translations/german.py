@@ -467,8 +467,8 @@ MESSAGES = {
     ("Operator", "Next Drawing Needed"): "Nächste nötige Zeichnung",
     (
         "*",
-        "Go to the frame between two drawings at which the outline is least sure, tracking it first",
-    ): "Zum Frame zwischen zwei Zeichnungen gehen, in dem der Umriss am unsichersten ist; er wird vorher verfolgt",
+        "Go to the middle of the frames at which the outline is least sure, tracking it first",
+    ): "Zur Mitte der Frames gehen, in denen der Umriss am unsichersten ist; er wird vorher verfolgt",
     ("Operator", "Insert Outline Drawing"): "Umrisszeichnung einfügen",
     (
         "*",
@@ -480,9 +480,8 @@ MESSAGES = {
     ): "Frame {frame}: Der Umriss ist zu {share:.0f} % sicher",
     (
         "*",
-        "The outline is sure by 75 % or more at all frames between its drawings",
-    ): "Der Umriss ist in allen Frames zwischen seinen Zeichnungen zu 75 % oder mehr sicher",
-    ("*", "Draw the outline at two frames first"): "Zeichnen Sie den Umriss zuerst in zwei Frames",
+        "The outline is sure by 75 % or more at all frames",
+    ): "Der Umriss ist in allen Frames zu 75 % oder mehr sicher",
     ("*", "The outline encloses nothing at the current frame"): "Der Umriss umschließt im aktuellen Frame nichts",
     ("*", "The region is no outline"): "Die Region ist kein Umriss",
     ("*", 'strip "{strip}" is scaled to nothing'): "Streifen „{strip}“ ist zu nichts skaliert",
@@ -1129,8 +1128,22 @@ MESSAGES = {
     ("*", "Tracking: {done} of {total} frames, Esc to stop"): "Verfolgt: {done} von {total} Bildern, Esc hält an",
     (
         "*",
-        "Frames {first} to {last} are tracked, {unsure} of them unsure",
-    ): "Bilder {first} bis {last} sind verfolgt, {unsure} davon unsicher",
+        "Frames {first} to {last} are tracked",
+    ): "Bilder {first} bis {last} sind verfolgt",
+    (
+        "*",
+        "Track lost the subject at frame {frame}: drag it right there, or outline it",
+    ): "Verfolgen verlor das Motiv bei Bild {frame}: dort zurechtziehen oder umreißen",
+    (
+        "*",
+        "From frame {frame} on, near and far move differently, or too little is seen: Tripod cannot hold all still",
+    ): "Ab Bild {frame} bewegen sich Nahes und Fernes verschieden, oder zu wenig ist zu sehen: "
+    "Stativ kann nicht alles still halten",
+    ("Operator", "Outline This Subject"): "Dieses Motiv umreißen",
+    (
+        "*",
+        "Timeline frame of the strokes; without one, the current frame",
+    ): "Bild der Zeitleiste mit den Strichen; ohne eines das aktuelle",
     ("*", "Tracking stopped at frame {frame}: {fault}"): "Das Verfolgen hielt bei Bild {frame} an: {fault}",
     ("*", "Confidence"): "Sicherheit",
     ("*", "How sure tracking was of where it is"): "Wie sicher das Verfolgen war, wo es ist",
