@@ -245,7 +245,7 @@ def lost(effect, index: int | None) -> tuple[int, str] | None:
     words = rpt_("Track lost the subject at frame {frame}: drag it right there, or outline it")
     if index is None:
         words = rpt_(
-            "From frame {frame} on, near and far move differently, or too little is seen: Tripod cannot hold all still"
+            "From frame {frame} on, near and far move differently, or too little is seen: not all can be held still"
         )
     return frame, words.format(frame=frame)
 

@@ -100,12 +100,11 @@ def draw_tracking(layout, index: int | None) -> None:
 
 def tracking_icon(effect, index: int | None) -> str | None:
     """Of what `draw_tracked` draws; None: nothing."""
-    confidence = track_region.confidence_at(effect, index, effect.id_data.frame_current)
     stops = track_region.stops(effect, index)
-    if confidence is None and not stops:
-        return None
-    is_unsure = (confidence is not None and confidence < SURE) or any(is_fault for _, _, is_fault in stops)
-    return "ERROR" if is_unsure else "INFO"
+    if track_region.lost(effect, index) or any(is_fault for _, _, is_fault in stops):
+        return "ERROR"
+    is_tracked = track_region.confidence_at(effect, index, effect.id_data.frame_current) is not None
+    return "INFO" if is_tracked or stops else None
 
 
 def draw_tracked(layout, effect, index: int | None) -> None:
@@ -113,10 +112,8 @@ def draw_tracked(layout, effect, index: int | None) -> None:
     look = "shutter.track_camera_look" if index is None else "shutter.track_look"
     confidence = track_region.confidence_at(effect, index, effect.id_data.frame_current)
     if confidence is not None:
-        column = layout.column(align=True)
         text = iface_("Confidence: {percent} %").format(percent=f"{100 * confidence:.0f}")
-        column.label(text=text, icon="CHECKMARK" if confidence >= SURE else "ERROR", translate=False)
-        column.operator(look, text="Next Unsure Frame")
+        layout.label(text=text, icon="CHECKMARK" if confidence >= SURE else "ERROR", translate=False)
     if index is None:  # a region's gaps go from its stops on
         _draw_camera_gaps(layout, effect)
     lost = track_region.lost(effect, index)

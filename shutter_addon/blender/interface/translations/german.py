@@ -1136,9 +1136,8 @@ MESSAGES = {
     ): "Verfolgen verlor das Motiv bei Bild {frame}: dort zurechtziehen oder umreißen",
     (
         "*",
-        "From frame {frame} on, near and far move differently, or too little is seen: Tripod cannot hold all still",
-    ): "Ab Bild {frame} bewegen sich Nahes und Fernes verschieden, oder zu wenig ist zu sehen: "
-    "Stativ kann nicht alles still halten",
+        "From frame {frame} on, near and far move differently, or too little is seen: not all can be held still",
+    ): "Ab Frame {frame} bewegen sich Nah und Fern verschieden, oder es ist zu wenig zu sehen: nicht alles steht still",
     ("Operator", "Outline This Subject"): "Dieses Motiv umreißen",
     (
         "*",
