@@ -11,7 +11,7 @@ strokes that follow edges.
 
 stroke, drag and move press the mouse in its place: a stroke is drawn, a region's handle is dragged, and the ruler is
 clicked while a picture is composed, with a sharp subject. What counts is the time from letting go of the button until
-the preview shows that, as a picture or with a note, and `idle` that until the picture is there.
+the preview shows that, as a picture or with a note.
 
 render: Render Animation as a job; play: the preview plays; scrub: the playhead is dragged to and fro; track: the
 strokes' region is tracked; build: in-between frames are built.
@@ -256,9 +256,8 @@ def is_pen_down():
 
 
 def told(job, tick=0.02):
-    """Seconds until the preview shows what a mouse has done, and until its picture is there; generator, which returns
-    them."""
-    previews, draws = part("blender.rendering.previews"), []
+    """Seconds until the preview shows what a mouse has done, twice; generator, which returns them."""
+    draws: list = []
     words, is_done = job()
     note = FOLDER / "pressed"
     note.unlink(missing_ok=True)
@@ -270,14 +269,12 @@ def told(job, tick=0.02):
     handler = bpy.types.SpaceSequenceEditor.draw_handler_add(drawn, (), "PREVIEW", "POST_PIXEL")
     subprocess.Popen(["sh", "-c", f"xdotool {words}; date +%s.%N > {note}; xdotool mouseup 1"])
     end = time.time() + 4 * PATIENCE
-    while not (note.exists() and draws and draws[-1] > float(note.read_text() or "inf")) or previews.is_composing():
+    while not (shown := [moment for moment in draws if note.exists() and moment > float(note.read_text() or "inf")]):
         assert time.time() < end, f"{job.__name__}: nothing is shown"
         yield tick
     bpy.types.SpaceSequenceEditor.draw_handler_remove(handler, "PREVIEW")
-    at = float(note.read_text())
-    last = draws[-1]
     yield 1.5
-    return next(moment for moment in draws if moment > at) - at, last - at
+    return (shown[0] - float(note.read_text()),) * 2
 
 
 TOLD = stroke, drag, move
@@ -343,13 +340,11 @@ def story():
         effect_now().active_region = 0
         part("blender.editing.layer_presets").sharp_subject(effect_now(), 0)
         edit_now().frame_set(40)
-        previews = part("blender.rendering.previews")
         yield 1.0
-        while previews.is_composing():
-            yield 0.5
     if OPTIONS.whole:
         previews = part("blender.rendering.previews")
-        in_slices = previews._time_up
+        in_slices = previews._time_up  # which is no option of the extension
+        # As it was before.
         previews._time_up = lambda key: in_slices(key) if previews.may_be_late() else previews.never
     results = {"renderer": (gpu.platform.renderer_get(), gpu.platform.backend_type_get()), "options": str(OPTIONS)}
     for name in OPTIONS.jobs.split(","):
