@@ -247,7 +247,7 @@ def dragged(*points):
 
 
 def pressed_words(first, *others):
-    words = f"mousemove {first[0]} {first[1]} sleep 0.3 mousedown 1"
+    words = f"mousemove {first[0]} {first[1]} sleep 2 mousedown 1"  # a handle lights up first
     return words + "".join(f" sleep 0.2 mousemove {x} {y}" for x, y in others) + " sleep 0.2"
 
 

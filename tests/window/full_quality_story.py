@@ -98,7 +98,7 @@ def composed_late():
     notes, first = preview._Notes, previews._SLICE  # on a quick machine nothing would be late
     preview._Notes = lambda region: said.append(notes(region)) or said[-1]  # what the screen shows of it is a picture
     driver.PREVIEWS = ""  # whose pictures it waits for
-    for step, frame in (("late_drawn", FRAME), ("late_engine", FRAME + 10)):
+    for step, frame in (("late_drawn", FRAME + 20), ("late_engine", FRAME + 10)):
         previews._SLICE = 0.0  # nothing is done in time
         story.edit().frame_set(frame)
         said.clear()
