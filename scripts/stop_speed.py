@@ -1,18 +1,24 @@
 """How long Blender takes to be free again after Esc, measured in its own window by real key presses.
 
     blender --factory-startup --python scripts/stop_speed.py -- FOOTAGE.mp4 OUT.json \\
-        [--presses 20] [--jobs render,play,scrub,track,build] [--window 16] [--device auto] [--packages DIR]
+        [--presses 20] [--jobs render,play,scrub,track,build] [--window 16] [--device auto] [--packages DIR] \\
+        [--whole]
 
 xdotool presses Esc at some moment of each job, from a process of its own: Blender need not have time for it. What
 counts is the time from that press until the job has ended and a timer ticks again; `idle` is the time until what works
 for it beside Blender has nothing left to do, either, so that nothing waits that comes next. Three shutters on two
 strokes that follow edges.
 
+stroke, drag and move press the mouse in its place: a stroke is drawn, a region's handle is dragged, and the ruler is
+clicked while a picture is composed, with a sharp subject. What counts is the time from letting go of the button until
+the preview shows that, as a picture or with a note.
+
 render: Render Animation as a job; play: the preview plays; scrub: the playhead is dragged to and fro; track: the
 strokes' region is tracked; build: in-between frames are built.
 
 Any Blender 5.2 with the extension enabled, started with a window and `--python` this file, will do.
 --packages: a folder with OpenCV, where Blender has none.
+--whole: still pictures are composed to their end before Blender looks at its keys.
 """
 
 import argparse
@@ -47,6 +53,7 @@ def arguments():
     parser.add_argument("--method", default="quick", choices=("quick", "good"))
     parser.add_argument("--zoom", default="fit", choices=("fit", "full"))
     parser.add_argument("--packages")
+    parser.add_argument("--whole", action="store_true")
     return parser.parse_args(sys.argv[sys.argv.index("--") + 1 :])
 
 
@@ -194,6 +201,85 @@ def build():
     return lambda: part("blender.rendering.inbetween_build").running() is not None
 
 
+# Jobs of the mouse: each gives the words of xdotool up to where the button is let go, and what tells a draw of the
+# preview that it is done.
+
+
+def on_preview(x, y):
+    """On the screen, of a point in fractions of the picture."""
+    found, render = region("PREVIEW")[1], edit_now().render
+    size = render.resolution_x, render.resolution_y
+    return on_screen(found, *found.view2d.view_to_region((x - 0.5) * size[0], (y - 0.5) * size[1], clip=False))
+
+
+def stroke():
+    with within("PREVIEW"):
+        bpy.ops.shutter.draw("INVOKE_DEFAULT")
+    count, x = strokes_drawn(), _random.uniform(0.4, 0.6)
+    return dragged((x, 0.4), (x, 0.5)), lambda: strokes_drawn() > count
+
+
+def strokes_drawn():
+    layers = effect_now().scene.annotation.layers
+    return sum(len(frame.strokes) for layer in layers for frame in layer.frames)
+
+
+def drag():
+    with within("PREVIEW"):
+        bpy.ops.wm.tool_set_by_id(name="builtin.select_box")
+        centre = part("blender.interface.region_gizmo").place(bpy.context).centre
+    found, step = region("PREVIEW")[1], _random.choice((-12, 12))
+    at, to = on_screen(found, *centre), on_screen(found, centre[0] + step, centre[1])
+    before = tuple(effect_now().regions[effect_now().active_region].location)
+    return pressed_words(at, to), lambda: tuple(effect_now().regions[effect_now().active_region].location) != before
+
+
+def move():
+    timeline, before = region("SEQUENCER")[1], edit_now().frame_current
+    frame = before - 20 if before > edit_now().frame_end / 2 else before + 20
+    edit_now().frame_set(frame + 5)  # whose picture is composed when the button is pressed
+    at = on_screen(timeline, timeline.view2d.view_to_region(frame, 0, clip=False)[0], timeline.height - 12)
+    return pressed_words(at), lambda: abs(edit_now().frame_current - frame) <= 1
+
+
+def dragged(*points):
+    return pressed_words(*(on_preview(*point) for point in points))
+
+
+def pressed_words(first, *others):
+    words = f"mousemove {first[0]} {first[1]} sleep 2 mousedown 1"  # a handle lights up first
+    return words + "".join(f" sleep 0.2 mousemove {x} {y}" for x, y in others) + " sleep 0.2"
+
+
+def is_pen_down():
+    return part("blender.rendering.previews").PEN in operators()
+
+
+def told(job, tick=0.02):
+    """Seconds until the preview shows what a mouse has done, twice; generator, which returns them."""
+    draws: list = []
+    words, is_done = job()
+    note = FOLDER / "pressed"
+    note.unlink(missing_ok=True)
+
+    def drawn():
+        if is_done() and not is_pen_down():
+            draws.append(time.time())
+
+    handler = bpy.types.SpaceSequenceEditor.draw_handler_add(drawn, (), "PREVIEW", "POST_PIXEL")
+    subprocess.Popen(["sh", "-c", f"xdotool {words}; date +%s.%N > {note}; xdotool mouseup 1"])
+    end = time.time() + 4 * PATIENCE
+    while not (shown := [moment for moment in draws if note.exists() and moment > float(note.read_text() or "inf")]):
+        assert time.time() < end, f"{job.__name__}: nothing is shown"
+        yield tick
+    bpy.types.SpaceSequenceEditor.draw_handler_remove(handler, "PREVIEW")
+    yield 1.5
+    return (shown[0] - float(note.read_text()),) * 2
+
+
+TOLD = stroke, drag, move
+
+
 def device_queue():
     """What comes last of what the render's device has to do; None: it has done it."""
     session = part("blender.rendering.sessions").OFFSCREEN
@@ -250,12 +336,22 @@ def undone(job):
 
 def story():
     yield from make_edit()
+    if any(job.__name__ in OPTIONS.jobs.split(",") for job in TOLD):
+        effect_now().active_region = 0
+        part("blender.editing.layer_presets").sharp_subject(effect_now(), 0)
+        edit_now().frame_set(40)
+        yield 1.0
+    if OPTIONS.whole:
+        previews = part("blender.rendering.previews")
+        in_slices = previews._time_up  # which is no option of the extension
+        # As it was before.
+        previews._time_up = lambda key: in_slices(key) if previews.may_be_late() else previews.never
     results = {"renderer": (gpu.platform.renderer_get(), gpu.platform.backend_type_get()), "options": str(OPTIONS)}
     for name in OPTIONS.jobs.split(","):
         job, times = globals()[name], []
         while len(times) < OPTIONS.presses:
             try:
-                times.append((yield from one(job)))
+                times.append((yield from (told if job in TOLD else one)(job)))
             except RuntimeError as error:
                 print(error, flush=True)
                 if "does not end" in str(error):

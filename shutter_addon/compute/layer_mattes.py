@@ -10,6 +10,7 @@ import numpy as np
 from ..core.model.frame_state import FrameState, Layers
 from ..core.model.mattes import FileFrame, Matte, MatteReader, Ramp
 from ..core.pixels import layering
+from ..core.stopping import kept
 
 # Bytes of mattes that are kept, at most, beyond those of the window.
 KEPT_BYTES = 512 << 20
@@ -98,6 +99,7 @@ class LayerMattes:
         most = max(KEPT_BYTES // (2 * self._size[0] * self._size[1]), 16)
         while len(self._kept) > most:
             self._kept.popitem(last=False)
+        kept()
 
     def clear(self) -> None:
         """Forgets all mattes."""

@@ -10,6 +10,7 @@ import numpy as np
 from ..core.frames.frame_source import FrameSource
 from ..core.model.frame_state import Light, Options
 from ..core.pixels import compositor
+from ..core.stopping import kept
 
 
 def summable(source: FrameSource) -> bool:
@@ -84,6 +85,7 @@ class RunningSums(ABC):
         same = next((position for position, held in self._frames.items() if held == frame), None)
         self._add(light, frame, same, known, next_)
         self._frames[min(known, next_)] = frame
+        kept()
 
     @abstractmethod
     def _add(self, light: Light, frame: int, same: int | None, known: int, next_: int) -> None:

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Hashable
 from typing import Any, TypeVar
 
+from .stopping import kept
+
 T = TypeVar("T")
 
 
@@ -27,6 +29,7 @@ class Memo:
             value = make()
             self.made += 1
             self._kept = key, value, not quick
+            kept()
         return self._kept[1]
 
     def clear(self) -> None:

@@ -6,9 +6,11 @@ right, or forgotten, wherever the work ends.
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
+from dataclasses import dataclass
 
 
 class StoppedError(Exception):
@@ -17,6 +19,19 @@ class StoppedError(Exception):
 
 def never() -> bool:
     return False
+
+
+@dataclass
+class Slice:
+    """What tells work to end after some time, and to go on in another slice.
+
+    end: of time.monotonic(); has_kept: whether something is kept for the next one"""
+
+    end: float
+    has_kept: bool = False
+
+    def __call__(self) -> bool:
+        return time.monotonic() > self.end
 
 
 _stopped: ContextVar[Callable[[], bool]] = ContextVar("stopped", default=never)
@@ -30,6 +45,12 @@ def once(stopped: Callable[[], bool]) -> Iterator[None]:
         yield
     finally:
         _stopped.reset(token)
+
+
+def kept() -> None:
+    """Notes that what this step has made is kept, should the work end here."""
+    if isinstance(now := _stopped.get(), Slice):
+        now.has_kept = True
 
 
 def check() -> None:

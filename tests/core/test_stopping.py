@@ -1,10 +1,12 @@
 """Work that is broken off between its steps."""
 
+import math
 import threading
 
 import pytest
 
 from shutter_addon.core import stopping
+from shutter_addon.core.memo import Memo
 
 
 def test_a_thread_is_told_what_was_said_on_it():
@@ -15,3 +17,18 @@ def test_a_thread_is_told_what_was_said_on_it():
         thread = threading.Thread(target=stopping.check)
         thread.start()
         thread.join()
+
+
+def test_a_slice_ends_work_and_knows_what_is_kept():
+    memo, over, endless = Memo(), stopping.Slice(-math.inf), stopping.Slice(math.inf)
+    with stopping.once(over), pytest.raises(stopping.StoppedError):
+        memo.get("key", stopping.check)
+    assert not over.has_kept
+    with stopping.once(endless):
+        stopping.check()
+        memo.get("key", lambda: 1)
+    assert endless.has_kept
+    again = stopping.Slice(math.inf)
+    with stopping.once(again):
+        assert memo.get("key", lambda: 2) == 1
+    assert not again.has_kept, "it was there"

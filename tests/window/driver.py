@@ -20,6 +20,7 @@ import thread_guard
 for deprecated in (DeprecationWarning, PendingDeprecationWarning):
     warnings.simplefilter("error", deprecated)
 
+PREVIEWS = "bl_ext.user_default.virtual_shutter.shutter_addon.blender.rendering.previews"
 OUT = Path(os.environ.get("SHUTTER_PICTURES", "/tmp/shutter-window"))
 _QUICK = "-define", "png:compression-level=1"  # a third of the time, for a tenth more bytes
 STEP = 0.25  # seconds that Blender gets for events and redraws
@@ -54,6 +55,10 @@ def play(story, seconds=STEP):
     def step():
         nonlocal handled
         if handled := not handled:  # a busy Blender runs this before what came meanwhile: that first
+            return 0.01
+        # What comes next is done with what a picture looks like; a window that goes on shows it later.
+        previews = sys.modules.get(PREVIEWS)
+        if previews and previews.is_composing() and not previews.may_be_late():
             return 0.01
         try:
             wait = next(steps)

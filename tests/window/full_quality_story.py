@@ -90,8 +90,46 @@ def looked():
     story.effect().edge_aware = 1.0
 
 
+def composed_late():
+    """Whatever takes too long, a note says so before it is done, and the playhead moves: what our handler draws, and
+    then what the engine is asked for."""
+    previews, preview, said = sys.modules[driver.PREVIEWS], interface("preview"), []
+    name = driver.PREVIEWS
+    notes, first = preview._Notes, previews._SLICE  # on a quick machine nothing would be late
+    preview._Notes = lambda region: said.append(notes(region)) or said[-1]  # what the screen shows of it is a picture
+    driver.PREVIEWS = ""  # whose pictures it waits for
+    for step, frame in (("late_drawn", FRAME + 20), ("late_engine", FRAME + 10)):
+        previews._SLICE = 0.0  # nothing is done in time
+        story.edit().frame_set(frame)
+        said.clear()
+        yield from driver.until(lambda: late(said), "it says that it composes")
+        if step == "late_engine":
+            yield from clicked()
+            said.clear()
+            yield from driver.until(lambda: late(said), "it says so in full quality")
+            assert previews.looking.whole.key is not None
+        assert previews.is_composing()
+        driver.shot(step)
+        driver.move(story.preview(), 50, 50)
+        driver.key("Right")
+        yield from driver.until(lambda frame=frame: story.edit().frame_current == frame + 1, "the playhead moves")
+        yield from driver.until(lambda: late(said), "it says so of this frame as well")
+        previews._SLICE = previews.looking.seconds = first  # as it was
+        yield from driver.until(lambda: not previews.is_composing(), "the picture comes", 60)
+        yield from driver.until(lambda: not late(said), "nothing is late")
+    driver.PREVIEWS, preview._Notes = name, notes  # as they were
+    story.edit().frame_set(FRAME)
+
+
+def late(said):
+    """Whether what was drawn last is a note that the picture is composed."""
+    # What it will draw, nobody else need know.
+    return bool(said) and any(sentence.startswith("Composing") for sentence, _button in said[-1]._lines)
+
+
 def told():
     yield from prepared()
+    yield from composed_late()
     yield from looked()
     yield from story.rendered()
 

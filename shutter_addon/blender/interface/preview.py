@@ -139,6 +139,7 @@ def _draw() -> None:
         _tell_sharp(context.region)
     # A stroke that is being drawn would lie below our picture: Blender's own shows the same.
     if any(op.bl_idname == previews.PEN for op in context.window.modal_operators):
+        previews.was_drawn()
         return
     if shown_annotations.is_other(context.space_data, selection.seen(scene)):
         bpy.app.timers.register(_follow_once)  # nothing may be changed while it is drawn
@@ -148,6 +149,7 @@ def _draw() -> None:
     shown = preview_areas.shown(context)
     if shown is None:
         previews.looking.whole = None
+        previews.was_drawn()
         _tell_unseen(context, say)
         return
     with drawing.pixel_space(context.region):
@@ -163,6 +165,8 @@ def _show(context, shown: Shown, decision: Decision | None, say) -> None:
             bpy.app.timers.register(_redraw_when_still, first_interval=_SOON)
         quad = Quad(context.region, shown.strip, annotations.picture_size(shown.effect))
         try:
+            if wanted.decision.is_late:
+                raise stopping.StoppedError
             with stopping.once(wanted.stopped):
                 _show_picture(context, quad, shown, wanted, say)
         except stopping.StoppedError:
@@ -170,6 +174,7 @@ def _show(context, shown: Shown, decision: Decision | None, say) -> None:
             _show_strokes(context, quad, shown, wanted)
             bpy.app.timers.register(_redraw_once)
     except effect_source.FAULTS as error:
+        previews.was_drawn()
         _tell_fault(error, say)
 
 

@@ -36,14 +36,14 @@ class VirtualShutterEngine(bpy.types.RenderEngine):
 
     def _render(self, depsgraph: Any, called_by_script: bool) -> None:
         scene, width, height = depsgraph.scene, self.resolution_x, self.resolution_y
-        asked = None
+        asked, stopped = None, None
         if render_job.where() is Where.WINDOW and not (called_by_script or render_job.runs()):
             asked = previews.for_engine(bpy.context, scene)
         if asked is None:
             shown, frame = job_snapshots.of(scene, scene.frame_current, self._stopped)
             detail, is_drawn = effect_source.FULL, False
         else:
-            shown, frame, detail, is_drawn = asked
+            shown, frame, detail, is_drawn, stopped = asked
         if detail != effect_source.FULL or is_drawn:
             invalidation.keep_until_drawn(scene.session_uid)
         if is_drawn:
@@ -51,8 +51,15 @@ class VirtualShutterEngine(bpy.types.RenderEngine):
         last = job_snapshots.pictures.get(scene.session_uid) if render_job.where() is Where.JOB else None
         if last is not None and last.shape == (height, width, 4):
             self._show(last)  # in the render's window, which would be empty until this one is made
-        context = render_context.of_engine(self._say, self._stopped)
-        picture = pictures.picture(context, shown, frame, detail)
+        context = render_context.of_engine(self._say, stopped or self._stopped)
+        try:
+            picture = pictures.picture(context, shown, frame, detail)
+        except StoppedError:
+            if stopped is None:
+                raise
+            previews.engine_stopped()
+            invalidation.keep_until_drawn(scene.session_uid)
+            return
         picture = pictures.resized(picture, width, height, detail.divisor)
         self._show(picture)
         self.update_progress(1.0)

@@ -16,7 +16,7 @@ from typing import Any, NamedTuple
 from ...compute.renderer import Renderer
 from ...compute.request import Request
 from ...core.frames.frame_source import FrameSource
-from ...core.stopping import never
+from ...core.stopping import Slice, never
 from ...media.reduced import DIVISORS
 from ..data import annotations, preview_areas, selection, strips
 from ..data.preview_areas import Look, Shown
@@ -33,6 +33,8 @@ _GOING = {"ANIM_OT_change_frame"} | _TRACKING | _BUILDING
 PEN = "GPENCIL_OT_annotate"
 _MOMENT = 0.3  # seconds
 _SLICE = 0.2  # seconds
+# By how much the next slice is longer: where something was kept for it, and where it begins again, so that all ends.
+_LONGER, _AGAIN = 1.02, 1.5
 _READING_TOOL = "builtin.sample"  # reads once before it is one of those that run
 DRAFT_ROWS = 270  # blocks along the shorter side of a draft in which shutters follow edges
 RESULTS = "RESULT", "SPLIT", "HOLES"  # views of the live preview that show the result
@@ -54,22 +56,26 @@ class Decision:
     """What a preview shows of an effect as it is drawn once.
 
     snapshot: of the effect; request: its picture in the previews' detail
-    is_drawn: whether our draw handler shows the result in place of Blender"""
+    is_drawn: whether our draw handler shows the result in place of Blender
+    is_late: whether the engine was stopped, for the window to look at its keys"""
 
     snapshot: Snapshot
     request: Request
     is_drawn: bool
+    is_late: bool = False
 
 
 class Asked(NamedTuple):
     """What the engine is asked for: the picture of an effect at a timeline frame, in a detail.
 
-    is_drawn: our draw handler shows it, and the engine need not"""
+    is_drawn: our draw handler shows it, and the engine need not
+    stopped: says that it takes too long, where the draw handler says so; None: it is waited for"""
 
     snapshot: Snapshot
     frame: float
     detail: effect_source.Detail
     is_drawn: bool
+    stopped: Callable[[], bool] | None = None
 
 
 @dataclass(frozen=True)
@@ -96,14 +102,15 @@ class _Looking:
 
     whole: the picture that is looked at as it will be rendered; late_until: the time until which pictures may be late
     decision: the engine's, for the draw handler, which Blender calls after it
-    slice_of: what was composed in slices of time last, by its effect's scene and frame; slice: how long that may take
+    slice_of: key of the request that is composed in slices of time; slice: the last one; seconds: how long that was
     """
 
     whole: Whole | None = None
     late_until: float = 0.0
     decision: Decision | None = None
-    slice_of: tuple[int, int] | None = None
-    slice: float = _SLICE
+    slice_of: tuple | None = None
+    slice: Slice | None = None
+    seconds: float = _SLICE
 
 
 looking = _Looking()
@@ -123,10 +130,18 @@ def for_engine(context: Any, effect_scene: Any) -> Asked | None:
     look = preview_areas.look(context, scene, effect, seen.strip if seen else strip) if owner == scene else None
     snapshot = invalidation.current(owner, effect, strip, frame)
     if seen and look:
-        looking.decision = _decide(context, seen, look, snapshot)
-        return Asked(snapshot, frame, looking.decision.request.source.detail, looking.decision.is_drawn)
+        decision = looking.decision = _decide(context, seen, look, snapshot)
+        is_told = context.window_manager.virtual_shutter.live and not decision.is_drawn
+        stopped = _time_up(decision.request.key) if is_told else None
+        return Asked(snapshot, frame, decision.request.source.detail, decision.is_drawn, stopped)
     detail = effect_source.FULL if look is None or looking.whole is not None else _detail(look)
     return Asked(snapshot, frame, detail, False)
+
+
+def engine_stopped() -> None:
+    """The engine's picture was not done in time: what is drawn after it says so."""
+    assert looking.decision is not None  # it was asked with one
+    looking.decision = replace(looking.decision, is_late=True)
 
 
 def take_decision() -> Decision | None:
@@ -141,7 +156,7 @@ def for_drawing(context: Any, shown: Shown, decision: Decision | None) -> Drawin
     settings, snapshot = context.window_manager.virtual_shutter, _snapshot(shown)
     if decision is None or decision.snapshot is not snapshot:
         decision = _decide(context, shown, _look(context, shown), snapshot)
-    stopped = _time_up(shown) if may_be_late() else never
+    stopped = never if is_read(context) else _time_up(decision.request.key)
     request = _drafted(context, shown, decision.request)
     has_result = settings.view in RESULTS
     left = settings.split if settings.view == "SPLIT" else 0.0 if has_result else 1.0
@@ -247,18 +262,25 @@ def _is_rendered(shown: Shown) -> bool:
     return shown.scene.render.sequencer_gl_preview == "RENDERED"
 
 
-def _time_up(shown: Shown) -> Callable[[], bool]:
-    """What says whether a picture has been composed for so long that Blender has to look at its keys: it goes on when
-    it is drawn again. Each time, it has half as long again, so that it comes to an end."""
-    frame = shown.effect.scene.session_uid, shown.scene.frame_current
-    looking.slice = 1.5 * looking.slice if looking.slice_of == frame else _SLICE
-    looking.slice_of, end = frame, time.monotonic() + looking.slice
-    return lambda: time.monotonic() > end
+def _time_up(key: tuple) -> Slice:
+    """What says whether a picture, by its request's key, has been composed for so long that Blender has to look at its
+    keys: it goes on when it is drawn again."""
+    if looking.slice is None or looking.slice_of != key:
+        looking.seconds = _SLICE if may_be_late() else 2 * _SLICE
+    else:
+        looking.seconds *= _LONGER if looking.slice.has_kept else _AGAIN
+    looking.slice_of, looking.slice = key, Slice(time.monotonic() + looking.seconds)
+    return looking.slice
 
 
 def was_drawn() -> None:
     """A picture is there, however many times it took."""
-    looking.slice_of, looking.slice = None, _SLICE
+    looking.slice_of = looking.slice = None
+
+
+def is_composing() -> bool:
+    """Whether a picture that was begun is not there yet."""
+    return looking.slice is not None
 
 
 def is_going(context: Any) -> bool:
