@@ -15,6 +15,7 @@ from ..editing import (
     add_effect,
     bar_edits,
     collection_edits,
+    drawn_places,
     match_source,
     region_edits,
     shown_annotations,
@@ -336,6 +337,7 @@ class SHUTTER_OT_draw(OfShutter, Operator):
             if sentence := collection_edits.why_full(effect, "regions"):  # poll() does not know what `new` is
                 raise EffectError(sentence)
             region = region_edits.first_drawn(effect, selection.active_shutter(effect), self.kind)
+        drawn_places.begin(effect, selection.active(context)[2], effect.active_region)
         if not drawing_tool(context, effect, region, "builtin.annotate"):
             self.report({"INFO"}, "Open a sequencer with a preview to draw")
         sharp_frame.show(context)
@@ -349,6 +351,7 @@ class SHUTTER_OT_erase(OfStrokes, Operator):
     only_seen = True
 
     def change(self, context, effect):
+        drawn_places.begin(effect, selection.active(context)[2], effect.active_region, erases=True)
         if not drawing_tool(context, effect, selection.active_region(effect), "builtin.annotate_eraser"):
             self.report({"INFO"}, "Open a sequencer with a preview to erase")
 
