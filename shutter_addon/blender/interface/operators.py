@@ -361,15 +361,9 @@ def drawing_tool(context, effect, region, tool: str) -> bool:
     if annotations.layer_of(effect, region) is None:
         region_edits.new_layer(effect, region)
     consistency.aim_pen(effect)
-    annotation = effect.scene.annotation
-    has_preview = False
-    for window, area in preview_areas.previews(context):
-        shown_annotations.give(area.spaces.active, annotation)
-        area.spaces.active.preview_overlay.show_annotation = True
-        with context.temp_override(window=window, area=area, region=preview_areas.preview_region(area)):
-            bpy.ops.wm.tool_set_by_id(name=tool, space_type="SEQUENCE_EDITOR")
-        has_preview = True
-    return has_preview
+    for _window, area in preview_areas.previews(context):
+        shown_annotations.give(area.spaces.active, effect.scene.annotation)
+    return sharp_frame.take_up(context, tool)
 
 
 _layer_items: list = []

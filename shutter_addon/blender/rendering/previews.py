@@ -30,12 +30,12 @@ _READERS = {"RENDER_OT_opengl", "SEQUENCER_OT_sample"}
 _TRACKING = {"SHUTTER_OT_track", "SHUTTER_OT_track_camera", "SHUTTER_OT_panning_shot", "SHUTTER_OT_tripod"}
 _BUILDING = {"SHUTTER_OT_inbetween_build", "SHUTTER_OT_smooth_streaks"}
 _GOING = {"ANIM_OT_change_frame"} | _TRACKING | _BUILDING
-PEN = "GPENCIL_OT_annotate"
+_PEN = "GPENCIL_OT_annotate"
 _MOMENT = 0.3  # seconds
 _SLICE = 0.2  # seconds
 _READING_TOOL = "builtin.sample"  # reads once before it is one of those that run
 DRAFT_ROWS = 270  # blocks along the shorter side of a draft in which shutters follow edges
-RESULTS = "RESULT", "SPLIT", "HOLES"  # views of the live preview that show the result
+RESULTS = "RESULT", "SPLIT", "EDGES", "HOLES"  # views of the live preview that show the result
 
 
 @dataclass
@@ -219,7 +219,7 @@ def _is_drawn(context: Any, shown: Shown, look: Look, source: FrameSource) -> bo
         and not shown.strips_above
         and source.alpha == "opaque"
         and look.is_plain
-        and PEN not in render_job.operators_running()
+        and not pen_is_down()
     )
 
 
@@ -265,6 +265,11 @@ def is_going(context: Any) -> bool:
     """Whether the film plays, or may_be_late."""
     is_playing = any(window.screen.is_animation_playing for window in context.window_manager.windows)
     return is_playing or may_be_late()
+
+
+def pen_is_down() -> bool:
+    """Whether a stroke is being drawn, or erased."""
+    return _PEN in render_job.operators_running()
 
 
 def is_tracking() -> bool:
