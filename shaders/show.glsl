@@ -78,6 +78,37 @@ void main() {
   shown = on_region(vec4(mix_of_colors / max(sum, 1e-6), 1.0) * opacity);
 }
 
+#elif defined(EDGES)
+// A line, in a shutter's colour, around what that gets more than half of; around the first one's there is none.
+uniform sampler2DArray coefficients, palette;
+uniform ivec2 size;
+uniform int block, count;
+uniform float unit;  // of the interface, in the region's pixels
+
+int most(vec2 place) {
+  vec2 all = vec2(size) / float(block);
+  vec2 texels = clamp(vec2(place.x, 1.0 - place.y) * all, vec2(0.5), all - 0.5);
+  for (int i = 1; i < count; i++) {
+    vec3 where = vec3(texels / vec2(textureSize(coefficients, 0).xy), float(i / 4));
+    if (textureLod(coefficients, where, 0.0)[i % 4] > 0.5) {
+      return i;
+    }
+  }
+  return 0;
+}
+
+void main() {
+  vec2 across = dFdx(at) * unit, up = dFdy(at) * unit;
+  int here = most(at), highest = here, least = here;
+  for (int i = 0; i < 4; i++) {
+    int there = most(at + (i < 2 ? across : up) * (i % 2 == 0 ? 0.5 : -0.5));
+    highest = max(highest, there);
+    least = min(least, there);
+  }
+  vec3 color = texelFetch(palette, ivec3(highest, 0, 0), 0).rgb;
+  shown = on_region(vec4(color, 1.0) * (highest > least ? opacity : 0.0));
+}
+
 #elif defined(SCRIBBLES)
 // The pixels that scribbles hold, in the colours of their shutters; labels: 0 where free.
 uniform usampler2DArray labels;

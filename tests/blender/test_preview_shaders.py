@@ -18,7 +18,7 @@ def completed(quad, shown, stage: str) -> str:
     return "\n".join([*lines, "#line 1", own.body])
 
 
-@pytest.mark.parametrize("name", ["PICTURE", "COEFFICIENTS", "SCRIBBLES"])
+@pytest.mark.parametrize("name", ["PICTURE", "COEFFICIENTS", "EDGES", "SCRIBBLES"])
 @pytest.mark.parametrize(("stage", "function"), [("vert", "vertex"), ("frag", "fragment")])
 def test_a_shader_translates(to_metal, name, stage, function):
     quad, shown = read_pass("show", "QUAD"), read_pass("show", name)

@@ -188,6 +188,8 @@ def test_previews_follow_what_is_seen(bpy, edit, effect, previews, tmp_path):
         edit.frame_set(frame)
         shown_annotations.follow()
         assert previews[0].annotation == expected, frame
+        is_laid = previews[0].preview_overlay.show_annotation
+        assert is_laid == (expected is None), "our draw handler shows it where it is, Blender where it was drawn"
     previews[0].annotation = None  # by the user
     shown_annotations.follow()
     assert previews[0].annotation is None

@@ -38,21 +38,21 @@ def by_numpy(colors, shares, unit) -> np.ndarray:
     return sum(full[..., [i]] * patterns.painted(colors[i], i, x / unit, y / unit) for i in range(SHUTTERS))
 
 
-def by_moderngl(colors, shares, unit) -> np.ndarray:
+def by_moderngl(colors, shares, unit, step="COEFFICIENTS") -> np.ndarray:
     from shutter_addon.devices.gl import GLDevice
 
     device = GLDevice()  # which leaves Blender's context current afterwards
     try:
         with device.current():
-            return _drawn(device._context, colors, shares, unit)  # private: no pass of the device's draws
+            return _drawn(device._context, colors, shares, unit, step)  # private: no pass of the device's draws
     finally:
         device.release()
 
 
-def _drawn(context, colors, shares, unit) -> np.ndarray:
+def _drawn(context, colors, shares, unit, step) -> np.ndarray:
     import moderngl
 
-    sources = read_pass("show", "QUAD").source, read_pass("show", "COEFFICIENTS").source
+    sources = read_pass("show", "QUAD").source, read_pass("show", step).source
     program = context.program(vertex_shader=sources[0], fragment_shader=sources[1])
     data = layers(shares)
     palette = np.ones((1, 1, SHUTTERS, 4), dtype=np.float32)
@@ -71,7 +71,7 @@ def _drawn(context, colors, shares, unit) -> np.ndarray:
     return np.frombuffer(target.read(components=4, dtype="f4"), np.float32).reshape(HEIGHT, WIDTH, 4)
 
 
-def by_blender(colors, shares, unit) -> np.ndarray:
+def by_blender(colors, shares, unit, step="COEFFICIENTS") -> np.ndarray:
     import gpu
     from gpu_extras.batch import batch_for_shader
     from mathutils import Matrix
@@ -86,7 +86,7 @@ def by_blender(colors, shares, unit) -> np.ndarray:
     with target.bind(), gpu.matrix.push_pop(), gpu.matrix.push_pop_projection():
         gpu.matrix.load_identity()
         gpu.matrix.load_projection_matrix(Matrix(TO_CLIP.tolist()))
-        shader = preview_quad.shader_of("COEFFICIENTS")
+        shader = preview_quad.shader_of(step)
         shader.bind()
         for name, values in (("coefficients", data), ("palette", palette)):
             buffer = gpu.types.Buffer("FLOAT", values.size, values.reshape(-1))
@@ -116,6 +116,26 @@ def test_a_renderer_draws_the_reference(request, given, renderer, unit):
     picture, expected = renderer(colors, shares, unit), by_numpy(colors, shares, unit)
     assert np.abs(picture[..., :3] - OPACITY * expected).max() <= LEVEL
     assert np.abs(picture[..., 3] - OPACITY).max() <= LEVEL
+
+
+@pytest.mark.parametrize("unit", [1.0, 2.0])
+@pytest.mark.parametrize("renderer", [by_moderngl, by_blender])
+def test_a_line_stands_around_what_a_shutter_gets(request, given, renderer, unit):
+    """As wide as a unit of the interface is, in its colour; none around the first one."""
+    if renderer is by_blender:
+        request.getfixturevalue("blender_device")
+    colors, shares = given[0], np.zeros_like(given[1])
+    shares[:, :6, 0] = shares[:, 6:, 5] = 1
+    picture = renderer(colors, shares, unit, "EDGES")
+    seen = picture[..., 3] > 0
+    assert (seen == seen[0]).all()
+    columns = np.flatnonzero(seen[0])
+    assert columns.tolist() == list(range(columns[0], columns[0] + len(columns)))
+    assert len(columns) == pytest.approx(unit, abs=1)
+    assert abs(columns.mean() + 0.5 - 6 * BLOCK) <= 1
+    assert np.abs(picture[:, columns, :3] - OPACITY * colors[5]).max() <= LEVEL
+    shares[..., 1:] = 0
+    assert not renderer(colors, shares, unit, "EDGES").any()
 
 
 def test_patterns_differ_and_leave_most_of_the_colour():

@@ -13,7 +13,7 @@ import one_stroke_story
 import story
 from one_stroke_story import FRAME, STROKE, part
 
-LATER = 82
+LATER, TOOL = 82, "builtin.select_box"
 ICON = 46, 92  # a file's in the browser, in pixels from the left and from above
 ENTRY = 47  # that of the strip's menu, which reaches down to the end of the window, in pixels above that
 _actions = []  # what was done, and whether in the tab
@@ -46,6 +46,10 @@ def on_preview(*points):
 def channel():
     """That the preview shows; 0: the result."""
     return driver.area_of("SEQUENCE_EDITOR", "PREVIEW").spaces.active.display_channel
+
+
+def tool():
+    return bpy.context.workspace.tools.from_space_sequencer("PREVIEW", create=False).idname
 
 
 def footage_chosen():
@@ -139,22 +143,26 @@ def stroke_drawn():
     acted("the stroke is drawn")
     yield from driver.until(lambda: channel() == 0, "the stroke gives the result back")
     assert story.effect().edge_aware == 1
-    tool = bpy.context.workspace.tools.from_space_sequencer("PREVIEW", create=False)
-    assert tool.idname == "builtin.annotate"
+    yield from driver.until(lambda: tool() == TOOL, "the tool of before is back")
+    yield 1.0
+    driver.shot("2_handles")  # the pointer has not moved
     yield from story.seen("2_result")
 
 
 def pressed_again():
-    """Of a second stroke, which is none of those that are counted: it is taken back."""
-    (point,) = on_preview(STROKE[0])
+    """Of a second stroke, by Blender's own key for the pen, over a handle: none of those that are counted, and taken
+    back."""
+    with driver.override("PREVIEW"):
+        point = part("blender.interface.region_gizmo").place(bpy.context).centre
     driver.move(story.preview(), *point)
     yield
-    driver.xdotool("mousedown", 1)
+    driver.xdotool("keydown", "d", "mousedown", 1, "keyup", "d")
     yield from driver.until(lambda: channel() == 1, "the pen shows the sharp frame again")
     yield from driver.shot_when_shown("3_pressed")
     driver.saw(step="3_pressed", crop=story.crop())
     driver.xdotool("mouseup", 1)
     yield from driver.until(lambda: channel() == 0, "and gives it back")
+    assert tool() == TOOL
     driver.key("ctrl+z")
     yield 1.0
 

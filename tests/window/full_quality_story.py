@@ -64,7 +64,8 @@ def prepared():
     story.effect().edge_aware = 1.0
     space = sizes.space()
     space.show_gizmo = space.show_overlays = True
-    space.preview_overlay.show_annotation = False
+    for layer in story.effect().scene.annotation.layers:
+        layer.annotation_hide = True
     yield 1.0
 
 

@@ -11,12 +11,13 @@ sys.path.append(os.environ["SHUTTER_PACKAGES"])  # OpenCV, which a Blender of a 
 
 import bpy
 import driver
+import numpy as np
 import story
 import traces
 
 # Of the footage's frame 70, in fractions of the picture: down a woman's back.
 FRAME, STROKE = 70, ((0.462, 0.65), (0.465, 0.62), (0.467, 0.59), (0.468, 0.565))
-MENDED = 85
+MENDED, REDRAWN = 85, 78
 SHOWN = range(55, 96)
 RENDERED = range(65, 86, 20)
 FOLLOW_EDGES, TRACK, PRESETS = 329, 167, 193  # where they stand in the sidebar, in pixels below its upper edge
@@ -65,8 +66,6 @@ def drawn():
     yield 0.5
     yield from driver.drag(story.preview(), [on_preview(*point) for point in STROKE])
     assert len(story.effect().regions) == 1
-    with driver.override("PREVIEW"):
-        bpy.ops.wm.tool_set_by_id(name="builtin.select_box")
     yield
 
 
@@ -149,6 +148,36 @@ def escaped():
     driver.saw(escaped=kinds(), frame=story.edit().frame_current)
 
 
+def redrawn():
+    """At another frame of what is tracked, a stroke lies where it is drawn; the pen is left, and one drag of the handle
+    moves it. Around what is sharp stands a line."""
+    story.edit().frame_set(REDRAWN)
+    yield 1.0
+    moved, place = np.array(stroke_at(REDRAWN)), part("blender.interface.region_gizmo").place
+    points = [np.add(moved, (0.1, y)) for y in (0.05, 0.02, -0.01, -0.04)]
+    with driver.override("PREVIEW"):
+        bpy.ops.shutter.draw("INVOKE_DEFAULT", True)
+    yield 1.0
+    driver.shot("6_begun")
+    yield from driver.drag(story.preview(), [on_preview(*point) for point in points])
+    apart = np.array(stroke_at(REDRAWN)) - np.mean(points, axis=0)
+    assert np.abs(apart).max() < 0.01, apart
+    assert np.abs(np.array(stroke_at(FRAME)) - np.mean(STROKE, axis=0)).max() < 0.01
+    yield 1.0
+    driver.shot("6_redrawn")
+    with driver.override("PREVIEW"):
+        x, y = place(bpy.context).centre
+    before = stroke_at(REDRAWN)
+    yield from driver.drag(story.preview(), [(x, y), (x + 10, y), (x + 20, y)])
+    strokes = story.effect().scene.annotation.layers[region().layer].frames[-1].strokes
+    assert len(strokes) == 1, "the drag draws nothing"
+    assert stroke_at(REDRAWN)[0] > before[0] + 0.01
+    assert kinds()[REDRAWN] == "KEYFRAME"
+    bpy.context.window_manager.virtual_shutter.view = "EDGES"
+    yield 2.0
+    driver.shot("6_edges")
+
+
 def rendered(frames=RENDERED):
     edit = story.edit()
     edit.render.image_settings.media_type = "IMAGE"
@@ -211,6 +240,7 @@ def told():
     yield from escaped()
     yield from edges_followed()
     yield from rendered()
+    yield from redrawn()
 
 
 if __name__ == "__main__":

@@ -43,7 +43,7 @@ def drawn():
         if frame != frame_shown():
             yield from gone_to(frame)
         for curve in TRUTH[frame]:
-            yield from driver.drag(story.preview(), on_preview(*curve))
+            yield from driver.drag(story.preview(), on_preview(*curve), hold=("d",))
             acted(f"a curve is drawn at frame {frame}")
         driver.shot(f"2_drawn_{frame:03d}")
     drawings = story.effect().scene.annotation.layers[region().layer].frames
@@ -59,10 +59,6 @@ def carried():
     yield from driver.until(lambda: is_carrying() or carrying.progress() is not None, "it is carried", 20, wait=0.02)
     yield from driver.until(lambda: not is_carrying() and carrying.progress() is None, "all is carried", 120)
     driver.saw(carried=time.monotonic() - started, needed=frame_shown())
-    tools = driver.region_of(driver.area_of("SEQUENCE_EDITOR", "PREVIEW"), "TOOLS")
-    driver.click(tools, tools.width / 2, tools.height - 25)
-    acted("click on the first tool")
-    yield 1.0
     tool = bpy.context.workspace.tools.from_space_sequencer("PREVIEW", create=False)
     assert tool.idname.startswith("builtin.select"), tool.idname
     yield from story.seen("3_carried")

@@ -142,7 +142,7 @@ def scribbled():
     """The pen draws on the half that is seen, scrubbed from one to the other."""
     yield from story.moved_to(RIGHT)
     with driver.override("PREVIEW"):
-        bpy.ops.shutter.draw("INVOKE_DEFAULT", True)
+        bpy.ops.wm.tool_set_by_id(name="builtin.annotate")  # one that is chosen so stays
     yield 0.5
     for frame, index in ((RIGHT, 1), (LEFT, 0), (RIGHT, 1)):
         yield from story.moved_to(frame)

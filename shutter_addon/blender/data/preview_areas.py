@@ -60,10 +60,11 @@ def preview_region(area):
     return next(region for region in area.regions if region.type == "PREVIEW")
 
 
-def shown(context) -> Shown | None:
-    """The effect strip under the playhead that the preview shows, as selection.seen has it."""
+def shown(context, channel: int = 0) -> Shown | None:
+    """The effect strip under the playhead that the preview shows, as selection.seen has it. channel: that the preview
+    has to show, 0: all."""
     scene, space = selection.scene_of(context), context.space_data
-    if space.display_mode != "IMAGE" or space.display_channel or (seen := selection.seen(scene)) is None:
+    if (space.display_mode, space.display_channel) != ("IMAGE", channel) or (seen := selection.seen(scene)) is None:
         return None
     _, effect, strip = seen
     above = any(other.channel > strip.channel for other in selection.visible(scene))

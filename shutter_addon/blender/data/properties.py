@@ -48,7 +48,7 @@ from .choices import (
     UNKEYED,
 )
 from .consistency import changed
-from .region_properties import KEYED, ShutterCamera, ShutterRegion, TrackStop, choice, share
+from .region_properties import KEYED, MOVING, ShutterCamera, ShutterRegion, choice, share
 
 
 def _renamed(shutter, new: str, old: str, _is_set) -> str:
@@ -321,7 +321,7 @@ class ShutterBake(PropertyGroup):
     channel: IntProperty()
 
 
-classes = (ShutterBar, Shutter, TrackStop, ShutterRegion, ShutterCamera, ShutterEffect, ShutterScene, ShutterBake)
+classes = (ShutterBar, Shutter, *MOVING, ShutterEffect, ShutterScene, ShutterBake)
 
 
 def register():

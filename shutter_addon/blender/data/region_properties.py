@@ -67,6 +67,15 @@ class TrackStop(PropertyGroup):
     fault: StringProperty()
 
 
+class DrawnPlace(PropertyGroup):
+    """Where a region was as its drawing at a frame was made, which is seen there; frame: as that of a TrackStop."""
+
+    frame: FloatProperty()
+    location: FloatVectorProperty(size=2)
+    rotation: FloatProperty()
+    scale: FloatProperty(default=1.0)
+
+
 class _Tracked:
     """What tracking has found of a region or of the camera, and how it is tracked."""
 
@@ -141,6 +150,8 @@ class ShutterRegion(_Tracked, PropertyGroup):
     name: StringProperty(name="Name", description="Name of the region", default="Region", set_transform=_shortened)
     shutter: StringProperty(name="Shutter", description="Name of the shutter that holds in the region", update=changed)
     layer: StringProperty(name="Layer", description="Annotation layer that holds the strokes", update=changed)
+    # Where there is any, drawings without one are seen where they were drawn as well; else, where it has not moved.
+    drawn: CollectionProperty(type=DrawnPlace)
     kind: choice("Type", "What says where the shutter holds", KINDS, translation_context=CONTEXT)
     between: choice("In Between", "What gives the matte between two drawings", BETWEEN)
     matte: choice("From", "What the matte is", MATTE_SOURCES)
@@ -224,3 +235,6 @@ class ShutterCamera(_Tracked, PropertyGroup):
     location: _location("Where what the camera sees has moved to, as a fraction of the picture")
     rotation: _rotation("Rotation of what the camera sees, about the picture's center")
     scale: _scale("Scale of what the camera sees, about the picture's center")
+
+
+MOVING = TrackStop, DrawnPlace, ShutterRegion, ShutterCamera  # in the order in which Blender gets to know them

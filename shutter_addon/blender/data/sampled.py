@@ -7,7 +7,8 @@ import numpy as np
 from ...core.messages import EffectError, UserError
 from ...core.model import effect as model
 from ...core.model import keyframes
-from . import annotations, geometry
+from ...core.model.motions import Placement
+from . import annotations, geometry, strips
 from .fcurves import Curves
 
 Frames = Collection[float]  # of the timeline
@@ -45,6 +46,20 @@ def moves(curves: Curves, moving, path: str, frames: Frames) -> model.Moves:
     )
 
 
+def placement_now(moving) -> Placement:
+    """Where a region or the camera is as its properties stand: at the current frame, keyed or not."""
+    return Placement(tuple(moving.location), float(np.degrees(moving.rotation)), moving.scale)
+
+
+def _origins(curves: Curves, path: str, effect, region, numbers: Collection[float]) -> tuple[Placement, ...]:
+    """Where a region was as its drawings at these frames were made (model.Drawings)."""
+    if not region.drawn or region.kind in strips.LAID:
+        return ()
+    known = {np.rint(effect.start + noted.frame): placement_now(noted) for noted in region.drawn}
+    there = moves(curves, region, path, numbers)
+    return tuple(known[number] if number in known else there.at(number) for number in numbers)
+
+
 def drawings(curves: Curves, path: str, effect, region, placement, frames: Frames | None) -> model.Drawings:
     """A region's drawings: between two of them with the ease of its location's keys. Only those that the frames need
     are read; None: all."""
@@ -64,6 +79,7 @@ def drawings(curves: Curves, path: str, effect, region, placement, frames: Frame
         eases=tuple(eases.get(number, "linear") for number in numbers),
         aspect=width / height,
         placement=placement,
+        origins=_origins(curves, path, effect, region, numbers),
     )
 
 

@@ -144,11 +144,6 @@ class MotionKeys:
         return fcurves.find_curve(scene, path, component)
 
 
-def placement_now(moving) -> Placement:
-    """Where a region or the camera is as its properties stand: at the current frame, keyed or not."""
-    return Placement(tuple(moving.location), float(np.degrees(moving.rotation)), moving.scale)
-
-
 def check_curves(effect, index: int | None) -> None:
     """EffectError: an F-curve of where a region or the camera is cannot be keyed, or its keys would do nothing."""
     moving = selection.moving(effect, index)

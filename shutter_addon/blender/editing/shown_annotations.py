@@ -1,5 +1,6 @@
 """Which annotation the previews show: that of the effect that is seen, none where none is seen, and never another one
-in place of one that the user made.
+in place of one that the user made. Blender shows an effect's while the pen is down alone: it has it as it was drawn, at
+whatever frame, and our draw handler where it is now.
 
 A sequencer keeps its annotation in every one of its spaces, those too that lie behind another editor or in a workspace
 that is not shown: each is a user of it, and would bring it into the saved file.
@@ -8,6 +9,7 @@ that is not shown: each is a user of it, and would bring it into the saved file.
 import bpy
 
 from ..data import annotations, selection
+from ..rendering import previews
 
 _emptied: set[int] = set()  # addresses of spaces whose annotation was an effect's, until none was seen or it went
 
@@ -19,6 +21,14 @@ def follow() -> None:
         for area in window.screen.areas:
             if area.type == "SEQUENCE_EDITOR" and is_other(area.spaces.active, seen):
                 give(area.spaces.active, seen[1].scene.annotation if seen else None)
+            if area.type == "SEQUENCE_EDITOR" and is_laid_wrong(area.spaces.active):
+                area.spaces.active.preview_overlay.show_annotation ^= True
+
+
+def is_laid_wrong(space) -> bool:
+    """Whether Blender shows an effect's annotation in a preview without the pen, or does not with it."""
+    is_effects = space.annotation is not None and is_own(space.annotation)
+    return is_effects and space.preview_overlay.show_annotation != previews.pen_is_down()
 
 
 def is_other(space, seen) -> bool:
@@ -40,6 +50,8 @@ def give(space, annotation) -> None:
     before = space.annotation
     if before is not None and annotation is not None and not is_own(before):
         before.use_fake_user = True  # or it would not be saved
+    if annotation is None:
+        space.preview_overlay.show_annotation = True  # the user's next one
     space.annotation = annotation
     (_emptied.discard if annotation else _emptied.add)(space.as_pointer())
 

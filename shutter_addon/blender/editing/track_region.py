@@ -26,9 +26,10 @@ from ...media import camera_tracking, matte_tracking, pursuit, tracking
 from ...media.footage import Footage
 from ...media.tracking import Tracked
 from ..data import annotations, inbetween_settings, selection, snapshot, strips, validation
+from ..data.sampled import placement_now
 from ..rendering import effect_source
 from . import motion_keys
-from .motion_keys import MotionKeys, placement_now
+from .motion_keys import MotionKeys
 
 # Sentences of media/tracking.py and media/camera_tracking.py, which are looked up where they are shown.
 FAULTS = (

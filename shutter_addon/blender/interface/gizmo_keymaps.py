@@ -6,9 +6,12 @@ _made: set[str] = set()  # of which groups
 
 
 def new(group, keyconfig):
-    """An empty keymap for a gizmo group."""
+    """A keymap for a gizmo group, in which Blender's own key for the pen is the pen's still."""
     _made.add(group.bl_idname)
-    return keyconfig.keymaps.new(group.bl_idname, space_type=group.bl_space_type, region_type="WINDOW")
+    keymap = keyconfig.keymaps.new(group.bl_idname, space_type=group.bl_space_type, region_type="WINDOW")
+    pen = keymap.keymap_items.new("gpencil.annotate", "LEFTMOUSE", "PRESS", key_modifier="D")
+    pen.properties.mode, pen.properties.wait_for_input = "DRAW", False
+    return keymap
 
 
 def unregister():

@@ -8,7 +8,7 @@ from bpy.types import Operator
 
 from ...core.model.limits import MAX_DEGREES, MAX_DISTANCE, MAX_SCALE
 from ..data import annotations, preview_areas, selection
-from ..editing import region_edits
+from ..editing import drawn_places, region_edits
 from .operator_bases import OfEffect, OfRegion, report_error
 from .region_gizmo import wants_keys
 
@@ -54,6 +54,7 @@ class SHUTTER_OT_region_transform(OfRegion, Operator):
 
     def change(self, context, effect):
         index, region = effect.active_region, selection.active_region(effect)
+        drawn_places.hold(effect, index)
         region.location, region.rotation, region.scale = self.location, self.rotation, self.scale
         if wants_keys(context, effect, index):
             region_edits.key_region(effect, index)

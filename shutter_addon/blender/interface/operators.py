@@ -15,6 +15,7 @@ from ..editing import (
     add_effect,
     bar_edits,
     collection_edits,
+    drawn_places,
     match_source,
     region_edits,
     shown_annotations,
@@ -335,6 +336,7 @@ class SHUTTER_OT_draw(OfShutter, Operator):
             if sentence := collection_edits.why_full(effect, "regions"):  # poll() does not know what `new` is
                 raise EffectError(sentence)
             region = region_edits.first_drawn(effect, selection.active_shutter(effect), self.kind)
+        drawn_places.begin(effect, selection.active(context)[2], effect.active_region)
         if not drawing_tool(context, effect, region, "builtin.annotate"):
             self.report({"INFO"}, "Open a sequencer with a preview to draw")
         sharp_frame.show(context)
@@ -348,6 +350,7 @@ class SHUTTER_OT_erase(OfStrokes, Operator):
     only_seen = True
 
     def change(self, context, effect):
+        drawn_places.begin(effect, selection.active(context)[2], effect.active_region, erases=True)
         if not drawing_tool(context, effect, selection.active_region(effect), "builtin.annotate_eraser"):
             self.report({"INFO"}, "Open a sequencer with a preview to erase")
 
@@ -357,15 +360,9 @@ def drawing_tool(context, effect, region, tool: str) -> bool:
     if annotations.layer_of(effect, region) is None:
         region_edits.new_layer(effect, region)
     consistency.aim_pen(effect)
-    annotation = effect.scene.annotation
-    has_preview = False
-    for window, area in preview_areas.previews(context):
-        shown_annotations.give(area.spaces.active, annotation)
-        area.spaces.active.preview_overlay.show_annotation = True
-        with context.temp_override(window=window, area=area, region=preview_areas.preview_region(area)):
-            bpy.ops.wm.tool_set_by_id(name=tool, space_type="SEQUENCE_EDITOR")
-        has_preview = True
-    return has_preview
+    for _window, area in preview_areas.previews(context):
+        shown_annotations.give(area.spaces.active, effect.scene.annotation)
+    return sharp_frame.take_up(context, tool)
 
 
 _layer_items: list = []

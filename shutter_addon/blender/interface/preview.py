@@ -1,5 +1,6 @@
 """The live preview: what is drawn over the sequencer's picture, composed on Blender's GPU: views, and scribbles."""
 
+from contextlib import suppress
 from dataclasses import replace
 
 import bpy
@@ -39,6 +40,7 @@ from .preview_quad import Quad
 VIEWS = (
     ("RESULT", "Result", "The finished picture"),
     ("SPLIT", "Split", "The source on the left of the handle, the result on its right"),
+    ("EDGES", "Edges", "The result, and a line around what a shutter gets more than half of"),
     ("SCRIBBLES", "Scribbles", "The source, and where each shutter is scribbled"),
     ("COEFFICIENTS", "Mattes", "How much of each shutter a pixel gets, in the shutters' colors and patterns"),
     (
@@ -134,15 +136,16 @@ def _draw() -> None:
     scene = selection.scene_of(context)
     if scene is not None and scene.library is None and invalidation.invalidate_changed(scene):
         bpy.app.timers.register(_redraw_once)  # what is tagged while it is drawn is not drawn again
-    sharp_frame.follow_pen(context)
-    if sharp_frame.is_shown(context.space_data):
-        _tell_sharp(context.region)
+    sharp_frame.follow_pen()
+    space = context.space_data
+    if shown_annotations.is_laid_wrong(space) or shown_annotations.is_other(space, selection.seen(scene)):
+        bpy.app.timers.register(_follow_once)  # nothing may be changed while it is drawn
+    if sharp_frame.is_shown(space):
+        _show_sharp(context, preview_areas.shown(context, space.display_channel))
     # A stroke that is being drawn would lie below our picture: Blender's own shows the same.
-    if any(op.bl_idname == previews.PEN for op in context.window.modal_operators):
+    if previews.pen_is_down():
         previews.was_drawn()
         return
-    if shown_annotations.is_other(context.space_data, selection.seen(scene)):
-        bpy.app.timers.register(_follow_once)  # nothing may be changed while it is drawn
     if not context.window_manager.virtual_shutter.live:
         return
     say = _Notes(context.region)
@@ -171,7 +174,7 @@ def _show(context, shown: Shown, decision: Decision | None, say) -> None:
                 _show_picture(context, quad, shown, wanted, say)
         except stopping.StoppedError:
             say(rpt_("Composing…"))
-            _show_strokes(context, quad, shown, wanted)
+            _show_strokes(context, quad, shown)
             bpy.app.timers.register(_redraw_once)
     except effect_source.FAULTS as error:
         previews.was_drawn()
@@ -206,11 +209,13 @@ def _show_picture(context, quad: Quad, shown: Shown, wanted: Drawing, say) -> No
     if settings.view == "SCRIBBLES":
         _show_scribbles(quad, shown.effect, renderer, request)
     elif settings.view == "COEFFICIENTS":
-        _show_coefficients(quad, shown.effect, renderer, request)
+        _show_coefficients(quad, shown.effect, renderer, request, "COEFFICIENTS", 0.75)
     else:
         if settings.view == "HOLES":
             _show_holes(quad, renderer, request)
-        _show_strokes(context, quad, shown, wanted)
+        if settings.view == "EDGES":
+            _show_coefficients(quad, shown.effect, renderer, request, "EDGES", 1.0)
+        _show_strokes(context, quad, shown)
     previews.was_drawn()
     _tell_carrying(say)
     for sentence in pictures.shortages(renderer, wanted.decision.snapshot, request):
@@ -272,11 +277,15 @@ def _measure() -> float | None:
     return inbetween_operators.TICK if strobing.is_busy() else None
 
 
-def _tell_sharp(region) -> None:
-    say = _Notes(region)
+def _show_sharp(context, shown: Shown | None) -> None:
+    """What is drawn over the sharp frame."""
+    say = _Notes(context.region)
     say(rpt_("The sharp frame, to draw on: the result comes with the stroke"))
-    with drawing.pixel_space(region):
+    with drawing.pixel_space(context.region), suppress(*effect_source.FAULTS):
         say.draw()
+        if shown is not None and not previews.pen_is_down():
+            quad = Quad(context.region, shown.strip, annotations.picture_size(shown.effect))
+            _show_strokes(context, quad, shown)
 
 
 def _tell_missing(renderer, request, say) -> None:
@@ -318,12 +327,12 @@ def _tell_fault(error: Exception, say) -> None:
         say(rpt_("Shutter: {fault}").format(fault=error))
 
 
-def _show_strokes(context, quad, shown: Shown, wanted: Drawing) -> None:
-    """The scribbles where they are by now; Blender's own annotations show where they were drawn."""
-    space = context.space_data
-    if not (space.show_overlays and space.preview_overlay.show_annotation):
+def _show_strokes(context, quad, shown: Shown) -> None:
+    """The scribbles where they are by now. One of effect_source.FAULTS: the effect cannot be shown."""
+    if not context.space_data.show_overlays:
         return
-    shapes = wanted.decision.snapshot.effect.drawn_at(shown.scene.frame_current)
+    frame = shown.scene.frame_current
+    shapes = invalidation.current(shown.scene, shown.effect, shown.strip, frame).effect.drawn_at(frame)
     for is_hidden, shape in zip(shown.hides_strokes, shapes, strict=True):
         if is_hidden:
             continue
@@ -362,12 +371,12 @@ def _show_holes(quad, renderer, request) -> None:
     quad.draw("SCRIBBLES", textures, opacity=0.7, block=block, size=_size(renderer))
 
 
-def _show_coefficients(quad, effect, renderer, request) -> None:
+def _show_coefficients(quad, effect, renderer, request, step: str, opacity: float) -> None:
     coefficients, block = renderer.drawn_with_layers(replace(request, quick=True))
     count = len(request.state.bars)
     textures = {"coefficients": coefficients, "palette": _palette(effect)}
     unit = float(drawing.ui_scale())
-    quad.draw("COEFFICIENTS", textures, opacity=0.75, block=block, count=count, size=_size(renderer), unit=unit)
+    quad.draw(step, textures, opacity=opacity, block=block, count=count, size=_size(renderer), unit=unit)
 
 
 def _size(renderer) -> tuple[int, int]:

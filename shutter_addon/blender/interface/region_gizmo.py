@@ -13,7 +13,7 @@ from ...core.messages import EffectError
 from ...core.model import scribbles
 from ...core.model.scribbles import mapped
 from ..data import annotations, geometry, selection, snapshot, validation
-from ..editing import bar_edits, region_edits, track_region
+from ..editing import bar_edits, drawn_places, region_edits, track_region
 from ..editing.motion_keys import MotionKeys
 from . import drawing, gizmo_keymaps
 
@@ -131,6 +131,7 @@ class SHUTTER_GT_region(Gizmo):
             return {"CANCELLED"}
         effect = selection.active(context)[1]
         region = selection.active_region(effect)
+        drawn_places.hold(effect, effect.active_region)
         # While it plays, another effect may come into the picture.
         self.target = track_region.Target.of(effect, effect.active_region)
         self.before = tuple(region.location), region.rotation, region.scale

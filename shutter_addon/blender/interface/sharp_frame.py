@@ -9,20 +9,39 @@ from dataclasses import dataclass
 import bpy
 
 from ..data import preview_areas, selection, strips
-from ..rendering.previews import PEN
+from ..rendering.previews import pen_is_down
 
 _TOOLS = "builtin.annotate"  # how the tools' names begin
 
 
 @dataclass
 class _Pen:
-    """channel: that the previews show, 0: they show the result; is_down: when a preview was drawn last"""
+    """channel: that the previews show, 0: they show the result; is_down: when a preview was drawn last
+    tool: that Draw or Erase has taken the place of, which comes back with the stroke; "": they have not"""
 
     channel: int = 0
+    tool: str = ""
     is_down: bool = False
 
 
 _pen = _Pen()
+
+
+def take_up(context, tool: str) -> bool:
+    """Makes a pen the tool of the previews, until a stroke is finished; whether there is a preview."""
+    before = context.workspace.tools.from_space_sequencer("PREVIEW", create=False)
+    if before is None or not before.idname.startswith(_TOOLS):
+        _pen.tool = before.idname if before else "builtin.select_box"
+    return _choose(context, tool)
+
+
+def _choose(context, tool: str) -> bool:
+    areas = list(preview_areas.previews(context))
+    for window, area in areas:
+        with context.temp_override(window=window, area=area, region=preview_areas.preview_region(area)):
+            bpy.ops.wm.tool_set_by_id(name=tool, space_type="SEQUENCE_EDITOR")
+        area.tag_redraw()  # or handles would come with the pointer alone
+    return bool(areas)
 
 
 def show(context) -> None:
@@ -47,13 +66,13 @@ def give_back(context) -> None:
     _pen.channel = 0
 
 
-def follow_pen(context) -> None:
+def follow_pen() -> None:
     """For what draws a preview, which may change nothing: what the pen asks for comes right after."""
-    was_down, _pen.is_down = _pen.is_down, any(op.bl_idname == PEN for op in context.window.modal_operators)
+    was_down, _pen.is_down = _pen.is_down, pen_is_down()
     if _pen.is_down and not _pen.channel:
         _soon(_show)
-    elif _pen.channel and was_down and not _pen.is_down:
-        _soon(_give_back)
+    elif was_down and not _pen.is_down:
+        _soon(_lay_down)
 
 
 def is_shown(space) -> bool:
@@ -65,6 +84,7 @@ def _tool_chosen() -> None:
     """Who takes another tool draws no more. A new tool draws no preview again."""
     tool = bpy.context.workspace.tools.from_space_sequencer("PREVIEW", create=False)
     if tool is not None and not tool.idname.startswith(_TOOLS):
+        _pen.tool = ""
         give_back(bpy.context)
 
 
@@ -73,13 +93,15 @@ def _show() -> None:
         show(bpy.context)
 
 
-def _give_back() -> None:
+def _lay_down() -> None:
     if not _pen.is_down:
         give_back(bpy.context)
+        if _pen.tool:
+            _choose(bpy.context, _pen.tool)
 
 
 _OWNER = object()  # of what Blender tells of tools
-TIMERS = (_show, _give_back)
+TIMERS = (_show, _lay_down)
 
 
 def _soon(change) -> None:

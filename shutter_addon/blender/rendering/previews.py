@@ -30,14 +30,14 @@ _READERS = {"RENDER_OT_opengl", "SEQUENCER_OT_sample"}
 _TRACKING = {"SHUTTER_OT_track", "SHUTTER_OT_track_camera", "SHUTTER_OT_panning_shot", "SHUTTER_OT_tripod"}
 _BUILDING = {"SHUTTER_OT_inbetween_build", "SHUTTER_OT_smooth_streaks"}
 _GOING = {"ANIM_OT_change_frame"} | _TRACKING | _BUILDING
-PEN = "GPENCIL_OT_annotate"
+_PEN = "GPENCIL_OT_annotate"
 _MOMENT = 0.3  # seconds
 _SLICE = 0.2  # seconds
 # By how much the next slice is longer: where something was kept for it, and where it begins again, so that all ends.
 _LONGER, _AGAIN = 1.02, 1.5
 _READING_TOOL = "builtin.sample"  # reads once before it is one of those that run
 DRAFT_ROWS = 270  # blocks along the shorter side of a draft in which shutters follow edges
-RESULTS = "RESULT", "SPLIT", "HOLES"  # views of the live preview that show the result
+RESULTS = "RESULT", "SPLIT", "EDGES", "HOLES"  # views of the live preview that show the result
 
 
 @dataclass
@@ -234,7 +234,7 @@ def _is_drawn(context: Any, shown: Shown, look: Look, source: FrameSource) -> bo
         and not shown.strips_above
         and source.alpha == "opaque"
         and look.is_plain
-        and PEN not in render_job.operators_running()
+        and not pen_is_down()
     )
 
 
@@ -287,6 +287,11 @@ def is_going(context: Any) -> bool:
     """Whether the film plays, or may_be_late."""
     is_playing = any(window.screen.is_animation_playing for window in context.window_manager.windows)
     return is_playing or may_be_late()
+
+
+def pen_is_down() -> bool:
+    """Whether a stroke is being drawn, or erased."""
+    return _PEN in render_job.operators_running()
 
 
 def is_tracking() -> bool:

@@ -31,7 +31,8 @@ class Drawings:
 
     name: the region's; aspect: the picture's width over its height
     placement: channel of the matrix (3, 3) from the strokes' space to fractions of the picture, or of None where they
-    are not on it; without one, strokes are fractions of the picture"""
+    are not on it; without one, strokes are fractions of the picture
+    origins: where the region was as each was drawn, which is seen there; none: where it has not moved"""
 
     name: str
     frames: tuple[float, ...]
@@ -39,6 +40,7 @@ class Drawings:
     eases: tuple[keyframes.Ease, ...]
     aspect: float
     placement: Channel | None = None
+    origins: tuple[Placement, ...] = ()
 
     @property
     def is_still(self) -> bool:
@@ -79,7 +81,10 @@ class Drawings:
         placed = [scribbles.mapped(placement, points) for points in self.strokes[index]]
         if not all((np.abs(points) <= limits.MAX_DISTANCE).all() for points in placed):
             raise EffectError(_FAR, name=self.name)
-        return placed
+        origin = self.origins[index] if self.origins and placed else Placement()
+        if origin == Placement():
+            return placed
+        return list(scribbles.taken_back(placed, origin.location, origin.rotation, origin.scale, self.aspect))
 
 
 @dataclass(frozen=True)

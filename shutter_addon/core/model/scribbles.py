@@ -98,6 +98,16 @@ def transform(
     return tuple((s - centre) @ turn.T + centre + np.asarray(location, dtype=np.float64) for s in strokes)
 
 
+def taken_back(
+    strokes: Iterable[ArrayLike], location: ArrayLike, rotation: float, scale: float, aspect: float
+) -> tuple[np.ndarray, ...]:
+    """The strokes that `transform` takes to these."""
+    strokes = tuple(np.asarray(s, dtype=np.float64) for s in strokes)
+    turned = transform(strokes, (0, 0), -rotation, 1 / scale, aspect)  # about another centre, perhaps
+    (there, *_) = transform(turned, location, rotation, scale, aspect)
+    return tuple(points + (np.asarray(strokes[0]) - there)[0] for points in turned)
+
+
 def rasterise(shapes: Iterable[Shape], width: int, height: int, *, border: bool = False) -> np.ndarray:
     """Labels (height, width) uint16: 0 where free, 1 + shutter where a shape covers the pixel's centre.
 

@@ -1044,6 +1044,11 @@ MESSAGES = {
         "*",
         "How much of each shutter a pixel gets, in the shutters' colors and patterns",
     ): "Wie viel jedes Verschlusses ein Pixel erhält, in den Farben und Mustern der Verschlüsse",
+    ("Virtual Shutter", "Edges"): "Ränder",
+    (
+        "*",
+        "The result, and a line around what a shutter gets more than half of",
+    ): "Das Ergebnis, und eine Linie um das, wovon ein Verschluss mehr als die Hälfte erhält",
     ("*", "Split Position"): "Teilung",
     (
         "*",

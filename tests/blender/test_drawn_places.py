@@ -1,0 +1,148 @@
+"""A stroke lies where it was drawn, however its region has been moved, and moves along with it from there."""
+
+import numpy as np
+import pytest
+
+from shutter_addon.blender.data import annotations, recipe_export, selection, snapshot
+from shutter_addon.blender.editing import drawn_places, outline_drawings, region_edits
+from shutter_addon.core.model import scribbles
+from shutter_addon.core.model.motions import Placement
+
+FIRST = np.array([(-30.0, -20.0), (10.0, 25.0), (30.0, 5.0)])  # in pixels from the picture's middle
+SECOND = np.array([(60.0, 10.0), (75.0, -15.0), (110.0, 0.0)])
+MOVES = {
+    "shifted": Placement((100 / 640, 0.0)),
+    "turned": Placement((0.1, -0.05), 40.0),
+    "all": Placement((-0.2, 0.1), -75.0, 1.6),
+}
+
+
+@pytest.fixture
+def region(bpy, effect):
+    """Of one stroke, drawn at frame 1, keyed where it lies there and somewhere else at frame 11."""
+    effect.scene.render.resolution_x, effect.scene.render.resolution_y = 640, 360
+    region_edits.first_drawn(effect, effect.shutters[1], "LINE")
+    pen(bpy, 1, FIRST)
+    return effect.regions[0]
+
+
+def pen(bpy, frame, points, *, by_draw=True):
+    """What Blender's pen leaves; by_draw: it was taken up by Draw, and is not chosen by hand."""
+    bpy.context.scene.frame_set(frame)
+    _scene, effect, strip = selection.active(bpy.context)
+    if by_draw:
+        drawn_places.begin(effect, strip, 0)
+    layer = annotations.layer_of(effect, effect.regions[0])
+    there = {drawing.frame_number: drawing for drawing in layer.frames}
+    annotations.add_stroke(there.get(frame) or layer.frames.new(frame), points)
+
+
+def move(bpy, frame, placed):
+    """As a handle is dragged."""
+    bpy.context.scene.frame_set(frame)
+    effect = selection.active(bpy.context)[1]
+    drawn_places.hold(effect, 0)
+    region = effect.regions[0]
+    region.location, region.rotation, region.scale = placed.location, np.radians(placed.rotation), placed.scale
+    region_edits.key_region(effect, 0)
+
+
+def seen(bpy, frame):
+    """The strokes at a frame, in pixels from the picture's middle."""
+    scene, effect, strip = selection.active(bpy.context)
+    shape = snapshot.region_at(scene, effect, strip, 0, (frame,)).at(frame)
+    return [points * (640, 360) - (320, 180) for points in shape.strokes]
+
+
+def same(strokes, *expected):
+    return len(strokes) == len(expected) and all(
+        np.abs(a - b).max() < 1e-3 for a, b in zip(strokes, expected, strict=True)
+    )
+
+
+@pytest.mark.parametrize("by_draw", [True, False], ids=["draw", "pen"])
+@pytest.mark.parametrize("placed", MOVES.values(), ids=MOVES)
+def test_a_stroke_lies_where_it_was_drawn(bpy, region, placed, by_draw):
+    """At another frame, of a region that has keys; the first drawing stays where it was."""
+    move(bpy, 1, Placement())
+    move(bpy, 11, placed)
+    (moved,) = seen(bpy, 11)
+    assert np.abs(moved - FIRST).max() > 50
+    pen(bpy, 11, SECOND, by_draw=by_draw)
+    assert same(seen(bpy, 1), FIRST)
+    assert same(seen(bpy, 11), SECOND)
+    assert not same(seen(bpy, 6), SECOND)
+    pen(bpy, 11, FIRST)
+    assert same(seen(bpy, 11), SECOND, FIRST), "one more at the same frame"
+
+
+@pytest.mark.parametrize("placed", MOVES.values(), ids=MOVES)
+def test_what_was_drawn_is_dragged_from_there(bpy, region, placed):
+    """And the pen finds all at that frame where it is seen."""
+    move(bpy, 1, Placement())
+    move(bpy, 11, placed)
+    pen(bpy, 11, SECOND, by_draw=False)
+    further = Placement((placed.location[0] + 0.125, placed.location[1]), placed.rotation, placed.scale)
+    move(bpy, 11, further)
+    assert same(seen(bpy, 11), np.add(SECOND, (80, 0)))
+    assert same(seen(bpy, 1), FIRST)
+    pen(bpy, 11, FIRST)
+    assert same(seen(bpy, 11), np.add(SECOND, (80, 0)), FIRST)
+    move(bpy, 11, Placement((further.location[0], further.location[1] + 0.25), placed.rotation, placed.scale))
+    assert same(seen(bpy, 11), np.add(SECOND, (80, 90)), np.add(FIRST, (0, 90)))
+
+
+def test_the_eraser_finds_what_is_seen(bpy, region):
+    """Where the region has moved, all of it becomes a drawing there; where it has not, its drawing stays the one."""
+    scene, effect, strip = selection.active(bpy.context)
+    layer = annotations.layer_of(effect, region)
+    scene.frame_set(6)
+    drawn_places.begin(effect, strip, 0, erases=True)
+    assert [drawing.frame_number for drawing in layer.frames] == [1]
+    move(bpy, 1, Placement())
+    move(bpy, 11, MOVES["all"])
+    before = seen(bpy, 11)
+    drawn_places.begin(effect, strip, 0, erases=True)
+    stored = {drawing.frame_number: annotations.strokes_of(drawing) for drawing in layer.frames}
+    assert stored.keys() == {1, 11}
+    assert same(stored[11], *before)
+    assert same(seen(bpy, 11), *before)
+    assert same(seen(bpy, 1), FIRST)
+
+
+def test_a_file_of_before_means_what_it_meant(bpy, region):
+    """Where nothing is noted, drawings lie where the region has not moved, until the pen is taken up."""
+    region.drawn.clear()
+    scene, effect, _strip = selection.active(bpy.context)
+    layer = annotations.layer_of(effect, region)
+    annotations.add_stroke(layer.frames.new(11), SECOND)
+    for frame, x in ((1, 0.0), (11, 100 / 640)):
+        scene.frame_set(frame)
+        region.location = x, 0
+        region_edits.key_region(effect, 0)
+    assert same(seen(bpy, 11), np.add(SECOND, (100, 0)))
+    pen(bpy, 11, FIRST)
+    assert same(seen(bpy, 11), np.add(SECOND, (100, 0)), FIRST)
+
+
+def test_a_recipe_keeps_its_meaning(bpy, region):
+    """Keys move the strokes: those of a drawing are what they are seen as, taken back."""
+    move(bpy, 1, Placement())
+    move(bpy, 11, MOVES["all"])
+    pen(bpy, 11, SECOND)
+    exported = recipe_export.recipe_of(*selection.active(bpy.context))
+    key = next(key for key in exported.regions[0].keys if key.frame == 11)
+    placed = scribbles.transform(key.strokes, key.location, key.rotation, key.scale, 640 / 360)
+    assert same([points * (640, 360) - (320, 180) for points in placed], SECOND)
+
+
+def test_outlines_stay_as_they_are_drawn(bpy, region):
+    region.kind = "OUTLINE"
+    move(bpy, 11, MOVES["shifted"])
+    scene, effect, strip = selection.active(bpy.context)
+    drawn_places.begin(effect, strip, 0)
+    (curve,) = snapshot.strokes_at(scene, effect, strip, 0, 11)
+    assert same([curve * (640, 360) - (320, 180)], FIRST)
+    outline_drawings.add(effect, strip, region, curve, 11)
+    (curve,) = snapshot.strokes_at(scene, effect, strip, 0, 11)
+    assert same([curve * (640, 360) - (320, 180)], FIRST)
