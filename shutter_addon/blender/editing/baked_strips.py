@@ -129,7 +129,9 @@ def baked_of(scene: Any, strip: Any) -> list:
 
 def effect_parts(scene: Any, strip: Any) -> list:
     """What an effect strip that was baked has been cut into; none, if it was not."""
-    return [other for other in selection.of_bake(scene, strip) if other.type == "SCENE" and other.scene == strip.scene]
+    start = round(strips.origin(strip))
+    parts = [other for other in selection.of_bake(scene, strip) if other.type == "SCENE"]
+    return [part for part in parts if round(strips.origin(part)) == start]
 
 
 def unbake(scene: Any, strip: Any) -> None:

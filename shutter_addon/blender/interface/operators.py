@@ -94,8 +94,9 @@ class SHUTTER_OT_match_source(OfEffect, Operator):
             return refused(cls, rpt_("The Shutter strip is like its source"))
         return True
 
-    def change(self, _context, effect):
-        for strip, neighbor in match_source.match(effect):
+    def change(self, context, effect):
+        if (neighbor := match_source.match(effect)) is not None:
+            strip = selection.active(context)[2]
             sentence = rpt_('"{neighbor}" is in the way: "{strip}" has not the whole range of its source')
             report_warning(self, sentence.format(neighbor=neighbor.name, strip=strip.name))
 
