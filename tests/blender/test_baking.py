@@ -123,10 +123,10 @@ def test_unbake_brings_the_effect_back(bpy, film):
     assert len(list(place.glob("*.exr"))) == COUNT  # files stay: baked again, they are found
 
 
-def states(scene, effect, strip):
+def states(scene, strip):
     revision.changed()
     parts = baked_strips.effect_parts(scene, strip)
-    return [baked_strips.is_stale(scene, effect, part) for part in parts]
+    return [baked_strips.is_stale(scene, strips.effect_of(scene, part.scene), part) for part in parts]
 
 
 def test_it_says_that_it_is_stale(bpy, film):
@@ -134,7 +134,7 @@ def test_it_says_that_it_is_stale(bpy, film):
     bake(bpy)
 
     def stale():
-        return states(scene, effect, strip)
+        return states(scene, strip)
 
     assert stale() == [False]
     effect.shutters[0].bars[1].weight = 0.5
@@ -159,7 +159,7 @@ def test_both_are_cut_and_nothing_is_lost(bpy, film, tmp_path, kind):
     for each in [baked, strip, strips.source_of(scene, effect, strip)][: 3 if kind == "HARD" else 2]:
         each.split(5, kind)
     bpy.context.view_layer.update()
-    assert states(scene, effect, strip) == [kind == "HARD"] * 2  # which leaves another content
+    assert states(scene, strip) == [kind == "HARD"] * 2  # which leaves another content
     selection.choose(scene, baked_in(scene)[1])
     assert bpy.ops.shutter.unbake() == {"FINISHED"}
     shown = [s for s in scene.sequence_editor.strips if s.type == "SCENE"]
@@ -315,8 +315,7 @@ def test_a_copy_of_all_of_it_is_unbaked_alone(bpy, film):
     copied = next(each for each in scene.sequence_editor.strips_all if each.type == "SCENE" and each != strip)
     assert copied.mute
     assert not strip.mute
-    effect = strips.effect_of(scene, copied.scene)
-    assert states(scene, effect, copied) == [False]
+    assert states(scene, copied) == [False]
 
 
 def test_the_baked_strip_looks_as_the_effect_strip(bpy, film, tmp_path):
@@ -356,14 +355,14 @@ def test_keys_that_moved_along_are_no_change_and_others_are(bpy, film, change):
         setattr(owner, name, (value, 0) if change == "location" else value)
         owner.keyframe_insert(name, frame=frame)
     bake(bpy)
-    assert states(scene, effect, strip) == [False]
+    assert states(scene, strip) == [False]
     for each in scene.sequence_editor.strips:
         each.content_start += 1007
     lifecycle.update()
-    assert states(scene, effect, strip) == [False]
+    assert states(scene, strip) == [False]
     point = scene.animation_data.action.layers[0].strips[0].channelbags[0].fcurves[0].keyframe_points[1]
     point.handle_right[0] += 0.5
-    assert states(scene, effect, strip) == [True]
+    assert states(scene, strip) == [True]
 
 
 def test_check_tells_of_a_stale_film_that_is_shown(bpy, film):
@@ -384,15 +383,15 @@ def test_names_are_no_change(bpy, film):
     effect.shutters[1].name, effect.shutters[0].color = "another", (1, 0, 0)
     effect.regions[0].shutter = "another"
     effect.regions[0].name = strip.name = "name"
-    assert states(scene, effect, strip) == [False]
+    assert states(scene, strip) == [False]
 
 
 def test_a_longer_strip_is_stale(bpy, film):
-    scene, effect, strip = film()
+    scene, _effect, strip = film()
     strip.right_handle = 6
     baked = bake(bpy)
     strip.right_handle = baked.right_handle = 10
-    assert states(scene, effect, strip) == [True]
+    assert states(scene, strip) == [True]
 
 
 def test_any_retouched_frame_is_a_change(bpy, film, tmp_path):

@@ -43,15 +43,21 @@ def source_of(edit, effect):
     return next(s for s in edit.sequence_editor.strips_all if s.virtual_shutter_source == effect.source)
 
 
-def test_after_a_cut_the_half_under_the_playhead_is_edited(bpy, edit, effect):
+def test_after_a_cut_the_half_that_is_selected_is_edited_else_that_under_the_playhead(bpy, edit, effect):
     left = strip_of(edit, effect)
-    right = left.split(21, "SOFT")
-    for chosen in (left, right, source_of(edit, effect)):
-        edit.sequence_editor.active_strip = chosen
+    right = left.split(21, "SOFT")  # and the source, which is connected
+    bpy.context.view_layer.update()
+    own = {left: left, right: right, source_of(edit, effect): left, None: None}
+    for chosen, wanted in own.items():
+        selection.choose(edit, chosen)
         for frame, half in ((20, left), (21, right)):
             edit.frame_set(frame)
-            assert seen(edit) == active(bpy) == half
-            assert selection.in_picture(bpy.context)[2] == half
+            assert seen(edit) == half
+            assert active(bpy) == (wanted or half)
+            assert (selection.in_picture(bpy.context) is not None) == (active(bpy) == half)
+    selection.choose(edit, left)
+    left.select = False
+    assert active(bpy) == right
 
 
 def test_halves_that_were_moved_apart_have_an_effect_each(bpy, edit, effect):
@@ -59,9 +65,9 @@ def test_halves_that_were_moved_apart_have_an_effect_each(bpy, edit, effect):
     right = left.split(21, "SOFT")
     right.content_start += 10
     lifecycle.update()
-    edit.sequence_editor.active_strip = left
+    selection.choose(edit, left)
     edit.frame_set(35)
-    assert selection.active(bpy.context)[1].scene == right.scene != left.scene
+    assert selection.active(bpy.context)[1].scene == left.scene != right.scene
     edit.frame_set(25)
     assert seen(edit) is None
     assert selection.in_picture(bpy.context) is None
@@ -79,8 +85,11 @@ def test_of_effects_on_top_of_each_other_the_active_one_is_edited(bpy, edit, eff
 def test_what_is_muted_is_not_edited(bpy, edit, effect, tmp_path):
     low, high = strip_of(edit, effect), another(bpy, edit, tmp_path)
     edit.sequence_editor.active_strip = high
-    high.mute = True
+    high.mute, high.select = True, False
     assert seen(edit) == active(bpy) == low
+    high.select = True
+    assert active(bpy) == high
+    assert selection.in_picture(bpy.context) is None
     edit.sequence_editor.channels[low.channel].mute = True
     assert seen(edit) is None
     assert active(bpy) == high

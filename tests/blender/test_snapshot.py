@@ -139,6 +139,7 @@ def test_a_part_of_a_cut_source_is_read_as_itself(bpy, found):
     (later,) = (s for s in strips.effect_strips(edit) if s != strip)
     invalidation.invalidate_changed(edit)
     for part, own in ((strip, source), (later, right), (strip, source)):
+        effect = strips.effect_of(edit, part.scene)
         taken = invalidation.current(edit, effect, part, part.left_handle)
         assert taken.timing.name == own.name
         assert taken.source.options["colorspace"] == own.colorspace_settings.name

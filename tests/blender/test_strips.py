@@ -464,15 +464,16 @@ def test_a_hard_cut_changes_no_picture(bpy, edit, render, tmp_path):
     frames = np.random.default_rng(2).integers(0, 256, (9, 24, 40, 3), dtype=np.uint8)
     source, _effect, strip = noise_film(edit, frames, tmp_path)
     before = render(edit, [3, 5, 8])
-    for each in (source, strip):
-        each.split(5, "HARD")
+    source.split(5, "HARD")  # and the effect strip, which is connected
+    right = next(each for each in edit.sequence_editor.strips if each.type == "SCENE" and each != strip)
     after = render(edit, [3, 5, 8])
     assert all(np.array_equal(after[frame], before[frame]) for frame in before)
     from shutter_addon.blender.rendering import job_snapshots as snapshots
 
     snapshots.begin(edit.session_uid)
     try:
-        of_parts = snapshots._taken[strip.scene.session_uid]  # what a job of the window reads, which is not to be seen
+        # What a job of the window reads, which is not to be seen.
+        of_parts = [part for half in (strip, right) for part in snapshots._taken[half.scene.session_uid]]
         assert [shown for shown, _ in of_parts] == [range(1, 5), range(5, 10)]
         assert of_parts[0][1].timing != of_parts[1][1].timing
         assert max(of_parts[0][1].frames) < 7 < max(of_parts[1][1].frames)

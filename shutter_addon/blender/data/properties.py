@@ -311,13 +311,12 @@ class ShutterBake(PropertyGroup):
 
     version: of the effect when it was baked (effect_version), over `count` frames from `first`, which count from the
     effect strip's origin
-    source: identity of the effect's source; channel: that of the effect strip before it made room for the film"""
+    channel: that of the effect strip before it made room for the film"""
 
     identity: StringProperty()
     version: StringProperty()
     first: IntProperty()
     count: IntProperty()
-    source: StringProperty()
     channel: IntProperty()
 
 

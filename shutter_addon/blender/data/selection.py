@@ -24,15 +24,16 @@ def active_strip(context):
 
 
 def active(context):
-    """Scene, effect and effect strip that the interface shows and changes: those that are seen, or where none are,
-    those of the active strip, which may be the source as well. None: that has no effect, or nothing has."""
+    """Scene, effect and effect strip that the interface shows and changes: those of the active strip, which may be the
+    source as well, if it is selected; else those that are seen. None: that strip has no effect, or nothing has."""
     scene, strip = scene_of(context), active_strip(context)
     if strip is not None and (baked := _baked_part(scene, strip)) is not None:
         return baked
     effects = _effects_of(scene, strip)
     if strip is not None and not effects:
         return None
-    if (shown := seen(scene)) is not None or not effects:
+    shown = seen(scene)
+    if not effects or (shown is not None and (shown[1] in effects or not strip.select)):
         return shown
     others = [other for other in effect_strips(scene) if effect_of(scene, other.scene) in effects]
     nearest = min(others, key=lambda o: (o != strip, abs(o.left_handle - strip.left_handle)), default=None)
@@ -42,7 +43,7 @@ def active(context):
 def in_picture(context):
     """What is active, where it is seen; else None: nothing in the picture belongs to it."""
     shown = active(context)
-    return shown if shown and seen(shown[0]) else None
+    return shown if shown and seen(shown[0]) == shown else None
 
 
 def seen(scene):
@@ -86,12 +87,13 @@ def why_unseen(scene, strip) -> str:
 
 
 def _effects_of(scene, strip) -> list:
-    """The effects of the source that a strip is, or whose effect it shows."""
+    """The effect that a strip shows, or those of the source that it is."""
     if strip is None:
         return []
-    own = effect_of(scene, strip.scene) if strip.type == "SCENE" and strip.scene else None
-    identity = own.source if own else strip.virtual_shutter_source
-    return [effect for effect in scene.virtual_shutter.effects if effect == own or effect.source == identity != ""]
+    if strip.type == "SCENE" and (own := effect_of(scene, strip.scene)):
+        return [own]
+    identity = strip.virtual_shutter_source
+    return [effect for effect in scene.virtual_shutter.effects if effect.source == identity != ""]
 
 
 def _baked_part(scene, strip):

@@ -107,7 +107,8 @@ def timeline_frame(strip, scene_frame: float) -> float:
 
 def source_of(scene: Any, effect: Any, strip: Any) -> Any:
     """The effect's source strip: of those with its identity (parts of a cut strip, copies) the nearest in time, then
-    the nearest below. EffectError: there is none any more, or none that has frames."""
+    that in the same meta strip, the connected one, the nearest below. EffectError: there is none any more, or none that
+    has frames."""
     if (source := nearest_source(scene, effect, strip)) is None:
         if others := _with_identity(scene, effect.source):
             sentence = rpt_('the source of "{strip}", "{source}", is not a movie, image or clip strip')
@@ -116,11 +117,16 @@ def source_of(scene: Any, effect: Any, strip: Any) -> Any:
     return source
 
 
+def with_sources(scene) -> list[tuple]:
+    """The effects that the scene's strips show, each with its strip and source; without those that lack a source."""
+    pairs = [(effect, strip) for strip in effect_strips(scene) if (effect := effect_of(scene, strip.scene))]
+    found = [(effect, strip, nearest_source(scene, effect, strip)) for effect, strip in pairs]
+    return [each for each in found if each[2] is not None]
+
+
 def shown_sources(scene) -> set[str]:
     """Names of the strips that are sources of the scene's effect strips."""
-    pairs = [(effect, strip) for strip in effect_strips(scene) if (effect := effect_of(scene, strip.scene))]
-    sources = [nearest_source(scene, effect, strip) for effect, strip in pairs]
-    return {source.name for source in sources if source is not None}
+    return {source.name for _effect, _strip, source in with_sources(scene)}
 
 
 def nearest_source(scene: Any, effect: Any, strip: Any) -> Any:
@@ -128,8 +134,16 @@ def nearest_source(scene: Any, effect: Any, strip: Any) -> Any:
 
     def distance(other):
         apart = max(other.left_handle - strip.right_handle + 1, strip.left_handle - other.right_handle + 1, 0)
-        return apart, other.channel > strip.channel, abs(strip.channel - other.channel)
+        elsewhere = other.parent_meta() != strip.parent_meta()
+        return (
+            apart,
+            elsewhere,
+            other not in connected,
+            other.channel > strip.channel,
+            abs(strip.channel - other.channel),
+        )
 
+    connected = list(strip.connections)  # as a pair stays that is duplicated
     candidates = [other for other in _with_identity(scene, effect.source) if other.type in SOURCES]
     return min(candidates, key=distance, default=None)
 

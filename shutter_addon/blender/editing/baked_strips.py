@@ -111,12 +111,11 @@ def _copy_curves(scene: Any, strip: Any, baked: Any) -> None:
 def _note(strip: Any, baked: Any, film: Film, channel: int) -> None:
     """Says of both strips that they belong together, and of which version the film is. channel: the effect strip's
     own"""
-    identity, effect = uuid.uuid4().hex, strips.effect_of(strip.id_data, strip.scene)
+    identity = uuid.uuid4().hex
     for each in (strip, baked):
         bake = each.virtual_shutter_bake
         bake.identity, bake.version = identity, film.version
-        bake.first, bake.count = film.frames.start, len(film.frames)
-        bake.source, bake.channel = effect.source, channel
+        bake.first, bake.count, bake.channel = film.frames.start, len(film.frames), channel
 
 
 def baked_of(scene: Any, strip: Any) -> list:
@@ -129,7 +128,9 @@ def baked_of(scene: Any, strip: Any) -> list:
 
 def effect_parts(scene: Any, strip: Any) -> list:
     """What an effect strip that was baked has been cut into; none, if it was not."""
-    return [other for other in selection.of_bake(scene, strip) if other.type == "SCENE" and other.scene == strip.scene]
+    start = round(strips.origin(strip))
+    parts = (other for other in selection.of_bake(scene, strip) if round(strips.origin(other)) == start)
+    return [part for part in parts if part.type == "SCENE"]
 
 
 def unbake(scene: Any, strip: Any) -> None:

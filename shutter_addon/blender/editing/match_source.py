@@ -7,7 +7,6 @@ Scribbles stay where they lie on the picture.
 
 from collections import Counter
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 import bpy
@@ -42,10 +41,12 @@ def forget() -> None:
 def follow(scene) -> None:
     """Gives the effect scenes of a scene's effects its rate and the size of their sources. A second call changes
     nothing."""
-    for effect in scene.virtual_shutter.effects:
-        if effect.scene is not None and effect.scene.library is None:
-            _follow_rate(scene, effect.scene.render)
-            _follow_size(effect)
+    for strip in strips.effect_strips(scene):
+        if strip.scene.library is None:
+            _follow_rate(scene, strip.scene.render)
+    for effect, strip, source in strips.with_sources(scene):
+        if effect.scene.library is None:
+            _follow_size(effect, strip, source)
 
 
 def _follow_rate(scene, render) -> None:
@@ -54,11 +55,10 @@ def _follow_rate(scene, render) -> None:
             setattr(render, name, getattr(scene.render, name))
 
 
-def _follow_size(effect) -> None:
-    pairs = parts(effect)
-    size = next((size for _part, source in pairs if (size := _size(source)) is not None), None)
+def _follow_size(effect, strip, source) -> None:
+    size = _size(source)
     if size is not None and size != annotations.picture_size(effect):
-        with _scribbles_kept(effect):
+        with _scribbles_kept(effect, strip):
             effect.scene.render.resolution_x, effect.scene.render.resolution_y = size
 
 
@@ -78,62 +78,59 @@ def _size(source) -> tuple[int, int] | None:
     return None
 
 
-def parts(effect) -> list[tuple]:
-    """The strips of an effect, one, or the parts of one that was cut; each with its source."""
-    scene = effect.id_data
-    own = [strip for strip in strips.effect_strips(scene) if strip.scene == effect.scene]
-    pairs = [(strip, strips.nearest_source(scene, effect, strip)) for strip in own]
-    return [(strip, source) for strip, source in pairs if source is not None]
+def strip_and_source(effect) -> Any:
+    """The strip of an effect and its source; None: it has one of them no more."""
+    shown = strips.with_sources(effect.id_data)
+    return next(((strip, source) for other, strip, source in shown if other == effect), None)
 
 
 class Shown(NamedTuple):
-    """What panels say of an effect beside its source: what `match` would change, in words to be translated; whether it
-    lacks modifiers of its source, and whether effect strips of Blender's are on that; None: it has no source."""
+    """What panels say of an effect beside its source: that one's name; what `match` would change, in words to be
+    translated; whether it lacks modifiers of its source, and whether effect strips of Blender's are on that."""
 
+    source: str
     differences: list[str]
     lacks_modifiers: bool
     has_effects: bool
 
 
 def shown(effect) -> Shown | None:
-    """For what is drawn: worked out once until something changes."""
+    """For what is drawn: worked out once until something changes. None: it has no source."""
     return _shown.get(effect.scene.session_uid, lambda: _compare(effect))
 
 
 def _compare(effect) -> Shown | None:
-    if not (pairs := parts(effect)):
+    if (pair := strip_and_source(effect)) is None:
         return None
-    lacks = any(missing_modifiers(part, source) for part, source in pairs)
-    return Shown(differences(effect), lacks, any(effects_on(effect.id_data, source) for _part, source in pairs))
+    lacks, has_effects = bool(missing_modifiers(*pair)), bool(effects_on(effect.id_data, pair[1]))
+    return Shown(pair[1].name, differences(effect), lacks, has_effects)
 
 
 def differences(effect) -> list[str]:
     """What match would change, in words to be translated."""
-    pairs = parts(effect)
-    looks = [(_looks(part), _looks(source)) for part, source in pairs]
-    words = [word for word in _LOOK if any(part[word] != source[word] for part, source in looks)]
-    if any((goal.left, goal.right) != _range(goal.part) for goal in _goals(effect, pairs)):
+    strip, source = strip_and_source(effect)
+    look, wanted = _looks(strip), _looks(source)
+    words = [word for word in _LOOK if look[word] != wanted[word]]
+    if _goal(effect, strip, source)[:2] != (strip.left_handle, strip.right_handle):
         words.append(_RANGE)
     return words
 
 
-def match(effect) -> list[tuple]:
-    """Gives the effect's strips the look and the range of their sources. Returns the strips that cannot have the whole
-    range, each with the neighbour in its channel that is in the way."""
-    scene, pairs = effect.id_data, parts(effect)
-    with _scribbles_kept(effect):
-        for part, source in pairs:
-            add_effect.copy_look(source, part)
-            for name in (name for names in _LOOK.values() for name in names):
-                old, new = f"{source.path_from_id()}.{name}", f"{part.path_from_id()}.{name}"
-                fcurves.remove_curves(scene, new)
-                fcurves.copy_curves(scene, old, scene, new)
-    goals = _goals(effect, pairs)
-    _slip(scene, goals)
-    for goal in goals:
-        goal.part.right_handle = max(goal.part.right_handle, goal.right)  # or the left one could not pass it
-        goal.part.left_handle, goal.part.right_handle = goal.left, goal.right
-    return [(goal.part, goal.neighbor) for goal in goals if goal.neighbor is not None]
+def match(effect) -> Any:
+    """Gives the effect's strip the look and the range of its source. Returns the neighbour in its channel that is in
+    the way of the whole range, or None."""
+    scene, (strip, source) = effect.id_data, strip_and_source(effect)
+    with _scribbles_kept(effect, strip):
+        add_effect.copy_look(source, strip)
+        for name in (name for names in _LOOK.values() for name in names):
+            old, new = f"{source.path_from_id()}.{name}", f"{strip.path_from_id()}.{name}"
+            fcurves.remove_curves(scene, new)
+            fcurves.copy_curves(scene, old, scene, new)
+    left, right, neighbor = _goal(effect, strip, source)
+    _slip(scene, strip, source, left, right)
+    strip.right_handle = max(strip.right_handle, right)  # or the left one could not pass it
+    strip.left_handle, strip.right_handle = left, right
+    return neighbor
 
 
 def _looks(strip) -> dict[str, str]:
@@ -164,68 +161,37 @@ def _keyed(curves, path: str) -> list:
     )
 
 
-def _range(strip) -> tuple[int, int]:
-    return strip.left_handle, strip.right_handle
+def _goal(effect, strip, source) -> tuple[int, int, Any]:
+    """The handles that an effect's strip would have from its source, or from the parts that this was cut into, short of
+    the strips in its channel; and which of these stops it, or None. Where they leave no room at all it stays. An edge
+    where another effect goes on with the same source stays as well."""
+    parts = (s for s in effect.id_data.sequence_editor.strips_all if s.virtual_shutter_source == effect.source)
+    parts = (s for s in parts if s.type == source.type and strips.origin(s) == strips.origin(source))
+    below = [s for s in parts if s == source or strips.overlap(s, strip)]
+    others = [other for _effect, other, by in strips.with_sources(effect.id_data) if by in below and other != strip]
+    left, right = min(s.left_handle for s in below), max(s.right_handle for s in below)
+    left = strip.left_handle if any(o.left_handle < strip.left_handle for o in others) else left
+    right = strip.right_handle if any(o.right_handle > strip.right_handle for o in others) else right
+    level = (strip.parent_meta() or strip.id_data.sequence_editor).strips
+    beside = [other for other in level if other.channel == strip.channel and other != strip]
+    before = [s for s in beside if s.left_handle < strip.left_handle and s.right_handle > left]
+    after = [s for s in beside if s.left_handle > strip.left_handle and s.left_handle < right]
+    first = max(before, key=lambda other: other.right_handle, default=None)
+    last = min(after, key=lambda other: other.left_handle, default=None)
+    left, right = first.right_handle if first else left, last.left_handle if last else right
+    left, right = (left, right) if left < right else (strip.left_handle, strip.right_handle)
+    return left, right, first or last
 
 
-@dataclass(frozen=True)
-class _Goal:
-    """The handles that a part of an effect would have from its source; neighbor: what stops it short of them."""
-
-    part: Any
-    source: Any
-    left: int
-    right: int
-    neighbor: Any = None
-
-
-def _goals(effect, pairs) -> list[_Goal]:
-    """An edge where another part of the effect goes on with the same source stays where it is."""
-    own = {part.name: _below(effect, part, source) for part, source in pairs}
-    goals = []
-    for part, source in pairs:
-        names = {s.name for s in own[part.name]}
-        beside = [other for other, _source in pairs if any(s.name in names for s in own[other.name])]
-        left, right = min(s.left_handle for s in own[part.name]), max(s.right_handle for s in own[part.name])
-        left = part.left_handle if any(p.left_handle < part.left_handle for p in beside) else left
-        right = part.right_handle if any(p.right_handle > part.right_handle for p in beside) else right
-        goals.append(_with_room(_Goal(part=part, source=source, left=left, right=right)))
-    return goals
-
-
-def _below(effect, part, source) -> list:
-    """The part's source, and those of the source's own parts, if it was cut, that lie below it."""
-    same = [s for s in part.id_data.sequence_editor.strips_all if s.virtual_shutter_source == effect.source]
-    same = [s for s in same if s.type == source.type and strips.origin(s) == strips.origin(source)]
-    return [s for s in same if s == source or (s.left_handle < part.right_handle and part.left_handle < s.right_handle)]
-
-
-def _with_room(goal: _Goal) -> _Goal:
-    """The goal, short of the strips in the part's channel; where it stands, if they leave no room at all."""
-    part = goal.part
-    level = (part.parent_meta() or part.id_data.sequence_editor).strips
-    beside = [strip for strip in level if strip.channel == part.channel and strip != part]
-    before = [s for s in beside if s.left_handle < part.left_handle and s.right_handle > goal.left]
-    after = [s for s in beside if s.left_handle > part.left_handle and s.left_handle < goal.right]
-    first = max(before, key=lambda strip: strip.right_handle, default=None)
-    last = min(after, key=lambda strip: strip.left_handle, default=None)
-    left = first.right_handle if first else goal.left
-    right = last.left_handle if last else goal.right
-    left, right = (left, right) if left < right else _range(part)
-    return replace(goal, left=left, right=right, neighbor=first or last)
-
-
-def _slip(scene, goals: list[_Goal]) -> None:
+def _slip(scene, strip, source, left: int, right: int) -> None:
     """Has the effect's content, and with it its keys, go along with a source that has moved as a whole, or that begins
     before it: an effect shows nothing but its first frame there."""
-    for goal in goals:
-        part, frames = goal.part, int(goal.source.content_start - goal.part.content_start)
-        moved = frames == goal.left - part.left_handle == goal.right - part.right_handle
-        if frames and (moved or (frames < 0 and goal.left < part.content_start)):
-            # Blender has an operator only, which takes the selection.
-            with _selected(scene, [goal.part for goal in goals]), bpy.context.temp_override(sequencer_scene=scene):
-                bpy.ops.sequencer.slip(offset=frames, ignore_connections=True)
-            return
+    frames = int(source.content_start - strip.content_start)
+    moved = frames == left - strip.left_handle == right - strip.right_handle
+    if frames and (moved or (frames < 0 and left < strip.content_start)):
+        # Blender has an operator only, which takes the selection.
+        with _selected(scene, [strip]), bpy.context.temp_override(sequencer_scene=scene):
+            bpy.ops.sequencer.slip(offset=frames, ignore_connections=True)
 
 
 @contextmanager
@@ -240,31 +206,37 @@ def _selected(scene, chosen):
 
 
 @contextmanager
-def _scribbles_kept(effect):
-    """Has scribbles stay on the effect's picture while it is laid elsewhere: every drawing at its own frame, on the
-    part that shows it, or the nearest to it."""
-    layers = {region.layer: annotations.layer_of(effect, region) for region in effect.regions}
-    drawings = [drawing for layer in layers.values() if layer for drawing in layer.frames]
-    own_parts = [part for part, _source in parts(effect)]
-    shown = [min(own_parts, key=lambda part: _apart(part, drawing.frame_number)) for drawing in drawings]
-    before = [_place(effect, part, drawing.frame_number) for part, drawing in zip(shown, drawings, strict=True)]
+def _scribbles_kept(effect, strip):
+    """Has scribbles stay on the effect's picture while it is laid elsewhere: every drawing at its own frame."""
+    before = places(effect, strip)
     yield
-    for part, drawing, old in zip(shown, drawings, before, strict=True):
-        new = _place(effect, part, drawing.frame_number)
+    put_back(effect, strip, before)
+
+
+def places(effect, strip) -> list[np.ndarray]:
+    """Where the picture of an effect lies on the image, at each of its drawings."""
+    return [_place(effect, strip, drawing.frame_number) for drawing in _drawings(effect)]
+
+
+def put_back(effect, strip, before: list[np.ndarray]) -> None:
+    """Puts an effect's drawings where they lie on its picture; before: the places at which they do."""
+    for drawing, old in zip(_drawings(effect), before, strict=True):
+        new = _place(effect, strip, drawing.frame_number)
         if geometry.is_invertible(old) and geometry.is_invertible(new) and not np.array_equal(old, new):
             _move(drawing, new @ np.linalg.inv(old))
 
 
-def _apart(strip, frame: int) -> int:
-    return max(strip.left_handle - frame, frame - strip.right_handle + 1, 0)
+def _drawings(effect) -> list:
+    layers = {region.layer: annotations.layer_of(effect, region) for region in effect.regions}
+    return [drawing for layer in layers.values() if layer for drawing in layer.frames]
 
 
-def _place(effect, part, frame: int) -> np.ndarray:
-    """Where a part's picture lies on the image at a frame, as geometry.picture_to_image has it."""
-    path = f"{part.path_from_id()}.transform."
+def _place(effect, strip, frame: int) -> np.ndarray:
+    """Where an effect's picture lies on the image at a frame, as geometry.picture_to_image has it."""
+    path = f"{strip.path_from_id()}.transform."
     curves = [curve for curve in fcurves.curves_under(effect.id_data, path) if not (curve.mute or curve.is_empty)]
     moved = {curve.data_path.removeprefix(path): curve.evaluate(frame) for curve in curves}
-    return geometry.picture_to_image(part, annotations.picture_size(effect), **moved)
+    return geometry.picture_to_image(strip, annotations.picture_size(effect), **moved)
 
 
 def _move(drawing, change: np.ndarray) -> None:
@@ -288,12 +260,9 @@ def missing_modifiers(part, source) -> list:
 
 
 def copy_modifiers(effect) -> None:
-    """Gives the effect's strips the modifiers of their sources that they lack, keys included."""
-    scene = effect.id_data
-    for part, source in parts(effect):
-        if not (lacking := missing_modifiers(part, source)):
-            continue
-        append_modifiers(scene, source, part, lacking)
+    """Gives the effect's strip the modifiers of its source that it lacks, keys included."""
+    strip, source = strip_and_source(effect)
+    append_modifiers(effect.id_data, source, strip, missing_modifiers(strip, source))
 
 
 def append_modifiers(scene, source, part, chosen: list | None = None) -> None:

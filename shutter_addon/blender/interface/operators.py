@@ -25,6 +25,7 @@ from ..rendering.effect_source import FAULTS
 from . import icons, sharp_frame
 from .operator_bases import (
     UNDOABLE,
+    Mixin,
     Move,
     OfEffect,
     OfRegion,
@@ -81,6 +82,19 @@ def effect_added(operator, context) -> bool:
     return True
 
 
+class MakesEffect(Mixin):
+    """Gives the active strip an effect first, if that has none."""
+
+    @classmethod
+    def poll(cls, context):
+        return takes_effect(cls, context) if selection.active(context) is None else super().poll(context)
+
+    def execute(self, context):
+        if selection.active(context) is None and not effect_added(self, context):
+            return {"CANCELLED"}
+        return super().execute(context)
+
+
 class SHUTTER_OT_match_source(OfEffect, Operator):
     """Give the Shutter strip transform, crop, flip, color and range of its source (scribbles stay on the picture)"""
 
@@ -95,8 +109,9 @@ class SHUTTER_OT_match_source(OfEffect, Operator):
             return refused(cls, rpt_("The Shutter strip is like its source"))
         return True
 
-    def change(self, _context, effect):
-        for strip, neighbor in match_source.match(effect):
+    def change(self, context, effect):
+        if (neighbor := match_source.match(effect)) is not None:
+            strip = selection.active(context)[2]
             sentence = rpt_('"{neighbor}" is in the way: "{strip}" has not the whole range of its source')
             report_warning(self, sentence.format(neighbor=neighbor.name, strip=strip.name))
 
@@ -292,7 +307,7 @@ class SHUTTER_OT_bar_set(OfShutter, Operator):
         return None
 
 
-class SHUTTER_OT_draw(OfShutter, Operator):
+class SHUTTER_OT_draw(MakesEffect, OfShutter, Operator):
     """Draw on the sharp frame where the active shutter holds (at another frame, this redraws the active region)"""
 
     bl_idname = "shutter.draw"
@@ -314,21 +329,10 @@ class SHUTTER_OT_draw(OfShutter, Operator):
     )
 
     @classmethod
-    def poll(cls, context):
-        if selection.active(context) is None:  # it makes the effect
-            return takes_effect(cls, context)
-        return super().poll(context)
-
-    @classmethod
     def possible(cls, effect):
         if not super().possible(effect):
             return False
         return selection.active_region(effect) is not None or has_room(cls, effect, "regions")
-
-    def execute(self, context):
-        if selection.active(context) is None and not effect_added(self, context):
-            return {"CANCELLED"}
-        return super().execute(context)
 
     def change(self, context, effect):
         region = selection.active_region(effect)

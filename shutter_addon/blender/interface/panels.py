@@ -119,6 +119,8 @@ class SHUTTER_MT_shutters(Menu):
         layout.operator("shutter.shutter_move", text="Move Up", icon="TRIA_UP").direction = "UP"
         layout.operator("shutter.shutter_move", text="Move Down", icon="TRIA_DOWN").direction = "DOWN"
         layout.separator()
+        layout.operator("shutter.effect_copy", icon="COPYDOWN")
+        layout.operator("shutter.effect_paste", icon="PASTEDOWN")
         layout.operator("shutter.recipe_import", icon="IMPORT")
         layout.operator("shutter.recipe_export", icon="EXPORT")
 
@@ -137,6 +139,7 @@ class _Shutters(Mixin):
             return
         effect = active[1]
         _draw_live(layout, context)
+        _draw_source(layout, effect)
         draw_list(layout, effect, "shutter", effect.shutters, "SHUTTER_MT_shutters")
         row = layout.row(align=True)
         row.operator("shutter.draw", icon="GREASEPENCIL")
@@ -224,6 +227,13 @@ def _draw_live(layout, context):
     notes.enabled = bool(found - {None})
     notes.alert = "ERROR" in found
     notes.popover("SHUTTER_PT_notes", text="", icon="ERROR" if notes.alert else "INFO")
+
+
+def _draw_source(layout, effect) -> None:
+    """Which clip the effect is for, and the choice of another."""
+    shown = match_source.shown(effect)
+    words = iface_("Source: {strip}").format(strip=shown.source) if shown else iface_("Choose Source")
+    layout.operator_menu_enum("shutter.source", "strip", text=words, icon="SEQUENCE", translate=False)
 
 
 def _notes(context) -> Iterator[tuple[str, Button | None]]:
@@ -349,10 +359,14 @@ def _add_entry(self, _context):
 
 def _strip_entry(self, context):
     strip = selection.active_strip(context)
-    if strip is not None and strip.type in strips.SOURCES:
-        self.layout.separator()
+    if strip is None or not (strip.type in strips.SOURCES or selection.active(context)):
+        return
+    self.layout.separator()
+    if strip.type in strips.SOURCES:
         self.layout.operator("shutter.draw", text="Draw Shutter", icon="GREASEPENCIL")
         self.layout.operator("shutter.add_effect")
+    self.layout.operator("shutter.effect_copy", icon="COPYDOWN")
+    self.layout.operator("shutter.effect_paste", icon="PASTEDOWN")
 
 
 MENUS = {
