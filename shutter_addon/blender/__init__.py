@@ -5,6 +5,7 @@ from .data import main_thread, movie_decoding, preferences, properties
 from .interface import (
     bake_operators,
     bar_editor,
+    copy_operators,
     full_quality,
     gizmo_keymaps,
     icons,
@@ -54,6 +55,7 @@ _modules = (
     outline_operators,
     outline_points,
     recipe_operators,
+    copy_operators,
     bake_operators,
     full_quality,
     report_operators,

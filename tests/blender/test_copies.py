@@ -1,4 +1,4 @@
-"""Copies and parts of effect strips: each gets a scene, an effect and keys of its own."""
+"""Copies and parts of effect strips: each gets a scene, an effect and keys of its own. And effects for other clips."""
 
 import json
 import os
@@ -10,7 +10,9 @@ import numpy as np
 import pytest
 from support import recipe, sequencer, write_frames
 
-from shutter_addon.blender.data import data_format, selection, strips
+from shutter_addon.blender.data import annotations, data_format, fcurves, geometry, selection, strips
+from shutter_addon.blender.editing import match_source, undelete
+from shutter_addon.core.model.scribbles import mapped
 from shutter_addon.core.recipes import recipe_file
 
 LINE = {"name": "Face", "shutter": "S1", "kind": "lasso", "strokes": [[[0.1, 0.1], [0.9, 0.1], [0.5, 0.9]]]}
@@ -213,3 +215,58 @@ def test_a_strip_of_an_effects_scene_from_the_add_menu_has_its_length(bpy, edit,
     bpy.context.view_layer.update()
     assert (added.left_handle, added.right_handle) == (30, 50)
     assert added.scene != strip.scene
+
+
+def test_the_picker_gives_an_effect_to_another_clip(bpy, edit, add, clip, render):
+    strip = add(data=recipe(4, [1, 0, 0, 0]))
+    old, other = source_of(strip), clip(1, 6, size=(24, 40))
+    right = other.split(8, "SOFT")
+    other.mute = right.mute = True
+    assert match_source.shown(effect_of(strip)).source == old.name
+    for source in (other, right):
+        selection.choose(edit, strip)
+        assert bpy.ops.shutter.source(strip=source.name) == {"FINISHED"}
+        bpy.context.view_layer.update()
+        assert source_of(strip) == source
+        assert set(strip.connections) == {source}
+    edit.sequence_editor.strips.remove(old)
+    assert (strip.scene.render.resolution_x, strip.scene.render.resolution_y) == (40, 24)
+    with_effect = render(edit, [10])[10]
+    strip.mute, right.mute = True, False
+    assert np.abs(with_effect - render(edit, [10])[10]).max() <= 1
+
+
+@pytest.mark.parametrize("where", ["clip", "effect", "scene"])
+def test_an_effect_is_pasted_onto_another_clip(bpy, edit, add, clip, where):
+    """Keys count from the strip's first frame; drawings lie on the picture as they did."""
+    strip = add()
+    strip.left_handle = 4
+    bpy.context.view_layer.update()
+    undelete.forget_copy()
+    with pytest.raises(RuntimeError, match="Copy an effect first"):
+        bpy.ops.shutter.effect_paste()
+    selection.choose(edit, strip)
+    assert bpy.ops.shutter.effect_copy() == {"FINISHED"}
+    effect_of(strip).window = 2  # what was copied is as it was
+    scene = bpy.data.scenes.new("Other") if where == "scene" else edit
+    bpy.context.window.scene = scene
+    goal = add(101, recipe(8, [1] * 8)) if where == "effect" else clip(101, size=(32, 64), scene=scene)
+    selection.choose(scene, goal)
+    bpy.ops.ed.undo_push(message="before")
+    before = [len(effect.shutters) for effect in scene.virtual_shutter.effects]
+    assert bpy.ops.shutter.effect_paste("EXEC_DEFAULT", True) == {"FINISHED"}
+    bpy.context.view_layer.update()
+    pasted = shown(scene)[-1]
+    effect = effect_of(pasted)
+    assert [shutter.name for shutter in effect.shutters] == ["S0", "S1"]
+    assert (effect.window, pasted.left_handle, source_of(pasted).name) == (4, 101, "clip 101")
+    curves = fcurves.curves_under(scene, f"{effect.path_from_id()}.regions[0].location")
+    assert fcurves.key_frames(curves) == [98, 106]
+    ((drawing,),) = [list(layer.frames) for layer in effect.scene.annotation.layers]
+    assert drawing.frame_number == 98
+    to_picture = np.linalg.inv(geometry.picture_to_image(pasted, annotations.picture_size(effect)))
+    assert np.abs(mapped(to_picture, annotations.strokes_of(drawing)[0]) - LINE["strokes"][0]).max() < 1e-5
+    name = scene.name
+    bpy.ops.ed.undo()
+    bpy.context.view_layer.update()
+    assert [len(effect.shutters) for effect in bpy.data.scenes[name].virtual_shutter.effects] == before

@@ -77,15 +77,17 @@ def drawn(*points):
 
 
 def cut():
-    """K with the playhead on the strip: the active one is the left half then, and the right half is seen."""
+    """K with the playhead on the strip, and the pointer behind it: the active one is the left half then, and the right
+    half is seen and selected."""
     story.edit().frame_set(CUT)
     with driver.override("SEQUENCER"):
         bpy.ops.sequencer.view_all()
     yield 0.5
-    driver.move(timeline(), timeline().width / 2, timeline().height / 2)
+    driver.move(timeline(), timeline().width * 0.9, timeline().height / 2)
     yield
     driver.key("k")
-    yield from driver.until(lambda: len(halves()) == 2, "K cuts the strip")
+    both = "K cuts the strip, and each half has an effect"
+    yield from driver.until(lambda: len(halves()) == len(story.edit().virtual_shutter.effects) == 2, both)
     left, right = halves()
     assert story.edit().sequence_editor.active_strip == left
     with driver.override("PREVIEW"):
@@ -94,23 +96,23 @@ def cut():
 
 
 def moved():
-    """The right half is moved away: it has an effect of its own then."""
+    """The right half, which has an effect of its own, is moved away."""
     bpy.ops.ed.undo_push(message="before")
-    with driver.override("SEQUENCER"):
-        bpy.ops.sequencer.select_all(action="DESELECT")
+    yield from deselected()
     yield from clicked(halves()[1])
     driver.key("g")
     yield 0.3
     driver.text("20")
     yield 0.3
     driver.key("Return")
-    yield from driver.until(lambda: len(story.edit().virtual_shutter.effects) == 2, "the half has its own effect")
+    yield from driver.until(lambda: halves()[1].left_handle == CUT + 20, "the half is moved")
     left, right = halves()
     assert (left.right_handle, right.left_handle) == (CUT, CUT + 20)
 
 
 def edited():
-    """The left half is active; the playhead is on the right one, then on the left one, then between."""
+    """The left half is selected; the playhead is on the right one, then on the left one, then between. Where none is
+    selected, that is edited which is seen."""
     yield from clicked(halves()[0])
     yield from story.moved_to(LEFT)
     yield from seen("2_left")
@@ -120,8 +122,13 @@ def edited():
     before = bars_of(left), bars_of(right)
     yield from drawn_bars()
     left, right = halves()
+    assert (bars_of(left), bars_of(right)) == before, "bars of a half that is not selected, or not seen, changed"
+    yield from deselected()
+    yield from drawn_bars()
+    left, right = halves()
     assert (bars_of(left) == before[0], bars_of(right) == before[1]) == (True, False), "bars of another half changed"
     yield from seen("3_right")
+    yield from clicked(halves()[0])
     yield from story.moved_to(LEFT)
     yield from seen("4_left_again")
     yield from story.moved_to(GAP)
@@ -134,6 +141,12 @@ def edited():
         assert not bpy.ops.shutter.draw.poll()
 
 
+def deselected():
+    with driver.override("SEQUENCER"):
+        bpy.ops.sequencer.select_all(action="DESELECT")
+    yield
+
+
 def drawn_bars():
     yield from driver.drag(story.preview(), [(50, 90), (70, 60), (90, 30)])
 
@@ -141,6 +154,7 @@ def drawn_bars():
 def scribbled():
     """The pen draws on the half that is seen, scrubbed from one to the other."""
     yield from story.moved_to(RIGHT)
+    yield from deselected()
     with driver.override("PREVIEW"):
         bpy.ops.shutter.draw("INVOKE_DEFAULT", True)
     yield 0.5

@@ -277,9 +277,23 @@ def around(mask):
 
 
 @pytest.mark.parametrize("backend", backends("opengl"))
+def test_every_strip_has_an_effect_of_its_own(backend, tmp_path):
+    """Cut by K, one half edited, duplicated, copied and pasted onto another clip; all of it undone and done again."""
+    seen, console = tell("strips_story.py", backend, linked(tmp_path))
+    assert "Traceback" not in console
+    crops = {entry["picture"]: entry["crop"] for entry in seen if "picture" in entry}
+    boxes = {name: [left, top, left + width, top + height] for name, (left, top, width, height) in crops.items()}
+    shown = {name: pixels(tmp_path / f"{name}.png", box) for name, box in boxes.items()}
+    for half in ("left", "right"):
+        assert_alike(shown[half], shown[f"{half}_before"], tmp_path / f"{half}_difference.png")
+    assert_alike(shown["left_edited"], shown["left"], tmp_path / "edited_difference.png")
+    assert np.abs(shown["right_edited"] - shown["right"]).max() > 50
+
+
+@pytest.mark.parametrize("backend", backends("opengl"))
 def test_what_is_seen_is_edited_and_nothing_of_the_deleted_stays(backend, tmp_path):
-    """A strip cut by K, its right half moved away: bars, strokes and tab are those of the half under the playhead. Then
-    both are deleted, in four ways: no stroke stays in the picture, and undo brings it back."""
+    """A strip cut by K, its right half moved away: bars, strokes and tab are those of the selected half, or of that
+    under the playhead. Then both are deleted, in four ways: no stroke stays in the picture, and undo brings it back."""
     seen, console = tell("seen_story.py", backend, linked(tmp_path))
     assert "Traceback" not in console
     entries = {entry["picture"]: entry for entry in seen}

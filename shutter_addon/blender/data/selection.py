@@ -90,7 +90,7 @@ def _effects_of(scene, strip) -> list:
     """The effect that a strip shows, or those of the source that it is."""
     if strip is None:
         return []
-    if strip.type == "SCENE" and strip.scene and (own := effect_of(scene, strip.scene)):
+    if strip.type == "SCENE" and (own := effect_of(scene, strip.scene)):
         return [own]
     identity = strip.virtual_shutter_source
     return [effect for effect in scene.virtual_shutter.effects if effect.source == identity != ""]

@@ -7,7 +7,8 @@ from bpy.app.translations import pgettext_data as data_
 
 from ...core.model.limits import MAX_FRAME
 from ..data import annotations, data_format, source_media
-from ..data.strips import ENGINE, effect_of, origin, overlap
+from ..data.strips import ENGINE, effect_of, nearest_source, origin, overlap
+from . import copies
 
 _COLOR = "COLOR_06"
 
@@ -32,9 +33,7 @@ def add_effect(scene, source):
     strip.left_handle, strip.right_handle = source.left_handle, source.right_handle
     strip.blend_type = source.blend_type
     copy_look(source, strip)
-    # Through a transparent picture the plain source would show. An opaque one stays: mute the effect to see it.
-    if medium.alpha != "opaque" and not source.mute:
-        source.mute = source.virtual_shutter_muted = True
+    _mute(source, medium)
     effect = data_format.new_effect(scene, data_format.FORMAT)
     effect.name, effect.scene, effect.source, effect.start = (
         strip.name,
@@ -47,6 +46,24 @@ def add_effect(scene, source):
     strip.color_tag = _COLOR
     connect(scene, [strip, source, *source.connections])
     return strip, effect_of(scene, effect_scene)  # again: an operator's update may move the collection's items
+
+
+def choose_source(effect, strip, source) -> None:
+    """Has an effect show another movie, image or clip strip. MediaError: it cannot be read."""
+    medium, scene = source_media.open_media(source), effect.id_data
+    medium.close()
+    _mute(source, medium)
+    source.virtual_shutter_source = effect.source = source.virtual_shutter_source or uuid.uuid4().hex
+    if nearest_source(scene, effect, strip) != source:  # but a copy or another part of it
+        copies.own_source(scene, source)
+        effect.source = source.virtual_shutter_source
+    connect(scene, [strip, source, *source.connections])
+
+
+def _mute(source, medium) -> None:
+    """Through a transparent picture the plain source would show. An opaque one stays: mute the effect to see it."""
+    if medium.alpha != "opaque" and not source.mute:
+        source.mute = source.virtual_shutter_muted = True
 
 
 def connect(scene, connected) -> None:

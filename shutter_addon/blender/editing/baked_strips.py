@@ -130,8 +130,8 @@ def baked_of(scene: Any, strip: Any) -> list:
 def effect_parts(scene: Any, strip: Any) -> list:
     """What an effect strip that was baked has been cut into; none, if it was not."""
     start = round(strips.origin(strip))
-    parts = [other for other in selection.of_bake(scene, strip) if other.type == "SCENE"]
-    return [part for part in parts if round(strips.origin(part)) == start]
+    parts = (other for other in selection.of_bake(scene, strip) if round(strips.origin(other)) == start)
+    return [part for part in parts if part.type == "SCENE"]
 
 
 def unbake(scene: Any, strip: Any) -> None:

@@ -5,7 +5,6 @@ half, would show the original's effect, and be changed with it.
 """
 
 import uuid
-from collections import Counter
 from typing import Any
 
 import bpy
@@ -97,9 +96,6 @@ def _shorten(strip, same: list) -> None:
 
 def _part_sources(scene) -> None:
     """Where effects with the same source show different strips, parts of a cut source or copies, each gets its own."""
-    effects = scene.virtual_shutter.effects
-    if max(Counter(effect.source for effect in effects).values(), default=1) == 1:
-        return
     first: dict = {}
     for effect, _strip, source in strips.with_sources(scene):
         if first.setdefault(effect.source, source) != source:
@@ -107,12 +103,8 @@ def _part_sources(scene) -> None:
 
 
 def own_source(scene, source) -> None:
-    """Gives a source an identity that no other strip has; the effects that show it go along, and what is baked."""
+    """Gives a source an identity that no other strip has; the effects that show it go along."""
     identity = uuid.uuid4().hex
-    baked = [strip.virtual_shutter_bake for strip in scene.sequence_editor.strips_all if strips.overlap(strip, source)]
-    for bake in baked:
-        if bake.source == source.virtual_shutter_source != "":
-            bake.source = identity
     for effect, _strip, other in strips.with_sources(scene):
         if other == source:
             effect.source = identity

@@ -98,6 +98,7 @@ def forget() -> None:
     renamed_drawings.forget()
     match_source.forget()
     shown_annotations.forget()
+    undelete.forget_copy()
 
 
 def _reconnect(scene) -> None:
@@ -160,9 +161,8 @@ def _unmute_sources(scene) -> None:
 
 def _is_baked_over(scene, source) -> bool:
     """Whether a film that was baked of a source lies above it: the source would be seen through transparent parts."""
-    identity = source.virtual_shutter_source
-    baked = (s for s in scene.sequence_editor.strips_all if s.type in strips.SOURCES and s.channel > source.channel)
-    return any(s.virtual_shutter_bake.source == identity != "" and strips.overlap(s, source) for s in baked)
+    baked = (s for s in source.connections if s.type in strips.SOURCES and s.channel > source.channel)
+    return any(s.virtual_shutter_bake.identity and strips.overlap(s, source) for s in baked)
 
 
 def _remove_scenes(updated) -> None:

@@ -108,11 +108,10 @@ def _compare(effect) -> Shown | None:
 
 def differences(effect) -> list[str]:
     """What match would change, in words to be translated."""
-    if (pair := strip_and_source(effect)) is None:
-        return []
-    look, wanted = map(_looks, pair)
+    strip, source = strip_and_source(effect)
+    look, wanted = _looks(strip), _looks(source)
     words = [word for word in _LOOK if look[word] != wanted[word]]
-    if _goal(effect, *pair)[:2] != _range(pair[0]):
+    if _goal(effect, strip, source)[:2] != (strip.left_handle, strip.right_handle):
         words.append(_RANGE)
     return words
 
@@ -162,15 +161,13 @@ def _keyed(curves, path: str) -> list:
     )
 
 
-def _range(strip) -> tuple[int, int]:
-    return strip.left_handle, strip.right_handle
-
-
 def _goal(effect, strip, source) -> tuple[int, int, Any]:
-    """The handles that an effect's strip would have from its source, short of the strips in its channel, and which of
-    these stops it; None: none does. Where they leave no room at all it stays. An edge where another effect goes on with
-    the same source stays as well."""
-    below = _below(effect, strip, source)
+    """The handles that an effect's strip would have from its source, or from the parts that this was cut into, short of
+    the strips in its channel; and which of these stops it, or None. Where they leave no room at all it stays. An edge
+    where another effect goes on with the same source stays as well."""
+    parts = (s for s in effect.id_data.sequence_editor.strips_all if s.virtual_shutter_source == effect.source)
+    parts = (s for s in parts if s.type == source.type and strips.origin(s) == strips.origin(source))
+    below = [s for s in parts if s == source or strips.overlap(s, strip)]
     others = [other for _effect, other, by in strips.with_sources(effect.id_data) if by in below and other != strip]
     left, right = min(s.left_handle for s in below), max(s.right_handle for s in below)
     left = strip.left_handle if any(o.left_handle < strip.left_handle for o in others) else left
@@ -182,14 +179,8 @@ def _goal(effect, strip, source) -> tuple[int, int, Any]:
     first = max(before, key=lambda other: other.right_handle, default=None)
     last = min(after, key=lambda other: other.left_handle, default=None)
     left, right = first.right_handle if first else left, last.left_handle if last else right
-    return (*((left, right) if left < right else _range(strip)), first or last)
-
-
-def _below(effect, strip, source) -> list:
-    """The source, and those of its own parts, if it was cut, that lie below the effect's strip."""
-    same = [s for s in strip.id_data.sequence_editor.strips_all if s.virtual_shutter_source == effect.source]
-    same = [s for s in same if s.type == source.type and strips.origin(s) == strips.origin(source)]
-    return [s for s in same if s == source or strips.overlap(s, strip)]
+    left, right = (left, right) if left < right else (strip.left_handle, strip.right_handle)
+    return left, right, first or last
 
 
 def _slip(scene, strip, source, left: int, right: int) -> None:

@@ -1,4 +1,5 @@
-"""Removed effects, kept in memory so that a strip which is cut and pasted gets its effect back.
+"""Effects kept in memory: removed ones, so that a strip which is cut and pasted gets its effect back, and the one that
+Copy Effect took.
 
 Blender's clipboard holds a Scene strip without its scene, and outlives the file that the strip was cut from.
 """
@@ -7,10 +8,12 @@ from typing import Any
 
 import bpy
 
-from ..data import annotations, data_format, fcurves, property_copy
-from . import add_effect
+from ..data import annotations, data_format, fcurves, property_copy, recipe_import, strips
+from . import add_effect, match_source
 
 _MOST = 64
+_COPIED = "copied"  # in place of an identity
+_OWN = {"name", "identity", "source", "start"}  # of an effect, what stays where another one is pasted over it
 # What effects point to, and where bpy.data has it.
 _POINTED = {"MovieClip": "movieclips", "Image": "images", "Mask": "masks"}
 _effects: dict = {}
@@ -18,14 +21,50 @@ _effects: dict = {}
 
 def keep(scene, effect) -> None:
     """Keeps an effect that is about to be removed, under its scene's identity: properties, F-curves, annotations."""
+    if effect.scene is not None and effect.scene.virtual_shutter.identity:
+        _keep(effect.scene.virtual_shutter.identity, scene, effect)
+
+
+def copy(effect, strip) -> None:
+    """Keeps an effect, as its strip shows it, for `paste`."""
+    first, skipped, places = strip.left_handle, strips.skipped(strip), match_source.places(effect, strip)
+    _keep(_COPIED, effect.id_data, effect, first=first, skipped=skipped, places=places)
+
+
+def has_copy() -> bool:
+    return _COPIED in _effects
+
+
+def forget_copy() -> None:
+    """Keeps no copied effect any more: before another file is loaded, which has not the images that it points to."""
+    _effects.pop(_COPIED, None)
+
+
+def paste(effect, strip) -> None:
+    """Replaces an effect's shutters, regions, keys and options by those of the copied one. Frames count from the first
+    that a strip shows; drawings lie on the picture as they did."""
+    data, scene = _effects[_COPIED], effect.id_data
+    recipe_import.clear(scene, effect)
+    _restore(scene, effect, data, {name: value for name, value in data["effect"].items() if name not in _OWN})
+    fcurves.move_curves(scene, effect.path_from_id() + ".", strip.left_handle - data["first"])
+    for drawing in [drawing for layer in effect.scene.annotation.layers for drawing in layer.frames]:
+        drawing.frame_number += strip.left_handle - data["first"]
+    match_source.put_back(effect, strip, data["places"])
+    later = strips.skipped(strip) - data["skipped"]
+    for stop in [stop for moving in (effect.camera, *effect.regions) for stop in moving.stops]:
+        stop.frame += later
+    for region in effect.regions:
+        region.follow_frame += later
+        region.offset -= later if region.timing == "TIMELINE" else 0
+
+
+def _keep(identity: str, scene, effect, **more) -> None:
     effect_scene, path = effect.scene, effect.path_from_id()
-    if effect_scene is None or not effect_scene.virtual_shutter.identity:
-        return
     curves = [_plain(curve) for curve in fcurves.curves_under(scene, path + ".")]
     for curve in curves:
         curve["data_path"] = curve["data_path"].removeprefix(path)
-    _effects.pop(effect_scene.virtual_shutter.identity, None)  # the newest are the last
-    _effects[effect_scene.virtual_shutter.identity] = {
+    _effects.pop(identity, None)  # the newest are the last
+    _effects[identity] = more | {
         "scene": (effect_scene.name, (effect_scene.render.resolution_x, effect_scene.render.resolution_y)),
         "format": scene.virtual_shutter.format,
         "effect": _plain(effect),
@@ -50,16 +89,21 @@ def restore(scene, identity: str):
             made.virtual_shutter_made = annotations.GONE  # of the scene before, which somebody removed
     effect_scene = add_effect.new_effect_scene(scene, identity, *data["scene"])
     effect = data_format.new_effect(scene, data["format"])
-    _fill(effect, data["effect"])
     effect.scene = effect_scene
+    _restore(scene, effect, data, data["effect"])
+    return effect_scene
+
+
+def _restore(scene, effect, data: dict, content: dict) -> None:
+    """Gives an effect the content, keys and drawings of a kept one."""
+    _fill(effect, content)
     for plain in data["curves"]:
         path = effect.path_from_id() + plain["data_path"]
         curve = fcurves.new_curve(scene, path, plain["array_index"])
         _fill(curve, plain | {"data_path": path})
         curve.update()
     for plain in data["layers"]:
-        _fill(effect_scene.annotation.layers.new(plain["info"], set_active=False), plain)
-    return effect_scene
+        _fill(annotations.annotation(effect).layers.new(plain["info"], set_active=False), plain)
 
 
 def _plain(struct) -> dict:

@@ -58,7 +58,7 @@ class SHUTTER_OT_matte_add(_AddsRegion, ImportHelper, Operator):
 _strip_items: list = []
 
 
-def _strips(_self, context):
+def strip_items(_self, context):
     scene = selection.scene_of(context)
     all_strips = scene.sequence_editor.strips_all if scene and scene.sequence_editor else ()
     _strip_items[:] = [(strip.name, strip.name, "") for strip in all_strips if strip.type in strips.SOURCES]
@@ -71,7 +71,7 @@ class SHUTTER_OT_matte_strip(_AddsRegion, Operator):
     bl_idname = "shutter.matte_strip"
     bl_label = "Matte from Strip"
 
-    strip: EnumProperty(name="Strip", items=_strips, translation_context=contexts.no_translation)
+    strip: EnumProperty(name="Strip", items=strip_items, translation_context=contexts.no_translation)
 
     def change(self, _context, effect):
         region = region_edits.add_matte(effect, selection.active_shutter(effect), name=self.strip, matte="STRIP")

@@ -13,6 +13,8 @@ class SHUTTER_MT_strip(Menu):
         layout.operator("shutter.draw", icon="GREASEPENCIL")
         layout.operator("shutter.erase")
         layout.separator()
+        layout.operator("shutter.effect_copy", icon="COPYDOWN")
+        layout.operator("shutter.effect_paste", icon="PASTEDOWN")
         for menu in (
             SHUTTER_MT_of_shutter,
             SHUTTER_MT_of_bars,
@@ -114,6 +116,7 @@ class SHUTTER_MT_of_footage(Menu):
 
     def draw(self, _context):
         layout = self.layout
+        layout.operator_menu_enum("shutter.source", "strip")
         layout.operator("shutter.match_source")
         layout.operator("shutter.copy_modifiers")
         layout.separator()

@@ -24,6 +24,7 @@ from ..rendering.effect_source import FAULTS
 from . import icons, sharp_frame
 from .operator_bases import (
     UNDOABLE,
+    Mixin,
     Move,
     OfEffect,
     OfRegion,
@@ -78,6 +79,19 @@ def effect_added(operator, context) -> bool:
         show_panel(context)
     redraw(context)
     return True
+
+
+class MakesEffect(Mixin):
+    """Gives the active strip an effect first, if that has none."""
+
+    @classmethod
+    def poll(cls, context):
+        return takes_effect(cls, context) if selection.active(context) is None else super().poll(context)
+
+    def execute(self, context):
+        if selection.active(context) is None and not effect_added(self, context):
+            return {"CANCELLED"}
+        return super().execute(context)
 
 
 class SHUTTER_OT_match_source(OfEffect, Operator):
@@ -293,7 +307,7 @@ class SHUTTER_OT_bar_set(OfShutter, Operator):
         return None
 
 
-class SHUTTER_OT_draw(OfShutter, Operator):
+class SHUTTER_OT_draw(MakesEffect, OfShutter, Operator):
     """Draw on the sharp frame where the active shutter holds (at another frame, this redraws the active region)"""
 
     bl_idname = "shutter.draw"
@@ -315,21 +329,10 @@ class SHUTTER_OT_draw(OfShutter, Operator):
     )
 
     @classmethod
-    def poll(cls, context):
-        if selection.active(context) is None:  # it makes the effect
-            return takes_effect(cls, context)
-        return super().poll(context)
-
-    @classmethod
     def possible(cls, effect):
         if not super().possible(effect):
             return False
         return selection.active_region(effect) is not None or has_room(cls, effect, "regions")
-
-    def execute(self, context):
-        if selection.active(context) is None and not effect_added(self, context):
-            return {"CANCELLED"}
-        return super().execute(context)
 
     def change(self, context, effect):
         region = selection.active_region(effect)

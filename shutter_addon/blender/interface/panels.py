@@ -106,6 +106,8 @@ class SHUTTER_MT_shutters(Menu):
         layout.operator("shutter.shutter_move", text="Move Up", icon="TRIA_UP").direction = "UP"
         layout.operator("shutter.shutter_move", text="Move Down", icon="TRIA_DOWN").direction = "DOWN"
         layout.separator()
+        layout.operator("shutter.effect_copy", icon="COPYDOWN")
+        layout.operator("shutter.effect_paste", icon="PASTEDOWN")
         layout.operator("shutter.recipe_import", icon="IMPORT")
         layout.operator("shutter.recipe_export", icon="EXPORT")
 
@@ -217,8 +219,11 @@ def _draw_live(layout, context):
 
 
 def _draw_source(layout, effect):
-    """What the effect does not have from its source, and the way to it."""
-    if (shown := match_source.shown(effect)) is None:
+    """Which clip the effect is for, what it does not have from that, and the way to it."""
+    shown = match_source.shown(effect)
+    words = iface_("Source: {strip}").format(strip=shown.source) if shown else iface_("Choose Source")
+    layout.operator_menu_enum("shutter.source", "strip", text=words, icon="SEQUENCE", translate=False)
+    if shown is None:
         return
     if shown.differences:
         what = ", ".join(iface_(word) for word in shown.differences)
@@ -339,10 +344,14 @@ def _add_entry(self, _context):
 
 def _strip_entry(self, context):
     strip = selection.active_strip(context)
-    if strip is not None and strip.type in strips.SOURCES:
-        self.layout.separator()
+    if strip is None or not (strip.type in strips.SOURCES or selection.active(context)):
+        return
+    self.layout.separator()
+    if strip.type in strips.SOURCES:
         self.layout.operator("shutter.draw", text="Draw Shutter", icon="GREASEPENCIL")
         self.layout.operator("shutter.add_effect")
+    self.layout.operator("shutter.effect_copy", icon="COPYDOWN")
+    self.layout.operator("shutter.effect_paste", icon="PASTEDOWN")
 
 
 MENUS = {

@@ -174,9 +174,9 @@ def _show(context, shown: Shown, decision: Decision | None, say) -> None:
 
 
 def _tell_unseen(context, say) -> None:
-    """Says why nothing of the active effect is in the picture."""
+    """Says why nothing of the active effect is in the picture, where no other one is."""
     active = selection.active(context)
-    if active is None or selection.in_picture(context) or not context.space_data.show_overlays:
+    if active is None or selection.seen(active[0]) or not context.space_data.show_overlays:
         return
     say(selection.why_unseen(active[0], active[2]))
     with drawing.pixel_space(context.region):

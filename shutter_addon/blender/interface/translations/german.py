@@ -1365,6 +1365,28 @@ MESSAGES = {
     ): "„{track}“ von Clip „{clip}“ hat keinen Marker bei Bild {frame}",
     ("*", 'region "{name}" has no strokes'): "Region „{name}“ hat keine Striche",
     # Recipes
+    ("Operator", "Choose Source"): "Quelle wählen",
+    ("*", "Choose Source"): "Quelle wählen",
+    ("*", "Source: {strip}"): "Quelle: {strip}",
+    (
+        "*",
+        "Give the effect another clip: the movie, image or clip strip whose frames it exposes",
+    ): "Dem Effekt einen anderen Clip geben: den Film-, Bild- oder Clip-Strip, dessen Einzelbilder er belichtet",
+    ("Operator", "Copy Effect"): "Effekt kopieren",
+    (
+        "*",
+        "Copy the shutters, regions, keyframes and options of the effect, for other strips and scenes of this file",
+    ): "Verschlüsse, Regionen, Keyframes und Optionen des Effekts für andere Strips und Szenen dieser Datei kopieren",
+    (
+        "*",
+        "Copied, without what a newer version of Virtual Shutter has added",
+    ): "Kopiert, ohne das, was eine neuere Version von Virtual Shutter hinzugefügt hat",
+    ("Operator", "Paste Effect"): "Effekt einfügen",
+    (
+        "*",
+        "Give the active strip the copied effect; where it has one, that is replaced",
+    ): "Dem aktiven Strip den kopierten Effekt geben; hat er schon einen, wird der ersetzt",
+    ("*", "Copy an effect first"): "Zuerst einen Effekt kopieren",
     ("Operator", "Import Recipe"): "Rezept importieren",
     (
         "*",
