@@ -311,7 +311,8 @@ class ShutterBake(PropertyGroup):
 
     version: of the effect when it was baked (effect_version), over `count` frames from `first`, which count from the
     effect strip's origin
-    channel: that of the effect strip before it made room for the film"""
+    source: identity of the effect's source, for 0.1.0 alone; channel: that of the effect strip before it made room for
+    the film"""
 
     identity: StringProperty()
     version: StringProperty()
