@@ -52,7 +52,7 @@ def test_what_cannot_be_read_is_shown_at_an_even_speed(bpy, edit, tmp_path, monk
         raise struct_dna.LayoutError
 
     told: list[str] = []
-    monkeypatch.setattr(pictures, "_said", set())
+    monkeypatch.setattr(pictures, "_said", set())  # by which a sentence is told once: as a new Blender has it
     monkeypatch.setattr(strip_timing, "record", unknown)
     timing = strip_timing.timing_of(source)
     assert timing.keys == (known.keys[0], known.keys[-1])
