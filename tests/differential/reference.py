@@ -594,7 +594,7 @@ def slid(recipe, bars, index, direction, count):
     there = positions(recipe, index, direction, count)
     moved = np.zeros_like(bars)
     for own, found in zip(bars, moved, strict=True):
-        first, *_, last = [k for k in range(length) if own[k] > 0] * 2
+        first, *_, last = [k for k in range(length) if own[k] > 1e-9 * own.sum()] * 2  # rounding leaves some
         by = into([places[first], places[last]], count)
         for k in range(first, last + 1):
             found[there.index(places[k] + by)] = own[k]

@@ -98,7 +98,7 @@ def test_recipes_have_all_that_a_recipe_may_have():
         is_layered = bool(layers_at(recipe, case.frame))
         seen.update([("layer", is_layered)])
         doubtful[is_layered].append(found.doubtful.mean())
-    values = {"position": 3, "interpolation": 2, "light": 2, "exposure": 2, "edges": 3, "aggregate": 3, "border": 2}
+    values = {"position": 3, "interpolation": 2, "light": 2, "exposure": 2, "edges": 4, "aggregate": 3, "border": 2}
     values |= {"ease": 4, "redrawn": 2, "kind": 5, "shutters": 6, "time": 2, "direction": 2, "footage": len(KINDS)}
     values |= {"ramp": 4, "blend": 2, "timing": 2, "channel": 4}
     values |= {"combine": 3, "by_luminance": 1, "threshold": 2}
