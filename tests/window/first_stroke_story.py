@@ -14,8 +14,8 @@ import story
 from one_stroke_story import FRAME, STROKE, part
 
 LATER, TOOL = 82, "builtin.select_box"
-ICON = 46, 92  # a file's in the browser, in pixels from the left and from above
-ENTRY = 47  # that of the strip's menu, which reaches down to the end of the window, in pixels above that
+ICON, NEXT = (46, 92), 91  # a file's in the browser, in pixels from the left and from above; and to the next one
+ENTRY = 89  # that of the strip's menu, which reaches down to the end of the window, in pixels above that
 _actions = []  # what was done, and whether in the tab
 
 
@@ -69,10 +69,12 @@ def footage_chosen():
     yield 2.0
 
 
-def movie_dragged():
-    files, (x, y) = driver.region_of(driver.area_of("FILE_BROWSER")), ICON
-    to_x, to_y = timeline().view2d.view_to_region(1, 1.5, clip=False)
-    start, end = driver.screen(files, x, files.height - y), driver.screen(timeline(), to_x + 5, to_y)
+def movie_dragged(number=0, frame=1, channel=1):
+    """number: which of the browser's; to a frame and a channel of the timeline."""
+    files, (x, y) = driver.region_of(driver.area_of("FILE_BROWSER")), (ICON[0] + number * NEXT, ICON[1])
+    to_x, to_y = timeline().view2d.view_to_region(frame, channel + 0.5, clip=False)
+    count = len(story.edit().sequence_editor.strips_all)
+    start, end = driver.screen(files, x, files.height - y), driver.screen(timeline(), to_x + 2, to_y)
     driver.move(files, x - 1, files.height - y + 2)  # the browser marks what the pointer comes to
     yield 0.5
     driver.xdotool("click", 1)
@@ -89,7 +91,7 @@ def movie_dragged():
     driver.shot("0_dragged")
     driver.xdotool("mouseup", 1)
     acted("the movie is dragged into the timeline")
-    yield from driver.until(lambda: len(story.edit().sequence_editor.strips_all), "there is a strip")
+    yield from driver.until(lambda: len(story.edit().sequence_editor.strips_all) > count, "there is a strip")
     yield 1.0
 
 
@@ -193,6 +195,22 @@ def rendered():
     yield from driver.until(lambda: done and not bpy.app.is_job_running("RENDER"), "the render ends", 60)
     driver.saw(actions=_actions, stroke=one_stroke_story.stroke_at(story.edit().frame_current))
     bpy.data.images["Render Result"].save_render(str(driver.OUT / "final.png"), scene=story.edit())
+
+
+def film_rendered(name="final"):
+    """By Ctrl F12, as pictures NAME_FRAME.png."""
+    edit, done = story.edit(), []
+    edit.render.image_settings.media_type = "IMAGE"
+    edit.render.image_settings.file_format = "PNG"
+    edit.render.filepath = str(driver.OUT / f"{name}_")
+    # The preview's pictures of the effect are renders of its own scene.
+    bpy.app.handlers.render_complete.append(lambda scene, *_: scene.name == "Edit" and done.append(True))
+    driver.move(story.preview(), 100, story.preview().height - 60)
+    yield
+    driver.key("ctrl+96")  # F12 by its code: to its name xdotool adds Alt, as if it changed terminals
+    acted("Ctrl F12")
+    yield from driver.until(lambda: bpy.app.is_job_running("RENDER"), "a render begins")
+    yield from driver.until(lambda: done and not bpy.app.is_job_running("RENDER"), "the render ends", 300)
 
 
 def told():

@@ -104,22 +104,6 @@ def layered():
     yield from story.seen("5_layer")
 
 
-def rendered():
-    """The whole film."""
-    edit, done = story.edit(), []
-    edit.render.image_settings.media_type = "IMAGE"
-    edit.render.image_settings.file_format = "PNG"
-    edit.render.filepath = str(driver.OUT / "final_")
-    # The preview's pictures of the effect are renders of its own scene.
-    bpy.app.handlers.render_complete.append(lambda scene, *_: scene.name == "Edit" and done.append(True))
-    driver.move(story.preview(), 100, story.preview().height - 60)
-    yield
-    driver.key("ctrl+96")  # F12 by its code: to its name xdotool adds Alt, as if it changed terminals
-    acted("Ctrl F12")
-    yield from driver.until(lambda: bpy.app.is_job_running("RENDER"), "a render begins")
-    yield from driver.until(lambda: done and not bpy.app.is_job_running("RENDER"), "the render ends", 300)
-
-
 def told():
     yield from driver.video_editing_opened()
     started = time.monotonic()
@@ -139,7 +123,7 @@ def told():
     yield from carried()
     yield from mended()
     yield from layered()
-    yield from rendered()
+    yield from first_stroke_story.film_rendered()
     driver.saw(actions=first_stroke_story.actions(), seconds=time.monotonic() - started)
     driver.saw(before=story.edit().frame_current - frame_shown())
 

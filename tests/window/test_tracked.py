@@ -6,12 +6,11 @@ import shutil
 from itertools import pairwise
 from pathlib import Path
 
-import av
 import cv2
 import numpy as np
 import pytest
 from screens import apart_on_screen, assert_alike, crop, pixels
-from telling import ROOT, backends, linked, needs_window, packages, tell
+from telling import ROOT, backends, linked, needs_window, packages, tell, write_film
 
 from shutter_addon.core.frames import light
 from shutter_addon.media import open_source
@@ -57,18 +56,6 @@ def broken_film(path):
         shots[n] = shots[n].copy()
         shots[n][:, 200:560] = 110
     return write_film(path, shots, 10)
-
-
-def write_film(path, pictures, crf):
-    """The path of an H.264 film of pictures (H, W, 3) uint8."""
-    with av.open(str(path), "w") as film:
-        stream = film.add_stream("libx264", rate=25, options={"crf": str(crf)})
-        stream.height, stream.width, _ = pictures[0].shape
-        stream.pix_fmt = "yuv420p"
-        for picture in pictures:
-            film.mux(stream.encode(av.VideoFrame.from_ndarray(np.ascontiguousarray(picture), "rgb24")))
-        film.mux(stream.encode())
-    return path
 
 
 @pytest.mark.parametrize("backend", backends("opengl"))

@@ -1,0 +1,121 @@
+"""What an editor makes of clips within minutes, by mouse and keys: each a story in a real window."""
+
+import json
+import os
+from itertools import pairwise
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+from screens import assert_alike, pixels
+from telling import ROOT, linked, needs_window, packages, tell, write_film
+
+from shutter_addon.media import open_source
+
+pytestmark = needs_window
+SUBJECTS = os.environ.get("SUBJECTS", "")
+CUTS = "final", "headless", "plain"
+STEPS = "tracked", "mended", "layer", "longer"
+CLIPS = {  # of the assets: the first of forty frames, and their size
+    "bunny.mp4": ("bigbuckbunny.mp4", 30, (320, 180)),
+    "street.mp4": ("pedestrians.avi", 10, (240, 180)),
+    "walkers.mp4": ("walkers.mp4", 40, (240, 180)),
+}
+
+
+@pytest.mark.parametrize("backend", ["opengl", "vulkan"])
+def test_an_edit(backend, tmp_path):
+    """Three clips, retimed, cut, dissolved, with an effect each: the film is that of a Blender without a window. Where
+    there is no effect, and where an effect is sharp, it is the edit without effects."""
+    (tmp_path / "footage").mkdir()
+    for name, (asset, first, size) in CLIPS.items():
+        with open_source(ROOT / "assets" / asset) as source:
+            frames = [
+                cv2.resize(source.read(first + n)[..., :3], size, interpolation=cv2.INTER_AREA) for n in range(40)
+            ]
+        write_film(tmp_path / "footage" / name, frames, 10)
+    given = {"footage": tmp_path / "footage" / "bunny.mp4", "packages": packages(tmp_path / "packages")}
+    seen, console = tell("edit_story.py", backend, linked(tmp_path), **given)
+    assert "Traceback" not in console
+    facts = {name: entry[name] for entry in seen for name in entry}
+    films = {name: {path.stem[-4:]: pixels(path) for path in tmp_path.glob(f"{name}_*.png")} for name in CUTS}
+    final, headless, plain = (films[name] for name in CUTS)
+    assert len(final) == 58
+    assert sorted(final) == sorted(headless) == sorted(plain)
+    for number, picture in final.items():
+        assert_alike(picture, headless[number], tmp_path / f"headless_difference_{number}.png", 1)
+    assert_beside_plain(final, plain, facts, tmp_path)
+
+
+def assert_beside_plain(final, plain, facts, folder):
+    """By the ranges of effects, and where each of them is sharp."""
+    within = {}
+    for first, end, name in facts["effects"]:
+        within |= {f"{frame:04d}": name for frame in range(first, end)}
+    assert len(set(final) - set(within)) == 10, "between the second effect and the third"
+    (dissolve_from, *_), (_, dissolve_to, _) = facts["effects"][1], facts["effects"][0]
+    height, width = next(iter(final.values())).shape[:2]
+    (left, y), (right, _y) = facts["sharp"]
+    line = np.s_[height - 1 - int(y * height), int(left * width) : int(right * width)]
+    moves = []
+    for number, picture in final.items():
+        apart = np.abs(picture - plain[number]).max(axis=2)
+        if number not in within:
+            assert apart.max() == 0, number
+        elif int(number) >= dissolve_to:
+            assert apart.max() > 20, number
+            assert apart[line].max() <= 2, number
+            moves.append(np.abs(picture - final[f"{int(number) - 2:04d}"])[line].max())
+    assert dissolve_from < dissolve_to
+    assert np.mean(np.array(moves) > 20) > 0.5, "people walk there"
+
+
+@pytest.mark.skipif(not SUBJECTS, reason="NO FOOTAGE: set SUBJECTS to a folder with tennis/ and tennis_mask/ of DAVIS")
+def test_a_players_first_minute(tmp_path):
+    """One stroke, tracked; dragged right where the track is wrong, and tracked again; Sharp Subject; 24 frames. What of
+    him was sharp stays so at each step."""
+    names = sorted((Path(SUBJECTS) / "tennis").glob("*.jpg"))
+    pictures = [cv2.imread(str(name))[..., ::-1] for name in names]
+    masks = [cv2.imread(str(Path(SUBJECTS) / "tennis_mask" / f"{name.stem}.png"), 0) > 0 for name in names]
+    (tmp_path / "footage").mkdir()
+    footage = write_film(tmp_path / "footage" / "player.mp4", pictures, 4)
+    truth = tmp_path / "truth.json"
+    places = map(shirt, pictures, masks)
+    truth.write_text(json.dumps(dict(enumerate(places, 1))))
+    given = {"footage": footage, "packages": packages(tmp_path / "packages"), "truth": truth}
+    seen, console = tell("player_story.py", "opengl", linked(tmp_path), **given)
+    assert "Traceback" not in console
+    facts = {name: entry[name] for entry in seen for name in entry}
+    assert facts["window"] == 24
+    sharp = {name: sharp_parts(tmp_path, name, footage, masks) for name in STEPS}
+    for before, after in pairwise(STEPS):
+        parts = [(part, sharp[after][number]) for number, (part, share) in sharp[before].items() if share > 0.2]
+        kept = [(part & later).sum() / part.sum() for part, (later, _share) in parts]
+        print(f"{before} to {after}: {np.mean(kept):.3f} kept in {len(kept)} frames, {min(kept):.3f} at least")
+        assert len(kept) >= 12
+        assert np.mean(kept) >= 0.9
+        assert min(kept) >= 0.75
+    shares = {name: np.mean([share for _part, share in parts.values()]) for name, parts in sharp.items()}
+    print(shares)
+    assert shares["mended"] > shares["tracked"]
+
+
+def sharp_parts(folder, name, footage, masks):
+    """Where he is as in the footage, within his mask without its edge, and which share of that it is, by frame."""
+    parts = {}
+    with open_source(footage) as source:
+        for path in sorted(folder.glob(f"{name}_*.png")):
+            number = int(path.stem[-4:])
+            apart = np.abs(pixels(path) - source.read(number - 1)[..., :3]).max(axis=2)
+            him = cv2.erode(masks[number - 1].astype(np.uint8), np.ones((5, 5))) > 0
+            parts[number] = (apart <= 8) & him, (apart <= 8)[him].mean()
+    return parts
+
+
+def shirt(picture, mask):
+    """The middle of his white shirt, in fractions of the picture."""
+    top = np.flatnonzero(mask.any(axis=1))[0]
+    rows, columns = np.nonzero((picture.min(axis=2) > 130) & mask & (np.arange(len(mask)) < top + 60)[:, None])
+    height, width = mask.shape
+    return [(np.median(columns) + 0.5) / width, 1 - (np.median(rows) + 0.5) / height]
