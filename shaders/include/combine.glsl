@@ -133,7 +133,7 @@ const vec3 LUMINANCE = vec3(0.2126, 0.7152, 0.0722);
 float passed(vec4 light) {
 #  if THRESHOLD
 #    if ENCODED
-  float luminance = dot(to_linear_of_any(max(straight(light), 0.0)), LUMINANCE);
+  float luminance = dot(to_linear_exact(straight(light)), LUMINANCE);
 #    else
   float luminance = dot(straight(light), LUMINANCE);
 #    endif
