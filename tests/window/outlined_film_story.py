@@ -23,7 +23,7 @@ TRUTH = {int(frame): curves for frame, curves in json.loads(Path(os.environ["SHU
 DRAWN = 1, 21, 41
 SIZE = 448, 256
 # Where they stand in the sidebar, in pixels below its upper edge.
-BESIDE_DRAW, NEXT_NEEDED = 142, 355
+BESIDE_DRAW, NEXT_NEEDED = 168, 381
 
 
 def begun():

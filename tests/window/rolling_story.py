@@ -17,7 +17,7 @@ import story
 from support import write_frames
 
 REPAIR, FIND = 8, 9  # the entries in the menu of regions
-MENU = 184  # where that is below four shutters, in pixels below the sidebar's upper edge
+MENU = 210  # where that is below four shutters, in pixels below the sidebar's upper edge
 FIELD = 210, 101  # of the readout in the panel of the last operation, to the right of where that opens, and below
 ADJUSTED = 30
 COUNT, SIZE, READOUT = 16, (360, 640), 0.6

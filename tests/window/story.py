@@ -160,7 +160,7 @@ def sidebar():
     return driver.region_of(driver.area_of("SEQUENCE_EDITOR", "PREVIEW"), "UI")
 
 
-def chosen_beside_draw(entry, below=142):
+def chosen_beside_draw(entry, below=168):
     """The first of an entry's own menu, in the menu of regions; the sidebar is as high as it needs. below: where the
     menu is, in pixels below the sidebar's upper edge."""
     driver.click(sidebar(), sidebar().width * 0.87, sidebar().height - below)
