@@ -92,6 +92,8 @@ def make(seed: int) -> Case:
     add_layers(np.random.default_rng([seed, 3]), recipe)
     add_outlines(np.random.default_rng([seed, 4]), recipe, count)
     add_combining(np.random.default_rng([seed, 5]), recipe, count)
+    if np.random.default_rng([seed, 6]).random() < 0.25:
+        recipe["edges"] = "slide"
     if "time" in recipe:
         # Halfway between two source frames nobody can tell which is shown.
         last = max(count, int(recipe["time"][-1]["frame"]))
@@ -242,7 +244,7 @@ def random_recipe(rng, count: int) -> dict:
         "interpolation": choose(rng, "displacement", "displacement", "value"),
         "light": choose(rng, "linear", "encoded"),
         "exposure": choose(rng, "normalized", "weighted"),
-        "edges": choose(rng, "hold", "mirror", "shorten", "slide"),
+        "edges": choose(rng, "hold", "mirror", "shorten"),
         "aggregate": choose(rng, 1, 1, 2, 4),
         "border": choose(rng, False, True),
         "stop_at_cuts": choose(rng, False, True),

@@ -264,7 +264,7 @@ def _tracked(effect) -> list[int | None]:
     return region + ([None] if shutter is not None and shutter.follow == "CAMERA" else [])
 
 
-class SHUTTER_PT_notes(Panel):
+class SHUTTER_PT_notes(WithEffect, Panel):
     """What there is to say of the effect: apart, so that no button moves as it comes and goes."""
 
     bl_label = "Notes"
