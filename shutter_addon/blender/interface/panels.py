@@ -264,13 +264,17 @@ def _tracked(effect) -> list[int | None]:
     return region + ([None] if shutter is not None and shutter.follow == "CAMERA" else [])
 
 
-class SHUTTER_PT_notes(WithEffect, Panel):
+class SHUTTER_PT_notes(Panel):
     """What there is to say of the effect: apart, so that no button moves as it comes and goes."""
 
     bl_label = "Notes"
     bl_space_type = "TOPBAR"
     bl_region_type = "HEADER"
     bl_ui_units_x = WIDEST // 20
+
+    @classmethod
+    def poll(cls, context):
+        return selection.active(context) is not None
 
     def draw(self, context):
         layout, effect = self.layout, selection.active(context)[1]
