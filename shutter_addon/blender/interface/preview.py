@@ -18,6 +18,7 @@ from ...media.errors import NotBuiltError
 from ..data import annotations, preview_areas, selection, strips
 from ..data.choices import CONTEXT
 from ..data.preview_areas import Shown
+from ..data.snapshot import Snapshot
 from ..devices import blender_gpu
 from ..devices.blender_gpu import Texture
 from ..editing import outline_drawings, shown_annotations
@@ -174,7 +175,7 @@ def _show(context, shown: Shown, decision: Decision | None, say) -> None:
                 _show_picture(context, quad, shown, wanted, say)
         except stopping.StoppedError:
             say(rpt_("Composing…"))
-            _show_strokes(context, quad, shown)
+            _show_strokes(context, quad, shown, wanted.decision.snapshot)
             bpy.app.timers.register(_redraw_once)
     except effect_source.FAULTS as error:
         previews.was_drawn()
@@ -215,7 +216,7 @@ def _show_picture(context, quad: Quad, shown: Shown, wanted: Drawing, say) -> No
             _show_holes(quad, renderer, request)
         if settings.view == "EDGES":
             _show_coefficients(quad, shown.effect, renderer, request, "EDGES", 1.0)
-        _show_strokes(context, quad, shown)
+        _show_strokes(context, quad, shown, wanted.decision.snapshot)
     previews.was_drawn()
     _tell_carrying(say)
     for sentence in pictures.shortages(renderer, wanted.decision.snapshot, request):
@@ -285,7 +286,8 @@ def _show_sharp(context, shown: Shown | None) -> None:
         say.draw()
         if shown is not None and not previews.pen_is_down():
             quad = Quad(context.region, shown.strip, annotations.picture_size(shown.effect))
-            _show_strokes(context, quad, shown)
+            snapshot = invalidation.current(shown.scene, shown.effect, shown.strip, shown.scene.frame_current)
+            _show_strokes(context, quad, shown, snapshot)
 
 
 def _tell_missing(renderer, request, say) -> None:
@@ -327,12 +329,11 @@ def _tell_fault(error: Exception, say) -> None:
         say(rpt_("Shutter: {fault}").format(fault=error))
 
 
-def _show_strokes(context, quad, shown: Shown) -> None:
-    """The scribbles where they are by now. One of effect_source.FAULTS: the effect cannot be shown."""
+def _show_strokes(context, quad, shown: Shown, snapshot: Snapshot) -> None:
+    """The scribbles where they are by now."""
     if not context.space_data.show_overlays:
         return
-    frame = shown.scene.frame_current
-    shapes = invalidation.current(shown.scene, shown.effect, shown.strip, frame).effect.drawn_at(frame)
+    shapes = snapshot.effect.drawn_at(shown.scene.frame_current)
     for is_hidden, shape in zip(shown.hides_strokes, shapes, strict=True):
         if is_hidden:
             continue
