@@ -49,7 +49,7 @@ def outlined():
         bpy.ops.shutter.draw("EXEC_DEFAULT", True, new=True, kind="OUTLINE")
         bpy.ops.wm.tool_set_by_id(name="builtin.select_box")
     yield 0.5
-    yield from found("outline from points", lambda: bpy.context.window_manager.windows[0].modal_operators)
+    yield from found("draw by points", lambda: bpy.context.window_manager.windows[0].modal_operators)
     for arrow in ("Right", "Up", "Left", "Down"):
         driver.key("space")
         yield 0.3

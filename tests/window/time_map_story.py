@@ -12,7 +12,7 @@ import driver
 import story
 
 TIME_MAP = 7  # the entry in the menu of regions
-RAMP, RADIAL = 371, 417  # where they stand in the sidebar, in pixels below its upper edge
+RAMP, RADIAL = 397, 443  # where they stand in the sidebar, in pixels below its upper edge
 
 
 HANDLE = 140  # of the ramp, in pixels to the right of its middle
