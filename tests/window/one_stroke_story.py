@@ -97,6 +97,7 @@ def edges_followed():
         yield from driver.drag(region, [(region.width * share, height) for share in shares])
         yield 1.0
         driver.saw(edges=story.effect().edge_aware)
+    driver.key("Escape")  # a slider that was not dragged far is a field to type in
     yield 2.0
     driver.saw(edge_aware=story.effect().edge_aware)
     driver.shot("5_edges")
