@@ -92,7 +92,8 @@ def make(seed: int) -> Case:
     add_layers(np.random.default_rng([seed, 3]), recipe)
     add_outlines(np.random.default_rng([seed, 4]), recipe, count)
     add_combining(np.random.default_rng([seed, 5]), recipe, count)
-    if np.random.default_rng([seed, 6]).random() < 0.25:
+    # A trail that is longer than the clip slides after it has its length: of that, this is no reference.
+    if np.random.default_rng([seed, 6]).random() < 0.25 and not any("trail" in each for each in recipe["shutters"]):
         recipe["edges"] = "slide"
     if "time" in recipe:
         # Halfway between two source frames nobody can tell which is shown.
