@@ -21,6 +21,8 @@ class Recorder:
     def operator_menu_enum(self, name, _property, **_look):
         return self.operator(name)
 
+    operator_enum = operator_menu_enum
+
     def menu(self, name, **_look):
         self.menus.append(name)
 
