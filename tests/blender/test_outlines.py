@@ -204,7 +204,7 @@ def test_one_drawing_says_where_the_next_is_needed(bpy, chosen, monkeypatch):
 
 def test_what_is_needed_of_straight_ones(bpy, chosen):
     chosen(1, 9, between="straight")
-    with pytest.raises(RuntimeError, match="a straight outline is not carried"):
+    with pytest.raises(RuntimeError, match="a linear outline is not tracked"):
         bpy.ops.shutter.outline_needed()
 
 
