@@ -358,7 +358,7 @@ class GPUCompositor:
         """As `draw`, by NumPy: of medians whose frames are seen elsewhere, which passes over some of them at a time
         cannot find; and of those that take more iterations than a device has."""
         host, source, options = cpu.CPUCompositor(), window.source, request.state.options
-        frames = host.window(source, options.window, True)
+        frames = host.window(source)
         frames.load(window_frames.positions(request, window.shot), options, window.shot)
         values = self.coefficients(coefficients.handle, len(request.state.bars))
         made = host.draw(frames, request, Coefficients(values, coefficients.block))

@@ -91,10 +91,8 @@ def _no_weight(_frame: int) -> Any:
 
 def of_numpy_window(source: FrameSource, kind: Kind) -> Needs:
     """What windows need with NumPy."""
-    if kind.layers:
-        frames = {id(read): read for read in (source, *_read(source, kind.layers))}
-        return Needs(0, sum(kind.window * frame_bytes(read) for read in frames.values()), False)
-    return Needs(0, kind.window * frame_bytes(source), False)
+    frames = {id(read): read for read in (source, *_read(source, kind.layers))}
+    return Needs(0, sum(kind.window * frame_bytes(read) for read in frames.values()), False)
 
 
 def frame_bytes(source: FrameSource) -> int:
