@@ -268,6 +268,7 @@ def two_effects(edit, source, strip, folder):
         other.elements.append(name)
     second, effect = add_effect.add_effect(edit, other)
     shutter_edits.start(effect)
+    effect.edges = "SHORTEN"  # an exposure longer than its clip would slide to one place
     second.right_handle = COUNT + 1
     return ALL
 

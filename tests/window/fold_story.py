@@ -17,7 +17,7 @@ import strobing_story
 
 SCALES = 1.0, 1.5
 LAST = "bpy.ops.shutter.outline_it()"  # the last row of what edits a region that is drawn
-SHUTTER = 96  # the row with the region's shutter is so much higher, in units of the interface
+SHUTTER = 74  # the row with the region's shutter is so much higher, in units of the interface
 NOTES = 52, 45  # the button of the notes, from the right and from above
 LANGUAGES = "en_US", "de_DE"
 

@@ -12,6 +12,8 @@ from ..editing import follow_track, outline_drawings, track_region
 from . import track_operators
 from .panel_parts import WithEffect, draw_list, sentence
 
+OF_KIND = {"LINE": "width", "OUTLINE": "between", "RAMP": "ramp"}  # the property that each kind adds
+
 
 class Regions(WithEffect):
     bl_label = "Regions"
@@ -27,18 +29,14 @@ class Regions(WithEffect):
             row = layout.row(align=True)
             row.operator_menu_enum("shutter.region_assign", "shutter", text=region.shutter, translate=False)
             row.prop(region, "kind", text="")
+            if region.kind in OF_KIND:
+                row.prop(region, OF_KIND[region.kind], text=None if region.kind == "LINE" else "")
         layout.use_property_split = True
         if region is None or region.kind not in strips.LAID:
             layout.prop(effect, "edge_aware")
         if region is None:
             return
-        if region.kind == "LINE":
-            layout.prop(region, "width")
-        elif region.kind == "OUTLINE":
-            layout.prop(region, "between")
-        elif region.kind == "RAMP":
-            layout.prop(region, "ramp")
-        elif region.kind == "MATTE":
+        if region.kind == "MATTE":
             _draw_matte(layout, matte_look.look(scene, effect, strip, region), region)
         if region.kind not in strips.LAID:
             layout.prop(region, "opacity")
