@@ -235,7 +235,7 @@ def told():
     edit = bpy.data.scenes[0]
     edit.name = "Edit"
     edit.render.resolution_x, edit.render.resolution_y = SIZE
-    edit.frame_end, edit.frame_step = LAST - 1, 2
+    edit.frame_end = LAST - 1  # each frame: what Blender reads of a retimed movie depends on the frame before
     edit.render.dither_intensity = 0
     edit.view_settings.view_transform = "Standard"
     bpy.context.preferences.view.smooth_view = 0

@@ -44,7 +44,7 @@ def test_an_edit(backend, tmp_path):
     facts = {name: entry[name] for entry in seen for name in entry}
     films = {name: {path.stem[-4:]: pixels(path) for path in tmp_path.glob(f"{name}_*.png")} for name in CUTS}
     final, headless, plain = (films[name] for name in CUTS)
-    assert len(final) == 58
+    assert len(final) == 116
     assert sorted(final) == sorted(headless) == sorted(plain)
     for number, picture in final.items():
         assert_alike(picture, headless[number], tmp_path / f"headless_difference_{number}.png", 1)
@@ -56,7 +56,7 @@ def assert_beside_plain(final, plain, facts, folder):
     within = {}
     for first, end, name in facts["effects"]:
         within |= {f"{frame:04d}": name for frame in range(first, end)}
-    assert len(set(final) - set(within)) == 10, "between the second effect and the third"
+    assert len(set(final) - set(within)) == 21, "between the second effect and the third"
     (dissolve_from, *_), (_, dissolve_to, _) = facts["effects"][1], facts["effects"][0]
     height, width = next(iter(final.values())).shape[:2]
     (left, y), (right, _y) = facts["sharp"]
