@@ -20,7 +20,7 @@ from .rendering.render_job import Where
 @persistent
 def _before_load(*_):
     edit_feed.end()
-    sharp_frame.give_back(bpy.context)
+    sharp_frame.forget()
     inbetween_operators.stop()
     bake_operators.forget()
     track_region.data_replaced()

@@ -242,6 +242,9 @@ def test_an_effect_is_pasted_onto_another_clip(bpy, edit, add, clip, where):
     strip = add()
     strip.left_handle = 4
     bpy.context.view_layer.update()
+    noted = effect_of(strip).regions[0].drawn.add()
+    ((drawing,),) = [list(layer.frames) for layer in effect_of(strip).scene.annotation.layers]
+    noted.frame = drawing.frame_number - effect_of(strip).start
     undelete.forget_copy()
     with pytest.raises(RuntimeError, match="Copy an effect first"):
         bpy.ops.shutter.effect_paste()
@@ -251,6 +254,8 @@ def test_an_effect_is_pasted_onto_another_clip(bpy, edit, add, clip, where):
     scene = bpy.data.scenes.new("Other") if where == "scene" else edit
     bpy.context.window.scene = scene
     goal = add(101, recipe(8, [1] * 8)) if where == "effect" else clip(101, size=(32, 64), scene=scene)
+    if where == "effect":
+        bpy.data.annotations.remove(effect_of(goal).scene.annotation)  # it comes again
     selection.choose(scene, goal)
     bpy.ops.ed.undo_push(message="before")
     before = [len(effect.shutters) for effect in scene.virtual_shutter.effects]
@@ -263,7 +268,7 @@ def test_an_effect_is_pasted_onto_another_clip(bpy, edit, add, clip, where):
     curves = fcurves.curves_under(scene, f"{effect.path_from_id()}.regions[0].location")
     assert fcurves.key_frames(curves) == [98, 106]
     ((drawing,),) = [list(layer.frames) for layer in effect.scene.annotation.layers]
-    assert drawing.frame_number == 98
+    assert drawing.frame_number == 98 == effect.start + effect.regions[0].drawn[0].frame
     to_picture = np.linalg.inv(geometry.picture_to_image(pasted, annotations.picture_size(effect)))
     assert np.abs(mapped(to_picture, annotations.strokes_of(drawing)[0]) - LINE["strokes"][0]).max() < 1e-5
     name = scene.name

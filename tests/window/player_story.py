@@ -22,7 +22,7 @@ from one_stroke_story import PRESETS, part, region, sidebar
 TRUTH = {int(frame): point for frame, point in json.loads(Path(os.environ["SHUTTER_TRUTH"]).read_text()).items()}
 SIZE, STEP = (448, 256), 3
 DRAWN = 58
-FRAMES = 600  # where it stands in the sidebar, in pixels below its upper edge
+FRAMES = 574  # where it stands in the sidebar, in pixels below its upper edge
 
 
 def drawn():

@@ -12,6 +12,7 @@ from ..data import annotations, selection
 from ..rendering import previews
 
 _emptied: set[int] = set()  # addresses of spaces whose annotation was an effect's, until none was seen or it went
+_shown: dict[int, bool] = {}  # by such an address, whether the user's own annotations are shown there
 
 
 def follow() -> None:
@@ -50,8 +51,10 @@ def give(space, annotation) -> None:
     before = space.annotation
     if before is not None and annotation is not None and not is_own(before):
         before.use_fake_user = True  # or it would not be saved
+    if before is None or not is_own(before):
+        _shown[space.as_pointer()] = space.preview_overlay.show_annotation
     if annotation is None:
-        space.preview_overlay.show_annotation = True  # the user's next one
+        space.preview_overlay.show_annotation = _shown.get(space.as_pointer(), True)
     space.annotation = annotation
     (_emptied.discard if annotation else _emptied.add)(space.as_pointer())
 
@@ -78,6 +81,7 @@ def shown_by(annotation) -> int:
 def forget() -> None:
     """Forgets the previews of a file, before another one is loaded."""
     _emptied.clear()
+    _shown.clear()
 
 
 def _spaces():

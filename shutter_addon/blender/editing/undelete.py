@@ -47,12 +47,13 @@ def paste(effect, strip) -> None:
     recipe_import.clear(scene, effect)
     _restore(scene, effect, data, {name: value for name, value in data["effect"].items() if name not in _OWN})
     fcurves.move_curves(scene, effect.path_from_id() + ".", strip.left_handle - data["first"])
-    for drawing in [drawing for layer in effect.scene.annotation.layers for drawing in layer.frames]:
+    for drawing in [drawing for layer in annotations.annotation(effect).layers for drawing in layer.frames]:
         drawing.frame_number += strip.left_handle - data["first"]
     match_source.put_back(effect, strip, data["places"])
     later = strips.skipped(strip) - data["skipped"]
-    for stop in [stop for moving in (effect.camera, *effect.regions) for stop in moving.stops]:
-        stop.frame += later
+    drawn = [place for region in effect.regions for place in region.drawn]
+    for noted in [*drawn, *(stop for moving in (effect.camera, *effect.regions) for stop in moving.stops)]:
+        noted.frame += later
     for region in effect.regions:
         region.follow_frame += later
         region.offset -= later if region.timing == "TIMELINE" else 0

@@ -66,6 +66,12 @@ def give_back(context) -> None:
     _pen.channel = 0
 
 
+def forget() -> None:
+    """Lets go of the pen, before another file is loaded."""
+    give_back(bpy.context)
+    _pen.tool = ""
+
+
 def follow_pen() -> None:
     """For what draws a preview, which may change nothing: what the pen asks for comes right after."""
     was_down, _pen.is_down = _pen.is_down, pen_is_down()
