@@ -205,7 +205,7 @@ def _show_picture(context, quad: Quad, shown: Shown, wanted: Drawing, say) -> No
     if wanted.has_result and not wanted.draws_result:
         _tell_missing(renderer, request, say)
     if wanted.draws_result:
-        texture = renderer.draw(replace(request, quick=True, levels=True))
+        texture = renderer.draw(replace(request, quick=previews.is_going(context), levels=True))
         quad.draw("PICTURE", {"picture": texture}, wanted.left, 1.0, opacity=shown.strip.blend_alpha)
     if settings.view == "SCRIBBLES":
         _show_scribbles(quad, shown.effect, renderer, request)
