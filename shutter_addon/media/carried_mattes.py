@@ -26,6 +26,7 @@ from . import carrying, flow
 from .cuts import ShotSource
 from .errors import MediaError, lacks_opencv
 from .files import check_name
+from .folder import own_folder
 from .image_writing import write_levels
 from .inbetween_cache import identity, manifest_key
 from .outline_tracing import traced
@@ -270,7 +271,7 @@ class CarriedMattes:
 def _taken(claims: Claims, folder: Path, name: str) -> bool:
     """As Claims.take. MediaError: the folder cannot be written to."""
     try:
-        folder.mkdir(parents=True, exist_ok=True)
-        return claims.take(name)
+        with own_folder(folder):
+            return claims.take(name)
     except OSError as error:
         raise MediaError(f"{folder}: mattes cannot be written there ({error.strerror or error})") from None

@@ -560,3 +560,31 @@ def test_a_transparent_source_beside_another_bake_is_shown(bpy, film, tmp_path):
     scene.sequence_editor.strips.remove(other)
     lifecycle.update()
     assert not source.mute
+
+
+@pytest.mark.skipif(os.name != "posix", reason="links need no rights there alone")
+@pytest.mark.parametrize(("kind", "name"), [("OPEN_EXR", "0001.exr"), ("MOVIE", "0001.mp4")])
+def test_nothing_is_baked_or_removed_behind_a_link(bpy, film, tmp_path, kind, name):
+    scene, effect, strip = film()
+    place = baked_film.film_of(scene, effect, strip, kind).place
+    (outside := tmp_path / "outside").mkdir()
+    (outside / name).write_bytes(b"mine")
+    place.parent.mkdir()
+    (link := place if kind == "OPEN_EXR" else place.with_suffix(".parts")).symlink_to(outside)
+    with pytest.raises(RuntimeError, match="it is a link, and none is followed"):
+        bpy.ops.shutter.bake(file_format=kind)
+    link.unlink()
+    bake(bpy, kind)
+    if not link.exists():
+        link.symlink_to(outside)
+    bake(bpy, kind)
+    assert [(path.name, path.read_bytes()) for path in outside.iterdir()] == [(name, b"mine")]
+
+
+def test_nothing_of_a_killed_bake_is_left(bpy, film):
+    scene, effect, strip = film()
+    parts = baked_film.film_of(scene, effect, strip, "MOVIE").place.with_suffix(".parts")
+    (half := parts / f".part-{1:016x}").mkdir(parents=True)
+    (half / "0001.mp4").write_bytes(b"half")
+    bake(bpy, "MOVIE")
+    assert not parts.exists()

@@ -1,6 +1,7 @@
 """Mattes that are carried from drawings of outlines: a subject that turns and changes its shape over a ground that the
 camera passes, both of them textured."""
 
+import os
 from concurrent.futures import ThreadPoolExecutor
 from itertools import pairwise
 
@@ -307,6 +308,18 @@ def test_a_folder_that_takes_nothing(footage, tmp_path):
     mattes = carried_mattes.CarriedFile(footage, drawings(0, 6), tmp_path / "file").open()
     with pytest.raises(MediaError, match="mattes cannot be written there"):
         mattes.read(3)
+
+
+@pytest.mark.skipif(os.name != "posix", reason="links need no rights there alone")
+def test_nothing_is_kept_behind_a_link(carried, tmp_path):
+    carried(0).read(0)
+    (place,) = (tmp_path / "mattes").iterdir()
+    place.rename(outside := tmp_path / "outside")
+    place.symlink_to(outside)
+    before = sorted(outside.iterdir())
+    with pytest.raises(MediaError, match="it is a link, and none is followed"):
+        carried(0, 6).read(3)
+    assert sorted(outside.iterdir()) == before
 
 
 def test_no_drawing_is_no_matte(footage):
