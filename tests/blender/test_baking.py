@@ -495,13 +495,19 @@ def test_a_transparent_source_stays_muted_below_what_was_baked_of_it(bpy, film, 
 
 def test_a_copy_of_a_killed_bake_goes(bpy, film, tmp_path):
     scene, effect, strip = film()
-    left, own = tmp_path / "edit.bake-00000000.blend", tmp_path / "edit.bake-final.blend"
-    for path in (left, own):
-        path.write_bytes(b"")
+    left, own = tmp_path / "edit.bake-00000000.blend", tmp_path / "edit.bake-20260115.blend"
+    logs = [tmp_path / baked_film.FOLDER / f".part-{number:016x}" for number in range(2)]
+    for log, named in zip(logs, (left.name, "in/f0001.png"), strict=True):  # the second as a stranger may write it
+        log.mkdir(parents=True)
+        (log / "copy").write_text(named)
+    for path in (left, own, *(path for log in logs for path in (log / "copy", log))):
+        path.touch()
         os.utime(path, (0, 0))
     job = bake_job.start(scene, effect, strip, baked_film.film_of(scene, effect, strip, "OPEN_EXR"))
     try:
         assert not left.exists()
+        assert not any(log.exists() for log in logs)
+        assert (tmp_path / "in" / "f0001.png").exists()
         assert own.exists()
         assert job.process.wait(60) == 0
         assert not job.copy.exists(), "it has been read"
@@ -510,12 +516,14 @@ def test_a_copy_of_a_killed_bake_goes(bpy, film, tmp_path):
     finally:
         job.end()
     assert list(tmp_path.glob("*.bake-*")) == [own]
+    assert not list((tmp_path / baked_film.FOLDER).glob(".*"))
 
 
 def test_a_job_tells_why_it_failed(bpy, film, tmp_path):
     scene, effect, strip = film()
     film_ = baked_film.film_of(scene, effect, strip, "OPEN_EXR")
-    (tmp_path / baked_film.FOLDER).write_bytes(b"")
+    film_.place.parent.mkdir()
+    film_.place.write_bytes(b"")
     job = bake_job.start(scene, effect, strip, film_)
     try:
         assert job.process.wait(60) == 2
