@@ -100,6 +100,19 @@ def test_a_movie_is_off_by_little(bpy, film, tmp_path):
     assert off.mean() <= 1
 
 
+@pytest.mark.parametrize(("fps", "base", "rate"), [(1, 0.0004, 2500), (24, 1.001, 24000 / 1001), (32767, 1e-5, None)])
+def test_any_rate(bpy, film, fps, base, rate):
+    """Whatever Blender takes for one is baked; what no movie has is a sentence."""
+    scene, _effect, _strip = film()
+    scene.render.fps, scene.render.fps_base = fps, base
+    if rate is None:
+        with pytest.raises(RuntimeError, match="cannot be written"):
+            bpy.ops.shutter.bake(file_format="MOVIE")
+        return
+    baked = bake(bpy, "MOVIE")
+    assert baked.elements[0].orig_fps == pytest.approx(rate)
+
+
 def test_a_movie_has_no_transparency(bpy, film):
     film(4)
     with pytest.raises(RuntimeError, match="a movie has no transparency: bake to OpenEXR"):

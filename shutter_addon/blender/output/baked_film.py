@@ -22,6 +22,7 @@ from ...core.farm import edit_version
 from ...core.messages import EffectError
 from ...core.stopping import StoppedError
 from ...media import film_parts, image_writing, rendered_pictures
+from ...media.blender_movie import frame_rate
 from ...media.completeness import is_whole_movie, is_whole_picture
 from ...media.folder import Folder, own_folder
 from ..data import colour_configuration, effect_version, snapshot, source_media, strips
@@ -132,7 +133,7 @@ def render(scene: Any, effect: Any, strip: Any, film: Film, told: Callable[[int]
 
         try:
             make = _make_movie if film.kind == "MOVIE" else _make_pictures
-            make(film, shown, size, _rate(scene), told)
+            make(film, shown, size, frame_rate(scene.render.fps / scene.render.fps_base), told)
         except StoppedError:
             raise film_output.InterruptedRenderError(f"{film.place}: stopped") from None
 
@@ -142,11 +143,6 @@ def _picture(taken: snapshot.Snapshot, frame: int, levels: bool, stopped: Callab
     picture = pictures.picture(context, taken, frame)
     context.session.begin_next(taken, frame, context)
     return picture
-
-
-def _rate(scene: Any) -> Fraction:
-    """Frames per second of the edit."""
-    return Fraction(scene.render.fps) / Fraction(scene.render.fps_base).limit_denominator(1001)
 
 
 def _make_pictures(film: Film, shown: Callable, size: tuple[int, int], _fps: Fraction, told: Callable) -> None:
