@@ -12,7 +12,7 @@ import pytest
 from shutter_addon.core.frames.light import to_encoded, to_linear
 from shutter_addon.core.model import outlines
 from shutter_addon.core.model.mattes import FileFrame, Matte
-from shutter_addon.media import carried_mattes, carrying, outline_tracing
+from shutter_addon.media import carried_mattes, carrying, matte_tracking, outline_tracing
 from shutter_addon.media.errors import MediaError
 from shutter_addon.media.matte_values import MatteValues
 
@@ -308,6 +308,18 @@ def test_a_folder_that_takes_nothing(footage, tmp_path):
     mattes = carried_mattes.CarriedFile(footage, drawings(0, 6), tmp_path / "file").open()
     with pytest.raises(MediaError, match="mattes cannot be written there"):
         mattes.read(3)
+
+
+@pytest.mark.parametrize("size", [(4, 4), (8, 8), (12, 1920), (1920, 24)])
+def test_any_picture_that_blender_renders_is_large_enough(size):
+    """Of the smallest ones, and of those that are so narrow that little of them is left in the working picture."""
+    pictures = np.random.default_rng(1).integers(0, 256, (5, *size, 3), dtype=np.uint8)
+    cover = outlines.coverage([[(0.1, 0.1), (0.9, 0.1), (0.5, 0.9)]], *carrying.working_size(*size[::-1]))
+    ends = (carrying.Drawing(frame, cover) for frame in (0, 4))
+    assert [each.matte.shape for each in carrying.carried(pictures.__getitem__, *ends, range(1, 4))] == 3 * [size]
+    whole = np.ones(size, np.float32)
+    step = matte_tracking.moved(pictures[0, ..., 0].copy(), pictures[1, ..., 0].copy(), whole, whole)
+    assert step is None or 0 <= step.confidence <= 1
 
 
 @pytest.mark.skipif(os.name != "posix", reason="links need no rights there alone")
