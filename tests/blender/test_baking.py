@@ -268,6 +268,26 @@ def test_parts_of_a_movie_are_kept(film, tmp_path, monkeypatch):
     assert film_of.is_finished()
 
 
+def test_a_movie_that_another_process_finishes_meanwhile_is_there(film, tmp_path, monkeypatch):
+    monkeypatch.setattr(film_parts, "LENGTH", 4)
+    scene, effect, strip = film(smooth=True)
+    film_of = baked_film.film_of(scene, effect, strip, "MOVIE")
+    baked_film.render(scene, effect, strip, film_of, lambda _done: None)
+    film_of.place.rename(tmp_path / "whole")
+    told = []
+
+    def tell(done):
+        told.append(done)
+        if done == 6:
+            (tmp_path / "whole").rename(film_of.place)
+            baked_film._remove_parts(film_of)
+
+    baked_film.render(scene, effect, strip, film_of, tell)
+    assert told[-1] == COUNT
+    assert film_of.is_finished()
+    assert not film_of.place.with_suffix(".parts").exists()
+
+
 @pytest.mark.parametrize(
     ("words", "sentence"),
     [

@@ -24,6 +24,7 @@ from ...core.stopping import StoppedError
 from ...media import film_parts, image_writing, rendered_pictures
 from ...media.blender_movie import frame_rate
 from ...media.completeness import is_whole_movie, is_whole_picture
+from ...media.errors import MediaError
 from ...media.folder import Folder, own_folder
 from ..data import colour_configuration, effect_version, snapshot, source_media, strips
 from ..rendering import pictures, render_context, render_settings
@@ -136,6 +137,10 @@ def render(scene: Any, effect: Any, strip: Any, film: Film, told: Callable[[int]
             make(film, shown, size, frame_rate(scene.render.fps / scene.render.fps_base), told)
         except StoppedError:
             raise film_output.InterruptedRenderError(f"{film.place}: stopped") from None
+        except (MediaError, OSError):
+            if not film.is_finished():  # by another process, which has removed the parts
+                raise
+            told(len(film.frames))
 
 
 def _picture(taken: snapshot.Snapshot, frame: int, levels: bool, stopped: Callable[[], bool]) -> np.ndarray:
