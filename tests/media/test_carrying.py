@@ -12,7 +12,7 @@ import pytest
 from shutter_addon.core.frames.light import to_encoded, to_linear
 from shutter_addon.core.model import outlines
 from shutter_addon.core.model.mattes import FileFrame, Matte
-from shutter_addon.media import carried_mattes, carrying, matte_tracking, outline_tracing
+from shutter_addon.media import carried_mattes, carrying, image_writing, matte_tracking, outline_tracing
 from shutter_addon.media.errors import MediaError
 from shutter_addon.media.matte_values import MatteValues
 
@@ -218,6 +218,8 @@ def test_mattes_are_kept(carried, footage, tmp_path):
     assert (other.read(11) != first[11]).any()
     (damaged,) = (tmp_path / "mattes").glob("*/00000003-*.png")
     damaged.write_bytes(damaged.read_bytes()[:40])
+    assert (carried(0, 6, 12).read(3) == first[3]).all()
+    image_writing.write_grey(damaged, np.ones((HEIGHT, WIDTH), np.float32))  # another's, of 16 bits
     assert (carried(0, 6, 12).read(3) == first[3]).all()
 
 
