@@ -280,7 +280,7 @@ def test_a_movie_that_another_process_finishes_meanwhile_is_there(film, tmp_path
         told.append(done)
         if done == 6:
             (tmp_path / "whole").rename(film_of.place)
-            baked_film._remove_parts(film_of)
+            baked_film._remove_parts(film_of)  # as the other process does at its end
 
     baked_film.render(scene, effect, strip, film_of, tell)
     assert told[-1] == COUNT

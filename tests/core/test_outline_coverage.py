@@ -96,13 +96,14 @@ def test_many_points_take_no_more_memory(monkeypatch):
     """Rows are covered in bands, which changes nothing of what is covered."""
     strokes = [np.random.default_rng(2).random((300, 2)) * 1.4 - 0.2]
     whole = outlines.coverage(strokes, 64, 48)
+    # These are what takes the memory.
     looked, crossings = [], outlines._crossings
 
     def counted(*arguments):
         looked.append(crossings(*arguments))
         return looked[-1]
 
-    monkeypatch.setattr(outlines, "_crossings", counted)
-    monkeypatch.setattr(outlines, "_CROSSINGS", 10_000)
+    monkeypatch.setattr(outlines, "_crossings", counted)  # as above
+    monkeypatch.setattr(outlines, "_CROSSINGS", 10_000)  # likewise
     assert (outlines.coverage(strokes, 64, 48) == whole).all()
     assert max(len(rows) for rows, _places in looked) <= 10_000 < sum(len(rows) for rows, _places in looked)
