@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
+import numpy as np
+
 from ..core.frames.frame_source import FrameSource
 from ..devices.budget import Budget
-from ..devices.device import Device, Holder, NoDeviceError
-from ..devices.paging import TEXEL_BYTES
+from ..devices.device import Device
+from ..devices.paging import PagedDevice
 from .layer_frames import WeightedFrames
 from .weighted_window import open_any
 from .window import beside
@@ -34,32 +36,28 @@ class Kind(NamedTuple):
     summed: bool = True
 
 
-class _CountedTexture:
-    def __init__(self, budget: Budget, size: int):
-        self._budget, self._size = budget, size
+class _CountingDevice(PagedDevice):
+    """Counts the bytes of textures, within what a real device allows, which has the same ones make room for others.
 
-    def release(self) -> None:
-        self._budget.give_back(self._size)
-
-
-class _CountingDevice:
-    """Counts the bytes of textures, within what a real device allows."""
+    most: of bytes that were taken at the same time"""
 
     def __init__(self, device: Device):
+        super().__init__(Budget(device.budget.limit))
         self.name, self.max_size, self.max_layers = device.name, device.max_size, device.max_layers
-        self.budget = Budget(device.budget.limit)
+        self.most = 0
 
-    def texture(self, width: int, height: int, layers: int, kind: str) -> _CountedTexture:
-        size = width * height * layers * TEXEL_BYTES[kind]
-        possible = max(width, height) <= self.max_size and layers <= self.max_layers
-        if not (possible and self.budget.take(size)):
-            raise NoDeviceError("over the budget")
-        return _CountedTexture(self.budget, size)
+    def _make(self, *_texture: Any) -> object:
+        self.most = max(self.most, self.budget.used)
+        return self
 
-    def use(self, window: Holder) -> None:
-        """It has no other windows."""
+    def _free(self, own: Any) -> None:
+        pass
 
-    forget = use
+    def write(self, *_texture: Any, **_how: Any) -> None:
+        pass
+
+    def read(self, texture: Any) -> np.ndarray:
+        return np.empty(0)
 
 
 def of_window(device: Device, source: FrameSource, kind: Kind) -> Needs:
@@ -68,7 +66,7 @@ def of_window(device: Device, source: FrameSource, kind: Kind) -> Needs:
     counting: Any = _CountingDevice(device)
     asked = kind.window, kind.moved, kind.shutters, kind.summed
     windows = [open_any(counting, frames, *asked) for frames in _read(source, kind.layers)]
-    gpu = min(counting.budget.used + beside(source, kind.shutters), counting.budget.limit)
+    gpu = min(counting.most + beside(source, kind.shutters), counting.budget.limit)
     host = sum(kind.window * frame_bytes(window.source) for window in windows if window.sends)
     return Needs(gpu, host, any(window.sends for window in windows))
 

@@ -27,13 +27,19 @@ def writing(path: Path) -> Iterator[Path]:
 def part_folder(parent: Path) -> Iterator[Path]:
     """A new folder in `parent`, for libraries that write by path: nobody can have put a link there, and no other writer
     uses it. At the end of the block it is removed with its content. OSError: it cannot be made."""
-    folder = parent / f".part-{secrets.token_hex(8)}"
-    # Only its owner may use it. Not on Windows: a file moved out of such a folder would keep that restriction.
-    folder.mkdir(0o700 if os.name == "posix" else 0o777)
+    folder = new_part(parent)
     try:
         yield folder
     finally:
         shutil.rmtree(folder, ignore_errors=True)
+
+
+def new_part(parent: Path) -> Path:
+    """Makes a part folder in `parent`. OSError: it cannot be made."""
+    folder = parent / f".part-{secrets.token_hex(8)}"
+    # Only its owner may use it. Not on Windows: a file moved out of such a folder would keep that restriction.
+    folder.mkdir(0o700 if os.name == "posix" else 0o777)
+    return folder
 
 
 def is_part(name: str) -> bool:

@@ -26,6 +26,7 @@ from . import carrying, flow
 from .cuts import ShotSource
 from .errors import MediaError, lacks_opencv
 from .files import check_name
+from .folder import own_folder
 from .image_writing import write_levels
 from .inbetween_cache import identity, manifest_key
 from .outline_tracing import traced
@@ -252,12 +253,15 @@ class CarriedMattes:
         return parent / f"{self._source.path.stem[:40]}-{manifest_key(identity(self._source))}"
 
     def _kept(self, path: Path) -> np.ndarray | None:
-        """The matte (H, W) uint8 of a file; None: there is none, or it is damaged."""
+        """The matte (H, W) uint8 of a file; None: there is none of ours, or it is damaged."""
         if not path.is_file():
             return None
         image = ImageBuf(check_name(path))
         spec = image.spec()
         if image.has_error or (spec.width, spec.height, spec.nchannels) != (self.width, self.height, 1):
+            return None
+        said = spec.get_string_attribute("ImageDescription")
+        if str(spec.format) != "uint8" or not said.startswith(CONFIDENCE):  # another's
             return None
         samples = image.get_pixels("uint8")
         return None if samples is None or image.has_error else samples[..., 0]
@@ -270,7 +274,7 @@ class CarriedMattes:
 def _taken(claims: Claims, folder: Path, name: str) -> bool:
     """As Claims.take. MediaError: the folder cannot be written to."""
     try:
-        folder.mkdir(parents=True, exist_ok=True)
-        return claims.take(name)
+        with own_folder(folder):
+            return claims.take(name)
     except OSError as error:
         raise MediaError(f"{folder}: mattes cannot be written there ({error.strerror or error})") from None

@@ -32,6 +32,7 @@ except ImportError:  # a package without wheels; the extension registers without
     cv2 = None
 
 WORKING = 512
+SLIM = 4  # pixels of a side that the working picture keeps: so many as a picture has at least that Blender renders
 FARTHEST = 100  # frames that a drawing is carried at most
 REACH, STEP = 6, 2  # pixels of the working picture, in which places lie that vote
 ALIKE = 6.0  # units of CIE Lab, its L halved: how far colours may differ
@@ -93,7 +94,7 @@ def is_possible() -> bool:
 def working_size(width: int, height: int) -> tuple[int, int]:
     """Width and height of the picture in which flow is found."""
     scale = min(1.0, WORKING / max(width, height))
-    return max(round(width * scale), 1), max(round(height * scale), 1)
+    return max(round(width * scale), min(width, SLIM)), max(round(height * scale), min(height, SLIM))
 
 
 def carried(frames: Frames, first: Drawing | None, last: Drawing | None, span: range) -> Iterator[Carried]:

@@ -18,6 +18,7 @@ from .errors import MediaError
 
 READY = "Virtual Shutter decodes"  # a line, before which a Blender prints what it likes
 STARTING = 60  # seconds after which a process that is not ready is killed
+ANSWERING = 120  # seconds after which one that does not answer is: no frame takes as long
 ENDING = 5  # seconds after which one that does not end is
 _PIPE = 1 << 20  # bytes, where a pipe's size can be chosen: of 64 KB, a frame takes twice as long
 
@@ -80,9 +81,13 @@ def _ask(wanted: dict) -> tuple[dict, np.ndarray | None]:
 
 
 def _answer(wanted: dict) -> tuple[dict, np.ndarray | None] | None:
-    """None: the process has ended."""
+    """None: the process has ended, or was killed as it did not answer."""
     try:
-        return _asked(_process or _started(), json.dumps(wanted).encode() + b"\n")
+        question = json.dumps(wanted).encode() + b"\n"
+        return threads.start(_asked, _process or _started(), question).result(ANSWERING)
+    except TimeoutError:  # it was stopped, say
+        _kill()
+        return None
     except (_EndedError, OSError, ValueError):
         _end()
         return None

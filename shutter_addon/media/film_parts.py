@@ -47,7 +47,7 @@ def write_part(path: Path, pictures: Iterable[np.ndarray], fps: Fraction) -> Non
                 container.mux(stream.encode(None))
             if not is_whole_movie(part, count):
                 raise MediaError(f"{path}: could not be written whole")
-    except (OSError, ValueError, av.error.FFmpegError) as error:
+    except (OSError, ValueError, OverflowError, av.error.FFmpegError) as error:
         raise _unwritten(path, error) from None
 
 

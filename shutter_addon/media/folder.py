@@ -94,6 +94,14 @@ class Folder:
         """Removes an empty folder."""
         os.rmdir(**self._at(name))
 
+    def remove_part(self, name: str, is_ours: Callable[[str], object]) -> None:
+        """Removes a folder in this one, with the plain files in it whose names are of ours."""
+        with self.folder(name) as part:
+            for entry in part.files():
+                if is_ours(entry.name):
+                    part.remove(entry.name)
+        self.remove_folder(name)
+
     def close(self) -> None:
         if self._descriptor is not None:
             os.close(self._descriptor)
@@ -109,6 +117,13 @@ class Folder:
 
     def __exit__(self, *_: object) -> None:
         self.close()
+
+
+def own_folder(path: Path) -> Folder:
+    """A folder of ours, new if there is none. The one that it lies in may be a link to another disk. OSError: it is a
+    link itself."""
+    path.mkdir(parents=True, exist_ok=True)
+    return Folder(path)
 
 
 def _check(status: os.stat_result, is_kind: Callable[[int], bool], otherwise: int) -> None:

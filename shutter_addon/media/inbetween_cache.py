@@ -22,7 +22,7 @@ from ..core.frames.frame_source import FrameSource
 from .completeness import is_whole_picture, why_short
 from .errors import MediaError
 from .files import check_name
-from .folder import Folder
+from .folder import Folder, own_folder
 
 VERSION = 3  # raise it when in-betweens of the same frames change, or the folder's format does: older ones get stale
 MANIFEST, CHECKS = "manifest.json", "checks"
@@ -145,14 +145,13 @@ class InbetweenCache:
         MediaError: the folder cannot be written to."""
         text = (json.dumps(self.manifest, indent=1, sort_keys=True) + "\n").encode()
         try:
-            self.folder.mkdir(parents=True, exist_ok=True)
-            with Folder(self.folder) as folder, folder.make(CHECKS):
+            with own_folder(self.folder) as folder, folder.make(CHECKS):
                 if content_of(folder, MANIFEST) != text:
                     with atomic_write.writing(self.folder / MANIFEST) as part:
                         part.write_bytes(text)
                 for part in atomic_write.left_behind(self.folder):
                     with suppress(OSError):  # another user's, or cleared by others meanwhile
-                        _remove_part(folder, part.name)
+                        folder.remove_part(part.name, HALF.fullmatch)
         except OSError as error:
             raise unwritable(self.folder, error) from None
 
@@ -378,14 +377,6 @@ def _read_lines(file: BufferedReader, checks: Checks) -> bool:
             return ours > 0 and not others and len(line) < LONGEST_LINE
         ours += 1
     return not others
-
-
-def _remove_part(cache: Folder, name: str) -> None:
-    with cache.folder(name) as part:
-        for entry in part.files():
-            if HALF.fullmatch(entry.name):
-                part.remove(entry.name)
-    cache.remove_folder(name)
 
 
 @lru_cache(maxsize=1 << 17)  # a sequence of an hour and a half

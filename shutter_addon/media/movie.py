@@ -33,6 +33,7 @@ from .reduced import reduced, reduced_size
 # Blender's choice for YUV to RGB; libswscale's defaults are a level too dark and smear colours.
 SCALER = "neighbor+accurate_rnd+full_chroma_int"
 REDUCER = "area+accurate_rnd+full_chroma_int"  # the same, where frames become smaller
+_NO_COUNT = 1 << 31  # frames: Blender has no number for so many, and a header that claims them is damaged
 _UNSPECIFIED = 2  # in ITU-T H.273
 _PLANAR_420 = frozenset({"yuv420p", "yuvj420p"})
 _PLANAR_YUV = re.compile(r"yuv[aj]?4\d\dp(\d+le)?")
@@ -76,7 +77,7 @@ class MovieSource(FrameSource):
         file, first = self._reader.first()
         self.fps = fraction(file.stream.guessed_rate)
         self.count = _count(file.container, file.stream, self.fps)
-        if self.count < 1:
+        if not 0 < self.count < _NO_COUNT:
             raise MediaError(f"{self.path.name}: its length is unknown; put it into an MP4 or MKV file first")
         self.has_audio = bool(file.container.streams.audio)
         self._step = float(1 / (self.fps * self._reader.time_base))

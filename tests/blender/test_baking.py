@@ -100,6 +100,19 @@ def test_a_movie_is_off_by_little(bpy, film, tmp_path):
     assert off.mean() <= 1
 
 
+@pytest.mark.parametrize(("fps", "base", "rate"), [(1, 0.0004, 2500), (24, 1.001, 24000 / 1001), (32767, 1e-5, None)])
+def test_any_rate(bpy, film, fps, base, rate):
+    """Whatever Blender takes for one is baked; what no movie has is a sentence."""
+    scene, _effect, _strip = film()
+    scene.render.fps, scene.render.fps_base = fps, base
+    if rate is None:
+        with pytest.raises(RuntimeError, match="cannot be written"):
+            bpy.ops.shutter.bake(file_format="MOVIE")
+        return
+    baked = bake(bpy, "MOVIE")
+    assert baked.elements[0].orig_fps == pytest.approx(rate)
+
+
 def test_a_movie_has_no_transparency(bpy, film):
     film(4)
     with pytest.raises(RuntimeError, match="a movie has no transparency: bake to OpenEXR"):
@@ -253,6 +266,26 @@ def test_parts_of_a_movie_are_kept(film, tmp_path, monkeypatch):
     assert told[0] == 4
     assert told[-1] == COUNT
     assert film_of.is_finished()
+
+
+def test_a_movie_that_another_process_finishes_meanwhile_is_there(film, tmp_path, monkeypatch):
+    monkeypatch.setattr(film_parts, "LENGTH", 4)
+    scene, effect, strip = film(smooth=True)
+    film_of = baked_film.film_of(scene, effect, strip, "MOVIE")
+    baked_film.render(scene, effect, strip, film_of, lambda _done: None)
+    film_of.place.rename(tmp_path / "whole")
+    told = []
+
+    def tell(done):
+        told.append(done)
+        if done == 6:
+            (tmp_path / "whole").rename(film_of.place)
+            baked_film._remove_parts(film_of)  # as the other process does at its end
+
+    baked_film.render(scene, effect, strip, film_of, tell)
+    assert told[-1] == COUNT
+    assert film_of.is_finished()
+    assert not film_of.place.with_suffix(".parts").exists()
 
 
 @pytest.mark.parametrize(
@@ -495,13 +528,19 @@ def test_a_transparent_source_stays_muted_below_what_was_baked_of_it(bpy, film, 
 
 def test_a_copy_of_a_killed_bake_goes(bpy, film, tmp_path):
     scene, effect, strip = film()
-    left, own = tmp_path / "edit.bake-00000000.blend", tmp_path / "edit.bake-final.blend"
-    for path in (left, own):
-        path.write_bytes(b"")
+    left, own = tmp_path / "edit.bake-00000000.blend", tmp_path / "edit.bake-20260115.blend"
+    logs = [tmp_path / baked_film.FOLDER / f".part-{number:016x}" for number in range(2)]
+    for log, named in zip(logs, (left.name, "in/f0001.png"), strict=True):  # the second as a stranger may write it
+        log.mkdir(parents=True)
+        (log / "copy").write_text(named)
+    for path in (left, own, *(path for log in logs for path in (log / "copy", log))):
+        path.touch()
         os.utime(path, (0, 0))
     job = bake_job.start(scene, effect, strip, baked_film.film_of(scene, effect, strip, "OPEN_EXR"))
     try:
         assert not left.exists()
+        assert not any(log.exists() for log in logs)
+        assert (tmp_path / "in" / "f0001.png").exists()
         assert own.exists()
         assert job.process.wait(60) == 0
         assert not job.copy.exists(), "it has been read"
@@ -510,12 +549,14 @@ def test_a_copy_of_a_killed_bake_goes(bpy, film, tmp_path):
     finally:
         job.end()
     assert list(tmp_path.glob("*.bake-*")) == [own]
+    assert not list((tmp_path / baked_film.FOLDER).glob(".*"))
 
 
 def test_a_job_tells_why_it_failed(bpy, film, tmp_path):
     scene, effect, strip = film()
     film_ = baked_film.film_of(scene, effect, strip, "OPEN_EXR")
-    (tmp_path / baked_film.FOLDER).write_bytes(b"")
+    film_.place.parent.mkdir()
+    film_.place.write_bytes(b"")
     job = bake_job.start(scene, effect, strip, film_)
     try:
         assert job.process.wait(60) == 2
@@ -560,3 +601,31 @@ def test_a_transparent_source_beside_another_bake_is_shown(bpy, film, tmp_path):
     scene.sequence_editor.strips.remove(other)
     lifecycle.update()
     assert not source.mute
+
+
+@pytest.mark.skipif(os.name != "posix", reason="links need no rights there alone")
+@pytest.mark.parametrize(("kind", "name"), [("OPEN_EXR", "0001.exr"), ("MOVIE", "0001.mp4")])
+def test_nothing_is_baked_or_removed_behind_a_link(bpy, film, tmp_path, kind, name):
+    scene, effect, strip = film()
+    place = baked_film.film_of(scene, effect, strip, kind).place
+    (outside := tmp_path / "outside").mkdir()
+    (outside / name).write_bytes(b"mine")
+    place.parent.mkdir()
+    (link := place if kind == "OPEN_EXR" else place.with_suffix(".parts")).symlink_to(outside)
+    with pytest.raises(RuntimeError, match="it is a link, and none is followed"):
+        bpy.ops.shutter.bake(file_format=kind)
+    link.unlink()
+    bake(bpy, kind)
+    if not link.exists():
+        link.symlink_to(outside)
+    bake(bpy, kind)
+    assert [(path.name, path.read_bytes()) for path in outside.iterdir()] == [(name, b"mine")]
+
+
+def test_nothing_of_a_killed_bake_is_left(bpy, film):
+    scene, effect, strip = film()
+    parts = baked_film.film_of(scene, effect, strip, "MOVIE").place.with_suffix(".parts")
+    (half := parts / f".part-{1:016x}").mkdir(parents=True)
+    (half / "0001.mp4").write_bytes(b"half")
+    bake(bpy, "MOVIE")
+    assert not parts.exists()

@@ -275,3 +275,12 @@ def test_an_effect_is_pasted_onto_another_clip(bpy, edit, add, clip, where):
     bpy.ops.ed.undo()
     bpy.context.view_layer.update()
     assert [len(effect.shutters) for effect in bpy.data.scenes[name].virtual_shutter.effects] == before
+
+
+def test_an_effect_scene_whose_sequencer_shows_itself(bpy, edit, add):
+    """Blender lets nobody change what such a strip shows."""
+    effect_scene = add().scene
+    shown_in = effect_scene.sequence_editor_create().strips.new_scene("itself", effect_scene, 1, 1)
+    bpy.context.view_layer.update()
+    assert shown_in.scene == effect_scene
+    assert len(edit.virtual_shutter.effects) == 1

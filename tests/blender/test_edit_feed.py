@@ -166,6 +166,16 @@ def smaller(edit, source, strip, folder):
     return []
 
 
+def marked(edit, source, strip, folder):
+    strip.scene.render.use_stamp = True
+    return []
+
+
+def deinterlaced(edit, source, strip, folder):
+    strip.use_deinterlace = True
+    return []
+
+
 def larger_edit(edit, source, strip, folder):
     edit.render.resolution_x += 8
     return []
@@ -293,6 +303,7 @@ EDITS = [
         brighter_view,
     ),
     *(replacing, blended, half_shown, fading, modified, moved, cropped, smaller, larger_edit, cut, muted, ends_early),
+    *(marked, deinterlaced),
     *(titled, title_is_muted, title_comes, adjusted, in_a_transition, in_a_meta, two_effects, keyed_effect),
     *(in_the_topmost_channel, over_more, over_nothing, over_another, behind_its_source),
 ]

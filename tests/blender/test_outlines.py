@@ -354,3 +354,25 @@ def test_a_mask_of_a_strip_that_runs_backward(bpy, edited):
     assert mask_reading.key_frames(mask)[-2:] == [COUNT - 5, COUNT - 2]
     outline_masks.from_mask(strip.id_data, effect, strip, effect.shutters["S1"], mask)
     assert drawn_at(effect, 1) == [3, 6, COUNT], "at the last it is not there yet"
+
+
+def test_what_fails_beside_blender_is_told_once(bpy):
+    """Whatever it is: else the file would be asked for with every look at the preview."""
+    from shutter_addon.blender.rendering import outline_carrying
+    from shutter_addon.media.carried_mattes import CarriedFile
+
+    file, arrived = CarriedFile(footage=Unreadable(), drawings=((0, outlines.curves(square(0))),)), []
+    outline_carrying.carry(file, [0], lambda: arrived.append(True))
+    outline_carrying._running[0].future.exception()  # waits for the thread
+    assert outline_carrying._look() is None  # the timer, which no Blender without a window calls
+    assert arrived == [True]
+    assert outline_carrying.failure(file) == "internal error: RuntimeError('of a library')"
+    outline_carrying.want(file, 0)
+    assert outline_carrying.begin(lambda: None) == outline_carrying.failure(file)
+    assert outline_carrying.progress() is None
+    outline_carrying.forget()
+
+
+class Unreadable:
+    def open(self):
+        raise RuntimeError("of a library")

@@ -85,3 +85,21 @@ def test_with_numpy(dtype, alpha):
         tracemalloc.stop()
     taken = sum(trace.size for trace in arrays.traces)
     assert memory_needs.of_numpy_window(pictures, memory_needs.Kind(WINDOW, False, SHUTTERS)) == (0, taken, False)
+
+
+@pytest.mark.parametrize("dtype", [np.uint8, np.float32])
+def test_of_layers_without_room_for_all_of_them(dtype):
+    """Windows make room for one another, as they do for a film: what that renders is not refused."""
+    pictures = source(dtype, "opaque")
+    for limit in range(500_000, 3_000_000, 250_000):
+        device = open_gl(Budget(limit))
+        kind = memory_needs.Kind(WINDOW, False, SHUTTERS, layers=4)
+        needs = memory_needs.of_window(device, pictures, kind)
+        with device.current():
+            frames = memory_needs._read(pictures, 4)  # which those are does not matter here
+            windows = [open_any(device, read, WINDOW, False, SHUTTERS) for read in frames]
+            assert needs.sends == any(window.sends for window in windows)
+            for window in windows:
+                window.release()
+        device.release()
+        assert needs.gpu <= limit

@@ -136,6 +136,19 @@ def test_strokes_far_off_and_too_many_points_are_refused():
     assert len(made(Bars(Constant(FIRST)), [region(half)]).at(1).shapes) == 1
     with pytest.raises(EffectError, match='region "Second": more than'):
         made(Bars(Constant(FIRST)), [region(half), region(half, name="Second")]).at(1)
+    outline = effect.OutlineRegion(
+        moves=effect.Moves(),
+        name="Outline",
+        shutter=0,
+        content=Constant(None),
+        blend="over",
+        invert=False,
+        opacity=Constant(1.0),
+        feather=Constant(0.0),
+        drawings=effect.Drawings("Outline", (1.0,), (half,), ("linear",), 1.0),
+    )
+    with pytest.raises(EffectError, match='region "Outline": more than'):
+        made(Bars(Constant(FIRST)), [region(half), outline]).at(1)
 
 
 def test_eases_are_those_that_begin_a_span():

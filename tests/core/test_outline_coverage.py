@@ -90,3 +90,20 @@ def test_what_lies_opposite_is_not_pulled_along():
     (pulled,) = outlines.dragged((arm,), 0, (0.5, 0.51), (0, 0.1), 0.1, 1.0)
     assert max(y for _x, y in pulled) == pytest.approx(0.61, abs=1e-3)
     assert min(y for _x, y in pulled) == 0.5
+
+
+def test_many_points_take_no_more_memory(monkeypatch):
+    """Rows are covered in bands, which changes nothing of what is covered."""
+    strokes = [np.random.default_rng(2).random((300, 2)) * 1.4 - 0.2]
+    whole = outlines.coverage(strokes, 64, 48)
+    # These are what takes the memory.
+    looked, crossings = [], outlines._crossings
+
+    def counted(*arguments):
+        looked.append(crossings(*arguments))
+        return looked[-1]
+
+    monkeypatch.setattr(outlines, "_crossings", counted)  # as above
+    monkeypatch.setattr(outlines, "_CROSSINGS", 10_000)  # likewise
+    assert (outlines.coverage(strokes, 64, 48) == whole).all()
+    assert max(len(rows) for rows, _places in looked) <= 10_000 < sum(len(rows) for rows, _places in looked)

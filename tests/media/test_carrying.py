@@ -1,6 +1,7 @@
 """Mattes that are carried from drawings of outlines: a subject that turns and changes its shape over a ground that the
 camera passes, both of them textured."""
 
+import os
 from concurrent.futures import ThreadPoolExecutor
 from itertools import pairwise
 
@@ -11,7 +12,7 @@ import pytest
 from shutter_addon.core.frames.light import to_encoded, to_linear
 from shutter_addon.core.model import outlines
 from shutter_addon.core.model.mattes import FileFrame, Matte
-from shutter_addon.media import carried_mattes, carrying, outline_tracing
+from shutter_addon.media import carried_mattes, carrying, image_writing, matte_tracking, outline_tracing
 from shutter_addon.media.errors import MediaError
 from shutter_addon.media.matte_values import MatteValues
 
@@ -218,6 +219,8 @@ def test_mattes_are_kept(carried, footage, tmp_path):
     (damaged,) = (tmp_path / "mattes").glob("*/00000003-*.png")
     damaged.write_bytes(damaged.read_bytes()[:40])
     assert (carried(0, 6, 12).read(3) == first[3]).all()
+    image_writing.write_grey(damaged, np.ones((HEIGHT, WIDTH), np.float32))  # another's, of 16 bits
+    assert (carried(0, 6, 12).read(3) == first[3]).all()
 
 
 def test_mattes_of_another_version_are_left_alone(carried, tmp_path, monkeypatch):
@@ -307,6 +310,30 @@ def test_a_folder_that_takes_nothing(footage, tmp_path):
     mattes = carried_mattes.CarriedFile(footage, drawings(0, 6), tmp_path / "file").open()
     with pytest.raises(MediaError, match="mattes cannot be written there"):
         mattes.read(3)
+
+
+@pytest.mark.parametrize("size", [(4, 4), (8, 8), (12, 1920), (1920, 24)])
+def test_any_picture_that_blender_renders_is_large_enough(size):
+    """Of the smallest ones, and of those that are so narrow that little of them is left in the working picture."""
+    pictures = np.random.default_rng(1).integers(0, 256, (5, *size, 3), dtype=np.uint8)
+    cover = outlines.coverage([[(0.1, 0.1), (0.9, 0.1), (0.5, 0.9)]], *carrying.working_size(*size[::-1]))
+    ends = (carrying.Drawing(frame, cover) for frame in (0, 4))
+    assert [each.matte.shape for each in carrying.carried(pictures.__getitem__, *ends, range(1, 4))] == 3 * [size]
+    whole = np.ones(size, np.float32)
+    step = matte_tracking.moved(pictures[0, ..., 0].copy(), pictures[1, ..., 0].copy(), whole, whole)
+    assert step is None or 0 <= step.confidence <= 1
+
+
+@pytest.mark.skipif(os.name != "posix", reason="links need no rights there alone")
+def test_nothing_is_kept_behind_a_link(carried, tmp_path):
+    carried(0).read(0)
+    (place,) = (tmp_path / "mattes").iterdir()
+    place.rename(outside := tmp_path / "outside")
+    place.symlink_to(outside)
+    before = sorted(outside.iterdir())
+    with pytest.raises(MediaError, match="it is a link, and none is followed"):
+        carried(0, 6).read(3)
+    assert sorted(outside.iterdir()) == before
 
 
 def test_no_drawing_is_no_matte(footage):

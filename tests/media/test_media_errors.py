@@ -391,3 +391,11 @@ def test_file_that_vanishes_and_comes_back(tmp_path, movies, name):
                 source.read(index)
         (tmp_path / "elsewhere").rename(path)
         assert np.array_equal(source.read(30), expected)
+
+
+def test_a_header_that_claims_more_frames_than_blender_counts(tmp_path):
+    path = make_movie(tmp_path / "a.webm", "libvpx-vp9")
+    data = path.read_bytes()
+    place = data.index(b"\x44\x89\x88") + 3  # the duration, in milliseconds
+    path.write_bytes(data[:place] + struct.pack(">d", 1e14) + data[place + 8 :])
+    assert sentence(path) == "a.webm: its length is unknown; put it into an MP4 or MKV file first"

@@ -8,7 +8,7 @@ import struct
 import subprocess
 import sys
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import ExitStack
+from contextlib import ExitStack, suppress
 from fractions import Fraction
 from pathlib import Path
 
@@ -389,6 +389,21 @@ def test_a_blender_that_was_killed_is_followed_by_another(movies):
         source.read(0)
         os.kill(process(), signal.SIGKILL)
         assert number(source.read(4)) == numbers[4]
+
+
+@pytest.mark.skipif(os.name != "posix", reason="processes are stopped by signals there alone")
+def test_a_blender_that_was_stopped_is_followed_by_another(movies, monkeypatch):
+    monkeypatch.setattr(decoding_child, "ANSWERING", 5)
+    with BlenderMovie(movies["open.mp4"][0]) as source, ThreadPoolExecutor(1) as pool:
+        before, stopped = source.read(3), process()
+        os.kill(stopped, signal.SIGSTOP)
+        try:
+            again = pool.submit(source.read, 3).result(60)
+        finally:
+            with suppress(ProcessLookupError):
+                os.kill(stopped, signal.SIGCONT)
+        assert (again == before).all()
+        assert process() != stopped
 
 
 def assert_ends(pid):

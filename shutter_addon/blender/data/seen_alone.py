@@ -11,13 +11,15 @@ from . import colour_configuration, fcurves, strips
 _KNOWN_TO = (5, 4)
 _PLAIN_STRIP = {
     **{"blend_alpha": 1.0, "color_multiply": 1.0, "color_saturation": 1.0, "scene_input": "CAMERA"},
-    **dict.fromkeys(("use_flip_x", "use_flip_y", "use_float", "use_reverse_frames", "multiply_alpha"), False),
+    **dict.fromkeys(
+        ("use_flip_x", "use_flip_y", "use_float", "use_reverse_frames", "use_deinterlace", "multiply_alpha"), False
+    ),
 }
 _PLAIN_TRANSFORM = {"scale_x": 1.0, "scale_y": 1.0, "offset_x": 0.0, "offset_y": 0.0, "rotation": 0.0}
 _UNCROPPED = dict.fromkeys(("min_x", "min_y", "max_x", "max_y"), 0)
 _WHOLE = {"resolution_percentage": 100, "use_border": False, "use_multiview": False}
-_PLAIN_RENDER = {"use_sequencer": True, "use_stamp": False, "metadata_input": "SCENE"}
-_PLAIN_RENDER |= {"frame_map_old": 100, "frame_map_new": 100}
+_UNMARKED = {"use_stamp": False, "metadata_input": "SCENE"}
+_PLAIN_RENDER = _UNMARKED | {"use_sequencer": True, "frame_map_old": 100, "frame_map_new": 100}
 _STANDARD = {"view_transform": "Standard", "look": "None", "exposure": 0.0, "gamma": 1.0}
 _STANDARD |= {"use_curve_mapping": False, "use_white_balance": False}
 _LEVELS = {"color_depth": "8", "color_management": "FOLLOW_SCENE"}
@@ -42,6 +44,7 @@ def hides(scene: Any, strip: Any) -> bool:
         and not strip.modifiers
         and not strip.retiming_keys
         and has(size, _WHOLE)
+        and has(shown, _UNMARKED)
         and (shown.resolution_x, shown.resolution_y) == (size.resolution_x, size.resolution_y)
         and not _is_animated(scene, strip)
     )

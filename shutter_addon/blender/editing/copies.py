@@ -21,6 +21,8 @@ def adopt() -> None:
     for scene in strips.local_scenes():
         for effect_scene, same in _groups(scene).items():
             effect, own = strips.effect_of(scene, effect_scene), effect_scene
+            if effect_scene == scene:  # which Blender allows nobody to change
+                continue
             if effect is None:  # Blender copied the scene with its strip, or the strip is pasted from another scene
                 if (original := _original(scene, effect_scene)) is None:
                     continue

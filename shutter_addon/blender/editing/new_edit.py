@@ -7,6 +7,7 @@ from pathlib import Path
 
 import bpy
 
+from ...core.model.limits import MAX_FRAME
 from ..data import recipe_import
 from ..data.property_copy import for_a_while
 from . import add_effect
@@ -49,8 +50,9 @@ def make_source(path: Path, medium):
 
 
 def length(medium, source_recipe) -> int:
-    """How many timeline frames the edit has: the source's, and more where its time is keyed beyond them."""
-    return max([medium.count, *(math.ceil(key.frame) for key in source_recipe.time)])
+    """How many timeline frames the edit has: the source's, and more where its time is keyed beyond them; as many as
+    Blender has at most."""
+    return min(max([medium.count, *(math.ceil(key.frame) for key in source_recipe.time)]), MAX_FRAME)
 
 
 def _add_source(editor, path: Path, medium):

@@ -3,13 +3,11 @@ then."""
 
 from __future__ import annotations
 
-import glob
 import re
 import secrets
+import shutil
 import subprocess
 import sys
-import tempfile
-import time
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -18,14 +16,16 @@ from typing import Any
 import bpy
 from bpy.app.translations import pgettext_rpt as rpt_
 
+from ...core import atomic_write
 from ...core.messages import EffectError, signed
+from ...media.folder import Folder
 from ..data import preferences
 from .baked_film import KINDS, Film
 
 _ZSTD = b"\x28\xb5\x2f\xfd"  # how a compressed file begins
-_READ = 600  # seconds after which a copy has been read
 _ROOT = Path(__file__).parents[3]  # of the extension, or of the checkout
-_COPY = re.compile(r"\.bake-[0-9a-f]{8}\.blend")
+_COPY = re.compile(r"[^/\\]+\.bake-[0-9a-f]{8}\.blend")
+_MANIFEST = "copy"  # the file of a log that has the name of the copy
 
 
 @dataclass
@@ -33,14 +33,14 @@ class BakeJob:
     """A bake that runs.
 
     scene: session_uid of the edit's; effect: identity of the effect, strip: name of its strip
-    copy: of the edit; log: folder with what the process says"""
+    copy: of the edit; log: part folder beside the film with what the process says, and the name of the copy"""
 
     scene: int
     effect: str
     strip: str
     film: Film
     copy: Path
-    log: tempfile.TemporaryDirectory
+    log: Path
     process: subprocess.Popen
 
     def done(self) -> int:
@@ -60,14 +60,14 @@ class BakeJob:
         return said[-1].removeprefix(signed("")).strip() if said else rpt_("the bake ended without a word")
 
     def _said(self, stream: str) -> str:
-        return Path(self.log.name, stream).read_text(encoding="utf-8", errors="replace")
+        return (self.log / stream).read_text(encoding="utf-8", errors="replace")
 
     def end(self) -> None:
         """Stops it, if it runs, and removes what it needed alone. Frames that are finished stay."""
         if not self.is_over():
             self.process.terminate()
         self.drop_copy()
-        self.log.cleanup()
+        shutil.rmtree(self.log, ignore_errors=True)
 
     def drop_copy(self) -> None:
         """Removes the copy of the edit, once it has been read."""
@@ -78,13 +78,15 @@ class BakeJob:
 def start(scene: Any, effect: Any, strip: Any, film: Film) -> BakeJob:
     """Begins to bake a film. EffectError, OSError: it cannot be begun."""
     edit = Path(bpy.data.filepath)
-    _clear_up(edit)
+    film.place.parent.mkdir(parents=True, exist_ok=True)
+    _clear_up(film.place.parent, edit)
+    log = atomic_write.new_part(film.place.parent)
     copy = edit.with_name(f"{edit.stem}.bake-{secrets.token_hex(4)}.blend")  # where the paths in it lead to the same
     try:
+        (log / _MANIFEST).write_text(copy.name, encoding="utf-8")
         bpy.ops.wm.save_as_mainfile(filepath=str(copy), copy=True, compress=_is_compressed(edit), relative_remap=False)
-        log = tempfile.TemporaryDirectory(prefix="virtual_shutter_bake_", ignore_cleanup_errors=True)
         words = _words(scene, strip, film)
-        with open(Path(log.name, "out"), "wb") as out, open(Path(log.name, "err"), "wb") as err:
+        with open(log / "out", "wb") as out, open(log / "err", "wb") as err:
             process = subprocess.Popen(
                 [*_command(), "bake", str(copy), *words],
                 cwd=_ROOT,
@@ -94,6 +96,7 @@ def start(scene: Any, effect: Any, strip: Any, film: Film) -> BakeJob:
             )
     except (RuntimeError, OSError) as error:
         copy.unlink(missing_ok=True)
+        shutil.rmtree(log, ignore_errors=True)
         raise EffectError(rpt_("the bake cannot begin: {reason}").format(reason=" ".join(str(error).split()))) from None
     return BakeJob(
         scene=scene.session_uid,
@@ -106,12 +109,14 @@ def start(scene: Any, effect: Any, strip: Any, film: Film) -> BakeJob:
     )
 
 
-def _clear_up(edit: Path) -> None:
-    """Removes copies of an edit that were left behind, by a Blender that was killed before they were read."""
-    for left in edit.parent.glob(f"{glob.escape(edit.stem)}.bake-*.blend"):
-        with suppress(OSError):
-            if _COPY.fullmatch(left.name[len(edit.stem) :]) and time.time() - left.stat().st_mtime > _READ:
-                left.unlink()
+def _clear_up(folder: Path, edit: Path) -> None:
+    """Removes what bakes left behind that were killed: logs, and the copies of an edit that these name."""
+    for left in atomic_write.left_behind(folder):
+        with suppress(OSError), Folder(left) as log:
+            name = log.read(_MANIFEST, 1024).decode(errors="replace")
+            if _COPY.fullmatch(name):
+                edit.with_name(name).unlink(missing_ok=True)
+    atomic_write.clear_up(folder)
 
 
 def _words(scene: Any, strip: Any, film: Film) -> list[str]:

@@ -17,11 +17,15 @@ import bpy
 import numpy as np
 from bpy.app.translations import pgettext_rpt as rpt_
 
+from ...core import atomic_write
 from ...core.farm import edit_version
 from ...core.messages import EffectError
 from ...core.stopping import StoppedError
 from ...media import film_parts, image_writing, rendered_pictures
+from ...media.blender_movie import frame_rate
 from ...media.completeness import is_whole_movie, is_whole_picture
+from ...media.errors import MediaError
+from ...media.folder import Folder, own_folder
 from ..data import colour_configuration, effect_version, snapshot, source_media, strips
 from ..rendering import pictures, render_context, render_settings
 from . import film_output
@@ -130,9 +134,13 @@ def render(scene: Any, effect: Any, strip: Any, film: Film, told: Callable[[int]
 
         try:
             make = _make_movie if film.kind == "MOVIE" else _make_pictures
-            make(film, shown, size, _rate(scene), told)
+            make(film, shown, size, frame_rate(scene.render.fps / scene.render.fps_base), told)
         except StoppedError:
             raise film_output.InterruptedRenderError(f"{film.place}: stopped") from None
+        except (MediaError, OSError):
+            if not film.is_finished():  # by another process, which has removed the parts
+                raise
+            told(len(film.frames))
 
 
 def _picture(taken: snapshot.Snapshot, frame: int, levels: bool, stopped: Callable[[], bool]) -> np.ndarray:
@@ -142,13 +150,8 @@ def _picture(taken: snapshot.Snapshot, frame: int, levels: bool, stopped: Callab
     return picture
 
 
-def _rate(scene: Any) -> Fraction:
-    """Frames per second of the edit."""
-    return Fraction(scene.render.fps) / Fraction(scene.render.fps_base).limit_denominator(1001)
-
-
 def _make_pictures(film: Film, shown: Callable, size: tuple[int, int], _fps: Fraction, told: Callable) -> None:
-    film_output.prepare(film.place)
+    _prepare(film.place)
     note = edit_version.note(film.version)
     for number, (path, frame) in enumerate(zip(film.pictures, film.frames, strict=True), start=1):
         there = rendered_pictures.read(path, film.version)
@@ -165,7 +168,7 @@ def _make_movie(film: Film, shown: Callable, _size: tuple[int, int], fps: Fracti
         if path.is_file() and is_whole_movie(path, len(frames)):
             told(done + len(frames))
         else:
-            film_output.prepare(path.parent)
+            _prepare(path.parent)
             film_parts.write_part(path, _counted(shown(frames), done, told), fps)
         done += len(frames)
     if not film.is_finished():  # by another process, say
@@ -173,12 +176,22 @@ def _make_movie(film: Film, shown: Callable, _size: tuple[int, int], fps: Fracti
     _remove_parts(film)
 
 
+def _prepare(place: Path) -> None:
+    """OSError: it cannot be made, or is a link, which a stranger may have put there."""
+    with own_folder(place):
+        atomic_write.clear_up(place)
+
+
 def _remove_parts(film: Film) -> None:
-    parts = [path for path, _frames in film.parts]
-    with suppress(OSError):
-        for path in parts:
-            path.unlink(missing_ok=True)
-        parts[0].parent.rmdir()
+    """Removes the parts of a movie that is finished, and what killed processes left there, and no other file."""
+    names = {path.name for path, _frames in film.parts}
+    with suppress(OSError), Folder(film.place.with_suffix(".parts")) as folder:
+        for entry in folder.entries():
+            if entry.name in names:
+                folder.remove(entry.name)
+            elif atomic_write.is_part(entry.name):
+                folder.remove_part(entry.name, names.__contains__)
+        film.place.with_suffix(".parts").rmdir()
 
 
 def _counted(shown: Iterator[np.ndarray], done: int, told: Callable[[int], object]) -> Iterator[np.ndarray]:

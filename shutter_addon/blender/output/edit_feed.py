@@ -20,8 +20,8 @@ from ...core.pixels.shown_levels import Display
 from ...media import display_transfer
 from ..data import seen_alone, strips
 from ..rendering import job_snapshots, pictures, render_context, render_job
-from ..rendering.effect_source import FULL
-from ..rendering.engine import in_words, say
+from ..rendering.effect_source import FULL, in_words
+from ..rendering.engine import say
 from ..rendering.render_job import Where
 from .levels_file import LevelsFile, strip_above
 

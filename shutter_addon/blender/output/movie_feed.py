@@ -17,7 +17,8 @@ from ...core import atomic_write
 from ...core.stopping import StoppedError
 from ..data import colour_configuration, snapshot, strips
 from ..rendering import pictures, render_context, render_job, render_settings
-from ..rendering.engine import in_words, say
+from ..rendering.effect_source import in_words
+from ..rendering.engine import say
 from .levels_file import LevelsFile, strip_above
 
 

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import math
+import traceback
 from dataclasses import dataclass
 
+from ...core import told
 from ...core.frames import retiming
-from ...core.messages import EffectError
+from ...core.messages import EffectError, of_file
 from ...devices.device import NoDeviceError
 from ...media import MediaError
 from ...media.cuts import ShotSource
@@ -19,6 +21,19 @@ from ..data.source_media import SourceSpec
 from ..data.strip_proxies import Proxy
 
 FAULTS = (EffectError, MediaError, NoDeviceError, MemoryError)
+
+
+def in_words(error: BaseException) -> str:
+    """A sentence for whatever a picture failed by; what nobody expected is kept for a report."""
+    if isinstance(error, FAULTS):
+        return str(error) or "not enough memory"
+    if isinstance(error, KeyboardInterrupt):
+        return "the render was stopped"
+    if isinstance(error, OSError) and error.filename:
+        return of_file(error)
+    told.exception(error)
+    traceback.print_exception(error)
+    return f"internal error: {error!r}"
 
 
 @dataclass(frozen=True)

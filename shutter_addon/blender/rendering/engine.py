@@ -2,14 +2,13 @@
 
 import inspect
 import sys
-import traceback
 from typing import Any
 
 import bpy
 import numpy as np
 
 from ...core import told
-from ...core.messages import of_file, signed
+from ...core.messages import signed
 from ...core.stopping import StoppedError
 from ..data.strips import ENGINE
 from . import effect_source, invalidation, job_snapshots, pictures, previews, render_context, render_job
@@ -30,7 +29,7 @@ class VirtualShutterEngine(bpy.types.RenderEngine):
         except BaseException as error:  # Blender would print it, and render the frame without the effect
             invalidation.spoil(depsgraph.scene.session_uid)
             if not isinstance(error, StoppedError):
-                fail(self, in_words(error))
+                fail(self, effect_source.in_words(error))
             elif not self.test_break():
                 render_job.cancel(self.test_break)
 
@@ -87,18 +86,6 @@ class VirtualShutterEngine(bpy.types.RenderEngine):
 def say(message: str) -> None:
     """Says something of a render in the background."""
     print(signed(message), file=sys.stderr, flush=True)
-
-
-def in_words(error: BaseException) -> str:
-    if isinstance(error, effect_source.FAULTS):
-        return str(error) or "not enough memory"
-    if isinstance(error, KeyboardInterrupt):
-        return "the render was stopped"
-    if isinstance(error, OSError) and error.filename:
-        return of_file(error)
-    told.exception(error)
-    traceback.print_exception(error)
-    return f"internal error: {error!r}"
 
 
 def fail(engine: Any, sentence: str) -> None:

@@ -13,9 +13,9 @@ from typing import Any
 import bpy
 
 from ...core import stopping, threads
-from ...core.messages import UserError
 from ...media.carried_mattes import CarriedFile
 from ..data import preview_areas
+from .effect_source import in_words
 
 TICK = 0.25  # seconds from one look at the thread to the next
 
@@ -108,8 +108,8 @@ def _look() -> float | None:
         carrying.future.result()
     except stopping.StoppedError:
         return None
-    except (UserError, MemoryError) as error:
-        _failed[carrying.file] = str(error)
+    except Exception as error:  # Blender would end the timer, and the file be asked for again and again
+        _failed[carrying.file] = in_words(error)
     carrying.arrived()
     return None
 

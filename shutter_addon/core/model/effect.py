@@ -6,7 +6,6 @@ of whoever made it: a recipe's count from 1, Blender's are the edit's timeline f
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -20,7 +19,7 @@ from .keyframes import Bars, Channel
 from .motions import Placement
 
 _CLOSED = 'shutter "{name}" at frame {frame}: {fault}'
-TOO_MANY_POINTS = 'region "{name}": more than {most} points with those before it'
+_TOO_MANY_POINTS = 'region "{name}": more than {most} points with those before it'
 _FAR = 'region "{name}": a point of its strokes is nowhere near the picture'
 
 
@@ -333,15 +332,18 @@ class Effect:
         return self._state(0.0)
 
     def _state(self, frame: float) -> FrameState:
+        if (name := self._one_too_many) is not None:
+            raise EffectError(_TOO_MANY_POINTS, name=name, most=limits.MAX_POINTS)
         options = replace(self.options.at(frame), edge_aware=float(self.edge_aware.at(frame)))
         bars = [self.bars_at(index, frame) for index in range(len(self.shutters))]
+        drawn = [each for each in self.regions if isinstance(each, Region) and not each.layer]
         mattes_ = [each for each in self.regions if isinstance(each, MatteRegion) and not each.layer]
         laid = [region.at(frame) for region in mattes_]
         seen = tuple(matte for matte in laid if matte.opacity > 0)
         return FrameState(
             options=options,
             bars=np.stack(bars),
-            shapes=tuple(self._shapes_at(frame)),
+            shapes=tuple(region.at(frame) for region in drawn),
             mattes=seen,
             combines=tuple(shutter.combine_at(frame) for shutter in self.shutters),
         )
@@ -356,16 +358,17 @@ class Effect:
         drawn = [region for region in self.regions if isinstance(region, Region | OutlineRegion)]
         return [region.at(frame) if isinstance(region, Region) else region.drawn_at(frame) for region in drawn]
 
-    def _shapes_at(self, frame: float) -> Iterator[scribbles.Shape]:
+    @cached_property
+    def _one_too_many(self) -> str | None:
+        """The name of the region whose points are more than there may be with those before it, layers and outlines as
+        well; each counts with the drawing that has the most."""
         room = limits.MAX_POINTS
         for region in self.regions:
-            if isinstance(region, MatteRegion) or region.layer:
-                continue
-            shape = region.at(frame)
-            room -= sum(map(len, shape.strokes))
+            if isinstance(region, Region | OutlineRegion):
+                room -= max((sum(map(len, drawing)) for drawing in region.drawings.strokes if drawing), default=0)
             if room < 0:
-                raise EffectError(TOO_MANY_POINTS, name=region.name, most=limits.MAX_POINTS)
-            yield shape
+                return region.name
+        return None
 
     def bars_at(self, index: int, frame: float) -> np.ndarray:
         """Bars (L,) of a shutter at a frame. EffectError: no picture can be made of them."""

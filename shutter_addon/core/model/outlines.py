@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
+from .. import stopping
+
 # Lines of each row of pixels on which coverage is exact.
 LINES = 8
+_CROSSINGS = 1 << 22  # of curves with lines that are looked at at once: some 300 MB of memory
 _PULLED = 12  # points at least, of either side of a curve that is pulled
 _NEAR = 0.005  # parts of the picture's height, within which it is known how near a curve is
 
@@ -22,14 +25,26 @@ def curves(strokes: Sequence[np.ndarray]) -> Curves:
 def coverage(strokes: Sequence, width: int, height: int) -> np.ndarray:
     """The share (height, width) float32, 0 to 1, of each pixel that closed curves enclose, the top row first; what two
     of them enclose lies outside (even-odd). strokes: (n, 2) in fractions of the picture, y up"""
-    rows, places = _crossings(strokes, width, height)
+    rows = max(_CROSSINGS // (LINES * max(sum(map(len, strokes)), 1)), 1)
+    return np.concatenate([_covered(strokes, width, height, band) for band in _bands(height, rows)])
+
+
+def _bands(height: int, rows: int) -> Iterator[range]:
+    for top in range(0, height, rows):
+        stopping.check()
+        yield range(top, min(top + rows, height))
+
+
+def _covered(strokes: Sequence, width: int, height: int, band: range) -> np.ndarray:
+    """The coverage of the rows of a band."""
+    rows, places = _crossings(strokes, width, height, band)
     order = np.lexsort((places, rows))
     rows, places = rows[order], np.clip(places[order], 0, width)
     rank = np.arange(len(rows)) - np.searchsorted(rows, rows)
     signs = np.where(rank % 2 == 0, 1.0, -1.0) / LINES
     columns = np.minimum(places.astype(np.intp), width - 1)
     beyond = places - columns  # the share of that pixel that lies before the crossing
-    changes = np.zeros((height, width + 1))
+    changes = np.zeros((len(band), width + 1))
     np.add.at(changes, (rows // LINES, columns), signs * (1 - beyond))
     np.add.at(changes, (rows // LINES, columns + 1), signs * beyond)
     return np.clip(np.cumsum(changes[:, :-1], axis=1), 0, 1).astype(np.float32)
@@ -77,8 +92,10 @@ def _apart(points: np.ndarray, point: tuple[float, float], aspect: float) -> np.
     return np.hypot(*((points - point) * (aspect, 1)).T)
 
 
-def _crossings(strokes: Sequence, width: int, height: int) -> tuple[np.ndarray, np.ndarray]:
-    """Where curves cross the lines: which of these, (n,) from the top, and places (n,) in pixels from the left."""
+def _crossings(strokes: Sequence, width: int, height: int, band: range) -> tuple[np.ndarray, np.ndarray]:
+    """Where curves cross the lines of a band of rows: which of these, (n,) from its top, and places (n,) in pixels from
+    the left."""
+    lines = band.start * LINES, band.stop * LINES
     rows, places = [np.zeros(0, np.intp)], [np.zeros(0)]
     for stroke in strokes:
         if len(stroke) < 3:
@@ -86,11 +103,11 @@ def _crossings(strokes: Sequence, width: int, height: int) -> tuple[np.ndarray, 
         points = np.asarray(stroke, dtype=np.float64) * (width, -height * LINES) + (0, height * LINES)
         ends = np.roll(points, -1, axis=0)
         upper, lower = np.where(points[:, 1:] <= ends[:, 1:], (points, ends), (ends, points))
-        first = np.clip(np.ceil(upper[:, 1] - 0.5), 0, height * LINES).astype(np.intp)
-        count = np.clip(np.ceil(lower[:, 1] - 0.5), first, height * LINES).astype(np.intp) - first
+        first = np.clip(np.ceil(upper[:, 1] - 0.5), *lines).astype(np.intp)
+        count = np.clip(np.ceil(lower[:, 1] - 0.5), first, lines[1]).astype(np.intp) - first
         edge = np.repeat(np.arange(len(count)), count)
         row = np.arange(len(edge)) - np.repeat(np.cumsum(count) - count, count) + first[edge]
         along = (row + 0.5 - upper[edge, 1]) / (lower[edge, 1] - upper[edge, 1])
-        rows.append(row)
+        rows.append(row - lines[0])
         places.append(upper[edge, 0] + along * (lower[edge, 0] - upper[edge, 0]))
     return np.concatenate(rows), np.concatenate(places)

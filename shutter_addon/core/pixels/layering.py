@@ -21,9 +21,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..frames.frame_source import FrameSource
-from ..messages import EffectError
-from ..model import limits, scribbles
-from ..model.effect import TOO_MANY_POINTS, Camera, Effect, MatteRegion, Region
+from ..model import scribbles
+from ..model.effect import Camera, Effect, MatteRegion, Region
 from ..model.frame_state import Following, FrameState, Layers
 from ..model.mattes import Matte
 from . import compositor, following
@@ -82,12 +81,9 @@ def _scribbles(
     if not drawn:
         return None
     others = [region for region in effect.regions if isinstance(region, Region) and region not in drawn]
-    room, shapes = limits.MAX_POINTS, []
+    shapes = []
     for region in (*others, *drawn):
         shape = _between(region, frame, share)
-        room -= sum(map(len, shape.strokes))
-        if room < 0:
-            raise EffectError(TOO_MANY_POINTS, name=region.name, most=limits.MAX_POINTS)
         if shape.opacity > 0:
             number = 1 + regions.index(region) if region in drawn else 0
             shapes.append(replace(shape, shutter=number, opacity=1.0))
