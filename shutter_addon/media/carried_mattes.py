@@ -19,6 +19,7 @@ import numpy as np
 from OpenImageIO import ImageBuf, ImageInput
 
 from ..core import stopping
+from ..core.atomic_write import part_folder
 from ..core.farm.claims import Claims
 from ..core.frames.frame_source import FrameSource
 from ..core.model import outlines, scribbles
@@ -41,7 +42,8 @@ BLOCK = 20  # frames beyond a drawing that are carried together
 # life to the next: somebody waits for what is carried, and to carry it twice does no harm.
 _PAUSE, _PATIENCE, _BEAT = 0.5, 20.0, 4.0
 
-_elsewhere: list[tempfile.TemporaryDirectory] = []  # where mattes are kept that have no folder, until this program ends
+# Where mattes are kept until this program ends, in place of folders that cannot be written to; None: of no folder.
+_elsewhere: dict[Path | None, tempfile.TemporaryDirectory] = {}
 
 
 class Footage(Hashable, Protocol):
@@ -55,7 +57,7 @@ class CarriedFile:
     """A core.model.mattes.MatteFile of an outline.
 
     drawings: by ascending source frame, the curves of each (core.model.outlines)
-    folder: where mattes are kept; None: for as long as this program runs"""
+    folder: where mattes are kept; for as long as this program runs where that cannot be written to, or is None"""
 
     footage: Footage
     drawings: tuple[tuple[int, outlines.Curves], ...]
@@ -101,7 +103,7 @@ class CarriedMattes:
             return self._nothing()
         path = self._path(index, *near)
         if (matte := self._kept(path)) is None:
-            with self._claimed(path, *near) as kept:
+            with self._claimed(index, *near) as kept:
                 matte = kept if kept is not None else self._carried(index, *near)
         return self._nothing() if matte is None else matte / np.float32(255)
 
@@ -157,8 +159,12 @@ class CarriedMattes:
         return matte
 
     @contextmanager
-    def _claimed(self, path: Path, first: int | None, last: int | None) -> Iterator[np.ndarray | None]:
+    def _claimed(self, index: int, first: int | None, last: int | None) -> Iterator[np.ndarray | None]:
         """While this process alone carries what lies between two drawings; what another has kept of a matte by then."""
+        path = self._path(index, first, last)
+        if self._parent not in _elsewhere and not _is_writable(path.parent):
+            _use_elsewhere(self._parent)
+            path = self._path(index, first, last)
         name = manifest_key({"drawn": [self._drawing_key(frame) for frame in (first, last) if frame is not None]})
         with Claims(path.parent, _PATIENCE, _BEAT) as claims:
             while not _taken(claims, path.parent, name):
@@ -235,7 +241,12 @@ class CarriedMattes:
     def _path(self, index: int, first: int | None, last: int | None) -> Path:
         """The file of a frame's matte, made of these drawings."""
         drawn = [self._drawing_key(frame) for frame in (first, last) if frame is not None]
-        return self._folder / f"{index:08d}-{manifest_key({'version': VERSION, 'frame': index, 'drawn': drawn})}.png"
+        key = manifest_key({"version": VERSION, "frame": index, "drawn": drawn})
+        file = Path(self._folder, f"{index:08d}-{key}.png")
+        kept = Path(self._parent or "", file)
+        if self._parent and (self._parent not in _elsewhere or kept.is_file()):
+            return kept
+        return Path(_use_elsewhere(self._parent), file)
 
     def _drawing_key(self, frame: int) -> str:
         if frame not in self._drawing_keys:
@@ -243,14 +254,9 @@ class CarriedMattes:
         return self._drawing_keys[frame]
 
     @cached_property
-    def _folder(self) -> Path:
-        """The folder of this footage."""
-        parent = self._parent
-        if parent is None:
-            if not _elsewhere:
-                _elsewhere.append(tempfile.TemporaryDirectory(prefix=FOLDER))
-            parent = Path(_elsewhere[0].name)
-        return parent / f"{self._source.path.stem[:40]}-{manifest_key(identity(self._source))}"
+    def _folder(self) -> str:
+        """The name of this footage's folder."""
+        return f"{self._source.path.stem[:40]}-{manifest_key(identity(self._source))}"
 
     def _kept(self, path: Path) -> np.ndarray | None:
         """The matte (H, W) uint8 of a file; None: there is none of ours, or it is damaged."""
@@ -278,3 +284,22 @@ def _taken(claims: Claims, folder: Path, name: str) -> bool:
             return claims.take(name)
     except OSError as error:
         raise MediaError(f"{folder}: mattes cannot be written there ({error.strerror or error})") from None
+
+
+def _is_writable(folder: Path) -> bool:
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        with part_folder(folder):
+            return True
+    except OSError:
+        return False
+
+
+def _use_elsewhere(parent: Path | None) -> str:
+    """Where mattes are kept in place of a folder. MediaError: nowhere."""
+    if parent not in _elsewhere:
+        try:
+            _elsewhere[parent] = tempfile.TemporaryDirectory(prefix=FOLDER, ignore_cleanup_errors=True)
+        except OSError as error:
+            raise MediaError(f"mattes cannot be written anywhere ({error.strerror or error})") from None
+    return _elsewhere[parent].name

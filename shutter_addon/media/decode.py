@@ -82,7 +82,8 @@ class FrameReader:
         return run.file, _known(run).frame
 
     def frame_at(self, time: float, step: float) -> av.VideoFrame:
-        """The last frame whose time stamp is not later, or the first one; step: the usual distance of two frames.
+        """The frame at that time, or the last before the first that is later, or the first one, as in Blender, where
+        time stamps go back as well; step: the usual distance of two frames.
 
         Raises MediaError, with the reason alone, if the file should have that frame but it cannot be decoded."""
         try:
@@ -96,7 +97,7 @@ class FrameReader:
 
     def _find(self, time: float, step: float) -> av.VideoFrame:
         run = self._run_at(time, step)
-        while run.next is not None and run.next.time <= time:
+        while run.next is not None and _known(run).time < time and run.next.time <= time:
             run.advance()
         shown = _known(run)
         if run.lost_between(time):
@@ -117,6 +118,8 @@ class FrameReader:
     def _is_near(self, run: _Run, time: float, step: float) -> bool:
         if run.shown is None or time < run.shown.time:
             return run.is_first
+        if time <= run.passed:
+            return False
         return run.next is None or time - run.next.time <= max(KEPT_DECODING, self._landmarks.longest) * step
 
     def _run_at(self, time: float, step: float) -> _Run:
@@ -166,19 +169,25 @@ class _Landmarks:
     """What was seen of the key frames: their packets' time stamps and sizes, the most frames from one to the next."""
 
     def __init__(self) -> None:
-        self._seen: set[tuple[int | None, int]] = set()
+        self._seen: dict[tuple[int | None, int], bool] = {}  # whether its time is later than all before it
+        self._latest = -math.inf
         self.longest = self._since = 0
 
     def note(self, packet: Packet, from_start: bool) -> None:
         """Takes in the next packet."""
         self._since = 0 if packet.is_keyframe else self._since + 1
         self.longest = max(self.longest, self._since)
+        time = time_of(packet)
         if packet.is_keyframe and from_start:
-            self._seen.add((time_of(packet), packet.size))
+            self._seen.setdefault((time, packet.size), time is None or time >= self._latest)
+        if packet.pts is not None and from_start:
+            self._latest = max(self._latest, packet.pts)
 
-    def knows(self, packet: Packet) -> bool:
-        """Whether a decode from the start has met that key frame at that time."""
-        return (time_of(packet), packet.size) in self._seen
+    def is_sound(self, packet: Packet, misleading: bool) -> bool:
+        """Whether decoding may begin at that key frame: what a decode from the start has met before it is earlier.
+        misleading: whether it has to have been met, as where time stamps go back."""
+        misleading = misleading or not all(self._seen.values())
+        return self._seen.get((time_of(packet), packet.size), not misleading)
 
 
 class _Timed(NamedTuple):
@@ -193,6 +202,7 @@ class _Run:
 
     shown: the frame on screen; next: its successor; None past the end
     fault: the last error's sentence; is_first: whether the file's first frame is shown
+    passed: the latest time of a frame before it
     """
 
     def __init__(self, file: File, landmarks: _Landmarks, seeking: bool):
@@ -200,7 +210,7 @@ class _Run:
         self.fault, self.is_first = "", not seeking
         self._awaited: list[int] = []
         self._lost: list[int] = []
-        self._end = -math.inf
+        self._end = self.passed = -math.inf
         self._ended = self._broken = False
         self._frames = self._decoded(seeking)
         self.shown = next(self._frames, None)
@@ -212,6 +222,7 @@ class _Run:
 
     def advance(self) -> None:
         """On to the successor."""
+        self.passed = max(self.passed, _known(self).time)
         self.shown, self.is_first = self.next, False
         self.next = next(self._frames, None)
 
@@ -235,7 +246,7 @@ class _Run:
         for packet in self._packets():
             if packet is not None:
                 self._landmarks.note(packet, from_start=not seeking)
-                if floor is None and packet.is_keyframe and (not misleading or self._landmarks.knows(packet)):
+                if floor is None and packet.is_keyframe and self._landmarks.is_sound(packet, misleading):
                     floor = time_of(packet)
             if floor is None:
                 continue

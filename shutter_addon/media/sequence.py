@@ -30,10 +30,12 @@ BLENDERS_FORMATS = "openexr hdr dpx cineon png jpeg tiff targa bmp webp jpeg2000
 ALPHA = 2, 4  # channels of colours with alpha: YA, RGBA
 COLOURS = ("RGBA", "RGB"), ("XYZA", "XYZ"), ("YA", "Y")  # in an EXR; those before go before
 NO_GREY = frozenset({"X", "BY", "RY"})  # beside these, Y is not all of the picture
+_VERSION = re.compile(r"(?<![a-z])v[0-9]{1,3}$", re.IGNORECASE)
 MISSING = 100  # numbers in a row; what lies beyond a wider gap is another sequence, or a stray number
 LONGEST = 1_048_574  # Blender's last frame
 
 Window = tuple[int, int, int, int]  # x, y, width, height
+_Parts = tuple[str, str, str]  # of a file's stem: what is before a number, its digits, what is behind it
 Layer = tuple[ImageSpec, list[int]]  # what describes a part of an image, and the positions of channels in it
 
 
@@ -208,13 +210,13 @@ def _in_window(samples: np.ndarray, spec: ImageSpec, window: Window) -> np.ndarr
 
 def _numbered(path: Path) -> tuple[list[int], list[Path], Path | None]:
     """(frame numbers from 0, files, the file beyond too wide a gap or None) from that file on: those that differ in the
-    last number of the name only."""
-    parts = _last_number(path.stem)
+    frame number only."""
+    parts, alike = _frame_number(path)
     if parts is None:
         return [0], [path], None
     prefix, first, suffix = parts
     by_frame: dict[int, Path] = {}
-    for file in numbered_alike(path):
+    for file in alike:
         digits = file.stem[len(prefix) : len(file.stem) - len(suffix)]
         number = int(digits) - int(first)
         if number >= 0 and (number not in by_frame or len(digits) == len(first)):
@@ -227,25 +229,37 @@ def _numbered(path: Path) -> tuple[list[int], list[Path], Path | None]:
 
 
 def numbered_alike(path: Path) -> list[Path]:
-    """The files in a file's folder, in order, whose name differs from its own in the last number only, if at all.
+    """The files in a file's folder, in order, whose name differs from its own in the frame number only, if at all.
     MediaError: the folder cannot be listed."""
-    parts = _last_number(path.stem)
-    if parts is None:
-        return [path] if path.exists() else []
-    prefix, _, suffix = parts
-    alike = re.compile(re.escape(prefix) + r"\d+" + re.escape(suffix + path.suffix))
-    return [file for file in sorted(_listed(path.parent)) if alike.fullmatch(file.name)]
+    return _frame_number(path)[1]
 
 
-def _last_number(stem: str) -> tuple[str, str, str] | None:
-    """(what is before it, its digits, what is behind it) of the last number in a file's stem; None: there is none."""
-    match = re.fullmatch(r"(.*?)(\d+)(\D*)", stem, re.DOTALL)
-    return (match[1], match[2], match[3]) if match else None
+def _frame_number(path: Path) -> tuple[_Parts | None, list[Path]]:
+    """Where a file's name has its frame number, and the files in its folder that differ there only: the last number
+    that varies between them, though a version (v3) only where no other does; where none does, the last."""
+    numbers = _numbers(path.stem)
+    if not numbers:
+        return None, [path] if path.exists() else []
+    files, found = sorted(_listed(path.parent)), []
+    for before, digits, behind in numbers:
+        alike = re.compile(re.escape(before) + r"\d+" + re.escape(behind + path.suffix))
+        found.append(((before, digits, behind), [file for file in files if alike.fullmatch(file.name)]))
+    varies = [each for each in found if len(each[1]) > 1] or found[:1]
+    return next((each for each in varies if not _VERSION.search("".join(each[0][:2]))), varies[0])
 
 
-def by_number(path: Path) -> Callable[[int], Path] | None:
-    """A function that gives the file i numbers on from that one, in the same folder; None: its stem has no number."""
-    parts = _last_number(path.stem)
+def _numbers(stem: str) -> list[_Parts]:
+    """The numbers in a file's stem, the last one first."""
+    found = [(stem[: n.start()], n[0], stem[n.end() :]) for n in re.finditer(r"[0-9]+", stem)]
+    return found[::-1]
+
+
+def by_number(path: Path, *, listed: bool = False) -> Callable[[int], Path] | None:
+    """A function that gives the file i numbers on from that one, in the same folder; None: its stem has no number.
+
+    listed: the files in the folder say which number counts (MediaError: it cannot be listed); else the last one does,
+    as in Blender's movie clips"""
+    parts = _frame_number(path)[0] if listed else next(iter(_numbers(path.stem)), None)
     if parts is None:
         return None
     before, digits, behind = parts

@@ -345,3 +345,22 @@ def test_a_scene_within_a_film_does_not_begin_it_again(bpy, film, monkeypatch):
         bpy.app.handlers.render_init.pop()
     assert told.count("Shown") > 1
     assert begun == [film.session_uid]
+
+
+@pytest.mark.parametrize("space", ["ACEScg", "Linear Rec.2020"])
+def test_light_is_that_of_the_working_space(bpy, film, tmp_path, space):
+    """A picture of one frame is the plain strip's, in any space that Blender works in."""
+    film.render.image_settings.color_depth = "16"
+    bpy.ops.wm.set_working_color_space(working_space=space, convert_colors=True)
+    scene = bpy.context.scene
+    strip = next(strip for strip in scene.sequence_editor.strips if strip.type == "SCENE")
+    shown = []
+    for name, frame in (("effect", 2), ("plain", 3)):
+        scene.frame_set(frame)
+        scene.render.filepath = str(tmp_path / name)
+        bpy.ops.render.render(write_still=True, scene=scene.name)
+        shown.append(read_picture(tmp_path / f"{name}.png"))
+        strip.mute = True
+    apart = np.abs(shown[0].astype(float) - shown[1])
+    assert shown[1].std() > 0
+    assert apart.max() <= shown[1].max() / 250

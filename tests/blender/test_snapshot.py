@@ -4,7 +4,7 @@ import pickle
 
 import numpy as np
 import pytest
-from support import sequencer, write_frames
+from support import sequencer, state, write_frames
 
 FRAMES = range(1, 25)
 
@@ -159,3 +159,33 @@ def test_another_factor_is_another_source_though_nothing_is_built(found, tmp_pat
             sources.append(request(edit, effect, strip, 3).renderer.source)
             assert sources[-1].step == int(factor)
     assert len(set(map(id, sources))) == 4
+
+
+def test_keys_follow_time_stretching(found):
+    """As Blender's own: a key's place on a timeline that is stretched is not its frame. What is sampled, kept by the
+    sequencer, exported and told of the bars follows; what changes bars at their keys does not move these."""
+    from shutter_addon.blender.data import fcurves, recipe_export
+    from shutter_addon.blender.editing import bar_edits
+    from shutter_addon.blender.rendering import invalidation
+
+    edit, effect, strip = found
+
+    def seen(frame):
+        now = state(edit, effect, strip, frame)
+        return [*now.bars[1], now.options.position == "end"]
+
+    before = [seen(frame) for frame in (1, 5.5, 10, 20)]
+    assert len({*map(tuple, before)}) == 4
+    keys = recipe_export.recipe_of(edit, effect, strip).shutters[1].keys
+    invalidation.invalidate_changed(edit)
+    edit.render.frame_map_old, edit.render.frame_map_new = 100, 200
+    assert invalidation.invalidate_changed(edit)
+    np.testing.assert_allclose([seen(frame) for frame in (2, 11, 20, 40)], before, atol=1e-6)
+    edit.frame_set(40)
+    assert bar_edits.key_state(effect, 1)[0] == "keyed"
+    np.testing.assert_allclose(bar_edits.bars_now(effect, 1), before[3][:4], atol=1e-6)
+    stretched = recipe_export.recipe_of(edit, effect, strip).shutters[1].keys
+    assert [key.frame for key in stretched[-1:]] == [2 * keys[-1].frame]
+    effect.window = 5
+    path = f"{effect.path_from_id()}.shutters[1].bars[0].weight"
+    assert fcurves.key_frames([fcurves.find_curve(edit, path)]) == [1, 20]

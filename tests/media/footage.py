@@ -78,8 +78,9 @@ def _write_silence(out, seconds):
         out.mux(sound.encode(frame))
 
 
-def copy_movie(source, path, *, later=0, drop=0):
-    """Copies the packets but the first `drop`, `later` frames (of the 25ths) later; earlier ones make an edit list."""
+def copy_movie(source, path, *, later=0, drop=0, stamped=None):
+    """Copies the packets but the first `drop`, `later` frames (of the 25ths) later; earlier ones make an edit list.
+    stamped: the time of each packet, in frames, by its number, in place of its own"""
     with (
         av.open(str(source)) as movie,
         av.open(str(path), "w", options={"avoid_negative_ts": "disabled"}) as out,
@@ -89,6 +90,9 @@ def copy_movie(source, path, *, later=0, drop=0):
         for position, packet in enumerate(movie.demux(video=0)):
             if packet.size and position >= drop:
                 packet.pts, packet.dts, packet.stream = packet.pts + shift, packet.dts + shift, stream
+                if stamped:
+                    times = stamped(position), position - 100  # which must not go back, nor be later
+                    packet.pts, packet.dts = (round(time / 25 / packet.time_base) for time in times)
                 out.mux(packet)
     return path
 
@@ -279,4 +283,11 @@ def ugly_movies(folder):
     files["late.mkv"] = copy_movie(open_mp4, folder / "late.mkv", later=20), None
     files["no_key_first.ts"] = copy_movie(folder / "open.ts", folder / "no_key_first.ts", drop=7), None
     files["no_index.avi"] = cut_file(mpeg4, folder / "no_index.avi", b"idx1"), None
+    # Times that go back: B-frames stamped in the order of decoding, a clock that is set, and two frames at each time.
+    for name, source, stamped in [
+        ("stamped.mkv", "b_frames.mp4", lambda number: number),
+        ("set_back.mkv", "b_frames.mp4", lambda number: number - 6 * (number >= 24)),
+        ("pairs.mkv", "film.mp4", lambda number: number // 2),
+    ]:
+        files[name] = copy_movie(folder / source, folder / name, stamped=stamped), None
     return files

@@ -2,6 +2,7 @@
 camera passes, both of them textured."""
 
 import os
+import tempfile
 from concurrent.futures import ThreadPoolExecutor
 from itertools import pairwise
 
@@ -305,11 +306,21 @@ def test_what_stands_in(footage, tmp_path):
     assert reader.values((matte,), 40, 1)[0][1].shape == (HEIGHT, WIDTH)
 
 
-def test_a_folder_that_takes_nothing(footage, tmp_path):
-    (tmp_path / "file").write_text("")
-    mattes = carried_mattes.CarriedFile(footage, drawings(0, 6), tmp_path / "file").open()
-    with pytest.raises(MediaError, match="mattes cannot be written there"):
-        mattes.read(3)
+def test_a_folder_that_takes_nothing(footage, tmp_path, monkeypatch):
+    """Mattes are kept elsewhere then, for all who ask; those that were in it before are read there."""
+    monkeypatch.setattr(carried_mattes, "_elsewhere", {})
+    good = carried_mattes.CarriedFile(footage, drawings(0, 6), tmp_path / "mattes").open()
+    expected = [good.read(frame) for frame in (3, 6)]
+    (tmp_path / "file").write_text("")  # where the folder would be: rights refuse root nothing
+    file = carried_mattes.CarriedFile(footage, drawings(0, 6), tmp_path / "file")
+    assert not file.open().has(3)
+    np.testing.assert_array_equal([file.open().read(frame) for frame in (3, 6)], expected)
+    assert file.open().has(3)
+    carried_mattes._use_elsewhere(tmp_path / "mattes")  # as where it may be read alone
+    assert good.has(3)
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path / "file"))
+    with pytest.raises(MediaError, match="mattes cannot be written anywhere"):
+        carried_mattes.CarriedFile(footage, drawings(0, 6), tmp_path / "file" / "other").open().read(3)
 
 
 @pytest.mark.parametrize("size", [(4, 4), (8, 8), (12, 1920), (1920, 24)])

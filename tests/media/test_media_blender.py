@@ -28,7 +28,8 @@ EXACT = (
     "vp9.webm ntsc.mov film.mp4 variable.mkv variable.mp4 sound.mkv animation.gif edit_list.mp4 late.mp4 "
     "late.mkv no_key_first.ts no_index.avi bunny bt709.mp4 bt601.mp4 full_range.mp4 jpeg_range.mp4 yuv444.mp4 "
     "mjpeg.avi rgb.mkv gray.mkv odd.avi turned_90.mp4 turned_180.mp4 turned_270.mp4 fields_420.avi "
-    "fields_422.mkv fields_444.mp4 blur_size.avi blur_rgb.mkv"
+    "fields_422.mkv fields_444.mp4 blur_size.avi blur_rgb.mkv "
+    "stamped.mkv set_back.mkv pairs.mkv"
 )
 ROUNDED = (
     "ten_bits.mp4 bt2020.mkv prores.mov rgb48.mkv turned_deep.mp4 blur_deep.mkv alpha.mov alpha_png.mov "

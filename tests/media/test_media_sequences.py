@@ -11,7 +11,7 @@ from footage import HEIGHT, WIDTH, number, picture, save_image, see_through
 from OpenImageIO import ImageOutput, ImageSpec
 
 from shutter_addon.media import MediaError, open_source
-from shutter_addon.media.sequence import by_number
+from shutter_addon.media.sequence import by_number, numbered_alike
 
 STRAIGHT = {"oiio__UnassociatedAlpha": 1}
 
@@ -61,6 +61,25 @@ def test_a_file_by_its_number(name, number, wanted):
 
 def test_a_file_without_a_number():
     assert by_number(Path("folder 1", "still.jp2")) is None
+
+
+@pytest.mark.parametrize(
+    "names",
+    [
+        ["sc02_tk05_0001_v3.png", "sc02_tk05_0002_v3.png", "sc02_tk05_0004_v3.png"],
+        ["sc02_0001_v3.png", "sc02_0002_v3.png", "sc02_0003_v3.png", "sc02_0001_v4.png", "sc02_0002_v4.png"],
+        ["0009_1920x1080.png", "0010_1920x1080.png", "0011_1920x1080.png"],
+        ["cam1_0001.png", "cam1_0002.png", "cam1_0003.png", *(f"cam{n}_0001.png" for n in range(2, 9))],
+        ["shot_v001.png", "shot_v002.png", "shot_v003.png"],
+        ["a1_v0001.png", "a1_v0002.png", "a1_v0003.png", "a2_v0001.png"],
+    ],
+)
+def test_the_number_that_varies_is_the_frame_number(tmp_path, names):
+    first = numbered(tmp_path, names)
+    with open_source(first) as source:
+        assert list(dict.fromkeys(source.files)) == [tmp_path / name for name in names[:3]]
+    assert by_number(first, listed=True)(1) == tmp_path / names[1]
+    assert numbered_alike(first) == [tmp_path / name for name in names[:3]]
 
 
 def test_gap_holds_the_file_before(tmp_path):

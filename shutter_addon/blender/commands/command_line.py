@@ -61,7 +61,7 @@ def opened(path: Path):
 def files(medium) -> list[Path]:
     """The source's files, also those that are missing in an image sequence: it would show them, were they there."""
     files = medium.files
-    beside = by_number(files[0]) if len(files) > 1 else None
+    beside = by_number(files[0], listed=True) if len(files) > 1 else None
     return [*files, *(map(beside, range(len(files))) if beside else ())]
 
 

@@ -152,7 +152,7 @@ def _change_bars(effect, index: int, change: Callable[[np.ndarray], np.ndarray])
     """Gives a shutter other bars, and as many, at all its keys: those that `change` makes of the old ones."""
     shutter = effect.shutters[index]
     scene, path = effect.id_data, f"{effect.path_from_id()}.shutters[{index}].bars"
-    curves = fcurves.Curves(scene)
+    curves = fcurves.Curves(scene, as_stored=True)
     old = bars(shutter)
     keyed = {k: curve for k in range(len(old)) if (curve := curves.find(f"{path}[{k}].weight"))}
     words = curves.keys(list(keyed.values()))

@@ -19,12 +19,33 @@ from . import validation
 _EASES: dict[int, Ease] = {0: "constant", 1: "linear", 2: "bezier"}
 
 
-class Curves:
-    """The F-curves of a scene, found by path; each is looked through once."""
+def stretched(scene) -> float:
+    """How far F-curves go on in a frame of the timeline, as Output ▸ Time Stretching has it."""
+    render = getattr(scene, "render", None)  # clips have none
+    return render.frame_map_old / render.frame_map_new if render else 1.0
 
-    def __init__(self, scene):
-        self._scene = scene
-        self._curves = {(c.data_path, c.array_index): c for c in curves_under(scene, "") if not (c.mute or c.is_empty)}
+
+class _Stretched:
+    """An F-curve that is asked for by frames of a timeline that is stretched."""
+
+    def __init__(self, curve, pace: float):
+        self.keyframe_points, self._curve, self._pace = curve.keyframe_points, curve, pace
+
+    def evaluate(self, frame: float) -> float:
+        return self._curve.evaluate(frame * self._pace)
+
+
+class Curves:
+    """The F-curves of a scene, found by path; each is looked through once.
+
+    as_stored: frames are those of the keys, not the timeline's"""
+
+    def __init__(self, scene, *, as_stored: bool = False):
+        self._scene, self._pace = scene, 1.0 if as_stored else stretched(scene)
+        found = (c for c in curves_under(scene, "") if not (c.mute or c.is_empty))
+        self._curves = {
+            (c.data_path, c.array_index): c if self._pace == 1 else _Stretched(c, self._pace) for c in found
+        }
         self._frames: dict = {}  # by curve: the frames (n,) of its keys
 
     def find(self, path: str, index: int = 0):
@@ -37,7 +58,7 @@ class Curves:
             if beyond.size:
                 owner, _, name = path.rpartition(".")
                 validation.refuse_key(self._scene.path_resolve(owner), name, beyond[0])
-            self._frames[curve] = frames
+            self._frames[curve] = frames if self._pace == 1 else frames / self._pace
         return curve
 
     def of(self, owner, path: str, name: str) -> list:

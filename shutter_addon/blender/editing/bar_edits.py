@@ -111,7 +111,7 @@ _shown = revision.UntilChange()
 def shown(effect, index: int) -> BarsShown:
     """What bars_now and key_state say, for what is drawn: worked out once until something changes."""
     scene = effect.id_data
-    key = effect.scene.session_uid, index, scene.frame_current_final
+    key = effect.scene.session_uid, index, scene.frame_float
 
     def read():
         states = key_state(effect, index)
@@ -133,8 +133,8 @@ def key_state(effect, index: int) -> list[str]:
 def _state(curve, value: float, scene) -> str:
     if curve is None:
         return ""
-    frame = scene.frame_current_final
-    if abs(max(curve.evaluate(frame), 0.0) - value) > 1e-4:  # no bar is below 0, a curve may be
+    frame = scene.frame_current_final  # by which keys are stretched
+    if abs(max(curve.evaluate(scene.frame_float), 0.0) - value) > 1e-4:  # no bar is below 0, a curve may be
         return "changed"
     return "keyed" if any(abs(key.co[0] - frame) < 1e-3 for key in curve.keyframe_points) else "animated"
 
@@ -150,4 +150,4 @@ def bars_now(effect, index: int) -> np.ndarray:
 def _bars_now(effect, index: int, states: list[str]) -> np.ndarray:
     if "changed" in states:
         return bars(effect.shutters[index])
-    return snapshot.bars_at(effect.id_data, effect, index, effect.id_data.frame_current_final)
+    return snapshot.bars_at(effect.id_data, effect, index, effect.id_data.frame_float)

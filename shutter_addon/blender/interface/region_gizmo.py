@@ -45,7 +45,7 @@ _strokes = revision.UntilChange()
 
 def _strokes_now(scene, effect, strip) -> list[np.ndarray]:
     """The active region's strokes, or the line of a ramp, not moved yet: read once until something changes."""
-    index, frame = effect.active_region, scene.frame_current_final
+    index, frame = effect.active_region, scene.frame_float
     region = effect.regions[index]
     if region.kind == "RAMP":
         return [_RAMP] if region.ramp != "LUMINANCE" else []

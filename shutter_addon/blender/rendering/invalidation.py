@@ -136,6 +136,7 @@ def _signature(scene: Any, effect: Any, strip: Any, looked: dict) -> Iterator[Ha
         yield from _strokes(effect.scene.annotation, region.layer)
         if region.kind == "MATTE":
             yield from _matte(region)
+    yield fcurves.stretched(scene)
     path = effect.path_from_id()
     for curve in fcurves.curves_under(scene, path + "."):
         yield curve.data_path.removeprefix(path)
