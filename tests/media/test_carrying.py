@@ -308,7 +308,7 @@ def test_what_stands_in(footage, tmp_path):
 
 def test_a_folder_that_takes_nothing(footage, tmp_path, monkeypatch):
     """Mattes are kept elsewhere then, for all who ask; those that were in it before are read there."""
-    monkeypatch.setattr(carried_mattes, "_elsewhere", {})
+    monkeypatch.setattr(carried_mattes, "_elsewhere", {})  # mattes of other tests lie there
     good = carried_mattes.CarriedFile(footage, drawings(0, 6), tmp_path / "mattes").open()
     expected = [good.read(frame) for frame in (3, 6)]
     (tmp_path / "file").write_text("")  # where the folder would be: rights refuse root nothing
