@@ -113,6 +113,7 @@ def _prepare(film: int, in_job: bool) -> bool:
     if bpy.app.background and not data_format.is_file_newer():  # in a window the last update has seen to it
         lifecycle.mend()
         copies.adopt()
+    if not data_format.is_file_newer():  # Blender tells of no other views
         lifecycle.follow_sources()
     for scene in bpy.data.scenes:
         invalidation.invalidate_changed(scene)

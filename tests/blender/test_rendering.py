@@ -364,3 +364,15 @@ def test_light_is_that_of_the_working_space(bpy, film, tmp_path, space):
     apart = np.abs(shown[0].astype(float) - shown[1])
     assert shown[1].std() > 0
     assert apart.max() <= shown[1].max() / 250
+
+
+def test_an_edit_in_stereo_shows_its_effects_to_both_eyes(bpy, film, tmp_path):
+    """Blender itself crashes there, where the scene of a strip has one view."""
+    film.frame_set(2)
+    names = "alone.png", "both_L.png", "both_R.png"
+    for name, is_stereo in (("alone", False), ("both", True)):
+        film.render.use_multiview, film.render.filepath = is_stereo, str(tmp_path / name)
+        bpy.ops.render.render(write_still=True, scene=film.name)
+    alone, *both = (read_picture(tmp_path / name) for name in names)
+    assert alone.std() > 0
+    assert all(np.array_equal(eye, alone) for eye in both)

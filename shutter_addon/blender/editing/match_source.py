@@ -39,18 +39,19 @@ def forget() -> None:
 
 
 def follow(scene) -> None:
-    """Gives the effect scenes of a scene's effects its rate and the size of their sources. A second call changes
-    nothing."""
+    """Gives the effect scenes of a scene's effects its rate and views, and the size of their sources. A second call
+    changes nothing."""
     for strip in strips.effect_strips(scene):
         if strip.scene.library is None:
-            _follow_rate(scene, strip.scene.render)
+            _follow_edit(scene, strip.scene.render)
     for effect, strip, source in strips.with_sources(scene):
         if effect.scene.library is None:
             _follow_size(effect, strip, source)
 
 
-def _follow_rate(scene, render) -> None:
-    for name in ("fps", "fps_base"):
+def _follow_edit(scene, render) -> None:
+    # Blender crashes where an edit in stereo shows a scene that is not.
+    for name in ("fps", "fps_base", "use_multiview"):
         if getattr(render, name) != getattr(scene.render, name):
             setattr(render, name, getattr(scene.render, name))
 

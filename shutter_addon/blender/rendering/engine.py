@@ -75,7 +75,10 @@ class VirtualShutterEngine(bpy.types.RenderEngine):
         # A result of a single pixel has Blender make room for the whole picture. One of all would be copied there.
         self.end_result(self.begin_result(0, 0, 1, 1))
         # Blender's rows go up; composed pictures lie so in memory, and this copies nothing.
-        self.get_result().layers[0].passes["Combined"].rect.foreach_set(np.ascontiguousarray(picture[::-1]).ravel())
+        values = np.ascontiguousarray(picture[::-1]).ravel()
+        for seen in self.get_result().layers[0].passes:
+            if seen.name == "Combined":  # one for each view of an edit in stereo
+                seen.rect.foreach_set(values)
 
     def _stopped(self) -> bool:
         return self.test_break() or render_job.stopping()
