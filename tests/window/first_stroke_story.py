@@ -210,7 +210,7 @@ def film_rendered(name="final"):
     driver.key("ctrl+96")  # F12 by its code: to its name xdotool adds Alt, as if it changed terminals
     acted("Ctrl F12")
     yield from driver.until(lambda: bpy.app.is_job_running("RENDER"), "a render begins")
-    yield from driver.until(lambda: done and not bpy.app.is_job_running("RENDER"), "the render ends", 300)
+    yield from driver.until(lambda: done and not bpy.app.is_job_running("RENDER"), "the render ends", 600)
 
 
 def told():

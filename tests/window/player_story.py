@@ -20,7 +20,7 @@ from one_stroke_story import PRESETS, part, region, sidebar
 
 # Where his shirt is at each frame of the movie, 1 is its first; in fractions of the picture.
 TRUTH = {int(frame): point for frame, point in json.loads(Path(os.environ["SHUTTER_TRUTH"]).read_text()).items()}
-SIZE, STEP = (448, 256), 3
+SIZE, STEP = (448, 256), 4
 DRAWN = 58
 FRAMES = 574  # where it stands in the sidebar, in pixels below its upper edge
 
