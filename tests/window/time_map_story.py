@@ -12,7 +12,7 @@ import driver
 import story
 
 TIME_MAP = 7  # the entry in the menu of regions
-RAMP, RADIAL = 397, 443  # where they stand in the sidebar, in pixels below its upper edge
+RAMP, RADIAL = 371, 447  # where they stand in the sidebar, in pixels below its upper edge
 
 
 HANDLE = 140  # of the ramp, in pixels to the right of its middle
@@ -56,14 +56,14 @@ def turned():
 
 
 def made_radial():
-    driver.move(story.sidebar(), *on_sidebar(0.55, RAMP))  # the slider has held the pointer
+    driver.move(story.sidebar(), *on_sidebar(0.68, RAMP))  # the slider has held the pointer
     yield 0.5
-    driver.click(story.sidebar(), *on_sidebar(0.6, RAMP))
+    driver.click(story.sidebar(), *on_sidebar(0.72, RAMP))
     yield 0.8
     driver.shot("ramps")
-    driver.move(story.sidebar(), *on_sidebar(0.55, RADIAL))
+    driver.move(story.sidebar(), *on_sidebar(0.68, RADIAL))
     yield 0.5
-    driver.click(story.sidebar(), *on_sidebar(0.6, RADIAL))
+    driver.click(story.sidebar(), *on_sidebar(0.72, RADIAL))
     yield from driver.until(lambda: region().ramp == "RADIAL", "the ramp is radial")
 
 
