@@ -243,7 +243,10 @@ def lost(effect, index: int | None) -> tuple[int, str] | None:
     frame = pursuit.lost(*MotionKeys(effect, index, "LOCATION").confidence())
     if frame is None:
         return None
-    words = rpt_("Track lost the subject at frame {frame}: drag it right there, or outline it")
+    words = rpt_(
+        "Track lost the subject at frame {frame}: move the region back onto it, there or where it is seen again, or"
+        " outline it"
+    )
     if index is None:
         words = rpt_(
             "From frame {frame} on, near and far move differently, or too little is seen: not all can be held still"

@@ -1137,8 +1137,10 @@ MESSAGES = {
     ): "Bilder {first} bis {last} sind verfolgt",
     (
         "*",
-        "Track lost the subject at frame {frame}: drag it right there, or outline it",
-    ): "Verfolgen verlor das Motiv bei Bild {frame}: dort zurechtziehen oder umreißen",
+        "Track lost the subject at frame {frame}: move the region back onto it, there or where it is seen again, or"
+        " outline it",
+    ): "Verfolgen verlor das Motiv bei Bild {frame}: die Region dort oder, wo es wieder zu sehen ist, auf das Motiv"
+    " ziehen, oder es umreißen",
     (
         "*",
         "From frame {frame} on, near and far move differently, or too little is seen: not all can be held still",
