@@ -252,7 +252,7 @@ def pressed_words(first, *others):
 
 
 def is_pen_down():
-    return part("blender.rendering.previews").PEN in operators()
+    return part("blender.rendering.previews").pen_is_down()
 
 
 def told(job, tick=0.02):

@@ -84,6 +84,7 @@ def by_blender(colors, shares, unit, step="COEFFICIENTS") -> np.ndarray:
     kept = {}  # what is drawn with is not freed before
     target = gpu.types.GPUOffScreen(WIDTH, HEIGHT, format="RGBA32F")
     with target.bind(), gpu.matrix.push_pop(), gpu.matrix.push_pop_projection():
+        gpu.state.active_framebuffer_get().clear(color=(0.0, 0.0, 0.0, 0.0))
         gpu.matrix.load_identity()
         gpu.matrix.load_projection_matrix(Matrix(TO_CLIP.tolist()))
         shader = preview_quad.shader_of(step)
