@@ -110,11 +110,11 @@ def _prepare(film: int, in_job: bool) -> bool:
     invalidation.drop_lesser()
     source_media.look_again()
     source_media.rest(render_job.runs())
-    if bpy.app.background and not data_format.is_file_newer():  # in a window the last update has seen to it
-        lifecycle.mend()
-        copies.adopt()
-    if not data_format.is_file_newer():  # Blender tells of no other views
-        lifecycle.follow_sources()
+    if not data_format.is_file_newer():
+        if bpy.app.background:  # in a window the last update has seen to it
+            lifecycle.mend()
+            copies.adopt()
+        lifecycle.follow_sources()  # Blender tells of no other views
     for scene in bpy.data.scenes:
         invalidation.invalidate_changed(scene)
     if in_job:

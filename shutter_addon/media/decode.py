@@ -170,7 +170,7 @@ class _Landmarks:
 
     def __init__(self) -> None:
         self._seen: dict[tuple[int | None, int], bool] = {}  # whether its time is later than all before it
-        self._latest = -math.inf
+        self._latest, self._goes_back = -math.inf, False
         self.longest = self._since = 0
 
     def note(self, packet: Packet, from_start: bool) -> None:
@@ -179,15 +179,15 @@ class _Landmarks:
         self.longest = max(self.longest, self._since)
         time = time_of(packet)
         if packet.is_keyframe and from_start:
-            self._seen.setdefault((time, packet.size), time is None or time >= self._latest)
+            sound = self._seen.setdefault((time, packet.size), time is None or time >= self._latest)
+            self._goes_back |= not sound
         if packet.pts is not None and from_start:
             self._latest = max(self._latest, packet.pts)
 
     def is_sound(self, packet: Packet, misleading: bool) -> bool:
         """Whether decoding may begin at that key frame: what a decode from the start has met before it is earlier.
         misleading: whether it has to have been met, as where time stamps go back."""
-        misleading = misleading or not all(self._seen.values())
-        return self._seen.get((time_of(packet), packet.size), not misleading)
+        return self._seen.get((time_of(packet), packet.size), not (misleading or self._goes_back))
 
 
 class _Timed(NamedTuple):

@@ -23,7 +23,6 @@ except ImportError:  # a package without wheels; the extension registers without
 
 STEP = 2  # pixels between the vectors that are carried; all pixels gain nothing and take four times as long
 SMALLEST = 16  # pixels; OpenCV's flows need about as many, smaller pictures are cross-faded
-_LEAST = 16  # pixels a side: OpenCV finds no flow in smaller pictures
 HALF_MAX = 65504  # the largest value of a half float, which infinite samples count as
 ALIKE = 8  # levels of 255 by which the ends of a vector may differ before another flow is believed more
 
@@ -95,7 +94,7 @@ def _dis(first: np.ndarray, second: np.ndarray, finest: int, stride: int, smooth
     dis.setPatchStride(stride)
     dis.setVariationalRefinementAlpha(smoothness)
     height, width = first.shape
-    beyond = max(_LEAST - height, 0), max(_LEAST - width, 0)
+    beyond = max(SMALLEST - height, 0), max(SMALLEST - width, 0)
     wide = (cv2.copyMakeBorder(each, 0, beyond[0], 0, beyond[1], cv2.BORDER_REPLICATE) for each in (first, second))
     return dis.calc(*wide, None)[:height, :width]
 

@@ -242,10 +242,12 @@ def _frame_number(path: Path) -> tuple[_Parts | None, list[Path]]:
         return None, [path] if path.exists() else []
     files, found = sorted(_listed(path.parent)), []
     for before, digits, behind in numbers:
-        alike = re.compile(re.escape(before) + r"\d+" + re.escape(behind + path.suffix))
-        found.append(((before, digits, behind), [file for file in files if alike.fullmatch(file.name)]))
-    varies = [each for each in found if len(each[1]) > 1] or found[:1]
-    return next((each for each in varies if not _VERSION.search("".join(each[0][:2]))), varies[0])
+        name = re.compile(re.escape(before) + r"\d+" + re.escape(behind + path.suffix))
+        alike = [file for file in files if name.fullmatch(file.name)]
+        found.append(((before, digits, behind), alike))
+        if len(alike) > 1 and not _VERSION.search(before + digits):
+            return found[-1]
+    return next((each for each in found if len(each[1]) > 1), found[0])
 
 
 def _numbers(stem: str) -> list[_Parts]:

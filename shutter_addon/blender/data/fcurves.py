@@ -58,7 +58,7 @@ class Curves:
             if beyond.size:
                 owner, _, name = path.rpartition(".")
                 validation.refuse_key(self._scene.path_resolve(owner), name, beyond[0])
-            self._frames[curve] = frames if self._pace == 1 else frames / self._pace
+            self._frames[curve] = frames / self._pace
         return curve
 
     def of(self, owner, path: str, name: str) -> list:

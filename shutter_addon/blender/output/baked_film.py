@@ -184,14 +184,15 @@ def _prepare(place: Path) -> None:
 
 def _remove_parts(film: Film) -> None:
     """Removes the parts of a movie that is finished, and what killed processes left there, and no other file."""
-    names = {path.name for path, _frames in film.parts}
-    with suppress(OSError), Folder(film.place.with_suffix(".parts")) as folder:
+    parts = [path for path, _frames in film.parts]
+    names, place = {path.name for path in parts}, parts[0].parent
+    with suppress(OSError), Folder(place) as folder:
         for entry in folder.entries():
             if entry.name in names:
                 folder.remove(entry.name)
             elif atomic_write.is_part(entry.name):
                 folder.remove_part(entry.name, names.__contains__)
-        film.place.with_suffix(".parts").rmdir()
+        place.rmdir()
 
 
 def _counted(shown: Iterator[np.ndarray], done: int, told: Callable[[int], object]) -> Iterator[np.ndarray]:

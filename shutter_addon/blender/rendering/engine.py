@@ -68,9 +68,10 @@ class VirtualShutterEngine(bpy.types.RenderEngine):
         context.session.begin_next(shown, frame, context)
 
     def _show(self, picture: np.ndarray) -> None:
-        to_working = [list(mathutils.Color(axis).from_rec709_linear_to_scene_linear()) for axis in np.eye(3)]
+        axes = [mathutils.Color(axis).from_rec709_linear_to_scene_linear() for axis in np.eye(3)]
+        to_working = np.array(axes, np.float32)
         if not np.allclose(to_working, np.eye(3), atol=1e-5):  # sums of light are the same in any space of its kind
-            colours = picture[..., :3] @ np.array(to_working, np.float32)
+            colours = picture[..., :3] @ to_working
             picture = np.concatenate([colours, picture[..., 3:]], axis=-1)
         # A result of a single pixel has Blender make room for the whole picture. One of all would be copied there.
         self.end_result(self.begin_result(0, 0, 1, 1))
