@@ -283,8 +283,9 @@ def test_the_machines_memory():
 
 
 def test_a_device_tells_what_there_is(kind):
-    """On the software renderer, the machine's memory; a limit that was set stays."""
+    """A software renderer has the machine's memory, a GPU may have less of its own; a limit that was set stays."""
     for given, wanted in ((None, budget.allowed(budget.machine_memory())), (5, 5)):
         device = kind(Budget(given))
-        assert device.budget.limit == wanted
+        assert device.budget.limit == wanted or (given is None and "llvmpipe" not in device.name)
+        assert budget.MEGABYTE < device.budget.limit <= wanted or given
         device.release()

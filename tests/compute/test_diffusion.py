@@ -382,7 +382,8 @@ def test_without_scribbles_the_first_shutter_is_everywhere(solve, size):
 def test_one_shutter_alone_is_everywhere(solve):
     labels, _ = dots(3, 1)
     got = solve(labels * 2, 3)
-    np.testing.assert_array_equal(got, np.broadcast_to(np.eye(3)[1][:, None, None], got.shape))
+    want = np.broadcast_to(np.eye(3)[1][:, None, None], got.shape)
+    np.testing.assert_allclose(got, want, rtol=0, atol=2e-7)  # a GPU's shares of neighbours may sum to 1 - 2⁻²⁴
 
 
 def test_the_device_forgets_earlier_frames(device, on_device):

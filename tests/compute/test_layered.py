@@ -5,7 +5,7 @@ import itertools
 
 import numpy as np
 import pytest
-from test_composition import LEVEL, Footage, device, footage, state  # noqa: F401 – a fixture
+from test_composition import LEVEL, ROUNDED, Footage, device, footage, state  # noqa: F401 – a fixture
 
 from shutter_addon.compute import layer_colors, layer_frames, layer_mattes, weighted_window
 from shutter_addon.compute.gpu import GPUCompositor
@@ -154,7 +154,8 @@ def test_the_formula(device, options, direction, count):  # noqa: F811
     assert_near(picture, expected, enough)
     without = Renderer(device, source).picture(Request(SHOWN, plain(moment), direction))
     assert 0.1 < (~covered).mean() < 0.9
-    assert np.array_equal(picture[~covered], without[~covered])  # to the bit
+    # As without layers; a GPU's compiler may round the same sum of two passes in two ways.
+    np.testing.assert_allclose(picture[~covered], without[~covered], rtol=1e-6, atol=1e-7)
 
 
 @pytest.mark.parametrize(
@@ -234,7 +235,7 @@ def test_levels_are_those_of_the_picture(device):  # noqa: F811
     _, levels = drawn(device, source, moment, levels=True)
     expected = light.to_encoded(picture[..., :3].astype(np.float64)) * 255
     assert levels.dtype == np.uint8
-    assert np.abs(levels[..., :3] - expected).max() <= 0.51
+    assert np.abs(levels[..., :3] - expected).max() <= ROUNDED
 
 
 def test_running_sums_do_not_depend_on_where_the_window_was(device):  # noqa: F811

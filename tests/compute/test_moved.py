@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from test_composition import SHAPES, check, device, few_pieces, footage, state  # noqa: F401
+from test_composition import ROUNDED, SHAPES, check, device, few_pieces, footage, state  # noqa: F401
 from test_shots import SHOTS, shots_of
 
 from shutter_addon.compute import window
@@ -118,7 +118,7 @@ def test_levels(device, monkeypatch):  # noqa: F811
         renderer = Renderer(device, source)
         picture, levels = renderer.picture(Request(5, moment)), renderer.picture(Request(5, moment, levels=True))
         renderer.release_window()
-        assert np.abs(levels - 255 * light.to_encoded(picture.astype(np.float64))).max() < 0.51
+        assert np.abs(levels - 255 * light.to_encoded(picture.astype(np.float64))).max() <= ROUNDED
 
 
 def test_one_shutter_everywhere(device):  # noqa: F811
