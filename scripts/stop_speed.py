@@ -231,7 +231,10 @@ def drag():
     found, step = region("PREVIEW")[1], _random.choice((-12, 12))
     at, to = on_screen(found, *centre), on_screen(found, centre[0] + step, centre[1])
     before = tuple(effect_now().regions[effect_now().active_region].location)
-    return pressed_words(at, to), lambda: tuple(effect_now().regions[effect_now().active_region].location) != before
+    halfway = (at[0] + to[0]) // 2, at[1]  # the first move begins the drag
+    return pressed_words(
+        at, halfway, to
+    ), lambda: tuple(effect_now().regions[effect_now().active_region].location) != before
 
 
 def move():
@@ -247,7 +250,8 @@ def dragged(*points):
 
 
 def pressed_words(first, *others):
-    words = f"mousemove {first[0]} {first[1]} sleep 2 mousedown 1"  # a handle lights up first
+    x, y = first  # a handle lights up first, which wants a pointer that moves
+    words = f"mousemove {x - 9} {y} sleep 1 mousemove {x} {y} sleep 1 mousedown 1"
     return words + "".join(f" sleep 0.2 mousemove {x} {y}" for x, y in others) + " sleep 0.2"
 
 

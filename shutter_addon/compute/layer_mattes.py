@@ -42,9 +42,10 @@ class LayerMattes:
     def edges(self, layers: Layers, frame: int) -> list[np.ndarray]:
         """The mattes that say which pixels hold some of a subject and some of what lies behind it: without opacities,
         and nothing of ramps and of what is drawn, whose soft edges are none of the picture's."""
-        whole, shown = self._whole(layers, frame), layers.mattes[self._place(layers, frame)]
+        shown = layers.mattes[self._place(layers, frame)]
         tell = [matte is not None and not isinstance(matte.content, Ramp) for matte in shown]
-        return [values if tells else np.zeros_like(values) for values, tells in zip(whole, tell, strict=True)]
+        none = np.zeros(self._size[::-1], np.float32)
+        return [self._layer(layers, frame, i) if tells else none for i, tells in enumerate(tell)]
 
     @staticmethod
     def _place(layers: Layers, frame: int) -> int:
@@ -52,15 +53,18 @@ class LayerMattes:
 
     def _whole(self, layers: Layers, frame: int) -> list[np.ndarray]:
         """The mattes without their opacities."""
+        return [self._layer(layers, frame, i) for i in range(len(layers.mattes[self._place(layers, frame)]))]
+
+    def _layer(self, layers: Layers, frame: int, layer: int) -> np.ndarray:
+        """The matte of one layer without its opacity."""
         place = self._place(layers, frame)
-        drawn, values = layers.scribbles[place], []
-        for i, matte in enumerate(layers.mattes[place]):
-            if matte is not None:
-                value = self._read(matte, frame)
-            elif drawn is not None:
-                value = self._drawn(drawn, frame, i)
-            values.append(value.astype(np.float32) / np.float32(_WHOLE))
-        return values
+        if (matte := layers.mattes[place][layer]) is not None:
+            value = self._read(matte, frame)
+        elif (drawn := layers.scribbles[place]) is not None:
+            value = self._drawn(drawn, frame, layer)
+        else:
+            raise ValueError("a layer without a matte is not drawn either")
+        return value.astype(np.float32) / np.float32(_WHOLE)
 
     def behind(self, layers: Layers, frame: int) -> np.ndarray:
         """How much (H, W) float32 of what lies behind all layers is seen in a source frame."""

@@ -25,13 +25,15 @@ def never() -> bool:
 class Slice:
     """What tells work to end after some time, and to go on in another slice.
 
-    end: of time.monotonic(); has_kept: whether something is kept for the next one"""
+    soon: of time.monotonic(), when it ends once something is kept for the next one; end: when it ends all the same
+    has_kept: whether something is kept"""
 
+    soon: float
     end: float
     has_kept: bool = False
 
     def __call__(self) -> bool:
-        return time.monotonic() > self.end
+        return time.monotonic() > (self.soon if self.has_kept else self.end)
 
 
 _stopped: ContextVar[Callable[[], bool]] = ContextVar("stopped", default=never)

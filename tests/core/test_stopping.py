@@ -20,7 +20,7 @@ def test_a_thread_is_told_what_was_said_on_it():
 
 
 def test_a_slice_ends_work_and_knows_what_is_kept():
-    memo, over, endless = Memo(), stopping.Slice(-math.inf), stopping.Slice(math.inf)
+    memo, over, endless = Memo(), stopping.Slice(-math.inf, -math.inf), stopping.Slice(math.inf, math.inf)
     with stopping.once(over), pytest.raises(stopping.StoppedError):
         memo.get("key", stopping.check)
     assert not over.has_kept
@@ -28,7 +28,16 @@ def test_a_slice_ends_work_and_knows_what_is_kept():
         stopping.check()
         memo.get("key", lambda: 1)
     assert endless.has_kept
-    again = stopping.Slice(math.inf)
+    again = stopping.Slice(math.inf, math.inf)
     with stopping.once(again):
         assert memo.get("key", lambda: 2) == 1
     assert not again.has_kept, "it was there"
+
+
+def test_a_slice_ends_soon_once_something_is_kept():
+    memo, slice_ = Memo(), stopping.Slice(-math.inf, math.inf)
+    with stopping.once(slice_):
+        stopping.check()
+        memo.get("key", lambda: 1)
+        with pytest.raises(stopping.StoppedError):
+            stopping.check()

@@ -32,8 +32,8 @@ _BUILDING = {"SHUTTER_OT_inbetween_build", "SHUTTER_OT_smooth_streaks"}
 _GOING = {"ANIM_OT_change_frame"} | _TRACKING | _BUILDING
 _PEN = "GPENCIL_OT_annotate"
 _MOMENT = 0.3  # seconds
-_SLICE = 0.2  # seconds
-# By how much the next slice is longer: where something was kept for it, and where it begins again, so that all ends.
+_SLICE = 0.15  # seconds
+# By how much the next slice is longer, so that all ends: of each, and of one that begins again what the last one did.
 _LONGER, _AGAIN = 1.02, 1.5
 _READING_TOOL = "builtin.sample"  # reads once before it is one of those that run
 DRAFT_ROWS = 270  # blocks along the shorter side of a draft in which shutters follow edges
@@ -102,7 +102,8 @@ class _Looking:
 
     whole: the picture that is looked at as it will be rendered; late_until: the time until which pictures may be late
     decision: the engine's, for the draw handler, which Blender calls after it
-    slice_of: key of the request that is composed in slices of time; slice: the last one; seconds: how long that was
+    slice_of: key of the request that is composed in slices of time; slice: the last one
+    soon, seconds: how long that was to be, with something kept and at most
     """
 
     whole: Whole | None = None
@@ -110,6 +111,7 @@ class _Looking:
     decision: Decision | None = None
     slice_of: tuple | None = None
     slice: Slice | None = None
+    soon: float = _SLICE
     seconds: float = _SLICE
 
 
@@ -266,10 +268,12 @@ def _time_up(key: tuple) -> Slice:
     """What says whether a picture, by its request's key, has been composed for so long that Blender has to look at its
     keys: it goes on when it is drawn again."""
     if looking.slice is None or looking.slice_of != key:
-        looking.seconds = _SLICE if may_be_late() else 2 * _SLICE
+        looking.soon = looking.seconds = _SLICE / 2  # the playhead moves with it, and a note
     else:
-        looking.seconds *= _LONGER if looking.slice.has_kept else _AGAIN
-    looking.slice_of, looking.slice = key, Slice(time.monotonic() + looking.seconds)
+        looking.soon = max(_SLICE, looking.soon * _LONGER)
+        looking.seconds = max(looking.soon, looking.seconds * (1 if looking.slice.has_kept else _AGAIN))
+    now = time.monotonic()
+    looking.slice_of, looking.slice = key, Slice(now + looking.soon, now + looking.seconds)
     return looking.slice
 
 
