@@ -230,11 +230,12 @@ def drag():
         centre = part("blender.interface.region_gizmo").place(bpy.context).centre
     found, step = region("PREVIEW")[1], _random.choice((-12, 12))
     at, to = on_screen(found, *centre), on_screen(found, centre[0] + step, centre[1])
-    before = tuple(effect_now().regions[effect_now().active_region].location)
-    halfway = (at[0] + to[0]) // 2, at[1]  # the first move begins the drag
-    return pressed_words(
-        at, halfway, to
-    ), lambda: tuple(effect_now().regions[effect_now().active_region].location) != before
+    before, halfway = place_now(), ((at[0] + to[0]) // 2, at[1])  # the first move begins the drag
+    return pressed_words(at, halfway, to), lambda: place_now() != before
+
+
+def place_now():
+    return tuple(effect_now().regions[effect_now().active_region].location)
 
 
 def move():
