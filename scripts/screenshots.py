@@ -135,14 +135,14 @@ def baked():
     area = driver.area_of("SEQUENCE_EDITOR", "PREVIEW")
     side = driver.region_of(area, "UI")
     yield from scrolled_down(side)
-    driver.click(side, side.width * 0.4, 13)  # the panel opens
+    driver.click(side, side.width * 0.4, 51)  # the panel opens; below it is Copy Report
     yield 1.0
     yield from scrolled_down(side)
     low = driver.screen(side, 0, 0)
-    yield from picture("panel", (low[0], low[1] - 129, side.width, 130))
+    yield from picture("panel", (low[0], low[1] - 159, side.width, 160))
     timeline = driver.region_of(driver.area_of("SEQUENCE_EDITOR", "SEQUENCER"))
     left, bottom = driver.screen(timeline, 0, 0)
-    yield from picture("strips", (left, bottom - 129, 700, 130))
+    yield from picture("strips", (left, bottom - 159, 700, 160))
     published("baked", "panel", "strips")
     with driver.override("PREVIEW"):
         bpy.ops.shutter.unbake("EXEC_DEFAULT", True)
