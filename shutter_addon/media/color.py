@@ -1,10 +1,12 @@
 """A source in any colour space that Blender knows."""
 
+from functools import cache
 from pathlib import Path
 
 import numpy as np
 from OpenImageIO import FLOAT, ColorConfig, ImageBuf, ImageBufAlgo
 
+from ..core.frames import light
 from ..core.frames.frame_source import FrameSource
 from .errors import MediaError
 from .source import SourceWrapper
@@ -25,6 +27,24 @@ def in_colorspace(source: FrameSource, name: str, config: str | Path | None) -> 
     return ColorSource(source, name, config)
 
 
+@cache
+def keeps(name: str, config: str | Path) -> bool:
+    """Whether the colours of 8-bit footage, made those of a colour space and light again, are less than a level off."""
+    if name in TRANSFERS:
+        return True
+    levels = np.linspace(0, 1, 18, dtype=np.float32)
+    colours = np.stack(np.meshgrid(levels, levels, levels), axis=-1).reshape(1, -1, 3)
+    there = _converted(ImageBuf(light.to_linear(colours)), SCENE_LINEAR, name, config)
+    back = _converted(there, name, SCENE_LINEAR, config)
+    if back.has_error:  # a space of another configuration
+        return True
+    return bool(np.abs(light.to_encoded(np.asarray(back.get_pixels(FLOAT))) - colours).max() < 1 / 255)
+
+
+def _converted(picture: ImageBuf, space: str, other: str, config: str | Path, associated: bool = False) -> ImageBuf:
+    return ImageBufAlgo.colorconvert(picture, space, other, associated, colorconfig=str(config))
+
+
 class ColorSource(SourceWrapper):
     """A source converted to scene linear float32."""
 
@@ -43,7 +63,7 @@ class ColorSource(SourceWrapper):
         scale = np.iinfo(samples.dtype).max if samples.dtype.kind == "u" else 1
         picture = ImageBuf(samples.astype(np.float32) / np.float32(scale))
         associated = self._source.alpha == "premultiplied"
-        linear = ImageBufAlgo.colorconvert(picture, self._name, SCENE_LINEAR, associated, colorconfig=self._config)
+        linear = _converted(picture, self._name, SCENE_LINEAR, self._config, associated)
         converted = linear.get_pixels(FLOAT)
         if linear.has_error or converted is None:
             raise MediaError(f"{self._source.path.name}: no conversion from {self._name} ({linear.geterror()})")

@@ -171,6 +171,11 @@ def marked(edit, source, strip, folder):
     return []
 
 
+def with_metadata_of_strips(edit, source, strip, folder):
+    edit.render.metadata_input = "STRIPS"
+    return []
+
+
 def deinterlaced(edit, source, strip, folder):
     strip.use_deinterlace = True
     return []
@@ -303,7 +308,7 @@ EDITS = [
         brighter_view,
     ),
     *(replacing, blended, half_shown, fading, modified, moved, cropped, smaller, larger_edit, cut, muted, ends_early),
-    *(marked, deinterlaced),
+    *(marked, with_metadata_of_strips, deinterlaced),
     *(titled, title_is_muted, title_comes, adjusted, in_a_transition, in_a_meta, two_effects, keyed_effect),
     *(in_the_topmost_channel, over_more, over_nothing, over_another, behind_its_source),
 ]

@@ -115,9 +115,6 @@ def transform(source):
     source.transform.scale_x, source.transform.scale_y = 0.75, 1.5
     source.transform.offset_x, source.transform.rotation = 5, 0.4
     source.transform.origin = 0.25, 0.75
-    source.transform.filter = (
-        "NEAREST"  # others mix colours, of a movie as they are encoded, of a scene in linear light
-    )
 
 
 def crop(source):
@@ -168,6 +165,27 @@ def test_matched_it_shows_what_its_source_shows(bpy, edit, made, shown, change):
     match(bpy)
     assert words() == []
     assert apart(shown(strip, frames), plain) <= LEVELS
+
+
+def test_a_strip_is_mixed_as_its_source_once_it_is_placed(bpy, made):
+    """By a factor that no one sees; one that an editor sets stays."""
+    strip, _source = made()
+    assert strip.color_multiply == 1
+    for name, value in {"scale_x": 0.5, "rotation": 0.2, "filter": "CUBIC_MITCHELL"}.items():
+        before = getattr(strip.transform, name)
+        setattr(strip.transform, name, value)
+        bpy.context.view_layer.update()
+        assert 1 < strip.color_multiply < 1.000001
+        assert words() == ["transform"]
+        setattr(strip.transform, name, before)
+        bpy.context.view_layer.update()
+        assert strip.color_multiply == 1
+    strip.transform.keyframe_insert("offset_x", frame=1)
+    bpy.context.view_layer.update()
+    assert strip.color_multiply > 1
+    strip.color_multiply = 0.5
+    bpy.context.view_layer.update()
+    assert strip.color_multiply == 0.5
 
 
 def test_undone_in_one_step(bpy, made):

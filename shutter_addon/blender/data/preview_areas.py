@@ -11,7 +11,7 @@ from . import annotations, geometry, selection, strip_proxies, strips
 _PERCENT = {"PROXY_25": 25, "PROXY_50": 50, "PROXY_75": 75, "PROXY_100": 100}
 _STANDARD = {"view_transform": "Standard", "look": "None", "exposure": 0.0, "gamma": 1.0}
 _STANDARD |= {"use_curve_mapping": False, "use_white_balance": False}
-_PLAIN_STRIP = {"blend_alpha": 1.0, "color_multiply": 1.0, "color_saturation": 1.0, "scene_input": "CAMERA"}
+_PLAIN_STRIP = {"blend_alpha": 1.0, "color_saturation": 1.0, "scene_input": "CAMERA"}
 _PLAIN_SPACE = {"display_mode": "IMAGE", "display_channel": 0, "show_overexposed": 0}
 
 
@@ -89,6 +89,7 @@ def _is_plain(scene, strip) -> bool:
     return (
         strip.blend_type in ("REPLACE", "ALPHA_OVER")
         and _has(strip, _PLAIN_STRIP)
+        and strip.color_multiply in (1, strips.IN_CODE_VALUES)
         and all(modifier.mute for modifier in strip.modifiers)
         and scene.display_settings.display_device == "sRGB"
         and _has(scene.view_settings, _STANDARD)

@@ -15,7 +15,7 @@ _PLAIN_STRIP = {
         ("use_flip_x", "use_flip_y", "use_float", "use_reverse_frames", "use_deinterlace", "multiply_alpha"), False
     ),
 }
-_PLAIN_TRANSFORM = {"scale_x": 1.0, "scale_y": 1.0, "offset_x": 0.0, "offset_y": 0.0, "rotation": 0.0}
+IN_PLACE = {"scale_x": 1.0, "scale_y": 1.0, "offset_x": 0.0, "offset_y": 0.0, "rotation": 0.0}
 _UNCROPPED = dict.fromkeys(("min_x", "min_y", "max_x", "max_y"), 0)
 _WHOLE = {"resolution_percentage": 100, "use_border": False, "use_multiview": False}
 _UNMARKED = {"use_stamp": False, "metadata_input": "SCENE"}
@@ -38,7 +38,7 @@ def hides(scene: Any, strip: Any) -> bool:
     return (
         strip.blend_type in ("REPLACE", "ALPHA_OVER")
         and has(strip, _PLAIN_STRIP)
-        and has(strip.transform, _PLAIN_TRANSFORM)
+        and has(strip.transform, IN_PLACE)
         and has(strip.crop, _UNCROPPED)
         and strip.strobe <= 1  # of new strips 0 in Blender 5.2, 1 in 5.3: both show all frames
         and not strip.modifiers

@@ -42,6 +42,7 @@ class Snapshot:
     effect: its channels are sampled at `frames`
     source: what is read, and `timing`, when; None: the effect's own source time says that
     inbetween: its in-between frames, None: it has none; built: the stamp of those there are
+    blended: the sequencer's colour space, in which Blender lays the strip over others; "": it does not
     first: the strip's first timeline frame; film: from frame to frame of the scene's film, and its last frame"""
 
     scene: int
@@ -54,6 +55,7 @@ class Snapshot:
     timing: StripTiming | None
     inbetween: inbetween_settings.Settings | None
     built: tuple
+    blended: str
 
     def timeline_frame(self, scene_frame: float) -> float:
         """The timeline frame at which the effect's scene is at one of its own."""
@@ -96,6 +98,7 @@ def take(
         timing=None if effect.use_source_time else timing_of(source),
         inbetween=inbetween_settings.settings(effect, folder) if inbetween_settings.factor(effect) > 1 else None,
         built=stamps.built,
+        blended="" if strip.blend_type == "REPLACE" or source.mute else scene.sequencer_colorspace_settings.name,
     )
 
 

@@ -14,6 +14,9 @@ CHANNELS = 128  # of Blender's sequencer
 SOURCES = ("MOVIE", "IMAGE", "MOVIECLIP")
 MATTES = ("MATTE", "RAMP")  # kinds of regions that have no strokes
 LAID = ("OUTLINE", *MATTES)  # kinds of mattes, which are laid over what scribbles give
+# Where Blender scales or turns a Scene strip, it mixes the light of pixels, and of movies and 8-bit pictures their code
+# values. It makes code values first where a strip's colours are multiplied: by this, nothing else changes.
+IN_CODE_VALUES = 1 + 2**-23
 
 
 def is_carried(region) -> bool:

@@ -6,7 +6,8 @@ import bpy
 from bpy.app.translations import pgettext_data as data_
 
 from ...core.model.limits import MAX_FRAME
-from ..data import annotations, data_format, source_media
+from ...media import color
+from ..data import annotations, data_format, seen_alone, source_media
 from ..data.strips import ENGINE, effect_of, nearest_source, origin, overlap
 from . import copies
 
@@ -34,6 +35,8 @@ def add_effect(scene, source):
     strip.blend_type = source.blend_type
     copy_look(source, strip)
     _mute(source, medium)
+    if not _is_kept(scene, source) and medium.alpha == "opaque" and seen_alone.hides(scene, strip):
+        strip.blend_type = "REPLACE"  # Blender changes colours as it lays strips over others
     effect = data_format.new_effect(scene, data_format.FORMAT)
     effect.name, effect.scene, effect.source, effect.start = (
         strip.name,
@@ -46,6 +49,11 @@ def add_effect(scene, source):
     strip.color_tag = _COLOR
     connect(scene, [strip, source, *source.connections])
     return strip, effect_of(scene, effect_scene)  # again: an operator's update may move the collection's items
+
+
+def _is_kept(scene, source) -> bool:
+    config = source_media.spec(source).options["config"]
+    return color.keeps(scene.sequencer_colorspace_settings.name, config)
 
 
 def choose_source(effect, strip, source) -> None:

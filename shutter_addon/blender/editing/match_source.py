@@ -16,8 +16,8 @@ from bpy.app.translations import pgettext_n as n_
 
 from ...core import revision
 from ...core.model.scribbles import mapped
-from ...media import MediaError
-from ..data import annotations, fcurves, geometry, source_media, strips
+from ...media import MediaError, open_source
+from ..data import annotations, fcurves, geometry, seen_alone, source_media, strips
 from . import add_effect
 
 # What a strip looks like: what it is called, and the names of the strip's properties and groups.
@@ -30,23 +30,24 @@ _LOOK = {
 _RANGE = n_("range")
 _KEPT = 256
 _shown = revision.UntilChange()
-_sizes: dict[tuple, tuple[int, int] | None] = {}  # of media, by their keys: their headers are read once
+_headers: dict[tuple, "_Header | None"] = {}  # of media, by their keys: they are read once
 
 
 def forget() -> None:
     """Forgets what media were read, before another file is loaded."""
-    _sizes.clear()
+    _headers.clear()
 
 
 def follow(scene) -> None:
-    """Gives the effect scenes of a scene's effects its rate and views, and the size of their sources. A second call
-    changes nothing."""
+    """Gives the effect scenes of a scene's effects its rate and views, and the size of their sources; has Blender mix
+    the strips' pixels as their sources'. A second call changes nothing."""
     for strip in strips.effect_strips(scene):
         if strip.scene.library is None:
             _follow_edit(scene, strip.scene.render)
     for effect, strip, source in strips.with_sources(scene):
-        if effect.scene.library is None:
-            _follow_size(effect, strip, source)
+        if effect.scene.library is None and (header := _header(source)) is not None:
+            _follow_size(effect, strip, header.size)
+            _follow_mixing(scene, strip, source, header.is_encoded)
 
 
 def _follow_edit(scene, render) -> None:
@@ -56,26 +57,49 @@ def _follow_edit(scene, render) -> None:
             setattr(render, name, getattr(scene.render, name))
 
 
-def _follow_size(effect, strip, source) -> None:
-    size = _size(source)
-    if size is not None and size != annotations.picture_size(effect):
+def _follow_size(effect, strip, size: tuple[int, int]) -> None:
+    if size != annotations.picture_size(effect):
         with _scribbles_kept(effect, strip):
             effect.scene.render.resolution_x, effect.scene.render.resolution_y = size
 
 
-def _size(source) -> tuple[int, int] | None:
-    """Width and height of a source's picture, as a scene can have them; None: it cannot be read."""
+def _follow_mixing(scene, strip, source, is_encoded: bool) -> None:
+    if strip.color_multiply not in (1, strips.IN_CODE_VALUES):
+        return
+    mixes = (
+        not seen_alone.has(strip.transform, seen_alone.IN_PLACE)
+        or strip.transform.filter.startswith("CUBIC")
+        or fcurves.curves_under(scene, f"{strip.path_from_id()}.transform.")
+    )
+    same_space = source_media.reading(source)[0] == scene.sequencer_colorspace_settings.name
+    factor = strips.IN_CODE_VALUES if mixes and is_encoded and same_space else 1
+    if strip.color_multiply != factor:
+        strip.color_multiply = factor
+
+
+class _Header(NamedTuple):
+    """size: width and height of a source's picture, as a scene can have them; is_encoded: Blender keeps code values of
+    it, not light"""
+
+    size: tuple[int, int]
+    is_encoded: bool
+
+
+def _header(source) -> _Header | None:
+    """None: it cannot be read."""
     with suppress(MediaError):
         key = source_media.media_key(source)
-        if key not in _sizes:
-            while len(_sizes) >= _KEPT:
-                del _sizes[next(iter(_sizes))]
-            _sizes[key] = None  # it is not tried again and again
-            medium = source_media.open_media(source)
+        if key not in _headers:
+            while len(_headers) >= _KEPT:
+                del _headers[next(iter(_headers))]
+            _headers[key] = None  # it is not tried again and again
+            spec = source_media.spec(source, key)
+            medium = open_source(spec.path, files=spec.files, **spec.options | {"colorspace": None})
             medium.close()
             side = bpy.types.RenderSettings.bl_rna.properties["resolution_x"]
-            _sizes[key] = tuple(min(max(n, side.hard_min), side.hard_max) for n in (medium.width, medium.height))
-        return _sizes[key]
+            width, height = (min(max(n, side.hard_min), side.hard_max) for n in (medium.width, medium.height))
+            _headers[key] = _Header((width, height), source_media.is_movie(source) or medium.dtype == np.uint8)
+        return _headers[key]
     return None
 
 
@@ -145,6 +169,8 @@ def _looks(strip) -> dict[str, str]:
 
 
 def _plain(value):
+    if value == strips.IN_CODE_VALUES:
+        return 1.0
     if isinstance(value, bpy.types.bpy_struct):
         names = [prop.identifier for prop in value.bl_rna.properties if not prop.is_readonly]
         return [_plain(getattr(value, name)) for name in names]

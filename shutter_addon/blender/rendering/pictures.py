@@ -15,6 +15,7 @@ from ...compute.renderer import Renderer
 from ...compute.request import Request
 from ...core.stopping import StoppedError
 from ...devices.budget import MEGABYTE
+from ...media import color
 from ...media.image_writing import write_exr
 from ..data import consistency
 from ..data.snapshot import Snapshot
@@ -70,7 +71,8 @@ def shortages(renderer: Renderer, snapshot: Snapshot, request: Request) -> list[
 
 
 def unread(snapshot: Snapshot, request: Request) -> Iterator[str]:
-    """Sentences about what cannot be read of Blender for a picture: how strips are retimed, the shapes of masks."""
+    """Sentences about what cannot be had of Blender for a picture: how strips are retimed, the shapes of masks, and
+    colours."""
     layers = request.state.layers.mattes if request.state.layers else ()
     contents = [matte.content for matte in chain(request.state.mattes, *layers) if matte is not None]
     for timing in (snapshot.timing, *(getattr(content, "timing", None) for content in contents)):
@@ -80,6 +82,12 @@ def unread(snapshot: Snapshot, request: Request) -> Iterator[str]:
                 " even speed; keys of Source Time can take their place"
             )
             yield sentence.format(strip=timing.name)
+    if snapshot.blended and not color.keeps(snapshot.blended, snapshot.source.options["config"]):
+        sentence = rpt_(
+            'In the color space "{space}" Blender\'s sequencer changes colors where it lays strips over others: set the'
+            " blend mode of the Shutter strip to Replace"
+        )
+        yield sentence.format(space=snapshot.blended)
     if any(getattr(content, "is_current", False) for content in contents):
         yield rpt_(
             "The shape keys of masks cannot be read in this version of Blender: mattes may have them as at another"

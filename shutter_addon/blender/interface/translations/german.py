@@ -184,6 +184,12 @@ MESSAGES = {
         " keys of Source Time can take their place",
     ): "Streifen „{strip}“: seine Retiming-Schlüssel sind in dieser Version von Blender nicht lesbar, darum läuft er"
     " gleichmäßig; Schlüssel der Quellzeit können an ihre Stelle treten",
+    (
+        "*",
+        'In the color space "{space}" Blender\'s sequencer changes colors where it lays strips over others: set the'
+        " blend mode of the Shutter strip to Replace",
+    ): "Im Farbraum „{space}“ ändert Blenders Sequencer Farben, wo er Streifen über andere legt: den Mischmodus des"
+    " Shutter-Streifens auf Ersetzen stellen",
     ("*", 'strip "{strip}" has no files'): "Streifen „{strip}“ hat keine Dateien",
     ("*", 'strip "{strip}" has no clip'): "Streifen „{strip}“ hat keinen Clip",
     (
