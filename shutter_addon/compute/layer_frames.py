@@ -11,6 +11,7 @@ import numpy as np
 from ..core.frames import light
 from ..core.frames.frame_source import FrameSource
 from ..core.frames.planes import Planes
+from .running_sums import summable
 
 # Bytes of frames that are kept as they were read, for all windows and mattes that need them.
 RECENT_BYTES = 256 << 20
@@ -49,6 +50,10 @@ class RecentFrames:
         self._kept.move_to_end(key)
         return self._kept[key]
 
+    def keep(self, count: int) -> None:
+        """Keeps so many frames, at least."""
+        self.most = max(self.most, count)
+
     def clear(self) -> None:
         """Forgets all frames."""
         self._kept.clear()
@@ -80,6 +85,7 @@ class WeightedFrames:
     """
 
     alpha, transfer = "premultiplied", "linear"
+    is_made = True  # of frames that are kept (RecentFrames)
 
     def __init__(self, source: Any, weight: Callable[[int], np.ndarray], *, rest: bool = False, alone: bool = False):
         self.base, self.weight, self.rest, self.alone = source, weight, rest, alone
@@ -98,6 +104,12 @@ class WeightedFrames:
         return (linear(self.base.read(index), self.base) * weight[..., None]).astype(self.dtype)
 
     decoded = read
+
+
+def with_layers(source: Any, weighted: int, moves: bool) -> int:
+    """How many windows a picture has, of which so many are weighted: where there are no running sums, the picture
+    without layers is composed as well. moves: something is followed."""
+    return weighted + int(moves or not summable(source))
 
 
 def linear(frame: np.ndarray, source: Any) -> np.ndarray:

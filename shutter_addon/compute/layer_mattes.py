@@ -36,31 +36,33 @@ class LayerMattes:
 
     def of(self, layers: Layers, frame: int) -> list[np.ndarray]:
         """The mattes (H, W) float32, 0 to 1, of all layers in a source frame, with their opacities."""
-        whole = self._whole(layers, frame)
-        return [values * np.float32(opacity) for values, opacity in zip(whole, layers.opacities, strict=True)]
+        return [self.one(layers, frame, i) for i in range(len(layers.opacities))]
+
+    def one(self, layers: Layers, frame: int, layer: int) -> np.ndarray:
+        """That of one layer."""
+        return self._whole(layers, frame, layer) * np.float32(layers.opacities[layer])
 
     def edges(self, layers: Layers, frame: int) -> list[np.ndarray]:
         """The mattes that say which pixels hold some of a subject and some of what lies behind it: without opacities,
         and nothing of ramps and of what is drawn, whose soft edges are none of the picture's."""
-        whole, shown = self._whole(layers, frame), layers.mattes[self._place(layers, frame)]
+        shown = layers.mattes[self._place(layers, frame)]
         tell = [matte is not None and not isinstance(matte.content, Ramp) for matte in shown]
-        return [values if tells else np.zeros_like(values) for values, tells in zip(whole, tell, strict=True)]
+        nothing = np.zeros(self._size[::-1], np.float32)
+        return [self._whole(layers, frame, i) if tells else nothing for i, tells in enumerate(tell)]
 
     @staticmethod
     def _place(layers: Layers, frame: int) -> int:
         return min(max(frame - layers.first, 0), len(layers.mattes) - 1)
 
-    def _whole(self, layers: Layers, frame: int) -> list[np.ndarray]:
-        """The mattes without their opacities."""
+    def _whole(self, layers: Layers, frame: int, layer: int) -> np.ndarray:
+        """A matte without its opacity."""
         place = self._place(layers, frame)
-        drawn, values = layers.scribbles[place], []
-        for i, matte in enumerate(layers.mattes[place]):
-            if matte is not None:
-                value = self._read(matte, frame)
-            elif drawn is not None:
-                value = self._drawn(drawn, frame, i)
-            values.append(value.astype(np.float32) / np.float32(_WHOLE))
-        return values
+        drawn, matte = layers.scribbles[place], layers.mattes[place][layer]
+        if matte is not None:
+            value = self._read(matte, frame)
+        elif drawn is not None:
+            value = self._drawn(drawn, frame, layer)
+        return value.astype(np.float32) / np.float32(_WHOLE)
 
     def behind(self, layers: Layers, frame: int) -> np.ndarray:
         """How much (H, W) float32 of what lies behind all layers is seen in a source frame."""
