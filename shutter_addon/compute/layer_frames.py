@@ -15,6 +15,7 @@ from .running_sums import summable
 
 # Bytes of frames that are kept as they were read, for all windows and mattes that need them.
 RECENT_BYTES = 256 << 20
+LARGEST = np.finfo(np.float32).max  # of light
 
 
 class RecentFrames:
@@ -126,7 +127,8 @@ def linear(frame: np.ndarray, source: Any) -> np.ndarray:
     frame = frame.astype(np.float32)
     if source.alpha == "premultiplied":
         return light.linearised(frame) if source.transfer == "srgb" else frame
-    return light.premultiplied(frame, light.to_linear if source.transfer == "srgb" else None)
+    made = light.premultiplied(frame, light.to_linear if source.transfer == "srgb" else None)
+    return made.clip(-LARGEST, LARGEST)  # an alpha may exceed 1
 
 
 def with_colors(frame: np.ndarray, colors: np.ndarray, where: np.ndarray, source: Any) -> np.ndarray:
