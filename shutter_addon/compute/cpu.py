@@ -16,7 +16,7 @@ from ..core.pixels import compositor, layering
 from ..core.pixels.shown_levels import Display
 from .diffusion import diffuse
 from .edge_diffusion import diffuse_along_edges, follows_edges
-from .layer_frames import linear
+from .layer_frames import LARGEST, linear
 from .laying import Behind, Exposure
 from .request import Coefficients, Request
 
@@ -240,7 +240,8 @@ class CPUCompositor:
             stopping.check()
             frames, moved = window.seen(indices, tile, moves)
             c, sharp = _of_tile(coefficients, tile), source.alpha == "opaque"
-            picture[tile] = compositor.compose(state, frames, indices >= 0, c, moved, sharp)
+            made = compositor.compose(state, frames, indices >= 0, c, moved, sharp)
+            picture[tile] = made.clip(-LARGEST, LARGEST)
         return self.over_black(picture) if request.levels else picture
 
     def release(self) -> None:

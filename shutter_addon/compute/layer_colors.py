@@ -61,7 +61,7 @@ class LayerColors:
         """What gives how much of a layer, or of what lies behind all, a frame shows."""
         if layer < 0:
             return lambda frame: self._behind(frame)[1]
-        return lambda frame: self._mattes.of(self.layers, frame)[layer]
+        return lambda frame: self._mattes.one(self.layers, frame, layer)
 
     @property
     def _separates(self) -> bool:

@@ -11,9 +11,11 @@ import numpy as np
 from ..core.frames import light
 from ..core.frames.frame_source import FrameSource
 from ..core.frames.planes import Planes
+from .running_sums import summable
 
 # Bytes of frames that are kept as they were read, for all windows and mattes that need them.
 RECENT_BYTES = 256 << 20
+LARGEST = np.finfo(np.float32).max  # of light
 
 
 class RecentFrames:
@@ -49,6 +51,10 @@ class RecentFrames:
         self._kept.move_to_end(key)
         return self._kept[key]
 
+    def keep(self, count: int) -> None:
+        """Keeps so many frames, at least."""
+        self.most = max(self.most, count)
+
     def clear(self) -> None:
         """Forgets all frames."""
         self._kept.clear()
@@ -80,6 +86,7 @@ class WeightedFrames:
     """
 
     alpha, transfer = "premultiplied", "linear"
+    is_made = True  # of frames that are kept (RecentFrames)
 
     def __init__(self, source: Any, weight: Callable[[int], np.ndarray], *, rest: bool = False, alone: bool = False):
         self.base, self.weight, self.rest, self.alone = source, weight, rest, alone
@@ -100,6 +107,12 @@ class WeightedFrames:
     decoded = read
 
 
+def with_layers(source: Any, weighted: int, moves: bool) -> int:
+    """How many windows a picture has, of which so many are weighted: where there are no running sums, the picture
+    without layers is composed as well. moves: something is followed."""
+    return weighted + int(moves or not summable(source))
+
+
 def linear(frame: np.ndarray, source: Any) -> np.ndarray:
     """A source's frame (H, W, 4) in linear light, premultiplied, float32."""
     if frame.dtype.kind == "u":
@@ -114,7 +127,8 @@ def linear(frame: np.ndarray, source: Any) -> np.ndarray:
     frame = frame.astype(np.float32)
     if source.alpha == "premultiplied":
         return light.linearised(frame) if source.transfer == "srgb" else frame
-    return light.premultiplied(frame, light.to_linear if source.transfer == "srgb" else None)
+    made = light.premultiplied(frame, light.to_linear if source.transfer == "srgb" else None)
+    return made.clip(-LARGEST, LARGEST)  # an alpha may exceed 1
 
 
 def with_colors(frame: np.ndarray, colors: np.ndarray, where: np.ndarray, source: Any) -> np.ndarray:

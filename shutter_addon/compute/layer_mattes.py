@@ -36,34 +36,32 @@ class LayerMattes:
 
     def of(self, layers: Layers, frame: int) -> list[np.ndarray]:
         """The mattes (H, W) float32, 0 to 1, of all layers in a source frame, with their opacities."""
-        whole = self._whole(layers, frame)
-        return [values * np.float32(opacity) for values, opacity in zip(whole, layers.opacities, strict=True)]
+        return [self.one(layers, frame, i) for i in range(len(layers.opacities))]
+
+    def one(self, layers: Layers, frame: int, layer: int) -> np.ndarray:
+        """That of one layer."""
+        return self._whole(layers, frame, layer) * np.float32(layers.opacities[layer])
 
     def edges(self, layers: Layers, frame: int) -> list[np.ndarray]:
         """The mattes that say which pixels hold some of a subject and some of what lies behind it: without opacities,
         and nothing of ramps and of what is drawn, whose soft edges are none of the picture's."""
         shown = layers.mattes[self._place(layers, frame)]
         tell = [matte is not None and not isinstance(matte.content, Ramp) for matte in shown]
-        none = np.zeros(self._size[::-1], np.float32)
-        return [self._layer(layers, frame, i) if tells else none for i, tells in enumerate(tell)]
+        nothing = np.zeros(self._size[::-1], np.float32)
+        return [self._whole(layers, frame, i) if tells else nothing for i, tells in enumerate(tell)]
 
     @staticmethod
     def _place(layers: Layers, frame: int) -> int:
         return min(max(frame - layers.first, 0), len(layers.mattes) - 1)
 
-    def _whole(self, layers: Layers, frame: int) -> list[np.ndarray]:
-        """The mattes without their opacities."""
-        return [self._layer(layers, frame, i) for i in range(len(layers.mattes[self._place(layers, frame)]))]
-
-    def _layer(self, layers: Layers, frame: int, layer: int) -> np.ndarray:
-        """The matte of one layer without its opacity."""
+    def _whole(self, layers: Layers, frame: int, layer: int) -> np.ndarray:
+        """A matte without its opacity."""
         place = self._place(layers, frame)
-        if (matte := layers.mattes[place][layer]) is not None:
+        drawn, matte = layers.scribbles[place], layers.mattes[place][layer]
+        if matte is not None:
             value = self._read(matte, frame)
-        elif (drawn := layers.scribbles[place]) is not None:
+        elif drawn is not None:
             value = self._drawn(drawn, frame, layer)
-        else:
-            raise ValueError("a layer without a matte is not drawn either")
         return value.astype(np.float32) / np.float32(_WHOLE)
 
     def behind(self, layers: Layers, frame: int) -> np.ndarray:

@@ -16,11 +16,10 @@ from ..core.pixels import compositor as reference
 from ..core.pixels import layering
 from . import plates
 from .layer_colors import TOGETHER, LayerColors
-from .layer_frames import RecentFrames, WeightedFrames
+from .layer_frames import RecentFrames, WeightedFrames, with_layers
 from .layer_mattes import LayerMattes
 from .laying import Behind, Exposure
 from .request import Coefficients, Request
-from .running_sums import summable
 
 # How often windows are made smaller that have freed one another.
 _TRIES = 4
@@ -123,9 +122,8 @@ class LayeredRenderer:
         plain: Callable[[], Any],
     ) -> Any:
         count = max(layer for layer, _ in parts) + 1
-        # Where there are no running sums, the picture without layers is composed as well.
         moves = any(part.state.following is not None for part in parts.values())
-        self.recent.windows = self._crowd * (len(parts) + (1 if moves or not summable(self._source) else 0))
+        self.recent.windows = self._crowd * with_layers(self._source, len(parts), moves)
         windows = {name: self._window(name, part, len(request.state.bars)) for name, part in parts.items()}
         self._load(windows, positions, request, shot)
         whole = Coefficients(self._compositor.constant(np.ones(1)), max(self._source.width, self._source.height))

@@ -10,7 +10,7 @@ from ..core.frames.frame_source import FrameSource
 from ..devices.budget import Budget
 from ..devices.device import Device
 from ..devices.paging import PagedDevice
-from .layer_frames import WeightedFrames
+from .layer_frames import RecentFrames, WeightedFrames, with_layers
 from .weighted_window import open_any
 from .window import beside
 
@@ -65,22 +65,26 @@ def of_window(device: Device, source: FrameSource, kind: Kind) -> Needs:
     device."""
     counting: Any = _CountingDevice(device)
     asked = kind.window, kind.moved, kind.shutters, kind.summed
-    windows = [open_any(counting, frames, *asked) for frames in _read(source, kind.layers)]
+    windows = [open_any(counting, frames, *asked) for frames in _read(source, kind)]
     gpu = min(counting.most + beside(source, kind.shutters), counting.budget.limit)
-    host = sum(kind.window * frame_bytes(window.source) for window in windows if window.sends)
-    return Needs(gpu, host, any(window.sends for window in windows))
+    sizes = {window: kind.window * frame_bytes(window.source) for window in windows if window.sends}
+    anew = [size for window, size in sizes.items() if window.anew]  # one after the other, of frames that are kept
+    host = sum(sizes.values()) - sum(anew) + (max(anew) + kind.window * frame_bytes(source) if anew else 0)
+    return Needs(gpu, host, bool(sizes))
 
 
-def _read(source: FrameSource, layers: int) -> list[FrameSource]:
+def _read(source: FrameSource, kind: Kind) -> list[Any]:
     """What the windows of a picture read."""
-    if not layers:
+    if not kind.layers:
         return [source]
-    weighted: list[Any] = [
-        WeightedFrames(source, _no_weight, rest=i < 0, alone=alone)
-        for i in range(-1, layers)
+    recent: Any = RecentFrames(source)
+    weighted = [
+        WeightedFrames(recent, _no_weight, rest=i < 0, alone=alone)
+        for i in range(-1, kind.layers)
         for alone in ((False,) if source.alpha == "opaque" else (False, True))
     ]
-    return weighted if weighted[0].is_summable else [source, *weighted]
+    recent.windows = with_layers(recent, len(weighted), kind.moved)
+    return weighted if recent.windows == len(weighted) else [recent, *weighted]
 
 
 def _no_weight(_frame: int) -> Any:
@@ -89,7 +93,7 @@ def _no_weight(_frame: int) -> Any:
 
 def of_numpy_window(source: FrameSource, kind: Kind) -> Needs:
     """What windows need with NumPy."""
-    frames = {id(read): read for read in (source, *_read(source, kind.layers))}
+    frames = {id(read): read for read in (source, *_read(source, kind))}
     return Needs(0, sum(kind.window * frame_bytes(read) for read in frames.values()), False)
 
 

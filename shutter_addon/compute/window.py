@@ -66,12 +66,14 @@ class Window:
     shutters: as for open_window
     is_open: whether it has its textures; once released, it can show nothing any more
     sends: whether every picture sends the frames anew, for which the device has no room
+    anew: whether it makes them anew as well (WeightedFrames): those of all its windows would take more of the host than
+    the device may
     shot: the source frames that the loaded window may show
     rows, tops: rows of pixels in a band (the last band may have fewer), and the top row of each band
     """
 
     layers: int
-    sends = False
+    sends = anew = False
 
     def __init__(self, device: Device, source: FrameSource, capacity: int, shutters: int):
         self.device, self.source, self.capacity, self.shutters = device, source, capacity, shutters
@@ -168,6 +170,10 @@ class Frames(Window):
         except NoDeviceError:
             device.use(self)
             self._host, self.sends = {}, True
+            size = source.width * source.height * self.pixel_bytes * capacity * getattr(source, "windows", 1)
+            self.anew = getattr(source, "is_made", False) and size > device.budget.limit
+            if self.anew:
+                source.keep(capacity)  # type: ignore[attr-defined]
             self._divide(int(device.budget.limit * SENT_SHARE))
             try:
                 self.picture = device.texture(source.width, source.height, 1, "rgba32f")
@@ -193,11 +199,10 @@ class Frames(Window):
             if self._held.get(layer) == index:
                 continue
             self._held.pop(layer, None)  # should it be broken off meanwhile
-            frame = self._read(index)
             if self._host is None:
-                self._place(frame, layer)
-            else:
-                self._host[layer] = frame
+                self._place(self._read(index), layer)
+            elif not self.anew:
+                self._host[layer] = self._read(index)
             self._held[layer] = index
 
     def _place(self, frame: np.ndarray, layer: int) -> None:
@@ -209,15 +214,19 @@ class Frames(Window):
         if self._host is None:
             yield from super().bands()
             return
-        texture = self.device.texture(*self._size(self.rows), self.kind)
+        frames, texture = self._on_host(), self.device.texture(*self._size(self.rows), self.kind)
         try:
             for top in self.tops:
                 height = self._height(top)
-                for layer, frame in self._host.items():
+                for layer, frame in frames.items():
                     self._send(texture, frame[top : top + height], layer)
                 yield top, height, texture
         finally:
             texture.release()
+
+    def _on_host(self) -> dict[int, np.ndarray]:
+        """By layer, the frames that a picture is sent."""
+        return {layer: self._read(index) for layer, index in self._held.items()} if self.anew else self._host or {}
 
     def _read(self, index: int) -> np.ndarray:
         """The source's frame (height, width, 4) in the samples that are stored."""
@@ -278,12 +287,12 @@ class WholeFrames(Frames):
             yield from zip(stacks, self.textures, strict=True)
             return
         size = self._texels(self.source.width, self.source.height)
-        texture = self.device.texture(*size, self.layers, self.kind)
+        frames, texture = self._on_host(), self.device.texture(*size, self.layers, self.kind)
         try:
             for slots in stacks:
                 for slot in slots:
-                    if slot in self._host:
-                        self._send(texture, self._host[slot], slot - slots.start)
+                    if slot in frames:
+                        self._send(texture, frames[slot], slot - slots.start)
                 yield slots, texture
         finally:
             texture.release()

@@ -4,6 +4,7 @@ files. What a file is made of is in its name: a drawing that changes leaves thos
 
 from __future__ import annotations
 
+import errno
 import tempfile
 import time
 from bisect import bisect_left, bisect_right
@@ -19,7 +20,6 @@ import numpy as np
 from OpenImageIO import ImageBuf, ImageInput
 
 from ..core import stopping
-from ..core.atomic_write import part_folder
 from ..core.farm.claims import Claims
 from ..core.frames.frame_source import FrameSource
 from ..core.model import outlines, scribbles
@@ -161,16 +161,22 @@ class CarriedMattes:
     @contextmanager
     def _claimed(self, index: int, first: int | None, last: int | None) -> Iterator[np.ndarray | None]:
         """While this process alone carries what lies between two drawings; what another has kept of a matte by then."""
-        path = self._path(index, first, last)
-        if self._parent not in _elsewhere and not _is_writable(path.parent):
-            _use_elsewhere(self._parent)
-            path = self._path(index, first, last)
         name = manifest_key({"drawn": [self._drawing_key(frame) for frame in (first, last) if frame is not None]})
-        with Claims(path.parent, _PATIENCE, _BEAT) as claims:
-            while not _taken(claims, path.parent, name):
-                stopping.check()
-                time.sleep(_PAUSE)
-            yield self._kept(path)
+        while True:
+            path = self._path(index, first, last)
+            with Claims(path.parent, _PATIENCE, _BEAT) as claims:
+                try:
+                    while not _taken(claims, path.parent, name):
+                        stopping.check()
+                        time.sleep(_PAUSE)
+                except OSError as error:
+                    if error.errno == errno.ELOOP or self._parent in _elsewhere:
+                        reason = error.strerror or error
+                        raise MediaError(f"{path.parent}: mattes cannot be written there ({reason})") from None
+                    _use_elsewhere(self._parent)
+                    continue
+                yield self._kept(path)
+                return
 
     def close(self) -> None:
         """Closes the footage; a later read opens it again."""
@@ -278,21 +284,9 @@ class CarriedMattes:
 
 
 def _taken(claims: Claims, folder: Path, name: str) -> bool:
-    """As Claims.take. MediaError: the folder cannot be written to."""
-    try:
-        with own_folder(folder):
-            return claims.take(name)
-    except OSError as error:
-        raise MediaError(f"{folder}: mattes cannot be written there ({error.strerror or error})") from None
-
-
-def _is_writable(folder: Path) -> bool:
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        with part_folder(folder):
-            return True
-    except OSError:
-        return False
+    """As Claims.take. OSError: the folder cannot be written to, or is a link."""
+    with own_folder(folder):
+        return claims.take(name)
 
 
 def _use_elsewhere(parent: Path | None) -> str:

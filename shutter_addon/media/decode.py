@@ -97,6 +97,10 @@ class FrameReader:
 
     def _find(self, time: float, step: float) -> av.VideoFrame:
         run = self._run_at(time, step)
+        if run.is_first and run.next is not None and time <= _known(run).time == run.next.time:
+            # Of key frames that are all at that time, a seek finds the last one, as Blender does.
+            found = self._run_from(run.file, run.next.time, run.next.time)
+            run = self._run if found and self._run else self._restart()
         while run.next is not None and _known(run).time < time and run.next.time <= time:
             run.advance()
         shown = _known(run)

@@ -164,7 +164,7 @@ def test_another_factor_is_another_source_though_nothing_is_built(found, tmp_pat
 def test_keys_follow_time_stretching(found):
     """As Blender's own: a key's place on a timeline that is stretched is not its frame. What is sampled, kept by the
     sequencer, exported and told of the bars follows; what changes bars at their keys does not move these."""
-    from shutter_addon.blender.data import fcurves, recipe_export
+    from shutter_addon.blender.data import fcurves, recipe_export, recipe_import
     from shutter_addon.blender.editing import bar_edits
     from shutter_addon.blender.rendering import invalidation
 
@@ -186,6 +186,8 @@ def test_keys_follow_time_stretching(found):
     np.testing.assert_allclose(bar_edits.bars_now(effect, 1), before[3][:4], atol=1e-6)
     stretched = recipe_export.recipe_of(edit, effect, strip).shutters[1].keys
     assert [key.frame for key in stretched[-1:]] == [2 * keys[-1].frame]
+    recipe_import.apply(edit, effect, strip, recipe_export.recipe_of(edit, effect, strip))
+    assert recipe_export.recipe_of(edit, effect, strip).shutters[1].keys == stretched
     effect.window = 5
     path = f"{effect.path_from_id()}.shutters[1].bars[0].weight"
     assert fcurves.key_frames([fcurves.find_curve(edit, path)]) == [1, 20]

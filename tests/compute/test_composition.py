@@ -344,6 +344,21 @@ def test_a_window_that_slides_reads_one_frame(device):
     assert source.reads == [*range(17), 0]
 
 
+@pytest.mark.parametrize("alpha", ["straight", "premultiplied"])
+@pytest.mark.parametrize("options", [{}, {"light": "encoded"}, {"light": "encoded", "interpolation": "value"}], ids=str)
+def test_no_light_becomes_infinite(options, alpha):
+    """With NumPy: not by an alpha beyond 1 or next to none, nor as it is encoded."""
+    rng = np.random.default_rng(21)
+    source = footage(rng, dtype=np.float32, transfer="linear", alpha=alpha)
+    source.frames[..., 3] = rng.choice([1e-3, 0.5, 2], source.frames.shape[:3])
+    source.frames[3:12, 4:9, :9, :3] = 1e38
+    source.frames[5:15, 6:12, 5:20, :3] = -3e38
+    with np.errstate(over="ignore"):
+        picture = Renderer(open_compositor("cpu"), source).picture(Request(9, state(rng, **options)))
+    assert np.isfinite(picture).all()
+    assert np.abs(picture).max() > 1e30
+
+
 def test_frames_that_no_shutter_exposes_are_not_read(device):
     rng = np.random.default_rng(12)
     source = footage(rng)

@@ -96,7 +96,7 @@ def test_of_layers_without_room_for_all_of_them(dtype):
         kind = memory_needs.Kind(WINDOW, False, SHUTTERS, layers=4)
         needs = memory_needs.of_window(device, pictures, kind)
         with device.current():
-            frames = memory_needs._read(pictures, 4)  # which those are does not matter here
+            frames = memory_needs._read(pictures, kind)  # which those are does not matter here
             windows = [open_any(device, read, WINDOW, False, SHUTTERS) for read in frames]
             assert needs.sends == any(window.sends for window in windows)
             for window in windows:

@@ -283,11 +283,14 @@ def ugly_movies(folder):
     files["late.mkv"] = copy_movie(open_mp4, folder / "late.mkv", later=20), None
     files["no_key_first.ts"] = copy_movie(folder / "open.ts", folder / "no_key_first.ts", drop=7), None
     files["no_index.avi"] = cut_file(mpeg4, folder / "no_index.avi", b"idx1"), None
-    # Times that go back: B-frames stamped in the order of decoding, a clock that is set, and two frames at each time.
+    make_movie(folder / "large.mp4", "mpeg4", size=(640, 360))  # whose key frames begin a new part of the file each
+    # Times that go back: B-frames stamped in the order of decoding, a clock that is set, two frames at each time, and
+    # all frames at one.
     for name, source, stamped in [
         ("stamped.mkv", "b_frames.mp4", lambda number: number),
         ("set_back.mkv", "b_frames.mp4", lambda number: number - 6 * (number >= 24)),
         ("pairs.mkv", "film.mp4", lambda number: number // 2),
+        ("one_time.mkv", "large.mp4", lambda number: 0),
     ]:
         files[name] = copy_movie(folder / source, folder / name, stamped=stamped), None
     return files

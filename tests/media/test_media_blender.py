@@ -29,7 +29,7 @@ EXACT = (
     "late.mkv no_key_first.ts no_index.avi bunny bt709.mp4 bt601.mp4 full_range.mp4 jpeg_range.mp4 yuv444.mp4 "
     "mjpeg.avi rgb.mkv gray.mkv odd.avi turned_90.mp4 turned_180.mp4 turned_270.mp4 fields_420.avi "
     "fields_422.mkv fields_444.mp4 blur_size.avi blur_rgb.mkv "
-    "stamped.mkv set_back.mkv pairs.mkv"
+    "stamped.mkv set_back.mkv pairs.mkv one_time.mkv"
 )
 ROUNDED = (
     "ten_bits.mp4 bt2020.mkv prores.mov rgb48.mkv turned_deep.mp4 blur_deep.mkv alpha.mov alpha_png.mov "

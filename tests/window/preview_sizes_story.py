@@ -73,6 +73,10 @@ def sizes():
     for view in ("SPLIT", "COEFFICIENTS", "SCRIBBLES", "RESULT"):
         settings.view = view
         yield from shown(f"view_{view}")
+    strip = story.edit().sequence_editor.active_strip
+    strip.transform.scale_x = strip.transform.scale_y = 2.0
+    yield from shown("enlarged")
+    strip.transform.scale_x = strip.transform.scale_y = 1.0
     yield from shown("waveform", display_mode="WAVEFORM")
     yield from shown("image", display_mode="IMAGE")
     settings.live = False

@@ -168,10 +168,16 @@ def test_previews_of_any_size_and_renders_after_them(tmp_path):
     assert "Traceback" not in console
     steps = {entry["step"]: entry for entry in seen if "step" in entry}
     composed = {name: tuple(of_one) for name, entry in steps.items() for of_one in entry["composed"]}
-    expected = dict.fromkeys(steps, (320, 180)) | {"at_100": (640, 360), "at_50": (640, 360), "engine": (1280, 720)}
-    expected |= dict.fromkeys(("proxy_note", "proxy", "proxy_still", "proxy_by_blender", "after"), (320, 180, "proxy"))
+    expected = dict.fromkeys(steps, (320, 180)) | dict.fromkeys(("at_100", "at_50", "enlarged"), (640, 360))
+    expected |= {"engine": (1280, 720)} | dict.fromkeys(
+        ("proxy_note", "proxy", "proxy_still", "proxy_by_blender", "after"), (320, 180, "proxy")
+    )
     assert composed == expected | {"proxy_of_half": (640, 360, "proxy")}
     pictures = {name: crop(tmp_path, entry) for name, entry in steps.items()}
+    middle = {name: picture[100:-100] for name, picture in pictures.items()}  # below the header
+    beside = (middle["image"] <= 3).all(axis=(0, 2))  # the edit's image
+    assert 20 < beside.sum() < beside.size / 2
+    assert middle["enlarged"][:, beside].max() <= 3
     for name, most in (("at_100", 2.5), ("at_50", 2.5), ("at_25", 4), ("image", 4), ("after", 6)):
         assert np.abs(pictures[name] - pictures["engine"]).mean() < most, name
     for name, other, most in (

@@ -162,7 +162,8 @@ def _change_bars(effect, index: int, change: Callable[[np.ndarray], np.ndarray])
     for k, weight in enumerate(change(old)):
         shutter.bars.add().weight = weight
         if keys:
-            fcurves.set_keys(scene, f"{path}[{k}].weight", 0, [(frame, bar[k], ease) for frame, bar, ease in keys])
+            new = [(frame, bar[k], ease) for frame, bar, ease in keys]
+            fcurves.set_keys(scene, f"{path}[{k}].weight", 0, new, as_stored=True)
 
 
 def _bars_keyed(old: np.ndarray, keyed: dict, frame: float) -> np.ndarray:

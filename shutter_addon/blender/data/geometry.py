@@ -34,6 +34,11 @@ def is_invertible(matrix: np.ndarray) -> bool:
 
 def picture_to_region(strip, size: tuple[int, int], region) -> np.ndarray:
     """Matrix (3, 3) from fractions of the strip's picture to pixels of a preview's region."""
+    return image_to_region(region) @ picture_to_image(strip, size)
+
+
+def image_to_region(region) -> np.ndarray:
+    """Matrix (3, 3) from the sequencer's image space to pixels of a preview's region."""
     # view_to_region rounds to whole pixels, region_to_view does not; and its last pixel is what is drawn at the edge.
     (left, bottom), (right, top) = (
         region.view2d.region_to_view(x, y) for x, y in ((0, 0), (region.width - 1, region.height - 1))
@@ -41,4 +46,4 @@ def picture_to_region(strip, size: tuple[int, int], region) -> np.ndarray:
     scale = np.array([region.width, region.height]) / (right - left, top - bottom)
     to_region = np.diag([*scale, 1.0])
     to_region[:2, 2] = -scale * (left, bottom)
-    return to_region @ picture_to_image(strip, size)
+    return to_region

@@ -10,7 +10,7 @@ tracked again are where tracking had left them.
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from itertools import pairwise, zip_longest
+from itertools import pairwise
 
 import bpy
 import numpy as np
@@ -89,7 +89,7 @@ class MotionKeys:
         """Makes the scene's current frame, at which it begins, the editor's; what was tracked beside it stays there.
         EffectError: as check_curves says."""
         self.hold(frame, frame)
-        insert(self.effect, self.index, self.channels())
+        insert(self.effect, self.index, self.channels(), begins=True)
 
     def write(self, placements: Mapping[int, Placement], confidence: Mapping[int, float]) -> None:
         """Makes keys at some of the frames that have a confidence, in place of all that were made at these, of the
@@ -112,7 +112,7 @@ class MotionKeys:
     def confidence(self) -> tuple[np.ndarray, np.ndarray]:
         """The frames (n,) that have a confidence, ascending, and what it is, 0 to 1."""
         curve = self._curve("confidence")
-        points = fcurves.points_of(curve) if curve else np.empty((0, 2))
+        points = curve.points() if curve else np.empty((0, 2))
         return points[:, 0], points[:, 1] / 100
 
     def fade(self, name: str, keys: Iterable[presence.Key]) -> None:
@@ -140,8 +140,9 @@ class MotionKeys:
         moving = selection.moving(self.effect, self.index)
         scene, path = self.effect.id_data, f"{moving.path_from_id()}.{name}"
         if new:
-            return fcurves.ensure_curve(scene, path, component, moving.name)
-        return fcurves.find_curve(scene, path, component)
+            return fcurves.Timed(fcurves.ensure_curve(scene, path, component, moving.name), scene)
+        curve = fcurves.find_curve(scene, path, component)
+        return curve and fcurves.Timed(curve, scene)
 
 
 def check_curves(effect, index: int | None) -> None:
@@ -156,23 +157,27 @@ def check_curves(effect, index: int | None) -> None:
                     raise EffectError(rpt_(sentence).format(place=validation.place(moving), channel=label))
 
 
-def insert(effect, index: int | None, channels=CHANNELS, *, keep_tracked: bool = False) -> None:
+def insert(effect, index: int | None, channels=CHANNELS, *, keep_tracked: bool = False, begins: bool = False) -> None:
     """Keys channels of a region or of the camera at the scene's current frame; where tracking has made a key, it is the
     editor's from now on, and sure. EffectError: as check_curves says.
 
-    keep_tracked: whether the keys keep what was tracked there, for the next MotionKeys.hold"""
+    keep_tracked: whether the keys keep what was tracked there, for the next MotionKeys.hold
+    begins: whether tracking begins there, so that they are read there; of a timeline that is stretched, others lie
+    where Blender's own do, and are read elsewhere"""
     check_curves(effect, index)
     scene, moving = effect.id_data, selection.moving(effect, index)
-    path, frame = moving.path_from_id(), scene.frame_current
+    path, pace, frame = moving.path_from_id(), fcurves.stretched(scene), scene.frame_current
+    if not begins and pace != 1:
+        frame = round(frame / pace, 3)
     for name in channels:
-        tracked = [_tracked_value(curve, frame) for curve in fcurves.curves_under(scene, f"{path}.{name}")]
+        tracked = [_tracked_value(curve, frame) for curve in _curves(scene, f"{path}.{name}")]
         # Without a frame Blender takes that of the window's scene, which may be another one.
-        scene.keyframe_insert(f"{path}.{name}", group=moving.name, frame=frame)
-        curves = fcurves.curves_under(scene, f"{path}.{name}")
-        for curve, value in zip_longest(curves, tracked, fillvalue=NOTHING_KEPT):
+        scene.keyframe_insert(f"{path}.{name}", group=moving.name, frame=frame * pace)
+        tracked += [NOTHING_KEPT] * len(_COMPONENTS)
+        for curve, value in zip(_curves(scene, f"{path}.{name}"), tracked, strict=False):
             for key in _keys_at(curve, frame):
                 key.type, key.back = "KEYFRAME", value if keep_tracked else NOTHING_KEPT
-    for curve in fcurves.curves_under(scene, f"{path}.confidence"):
+    for curve in _curves(scene, f"{path}.confidence"):
         for key in _keys_at(curve, frame):
             key.back = key.co[1] = 100
         curve.update()
@@ -186,11 +191,15 @@ def runs(frames: Iterable[int]) -> list[tuple[int, int]]:
     return [(ordered[first], ordered[last]) for first, last in zip(firsts, lasts, strict=True)]
 
 
-def _keys_at(curve, frame: int) -> list:
-    return [key for key in curve.keyframe_points if key.co[0] == frame]
+def _curves(scene, path: str) -> list[fcurves.Timed]:
+    return [fcurves.Timed(curve, scene) for curve in fcurves.curves_under(scene, path)]
 
 
-def _tracked_value(curve, frame: int) -> float:
+def _keys_at(curve: fcurves.Timed, frame: float) -> list:
+    return [curve.keyframe_points[i] for i in np.flatnonzero(curve.points()[:, 0] == frame).tolist()]
+
+
+def _tracked_value(curve, frame: float) -> float:
     """What tracking has made of a frame, for a key that the editor sets there; of the editor's key there, what it
     keeps."""
     for key in _keys_at(curve, frame):
@@ -207,7 +216,7 @@ def _as_tracked(curve, edited: tuple[int, int], frames: list[float]) -> dict[flo
         if key.type != MADE and key.back != NOTHING_KEPT:
             moved.append((key, key.co[1], key.interpolation))
             key.co_ui[1], key.back, key.interpolation = key.back, NOTHING_KEPT, "LINEAR"
-    keyed = fcurves.points_of(curve)[:, 0]
+    keyed = curve.points()[:, 0]
     values = {frame: curve.evaluate(frame) for frame in frames if not curve.is_empty and frame not in keyed}
     for key, value, ease in moved:
         key.co_ui[1], key.interpolation = value, ease
@@ -235,13 +244,13 @@ def _replace(curve, values: dict[int, float], tracked: Iterable[int]) -> None:
 
 
 def _insert(curve, frame: float, value: float, ease: str = "LINEAR") -> None:
-    key = curve.keyframe_points.insert(frame, value, options={"FAST"}, keyframe_type=MADE)
+    key = curve.insert(frame, value, options={"FAST"}, keyframe_type=MADE)
     key.interpolation, key.back = ease, key.co[1]
 
 
 def _read(curve) -> tuple[np.ndarray, np.ndarray]:
     """The frames (n,) of an F-curve's keys, and which of them were made and are as they were made."""
-    points, count = fcurves.points_of(curve), len(curve.keyframe_points)
+    points, count = curve.points(), len(curve.keyframe_points)
     types, kept = np.empty(count, np.int32), np.empty(count, np.float32)
     curve.keyframe_points.foreach_get("type", types)
     curve.keyframe_points.foreach_get("back", kept)

@@ -15,6 +15,9 @@ class Quad:
 
     def __init__(self, region, strip, size):
         self._matrix = geometry.picture_to_region(strip, size, region)
+        render = strip.id_data.render
+        half = np.array([render.resolution_x, render.resolution_y]) / 2
+        self._image = mapped(geometry.image_to_region(region), np.array([-half, half]))
         crop, (width, height) = strip.crop, size
         self._low = np.array([crop.min_x / width, crop.min_y / height])
         self._high = 1 - np.array([crop.max_x / width, crop.max_y / height])
@@ -37,8 +40,20 @@ class Quad:
             (shader.uniform_float if isinstance(value, float) else shader.uniform_int)(constant, value)
         where = {"corner": self.on_region(corners).tolist(), "place": corners}
         gpu.state.blend_set("ALPHA_PREMULT")
-        batch_for_shader(shader, "TRI_STRIP", where).draw(shader)
+        self._clipped(batch_for_shader(shader, "TRI_STRIP", where), shader)
         gpu.state.blend_set("NONE")
+
+    def _clipped(self, batch, shader) -> None:
+        """Draws as much as lies in the sequencer's image, which shows no more of a strip."""
+        left, bottom, width, height = before = gpu.state.scissor_get()
+        low = np.maximum(np.rint(self._image[0]), (left, bottom))
+        high = np.minimum(np.rint(self._image[1]), (left + width, bottom + height))
+        if (low < high).all():
+            gpu.state.scissor_test_set(True)
+            gpu.state.scissor_set(*map(int, (*low, *(high - low))))
+            batch.draw(shader)
+            gpu.state.scissor_set(*before)
+            gpu.state.scissor_test_set(False)  # as it is where Blender has handlers draw
 
 
 _shaders: dict = {}

@@ -17,6 +17,8 @@ from . import combined
 # By how much of a frame the window's earlier ones are preferred, where the nearest frame is shown: of two that are as
 # near, rounding must not choose, for devices round differently.
 CLOSE = 1e-3
+# Light of which nothing becomes infinite as it is encoded in float32.
+_MOST = 1e37
 # Of an exposure: rounding may leave as much in a bar that is closed.
 _CLOSED = 1e-9
 
@@ -281,7 +283,7 @@ def _without_absent(q: np.ndarray, parts: np.ndarray, present: np.ndarray) -> np
 
 
 def _encode(frame: np.ndarray) -> np.ndarray:
-    return light.premultiplied(light.straight(frame), light.to_encoded)
+    return light.premultiplied(light.straight(frame).clip(-_MOST, _MOST), light.to_encoded)
 
 
 def _decode(total: np.ndarray) -> np.ndarray:
