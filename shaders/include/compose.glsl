@@ -233,7 +233,8 @@ void expose(int quad, int frame, vec4 weight) {
 #if THRESHOLD
   for (int pixel = 0; pixel < 4; pixel++) {
     vec4 light = frame_light(pixel_at(quad, pixel), layer);
-    fold(quad, pixel, light, frame == shown ? 1.0 : weight[pixel] * passed(light));
+    fold(quad, pixel, light, weight[pixel] * passed(light));
+    fold(quad, pixel, light, frame == shown ? 1.0 : 0.0);
   }
 #else
   fold(quad, 0, frame_light(pixel_at(quad, 0), layer), weight.x);

@@ -101,11 +101,14 @@ def test_a_long_median_of_any_light(device):
     check(device, source, combining(rng, *[MEDIAN] * 3, window=220), 1)
 
 
-@pytest.mark.parametrize("mode", ["lightest", "darkest", "by luminance"])
-def test_light_below_black(device, mode):
+@pytest.mark.parametrize(
+    ("mode", "first"), [("lightest", 0), ("darkest", 0), ("by luminance", 0), ("threshold", 2), ("dark threshold", 2)]
+)
+def test_light_below_black(device, mode, first):
+    """With a threshold, blue alone: what is shown may be below what leaves a trail."""
     rng = np.random.default_rng(10)
     source = footage(rng, dtype=np.float32, transfer="linear")
-    source.frames[..., :3] -= 5
+    source.frames[..., first:3] -= 5
     picture, expected = composed(device, source, combining(rng, MODES[mode], shapes=()), 2)
     assert expected.min() < -0.03
     np.testing.assert_allclose(picture, expected, atol=1e-4)
