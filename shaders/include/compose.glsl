@@ -218,7 +218,11 @@ int layer_of(int frame) {
 #elif COMBINE
 void expose(int quad, int frame, vec4 weight) {
 #if EDGES == 2  // shorten
+#  if COMBINE == 3
+  centre[quad] += scan == 0 ? weight * (float(frame) + 0.5) : vec4(0.0);
+#  else
   centre[quad] += weight * (float(frame) + 0.5);
+#  endif
   int index = origin + direction * frame;
   weight = index >= 0 && index < count ? weight : vec4(0.0);
 #endif

@@ -86,12 +86,14 @@ def test_ends_of_the_clip(device, edges, mode, index):
 
 @pytest.mark.parametrize("mode", FEW)
 @pytest.mark.parametrize("kind", [{}, {"alpha": "straight"}], ids=["opaque", "straight"])
-def test_all_that_is_exposed_is_left_out(device, mode, kind):
-    """Open ahead of the shown frame alone, at the clip's last one: the nearest frame is seen."""
+@pytest.mark.parametrize(("index", "position"), [(19, "start"), (0, "end")])
+def test_all_that_is_exposed_is_left_out(device, mode, kind, index, position):
+    """Open ahead of the shown frame alone, at the clip's last one, or behind it, at the first: the nearest is seen."""
     rng = np.random.default_rng(6)
-    moment = combining(rng, MODES[mode], shapes=(), edges="shorten")
-    moment.bars[:, :3] = 0
-    check(device, footage(rng, **kind), moment, 19)
+    moment = combining(rng, MODES[mode], shapes=(), edges="shorten", position=position)
+    moment.bars[:, slice(0, 3) if index else slice(-3, None)] = 0
+    moment.bars[:, 4] += 0.1
+    check(device, footage(rng, **kind), moment, index)
 
 
 def test_a_long_median_of_any_light(device):
