@@ -198,7 +198,7 @@ def add_outlines(rng, recipe: dict, count: int) -> None:
 def add_combining(rng, recipe: dict, count: int, mixed: bool) -> None:
     """Shutters that make something else than an average of their frames, where none follows and there are no layers, or
     in mixed recipes."""
-    if (not mixed and (follows(recipe) or "plate_reach" in recipe)) or rng.random() < 0.1:
+    if (not mixed and (follows(recipe) or "plate_reach" in recipe)) or rng.random() < (0.35 if mixed else 0.1):
         return
     for shutter in recipe["shutters"]:
         if (way := choose(rng, "average", "lightest", "darkest", "median")) == "average":

@@ -106,9 +106,14 @@ def is_referable(case: Case) -> bool:
 
 
 # Wherever rounding decides: a threshold that is not soft, which of two frames is as light, whether anything is left of
-# a shutter. There NumPy's own picture changes by what is nothing of a threshold, of bars and of coefficients.
-NUDGE, NUDGES = 2e-6, 4
+# a shutter, or enough of what lies behind layers. There NumPy's own picture changes by more than half of PICTURE as a
+# threshold, bars, coefficients, light and opacities change by what is nothing of them.
+NUDGE, NUDGES = 2e-6, 16
 THRESHOLD = 2e-5
+# What running sums lose of a layer's share, which decides whether what lies behind is looked for; and steps of the
+# square root of light that is followed (shaders/include/packed.glsl).
+SHARES = 2e-4
+PACKED = 1 / 2047, 1 / 2047, 1 / 1023
 TIES = 0.05  # of a picture's pixels, at most
 
 
@@ -146,15 +151,16 @@ def check_mixed(case: Case, devices: dict, folder: Path) -> dict:
                 made, mix = renderer.picture(asked), renderer.coefficients(asked).copy()
                 levels, own = renderer.picture(replace(asked, levels=True)).copy(), layers_of(renderer, asked)
             right = lent_picture(device, rendering, asked)
-            apart = light_apart(made, right)
             stepped = np.abs(levels.astype(int) - CPUCompositor().over_black(right)).max(axis=-1) > 1
-            doubtful = np.zeros(stepped.shape, bool)
-            if not apart.max() <= PICTURE or stepped.any():
-                for seed, other in enumerate(nudged(asked)):
-                    doubtful |= light_apart(lent_picture(device, rendering, other, seed), right).max(-1) > PICTURE / 8
-            doubtful &= np.isfinite(made).all(axis=-1)
+            differs, doubtful = (
+                stepped | ~(light_apart(made, right).max(axis=-1) <= PICTURE),
+                np.zeros(stepped.shape, bool),
+            )
+            for seed, other in enumerate(nudged(asked)) if differs.any() else ():
+                doubtful |= light_apart(lent_picture(device, rendering, other, seed), right).max(axis=-1) > PICTURE / 2
+            doubtful &= differs & np.isfinite(made).all(axis=-1)
             if doubtful.mean() > TIES:
-                raise DifferenceError(f"{told(case)}: {doubtful.mean():.0%} of the pixels tie")
+                raise DifferenceError(f"{told(case)}: {name}: {doubtful.mean():.0%} of the pixels tie")
             made, stepped = np.where(doubtful[..., None], right, made), stepped & ~doubtful
             mix = np.moveaxis(mix, 0, -1)
             found[name] = (
@@ -176,6 +182,8 @@ def lent_picture(device, rendering, asked, nudge: int | None = None) -> np.ndarr
     """NumPy's picture of the coefficients that another device has for the same labels; nudge: from a seed, a little."""
     from shutter_addon.compute import cpu
 
+    random = None if nudge is None else np.random.default_rng(nudge)
+
     class Solver(cpu.Solver):
         def __init__(self):
             self._own = device.solver()
@@ -183,20 +191,41 @@ def lent_picture(device, rendering, asked, nudge: int | None = None) -> np.ndarr
         def solve(self, labels, count, *guide, **_how):
             with device.current():
                 found = np.array(device.coefficients(self._own.solve(labels, count, *guide), count))
-            if nudge is not None:
-                found += np.random.default_rng(nudge).random(found.shape, np.float32) * NUDGE
+            if random is not None:
+                found += random.random(found.shape, np.float32) * NUDGE
             return found
 
         def release(self):
             with device.freeing():
                 self._own.release()
 
+    class Window(cpu.HostWindow):
+        def seen(self, *given):
+            frames, moved = super().seen(*given)
+            if random is not None:
+                frames = [nudged_light(frame, asked, self.source, random) for frame in frames]
+            return frames, moved
+
     class Lent(cpu.CPUCompositor):
         def solver(self):
             return Solver()
 
+        def window(self, source, *_size):
+            return Window(source)
+
     with rendering(Lent()) as renderer:
         return renderer.picture(asked)
+
+
+def nudged_light(frame, asked, source, random):
+    """A frame (H, W, 4) of linear light, with what a device may lose of it."""
+    noise = random.uniform(-1, 1, frame[..., :3].shape)
+    is_packed = asked.state.following is not None and source.dtype == np.uint8 and source.alpha == "opaque"
+    found, nudged_ = frame.copy(), frame[..., :3] * (1 + NUDGE * noise)
+    if is_packed and asked.state.options.light == "linear":
+        nudged_ = (np.sqrt(np.maximum(nudged_, 0)) + noise * PACKED) ** 2
+    found[..., :3] = nudged_
+    return found
 
 
 def nudged(asked):
@@ -208,7 +237,10 @@ def nudged(asked):
             each if each.threshold is None else replace(each, threshold=each.threshold + way * THRESHOLD)
             for each in state.combines
         )
-        yield replace(asked, state=replace(state, bars=bars, combines=combines))
+        layers = state.layers
+        if layers is not None:
+            layers = replace(layers, opacities=tuple(opacity * (1 + way * SHARES) for opacity in layers.opacities))
+        yield replace(asked, state=replace(state, bars=bars, combines=combines, layers=layers))
 
 
 def asked_of(case: Case, source, folder: Path):

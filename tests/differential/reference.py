@@ -638,7 +638,7 @@ def to_encoded(light):
 
 
 def covering(alpha):
-    return np.where(alpha > 0, alpha, 1)
+    return np.where(alpha > 1e-12, alpha, 1)  # less is what rounding leaves of none
 
 
 def summed(footage, index, light):
@@ -822,12 +822,20 @@ def exposed(recipe, frame, footage, index, direction, given, weights=None):
         cover = made[..., 3]
         if footage.alpha != "opaque":
             plain = recipe | {"light": "linear", "exposure": "normalized"}
-            white = [f if f is None else np.stack([of[f]] * 4, axis=-1) for f in frames]
-            cover = one_way(plain, way, window, white)[0][..., 3]
+            seen = [f if f is None else summed(footage, f, "linear") for f in frames]
+            shares = [
+                f if f is None else whole(sight) * of[f][..., None] for f, sight in zip(frames, seen, strict=True)
+            ]
+            cover = one_way(plain, way, window, shares)[0][..., 3]
         total += of_pixels(share)[..., None] * made
         left += of_pixels(share) * cover
         doubtful |= unsure & (of_pixels(share) > 0)
     return total, left, doubtful
+
+
+def whole(light):
+    """Light (H, W, 4) as if it covered all of each pixel."""
+    return np.concatenate([light[..., :3] / covering(light[..., 3:]), np.ones_like(light[..., 3:])], axis=-1)
 
 
 def opened(recipe, frame, index, direction, count, aspect):

@@ -18,12 +18,13 @@ from shutter_addon.core.frames import light
 from shutter_addon.core.model import keyframes, mattes, scribbles, shutters
 from shutter_addon.core.pixels import combined, compositor, following, layering, trails
 from shutter_addon.devices import gl
+from shutter_addon.devices.passes import SHADERS
 from shutter_addon.media import matte_values
 
 SEEDS = range(120)
 BATCH = 20
 IN_BLENDER = SEEDS[::8]  # which goes around the kinds of footage
-MIXED = range(60)
+MIXED = range(13, 30)  # which all passes that compose are run for
 
 
 @pytest.fixture(scope="module")
@@ -56,15 +57,24 @@ def test_on_blenders_gpu(tmp_path):
     assert not errors, "\n".join(errors)
 
 
-@pytest.mark.parametrize("first", MIXED[::BATCH])
-def test_every_field_with_every_other(devices, first, tmp_path):
-    errors = differences(range(first, first + BATCH), devices, tmp_path, mixed=True)
+def test_every_field_with_every_other(devices, monkeypatch, tmp_path):
+    """And all passes that compose are among them, each of which leaves no texel unwritten."""
+    seen = set()
+
+    def noted(device, program, *given, **more):
+        seen.add(program.file)
+        run(device, program, *given, **more)
+
+    monkeypatch.setattr(gl.GLDevice, "run", noted)
+    errors = differences(MIXED, devices, tmp_path, mixed=True)
     assert not errors, "\n".join(errors)
+    composing = {path.stem for path in SHADERS.glob("*.glsl") if path.stem.startswith("compose_")}
+    assert seen >= composing | {"accumulate", "pack", "ways", "layer", "levels", "matte_blend", "mix", "diffusion"}
 
 
 def test_every_field_with_every_other_on_blenders_gpu(tmp_path):
     pytest.importorskip("bpy")
-    errors = differences(MIXED[::6], open_devices(["blender"]), tmp_path, mixed=True)
+    errors = differences(MIXED[::5], open_devices(["blender"]), tmp_path, mixed=True)
     assert not errors, "\n".join(errors)
 
 
@@ -147,7 +157,7 @@ def test_mixed_recipes_have_every_field_with_every_other():
         return found | ({"equal names"} if len(set(names)) < len(names) else set())
 
     pairs, every = set(), set()
-    for recipe in (json.loads(make(seed, mixed=True).recipe) for seed in range(400)):
+    for recipe in (json.loads(make(seed, mixed=True).recipe) for seed in range(500)):
         found = fields(recipe)
         every |= found
         pairs |= {frozenset(pair) for pair in itertools.combinations(found, 2)}
@@ -156,7 +166,7 @@ def test_mixed_recipes_have_every_field_with_every_other():
         for a, b in itertools.combinations(every, 2)
         if frozenset((a, b)) not in pairs and not (a[0] == b[0] and a[0] in single)
     ]
-    assert len(every) == 40
+    assert len(every) == 47
     assert not lacking
 
 
@@ -233,20 +243,25 @@ def test_planted_faults_are_found(monkeypatch, fault, tmp_path):
 
 MIXED_FAULTS = {
     "groups that are black": (gpu, "_in_window", lambda state, chosen: state.of(chosen)),
-    "a column that is not written": (
-        gl.GLDevice,
-        "run",
-        lambda device, program, extent, **given: run(device, program, (max(extent[0] - 1, 1), *extent[1:]), **given),
-    ),
     "levels that are not drawn": (gpu, "way_sum", lambda begins, levels: way_sum(begins, False)),
 }
 run, way_sum = gl.GLDevice.run, gpu.way_sum
 
 
+def test_a_texel_that_no_pass_writes_is_seen(monkeypatch, devices, tmp_path):
+    def half(device, program, extent, **given):
+        rows = max(extent[1] // 2, 1) if program.file.startswith("compose_") else extent[1]
+        run(device, program, (extent[0], rows, *extent[2:]), **given)
+
+    monkeypatch.setattr(gl.GLDevice, "run", half)
+    errors = differences(MIXED[:4], {"gpu": devices["gpu"]}, tmp_path, mixed=True)
+    assert any("nan instead of" in error for error in errors)
+
+
 @pytest.mark.parametrize("fault", MIXED_FAULTS)
 def test_planted_faults_of_a_gpu_are_found(monkeypatch, devices, fault, tmp_path):
     monkeypatch.setattr(*MIXED_FAULTS[fault])
-    assert differences(MIXED[:20], {"gpu": devices["gpu"]}, tmp_path, mixed=True)
+    assert any(differences([seed], {"gpu": devices["gpu"]}, tmp_path, mixed=True) for seed in range(60))
 
 
 @pytest.mark.parametrize("value", [np.nan, np.inf, 0.6 / 255])
