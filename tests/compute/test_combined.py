@@ -96,6 +96,19 @@ def test_all_that_is_exposed_is_left_out(device, mode, kind, index, position):
     check(device, footage(rng, **kind), moment, index)
 
 
+@pytest.mark.parametrize("follows", [False, True])
+def test_the_shown_frame_may_be_left_out(device, follows):
+    """Played in reverse, a filmed frame begins with its last in-between frame, which the clip's end does not have."""
+    rng = np.random.default_rng(6)
+    moment = combining(rng, MODES["threshold"], shapes=(), edges="shorten", step=4)
+    if follows:
+        shifts = np.arange(20)[:, None] * (0.7 - 0.3j)
+        moment = dataclasses.replace(moment, following=Following(0, np.ones((20, 1), complex), shifts))
+    source = footage(rng)
+    source.frames[..., :3] //= 2
+    check(device, source, moment, 19, -1)
+
+
 def test_a_long_median_of_any_light(device):
     """More iterations than a software renderer has."""
     rng = np.random.default_rng(8)
