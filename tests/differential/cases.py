@@ -107,7 +107,10 @@ def make(seed: int, mixed: bool = False) -> Case:
         if follows(recipe) or "plate_reach" in recipe:
             reach = 4 * recipe["window"] + recipe.get("plate_reach", 0)
             clear = [f for f in clear if all(is_clear[g] for g in range(f - reach, f + reach + 1))]
-        frame = int(rng.choice(clear))
+        if clear:
+            frame = int(rng.choice(clear))
+        else:
+            del recipe["time"]
     uncovered = recipe["light"] == "linear"
     stored = random_footage(rng, kind, (count, height, width), uncovered)
     direction = -1 if rng.random() < 0.25 else 1
