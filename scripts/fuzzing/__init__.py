@@ -9,5 +9,6 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[2]
 WRITTEN = ("out", "cache")
 
-# For the tests' makers of footage, edits and recipes, and their comparison of a device with the reference.
-sys.path += [str(ROOT / folder) for folder in (".", "tests/media", "tests/blender", "tests/compute")]
+# For the tests' makers of footage, edits and recipes, and their comparisons of a device with the references.
+TESTS = "tests", "tests/media", "tests/blender", "tests/compute", "tests/differential"
+sys.path += [str(ROOT / folder) for folder in (".", *TESTS)]

@@ -1,5 +1,5 @@
-"""Recipes: valid ones of all features, with values, structure and bytes made wrong; rendered, and composed by both
-devices."""
+"""Recipes: valid ones of all features, and of every field with every other, with values, structure and bytes made
+wrong; rendered, and composed by both devices."""
 
 import json
 import sys
@@ -30,14 +30,21 @@ def plausible(random, longest: int) -> dict:
 
 
 def make(random, folder):
+    import cases
     from support import write_frames
 
     write_frames(folder / "in", np.random.default_rng(0).integers(0, 256, (4, *SIZE[::-1], 3), dtype=np.uint8))
     hostile.outside(folder)
-    data = plausible(random, random.choice((4, 16, 256)))
+    plan = {"footage": random.choice(FOOTAGE), "direction": random.choice((1, -1))}
+    if random.random() < 0.5:
+        plan["seed"] = random.getrandbits(31)
+        case = cases.make(plan["seed"], mixed=True)
+        cases.write_mattes(case, folder)
+        data = json.loads(case.recipe)
+    else:
+        data = plausible(random, random.choice((4, 16, 256)))
     text = hostile.as_json(hostile.spoiled(random, data, random.choice((0, 0, 1, 1, 1, 2, 5))))
     (folder / "recipe.json").write_bytes(hostile.damaged(random, text) if random.random() < 0.1 else text)
-    plan = {"footage": random.choice(FOOTAGE), "direction": random.choice((1, -1))}
     (folder / "plan.json").write_text(json.dumps(plan))
 
 
@@ -49,7 +56,10 @@ def run(folder):
         if recipe_file.parse(recipe_file.dump(found)) != found:
             raise trial.Fault("a recipe does not come back as it was")
         render(folder, 0)
-        compose(found, json.loads((folder / "plan.json").read_text()), folder)
+        plan = json.loads((folder / "plan.json").read_text())
+        compose(found, plan, folder)
+        if "seed" in plan:
+            compose_mixed(found, plan["seed"], folder / "out")
         return
     render(folder, 2)
 
@@ -134,3 +144,19 @@ def compose(found, plan: dict, folder):
                 raise trial.Fault(f"{name} differs from the reference: {plan['footage']}, frame {frame:g}") from None
             if not np.array_equal(once, again):
                 raise trial.Fault(f"{name} gives another picture for the same recipe at frame {frame:g}")
+
+
+def compose_mixed(found, seed: int, folder):
+    """A recipe of every field with every other, unless values are others now, with all that a render makes of it."""
+    import cases
+    import compare
+
+    from shutter_addon.core.recipes import recipe_file
+
+    case = cases.make(seed, mixed=True)
+    if found != recipe_file.parse(case.recipe):
+        return
+    try:
+        compare.check_mixed(case, compare.open_devices(["cpu", "gpu"]), folder)
+    except compare.DifferenceError as error:
+        raise trial.Fault(str(error)) from None

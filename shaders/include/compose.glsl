@@ -218,7 +218,11 @@ int layer_of(int frame) {
 #elif COMBINE
 void expose(int quad, int frame, vec4 weight) {
 #if EDGES == 2  // shorten
+#  if COMBINE == 3
+  centre[quad] += scan == 0 ? weight * (float(frame) + 0.5) : vec4(0.0);
+#  else
   centre[quad] += weight * (float(frame) + 0.5);
+#  endif
   int index = origin + direction * frame;
   weight = index >= 0 && index < count ? weight : vec4(0.0);
 #endif
@@ -233,7 +237,8 @@ void expose(int quad, int frame, vec4 weight) {
 #if THRESHOLD
   for (int pixel = 0; pixel < 4; pixel++) {
     vec4 light = frame_light(pixel_at(quad, pixel), layer);
-    fold(quad, pixel, light, frame == shown ? 1.0 : weight[pixel] * passed(light));
+    fold(quad, pixel, light, weight[pixel] * passed(light));
+    fold(quad, pixel, light, frame == shown ? 1.0 : 0.0);
   }
 #else
   fold(quad, 0, frame_light(pixel_at(quad, 0), layer), weight.x);

@@ -10,7 +10,7 @@ import numpy as np
 
 from ..core.frames.frame_source import FrameSource
 from ..core.model.combining import AVERAGE, Combine
-from ..core.model.frame_state import Following, FrameState, Options
+from ..core.model.frame_state import Following, FrameState
 from ..core.pixels import compositor
 from ..core.pixels.shown_levels import Display
 from ..devices.device import Device, NoDeviceError, Texture
@@ -113,15 +113,18 @@ def _from_frames(
         kind=window.kind if not summed else "",
         opaque=source.alpha == "opaque",
     )
-    given |= _threshold(combine, options)
+    given |= _threshold(combine, request, window.shot)
     return composition(way, -(-len(state.bars) // 4), stored, edges, light), given
 
 
-def _threshold(combine: Combine, options: Options) -> dict[str, Any]:
+def _threshold(combine: Combine, request: Request, shot: range) -> dict[str, Any]:
     """The arguments of passes with a threshold."""
     if combine.threshold is None:
         return {}
-    return {"threshold": (combine.threshold, max(combine.softness, 1e-6) / 2), "shown": options.before}
+    options = request.state.options
+    is_there = compositor.window_indices(options, request.index, shot, request.direction)[options.before] >= 0
+    half = max(combine.softness, 1e-6) / 2
+    return {"threshold": (combine.threshold, half), "shown": options.before if is_there else -1}
 
 
 def _in_window(state: FrameState, chosen: tuple[int, ...]) -> FrameState:
@@ -397,7 +400,7 @@ class GPUCompositor:
         light = LightFormat(
             decode, alpha == "premultiplied", options.light == "encoded", request.levels, combine=combine
         )
-        given |= _threshold(combine, options)
+        given |= _threshold(combine, request, window.shot)
         for held, stack in window.stacks():
             before, after = held.start > 0, held.stop < window.capacity
             inside = (slots >= held.start) & (slots < held.stop)

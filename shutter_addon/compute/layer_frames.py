@@ -81,15 +81,23 @@ class WeightedFrames:
     source: the frames; opaque 8-bit ones become halves, all others float32
     weight: gives the weights (H, W) float32, 0 to 1, of a frame
     rest: whether the weights are what layers leave: then running sums hold what these take
-    alone: the weights themselves, as alpha, without any colour
+    alone: the weights themselves, as alpha; colored: with the frames' colours, as a threshold asks for them
     is_summable: whether running sums can be made of them (weighted_window.WeightedSums)
     """
 
     alpha, transfer = "premultiplied", "linear"
     is_made = True  # of frames that are kept (RecentFrames)
 
-    def __init__(self, source: Any, weight: Callable[[int], np.ndarray], *, rest: bool = False, alone: bool = False):
-        self.base, self.weight, self.rest, self.alone = source, weight, rest, alone
+    def __init__(
+        self,
+        source: Any,
+        weight: Callable[[int], np.ndarray],
+        *,
+        rest: bool = False,
+        alone: bool = False,
+        colored: bool = False,
+    ):
+        self.base, self.weight, self.rest, self.alone, self.colored = source, weight, rest, alone, colored
         is_short = np.dtype(source.dtype) == np.uint8 and source.alpha == "opaque"
         self.is_summable, self.dtype = is_short and not alone, np.dtype(np.float16 if is_short else np.float32)
 
@@ -98,11 +106,14 @@ class WeightedFrames:
 
     def read(self, index: int) -> np.ndarray:
         weight = self.weight(index)
+        if self.alone and not self.colored:
+            seen = np.zeros((*weight.shape, 4), self.dtype)
+        else:
+            seen = linear(self.base.read(index), self.base) * weight[..., None]
         if self.alone:
-            result = np.zeros((*weight.shape, 4), self.dtype)
-            result[..., 3] = weight
-            return result
-        return (linear(self.base.read(index), self.base) * weight[..., None]).astype(self.dtype)
+            seen[..., :3] = light.straight(seen)[..., :3] * weight[..., None]
+            seen[..., 3] = weight
+        return seen.astype(self.dtype)
 
     decoded = read
 

@@ -155,14 +155,14 @@ class LayeredRenderer:
     def _window(self, name: tuple[int, bool], part: Request, shutters: int) -> Any:
         (layer, alone), moved, options = name, part.state.following is not None, part.state.options
         summed = part.state.averages
-        key = layer, alone, moved, options.window, summed, self._colors.changes(layer)
+        has_threshold = any(combine.threshold is not None for combine in part.state.combines)
+        key = layer, alone, moved, options.window, summed, has_threshold, self._colors.changes(layer)
         window = self._windows.get(key)
         if window is None or not window.is_open:
             for other in [other for other in self._windows if other[:2] == name]:
                 self._windows.pop(other).release()
-            weighted = WeightedFrames(
-                self._colors.frames(layer), self._colors.weights(layer), rest=layer < 0, alone=alone
-            )
+            frames, weights = self._colors.frames(layer), self._colors.weights(layer)
+            weighted = WeightedFrames(frames, weights, rest=layer < 0, alone=alone, colored=has_threshold)
             window = self._windows[key] = self._compositor.window(weighted, options.window, moved, shutters, summed)
         return window
 
@@ -215,9 +215,12 @@ class LayeredRenderer:
         )
         picture[..., :3] *= gain()[..., None]
         if (self._kinds == plates.FILLED).any():
-            around = self._laying.around(bottom)
-            known = self._kinds != plates.FILLED
-            picture = plates.filled(np.where((self._kinds == plates.OPEN)[..., None], around, picture), known)
+            around, is_open = self._laying.around(bottom), self._kinds == plates.OPEN
+            # Of what a layer hides altogether, there is nothing to go on from.
+            known = np.where(is_open, self._laying.shares(bottom) >= layering.CLEAR, self._kinds == plates.TAKEN)
+            picture = plates.filled(np.where(is_open[..., None], around, picture), known)
+        if self._source.alpha == "opaque":
+            picture[..., 3] = 1  # even if nothing is known
         return self._laying.plate(picture)
 
     def _lacks(self, exposed: list[Exposure], least: float) -> np.ndarray | None:

@@ -86,12 +86,27 @@ def test_ends_of_the_clip(device, edges, mode, index):
 
 @pytest.mark.parametrize("mode", FEW)
 @pytest.mark.parametrize("kind", [{}, {"alpha": "straight"}], ids=["opaque", "straight"])
-def test_all_that_is_exposed_is_left_out(device, mode, kind):
-    """Open ahead of the shown frame alone, at the clip's last one: the nearest frame is seen."""
+@pytest.mark.parametrize(("index", "position"), [(19, "start"), (0, "end")])
+def test_all_that_is_exposed_is_left_out(device, mode, kind, index, position):
+    """Open ahead of the shown frame alone, at the clip's last one, or behind it, at the first: the nearest is seen."""
     rng = np.random.default_rng(6)
-    moment = combining(rng, MODES[mode], shapes=(), edges="shorten")
-    moment.bars[:, :3] = 0
-    check(device, footage(rng, **kind), moment, 19)
+    moment = combining(rng, MODES[mode], shapes=(), edges="shorten", position=position)
+    moment.bars[:, slice(0, 3) if index else slice(-3, None)] = 0
+    moment.bars[:, 4] += 0.1
+    check(device, footage(rng, **kind), moment, index)
+
+
+@pytest.mark.parametrize("follows", [False, True])
+def test_the_shown_frame_may_be_left_out(device, follows):
+    """Played in reverse, a filmed frame begins with its last in-between frame, which the clip's end does not have."""
+    rng = np.random.default_rng(6)
+    moment = combining(rng, MODES["threshold"], shapes=(), edges="shorten", step=4)
+    if follows:
+        shifts = np.arange(20)[:, None] * (0.7 - 0.3j)
+        moment = dataclasses.replace(moment, following=Following(0, np.ones((20, 1), complex), shifts))
+    source = footage(rng)
+    source.frames[..., :3] //= 2
+    check(device, source, moment, 19, -1)
 
 
 def test_a_long_median_of_any_light(device):
@@ -101,11 +116,14 @@ def test_a_long_median_of_any_light(device):
     check(device, source, combining(rng, *[MEDIAN] * 3, window=220), 1)
 
 
-@pytest.mark.parametrize("mode", ["lightest", "darkest", "by luminance"])
-def test_light_below_black(device, mode):
+@pytest.mark.parametrize(
+    ("mode", "first"), [("lightest", 0), ("darkest", 0), ("by luminance", 0), ("threshold", 2), ("dark threshold", 2)]
+)
+def test_light_below_black(device, mode, first):
+    """With a threshold, blue alone: what is shown may be below what leaves a trail."""
     rng = np.random.default_rng(10)
     source = footage(rng, dtype=np.float32, transfer="linear")
-    source.frames[..., :3] -= 5
+    source.frames[..., first:3] -= 5
     picture, expected = composed(device, source, combining(rng, MODES[mode], shapes=()), 2)
     assert expected.min() < -0.03
     np.testing.assert_allclose(picture, expected, atol=1e-4)

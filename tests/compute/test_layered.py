@@ -13,6 +13,7 @@ from shutter_addon.compute.gpu import GPUCompositor
 from shutter_addon.compute.renderer import Renderer, open_compositor, open_gl
 from shutter_addon.compute.request import Request
 from shutter_addon.core.frames import light
+from shutter_addon.core.model.combining import Combine
 from shutter_addon.core.model.frame_state import Following, FrameState, Layers, Options
 from shutter_addon.core.model.mattes import FileFrame, Matte
 from shutter_addon.core.model.scribbles import Shape
@@ -333,6 +334,40 @@ def test_nothing_clear_within_reach_is_filled_smoothly(device):  # noqa: F811
     behind = (0.05 * source.linear()[SHOWN] + (layering.CLEAR - 0.05) * around) / layering.CLEAR
     expected = np.where(matte[SHOWN][..., None] > 0, 0.95 * source.linear()[SHOWN] + 0.05 * behind, around)
     assert_near(picture, expected)
+
+
+def test_what_is_hidden_altogether_is_nothing_to_fill_from(device):  # noqa: F811
+    rng = np.random.default_rng(10)
+    source = footage(rng, COUNT, SIZE)
+    source.frames[:] = [200, 100, 50, 255]
+    matte = np.zeros((COUNT, *SIZE[::-1]))
+    matte[:, 5:15, 5:20] = 0.95
+    matte[:, 7:13, 7:18] = 1
+    source.frames[matte > 0] = [0, 0, 255, 255]
+    options = Options(4, plate_reach=3, decontaminate=False)
+    moment, _ = with_layers(FrameState(options, np.ones((3, 4))), matte)
+    _, picture = drawn(device, source, moment)
+    around, own, share = source.linear()[0, 0, 0], source.linear()[SHOWN], matte[SHOWN][..., None]
+    behind = (0.05 * own + (layering.CLEAR - 0.05) * around) / layering.CLEAR
+    assert_near(picture, np.where(share > 0, share * own + (1 - share) * behind, around))
+    covered, _ = with_layers(FrameState(options, np.ones((3, 4))), np.full_like(matte, 0.97))
+    _, picture = drawn(device, source, covered)
+    np.testing.assert_allclose(picture[..., 3], 1, atol=1e-6)  # of opaque footage, even if nothing is known
+
+
+def test_a_threshold_tells_how_much_a_layer_covers(device):  # noqa: F811
+    rng, mattes = np.random.default_rng(3), [discs(0.5)]
+    source = footage(rng, COUNT, SIZE, alpha="straight")
+    moment, _ = with_layers(drawn_state(rng, window=6), *mattes)
+    moment = dataclasses.replace(moment, combines=(Combine.of("darkest", threshold=0.3, softness=0.2),) * 3)
+    renderer, picture = drawn(device, source, moment)
+    indices = compositor.window_indices(moment.options, SHOWN, range(COUNT))
+    c = renderer.coefficients(Request(SHOWN, plain(moment))).astype(np.float64)
+    of_frames = np.stack([each[indices] for each in mattes])
+    expected = layering.compose(moment, source.linear()[indices], indices >= 0, c / c.sum(axis=0), of_frames)
+    seen = np.ones(SIZE[::-1], bool) if renderer.holes is None else renderer.holes == 0
+    assert seen.mean() > 0.5
+    assert_near(picture, expected, seen)
 
 
 def test_a_plate_is_laid_by_the_cameras_motion(device):  # noqa: F811

@@ -76,8 +76,9 @@ class Case:
         return {path: matte.astype(float) / scales[path] for path, matte in self.mattes.items()}
 
 
-def make(seed: int) -> Case:
-    """The case of a seed."""
+def make(seed: int, mixed: bool = False) -> Case:
+    """The case of a seed. mixed: its recipe has every field with every other, of some of which the reference knows
+    nothing."""
     rng = np.random.default_rng(seed)
     kind = KINDS[seed % len(KINDS)]
     sizes = EVEN if kind.codec else SIZES
@@ -91,10 +92,13 @@ def make(seed: int) -> Case:
     mattes = add_mattes(np.random.default_rng([seed, 2]), recipe, (count, height, width))
     add_layers(np.random.default_rng([seed, 3]), recipe)
     add_outlines(np.random.default_rng([seed, 4]), recipe, count)
-    add_combining(np.random.default_rng([seed, 5]), recipe, count)
+    add_combining(np.random.default_rng([seed, 5]), recipe, count, mixed)
     # A trail that is longer than the clip slides after it has its length: of that, this is no reference.
-    if np.random.default_rng([seed, 6]).random() < 0.25 and not any("trail" in each for each in recipe["shutters"]):
+    slides = mixed or not any("trail" in each for each in recipe["shutters"])
+    if np.random.default_rng([seed, 6]).random() < 0.25 and slides:
         recipe["edges"] = "slide"
+    if mixed:
+        add_others(np.random.default_rng([seed, 7]), recipe, count)
     if "time" in recipe:
         # Halfway between two source frames nobody can tell which is shown.
         last = max(count, int(recipe["time"][-1]["frame"]))
@@ -103,10 +107,15 @@ def make(seed: int) -> Case:
         if follows(recipe) or "plate_reach" in recipe:
             reach = 4 * recipe["window"] + recipe.get("plate_reach", 0)
             clear = [f for f in clear if all(is_clear[g] for g in range(f - reach, f + reach + 1))]
-        frame = int(rng.choice(clear))
+        if clear:
+            frame = int(rng.choice(clear))
+        else:
+            del recipe["time"]
     uncovered = recipe["light"] == "linear"
     stored = random_footage(rng, kind, (count, height, width), uncovered)
     direction = -1 if rng.random() < 0.25 else 1
+    if mixed and kind.samples.startswith("uint") and rng.random() < 0.3:
+        stored[int(rng.integers(count)) :, ..., :3] //= 8  # a cut
     return Case(seed, json.dumps(recipe, indent=1), frame, kind, stored, int(rng.integers(count)), direction, mattes)
 
 
@@ -189,9 +198,10 @@ def add_outlines(rng, recipe: dict, count: int) -> None:
         choose(rng, *recipe["shutters"]).update(follow="O")
 
 
-def add_combining(rng, recipe: dict, count: int) -> None:
-    """Shutters that make something else than an average of their frames, where none follows and there are no layers."""
-    if follows(recipe) or "plate_reach" in recipe or rng.random() < 0.1:
+def add_combining(rng, recipe: dict, count: int, mixed: bool) -> None:
+    """Shutters that make something else than an average of their frames, where none follows and there are no layers, or
+    in mixed recipes."""
+    if (not mixed and (follows(recipe) or "plate_reach" in recipe)) or rng.random() < (0.35 if mixed else 0.1):
         return
     for shutter in recipe["shutters"]:
         if (way := choose(rng, "average", "lightest", "darkest", "median")) == "average":
@@ -204,6 +214,32 @@ def add_combining(rng, recipe: dict, count: int) -> None:
         if rng.random() < 0.8:
             shutter["threshold"] = choose(rng, round(rng.random(), 3), random_numbers(rng, count, 1))
             shutter["softness"] = choose(rng, 0.0, round(rng.uniform(0.05, 0.5), 3), 0.2)
+
+
+def add_others(rng, recipe: dict, count: int) -> None:
+    """What the reference knows nothing of: how motion is followed, lengths on the timeline, opacities of scribbles,
+    equal names, in-between frames, colours of edges."""
+
+    def share():
+        return choose(rng, 1, 0, round(rng.random(), 3), random_numbers(rng, count, 1))
+
+    for shutter in recipe["shutters"]:
+        if "follow" in shutter:
+            shutter["follow_motion"] = choose(rng, "location", "rotation", "scale")
+            shutter["follow_smooth"] = int(choose(rng, 0, 0, 1, 3))
+        if "trail" not in shutter:
+            shutter["length"] = choose(rng, "bars", "bars", "timeline")
+    if "camera" in recipe:
+        recipe["camera_influence"] = share()
+    followed = {shutter.get("follow") for shutter in recipe["shutters"]}
+    for region in recipe["regions"]:
+        if region["kind"] in ("line", "lasso"):
+            region["opacity"] = share()
+        if region["name"] not in followed and rng.random() < 0.5:
+            region["name"] = choose(rng, "", "same")
+    recipe["inbetween"] = int(choose(rng, 1, 1, 1, 2, 4))
+    if "decontaminate" in recipe:
+        recipe["decontaminate"] = choose(rng, False, True)
 
 
 def random_matte(rng, number: int, shape) -> tuple[str, np.ndarray]:
@@ -367,13 +403,17 @@ def random_footage(rng, kind: Kind, shape, uncovered: bool) -> np.ndarray:
     return np.rint(stored.clip(0, 1) * np.iinfo(kind.samples).max).astype(kind.samples)
 
 
-def write(case: Case, folder):
-    """Writes the case's footage and mattes into a folder; the movie, or the first file of the images."""
+def write_mattes(case: Case, folder):
     for path, matte in case.mattes.items():
         first = folder / path
         first.parent.mkdir(parents=True)
         for i, frame in enumerate(matte, start=1):
             write_image(first.with_stem(f"{i:04d}"), frame)
+
+
+def write(case: Case, folder):
+    """Writes the case's footage and mattes into a folder; the movie, or the first file of the images."""
+    write_mattes(case, folder)
     if case.kind.codec:
         return write_movie(case, folder / case.kind.name)
     for i, frame in enumerate(case.stored, start=1):

@@ -1,11 +1,14 @@
 """Compares the product with the reference, one random case after the other:
 
-    .venv/bin/python tests/differential/compare.py SEED … [--ways cpu,gpu,blender,film] [--output DIR]
+    .venv/bin/python tests/differential/compare.py SEED … [--ways cpu,gpu,blender,film] [--mixed] [--output DIR]
 
 A picture may be 0.5/255 off, coefficients 1/255. How far a picture is off is the most of any channel of any pixel: in
 scene-linear light, or in the codes that a viewer sees (sRGB), whichever is more, both premultiplied; light above 1 in
 proportion. Coefficients are judged by themselves, against exact ones. For pictures the reference has the product's:
 their tolerance alone moves a picture by more than its own, where shutters that are far apart in time meet in noise.
+
+--mixed: recipes that have every field with every other. What the reference knows nothing of is compared with NumPy's
+picture, see check_mixed. A seed may be a range: 1000:2000.
 """
 
 import argparse
@@ -13,6 +16,9 @@ import json
 import subprocess
 import sys
 import tempfile
+import traceback
+from contextlib import contextmanager
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
@@ -22,16 +28,13 @@ from OpenImageIO import ImageBuf
 from reference import (
     coefficients,
     has_strokes,
-    labels_at,
     laid,
     layer_mattes,
     layers_at,
     number_at,
     picture,
-    showing,
     shown,
     solved,
-    time_at,
     to_encoded,
 )
 
@@ -46,7 +49,10 @@ class DifferenceError(AssertionError):
 
 
 def open_devices(names) -> dict:
-    """Compositors by name: "cpu" (NumPy), "gpu" (moderngl), "blender" (its own GPU, without a window)."""
+    """Compositors by name: "cpu" (NumPy), "gpu" (moderngl), "blender" (its own GPU, without a window). What passes
+    leave unwritten is seen."""
+    from unwritten import filled
+
     from shutter_addon.compute.gpu import GPUCompositor
     from shutter_addon.compute.renderer import open_compositor
 
@@ -58,6 +64,9 @@ def open_devices(names) -> dict:
         from shutter_addon.blender.devices.blender_gpu import BlenderDevice
 
         devices["blender"] = GPUCompositor(BlenderDevice())
+    for compositor in devices.values():
+        if isinstance(compositor, GPUCompositor):
+            filled(compositor.device)
     return devices
 
 
@@ -65,31 +74,19 @@ def check(case: Case, devices: dict, folder: Path) -> dict:
     """How far each device is off, as {device: (picture, coefficients)}. DifferenceError: too far; what differs is left
     in the folder."""
     from shutter_addon.compute.renderer import Renderer
-    from shutter_addon.compute.request import Request
-    from shutter_addon.core.pixels import compositor, following, layering
-    from shutter_addon.core.recipes import recipe_file
     from shutter_addon.media import open_source
     from shutter_addon.media.matte_values import MatteValues
 
-    recipe, parsed, found = json.loads(case.recipe), recipe_file.parse(case.recipe), {}
+    recipe, found = json.loads(case.recipe), {}
     with tempfile.TemporaryDirectory() as files, open_source(write(case, Path(files))) as source:
-        footage = case.footage(samples_of(case, source))
-        index, direction = case.index, case.direction
-        if parsed.time:
-            index, direction = shown(recipe, case.frame, source.count)
-            if abs(parsed.time_at(case.frame) - time_at(recipe, case.frame)) > 1e-9:
-                raise DifferenceError(f"{told(case)}: another source time")
-        shows = showing(recipe, case.frame, index, direction, source.count)
-        effect = parsed.effect(source.width / source.height, partial(matte_file, Path(files), source))
-        trails = any(shutter.trail for shutter in effect.shutters)
-        state = compositor.slid(effect.at(case.frame), index, direction, range(source.count), whole=trails)
-        state = following.followed(effect, state, following.Shown(case.frame, index, direction), source, shows)
-        state = layering.layered(effect, state, following.Shown(case.frame, index, direction), source, shows)
+        footage, asked = case.footage(samples_of(case, source)), asked_of(case, source, Path(files))
+        index, direction = shown(recipe, case.frame, source.count) if "time" in recipe else (case.index, case.direction)
+        if (index, direction) != (asked.index, asked.direction):
+            raise DifferenceError(f"{told(case)}: another source time")
         exact = exact_coefficients(case, source, footage, index)
         layers = exact_layers(case, source, footage, index, direction)
         for name, device in devices.items():
             renderer = Renderer(device, source, MatteValues(source.width, source.height))
-            asked = Request(index, state, direction)
             made, mix = renderer.picture(asked), renderer.coefficients(asked)
             own = {frame: renderer.layer_mattes(asked, frame) for frame in layers}
             with device.current():
@@ -100,6 +97,180 @@ def check(case: Case, devices: dict, folder: Path) -> dict:
                 ours, right = (np.stack(mattes, axis=-1) for mattes in (own[frame], values))
                 within(LAYERS, np.abs(ours - right), case, f"{name}-layers", folder, ours, right)
     return found
+
+
+def is_referable(case: Case) -> bool:
+    """Whether the reference knows all that the recipe has: it has no in-between frames, and no estimate of colours."""
+    recipe = json.loads(case.recipe)
+    return recipe.get("inbetween", 1) == 1 and not ("plate_reach" in recipe and recipe["decontaminate"])
+
+
+# Wherever rounding decides: a threshold that is not soft, which of two frames is as light, whether anything is left of
+# a shutter, or enough of what lies behind layers. There NumPy's own picture changes by more than half of PICTURE as a
+# threshold, bars, coefficients, light and opacities change by what is nothing of them.
+NUDGE, NUDGES = 2e-6, 16
+THRESHOLD = 2e-5
+# What running sums lose of a layer's share, which decides whether what lies behind is looked for; and steps of the
+# square root of light that is followed (shaders/include/packed.glsl).
+SHARES = 2e-4
+PACKED = 1 / 2047, 1 / 2047, 1 / 1023
+TIES = 0.05  # of a picture's pixels, at most
+
+
+def check_mixed(case: Case, devices: dict, folder: Path) -> dict:
+    """As `check`, of any recipe, and of levels: a GPU's picture against NumPy's of the same coefficients, and these and
+    mattes against NumPy's own. Pixels that tie (NUDGE) are left out, few as they are."""
+    from shutter_addon.compute.cpu import CPUCompositor
+    from shutter_addon.compute.renderer import Renderer
+    from shutter_addon.media import open_source
+    from shutter_addon.media.cuts import ShotSource
+    from shutter_addon.media.matte_values import MatteValues
+
+    found = check(case, devices, folder) if is_referable(case) else {}
+    step = json.loads(case.recipe).get("inbetween", 1)
+    with tempfile.TemporaryDirectory() as files, ShotSource(open_source(write(case, Path(files))), step) as source:
+        asked = asked_of(case, source, Path(files))
+
+        @contextmanager
+        def rendering(compositor):
+            renderer = Renderer(compositor, source, MatteValues.of(source))
+            try:
+                yield renderer
+            finally:
+                renderer.release()
+
+        with rendering(CPUCompositor()) as host:
+            picture, exact = host.picture(asked), np.moveaxis(host.coefficients(asked), 0, -1).copy()
+            layers = layers_of(host, asked)
+        if not np.isfinite(picture).all():
+            raise DifferenceError(f"{told(case)}: NumPy's picture has what is no number")
+        for name, device in devices.items():
+            if name == "cpu":
+                continue
+            with rendering(device) as renderer:
+                made, mix = renderer.picture(asked), renderer.coefficients(asked).copy()
+                levels, own = renderer.picture(replace(asked, levels=True)).copy(), layers_of(renderer, asked)
+            right = lent_picture(device, rendering, asked)
+            stepped = np.abs(levels.astype(int) - CPUCompositor().over_black(right)).max(axis=-1) > 1
+            differs, doubtful = (
+                stepped | ~(light_apart(made, right).max(axis=-1) <= PICTURE),
+                np.zeros(stepped.shape, bool),
+            )
+            for seed, other in enumerate(nudged(asked)) if differs.any() else ():
+                doubtful |= light_apart(lent_picture(device, rendering, other, seed), right).max(axis=-1) > PICTURE / 2
+            doubtful &= differs & np.isfinite(made).all(axis=-1)
+            if doubtful.mean() > TIES:
+                raise DifferenceError(f"{told(case)}: {name}: {doubtful.mean():.0%} of the pixels tie")
+            made, stepped = np.where(doubtful[..., None], right, made), stepped & ~doubtful
+            mix = np.moveaxis(mix, 0, -1)
+            found[name] = (
+                within(PICTURE, light_apart(made, right), case, f"{name}-picture", folder, made, right),
+                within(COEFFICIENTS, np.abs(mix - exact), case, f"{name}-coefficients", folder, mix, exact),
+            )
+            within(0, stepped[..., None].astype(float), case, f"{name}-levels", folder, made, right)
+            within(LAYERS, np.abs(own - layers), case, f"{name}-layers", folder, own, layers)
+    return found
+
+
+def layers_of(renderer, asked) -> np.ndarray:
+    """The mattes (H, W, n) of the layers in the shown frame; none: black."""
+    mattes = renderer.layer_mattes(asked)
+    return np.stack(mattes, axis=-1) if mattes else np.zeros((1, 1, 1))
+
+
+def lent_picture(device, rendering, asked, nudge: int | None = None) -> np.ndarray:
+    """NumPy's picture of the coefficients that another device has for the same labels; nudge: from a seed, a little."""
+    from shutter_addon.compute import cpu
+
+    random = None if nudge is None else np.random.default_rng(nudge)
+
+    class Solver(cpu.Solver):
+        def __init__(self):
+            self._own = device.solver()
+
+        def solve(self, labels, count, *guide, **_how):
+            with device.current():
+                found = np.array(device.coefficients(self._own.solve(labels, count, *guide), count))
+            if random is not None:
+                found += random.random(found.shape, np.float32) * NUDGE
+            return found
+
+        def release(self):
+            with device.freeing():
+                self._own.release()
+
+    class Window(cpu.HostWindow):
+        def seen(self, *given):
+            frames, moved = super().seen(*given)
+            if random is not None:
+                frames = [nudged_light(frame, asked, self.source, random) for frame in frames]
+            return frames, moved
+
+    class Lent(cpu.CPUCompositor):
+        def solver(self):
+            return Solver()
+
+        def window(self, source, *_size):
+            return Window(source)
+
+    with rendering(Lent()) as renderer:
+        return renderer.picture(asked)
+
+
+def nudged_light(frame, asked, source, random):
+    """A frame (H, W, 4) of linear light, with what a device may lose of it."""
+    noise = random.uniform(-1, 1, frame[..., :3].shape)
+    is_packed = asked.state.following is not None and source.dtype == np.uint8 and source.alpha == "opaque"
+    found, nudged_ = frame.copy(), frame[..., :3] * (1 + NUDGE * noise)
+    if is_packed and asked.state.options.light == "linear":
+        nudged_ = (np.sqrt(np.maximum(nudged_, 0)) + noise * PACKED) ** 2
+    found[..., :3] = nudged_
+    return found
+
+
+def nudged(asked):
+    """Requests for almost the same picture."""
+    for seed in range(NUDGES):
+        state, way = asked.state, (-1) ** seed
+        bars = state.bars * (1 + NUDGE * np.random.default_rng(seed).normal(size=state.bars.shape))
+        combines = tuple(
+            each if each.threshold is None else replace(each, threshold=each.threshold + way * THRESHOLD)
+            for each in state.combines
+        )
+        layers = state.layers
+        if layers is not None:
+            layers = replace(layers, opacities=tuple(opacity * (1 + way * SHARES) for opacity in layers.opacities))
+        yield replace(asked, state=replace(state, bars=bars, combines=combines, layers=layers))
+
+
+def asked_of(case: Case, source, folder: Path):
+    """The Request for the case's frame, as a render session makes it."""
+    from shutter_addon.compute.request import Request
+    from shutter_addon.core.frames.retiming import nearest
+    from shutter_addon.core.pixels import compositor, following, layering, timeline_exposure
+    from shutter_addon.core.recipes import recipe_file
+
+    effect = recipe_file.parse(case.recipe).effect(source.width / source.height, partial(matte_file, folder, source))
+    last, index, direction = source.count - 1, case.index, case.direction
+
+    def place(frame: float) -> float:
+        if effect.time is None:
+            return min(max(case.index + case.direction * source.step * (frame - case.frame), 0), last)
+        return (effect.time.at(frame)[0] - 1) * source.step
+
+    def shows(frame: float) -> int:
+        return nearest(place(frame) / source.step, source.step, source.count)
+
+    ends = (0, last)
+    if effect.time is not None:
+        index, direction = shows(case.frame), -1 if effect.time.at(case.frame)[1] else 1
+        ends = (-np.inf, np.inf)
+    at = following.Shown(case.frame, index, direction)
+    state = timeline_exposure.exposed(effect, effect.at(case.frame), at, place, ends)
+    trails = any(shutter.trail for shutter in effect.shutters)
+    state = compositor.slid(state, index, direction, range(source.count), whole=trails)
+    state = following.followed(effect, state, at, source, shows)
+    return Request(index, layering.layered(effect, state, at, source, shows), direction)
 
 
 def exact_layers(case: Case, source, footage, index: int, direction: int) -> dict:
@@ -138,14 +309,14 @@ def exact_coefficients(case: Case, source, footage, index: int) -> np.ndarray:
 
     from shutter_addon.compute.guide import Guides, guiding
 
-    recipe, size = json.loads(case.recipe), (source.width, source.height)
-    strength = number_at(recipe.get("edge_aware", 0), case.frame)
-    if strength:
-        labels = labels_at(recipe, case.frame, *size) + 1
+    recipe, size, solve = json.loads(case.recipe), (source.width, source.height), None
+    if strength := number_at(recipe.get("edge_aware", 0), case.frame):
         guide = Guides(source).guide(guiding(index, 1, range(source.count)), recipe["aggregate"])
-        mix = exact_diffusion.solve(labels, len(recipe["shutters"]), guide, strength)
-    else:
-        mix = coefficients(recipe, case.frame, *size)
+
+        def solve(labels, count):
+            return exact_diffusion.solve(labels + 1, count, guide, strength)
+
+    mix = coefficients(recipe, case.frame, *size, solve)
     return laid(recipe, case.frame, index, mix, footage, case.matte_samples())
 
 
@@ -261,9 +432,15 @@ def told(case: Case) -> str:
     return f"seed {case.seed}, frame {case.frame}, {case.kind.name}"
 
 
+def seeds_of(text: str) -> range:
+    first, _, stop = text.partition(":")
+    return range(int(first), int(stop) if stop else int(first) + 1)
+
+
 def main() -> int:
     parser = argparse.ArgumentParser(description="Compares pictures and coefficients of random recipes.")
-    parser.add_argument("seeds", type=int, nargs="+", metavar="SEED")
+    parser.add_argument("seeds", type=seeds_of, nargs="+", metavar="SEED")
+    parser.add_argument("--mixed", action="store_true", help="recipes that have every field with every other")
     parser.add_argument("--ways", default="cpu,gpu", help="of cpu, gpu, blender, film (default: cpu,gpu)")
     parser.add_argument(
         "--output", type=Path, default=ROOT / "out" / "differential", metavar="DIR", help="for pictures"
@@ -271,9 +448,9 @@ def main() -> int:
     arguments = parser.parse_args()
     ways = arguments.ways.split(",")
     devices, failed = open_devices([way for way in ways if way != "film"]), False
-    for case in map(make, arguments.seeds):
+    for case in (make(seed, arguments.mixed) for seeds in arguments.seeds for seed in seeds):
         try:
-            found = check(case, devices, arguments.output)
+            found = (check_mixed if arguments.mixed else check)(case, devices, arguments.output)
             if "film" in ways and can_be_a_film(case):
                 films, errors = check_films([case], arguments.output)
                 found["film"] = films.get(case.seed)
@@ -281,7 +458,10 @@ def main() -> int:
                     raise error
             print(f"{told(case)}:", *(f"{way} {255 * p:.3f} {255 * c:.3f}" for way, (p, c) in found.items()))
         except DifferenceError as error:
-            print(error)
+            print(error, flush=True)
+            failed = True
+        except Exception:
+            print(f"{told(case)}: {traceback.format_exc()}", flush=True)
             failed = True
     return failed
 

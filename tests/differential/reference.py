@@ -199,10 +199,19 @@ def at_equal_lengths(stroke, count):
 # Scribbles and coefficients
 
 
-def labels_at(recipe, frame, width, height):
-    """Labels (h, w) of the pixels, or of the blocks that share a shutter: −1 free, otherwise the shutter's number."""
+def label_layers(recipe, frame, width, height):
+    """(share, labels) of which coefficients are the mean: of each share, what is at least that opaque holds."""
+    regions = [region for region in recipe.get("regions", []) if has_strokes(region) and not region.get("layer")]
+    steps = sorted({0.0, 1.0, *(number_at(region.get("opacity", 1), frame) for region in regions)})
+    return [(high - low, labels_at(recipe, frame, width, height, high)) for low, high in pairwise(steps)]
+
+
+def labels_at(recipe, frame, width, height, least=0.0):
+    """Labels (h, w) of the pixels, or of the blocks that share a shutter: −1 free, otherwise the shutter's number, of
+    regions that are at least so opaque."""
     names = [shutter["name"] for shutter in recipe["shutters"]]
     regions = [region for region in recipe.get("regions", []) if has_strokes(region) and not region.get("layer")]
+    regions = [region for region in regions if number_at(region.get("opacity", 1), frame) >= least]
     drawn = [(region, strokes_at(region, frame, width / height), names.index(region["shutter"])) for region in regions]
     return painted(recipe, drawn, width, height)
 
@@ -354,9 +363,11 @@ def enclosed(places, points):
     return np.rint(angle / (2 * np.pi)) != 0
 
 
-def coefficients(recipe, frame, width, height):
-    """The exact coefficients at a frame, for a picture of that size: scribbles are fixed, edges are free."""
-    return solved(labels_at(recipe, frame, width, height), len(recipe["shutters"]))
+def coefficients(recipe, frame, width, height, solve=None):
+    """The exact coefficients at a frame, for a picture of that size: scribbles are fixed, edges are free. solve: in
+    place of `solved`"""
+    layers = label_layers(recipe, frame, width, height)
+    return sum(share * (solve or solved)(labels, len(recipe["shutters"])) for share, labels in layers)
 
 
 def solved(labels, count):
@@ -434,8 +445,23 @@ def shown_times(recipe, frame, index, direction, count, more=0):
     return {source: times[min(sorted(times), key=lambda other: abs(other - source))] for source in wanted}
 
 
+def followed(recipe, shutter):
+    """As `subject`, of what a shutter follows: what of its motion counts, averaged over time."""
+    tells, smooth = subject(recipe, shutter["follow"]), shutter.get("follow_smooth", 0)
+    counts = ["location", "rotation", "scale"].index(shutter.get("follow_motion", "scale"))
+    bell = 1 + np.cos(np.pi * np.arange(-smooth, smooth + 1) / (smooth + 1))
+
+    def told(frame, aspect):
+        around = [tells(frame + k, aspect) for k in range(-smooth, smooth + 1)]
+        centre = sum(share * c for share, (c, _) in zip(bell / bell.sum(), around, strict=True))
+        x, y, rotation, scale = sum(share * p for share, (_, p) in zip(bell / bell.sum(), around, strict=True))
+        return centre, np.array([x, y, rotation if counts > 0 else 0, scale if counts > 1 else 1])
+
+    return told
+
+
 def subject(recipe, name):
-    """A function of a timeline frame that tells of what is followed its centre and its placement, and its corners."""
+    """A function of a timeline frame and the aspect that tells of what is followed its centre and its placement."""
     if name == "camera":
         keys = recipe.get("camera", [])
         return lambda frame, aspect: (aspect / 2 + 0.5j, placement(keys, frame) if keys else STILL)
@@ -477,7 +503,7 @@ def motions(recipe, frame, index, direction, count, aspect):
     def of(shutter):
         if "follow" not in shutter:
             return [(1, 0)] * len(seen)
-        tells = subject(recipe, shutter["follow"])
+        tells = followed(recipe, shutter)
         return [motion(tells, frame, times[source], aspect) for source in seen]
 
     found = [of(shutter) for shutter in recipe["shutters"]]
@@ -517,14 +543,7 @@ def trailed(recipe, shutter, bars, frame, turns, shifts, shown_time, aspect):
             width = (low + high) / 2
             low, high = (width, high) if way(*span(width)) < length else (low, width)
     start, end = span(high)
-    scale = (end - start) / (last - first)
-    edges = [start + (j - first) * scale for j in range(len(bars) + 1)]
-    spans = list(pairwise(edges))
-
-    def exposed(k):
-        return sum(bar * overlap(*own, k, k + 1) for bar, own in zip(bars, spans, strict=True)) / scale
-
-    return np.array([exposed(k) for k in range(len(bars))])
+    return stretched(bars, first, last, start, end)
 
 
 def overlap(a, b, c, d):
@@ -586,15 +605,13 @@ def into(places, count):
     return inside if high - low < count else around
 
 
-def slid(recipe, bars, index, direction, count):
-    """Each shutter's bars, moved into the clip by itself, in the window that has moved as well."""
+def slid(recipe, bars, places, there, count):
+    """Each shutter's bars, moved into the clip by itself. places: of the window; there: of that which has moved"""
     if option(recipe, "edges") != "slide":
         return bars
-    length, places = recipe["window"], positions(recipe | {"edges": "hold"}, index, direction, count)
-    there = positions(recipe, index, direction, count)
     moved = np.zeros_like(bars)
     for own, found in zip(bars, moved, strict=True):
-        first, *_, last = [k for k in range(length) if own[k] > 1e-9 * own.sum()] * 2  # rounding leaves some
+        first, *_, last = [k for k in range(len(own)) if own[k] > 1e-9 * own.sum()] * 2  # rounding leaves some
         by = into([places[first], places[last]], count)
         for k in range(first, last + 1):
             found[there.index(places[k] + by)] = own[k]
@@ -621,7 +638,7 @@ def to_encoded(light):
 
 
 def covering(alpha):
-    return np.where(alpha > 0, alpha, 1)
+    return np.where(alpha > 1e-12, alpha, 1)  # less is what rounding leaves of none
 
 
 def summed(footage, index, light):
@@ -666,7 +683,8 @@ def layer_mattes(recipe, frame, footage, index, direction, mattes, solve=None):
         share = times[source] - low
         near, values = low + (1 if share > 0.5 else 0), []
         drawn = [(region, 0) for region in others if number_at(region.get("opacity", 1), low) > 0]
-        drawn += [(region, 1 + i) for i, (region, _) in enumerate(layers) if has_strokes(region)]
+        own = [(region, 1 + i) for i, (region, _) in enumerate(layers) if has_strokes(region)]
+        drawn += [(region, i) for region, i in own if number_at(region.get("opacity", 1), low) > 0]
         strokes = [(region, strokes_between(region, low, share, width / height), own) for region, own in drawn]
         labels = painted(recipe, strokes, width, height)
         mix = (solve or (lambda *given: solved(*given[:2])))(labels, 1 + len(layers), source, near)
@@ -777,115 +795,172 @@ def exposed(recipe, frame, footage, index, direction, given, weights=None):
     count, height, width, _ = footage.samples.shape
     mix = np.asarray(given, float)
     mix = mix / mix.sum(axis=0)
-    blocks, aspect = mix.shape[1:], width / height
+    blocks = mix.shape[1:]
     mix = mix.reshape(len(mix), -1)
-    bars = np.array([bars_at(shutter, frame, option(recipe, "interpolation")) for shutter in recipe["shutters"]])
-    where, moves = positions(recipe, index, direction, count), motions(recipe, frame, index, direction, count, aspect)
-    bars = slid(recipe, bars, index, direction, count)
-    if moves is not None:
-        shown_time = np.abs(np.array(where) - index).argmin() + 0.5
-        bars = np.array(
-            [
-                trailed(recipe, shutter, own, frame, *move, shown_time, aspect)
-                for shutter, own, move in zip(recipe["shutters"], bars, np.moveaxis(moves, 1, 0), strict=True)
-            ]
-        )
-    exposures = bars.sum(axis=1)
-    if any("combine" in shutter for shutter in recipe["shutters"]):
-        return combined(
-            recipe,
-            frame,
-            footage,
-            [at_edges(option(recipe, "edges"), w, count) for w in where],
-            mix,
-            bars,
-            where.index(index),
-        )
-    if option(recipe, "interpolation") == "displacement":
-        parts = displaced(bars, mix)[None]
-    else:  # a picture of each shutter, mixed
-        parts = (bars / exposures[:, None])[..., None] * mix[:, None]
+    bars, moves = opened(recipe, frame, index, direction, count, width / height)
+    where = positions(recipe, index, direction, count)
     frames = [at_edges(option(recipe, "edges"), place, count) for place in where]
-    parts, doubtful = shortened(parts, frames, mix)
-    gain = np.ones(mix.shape[1])
-    if option(recipe, "exposure") == "weighted":
-        gain = exposures @ mix / exposures[0]
+    of = {source: np.ones((height, width)) if weights is None else weights[source] for source in {*frames} - {None}}
 
     def of_pixels(values):
         block = option(recipe, "aggregate")
         return values.reshape(blocks).repeat(block, 0).repeat(block, 1)[:height, :width]
 
-    y, x = np.mgrid[:height, :width] + 0.5
-    own = (x + 1j * (height - y)) / height
-
-    def place(i, k):
-        """Where the pixels lie in frame k of the window, by shutter i, or where positions are mixed."""
-        if len(parts) > 1:
-            return moves[0, i, k] * own + moves[1, i, k]
-        return sum(of_pixels(c) * (turn * own + shift) for c, turn, shift in zip(mix, *moves[:, :, k], strict=True))
-
     total, left = np.zeros((height, width, 4)), np.zeros((height, width))
-    for k, seen in enumerate(frames):
-        if seen is None:
-            continue
-        light = summed(footage, seen, option(recipe, "light"))
-        weight = np.ones((height, width)) if weights is None else weights[seen]
-        light, sharp = light * weight[..., None], footage.alpha == "opaque" and weights is None
-        for i, own_weights in enumerate(parts):
-            if own_weights[k].any():
-                both = np.concatenate([light, weight[..., None]], axis=-1)
-                there = both if moves is None else sampled(both, place(i, k), sharp)
-                total += of_pixels(own_weights[k])[..., None] * there[..., :4]
-                left += of_pixels(own_weights[k]) * there[..., 4]
-    colour, alpha = total[..., :3], total[..., 3:]
-    if option(recipe, "light") == "encoded":
-        colour = to_linear(colour / covering(alpha)) * covering(alpha)
-    return np.concatenate([colour * of_pixels(gain)[..., None], alpha], axis=-1), left, of_pixels(doubtful)
-
-
-def combined(recipe, frame, footage, frames, mix, bars, before):
-    """As `exposed`, of shutters that combine frames in several ways and follow nothing. mix: (N, n) of the blocks"""
-    _, height, width, _ = footage.samples.shape
-    block, exposures = option(recipe, "aggregate"), bars.sum(axis=1)
-    shape = -(-height // block), -(-width // block)
-
-    def of_pixels(values):
-        return values.reshape(shape).repeat(block, 0).repeat(block, 1)[:height, :width]
-
-    lights = [None if f is None else summed(footage, f, option(recipe, "light")) for f in frames]
-    ways = [way_of(shutter, frame) for shutter in recipe["shutters"]]
-    total, doubtful = np.zeros((height, width, 4)), np.zeros((height, width), bool)
+    doubtful, ways = np.zeros((height, width), bool), [way_of(shutter, frame) for shutter in recipe["shutters"]]
     for way in sorted(set(ways), key=str):
         chosen = [i for i, other in enumerate(ways) if other == way]
         share = mix[chosen].sum(axis=0)
         own = np.where(share > 0, mix[chosen] / np.where(share > 0, share, 1), 1 / len(chosen))
-        normalised = bars[chosen] / exposures[chosen, None]
-        is_moved = option(recipe, "interpolation") == "displacement"
-        parts = displaced(bars[chosen], own) if is_moved else normalised.T @ own
-        kept, lost = shortened(parts[None], frames, own)
-        averaged = sum(of_pixels(kept[0, k])[..., None] * light for k, light in enumerate(lights) if light is not None)
-        unsure = of_pixels(lost)
-        if way[0] == "average":
-            gain = (
-                exposures[chosen] @ own / exposures[0]
-                if option(recipe, "exposure") == "weighted"
-                else np.ones(len(share))
-            )
-            made = decoded(recipe, averaged) * [1, 1, 1, 0] * of_pixels(gain)[..., None] + averaged * [0, 0, 0, 1]
-        else:
-            if way[0] == "median":
-                counts = parts
-            elif is_moved:
-                counts = parts * (own / normalised.max(axis=1)[:, None]).sum(axis=0)
-            else:
-                counts = (normalised / normalised.max(axis=1)[:, None]).T @ own
-            seen = [(light, of_pixels(counts[k]), k == before) for k, light in enumerate(lights) if light is not None]
-            found, doubt, counted = (median if way[0] == "median" else extreme)(way, seen, option(recipe, "light"))
-            made = decoded(recipe, np.where((counted > NOTHING)[..., None], found, averaged))
-            unsure = unsure | doubt | (counted > NOTHING / 100) & (counted < ROUNDING)
+        window = Window(
+            own, bars[chosen], bars[0].sum(), None if moves is None else moves[:, chosen], of_pixels,
+            footage.alpha == "opaque" and weights is None, where.index(index) if index in where else None,
+        )  # fmt: skip
+        light = option(recipe, "light")
+        lights = [f if f is None else summed(footage, f, light) * of[f][..., None] for f in frames]
+        made, unsure = one_way(recipe, way, window, lights)
+        cover = made[..., 3]
+        if footage.alpha != "opaque":
+            plain = recipe | {"light": "linear", "exposure": "normalized"}
+            seen = [f if f is None else summed(footage, f, "linear") for f in frames]
+            shares = [
+                f if f is None else whole(sight) * of[f][..., None] for f, sight in zip(frames, seen, strict=True)
+            ]
+            cover = one_way(plain, way, window, shares)[0][..., 3]
         total += of_pixels(share)[..., None] * made
+        left += of_pixels(share) * cover
         doubtful |= unsure & (of_pixels(share) > 0)
-    return total, np.ones((height, width)), doubtful
+    return total, left, doubtful
+
+
+def whole(light):
+    """Light (H, W, 4) as if it covered all of each pixel."""
+    return np.concatenate([light[..., :3] / covering(light[..., 3:]), np.ones_like(light[..., 3:])], axis=-1)
+
+
+def opened(recipe, frame, index, direction, count, aspect):
+    """The bars (N, L) of all shutters as they are open, and the turns and shifts (2, N, L), or None, of `motions`."""
+    shutters = recipe["shutters"]
+    bars = np.array([bars_at(shutter, frame, option(recipe, "interpolation")) for shutter in shutters])
+    for i, shutter in enumerate(shutters):
+        if shutter.get("length") == "timeline":
+            bars[i] = on_timeline(recipe, bars[i], frame, index, direction, count)
+    places = positions(recipe | {"edges": "hold"}, index, direction, count)
+    where = positions(recipe, index, direction, count)
+    bars, moves = slid(recipe, bars, places, where, count), motions(recipe, frame, index, direction, count, aspect)
+    if moves is None:
+        return bars, None
+    shown_time, turned = np.abs(np.array(where) - index).argmin() + 0.5, np.moveaxis(moves, 1, 0)
+    for i, (shutter, move) in enumerate(zip(shutters, turned, strict=True)):
+        bars[i] = trailed(recipe, shutter, bars[i], frame, *move, shown_time, aspect)
+        share = number_at(recipe.get("camera_influence", 1), frame)
+        if shutter.get("follow") == "camera" and share < 1:
+            bars[i] = influenced(bars[i], share, shown_time)
+    return slid(recipe, bars, where, where, count), moves
+
+
+def on_timeline(recipe, bars, frame, index, direction, count):
+    """Bars (L,) that are the shape of an exposure over one frame of the timeline, as those of the source's frames."""
+    length, keyed = len(bars), recipe.get("time")
+
+    def place(time):
+        return time_at(recipe, time) - 1 if keyed else min(max(index + direction * (time - frame), 0), count - 1)
+
+    times = np.array([-1, -0.5, 0, 0.5, 1])
+    ways = np.array([place(frame + time) for time in times]) - place(frame)
+    if not keyed and index in (0, count - 1):  # beyond its ends a clip goes on
+        if ways[0] == 0:
+            ways[:2] = -ways[:2:-1]
+        elif ways[4] == 0:
+            ways[3:] = -ways[1::-1]
+    begin, anchor = {"start": (0, 0), "center": (-0.5, 0.5), "end": (-1, 1)}[option(recipe, "position")]
+    before = {"start": 0, "center": (length - 1) // 2, "end": length - 1}[option(recipe, "position")]
+    edges = before + anchor + direction * np.interp(begin + np.arange(length + 1) / length, times, ways)
+    found = np.zeros(length)
+    if edges.max() - edges.min() < NOTHING:
+        found[before] = 1
+        return found * bars.sum()
+    for bar, ends in zip(bars, pairwise(edges), strict=True):
+        start, end = sorted(ends)
+        if end - start < NOTHING:
+            found += bar * (np.arange(length) == np.floor(start + NOTHING))
+        else:
+            found += bar * np.array([overlap(start, end, k, k + 1) for k in range(length)]) / (end - start)
+    if found.sum() <= 1e-9 * bars.sum():
+        found[before] = 1
+    return found * bars.sum() / found.sum()
+
+
+def influenced(bars, share, shown_time):
+    """Bars (L,) that are open for a share of their time, about the shown frame, which stays."""
+    is_open = np.flatnonzero(bars > 1e-9 * bars.sum())
+    first, last = is_open[0], is_open[-1] + 1
+    own = min(max(shown_time - 0.5, first), last - 1)
+    return stretched(bars, first, last, own + share * (first - own), own + 1 + share * (last - own - 1))
+
+
+def stretched(bars, first, last, start, end):
+    """Bars (L,) that were open from `first` to `last`, open from start to end."""
+    scale = (end - start) / (last - first)
+    spans = list(pairwise(start + (j - first) * scale for j in range(len(bars) + 1)))
+    return np.array(
+        [
+            sum(bar * overlap(*own, k, k + 1) for bar, own in zip(bars, spans, strict=True)) / scale
+            for k in range(len(bars))
+        ]
+    )
+
+
+# What shutters that combine alike compose with. mix: coefficients (N, n) of the blocks, Σ = 1; bars (N, L); reference:
+# the exposure of full brightness; moves: turns and shifts (2, N, L), or None; of_pixels: gives values (H, W) of the
+# pixels by those of blocks (n,); sharp: how frames are seen between pixels; before: which of the window is shown
+Window = namedtuple("Window", "mix bars reference moves of_pixels sharp before")
+
+
+def one_way(recipe, way, window, lights):
+    """The picture (H, W, 4) of shutters that combine alike, and where it is doubtful. lights: (H, W, 4) of the window's
+    frames as they are summed, None: left out"""
+    mix, bars, reference, moves, of_pixels, sharp, before = window
+    (height, width, _), exposures = next(light for light in lights if light is not None).shape, bars.sum(axis=1)
+    normalised, is_moved = bars / exposures[:, None], option(recipe, "interpolation") == "displacement"
+    # A picture of each shutter, mixed, or one.
+    parts = displaced(bars, mix)[None] if is_moved else normalised[..., None] * mix[:, None]
+    kept, lost = shortened(parts, lights, mix)
+    y, x = np.mgrid[:height, :width] + 0.5
+    here = (x + 1j * (height - y)) / height
+
+    def look(i, k):
+        """What is seen of frame k by shutter i, or where positions are mixed."""
+        if moves is None:
+            return lights[k]
+        at = [turn * here + shift for turn, shift in zip(*moves[:, :, k], strict=True)]
+        return sampled(
+            lights[k], at[i] if not is_moved else sum(of_pixels(c) * p for c, p in zip(mix, at, strict=True)), sharp
+        )
+
+    there = [k for k, light in enumerate(lights) if light is not None]
+    looks = {k: [look(i, k) for i in range(len(parts))] for k in there}
+    averaged = sum(of_pixels(kept[i, k])[..., None] * looks[k][i] for k in there for i in range(len(parts)))
+    if way[0] == "average":
+        gain = exposures @ mix / reference if option(recipe, "exposure") == "weighted" else np.ones(mix.shape[1])
+        scale = of_pixels(gain)[..., None] ** [1, 1, 1, 0]
+        return decoded(recipe, averaged) * scale, of_pixels(lost)
+    highest = normalised.max(axis=1)
+    if way[0] == "median":
+        counts = parts
+    else:
+        counts = parts * (mix / highest[:, None]).sum(axis=0) if is_moved else parts / highest[:, None, None]
+    shares = np.ones((1, mix.shape[1])) if is_moved else mix
+    seen = []
+    for k in there:
+        own = [of_pixels(counts[i, k]) for i in range(len(parts))]
+        weight, whole = sum(own), sum(of_pixels(c)[..., None] * each for c, each in zip(shares, looks[k], strict=True))
+        mean = sum(each[..., None] * sight for each, sight in zip(own, looks[k], strict=True))
+        mean = np.where(weight[..., None] > 0, mean / np.where(weight > 0, weight, 1)[..., None], whole)
+        seen.append((mean, weight, whole if k == before else None))
+    found, unsure, counted = (median if way[0] == "median" else extreme)(way, seen, option(recipe, "light"))
+    made = decoded(recipe, np.where((counted > NOTHING)[..., None], found, averaged))
+    return made, of_pixels(lost) | unsure | (counted > NOTHING / 100) & (counted < ROUNDING)
 
 
 def way_of(shutter, frame):
@@ -908,11 +983,11 @@ def decoded(recipe, light):
 
 
 def extreme(way, seen, light):
-    """What is lightest or darkest (H, W, 4) of frames (light, weight, whether it is the shown one), where that is
-    doubtful, and how much counts."""
+    """What is lightest or darkest (H, W, 4) of frames (light, weight, of the shown one its light whatever counts, or
+    None), where that is doubtful, and how much counts."""
     mode, by_luminance, threshold, softness = way
     doubtful, offered = np.zeros(seen[0][1].shape, bool), []
-    for colour, weight, is_shown in seen:
+    for colour, weight, whole in seen:
         if threshold is not None:
             straight = colour[..., :3] / covering(colour[..., 3:])
             brightness = (to_linear(straight) if light == "encoded" else straight) @ LUMINANCE
@@ -920,8 +995,8 @@ def extreme(way, seen, light):
             passed = 3 * t**2 - 2 * t**3
             doubtful |= (softness < 0.01) & (np.abs(brightness - threshold) < ROUNDING * 10)
             weight = weight * (passed if mode == "lightest" else 1 - passed)
-            if is_shown:
-                offered.append((colour, np.ones_like(weight)))
+            if whole is not None:
+                offered.append((whole, np.ones_like(weight)))
         offered.append((colour, weight))
     colours, weights = (np.array(each) for each in zip(*offered, strict=True))
     counted = weights.sum(axis=0)
@@ -939,7 +1014,7 @@ def extreme(way, seen, light):
     else:
         best = np.where(there, value, -np.inf).max(axis=0)
     best = np.where(counted[..., None] > 0, best, 0)
-    if threshold is not None and any(is_shown for _, _, is_shown in seen):
+    if threshold is not None and any(whole is not None for *_, whole in seen):
         counted = np.ones_like(counted)
     return (
         np.concatenate([best if mode == "lightest" else cover[..., None] - best, cover[..., None]], -1),

@@ -1,6 +1,7 @@
 """The product against a reference of its own: random recipes over footage of many kinds, on every device."""
 
 import ast
+import itertools
 import json
 from collections import Counter
 from dataclasses import replace
@@ -9,18 +10,21 @@ from pathlib import Path
 import numpy as np
 import pytest
 from cases import KINDS, make
-from compare import PICTURE, DifferenceError, can_be_a_film, check, check_films, open_devices, within
+from compare import PICTURE, DifferenceError, can_be_a_film, check, check_films, check_mixed, open_devices, within
 from reference import DEFAULTS, layers_at, picture, shown
 
-from shutter_addon.compute import cpu, plates
+from shutter_addon.compute import cpu, gpu, plates
 from shutter_addon.core.frames import light
 from shutter_addon.core.model import keyframes, mattes, scribbles, shutters
 from shutter_addon.core.pixels import combined, compositor, following, layering, trails
+from shutter_addon.devices import gl
+from shutter_addon.devices.passes import SHADERS
 from shutter_addon.media import matte_values
 
 SEEDS = range(120)
 BATCH = 20
 IN_BLENDER = SEEDS[::8]  # which goes around the kinds of footage
+MIXED = range(13, 30)  # which all passes that compose are run for
 
 
 @pytest.fixture(scope="module")
@@ -31,11 +35,11 @@ def devices():
         device.release()
 
 
-def differences(seeds, devices, folder) -> list[str]:
+def differences(seeds, devices, folder, mixed=False) -> list[str]:
     errors = []
     for seed in seeds:
         try:
-            check(make(seed), devices, folder)
+            (check_mixed if mixed else check)(make(seed, mixed), devices, folder)
         except DifferenceError as error:
             errors.append(str(error))
     return errors
@@ -50,6 +54,27 @@ def test_pictures_and_coefficients(devices, first, tmp_path):
 def test_on_blenders_gpu(tmp_path):
     pytest.importorskip("bpy")
     errors = differences(IN_BLENDER, open_devices(["blender"]), tmp_path)
+    assert not errors, "\n".join(errors)
+
+
+def test_every_field_with_every_other(devices, monkeypatch, tmp_path):
+    """And all passes that compose are among them, each of which leaves no texel unwritten."""
+    seen = set()
+
+    def noted(device, program, *given, **more):
+        seen.add(program.file)
+        run(device, program, *given, **more)
+
+    monkeypatch.setattr(gl.GLDevice, "run", noted)
+    errors = differences(MIXED, devices, tmp_path, mixed=True)
+    assert not errors, "\n".join(errors)
+    composing = {path.stem for path in SHADERS.glob("*.glsl") if path.stem.startswith("compose_")}
+    assert seen >= composing | {"accumulate", "pack", "ways", "layer", "levels", "matte_blend", "mix", "diffusion"}
+
+
+def test_every_field_with_every_other_on_blenders_gpu(tmp_path):
+    pytest.importorskip("bpy")
+    errors = differences(MIXED[::5], open_devices(["blender"]), tmp_path, mixed=True)
     assert not errors, "\n".join(errors)
 
 
@@ -108,6 +133,41 @@ def test_recipes_have_all_that_a_recipe_may_have():
     assert seen["layer", True] >= 0.4 * len(SEEDS)
     assert np.mean(doubtful[0]) < 0.02
     assert np.mean(doubtful[1]) < 0.35  # nothing is seen behind layers that cover all
+
+
+def test_mixed_recipes_have_every_field_with_every_other():
+    single = "position", "interpolation", "light", "exposure", "edges", "inbetween"
+
+    def fields(recipe):
+        shutters_, regions = recipe["shutters"], recipe["regions"]
+        found = {
+            (name, recipe[name]) for name in ("position", "interpolation", "light", "exposure", "edges", "inbetween")
+        }
+        found |= {name for name in ("time", "camera", "border", "edge_aware", "stop_at_cuts") if recipe.get(name)}
+        found |= {(name, each[name]) for each in shutters_ for name in ("combine", "length") if name in each}
+        found |= {
+            name for each in shutters_ for name in ("follow", "trail", "threshold", "by_luminance") if name in each
+        }
+        found |= {(each["follow_motion"], bool(each["follow_smooth"])) for each in shutters_ if "follow" in each}
+        found |= {each["kind"] for each in regions} | {"layer" for each in regions if each.get("layer")}
+        found |= {("opacity", isinstance(each["opacity"], list)) for each in regions if each["opacity"] != 1}
+        found |= {"influence"} if recipe.get("camera_influence", 1) != 1 else set()
+        found |= {"aggregate"} if recipe["aggregate"] > 1 else set()
+        names = [each["name"] for each in regions]
+        return found | ({"equal names"} if len(set(names)) < len(names) else set())
+
+    pairs, every = set(), set()
+    for recipe in (json.loads(make(seed, mixed=True).recipe) for seed in range(500)):
+        found = fields(recipe)
+        every |= found
+        pairs |= {frozenset(pair) for pair in itertools.combinations(found, 2)}
+    lacking = [
+        (a, b)
+        for a, b in itertools.combinations(every, 2)
+        if frozenset((a, b)) not in pairs and not (a[0] == b[0] and a[0] in single)
+    ]
+    assert len(every) == 47
+    assert not lacking
 
 
 FAULTS = {
@@ -179,6 +239,29 @@ def test_planted_faults_are_found(monkeypatch, fault, tmp_path):
         names = sorted(path.name for path in place.iterdir())
         assert names == ["difference-x64.png", "made.exr", "recipe.json", "right.exr"]
         assert again.endswith(f"tests/differential/compare.py {place.name.partition('-')[0]} --ways cpu")
+
+
+MIXED_FAULTS = {
+    "groups that are black": (gpu, "_in_window", lambda state, chosen: state.of(chosen)),
+    "levels that are not drawn": (gpu, "way_sum", lambda begins, levels: way_sum(begins, False)),
+}
+run, way_sum = gl.GLDevice.run, gpu.way_sum
+
+
+def test_a_texel_that_no_pass_writes_is_seen(monkeypatch, devices, tmp_path):
+    def half(device, program, extent, **given):
+        rows = max(extent[1] // 2, 1) if program.file.startswith("compose_") else extent[1]
+        run(device, program, (extent[0], rows, *extent[2:]), **given)
+
+    monkeypatch.setattr(gl.GLDevice, "run", half)
+    errors = differences(MIXED[:4], {"gpu": devices["gpu"]}, tmp_path, mixed=True)
+    assert any("nan instead of" in error for error in errors)
+
+
+@pytest.mark.parametrize("fault", MIXED_FAULTS)
+def test_planted_faults_of_a_gpu_are_found(monkeypatch, devices, fault, tmp_path):
+    monkeypatch.setattr(*MIXED_FAULTS[fault])
+    assert any(differences([seed], {"gpu": devices["gpu"]}, tmp_path, mixed=True) for seed in range(60))
 
 
 @pytest.mark.parametrize("value", [np.nan, np.inf, 0.6 / 255])

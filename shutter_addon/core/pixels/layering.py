@@ -20,6 +20,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..frames import light
 from ..frames.frame_source import FrameSource
 from ..model import scribbles
 from ..model.effect import Camera, Effect, MatteRegion, Region
@@ -162,7 +163,11 @@ def compose(
         part: FrameState, weights: np.ndarray, c: ArrayLike, moved: Moves | None
     ) -> tuple[np.ndarray, np.ndarray]:
         colors = [frame * weight[..., None] for frame, weight in zip(frames, weights, strict=True)]
-        shares = [np.stack([weight] * 4, axis=-1) for weight in weights]
+        seen = [light.straight(color) for color in colors]  # a threshold asks for it
+        shares = [
+            np.concatenate([color[..., :3] * w[..., None], w[..., None]], axis=-1)
+            for color, w in zip(seen, weights, strict=True)
+        ]
         plain = replace(part, options=replace(part.options, light="linear", exposure="normalized"))
         color = compositor.compose(part, colors, present, c, moved)
         if opaque:  # what it covers is as much as its weights are
