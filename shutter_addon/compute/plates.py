@@ -13,6 +13,8 @@ SEEN = 0.9
 # How much of an exposed frame counts that is taken from others: a little less than all of it, which would say that no
 # layer was in the way (layering.UNCOVERED).
 TAKEN_SHARE = 1 - 1 / 64
+# The most that it counts: less than whole in half floats, too.
+TAKEN_MOST = 1 - 1 / 1024
 # Kinds of pixels: seen, taken from another frame, filled from what is around.
 OPEN, TAKEN, FILLED = 0, 1, 2
 
@@ -65,7 +67,7 @@ def uncovered(colors: np.ndarray, seen: np.ndarray, plate: np.ndarray, kinds: np
     colors: (H, W, 3) what it shows; plate, kinds: as from `plate`, with holes where it does not show all"""
     taken = kinds == TAKEN
     mixed = seen[..., None] * colors + (1 - seen)[..., None] * plate[..., :3]
-    share = np.where(taken, seen + (1 - seen) * np.float32(TAKEN_SHARE), seen)
+    share = np.where(taken, np.minimum(seen + (1 - seen) * np.float32(TAKEN_SHARE), np.float32(TAKEN_MOST)), seen)
     return np.where(taken[..., None], mixed, colors), share.astype(np.float32)
 
 

@@ -573,3 +573,12 @@ def _encoded(colors, source):
     if source.dtype.kind == "f":
         return whole.astype(source.dtype)
     return np.rint(light.to_encoded(whole).clip(0, 1) * 255).astype(np.uint8)
+
+
+def test_a_taken_pixel_never_counts_as_if_no_layer_was_in_the_way():
+    """Windows of layers keep weights in half floats, which must not round its share up to a whole one."""
+    seen = np.linspace(0, 1, 2001, dtype=np.float32)[None]
+    colors, plate = np.zeros((*seen.shape, 3), np.float32), np.ones((*seen.shape, 4), np.float32)
+    kinds = np.full(seen.shape, layer_colors.plates.TAKEN)
+    _, share = layer_colors.plates.uncovered(colors, seen, plate, kinds)
+    assert share.astype(np.float16).max() < layering.UNCOVERED
