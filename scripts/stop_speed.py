@@ -201,8 +201,8 @@ def build():
     return lambda: part("blender.rendering.inbetween_build").running() is not None
 
 
-# Jobs of the mouse: each gives the words of xdotool up to where the button is let go, and what tells a draw of the
-# preview that it is done.
+# Jobs of the mouse: each gives places on the screen, of which the first is pressed and the last let go at, and what
+# tells a draw of the preview that it is done.
 
 
 def on_preview(x, y):
@@ -216,7 +216,7 @@ def stroke():
     with within("PREVIEW"):
         bpy.ops.shutter.draw("INVOKE_DEFAULT")
     count, x = strokes_drawn(), _random.uniform(0.4, 0.6)
-    return dragged((x, 0.4), (x, 0.5)), lambda: strokes_drawn() > count
+    return [on_preview(x, 0.4), on_preview(x, 0.5)], lambda: strokes_drawn() > count
 
 
 def strokes_drawn():
@@ -231,7 +231,7 @@ def drag():
     found, step = region("PREVIEW")[1], _random.choice((-12, 12))
     at, to = on_screen(found, *centre), on_screen(found, centre[0] + step, centre[1])
     before, halfway = place_now(), ((at[0] + to[0]) // 2, at[1])  # the first move begins the drag
-    return pressed_words(at, halfway, to), lambda: place_now() != before
+    return [at, halfway, to], lambda: place_now() != before
 
 
 def place_now():
@@ -243,17 +243,7 @@ def move():
     frame = before - 20 if before > edit_now().frame_end / 2 else before + 20
     edit_now().frame_set(frame + 5)  # whose picture is composed when the button is pressed
     at = on_screen(timeline, timeline.view2d.view_to_region(frame, 0, clip=False)[0], timeline.height - 12)
-    return pressed_words(at), lambda: abs(edit_now().frame_current - frame) <= 1
-
-
-def dragged(*points):
-    return pressed_words(*(on_preview(*point) for point in points))
-
-
-def pressed_words(first, *others):
-    x, y = first  # a handle lights up first, which wants a pointer that moves
-    words = f"mousemove {x - 9} {y} sleep 1 mousemove {x} {y} sleep 1 mousedown 1"
-    return words + "".join(f" sleep 0.2 mousemove {x} {y}" for x, y in others) + " sleep 0.2"
+    return [at], lambda: abs(edit_now().frame_current - frame) <= 1
 
 
 def is_pen_down():
@@ -263,16 +253,26 @@ def is_pen_down():
 def told(job, tick=0.02):
     """Seconds until the preview shows what a mouse has done, twice; generator, which returns them."""
     draws: list = []
-    words, is_done = job()
+    (first, *others), is_done = job()
     note = FOLDER / "pressed"
     note.unlink(missing_ok=True)
+    for x in (first[0] - 9, first[0]):  # a handle lights up under a pointer that moves
+        xdotool("mousemove", x, first[1])
+        yield 1.0
+    if others:  # each is looked at, however long a picture takes; then the button is let go at any moment
+        xdotool("mousedown", 1)
+        for place in others:
+            yield 0.3
+            xdotool("mousemove", *place)
+        yield 0.3
+    last = f"sleep {_random.uniform(0, 0.5):.3f}" if others else "xdotool mousedown 1 sleep 0.2"
 
     def drawn():
         if is_done() and not is_pen_down():
             draws.append(time.time())
 
     handler = bpy.types.SpaceSequenceEditor.draw_handler_add(drawn, (), "PREVIEW", "POST_PIXEL")
-    subprocess.Popen(["sh", "-c", f"xdotool {words}; date +%s.%N > {note}; xdotool mouseup 1"])
+    subprocess.Popen(["sh", "-c", f"{last}; date +%s.%N > {note}; xdotool mouseup 1"])
     end = time.time() + 4 * PATIENCE
     while not (shown := [moment for moment in draws if note.exists() and moment > float(note.read_text() or "inf")]):
         assert time.time() < end, f"{job.__name__}: nothing is shown"

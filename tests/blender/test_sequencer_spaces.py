@@ -70,7 +70,7 @@ def test_colours_that_blender_changes_are_told(edit, render, spaces, made, capfd
     for space in spaces:
         edit.sequencer_colorspace_settings.name = space
         capfd.readouterr()
-        monkeypatch.setattr(pictures, "_said", set())
+        monkeypatch.setattr(pictures, "_said", set())  # what was said is not said again
         is_off = apart(edit, render, strip) > LEVELS
         assert (f'In the color space "{space}" Blender' in capfd.readouterr().err) == is_off, space
         if is_off:

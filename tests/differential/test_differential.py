@@ -242,7 +242,7 @@ def test_planted_faults_are_found(monkeypatch, fault, tmp_path):
 
 
 MIXED_FAULTS = {
-    "groups that are black": (gpu, "_in_window", lambda state, chosen: state.of(chosen)),
+    "groups that are black": (gpu, "_in_window", lambda state, chosen: state.of(chosen)),  # where that fault was
     "levels that are not drawn": (gpu, "way_sum", lambda begins, levels: way_sum(begins, False)),
 }
 run, way_sum = gl.GLDevice.run, gpu.way_sum
