@@ -44,11 +44,12 @@ def test_ugly_movies_become_smaller(movies):
         with open_source(path, deinterlace=True) as full, open_source(path, deinterlace=True, divisor=2) as small:
             assert (small.width, small.height) == (-(-full.width // 2), -(-full.height // 2)), name
             assert (small.count, small.alpha, small.dtype) == (full.count, full.alpha, full.dtype), name
-            frame = small.read(1)
+            index = min(1, full.count - 1)
+            frame = small.read(index)
             assert frame.shape == (small.height, small.width, 4), name
             assert frame.dtype == small.dtype, name
             scale = 255 / (np.iinfo(small.dtype).max)
-            apart = np.abs(frame.astype(np.float64) - reduced(full.read(1), 2, full.alpha)) * scale
+            apart = np.abs(frame.astype(np.float64) - reduced(full.read(index), 2, full.alpha)) * scale
             assert apart.mean() < 4, name
 
 
