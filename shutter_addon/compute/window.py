@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from ..core import stopping
 from ..core.frames import light
 from ..core.frames.frame_source import FrameSource
 from ..core.frames.planes import Planes, chroma_step
@@ -226,7 +227,13 @@ class Frames(Window):
 
     def _on_host(self) -> dict[int, np.ndarray]:
         """By layer, the frames that a picture is sent."""
-        return {layer: self._read(index) for layer, index in self._held.items()} if self.anew else self._host or {}
+        if not self.anew:
+            return self._host or {}
+        made = {}
+        for layer, index in self._held.items():
+            stopping.check()
+            made[layer] = self._read(index)
+        return made
 
     def _read(self, index: int) -> np.ndarray:
         """The source's frame (height, width, 4) in the samples that are stored."""

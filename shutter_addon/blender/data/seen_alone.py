@@ -63,7 +63,7 @@ def alone(scene: Any, frame: int, but: str | None = None) -> Alone | None:
     """What is seen of a scene at a frame, if it is an effect strip alone, by `hides`. but: the name of a strip that
     does not count."""
     editor = scene.sequence_editor
-    if _has_animation(scene, ".mute"):
+    if has_animation(scene, ".mute"):
         return None  # what is muted now may not be then
     seen = [
         strip
@@ -102,15 +102,15 @@ def makes_levels(scene: Any) -> bool:
         and scene.render.image_settings.color_mode in _MODES
         and has(scene.render, _PLAIN_RENDER)
         and scene.frame_subframe == 0
-        and not any(_has_animation(scene, name) for name in ("view_settings", "render.", "display_settings"))
+        and not any(has_animation(scene, name) for name in ("view_settings", "render.", "display_settings"))
     )
 
 
 def _is_animated(scene: Any, strip: Any) -> bool:
-    return _has_animation(scene, f'sequence_editor.strips_all["{bpy.utils.escape_identifier(strip.name)}"]')
+    return has_animation(scene, f'sequence_editor.strips_all["{bpy.utils.escape_identifier(strip.name)}"]')
 
 
-def _has_animation(scene: Any, part: str) -> bool:
+def has_animation(scene: Any, part: str) -> bool:
     """Whether anything animates a property of the scene in whose path that is; of what the NLA does, it may."""
     animation = scene.animation_data
     if animation is None:

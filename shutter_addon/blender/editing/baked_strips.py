@@ -54,6 +54,8 @@ def lay(scene: Any, strip: Any, film: Film) -> Any:
         _move(owner, baked, home)
         _move(owner, strip, spare)
     add_effect.copy_look(strip, baked)
+    if baked.color_multiply == strips.IN_CODE_VALUES:  # a film is mixed so by itself
+        baked.color_multiply = 1
     for look in _LOOK:
         setattr(baked, look, getattr(strip, look))
     _copy_curves(scene, strip, baked)

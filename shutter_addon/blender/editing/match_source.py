@@ -64,12 +64,14 @@ def _follow_size(effect, strip, size: tuple[int, int]) -> None:
 
 
 def _follow_mixing(scene, strip, source, is_encoded: bool) -> None:
-    if strip.color_multiply not in (1, strips.IN_CODE_VALUES):
+    path = strip.path_from_id()
+    is_own = strip.color_multiply in (1, strips.IN_CODE_VALUES)
+    if not is_own or seen_alone.has_animation(scene, f"{path}.color_multiply"):
         return
     mixes = (
         not seen_alone.has(strip.transform, seen_alone.IN_PLACE)
         or strip.transform.filter.startswith("CUBIC")
-        or fcurves.curves_under(scene, f"{strip.path_from_id()}.transform.")
+        or seen_alone.has_animation(scene, f"{path}.transform.")
     )
     same_space = source_media.reading(source)[0] == scene.sequencer_colorspace_settings.name
     factor = strips.IN_CODE_VALUES if mixes and is_encoded and same_space else 1
