@@ -93,8 +93,8 @@ def _no_weight(_frame: int) -> Any:
 
 def of_numpy_window(source: FrameSource, kind: Kind) -> Needs:
     """What windows need with NumPy."""
-    frames = {id(read): read for read in (source, *_read(source, kind))}
-    return Needs(0, sum(kind.window * frame_bytes(read) for read in frames.values()), False)
+    frames: list[Any] = [source, *(read for read in _read(source, kind) if isinstance(read, WeightedFrames))]
+    return Needs(0, sum(kind.window * frame_bytes(read) for read in frames), False)
 
 
 def frame_bytes(source: FrameSource) -> int:

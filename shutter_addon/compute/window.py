@@ -68,7 +68,7 @@ class Window:
     is_open: whether it has its textures; once released, it can show nothing any more
     sends: whether every picture sends the frames anew, for which the device has no room
     anew: whether it makes them anew as well (WeightedFrames): those of all its windows would take more of the host than
-    the device may
+    the device may hold
     shot: the source frames that the loaded window may show
     rows, tops: rows of pixels in a band (the last band may have fewer), and the top row of each band
     """

@@ -319,13 +319,18 @@ def test_what_was_not_exposed_comes_from_the_nearest_clear_frame(device):  # noq
     assert_near(picture, np.where(inside[..., None], expected, source.linear()[SHOWN]))
 
 
-def test_nothing_clear_within_reach_is_filled_smoothly(device):  # noqa: F811
-    rng = np.random.default_rng(10)
-    source = footage(rng, COUNT, SIZE)
+def of_two_colours(matte):
+    """Footage of one colour, and of another where a layer has some of a matte (COUNT, h, w)."""
+    source = footage(np.random.default_rng(10), COUNT, SIZE)
     source.frames[:] = [200, 100, 50, 255]
+    source.frames[matte > 0] = [0, 0, 255, 255]
+    return source
+
+
+def test_nothing_clear_within_reach_is_filled_smoothly(device):  # noqa: F811
     matte = np.zeros((COUNT, *SIZE[::-1]))
     matte[:, 5:15, 5:20] = 1
-    source.frames[matte > 0] = [0, 0, 255, 255]
+    source = of_two_colours(matte)
     moment, _ = with_layers(FrameState(Options(4), np.ones((3, 4))), matte, opacities=(0.95,))
     renderer = Renderer(device, source, MatteValues(*SIZE))
     picture = renderer.picture(Request(SHOWN, dataclasses.replace(moment, options=Options(4, plate_reach=3))))
@@ -337,13 +342,10 @@ def test_nothing_clear_within_reach_is_filled_smoothly(device):  # noqa: F811
 
 
 def test_what_is_hidden_altogether_is_nothing_to_fill_from(device):  # noqa: F811
-    rng = np.random.default_rng(10)
-    source = footage(rng, COUNT, SIZE)
-    source.frames[:] = [200, 100, 50, 255]
     matte = np.zeros((COUNT, *SIZE[::-1]))
     matte[:, 5:15, 5:20] = 0.95
     matte[:, 7:13, 7:18] = 1
-    source.frames[matte > 0] = [0, 0, 255, 255]
+    source = of_two_colours(matte)
     options = Options(4, plate_reach=3, decontaminate=False)
     moment, _ = with_layers(FrameState(options, np.ones((3, 4))), matte)
     _, picture = drawn(device, source, moment)

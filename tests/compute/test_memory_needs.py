@@ -87,6 +87,13 @@ def test_with_numpy(dtype, alpha):
     assert memory_needs.of_numpy_window(pictures, memory_needs.Kind(WINDOW, False, SHUTTERS)) == (0, taken, False)
 
 
+def test_of_layers_with_numpy():
+    """The frames as they are, and what each of two layers and what lies behind them makes of these."""
+    pictures = source(np.float32, "opaque")
+    needs = memory_needs.of_numpy_window(pictures, memory_needs.Kind(WINDOW, False, SHUTTERS, layers=2))
+    assert needs == (0, 4 * WINDOW * memory_needs.frame_bytes(pictures), False)
+
+
 @pytest.mark.parametrize("dtype", [np.uint8, np.float32])
 def test_of_layers_without_room_for_all_of_them(dtype):
     """Windows make room for one another, as they do for a film: what that renders is not refused."""

@@ -64,10 +64,9 @@ def _follow_size(effect, strip, size: tuple[int, int]) -> None:
 
 
 def _follow_mixing(scene, strip, source, is_encoded: bool) -> None:
-    path = strip.path_from_id()
-    is_own = strip.color_multiply in (1, strips.IN_CODE_VALUES)
-    if not is_own or seen_alone.has_animation(scene, f"{path}.color_multiply"):
+    if strip.color_multiply not in (1, strips.IN_CODE_VALUES):
         return
+    path = strip.path_from_id()
     mixes = (
         not seen_alone.has(strip.transform, seen_alone.IN_PLACE)
         or strip.transform.filter.startswith("CUBIC")
@@ -75,7 +74,7 @@ def _follow_mixing(scene, strip, source, is_encoded: bool) -> None:
     )
     same_space = source_media.reading(source)[0] == scene.sequencer_colorspace_settings.name
     factor = strips.IN_CODE_VALUES if mixes and is_encoded and same_space else 1
-    if strip.color_multiply != factor:
+    if strip.color_multiply != factor and not seen_alone.has_animation(scene, f"{path}.color_multiply"):
         strip.color_multiply = factor
 
 

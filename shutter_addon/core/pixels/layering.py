@@ -163,15 +163,15 @@ def compose(
         part: FrameState, weights: np.ndarray, c: ArrayLike, moved: Moves | None
     ) -> tuple[np.ndarray, np.ndarray]:
         colors = [frame * weight[..., None] for frame, weight in zip(frames, weights, strict=True)]
-        seen = [light.straight(color) for color in colors]  # a threshold asks for it
-        shares = [
-            np.concatenate([color[..., :3] * w[..., None], w[..., None]], axis=-1)
-            for color, w in zip(seen, weights, strict=True)
-        ]
-        plain = replace(part, options=replace(part.options, light="linear", exposure="normalized"))
         color = compositor.compose(part, colors, present, c, moved)
         if opaque:  # what it covers is as much as its weights are
             return color, color[..., 3]
+        seen = [light.straight(each) for each in colors]  # a threshold asks for it
+        shares = [
+            np.concatenate([each[..., :3] * w[..., None], w[..., None]], axis=-1)
+            for each, w in zip(seen, weights, strict=True)
+        ]
+        plain = replace(part, options=replace(part.options, light="linear", exposure="normalized"))
         return color, compositor.compose(plain, shares, present, c, moved)[..., 3]
 
     behind_them = replace(state, layers=None)
