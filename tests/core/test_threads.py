@@ -33,9 +33,10 @@ def test_who_is_not_to_wait_gets_nothing_yet():
 
 
 def test_closed_early_it_ends_at_its_next_look():
-    looks = []
+    looks, threads_of = [], set()
 
     def steps():
+        threads_of.add(threading.current_thread())
         while True:
             stopping.check()
             looks.append(None)
@@ -45,5 +46,5 @@ def test_closed_early_it_ends_at_its_next_look():
     assert next(found) == 1
     found.close()
     count = len(looks)
-    assert not any(thread.name == "Virtual Shutter" for thread in threading.enumerate())
+    assert not any(thread.is_alive() for thread in threads_of)
     assert len(looks) == count

@@ -33,6 +33,7 @@ _GOING = {"ANIM_OT_change_frame"} | _TRACKING | _BUILDING
 _PEN = "GPENCIL_OT_annotate"
 _MOMENT = 0.3  # seconds
 _SLICE = 0.15  # seconds
+_PLAYED = 1.0  # seconds: of a frame that plays, which has one slice, as the next one is another frame
 # By how much the next slice is longer, so that all ends: of each, and of one that begins again what the last one did.
 _LONGER, _AGAIN = 1.02, 1.5
 _READING_TOOL = "builtin.sample"  # reads once before it is one of those that run
@@ -134,7 +135,7 @@ def for_engine(context: Any, effect_scene: Any) -> Asked | None:
     if seen and look:
         decision = looking.decision = _decide(context, seen, look, snapshot)
         is_told = context.window_manager.virtual_shutter.live and not decision.is_drawn
-        stopped = _time_up(decision.request.key) if is_told else None
+        stopped = _time_up(context, decision.request.key) if is_told else None
         return Asked(snapshot, frame, decision.request.source.detail, decision.is_drawn, stopped)
     detail = effect_source.FULL if look is None or looking.whole is not None else _detail(look)
     return Asked(snapshot, frame, detail, False)
@@ -158,7 +159,7 @@ def for_drawing(context: Any, shown: Shown, decision: Decision | None) -> Drawin
     settings, snapshot = context.window_manager.virtual_shutter, _snapshot(shown)
     if decision is None or decision.snapshot is not snapshot:
         decision = _decide(context, shown, _look(context, shown), snapshot)
-    stopped = never if is_read(context) else _time_up(decision.request.key)
+    stopped = never if is_read(context) else _time_up(context, decision.request.key)
     request = _drafted(context, shown, decision.request)
     has_result = settings.view in RESULTS
     left = settings.split if settings.view == "SPLIT" else 0.0 if has_result else 1.0
@@ -264,10 +265,12 @@ def _is_rendered(shown: Shown) -> bool:
     return shown.scene.render.sequencer_gl_preview == "RENDERED"
 
 
-def _time_up(key: tuple) -> Slice:
+def _time_up(context: Any, key: tuple) -> Slice:
     """What says whether a picture, by its request's key, has been composed for so long that Blender has to look at its
     keys: it goes on when it is drawn again."""
-    if looking.slice is None or looking.slice_of != key:
+    if _is_playing(context):
+        looking.soon = looking.seconds = _PLAYED
+    elif looking.slice is None or looking.slice_of != key:
         looking.soon = looking.seconds = _SLICE / 2  # the playhead moves with it, and a note
     else:
         looking.soon = max(_SLICE, looking.soon * _LONGER)
@@ -289,8 +292,11 @@ def is_composing() -> bool:
 
 def is_going(context: Any) -> bool:
     """Whether the film plays, or may_be_late."""
-    is_playing = any(window.screen.is_animation_playing for window in context.window_manager.windows)
-    return is_playing or may_be_late()
+    return _is_playing(context) or may_be_late()
+
+
+def _is_playing(context: Any) -> bool:
+    return any(window.screen.is_animation_playing for window in context.window_manager.windows)
 
 
 def pen_is_down() -> bool:
