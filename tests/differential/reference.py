@@ -987,6 +987,7 @@ def extreme(way, seen, light):
     None), where that is doubtful, and how much counts."""
     mode, by_luminance, threshold, softness = way
     doubtful, offered = np.zeros(seen[0][1].shape, bool), []
+    most = np.max([np.ones_like(own) if threshold is not None and w is not None else own for _, own, w in seen], axis=0)
     for colour, weight, whole in seen:
         if threshold is not None:
             straight = colour[..., :3] / covering(colour[..., 3:])
@@ -999,8 +1000,8 @@ def extreme(way, seen, light):
                 offered.append((whole, np.ones_like(weight)))
         offered.append((colour, weight))
     colours, weights = (np.array(each) for each in zip(*offered, strict=True))
-    counted = weights.sum(axis=0)
-    cover = (weights * colours[..., 3]).max(axis=0) / np.maximum(weights.max(axis=0), 1e-30)
+    counted = sum(own for _, own, _ in seen)
+    cover = (weights * colours[..., 3]).max(axis=0) / np.maximum(most, 1e-30)
     there = weights[..., None] > NOTHING / 1000  # less is what the bisection leaves of none
     value = colours[..., :3] if mode == "lightest" else colours[..., 3:] - colours[..., :3]
     value = np.where((mode == "lightest") | (value > 0), weights[..., None] * value, value)
@@ -1013,7 +1014,7 @@ def extreme(way, seen, light):
         best = np.take_along_axis(value, rank.argmax(axis=0)[None, ..., None], axis=0)[0]
     else:
         best = np.where(there, value, -np.inf).max(axis=0)
-    best = np.where(counted[..., None] > 0, best, 0)
+    best = np.where(there.any(axis=0), best, 0)
     if threshold is not None and any(whole is not None for *_, whole in seen):
         counted = np.ones_like(counted)
     return (

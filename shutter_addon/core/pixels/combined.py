@@ -8,6 +8,7 @@ With wₖ how much a frame counts, from 0 to 1 (`counts`), and Vₖ its light wi
     median      M · Σ qₖ aₖ / Σ qₖ, where M is the weighted median of Vₖ / aₖ, each counted qₖ aₖ times
 
 and A = max wₖ aₖ / max wₖ, the alpha of the first two. Their brightness does not depend on how many frames there are.
+A threshold lowers wₖ, but not what A divides by: a pixel without light that passes is transparent.
 """
 
 from __future__ import annotations
@@ -63,6 +64,7 @@ def extreme(combine: Combine, samples: Sequence[Sample], *, encoded: bool = Fals
     best = np.full((*samples[0].weight.shape, 3), -np.inf)
     alpha, most = np.zeros(best.shape[:2]), np.zeros(best.shape[:2])
     for sample in samples:
+        most = np.maximum(most, sample.weight)
         for light_, weight in _counted(combine, sample, encoded):
             value = light_[..., :3]
             if combine.mode == "darkest":
@@ -73,7 +75,9 @@ def extreme(combine: Combine, samples: Sequence[Sample], *, encoded: bool = Fals
                 best = np.where((_luminance(value) > _luminance(best))[..., None], value, best)
             else:
                 best = np.maximum(best, value)
-            alpha, most = np.maximum(alpha, weight * light_[..., 3]), np.maximum(most, weight)
+            alpha = np.maximum(alpha, weight * light_[..., 3])
+        if combine.threshold is not None and sample.shown is not None:
+            most = np.maximum(most, 1.0)
     alpha = (alpha / np.maximum(most, 1e-30))[..., None]
     best = np.where(np.isinf(best), 0.0, best)
     return np.concatenate([alpha - best if combine.mode == "darkest" else best, alpha], axis=-1)
