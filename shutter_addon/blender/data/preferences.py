@@ -3,7 +3,7 @@
 import bpy
 from bpy.props import EnumProperty, IntProperty
 
-from .choices import CONTEXT
+from ...core.model.choices import CONTEXT
 
 ADDON = __package__.rpartition(".shutter_addon")[0] or "shutter_addon"
 

@@ -30,7 +30,7 @@ from ...core.model.limits import (
 )
 from ...core.model.shutters import MAX_WINDOW
 from . import consistency, selection
-from .choices import (
+from ...core.model.choices import (
     AGGREGATES,
     COMBINES,
     CONTEXT,

@@ -17,7 +17,7 @@ from bpy.types import PropertyGroup
 
 from ...core.model.limits import MAX_CHANNEL, MAX_DEGREES, MAX_DISTANCE, MAX_FRAME, MAX_NAME, MAX_SCALE
 from . import consistency, matte_strips, selection
-from .choices import (
+from ...core.model.choices import (
     BETWEEN,
     BLENDS,
     CHANNELS,

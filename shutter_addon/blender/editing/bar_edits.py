@@ -9,7 +9,7 @@ from bpy.app.translations import pgettext_iface as iface_
 from ...core import revision
 from ...core.model import shutters
 from ..data import fcurves, snapshot
-from ..data.choices import COMBINES
+from ...core.model.choices import COMBINES
 from ..data.consistency import bars
 from ..rendering import effect_source, invalidation, render_context
 

@@ -10,7 +10,7 @@ from bpy.types import Operator
 from ...core.messages import EffectError
 from ...core.model import presets
 from ..data import annotations, consistency, preview_areas, selection, strips
-from ..data.choices import CONTEXT, DRAWN
+from ...core.model.choices import CONTEXT, DRAWN
 from ..editing import (
     add_effect,
     bar_edits,

@@ -9,7 +9,7 @@ from bpy.types import Menu, Panel, UIList
 from ...core.messages import EffectError
 from ...core.model import presets
 from ..data import annotations, consistency, data_format, selection, strips
-from ..data.choices import CONTEXT
+from ...core.model.choices import CONTEXT
 from ..editing import bar_edits, match_source
 from ..rendering import inbetween_build, strobing
 from . import icons, inbetween_operators

@@ -16,7 +16,7 @@ from ...core.model.frame_state import FrameState
 from ...media import MediaError
 from ...media.errors import NotBuiltError
 from ..data import annotations, preview_areas, selection, strips
-from ..data.choices import CONTEXT
+from ...core.model.choices import CONTEXT
 from ..data.preview_areas import Shown
 from ..data.snapshot import Snapshot
 from ..devices import blender_gpu

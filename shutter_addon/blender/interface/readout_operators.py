@@ -9,7 +9,7 @@ from bpy.types import Operator
 
 from ...core.messages import EffectError
 from ..data import selection
-from ..data.choices import CONTEXT, READOUT_UNITS, READS, SIDES
+from ...core.model.choices import CONTEXT, READOUT_UNITS, READS, SIDES
 from ..editing import rolling_shutter
 from .operator_bases import OfEffect, has_room, refused
 

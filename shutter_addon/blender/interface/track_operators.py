@@ -11,7 +11,7 @@ from bpy.props import EnumProperty, IntProperty
 from bpy.types import Operator
 
 from ..data import selection, validation
-from ..data.choices import CONTEXT
+from ...core.model.choices import CONTEXT
 from ..editing import (
     bar_edits,
     follow_stabilization,

@@ -112,7 +112,7 @@ class RenderSession:
 
             ends = source_ends(snapshot, source)
             state = timeline_exposure.exposed(snapshot.effect, state, shown, position, ends)
-            trails = any(shutter.trail for shutter in snapshot.effect.shutters)
+            trails = any(shutter.has_trail for shutter in snapshot.effect.shutters)
             state = compositor.slid(state, index, direction, range(source.count), whole=trails)
             state = following.followed(snapshot.effect, state, shown, source, shown_at)
             state = layering.layered(snapshot.effect, state, shown, source, shown_at)

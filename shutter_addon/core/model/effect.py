@@ -9,15 +9,20 @@ from __future__ import annotations
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from typing import Literal
 
 import numpy as np
 
 from ..messages import EffectError
 from . import combining, keyframes, limits, mattes, motions, outlines, scribbles, shutters
+from .choices import BETWEEN, BLENDS, CHANNELS, COMBINES, CONTEXT, LENGTHS, METHODS, MOTIONS, RAMPS, TIMINGS
+from .fields import MISSING, choice, color, number, switch, text, whole
 from .frame_state import FrameState
 from .keyframes import Bars, Channel
 from .motions import Placement
 
+Length = Literal["frames", "timeline", "motion"]
+Method = Literal["quick", "good"]
 _CLOSED = 'shutter "{name}" at frame {frame}: {fault}'
 _TOO_MANY_POINTS = 'region "{name}": more than {most} points with those before it'
 _FAR = 'region "{name}": a point of its strokes is nowhere near the picture'
@@ -127,22 +132,42 @@ class Subject:
         return motions.PICTURE
 
 
-@dataclass(frozen=True, eq=False)
-class Region(Subject):
+@dataclass(frozen=True, eq=False, kw_only=True)
+class AnyRegion(Subject):
+    """Where a shutter holds. shutter: its index; layer: core.pixels.layering"""
+
+    name: str = text("Name", "Name of the region", default="Region", absent="", most=limits.MAX_NAME)
+    shutter: int
+    opacity: Channel = number(
+        "Opacity",
+        "How much of the region counts: at 0 the picture is as without it",
+        default=1.0,
+        subtype="FACTOR",
+        told=False,
+    )
+    layer: bool = switch(
+        "Layer",
+        "Expose the region by itself, before all else, which is exposed without it: it leaves no ghost",
+        blender="is_layer",
+    )
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Region(AnyRegion):
     """A scribble of a shutter that moves.
 
-    shutter: index of the shutter; kind: "line" or "lasso", and
-    width: of its lines, fraction of the picture's height
-    opacity: 0 to 1 (scribbles.layers)
-    layer: whether it is exposed by itself (core.pixels.layering)"""
+    kind: "line" or "lasso", and width: of its lines, fraction of the picture's height"""
 
-    name: str
-    shutter: int
     kind: Channel
-    width: Channel
+    width: Channel = number(
+        "Width",
+        "Width of the lines as a fraction of the picture's height",
+        default=0.02,
+        most=limits.MAX_DISTANCE,
+        soft_most=0.5,
+        keyed_in_recipe=False,
+    )
     drawings: Drawings
-    opacity: Channel = field(default=keyframes.Constant(1.0))
-    layer: bool = False
 
     @property
     def is_still(self) -> bool:
@@ -161,22 +186,28 @@ class Region(Subject):
         return self.drawings.corners(frame, self.placement(frame))
 
 
-@dataclass(frozen=True, eq=False)
-class MatteRegion(Subject):
+@dataclass(frozen=True, eq=False, kw_only=True)
+class MatteRegion(AnyRegion):
     """A region whose shutter gets coefficients by a matte. It moves about the picture's centre: that places a ramp, and
     says of any other matte how what it covers moves.
 
-    content: channel of mattes.Content; feather: of mattes.Matte, as blend, invert and opacity
-    layer: as a Region's"""
+    content: channel of mattes.Content; feather: of mattes.Matte, as blend, invert and opacity"""
 
-    name: str
-    shutter: int
     content: Channel
-    blend: mattes.Blend
-    invert: bool
-    opacity: Channel
-    feather: Channel
-    layer: bool = False
+    blend: mattes.Blend = choice(
+        "Blend", "How the matte lies over other regions", BLENDS, default="over", context=CONTEXT
+    )
+    invert: bool = switch("Invert", "The shutter gets what the matte leaves")
+    feather: Channel = number(
+        "Feather",
+        "How wide a hard edge of the matte becomes, as a fraction of the picture's height",
+        default=0.0,
+        most=limits.MAX_DISTANCE,
+        soft_most=0.2,
+        precision=3,
+        context=CONTEXT,
+        recipe="width",
+    )
 
     @property
     def is_still(self) -> bool:
@@ -205,7 +236,9 @@ class OutlineRegion(MatteRegion):
     go from one to the next; content: a channel of mattes.FileFrame or of mattes.Outline"""
 
     drawings: Drawings
-    between: mattes.Between = "carried"
+    between: mattes.Between = choice(
+        "In Between", "What gives the matte between two drawings", BETWEEN, default="carried"
+    )
 
     def drawn_at(self, frame: float) -> scribbles.Shape:
         """The curves at a frame, as a lasso; between drawings, what is carried has none. EffectError: they are nowhere
@@ -237,6 +270,44 @@ class DrawnOutlines:
 
 
 @dataclass(frozen=True)
+class FileContent:
+    """Channel of a matte that a recipe names: a path has to be found before anybody reads it (for_picture).
+
+    path: a movie, or the first file of an image sequence, relative to the recipe's folder
+    offset: the matte's frame, from 0, that belongs to the source's or the timeline's first"""
+
+    path: str
+    channel: str = choice(
+        "Channel", "What of the matte says how much of the shutter a pixel gets", CHANNELS, default="luminance"
+    )
+    offset: int = whole(
+        "Offset",
+        "Frames by which the matte is ahead",
+        default=0,
+        least=-limits.MAX_FRAME,
+        most=limits.MAX_FRAME,
+    )
+    timing: Literal["source", "timeline"] = choice(
+        "Frames Of", "What the matte's frames belong to", TIMINGS, default="source"
+    )
+
+    def at(self, _frame: float) -> mattes.FileFrame:
+        raise NotImplementedError
+
+
+@dataclass(frozen=True)
+class RampContent:
+    """Channel of a ramp that a recipe names, or of the luminance of the shown frame (for_picture)."""
+
+    ramp: Literal["linear", "radial", "angle", "luminance"] = choice(
+        "Ramp", "How the ramp runs", RAMPS, default="linear", absent=MISSING
+    )
+
+    def at(self, _frame: float) -> mattes.Ramp:
+        raise NotImplementedError
+
+
+@dataclass(frozen=True)
 class PlacedRamp:
     """Channel of a ramp (mattes.Ramp) that is moved by keys."""
 
@@ -259,38 +330,92 @@ class Camera(Subject):
 
     influence: 0 to 1, what is left of the exposure that follows it: at 0 the shown frame alone"""
 
-    influence: Channel = field(default=keyframes.Constant(1.0))
+    influence: Channel = number(
+        "Influence",
+        "How much is left of exposures that follow the camera: at 0 the shown frame alone",
+        default=1.0,
+        subtype="FACTOR",
+        recipe="camera_influence",
+        told=False,
+    )
 
 
 STILL_CAMERA = Camera(Moves())
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Shutter:
-    """name, color: RGB display values, 0 to 1; follow: what its exposure moves with, None: nothing
-    trail: channel of how far that moves while the shutter is open, in fractions of the picture's height; None: the bars
-    say for how many frames it is open
-    motion: what of its motion is followed: the location, its rotation too, or its scale as well
-    smooth: frames before and after each over which that motion is averaged
-    timeline: whether the bars are the shape of the exposure over one frame of the timeline
-    combine, by_luminance: as mode and by_luminance of combining.Combine
-    threshold, softness: channels of its numbers; None: it has no threshold"""
+    """Bars over time, and what becomes of the frames that they expose.
 
-    name: str
-    color: tuple[float, float, float]
+    follow: what its exposure moves with, None: nothing"""
+
+    name: str = text("Name", "Name of the shutter", default="Shutter", absent=MISSING, most=limits.MAX_NAME)
+    color: tuple[float, float, float] = color(
+        "Color", "Color of the shutter's bars, scribbles and matte", default=(0.8, 0.8, 0.8)
+    )
     bars: Bars
     follow: Subject | None = None
-    trail: Channel | None = None
-    motion: motions.Motion = "scale"
-    smooth: int = 0
-    timeline: bool = False
-    combine: combining.Mode = "average"
-    by_luminance: bool = False
-    threshold: Channel | None = None
-    softness: Channel = field(default=keyframes.Constant(0.0))
+    follow_motion: motions.Motion = choice(
+        "Motion", "What of its motion is followed", MOTIONS, default="scale", context=CONTEXT, told=False
+    )
+    follow_smooth: int = whole(
+        "Smoothness",
+        "Frames before and after each over which the motion is averaged, as the mass of a camera does: "
+        "at 0 it is followed as it is",
+        default=0,
+        most=limits.MAX_SMOOTH,
+        soft_most=24,
+        told=False,
+    )
+    length: Length = choice(
+        "Exposure Length", "What says how long the exposure is", LENGTHS, default="frames", context=CONTEXT, recipe=""
+    )
+    trail: Channel = number(
+        "Distance",
+        "How far what is followed moves while the shutter is open, as a fraction of the picture's height",
+        default=0.1,
+        most=limits.MAX_DISTANCE,
+        precision=3,
+        recipe="",
+    )
+    combine: combining.Mode = choice(
+        "Combine", "What the frames that are exposed become", COMBINES, default="average", told=False
+    )
+    by_luminance: bool = switch(
+        "By Luminance",
+        "Choose a frame for each pixel, by how light it is there, and not one for each color channel",
+        told=False,
+    )
+    use_threshold: bool = switch(
+        "Use Threshold",
+        "Let only what is lighter, or of the darkest darker, leave a trail beside what is shown",
+        recipe="",
+    )
+    threshold: Channel = number(
+        "Threshold",
+        "Luminance of linear light from which on it leaves a trail; white is 1",
+        default=0.5,
+        most=limits.MAX_THRESHOLD,
+        precision=3,
+        recipe="",
+    )
+    softness: Channel = number(
+        "Softness",
+        "Range of luminance, around the threshold, over which a trail fades in",
+        default=0.1,
+        absent=0.0,
+        most=limits.MAX_THRESHOLD,
+        precision=3,
+        told=False,
+    )
+
+    @property
+    def has_trail(self) -> bool:
+        """Whether it is open while what it follows moves by a distance."""
+        return self.follow is not None and self.length == "motion"
 
     def combine_at(self, frame: float) -> combining.Combine:
-        threshold = None if self.threshold is None else float(self.threshold.at(frame))
+        threshold = float(self.threshold.at(frame)) if self.use_threshold else None
         return combining.Combine.of(self.combine, self.by_luminance, threshold, float(self.softness.at(frame)))
 
 
@@ -310,14 +435,20 @@ class Effect:
     regions: tuple[Region | MatteRegion, ...]
     options: Channel
     time: Channel | None = None
-    edge_aware: Channel = field(default=keyframes.Constant(0.0))
+    edge_aware: Channel = number(
+        "Follow Edges",
+        "How much shutters keep to the edges of the shown frame: at 1 a scribble fills what it lies in",
+        default=0.0,
+        subtype="FACTOR",
+    )
+    inbetween_method: Method = choice("Method", "How in-between frames are made", METHODS, default="quick")
     camera: Camera = STILL_CAMERA
 
     @cached_property
     def is_still(self) -> bool:
         """Whether its state is known to be the same at every frame."""
         bars = (shutter.bars for shutter in self.shutters)
-        thresholds = [each for shutter in self.shutters for each in (shutter.threshold, shutter.softness) if each]
+        thresholds = [each for shutter in self.shutters for each in (shutter.threshold, shutter.softness)]
         return keyframes.are_still(self.options, self.edge_aware, *bars, *thresholds, *self.regions)
 
     def at(self, frame: float) -> FrameState:

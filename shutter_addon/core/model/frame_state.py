@@ -10,8 +10,10 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
-from . import scribbles, shutters
+from . import limits, scribbles, shutters
+from .choices import AGGREGATES, CONTEXT, EDGES, EXPOSURES, INBETWEENS, INTERPOLATIONS, LIGHTS, POSITIONS
 from .combining import AVERAGE, Combine
+from .fields import MISSING, choice, switch, whole
 from .mattes import Matte
 
 Interpolation = Literal["displacement", "value"]
@@ -23,29 +25,88 @@ Position = Literal["start", "center", "end"]
 
 @dataclass(frozen=True)
 class Options:
-    """How a window of frames becomes a picture; the recipe's fields of the same names.
+    """How a window of frames becomes a picture.
 
     window: L, its length in frames, in-between frames included
     edge_aware: 0 to 1, how much coefficients stop at the edges of the shown frame (core.pixels.conductances)
-    plate_reach: how many frames before and after the shown one are looked through for what lies behind layers
-    decontaminate: whether layers, and what lies behind them, have their own colours in the mixed pixels at their edges
     step: frames for each filmed one: 1, or the factor of in-between frames
     slid: how many frames later the window lies than its position says (core.pixels.compositor.slid)
     """
 
-    window: int
-    position: Position = "start"
-    interpolation: Interpolation = "displacement"
-    light: Light = "linear"
-    exposure: Exposure = "normalized"
-    edges: Edges = "hold"
-    aggregate: int = 1
-    border: bool = False
-    stop_at_cuts: bool = True
+    window: int = whole(
+        "Frames",
+        "Number of source frames that a shutter can expose",
+        default=8,
+        absent=MISSING,
+        least=1,
+        most=shutters.MAX_WINDOW,
+        context=CONTEXT,
+    )
+    position: Position = choice(
+        "Position", "Where the frames that are exposed lie around the shown one", POSITIONS, default="start", keyed=True
+    )
+    interpolation: Interpolation = choice(
+        "Interpolation",
+        "How shutters blend, in the picture and between keyframes",
+        INTERPOLATIONS,
+        default="displacement",
+        keyed=True,
+    )
+    light: Light = choice("Light", "How the frames that are exposed are summed", LIGHTS, default="linear", keyed=True)
+    exposure: Exposure = choice(
+        "Exposure",
+        "How bright shutters are that are open for different times",
+        EXPOSURES,
+        default="normalized",
+        keyed=True,
+        context=CONTEXT,
+    )
+    edges: Edges = choice(
+        "Clip Ends",
+        "What an exposure gets that reaches beyond the ends of the clip, or of the shot",
+        EDGES,
+        default="hold",
+        keyed=True,
+        context=CONTEXT,
+    )
+    aggregate: int = choice(
+        "Matte Resolution", "Pixels that share a shutter (larger blocks are quicker)", AGGREGATES, default=1, keyed=True
+    )
+    border: bool = switch(
+        "Keep Edges Default",
+        "Make the picture's edge a scribble of the default shutter, so that a stroke alone acts locally",
+        keyed=True,
+    )
+    stop_at_cuts: bool = switch(
+        "Stop at Cuts",
+        "Exposures end at the source's cuts as they do at the clip's ends",
+        default=True,
+        keyed=True,
+    )
     edge_aware: float = 0.0
-    plate_reach: int = 48
-    decontaminate: bool = True
-    step: int = 1
+    plate_reach: int = whole(
+        "Background Search",
+        "Frames before and after the shown one in which what lies behind layers is looked for, "
+        "where no exposed frame shows it",
+        default=48,
+        most=limits.MAX_PLATE_REACH,
+        soft_most=120,
+    )
+    decontaminate: bool = switch(
+        "Clean Edges",
+        "Give layers, and what lies behind them, their own colors in the mixed pixels at their edges",
+        default=True,
+        keyed=True,
+    )
+    step: int = choice(
+        "In-Between Frames",
+        "Frames between those of the source, by optical flow: bars count them all, "
+        "and a still frame becomes as many equal bars",
+        INBETWEENS,
+        default=1,
+        blender="inbetween",
+        recipe="inbetween",
+    )
     slid: int = 0
 
     @property

@@ -92,11 +92,11 @@ def followed(
     times = times_of(shown, frame, index, frames, reach(state.options.window))
     turns = np.ones((len(frames), len(subjects)), np.complex128)
     shifts = np.zeros_like(turns)
-    ways = [(id(shutter.follow), shutter.motion, shutter.smooth) for shutter in effect.shutters]
+    ways = [(id(shutter.follow), shutter.follow_motion, shutter.follow_smooth) for shutter in effect.shutters]
     for way, shutter in dict(zip(ways, effect.shutters, strict=True)).items():
         if shutter.follow is None:
             continue
-        subject = Followed(shutter.motion, shutter.smooth, shutter.follow)
+        subject = Followed(shutter.follow_motion, shutter.follow_smooth, shutter.follow)
         moves = [motion_to(subject, frame, time, (source.width, source.height)) for time in times]
         followers = [other == way for other in ways]
         turns[:, followers] = np.array([motion.turn for motion in moves])[:, None]
@@ -119,7 +119,7 @@ def _with_trails(
     # What is left out beyond the clip's ends stands still there, as what is held does.
     turns, shifts = following.at(np.where(seen < 0, positions, seen))
     for i, shutter in enumerate(effect.shutters):
-        if shutter.follow and shutter.trail:
+        if shutter.has_trail:
             corners = [motions.pixel(corner, size) for corner in shutter.follow.corners(frame)]
             places = np.outer(turns[:, i], corners) + shifts[:, i, None]
             way = trails.travelled(places) / source.height

@@ -35,7 +35,7 @@ def exposed(
     position: where in the source, in frames, a timeline frame is; asked for the frame, those beside it, and halfway to
     these
     ends: the first and the last position that its strip shows"""
-    chosen = [i for i, shutter in enumerate(effect.shutters) if shutter.timeline]
+    chosen = [i for i, shutter in enumerate(effect.shutters) if shutter.length == "timeline"]
     if not chosen:
         return state
     places = np.array([position(at.frame + k) for k in (-1, -0.5, 0, 0.5, 1)])

@@ -1,0 +1,117 @@
+"""What a property of an effect is: its label, range, choices and name in a recipe.
+
+The classes of the model (effect.py, frame_state.py) define each property once, as a dataclass field that is made here:
+
+    trail: Channel = number("Distance", "How far …", default=0.1, most=MAX_DISTANCE)
+
+Blender's property groups, recipes, the snapshot, import, export, validation, panels and the table of the recipe's
+fields come from these. What a field has no Field for, such as bars and strokes, is written next to its subject.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Sequence
+from typing import Any
+
+from .keyframes import Constant
+
+Choice = tuple[str, str, str]  # its word in capitals, label, description
+
+
+@dataclasses.dataclass(frozen=True)
+class Field:
+    """A property of an effect, a shutter, a region or the camera.
+
+    default: where Blender begins; absent: what a recipe means that does not say it; MISSING: it has to
+    least, most: the range of a number; soft_most: how far a slider goes; of a text, `most` counts its characters
+    choices: of a word; the word in the model and in recipes is in small letters
+    keyed: whether Blender's F-curves may change it; keyed_in_recipe: whether a recipe's keys may
+    blender, recipe: its names there; recipe "": it has none
+    told: whether a recipe says it even where it is as `absent`
+    subtype, context: of Blender's property, and of the translation of its label
+    since: the version of the extension in which it appeared"""
+
+    label: str
+    description: str
+    default: Any
+    absent: Any
+    blender: str
+    recipe: str
+    least: float = 0.0
+    most: float = 1.0
+    soft_least: float | None = None
+    soft_most: float | None = None
+    choices: Sequence[Choice] = ()
+    keyed: bool = True
+    keyed_in_recipe: bool = False
+    told: bool = True
+    subtype: str = "NONE"
+    precision: int = 2
+    context: str = "*"
+    since: str = "0.1.0"
+
+    @property
+    def words(self) -> tuple[Any, ...]:
+        """Its choices as the model has them: texts, or whole numbers."""
+        return tuple(type(self.default)(word.lower()) for word, *_ in self.choices)
+
+
+MISSING = dataclasses.MISSING
+
+
+def number(label: str, description: str, *, default: float, **more: Any) -> Any:
+    """Make a number that keys may change; the model has a channel of it."""
+    more = {"keyed_in_recipe": True} | more
+    return _field(label, description, default, lambda: Constant(default), **more)
+
+
+def constant(label: str, description: str, *, default: float, **more: Any) -> Any:
+    """Make a number of which the model has the value alone."""
+    return _field(label, description, default, **more)
+
+
+def whole(label: str, description: str, *, default: int, **more: Any) -> Any:
+    """Make a whole number, without keys."""
+    return _field(label, description, default, **({"keyed": False} | more))
+
+
+def switch(label: str, description: str, *, default: bool = False, **more: Any) -> Any:
+    """Make a property that is on or off, without keys."""
+    return _field(label, description, default, **({"keyed": False} | more))
+
+
+def choice(label: str, description: str, choices: Sequence[Choice], *, default: str | int, **more: Any) -> Any:
+    """Make a choice of one word among several, without keys."""
+    return _field(label, description, default, choices=choices, **({"keyed": False} | more))
+
+
+def text(label: str, description: str, *, default: str, **more: Any) -> Any:
+    """Make a text, without keys."""
+    return _field(label, description, default, **({"keyed": False} | more))
+
+
+def color(label: str, description: str, *, default: tuple[float, float, float], **more: Any) -> Any:
+    """Make a color: red, green and blue display values, 0 to 1."""
+    return _field(label, description, default, **({"keyed": False, "subtype": "COLOR_GAMMA"} | more))
+
+
+def _field(label: str, description: str, default: Any, made: Any = None, **more: Any) -> Any:
+    said = {"absent": default, "blender": "", "recipe": None} | more
+    factory = made or (lambda: default)
+    return dataclasses.field(default_factory=factory, metadata={"said": (label, description, default, said)})
+
+
+def fields_of(*kinds: type) -> dict[str, Field]:
+    """Give the Fields of classes, by the name of the model's field."""
+    found: dict[str, Field] = {}
+    for kind in kinds:
+        for each in dataclasses.fields(kind):
+            if "said" in each.metadata:
+                label, description, default, said = each.metadata["said"]
+                names = {
+                    "blender": said["blender"] or each.name,
+                    "recipe": each.name if said["recipe"] is None else said["recipe"],
+                }
+                found[each.name] = Field(label, description, default, **(said | names))
+    return found
