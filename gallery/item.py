@@ -16,7 +16,7 @@ from shutter_addon.core.model import scribbles
 from shutter_addon.core.model.effect import Effect
 from shutter_addon.core.model.frame_state import FrameState
 from shutter_addon.core.pixels import following, layering
-from shutter_addon.core.recipes import recipe, recipe_file
+from shutter_addon.core.recipes import recipe_file
 from shutter_addon.media import open_source
 from shutter_addon.media.matte_files import MatteFile
 from shutter_addon.media.matte_values import MatteValues
@@ -97,12 +97,12 @@ class Shot:
         return self._at(frame).bars[index], self._colors[index]
 
     @cached_property
-    def contents(self) -> recipe.Recipe:
+    def contents(self) -> Effect:
         return recipe_file.load(self.recipe)
 
     @cached_property
     def effect(self) -> Effect:
-        return self.contents.effect(self._source.width / self._source.height, self._matte)
+        return self.contents.for_picture(self._source.width / self._source.height, self._matte)
 
     @cached_property
     def _source(self):
@@ -131,8 +131,8 @@ class Shot:
         """The source frame that is shown at a timeline frame."""
         return min(max(int(frame) - 1, 0), self._source.count - 1)
 
-    def _matte(self, region: recipe.MatteRegion | recipe.RampRegion) -> MatteFile:
+    def _matte(self, region: MatteRegion) -> MatteFile:
         """What a matte is read from: its file, or for a ramp of luminance the footage."""
-        if isinstance(region, recipe.RampRegion):
-            return MatteFile(self.footage)
-        return MatteFile(self.recipe.parent / region.path, region.channel)
+        if isinstance(region.content, FileContent):
+            return MatteFile(self.recipe.parent / region.content.path, region.content.channel)
+        return MatteFile(self.footage)

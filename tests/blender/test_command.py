@@ -124,7 +124,7 @@ def test_random_bars_equal_the_reference(command, noise, tmp_path, same_pixels, 
     image = OpenImageIO.ImageInput.open(str(tmp_path / "w" / "0002.exr"))
     assert image.spec().channelnames == ("S0", "S1", "S2")
     image.close()
-    moment = recipe_file.parse((tmp_path / "recipe.json").read_text()).at(2, 64 / 48)
+    moment = recipe_file.parse((tmp_path / "recipe.json").read_text()).for_picture(64 / 48).at(2)
     window = np.dstack([linear(frames[1:9]).transpose(1, 2, 3, 0)]).transpose(3, 0, 1, 2)
     opaque = np.concatenate([window, np.ones((*window.shape[:3], 1))], axis=-1)
     expected = compositor.compose(moment, opaque, np.ones(8, bool), np.moveaxis(coefficients, -1, 0))

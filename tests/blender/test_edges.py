@@ -58,7 +58,7 @@ def test_a_render_equals_the_reference(command, film, tmp_path, same_pixels, agg
     command(film, "--output", tmp_path / "out", "--weights", tmp_path / "w", "--frames", "4:9", recipe=data)
     found = recipe_file.parse((tmp_path / "recipe.json").read_text())
     for frame in (4, 9):
-        moment = found.at(frame, SIZE[0] / SIZE[1])
+        moment = found.for_picture(SIZE[0] / SIZE[1]).at(frame)
         assert moment.options.edge_aware == pytest.approx(0.2 + 0.1 * (frame - 1))
         c, picture = expected(film, moment, frame - 1)
         written = np.moveaxis(read_picture(tmp_path / "w" / f"{frame:04d}.exr"), -1, 0)

@@ -93,9 +93,9 @@ def by_keys(effect):
 
 
 def by_recipe(effect):
-    parts = [recipe.Shutter("A", bars=[1.0] * 8), recipe.Shutter("B", bars=[1.0, *[0.0] * 7])]
+    parts = [{"name": "A", "bars": [1] * 8}, {"name": "B", "bars": [1, *[0] * 7]}]
     scene, _, strip = strips.find_effect(effect.scene)
-    recipe_import.apply(scene, effect, strip, recipe.Recipe(version=1, window=8, shutters=parts))
+    recipe_import.apply(scene, effect, strip, made(8, parts))
 
 
 @pytest.mark.parametrize("edited", [by_hand, by_number, by_script, by_keys, by_recipe])

@@ -12,13 +12,13 @@ FIRST, LAST = np.array([1.0, 0, 0, 0]), np.array([0, 0, 0, 1.0])
 
 
 def made(bars, regions=(), **options) -> effect.Effect:
-    shutter = effect.Shutter("Sharp", (1, 1, 1), bars)
+    shutter = effect.Shutter(name="Sharp", bars=bars)
     return effect.Effect((shutter,), tuple(regions), Constant(Options(4, **options)))
 
 
 def region(strokes, placement=None, name="Face") -> effect.Region:
     drawings = effect.Drawings(name, (1.0,), (strokes,), ("linear",), 1.0, placement)
-    return effect.Region(effect.Moves(), name, 0, Constant("line"), Constant(0.1), drawings)
+    return effect.Region(moves=effect.Moves(), name=name, shutter=0, kind=Constant("line"), drawings=drawings)
 
 
 def test_an_error_among_samples_is_raised_at_its_frame_alone():
@@ -48,10 +48,10 @@ def changed(**channels) -> effect.Effect:
     ramp = Constant(mattes.Ramp("linear", (0, 0), 0.0, 1.0))
     matte = {"content": ramp, "opacity": Constant(1.0), "feather": Constant(0.0)} | channels
     regions = (
-        effect.Region(effect.Moves(**numbers), "Face", 0, kind, width, drawings),
-        effect.MatteRegion(effect.Moves(), "Sky", 0, blend="over", invert=False, **matte),
+        effect.Region(moves=effect.Moves(**numbers), shutter=0, kind=kind, width=width, drawings=drawings),
+        effect.MatteRegion(moves=effect.Moves(), shutter=0, **matte),
     )
-    return effect.Effect((effect.Shutter("Sharp", (1, 1, 1), Bars(bars)),), regions, options, edge_aware=edge_aware)
+    return effect.Effect((effect.Shutter(name="Sharp", bars=Bars(bars)),), regions, options, edge_aware=edge_aware)
 
 
 def test_the_state_of_a_still_effect_is_made_once():
@@ -141,10 +141,6 @@ def test_strokes_far_off_and_too_many_points_are_refused():
         name="Outline",
         shutter=0,
         content=Constant(None),
-        blend="over",
-        invert=False,
-        opacity=Constant(1.0),
-        feather=Constant(0.0),
         drawings=effect.Drawings("Outline", (1.0,), (half,), ("linear",), 1.0),
     )
     with pytest.raises(EffectError, match='region "Outline": more than'):

@@ -3,25 +3,27 @@
 import dataclasses
 from types import SimpleNamespace
 
+import made_recipes
 import numpy as np
 import pytest
+from made_recipes import key
 
 from shutter_addon.core.model import motions
+from shutter_addon.core.model.keyframes import Constant
 from shutter_addon.core.model.motions import Placement
 from shutter_addon.core.pixels import following
-from shutter_addon.core.recipes import recipe
 
 SOURCE = SimpleNamespace(count=40, width=64, height=48)
 
 
 def made(keys=(), position="start", edges="hold", follow="car", camera=(), strokes=(((0.4, 0.4), (0.6, 0.6)),)):
-    region = recipe.Region("Long", "car", strokes=[list(stroke) for stroke in strokes], keys=list(keys))
-    shutter = recipe.Shutter("Long", bars=[1.0] * 6, follow=follow)
-    return recipe.Recipe(1, 6, [shutter], [region], position=position, edges=edges, camera=list(camera))
+    region = {"shutter": "Long", "name": "car", "strokes": strokes, "keys": list(keys)}
+    shutter = {"name": "Long", "bars": [1] * 6} | ({"follow": follow} if follow else {})
+    return made_recipes.made(6, [shutter], [region], position=position, edges=edges, camera=list(camera))
 
 
 def state_of(source, frame, index, direction=1, shown=None):
-    effect = source.effect(SOURCE.width / SOURCE.height)
+    effect = source.for_picture(SOURCE.width / SOURCE.height)
     state = effect.at(frame)
     shown = shown or (lambda other: index + round(other - frame))
     return following.followed(effect, state, following.Shown(frame, index, direction), SOURCE, shown)
@@ -31,7 +33,7 @@ def followed(*arguments, **given):
     return state_of(*arguments, **given).following
 
 
-STRAIGHT = [recipe.RegionKey(0, (0, 0)), recipe.RegionKey(100, (1, 0.5))]
+STRAIGHT = [key(0, (0, 0)), key(100, (1, 0.5))]
 STEP = 0.64 - 0.24j  # pixels a frame, y down
 
 
@@ -83,7 +85,7 @@ def test_mirrored_frames_have_the_motion_of_what_they_are():
 
 
 def test_turned_and_scaled_about_the_shapes_centre():
-    keys = [recipe.RegionKey(1), recipe.RegionKey(2, (0.1, 0), 90, 2)]
+    keys = [key(1), key(2, (0.1, 0), 90, 2)]
     source = made(keys, strokes=[((0.25, 0.25), (0.5, 0.25))])
     motion = motions.Similarity(*(part[0, 0] for part in followed(source, 1, 0).at([1])))
     size = SOURCE.width, SOURCE.height
@@ -93,22 +95,22 @@ def test_turned_and_scaled_about_the_shapes_centre():
 
 
 def test_a_redrawn_shape_moves_as_its_centre_does():
-    keys = [recipe.RegionKey(1), recipe.RegionKey(3, strokes=[[(0.5, 0.4), (0.7, 0.6)]])]
+    keys = [key(1), key(3, strokes=[[(0.5, 0.4), (0.7, 0.6)]])]
     assert shifts(made(keys), [0, 1, 2], frame=1, index=0) == pytest.approx([0, 0.05 * 64, 0.1 * 64])
 
 
 def test_the_camera_turns_about_the_pictures_centre():
-    keys = [recipe.CameraKey(1), recipe.CameraKey(2, (0, 0.25), 0, 1.5)]
+    keys = [key(1), key(2, (0, 0.25), 0, 1.5)]
     motion = motions.Similarity(*(part[0, 0] for part in followed(made(follow="camera", camera=keys), 1, 0).at([1])))
     assert motion(31.5 + 23.5j) == pytest.approx(31.5 + 11.5j)
     assert motion.turn == pytest.approx(1.5)
 
 
-WHIRL = [recipe.RegionKey(1), recipe.RegionKey(2, (0.1, 0), 90, 2)]
+WHIRL = [key(1), key(2, (0.1, 0), 90, 2)]
 
 
 def with_way(source, **way):
-    return dataclasses.replace(source, shutters=[dataclasses.replace(source.shutters[0], **way)])
+    return dataclasses.replace(source, shutters=(dataclasses.replace(source.shutters[0], **way),))
 
 
 def test_the_location_alone_is_followed():
@@ -121,7 +123,7 @@ def test_the_location_alone_is_followed():
 
 
 def jittered(rng):
-    return [recipe.RegionKey(n, (0.01 * n + rng.normal(0, 0.01), 0)) for n in range(60)]
+    return [key(n, (0.01 * n + rng.normal(0, 0.01), 0)) for n in range(60)]
 
 
 def test_a_smooth_motion_has_less_jitter_and_the_same_way():
@@ -141,7 +143,7 @@ def test_a_straight_way_is_smooth_already():
 
 
 def test_smoothing_is_the_weighted_mean_of_the_frames_around():
-    jump = [recipe.RegionKey(10, ease="constant"), recipe.RegionKey(20, (0.5, 0))]
+    jump = [key(10, ease="constant"), key(20, (0.5, 0))]
     found = shifts(
         with_way(made(jump, "center"), follow_smooth=3), [19], frame=17, index=16, shown=lambda f: int(f) - 1
     )
@@ -153,29 +155,30 @@ def test_smoothing_is_the_weighted_mean_of_the_frames_around():
 def test_shutters_may_follow_one_region_in_ways_of_their_own():
     source = made(WHIRL)
     other = dataclasses.replace(source.shutters[0], name="Other", follow_motion="location")
-    found = followed(dataclasses.replace(source, shutters=[*source.shutters, other]), 1, 0).at([1])[0][0]
+    found = followed(dataclasses.replace(source, shutters=(*source.shutters, other)), 1, 0).at([1])[0][0]
     assert found == pytest.approx([-2j, 1])
 
 
 def test_where_the_camera_counts_for_nothing_the_shown_frame_alone_is_exposed():
-    camera = [recipe.CameraKey(0), recipe.CameraKey(100, (1, 0.5))]
+    camera = [key(0), key(100, (1, 0.5))]
     source = made(position="center", follow="camera", camera=camera)
     bars = {}
     for influence in (0.0, 0.5, 1.0):
-        bars[influence] = state_of(dataclasses.replace(source, camera_influence=influence), 11, 10).bars[0]
+        camera = dataclasses.replace(source.camera, influence=Constant(influence))
+        bars[influence] = state_of(source.with_parts(source.regions, camera), 11, 10).bars[0]
     assert bars[0.0] == pytest.approx([0, 0, 6, 0, 0, 0])
     assert bars[0.5] == pytest.approx(np.array([0, 1, 1, 1, 0.5, 0]) * 6 / 3.5)
     assert bars[1.0].tolist() == [1.0] * 6
 
 
-@pytest.mark.parametrize("keys", [[], STRAIGHT[:1], [recipe.RegionKey(0, scale=0), recipe.RegionKey(9, (1, 1))]])
+@pytest.mark.parametrize("keys", [[], STRAIGHT[:1], [key(0, scale=0), key(9, (1, 1))]])
 def test_what_does_not_move_is_nothing_to_follow(keys):
     """The state is that of an effect which follows nothing."""
-    assert state_of(made(keys), 0, 0).key == made(keys, follow=None).at(0, 4 / 3).key
+    assert state_of(made(keys), 0, 0).key == made(keys, follow=None).for_picture(4 / 3).at(0).key
 
 
 def test_a_subject_of_no_size_later_is_a_point():
-    keys = [recipe.RegionKey(0), recipe.RegionKey(4, scale=0)]
+    keys = [key(0), key(4, scale=0)]
     assert followed(made(keys), 0, 0).at([4])[0][0, 0] == 0
 
 
@@ -186,8 +189,8 @@ def test_in_between_frames_take_the_motion_between():
 
 
 def test_a_bezier_way_is_straight_between_frames():
-    keys = [recipe.RegionKey(0, ease="bezier"), recipe.RegionKey(4, (1, 0))]
-    effect = made(keys).effect(4 / 3)
+    keys = [key(0, ease="bezier"), key(4, (1, 0))]
+    effect = made(keys).for_picture(4 / 3)
     halfway = motions.between(*(effect.regions[0].placement(frame) for frame in (1, 2)), 0.5)
     found = shifts(made(keys), [1], frame=1, index=0, shown=lambda other: 2 * int(other - 1))
     start = effect.regions[0].placement(1)

@@ -9,10 +9,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
+from made_recipes import comes_back, key, made
 
 from shutter_addon.core.model import shutters
+from shutter_addon.core.model.effect import Moves
+from shutter_addon.core.model.keyframes import Constant
 from shutter_addon.core.pixels import compositor, following, trails
-from shutter_addon.core.recipes import recipe, recipe_file
+from shutter_addon.core.recipes import recipe_file
 
 WINDOW = 24
 SOURCE = SimpleNamespace(count=60, width=160, height=100)
@@ -115,15 +118,18 @@ WAY = np.cumsum(SPEEDS) - SPEEDS[0]
 
 def accelerating(trail, position="center", bars=(1.0,) * WINDOW, edges="hold", follow="car"):
     places = [(x / SOURCE.width, 0.0) for x in WAY]
-    keys = [recipe.RegionKey(frame, place) for frame, place in enumerate(places, 1)]
-    region = recipe.Region("S", "car", strokes=[[(0.1, 0.4), (0.2, 0.6)]], keys=keys)
-    camera = [recipe.CameraKey(key.frame, key.location) for key in keys]
-    shutter = recipe.Shutter("S", bars=list(bars), follow=follow, trail=trail)
-    return recipe.Recipe(1, len(bars), [shutter], [region], position=position, edges=edges, camera=camera)
+    keys = [key(frame, place) for frame, place in enumerate(places, 1)]
+    region = {"shutter": "S", "name": "car", "strokes": [[[0.1, 0.4], [0.2, 0.6]]], "keys": keys}
+    shutter = {"name": "S", "bars": list(bars), "follow": follow} | ({} if trail is None else {"trail": trail})
+    return made(len(bars), [shutter], [region], position=position, edges=edges, camera=keys)
+
+
+def with_options(source, **options):
+    return replace(source, options=Constant(replace(source.options.at(1), **options)))
 
 
 def followed(source, frame, direction=1):
-    effect = source.effect(SOURCE.width / SOURCE.height)
+    effect = source.for_picture(SOURCE.width / SOURCE.height)
     index = frame - 1 if direction > 0 else SOURCE.count - frame
     shown = lambda other: index + direction * round(other - frame)  # noqa: E731
     state = compositor.slid(effect.at(frame), index, direction, range(SOURCE.count), whole=True)
@@ -166,7 +172,7 @@ def test_what_slides_is_as_long_at_the_clips_end_and_lies_within(bars):
     assert [streak(source, frame) for frame in (45, 57, 60)] == pytest.approx([30] * 3, rel=0.06)
     state, index = followed(source, SOURCE.count)
     assert compositor.reach(state, index)[1] == SOURCE.count - 1
-    held, index = followed(replace(source, edges="hold"), SOURCE.count)
+    held, index = followed(with_options(source, edges="hold"), SOURCE.count)
     assert compositor.reach(held, index)[1] > SOURCE.count + 3
 
 
@@ -176,13 +182,14 @@ def test_for_how_long_a_shutter_is_open_is_told():
     assert state.open_for == {0: pytest.approx(open_frames(state.bars[0]))}
     ramp, _ = followed(accelerating(0.2, bars=np.linspace(1, 2, WINDOW)), 30)
     assert ramp.open_for == state.open_for
-    still, _ = followed(replace(accelerating(0.2), regions=[replace(accelerating(0.2).regions[0], keys=[])]), 30)
+    source = accelerating(0.2)
+    still, _ = followed(source.with_parts([replace(source.regions[0], moves=Moves())]), 30)
     assert still.open_for == {0: WINDOW}
     assert followed(accelerating(None), 30)[0].open_for == {}
 
 
 def test_keys_of_the_length():
-    keyed = accelerating([recipe.ValueKey(20, 0.1), recipe.ValueKey(40, 0.3)])
+    keyed = accelerating([{"frame": 20, "value": 0.1}, {"frame": 40, "value": 0.3}])
     for frame, length in ((20, 0.1), (30, 0.2), (40, 0.3)):
         assert np.array_equal(followed(keyed, frame)[0].bars, followed(accelerating(length), frame)[0].bars)
 
@@ -191,17 +198,17 @@ def test_a_reversed_source():
     """The same moments are exposed, whichever way they run."""
     bars = (1.0,) * 23  # as many before the shown frame as after it
     forward, index = followed(accelerating(0.2, bars=bars), 30)
-    keys = [recipe.CameraKey(frame, (x / SOURCE.width, 0)) for frame, x in enumerate(WAY[::-1], 1)]
-    shutter = recipe.Shutter("S", bars=list(bars), follow="camera", trail=0.2)
-    backward, same = followed(recipe.Recipe(1, 23, [shutter], position="center", camera=keys), 31, direction=-1)
+    keys = [key(frame, (x / SOURCE.width, 0)) for frame, x in enumerate(WAY[::-1], 1)]
+    shutter = {"name": "S", "bars": list(bars), "follow": "camera", "trail": 0.2}
+    backward, same = followed(made(23, [shutter], position="center", camera=keys), 31, direction=-1)
     assert same == index
     assert backward.bars[0] == pytest.approx(forward.bars[0, ::-1])
 
 
 def test_in_between_frames_count_as_the_parts_of_one():
     plain, _ = followed(accelerating(0.2), 40)
-    source = replace(accelerating(0.2, bars=(1.0,) * 4 * WINDOW), inbetween=4)
-    effect, fine = source.effect(1.6), SimpleNamespace(count=4 * SOURCE.count, width=160, height=100)
+    source = with_options(accelerating(0.2, bars=(1.0,) * 4 * WINDOW), step=4)
+    effect, fine = source.for_picture(1.6), SimpleNamespace(count=4 * SOURCE.count, width=160, height=100)
     state = following.followed(
         effect, effect.at(40), following.Shown(40, 156), fine, lambda other: 4 * round(other - 1)
     )
@@ -210,11 +217,11 @@ def test_in_between_frames_count_as_the_parts_of_one():
 
 def test_frames_change_no_bit():
     state, _ = followed(accelerating(None), 30)
-    assert np.array_equal(state.bars, accelerating(None).effect(1.6).at(30).bars)
+    assert np.array_equal(state.bars, accelerating(None).for_picture(1.6).at(30).bars)
 
 
 def test_a_recipe_of_it_comes_back():
-    for trail in (0.25, [recipe.ValueKey(1, 0.1), recipe.ValueKey(9, 0.3, "bezier")]):
+    for trail in (0.25, [{"frame": 1, "value": 0.1}, {"frame": 9, "value": 0.3, "ease": "bezier"}]):
         source = accelerating(trail)
-        assert recipe_file.parse(recipe_file.dump(source)) == source
+        assert comes_back(source)
     assert json.loads(recipe_file.dump(accelerating(None)))["shutters"][0].get("trail") is None

@@ -250,7 +250,8 @@ def asked_of(case: Case, source, folder: Path):
     from shutter_addon.core.pixels import compositor, following, layering, timeline_exposure
     from shutter_addon.core.recipes import recipe_file
 
-    effect = recipe_file.parse(case.recipe).effect(source.width / source.height, partial(matte_file, folder, source))
+    recipe = recipe_file.parse(case.recipe)
+    effect = recipe.for_picture(source.width / source.height, partial(matte_file, folder, source))
     last, index, direction = source.count - 1, case.index, case.direction
 
     def place(frame: float) -> float:
@@ -267,7 +268,7 @@ def asked_of(case: Case, source, folder: Path):
         ends = (-np.inf, np.inf)
     at = following.Shown(case.frame, index, direction)
     state = timeline_exposure.exposed(effect, effect.at(case.frame), at, place, ends)
-    trails = any(shutter.trail for shutter in effect.shutters)
+    trails = any(shutter.has_trail for shutter in effect.shutters)
     state = compositor.slid(state, index, direction, range(source.count), whole=trails)
     state = following.followed(effect, state, at, source, shows)
     return Request(index, layering.layered(effect, state, at, source, shows), direction)
@@ -297,9 +298,8 @@ def matte_file(folder: Path, source, region):
     """What the product reads for a matte region of a recipe in that folder, or for the luminance of its source."""
     from shutter_addon.media.matte_files import MatteFile
 
-    if region.kind == "ramp":
-        return MatteFile(source.path)
-    return MatteFile(folder / region.path, region.channel)
+    content = region.content
+    return MatteFile(folder / content.path, content.channel) if hasattr(content, "path") else MatteFile(source.path)
 
 
 def exact_coefficients(case: Case, source, footage, index: int) -> np.ndarray:

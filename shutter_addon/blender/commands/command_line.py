@@ -5,17 +5,17 @@ import os
 import re
 import sys
 from pathlib import Path
-from typing import get_args
 
 from ...core.messages import sentence, signed
-from ...core.recipes import recipe
+from ...core.model.fields import fields_of
+from ...core.model.frame_state import Options
 from ...media import open_source
 from ...media.sequence import by_number
 from ..data import inbetween_settings
 from ..devices import available
 from ..output import film_output
 
-FACTORS = get_args(recipe.Factor)  # 1: none
+FACTORS = fields_of(Options)["step"].words  # 1: none
 METHODS = tuple(inbetween_settings.METHODS.values())
 
 

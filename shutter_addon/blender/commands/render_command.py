@@ -7,6 +7,7 @@ import bpy
 
 from ...core import atomic_write
 from ...core.farm import job_file
+from ...core.model.effect import Effect
 from ...core.recipes import recipe, recipe_file
 from ...media.completeness import is_whole_blend, why_short
 from ...media.files import stamp
@@ -104,7 +105,7 @@ def _render_source(arguments) -> None:
         film_output.set_output(scene, output, file_format, alpha=medium.alpha != "opaque")
     if arguments.save:
         _save(scene, arguments.save)
-    folder = _cache(arguments) if source_recipe.inbetween > 1 else None
+    folder = _cache(arguments) if source_recipe.options.at(1).step > 1 else None
     weights = arguments.weights if output else None
     with render_settings.using(render_settings.RenderSettings(arguments.device, weights, folder, arguments.gpu_memory)):
         if folder:
@@ -135,14 +136,13 @@ def _written(arguments, file_format: str, frames: tuple[int, int]) -> list[Path]
 def _mattes(source_recipe, folder: Path) -> list[Path]:
     """The files of a recipe's mattes; folder: where the recipe lies. MediaError: there are none."""
     files = []
-    for region in source_recipe.regions:
-        if isinstance(region, recipe.MatteRegion):
-            with MatteFile(folder / region.path, region.channel).open() as matte:
-                files += matte.files
+    for content in recipe.contents(source_recipe):
+        with MatteFile(folder / content.path, content.channel).open() as matte:
+            files += matte.files
     return files
 
 
-def _recipe(arguments) -> recipe.Recipe:
+def _recipe(arguments) -> Effect:
     """The recipe, with the in-between frames that were asked for."""
     source_recipe = recipe_file.load(arguments.recipe)
     if arguments.inbetween is not None:

@@ -9,7 +9,7 @@ from ...core import atomic_write
 from ...core.frames import retiming
 from ...core.messages import signed
 from ...core.model import outlines, presence
-from ...core.model.effect import OutlineRegion, Region
+from ...core.model.effect import Effect, OutlineRegion, Region
 from ...core.recipes import recipe, recipe_file, region_keys
 from ...media import PrefetchSource, camera_tracking, filmed_frames, matte_tracking, registration, tracking
 from ...media.carried_mattes import CarriedMattes
@@ -61,7 +61,7 @@ def run(arguments) -> None:
         size = medium.width, medium.height
     placements = {frame: step.placement for frame, step in tracked.items()}
     with_keys = _keyed(source_recipe, index, placements, {arguments.frame}, size, thin=not arguments.all_keys)
-    has_matte = index is not None and isinstance(source_recipe.regions[index], recipe.OutlineRegion)
+    has_matte = index is not None and isinstance(source_recipe.regions[index], OutlineRegion)
     if not (arguments.hold or has_matte):  # a matte says itself where it is
         with_keys = _ended(with_keys, index, tracked, stops, arguments.frame, range(first, last + 1))
     _write_track(arguments, with_keys, tracked, stops)
@@ -79,7 +79,7 @@ def _region_index(arguments, source_recipe) -> int:
     if arguments.region not in names:
         raise film_output.OutputError(f'{arguments.recipe}: there is no region "{arguments.region}"')
     index = names.index(arguments.region)
-    if not isinstance(source_recipe.regions[index], recipe.Region | recipe.OutlineRegion):
+    if not isinstance(source_recipe.regions[index], Region | OutlineRegion):
         sentence = f'region "{arguments.region}" is a matte or a ramp, and has no strokes to track'
         raise film_output.OutputError(f"{arguments.recipe}: {sentence}")
     return index
@@ -88,7 +88,7 @@ def _region_index(arguments, source_recipe) -> int:
 def _followed(arguments, source_recipe, index: int | None, medium, frames: range) -> tuple[dict, list]:
     """What tracking of a region, or of the camera, found by frame, and where it ended before the last frame.
     TrackingError: at once."""
-    effect = source_recipe.effect(medium.width / medium.height)
+    effect = source_recipe.for_picture(medium.width / medium.height)
     subject = effect.camera if index is None else effect.regions[index]
     times = {frame: _shown(source_recipe, frame, medium.count) for frame in frames}
     filmed = filmed_frames.FilmedFrames(times, arguments.frame)
@@ -131,32 +131,33 @@ def _cover(arguments, source_recipe, region: OutlineRegion, filmed, size: tuple[
             yield matte_tracking.cover_of(mattes, filmed.index_at, size)
 
 
-def _keyed(source_recipe, index: int | None, *placements, thin: bool) -> recipe.Recipe:
+def _keyed(source_recipe, index: int | None, *placements, thin: bool) -> Effect:
     """The recipe with placements as keys of a region, or of the camera; arguments: see region_keys."""
     if index is None:
         return region_keys.with_camera(source_recipe, *placements, thin=thin)
     regions = list(source_recipe.regions)
     regions[index] = region_keys.with_placements(regions[index], *placements, thin=thin)
-    return replace(source_recipe, regions=regions)
+    return source_recipe.with_parts(regions)
 
 
-def _ended(source_recipe, index: int | None, tracked: dict, stops: list, start: int, frames: range) -> recipe.Recipe:
+def _ended(source_recipe, index: int | None, tracked: dict, stops: list, start: int, frames: range) -> Effect:
     """The recipe whose region, or camera, counts only where it was tracked."""
     seen = [frame for frame, step in tracked.items() if step.confidence > 0]
     ends = [presence.Stop(stop.frame, stop.frame > start, stop.fault == tracking.SHOT_ENDS) for stop in stops]
     if index is None:
-        keys = presence.keys(seen, ends, (), max(source_recipe.options.reach, presence.FADE), beside=1)
-        value = region_keys.with_ends(source_recipe.camera_influence, keys, frames)
-        return replace(source_recipe, camera_influence=value)
+        reach, camera = source_recipe.options.at(1).reach, source_recipe.camera
+        keys = presence.keys(seen, ends, (), max(reach, presence.FADE), beside=1)
+        camera = replace(camera, influence=region_keys.with_ends(camera.influence, keys, frames))
+        return source_recipe.with_parts(source_recipe.regions, camera)
     regions, keys = list(source_recipe.regions), presence.keys(seen, ends, {start})
     regions[index] = replace(regions[index], opacity=region_keys.with_ends(regions[index].opacity, keys, frames))
-    return replace(source_recipe, regions=regions)
+    return source_recipe.with_parts(regions)
 
 
 def _shown(source_recipe, frame: float, count: int) -> float:
     """Which of a source's frames, from 0 on, a recipe shows at a timeline frame; a fraction: an in-between one."""
-    time, factor = source_recipe.time_at(frame), source_recipe.inbetween
-    filmed = (frame if time is None else time) - 1
+    factor = source_recipe.options.at(1).step
+    filmed = (source_recipe.time.at(frame)[0] if source_recipe.time else frame) - 1
     return retiming.nearest(filmed, factor, (count - 1) * factor + 1) / factor
 
 

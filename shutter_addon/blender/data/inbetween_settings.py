@@ -7,7 +7,7 @@ import bpy
 from bpy.app.translations import pgettext_rpt as rpt_
 
 from ...core.messages import EffectError
-from ...core.recipes.recipe import Method
+from ...core.model.effect import Method
 from ...media import inbetween_cache
 from . import validation
 

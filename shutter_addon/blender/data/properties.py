@@ -20,16 +20,6 @@ from bpy.types import PropertyGroup
 
 from ...core import revision, told
 from ...core.messages import EffectError
-from ...core.model.limits import (
-    MAX_BAR,
-    MAX_DISTANCE,
-    MAX_FRAME,
-    MAX_PLATE_REACH,
-    MAX_SMOOTH,
-    MAX_THRESHOLD,
-)
-from ...core.model.shutters import MAX_WINDOW
-from . import consistency, selection
 from ...core.model.choices import (
     AGGREGATES,
     COMBINES,
@@ -47,6 +37,16 @@ from ...core.model.choices import (
     POSITIONS,
     UNKEYED,
 )
+from ...core.model.limits import (
+    MAX_BAR,
+    MAX_DISTANCE,
+    MAX_FRAME,
+    MAX_PLATE_REACH,
+    MAX_SMOOTH,
+    MAX_THRESHOLD,
+)
+from ...core.model.shutters import MAX_WINDOW
+from . import consistency, selection
 from .consistency import changed
 from .region_properties import KEYED, MOVING, ShutterCamera, ShutterRegion, choice, share
 

@@ -1,18 +1,20 @@
 """The recipe of an effect: the inverse of recipe_import.apply."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 from bpy.app.translations import pgettext_rpt as rpt_
 
 from ...core.messages import EffectError, translated
 from ...core.model import limits
-from ...core.recipes import baking, recipe
+from ...core.model.effect import Effect
+from ...core.recipes import baking
 from . import annotations, fcurves, inbetween_settings, snapshot, strips, validation
 
 
-def recipe_of(scene, effect, strip, mattes: Sequence = ()) -> recipe.Recipe:
+def recipe_of(scene, effect, strip, contents: Sequence = ()) -> Effect:
     """The effect as a recipe, whose frame 1 is the strip's first; left out is what baking.baked leaves out, and regions
-    without a shutter. mattes: see baking.baked. EffectError: it cannot be rendered as it stands."""
+    without a shutter. contents: see baking.baked. EffectError: it cannot be rendered as it stands."""
     snapshot.check_counts(effect)
     shown = range(strip.left_handle, strip.right_handle)
     if not -limits.MAX_FRAME <= shown.start <= shown.stop <= limits.MAX_FRAME:
@@ -29,7 +31,8 @@ def recipe_of(scene, effect, strip, mattes: Sequence = ()) -> recipe.Recipe:
         raise EffectError(sentence.format(strip=strip.name))
     with translated(rpt_):
         plain = snapshot.read(scene, effect, strip, sorted({*shown, *_keyed(scene, effect)}), thorough=True)
-        return baking.baked(plain, shown, inbetween_settings.method(effect), mattes)
+        plain = replace(plain, inbetween_method=inbetween_settings.method(effect))
+        return baking.baked(plain, shown, contents)
 
 
 def _keyed(scene, effect) -> set[float]:

@@ -1,9 +1,10 @@
 """A recipe into Blender's data: shutters, regions, strokes, keys and options."""
 
 import os
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from contextlib import suppress
 from pathlib import Path
+from typing import Any
 
 import bpy
 import numpy as np
@@ -11,64 +12,70 @@ from bpy.app.translations import pgettext_data as data_
 from bpy.app.translations import pgettext_rpt as rpt_
 
 from ...core.messages import EffectError
-from ...core.model import limits
+from ...core.model import effect as model
+from ...core.model import keyframes, limits
+from ...core.model.choices import CHANNELS
+from ...core.model.fields import fields_of
 from ...core.model.scribbles import mapped
-from ...core.recipes import recipe
 from ...media import MediaError
 from ...media.files import check_name
 from ...media.matte_files import MatteFile
 from ...media.sequence import IMAGE_SUFFIXES
 from . import fcurves, geometry, strips
 from .annotations import add_stroke, annotation, picture_size
-from .snapshot import OPTIONS
 
 
-def apply(scene, effect, strip, source: recipe.Recipe, folder: Path = Path()) -> None:
-    """Replaces the effect's data and keys by a recipe, whose frame 1 is the strip's first; folder: where it lies, which
-    its mattes' paths begin at. EffectError: its keys cannot lie there; MediaError: it has no such mattes; nothing has
-    changed."""
+def apply(scene, effect, strip, source: model.Effect, folder: Path = Path()) -> None:
+    """Replaces the effect's data and keys by a recipe's, whose frame 1 is the strip's first; folder: where it lies,
+    which its mattes' paths begin at. EffectError: its keys cannot lie there; MediaError: it has no such mattes; nothing
+    has changed."""
     first = strip.left_handle - 1
     _check_keys(source, first)
-    mattes = [region for region in source.regions if isinstance(region, recipe.MatteRegion)]
-    images = {region.path: matte_image(folder / region.path, region.channel) for region in mattes}
+    contents = [region.content for region in source.regions if isinstance(region, model.MatteRegion)]
+    files = [content for content in contents if isinstance(content, model.FileContent)]
+    images = {content: matte_image(folder / content.path, content.channel) for content in files}
     clear(scene, effect)
-    # Bars per frame before the factor, which else would change the window.
-    effect.bars_per_frame, effect.inbetween = source.inbetween, str(source.inbetween)
-    effect.inbetween_method = source.inbetween_method.upper()
-    effect.window = source.window
-    for name in OPTIONS:
-        setattr(effect, name, getattr(source, name).upper())
-    effect.aggregate, effect.border = str(source.aggregate), source.border
-    for name in ("stop_at_cuts", "plate_reach", "decontaminate"):
-        setattr(effect, name, getattr(source, name))
-    path = effect.path_from_id()
-    effect.use_source_time = bool(source.time)
-    if source.time:
-        _set_number(scene, effect, path, "source_time", source.time, first, group=effect.name)
-    _set_number(scene, effect, path, "edge_aware", source.edge_aware, first, group=effect.name)
-    _set_moves(scene, effect.camera, f"{path}.camera", source.camera, first, group=effect.camera.name)
-    influence = source.camera_influence
-    _set_number(scene, effect.camera, f"{path}.camera", "influence", influence, first, group=effect.camera.name)
+    path, options = effect.path_from_id(), source.options.at(1)
+    effect.bars_per_frame = options.step  # before the factor, which else would change the window
+    _set_fields(scene, effect, path, options, first)
+    _set_fields(scene, effect, path, source, first, group=effect.name)
+    effect.use_source_time = source.time is not None
+    if isinstance(source.time, keyframes.SourceTime):
+        _set_channel(scene, effect, path, "source_time", source.time.numbers, first, group=effect.name)
+    _set_fields(scene, effect.camera, f"{path}.camera", source.camera, first, group=effect.camera.name)
+    _set_moves(scene, effect.camera, f"{path}.camera", source.camera.moves, first, group=effect.camera.name)
     for i, shutter in enumerate(source.shutters):
         _add_shutter(scene, effect, f"{path}.shutters[{i}]", shutter, first)
-    colors = {shutter.name: shutter.color for shutter in source.shutters}
-    for region in source.regions:
-        if isinstance(region, recipe.Region):
-            _add_region(scene, effect, strip, region, colors[region.shutter], first)
-        elif isinstance(region, recipe.OutlineRegion):
-            _add_outline(scene, effect, strip, region, colors[region.shutter], first)
+    for i, region in enumerate(source.regions):
+        # By its path: Blender takes long to find an item's place among many.
+        _add_region(scene, effect, strip, f"{path}.regions[{i}]", region, source.shutters[region.shutter], first)
+        if isinstance(region, model.MatteRegion) and isinstance(region.content, model.FileContent):
+            _set_file(effect.regions[-1], strip, region.content, images[region.content])
+
+
+def _set_fields(scene, owner, path: str, part: Any, first: float, **curve) -> None:
+    """What fields define of a part of an effect, and its keys."""
+    for name, each in fields_of(type(part)).items():
+        value = getattr(part, name)
+        if each.is_channel:
+            _set_channel(scene, owner, path, each.blender, value, first, **curve)
         else:
-            _add_matte(scene, effect, strip, region, images, first)
+            setattr(owner, each.blender, str(value).upper() if each.choices else value)
 
 
-def _set_number(scene, owner, path: str, name: str, value: recipe.Keyable, first: float, **curve) -> None:
+def _set_channel(scene, owner, path: str, name: str, channel: keyframes.Channel, first: float, **curve) -> None:
     """A number of a property group, or its keys."""
-    if not isinstance(value, list):
-        setattr(owner, name, value)
+    if not isinstance(channel, keyframes.Keys):
+        setattr(owner, name, channel.at(1))
         return
-    setattr(owner, name, value[0].value)
-    keys = [(key.frame + first, key.value, key.ease) for key in value]
-    fcurves.set_keys(scene, f"{path}.{name}", 0, keys, **curve)
+    setattr(owner, name, channel.values[0])
+    _set_keys(scene, f"{path}.{name}", 0, channel, channel.values, first, **curve)
+
+
+def _set_keys(scene, path: str, index: int, keys: keyframes.Keys, values: Iterable[float], first: float, **curve):
+    """An F-curve with these values at the frames of keys."""
+    frames = (frame + first for frame in keys.frames)
+    fcurves.set_keys(scene, path, index, list(zip(frames, values, keys.eases, strict=True)), **curve)
 
 
 def matte_image(path: str | Path, channel: str = "luminance"):
@@ -107,21 +114,28 @@ def _kept(name: str) -> str:
     return name
 
 
-def _check_keys(source: recipe.Recipe, first: float) -> None:
+def _check_keys(source: model.Effect, first: float) -> None:
     """EffectError: keys would lie beyond Blender's timeline, or on the same frame, as it counts in float32."""
-    mattes = [region for region in source.regions if not isinstance(region, recipe.Region)]
-    numbers = [source.edge_aware, source.camera_influence, *(shutter.trail for shutter in source.shutters)]
-    numbers += [number for shutter in source.shutters for number in (shutter.threshold, shutter.softness)]
-    numbers += [*(region.opacity for region in source.regions), *(region.width for region in mattes)]
-    keyed: list = [source.time, source.camera, *(number for number in numbers if isinstance(number, list))]
-    for keys in (*keyed, *(part.keys for part in (*source.shutters, *source.regions))):
-        frames = np.array([key.frame + first for key in keys], dtype=np.float32)
+    for keys in _keyed(source):
+        frames = np.array([frame + first for frame in keys.frames], dtype=np.float32)
         if (wrong := np.flatnonzero(np.abs(frames) > limits.MAX_FRAME)).size:
             sentence = rpt_("frame {frame} of the recipe: a key cannot lie beyond Blender's timeline")
-            raise EffectError(sentence.format(frame=f"{keys[wrong[0]].frame:.10g}"))
+            raise EffectError(sentence.format(frame=f"{keys.frames[wrong[0]]:.10g}"))
         if (wrong := np.flatnonzero(np.diff(frames) == 0)).size:
             sentence = rpt_("frame {frame} of the recipe: so late on the timeline, the next key is on the same frame")
-            raise EffectError(sentence.format(frame=f"{keys[wrong[0]].frame:.10g}"))
+            raise EffectError(sentence.format(frame=f"{keys.frames[wrong[0]]:.10g}"))
+
+
+def _keyed(source: model.Effect) -> list[keyframes.Keys]:
+    """All channels of an effect that have keys."""
+    parts: tuple = source, source.camera, *source.shutters, *source.regions
+    channels = [
+        getattr(part, name) for part in parts for name, each in fields_of(type(part)).items() if each.is_channel
+    ]
+    channels += [part.moves.location for part in (source.camera, *source.regions)]
+    channels += [shutter.bars.channel for shutter in source.shutters]
+    channels += [source.time.numbers] if isinstance(source.time, keyframes.SourceTime) else []
+    return [channel for channel in channels if isinstance(channel, keyframes.Keys)]
 
 
 def clear(scene, effect) -> None:
@@ -136,107 +150,77 @@ def clear(scene, effect) -> None:
             effect.scene.annotation.layers.remove(layer)
 
 
-def _add_shutter(scene, effect, path: str, source: recipe.Shutter, first: float) -> None:
+def _add_shutter(scene, effect, path: str, source: model.Shutter, first: float) -> None:
     shutter = effect.shutters.add()
-    shutter.name, shutter.color = source.name, source.color
-    if source.follow is not None:
-        shutter.follow = "CAMERA" if source.follow == recipe.CAMERA else "REGION"
-        shutter.follow_region = "" if source.follow == recipe.CAMERA else source.follow
-    shutter.follow_motion, shutter.follow_smooth = source.follow_motion.upper(), source.follow_smooth
-    if source.length == "timeline":
-        shutter.length = "TIMELINE"
-    if source.trail is not None:
-        shutter.length = "MOTION"
-        _set_number(scene, shutter, path, "trail", source.trail, first)
-    shutter.combine, shutter.by_luminance = source.combine.upper(), source.by_luminance
-    if source.threshold is not None:
-        shutter.use_threshold = True
-        for name in ("threshold", "softness"):
-            _set_number(scene, shutter, path, name, getattr(source, name), first)
-    for weight in source.bars if source.bars is not None else source.keys[0].bars:
+    _set_fields(scene, shutter, path, source, first)
+    if isinstance(source.follow, model.AnyRegion):
+        shutter.follow, shutter.follow_region = "REGION", source.follow.name
+    elif source.follow is not None:
+        shutter.follow = "CAMERA"
+    keys = source.bars.channel
+    bars = keys.values if isinstance(keys, keyframes.Keys) else (keys.at(1),)
+    for k, weight in enumerate(bars[0]):
         shutter.bars.add().weight = weight
-    if source.keys:
-        for k in range(len(shutter.bars)):
-            keys = [(key.frame + first, key.bars[k], key.ease) for key in source.keys]
-            fcurves.set_keys(scene, f"{path}.bars[{k}].weight", 0, keys)
+        if isinstance(keys, keyframes.Keys):
+            _set_keys(scene, f"{path}.bars[{k}].weight", 0, keys, (each[k] for each in bars), first)
 
 
-def _add_region(scene, effect, strip, source: recipe.Region, color: Sequence[float], first: float) -> None:
+def _add_region(
+    scene, effect, strip, path: str, source: model.Region | model.MatteRegion, shutter: model.Shutter, first: float
+) -> None:
     region = effect.regions.add()
-    region.name, region.shutter, region.width = source.name, source.shutter, source.width
-    region.kind, region.is_layer = source.kind.upper(), source.layer
-    region.layer = _draw(effect, strip, source, color, first)
-    path = _last_path(effect)
-    _set_number(scene, region, path, "opacity", source.opacity, first)
-    _set_moves(scene, region, path, source.keys, first)
-
-
-def _add_outline(scene, effect, strip, source: recipe.OutlineRegion, color: Sequence[float], first: float) -> None:
-    region = _new_matte(effect, source)
-    region.between = source.between.upper()
-    region.layer = _draw(effect, strip, source, color, first)
-    _set_numbers(scene, effect, source, first)
-
-
-def _add_matte(scene, effect, strip, source: recipe.MatteRegion | recipe.RampRegion, images, first: float) -> None:
-    region = _new_matte(effect, source)
-    if isinstance(source, recipe.RampRegion):
-        region.ramp = source.ramp.upper()
+    region.shutter = shutter.name
+    if isinstance(source, model.Region):
+        region.kind = source.kind.at(1).upper()
+    elif isinstance(source, model.OutlineRegion):
+        region.kind = "OUTLINE"
     else:
-        region.matte, region.image = "IMAGE", images[source.path]
-        # Blender's offset counts from the strip's untrimmed start, a recipe's from the strip's first frame.
-        region.offset = source.offset - (strips.skipped(strip) if source.timing == "timeline" else 0)
-        region.timing = source.timing.upper()
-        is_named = source.channel not in recipe.CHANNELS
-        region.channel = "NAMED" if is_named else source.channel.upper()
-        region.channel_name = source.channel if is_named else ""
-    _set_numbers(scene, effect, source, first)
+        region.kind = "RAMP" if isinstance(source.content, model.RampContent) else "MATTE"
+        if region.kind == "RAMP":
+            _set_fields(scene, region, path, source.content, first)
+    _set_fields(scene, region, path, source, first)
+    if isinstance(source, model.Region | model.OutlineRegion):
+        region.layer = _draw(effect, strip, source, shutter.color, first)
+    _set_moves(scene, region, path, source.moves, first)
 
 
-def _new_matte(effect, source: recipe.OutlineRegion | recipe.MatteRegion | recipe.RampRegion):
-    region = effect.regions.add()
-    region.name, region.shutter, region.kind = source.name, source.shutter, source.kind.upper()
-    region.invert, region.blend, region.is_layer = source.invert, source.blend.upper(), source.layer
-    return region
+def _set_file(region, strip, content: model.FileContent, image) -> None:
+    """A matte that a file has."""
+    region.matte, region.image = "IMAGE", image
+    # Blender's offset counts from the strip's untrimmed start, a recipe's from the strip's first frame.
+    region.offset = content.offset - (strips.skipped(strip) if content.timing == "timeline" else 0)
+    region.timing = content.timing.upper()
+    is_named = content.channel not in [word.lower() for word, *_ in CHANNELS if word != "NAMED"]
+    region.channel = "NAMED" if is_named else content.channel.upper()
+    region.channel_name = content.channel if is_named else ""
 
 
-def _last_path(effect) -> str:
-    """The path of the region that was added last. Blender takes long to find an item's place among many."""
-    return f"{effect.path_from_id()}.regions[{len(effect.regions) - 1}]"
-
-
-def _set_numbers(scene, effect, source, first: float) -> None:
-    """Numbers of the matte that was added last, and their keys."""
-    region, path = effect.regions[-1], _last_path(effect)
-    _set_number(scene, region, path, "opacity", source.opacity, first)
-    _set_number(scene, region, path, "feather", source.width, first)
-    _set_moves(scene, region, path, source.keys, first)
-
-
-def _set_moves(scene, moving, path: str, keys: list, first: float, **curve) -> None:
+def _set_moves(scene, moving, path: str, moves: model.Moves, first: float, **curve) -> None:
     """Location, rotation and scale of a region or of the camera, and their keys."""
-    start = keys[0] if keys else recipe.CameraKey(frame=0)
-    moving.location, moving.rotation, moving.scale = start.location, np.radians(start.rotation), start.scale
-    if not keys:
+    channels = moves.location, moves.rotation, moves.scale
+    keyed = [channel for channel in channels if isinstance(channel, keyframes.Keys)]
+    if not keyed:
+        start = moves.at(1)
+        moving.location, moving.rotation, moving.scale = start.location, np.radians(start.rotation), start.scale
         return
-    channels = {
-        ("location", 0): lambda key: key.location[0],
-        ("location", 1): lambda key: key.location[1],
-        ("rotation", 0): lambda key: np.radians(key.rotation),
-        ("scale", 0): lambda key: key.scale,
-    }
-    for (name, index), value in channels.items():
-        numbers = [(key.frame + first, value(key), key.ease) for key in keys]
-        fcurves.set_keys(scene, f"{path}.{name}", index, numbers, **curve)
+    location, rotation, scale = keyed
+    radians = np.radians(rotation.values)
+    moving.location, moving.rotation, moving.scale = location.values[0], radians[0], scale.values[0]
+    for index in range(2):
+        values = (place[index] for place in location.values)
+        _set_keys(scene, f"{path}.location", index, location, values, first, **curve)
+    _set_keys(scene, f"{path}.rotation", 0, location, radians, first, **curve)
+    _set_keys(scene, f"{path}.scale", 0, location, scale.values, first, **curve)
 
 
-def _draw(effect, strip, source: recipe.Region | recipe.OutlineRegion, color: Sequence[float], first: float) -> str:
+def _draw(effect, strip, source: model.Region | model.OutlineRegion, color: Sequence[float], first: float) -> str:
     """Draws a region's strokes on an annotation layer of its own, a frame per drawing; the layer's name."""
     layer = annotation(effect).layers.new(source.name or data_("Region"), set_active=False)
     layer.color = color
     to_image = geometry.picture_to_image(strip, picture_size(effect))
-    for key, strokes in source.drawings():
-        drawing = layer.frames.new(int((key.frame if key else 1) + first))
+    is_keyed = isinstance(source.moves.location, keyframes.Keys)
+    for frame, strokes in zip(source.drawings.frames, source.drawings.strokes, strict=True):
+        drawing = layer.frames.new(int((frame if is_keyed else 1) + first))
         for points in strokes:
-            add_stroke(drawing, mapped(to_image, np.asarray(points)))
+            add_stroke(drawing, mapped(to_image, points))
     return layer.info

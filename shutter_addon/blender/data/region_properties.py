@@ -15,8 +15,6 @@ from bpy.props import (
 )
 from bpy.types import PropertyGroup
 
-from ...core.model.limits import MAX_CHANNEL, MAX_DEGREES, MAX_DISTANCE, MAX_FRAME, MAX_NAME, MAX_SCALE
-from . import consistency, matte_strips, selection
 from ...core.model.choices import (
     BETWEEN,
     BLENDS,
@@ -30,6 +28,8 @@ from ...core.model.choices import (
     TIMINGS,
     UNKEYED,
 )
+from ...core.model.limits import MAX_CHANNEL, MAX_DEGREES, MAX_DISTANCE, MAX_FRAME, MAX_NAME, MAX_SCALE
+from . import consistency, matte_strips, selection
 from .consistency import changed
 
 KEYED = {"ANIMATABLE"}  # as properties are where nothing else is said

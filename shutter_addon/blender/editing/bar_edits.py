@@ -8,8 +8,8 @@ from bpy.app.translations import pgettext_iface as iface_
 
 from ...core import revision
 from ...core.model import shutters
-from ..data import fcurves, snapshot
 from ...core.model.choices import COMBINES
+from ..data import fcurves, snapshot
 from ..data.consistency import bars
 from ..rendering import effect_source, invalidation, render_context
 

@@ -52,7 +52,8 @@ def make_source(path: Path, medium):
 def length(medium, source_recipe) -> int:
     """How many timeline frames the edit has: the source's, and more where its time is keyed beyond them; as many as
     Blender has at most."""
-    return min(max([medium.count, *(math.ceil(key.frame) for key in source_recipe.time)]), MAX_FRAME)
+    keys = source_recipe.time.keys if source_recipe.time else ()
+    return min(max([medium.count, *(math.ceil(frame) for frame, _ in keys)]), MAX_FRAME)
 
 
 def _add_source(editor, path: Path, medium):

@@ -11,8 +11,8 @@ from bpy.types import Operator
 
 from ...core import messages
 from ...core.messages import EffectError
-from ..data import inbetween_settings, selection, strips
 from ...core.model.choices import INBETWEENS
+from ..data import inbetween_settings, selection, strips
 from ..rendering import inbetween_build, strobing
 from ..rendering.effect_source import FAULTS
 from .note_buttons import Button

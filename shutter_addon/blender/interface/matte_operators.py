@@ -10,11 +10,11 @@ from bpy.types import Operator
 from bpy_extras.io_utils import ImportHelper
 
 from ...core.messages import EffectError
+from ...core.model.choices import RAMPS
 from ...core.model.limits import MAX_CHANNEL
 from ...core.recipes.recipe import RecipeError
 from ...media import MediaError
 from ..data import matte_strips, recipe_import, selection, strips
-from ...core.model.choices import RAMPS
 from ..editing import outline_masks, region_edits, time_map
 from ..output import matte_export
 from .operator_bases import OfRegion, OfShutter, chosen_file, has_room, refused, report_error

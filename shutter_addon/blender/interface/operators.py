@@ -9,8 +9,8 @@ from bpy.types import Operator
 
 from ...core.messages import EffectError
 from ...core.model import presets
-from ..data import annotations, consistency, preview_areas, selection, strips
 from ...core.model.choices import CONTEXT, DRAWN
+from ..data import annotations, consistency, preview_areas, selection, strips
 from ..editing import (
     add_effect,
     bar_edits,

@@ -8,8 +8,8 @@ from bpy.types import Menu, Panel, UIList
 
 from ...core.messages import EffectError
 from ...core.model import presets
-from ..data import annotations, consistency, data_format, selection, strips
 from ...core.model.choices import CONTEXT
+from ..data import annotations, consistency, data_format, selection, strips
 from ..editing import bar_edits, match_source
 from ..rendering import inbetween_build, strobing
 from . import icons, inbetween_operators

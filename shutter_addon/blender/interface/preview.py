@@ -12,11 +12,11 @@ from bpy.props import BoolProperty, EnumProperty, FloatProperty, FloatVectorProp
 from bpy.types import PropertyGroup
 
 from ...core import stopping, told
+from ...core.model.choices import CONTEXT
 from ...core.model.frame_state import FrameState
 from ...media import MediaError
 from ...media.errors import NotBuiltError
 from ..data import annotations, preview_areas, selection, strips
-from ...core.model.choices import CONTEXT
 from ..data.preview_areas import Shown
 from ..data.snapshot import Snapshot
 from ..devices import blender_gpu

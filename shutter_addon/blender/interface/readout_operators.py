@@ -8,8 +8,8 @@ from bpy.props import EnumProperty, FloatProperty
 from bpy.types import Operator
 
 from ...core.messages import EffectError
-from ..data import selection
 from ...core.model.choices import CONTEXT, READOUT_UNITS, READS, SIDES
+from ..data import selection
 from ..editing import rolling_shutter
 from .operator_bases import OfEffect, has_room, refused
 

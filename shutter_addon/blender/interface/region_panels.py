@@ -5,9 +5,9 @@ import math
 from bpy.app.translations import pgettext_iface as iface_
 
 from ...core.messages import EffectError
+from ...core.model.choices import CONTEXT
 from ...media.pursuit import SURE
 from ..data import matte_look, selection, strips, validation
-from ...core.model.choices import CONTEXT
 from ..editing import follow_track, outline_drawings, track_region
 from . import track_operators
 from .panel_parts import WithEffect, draw_list, sentence

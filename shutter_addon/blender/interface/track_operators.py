@@ -10,8 +10,8 @@ from bpy.app.translations import pgettext_rpt as rpt_
 from bpy.props import EnumProperty, IntProperty
 from bpy.types import Operator
 
-from ..data import selection, validation
 from ...core.model.choices import CONTEXT
+from ..data import selection, validation
 from ..editing import (
     bar_edits,
     follow_stabilization,

@@ -15,6 +15,7 @@ from bpy.app.translations import pgettext_rpt as rpt_
 from ...core import atomic_write
 from ...core.messages import EffectError, translated
 from ...core.model import mattes
+from ...core.model.effect import Effect, FileContent, RampContent
 from ...core.recipes import recipe
 from ...media.image_writing import write_exr, write_grey
 from ...media.matte_values import MatteValues
@@ -23,7 +24,7 @@ from ..data import matte_content, matte_strips, recipe_export, snapshot, source_
 from ..rendering import effect_source
 
 
-def recipe_for(scene, effect, strip, path: Path) -> recipe.Recipe:
+def recipe_for(scene, effect, strip, path: Path) -> Effect:
     """An effect as a recipe that is to lie at a path. What it cannot point to is written into a folder beside it, "NAME
     mattes". One of effect_source.FAULTS: the effect cannot be rendered as it stands, or a matte cannot be read or
     written. OSError: there can be no such folder."""
@@ -49,9 +50,9 @@ def save(scene, effect, strip, region, folder: Path, word: str) -> int:
     return len(frames)
 
 
-def _ramp(region) -> recipe.RampRegion:
+def _ramp(region) -> RampContent:
     ramp: Any = validation.word(region, "ramp").lower() if region.kind == "RAMP" else "linear"
-    return recipe.RampRegion(shutter=region.shutter, kind="ramp", ramp=ramp)
+    return RampContent(ramp)
 
 
 def _folder(region, path: Path, number: int) -> Path | None:
@@ -87,17 +88,17 @@ def _spare(folders: list[Path | None], read: Iterator[Path]) -> None:
             raise EffectError(sentence.format(folder=folder))
 
 
-def _words(scene, effect, strip, region, folder: Path | None, path: Path) -> recipe.MatteRegion | recipe.RampRegion:
+def _words(scene, effect, strip, region, folder: Path | None, path: Path) -> FileContent | RampContent:
     if region.kind == "RAMP":
         return _ramp(region)
     if folder is not None:
         first = recipe.relative(_write(scene, effect, strip, region, folder), path.parent)
-        return recipe.MatteRegion(shutter=region.shutter, kind="matte", path=first, timing="timeline")
+        return FileContent(path=first, timing="timeline")
     file, channel = matte_content.image_path(region), matte_content.channel(region)
     # A recipe's timeline begins with the strip, trimmed as it is.
     offset = region.offset + (strips.skipped(strip) if region.timing == "TIMELINE" else 0)
-    words = {"channel": channel, "offset": offset, "timing": region.timing.lower()}
-    return recipe.MatteRegion(shutter=region.shutter, kind="matte", path=recipe.relative(file, path.parent), **words)
+    named = recipe.relative(file, path.parent)
+    return FileContent(path=named, channel=channel, offset=offset, timing=region.timing.lower())
 
 
 def _write(scene, effect, strip, region, folder: Path) -> Path:

@@ -6,6 +6,7 @@ of whoever made it: a recipe's count from 1, Blender's are the edit's timeline f
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -278,7 +279,11 @@ class FileContent:
 
     path: str
     channel: str = choice(
-        "Channel", "What of the matte says how much of the shutter a pixel gets", CHANNELS, default="luminance"
+        "Channel",
+        "What of the matte says how much of the shutter a pixel gets",
+        CHANNELS,
+        default="luminance",
+        recipe="",
     )
     offset: int = whole(
         "Offset",
@@ -419,6 +424,27 @@ class Shutter:
         return combining.Combine.of(self.combine, self.by_luminance, threshold, float(self.softness.at(frame)))
 
 
+MatteFiles = Callable[[MatteRegion], mattes.MatteFile]
+
+
+def _placed(region: Region | MatteRegion, aspect: float, files: MatteFiles) -> Region | MatteRegion:
+    """A region of a recipe with what its content is."""
+    if isinstance(region, Region | OutlineRegion):
+        region = replace(region, drawings=replace(region.drawings, aspect=aspect))
+    if isinstance(region, OutlineRegion):
+        if region.between == "straight":
+            return replace(region, content=DrawnOutlines(region.drawings))
+        return replace(region, content=mattes.FileFrames(file=files(region)))
+    if isinstance(region, MatteRegion) and isinstance(said := region.content, FileContent):
+        first = None if said.timing == "source" else 1
+        return replace(region, content=mattes.FileFrames(file=files(region), offset=said.offset, first=first))
+    if isinstance(region, MatteRegion) and isinstance(said := region.content, RampContent):
+        if said.ramp == "luminance":
+            return replace(region, content=mattes.FileFrames(file=files(region)))
+        return replace(region, content=PlacedRamp(said.ramp, region.moves))
+    return region
+
+
 @dataclass(frozen=True)
 class Effect:
     """The whole effect but its source.
@@ -478,6 +504,20 @@ class Effect:
             mattes=seen,
             combines=tuple(shutter.combine_at(frame) for shutter in self.shutters),
         )
+
+    def with_parts(self, regions: Sequence[Region | MatteRegion], camera: Camera | None = None) -> Effect:
+        """The effect with other regions in place of its own, and another camera; what shutters follow goes with it."""
+        camera = camera or self.camera
+        new: dict[int, Subject] = {id(old): each for old, each in zip(self.regions, regions, strict=True)}
+        new[id(self.camera)] = camera
+        followed = tuple(shutter.follow and new[id(shutter.follow)] for shutter in self.shutters)
+        shutters_ = tuple(replace(s, follow=follow) for s, follow in zip(self.shutters, followed, strict=True))
+        return replace(self, shutters=shutters_, regions=tuple(regions), camera=camera)
+
+    def for_picture(self, aspect: float, files: MatteFiles = lambda _region: mattes.NoFile()) -> Effect:
+        """The effect of a recipe for a picture of width / height = aspect. files: gives the file of a matte, for a ramp
+        the source's luminance, and for an outline its carried mattes; without it, nobody may ask for values of these"""
+        return self.with_parts([_placed(region, aspect, files) for region in self.regions])
 
     def layers_at(self, frame: float) -> list[Region | MatteRegion]:
         """The layers that there are at a frame, the first farthest."""

@@ -119,7 +119,7 @@ def _with_trails(
     # What is left out beyond the clip's ends stands still there, as what is held does.
     turns, shifts = following.at(np.where(seen < 0, positions, seen))
     for i, shutter in enumerate(effect.shutters):
-        if shutter.has_trail:
+        if shutter.follow and shutter.has_trail:
             corners = [motions.pixel(corner, size) for corner in shutter.follow.corners(frame)]
             places = np.outer(turns[:, i], corners) + shifts[:, i, None]
             way = trails.travelled(places) / source.height

@@ -1,4 +1,4 @@
-"""An effect as a recipe, where its channels were sampled: the inverse of Recipe.effect.
+"""An effect as a recipe has it, where its channels were sampled: with keys in their place.
 
 Numbers are float32 where they come from: a recipe gets the shortest decimals that give the same ones back, and points
 to a millionth of the picture. So a recipe's numbers come back as they were written, up to seven digits.
@@ -8,8 +8,8 @@ whole frame, recipe and effect agree within TOLERANCE.
 
 import itertools
 import math
-from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
-from dataclasses import asdict, replace
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
+from dataclasses import replace
 from decimal import Decimal
 from functools import cache
 from itertools import pairwise
@@ -18,9 +18,21 @@ from typing import Any
 import numpy as np
 
 from ..model import keyframes, limits
-from ..model.effect import Effect, MatteRegion, OutlineRegion, Region, Shutter, Subject
+from ..model.effect import (
+    Camera,
+    Drawings,
+    Effect,
+    FileContent,
+    MatteRegion,
+    Moves,
+    OutlineRegion,
+    RampContent,
+    Region,
+    Shutter,
+    Subject,
+)
 from ..model.frame_state import Interpolation
-from ..model.keyframes import Channel, Ease, Samples
+from ..model.keyframes import Bars, Channel, Constant, Ease, Keys, Samples, SourceTime
 from . import recipe, recipe_file
 
 # Of the largest bar, of fractions of the picture, of degrees; of the larger key's value where that is above 1.
@@ -30,46 +42,33 @@ TOLERANCE = 1e-4
 _Eased = Sequence[tuple[float, Ease]]
 
 
-def baked(
-    effect: Effect,
-    shown: range,
-    inbetween_method: recipe.Method,
-    mattes: Iterable[recipe.MatteRegion | recipe.RampRegion] = (),
-) -> recipe.Recipe:
-    """The recipe of an effect that is shown at these frames, of which the first is the recipe's frame 1. Its channels
-    are sampled there, at their keys and at its drawings. EffectError: it cannot be rendered as it stands.
+def baked(effect: Effect, shown: range, contents: Iterable[FileContent | RampContent] = ()) -> Effect:
+    """The effect of a recipe, for an effect that is shown at these frames, of which the first is the recipe's frame 1.
+    Its channels are sampled there, at their keys and at its drawings. EffectError: it cannot be rendered as it stands.
 
-    mattes: of each matte region what a recipe says of it besides its name, shutter and numbers, as a region of one
+    contents: of each matte region but outlines, what a recipe says of it
 
     Left out are regions without strokes, drawings before the first that has strokes, and keys of widths and of options,
     which are as at the first frame."""
     options = effect.options.at(shown.start)
     names = _different([shutter.name for shutter in effect.shutters])
-    called = _region_names(effect)
-    words = iter(mattes)
-    regions = [
-        _drawn(region, name, names[region.shutter], shown)
-        if isinstance(region, Region | OutlineRegion)
-        else _matte(region, next(words), name, names[region.shutter], shown)
-        for region, name in zip(effect.regions, called, strict=True)
-    ]
+    called, words = _region_names(effect), iter(contents)
+    made = [_region(region, name, words, shown) for region, name in zip(effect.regions, called, strict=True)]
+    camera = Camera(moves=_moves(effect.camera, {}, shown), influence=_number(effect.camera.influence, shown))
     # A region without strokes says nothing of how anything moves.
-    known = {region.name for region in regions if region} | {recipe.CAMERA}
-    follows = [name if name in known else None for name in _follows(effect, called)]
-    sampled = recipe.Recipe(
-        version=1,
-        shutters=[
-            _whole(effect.shutters[i], _shutter(effect, i, name, options.interpolation, shown), follows[i], shown)
-            for i, name in enumerate(names)
-        ],
-        regions=[region for region in regions if region],
-        inbetween=options.step,
-        inbetween_method=inbetween_method,
+    followed = {id(old): new for old, new in zip(effect.regions, made, strict=True)} | {id(effect.camera): camera}
+    shutters = [
+        _shutter(effect, index, name, followed.get(id(effect.shutters[index].follow)), options.interpolation, shown)
+        for index, name in enumerate(names)
+    ]
+    sampled = Effect(
+        shutters=tuple(shutters),
+        regions=tuple(region for region in made if region),
+        options=Constant(options),
+        time=_time(effect.time, shown) if effect.time else None,
         edge_aware=_number(effect.edge_aware, shown),
-        time=_time(effect.time, shown) if effect.time else [],
-        camera=_camera(effect.camera, shown),
-        camera_influence=_number(effect.camera.influence, shown),
-        **{name: value for name, value in asdict(options).items() if name not in ("step", "slid", "edge_aware")},
+        inbetween_method=effect.inbetween_method,
+        camera=camera,
     )
     return recipe_file.parse(recipe_file.dump(sampled))
 
@@ -103,40 +102,38 @@ def _region_names(effect: Effect) -> list[str]:
     return names
 
 
-def _follows(effect: Effect, names: list[str]) -> list[str | None]:
-    """What each shutter follows, in a recipe's words."""
-    words = {id(region): name for region, name in zip(effect.regions, names, strict=True)}
-    words[id(effect.camera)] = recipe.CAMERA
-    return [words.get(id(shutter.follow)) for shutter in effect.shutters]
-
-
-def _whole(shutter: Shutter, said: recipe.Shutter, follow: str | None, shown: range) -> recipe.Shutter:
-    """A recipe's shutter with what it makes of frames, what it follows, and how far."""
-    if shutter.timeline:
-        said = replace(said, length="timeline")
-    if shutter.combine != "average":
-        said = replace(said, combine=shutter.combine)
+def _shutter(
+    effect: Effect, index: int, name: str, follow: Subject | None, interpolation: Interpolation, shown: range
+) -> Shutter:
+    """A shutter, with what it makes of frames; what counts nothing is as it is at first."""
+    shutter = effect.shutters[index]
+    red, green, blue = (_short(component) for component in shutter.color)
+    said: dict[str, Any] = {"combine": shutter.combine, "length": shutter.length}
     if shutter.combine in ("lightest", "darkest"):
-        said = replace(said, by_luminance=shutter.by_luminance)
-        if shutter.threshold is not None:
-            threshold, softness = _number(shutter.threshold, shown), _number(shutter.softness, shown)
-            said = replace(said, threshold=threshold, softness=softness)
-    if not follow:
-        return said
-    trail = _number(shutter.trail, shown) if shutter.trail else None
-    return replace(said, follow=follow, trail=trail, follow_motion=shutter.motion, follow_smooth=shutter.smooth)
+        said["by_luminance"] = shutter.by_luminance
+        if shutter.use_threshold:
+            said |= {"use_threshold": True, "threshold": _number(shutter.threshold, shown)}
+            said["softness"] = _number(shutter.softness, shown)
+    if follow:
+        said |= {"follow": follow, "follow_motion": shutter.follow_motion, "follow_smooth": shutter.follow_smooth}
+        said["trail"] = _number(shutter.trail, shown)
+    elif shutter.length == "motion":
+        said["length"] = "frames"
+    return Shutter(name=name, color=(red, green, blue), bars=_bars(effect, index, interpolation, shown), **said)
 
 
-def _shutter(effect: Effect, index: int, name: str, interpolation: Interpolation, shown: range) -> recipe.Shutter:
-    red, green, blue = (_short(component) for component in effect.shutters[index].color)
+def _bars(effect: Effect, index: int, interpolation: Interpolation, shown: range) -> Bars:
     sampled = effect.shutters[index].bars
 
     @cache
     def bars(frame: float) -> np.ndarray:
         return effect.checked(index, frame, sampled.at(frame, interpolation))
 
+    def short(frame: float) -> np.ndarray:
+        return np.array([_short(weight) for weight in bars(frame)])
+
     if not isinstance(sampled.channel, Samples):
-        return recipe.Shutter(name=name, color=(red, green, blue), bars=[_short(v) for v in bars(shown.start)])
+        return Bars(Constant(short(shown.start)))
 
     def fits(first: float, second: float, frame: float, share: float) -> bool:
         ends = np.array([bars(first), bars(second)])
@@ -146,25 +143,28 @@ def _shutter(effect: Effect, index: int, name: str, interpolation: Interpolation
             apart = abs(sampled.share.at(frame) - share) * np.ptp(ends, axis=0).max()
         return bool(apart <= TOLERANCE * ends.max())
 
-    keys = _keys(fits, lambda *_: True, sampled.keys, [frame for frame, _ in sampled.keys], {}, shown)
-    return recipe.Shutter(
-        name=name,
-        color=(red, green, blue),
-        keys=[recipe.ShutterKey(_frame(frame, shown), [_short(v) for v in bars(frame)], ease) for frame, ease in keys],
-    )
+    eased = _keys(fits, lambda *_: True, sampled.keys, [frame for frame, _ in sampled.keys], {}, shown)
+    return Bars(_keyed(eased, short, shown))
 
 
-def _number(channel: Channel, shown: range) -> recipe.Keyable:
+def _keyed(eased: _Eased, value: Callable[[float], Any], shown: range) -> Keys:
+    """Keys at these frames; value: gives that at a timeline frame."""
+    frames, eases = zip(*eased, strict=True)
+    return Keys(tuple(_frame(frame, shown) for frame in frames), tuple(map(value, frames)), eases)
+
+
+def _number(channel: Channel, shown: range) -> Channel:
     if isinstance(channel, Samples):
-        return _value_keys(channel.at, channel, shown)
-    return _short(channel.at(shown.start))
+        return _number_keys(channel.at, channel, shown)
+    return Constant(_short(channel.at(shown.start)))
 
 
-def _time(time: Channel, shown: range) -> list[recipe.ValueKey]:
-    return _value_keys(lambda frame: time.at(frame)[0], time, shown)
+def _time(time: Channel, shown: range) -> SourceTime:
+    keys = _number_keys(lambda frame: time.at(frame)[0], time, shown)
+    return SourceTime(keys, tuple(zip(keys.frames, keys.eases, strict=True)))
 
 
-def _value_keys(at: Callable[[float], float], channel: Channel, shown: range) -> list[recipe.ValueKey]:
+def _number_keys(at: Callable[[float], float], channel: Channel, shown: range) -> Keys:
     """The keys of a number; at: its values, channel: where it was sampled."""
 
     def fits(first: float, second: float, frame: float, share: float) -> bool:
@@ -176,57 +176,46 @@ def _value_keys(at: Callable[[float], float], channel: Channel, shown: range) ->
     if isinstance(channel, Samples):
         frames = [frame for frame, _ in channel.keys]
         keys = _keys(fits, lambda frame, held: fits(held, held, frame, 0), channel.keys, frames, {}, shown)
-    return [recipe.ValueKey(_frame(frame, shown), _short(at(frame)), ease) for frame, ease in keys]
+    return _keyed(keys, lambda frame: _short(at(frame)), shown)
 
 
-def _drawn(
-    region: Region | OutlineRegion, name: str, shutter: str, shown: range
-) -> recipe.Region | recipe.OutlineRegion | None:
-    drawings = _drawings(region, shown.start)
-    if not drawings:
+def _region(
+    region: Region | MatteRegion, name: str, contents: Iterator[FileContent | RampContent], shown: range
+) -> Region | MatteRegion | None:
+    """A region whose numbers have the recipe's keys; None: nothing is drawn."""
+    said: dict[str, Any] = {"name": name, "opacity": _number(region.opacity, shown)}
+    if isinstance(region, MatteRegion):
+        said["feather"] = _number(region.feather, shown)
+    if isinstance(region, Region):
+        said["kind"] = Constant(region.kind.at(shown.start))
+        said["width"] = Constant(_short(region.width.at(shown.start)))
+    if isinstance(region, MatteRegion) and not isinstance(region, OutlineRegion):
+        return replace(region, content=next(contents), moves=_moves(region, {}, shown), **said)
+    assert isinstance(region, Region | OutlineRegion)
+    drawn = _drawings(region, shown.start)
+    if not drawn:
         return None
     # The ease from a drawing to the next is its own.
-    words = dict(zip(region.drawings.frames, region.drawings.eases, strict=True)) if len(drawings) > 1 else {}
-    words = {number: words[number] for number in drawings if words}
-    keys = _move_keys(region, words, shown)
-    redrawn = {number: strokes for number, strokes in drawings.items() if words and number != keys[0][0]}
-    said: dict[str, Any] = {
-        "shutter": shutter,
-        "name": name,
-        "strokes": drawings[min(drawings)],
-        "keys": [
-            recipe.RegionKey(strokes=redrawn.get(frame), ease=ease, **_placed(region, frame, shown))
-            for frame, ease in keys
-        ],
-        "opacity": _number(region.opacity, shown),
-        "layer": region.layer,
-    }
-    if isinstance(region, OutlineRegion):
-        width = _number(region.feather, shown)
-        kinds: dict[str, Any] = {"between": region.between, "invert": region.invert, "blend": region.blend}
-        return recipe.OutlineRegion(kind="outline", width=width, **kinds, **said)
-    return recipe.Region(kind=region.kind.at(shown.start), width=_short(region.width.at(shown.start)), **said)
+    words = dict(zip(region.drawings.frames, region.drawings.eases, strict=True)) if len(drawn) > 1 else {}
+    words = {number: words[number] for number in drawn if words}
+    moves = _moves(region, words, shown)
+    starts = [_frame(number, shown) for number in drawn]
+    if words and isinstance(moves.location, Keys):
+        starts[0] = moves.location.frames[0]
+    drawings = Drawings(name, tuple(starts), tuple(drawn.values()), tuple(words.values()) or ("linear",), 1.0)
+    return replace(region, drawings=drawings, moves=moves, **said)
 
 
-def _matte(
-    region: MatteRegion, words: recipe.MatteRegion | recipe.RampRegion, name: str, shutter: str, shown: range
-) -> recipe.MatteRegion | recipe.RampRegion:
-    return replace(
-        words,
-        name=name,
-        shutter=shutter,
-        invert=region.invert,
-        blend=region.blend,
-        keys=_camera(region, shown),
-        opacity=_number(region.opacity, shown),
-        width=_number(region.feather, shown),
-        layer=region.layer,
-    )
-
-
-def _camera(moving: Subject, shown: range) -> list[recipe.CameraKey]:
-    keys = _move_keys(moving, {}, shown)
-    return [recipe.CameraKey(ease=ease, **_placed(moving, frame, shown)) for frame, ease in keys]
+def _moves(moving: Subject, words: Mapping[float, Ease], shown: range) -> Moves:
+    """Location, rotation and scale with the recipe's keys; words: see _keys."""
+    eased = _move_keys(moving, words, shown)
+    if not eased:
+        return Moves()
+    x, y, degrees, scale = zip(*(_place(moving, frame) for frame, _ in eased), strict=True)
+    locations = tuple((_short(left), _short(up)) for left, up in zip(x, y, strict=True))
+    frames, eases = tuple(_frame(frame, shown) for frame, _ in eased), tuple(ease for _, ease in eased)
+    columns = locations, tuple(map(_short_degrees, degrees)), tuple(map(_short, scale))
+    return Moves(*(Keys(frames, values, eases) for values in columns))
 
 
 def _move_keys(moving: Subject, words: Mapping[float, Ease], shown: range) -> _Eased:
@@ -261,20 +250,13 @@ def _place(moving: Subject, frame: float) -> np.ndarray:
     return np.array([*placed.location, placed.rotation, placed.scale])
 
 
-def _placed(moving: Subject, frame: float, shown: range) -> dict[str, Any]:
-    """The frame, location, rotation and scale of a key, as a recipe has them."""
-    x, y, rotation, scale = _place(moving, frame)
-    location, degrees = (_short(x), _short(y)), _short_degrees(rotation)
-    return {"frame": _frame(frame, shown), "location": location, "rotation": degrees, "scale": _short(scale)}
-
-
-def _drawings(region: Region | OutlineRegion, frame: float) -> dict[float, list[recipe.Stroke]]:
+def _drawings(region: Region | OutlineRegion, frame: float) -> dict[float, list[np.ndarray]]:
     """A region's strokes by the frames they were drawn at, from the first that has any, as they lie at a frame."""
-    result: dict[float, list[recipe.Stroke]] = {}
+    result: dict[float, list[np.ndarray]] = {}
     for index, number in enumerate(region.drawings.frames):
         strokes = region.drawings.drawing(index, frame)
         if strokes or result:
-            result[number] = [[(x, y) for x, y in np.round(points, 6).tolist()] for points in strokes]
+            result[number] = [np.round(points, 6) for points in strokes]
     return result
 
 

@@ -3,17 +3,16 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection
+from collections.abc import Collection, Mapping
 from dataclasses import replace
-from typing import TypeVar
 
 import numpy as np
 
-from ..model import effect, keyframes, mattes, motions, presence
+from ..model import motions, presence
+from ..model.effect import Effect, Moves, OutlineRegion, Region, Subject
+from ..model.keyframes import Channel, Ease, Keys
 from ..model.motions import Placement, Placements, Size
-from .recipe import CameraKey, Keyable, OutlineRegion, Recipe, Region, RegionKey, ValueKey
 
-D = TypeVar("D", Region, OutlineRegion)
 _DIGITS = 6  # of what was measured: far below a pixel
 # Pixels by which a thinned camera may be off: unlike a region, it carries the picture itself.
 STEADY = 0.25
@@ -21,75 +20,85 @@ STEADY = 0.25
 CORNERS = motions.offsets([motions.PICTURE])
 
 
-def with_placements(region: D, placements: Placements, exact: Collection[int], size: Size, *, thin: bool = True) -> D:
+def with_placements(
+    region: Region | OutlineRegion, placements: Placements, exact: Collection[int], size: Size, *, thin: bool = True
+) -> Region | OutlineRegion:
     """The region with these placements as its keys, in place of those that it has from the first of these frames to the
     last. At whole frames beyond these it stays where its keys put it, and its drawings stay where and as they are.
 
     exact: those frames among them whose keys are kept in any case, and as they are given
     size: of the picture; thin: no more keys than the motion needs within a pixel"""
-    drawn: dict[float | None, list] = {key.frame if key else None: strokes for key, strokes in region.drawings()}
-    eases = {key.frame: key.ease for key in region.keys if key.frame in drawn and len(drawn) > 1}
+    drawings = replace(region.drawings, aspect=size[0] / size[1])
+    keyed = _frames(region)
+    # A drawing at no key is there from the first on.
+    drawn = [frame for frame in drawings.frames if frame in keyed]
+    eases = dict(zip(keyed, _eases(region), strict=True)) if len(drawings.frames) > 1 else {}
+    eases = {frame: ease for frame, ease in eases.items() if frame in drawn}
     chosen = sorted(placements)
     if thin:
         # behind a drawing with an ease of its own the motion is to go straight
         straight: set[float] = {frame + 1 for frame, ease in eases.items() if ease != "linear"}
-        kept = {*exact, *(frame for frame in drawn if frame is not None), *straight}
-        shape = np.concatenate([motions.offsets(strokes) for strokes in drawn.values()])
-        chosen = motions.thinned(placements, shape, size, kept)
-    moving = region.over_time(0, size[0] / size[1], *([mattes.NoFile()] if isinstance(region, OutlineRegion) else []))
-    keys = _keys(RegionKey, region.keys, moving, placements, exact, chosen)
-    keys = [replace(key, ease=eases.get(key.frame, key.ease)) for key in keys]
-    return _redrawn(replace(region, keys=keys), drawn)
+        shape = np.concatenate([motions.offsets(strokes) for strokes in drawings.strokes])
+        chosen = motions.thinned(placements, shape, size, {*exact, *drawn, *straight})
+    moves = _moves(replace(region, drawings=drawings), placements, exact, chosen, eases)
+    assert isinstance(moves.location, Keys)
+    if len(drawings.frames) == 1 or drawings.frames[0] not in keyed:
+        frames = moves.location.frames[0], *drawings.frames[1:]
+        drawings = replace(drawings, frames=frames)
+    return replace(region, moves=moves, drawings=replace(drawings, aspect=region.drawings.aspect))
 
 
 def with_camera(
-    source: Recipe, placements: Placements, exact: Collection[int], size: Size, *, thin: bool = True
-) -> Recipe:
+    source: Effect, placements: Placements, exact: Collection[int], size: Size, *, thin: bool = True
+) -> Effect:
     """The recipe whose camera has these placements as its keys; arguments like those of with_placements. Thinned keys
     are within a quarter of a pixel of the placements, everywhere in the picture."""
     chosen = motions.thinned(placements, CORNERS, size, exact, STEADY) if thin else sorted(placements)
-    camera = source.effect(size[0] / size[1]).camera
-    return replace(source, camera=_keys(CameraKey, source.camera, camera, placements, exact, chosen))
+    camera = replace(source.camera, moves=_moves(source.camera, placements, exact, chosen, {}))
+    return source.with_parts(source.regions, camera)
 
 
-def _keys(
-    kind: type[RegionKey | CameraKey],
-    keys: list,
-    moving: effect.Subject,
+def _frames(moving: Subject) -> tuple[float, ...]:
+    """The frames of its keys."""
+    location = moving.moves.location
+    return location.frames if isinstance(location, Keys) else ()
+
+
+def _eases(moving: Subject) -> tuple[Ease, ...]:
+    location = moving.moves.location
+    return location.eases if isinstance(location, Keys) else ()
+
+
+def _moves(
+    moving: Subject,
     placements: Placements,
     exact: Collection[int],
     chosen: list[int],
-) -> list:
-    """Keys with the chosen placements, in place of those from the first placement to the last; moving: what moves by
-    `keys`, and still does so at whole frames beyond."""
+    eases: Mapping[float, Ease],
+) -> Moves:
+    """Keys with the chosen placements, in place of those from the first placement to the last; what moves still does so
+    at whole frames beyond. eases: by frame, those that drawings have."""
     first, last = min(placements), max(placements)
-    keyed = {frame: moving.placement(frame) for frame in _cut(keys, first - 1, -1) + _cut(keys, last + 1, 1)}
-    keyed |= {frame: placements[frame] if frame in exact else _rounded(placements[frame]) for frame in chosen}
-    made = [
-        kind(frame=frame, location=there.location, rotation=there.rotation, scale=there.scale)
-        for frame, there in keyed.items()
-    ]
-    kept = [key for key in keys if not first <= key.frame <= last]
-    return sorted(kept + made, key=lambda key: key.frame)
+    old = dict(zip(_frames(moving), _eases(moving), strict=True))
+    keys: dict[float, Placement] = {frame: moving.placement(frame) for frame in old if not first <= frame <= last}
+    kept = {frame: old[frame] for frame in keys}
+    keys |= {frame: moving.placement(frame) for frame in _cut(old, first - 1, -1) + _cut(old, last + 1, 1)}
+    keys |= {frame: placements[frame] if frame in exact else _rounded(placements[frame]) for frame in chosen}
+    frames = tuple(sorted(keys))
+    made = tuple(eases.get(frame, kept.get(frame, "linear")) for frame in frames)
+    columns = [(there.location, there.rotation, there.scale) for there in map(keys.__getitem__, frames)]
+    return Moves(*(Keys(frames, values, made) for values in zip(*columns, strict=True)))
 
 
-def _cut(keys: list, edge: int, step: int) -> list[int]:
+def _cut(keys: Mapping[float, Ease], edge: int, step: int) -> list[int]:
     """The frames that need a key, so that what lies beyond an edge stays when keys on the other side of it change: the
     edge where the way to the next key is straight, all frames on a way that is not; none without a key beyond."""
-    beyond = [key.frame for key in keys if step * (key.frame - edge) >= 0]
+    beyond = [frame for frame in keys if step * (frame - edge) >= 0]
     if not beyond or edge in beyond:
         return []
-    if next((key.ease for key in reversed(keys) if key.frame < edge), "linear") == "linear":
+    if next((keys[frame] for frame in sorted(keys, reverse=True) if frame < edge), "linear") == "linear":
         return [edge]
     return list(range(edge, math.ceil(min(beyond)) if step > 0 else math.floor(max(beyond)), step))
-
-
-def _redrawn(region: D, drawn: dict) -> D:
-    """The region with its drawings, by frame, on its keys: the first one is its own as well."""
-    strokes = next(iter(drawn.values()))
-    if len(drawn) == 1:
-        return replace(region, strokes=strokes, keys=[replace(key, strokes=None) for key in region.keys])
-    return replace(region, strokes=strokes, keys=[replace(key, strokes=drawn.get(key.frame)) for key in region.keys])
 
 
 def _rounded(placement: Placement) -> Placement:
@@ -97,18 +106,21 @@ def _rounded(placement: Placement) -> Placement:
     return Placement((x, y), round(placement.rotation, _DIGITS), round(placement.scale, _DIGITS))
 
 
-def with_ends(value: Keyable, keys: list[presence.Key], frames: range) -> Keyable:
+def with_ends(value: Channel, keys: list[presence.Key], frames: range) -> Channel:
     """How much something counts, with keys of where it is tracked (presence.keys), in place of those that it has at
     these frames; beyond them it stays what it is. All of it is what it was at most."""
-    if not isinstance(value, list):
-        return [ValueKey(key.frame, value * key.value, key.ease) for key in keys] if keys else value
-    columns = zip(*((key.frame, key.value, key.ease) for key in value), strict=True)
-    at, whole = keyframes.Keys(*columns).at, max(key.value for key in value)
-    first, last = frames[0], frames[-1]
-    before, after = [k for k in value if k.frame < first], [k for k in value if k.frame > last]
-    made = [ValueKey(key.frame, whole * key.value, key.ease) for key in keys if first <= key.frame <= last]
+    if not isinstance(value, Keys):
+        return _channel([(key.frame, value.at(1) * key.value, key.ease) for key in keys]) if keys else value
+    old = list(zip(value.frames, value.values, value.eases, strict=True))
+    whole, first, last = max(value.values), frames[0], frames[-1]
+    before, after = [key for key in old if key[0] < first], [key for key in old if key[0] > last]
+    made = [(key.frame, whole * key.value, key.ease) for key in keys if first <= key.frame <= last]
     start = whole * keys[0].value if keys else whole
-    made = made if made and made[0].frame == first else [ValueKey(first, start, "constant"), *made]
-    held = [ValueKey(first - 1, float(at(first - 1)), "constant")] if before and before[-1].frame < first - 1 else []
-    back = [ValueKey(last + 1, float(at(last + 1)))] if after and after[0].frame > last + 1 else []
-    return [*before, *held, *made, *back, *after]
+    made = made if made and made[0][0] == first else [(first, start, "constant"), *made]
+    held = [(first - 1, float(value.at(first - 1)), "constant")] if before and before[-1][0] < first - 1 else []
+    back = [(last + 1, float(value.at(last + 1)), "linear")] if after and after[0][0] > last + 1 else []
+    return _channel([*before, *held, *made, *back, *after])
+
+
+def _channel(keys: list[tuple]) -> Keys:
+    return Keys(*zip(*keys, strict=True))
