@@ -27,6 +27,7 @@ class Field:
     least, most: the range of a number; soft_most: how far a slider goes; of a text, `most` counts its characters
     choices: of a word; the word in the model and in recipes is in small letters
     keyed: whether Blender's F-curves may change it; keyed_in_recipe: whether a recipe's keys may
+    is_channel: whether the model has a channel of it (keyframes.Channel), not the value
     blender, recipe: its names there; recipe "": it has none
     told: whether a recipe says it even where it is as `absent`
     subtype, context: of Blender's property, and of the translation of its label
@@ -44,6 +45,7 @@ class Field:
     soft_most: float | None = None
     choices: Sequence[Choice] = ()
     keyed: bool = True
+    is_channel: bool = False
     keyed_in_recipe: bool = False
     told: bool = True
     subtype: str = "NONE"
@@ -62,13 +64,8 @@ MISSING = dataclasses.MISSING
 
 def number(label: str, description: str, *, default: float, **more: Any) -> Any:
     """Make a number that keys may change; the model has a channel of it."""
-    more = {"keyed_in_recipe": True} | more
+    more = {"is_channel": True, "keyed_in_recipe": True} | more
     return _field(label, description, default, lambda: Constant(default), **more)
-
-
-def constant(label: str, description: str, *, default: float, **more: Any) -> Any:
-    """Make a number of which the model has the value alone."""
-    return _field(label, description, default, **more)
 
 
 def whole(label: str, description: str, *, default: int, **more: Any) -> Any:
