@@ -37,7 +37,7 @@ def with_fields(*kinds: type, **more: dict[str, Any]) -> Callable[[type], type]:
 def _property(field: Field, **more: Any) -> Any:
     """A field as Blender's property: of what pictures are made by, unless it is a text, which is a name."""
     kind, default = type(field.default), field.default
-    said = {"name": field.label, "description": field.description, "translation_context": field.context}
+    said: dict[str, Any] = {"name": field.label, "description": field.description, "translation_context": field.context}
     if kind is str and not field.choices:
         return StringProperty(**said, default=default, **more)
     said |= {"update": changed, "options": KEYED if field.keyed else UNKEYED} | more

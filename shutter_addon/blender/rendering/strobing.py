@@ -188,7 +188,10 @@ def pairs(snapshot: Snapshot, medium: FrameSource, settings: inbetween_settings.
     factor = settings.factor
     needed: set[int] = set()
     source = ShotSource(inbetween.InbetweenSource(medium, *settings), factor)
-    moved = (shutter.has_trail or shutter.length == "timeline" or shutter.use_threshold for shutter in snapshot.effect.shutters)
+    moved = (
+        shutter.has_trail or shutter.length == "timeline" or shutter.use_threshold
+        for shutter in snapshot.effect.shutters
+    )
     has_trails = any(moved)
     for frame in snapshot.frames:
         with translated(rpt_):
