@@ -15,24 +15,12 @@ from bpy.props import (
 )
 from bpy.types import PropertyGroup
 
-from ...core.model.choices import (
-    BETWEEN,
-    BLENDS,
-    CHANNELS,
-    CONTEXT,
-    FOLLOWED,
-    KINDS,
-    MATTE_SOURCES,
-    MOTIONS,
-    RAMPS,
-    TIMINGS,
-    UNKEYED,
-)
+from ...core.model import effect as model
+from ...core.model.choices import CONTEXT, FOLLOWED, KINDS, MATTE_SOURCES, MOTIONS, UNKEYED
 from ...core.model.limits import MAX_CHANNEL, MAX_DEGREES, MAX_DISTANCE, MAX_FRAME, MAX_NAME, MAX_SCALE
 from . import consistency, matte_strips, selection
 from .consistency import changed
-
-KEYED = {"ANIMATABLE"}  # as properties are where nothing else is said
+from .field_properties import with_fields
 
 
 def _shortened(region, new: str, old: str, is_set: bool) -> str:
@@ -49,12 +37,6 @@ def _shortened(region, new: str, old: str, is_set: bool) -> str:
 def choice(name: str, description: str, items, *, update=changed, options=UNKEYED, **more):
     """An enum; as most are, of what pictures are made by, and without keys."""
     return EnumProperty(name=name, description=description, items=items, update=update, options=options, **more)
-
-
-def share(name: str, description: str, default: float):
-    """0 to 1, of what pictures are made by."""
-    words = {"name": name, "description": description, "subtype": "FACTOR"}
-    return FloatProperty(**words, default=default, min=0.0, max=1.0, update=changed)
 
 
 class TrackStop(PropertyGroup):
@@ -146,14 +128,19 @@ def _scale(description: str):
     )
 
 
+@with_fields(
+    model.Region,
+    model.OutlineRegion,
+    model.FileContent,
+    model.RampContent,
+    name={"set_transform": _shortened},
+)
 class ShutterRegion(_Tracked, PropertyGroup):
-    name: StringProperty(name="Name", description="Name of the region", default="Region", set_transform=_shortened)
     shutter: StringProperty(name="Shutter", description="Name of the shutter that holds in the region", update=changed)
     layer: StringProperty(name="Layer", description="Annotation layer that holds the strokes", update=changed)
     # Where there is any, drawings without one are seen where they were drawn as well; else, where it has not moved.
     drawn: CollectionProperty(type=DrawnPlace)
     kind: choice("Type", "What says where the shutter holds", KINDS, translation_context=CONTEXT)
-    between: choice("In Between", "What gives the matte between two drawings", BETWEEN)
     matte: choice("From", "What the matte is", MATTE_SOURCES)
     image: PointerProperty(
         name="File",
@@ -170,50 +157,8 @@ class ShutterRegion(_Tracked, PropertyGroup):
         options={"SKIP_SAVE"},
     )
     mask: PointerProperty(name="Mask", description="Mask that is the matte", type=bpy.types.Mask, update=changed)
-    channel: choice("Channel", "What of the matte says how much of the shutter a pixel gets", CHANNELS)
     channel_name: StringProperty(
         name="Channel Name", description="Name of the channel in the EXR file", maxlen=MAX_CHANNEL, update=changed
-    )
-    invert: BoolProperty(
-        name="Invert", description="The shutter gets what the matte leaves", update=changed, options=UNKEYED
-    )
-    timing: choice("Frames Of", "What the matte's frames belong to", TIMINGS)
-    offset: IntProperty(
-        name="Offset",
-        description="Frames by which the matte is ahead",
-        min=-MAX_FRAME,
-        max=MAX_FRAME,
-        update=changed,
-        options=UNKEYED,
-    )
-    blend: choice("Blend", "How the matte lies over other regions", BLENDS, translation_context=CONTEXT)
-    is_layer: BoolProperty(
-        name="Layer",
-        description="Expose the region by itself, before all else, which is exposed without it: it leaves no ghost",
-        update=changed,
-        options=UNKEYED,
-    )
-    opacity: share("Opacity", "How much of the region counts: at 0 the picture is as without it", 1)
-    feather: FloatProperty(
-        name="Feather",
-        description="How wide a hard edge of the matte becomes, as a fraction of the picture's height",
-        min=0.0,
-        max=MAX_DISTANCE,
-        soft_max=0.2,
-        precision=3,
-        step=1,
-        update=changed,
-        translation_context=CONTEXT,
-    )
-    ramp: choice("Ramp", "How the ramp runs", RAMPS)
-    width: FloatProperty(
-        name="Width",
-        description="Width of the lines as a fraction of the picture's height",
-        default=0.02,
-        min=0.0,
-        max=MAX_DISTANCE,
-        soft_max=0.5,
-        update=changed,
     )
     location: _location("Distance from where the region was drawn, as a fraction of the picture")
     rotation: _rotation("Rotation about the region's center")
@@ -229,9 +174,9 @@ class ShutterRegion(_Tracked, PropertyGroup):
     follow_stamp: StringProperty(options={"HIDDEN"})
 
 
+@with_fields(model.Camera)
 class ShutterCamera(_Tracked, PropertyGroup):
     name: StringProperty(name="Name", description="Name of the camera's animation channels", default="Camera")
-    influence: share("Influence", "How much is left of exposures that follow the camera: at 0 the shown frame alone", 1)
     location: _location("Where what the camera sees has moved to, as a fraction of the picture")
     rotation: _rotation("Rotation of what the camera sees, about the picture's center")
     scale: _scale("Scale of what the camera sees, about the picture's center")

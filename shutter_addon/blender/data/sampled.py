@@ -1,14 +1,17 @@
 """What of Blender's data has F-curves, as channels that are sampled at timeline frames. On Blender's main thread."""
 
 from collections.abc import Callable, Collection
+from typing import Any
 
 import numpy as np
+from bpy.types import PropertyGroup
 
 from ...core.messages import EffectError, UserError
 from ...core.model import effect as model
 from ...core.model import keyframes
+from ...core.model.fields import Field, fields_of
 from ...core.model.motions import Placement
-from . import annotations, geometry, strips
+from . import annotations, geometry, strips, validation
 from .fcurves import Curves
 
 Frames = Collection[float]  # of the timeline
@@ -35,6 +38,33 @@ def channel(curves: Curves, owner, path: str, name: str, frames: Frames, change=
     if not keyed:
         return keyframes.Constant(tried(at, 0.0))
     return keyframes.Samples({frame: tried(at, frame) for frame in frames}, curves.keys(keyed))
+
+
+def sampled_fields(
+    curves: Curves, owner: PropertyGroup, path: str, kind: type, frames: Frames, unused: Collection[str] = ()
+) -> dict[str, Any]:
+    """What the fields of one of the model's classes are in Blender, by their names there; path: the owner's, from the
+    scene; unused: those that count nothing, which stay as a new one has them. EffectError: a choice is none of its
+    items, or a number without keys outside of its range."""
+    return {
+        name: channel(curves, owner, path, field.blender, frames) if field.is_channel else value(owner, field)
+        for name, field in fields_of(kind).items()
+        if name not in unused
+    }
+
+
+def value(owner: PropertyGroup, field: Field, number: float | None = None) -> Any:
+    """What a field without a channel is, as the model has it; number: which an F-curve gives it. EffectError: it is
+    none of its choices, or outside of its range."""
+    if field.choices:
+        return type(field.default)(validation.word(owner, field.blender, number).lower())
+    if isinstance(field.default, bool) and number is not None:
+        return number >= 0.5
+    if isinstance(field.default, bool | str):
+        return getattr(owner, field.blender)
+    if isinstance(field.default, tuple):
+        return tuple(getattr(owner, field.blender))
+    return validation.number(owner, field.blender)
 
 
 def moves(curves: Curves, moving, path: str, frames: Frames) -> model.Moves:

@@ -13,11 +13,13 @@ from typing import Any, NamedTuple
 import numpy as np
 from bpy.app.translations import pgettext_n as n_
 from bpy.app.translations import pgettext_rpt as rpt_
+from bpy.types import PropertyGroup
 
 from ...core.frames.retiming import StripTiming
 from ...core.messages import EffectError, UserError, translated
 from ...core.model import effect as model
 from ...core.model import keyframes, limits, mattes, outlines
+from ...core.model.fields import fields_of
 from ...core.model.frame_state import Options
 from ...core.pixels import following
 from . import inbetween_settings, matte_content, sampled, source_media, strips, validation
@@ -125,6 +127,7 @@ def read(scene, effect, strip, frames: Frames, *, thorough: bool = False) -> mod
         if region.shutter in names
     )
     camera = _camera(curves, effect, around)
+    unused = ("inbetween_method",) if effect.inbetween == "1" and not thorough else ()
     return model.Effect(
         shutters=tuple(
             replace(_shutter(curves, effect, i, options, frames, thorough), follow=_followed(shutter, regions, camera))
@@ -133,8 +136,8 @@ def read(scene, effect, strip, frames: Frames, *, thorough: bool = False) -> mod
         regions=regions,
         options=options,
         time=sampling.time,
-        edge_aware=sampled.channel(curves, effect, path, "edge_aware", around if layers else frames),
         camera=camera,
+        **sampled.sampled_fields(curves, effect, path, model.Effect, around if layers else frames, unused),
     )
 
 
@@ -250,9 +253,9 @@ def check_counts(effect) -> None:
             raise EffectError(sentence.format(place=validation.place(effect), count=len(items), most=most))
 
 
-def _options(curves: Curves, path: str, effect, frames: Frames) -> keyframes.Channel:
-    names = (*OPTIONS, "aggregate", "border", "stop_at_cuts", "decontaminate")
-    option_curves = {name: sampled.tried(curves.find, f"{path}.{name}") for name in names}
+def _options(curves: Curves, path: str, effect: PropertyGroup, frames: Frames) -> keyframes.Channel:
+    keyed = [name for name, field in fields_of(Options).items() if field.keyed]
+    option_curves = {name: sampled.tried(curves.find, f"{path}.{name}") for name in keyed}
     if error := next((error for error in option_curves.values() if isinstance(error, EffectError)), None):
         return keyframes.Constant(error)
     if not any(option_curves.values()):
@@ -260,28 +263,13 @@ def _options(curves: Curves, path: str, effect, frames: Frames) -> keyframes.Cha
     return keyframes.Samples({frame: sampled.tried(_options_at, effect, option_curves, frame) for frame in frames})
 
 
-def _options_at(effect, curves: dict, frame: float) -> Options:
-    """The effect's options in the recipe's words at a frame; curves: F-curves or None by name. EffectError: one that no
-    effect can have."""
-
-    def at(name):
+def _options_at(effect: PropertyGroup, curves: dict[str, Any], frame: float) -> Options:
+    """The effect's options at a frame; curves: F-curves or None by name. EffectError: one that no effect can have."""
+    values = {}
+    for name, field in fields_of(Options).items():
         curve = curves.get(name)
-        value = None if curve is None else curve.evaluate(frame)
-        if effect.bl_rna.properties[name].type == "ENUM":
-            return validation.word(effect, name, value)
-        return getattr(effect, name) if value is None else value >= 0.5
-
-    words = {name: at(name).lower() for name in OPTIONS}
-    return Options(
-        window=validation.number(effect, "window"),
-        **words,
-        aggregate=int(at("aggregate")),
-        border=at("border"),
-        stop_at_cuts=at("stop_at_cuts"),
-        decontaminate=at("decontaminate"),
-        plate_reach=validation.number(effect, "plate_reach"),
-        step=inbetween_settings.factor(effect),
-    )
+        values[name] = sampled.value(effect, field, None if curve is None else curve.evaluate(frame))
+    return Options(**values)
 
 
 def _shutter(
@@ -292,27 +280,10 @@ def _shutter(
     bars = sampled.tried(_bars, curves, path, shutter, options, frames, thorough)
     if isinstance(bars, EffectError):
         bars = keyframes.Bars(keyframes.Constant(bars))
-    follows = validation.word(shutter, "follow") != "NOTHING"
-    is_trail = follows and validation.word(shutter, "length") == "MOTION"
-    trail = sampled.channel(curves, shutter, path, "trail", frames) if is_trail else None
-    motion = validation.word(shutter, "follow_motion").lower()
-    smooth = validation.number(shutter, "follow_smooth")
-    numbers = {}
-    if shutter.use_threshold:
-        numbers = {name: sampled.channel(curves, shutter, path, name, frames) for name in ("threshold", "softness")}
-    return model.Shutter(
-        name=shutter.name,
-        color=tuple(shutter.color),
-        bars=bars,
-        follow=None,
-        trail=trail,
-        motion=motion,
-        smooth=smooth,
-        timeline=validation.word(shutter, "length") == "TIMELINE",
-        combine=validation.word(shutter, "combine").lower(),
-        by_luminance=shutter.by_luminance,
-        **numbers,
-    )
+    unused = [] if shutter.use_threshold else ["threshold", "softness"]
+    if validation.word(shutter, "follow") == "NOTHING" or shutter.length != "MOTION":
+        unused.append("trail")
+    return model.Shutter(bars=bars, **sampled.sampled_fields(curves, shutter, path, model.Shutter, frames, unused))
 
 
 def _bars(curves: Curves, path: str, shutter, options: keyframes.Channel, frames, thorough: bool) -> keyframes.Bars:
@@ -415,27 +386,16 @@ def _any_region(sampling: _Sampling, index: int, shutter: int) -> model.Region |
     drawn: dict[str, Any] = {}
     if region.kind == "OUTLINE":
         drawings = sampled.drawings(curves, path, effect, region, sampling.placement, None)
-        between = "straight" if region.between == "STRAIGHT" else "carried"
-        kind, drawn = model.OutlineRegion, {"drawings": drawings, "between": between}
+        kind, drawn = model.OutlineRegion, {"drawings": drawings}
         content = sampled.tried(_outlines, sampling, region, drawings)
     else:
         content = sampled.tried(matte_content.content, effect, sampling.strip, region, moves, frames, sampling.time)
-    blend = sampled.tried(validation.word, region, "blend")
-    if faults := [value for value in (content, blend) if isinstance(value, UserError)]:
-        content, blend = keyframes.Constant(faults[0]), "OVER"
-    opacity, feather = (sampled.channel(curves, region, path, name, frames) for name in ("opacity", "feather"))
-    return kind(
-        name=region.name,
-        shutter=shutter,
-        content=content,
-        blend=blend.lower(),
-        invert=region.invert,
-        opacity=opacity,
-        feather=feather,
-        moves=moves,
-        layer=region.is_layer,
-        **drawn,
-    )
+    fields = sampled.tried(sampled.sampled_fields, curves, region, path, kind, frames)
+    if isinstance(fields, UserError):  # it is told where the matte is asked for
+        content, fields = fields, {"name": region.name}
+    if isinstance(content, UserError):
+        content = keyframes.Constant(content)
+    return kind(shutter=shutter, content=content, moves=moves, **drawn, **fields)
 
 
 def _outlines(sampling: _Sampling, region, drawings: model.Drawings) -> Any:
@@ -469,14 +429,11 @@ def _drawings(sampling: _Sampling, index: int) -> model.Drawings:
 def _region(sampling: _Sampling, path: str, region, shutter: int) -> model.Region:
     curves, frames = sampling.curves, sampling.frames
     return model.Region(
-        name=region.name,
         shutter=shutter,
         kind=keyframes.Constant(sampled.tried(_word_of_kind, region)),
-        width=sampled.channel(curves, region, path, "width", frames),
         drawings=sampled.drawings(curves, path, sampling.effect, region, sampling.placement, frames),
         moves=sampled.moves(curves, region, path, frames),
-        opacity=sampled.channel(curves, region, path, "opacity", frames),
-        layer=region.is_layer,
+        **sampled.sampled_fields(curves, region, path, model.Region, frames),
     )
 
 
@@ -487,5 +444,5 @@ def _word_of_kind(region) -> str:
 
 def _camera(curves: Curves, effect, frames: Frames) -> model.Camera:
     path = effect.camera.path_from_id()
-    influence = sampled.channel(curves, effect.camera, path, "influence", frames)
-    return model.Camera(sampled.moves(curves, effect.camera, path, frames), influence)
+    moves = sampled.moves(curves, effect.camera, path, frames)
+    return model.Camera(moves, **sampled.sampled_fields(curves, effect.camera, path, model.Camera, frames))

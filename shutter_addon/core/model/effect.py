@@ -380,6 +380,7 @@ class Shutter:
         "How far what is followed moves while the shutter is open, as a fraction of the picture's height",
         default=0.1,
         most=limits.MAX_DISTANCE,
+        soft_most=1.0,
         precision=3,
         recipe="",
     )
@@ -401,6 +402,7 @@ class Shutter:
         "Luminance of linear light from which on it leaves a trail; white is 1",
         default=0.5,
         most=limits.MAX_THRESHOLD,
+        soft_most=1.0,
         precision=3,
         recipe="",
     )
@@ -410,6 +412,7 @@ class Shutter:
         default=0.1,
         absent=0.0,
         most=limits.MAX_THRESHOLD,
+        soft_most=1.0,
         precision=3,
         told=False,
     )

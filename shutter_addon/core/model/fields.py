@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Sequence
+from functools import cache
 from typing import Any
 
 from .keyframes import Constant
@@ -99,6 +100,7 @@ def _field(label: str, description: str, default: Any, made: Any = None, **more:
     return dataclasses.field(default_factory=factory, metadata={"said": (label, description, default, said)})
 
 
+@cache
 def fields_of(*kinds: type) -> dict[str, Field]:
     """Give the Fields of classes, by the name of the model's field."""
     found: dict[str, Field] = {}
