@@ -13,7 +13,6 @@ from pathlib import Path
 import numpy as np
 
 from shutter_addon.core.frames import light
-from shutter_addon.core.recipes import recipe
 from shutter_addon.media import open_source
 
 from . import stills
@@ -65,14 +64,10 @@ def _turned(angles) -> np.ndarray:
     return pan @ roll @ tilt
 
 
-def held() -> recipe.Recipe:
-    """One shutter that follows the camera: what Tripod sets up, before it tracks."""
-    return recipe.Recipe(
-        1,
-        COUNT,
-        [recipe.Shutter("Tripod", (0.9, 0.62, 0.0), [1.0] * COUNT, follow=recipe.CAMERA)],
-        position="center",
-    )
+def held() -> dict:
+    """The recipe of one shutter that follows the camera: what Tripod sets up, before it tracks."""
+    shutter = {"name": "Tripod", "color": [0.9, 0.62, 0.0], "bars": [1.0] * COUNT, "follow": "camera"}
+    return {"version": 1, "window": COUNT, "position": "center", "shutters": [shutter]}
 
 
 def _render(folder: Path, turned) -> Path:

@@ -13,7 +13,7 @@ from shutter_addon.compute.renderer import Renderer, open_compositor
 from shutter_addon.compute.request import Request
 from shutter_addon.core.frames import light
 from shutter_addon.core.model import scribbles
-from shutter_addon.core.model.effect import Effect
+from shutter_addon.core.model.effect import Effect, FileContent, MatteRegion
 from shutter_addon.core.model.frame_state import FrameState
 from shutter_addon.core.pixels import following, layering
 from shutter_addon.core.recipes import recipe_file

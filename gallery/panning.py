@@ -12,7 +12,6 @@ from pathlib import Path
 
 import numpy as np
 
-from shutter_addon.core.recipes import recipe
 from shutter_addon.media import open_source
 
 from . import stills
@@ -71,15 +70,11 @@ def mask(folder: Path) -> Path:
     return path
 
 
-def drawn() -> recipe.Recipe:
-    """One stroke on the scooter at the shown frame, not tracked yet, and a shutter that follows it; no layer."""
-    return recipe.Recipe(
-        1,
-        WINDOW,
-        [recipe.Shutter("Panning", (0.9, 0.62, 0.0), [1.0] * WINDOW, follow=NAME)],
-        [recipe.Region("Panning", NAME, "line", 0.02, [STROKE])],
-        position="center",
-    )
+def drawn() -> dict:
+    """A recipe: one stroke on the scooter at the shown frame, not tracked yet, and a shutter that follows it; no layer."""
+    shutter = {"name": "Panning", "color": [0.9, 0.62, 0.0], "bars": [1.0] * WINDOW, "follow": NAME}
+    stroke = {"name": NAME, "shutter": "Panning", "kind": "line", "width": 0.02, "strokes": [STROKE]}
+    return {"version": 1, "window": WINDOW, "position": "center", "shutters": [shutter], "regions": [stroke]}
 
 
 def place(frame: float) -> float:

@@ -27,7 +27,8 @@ from quality import similarity
 from gallery import handheld as scene
 from shutter_addon.core.frames import light
 from shutter_addon.core.model import motions
-from shutter_addon.core.recipes import recipe, recipe_file
+from shutter_addon.core.model.effect import Effect
+from shutter_addon.core.recipes import recipe_file
 from shutter_addon.media import open_source
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -75,22 +76,22 @@ def encoded(picture: np.ndarray) -> np.ndarray:
     return np.rint(255 * np.clip(light.to_encoded(picture), 0, 1)).astype(np.uint8)
 
 
-def tracked(footage: Path, folder: Path) -> recipe.Recipe:
+def tracked(footage: Path, folder: Path) -> Effect:
     """The effect with the keys that the command writes."""
-    (folder / "held.json").write_text(recipe_file.dump(scene.held()), encoding="utf-8")
+    (folder / "held.json").write_text(json.dumps(scene.held()), encoding="utf-8")
     options = ["--recipe", folder / "held.json", "--camera", "--frame", scene.FRAME, "--all-keys"]
     run("track", footage, *options, "--output", folder / "tracked.json")
     return recipe_file.load(folder / "tracked.json")
 
 
-def motion(effect: recipe.Recipe, frame: int, size) -> motions.Similarity:
+def motion(effect: Effect, frame: int, size) -> motions.Similarity:
     """From the shown frame to another one, as the keys have it."""
-    camera = effect.effect(size[0] / size[1]).camera
+    camera = effect.for_picture(size[0] / size[1]).camera
     ends, centre = (camera.placement(scene.FRAME), camera.placement(frame)), camera.centre(frame)
     return motions.motion_between(*ends, centre, centre, size)
 
 
-def seen_by_all(effect: recipe.Recipe, size) -> np.ndarray:
+def seen_by_all(effect: Effect, size) -> np.ndarray:
     """The pixels (h, w) bool of the shown frame that lie in every frame of its window."""
     y, x = np.mgrid[: size[1], : size[0]]
     places = [motion(effect, frame, size)(x + 1j * y) for frame in range(1, scene.COUNT + 1)]
@@ -99,7 +100,7 @@ def seen_by_all(effect: recipe.Recipe, size) -> np.ndarray:
     return np.all(inside, axis=0)
 
 
-def off(effect: recipe.Recipe, size) -> float:
+def off(effect: Effect, size) -> float:
     corners = np.array([0, size[0] - 1, 1j * (size[1] - 1), complex(size[0] - 1, size[1] - 1)])
     frames = range(1, scene.COUNT + 1)
     return max(

@@ -32,8 +32,9 @@ from shutter_addon.compute.renderer import Renderer, open_compositor
 from shutter_addon.compute.request import Request
 from shutter_addon.core.frames import light
 from shutter_addon.core.frames.frame_source import FrameSource
+from shutter_addon.core.model.effect import Effect
 from shutter_addon.core.pixels import following, layering
-from shutter_addon.core.recipes import recipe
+from shutter_addon.core.recipes import recipe_file
 from shutter_addon.media import open_source
 from shutter_addon.media.matte_files import MatteFile
 from shutter_addon.media.matte_values import MatteValues
@@ -106,9 +107,9 @@ class Case:
     name: str
     parts: dict[str, np.ndarray]
     subjects: list[str]
-    regions: Callable[[str, bool], list[recipe.AnyRegion]]
+    regions: Callable[[str, bool], list[dict]]
     cryptomatte: dict[str, MatteFile] = field(default_factory=dict)
-    camera: list[recipe.CameraKey] = field(default_factory=list)
+    camera: list[dict] = field(default_factory=list)
 
 
 class Memory(FrameSource):
@@ -177,13 +178,13 @@ def tracked_board(folder: Path) -> Case:
     (folder / "footage").mkdir(exist_ok=True)
     for number, picture in enumerate(footage, start=1):
         stills.save(codes(picture) / 255, folder / "footage" / f"{number:04}.png")
-    (stroke,) = one_stroke.tracked(scene, folder)["thinned"].regions
+    (stroke,) = json.loads(recipe_file.dump(one_stroke.tracked(scene, folder)["thinned"]))["regions"]
     common = {"name": "board", "shutter": "Subject"}
 
-    def regions(matte: str, layer: bool) -> list[recipe.AnyRegion]:
+    def regions(matte: str, layer: bool) -> list[dict]:
         if matte == "stroke":
-            return [replace(stroke, **common, layer=layer)]
-        return [recipe.MatteRegion(**common, kind="matte", path="board", layer=layer)]
+            return [stroke | common | {"layer": layer}]
+        return [common | {"kind": "matte", "path": "board", "layer": layer}]
 
     return Case(f"one stroke, {scene.name}", parts, ["board"], regions)
 
@@ -315,47 +316,48 @@ def exposed(subjects: list[np.ndarray], ground: np.ndarray, own: np.ndarray, res
     return picture
 
 
-def made(case: Case, bars: tuple, matte: str, layer: bool) -> recipe.Recipe:
+def made(case: Case, bars: tuple, matte: str, layer: bool) -> Effect:
     """The recipe of a picture. bars: of the subjects, and of all else; matte, layer: see WAYS"""
     own, rest = bars
-    return recipe.Recipe(
-        1,
-        WINDOW,
-        [recipe.Shutter("Rest", bars=list(rest)), recipe.Shutter("Subject", bars=list(own))],
-        case.regions(matte, layer),
-        position="center",
+    return parsed(
+        shutters=[{"name": "Rest", "bars": list(rest)}, {"name": "Subject", "bars": list(own)}],
+        regions=case.regions(matte, layer),
         border=True,
         edge_aware=1.0 if matte == "stroke" else 0.0,
         camera=case.camera,
     )
 
 
-def _region(scene: Scene, size: tuple[int, int], subject: str, matte: str, layer: bool) -> recipe.AnyRegion:
+def parsed(**data) -> Effect:
+    return recipe_file.parse(json.dumps({"version": 1, "window": WINDOW, "position": "center"} | data))
+
+
+def _region(scene: Scene, size: tuple[int, int], subject: str, matte: str, layer: bool) -> dict:
     """A subject by a matte, or by a stroke that moves as it does."""
     common = {"name": subject, "shutter": "Subject", "layer": layer}
     if matte != "stroke":
-        return recipe.MatteRegion(**common, kind="matte", path=subject)
+        return common | {"kind": "matte", "path": subject}
     high = WIDE * size[1] / size[0]
     keys = [
-        recipe.RegionKey(frame=frame + 1.0, location=(x / WIDE, y / high))
+        {"frame": frame + 1, "location": [x / WIDE, y / high]}
         for frame in range(COUNT)
         for x, y in [scene.place(subject, frame)]
     ]
     stroke = [(0.5 + x / WIDE, 0.5 + y / high) for x, y in STROKE]
-    return recipe.Region(**common, kind="line", width=0.08, strokes=[stroke], keys=keys)
+    return common | {"kind": "line", "width": 0.08, "strokes": [stroke], "keys": keys}
 
 
-def camera(scene: Scene) -> list[recipe.CameraKey]:
+def camera(scene: Scene) -> list[dict]:
     """The keys of a camera that pans: where what it sees lies."""
     if not scene.pan:
         return []
     places = [-scene.pan * (frame - SHOWN) / WIDE for frame in range(COUNT)]
-    return [recipe.CameraKey(frame=frame + 1.0, location=(x, 0.0)) for frame, x in enumerate(places)]
+    return [{"frame": frame + 1, "location": [x, 0]} for frame, x in enumerate(places)]
 
 
-def shown(source: Memory, given: recipe.Recipe, files: dict) -> np.ndarray:
+def shown(source: Memory, given: Effect, files: dict) -> np.ndarray:
     """The picture (H, W, 3), scene-linear, of the shown frame. files: of mattes, by subject"""
-    effect = given.effect(source.width / source.height, lambda region: files[region.path])
+    effect = given.for_picture(source.width / source.height, lambda region: files[region.content.path])
     at = following.Shown(SHOWN + 1.0, SHOWN)
     state = replace(effect.at(at.frame), layers=None)
 
@@ -371,8 +373,7 @@ def shown(source: Memory, given: recipe.Recipe, files: dict) -> np.ndarray:
 
 
 def without_region(source: Memory, rest: np.ndarray) -> np.ndarray:
-    bare = recipe.Recipe(1, WINDOW, [recipe.Shutter("Rest", bars=list(rest))], position="center")
-    return shown(source, bare, {})
+    return shown(source, parsed(shutters=[{"name": "Rest", "bars": list(rest)}]), {})
 
 
 def near(mask: np.ndarray, reach: int) -> np.ndarray:

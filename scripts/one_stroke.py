@@ -35,7 +35,8 @@ from gallery import stills
 from shutter_addon.compute.renderer import Renderer, open_compositor
 from shutter_addon.compute.request import Request
 from shutter_addon.core.model import scribbles
-from shutter_addon.core.recipes import recipe, recipe_file
+from shutter_addon.core.model.effect import Effect
+from shutter_addon.core.recipes import recipe_file
 from shutter_addon.media import open_source
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -76,26 +77,31 @@ def main() -> int:
     return 0
 
 
-def stroked(scene: truth.Scene, size, window: int = 9) -> recipe.Recipe:
+def stroked(scene: truth.Scene, size, window: int = 9, aggregate: int = 1) -> Effect:
     """The effect of a new stroke on the subject at the scene's first frame of tracking, not tracked yet."""
     stroke = truth.on_picture(truth.STROKE, truth.place(scene, scene.start, size), size)
     long, sharp = [1.0] * window, [0.0] * (window // 2) + [1.0] + [0.0] * (window // 2)
-    return recipe.Recipe(
-        1,
-        window,
-        [recipe.Shutter("Long", (0.2, 0.5, 1.0), long), recipe.Shutter("Sharp", (1.0, 0.5, 0.1), sharp)],
-        [recipe.Region("Sharp", NAME, "line", 0.02, [stroke.tolist()])],
-        position="center",
-        border=True,
-        edge_aware=1.0,
-    )
+    data = {
+        "version": 1,
+        "window": window,
+        "position": "center",
+        "border": True,
+        "edge_aware": 1,
+        "aggregate": aggregate,
+        "shutters": [
+            {"name": "Long", "color": [0.2, 0.5, 1], "bars": long},
+            {"name": "Sharp", "color": [1, 0.5, 0.1], "bars": sharp},
+        ],
+        "regions": [{"name": NAME, "shutter": "Sharp", "width": 0.02, "strokes": [stroke.tolist()]}],
+    }
+    return recipe_file.parse(json.dumps(data))
 
 
-def tracked(scene: truth.Scene, folder: Path, aggregate: int = 1) -> dict[str, recipe.Recipe]:
+def tracked(scene: truth.Scene, folder: Path, aggregate: int = 1) -> dict[str, Effect]:
     """The effect with the keys that the command writes: `thinned`, and `all` of them."""
     footage = folder / "footage" / "0001.png"
     with open_source(footage) as source:
-        drawn = replace(stroked(scene, (source.width, source.height)), aggregate=aggregate)
+        drawn = stroked(scene, (source.width, source.height), aggregate=aggregate)
     (folder / "drawn.json").write_text(recipe_file.dump(drawn), encoding="utf-8")
     options = ["--recipe", folder / "drawn.json", "--region", NAME, "--frame", scene.start]
     found = {"drawn": drawn}
@@ -107,7 +113,7 @@ def tracked(scene: truth.Scene, folder: Path, aggregate: int = 1) -> dict[str, r
     return found
 
 
-def motion(scene: truth.Scene, folder: Path, keyed: dict[str, recipe.Recipe]) -> dict:
+def motion(scene: truth.Scene, folder: Path, keyed: dict[str, Effect]) -> dict:
     """How far the stroke lies from where it belongs, in pixels of 640."""
     with open_source(folder / "footage" / "0001.png") as source:
         size, frames = (source.width, source.height), range(1, source.count + 1)
@@ -118,7 +124,7 @@ def motion(scene: truth.Scene, folder: Path, keyed: dict[str, recipe.Recipe]) ->
 
     def error(way, frame):
         stroke = truth.on_picture(truth.STROKE, truth.place(scene, frame, size), size)
-        (shape,) = keyed[way].at(frame, size[0] / size[1]).shapes
+        (shape,) = keyed[way].for_picture(size[0] / size[1]).at(frame).shapes
         return float(np.hypot(*((shape.strokes[0] - stroke) * size).T).max() * 640 / size[0])
 
     def worst(way, chosen):
@@ -129,7 +135,7 @@ def motion(scene: truth.Scene, folder: Path, keyed: dict[str, recipe.Recipe]) ->
         "seen": len(whole),
         "error": worst("all", whole),
         "error_thinned": worst("thinned", whole),
-        "keys": len(keyed["thinned"].regions[0].keys),
+        "keys": len(keyed["thinned"].regions[0].moves.location.frames),
         "least_confidence": min((sure[f] for f in whole), default=0.0),
         "unseen_but_sure": worst("all", partly),
         "wrong_but_sure": sum(error("all", f) > 2 for f in sure if sure[f] > SURE),
@@ -140,7 +146,7 @@ def motion(scene: truth.Scene, folder: Path, keyed: dict[str, recipe.Recipe]) ->
 class Masks:
     """What each way takes for the subject, beside the true masks."""
 
-    def __init__(self, folder: Path, keyed: dict[str, recipe.Recipe]):
+    def __init__(self, folder: Path, keyed: dict[str, Effect]):
         self._source = open_source(folder / "footage" / "0001.png")
         self._truth = open_source(folder / "mask" / "0001.png")
         self._keyed, self._known = keyed, {}
@@ -194,7 +200,7 @@ class Masks:
         return scribbles.rasterise(self._state("thinned", frame).shapes, *size, border=True)
 
     def _state(self, keys: str, frame: int):
-        return self._keyed[keys].at(frame, self._source.width / self._source.height)
+        return self._keyed[keys].for_picture(self._source.width / self._source.height).at(frame)
 
     def picture(self) -> np.ndarray:
         """A row of each way at four moments: what it takes in colours, the true outline in white."""

@@ -27,7 +27,8 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 from quality import similarity
 
 from gallery import panning as scene
-from shutter_addon.core.recipes import recipe, recipe_file
+from shutter_addon.core.model.effect import Effect
+from shutter_addon.core.recipes import recipe_file
 from shutter_addon.media import open_source
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -71,20 +72,20 @@ def measure(folder: Path, samples: int = 64) -> list[dict]:
     ]
 
 
-def tracked(footage: Path, folder: Path) -> recipe.Recipe:
+def tracked(footage: Path, folder: Path) -> Effect:
     """The stroke's effect with the keys that the command writes."""
-    (folder / "drawn.json").write_text(recipe_file.dump(scene.drawn()), encoding="utf-8")
+    (folder / "drawn.json").write_text(json.dumps(scene.drawn()), encoding="utf-8")
     options = ["--recipe", folder / "drawn.json", "--region", scene.NAME, "--frame", scene.FRAME]
     run("track", footage, *options, "--output", folder / "tracked.json")
     return recipe_file.load(folder / "tracked.json")
 
 
-def unfollowing(effect: recipe.Recipe) -> recipe.Recipe:
+def unfollowing(effect: Effect) -> Effect:
     """The effect with shutters that follow nothing."""
-    return replace(effect, shutters=[replace(shutter, follow=None) for shutter in effect.shutters])
+    return replace(effect, shutters=tuple(replace(shutter, follow=None) for shutter in effect.shutters))
 
 
-def exposed(footage: Path, effect: recipe.Recipe, frame: int, folder: Path) -> np.ndarray:
+def exposed(footage: Path, effect: Effect, frame: int, folder: Path) -> np.ndarray:
     """The picture of an effect at a frame, by the command."""
     folder.mkdir(exist_ok=True)
     (folder / "recipe.json").write_text(recipe_file.dump(effect), encoding="utf-8")

@@ -59,7 +59,8 @@ from shutter_addon.compute.renderer import Renderer
 from shutter_addon.compute.request import Request
 from shutter_addon.core.frames import light
 from shutter_addon.core.model import presets
-from shutter_addon.core.recipes import recipe, recipe_file
+from shutter_addon.core.model.effect import Effect
+from shutter_addon.core.recipes import recipe_file
 from shutter_addon.devices.device import NoDeviceError
 from shutter_addon.devices.gl import GLDevice
 from shutter_addon.media import MediaError, open_source
@@ -82,7 +83,7 @@ _THREADS = Path("/proc/self/task")  # only on Linux
 _LOOK = 0.02  # seconds between two looks at the threads
 
 
-def effect_recipe(window: int) -> recipe.Recipe:
+def effect_recipe(window: int) -> Effect:
     """Three shutters on two lines and the border."""
     bars = {"Long": "ANGLE_360", "Sharp": "STILL", "Twice": "TWO_CUTS"}
     lines = {"Sharp": [[0.3, 0.2], [0.5, 0.8]], "Twice": [[0.7, 0.2], [0.7, 0.8]]}

@@ -1,19 +1,32 @@
 """What the extension has stored in the .blend file that is open, as plain data; and by which names it can."""
 
-import dataclasses
-import inspect
 from collections.abc import Iterator
 from typing import get_args, get_type_hints
 
 import bpy
 
 from shutter_addon.blender.data import data_format, fcurves, properties
-from shutter_addon.core.recipes import recipe, recipe_file
+from shutter_addon.core.recipes import records
 
 PREFIX = "virtual_shutter"
 OWNERS = {"Strip": bpy.types.Strip, "Annotation": bpy.types.Annotation}  # beside scenes; IDs' own are in both
 NEVER_EQUAL = {"format", "version"}  # of a scene: who has saved it last
 _BLENDERS_NAME = "Unique name used in the code"  # begins what Blender says of each group's own, which nothing uses
+
+
+# The parts of a recipe, as saved versions name them.
+RECORDS = {
+    "CameraKey": records.MoveKey,
+    "MatteRegion": records.MatteRecord,
+    "OutlineRegion": records.OutlineRecord,
+    "RampRegion": records.RampRecord,
+    "Recipe": records.RecipeRecord,
+    "Region": records.RegionRecord,
+    "RegionKey": records.RegionKey,
+    "Shutter": records.ShutterRecord,
+    "ShutterKey": records.BarsKey,
+    "ValueKey": records.ValueKey,
+}
 
 
 def values() -> dict:
@@ -47,13 +60,10 @@ def names() -> dict:
     """The properties by class, with the items of each that is an enum; and of recipes the fields, with their words."""
     classes = {cls.__name__: _properties(cls.bl_rna.properties) for cls in properties.classes}
     owned = {name: _properties(cls.bl_rna.properties, PREFIX) for name, cls in OWNERS.items()}
-    parts = [
-        cls for _, cls in inspect.getmembers(recipe, dataclasses.is_dataclass) if cls.__module__ == recipe.__name__
-    ]
-    hints = {cls.__name__: get_type_hints(cls) for cls in parts}
+    hints = {name: get_type_hints(cls) for name, cls in RECORDS.items()}
     return {
         "format": data_format.FORMAT,
-        "recipe": recipe_file.VERSION,
+        "recipe": records.VERSION,
         "properties": classes | owned,
         "fields": {
             name: {field: sorted(set(map(str, _words(kind)))) for field, kind in fields.items()}

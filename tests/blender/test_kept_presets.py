@@ -4,12 +4,12 @@ import itertools
 
 import numpy as np
 import pytest
+from made_recipes import made
 
 from shutter_addon.blender.data import consistency, recipe_import, selection, strips
 from shutter_addon.blender.editing import bar_edits, copies, layer_presets, region_edits, shutter_edits, time_map
 from shutter_addon.core.model import presets, shutters
 from shutter_addon.core.model.frame_state import Options
-from shutter_addon.core.recipes import recipe
 
 WINDOWS = 1, 2, 8, 32, 256
 
