@@ -71,7 +71,7 @@ def mask(folder: Path) -> Path:
 
 
 def drawn() -> dict:
-    """A recipe: one stroke on the scooter at the shown frame, not tracked yet, and a shutter that follows it; no layer."""
+    """A recipe: one stroke on the scooter at the shown frame, not tracked, and a shutter that follows it; no layer."""
     shutter = {"name": "Panning", "color": [0.9, 0.62, 0.0], "bars": [1.0] * WINDOW, "follow": NAME}
     stroke = {"name": NAME, "shutter": "Panning", "kind": "line", "width": 0.02, "strokes": [STROKE]}
     return {"version": 1, "window": WINDOW, "position": "center", "shutters": [shutter], "regions": [stroke]}

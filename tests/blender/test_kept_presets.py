@@ -2,9 +2,9 @@
 
 import itertools
 
+import made_recipes
 import numpy as np
 import pytest
-from made_recipes import made
 
 from shutter_addon.blender.data import consistency, recipe_import, selection, strips
 from shutter_addon.blender.editing import bar_edits, copies, layer_presets, region_edits, shutter_edits, time_map
@@ -95,7 +95,7 @@ def by_keys(effect):
 def by_recipe(effect):
     parts = [{"name": "A", "bars": [1] * 8}, {"name": "B", "bars": [1, *[0] * 7]}]
     scene, _, strip = strips.find_effect(effect.scene)
-    recipe_import.apply(scene, effect, strip, made(8, parts))
+    recipe_import.apply(scene, effect, strip, made_recipes.made(8, parts))
 
 
 @pytest.mark.parametrize("edited", [by_hand, by_number, by_script, by_keys, by_recipe])

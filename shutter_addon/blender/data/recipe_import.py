@@ -1,7 +1,7 @@
 """A recipe into Blender's data: shutters, regions, strokes, keys and options."""
 
 import os
-from collections.abc import Hashable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
@@ -64,7 +64,7 @@ def _set_fields(scene, owner, path: str, part: Any, first: float, **curve) -> No
 
 
 def _fields(part: Any) -> Iterable[tuple[str, Field]]:
-    kind: Hashable = type(part)
+    kind: Any = type(part)
     return fields_of(kind).items()
 
 
