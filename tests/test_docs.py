@@ -1,11 +1,15 @@
 """The pages: every link and picture leads somewhere."""
 
+import importlib
 import re
+import sys
 from pathlib import Path
 
 import pytest
 
 ROOT = Path(__file__).parents[1]
+sys.path.append(str(ROOT / "scripts"))  # at the end: gallery is a package, and a script there
+recipe_table = importlib.import_module("recipe_table")
 PAGES = [*ROOT.glob("*.md"), *(ROOT / "docs").rglob("*.md")]
 
 
@@ -57,3 +61,9 @@ def test_what_the_page_of_developers_says_where_to_look_is_there():
                 folder, text = file.parent, file.read_text(encoding="utf-8")
             elif brackets and not word.endswith("/"):
                 assert re.search(rf"\b(def|class|void) {word.rpartition('.')[2]}\b", text), f"{word} in {file.name}"
+
+
+def test_the_table_of_a_recipes_fields_is_that_of_the_model():
+    page = recipe_table.PAGE.read_text(encoding="utf-8")
+    assert "| `softness` |" in page
+    assert recipe_table.written(page) == page, "run scripts/recipe_table.py"
