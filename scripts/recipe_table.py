@@ -7,14 +7,13 @@ import re
 import sys
 from pathlib import Path
 
-ROOT = Path(__file__).resolve().parents[1]
-sys.path.insert(0, str(ROOT))
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from shutter_addon.core.model import effect
 from shutter_addon.core.model.fields import MISSING, Field, fields_of
 from shutter_addon.core.model.frame_state import Options
 
-PAGE = ROOT / "docs" / "command.md"
+PAGE = Path(__file__).resolve().parents[1] / "docs" / "command.md"
 HEAD = "| field | of | in Blender | values | default |\n|---|---|---|---|---|\n"
 PARTS = {
     "the recipe": (Options, effect.Effect, effect.Camera),
