@@ -54,9 +54,8 @@ def key(scene, effect, strip, frames: range) -> str:
     start = round(strips.origin(strip))
     taken = snapshot.take(scene, effect, strip, [start + frame for frame in frames])
     digest = _Digest(start)
-    size = None if taken.inbetween is None else (taken.inbetween.factor, taken.inbetween.method)
     rate = None if taken.timing else scene.render.fps / scene.render.fps_base  # a timing has it
-    parts = taken.effect, taken.timing, taken.source, size, rate, (frames.start, frames.stop)
+    parts = taken.effect, taken.timing, taken.source, rate, (frames.start, frames.stop)
     digest.add((versions.extension(), colour_configuration.name(), *parts))
     digest.add(_curves(scene, f"{effect.path_from_id()}.", start))
     if placed := _curves(scene, f"{strip.path_from_id()}.transform.", start):

@@ -14,6 +14,8 @@ from bpy.app.translations import pgettext_n as n_
 from bpy.app.translations import pgettext_rpt as rpt_
 
 from ...core.messages import EffectError
+from ...core.model.effect import MatteRegion, Region
+from ...core.model.fields import fields_of
 from ...core.model.limits import MAX_FRAME
 
 _PLACES = {
@@ -68,8 +70,9 @@ def check(items, name: str, numbers: np.ndarray) -> None:
 def check_region(region) -> None:
     """EffectError: a property of a region, as it stands, is outside of its range."""
     word(region, "kind")
-    for name in ("width", "opacity", "feather"):
-        number(region, name)
+    for field in fields_of(Region, MatteRegion).values():
+        if field.is_channel:
+            number(region, field.blender)
     check_placement(region)
 
 
