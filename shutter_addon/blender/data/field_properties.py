@@ -34,7 +34,7 @@ def with_fields(*kinds: type, **more: dict[str, Any]) -> Callable[[type], type]:
     return added
 
 
-def _property(field: Field, **more: Any) -> Any:
+def _property(field: Field, **more: Any) -> object:
     """A field as Blender's property: of what pictures are made by, unless it is a text, which is a name."""
     kind, default = type(field.default), field.default
     said: dict[str, Any] = {"name": field.label, "description": field.description, "translation_context": field.context}
