@@ -53,7 +53,7 @@ def store(group: bpy_struct, name: str, value: object) -> None:
 
 
 @contextmanager
-def for_a_while(changes: Iterable[tuple[Any, str, Any]]) -> Iterator[None]:
+def for_a_while(changes: Iterable[tuple[object, str, object]]) -> Iterator[None]:
     """Inside, attributes have other values. changes: owner, name and value of each."""
     changes = list(changes)
     before = [(owner, name, getattr(owner, name)) for owner, name, _ in changes]

@@ -31,7 +31,7 @@ def channel(
 ) -> keyframes.Channel:
     """A float property or a vector, each value changed by a function."""
 
-    def at(frame: float) -> Any:
+    def at(frame: float) -> object:
         return change(curves.value(owner, path, name, frame))
 
     try:
@@ -45,7 +45,7 @@ def channel(
 
 def sampled_fields(
     curves: Curves, owner: PropertyGroup, path: str, kind: type, frames: Frames, unused: Collection[str] = ()
-) -> dict[str, Any]:
+) -> dict:
     """What the fields of one of the model's classes are in Blender, by their names there; path: the owner's, from the
     scene; unused: those that count nothing, which stay as a new one has them. EffectError: a choice is none of its
     items, or a number without keys outside of its range."""

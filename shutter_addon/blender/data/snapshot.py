@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from bpy.app.translations import pgettext_n as n_
 from bpy.app.translations import pgettext_rpt as rpt_
-from bpy.types import PropertyGroup, Scene, Strip
+from bpy.types import FCurve, PropertyGroup, Scene, Strip
 
 from ...core.frames.retiming import StripTiming
 from ...core.messages import EffectError, UserError, translated
@@ -24,8 +24,9 @@ from ...core.model import keyframes, limits, mattes, outlines
 from ...core.model.fields import fields_of
 from ...core.model.frame_state import Options
 from ...core.pixels import following
+from ...media.carried_mattes import CarriedFile
 from . import inbetween_settings, matte_content, sampled, source_media, strips, validation
-from .fcurves import Curves, leading, progress
+from .fcurves import Curves, Timed, leading, progress
 from .sampled import Frames, Keys
 from .strip_timing import timing_of
 
@@ -214,14 +215,14 @@ def matte_content_at(
 
 def carried_outline(
     scene: Scene, effect: PropertyGroup, strip: Strip, index: int, frames: Frames
-) -> tuple[Any, dict[float, int]]:
+) -> tuple[CarriedFile, dict[float, int]]:
     """What gives the mattes of an outline (a media.carried_mattes.CarriedFile), and which of the source's filmed frames
     timeline frames show. EffectError, MediaError: it is straight, or has no source."""
     region = effect.regions[index]
     if validation.word(region, "between") == "STRAIGHT":
         raise EffectError(rpt_("{place}: a linear outline is not tracked").format(place=validation.place(region)))
     sampling = _Sampling.of(Curves(scene), effect, strip, frames)
-    return _outlines(sampling, region, _drawings(sampling, index)).file, _source_frames(sampling)
+    return _carried(sampling, _drawings(sampling, index)), _source_frames(sampling)
 
 
 def drawn_outline(scene: Scene, effect: PropertyGroup, strip: Strip, index: int) -> dict[int, outlines.Curves]:
@@ -275,7 +276,7 @@ def _options(curves: Curves, path: str, effect: PropertyGroup, frames: Frames) -
     return keyframes.Samples({frame: sampled.tried(_options_at, effect, option_curves, frame) for frame in frames})
 
 
-def _options_at(effect: PropertyGroup, curves: dict[str, Any], frame: float) -> Options:
+def _options_at(effect: PropertyGroup, curves: dict[str, Timed | FCurve | None], frame: float) -> Options:
     """The effect's options at a frame; curves: F-curves or None by name. EffectError: one that no effect can have."""
     values = {}
     for name, field in fields_of(Options).items():
@@ -397,7 +398,7 @@ def _any_region(sampling: _Sampling, index: int, shutter: int) -> model.Region |
         return _region(sampling, path, region, shutter)
     moves = sampled.moves(curves, region, path, frames)
     kind: type[model.MatteRegion] = model.MatteRegion
-    drawn: dict[str, Any] = {}
+    drawn: dict = {}
     if region.kind == "OUTLINE":
         drawings = sampled.drawings(curves, path, effect, region, sampling.placement, None)
         kind, drawn = model.OutlineRegion, {"drawings": drawings}
@@ -412,12 +413,16 @@ def _any_region(sampling: _Sampling, index: int, shutter: int) -> model.Region |
     return kind(shutter=shutter, content=content, moves=moves, **drawn, **fields)
 
 
-def _outlines(sampling: _Sampling, region: PropertyGroup, drawings: model.Drawings) -> Any:
+def _outlines(sampling: _Sampling, region: PropertyGroup, drawings: model.Drawings) -> keyframes.Channel:
     """The content of an outline. EffectError, MediaError: there is no source."""
     if validation.word(region, "between") == "STRAIGHT":
         return model.DrawnOutlines(drawings)
+    return mattes.FileFrames(file=_carried(sampling, drawings))
+
+
+def _carried(sampling: _Sampling, drawings: model.Drawings) -> CarriedFile:
     drawn = _by_source_frame(sampling, drawings)
-    return mattes.FileFrames(file=matte_content.carried_file(sampling.effect, sampling.strip, drawn))
+    return matte_content.carried_file(sampling.effect, sampling.strip, drawn)
 
 
 def _by_source_frame(sampling: _Sampling, drawings: model.Drawings) -> dict[int, outlines.Curves]:
