@@ -30,7 +30,6 @@ from .fcurves import Curves, Timed, leading, progress
 from .sampled import Frames, Keys
 from .strip_timing import timing_of
 
-OPTIONS = ("position", "interpolation", "light", "exposure", "edges")
 # Sentences of core/model/effect.py, which are looked up where they are passed on.
 _CORE = (
     n_('shutter "{name}" at frame {frame}: {fault}'),
