@@ -11,6 +11,7 @@ from shutter_addon.blender.data.choices import CONTEXT
 
 from shutter_addon import blender
 from shutter_addon.core.model import presets, shutters
+from shutter_addon.core.model.choices import CONTEXT
 
 SOURCES = sorted(Path(blender.__file__).parent.rglob("*.py"))
 

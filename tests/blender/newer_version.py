@@ -13,7 +13,8 @@ from bpy.props import CollectionProperty, EnumProperty, FloatProperty, PointerPr
 
 from shutter_addon import blender
 from shutter_addon.blender import handlers
-from shutter_addon.blender.data import choices, data_format, properties, versions
+from shutter_addon.blender.data import data_format, properties, versions
+from shutter_addon.core.model import choices
 
 
 class Glow(bpy.types.PropertyGroup):

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from bpy.types import FCurve, PropertyGroup, Scene, Strip, bpy_struct
 
 from ...core.messages import UserError
 from ...media import MediaError
@@ -43,20 +44,19 @@ _LEFT_OUT = {
 _POINTS = ("co", "handle_left", "handle_right")
 
 
-def frames_of(strip) -> range:
+def frames_of(strip: Strip) -> range:
     """The frames that an effect strip shows, counted from its origin: the same for all parts of a cut strip."""
     start = round(strips.origin(strip))
     return range(strip.left_handle - start, strip.right_handle - start)
 
 
-def key(scene, effect, strip, frames: range) -> str:
+def key(scene: Scene, effect: PropertyGroup, strip: Strip, frames: range) -> str:
     """16 hexadecimal digits; frames: as frames_of. EffectError, MediaError: the effect cannot be shown."""
     start = round(strips.origin(strip))
     taken = snapshot.take(scene, effect, strip, [start + frame for frame in frames])
     digest = _Digest(start)
-    size = None if taken.inbetween is None else (taken.inbetween.factor, taken.inbetween.method)
     rate = None if taken.timing else scene.render.fps / scene.render.fps_base  # a timing has it
-    parts = taken.effect, taken.timing, taken.source, size, rate, (frames.start, frames.stop)
+    parts = taken.effect, taken.timing, taken.source, rate, (frames.start, frames.stop)
     digest.add((versions.extension(), colour_configuration.name(), *parts))
     digest.add(_curves(scene, f"{effect.path_from_id()}.", start))
     if placed := _curves(scene, f"{strip.path_from_id()}.transform.", start):
@@ -65,7 +65,7 @@ def key(scene, effect, strip, frames: range) -> str:
     return digest.hexadecimal[:16]
 
 
-def is_changed(scene, effect, strip) -> bool:
+def is_changed(scene: Scene, effect: PropertyGroup, strip: Strip) -> bool:
     """Whether an effect is another than when its strip was baked, or cannot be shown any more."""
     bake, frames = strip.virtual_shutter_bake, frames_of(strip)
     if frames.start < bake.first or frames.stop > bake.first + bake.count:
@@ -76,13 +76,13 @@ def is_changed(scene, effect, strip) -> bool:
         return True
 
 
-def _curves(scene: Any, path: str, start: int) -> list[tuple]:
+def _curves(scene: Scene, path: str, start: int) -> list[tuple]:
     """The F-curves below a path, as plain data."""
     found = fcurves.curves_under(scene, path)
     return sorted(((curve.data_path.removeprefix(path), *_curve(curve, start)) for curve in found), key=lambda c: c[:2])
 
 
-def _curve(curve: Any, start: int) -> tuple:
+def _curve(curve: FCurve, start: int) -> tuple:
     """An F-curve, its frames from `start` on; these are rounded, as floats of other frames are others."""
     points = np.empty((len(_POINTS), len(curve.keyframe_points), 2), np.float32)
     for name, values in zip(_POINTS, points, strict=True):
@@ -95,7 +95,7 @@ def _curve(curve: Any, start: int) -> tuple:
     return curve.array_index, curve.mute, curve.extrapolation, points, kinds, changes
 
 
-def _plain(modifier: Any) -> list:
+def _plain(modifier: bpy_struct) -> list:
     """All that it is, in plain data."""
     plain: list = []
     for prop in modifier.bl_rna.properties:
@@ -110,18 +110,18 @@ def _plain(modifier: Any) -> list:
 class _Digest:
     """A hash of plain data; start: the timeline frame that frames count from."""
 
-    def __init__(self, start: int):
+    def __init__(self, start: int) -> None:
         self._hash, self._start = hashlib.sha256(), start
 
     @property
     def hexadecimal(self) -> str:
         return self._hash.hexdigest()
 
-    def _feed(self, *texts: Any) -> None:
+    def _feed(self, *texts: object) -> None:
         for text in texts:
             self._hash.update(repr(text).encode() + b"\0")
 
-    def add(self, value: Any) -> None:
+    def add(self, value: object) -> None:
         if isinstance(value, np.ndarray):
             self._feed(value.dtype.str, value.shape)
             self._hash.update(np.ascontiguousarray(value).tobytes())
@@ -170,7 +170,7 @@ class _Digest:
             self.add(content)
 
 
-def _is_number(value: Any) -> bool:
+def _is_number(value: object) -> bool:
     """Whether it is a number, or several."""
     if isinstance(value, tuple | list):
         return all(map(_is_number, value))

@@ -21,7 +21,7 @@ from .consistency import changed
 KEYED = {"ANIMATABLE"}  # as properties are where nothing else is said
 
 
-def with_fields(*kinds: type, **more: dict[str, Any]) -> Callable[[type], type]:
+def with_fields(*kinds: type, **more: dict) -> Callable[[type], type]:
     """A decorator: adds to a class, behind its own properties, those of the fields of the model's classes.
 
     more: for a property of that name in Blender, what is said of it beside its field, such as its `update`"""
@@ -34,10 +34,10 @@ def with_fields(*kinds: type, **more: dict[str, Any]) -> Callable[[type], type]:
     return added
 
 
-def _property(field: Field, **more: Any) -> Any:
+def _property(field: Field, **more: Any) -> object:
     """A field as Blender's property: of what pictures are made by, unless it is a text, which is a name."""
     kind, default = type(field.default), field.default
-    said: dict[str, Any] = {"name": field.label, "description": field.description, "translation_context": field.context}
+    said: dict = {"name": field.label, "description": field.description, "translation_context": field.context}
     if kind is str and not field.choices:
         return StringProperty(**said, default=default, **more)
     said |= {"update": changed, "options": KEYED if field.keyed else UNKEYED} | more

@@ -5,6 +5,7 @@ are the effect's strips. Frames are timeline frames, as everywhere in Blender.
 """
 
 import sys
+from collections.abc import Callable
 
 import bpy
 from bpy.props import (
@@ -15,7 +16,7 @@ from bpy.props import (
     PointerProperty,
     StringProperty,
 )
-from bpy.types import PropertyGroup
+from bpy.types import Context, PropertyGroup
 
 from ...core import revision, told
 from ...core.messages import EffectError
@@ -29,25 +30,25 @@ from .field_properties import with_fields
 from .region_properties import MOVING, ShutterCamera, ShutterRegion, choice
 
 
-def _renamed(shutter, new: str, old: str, _is_set) -> str:
+def _renamed(shutter: PropertyGroup, new: str, old: str, _is_set: bool) -> str:
     revision.changed()
     return consistency.rename(selection.effect_of_item(shutter), old, new)
 
 
-def _recolored(shutter, _context):
+def _recolored(shutter: PropertyGroup, _context: Context) -> None:
     revision.changed()
     consistency.color_layers(selection.effect_of_item(shutter), shutter)
 
 
-def _window_changed(effect, context):
+def _window_changed(effect: PropertyGroup, context: Context) -> None:
     _fit(consistency.fit_bars, effect, context)
 
 
-def _multiplied(effect, context):
+def _multiplied(effect: PropertyGroup, context: Context) -> None:
     _fit(consistency.fit_factor, effect, context)
 
 
-def _fit(change, effect, context):
+def _fit(change: Callable[[PropertyGroup], None], effect: PropertyGroup, context: Context) -> None:
     """What a change of a property asks for; why it cannot be would only be printed from here."""
     try:
         change(effect)
@@ -62,12 +63,12 @@ def _fit(change, effect, context):
     changed(effect, context)
 
 
-def _chosen(effect, context):
+def _chosen(effect: PropertyGroup, context: Context) -> None:
     consistency.choose_region(effect)
     _aimed(effect, context)
 
 
-def _aimed(effect, _context):
+def _aimed(effect: PropertyGroup, _context: Context) -> None:
     consistency.aim_pen(effect)
 
 
@@ -175,7 +176,7 @@ class ShutterBake(PropertyGroup):
 classes = (ShutterBar, Shutter, *MOVING, ShutterEffect, ShutterScene, ShutterBake)
 
 
-def register():
+def register() -> None:
     bpy.types.Scene.virtual_shutter = PointerProperty(type=ShutterScene)
     # A strip cannot be pointed to and may be renamed: the source strip carries the identity that effects look for.
     bpy.types.Strip.virtual_shutter_source = StringProperty(options={"HIDDEN"})
@@ -195,7 +196,7 @@ def register():
     bpy.types.Annotation.virtual_shutter_names = StringProperty(options={"HIDDEN"})
 
 
-def unregister():
+def unregister() -> None:
     for name in ("source", "matte", "effect", "muted", "bake"):
         delattr(bpy.types.Strip, f"virtual_shutter_{name}")
     del bpy.types.ID.virtual_shutter_made

@@ -1,13 +1,15 @@
 """Property groups as they are stored, enum numbers without an item included; and values that they have for a while."""
 
+from __future__ import annotations
+
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from typing import Any
 
-from bpy.types import PropertyGroup
+from bpy.types import PropertyGroup, bpy_struct
 
 
-def copy_properties(old, new) -> None:
+def copy_properties(old: PropertyGroup, new: PropertyGroup) -> None:
     """Copies a property group with all that is in it; IDs stay shared."""
     for prop in old.bl_rna.properties:
         name = prop.identifier
@@ -22,19 +24,19 @@ def copy_properties(old, new) -> None:
     _copy_unknown(old, new)
 
 
-def _copy_unknown(old, new) -> None:
+def _copy_unknown(old: PropertyGroup, new: PropertyGroup) -> None:
     """Copies what a newer version has stored in a property group, of which Blender knows the values alone."""
     there = old.bl_system_properties_get() or {}
     for name in set(there.keys()).difference(old.bl_rna.properties.keys()):
         new.bl_system_properties_get(do_create=True)[name] = there[name]
 
 
-def is_group(struct, name: str) -> bool:
+def is_group(struct: bpy_struct, name: str) -> bool:
     """Whether a property is a property group within a struct."""
     return name != "rna_type" and isinstance(getattr(struct, name), PropertyGroup)
 
 
-def stored(group, name: str):
+def stored(group: bpy_struct, name: str) -> Any:
     """A property's value for a copy of the group; of an enum that has none of its items, the number it is kept as."""
     value = getattr(group, name)
     if value == "" and group.bl_rna.properties[name].type == "ENUM" and isinstance(group, PropertyGroup):
@@ -42,7 +44,7 @@ def stored(group, name: str):
     return value
 
 
-def store(group, name: str, value) -> None:
+def store(group: bpy_struct, name: str, value: object) -> None:
     """Gives a property what `stored` gave."""
     if isinstance(value, int) and group.bl_rna.properties[name].type == "ENUM":
         group.bl_system_properties_get(do_create=True)[name] = value
@@ -51,7 +53,7 @@ def store(group, name: str, value) -> None:
 
 
 @contextmanager
-def for_a_while(changes: Iterable[tuple[Any, str, Any]]) -> Iterator[None]:
+def for_a_while(changes: Iterable[tuple[object, str, object]]) -> Iterator[None]:
     """Inside, attributes have other values. changes: owner, name and value of each."""
     changes = list(changes)
     before = [(owner, name, getattr(owner, name)) for owner, name, _ in changes]

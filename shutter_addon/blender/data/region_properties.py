@@ -1,6 +1,7 @@
 """What a region and the camera are in Blender: properties of the scene."""
 
 import math
+from collections.abc import Callable, Sequence
 
 import bpy
 from bpy.props import (
@@ -23,7 +24,7 @@ from .consistency import changed
 from .field_properties import with_fields
 
 
-def _shortened(region, new: str, old: str, is_set: bool) -> str:
+def _shortened(region: PropertyGroup, new: str, old: str, is_set: bool) -> str:
     """As recipes have names. Blender's own `maxlen` counts bytes, of which a character takes up to four."""
     new = new[:MAX_NAME]
     # Blender takes long to find an item's place among many: only where the name counts. The default name of a region
@@ -34,9 +35,16 @@ def _shortened(region, new: str, old: str, is_set: bool) -> str:
     return new
 
 
-def choice(name: str, description: str, items, *, update=changed, options=UNKEYED, **more):
+def choice(
+    name: str,
+    description: str,
+    items: Sequence[tuple[str, str, str]],
+    *,
+    update: Callable | None = changed,
+    **more: str,
+) -> object:
     """An enum; as most are, of what pictures are made by, and without keys."""
-    return EnumProperty(name=name, description=description, items=items, update=update, options=options, **more)
+    return EnumProperty(name=name, description=description, items=items, update=update, options=UNKEYED, **more)
 
 
 class TrackStop(PropertyGroup):
@@ -103,7 +111,7 @@ class _Tracked:
     )
 
 
-def _location(description: str):
+def _location(description: str) -> object:
     return FloatVectorProperty(
         name="Location",
         description=description,
@@ -115,14 +123,14 @@ def _location(description: str):
     )
 
 
-def _rotation(description: str):
+def _rotation(description: str) -> object:
     limit = math.radians(MAX_DEGREES)
     return FloatProperty(
         name="Rotation", description=description, subtype="ANGLE", min=-limit, max=limit, update=changed
     )
 
 
-def _scale(description: str):
+def _scale(description: str) -> object:
     return FloatProperty(
         name="Scale", description=description, default=1.0, min=-MAX_SCALE, max=MAX_SCALE, update=changed
     )

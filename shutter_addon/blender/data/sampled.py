@@ -4,7 +4,7 @@ from collections.abc import Callable, Collection
 from typing import Any
 
 import numpy as np
-from bpy.types import PropertyGroup
+from bpy.types import PropertyGroup, Strip
 
 from ...core.messages import EffectError, UserError
 from ...core.model import effect as model
@@ -15,9 +15,10 @@ from . import annotations, geometry, strips, validation
 from .fcurves import Curves
 
 Frames = Collection[float]  # of the timeline
+Keys = tuple[tuple[float, keyframes.Ease], ...]  # frames and eases of keys
 
 
-def tried(function: Callable, *arguments):
+def tried(function: Callable, *arguments: object) -> Any:
     """The result, or the UserError in its place, which is raised where the value is asked for."""
     try:
         return function(*arguments)
@@ -25,10 +26,12 @@ def tried(function: Callable, *arguments):
         return error
 
 
-def channel(curves: Curves, owner, path: str, name: str, frames: Frames, change=lambda v: v) -> keyframes.Channel:
+def channel(
+    curves: Curves, owner: PropertyGroup, path: str, name: str, frames: Frames, change: Callable = lambda v: v
+) -> keyframes.Channel:
     """A float property or a vector, each value changed by a function."""
 
-    def at(frame):
+    def at(frame: float) -> object:
         return change(curves.value(owner, path, name, frame))
 
     try:
@@ -42,7 +45,7 @@ def channel(curves: Curves, owner, path: str, name: str, frames: Frames, change=
 
 def sampled_fields(
     curves: Curves, owner: PropertyGroup, path: str, kind: type, frames: Frames, unused: Collection[str] = ()
-) -> dict[str, Any]:
+) -> dict:
     """What the fields of one of the model's classes are in Blender, by their names there; path: the owner's, from the
     scene; unused: those that count nothing, which stay as a new one has them. EffectError: a choice is none of its
     items, or a number without keys outside of its range."""
@@ -67,7 +70,7 @@ def value(owner: PropertyGroup, field: Field, number: float | None = None) -> An
     return validation.number(owner, field.blender)
 
 
-def moves(curves: Curves, moving, path: str, frames: Frames) -> model.Moves:
+def moves(curves: Curves, moving: PropertyGroup, path: str, frames: Frames) -> model.Moves:
     """Of a region or of the camera."""
     return model.Moves(
         location=channel(curves, moving, path, "location", frames),
@@ -76,12 +79,14 @@ def moves(curves: Curves, moving, path: str, frames: Frames) -> model.Moves:
     )
 
 
-def placement_now(moving) -> Placement:
+def placement_now(moving: PropertyGroup) -> Placement:
     """Where a region or the camera is as its properties stand: at the current frame, keyed or not."""
     return Placement(tuple(moving.location), float(np.degrees(moving.rotation)), moving.scale)
 
 
-def _origins(curves: Curves, path: str, effect, region, numbers: Collection[float]) -> tuple[Placement, ...]:
+def _origins(
+    curves: Curves, path: str, effect: PropertyGroup, region: PropertyGroup, numbers: Collection[float]
+) -> tuple[Placement, ...]:
     """Where a region was as its drawings at these frames were made (model.Drawings)."""
     if not region.drawn or region.kind in strips.LAID:
         return ()
@@ -90,7 +95,14 @@ def _origins(curves: Curves, path: str, effect, region, numbers: Collection[floa
     return tuple(known[number] if number in known else there.at(number) for number in numbers)
 
 
-def drawings(curves: Curves, path: str, effect, region, placement, frames: Frames | None) -> model.Drawings:
+def drawings(
+    curves: Curves,
+    path: str,
+    effect: PropertyGroup,
+    region: PropertyGroup,
+    placement: keyframes.Channel | None,
+    frames: Frames | None,
+) -> model.Drawings:
     """A region's drawings: between two of them with the ease of its location's keys. Only those that the frames need
     are read; None: all."""
     width, height = annotations.picture_size(effect)
@@ -113,12 +125,12 @@ def drawings(curves: Curves, path: str, effect, region, placement, frames: Frame
     )
 
 
-def placement(curves: Curves, effect, strip, frames: Frames) -> keyframes.Channel:
+def placement(curves: Curves, effect: PropertyGroup, strip: Strip, frames: Frames) -> keyframes.Channel:
     """The matrix from the sequencer's image to the strip's picture, which may be keyed."""
     size, path = annotations.picture_size(effect), f"{strip.path_from_id()}.transform"
     keyed = {name: curve for name in geometry.TRANSFORM if (curve := tried(curves.find, f"{path}.{name}"))}
 
-    def at(frame):
+    def at(frame: float) -> np.ndarray | None:
         moved = {name: curve.evaluate(frame) for name, curve in keyed.items() if not isinstance(curve, EffectError)}
         return annotations.image_to_picture(strip, size, **moved)
 
@@ -130,12 +142,12 @@ def placement(curves: Curves, effect, strip, frames: Frames) -> keyframes.Channe
 class _Evaluated:
     """Channel of a number that Blender evaluates: for sampling alone."""
 
-    def __init__(self, function: Callable):
+    def __init__(self, function: Callable) -> None:
         self.at = function
 
 
-def source_time(curves: Curves, path: str, effect, frames: Frames) -> keyframes.Channel:
-    def value(frame):
+def source_time(curves: Curves, path: str, effect: PropertyGroup, frames: Frames) -> keyframes.Channel:
+    def value(frame: float) -> float:
         return curves.value(effect, path, "source_time", frame)
 
     keyed = tried(curves.of, effect, path, "source_time")

@@ -5,7 +5,9 @@ change when the scene does. Channels are sampled at the frames that are asked fo
 Blender itself. Drivers, NLA strips and further layers of an action do not count (docs/manual.md).
 """
 
-from collections.abc import Callable
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -13,7 +15,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from bpy.app.translations import pgettext_n as n_
 from bpy.app.translations import pgettext_rpt as rpt_
-from bpy.types import PropertyGroup
+from bpy.types import FCurve, PropertyGroup, Scene, Strip
 
 from ...core.frames.retiming import StripTiming
 from ...core.messages import EffectError, UserError, translated
@@ -22,12 +24,12 @@ from ...core.model import keyframes, limits, mattes, outlines
 from ...core.model.fields import fields_of
 from ...core.model.frame_state import Options
 from ...core.pixels import following
+from ...media.carried_mattes import CarriedFile
 from . import inbetween_settings, matte_content, sampled, source_media, strips, validation
-from .fcurves import Curves, leading, progress
-from .sampled import Frames
+from .fcurves import Curves, Timed, leading, progress
+from .sampled import Frames, Keys
 from .strip_timing import timing_of
 
-OPTIONS = ("position", "interpolation", "light", "exposure", "edges")
 # Sentences of core/model/effect.py, which are looked up where they are passed on.
 _CORE = (
     n_('shutter "{name}" at frame {frame}: {fault}'),
@@ -71,7 +73,7 @@ class SourceFiles(NamedTuple):
     built: tuple
 
 
-def source_files(effect, source, folder: Path | None = None) -> SourceFiles:
+def source_files(effect: PropertyGroup, source: Strip, folder: Path | None = None) -> SourceFiles:
     """Looks at the files of an effect's source strip. folder: where in-between frames lie, in place of the effect's
     own. EffectError: they lie nowhere. MediaError: there are no files."""
     key, built = source_media.media_key(source), ()
@@ -82,7 +84,13 @@ def source_files(effect, source, folder: Path | None = None) -> SourceFiles:
 
 
 def take(
-    scene, effect, strip, frames: Frames, *, folder: Path | None = None, files: dict[str, SourceFiles] | None = None
+    scene: Scene,
+    effect: PropertyGroup,
+    strip: Strip,
+    frames: Frames,
+    *,
+    folder: Path | None = None,
+    files: dict[str, SourceFiles] | None = None,
 ) -> Snapshot:
     """The snapshot of an effect strip at timeline frames; folder: see source_files; files: what that
     returned, by source strip.
@@ -104,7 +112,7 @@ def take(
     )
 
 
-def read(scene, effect, strip, frames: Frames, *, thorough: bool = False) -> model.Effect:
+def read(scene: Scene, effect: PropertyGroup, strip: Strip, frames: Frames, *, thorough: bool = False) -> model.Effect:
     """An effect, its channels sampled at timeline frames; strip: the effect strip that shows it. EffectError: it has no
     shutter, or more of anything than an effect has. What is wrong at one frame is told at that frame.
 
@@ -141,7 +149,7 @@ def read(scene, effect, strip, frames: Frames, *, thorough: bool = False) -> mod
     )
 
 
-def _around(effect, frames: Frames) -> Frames:
+def _around(effect: PropertyGroup, frames: Frames) -> Frames:
     """The frames at which motions are asked for: where a shutter follows something, or a region is a layer, those
     around these frames too."""
     has_layers = any(region.is_layer for region in effect.regions)
@@ -155,7 +163,7 @@ def _around(effect, frames: Frames) -> Frames:
     return np.unique(np.add.outer(sorted(frames), np.arange(-reach, reach + 1))).tolist()
 
 
-def _followed(shutter, regions: tuple, camera: model.Camera) -> model.Region | model.Camera | None:
+def _followed(shutter: PropertyGroup, regions: Sequence[model.AnyRegion], camera: model.Camera) -> model.Subject | None:
     """What a shutter follows. EffectError: there is no such region."""
     follow = validation.word(shutter, "follow")
     if follow == "NOTHING":
@@ -169,16 +177,16 @@ def _followed(shutter, regions: tuple, camera: model.Camera) -> model.Region | m
     return followed
 
 
-def bars_at(scene, effect, index: int, frame: float) -> np.ndarray:
+def bars_at(scene: Scene, effect: PropertyGroup, index: int, frame: float) -> np.ndarray:
     """Bars (L,) of a shutter at a timeline frame, whether or not a picture can be made of them. EffectError: they are
     not as many as the window is long, or one cannot be."""
     curves, frames = Curves(scene), (frame,)
     options = _options(curves, effect.path_from_id(), effect, frames)
-    shutter = _shutter(curves, effect, index, options, frames)
+    shutter = _shutter(curves, effect, index, options, frames, thorough=False)
     return shutter.bars.at(frame, options.at(frame).interpolation)
 
 
-def strokes_at(scene, effect, strip, index: int, frame: float) -> list[np.ndarray]:
+def strokes_at(scene: Scene, effect: PropertyGroup, strip: Strip, index: int, frame: float) -> list[np.ndarray]:
     """A region's strokes (n, 2) on the picture at a timeline frame, not moved yet; a matte has none. EffectError: they
     lie nowhere."""
     if effect.regions[index].kind in strips.MATTES:
@@ -187,7 +195,7 @@ def strokes_at(scene, effect, strip, index: int, frame: float) -> list[np.ndarra
         return region_at(scene, effect, strip, index, (frame,)).drawings.at(frame)
 
 
-def region_at(scene, effect, strip, index: int, frames: Frames) -> Any:
+def region_at(scene: Scene, effect: PropertyGroup, strip: Strip, index: int, frames: Frames) -> Any:
     """A region as plain data, by its kind a Region or a MatteRegion, its channels sampled at timeline frames; an
     outline is the Region that its curves would be as a lasso. What is wrong at one frame is told at that frame."""
     if effect.regions[index].kind == "OUTLINE":
@@ -196,36 +204,40 @@ def region_at(scene, effect, strip, index: int, frames: Frames) -> Any:
     return _any_region(_Sampling.of(Curves(scene), effect, strip, frames), index, 0)
 
 
-def matte_content_at(scene, effect, strip, index: int, frames: Frames) -> keyframes.Channel:
+def matte_content_at(
+    scene: Scene, effect: PropertyGroup, strip: Strip, index: int, frames: Frames
+) -> keyframes.Channel:
     """The content of a region that is a matte, an outline too, sampled at timeline frames; as region_at."""
     region: Any = _any_region(_Sampling.of(Curves(scene), effect, strip, frames), index, 0)
     return region.content
 
 
-def carried_outline(scene, effect, strip, index: int, frames: Frames) -> tuple[Any, dict[float, int]]:
+def carried_outline(
+    scene: Scene, effect: PropertyGroup, strip: Strip, index: int, frames: Frames
+) -> tuple[CarriedFile, dict[float, int]]:
     """What gives the mattes of an outline (a media.carried_mattes.CarriedFile), and which of the source's filmed frames
     timeline frames show. EffectError, MediaError: it is straight, or has no source."""
     region = effect.regions[index]
     if validation.word(region, "between") == "STRAIGHT":
         raise EffectError(rpt_("{place}: a linear outline is not tracked").format(place=validation.place(region)))
     sampling = _Sampling.of(Curves(scene), effect, strip, frames)
-    return _outlines(sampling, region, _drawings(sampling, index)).file, _source_frames(sampling)
+    return _carried(sampling, _drawings(sampling, index)), _source_frames(sampling)
 
 
-def drawn_outline(scene, effect, strip, index: int) -> dict[int, outlines.Curves]:
+def drawn_outline(scene: Scene, effect: PropertyGroup, strip: Strip, index: int) -> dict[int, outlines.Curves]:
     """The curves of an outline by the source's filmed frame at which they are drawn. EffectError, MediaError: it has no
     source."""
     sampling = _Sampling.of(Curves(scene), effect, strip, ())
     return _by_source_frame(sampling, _drawings(sampling, index))
 
 
-def source_frames(scene, effect, strip, frames: Frames) -> dict[float, int]:
+def source_frames(scene: Scene, effect: PropertyGroup, strip: Strip, frames: Frames) -> dict[float, int]:
     """Which of the source's filmed frames an effect strip shows, by timeline frame. EffectError, MediaError: nobody
     knows."""
     return _source_frames(_Sampling.of(Curves(scene), effect, strip, frames))
 
 
-def last_shown(scene, effect, strip) -> float:
+def last_shown(scene: Scene, effect: PropertyGroup, strip: Strip) -> float:
     """The last of the source's frames that an effect strip shows (see matte_content.shown_frame); where keys say which
     these are, of a hundred frames of the strip. EffectError, MediaError: it cannot be known."""
     first, last = strip.left_handle, strip.right_handle - 1
@@ -236,12 +248,12 @@ def last_shown(scene, effect, strip) -> float:
     return max(map(matte_content.shown_frame(scene, effect, strip, time), frames))
 
 
-def camera_at(scene, effect, frames: Frames) -> model.Camera:
+def camera_at(scene: Scene, effect: PropertyGroup, frames: Frames) -> model.Camera:
     """The camera as plain data, its channels sampled at timeline frames; as region_at."""
     return _camera(Curves(scene), effect, frames)
 
 
-def check_counts(effect) -> None:
+def check_counts(effect: PropertyGroup) -> None:
     """EffectError: there are no shutters, or more of anything than an effect has."""
     if not effect.shutters:
         raise EffectError(rpt_('"{effect}" has no shutter').format(effect=effect.name))
@@ -263,7 +275,7 @@ def _options(curves: Curves, path: str, effect: PropertyGroup, frames: Frames) -
     return keyframes.Samples({frame: sampled.tried(_options_at, effect, option_curves, frame) for frame in frames})
 
 
-def _options_at(effect: PropertyGroup, curves: dict[str, Any], frame: float) -> Options:
+def _options_at(effect: PropertyGroup, curves: dict[str, Timed | FCurve | None], frame: float) -> Options:
     """The effect's options at a frame; curves: F-curves or None by name. EffectError: one that no effect can have."""
     values = {}
     for name, field in fields_of(Options).items():
@@ -273,7 +285,7 @@ def _options_at(effect: PropertyGroup, curves: dict[str, Any], frame: float) -> 
 
 
 def _shutter(
-    curves: Curves, effect, index: int, options: keyframes.Channel, frames: Frames, thorough: bool = False
+    curves: Curves, effect: PropertyGroup, index: int, options: keyframes.Channel, frames: Frames, thorough: bool
 ) -> model.Shutter:
     """A shutter, but for what it follows."""
     path, shutter = f"{effect.path_from_id()}.shutters[{index}]", effect.shutters[index]
@@ -286,7 +298,9 @@ def _shutter(
     return model.Shutter(bars=bars, **sampled.sampled_fields(curves, shutter, path, model.Shutter, frames, unused))
 
 
-def _bars(curves: Curves, path: str, shutter, options: keyframes.Channel, frames, thorough: bool) -> keyframes.Bars:
+def _bars(
+    curves: Curves, path: str, shutter: PropertyGroup, options: keyframes.Channel, frames: Frames, thorough: bool
+) -> keyframes.Bars:
     """EffectError: they are not as many as the window is long."""
     stored = np.array([bar.weight for bar in shutter.bars])
     keyed = {i: curve for i in range(len(stored)) if (curve := curves.find(f"{path}.bars[{i}].weight"))}
@@ -294,7 +308,7 @@ def _bars(curves: Curves, path: str, shutter, options: keyframes.Channel, frames
     for window in {state.window for state in chosen.values()}:
         check_bar_count(shutter, window)
 
-    def at(frame):
+    def at(frame: float) -> np.ndarray:
         bars = stored.copy()
         # No bar is below 0, a curve may be. In this order "not a number" stays what it is.
         bars[list(keyed)] = [min(max(curve.evaluate(frame), 0.0), limits.MAX_BAR) for curve in keyed.values()]
@@ -312,12 +326,12 @@ def _bars(curves: Curves, path: str, shutter, options: keyframes.Channel, frames
     return _keyed_bars(keys, list(keyed.values()), at, ways, thorough)
 
 
-def _keyed_bars(keys, curves: list, at: Callable, frames: dict[float, str], thorough: bool) -> keyframes.Bars:
+def _keyed_bars(keys: Keys, curves: list, at: Callable, frames: dict[float, str], thorough: bool) -> keyframes.Bars:
     """Bars sampled where they are needed: at keys; between them the way that the curve has gone which changes most, or
     the bars, where they are not displaced. frames: by frame the interpolation."""
     numbers, values, shares, leaders = [frame for frame, _ in keys], {}, {}, {}
 
-    def sample(frame):
+    def sample(frame: float) -> np.ndarray | UserError:
         if frame not in values:
             values[frame] = sampled.tried(at, frame)
         return values[frame]
@@ -337,7 +351,7 @@ def _keyed_bars(keys, curves: list, at: Callable, frames: dict[float, str], thor
     return keyframes.Bars(keyframes.Samples(values), keys, keyframes.Samples(shares))
 
 
-def check_bar_count(shutter, window: int) -> None:
+def check_bar_count(shutter: PropertyGroup, window: int) -> None:
     """EffectError: a shutter has not as many bars as the window is long."""
     if len(shutter.bars) != window:
         sentence = rpt_("{place}: {count} bars, and {window} frames")
@@ -352,14 +366,14 @@ class _Sampling:
     placement: of the strip's picture (sampled.placement); time: of the source, None where its strip says that"""
 
     curves: Curves
-    effect: Any
-    strip: Any
+    effect: PropertyGroup
+    strip: Strip
     frames: Frames
     placement: keyframes.Channel
     time: keyframes.Channel | None
 
     @staticmethod
-    def of(curves: Curves, effect, strip, frames: Frames) -> "_Sampling":
+    def of(curves: Curves, effect: PropertyGroup, strip: Strip, frames: Frames) -> _Sampling:
         moments, time = frames, None
         if any(shutter.length == "TIMELINE" for shutter in effect.shutters):
             moments = np.unique(np.add.outer(sorted(frames), (-0.5, 0, 0.5))).tolist()
@@ -383,7 +397,7 @@ def _any_region(sampling: _Sampling, index: int, shutter: int) -> model.Region |
         return _region(sampling, path, region, shutter)
     moves = sampled.moves(curves, region, path, frames)
     kind: type[model.MatteRegion] = model.MatteRegion
-    drawn: dict[str, Any] = {}
+    drawn: dict = {}
     if region.kind == "OUTLINE":
         drawings = sampled.drawings(curves, path, effect, region, sampling.placement, None)
         kind, drawn = model.OutlineRegion, {"drawings": drawings}
@@ -398,12 +412,16 @@ def _any_region(sampling: _Sampling, index: int, shutter: int) -> model.Region |
     return kind(shutter=shutter, content=content, moves=moves, **drawn, **fields)
 
 
-def _outlines(sampling: _Sampling, region, drawings: model.Drawings) -> Any:
+def _outlines(sampling: _Sampling, region: PropertyGroup, drawings: model.Drawings) -> keyframes.Channel:
     """The content of an outline. EffectError, MediaError: there is no source."""
     if validation.word(region, "between") == "STRAIGHT":
         return model.DrawnOutlines(drawings)
+    return mattes.FileFrames(file=_carried(sampling, drawings))
+
+
+def _carried(sampling: _Sampling, drawings: model.Drawings) -> CarriedFile:
     drawn = _by_source_frame(sampling, drawings)
-    return mattes.FileFrames(file=matte_content.carried_file(sampling.effect, sampling.strip, drawn))
+    return matte_content.carried_file(sampling.effect, sampling.strip, drawn)
 
 
 def _by_source_frame(sampling: _Sampling, drawings: model.Drawings) -> dict[int, outlines.Curves]:
@@ -426,7 +444,7 @@ def _drawings(sampling: _Sampling, index: int) -> model.Drawings:
     return sampled.drawings(sampling.curves, path, effect, effect.regions[index], sampling.placement, None)
 
 
-def _region(sampling: _Sampling, path: str, region, shutter: int) -> model.Region:
+def _region(sampling: _Sampling, path: str, region: PropertyGroup, shutter: int) -> model.Region:
     curves, frames = sampling.curves, sampling.frames
     return model.Region(
         shutter=shutter,
@@ -437,12 +455,12 @@ def _region(sampling: _Sampling, path: str, region, shutter: int) -> model.Regio
     )
 
 
-def _word_of_kind(region) -> str:
+def _word_of_kind(region: PropertyGroup) -> str:
     word = validation.word(region, "kind").lower()
     return "lasso" if word == "outline" else word
 
 
-def _camera(curves: Curves, effect, frames: Frames) -> model.Camera:
+def _camera(curves: Curves, effect: PropertyGroup, frames: Frames) -> model.Camera:
     path = effect.camera.path_from_id()
     moves = sampled.moves(curves, effect.camera, path, frames)
     return model.Camera(moves, **sampled.sampled_fields(curves, effect.camera, path, model.Camera, frames))

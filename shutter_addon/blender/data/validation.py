@@ -4,16 +4,22 @@ Blender keeps properties in their ranges where users and F-curves set them. Scri
 that, and "not a number" past every range.
 """
 
+from __future__ import annotations
+
 import math
 import re
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 from bpy.app.translations import pgettext_iface as iface_
 from bpy.app.translations import pgettext_n as n_
 from bpy.app.translations import pgettext_rpt as rpt_
+from bpy.types import FCurve, Property, PropertyGroup
 
 from ...core.messages import EffectError
+from ...core.model.effect import MatteRegion, Region
+from ...core.model.fields import fields_of
 from ...core.model.limits import MAX_FRAME
 
 _PLACES = {
@@ -24,7 +30,7 @@ _PLACES = {
 }
 
 
-def place(group) -> str:
+def place(group: PropertyGroup) -> str:
     """The effect, shutter, bar, region or camera that a property group is, in the user's words."""
     path = group.path_from_id()
     if path.endswith(".camera"):
@@ -37,7 +43,7 @@ def place(group) -> str:
     return rpt_("{shutter}, bar {number}").format(shutter=words, number=int(bar[1]) + 1) if bar else words
 
 
-def number(group, name: str, value: float | None = None):
+def number(group: PropertyGroup, name: str, value: float | None = None) -> Any:
     """A number, or one of a vector's, as the property has it; or `value`, which it would be. EffectError: it is outside
     of the property's range."""
     value, prop = getattr(group, name) if value is None else value, group.bl_rna.properties[name]
@@ -51,36 +57,37 @@ def number(group, name: str, value: float | None = None):
     )
 
 
-def curved(group, name: str, curve, frame: float) -> float:
+def curved(group: PropertyGroup, name: str, curve: FCurve, frame: float) -> float:
     """A number that an F-curve gives, in the property's range, where Blender keeps it. EffectError: it is none."""
     prop = group.bl_rna.properties[name]
     # In this order "not a number" stays what it is.
     return number(group, name, min(max(curve.evaluate(frame), prop.hard_min), prop.hard_max))
 
 
-def check(items, name: str, numbers: np.ndarray) -> None:
+def check(items: Sequence[PropertyGroup], name: str, numbers: np.ndarray) -> None:
     """EffectError: one of the numbers (n,) of as many items of a collection is outside of the property's range."""
     prop = items[0].bl_rna.properties[name]
     for i in np.flatnonzero(~((numbers >= prop.hard_min) & (numbers <= prop.hard_max))):
         number(items[int(i)], name, float(numbers[i]))
 
 
-def check_region(region) -> None:
+def check_region(region: PropertyGroup) -> None:
     """EffectError: a property of a region, as it stands, is outside of its range."""
     word(region, "kind")
-    for name in ("width", "opacity", "feather"):
-        number(region, name)
+    for field in fields_of(Region, MatteRegion).values():
+        if field.is_channel:
+            number(region, field.blender)
     check_placement(region)
 
 
-def check_placement(moving) -> None:
+def check_placement(moving: PropertyGroup) -> None:
     """EffectError: a number of where a region or the camera is, as it stands, is outside of its range."""
     for name in ("location", "rotation", "scale"):
         for value in np.atleast_1d(getattr(moving, name)):
             number(moving, name, float(value))
 
 
-def word(group, name: str, value: float | None = None) -> Any:
+def word(group: PropertyGroup, name: str, value: float | None = None) -> Any:
     """The identifier of an enum as the property has it; or of the item with the number `value`. EffectError: it has
     none of its items."""
     prop = group.bl_rna.properties[name]
@@ -100,12 +107,12 @@ def beyond_timeline(frames: np.ndarray) -> np.ndarray:
     return frames[~(np.abs(frames) <= MAX_FRAME)]
 
 
-def refuse_key(group, name: str, frame: float) -> None:
+def refuse_key(group: PropertyGroup, name: str, frame: float) -> None:
     """EffectError: a property has a key at a frame that is on no timeline."""
     sentence = rpt_("{place}: {property} has a keyframe at frame {frame}, not {low} to {high}")
     words = {"place": place(group), "property": _called(group.bl_rna.properties[name]), "frame": f"{frame:.7g}"}
     raise EffectError(sentence.format(**words, low=-MAX_FRAME, high=MAX_FRAME))
 
 
-def _called(prop) -> str:
+def _called(prop: Property) -> str:
     return iface_(prop.name, prop.translation_context)
