@@ -8,9 +8,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from shutter_addon.core.model import limits, mattes, scribbles
+from shutter_addon.core.model import limits, mattes, scribbles, windows
 from shutter_addon.core.model.motions import Placement
-from shutter_addon.core.pixels.compositor import window_positions
 from shutter_addon.core.recipes import recipe, recipe_file
 
 EXAMPLE = {
@@ -512,7 +511,7 @@ def test_bars_are_open_at_the_same_times_at_another_factor(window, old, new, pos
 
     def light(found):
         """Of each sixteenth of a filmed frame, from frame -20 to frame 40; of as many as the coarser has together."""
-        positions = window_positions(found.options, 10 * found.inbetween, direction) + 20 * found.inbetween
+        positions = windows.positions(found.options, 10 * found.inbetween, direction) + 20 * found.inbetween
         spread = np.zeros(60 * found.inbetween)
         spread[positions] = np.asarray(found.shutters[0].bars) / found.inbetween
         each = np.repeat(spread * found.inbetween / fine, fine // found.inbetween)
@@ -526,7 +525,7 @@ def test_a_still_frame_stays_where_it_is(position):
     """In reverse as well: of the filmed frame's time the last part comes first."""
     for direction in (1, -1):
         options = recipe.Options(64, position=position, step=8)
-        positions = window_positions(options, 80, direction)[options.before : options.before + 8]
+        positions = windows.positions(options, 80, direction)[options.before : options.before + 8]
         assert sorted(positions) == list(range(80, 88))
 
 

@@ -17,9 +17,8 @@ from bpy.app.translations import pgettext_rpt as rpt_
 from ...core.frames.retiming import StripTiming
 from ...core.messages import EffectError, UserError, translated
 from ...core.model import effect as model
-from ...core.model import keyframes, limits, mattes, outlines
+from ...core.model import following, keyframes, limits, mattes, outlines
 from ...core.model.frame_state import Options
-from ...core.pixels import following
 from . import inbetween_settings, matte_content, sampled, source_media, strips, validation
 from .fcurves import Curves, leading, progress
 from .sampled import Frames

@@ -15,8 +15,7 @@ from ...compute.renderer import Renderer
 from ...compute.request import Request
 from ...core import threads
 from ...core.messages import translated
-from ...core.model.frame_state import FrameState
-from ...core.pixels import compositor, following, layering, timeline_exposure
+from ...core.model.state_at import state_at
 from ...core.pixels.matte_grid import block_means
 from ...core.stopping import never
 from ...devices.device import NoDeviceError
@@ -25,7 +24,7 @@ from ..data.snapshot import Snapshot
 from ..devices import available
 from . import render_settings
 from .device_work import Work, broken_off, result_of
-from .effect_source import FAULTS, FULL, Detail, SourceKey, source_ends, source_index, source_position
+from .effect_source import FAULTS, FULL, Detail, SourceKey, clip_of
 
 if TYPE_CHECKING:
     from .render_context import RenderContext
@@ -99,26 +98,10 @@ class RenderSession:
             if (request.source, request.levels, request.display) == (key, context.levels, context.display):
                 return request
         with translated(rpt_):
-            state = _in_blocks(snapshot.effect.at(frame), key.detail.divisor)
-            index, backward = source_index(snapshot, frame, source)
-            direction = -1 if backward else 1
-            shown = following.Shown(frame, index, direction)
-
-            def shown_at(other: float) -> int:
-                return source_index(snapshot, other, source)[0]
-
-            def position(other: float) -> float:
-                return source_position(snapshot, other, source)
-
-            ends = source_ends(snapshot, source)
-            state = timeline_exposure.exposed(snapshot.effect, state, shown, position, ends)
-            trails = any(shutter.trail for shutter in snapshot.effect.shutters)
-            state = compositor.slid(state, index, direction, range(source.count), whole=trails)
-            state = following.followed(snapshot.effect, state, shown, source, shown_at)
-            state = layering.layered(snapshot.effect, state, shown, source, shown_at)
+            index, state, direction = state_at(snapshot.effect, clip_of(snapshot, source), frame)
         request = Request(
             index=index,
-            state=state,
+            state=state.in_blocks(max(state.options.aggregate // key.detail.divisor, 1)),
             direction=direction,
             source=key,
             levels=context.levels,
@@ -263,11 +246,3 @@ def _weights(renderer: Renderer, request: Request) -> list[np.ndarray]:
     block = request.state.options.aggregate
     mattes = [block_means(matte, block) for matte in renderer.layer_mattes(request)]
     return [*renderer.coefficients(request), *mattes]
-
-
-def _in_blocks(state: FrameState, divisor: int) -> FrameState:
-    """The state with its blocks of pixels as large in a smaller picture."""
-    options = state.options
-    if divisor == 1 or options.aggregate == 1:
-        return state
-    return state.in_blocks(max(options.aggregate // divisor, 1))

@@ -30,7 +30,7 @@ class Options:
     plate_reach: how many frames before and after the shown one are looked through for what lies behind layers
     decontaminate: whether layers, and what lies behind them, have their own colours in the mixed pixels at their edges
     step: frames for each filmed one: 1, or the factor of in-between frames
-    slid: how many frames later the window lies than its position says (core.pixels.compositor.slid)
+    slid: how many frames later the window lies than its position says (core.model.windows.slid)
     """
 
     window: int
@@ -218,6 +218,8 @@ class FrameState:
 
     def in_blocks(self, aggregate: int) -> FrameState:
         """The state with blocks of another size, those of what is drawn of layers as well."""
+        if aggregate == self.options.aggregate:
+            return self
         layers = self.layers
         if layers is not None:
             drawn = tuple(state and state.in_blocks(aggregate) for state in layers.scribbles)
