@@ -23,6 +23,8 @@ def layered(effect: Effect, state: FrameState, clip: Clip, at: Shown) -> FrameSt
     frames = range(max(seen.start - beyond, 0), min(seen.stop + beyond, clip.count))
     times = following.times_of(clip, at, frames, following.reach(state.options.window) + beyond)
     moments = [(at.frame + math.floor(time - at.frame), (time - at.frame) % 1.0) for time in times]
+    drawn = [(1 + i, region) for i, region in enumerate(regions) if isinstance(region, Region)]
+    others = [(0, region) for region in effect.regions if isinstance(region, Region) and region not in regions]
     camera = None
     if not effect.camera.moves.is_still:
         turns, shifts = following.moves(following.places_of(effect.camera), clip, at.frame, times)
@@ -33,7 +35,10 @@ def layered(effect: Effect, state: FrameState, clip: Clip, at: Shown) -> FrameSt
             shutters=tuple(region.shutter for region in regions),
             opacities=tuple(float(region.opacity.at(at.frame)) for region in regions),
             first=frames.start,
-            scribbles=tuple(_scribbles(effect, state, regions, *moment) for moment in moments),
+            scribbles=tuple(
+                _scribbles(effect, state, (*others, *drawn), len(regions), *moment) if drawn else None
+                for moment in moments
+            ),
             mattes=tuple(tuple(_matte(region, *moment) for region in regions) for moment in moments),
             camera=camera,
         ),
@@ -46,21 +51,18 @@ def _matte(region: Region | MatteRegion, frame: float, share: float) -> Matte | 
 
 
 def _scribbles(
-    effect: Effect, state: FrameState, regions: Sequence[Region | MatteRegion], frame: float, share: float
-) -> FrameState | None:
-    """Layers.scribbles at a time between a timeline frame and the next."""
-    drawn = [region for region in regions if isinstance(region, Region)]
-    if not drawn:
-        return None
-    others = [region for region in effect.regions if isinstance(region, Region) and region not in drawn]
+    effect: Effect, state: FrameState, drawn: Sequence[tuple[int, Region]], count: int, frame: float, share: float
+) -> FrameState:
+    """Layers.scribbles at a time between a timeline frame and the next, of so many layers.
+
+    drawn: regions, the later over the earlier, each with 1 + the number of its layer, 0 for what is none's"""
     shapes = []
-    for region in (*others, *drawn):
+    for number, region in drawn:
         shape = _between(region, frame, share)
         if shape.opacity > 0:
-            number = 1 + regions.index(region) if region in drawn else 0
             shapes.append(replace(shape, shutter=number, opacity=1.0))
     options = replace(state.options, edge_aware=float(effect.edge_aware.at(frame + round(share))))
-    return FrameState(options=options, bars=np.ones((1 + len(regions), options.window)), shapes=tuple(shapes))
+    return FrameState(options=options, bars=np.ones((1 + count, options.window)), shapes=tuple(shapes))
 
 
 def _between(region: Region, frame: float, share: float) -> scribbles.Shape:
