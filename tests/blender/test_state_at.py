@@ -45,8 +45,7 @@ def test_it_is_what_the_session_asks_for(bpy, edit, tmp_path, name):
     from shutter_addon.blender.rendering import render_context, sessions
 
     found = recipe_file.parse(json.dumps(RECIPES[name]))
-    count, step = (COUNT - 1) * found.inbetween + 1, found.inbetween
-    clip = Clip(width=WIDTH, height=HEIGHT, count=count, step=step)
+    clip = Clip(width=WIDTH, height=HEIGHT, count=COUNT).stepped(found.inbetween)
     made = {frame: Request(*state_at(found.effect(WIDTH / HEIGHT), clip, frame)) for frame in (1, 8, COUNT)}
 
     first = write_frames(tmp_path / "in", np.zeros((COUNT, HEIGHT, WIDTH, 3), np.uint8))

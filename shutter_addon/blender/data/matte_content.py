@@ -108,17 +108,11 @@ def shown_frame(scene, effect, strip, time: keyframes.Channel | None) -> Callabl
     """What gives the source's frame that an effect strip shows at a timeline frame: filmed ones counted from 0, those
     between them in parts. time: see `content`. EffectError, MediaError: it cannot be known."""
     source = strips.source_of(scene, effect, strip)
-    spec, step = source_media.spec(source), inbetween_settings.factor(effect)
+    spec, timing = source_media.spec(source), time or strip_timing.timing_of(source)
     filmed, fps = (len(spec.files), None) if spec.files else _movie(spec)
-    clip = Clip(
-        width=0,  # nothing of it is in pixels
-        height=0,
-        count=(filmed - 1) * step + 1,
-        step=step,
-        fps=fps and fps * step,
-        timing=time or strip_timing.timing_of(source),
-    )
-    return lambda frame: clip.shown(frame).source_frame / step
+    size = 0, 0  # nothing of it is in pixels
+    clip = Clip(*size, filmed, fps=fps, timing=timing).stepped(inbetween_settings.factor(effect))
+    return lambda frame: clip.shown(frame).source_frame / clip.step
 
 
 @lru_cache(64)

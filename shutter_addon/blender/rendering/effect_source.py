@@ -6,6 +6,7 @@ import traceback
 from dataclasses import dataclass
 
 from ...core import told
+from ...core.frames.frame_source import FrameSource
 from ...core.messages import EffectError, of_file
 from ...core.model.clip import Clip
 from ...devices.device import NoDeviceError
@@ -90,6 +91,6 @@ def open_source(snapshot: Snapshot) -> ShotSource:
     return SourceKey.of(snapshot).open()
 
 
-def clip_of(snapshot: Snapshot, source: ShotSource) -> Clip:
+def clip_of(snapshot: Snapshot, source: FrameSource) -> Clip:
     """An effect's source as plain facts, with what tells when it is shown."""
     return Clip.of(source, snapshot.effect.time or snapshot.timing)

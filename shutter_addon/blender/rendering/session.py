@@ -92,7 +92,7 @@ class RenderSession:
         detail: None: as it was the last time, for who asks for no picture"""
         known = self._renderers.get(snapshot.scene)
         key = SourceKey.of(snapshot, detail or (known[0].detail if known else FULL))
-        source: Any = self.renderer(key, context.say, context.stopped).source  # what the key has opened
+        source = self.renderer(key, context.say, context.stopped).source
         if (last := self._requests.get(snapshot.scene)) and last[0] is snapshot and last[1] == frame:
             request = last[2]
             if (request.source, request.levels, request.display) == (key, context.levels, context.display):

@@ -24,7 +24,6 @@ from ...core.model import shutters, windows
 from ...core.model.frame_state import FrameState
 from ...core.model.motions import Similarity
 from ...media import MediaError, inbetween, steps
-from ...media.cuts import ShotSource
 from ..data import inbetween_settings
 from ..data.snapshot import Snapshot
 from ..data.source_media import SourceSpec
@@ -181,14 +180,12 @@ def _count(strip: Any, snapshot: Snapshot, source: Any, request: Request) -> int
     return min(abs(final - first) + -(-options.window // options.step), all_pairs)
 
 
-def pairs(snapshot: Snapshot, medium: FrameSource, settings: inbetween_settings.Settings) -> list[int]:
+def pairs(snapshot: Snapshot, medium: FrameSource, factor: int) -> list[int]:
     """The pairs of filmed frames, each by its first, ascending, whose in-between frames an effect strip needs with
-    these settings, in place of its own, at the snapshot's frames: those across cuts as well, which take no time.
+    this factor, in place of its own, at the snapshot's frames: those across cuts as well, which take no time.
     EffectError, MediaError: that cannot be known."""
-    factor = settings.factor
     needed: set[int] = set()
-    source = ShotSource(inbetween.InbetweenSource(medium, *settings), factor)
-    clip = effect_source.clip_of(snapshot, source)
+    clip = effect_source.clip_of(snapshot, medium).stepped(factor)
     moved = (shutter.trail or shutter.timeline or shutter.threshold for shutter in snapshot.effect.shutters)
     has_trails = any(moved)
     for frame in snapshot.frames:
@@ -205,7 +202,7 @@ def pairs(snapshot: Snapshot, medium: FrameSource, settings: inbetween_settings.
             places = places[slice(*shutters.open_span(bars))]
         if options.edges == "slide":  # at an end, or a cut that is not known yet
             places = np.append(places, np.arange(index - len(places) + 1, index + len(places)))
-        shown = windows.source_frames(options, np.append(places, index), range(source.count))
+        shown = windows.source_frames(options, np.append(places, index), range(clip.count))
         needed.update((shown[(shown >= 0) & (shown % factor > 0)] // factor).tolist())
     return sorted(needed)
 

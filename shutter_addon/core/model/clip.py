@@ -52,6 +52,11 @@ class Clip:
     def of(medium: Medium, timing: StripTiming | Channel | None = None) -> Clip:
         return Clip(medium.width, medium.height, medium.count, medium.step, medium.fps, timing)
 
+    def stepped(self, factor: int) -> Clip:
+        """The clip of filmed frames with those in between, as many for each as the factor says."""
+        fps = None if self.fps is None else self.fps * factor
+        return replace(self, count=(self.count - 1) * factor + 1, step=factor, fps=fps)
+
     def shown(self, frame: float) -> Shown:
         """What is shown at a timeline frame."""
         if isinstance(self.timing, StripTiming):
