@@ -19,6 +19,9 @@ CLOSE = 1e-3
 # Light of which nothing becomes infinite as it is encoded in float32.
 _MOST = 1e37
 
+# Turns and shifts, frame by frame (motions.Similarity).
+Moves = tuple[np.ndarray, np.ndarray]
+
 
 def mixed_shutter(state: FrameState, coefficients: ArrayLike) -> np.ndarray:
     """The bars (…, L) of the shutter that pixels with coefficients (…, N) are exposed with, Σ coefficients = 1; of
@@ -44,7 +47,7 @@ def compose(
     frames: Sequence[np.ndarray],
     present: ArrayLike,
     coefficients: ArrayLike,
-    moves: tuple[np.ndarray, np.ndarray] | None = None,
+    moves: Moves | None = None,
     sharp: bool | None = None,
 ) -> np.ndarray:
     """The picture (H, W, 4) float64, scene-linear and premultiplied: F = e(q) · ∫ V(t + ⌊Q⁻¹(z)⌋) dz (§3.1, §3.4.1); or
@@ -75,7 +78,7 @@ def _composed(
     frames: Sequence[np.ndarray],
     present: np.ndarray,
     coefficients: np.ndarray,
-    moves: tuple[np.ndarray, np.ndarray] | None,
+    moves: Moves | None,
     sharp: bool,
 ) -> np.ndarray:
     """As `compose`, of shutters that combine alike."""
@@ -85,19 +88,18 @@ def _composed(
     y, x = np.indices(coefficients.shape[1:])
     own = x + 1j * y
 
-    def look(k: int, turns: np.ndarray | None, shifts: np.ndarray | None) -> np.ndarray:
-        if turns is None or shifts is None:
-            return frames[k]
-        return seen(frames[k], turns[k] * own + shifts[k], sharp=sharp)
+    def look(k: int, motion: Moves | None) -> np.ndarray:
+        return frames[k] if motion is None else seen(frames[k], motion[0][k] * own + motion[1][k], sharp=sharp)
 
+    motions = _motions(state, coefficients, moves)
     total = np.zeros((*x.shape, 4))
-    for weights, *moved in _exposed(state, coefficients, present, moves):
+    for weights, motion in zip(_exposed(state, coefficients, present, moves), motions, strict=True):
         for k in np.flatnonzero(weights.any(axis=(0, 1))).tolist():
-            total = total + weights[..., k, None] * look(k, *moved)
+            total = total + weights[..., k, None] * look(k, motion)
     if combine.mode == "average":
         gain = np.einsum("n,nhw->hw", state.gains, coefficients)[..., None]
         return (_decode(total) if encoded else total) * np.concatenate([gain, gain, gain, np.ones_like(gain)], axis=-1)
-    samples = _samples(combine, state, coefficients, present, moves, look)
+    samples = _samples(combine, state, coefficients, present, moves, lambda k: [look(k, each) for each in motions])
     if not samples:
         return _decode(total) if encoded else total
     found = combined.of_samples(combine, samples, encoded=encoded)
@@ -118,28 +120,23 @@ def _samples(
     state: FrameState,
     coefficients: np.ndarray,
     present: np.ndarray,
-    moves: tuple[np.ndarray, np.ndarray] | None,
-    look: Callable[[int, np.ndarray | None, np.ndarray | None], np.ndarray],
+    moves: Moves | None,
+    looks_at: Callable[[int], list[np.ndarray]],
 ) -> list[combined.Sample]:
-    """The frames that are there. By value interpolation, of what follows several motions, those of a frame are mixed,
-    by how much it counts by each."""
+    """The frames that are there. What is seen of one by several motions is mixed, by how much it counts by each."""
     options, bars = state.options, state.bars
-    apart = [] if moves is None else [part.T[:, :, None, None] for part in moves]
     if moves is not None and options.interpolation == "value":
         alone = np.stack([combined.counts(combine, row, np.ones(1), options.interpolation) for row in bars])
         weights, shares = coefficients[..., None] * alone[:, None, None], coefficients
-        turns, shifts = (list(part) for part in apart)
     else:
         weights = combined.counts(combine, bars, np.moveaxis(coefficients, 0, -1), options.interpolation)[None]
         shares = np.ones(weights.shape[:-1])
-        mixed: list = [None] if moves is None else [np.einsum("ln,nhw->lhw", part, coefficients) for part in moves]
-        turns, shifts = [mixed[0]], [mixed[-1]]
     samples = []
     counted = weights.any(axis=(0, 1, 2))
     if combine.threshold is not None:
         counted[options.before] = True
     for k in np.flatnonzero(counted & present).tolist():
-        looks = [look(k, *moved) for moved in zip(turns, shifts, strict=True)]
+        looks = looks_at(k)
         weight = weights[..., k].sum(axis=0)
         light_ = sum(own[..., k, None] * sight for own, sight in zip(weights, looks, strict=True))
         shown = sum(share[..., None] * sight for share, sight in zip(shares, looks, strict=True))
@@ -148,21 +145,25 @@ def _samples(
     return samples
 
 
-def _exposed(
-    state: FrameState, coefficients: np.ndarray, present: np.ndarray, moves: tuple[np.ndarray, np.ndarray] | None
-) -> list[tuple]:
-    """What is summed: weights (H, W, L) of the frames, and the turns and shifts (L, H, W), or None, by which each is
-    seen there."""
+def _motions(state: FrameState, coefficients: np.ndarray, moves: Moves | None) -> list[Moves | None]:
+    """The motions by which each frame is seen: by value interpolation those of all shutters, else what pixels have of
+    them."""
+    if moves is None:
+        return [None]
+    turns, shifts = moves
+    if state.options.interpolation == "value":
+        return list(zip(turns.T[:, :, None, None], shifts.T[:, :, None, None], strict=True))
+    return [(np.einsum("ln,nhw->lhw", turns, coefficients), np.einsum("ln,nhw->lhw", shifts, coefficients))]
+
+
+def _exposed(state: FrameState, coefficients: np.ndarray, present: np.ndarray, moves: Moves | None) -> np.ndarray:
+    """The weights (M, H, W, L) with which the frames are summed, as they are seen by each of `_motions`."""
     normalised = state.bars / state.bars.sum(axis=1, keepdims=True)
     if moves is not None and state.options.interpolation == "value":
-        q = coefficients[..., None] * normalised[:, None, None]
-        apart = (part.T[:, :, None, None] for part in moves)
-        return list(zip(_without_absent(q, coefficients, present), *apart, strict=True))
+        return _without_absent(coefficients[..., None] * normalised[:, None, None], coefficients, present)
     between = shutters.INTERPOLATIONS[state.options.interpolation]
-    q = between(normalised, np.moveaxis(coefficients, 0, -1))
-    (weights,) = _without_absent(q[None], np.ones(coefficients[:1].shape), present)
-    mixed = [None, None] if moves is None else [np.einsum("ln,nhw->lhw", part, coefficients) for part in moves]
-    return [(weights, *mixed)]
+    q = between(normalised, np.moveaxis(coefficients, 0, -1))[None]
+    return _without_absent(q, np.ones(coefficients[:1].shape), present)
 
 
 def seen(frame: np.ndarray, places: np.ndarray, *, sharp: bool) -> np.ndarray:

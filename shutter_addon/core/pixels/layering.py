@@ -31,8 +31,6 @@ UNCOVERED = 1 - 2e-5
 # more than half of its shutter, and what is around has a little of it (scripts/layer_truth.py).
 NONE, WHOLE = 0.3, 0.5
 
-Moves = tuple[np.ndarray, np.ndarray]
-
 
 def matte_of(coefficients: ArrayLike) -> np.ndarray:
     """The matte of a layer that is drawn, of its coefficients."""
@@ -67,7 +65,7 @@ def compose(
     present: ArrayLike,
     coefficients: ArrayLike,
     mattes: np.ndarray,
-    moves: Moves | None = None,
+    moves: compositor.Moves | None = None,
     plate: np.ndarray | None = None,
 ) -> np.ndarray:
     """The picture (H, W, 4) float64 of a state with layers; arguments as for compositor.compose.
@@ -80,7 +78,7 @@ def compose(
     clear = np.stack([behind(list(of_frame)) for of_frame in np.swapaxes(mattes, 0, 1)])
 
     def exposed(
-        part: FrameState, weights: np.ndarray, c: ArrayLike, moved: Moves | None
+        part: FrameState, weights: np.ndarray, c: ArrayLike, moved: compositor.Moves | None
     ) -> tuple[np.ndarray, np.ndarray]:
         colors = [frame * weight[..., None] for frame, weight in zip(frames, weights, strict=True)]
         color = compositor.compose(part, colors, present, c, moved)
