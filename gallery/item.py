@@ -13,9 +13,10 @@ from shutter_addon.compute.renderer import Renderer, open_compositor
 from shutter_addon.compute.request import Request
 from shutter_addon.core.frames import light
 from shutter_addon.core.model import scribbles
+from shutter_addon.core.model.clip import Clip
 from shutter_addon.core.model.effect import Effect, FileContent, MatteRegion
 from shutter_addon.core.model.frame_state import FrameState
-from shutter_addon.core.pixels import following, layering
+from shutter_addon.core.model.state_at import state_at
 from shutter_addon.core.recipes import recipe_file
 from shutter_addon.media import open_source
 from shutter_addon.media.matte_files import MatteFile
@@ -86,9 +87,8 @@ class Shot:
 
     def coefficients(self, frame: int) -> np.ndarray:
         """How much of each shutter a pixel gets, in the shutters' colours."""
-        at = following.Shown(frame, frame - 1)
-        state = layering.layered(self.effect, self._at(frame), at, self._source, self._shown_at)
-        values = self._renderer.coefficients_with_layers(Request(frame - 1, state))
+        request = Request(*state_at(self.effect, Clip.of(self._source), frame))
+        values = self._renderer.coefficients_with_layers(request)
         return np.tensordot(values, self._colors, axes=(0, 0))
 
     def bars(self, frame: int, shutter: str) -> tuple[np.ndarray, np.ndarray]:
@@ -126,10 +126,6 @@ class Shot:
 
     def _at(self, frame: int) -> FrameState:
         return self.effect.at(frame)
-
-    def _shown_at(self, frame: float) -> int:
-        """The source frame that is shown at a timeline frame."""
-        return min(max(int(frame) - 1, 0), self._source.count - 1)
 
     def _matte(self, region: MatteRegion) -> MatteFile:
         """What a matte is read from: its file, or for a ramp of luminance the footage."""

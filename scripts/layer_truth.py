@@ -18,7 +18,7 @@ import argparse
 import json
 import sys
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from math import cos, pi, sin
 from pathlib import Path
 from typing import Any
@@ -32,8 +32,10 @@ from shutter_addon.compute.renderer import Renderer, open_compositor
 from shutter_addon.compute.request import Request
 from shutter_addon.core.frames import light
 from shutter_addon.core.frames.frame_source import FrameSource
+from shutter_addon.core.model.clip import Clip
 from shutter_addon.core.model.effect import Effect
-from shutter_addon.core.pixels import following, layering
+from shutter_addon.core.model.state_at import state_at
+from shutter_addon.core.pixels import layering
 from shutter_addon.core.recipes import recipe_file
 from shutter_addon.media import open_source
 from shutter_addon.media.matte_files import MatteFile
@@ -358,16 +360,10 @@ def camera(scene: Scene) -> list[dict]:
 def shown(source: Memory, given: Effect, files: dict) -> np.ndarray:
     """The picture (H, W, 3), scene-linear, of the shown frame. files: of mattes, by subject"""
     effect = given.for_picture(source.width / source.height, lambda region: files[region.content.path])
-    at = following.Shown(SHOWN + 1.0, SHOWN)
-    state = replace(effect.at(at.frame), layers=None)
-
-    def other(frame: float) -> int:
-        return min(max(int(frame) - 1, 0), source.count - 1)
-
-    state = layering.layered(effect, state, at, source, other)
+    clip = Clip(width=source.width, height=source.height, count=source.count)
     renderer = Renderer(open_compositor(), source, MatteValues(source.width, source.height))
     try:
-        return renderer.picture(Request(SHOWN, state))[..., :3].copy()
+        return renderer.picture(Request(*state_at(effect, clip, SHOWN + 1.0)))[..., :3].copy()
     finally:
         renderer.close()
 

@@ -55,7 +55,6 @@ REVIEWED: dict[str, set[str]] = {
     },
     "editing/track_region.py": {"_each", "_follow_drawn", "track.<lambda>"},
     "rendering/device_work.py": {"broken_off"},
-    "rendering/effect_source.py": {"source_index"},
     "rendering/inbetween_build.py": {"Build._build", "Build._update", "Build.stop", "_estimated", "running"},
     "rendering/outline_carrying.py": {"_Carrying._carry"},
     "rendering/render_job.py": {"where"},

@@ -10,7 +10,7 @@ import numpy as np
 from ..core import stopping
 from ..core.frames import light
 from ..core.frames.frame_source import FrameSource
-from ..core.model import mattes
+from ..core.model import mattes, windows
 from ..core.model.frame_state import Options
 from ..core.pixels import compositor, layering
 from ..core.pixels.shown_levels import Display
@@ -116,7 +116,7 @@ class HostWindow:
     def load(self, positions: np.ndarray, options: Options, shot: range) -> None:
         """See RunningSums.load."""
         self.shot = shot
-        wanted = set(compositor.source_frames(options, positions, shot).tolist())
+        wanted = set(windows.source_frames(options, positions, shot).tolist())
         self.frames = {index: frame for index, frame in self.frames.items() if index in wanted}
         for index in sorted(wanted - self.frames.keys()):
             self.frames[index] = self.source.read(index)
@@ -232,7 +232,7 @@ class CPUCompositor:
     def draw(self, window: HostWindow, request: Request, coefficients: Coefficients) -> np.ndarray:
         """The picture (H, W, 4), top row first: float32, or levels in uint8; arguments as for GPUCompositor.draw."""
         state, source = request.state, window.source
-        indices = compositor.window_indices(state.options, request.index, window.shot, request.direction)
+        indices = windows.indices(state.options, request.index, window.shot, request.direction)
         moves = None if state.following is None else state.following.at(indices)
         coefficients = Coefficients(coefficients.handle[: len(state.bars)], coefficients.block)
         picture = np.empty((source.height, source.width, 4), np.float32)

@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 
 from ..core.frames.frame_source import FrameSource
+from ..core.model import windows
 from ..core.model.combining import AVERAGE, Combine
 from ..core.model.frame_state import Following, FrameState
-from ..core.pixels import compositor
 from ..core.pixels.shown_levels import Display
 from ..devices.device import Device, NoDeviceError, Texture
 from ..devices.llvmpipe import MOST_ITERATIONS
@@ -93,7 +93,7 @@ def _from_frames(
         lowest, decode, edges = window.start, 0, 2 if shortened else 0
         given |= _extent(window)
     else:
-        indices = compositor.source_frames(options, origin + direction * np.arange(options.window), window.shot)
+        indices = windows.source_frames(options, origin + direction * np.arange(options.window), window.shot)
         lowest, decode, edges = (
             int(indices[indices >= 0].min()),
             decoding(window.transfer, options.light),
@@ -122,7 +122,7 @@ def _threshold(combine: Combine, request: Request, shot: range) -> dict[str, Any
     if combine.threshold is None:
         return {}
     options = request.state.options
-    is_there = compositor.window_indices(options, request.index, shot, request.direction)[options.before] >= 0
+    is_there = windows.indices(options, request.index, shot, request.direction)[options.before] >= 0
     half = max(combine.softness, 1e-6) / 2
     return {"threshold": (combine.threshold, half), "shown": options.before if is_there else -1}
 
@@ -298,7 +298,7 @@ class GPUCompositor:
             return self._draw_moved(window, request, coefficients)
         options, values = state.options, table(state)
         first, last = state.open_span
-        origin, (low, high) = compositor.origin(options, index, direction), compositor.reach(state, index, direction)
+        origin, (low, high) = windows.origin(options, index, direction), windows.reach(state, index, direction)
         shortened = options.edges == "shorten" and (low < window.shot.start or high >= window.shot.stop)
         way = way_of(window, options, values, (first, last), shortened, combine)
         is_search = combine.mode == "median" and way == "search"
@@ -378,7 +378,7 @@ class GPUCompositor:
             request.state.options,
             (window.source.width, window.source.height),
         )
-        frames = compositor.window_indices(options, request.index, window.shot, request.direction)
+        frames = windows.indices(options, request.index, window.shot, request.direction)
         first, last = state.open_span
         values, moves = moved_tables(state, frames)
         motions, there = len(moves) // len(frames), np.flatnonzero(frames >= 0)

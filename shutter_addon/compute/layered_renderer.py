@@ -12,7 +12,7 @@ import numpy as np
 from ..core.frames.frame_source import FrameSource
 from ..core.model.frame_state import FrameState, Layers
 from ..core.model.mattes import MatteReader
-from ..core.pixels import compositor as reference
+from ..core.model.windows import source_frames
 from ..core.pixels import layering
 from . import plates
 from .layer_colors import TOGETHER, LayerColors
@@ -169,7 +169,7 @@ class LayeredRenderer:
     def _load(self, windows: dict, positions: np.ndarray, request: Request, shot: range) -> None:
         """Loads all windows. Where many frames lack, they are loaded a few at a time: each is read once for all."""
         options, ordered = request.state.options, np.sort(positions)
-        lacking = set(reference.source_frames(options, ordered, shot).tolist()).difference(self.held)
+        lacking = set(source_frames(options, ordered, shot).tolist()).difference(self.held)
         step = TOGETHER if len(lacking) > 1 else len(ordered)
         for end in range(step, len(ordered) + step, step):
             for window in windows.values():

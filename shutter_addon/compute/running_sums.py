@@ -8,8 +8,8 @@ from collections.abc import Collection
 import numpy as np
 
 from ..core.frames.frame_source import FrameSource
+from ..core.model import windows
 from ..core.model.frame_state import Light, Options
-from ..core.pixels import compositor
 from ..core.stopping import kept
 
 
@@ -45,12 +45,12 @@ class RunningSums(ABC):
     def load(self, positions: np.ndarray, options: Options, shot: range) -> None:
         """Reads the frames at these positions that are not loaded.
 
-        positions: of core.pixels.compositor.window_positions; the first and the last less than `capacity` apart
-        shot: the source frames that the window may show (core.pixels.compositor.source_frames)
+        positions: of core.model.windows.positions; the first and the last less than `capacity` apart
+        shot: the source frames that the window may show (core.model.windows.source_frames)
         """
         self.shot = shot
         first, last = int(positions.min()), int(positions.max()) + 1
-        frames = compositor.source_frames(options, np.arange(first, last), shot).tolist()
+        frames = windows.source_frames(options, np.arange(first, last), shot).tolist()
         if not self._continues(first, frames, options):
             self._light, self._frames = options.light, {}
             self.start = self.stop = first

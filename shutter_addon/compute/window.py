@@ -11,8 +11,8 @@ from ..core import stopping
 from ..core.frames import light
 from ..core.frames.frame_source import FrameSource
 from ..core.frames.planes import Planes, chroma_step
+from ..core.model import windows
 from ..core.model.frame_state import Light, Options
-from ..core.pixels import compositor
 from ..devices import llvmpipe
 from ..devices.device import Device, NoDeviceError, Texture
 from ..devices.paging import TEXEL_BYTES
@@ -195,7 +195,7 @@ class Frames(Window):
         """See RunningSums.load."""
         self.shot = shot
         self.device.use(self)
-        for index in sorted(set(compositor.source_frames(options, positions, shot).tolist())):
+        for index in sorted(set(windows.source_frames(options, positions, shot).tolist())):
             layer = index % self.capacity
             if self._held.get(layer) == index:
                 continue

@@ -11,7 +11,7 @@ from dataclasses import replace
 import numpy as np
 
 from ..core.frames.frame_source import FrameSource, ShotFinder
-from ..core.pixels import compositor
+from ..core.model import windows
 from .request import Request
 
 
@@ -23,7 +23,7 @@ def shots_of(request: Request, source: FrameSource) -> ShotFinder | None:
 def reach(request: Request, beside: int) -> tuple[int, int]:
     """The first and the last of all positions that any shutter exposes, and of the shown frame itself with the frames
     that guide the diffusion."""
-    low, high = compositor.reach(request.state, request.index, request.direction)
+    low, high = windows.reach(request.state, request.index, request.direction)
     return min(low, request.index - beside), max(high, request.index + beside)
 
 
@@ -36,7 +36,7 @@ def shot_of(request: Request, source: FrameSource, beside: int, *, known: bool =
     if shots is None:
         return range(source.count)
     shot = shots.around(index, low, high, known=known)
-    moved = compositor.slid(request.state, index, request.direction, shot)
+    moved = windows.slid(request.state, index, request.direction, shot)
     if moved is not request.state:
         first, final = reach(replace(request, state=moved), beside)
         return shots.around(index, min(low, first), max(high, final), known=known)
@@ -50,7 +50,7 @@ def shot_of(request: Request, source: FrameSource, beside: int, *, known: bool =
 
 def slid(request: Request, shot: range) -> Request:
     """The request with what it exposes moved into the shot, where its edges "slide": nothing is left of that."""
-    state = compositor.slid(request.state, request.index, request.direction, shot)
+    state = windows.slid(request.state, request.index, request.direction, shot)
     return replace(request, state=replace(state, options=replace(state.options, edges="hold")))
 
 
@@ -63,21 +63,21 @@ def looked_for_cuts(request: Request, source: FrameSource, beside: int) -> tuple
 
 
 def positions(request: Request, shot: range) -> np.ndarray:
-    """The positions (core.pixels.compositor.window_positions) that any shutter exposes, whether it has a scribble or
+    """The positions (core.model.windows.positions) that any shutter exposes, whether it has a scribble or
     not. Where frames of them are left out (edges "shorten"), all positions of the window that have a frame: the nearest
     may be needed in place of those."""
     state = request.state
-    within = compositor.window_positions(state.options, request.index, request.direction)
+    within = windows.positions(state.options, request.index, request.direction)
     exposed = slice(*state.open_span)
     if state.options.edges != "shorten":
         return within[exposed]
-    frames = compositor.source_frames(state.options, within, shot)
+    frames = windows.source_frames(state.options, within, shot)
     return within[exposed] if (frames[exposed] >= 0).all() else within[frames >= 0]
 
 
 def exposed_frames(request: Request, shot: range) -> set[int]:
     """The source frames at `positions`."""
-    return set(compositor.source_frames(request.state.options, positions(request, shot), shot).tolist())
+    return set(windows.source_frames(request.state.options, positions(request, shot), shot).tolist())
 
 
 def guided_later(request: Request, beside: int) -> list[int]:

@@ -87,7 +87,7 @@ class CarriedMattes:
     ):
         self._source = source if isinstance(source, ShotSource) else ShotSource(source)
         self.width, self.height = source.width, source.height
-        self.count = self.filmed = source.count
+        self.count = source.count
         self.fps: Fraction | None = source.fps
         self._drawings = {frame: curves for frame, curves in drawings if 0 <= frame < self.count}
         self._frames = sorted(self._drawings)

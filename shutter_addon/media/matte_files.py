@@ -41,7 +41,7 @@ class MatteSource:
     Values are samples as they are stored: no transfer function, no colour space, alpha neither multiplied nor divided;
     a movie's range is expanded to 0 … 1. Luminance is that of Rec.709's weights, and of a grey file its grey.
 
-    path: the movie, or the first image; width, height: pixels; count, filmed: of frames, 1 for a still picture
+    path: the movie, or the first image; width, height: pixels; count: of frames, 1 for a still picture
     fps: frames per second, None for images; files: the movie, or those of the frames
     """
 
@@ -53,7 +53,6 @@ class MatteSource:
         """As MatteFile has them."""
         self._frames = open_channel(path, channel, files=files, stream=stream)
         self.path, self.count = self._frames.path, self._frames.count
-        self.filmed = self.count
         self.width, self.height = self._frames.width, self._frames.height
         self.fps, self.files = self._frames.fps, self._frames.files
 

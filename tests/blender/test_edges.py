@@ -11,7 +11,7 @@ from support import picture_of, read_picture, recipe, request, state, write_fram
 
 from shutter_addon.compute.guide import Guides, guiding
 from shutter_addon.core.frames import light
-from shutter_addon.core.model import scribbles
+from shutter_addon.core.model import scribbles, windows
 from shutter_addon.core.pixels import compositor
 from shutter_addon.core.recipes import recipe_file
 from shutter_addon.media import MediaError, inbetween, open_source
@@ -45,7 +45,7 @@ def expected(first, moment, index: int):
         seen = Guides(source).guide(guiding(index, 1, shot), block)
     c = exact_diffusion.solve(labels, len(moment.bars), seen, moment.options.edge_aware)
     pixels = c.repeat(block, 1).repeat(block, 2)[:, : SIZE[1], : SIZE[0]]
-    indices = compositor.window_indices(moment.options, index, shot)
+    indices = windows.indices(moment.options, index, shot)
     frames = light.premultiplied(samples / 255, light.to_linear)[np.maximum(indices, 0)]
     picture = compositor.compose(moment, frames, indices >= 0, pixels)
     return c, light.to_encoded(picture[..., :3]) * 255
@@ -160,7 +160,7 @@ def test_a_draft_has_larger_blocks_where_edges_are_followed(add, film, monkeypat
     exact = request(edit, effect, strip, 3)
     draft = previews.draft(exact.request, exact.renderer.source)
     assert (exact.state.options.aggregate, draft.state.options.aggregate) == (1, 4)
-    assert exact.session.coefficients(draft).shape[1:] == (-(-SIZE[1] // 4), -(-SIZE[0] // 4))
+    assert exact.session.run(exact.renderer.coefficients, draft).shape[1:] == (-(-SIZE[1] // 4), -(-SIZE[0] // 4))
     effect.edge_aware = 0
     plain = request(edit, effect, strip, 3)
     assert previews.draft(plain.request, plain.renderer.source) is plain.request

@@ -2,14 +2,14 @@
 
 import json
 from dataclasses import replace
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from support import read_picture, recipe, request, write_frames
 
 from shutter_addon.core.frames import light
-from shutter_addon.core.pixels import following as followings
+from shutter_addon.core.model.clip import Clip
+from shutter_addon.core.model.state_at import state_at
 from shutter_addon.core.recipes import recipe_file
 
 COUNT, WIDTH, HEIGHT, WINDOW = 24, 120, 72, 6
@@ -194,10 +194,8 @@ def test_the_trails_length_is_keyed(shown):
 
 
 def core_bars(data, frame):
-    source = SimpleNamespace(count=COUNT, width=WIDTH, height=HEIGHT)
     effect = recipe_file.parse(json.dumps(data)).effect(WIDTH / HEIGHT)
-    shown = lambda other: min(max(round(other) - 1, 0), COUNT - 1)  # noqa: E731
-    return followings.followed(effect, effect.at(frame), followings.Shown(frame, frame - 1), source, shown).bars
+    return state_at(effect, Clip(width=WIDTH, height=HEIGHT, count=COUNT), frame).state.bars
 
 
 def test_the_command_follows(command, tmp_path):

@@ -7,7 +7,7 @@ import pytest
 from support import request, write_frames
 
 from shutter_addon.blender.data import consistency, selection
-from shutter_addon.core.model import limits
+from shutter_addon.core.model import limits, windows
 from shutter_addon.core.pixels import compositor
 
 WIDTH, HEIGHT, COUNT = 160, 120, 16
@@ -53,7 +53,7 @@ def moments(strip, effect, at=8):
     asked = request(strip.id_data, effect, strip, at)
     options, places = (
         asked.state.options,
-        compositor.window_positions(asked.state.options, asked.index, asked.direction),
+        windows.positions(asked.state.options, asked.index, asked.direction),
     )
     coefficients = np.moveaxis(asked.coefficients(), 0, -1)
     exposed = compositor.mixed_shutter(asked.state, coefficients)

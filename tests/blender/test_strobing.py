@@ -244,18 +244,11 @@ def test_the_estimate_is_near_what_is_built(add, smoothed, monkeypatch):
     edit, effect, strip = add(3, np.ones(4))
     strip.left_handle, strip.right_handle = 3, 6
     taken = snapshot.take(edit, effect, strip, range(3, 6))
-    settings = replace_factor(effect, 4)
     with taken.source.open() as medium:
-        needed = strobing.pairs(taken, medium, settings)
+        needed = strobing.pairs(taken, medium, 4)
     assert needed == [2, 3, 4, 5, 6, 7]
     monkeypatch.setattr(inbetween, "cost", lambda *_: inbetween.Cost(pair=1.0, frame=0.0, size=1.0))
     assert looked(edit, effect, strip).seconds == len(needed)
-
-
-def replace_factor(effect, factor):
-    from shutter_addon.blender.data import inbetween_settings
-
-    return inbetween_settings.settings(effect)._replace(factor=factor)
 
 
 def test_what_looks_smooth(bpy):

@@ -2,7 +2,6 @@
 
 import math
 import time
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -81,12 +80,11 @@ def test_other_memory_than_the_strips(bpy, edit, tmp_path):
 def test_a_still_of_a_million_frames_takes_no_time(bpy, edit, tmp_path):
     """Blender shows one frame of it all along; where that began is not sought frame by frame."""
     from shutter_addon.blender.data import strip_timing
-    from shutter_addon.core.frames import retiming
+    from shutter_addon.core.model.clip import Clip
 
     first = write_frames(tmp_path / "in", np.zeros((1, 8, 8, 3), dtype=np.uint8))
     source = edit.sequence_editor.strips.new_image("images", str(first), 1, 1)
     source.right_handle = 1_000_000
     start = time.perf_counter()
-    medium = SimpleNamespace(filmed=1, step=1, fps=None)
-    assert retiming.source_frame(strip_timing.timing_of(source), 999_999, medium) == 0
+    assert Clip(width=8, height=8, count=1, timing=strip_timing.timing_of(source)).shown(999_999).source_frame == 0
     assert time.perf_counter() - start < 1

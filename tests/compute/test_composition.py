@@ -12,7 +12,7 @@ from shutter_addon.compute.renderer import Renderer, open_compositor
 from shutter_addon.compute.request import Request
 from shutter_addon.core.frames import light
 from shutter_addon.core.frames.frame_source import FrameSource
-from shutter_addon.core.model import presets
+from shutter_addon.core.model import presets, windows
 from shutter_addon.core.model.frame_state import FrameState, Options
 from shutter_addon.core.model.scribbles import Shape, rasterise
 from shutter_addon.core.pixels import compositor
@@ -87,8 +87,8 @@ def composed(device, source, moment, index, direction=1, shot=None, mattes=None)
     block = moment.options.aggregate
     c = c.repeat(block, 1).repeat(block, 2)[:, : source.height, : source.width].astype(np.float64)
     c /= c.sum(axis=0)
-    moment = compositor.slid(moment, index, direction, shot or range(source.count))
-    indices = compositor.window_indices(moment.options, index, shot or range(source.count), direction)
+    moment = windows.slid(moment, index, direction, shot or range(source.count))
+    indices = windows.indices(moment.options, index, shot or range(source.count), direction)
     moves = moment.following and moment.following.at(indices)
     expected = compositor.compose(moment, source.linear()[np.maximum(indices, 0)], indices >= 0, c, moves)
     assert picture.shape == expected.shape

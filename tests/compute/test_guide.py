@@ -13,6 +13,7 @@ from shutter_addon.compute.gpu import GPUCompositor
 from shutter_addon.compute.renderer import Renderer, open_compositor
 from shutter_addon.compute.request import Request
 from shutter_addon.core.frames import light
+from shutter_addon.core.model import windows
 from shutter_addon.core.model.frame_state import FrameState, Options
 from shutter_addon.core.model.scribbles import Shape
 from shutter_addon.core.pixels import compositor
@@ -174,7 +175,7 @@ def test_pictures_equal_the_reference(device, aggregate, dtype):
     assert np.abs(exact - exact_diffusion.solve(labels, count)).max() > 4 * LEVEL
     assert np.abs(renderer.coefficients(Request(2, moment)) - exact).max() <= LEVEL
     pixels = exact.repeat(aggregate, 1).repeat(aggregate, 2)[:, :60, :90]
-    indices = compositor.window_indices(moment.options, 2, range(4))
+    indices = windows.indices(moment.options, 2, range(4))
     expected = compositor.compose(moment, source.linear()[np.maximum(indices, 0)], indices >= 0, pixels)
     apart = np.abs(light.to_encoded(renderer.picture(Request(2, moment)).astype(float)) - light.to_encoded(expected))
     assert (apart / np.maximum(1, np.abs(expected))).max() <= LEVEL

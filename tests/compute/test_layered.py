@@ -13,6 +13,7 @@ from shutter_addon.compute.gpu import GPUCompositor
 from shutter_addon.compute.renderer import Renderer, open_compositor, open_gl
 from shutter_addon.compute.request import Request
 from shutter_addon.core.frames import light
+from shutter_addon.core.model import windows
 from shutter_addon.core.model.combining import Combine
 from shutter_addon.core.model.frame_state import Following, FrameState, Layers, Options
 from shutter_addon.core.model.mattes import FileFrame, Matte
@@ -93,8 +94,8 @@ def formula(device, sources, moment, mattes, index=SHOWN, direction=1):  # noqa:
     block = moment.options.aggregate
     c = c.repeat(block, 1).repeat(block, 2)[:, : source.height, : source.width].astype(np.float64)
     c /= c.sum(axis=0)
-    moment = compositor.slid(moment, index, direction, range(source.count))
-    indices = compositor.window_indices(moment.options, index, range(source.count), direction)
+    moment = windows.slid(moment, index, direction, range(source.count))
+    indices = windows.indices(moment.options, index, range(source.count), direction)
     there = indices >= 0
     parts, encoded = [each.linear() for each in sources], moment.options.light == "encoded"
     if encoded:
@@ -194,7 +195,7 @@ def test_layers_and_what_lies_behind_follow(device, alpha, interpolation):  # no
     moment, _ = with_layers(drawn_state(rng, window=6, interpolation=interpolation), *mattes)
     moment = dataclasses.replace(moment, following=following)
     renderer, picture = drawn(device, source, moment)
-    indices = compositor.window_indices(moment.options, SHOWN, range(COUNT))
+    indices = windows.indices(moment.options, SHOWN, range(COUNT))
     c = renderer.coefficients(Request(SHOWN, plain(moment))).astype(np.float64)
     frames, of_frames, moves = (
         source.linear()[indices],
@@ -363,7 +364,7 @@ def test_a_threshold_tells_how_much_a_layer_covers(device):  # noqa: F811
     moment, _ = with_layers(drawn_state(rng, window=6), *mattes)
     moment = dataclasses.replace(moment, combines=(Combine.of("darkest", threshold=0.3, softness=0.2),) * 3)
     renderer, picture = drawn(device, source, moment)
-    indices = compositor.window_indices(moment.options, SHOWN, range(COUNT))
+    indices = windows.indices(moment.options, SHOWN, range(COUNT))
     c = renderer.coefficients(Request(SHOWN, plain(moment))).astype(np.float64)
     of_frames = np.stack([each[indices] for each in mattes])
     expected = layering.compose(moment, source.linear()[indices], indices >= 0, c / c.sum(axis=0), of_frames)

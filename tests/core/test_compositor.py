@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from shutter_addon.core.frames import light
-from shutter_addon.core.model import shutters
+from shutter_addon.core.model import shutters, windows
 from shutter_addon.core.model.frame_state import FrameState, Options
 from shutter_addon.core.pixels import compositor
 
@@ -39,23 +39,23 @@ def everywhere(c, size=(3, 4)):
     ],
 )
 def test_edges(edges, index, expected):
-    assert compositor.window_indices(Options(5, edges=edges), index, range(10)).tolist() == expected
+    assert windows.indices(Options(5, edges=edges), index, range(10)).tolist() == expected
 
 
 def test_positions():
     for position, expected in [("start", [5, 6, 7, 8]), ("center", [4, 5, 6, 7]), ("end", [2, 3, 4, 5])]:
-        assert compositor.window_indices(Options(4, position=position), 5, range(10)).tolist() == expected
+        assert windows.indices(Options(4, position=position), 5, range(10)).tolist() == expected
 
 
 def test_backward():
-    assert compositor.window_indices(Options(4), 5, range(10), -1).tolist() == [5, 4, 3, 2]
-    assert compositor.window_indices(Options(4, edges="mirror"), 1, range(10), -1).tolist() == [1, 0, 1, 2]
-    assert compositor.window_indices(Options(4, position="end"), 5, range(10), -1).tolist() == [8, 7, 6, 5]
+    assert windows.indices(Options(4), 5, range(10), -1).tolist() == [5, 4, 3, 2]
+    assert windows.indices(Options(4, edges="mirror"), 1, range(10), -1).tolist() == [1, 0, 1, 2]
+    assert windows.indices(Options(4, position="end"), 5, range(10), -1).tolist() == [8, 7, 6, 5]
 
 
 def exposed(moment, index, direction, shot):
     """By shutters: how much of each frame they expose."""
-    frames = compositor.window_indices(moment.options, index, shot, direction)
+    frames = windows.indices(moment.options, index, shot, direction)
     return [
         {f: float(bars[frames == f].sum()) for f in set(frames.tolist()) if bars[frames == f].any()}
         for bars in moment.bars
@@ -74,14 +74,14 @@ def test_what_slides_keeps_its_length_and_what_lies_in_the_shot_its_place(direct
     """In a shot from frame 10 to 19, which the middle one of five frames shows."""
     moment, shot = sliding([LONG, SHARP, LATE]), range(10, 20)
     for index in range(12, 18):
-        assert compositor.slid(moment, index, direction, shot) is moment
-    last = compositor.slid(moment, 19 if direction > 0 else 10, direction, shot)
+        assert windows.slid(moment, index, direction, shot) is moment
+    last = windows.slid(moment, 19 if direction > 0 else 10, direction, shot)
     there = [
         {f if direction > 0 else 29 - f: weight for f, weight in each.items()}
         for each in exposed(last, 19 if direction > 0 else 10, direction, shot)
     ]
     assert there == [{15: 1, 16: 2, 17: 3, 18: 4, 19: 5}, {19: 1}, {18: 1, 19: 1}]
-    early = compositor.slid(moment, 11 if direction > 0 else 18, direction, shot)
+    early = windows.slid(moment, 11 if direction > 0 else 18, direction, shot)
     there = [
         {f if direction > 0 else 29 - f: weight for f, weight in each.items()}
         for each in exposed(early, 11 if direction > 0 else 18, direction, shot)
@@ -91,14 +91,14 @@ def test_what_slides_keeps_its_length_and_what_lies_in_the_shot_its_place(direct
 
 def test_what_is_longer_than_the_shot_covers_it_and_holds_its_end():
     moment, shot = sliding([LONG, SHARP]), range(10, 13)
-    found = exposed(compositor.slid(moment, 12, 1, shot), 12, 1, shot)
+    found = exposed(windows.slid(moment, 12, 1, shot), 12, 1, shot)
     assert found == [{10: 1, 11: 2, 12: 12}, {12: 1}]
 
 
 def test_the_last_filmed_frame_lasts_as_long_as_others():
     """So that what is sharp stays so where there are in-between frames."""
     still = sliding([[0, 0, 0, 0, 1, 1, 1, 1, 0, 0, 0, 0], [1] * 12], step=4)
-    found = exposed(compositor.slid(still, 36, 1, range(37)), 36, 1, range(37))
+    found = exposed(windows.slid(still, 36, 1, range(37)), 36, 1, range(37))
     assert found == [{36: 4}, {**dict.fromkeys(range(28, 36), 1), 36: 4}]
 
 
@@ -119,7 +119,7 @@ def test_whatever_slides(bars, position, direction, count, place):
     shot = range(20, 20 + count)
     index = 20 + place % count
     held = FrameState(Options(len(bars[0]), position=position), moment.bars)
-    found = exposed(compositor.slid(moment, index, direction, shot), index, direction, shot)
+    found = exposed(windows.slid(moment, index, direction, shot), index, direction, shot)
     for before, after in zip(exposed(held, index, direction, range(100)), found, strict=True):
         first, last = min(before), max(before)
         assert sum(after.values()) == sum(before.values())
@@ -138,15 +138,15 @@ def test_whatever_slides(bars, position, direction, count, place):
 )
 def test_what_a_window_reaches_is_what_its_shutters_expose(exposed, position, step, direction):
     options = Options(len(exposed), position=position, step=step)
-    positions = compositor.window_positions(options, 20, direction)
+    positions = windows.positions(options, 20, direction)
     state = FrameState(options, np.array([exposed], float))
     shown = positions[np.flatnonzero(exposed)]
-    assert compositor.reach(state, 20, direction) == (shown.min(), shown.max())
+    assert windows.reach(state, 20, direction) == (shown.min(), shown.max())
 
 
 def test_a_clip_of_one_frame():
     for edges in ("hold", "mirror", "shorten"):
-        indices = compositor.window_indices(Options(3, edges=edges), 0, range(1))
+        indices = windows.indices(Options(3, edges=edges), 0, range(1))
         assert set(indices.tolist()) <= {0, -1}
 
 

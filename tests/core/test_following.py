@@ -8,12 +8,13 @@ import numpy as np
 import pytest
 from made_recipes import key
 
-from shutter_addon.core.model import motions
+from shutter_addon.core.model import following, motions
+from shutter_addon.core.model.clip import Clip
 from shutter_addon.core.model.keyframes import Constant
 from shutter_addon.core.model.motions import Placement
-from shutter_addon.core.pixels import following
+from shutter_addon.core.model.state_at import state_at
 
-SOURCE = SimpleNamespace(count=40, width=64, height=48)
+SOURCE = Clip(width=64, height=48, count=40)
 
 
 def made(keys=(), position="start", edges="hold", follow="car", camera=(), strokes=(((0.4, 0.4), (0.6, 0.6)),)):
@@ -23,10 +24,13 @@ def made(keys=(), position="start", edges="hold", follow="car", camera=(), strok
 
 
 def state_of(source, frame, index, direction=1, shown=None):
-    effect = source.for_picture(SOURCE.width / SOURCE.height)
-    state = effect.at(frame)
+    """The effect at a frame; shown: the source frame at any, `index` at that one."""
     shown = shown or (lambda other: index + round(other - frame))
-    return following.followed(effect, state, following.Shown(frame, index, direction), SOURCE, shown)
+    time = SimpleNamespace(at=lambda other: (shown(other) + 1, direction < 0))
+    effect = dataclasses.replace(source.for_picture(SOURCE.width / SOURCE.height), time=time)
+    found = state_at(effect, SOURCE, frame)
+    assert (found.source_frame, found.direction) == (index, direction)
+    return found.state
 
 
 def followed(*arguments, **given):
@@ -69,7 +73,7 @@ def test_time_that_turns_back():
 
 def test_of_frames_passed_over_the_nearest_time_counts():
     """It is passed over a quarter of a frame before, and shown a frame after."""
-    shown = lambda other: 14 if other < 12 else 11  # noqa: E731
+    shown = lambda other: {11: 14, 12: 10}.get(other, 11)  # noqa: E731
     found = shifts(made(STRAIGHT, "center"), [11], frame=12, index=10, shown=shown)
     assert found == pytest.approx(np.array([-0.25]) * STEP)
 

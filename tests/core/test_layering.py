@@ -9,14 +9,15 @@ import pytest
 
 from shutter_addon.core.messages import EffectError
 from shutter_addon.core.model import limits
+from shutter_addon.core.model.clip import Clip
+from shutter_addon.core.model.state_at import state_at
 from shutter_addon.core.pixels import layering
-from shutter_addon.core.pixels.following import Shown
 from shutter_addon.core.recipes import recipe_file
 
 LINE = {"shutter": "S1", "name": "Cup", "strokes": [[[0.2, 0.4], [0.3, 0.6]]], "width": 0.1}
 MOVED = LINE | {"keys": [{"frame": 1}, {"frame": 101, "location": [1.0, 0.0]}]}
 RAMP = {"shutter": "S0", "name": "Ramp", "kind": "ramp", "ramp": "linear"}
-SOURCE = SimpleNamespace(width=64, height=36, count=60)
+SOURCE = Clip(width=64, height=36, count=60)
 
 
 def effect(*regions, **more):
@@ -25,10 +26,11 @@ def effect(*regions, **more):
     return recipe_file.parse(json.dumps(data)).for_picture(SOURCE.width / SOURCE.height)
 
 
-def layers(found, frame=21.0, shown=lambda frame: int(frame) - 1, index=20):
-    state = found.at(frame)
-    at = Shown(frame, index)
-    return state, layering.layered(found, state, at, SOURCE, lambda other: min(max(shown(other), 0), 59)).layers
+def layers(found, frame=21.0, shown=lambda frame: int(frame) - 1):
+    """The effect at a frame, and its layers there; shown: the source frame at any."""
+    time = SimpleNamespace(at=lambda other: (shown(other) + 1, False))
+    state = state_at(dataclasses.replace(found, time=time), SOURCE, frame).state
+    return state, state.layers
 
 
 def test_a_layer_is_no_scribble_of_what_lies_behind_it():
@@ -60,7 +62,7 @@ def test_its_mattes_are_known_in_the_window_and_as_far_as_plates_reach():
 
 
 def test_the_frames_of_a_clip_that_is_short():
-    found = layers(effect(MOVED | {"layer": True}), 60.0, index=59)[1]
+    found = layers(effect(MOVED | {"layer": True}), 60.0)[1]
     assert found.frames == range(57, 60)
 
 
@@ -74,8 +76,8 @@ def test_in_a_slow_source_between_two_timeline_frames():
 def test_it_begins_and_ends_with_its_opacity():
     keys = [{"frame": 1, "value": 0, "ease": "constant"}, {"frame": 20, "value": 0.5}]
     found = effect(LINE | {"layer": True, "opacity": keys})
-    assert layers(found, 19.0, index=18)[1] is None
-    assert layers(found, 20.0, index=19)[1].opacities == (0.5,)
+    assert layers(found, 19.0)[1] is None
+    assert layers(found, 20.0)[1].opacities == (0.5,)
     assert layers(found)[1].scribbles[-1].shapes[0].opacity == 1  # it is weighed afterwards
 
 
@@ -97,7 +99,7 @@ def test_keys_are_equal_for_equal_layers_alone():
     found = effect(MOVED | {"layer": True})
     same, other = layers(found)[1], layers(effect(LINE | {"layer": True}))[1]
     assert layers(found)[1].key == same.key != other.key
-    assert same.key_at(20) == layers(found, 22.0, index=21)[1].key_at(20)
+    assert same.key_at(20) == layers(found, 22.0)[1].key_at(20)
     half = dataclasses.replace(same, opacities=(0.5,))
     assert half.key != same.key
 

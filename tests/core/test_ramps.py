@@ -86,7 +86,7 @@ def test_values_stay_within_0_and_1():
 
 
 class Opened:
-    count, filmed, fps, step = 20, 20, None, 1
+    width, height, count, fps, step = 8, 8, 20, None, 1
 
 
 def test_which_frame_of_a_file_is_shown():

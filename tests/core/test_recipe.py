@@ -9,10 +9,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from made_recipes import comes_back, is_same, key, made
 
-from shutter_addon.core.model import limits, mattes, scribbles
+from shutter_addon.core.model import limits, mattes, scribbles, windows
 from shutter_addon.core.model.frame_state import Options
 from shutter_addon.core.model.motions import Placement
-from shutter_addon.core.pixels.compositor import window_positions
 from shutter_addon.core.recipes import recipe, recipe_file
 
 EXAMPLE = {
@@ -516,7 +515,7 @@ def test_bars_are_open_at_the_same_times_at_another_factor(window, old, new, pos
     def light(found):
         """Of each sixteenth of a filmed frame, from frame -20 to frame 40; of as many as the coarser has together."""
         options = found.options.at(1)
-        positions = window_positions(options, 10 * options.step, direction) + 20 * options.step
+        positions = windows.positions(options, 10 * options.step, direction) + 20 * options.step
         spread = np.zeros(60 * options.step)
         spread[positions] = found.bars_at(0, 1) / options.step
         each = np.repeat(spread * options.step / fine, fine // options.step)
@@ -530,7 +529,7 @@ def test_a_still_frame_stays_where_it_is(position):
     """In reverse as well: of the filmed frame's time the last part comes first."""
     for direction in (1, -1):
         options = Options(64, position=position, step=8)
-        positions = window_positions(options, 80, direction)[options.before : options.before + 8]
+        positions = windows.positions(options, 80, direction)[options.before : options.before + 8]
         assert sorted(positions) == list(range(80, 88))
 
 

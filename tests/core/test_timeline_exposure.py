@@ -5,8 +5,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from shutter_addon.core.model import timeline_exposure
 from shutter_addon.core.model.frame_state import Options
-from shutter_addon.core.pixels import timeline_exposure
 
 HALF = [1, 1, 1, 1, 0, 0, 0, 0]  # 180°
 OPEN = [1] * 8

@@ -11,14 +11,16 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from made_recipes import comes_back, key, made
 
-from shutter_addon.core.model import shutters
+from shutter_addon.core.model import shutters, trails, windows
+from shutter_addon.core.model.clip import Clip
 from shutter_addon.core.model.effect import Moves
 from shutter_addon.core.model.keyframes import Constant
-from shutter_addon.core.pixels import compositor, following, trails
+from shutter_addon.core.model.state_at import state_at
+from shutter_addon.core.pixels import compositor
 from shutter_addon.core.recipes import recipe_file
 
 WINDOW = 24
-SOURCE = SimpleNamespace(count=60, width=160, height=100)
+SOURCE = Clip(width=160, height=100, count=60)
 
 
 def with_length(*arguments):
@@ -130,10 +132,10 @@ def with_options(source, **options):
 
 def followed(source, frame, direction=1):
     effect = source.for_picture(SOURCE.width / SOURCE.height)
-    index = frame - 1 if direction > 0 else SOURCE.count - frame
-    shown = lambda other: index + direction * round(other - frame)  # noqa: E731
-    state = compositor.slid(effect.at(frame), index, direction, range(SOURCE.count), whole=True)
-    return following.followed(effect, state, following.Shown(frame, index, direction), SOURCE, shown), index
+    if direction < 0:
+        effect = replace(effect, time=SimpleNamespace(at=lambda other: (SOURCE.count - other + 1, True)))
+    index, state, _direction = state_at(effect, SOURCE, frame)
+    return state, index
 
 
 def streak(source, frame):
@@ -141,7 +143,7 @@ def streak(source, frame):
     state, index = followed(source, frame)
     still = np.broadcast_to((np.arange(400) > 200)[None, :, None], (1, 400, 4)).astype(float)
     still[..., 3] = 1
-    frames = compositor.window_indices(state.options, index, range(SOURCE.count))
+    frames = windows.indices(state.options, index, range(SOURCE.count))
     moves = state.following.at(frames)
     picture = compositor.compose(state, [still] * len(frames), frames >= 0, np.ones((1, 1, 400)), moves)
     grey = picture[0, :, 0]
@@ -171,9 +173,9 @@ def test_what_slides_is_as_long_at_the_clips_end_and_lies_within(bars):
     source = accelerating(0.3, bars=bars, edges="slide")
     assert [streak(source, frame) for frame in (45, 57, 60)] == pytest.approx([30] * 3, rel=0.06)
     state, index = followed(source, SOURCE.count)
-    assert compositor.reach(state, index)[1] == SOURCE.count - 1
+    assert windows.reach(state, index)[1] == SOURCE.count - 1
     held, index = followed(with_options(source, edges="hold"), SOURCE.count)
-    assert compositor.reach(held, index)[1] > SOURCE.count + 3
+    assert windows.reach(held, index)[1] > SOURCE.count + 3
 
 
 def test_for_how_long_a_shutter_is_open_is_told():
@@ -208,10 +210,7 @@ def test_a_reversed_source():
 def test_in_between_frames_count_as_the_parts_of_one():
     plain, _ = followed(accelerating(0.2), 40)
     source = with_options(accelerating(0.2, bars=(1.0,) * 4 * WINDOW), step=4)
-    effect, fine = source.for_picture(1.6), SimpleNamespace(count=4 * SOURCE.count, width=160, height=100)
-    state = following.followed(
-        effect, effect.at(40), following.Shown(40, 156), fine, lambda other: 4 * round(other - 1)
-    )
+    state = state_at(source.for_picture(1.6), replace(SOURCE, count=4 * SOURCE.count, step=4), 40).state
     assert open_frames(state.bars[0]) == pytest.approx(4 * open_frames(plain.bars[0]), rel=0.03)
 
 

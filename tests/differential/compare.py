@@ -246,32 +246,28 @@ def nudged(asked):
 def asked_of(case: Case, source, folder: Path):
     """The Request for the case's frame, as a render session makes it."""
     from shutter_addon.compute.request import Request
-    from shutter_addon.core.frames.retiming import nearest
-    from shutter_addon.core.pixels import compositor, following, layering, timeline_exposure
+    from shutter_addon.core.frames.retiming import StripTiming
+    from shutter_addon.core.model.clip import Clip
+    from shutter_addon.core.model.state_at import state_at
     from shutter_addon.core.recipes import recipe_file
 
     recipe = recipe_file.parse(case.recipe)
     effect = recipe.for_picture(source.width / source.height, partial(matte_file, folder, source))
-    last, index, direction = source.count - 1, case.index, case.direction
-
-    def place(frame: float) -> float:
-        if effect.time is None:
-            return min(max(case.index + case.direction * source.step * (frame - case.frame), 0), last)
-        return (effect.time.at(frame)[0] - 1) * source.step
-
-    def shows(frame: float) -> int:
-        return nearest(place(frame) / source.step, source.step, source.count)
-
-    ends = (0, last)
-    if effect.time is not None:
-        index, direction = shows(case.frame), -1 if effect.time.at(case.frame)[1] else 1
-        ends = (-np.inf, np.inf)
-    at = following.Shown(case.frame, index, direction)
-    state = timeline_exposure.exposed(effect, effect.at(case.frame), at, place, ends)
-    trails = any(shutter.has_trail for shutter in effect.shutters)
-    state = compositor.slid(state, index, direction, range(source.count), whole=trails)
-    state = following.followed(effect, state, at, source, shows)
-    return Request(index, layering.layered(effect, state, at, source, shows), direction)
+    way = case.direction * case.index / source.step
+    timing = StripTiming(
+        name="Footage",
+        first=0,
+        scene_fps=24.0,
+        content_start=case.frame - way,
+        content_end=case.frame - way + 1,  # where it plays backward, it ends there
+        content_trim_start=0,
+        content_trim_end=0,
+        left_handle=1,
+        use_reverse_frames=case.direction < 0,
+        strobe=1.0,
+    )
+    clip = Clip(width=source.width, height=source.height, count=source.count, step=source.step, timing=timing)
+    return Request(*state_at(effect, clip, case.frame))
 
 
 def exact_layers(case: Case, source, footage, index: int, direction: int) -> dict:

@@ -16,8 +16,8 @@ from reference import DEFAULTS, layers_at, picture, shown
 
 from shutter_addon.compute import cpu, gpu, plates
 from shutter_addon.core.frames import light
-from shutter_addon.core.model import keyframes, mattes, scribbles, shutters
-from shutter_addon.core.pixels import combined, compositor, following, layering, trails
+from shutter_addon.core.model import following, keyframes, mattes, scribbles, shutters, trails, windows
+from shutter_addon.core.pixels import combined, compositor, layering
 from shutter_addon.devices import gl
 from shutter_addon.devices.passes import SHADERS
 from shutter_addon.media import matte_values
@@ -192,7 +192,7 @@ FAULTS = {
     ),
     "no displacement": (shutters, "displace", shutters.mix),
     "another curve": (light, "to_linear", lambda code: np.sign(code) * np.abs(code) ** 2.2),
-    "an edge twice": (compositor, "source_frames", lambda *given: twice(*given)),
+    "an edge twice": (windows, "source_frames", lambda *given: twice(*given)),
     "nothing followed": (following, "followed", lambda effect, state, *_: state),
     "a dull filter": (compositor, "seen", lambda frame, places, sharp: seen(frame, places, sharp=False)),
     "trails of no length": (trails, "with_length", lambda bars, *_: (bars, len(bars))),
@@ -210,10 +210,10 @@ FAULTS = {
     "the mean for the median": (combined, "weighted_median", lambda values, weights: mean(values, weights)),
     "thresholds that let all pass": (combined, "passes", lambda combine, luminance: np.ones_like(luminance)),
     "soft scribbles": (layering, "matte_of", lambda values: values),
-    "nothing slides": (compositor, "slid", lambda state, *_, **__: state),
-    "not normalised": (compositor, "source_frames", lambda options, places, shot: places.clip(0, shot.stop - 1)),
+    "nothing slides": (windows, "slid", lambda state, *_, **__: state),
+    "not normalised": (windows, "source_frames", lambda options, places, shot: places.clip(0, shot.stop - 1)),
 }
-eased, source_frames, solve = keyframes.eased, compositor.source_frames, cpu.Solver.solve
+eased, source_frames, solve = keyframes.eased, windows.source_frames, cpu.Solver.solve
 blended, ramp_values, coverage = mattes.blended, mattes.Ramp.values, mattes.coverage
 rasterise, seen = scribbles.rasterise, compositor.seen
 

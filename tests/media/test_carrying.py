@@ -62,7 +62,7 @@ class Footage:
     def __init__(self, folder, count=COUNT, cut=None):
         self.path = folder / "scene.png"
         self.path.write_bytes(b"the files of frames")
-        self.files, self.count, self.filmed, self.cut, self.asked = (self.path,), count, count, cut, []
+        self.files, self.count, self.cut, self.asked = (self.path,), count, cut, []
 
     def open(self):
         return self

@@ -27,7 +27,7 @@ class File:
 
 
 class Source:
-    count = filmed = COUNT
+    width, height, count = WIDTH, HEIGHT, COUNT
     fps, step = None, 1
 
     def __init__(self, log):

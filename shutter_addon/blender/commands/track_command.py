@@ -6,9 +6,9 @@ from contextlib import ExitStack, closing, contextmanager
 from dataclasses import replace
 
 from ...core import atomic_write
-from ...core.frames import retiming
 from ...core.messages import signed
 from ...core.model import outlines, presence
+from ...core.model.clip import nearest
 from ...core.model.effect import Effect, OutlineRegion, Region
 from ...core.recipes import recipe, recipe_file, region_keys
 from ...media import PrefetchSource, camera_tracking, filmed_frames, matte_tracking, registration, tracking
@@ -158,7 +158,7 @@ def _shown(source_recipe, frame: float, count: int) -> float:
     """Which of a source's frames, from 0 on, a recipe shows at a timeline frame; a fraction: an in-between one."""
     factor = source_recipe.options.at(1).step
     filmed = (source_recipe.time.at(frame)[0] if source_recipe.time else frame) - 1
-    return retiming.nearest(filmed, factor, (count - 1) * factor + 1) / factor
+    return nearest(filmed, factor, (count - 1) * factor + 1) / factor
 
 
 def _write_track(arguments, result, tracked: dict, stops: list) -> None:

@@ -2,7 +2,6 @@
 
 from collections.abc import Callable, Collection
 from contextlib import closing
-from dataclasses import dataclass
 from fractions import Fraction
 from functools import lru_cache
 from pathlib import Path
@@ -10,9 +9,9 @@ from pathlib import Path
 import bpy
 from bpy.app.translations import pgettext_rpt as rpt_
 
-from ...core.frames import retiming
 from ...core.messages import EffectError
 from ...core.model import keyframes, mattes, outlines
+from ...core.model.clip import Clip
 from ...core.model.effect import Moves, PlacedRamp
 from ...media import MediaError
 from ...media.carried_mattes import FOLDER, CarriedFile
@@ -109,31 +108,11 @@ def shown_frame(scene, effect, strip, time: keyframes.Channel | None) -> Callabl
     """What gives the source's frame that an effect strip shows at a timeline frame: filmed ones counted from 0, those
     between them in parts. time: see `content`. EffectError, MediaError: it cannot be known."""
     source = strips.source_of(scene, effect, strip)
-    medium, timing = _Medium.of(source, inbetween_settings.factor(effect)), strip_timing.timing_of(source)
-
-    def shown(frame):
-        if time is None:
-            return retiming.source_frame(timing, frame, medium) / medium.step
-        return retiming.nearest(time.at(frame)[0] - 1, medium.step, medium.count) / medium.step
-
-    return shown
-
-
-@dataclass
-class _Medium:
-    """A source's length and rate, for core.frames.retiming."""
-
-    filmed: int
-    step: int
-    count: int
-    fps: Fraction | None
-
-    @classmethod
-    def of(cls, source, step: int) -> "_Medium":
-        """MediaError: it cannot be read."""
-        spec = source_media.spec(source)
-        filmed, fps = (len(spec.files), None) if spec.files else _movie(spec)
-        return cls(filmed=filmed, step=step, count=(filmed - 1) * step + 1, fps=fps and fps * step)
+    spec, timing = source_media.spec(source), time or strip_timing.timing_of(source)
+    filmed, fps = (len(spec.files), None) if spec.files else _movie(spec)
+    size = 0, 0  # nothing of it is in pixels
+    clip = Clip(*size, filmed, fps=fps, timing=timing).stepped(inbetween_settings.factor(effect))
+    return lambda frame: clip.shown(frame).source_frame / clip.step
 
 
 @lru_cache(64)

@@ -20,10 +20,9 @@ from bpy.types import FCurve, PropertyGroup, Scene, Strip
 from ...core.frames.retiming import StripTiming
 from ...core.messages import EffectError, UserError, translated
 from ...core.model import effect as model
-from ...core.model import keyframes, limits, mattes, outlines
+from ...core.model import following, keyframes, limits, mattes, outlines
 from ...core.model.fields import fields_of
 from ...core.model.frame_state import Options
-from ...core.pixels import following
 from ...media.carried_mattes import CarriedFile
 from . import inbetween_settings, matte_content, sampled, source_media, strips, validation
 from .fcurves import Curves, Timed, leading, progress

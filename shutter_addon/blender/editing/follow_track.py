@@ -159,7 +159,8 @@ def clip_times(scene, effect, strip, clip) -> dict[int, float]:
     _check_footage(source, clip)
     shown, first = snapshot.take(scene, effect, strip, frames), _first_frame(source, clip)
     with effect_source.open_source(shown) as source:
-        return {frame: effect_source.source_index(shown, frame, source)[0] / source.step + first for frame in frames}
+        clip = effect_source.clip_of(shown, source)
+        return {frame: clip.shown(frame).source_frame / clip.step + first for frame in frames}
 
 
 def _points_at(tracks, time: float, size) -> Points:

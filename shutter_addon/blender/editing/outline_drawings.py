@@ -100,7 +100,7 @@ def picture_now(scene, effect, strip) -> np.ndarray:
     """The source's frame (H, W, 3) uint8 that is seen at the current frame. EffectError, MediaError: there is none."""
     shown = snapshot.take(scene, effect, strip, (scene.frame_current,))
     with effect_source.open_source(shown) as source:
-        samples = source.read(effect_source.source_index(shown, scene.frame_current, source)[0])
+        samples = source.read(effect_source.clip_of(shown, source).shown(scene.frame_current).source_frame)
         return flow.displayed(samples, source.transfer, source.alpha)
 
 

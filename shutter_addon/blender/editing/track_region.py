@@ -145,7 +145,8 @@ def track(
     del scene, effect, strip, keys, moving  # which may not outlive the first step
     with effect_source.open_source(shown) as source:
         try:
-            footage = Footage(source, lambda frame: effect_source.source_index(shown, frame, source)[0])
+            clip = effect_source.clip_of(shown, source)
+            footage = Footage(source, lambda frame: clip.shown(frame).source_frame)
             follow = partial(subject.follow, footage, start, frames, motion=motion.lower(), anchors=anchors)
             for step in _followed(follow, patience):
                 if step is None:

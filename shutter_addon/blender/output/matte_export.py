@@ -127,10 +127,11 @@ def _write_frames(scene, effect, strip, region, folder: Path, word: str = "png")
     shown = snapshot.take(scene, effect, strip, frames)
     content = snapshot.matte_content_at(scene, effect, strip, list(effect.regions).index(region), frames)
     with closing(effect_source.open_source(shown)) as source, closing(MatteValues.of(source)) as values:
+        clip = effect_source.clip_of(shown, source)
         for frame in frames:
             with translated(rpt_):
                 matte = mattes.Matte(shutter=0, content=content.at(frame))
-            ((key, array),) = values.values((matte,), effect_source.source_index(shown, frame, source)[0], 1)
+            ((key, array),) = values.values((matte,), clip.shown(frame).source_frame, 1)
             if word == "exr":
                 write_exr(folder / _name(frame, word), array[..., None], ["Y"])
             else:

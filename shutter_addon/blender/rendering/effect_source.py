@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import math
 import traceback
 from dataclasses import dataclass
 
 from ...core import told
-from ...core.frames import retiming
+from ...core.frames.frame_source import FrameSource
 from ...core.messages import EffectError, of_file
+from ...core.model.clip import Clip
 from ...devices.device import NoDeviceError
 from ...media import MediaError
 from ...media.cuts import ShotSource
@@ -91,26 +91,6 @@ def open_source(snapshot: Snapshot) -> ShotSource:
     return SourceKey.of(snapshot).open()
 
 
-def source_position(snapshot: Snapshot, frame: float, source: ShotSource) -> float:
-    """Where in an effect's source a timeline frame is, in frames, in-between ones counted."""
-    if snapshot.effect.time is not None:
-        return (snapshot.effect.time.at(frame)[0] - 1) * source.step
-    assert snapshot.timing is not None  # of a strip without source time
-    return retiming.source_position(snapshot.timing, frame, source)
-
-
-def source_ends(snapshot: Snapshot, source: ShotSource) -> tuple[float, float]:
-    """The first and the last position beyond which an effect's source stays; infinite: it goes on."""
-    if snapshot.timing is None:
-        return -math.inf, math.inf
-    return retiming.content_ends(snapshot.timing, source)
-
-
-def source_index(snapshot: Snapshot, frame: float, source: ShotSource) -> tuple[int, bool]:
-    """Which frame of an effect's source is shown at a timeline frame, in-between frames counted, and whether the source
-    runs backward there."""
-    if snapshot.effect.time is not None:
-        time, backward = snapshot.effect.time.at(frame)
-        return retiming.nearest(time - 1, source.step, source.count), backward
-    assert snapshot.timing is not None  # of a strip without source time
-    return retiming.source_frame(snapshot.timing, frame, source), snapshot.timing.use_reverse_frames
+def clip_of(snapshot: Snapshot, source: FrameSource) -> Clip:
+    """An effect's source as plain facts, with what tells when it is shown."""
+    return Clip.of(source, snapshot.effect.time or snapshot.timing)

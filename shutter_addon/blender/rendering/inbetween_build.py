@@ -124,7 +124,7 @@ class Build:
 def _needed(scene: Any, effect: Any, strip: Any, medium: FrameSource, settings: Any) -> list[int]:
     frames = range(strip.left_handle, strip.right_handle)
     try:
-        return strobing.pairs(snapshot.take(scene, effect, strip, frames), medium, settings)
+        return strobing.pairs(snapshot.take(scene, effect, strip, frames), medium, settings.factor)
     except ShutterError as error:
         raise EffectError(str(error)) from None
     finally:

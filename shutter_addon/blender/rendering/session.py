@@ -15,8 +15,7 @@ from ...compute.renderer import Renderer
 from ...compute.request import Request
 from ...core import threads
 from ...core.messages import translated
-from ...core.model.frame_state import FrameState
-from ...core.pixels import compositor, following, layering, timeline_exposure
+from ...core.model.state_at import state_at
 from ...core.pixels.matte_grid import block_means
 from ...core.stopping import never
 from ...devices.device import NoDeviceError
@@ -25,7 +24,7 @@ from ..data.snapshot import Snapshot
 from ..devices import available
 from . import render_settings
 from .device_work import Work, broken_off, result_of
-from .effect_source import FAULTS, FULL, Detail, SourceKey, source_ends, source_index, source_position
+from .effect_source import FAULTS, FULL, Detail, SourceKey, clip_of
 
 if TYPE_CHECKING:
     from .render_context import RenderContext
@@ -93,32 +92,16 @@ class RenderSession:
         detail: None: as it was the last time, for who asks for no picture"""
         known = self._renderers.get(snapshot.scene)
         key = SourceKey.of(snapshot, detail or (known[0].detail if known else FULL))
-        source: Any = self.renderer(key, context.say, context.stopped).source  # what the key has opened
+        source = self.renderer(key, context.say, context.stopped).source
         if (last := self._requests.get(snapshot.scene)) and last[0] is snapshot and last[1] == frame:
             request = last[2]
             if (request.source, request.levels, request.display) == (key, context.levels, context.display):
                 return request
         with translated(rpt_):
-            state = _in_blocks(snapshot.effect.at(frame), key.detail.divisor)
-            index, backward = source_index(snapshot, frame, source)
-            direction = -1 if backward else 1
-            shown = following.Shown(frame, index, direction)
-
-            def shown_at(other: float) -> int:
-                return source_index(snapshot, other, source)[0]
-
-            def position(other: float) -> float:
-                return source_position(snapshot, other, source)
-
-            ends = source_ends(snapshot, source)
-            state = timeline_exposure.exposed(snapshot.effect, state, shown, position, ends)
-            trails = any(shutter.has_trail for shutter in snapshot.effect.shutters)
-            state = compositor.slid(state, index, direction, range(source.count), whole=trails)
-            state = following.followed(snapshot.effect, state, shown, source, shown_at)
-            state = layering.layered(snapshot.effect, state, shown, source, shown_at)
+            index, state, direction = state_at(snapshot.effect, clip_of(snapshot, source), frame)
         request = Request(
             index=index,
-            state=state,
+            state=state.in_blocks(max(state.options.aggregate // key.detail.divisor, 1)),
             direction=direction,
             source=key,
             levels=context.levels,
@@ -151,10 +134,6 @@ class RenderSession:
             with suppress(*FAULTS):  # it is met again when the picture is asked for
                 request = self.request(snapshot, frame + step, context, FULL)
                 self._begun[snapshot.scene] = request.key, self._begin(request)
-
-    def coefficients(self, request: Request, stopped: Callable[[], bool] = never) -> np.ndarray:
-        """See Renderer.coefficients."""
-        return self.run(self.renderer(request.source).coefficients, request, stopped=stopped)
 
     def weights(self, request: Request, stopped: Callable[[], bool] = never) -> list[np.ndarray]:
         """Coefficients (h, w) of all shutters, and then the mattes of all layers, in blocks as large."""
@@ -221,25 +200,20 @@ class RenderSession:
 
     def keep(self, scenes: set[int]) -> None:
         """Closes what belongs to other scenes than those of these session_uids. A render job may take them away
-        meanwhile."""
+        meanwhile, or take up more."""
         self._drop_begun(set(self._begun) - scenes)
         for known in (self._shown, self._requests):
             for place in set(known) - scenes:
                 known.pop(place, None)
-        for place in set(self._renderers) - scenes:
-            _key, renderer = self._renderers.pop(place, (None, None))
-            if renderer is not None:
-                self._submit(renderer.close)
+        while gone := set(self._renderers) - scenes:
+            for place in gone:
+                _key, renderer = self._renderers.pop(place, (None, None))
+                if renderer is not None:
+                    self._submit(renderer.close)
 
     def forget(self) -> None:
-        """Closes all sources and frees the device; where Blender's GPU is not current, once it is. A render job may
-        take up more meanwhile."""
-        self._drop_begun(list(self._begun))
-        for known in (self._shown, self._requests):
-            known.clear()
-        while self._renderers:
-            _place, (_key, renderer) = self._renderers.popitem()
-            self._submit(renderer.close)
+        """Closes all sources and frees the device; where Blender's GPU is not current, once it is."""
+        self.keep(set())
         compositor, self._compositor = self._compositor, None
         if compositor is not None:
             with suppress(NoDeviceError):
@@ -263,11 +237,3 @@ def _weights(renderer: Renderer, request: Request) -> list[np.ndarray]:
     block = request.state.options.aggregate
     mattes = [block_means(matte, block) for matte in renderer.layer_mattes(request)]
     return [*renderer.coefficients(request), *mattes]
-
-
-def _in_blocks(state: FrameState, divisor: int) -> FrameState:
-    """The state with its blocks of pixels as large in a smaller picture."""
-    options = state.options
-    if divisor == 1 or options.aggregate == 1:
-        return state
-    return state.in_blocks(max(options.aggregate // divisor, 1))

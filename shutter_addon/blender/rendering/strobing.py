@@ -20,12 +20,10 @@ from ...compute.request import Request
 from ...core import threads
 from ...core.frames.frame_source import FrameSource
 from ...core.messages import translated
-from ...core.model import shutters
+from ...core.model import shutters, windows
 from ...core.model.frame_state import FrameState
 from ...core.model.motions import Similarity
-from ...core.pixels import compositor
 from ...media import MediaError, inbetween, steps
-from ...media.cuts import ShotSource
 from ..data import inbetween_settings
 from ..data.snapshot import Snapshot
 from ..data.source_media import SourceSpec
@@ -128,7 +126,7 @@ def _ways(renderer: Renderer, request: Request) -> dict[int, list[tuple[Similari
     options, count = state.options, state.options.step
     ways: dict[int, list[tuple[Similarity, Similarity]]] = {}
     shot = renderer.shot(request, known=True)
-    frames = compositor.window_indices(options, request.index, shot, request.direction)
+    frames = windows.indices(options, request.index, shot, request.direction)
     for i in _seen(state):
         if state.combines and state.combines[i].mode == "median":  # which leaves no streaks
             continue
@@ -176,18 +174,18 @@ def _count(strip: Any, snapshot: Snapshot, source: Any, request: Request) -> int
     all_pairs = source.filmed - 1
     if snapshot.timing is None:
         return all_pairs
-    ends = (effect_source.source_index(snapshot, at, source)[0] for at in (strip.left_handle, strip.right_handle - 1))
-    first, final = (index // options.step for index in ends)
+    clip = effect_source.clip_of(snapshot, source)
+    ends = strip.left_handle, strip.right_handle - 1
+    first, final = (clip.shown(frame).source_frame // options.step for frame in ends)
     return min(abs(final - first) + -(-options.window // options.step), all_pairs)
 
 
-def pairs(snapshot: Snapshot, medium: FrameSource, settings: inbetween_settings.Settings) -> list[int]:
+def pairs(snapshot: Snapshot, medium: FrameSource, factor: int) -> list[int]:
     """The pairs of filmed frames, each by its first, ascending, whose in-between frames an effect strip needs with
-    these settings, in place of its own, at the snapshot's frames: those across cuts as well, which take no time.
+    this factor, in place of its own, at the snapshot's frames: those across cuts as well, which take no time.
     EffectError, MediaError: that cannot be known."""
-    factor = settings.factor
     needed: set[int] = set()
-    source = ShotSource(inbetween.InbetweenSource(medium, *settings), factor)
+    clip = effect_source.clip_of(snapshot, medium).stepped(factor)
     moved = (
         shutter.has_trail or shutter.length == "timeline" or shutter.use_threshold
         for shutter in snapshot.effect.shutters
@@ -199,15 +197,15 @@ def pairs(snapshot: Snapshot, medium: FrameSource, settings: inbetween_settings.
         options, position = state.options, state.options.position
         bars = np.stack([shutters.multiplied(row, options.step, factor, position) for row in state.bars])
         options = replace(options, step=factor, window=bars.shape[1])
-        index, backward = effect_source.source_index(snapshot, frame, source)
-        places = compositor.window_positions(options, index, -1 if backward else 1)
+        _frame, index, direction = clip.shown(frame)
+        places = windows.positions(options, index, direction)
         if options.edges == "mirror":  # at a cut, on the other side of it
             places = np.arange(places.min() - options.window, places.max() + options.window + 1)
         elif options.edges != "shorten" and not has_trails:
             places = places[slice(*shutters.open_span(bars))]
         if options.edges == "slide":  # at an end, or a cut that is not known yet
             places = np.append(places, np.arange(index - len(places) + 1, index + len(places)))
-        shown = compositor.source_frames(options, np.append(places, index), range(source.count))
+        shown = windows.source_frames(options, np.append(places, index), range(clip.count))
         needed.update((shown[(shown >= 0) & (shown % factor > 0)] // factor).tolist())
     return sorted(needed)
 

@@ -1,12 +1,9 @@
-"""Which source frame a strip of Blender's sequencer shows at a timeline frame: trimmed, retimed, reversed, strobed."""
+"""How a strip of Blender's sequencer lies on the timeline: trimmed, retimed, reversed, strobed."""
 
 import math
-from bisect import bisect_left
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
-from fractions import Fraction
+from dataclasses import dataclass
 from itertools import pairwise
-from typing import Protocol
 
 import numpy as np
 
@@ -45,67 +42,15 @@ class StripTiming:
     keys: tuple[RetimingKey, ...] = ()
     is_known: bool = True
 
-
-class Medium(Protocol):
-    """What a strip shows, opened: a FrameSource that says how many of its frames were filmed, every `step`-th."""
-
-    fps: Fraction | None
-    count: int
-    filmed: int
-    step: int
+    @property
+    def start(self) -> int:
+        """The frame of the medium that is shown first, as far as it is not retimed."""
+        return self.first + self.content_trim_start
 
 
-def source_frame(strip: StripTiming, frame: float, medium: Medium) -> int:
-    """Frame of the medium that a source strip shows at a timeline frame.
-
-    Trims, cuts, playback rate, retiming keys, reversed frames and strobe as Blender's sequencer applies them. Where
-    there are frames between filmed ones, it is the nearest of all, which Blender knows nothing of.
-    """
-    length, rate = _content(strip, medium)
-
-    def position(time: float) -> np.float32:
-        return _position(strip, rate, length, time)
-
-    first = strip.content_trim_start + strip.first
-    if medium.step > 1:
-        return nearest(first + float(position(frame)), medium.step, medium.count)
-    # Blender rounds a position to the nearest frame, but caches the result by the position's whole part. So a slow
-    # strip that plays forward shows, for all positions with one whole part, the frame nearest to the first of them.
-    whole = int(position(frame))
-    earlier = range(1, max(math.floor(frame - strip.left_handle), 0) + 1)
-    frame -= bisect_left(earlier, True, key=lambda back: int(position(frame - back)) != whole)
-    index = math.floor(position(frame) + np.float32(0.5))
-    return first + min(index, length - 1)
-
-
-def source_position(strip: StripTiming, frame: float, medium: Medium) -> float:
-    """Where in the medium a strip is at a timeline frame, in frames, in-between ones counted; source_frame has one of
-    those that are beside it."""
-    length, rate = _content(strip, medium)
-    position = float(_position(replace(strip, strobe=1.0), rate, length, frame))
-    return (strip.content_trim_start + strip.first + position) * medium.step
-
-
-def content_ends(strip: StripTiming, medium: Medium) -> tuple[float, float]:
-    """The first and the last of what source_position gives."""
-    first, (length, _rate) = strip.content_trim_start + strip.first, _content(strip, medium)
-    return float(first * medium.step), float((first + length - 1) * medium.step)
-
-
-def nearest(filmed: float, step: int, count: int) -> int:
-    """The frame that is nearest to a time, which counts filmed frames from 0 on, of a medium that has so many frames,
-    every step-th of which was filmed."""
-    return min(max(math.floor(filmed * step + 0.5), 0), count - 1)
-
-
-def _content(strip: StripTiming, medium: Medium) -> tuple[int, float]:
-    """How many filmed frames of the medium a strip has, and how many pass in a timeline frame before it is retimed."""
-    length = max(1, medium.filmed - strip.content_trim_start - strip.content_trim_end)
-    return length, _playback_rate(strip, length, float(medium.fps or 0) / medium.step / strip.scene_fps)
-
-
-def _position(strip: StripTiming, rate: float, length: int, frame: float) -> np.float32:
-    """Where in the strip's content a timeline frame lies, in frames; in float32 as Blender reckons, ties included."""
+def position(strip: StripTiming, rate: float, length: int, frame: float) -> np.float32:
+    """Where in the strip's content, of so many frames, a timeline frame lies, in frames; in float32 as Blender reckons,
+    ties included. rate: of playback_rate"""
     end = strip.content_end - 1
     position = np.float32(max(end - frame if strip.use_reverse_frames else frame - strip.content_start, 0.0))
     position *= np.float32(rate)
@@ -117,9 +62,10 @@ def _position(strip: StripTiming, rate: float, length: int, frame: float) -> np.
     return position
 
 
-def _playback_rate(strip: StripTiming, length: int, rate: float) -> float:
-    """Source frames per timeline frame: 1, or the movie's rate over the scene's if the strip was added to keep its
-    speed. Blender does not tell which; the strip's length does."""
+def playback_rate(strip: StripTiming, length: int, fps: float) -> float:
+    """Source frames per timeline frame, before it is retimed: 1, or the movie's rate over the scene's if the strip was
+    added to keep its speed. Blender does not tell which; the strip's length does."""
+    rate = fps / strip.scene_fps
     if rate <= 0:  # images
         return 1.0
     shown = strip.content_end - strip.content_start

@@ -30,7 +30,7 @@ class Options:
     window: L, its length in frames, in-between frames included
     edge_aware: 0 to 1, how much coefficients stop at the edges of the shown frame (core.pixels.conductances)
     step: frames for each filmed one: 1, or the factor of in-between frames
-    slid: how many frames later the window lies than its position says (core.pixels.compositor.slid)
+    slid: how many frames later the window lies than its position says (core.model.windows.slid)
     """
 
     window: int = whole(
@@ -279,6 +279,8 @@ class FrameState:
 
     def in_blocks(self, aggregate: int) -> FrameState:
         """The state with blocks of another size, those of what is drawn of layers as well."""
+        if aggregate == self.options.aggregate:
+            return self
         layers = self.layers
         if layers is not None:
             drawn = tuple(state and state.in_blocks(aggregate) for state in layers.scribbles)

@@ -12,7 +12,8 @@ from typing import Literal, Protocol
 
 import numpy as np
 
-from ..frames.retiming import Medium, StripTiming, source_frame
+from ..frames.retiming import StripTiming
+from .clip import Clip, Medium
 from .outlines import Curves, coverage
 
 Blend = Literal["over", "add"]
@@ -31,10 +32,7 @@ class MatteFile(Hashable, Protocol):
 
 
 class MatteSource(Medium, Protocol):
-    """What was opened: width and height in pixels."""
-
-    width: int
-    height: int
+    """What was opened."""
 
     def read(self, index: int) -> np.ndarray:
         """The values (height, width) float32 of a frame, 0 to 1, top row first. Beyond its ends the nearest one's.
@@ -72,7 +70,7 @@ class FileFrame:
             return shown + self.offset
         if self.timing is None:
             return math.floor(self.time) + self.offset
-        return source_frame(self.timing, self.time, source)
+        return Clip.of(source, self.timing).shown(self.time).source_frame
 
 
 @dataclass(frozen=True)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import replace
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -11,7 +10,7 @@ from numpy.typing import ArrayLike
 from ..frames import light
 from ..model import shutters
 from ..model.combining import Combine
-from ..model.frame_state import FrameState, Options
+from ..model.frame_state import FrameState
 from . import combined
 
 # By how much of a frame the window's earlier ones are preferred, where the nearest frame is shown: of two that are as
@@ -19,76 +18,9 @@ from . import combined
 CLOSE = 1e-3
 # Light of which nothing becomes infinite as it is encoded in float32.
 _MOST = 1e37
-# Of an exposure: rounding may leave as much in a bar that is closed.
-_CLOSED = 1e-9
 
-
-def window_positions(options: Options, index: int, direction: int = 1) -> np.ndarray:
-    """Where the window's frames (L,) lie around source frame `index`, beyond the clip's ends as well.
-
-    direction: 1, or −1 where the source plays in reverse, and the window's next frames are those before `index`. A
-    filmed frame lasts until the next one, so that in reverse its in-between frames come first, from the last one on.
-    """
-    return origin(options, index, direction) + direction * np.arange(options.window)
-
-
-def reach(state: FrameState, index: int, direction: int = 1) -> tuple[int, int]:
-    """The first and the last of the positions that any shutter exposes."""
-    first = origin(state.options, index, direction)
-    ends = [first + direction * place for place in (state.open_span[0], state.open_span[1] - 1)]
-    return min(ends), max(ends)
-
-
-def origin(options: Options, index: int, direction: int = 1) -> int:
-    """The position of the window's first frame; arguments like those of `window_positions`."""
-    return (index if direction > 0 else index + options.step - 1) - direction * options.before
-
-
-def slid(state: FrameState, index: int, direction: int, shot: range, *, whole: bool = False) -> FrameState:
-    """The state whose edges "slide", with the bars of shutters that reach beyond the ends of `shot` moved back into it,
-    each shutter's by no more frames than it has to; one that is longer than the shot covers it, and goes beyond.
-
-    whole: the window moves even if no bars do, as trails may become as long as it is. Else it moves with them, as it
-    has no room for all otherwise"""
-    options = state.options
-    first, last_filmed = origin(options, index, direction), (shot.stop - 1) // options.step * options.step
-    ends = shot.start, last_filmed + options.step - 1  # a filmed frame lasts until the next one
-    low, high = sorted(direction * (end - first) for end in ends)
-
-    def way(start: int, stop: int) -> int:
-        return sorted((0, low - start, high + 1 - stop))[1]
-
-    spans = [shutters.open_span(bars > _CLOSED * bars.sum()) for bars in state.bars]
-    if options.edges != "slide" or not (whole or any(way(*span) for span in spans)):
-        return state
-    moved, by = np.zeros_like(state.bars), way(0, options.window)
-    for new, bars, (start, stop) in zip(moved, state.bars, spans, strict=True):
-        place = start + way(start, stop) - by
-        new[place : place + stop - start] = bars[start:stop]
-    return replace(state, bars=moved, options=replace(options, slid=options.slid + by))
-
-
-def source_frames(options: Options, positions: np.ndarray, shot: range) -> np.ndarray:
-    """The frames that are seen at `positions` by a window that shows those of `shot` alone; −1: none.
-
-    shot: range(count) for a whole clip, or the frames between two of its cuts.
-    Past its ends "hold" repeats the last frame, as "slide" does where bars are not moved (`slid`); "mirror" plays back
-    from it without showing it twice.
-    "shorten" leaves frames out, but keeps the nearest when all lie outside.
-    """
-    first, count = shot.start, len(shot)
-    held = np.minimum(np.maximum(positions, first), shot.stop - 1)  # quicker than np.clip for so few
-    if options.edges == "mirror" and count > 1:
-        folded = np.mod(positions - first, 2 * (count - 1))
-        return first + np.where(folded < count, folded, 2 * (count - 1) - folded)
-    if options.edges == "shorten" and (positions == held).any():
-        return np.where(positions == held, held, -1)
-    return held
-
-
-def window_indices(options: Options, index: int, shot: range, direction: int = 1) -> np.ndarray:
-    """Source frames (L,) of the window around source frame `index`; −1: left out. Arguments as above."""
-    return source_frames(options, window_positions(options, index, direction), shot)
+# Turns and shifts, frame by frame (motions.Similarity).
+Moves = tuple[np.ndarray, np.ndarray]
 
 
 def mixed_shutter(state: FrameState, coefficients: ArrayLike) -> np.ndarray:
@@ -115,7 +47,7 @@ def compose(
     frames: Sequence[np.ndarray],
     present: ArrayLike,
     coefficients: ArrayLike,
-    moves: tuple[np.ndarray, np.ndarray] | None = None,
+    moves: Moves | None = None,
     sharp: bool | None = None,
 ) -> np.ndarray:
     """The picture (H, W, 4) float64, scene-linear and premultiplied: F = e(q) · ∫ V(t + ⌊Q⁻¹(z)⌋) dz (§3.1, §3.4.1); or
@@ -146,7 +78,7 @@ def _composed(
     frames: Sequence[np.ndarray],
     present: np.ndarray,
     coefficients: np.ndarray,
-    moves: tuple[np.ndarray, np.ndarray] | None,
+    moves: Moves | None,
     sharp: bool,
 ) -> np.ndarray:
     """As `compose`, of shutters that combine alike."""
@@ -156,19 +88,18 @@ def _composed(
     y, x = np.indices(coefficients.shape[1:])
     own = x + 1j * y
 
-    def look(k: int, turns: np.ndarray | None, shifts: np.ndarray | None) -> np.ndarray:
-        if turns is None or shifts is None:
-            return frames[k]
-        return seen(frames[k], turns[k] * own + shifts[k], sharp=sharp)
+    def look(k: int, motion: Moves | None) -> np.ndarray:
+        return frames[k] if motion is None else seen(frames[k], motion[0][k] * own + motion[1][k], sharp=sharp)
 
+    motions = _motions(state, coefficients, moves)
     total = np.zeros((*x.shape, 4))
-    for weights, *moved in _exposed(state, coefficients, present, moves):
+    for weights, motion in zip(_exposed(state, coefficients, present, moves), motions, strict=True):
         for k in np.flatnonzero(weights.any(axis=(0, 1))).tolist():
-            total = total + weights[..., k, None] * look(k, *moved)
+            total = total + weights[..., k, None] * look(k, motion)
     if combine.mode == "average":
         gain = np.einsum("n,nhw->hw", state.gains, coefficients)[..., None]
         return (_decode(total) if encoded else total) * np.concatenate([gain, gain, gain, np.ones_like(gain)], axis=-1)
-    samples = _samples(combine, state, coefficients, present, moves, look)
+    samples = _samples(combine, state, coefficients, present, moves, lambda k: [look(k, each) for each in motions])
     if not samples:
         return _decode(total) if encoded else total
     found = combined.of_samples(combine, samples, encoded=encoded)
@@ -189,28 +120,23 @@ def _samples(
     state: FrameState,
     coefficients: np.ndarray,
     present: np.ndarray,
-    moves: tuple[np.ndarray, np.ndarray] | None,
-    look: Callable[[int, np.ndarray | None, np.ndarray | None], np.ndarray],
+    moves: Moves | None,
+    looks_at: Callable[[int], list[np.ndarray]],
 ) -> list[combined.Sample]:
-    """The frames that are there. By value interpolation, of what follows several motions, those of a frame are mixed,
-    by how much it counts by each."""
+    """The frames that are there. What is seen of one by several motions is mixed, by how much it counts by each."""
     options, bars = state.options, state.bars
-    apart = [] if moves is None else [part.T[:, :, None, None] for part in moves]
     if moves is not None and options.interpolation == "value":
         alone = np.stack([combined.counts(combine, row, np.ones(1), options.interpolation) for row in bars])
         weights, shares = coefficients[..., None] * alone[:, None, None], coefficients
-        turns, shifts = (list(part) for part in apart)
     else:
         weights = combined.counts(combine, bars, np.moveaxis(coefficients, 0, -1), options.interpolation)[None]
         shares = np.ones(weights.shape[:-1])
-        mixed: list = [None] if moves is None else [np.einsum("ln,nhw->lhw", part, coefficients) for part in moves]
-        turns, shifts = [mixed[0]], [mixed[-1]]
     samples = []
     counted = weights.any(axis=(0, 1, 2))
     if combine.threshold is not None:
         counted[options.before] = True
     for k in np.flatnonzero(counted & present).tolist():
-        looks = [look(k, *moved) for moved in zip(turns, shifts, strict=True)]
+        looks = looks_at(k)
         weight = weights[..., k].sum(axis=0)
         light_ = sum(own[..., k, None] * sight for own, sight in zip(weights, looks, strict=True))
         shown = sum(share[..., None] * sight for share, sight in zip(shares, looks, strict=True))
@@ -219,21 +145,25 @@ def _samples(
     return samples
 
 
-def _exposed(
-    state: FrameState, coefficients: np.ndarray, present: np.ndarray, moves: tuple[np.ndarray, np.ndarray] | None
-) -> list[tuple]:
-    """What is summed: weights (H, W, L) of the frames, and the turns and shifts (L, H, W), or None, by which each is
-    seen there."""
+def _motions(state: FrameState, coefficients: np.ndarray, moves: Moves | None) -> list[Moves | None]:
+    """The motions by which each frame is seen: by value interpolation those of all shutters, else what pixels have of
+    them."""
+    if moves is None:
+        return [None]
+    turns, shifts = moves
+    if state.options.interpolation == "value":
+        return list(zip(turns.T[:, :, None, None], shifts.T[:, :, None, None], strict=True))
+    return [(np.einsum("ln,nhw->lhw", turns, coefficients), np.einsum("ln,nhw->lhw", shifts, coefficients))]
+
+
+def _exposed(state: FrameState, coefficients: np.ndarray, present: np.ndarray, moves: Moves | None) -> np.ndarray:
+    """The weights (M, H, W, L) with which the frames are summed, as they are seen by each of `_motions`."""
     normalised = state.bars / state.bars.sum(axis=1, keepdims=True)
     if moves is not None and state.options.interpolation == "value":
-        q = coefficients[..., None] * normalised[:, None, None]
-        apart = (part.T[:, :, None, None] for part in moves)
-        return list(zip(_without_absent(q, coefficients, present), *apart, strict=True))
+        return _without_absent(coefficients[..., None] * normalised[:, None, None], coefficients, present)
     between = shutters.INTERPOLATIONS[state.options.interpolation]
-    q = between(normalised, np.moveaxis(coefficients, 0, -1))
-    (weights,) = _without_absent(q[None], np.ones(coefficients[:1].shape), present)
-    mixed = [None, None] if moves is None else [np.einsum("ln,nhw->lhw", part, coefficients) for part in moves]
-    return [(weights, *mixed)]
+    q = between(normalised, np.moveaxis(coefficients, 0, -1))[None]
+    return _without_absent(q, np.ones(coefficients[:1].shape), present)
 
 
 def seen(frame: np.ndarray, places: np.ndarray, *, sharp: bool) -> np.ndarray:

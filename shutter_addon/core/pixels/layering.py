@@ -13,20 +13,15 @@ light. Where Σ qₖ hₖ is less than CLEAR, too little of B was seen: a plate 
 
 from __future__ import annotations
 
-import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from ..frames import light
-from ..frames.frame_source import FrameSource
-from ..model import scribbles
-from ..model.effect import Camera, Effect, MatteRegion, Region
-from ..model.frame_state import Following, FrameState, Layers
-from ..model.mattes import Matte
-from . import compositor, following
+from ..model.frame_state import FrameState
+from . import compositor
 
 # The share of the exposure that must have fallen on what lies behind layers.
 CLEAR = 1 / 16
@@ -35,83 +30,6 @@ UNCOVERED = 1 - 2e-5
 # Diffused coefficients that are no matte yet, and those that are a whole one: far from its stroke a subject has little
 # more than half of its shutter, and what is around has a little of it (scripts/layer_truth.py).
 NONE, WHOLE = 0.3, 0.5
-
-Moves = tuple[np.ndarray, np.ndarray]
-
-
-def reach(state: FrameState) -> int:
-    """How many timeline frames before and after the shown one say where layers lie in the frames around it."""
-    return following.reach(state.options.window) + state.options.plate_reach
-
-
-def layered(
-    effect: Effect, state: FrameState, at: following.Shown, source: FrameSource, shown: Callable[[float], int]
-) -> FrameState:
-    """The effect's state at a timeline frame, with its layers; arguments as for following.followed, `shown` as far as
-    `reach`. EffectError: a layer lies nowhere."""
-    if not (regions := effect.layers_at(at.frame)):
-        return state
-    seen = following.seen(state.options, at.source_frame, at.direction, source.count)
-    beyond = state.options.plate_reach
-    frames = range(max(seen.start - beyond, 0), min(seen.stop + beyond, source.count))
-    times = following.times_of(shown, at.frame, at.source_frame, frames, reach(state))
-    drawn = [region for region in regions if isinstance(region, Region)]
-    moments = [(at.frame + math.floor(time - at.frame), (time - at.frame) % 1.0) for time in times]
-    return replace(
-        state,
-        layers=Layers(
-            shutters=tuple(region.shutter for region in regions),
-            opacities=tuple(float(region.opacity.at(at.frame)) for region in regions),
-            first=frames.start,
-            scribbles=tuple(_scribbles(effect, state, regions, drawn, *moment) for moment in moments),
-            mattes=tuple(tuple(_matte(region, *moment) for region in regions) for moment in moments),
-            camera=_camera_motion(effect.camera, at, times, frames, source),
-        ),
-    )
-
-
-def _matte(region: Region | MatteRegion, frame: float, share: float) -> Matte | None:
-    """Its matte at a time between a timeline frame and the next: that of the nearer one."""
-    return region.at(frame + round(share)) if isinstance(region, MatteRegion) else None
-
-
-def _scribbles(
-    effect: Effect, state: FrameState, regions: Sequence, drawn: list[Region], frame: float, share: float
-) -> FrameState | None:
-    """Layers.scribbles at a time between a timeline frame and the next."""
-    if not drawn:
-        return None
-    others = [region for region in effect.regions if isinstance(region, Region) and region not in drawn]
-    shapes = []
-    for region in (*others, *drawn):
-        shape = _between(region, frame, share)
-        if shape.opacity > 0:
-            number = 1 + regions.index(region) if region in drawn else 0
-            shapes.append(replace(shape, shutter=number, opacity=1.0))
-    options = replace(state.options, edge_aware=float(effect.edge_aware.at(frame + round(share))))
-    return FrameState(options=options, bars=np.ones((1 + len(regions), options.window)), shapes=tuple(shapes))
-
-
-def _between(region: Region, frame: float, share: float) -> scribbles.Shape:
-    before = region.at(frame)
-    if not share:
-        return before
-    after = region.at(frame + 1)
-    strokes = scribbles.between_strokes(before.strokes, after.strokes, share, region.drawings.aspect)
-    return replace(before, strokes=tuple(strokes), width=(1 - share) * before.width + share * after.width)
-
-
-def _camera_motion(
-    camera: Camera, at: following.Shown, times: list[float], frames: range, source: FrameSource
-) -> Following | None:
-    """Layers.camera, for all the frames."""
-    if camera.moves.is_still:
-        return None
-    size = source.width, source.height
-    subject = following.Followed("scale", 0, camera)
-    moves = [following.motion_to(subject, at.frame, time, size) for time in times]
-    turns, shifts = (np.array([[getattr(move, name)] for move in moves]) for name in ("turn", "shift"))
-    return Following(frames.start, turns.astype(np.complex128), shifts.astype(np.complex128)).of(slice(None))
 
 
 def matte_of(coefficients: ArrayLike) -> np.ndarray:
@@ -147,7 +65,7 @@ def compose(
     present: ArrayLike,
     coefficients: ArrayLike,
     mattes: np.ndarray,
-    moves: Moves | None = None,
+    moves: compositor.Moves | None = None,
     plate: np.ndarray | None = None,
 ) -> np.ndarray:
     """The picture (H, W, 4) float64 of a state with layers; arguments as for compositor.compose.
@@ -160,7 +78,7 @@ def compose(
     clear = np.stack([behind(list(of_frame)) for of_frame in np.swapaxes(mattes, 0, 1)])
 
     def exposed(
-        part: FrameState, weights: np.ndarray, c: ArrayLike, moved: Moves | None
+        part: FrameState, weights: np.ndarray, c: ArrayLike, moved: compositor.Moves | None
     ) -> tuple[np.ndarray, np.ndarray]:
         colors = [frame * weight[..., None] for frame, weight in zip(frames, weights, strict=True)]
         color = compositor.compose(part, colors, present, c, moved)

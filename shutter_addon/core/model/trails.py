@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..model import shutters
+from . import shutters
 
 # In frames.
 _SHORTEST = 1e-3

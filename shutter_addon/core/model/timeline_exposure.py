@@ -7,14 +7,13 @@ throughout; in a freeze, for the shown frame alone.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
 
-from ..model.effect import Effect
-from ..model.frame_state import FrameState, Options
-from .following import Shown
+from .clip import Clip, Shown
+from .effect import Effect
+from .frame_state import FrameState, Options
 
 # In frames: what is open for less is open in one.
 _SHORTEST = 1e-6
@@ -22,27 +21,17 @@ _SHORTEST = 1e-6
 _LEAST = 1e-9
 
 
-def exposed(
-    effect: Effect,
-    state: FrameState,
-    at: Shown,
-    position: Callable[[float], float],
-    ends: tuple[float, float],
-) -> FrameState:
+def exposed(effect: Effect, state: FrameState, clip: Clip, at: Shown) -> FrameState:
     """The effect's state at a timeline frame, with the bars of those shutters whose length is the timeline's, and for
-    how many frames they are open (FrameState.open_for).
-
-    position: where in the source, in frames, a timeline frame is; asked for the frame, those beside it, and halfway to
-    these
-    ends: the first and the last position that its strip shows"""
+    how many frames they are open (FrameState.open_for)."""
     chosen = [i for i, shutter in enumerate(effect.shutters) if shutter.length == "timeline"]
     if not chosen:
         return state
-    places = np.array([position(at.frame + k) for k in (-1, -0.5, 0, 0.5, 1)])
+    places = np.array([clip.position(at.frame + k) for k in (-1, -0.5, 0, 0.5, 1)])
     here = places[2]
-    if places[0] == here in ends:  # there a strip goes on with the same frame: it is no freeze
+    if places[0] == here in clip.ends:  # there a strip goes on with the same frame: it is no freeze
         places[:2] = 2 * here - places[:2:-1]
-    elif places[4] == here in ends:
+    elif places[4] == here in clip.ends:
         places[3:] = 2 * here - places[1::-1]
     bars, open_for = state.bars.copy(), dict(state.open_for)
     for index in chosen:

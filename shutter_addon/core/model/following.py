@@ -1,0 +1,162 @@
+"""What the exposures of shutters follow: where the points of the shown picture lie in the frames around it.
+
+Keys of regions and of the camera are on timeline frames, a window has frames of the source. What a source frame shows
+is where the keys have it at the timeline frame that shows it: of several the one nearest to the shown frame; between
+two timeline frames for a source frame that is passed over there, or for an in-between frame. Between timeline frames
+motion is straight.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+
+from . import motions, trails, windows
+from .clip import Clip, Shown
+from .effect import Camera, Effect, Subject
+from .frame_state import Following, FrameState, Options
+from .motions import Placement, Similarity
+
+# Below this scale a subject is a point, and says nothing of where the others are.
+_SMALLEST = 1e-6
+
+# What gives at a frame where something lies: its placement, and its centre (2,), None: nothing is drawn.
+Places = Callable[[float], tuple[Placement, np.ndarray | None]]
+
+
+def followed(effect: Effect, state: FrameState, clip: Clip, at: Shown) -> FrameState:
+    """The effect's state at a timeline frame, with what its shutters follow, and with the bars of those whose trail has
+    a length. EffectError: what is followed lies nowhere."""
+    if not any(shutter.follow for shutter in effect.shutters):
+        return state
+    frames = seen(state.options, at, clip.count)
+    times = times_of(clip, at, frames, reach(state.options.window))
+    turns = np.ones((len(frames), len(effect.shutters)), np.complex128)
+    shifts = np.zeros_like(turns)
+    known: dict[tuple, np.ndarray] = {}
+    for i, shutter in enumerate(effect.shutters):
+        if shutter.follow is None:
+            continue
+        way = id(shutter.follow), shutter.follow_motion, shutter.follow_smooth
+        if way not in known:
+            known[way] = moves(
+                places_of(shutter.follow, shutter.follow_motion, shutter.follow_smooth), clip, at.frame, times
+            )
+        turns[:, i], shifts[:, i] = known[way]
+    following = Following(frames.start, turns, shifts)
+    bars, open_for = _with_trails(effect, state, following, clip, at)
+    return replace(state, bars=bars, following=following.of(slice(None)), open_for=open_for)
+
+
+def _with_trails(
+    effect: Effect, state: FrameState, following: Following, clip: Clip, at: Shown
+) -> tuple[np.ndarray, dict[int, float]]:
+    """The state's bars (N, L), those of shutters whose trail has a length open for it, and FrameState.open_for."""
+    bars, open_for = state.bars.copy(), dict(state.open_for)
+    positions = windows.positions(state.options, at.source_frame, at.direction)
+    shown_at = float(np.abs(positions - at.source_frame).argmin()) + 0.5
+    frames = windows.source_frames(state.options, positions, range(clip.count))
+    # What is left out beyond the clip's ends stands still there, as what is held does.
+    turns, shifts = following.at(np.where(frames < 0, positions, frames))
+    for i, shutter in enumerate(effect.shutters):
+        if shutter.follow and shutter.has_trail:
+            corners = [motions.pixel(corner, (clip.width, clip.height)) for corner in shutter.follow.corners(at.frame)]
+            places = np.outer(turns[:, i], corners) + shifts[:, i, None]
+            way = trails.travelled(places) / clip.height
+            bars[i], open_for[i] = trails.with_length(bars[i], way, float(shutter.trail.at(at.frame)), shown_at)
+        share = float(shutter.follow.influence.at(at.frame)) if isinstance(shutter.follow, Camera) else 1.0
+        if share < 1:
+            bars[i], open_for[i] = trails.shortened(bars[i], share, shown_at)
+    return bars, open_for
+
+
+def reach(window: int) -> int:
+    """How many timeline frames before and after the shown one say where the source frames of a window lie: enough for
+    footage that is slowed down to a quarter. Source frames shown beyond have the motion of the nearest within."""
+    return 4 * window
+
+
+def seen(options: Options, at: Shown, count: int) -> range:
+    """The source frames, of so many, that a window may show, wherever its shot ends."""
+    positions = windows.positions(options, at.source_frame, at.direction)
+    if options.edges == "slide" and options.stop_at_cuts:  # a cut may lie on either side
+        positions = at.source_frame + np.array([-1, 1]) * (options.window + options.step)
+    beyond = options.window if options.edges == "mirror" else 0
+    low, high = min(positions.min(), at.source_frame) - beyond, max(positions.max(), at.source_frame) + beyond
+    return range(max(int(low), 0), min(int(high), count - 1) + 1)
+
+
+def times_of(clip: Clip, at: Shown, wanted: range, reach: int) -> list[float]:
+    """The time on the timeline, nearest to a frame and no more than `reach` frames away, at which each of the wanted
+    source frames is shown."""
+    times, last = {at.source_frame: at.frame}, {1: at.source_frame, -1: at.source_frame}
+    for distance in range(1, reach + 1):
+        if len(times) == len(wanted):
+            break
+        for way, before in last.items():
+            after = last[way] = clip.shown(at.frame + way * distance).source_frame
+            low, high = max(min(before, after), wanted.start), min(max(before, after), wanted.stop - 1)
+            for source in range(low, high + 1) if before != after else ():
+                apart = distance - 1 + (source - before) / (after - before)
+                if source not in times or apart < abs(times[source] - at.frame):
+                    times[source] = at.frame + way * apart
+    known = np.array(sorted(times))
+    nearest = known[np.abs(known - np.arange(wanted.start, wanted.stop)[:, None]).argmin(axis=1)]
+    return [times[source] for source in nearest.tolist()]
+
+
+def smoothing(smooth: int) -> np.ndarray:
+    """Weights (2 · smooth + 1,), Σ = 1, of the frames before and after one: a bell, without the jolts that a box has
+    where something sudden enters and leaves it."""
+    bell = 1 + np.cos(np.pi * np.arange(-smooth, smooth + 1) / (smooth + 1))
+    return bell / bell.sum()
+
+
+def places_of(subject: Subject, motion: motions.Motion = "scale", smooth: int = 0) -> Places:
+    """What a shutter follows of a region or the camera: its location alone, perhaps, and averaged over time. It depends
+    on keys around a frame, and on no other picture."""
+
+    @cache
+    def own(frame: float) -> tuple[Placement, np.ndarray | None]:
+        return motions.only(subject.placement(frame), motion), subject.centre(frame)
+
+    if not smooth:
+        return own
+    weights = smoothing(smooth)
+
+    @cache
+    def averaged(frame: float) -> tuple[Placement, np.ndarray | None]:
+        around = [own(frame + k) for k in range(-smooth, smooth + 1)]
+        placements, centres = zip(*around, strict=True)
+        is_drawn = all(centre is not None for centre in centres)
+        centre = weights @ np.array(centres) if is_drawn else None
+        return motions.averaged(placements, weights), centre
+
+    return averaged
+
+
+def moves(places: Places, clip: Clip, frame: float, times: list[float]) -> np.ndarray:
+    """The turns and shifts (2, n) of the motions of the picture from a timeline frame to times, which may lie between
+    two."""
+    found = [motion_to(places, frame, time, (clip.width, clip.height)) for time in times]
+    return np.array([(motion.turn, motion.shift) for motion in found], np.complex128).T
+
+
+def motion_to(places: Places, frame: float, time: float, size: tuple[int, int]) -> Similarity:
+    """The motion of the picture from a timeline frame to a time that may lie between two; none where nothing is drawn
+    that could be followed."""
+    whole = frame + math.floor(time - frame)
+    share = time - whole
+    start, centre = places(frame)
+    (first, first_centre), (second, second_centre) = places(whole), places(whole + 1 if share else whole)
+    if centre is None or first_centre is None or second_centre is None or abs(start.scale) < _SMALLEST:
+        return Similarity()
+    placement = motions.between(first, second, share)
+    moved = (1 - share) * first_centre + share * second_centre
+    if start == placement and np.array_equal(centre, moved):
+        return Similarity()  # to the bit
+    return motions.motion_between(start, placement, centre, moved, size)
