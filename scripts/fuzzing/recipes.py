@@ -24,9 +24,9 @@ def plausible(random, longest: int) -> dict:
     """A recipe that keeps to the format, with a window of so many frames at most."""
     from test_export import following_recipes
 
-    from shutter_addon.core.recipes import recipe_file
+    from shutter_addon.core.recipes import recipe_file, records
 
-    return json.loads(recipe_file.dump(hostile.drawn(following_recipes(longest), random)))
+    return json.loads(recipe_file.dump(records.effect_of(hostile.drawn(following_recipes(longest), random))))
 
 
 def make(random, folder):

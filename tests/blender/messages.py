@@ -7,7 +7,6 @@ from pathlib import Path
 import bpy
 import pytest
 from _bl_i18n_utils import bl_extract_messages, settings
-from shutter_addon.blender.data.choices import CONTEXT
 
 from shutter_addon import blender
 from shutter_addon.core.model import presets, shutters

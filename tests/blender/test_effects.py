@@ -96,7 +96,7 @@ def test_every_ease_and_every_kind_of_key(effect_on):
     data = keyed_recipe()
     at, source = effect_on(data), recipe_file.parse(json.dumps(data))
     for frame in np.arange(0, 24, 0.5):
-        check(at(frame), source.at(frame, 40 / 24))
+        check(at(frame), source.for_picture(40 / 24).at(frame))
 
 
 def test_a_moved_scaled_and_turned_strip(effect_on):
@@ -105,7 +105,7 @@ def test_a_moved_scaled_and_turned_strip(effect_on):
     at = effect_on(
         data, {"offset_x": 30, "offset_y": -9, "scale_x": 1.5, "scale_y": 0.7, "rotation": 0.6, "origin": (0.2, 0.9)}
     )
-    check(at(8), recipe_file.parse(json.dumps(data)).at(8, 40 / 24))
+    check(at(8), recipe_file.parse(json.dumps(data)).for_picture(40 / 24).at(8))
 
 
 def test_a_picture_point_lies_where_blender_draws_it(bpy, edit, render, tmp_path):
@@ -133,7 +133,7 @@ def test_applying_another_recipe_leaves_nothing_of_the_first(bpy, edit, effect_o
     strip = next(s for s in edit.sequence_editor.strips if s.type == "SCENE")
     plain = recipe_file.parse('{"version": 1, "window": 2, "shutters": [{"name": "A", "bars": [1, 0]}]}')
     recipe_import.apply(edit, effect, strip, plain)
-    check(state(edit, effect, strip, 40), plain.at(10, 40 / 24))
+    check(state(edit, effect, strip, 40), plain.for_picture(40 / 24).at(10))
     from bpy_extras import anim_utils
 
     animation = edit.animation_data

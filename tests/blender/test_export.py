@@ -10,8 +10,11 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from support import source_time, state, write_frames
 
-from shutter_addon.core.recipes import recipe as recipes
-from shutter_addon.core.recipes import recipe_file
+from shutter_addon.core.model.effect import Camera, Effect
+from shutter_addon.core.model.fields import fields_of
+from shutter_addon.core.model.frame_state import Options
+from shutter_addon.core.recipes import recipe_file, records
+from shutter_addon.core.recipes.recipe import CAMERA
 
 FIRST, LAST = 31, 70
 ASPECT = 40 / 24
@@ -39,9 +42,9 @@ def shutters(draw, name, window):
     bars = st.lists(numbers(0, 1e6), min_size=window, max_size=window).filter(lambda bars: sum(bars) > 1e-5)
     color = draw(st.tuples(*[numbers(0, 1)] * 3))
     if draw(st.booleans()):
-        return recipes.Shutter(name, color, draw(bars))
-    keys = [recipes.ShutterKey(frame, draw(bars), draw(eases)) for frame in draw(frames)]
-    return recipes.Shutter(name, color, keys=keys)
+        return records.ShutterRecord(name=name, color=color, bars=draw(bars))
+    keys = [records.BarsKey(frame, draw(bars), draw(eases)) for frame in draw(frames)]
+    return records.ShutterRecord(name=name, color=color, keys=keys)
 
 
 @st.composite
@@ -52,41 +55,49 @@ def regions(draw, names):
         location = draw(st.tuples(*[numbers(-100, 100)] * 2))
         rotation = draw(st.integers(-720_00, 720_00)) / 100
         drawn = draw(strokes) if redrawn and i and draw(st.booleans()) else None
-        keys.append(recipes.RegionKey(frame, location, rotation, draw(numbers(-50, 50)), drawn, draw(eases)))
+        keys.append(records.RegionKey(frame, location, rotation, draw(numbers(-50, 50)), draw(eases), drawn))
     kind, width = draw(st.sampled_from(["line", "lasso"])), draw(numbers(0, 10))
-    named = draw(st.sampled_from(names)), draw(text)
-    return recipes.Region(*named, kind, width, draw(strokes), keys, layer=draw(st.booleans()))
+    named = {"shutter": draw(st.sampled_from(names)), "name": draw(text), "layer": draw(st.booleans())}
+    return records.RegionRecord(kind=kind, width=width, strokes=draw(strokes), keys=keys, **named)
 
 
 @st.composite
 def value_keys(draw, low, high):
-    return [recipes.ValueKey(frame, draw(numbers(low, high)), draw(eases)) for frame in draw(frames)]
+    return [records.ValueKey(frame, draw(numbers(low, high)), draw(eases)) for frame in draw(frames)]
+
+
+def of_field(field):
+    """Values that a recipe may say of a field."""
+    if field.choices:
+        return st.sampled_from(field.words)
+    if isinstance(field.default, bool):
+        return st.booleans()
+    if isinstance(field.default, int):
+        return st.integers(field.least, field.most)
+    return numbers(field.least, field.most) | value_keys(field.least, field.most)
+
+
+options = st.fixed_dictionaries(
+    {
+        field.recipe: of_field(field)
+        for field in fields_of(Options, Effect, Camera).values()
+        if field.recipe not in ("", "window")
+    }
+)
 
 
 @st.composite
 def valid_recipes(draw, longest=6):
     window = draw(st.integers(1, longest))
     names = draw(st.lists(text, min_size=1, max_size=3, unique=True))
-    return recipes.Recipe(
-        1,
-        window,
-        [draw(shutters(name, window)) for name in names],
-        draw(st.lists(regions(names), max_size=3)),
-        draw(st.sampled_from(["start", "center", "end"])),
-        draw(st.sampled_from(["displacement", "value"])),
-        draw(st.sampled_from(["linear", "encoded"])),
-        draw(st.sampled_from(["normalized", "weighted"])),
-        draw(st.sampled_from(["hold", "mirror", "shorten", "slide"])),
-        draw(st.sampled_from([1, 2, 4])),
-        draw(st.booleans()),
-        draw(st.booleans()),
-        draw(numbers(0, 1) | value_keys(0, 1)),
-        draw(st.integers(0, 500)),
-        draw(st.booleans()),
-        draw(st.sampled_from([1, 2, 4, 8, 16])),
-        draw(st.sampled_from(["quick", "good"])),
-        draw(st.just([]) | value_keys(-10, 10000)),
-        draw(st.just([]) | camera_keys()),
+    return records.RecipeRecord(
+        version=1,
+        window=window,
+        shutters=[draw(shutters(name, window)) for name in names],
+        regions=draw(st.lists(regions(names), max_size=3)),
+        time=draw(st.just([]) | value_keys(-10, 10000)),
+        camera=draw(st.just([]) | camera_keys()),
+        **draw(options),
     )
 
 
@@ -94,7 +105,7 @@ def valid_recipes(draw, longest=6):
 def camera_keys(draw):
     places = {frame: draw(st.tuples(*[numbers(-100, 100)] * 2)) for frame in draw(frames)}
     return [
-        recipes.CameraKey(frame, place, draw(st.integers(-720_00, 720_00)) / 100, draw(numbers(-50, 50)), draw(eases))
+        records.MoveKey(frame, place, draw(st.integers(-720_00, 720_00)) / 100, draw(numbers(-50, 50)), draw(eases))
         for frame, place in places.items()
     ]
 
@@ -108,10 +119,10 @@ def mattes(draw, names):
     fields |= {"opacity": draw(numbers(0, 1) | value_keys(0, 1)), "width": draw(numbers(0, 1) | value_keys(0, 1))}
     if draw(st.booleans()):
         ramp = draw(st.sampled_from(["linear", "radial", "angle", "luminance"]))
-        return recipes.RampRegion(kind="ramp", ramp=ramp, **fields)
+        return records.RampRecord(kind="ramp", ramp=ramp, **fields)
     fields |= {"offset": draw(st.integers(-9, 9)), "timing": draw(st.sampled_from(["source", "timeline"]))}
     channel = draw(st.sampled_from(["luminance", "red", "green", "blue", "alpha"]))
-    return recipes.MatteRegion(kind="matte", path="in/f0001.png", channel=channel, **fields)
+    return records.MatteRecord(kind="matte", path="in/f0001.png", channel=channel, **fields)
 
 
 @st.composite
@@ -122,7 +133,7 @@ def outlines(draw, names):
     fields |= {"opacity": draw(numbers(0, 1) | value_keys(0, 1)), "width": draw(numbers(0, 1) | value_keys(0, 1))}
     fields |= {"blend": draw(st.sampled_from(["over", "add"])), "layer": region.layer, "keys": region.keys}
     fields |= {"shutter": region.shutter, "name": region.name, "strokes": region.strokes}
-    return recipes.OutlineRegion(kind="outline", **fields)
+    return records.OutlineRecord(kind="outline", **fields)
 
 
 extremes = st.sampled_from(["lightest", "darkest"])
@@ -144,7 +155,7 @@ def following_recipes(draw, longest=6):
     laid = draw(st.lists(mattes(names) | outlines(names), max_size=2))
     regions_ = draw(st.permutations([*found.regions, *laid]))
     named = [dataclasses.replace(region, name=f"{region.name[:9]}{i}") for i, region in enumerate(regions_)]
-    followed = st.sampled_from([None, recipes.CAMERA, *(region.name for region in named)])
+    followed = st.sampled_from([None, CAMERA, *(region.name for region in named)])
     shutters = [dataclasses.replace(shutter, follow=draw(followed)) for shutter in found.shutters]
     trails = st.none() | numbers(0, 10) | value_keys(0, 10)
     shutters = [dataclasses.replace(shutter, trail=draw(trails)) if shutter.follow else shutter for shutter in shutters]
@@ -169,14 +180,14 @@ def effect_on(bpy, edit, tmp_path):
 def apply(effect_on, data):
     from shutter_addon.blender.data import recipe_import
 
-    source = recipe_file.parse(json.dumps(data)) if isinstance(data, dict) else data
+    source = recipe_file.parse(json.dumps(data)) if isinstance(data, dict) else records.effect_of(data)
     recipe_import.apply(*effect_on, source, folder_of(effect_on))
 
 
 def export(effect_on):
     from shutter_addon.blender.output.matte_export import recipe_for
 
-    return recipe_for(*effect_on, folder_of(effect_on) / "recipe.json")
+    return records.recipe_of(recipe_for(*effect_on, folder_of(effect_on) / "recipe.json"))
 
 
 def folder_of(effect_on):
@@ -357,11 +368,12 @@ def test_what_blender_made_agrees_at_every_frame(effect_on, change):
     apply(effect_on, BASE)
     change(effect_on[0], effect_on[1])
     found = export(effect_on)
+    plain = records.effect_of(found)
     wanted = {frame: state(*effect_on, frame) for frame in range(FIRST, LAST + 1)}
     for frame, instant in wanted.items():
-        check(found.at(frame - FIRST + 1, ASPECT), instant)
+        check(plain.for_picture(ASPECT).at(frame - FIRST + 1), instant)
         time, _ = source_time(effect_on[0], effect_on[1], frame)
-        assert found.time_at(frame - FIRST + 1) == pytest.approx(time, abs=1e-3)
+        assert plain.time.at(frame - FIRST + 1)[0] == pytest.approx(time, abs=1e-3)
     apply(effect_on, found)
     assert export(effect_on) == found
 
@@ -382,7 +394,7 @@ def test_a_plain_ease_stays_a_key_and_no_more(effect_on):
     found = export(effect_on)
     assert [key.frame for key in found.shutters[1].keys] == [3, 17, 30]
     assert [key.ease for key in found.regions[0].keys] == ["linear", "bezier", "linear"]
-    assert found == recipe_file.parse(json.dumps(BASE))
+    assert found == records.recipe_of(recipe_file.parse(json.dumps(BASE)))
 
 
 def test_keys_of_the_source_time_lie_in_a_group_of_the_effect(effect_on):
@@ -418,7 +430,7 @@ def test_a_source_time_without_keys_holds_a_frame(effect_on):
     plain = {"version": 1, "window": 1, "shutters": [{"name": "A", "bars": [1]}]}
     apply(effect_on, plain)
     effect_on[1].use_source_time, effect_on[1].source_time = True, 3.5
-    assert export(effect_on).time == [recipes.ValueKey(1, 3.5)]
+    assert export(effect_on).time == [records.ValueKey(1, 3.5)]
     effect_on[1].use_source_time = False
     assert export(effect_on).time == []
     apply(effect_on, plain | {"time": [{"frame": 1, "value": 3.5}]})
@@ -529,7 +541,7 @@ def test_what_a_recipe_may_hold_at_most(effect_on):
     apply(effect_on, data)
     assert state(*effect_on, 40).bars.shape == (32, 256)
     found = export(effect_on)
-    assert found == recipe_file.parse(json.dumps(data))
+    assert found == records.recipe_of(recipe_file.parse(json.dumps(data)))
 
 
 def test_a_key_at_every_frame_is_soon_written(effect_on):
@@ -545,5 +557,5 @@ def test_a_key_at_every_frame_is_soon_written(effect_on):
 def test_a_written_recipe_reads_the_same(effect_on, tmp_path):
     apply(effect_on, BASE)
     found = export(effect_on)
-    recipe_file.save(found, tmp_path / "r.json")
-    assert recipe_file.load(tmp_path / "r.json") == found
+    recipe_file.save(records.effect_of(found), tmp_path / "r.json")
+    assert records.recipe_of(recipe_file.load(tmp_path / "r.json")) == found

@@ -194,7 +194,7 @@ def test_the_trails_length_is_keyed(shown):
 
 
 def core_bars(data, frame):
-    effect = recipe_file.parse(json.dumps(data)).effect(WIDTH / HEIGHT)
+    effect = recipe_file.parse(json.dumps(data)).for_picture(WIDTH / HEIGHT)
     return state_at(effect, Clip(width=WIDTH, height=HEIGHT, count=COUNT), frame).state.bars
 
 

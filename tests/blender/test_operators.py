@@ -282,7 +282,7 @@ def test_an_export_replaces_the_file(bpy, effect, tmp_path):
     path = tmp_path / "out.json"
     path.write_text("old")
     call(bpy, "recipe_export", filepath=str(path))
-    assert recipe_file.load(path).window == 8
+    assert recipe_file.load(path).options.at(1).window == 8
 
 
 def refusal(bpy, name, **settings):

@@ -45,8 +45,8 @@ def test_it_is_what_the_session_asks_for(bpy, edit, tmp_path, name):
     from shutter_addon.blender.rendering import render_context, sessions
 
     found = recipe_file.parse(json.dumps(RECIPES[name]))
-    clip = Clip(width=WIDTH, height=HEIGHT, count=COUNT).stepped(found.inbetween)
-    made = {frame: Request(*state_at(found.effect(WIDTH / HEIGHT), clip, frame)) for frame in (1, 8, COUNT)}
+    clip = Clip(width=WIDTH, height=HEIGHT, count=COUNT).stepped(found.options.at(1).step)
+    made = {frame: Request(*state_at(found.for_picture(WIDTH / HEIGHT), clip, frame)) for frame in (1, 8, COUNT)}
 
     first = write_frames(tmp_path / "in", np.zeros((COUNT, HEIGHT, WIDTH, 3), np.uint8))
     source = edit.sequence_editor.strips.new_image("images", str(first), 1, 1)

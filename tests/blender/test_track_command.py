@@ -12,7 +12,7 @@ from support import recipe, write_frames
 
 from shutter_addon.blender import command as program
 from shutter_addon.core.model import motions
-from shutter_addon.core.recipes import recipe_file
+from shutter_addon.core.recipes import recipe_file, records
 from shutter_addon.media import camera_tracking, pursuit, tracking
 
 ROOT = Path(__file__).parents[2]
@@ -47,8 +47,13 @@ def plain(**region):
     return recipe(2, [1, 1], [1, 0], regions=[{"shutter": "S0", "strokes": [[[0, 0]]]}, fields | region])
 
 
+def said(path):
+    """What a recipe's file says."""
+    return records.recipe_of(recipe_file.load(path))
+
+
 def keys(path):
-    return recipe_file.load(path).regions[1].keys
+    return said(path).regions[1].keys
 
 
 def expected(frame, start=5):
@@ -68,7 +73,7 @@ def test_the_recipe_gets_the_keys_that_the_motion_needs(track, film, tmp_path):
     assert [each["frame"] for each in told["frames"]] == list(range(1, COUNT + 1))
     assert all(each["confidence"] > pursuit.SURE for each in told["frames"])
     assert told["stops"] == []
-    before, after = recipe_file.load(tmp_path / "recipe.json"), recipe_file.load(output)
+    before, after = said(tmp_path / "recipe.json"), said(output)
     assert (after.shutters, after.regions[0]) == (before.shutters, before.regions[0])
 
 
@@ -83,7 +88,7 @@ def test_every_key_is_kept_on_demand_and_only_in_those_frames(track, film, tmp_p
     assert {key.scale for key in found} == {1.0}
     # at frame 6, and at those that were not tracked, it is where the keys had put it
     before, after = (
-        recipe_file.load(tmp_path / name).effect(WIDTH / HEIGHT).regions[1].moves.location
+        recipe_file.load(tmp_path / name).for_picture(WIDTH / HEIGHT).regions[1].moves.location
         for name in ("recipe.json", "t.json")
     )
     for frame in (1, 2, 3, 6, 9, 10, 11, 12):
@@ -96,7 +101,7 @@ def test_frames_beyond_those_that_are_tracked_stay(track, film, tmp_path, ease):
     options = ("--region", "cross", "--frame", 6, "--frames", "5:7", "--output", tmp_path / "t.json")
     assert track(film, *options, recipe=given) == (0, "")
     before, after = (
-        recipe_file.load(tmp_path / name).effect(WIDTH / HEIGHT).regions[1] for name in ("recipe.json", "t.json")
+        recipe_file.load(tmp_path / name).for_picture(WIDTH / HEIGHT).regions[1] for name in ("recipe.json", "t.json")
     )
     for frame in (1, 2, 3, 4, 8, 9, 10, 11, 12):
         assert after.moves.location.at(frame) == pytest.approx(before.moves.location.at(frame)), frame
@@ -110,8 +115,8 @@ def test_a_redrawn_shape_stays_drawn_as_it_was_and_on_what_it_covers(track, film
     other = [[[0.5, 0.4], [0.7, 0.6]]]
     given = plain(keys=[{"frame": 4, "ease": ease}, {"frame": 8, "strokes": other, "ease": "bezier"}])
     assert track(film, "--region", "cross", "--frame", 5, "--output", tmp_path / "t.json", recipe=given) == (0, "")
-    region, before = (recipe_file.load(tmp_path / name).regions[1] for name in ("t.json", "recipe.json"))
-    shapes = [each.over_time(1, WIDTH / HEIGHT) for each in (region, before)]
+    files = tmp_path / "t.json", tmp_path / "recipe.json"
+    shapes = [recipe_file.load(path).for_picture(WIDTH / HEIGHT).regions[1] for path in files]
     for frame in range(1, COUNT + 1):
         after, was = (np.concatenate(shape.drawings.at(frame)) for shape in shapes)
         assert after == pytest.approx(was, abs=1e-9)
@@ -140,7 +145,7 @@ def test_between_filmed_frames_it_goes_straight(track, film, tmp_path, subject, 
     if subject == "camera":
         given["regions"] = []
     assert track(film, *options, recipe=given) == (0, "")
-    effect = recipe_file.load(tmp_path / "t.json").effect(WIDTH / HEIGHT)
+    effect = recipe_file.load(tmp_path / "t.json").for_picture(WIDTH / HEIGHT)
     places = {}
     for frame in range(1, 46):
         moving = effect.regions[1] if subject == "region" else effect.camera
@@ -185,7 +190,7 @@ def test_where_it_ends_is_said(track, tmp_path, shown, last):
     code, said = track(first, *options, recipe=plain() | shown)
     assert (code, said) == (0, f"Virtual Shutter: cross: tracked to frame {last}, where the shot ends")
     assert json.loads((tmp_path / "r.json").read_text())["stops"] == [{"frame": last + 1, "reason": tracking.SHOT_ENDS}]
-    region = recipe_file.load(tmp_path / "t.json").effect(4 / 3).regions[1]
+    region = recipe_file.load(tmp_path / "t.json").for_picture(4 / 3).regions[1]
     assert [region.opacity.at(frame) for frame in (1, last, last + 1, 99)] == [1, 1, 0, 0]
     assert [key.frame for key in keys(tmp_path / "t.json")] == [1, 3, last]
 
@@ -196,10 +201,10 @@ def test_opacities_that_a_recipe_has_stay_beyond_the_frames_that_are_tracked(tra
     given = {"recipe": plain(opacity=faded)}
     options = "--region", "cross", "--frame", 8, "--frames", "7:10", "--output", tmp_path / "o.json"
     assert track(film, *options, **given)[0] == 0
-    found = recipe_file.load(tmp_path / "o.json").effect(4 / 3).regions[1].opacity
+    found = recipe_file.load(tmp_path / "o.json").for_picture(4 / 3).regions[1].opacity
     assert [found.at(frame) for frame in (1, 4, 6, 7, 8, 10, 12)] == [0, 0.5, 0.5, 0.5, 0.5, 0.5, 0.5]
     assert track(film, *options, "--hold", **given)[0] == 0
-    before, after = (recipe_file.load(tmp_path / name).regions[1].opacity for name in ("recipe.json", "o.json"))
+    before, after = (said(tmp_path / name).regions[1].opacity for name in ("recipe.json", "o.json"))
     assert before == after
 
 
@@ -234,8 +239,8 @@ def test_the_camera_gets_keys_that_a_shutter_follows(track, film, tmp_path):
     given = plain(strokes=[[[0.5, 0.5]]]) | {"camera": [{"frame": 20, "location": [0.5, 0]}]}
     options = ("--camera", "--frame", 5, "--output", tmp_path / "t.json", "--report", tmp_path / "r.json")
     assert track(film, *options, recipe=given) == (0, "")
-    before, after = (recipe_file.load(tmp_path / name) for name in ("recipe.json", "t.json"))
-    camera = after.effect(WIDTH / HEIGHT).camera
+    before, after = (said(tmp_path / name) for name in ("recipe.json", "t.json"))
+    camera = recipe_file.load(tmp_path / "t.json").camera
     shift = np.subtract(camera.placement(12).location, camera.placement(1).location)
     assert shift == pytest.approx(expected(12, 1), abs=0.3 / WIDTH)
     assert camera.placement(5).location == (0.5, 0), "as it was"
@@ -244,7 +249,7 @@ def test_the_camera_gets_keys_that_a_shutter_follows(track, film, tmp_path):
     told = json.loads((tmp_path / "r.json").read_text())
     assert (told["camera"], "region" in told, len(told["frames"])) == (True, False, COUNT)
     assert track(film, *options, "--all-keys", recipe=given) == (0, "")
-    assert [key.frame for key in recipe_file.load(tmp_path / "t.json").camera] == [*range(1, COUNT + 2), 20]
+    assert [key.frame for key in said(tmp_path / "t.json").camera] == [*range(1, COUNT + 2), 20]
 
 
 def test_what_is_read_is_not_written_over(track, film, tmp_path):

@@ -139,7 +139,7 @@ def test_recipes_keep_it(bpy, between_cuts):
     found = recipe_file.parse(recipe_file.dump(recipe_export.recipe_of(edit, effect, strip)))
     assert found.camera_influence == 0.25
     before = opacity(bpy, range(11, 47))
-    assert [found.effect(1.5).regions[0].opacity.at(frame) for frame in range(1, 37)] == before
+    assert [found.for_picture(1.5).regions[0].opacity.at(frame) for frame in range(1, 37)] == before
     recipe_import.apply(edit, effect, strip, found)
     assert opacity(bpy, range(11, 47)) == before
     assert effect.camera.influence == 0.25
