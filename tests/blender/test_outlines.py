@@ -9,7 +9,7 @@ from support import recipe, request, write_frames
 
 from shutter_addon.core.frames import light
 from shutter_addon.core.model import outlines
-from shutter_addon.core.recipes import recipe_file
+from shutter_addon.core.recipes import recipe_file, records
 
 WIDTH, HEIGHT, COUNT = 96, 64, 12
 OPTIONS = {"light": "encoded", "interpolation": "value"}
@@ -106,8 +106,9 @@ def test_out_and_in_again(edited, layer):
 
     said = region(1, 9, between="straight", layer=layer, invert=True, blend="add", opacity=0.5, width=0.125)
     strip, effect = edited(said)
-    (back,) = recipe_export.recipe_of(strip.id_data, effect, strip).regions
-    expected = recipe_file.parse(json.dumps(recipe(2, [1, 0], [0, 1], regions=[said], **OPTIONS))).regions[0]
+    (back,) = records.recipe_of(recipe_export.recipe_of(strip.id_data, effect, strip)).regions
+    parsed = recipe_file.parse(json.dumps(recipe(2, [1, 0], [0, 1], regions=[said], **OPTIONS)))
+    expected = records.recipe_of(parsed).regions[0]
     assert (back.between, back.layer, back.invert, back.blend) == ("straight", layer, True, "add")
     assert (back.opacity, back.width) == (0.5, 0.125)
     assert [key.frame for key in back.keys] == [1, 9]

@@ -42,7 +42,6 @@ class Field:
     recipe: str
     least: float = 0.0
     most: float = 1.0
-    soft_least: float | None = None
     soft_most: float | None = None
     choices: Sequence[Choice] = ()
     keyed: bool = True
