@@ -112,7 +112,7 @@ def test_out_and_in_again(edited, layer):
     assert (back.between, back.layer, back.invert, back.blend) == ("straight", layer, True, "add")
     assert (back.opacity, back.width) == (0.5, 0.125)
     assert [key.frame for key in back.keys] == [1, 9]
-    shapes = [np.array([strokes for _, strokes in each.drawings()]) for each in (back, expected)]
+    shapes = [np.array([strokes for _, strokes in records.drawings_of(each)]) for each in (back, expected)]
     np.testing.assert_allclose(*shapes, atol=1e-5)
 
 

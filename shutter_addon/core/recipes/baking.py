@@ -199,10 +199,8 @@ def _region(
     words = dict(zip(region.drawings.frames, region.drawings.eases, strict=True)) if len(drawn) > 1 else {}
     words = {number: words[number] for number in drawn if words}
     moves = _moves(region, words, shown)
-    starts = [_frame(number, shown) for number in drawn]
-    if words and isinstance(moves.location, Keys):
-        starts[0] = moves.location.frames[0]
-    drawings = Drawings(name, tuple(starts), tuple(drawn.values()), tuple(words.values()) or ("linear",), 1.0)
+    starts = tuple(_frame(number, shown) for number in drawn)
+    drawings = Drawings(name, starts, tuple(drawn.values()), tuple(words.values()) or ("linear",), 1.0)
     return replace(region, drawings=drawings, moves=moves, **said)
 
 

@@ -298,11 +298,16 @@ def _move_keys(moves: model.Moves) -> list[dict[str, Any]]:
     return [{"frame": frame, "ease": ease} | dict(zip(names, key, strict=True)) for frame, ease, *key in columns]
 
 
+def _points(stroke: np.ndarray) -> Stroke:
+    return [(x, y) for x, y in stroke.tolist()]
+
+
 def _region_record(region: Any, shutter: str) -> Any:
     said = _words(type(region), region) | {"shutter": shutter}
     keys = _move_keys(region.moves)
     if isinstance(region, model.Region | model.OutlineRegion):
-        frames, drawings = region.drawings.frames, [[p.tolist() for p in d] for d in region.drawings.strokes]
+        frames = region.drawings.frames
+        drawings = [[_points(stroke) for stroke in drawing] for drawing in region.drawings.strokes]
         # What the region itself carries is its first key's; others stand at keys.
         drawn = dict(zip(frames, drawings, strict=True)) if len(frames) > 1 else {}
         if keys and keys[0]["frame"] == frames[0]:
