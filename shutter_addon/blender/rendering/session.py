@@ -200,20 +200,21 @@ class RenderSession:
 
     def keep(self, scenes: set[int]) -> None:
         """Closes what belongs to other scenes than those of these session_uids. A render job may take them away
-        meanwhile, or take up more."""
+        meanwhile."""
         self._drop_begun(set(self._begun) - scenes)
         for known in (self._shown, self._requests):
             for place in set(known) - scenes:
                 known.pop(place, None)
-        while gone := set(self._renderers) - scenes:
-            for place in gone:
-                _key, renderer = self._renderers.pop(place, (None, None))
-                if renderer is not None:
-                    self._submit(renderer.close)
+        for place in set(self._renderers) - scenes:
+            _key, renderer = self._renderers.pop(place, (None, None))
+            if renderer is not None:
+                self._submit(renderer.close)
 
     def forget(self) -> None:
         """Closes all sources and frees the device; where Blender's GPU is not current, once it is."""
         self.keep(set())
+        while self._renderers:  # a render job may take up more meanwhile
+            self.keep(set())
         compositor, self._compositor = self._compositor, None
         if compositor is not None:
             with suppress(NoDeviceError):
