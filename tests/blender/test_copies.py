@@ -23,7 +23,7 @@ SCRIPT = """
 import bpy
 from shutter_addon import blender
 from shutter_addon.blender.data import strips
-from shutter_addon.blender.editing import add_effect, copies, shutter_edits
+from shutter_addon.blender.editing import add_effect, reconcile, shutter_edits
 from shutter_addon.blender.editing import add_effect
 
 blender.register()
@@ -33,7 +33,7 @@ strip, effect = add_effect.add_effect(edit, source)
 shutter_edits.start(effect)
 for i in range({count}):
     edit.sequence_editor.strips.new_scene("copy", effect.scene, 5, 200 + 100 * i)
-copies.adopt()
+reconcile.tidy()
 effects = edit.virtual_shutter.effects
 print("EFFECTS", [effect.start for effect in effects], len({{effect.scene.name for effect in effects}}))
 """

@@ -373,10 +373,10 @@ class Work(RuleBasedStateMachine):
 
     @invariant()
     def a_second_update_changes_nothing(self):
-        from shutter_addon.blender.editing import lifecycle
+        from shutter_addon.blender.editing import reconcile
 
         before = snapshot(self.bpy), [s.name for s in self.bpy.data.scenes]
-        lifecycle.update()
+        reconcile.update()
         assert (snapshot(self.bpy), [s.name for s in self.bpy.data.scenes]) == before
 
 

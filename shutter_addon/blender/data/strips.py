@@ -1,10 +1,14 @@
 """Effect strips: a Scene strip above its source, and the scene, data and source that belong to it."""
 
+from __future__ import annotations
+
 import math
+from collections.abc import Iterable
 from typing import Any
 
 import bpy
 from bpy.app.translations import pgettext_rpt as rpt_
+from bpy.types import Scene, Strip
 
 from ...core import revision
 from ...core.messages import EffectError
@@ -24,15 +28,15 @@ def is_carried(region) -> bool:
     return region.kind == "OUTLINE" and region.between != "STRAIGHT"
 
 
-def effect_strips(scene) -> list:
+def all_strips(scene: Scene) -> Iterable[Strip]:
+    """The scene's strips, those inside meta strips too."""
+    return scene.sequence_editor.strips_all if scene.sequence_editor else ()
+
+
+def effect_strips(scene: Scene) -> list[Strip]:
     """The scene's effect strips, those inside meta strips too."""
-    if scene.sequence_editor is None:
-        return []
-    return [
-        strip
-        for strip in scene.sequence_editor.strips_all
-        if strip.type == "SCENE" and strip.scene and strip.scene.render.engine == ENGINE
-    ]
+    found = [strip for strip in all_strips(scene) if strip.type == "SCENE" and strip.scene]
+    return [strip for strip in found if strip.scene.render.engine == ENGINE]
 
 
 def local_scenes() -> list:
@@ -51,14 +55,12 @@ def shown_scenes(scene) -> list:
     return shown
 
 
-def own_strips(scene) -> list:
+def own_strips(scene: Scene) -> list[Strip]:
     """The strips that were made for effects, those too whose scene has another engine or is gone."""
-    if scene.sequence_editor is None:
-        return []
-    return [strip for strip in scene.sequence_editor.strips_all if strip.type == "SCENE" and _is_own(strip)]
+    return [strip for strip in all_strips(scene) if strip.type == "SCENE" and _is_own(strip)]
 
 
-def _is_own(strip) -> bool:
+def _is_own(strip: Strip) -> bool:
     scene, identity = strip.scene, strip.virtual_shutter_effect
     if scene is None:
         return identity != ""

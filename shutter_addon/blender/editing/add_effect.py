@@ -8,8 +8,7 @@ from bpy.app.translations import pgettext_data as data_
 from ...core.model.limits import MAX_FRAME
 from ...media import color
 from ..data import annotations, data_format, seen_alone, source_media
-from ..data.strips import ENGINE, effect_of, nearest_source, origin, overlap
-from . import copies
+from ..data.strips import ENGINE, effect_of, nearest_source, origin, overlap, with_sources
 
 _COLOR = "COLOR_06"
 
@@ -63,9 +62,18 @@ def choose_source(effect, strip, source) -> None:
     _mute(source, medium)
     source.virtual_shutter_source = effect.source = source.virtual_shutter_source or uuid.uuid4().hex
     if nearest_source(scene, effect, strip) != source:  # but a copy or another part of it
-        copies.own_source(scene, source)
+        own_source(scene, source)
         effect.source = source.virtual_shutter_source
     connect(scene, [strip, source, *source.connections])
+
+
+def own_source(scene, source) -> None:
+    """Gives a source an identity that no other strip has; the effects that show it go along."""
+    identity = uuid.uuid4().hex
+    for effect, _strip, other in with_sources(scene):
+        if other == source:
+            effect.source = identity
+    source.virtual_shutter_source = identity
 
 
 def _mute(source, medium) -> None:

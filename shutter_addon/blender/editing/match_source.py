@@ -1,12 +1,11 @@
-"""An effect goes along with its source.
+"""What an editor may have set on purpose on an effect's strip is made that of its source when asked for: place, crop,
+flip and colour, and the range. Scribbles stay where they lie on the picture.
 
-What could only be wrong follows by itself: the rate of the effect's scene, and the size of its picture. What an editor
-may have set on purpose is matched when asked for: place, crop, flip and colour of the strips, and their range.
-Scribbles stay where they lie on the picture.
+What could only be wrong follows by itself (reconcile.follow_sources).
 """
 
 from collections import Counter
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from typing import Any, NamedTuple
 
 import bpy
@@ -16,8 +15,7 @@ from bpy.app.translations import pgettext_n as n_
 
 from ...core import revision
 from ...core.model.scribbles import mapped
-from ...media import MediaError, open_source
-from ..data import annotations, fcurves, geometry, seen_alone, source_media, strips
+from ..data import annotations, fcurves, geometry, strips
 from . import add_effect
 
 # What a strip looks like: what it is called, and the names of the strip's properties and groups.
@@ -28,80 +26,7 @@ _LOOK = {
     n_("color"): ("color_multiply", "color_saturation", "multiply_alpha"),
 }
 _RANGE = n_("range")
-_KEPT = 256
 _shown = revision.UntilChange()
-_headers: dict[tuple, "_Header | None"] = {}  # of media, by their keys: they are read once
-
-
-def forget() -> None:
-    """Forgets what media were read, before another file is loaded."""
-    _headers.clear()
-
-
-def follow(scene) -> None:
-    """Gives the effect scenes of a scene's effects its rate and views, and the size of their sources; has Blender mix
-    the strips' pixels as their sources'. A second call changes nothing."""
-    for strip in strips.effect_strips(scene):
-        if strip.scene.library is None:
-            _follow_edit(scene, strip.scene.render)
-    for effect, strip, source in strips.with_sources(scene):
-        if effect.scene.library is None and (header := _header(source)) is not None:
-            _follow_size(effect, strip, header.size)
-            _follow_mixing(scene, strip, source, header.is_encoded)
-
-
-def _follow_edit(scene, render) -> None:
-    # Blender crashes where an edit in stereo shows a scene that is not.
-    for name in ("fps", "fps_base", "use_multiview"):
-        if getattr(render, name) != getattr(scene.render, name):
-            setattr(render, name, getattr(scene.render, name))
-
-
-def _follow_size(effect, strip, size: tuple[int, int]) -> None:
-    if size != annotations.picture_size(effect):
-        with _scribbles_kept(effect, strip):
-            effect.scene.render.resolution_x, effect.scene.render.resolution_y = size
-
-
-def _follow_mixing(scene, strip, source, is_encoded: bool) -> None:
-    if strip.color_multiply not in (1, strips.IN_CODE_VALUES):
-        return
-    path = strip.path_from_id()
-    mixes = (
-        not seen_alone.has(strip.transform, seen_alone.IN_PLACE)
-        or strip.transform.filter.startswith("CUBIC")
-        or seen_alone.has_animation(scene, f"{path}.transform.")
-    )
-    same_space = source_media.reading(source)[0] == scene.sequencer_colorspace_settings.name
-    factor = strips.IN_CODE_VALUES if mixes and is_encoded and same_space else 1
-    if strip.color_multiply != factor and not seen_alone.has_animation(scene, f"{path}.color_multiply"):
-        strip.color_multiply = factor
-
-
-class _Header(NamedTuple):
-    """size: width and height of a source's picture, as a scene can have them; is_encoded: Blender keeps code values of
-    it, not light"""
-
-    size: tuple[int, int]
-    is_encoded: bool
-
-
-def _header(source) -> _Header | None:
-    """None: it cannot be read."""
-    with suppress(MediaError):
-        key = source_media.media_key(source)
-        if key not in _headers:
-            while len(_headers) >= _KEPT:
-                del _headers[next(iter(_headers))]
-            _headers[key] = None  # it is not tried again and again
-            spec = source_media.spec(source, key)
-            medium = open_source(spec.path, files=spec.files, **spec.options | {"colorspace": None})
-            medium.close()
-            side = bpy.types.RenderSettings.bl_rna.properties["resolution_x"]
-            width, height = (min(max(n, side.hard_min), side.hard_max) for n in (medium.width, medium.height))
-            _headers[key] = _Header((width, height), source_media.is_movie(source) or medium.dtype == np.uint8)
-        return _headers[key]
-    return None
 
 
 def strip_and_source(effect) -> Any:
@@ -146,7 +71,7 @@ def match(effect) -> Any:
     """Gives the effect's strip the look and the range of its source. Returns the neighbour in its channel that is in
     the way of the whole range, or None."""
     scene, (strip, source) = effect.id_data, strip_and_source(effect)
-    with _scribbles_kept(effect, strip):
+    with scribbles_kept(effect, strip):
         add_effect.copy_look(source, strip)
         for name in (name for names in _LOOK.values() for name in names):
             old, new = f"{source.path_from_id()}.{name}", f"{strip.path_from_id()}.{name}"
@@ -234,7 +159,7 @@ def _selected(scene, chosen):
 
 
 @contextmanager
-def _scribbles_kept(effect, strip):
+def scribbles_kept(effect, strip):
     """Has scribbles stay on the effect's picture while it is laid elsewhere: every drawing at its own frame."""
     before = places(effect, strip)
     yield

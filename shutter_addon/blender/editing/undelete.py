@@ -19,16 +19,16 @@ _POINTED = {"MovieClip": "movieclips", "Image": "images", "Mask": "masks"}
 _effects: dict = {}
 
 
-def keep(scene, effect) -> None:
+def keep(effect) -> None:
     """Keeps an effect that is about to be removed, under its scene's identity: properties, F-curves, annotations."""
     if effect.scene is not None and effect.scene.virtual_shutter.identity:
-        _keep(effect.scene.virtual_shutter.identity, scene, effect)
+        _keep(effect.scene.virtual_shutter.identity, effect)
 
 
 def copy(effect, strip) -> None:
     """Keeps an effect, as its strip shows it, for `paste`."""
     first, skipped, places = strip.left_handle, strips.skipped(strip), match_source.places(effect, strip)
-    _keep(_COPIED, effect.id_data, effect, first=first, skipped=skipped, places=places)
+    _keep(_COPIED, effect, first=first, skipped=skipped, places=places)
 
 
 def has_copy() -> bool:
@@ -59,8 +59,8 @@ def paste(effect, strip) -> None:
         region.offset -= later if region.timing == "TIMELINE" else 0
 
 
-def _keep(identity: str, scene, effect, **more) -> None:
-    effect_scene, path = effect.scene, effect.path_from_id()
+def _keep(identity: str, effect, **more) -> None:
+    scene, effect_scene, path = effect.id_data, effect.scene, effect.path_from_id()
     curves = [_plain(curve) for curve in fcurves.curves_under(scene, path + ".")]
     for curve in curves:
         curve["data_path"] = curve["data_path"].removeprefix(path)
@@ -85,9 +85,6 @@ def restore(scene, identity: str):
     """Makes a kept effect again in a scene. Returns the effect scene; None: none was kept under this identity."""
     if (data := _effects.get(identity)) is None:
         return None
-    for made in (*bpy.data.annotations, *bpy.data.cameras):
-        if made.virtual_shutter_made == identity and made.library is None:
-            made.virtual_shutter_made = annotations.GONE  # of the scene before, which somebody removed
     effect_scene = add_effect.new_effect_scene(scene, identity, *data["scene"])
     effect = data_format.new_effect(scene, data["format"])
     effect.scene = effect_scene
