@@ -54,7 +54,6 @@ def _before_save(*_):
     reconcile.update()  # a script may have removed strips, since Blender last told
     sharp_frame.give_back(bpy.context)
     if not data_format.is_file_newer():
-        migrations.leave_to_user()
         data_format.stamp_saved(versions.extension())
 
 

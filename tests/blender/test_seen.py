@@ -5,7 +5,7 @@ import pytest
 from support import sequencer, write_frames
 
 from shutter_addon.blender.data import selection
-from shutter_addon.blender.editing import add_effect, migrations, reconcile, shown_annotations, shutter_edits, undelete
+from shutter_addon.blender.editing import add_effect, reconcile, shown_annotations, shutter_edits, undelete
 
 
 @pytest.fixture(autouse=True)
@@ -165,7 +165,6 @@ def test_annotations_of_the_user_stay(bpy, edit, effect, previews, tmp_path):
     by_strip(bpy, edit, effect)
     reconcile.update()
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "saved.blend"))
-    migrations.take_over()
     assert [space.annotation for space in previews] == [drawn, copied]
     assert other.annotation == used
     assert len(bpy.data.annotations) == 3
@@ -223,29 +222,12 @@ def test_undo_shows_the_scribbles_again(bpy, edit, effect, previews):
 
 
 @pytest.mark.parametrize("has_effect", [False, True])
-def test_a_drawing_of_the_user_survives_an_autosave(bpy, edit, request, tmp_path, monkeypatch, has_effect):
+def test_a_drawing_of_the_user_survives_an_autosave(bpy, edit, request, tmp_path, has_effect):
     """Nothing is marked before it, and the file is not of an older version for that."""
     if has_effect:
         request.getfixturevalue("effect")
     with sequencer(bpy) as area:
         area.spaces.active.annotation = bpy.data.annotations.new("Shutter of mine")
-        monkeypatch.setattr(migrations, "leave_to_user", lambda: None)
         bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "autosave.blend"))
     bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "autosave.blend"))
     assert "Shutter of mine" in bpy.data.annotations
-
-
-def test_an_older_file_is_mended(bpy, edit, effect, previews, tmp_path, monkeypatch):
-    """One that was saved with the annotation of a deleted effect, before such were marked."""
-    left = bpy.data.annotations.new("Shutter deleted.mp4")
-    notes = bpy.data.annotations.new("Notes")
-    previews[0].annotation, previews[1].annotation = left, notes
-    effect.scene.annotation.virtual_shutter_made = effect.scene.camera.data.virtual_shutter_made = ""
-    edit.virtual_shutter.format = 0
-    monkeypatch.setattr(migrations, "leave_to_user", lambda: None)  # which older versions did not have
-    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "older.blend"))
-    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "older.blend"))
-    scene = bpy.data.scenes["Scene"].virtual_shutter.effects[0].scene
-    assert {annotation.name for annotation in bpy.data.annotations} == {scene.annotation.name, "Notes"}
-    assert scene.annotation.virtual_shutter_made == scene.virtual_shutter.identity
-    assert scene.camera.data.virtual_shutter_made == scene.virtual_shutter.identity

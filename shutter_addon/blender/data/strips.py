@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
-from typing import Any
+from typing import Any, NamedTuple
 
 import bpy
 from bpy.app.translations import pgettext_rpt as rpt_
-from bpy.types import Scene, Strip
+from bpy.types import PropertyGroup, Scene, Strip
 
 from ...core import revision
 from ...core.messages import EffectError
@@ -122,16 +122,28 @@ def source_of(scene: Any, effect: Any, strip: Any) -> Any:
     return source
 
 
-def with_sources(scene) -> list[tuple]:
-    """The effects that the scene's strips show, each with its strip and source; without those that lack a source."""
+class Shown(NamedTuple):
+    """An effect, its strip, and its source; None: it has none."""
+
+    effect: PropertyGroup
+    strip: Strip
+    source: Strip | None
+
+
+def shown_effects(scene: Scene) -> list[Shown]:
+    """The effects that the scene's strips show."""
     pairs = [(effect, strip) for strip in effect_strips(scene) if (effect := effect_of(scene, strip.scene))]
-    found = [(effect, strip, nearest_source(scene, effect, strip)) for effect, strip in pairs]
-    return [each for each in found if each[2] is not None]
+    return [Shown(effect, strip, nearest_source(scene, effect, strip)) for effect, strip in pairs]
+
+
+def with_sources(scene: Scene) -> list[Shown]:
+    """The effects that the scene's strips show, without those that lack a source."""
+    return [each for each in shown_effects(scene) if each.source is not None]
 
 
 def shown_sources(scene) -> set[str]:
     """Names of the strips that are sources of the scene's effect strips."""
-    return {source.name for _effect, _strip, source in with_sources(scene)}
+    return {each.source.name for each in shown_effects(scene) if each.source}
 
 
 def nearest_source(scene: Any, effect: Any, strip: Any) -> Any:

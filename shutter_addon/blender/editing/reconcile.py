@@ -15,7 +15,7 @@ from __future__ import annotations
 import uuid
 from contextlib import suppress
 from functools import lru_cache
-from typing import Any, NamedTuple
+from typing import Any
 
 import bpy
 import numpy as np
@@ -27,17 +27,9 @@ from ..data import data_format, fcurves, requirements, seen_alone, source_media,
 from ..data.annotations import USERS, picture_size
 from ..data.property_copy import copy_properties
 from ..rendering import invalidation, render_job, sessions
-from . import add_effect, match_source, shown_annotations, undelete
+from . import add_effect, collection_edits, match_source, shown_annotations, undelete
 
 _names: dict[int, list[str]] = {}  # of layers, by session_uid of their annotation, as they were at the last update
-
-
-class Shown(NamedTuple):
-    """An effect strip, its effect and that one's source; None: it has none."""
-
-    strip: Strip
-    effect: PropertyGroup | None
-    source: Strip | None
 
 
 def update(updated: Scene | None = None) -> None:
@@ -54,13 +46,13 @@ def update(updated: Scene | None = None) -> None:
         invalidation.invalidate_changed(scene)
 
 
-def tidy(updated: Scene | None = None) -> list[Shown]:
+def tidy(updated: Scene | None = None) -> list[strips.Shown]:
     """Does all but follow_sources, which reads media. Returns what is shown then."""
-    scenes = strips.local_scenes()
+    scenes = _oldest_first(strips.local_scenes())
     _find_scenes(scenes)
     _mend(scenes)
     _bring_back(scenes)
-    _separate_actions(scenes)
+    _separate(scenes)
     _adopt(scenes)
     for scene in scenes:
         _remove_effects(scene)
@@ -70,20 +62,14 @@ def tidy(updated: Scene | None = None) -> list[Shown]:
     _part_sources(shown)
     _unmute_sources(scenes, shown)
     _follow_names(shown)
-    _remove_scenes(shown, updated)
+    _remove_scenes(updated)
     _remove_left()
     return shown
 
 
-def gather() -> list[Shown]:
+def gather() -> list[strips.Shown]:
     """All that scenes which can be changed show of effects."""
-    shown = []
-    for scene in strips.local_scenes():
-        for strip in strips.effect_strips(scene):
-            effect = strips.effect_of(scene, strip.scene)
-            source = strips.nearest_source(scene, effect, strip) if effect else None
-            shown.append(Shown(strip, effect, source))
-    return shown
+    return [each for scene in strips.local_scenes() for each in strips.shown_effects(scene)]
 
 
 def forget() -> None:
@@ -162,45 +148,51 @@ def _bring_back(scenes: list[Scene]) -> None:
             strip.scene = found[identity]
 
 
-def _separate_actions(scenes: list[Scene]) -> None:
-    """A copied scene gets keys of its own: Blender lets both share an action."""
+def _oldest_first(scenes: list[Scene]) -> list[Scene]:
+    """Copies come after what they were made of, so that this stays what it is: undo takes a scene for unchanged that
+    the last step did not change."""
+    return sorted(scenes, key=lambda scene: scene.session_uid)
+
+
+def _separate(scenes: list[Scene]) -> None:
+    """A copied edit gets keys and effect scenes of its own: Blender lets both share actions and what strips show."""
     taken = set()
-    for scene in scenes:
-        animation = scene.animation_data
-        if scene.virtual_shutter.effects and animation and animation.action:
-            key = animation.action, animation.action_slot_handle
-            if key in taken:
+    for scene in [scene for scene in scenes if scene.virtual_shutter.effects]:
+        animation, effects = scene.animation_data, scene.virtual_shutter.effects
+        if animation and animation.action:
+            if (animation.action, animation.action_slot_handle) in taken:
                 animation.action = animation.action.copy()
-            taken.add(key)
+            taken.add((animation.action, animation.action_slot_handle))
+        for effect in effects:
+            if effect.scene in taken:
+                same = [strip for strip in strips.effect_strips(scene) if strip.scene == effect.scene]
+                effect.scene = effect.scene.copy()
+                for strip in same:
+                    strip.scene = effect.scene
+        taken.update(effect.scene for effect in effects if effect.scene)
 
 
 def _adopt(scenes: list[Scene]) -> None:
     """Effect strips that are copies, parts of cut ones or pasted from another scene get a scene and an effect."""
-    taken: set[Scene] = set()
+    taken = set()
     for scene in scenes:
-        groups: dict[Scene, list[Strip]] = {}
-        for strip in strips.effect_strips(scene):
-            groups.setdefault(strip.scene, []).append(strip)
-        groups.pop(scene, None)  # what it shows of itself Blender allows nobody to change
-        for effect_scene, same in groups.items():
-            effect = strips.effect_of(scene, effect_scene)
+        for strip in sorted(strips.effect_strips(scene), key=_place):
+            own, effect = strip.scene, strips.effect_of(scene, strip.scene)
             # Without an effect, Blender copied the scene with its strip, or the strip is pasted from another scene.
-            original = effect or _original(scene, effect_scene)
-            if original is None:
+            original = effect or _original(scene, own)
+            if original is None or own == scene:  # what a scene shows of itself Blender allows nobody to change
                 continue
-            owner, path, start = original.id_data, original.path_from_id(), original.start
-            # The effect stays with the first of the strips that begin where its keys are.
-            first, *others = sorted(same, key=lambda s: (strips.origin(s) != start, s.left_handle, s.channel))
-            own = effect_scene
-            if own in taken or (effect is None and strips.effect_of(owner, own)):
+            if own in taken or (effect is None and strips.effect_of(original.id_data, own)):
                 own = own.copy()
+            if effect is None or own != strip.scene:
+                _duplicate(original, strip, own)
             taken.add(own)
-            if effect is None:
-                _duplicate(owner, path, first, own)
-            elif own != effect_scene:
-                effect.scene = first.scene = own
-            for strip in others:  # of which each one that is added may move the effects in memory
-                _duplicate(owner, path, strip, own.copy())
+
+
+def _place(strip: Strip) -> tuple[bool, int, int]:
+    """Of strips with the same effect, the first of those that begin where its keys are comes first, and keeps it."""
+    effect = strips.effect_of(strip.id_data, strip.scene)
+    return effect is None or strips.origin(strip) != effect.start, strip.left_handle, strip.channel
 
 
 def _original(scene: Scene, effect_scene: Scene) -> PropertyGroup | None:
@@ -212,9 +204,9 @@ def _original(scene: Scene, effect_scene: Scene) -> PropertyGroup | None:
     return None
 
 
-def _duplicate(old_scene: Scene, path: str, strip: Strip, effect_scene: Scene) -> None:
-    """Gives a strip and its scene a copy of the effect at `path`."""
-    scene = strip.id_data
+def _duplicate(effect: PropertyGroup, strip: Strip, effect_scene: Scene) -> None:
+    """Gives a strip and its scene a copy of an effect."""
+    scene, old_scene, path = strip.id_data, effect.id_data, effect.path_from_id()
     new = data_format.new_effect(scene, old_scene.virtual_shutter.format)
     old = old_scene.path_resolve(path)  # adding to a collection moves its items in memory
     copy_properties(old, new)
@@ -234,31 +226,25 @@ def _shorten(strip: Strip, same: list[Strip]) -> None:
 
 def _remove_effects(scene: Scene) -> None:
     """Removes the scene's effects that none of its strips shows any more."""
-    shown = {strip.scene for strip in strips.effect_strips(scene)}
-    effects = scene.virtual_shutter.effects
-    stay = [i for i, effect in enumerate(effects) if effect.scene in shown]
-    gone = [i for i in range(len(effects)) if i not in stay]
-    if not gone:
-        return
+    group, shown = scene.virtual_shutter, {strip.scene for strip in strips.effect_strips(scene)}
+    gone = [i for i, effect in enumerate(group.effects) if effect.scene not in shown]
+    if gone:
+        undo.renew_action(scene)
     for i in reversed(gone):
-        undelete.keep(effects[i])
-        effects.remove(i)
-    undo.renew_action(scene)
-    places = dict.fromkeys(gone) | {old: new for new, old in enumerate(stay)}
-    fcurves.reindex(scene, "virtual_shutter.effects", places)
+        undelete.keep(group.effects[i])
+        collection_edits.remove(group, "effects", i)
 
 
 def _effect_scenes() -> list[Scene]:
-    """The scenes that were made for effects, and can be changed; those first that were there before others, as copies
-    are."""
-    local = sorted(strips.local_scenes(), key=lambda scene: scene.session_uid)
-    return [scene for scene in local if scene.render.engine == strips.ENGINE and scene.virtual_shutter.identity]
+    """The scenes that were made for effects, and can be changed."""
+    made = [scene for scene in strips.local_scenes() if scene.virtual_shutter.identity]
+    return [scene for scene in made if scene.render.engine == strips.ENGINE]
 
 
-def _identify(shown: list[Shown]) -> None:
+def _identify(shown: list[strips.Shown]) -> None:
     """Every effect scene has an identity and an annotation of its own; its strip, its effect and that carry it."""
     identities, drawn = set(), set()
-    for scene in _effect_scenes():
+    for scene in _oldest_first(_effect_scenes()):
         group = scene.virtual_shutter
         if group.identity in identities:
             group.identity = uuid.uuid4().hex
@@ -269,17 +255,14 @@ def _identify(shown: list[Shown]) -> None:
             drawn.add(scene.annotation)
             if shown_annotations.is_own(scene.annotation):
                 _give(scene.annotation, "virtual_shutter_made", group.identity)
-    for strip, effect, _source in shown:
-        _give(strip, "virtual_shutter_effect", strip.scene.virtual_shutter.identity)
-        if effect:
-            _give(effect, "identity", strip.scene.virtual_shutter.identity)
+    for effect, strip, _source in shown:
+        _give(strip, "virtual_shutter_effect", effect.scene.virtual_shutter.identity)
+        _give(effect, "identity", effect.scene.virtual_shutter.identity)
 
 
-def _follow_strips(shown: list[Shown]) -> None:
+def _follow_strips(shown: list[strips.Shown]) -> None:
     """Moves keys and drawings with their strips."""
-    for strip, effect, _source in shown:
-        if effect is None:
-            continue
+    for effect, strip, _source in shown:
         start = strips.origin(strip)
         if not abs(effect.start) <= 2 * MAX_FRAME:  # no frame: its keys are where they are
             effect.start = start
@@ -306,15 +289,15 @@ def _move_drawings(effect: PropertyGroup) -> None:
         annotation.virtual_shutter_start = effect.start
 
 
-def _part_sources(shown: list[Shown]) -> None:
+def _part_sources(shown: list[strips.Shown]) -> None:
     """Where effects with the same source show different strips, parts of a cut source or copies, each gets its own."""
     first: dict[tuple[Scene, str], Strip] = {}
-    for strip, effect, source in shown:
-        if effect and source and first.setdefault((strip.id_data, effect.source), source) != source:
+    for effect, strip, source in shown:
+        if source and first.setdefault((strip.id_data, effect.source), source) != source:
             add_effect.own_source(strip.id_data, source)
 
 
-def _unmute_sources(scenes: list[Scene], shown: list[Shown]) -> None:
+def _unmute_sources(scenes: list[Scene], shown: list[strips.Shown]) -> None:
     """Sources that an effect muted show again once no effect strip shows them."""
     sources = {each.source for each in shown}
     for strip in [strip for scene in scenes for strip in strips.all_strips(scene) if strip.virtual_shutter_muted]:
@@ -328,7 +311,7 @@ def _is_baked_over(source: Strip) -> bool:
     return any(s.virtual_shutter_bake.identity and strips.overlap(s, source) for s in baked)
 
 
-def _follow_names(shown: list[Shown]) -> None:
+def _follow_names(shown: list[strips.Shown]) -> None:
     """Gives regions the new names of their drawings, layers of the effect's annotation.
 
     Handlers come after the undo push of the user's step. Undoing the step after a rename brings back a region with
@@ -337,7 +320,7 @@ def _follow_names(shown: list[Shown]) -> None:
     """
     before = dict(_names)
     _names.clear()  # of annotations that are gone
-    for effect in [each.effect for each in shown if each.effect]:
+    for effect, _strip, _source in shown:
         annotation = effect.scene.annotation
         if annotation is None or annotation.library is not None:
             continue
@@ -357,9 +340,9 @@ def _rename(effect: PropertyGroup, before: list[str], names: list[str]) -> None:
                 region.layer = changed[0][1]
 
 
-def _remove_scenes(shown: list[Shown], updated: Scene | None) -> None:
+def _remove_scenes(updated: Scene | None) -> None:
     """Removes effect scenes that no strip and no window shows."""
-    stay = {updated, *(each.strip.scene for each in shown)}
+    stay = {strip.scene for scene in strips.local_scenes() for strip in strips.effect_strips(scene)} | {updated}
     for window in [window for manager in bpy.data.window_managers for window in manager.windows]:
         stay.update((window.scene, window.workspace.sequencer_scene))
     for scene in _effect_scenes():
@@ -387,22 +370,28 @@ def _remove_left() -> None:
         made.virtual_shutter_made = USERS
 
 
-def follow_sources(shown: list[Shown]) -> None:
+def follow_sources(shown: list[strips.Shown]) -> None:
     """Gives effect scenes the rate and views of the scene that shows them, and the size of their sources; has Blender
     mix the strips' pixels as their sources'."""
-    for strip, effect, source in shown:
+    for effect, strip, source in shown:
         if strip.scene.library is not None:
             continue
         for name in ("fps", "fps_base", "use_multiview"):  # Blender crashes where an edit in stereo shows a plain scene
             _give(strip.scene.render, name, getattr(strip.id_data.render, name))
-        if source is not None and (header := _header_of(source)) is not None:
-            if header.size != picture_size(effect):
-                with match_source.scribbles_kept(effect, strip):
-                    strip.scene.render.resolution_x, strip.scene.render.resolution_y = header.size
-            _follow_mixing(strip, source, header.is_encoded)
+        with suppress(MediaError):
+            header = _header(source_media.spec(source)) if source else None
+            if header is not None:
+                _follow_size(effect, strip, header[0])
+                _follow_mixing(strip, source, is_encoded=header[1])
 
 
-def _follow_mixing(strip: Strip, source: Strip, is_encoded: bool) -> None:
+def _follow_size(effect: PropertyGroup, strip: Strip, size: tuple[int, int]) -> None:
+    if size != picture_size(effect):
+        with match_source.scribbles_kept(effect, strip):
+            effect.scene.render.resolution_x, effect.scene.render.resolution_y = size
+
+
+def _follow_mixing(strip: Strip, source: Strip, *, is_encoded: bool) -> None:
     if strip.color_multiply not in (1, strips.IN_CODE_VALUES):
         return
     scene, path = strip.id_data, strip.path_from_id()
@@ -417,28 +406,14 @@ def _follow_mixing(strip: Strip, source: Strip, is_encoded: bool) -> None:
         strip.color_multiply = factor
 
 
-class _Header(NamedTuple):
-    """size: width and height of a source's picture, as a scene can have them; is_encoded: Blender keeps code values of
-    it, not light"""
-
-    size: tuple[int, int]
-    is_encoded: bool
-
-
-def _header_of(source: Strip) -> _Header | None:
-    """None: it cannot be read."""
-    with suppress(MediaError):
-        return _header(source_media.spec(source))
-    return None
-
-
 @lru_cache(256)
-def _header(spec: source_media.SourceSpec) -> _Header | None:
-    """What a medium says of itself, read once; None: it cannot be, and is not tried again and again."""
+def _header(spec: source_media.SourceSpec) -> tuple[tuple[int, int], bool] | None:
+    """Width and height of a medium's picture, as a scene can have them, and whether Blender keeps code values of it in
+    place of light. None: it cannot be read, and is not tried again and again."""
     with suppress(MediaError):
         medium = open_source(spec.path, files=spec.files, **spec.options | {"colorspace": None})
         medium.close()
         side = bpy.types.RenderSettings.bl_rna.properties["resolution_x"]
         width, height = (min(max(n, side.hard_min), side.hard_max) for n in (medium.width, medium.height))
-        return _Header((width, height), spec.files is None or medium.dtype == np.uint8)
+        return (width, height), spec.files is None or medium.dtype == np.uint8
     return None

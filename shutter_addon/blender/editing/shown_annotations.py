@@ -73,11 +73,6 @@ def before_undo() -> None:
             _emptied.add(space.as_pointer())
 
 
-def shown_by(annotation) -> int:
-    """How many previews have an annotation."""
-    return sum(space.annotation == annotation for space in _spaces())
-
-
 def forget() -> None:
     """Forgets the previews of a file, before another one is loaded."""
     _emptied.clear()
