@@ -15,15 +15,14 @@ from __future__ import annotations
 import uuid
 from contextlib import suppress
 from functools import lru_cache
-from typing import Any
 
 import bpy
 import numpy as np
-from bpy.types import PropertyGroup, Scene, Strip
+from bpy.types import PropertyGroup, Scene, Strip, bpy_struct
 
 from ...core.model.limits import MAX_FRAME
 from ...media import MediaError, open_source
-from ..data import data_format, fcurves, requirements, seen_alone, source_media, strips, undo
+from ..data import data_format, fcurves, requirements, seen_alone, source_media, strips
 from ..data.annotations import USERS, picture_size
 from ..data.property_copy import copy_properties
 from ..rendering import invalidation, render_job, sessions
@@ -83,7 +82,7 @@ def forget() -> None:
 def find_lost() -> None:
     """Finds again what Blender's undo loses. A scene that was changed is read into new memory, and what points there is
     taken for pointing to the scene itself. This memory may be that of data which the undone step had removed: of effect
-    scenes, and of actions (data.undo)."""
+    scenes, and of actions (_renew_action)."""
     scenes = strips.local_scenes()
     for scene in scenes:
         _find_action(scene)
@@ -128,7 +127,7 @@ def _mend(scenes: list[Scene]) -> None:
                 add_effect.add_camera(strip.scene)
 
 
-def _give(owner: Any, name: str, value: object) -> None:
+def _give(owner: bpy_struct, name: str, value: object) -> None:
     """Gives a property a value that it has not: Blender takes whatever is set for a change."""
     if getattr(owner, name) != value:
         setattr(owner, name, value)
@@ -197,11 +196,10 @@ def _place(strip: Strip) -> tuple[bool, int, int]:
 
 def _original(scene: Scene, effect_scene: Scene) -> PropertyGroup | None:
     """The effect that a copied effect scene was made for; those of the scene itself first."""
-    for other in sorted(bpy.data.scenes, key=lambda other: other != scene):
-        for effect in other.virtual_shutter.effects:
-            if effect.scene and effect.scene.virtual_shutter.identity == effect_scene.virtual_shutter.identity:
-                return effect
-    return None
+    identity = effect_scene.virtual_shutter.identity
+    scenes = sorted(bpy.data.scenes, key=lambda other: other != scene)
+    effects = (effect for other in scenes for effect in other.virtual_shutter.effects if effect.scene)
+    return next((effect for effect in effects if effect.identity == identity != ""), None)
 
 
 def _duplicate(effect: PropertyGroup, strip: Strip, effect_scene: Scene) -> None:
@@ -213,7 +211,7 @@ def _duplicate(effect: PropertyGroup, strip: Strip, effect_scene: Scene) -> None
     new.scene = effect_scene
     _shorten(strip, [other for other in strips.effect_strips(old_scene) if other.scene == old.scene])
     strip.scene = effect_scene
-    undo.renew_action(scene)
+    _renew_action(scene)
     fcurves.copy_curves(old_scene, path + ".", scene, new.path_from_id() + ".")
 
 
@@ -229,10 +227,26 @@ def _remove_effects(scene: Scene) -> None:
     group, shown = scene.virtual_shutter, {strip.scene for strip in strips.effect_strips(scene)}
     gone = [i for i, effect in enumerate(group.effects) if effect.scene not in shown]
     if gone:
-        undo.renew_action(scene)
+        _renew_action(scene)
     for i in reversed(gone):
         undelete.keep(group.effects[i])
         collection_edits.remove(group, "effects", i)
+
+
+def _renew_action(scene: Scene) -> None:
+    """Puts a copy of the action that holds a scene's keys in its place, for a handler to change.
+
+    Handlers come after the undo push of the user's step. Undo keeps data that is equal in both steps as it is now,
+    whatever a handler did to it since; the copy is in neither of them, and the action comes back.
+    """
+    action = scene.animation_data and scene.animation_data.action
+    if not action or action.library is not None:
+        return
+    name, copy = action.name, action.copy()
+    action.user_remap(copy)
+    copy.use_fake_user = action.use_fake_user
+    bpy.data.actions.remove(action)
+    copy.name = name
 
 
 def _effect_scenes() -> list[Scene]:
@@ -268,7 +282,7 @@ def _follow_strips(shown: list[strips.Shown]) -> None:
             effect.start = start
         _move_drawings(effect)
         if start != effect.start:
-            undo.renew_action(strip.id_data)
+            _renew_action(strip.id_data)
             fcurves.move_curves(strip.id_data, effect.path_from_id() + ".", start - effect.start)
             effect.start = start
             _move_drawings(effect)
