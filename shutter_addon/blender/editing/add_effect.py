@@ -15,7 +15,7 @@ from ...core.model.limits import MAX_FRAME
 from ...media import color
 from ..data import data_format, seen_alone, source_media
 from ..data.annotations import new_annotation
-from ..data.strips import ENGINE, effect_of, nearest_source, origin, overlap, with_sources
+from ..data.strips import ENGINE, Shown, effect_of, nearest_source, origin, overlap, shown_effects
 
 _COLOR = "COLOR_06"
 _LOOK = ("use_flip_x", "use_flip_y", "color_multiply", "color_saturation", "multiply_alpha")
@@ -67,18 +67,16 @@ def choose_source(effect: PropertyGroup, strip: Strip, source: Strip) -> None:
     _mute(source, medium)
     source.virtual_shutter_source = effect.source = source.virtual_shutter_source or uuid.uuid4().hex
     if nearest_source(scene, effect, strip) != source:  # but a copy or another part of it
-        own_source(scene, source)
+        own_source(source, shown_effects(scene))
         effect.source = source.virtual_shutter_source
     connect(scene, [strip, source, *source.connections])
 
 
-def own_source(scene: Scene, source: Strip) -> None:
-    """Gives a source an identity that no other strip has; the effects that show it go along."""
-    identity = uuid.uuid4().hex
-    for effect, _strip, other in with_sources(scene):
-        if other == source:
-            effect.source = identity
-    source.virtual_shutter_source = identity
+def own_source(source: Strip, shown: list[Shown]) -> None:
+    """Gives a source an identity that no other strip has; the effects that show it, of all those, go along."""
+    source.virtual_shutter_source = uuid.uuid4().hex
+    for effect in [each.effect for each in shown if each.source == source]:
+        effect.source = source.virtual_shutter_source
 
 
 def _mute(source: Strip, medium: FrameSource) -> None:

@@ -308,7 +308,7 @@ def _part_sources(shown: list[strips.Shown]) -> None:
     first: dict[tuple[Scene, str], Strip] = {}
     for effect, strip, source in shown:
         if source and first.setdefault((strip.id_data, effect.source), source) != source:
-            add_effect.own_source(strip.id_data, source)
+            add_effect.own_source(source, shown)
 
 
 def _unmute_sources(scenes: list[Scene], shown: list[strips.Shown]) -> None:
