@@ -10,7 +10,7 @@ from bpy.app.handlers import persistent
 
 from ..core import revision, told
 from .data import data_format, inbetween_settings, preview_areas, source_media, strips, versions
-from .editing import copies, lifecycle, migrations, shown_annotations, track_region, undelete, undo_repair
+from .editing import migrations, reconcile, shown_annotations, track_region, undelete
 from .interface import bake_operators, inbetween_operators, newer_files, sharp_frame
 from .output import edit_feed
 from .rendering import invalidation, job_snapshots, render_job, sessions
@@ -28,7 +28,7 @@ def _before_load(*_):
     invalidation.forget()
     inbetween_settings.built.forget()
     source_media.forget()
-    lifecycle.forget()
+    reconcile.forget()
 
 
 @persistent
@@ -36,9 +36,8 @@ def _after_load(*_):
     sharp_frame.listen()
     sessions.drop_removed()  # what a render job took up while the file was loaded
     if not data_format.is_file_newer():
-        copies.adopt()
-        lifecycle.mend()
         migrations.migrate()
+        reconcile.tidy()
     shown_annotations.follow()
     newer_files.tell(bpy.data.scenes)
 
@@ -52,10 +51,9 @@ def _after_import(imported, *_):
 @persistent
 def _before_save(*_):
     edit_feed.end()
-    lifecycle.update()  # a script may have removed strips, since Blender last told
+    reconcile.update()  # a script may have removed strips, since Blender last told
     sharp_frame.give_back(bpy.context)
     if not data_format.is_file_newer():
-        lifecycle.leave_to_user()
         data_format.stamp_saved(versions.extension())
 
 
@@ -65,7 +63,7 @@ def _update(scene=None, depsgraph=None):
     if (film := render_job.film()) is not None and bpy.app.is_job_running("RENDER"):
         job_snapshots.look(film)
     if not render_job.cancelling():
-        lifecycle.update(scene)
+        reconcile.update(scene)
     # Blender itself draws previews again for most of what changes, but not for a mask. And it may crash where one is
     # drawn while a render ends.
     if depsgraph is not None and depsgraph.id_type_updated("MASK") and not render_job.runs():
@@ -80,7 +78,7 @@ def _before_undo(*_):
 @persistent
 def _after_undo(*_):
     revision.changed()
-    undo_repair.find_lost()
+    reconcile.find_lost()
     track_region.data_replaced()
     _drop_frames()
     sessions.drop_removed()
@@ -111,10 +109,8 @@ def _prepare(film: int, in_job: bool) -> bool:
     source_media.look_again()
     source_media.rest(render_job.runs())
     if not data_format.is_file_newer():
-        if bpy.app.background:  # in a window the last update has seen to it
-            lifecycle.mend()
-            copies.adopt()
-        lifecycle.follow_sources()  # Blender tells of no other views
+        # In a window the last update has seen to it, but for views, of which Blender tells nobody.
+        reconcile.follow_sources(reconcile.tidy() if bpy.app.background else reconcile.gather())
     for scene in bpy.data.scenes:
         invalidation.invalidate_changed(scene)
     if in_job:
@@ -198,5 +194,5 @@ def unregister():
     edit_feed.end()
     sessions.forget()
     source_media.forget()
-    lifecycle.forget()
+    reconcile.forget()
     undelete.forget()

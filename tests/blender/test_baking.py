@@ -12,7 +12,7 @@ import pytest
 from support import noise_film, picture_of, read_picture, sequencer
 
 from shutter_addon.blender.data import effect_version, selection, strips
-from shutter_addon.blender.editing import add_effect, baked_strips, lifecycle
+from shutter_addon.blender.editing import add_effect, baked_strips, reconcile
 from shutter_addon.blender.output import bake_job, baked_film, edit_check, film_output
 from shutter_addon.blender.rendering import sessions
 from shutter_addon.core import revision
@@ -341,7 +341,7 @@ def test_a_copy_of_all_of_it_is_unbaked_alone(bpy, film):
         scene.frame_set(101)
         bpy.ops.sequencer.paste()
     assert len(scene.sequence_editor.strips) == 6
-    lifecycle.update()
+    reconcile.update()
     selection.choose(scene, strip)
     bpy.ops.shutter.unbake()
     assert len(baked_in(scene)) == 1
@@ -391,7 +391,7 @@ def test_keys_that_moved_along_are_no_change_and_others_are(bpy, film, change):
     assert states(scene, strip) == [False]
     for each in scene.sequence_editor.strips:
         each.content_start += 1007
-    lifecycle.update()
+    reconcile.update()
     assert states(scene, strip) == [False]
     point = scene.animation_data.action.layers[0].strips[0].channelbags[0].fcurves[0].keyframe_points[1]
     point.handle_right[0] += 0.5
@@ -522,7 +522,7 @@ def test_a_transparent_source_stays_muted_below_what_was_baked_of_it(bpy, film, 
     bake(bpy)
     before = rendered(bpy, scene, tmp_path / "baked", (4,))
     scene.sequence_editor.strips.remove(strip)
-    lifecycle.update()
+    reconcile.update()
     assert (rendered(bpy, scene, tmp_path / "left", (4,)) == before).all()
 
 
@@ -599,7 +599,7 @@ def test_a_transparent_source_beside_another_bake_is_shown(bpy, film, tmp_path):
     other, _effect = add_effect.add_effect(scene, source)
     assert source.mute
     scene.sequence_editor.strips.remove(other)
-    lifecycle.update()
+    reconcile.update()
     assert not source.mute
 
 

@@ -198,14 +198,14 @@ def test_the_cache_is_on(bpy, edit, effect, render):
 
 
 def test_what_is_known_of_effects_goes_with_them(edit, effect):
-    from shutter_addon.blender.editing import lifecycle
+    from shutter_addon.blender.editing import reconcile
     from shutter_addon.blender.rendering import invalidation
 
     scene = effect.scene.session_uid
     invalidation.invalidate_changed(edit)
     assert "invalidation" in remembering(scene)
     edit.sequence_editor.strips.remove(next(strip for strip in edit.sequence_editor.strips if strip.type == "SCENE"))
-    lifecycle.update()
+    reconcile.update()
     invalidation.invalidate_changed(edit)
     assert remembering(scene) == set()
 

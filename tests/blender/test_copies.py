@@ -23,7 +23,7 @@ SCRIPT = """
 import bpy
 from shutter_addon import blender
 from shutter_addon.blender.data import strips
-from shutter_addon.blender.editing import add_effect, copies, shutter_edits
+from shutter_addon.blender.editing import add_effect, reconcile, shutter_edits
 from shutter_addon.blender.editing import add_effect
 
 blender.register()
@@ -33,7 +33,7 @@ strip, effect = add_effect.add_effect(edit, source)
 shutter_edits.start(effect)
 for i in range({count}):
     edit.sequence_editor.strips.new_scene("copy", effect.scene, 5, 200 + 100 * i)
-copies.adopt()
+reconcile.tidy()
 effects = edit.virtual_shutter.effects
 print("EFFECTS", [effect.start for effect in effects], len({{effect.scene.name for effect in effects}}))
 """
@@ -275,6 +275,32 @@ def test_an_effect_is_pasted_onto_another_clip(bpy, edit, add, clip, where):
     bpy.ops.ed.undo()
     bpy.context.view_layer.update()
     assert [len(effect.shutters) for effect in bpy.data.scenes[name].virtual_shutter.effects] == before
+
+
+@pytest.mark.parametrize("name", ["Shutter", "Shutter.002"])
+def test_an_original_stays_what_it_is_whatever_it_is_called(bpy, edit, add, name):
+    """Blender gives a copy the first free number behind the name: it may come before that of the original."""
+    strip = add()
+    scene, annotation, identity = strip.scene, strip.scene.annotation, strip.scene.virtual_shutter.identity
+    scene.name = name
+    cut(edit, 8)
+    copied = scene.copy()  # by the user, for a strip
+    edit.sequence_editor.strips.new_scene("copied", copied, 5, 100)
+    bpy.context.view_layer.update()
+    assert (strip.scene, scene.annotation, scene.virtual_shutter.identity) == (scene, annotation, identity)
+    effects = list(edit.virtual_shutter.effects)
+    assert len({effect.identity for effect in effects}) == len({e.scene.annotation for e in effects}) == 3
+    assert all(e.scene.annotation.virtual_shutter_made == e.identity for e in effects)
+
+
+def test_an_effect_whose_scene_somebody_removed_leaves_nothing(bpy, edit, add):
+    """And a strip that still shows nothing stays as it is."""
+    strip = add()
+    bpy.data.scenes.remove(strip.scene)
+    for _ in range(2):
+        bpy.context.view_layer.update()
+        assert strip.scene is None
+        assert (len(edit.virtual_shutter.effects), len(bpy.data.annotations), len(bpy.data.cameras)) == (0, 0, 0)
 
 
 def test_an_effect_scene_whose_sequencer_shows_itself(bpy, edit, add):

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from shutter_addon.blender.data import consistency, recipe_import, selection, strips
-from shutter_addon.blender.editing import bar_edits, copies, layer_presets, region_edits, shutter_edits, time_map
+from shutter_addon.blender.editing import bar_edits, layer_presets, reconcile, region_edits, shutter_edits, time_map
 from shutter_addon.core.model import presets, shutters
 from shutter_addon.core.model.frame_state import Options
 
@@ -138,7 +138,7 @@ def test_copies_keep_to_it_too(edit, effect):
     effect.window = 24
     assert opened(effect, 2) == [0]
     edit.sequence_editor.strips.new_scene("copy", effect.scene, 5, 200)
-    copies.adopt()
+    reconcile.tidy()
     copy = edit.virtual_shutter.effects[1]
     copy.position = "END"
     assert opened(copy) == opened(copy, 2) == [23]

@@ -10,7 +10,7 @@ from shutter_addon.core.recipes import recipe_file
 
 REGION = {"name": "Face", "shutter": "S1", "kind": "lasso", "strokes": [[[0.1, 0.1], [0.9, 0.1], [0.5, 0.9]]]}
 MOVED = REGION | {"keys": [{"frame": 1}, {"frame": 9, "location": [0.2, 0.1], "ease": "bezier"}]}
-REMEMBER = "renamed_drawings", "invalidation"  # what modules know of an effect's annotation, and of its scene
+REMEMBER = "reconcile", "invalidation"  # what modules know of an effect's annotation, and of its scene
 KEYED = recipe(4, {1: [1, 0, 0, 0], 9: [0, 0, 0, 1]}, [1, 1, 1, 1], regions=[MOVED])
 
 
@@ -457,7 +457,7 @@ def test_only_the_last_effects_that_were_removed_are_kept(edit, add):
     scene, effect = add().scene, edit.virtual_shutter.effects[0]
     for number in (*range(64), 0, *range(64, 127)):
         scene.virtual_shutter.identity = f"identity {number}"
-        undelete.keep(edit, effect)
+        undelete.keep(effect)
     found = {number: undelete.restore(edit, f"identity {number}") for number in range(128)}
     kept = {number: scene for number, scene in found.items() if scene is not None}
     assert list(kept) == [0, *range(64, 127)]
@@ -469,10 +469,10 @@ def test_the_extension_leaves_nothing_kept(bpy, edit, add):
     from shutter_addon.blender.editing import undelete
 
     scene = add().scene
-    undelete.keep(edit, edit.virtual_shutter.effects[0])
+    undelete.keep(edit.virtual_shutter.effects[0])
     update(bpy)
     annotation, identity = scene.annotation.session_uid, scene.virtual_shutter.identity
-    assert "renamed_drawings" in remembering(annotation)
+    assert "reconcile" in remembering(annotation)
     assert undelete.restore(edit, identity) is not None
     handlers.unregister()
     try:

@@ -8,7 +8,7 @@ import pytest
 from support import recipe, sequencer
 
 from shutter_addon.blender.data import annotations, fcurves, geometry, selection
-from shutter_addon.blender.editing import lifecycle, match_source
+from shutter_addon.blender.editing import match_source, reconcile
 from shutter_addon.core.model.scribbles import mapped
 from shutter_addon.core.recipes import recipe_file
 
@@ -396,16 +396,16 @@ def test_a_film_keeps_its_size(bpy, edit, made, large_movie, monkeypatch):
     bpy.context.view_layer.update()
     assert annotations.picture_size(edit.virtual_shutter.effects[0]) == (32, 24)
     monkeypatch.undo()
-    lifecycle.update()
+    reconcile.update()
     assert annotations.picture_size(edit.virtual_shutter.effects[0]) == (40, 40)
 
 
 def test_headers_are_read_once_and_never_for_a_panel(bpy, made, monkeypatch):
     made()
-    monkeypatch.setattr(match_source.source_media, "open_media", lambda _strip: pytest.fail("a file was opened"))
+    monkeypatch.setattr(reconcile.source_media, "open_media", lambda _strip: pytest.fail("a file was opened"))
     bpy.context.view_layer.update()
-    match_source.follow(bpy.context.scene)
-    match_source.forget()
+    reconcile.follow_sources(reconcile.gather())
+    reconcile.forget()
     assert words() == []
 
 

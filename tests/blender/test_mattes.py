@@ -119,14 +119,14 @@ def test_the_timeline_and_an_offset(shown, matte):
 def test_a_cut_of_the_effect_changes_nothing(shown, matte, tmp_path):
     """Neither with the timeline's frames nor with the footage's."""
     from shutter_addon.blender.data import recipe_import, strips
-    from shutter_addon.blender.editing import lifecycle
+    from shutter_addon.blender.editing import reconcile
     from shutter_addon.blender.output import matte_export
 
     regions = region(matte, timing="timeline", offset=1, opacity=0.5), region(matte, opacity=0.5, name="n")
     strip, effect, _coefficients = shown(data(*regions))
     before = request(strip.id_data, effect, strip, 9).coefficients()
     right = strip.split(frame=7, split_method="SOFT")
-    lifecycle.update()
+    reconcile.update()
     effect = strips.effect_of(strip.id_data, right.scene)
     assert close(request(strip.id_data, effect, right, 9).coefficients(), before)
     saved = matte_export.recipe_for(strip.id_data, effect, right, tmp_path / "r.json")
@@ -347,13 +347,13 @@ def test_drawn_regions_stay_beside_mattes(shown, matte):
 
 
 def test_copies_have_mattes_of_their_own(bpy, edit, shown, matte):
-    from shutter_addon.blender.editing import lifecycle
+    from shutter_addon.blender.editing import reconcile
 
     _strip, effect, coefficients = shown(data(region(matte)))
     own = strip_of(edit, matte, 3)
     effect.regions[0].matte, effect.regions[0].strip_name = "STRIP", own.name
     copy = edit.copy()
-    lifecycle.update()
+    reconcile.update()
     (other,) = copy.virtual_shutter.effects
     assert other.regions[0].strip_name == own.name
     own.name = "renamed"

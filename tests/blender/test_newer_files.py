@@ -12,7 +12,7 @@ from support import picture_of, recipe, sequencer
 
 from shutter_addon.blender import command
 from shutter_addon.blender.data import data_format, preferences, property_copy
-from shutter_addon.blender.editing import lifecycle, migrations, undelete
+from shutter_addon.blender.editing import migrations, reconcile, undelete
 from shutter_addon.core.messages import EffectError
 from shutter_addon.core.recipes import recipe_file
 from shutter_addon.core.recipes.recipe import RecipeError
@@ -61,7 +61,7 @@ def test_nothing_of_it_is_lost_by_saving(bpy, newer, made):
     for frame in (4, 1):
         edit.frame_set(frame)
         bpy.ops.render.render(scene=edit.name)
-    lifecycle.update()
+    reconcile.update()
     bpy.ops.wm.save_mainfile()
     after = newer_version("read", path)
     assert list(stored.missing(made[1], after)) == []
@@ -176,8 +176,8 @@ def test_what_is_made_of_older_effects_is_older(bpy, edit, effect):
     copied = edit.copy()
     other = bpy.data.scenes.new("Other")
     other.sequence_editor_create().strips.new_scene("pasted", effect.scene, 2, 1)
-    lifecycle.update()
-    undelete.keep(edit, edit.virtual_shutter.effects[0])
+    reconcile.update()
+    undelete.keep(edit.virtual_shutter.effects[0])
     empty = bpy.data.scenes.new("Empty")
     undelete.restore(empty, edit.virtual_shutter.effects[0].identity)
     data_format.stamp_saved("9")

@@ -5,7 +5,7 @@ import pytest
 from support import sequencer, write_frames
 
 from shutter_addon.blender.data import selection
-from shutter_addon.blender.editing import add_effect, lifecycle, shown_annotations, shutter_edits, undelete
+from shutter_addon.blender.editing import add_effect, reconcile, shown_annotations, shutter_edits, undelete
 
 
 @pytest.fixture(autouse=True)
@@ -64,7 +64,7 @@ def test_halves_that_were_moved_apart_have_an_effect_each(bpy, edit, effect):
     left = strip_of(edit, effect)
     right = left.split(21, "SOFT")
     right.content_start += 10
-    lifecycle.update()
+    reconcile.update()
     selection.choose(edit, left)
     edit.frame_set(35)
     assert selection.active(bpy.context)[1].scene == left.scene != right.scene
@@ -159,13 +159,12 @@ def test_annotations_of_the_user_stay(bpy, edit, effect, previews, tmp_path):
     """Those that are shown in place of an effect's, copies, and those that are used elsewhere."""
     drawn, copied = bpy.data.annotations.new("Shutter of mine"), effect.scene.annotation.copy()
     previews[0].annotation, previews[1].annotation = drawn, copied
-    lifecycle.update()
+    reconcile.update()
     other = bpy.data.scenes.new("Other")
     other.annotation = used = effect.scene.annotation
     by_strip(bpy, edit, effect)
-    lifecycle.update()
+    reconcile.update()
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "saved.blend"))
-    lifecycle.take_over()
     assert [space.annotation for space in previews] == [drawn, copied]
     assert other.annotation == used
     assert len(bpy.data.annotations) == 3
@@ -174,11 +173,11 @@ def test_annotations_of_the_user_stay(bpy, edit, effect, previews, tmp_path):
 def test_of_a_removed_scene_that_a_strip_brings_back_one_annotation_is_left(bpy, edit, effect, previews):
     """The strip stays, and gets its effect again, which was kept when it was deleted before."""
     scene, strip = effect.scene, strip_of(edit, effect)
-    undelete.keep(edit, effect)
+    undelete.keep(effect)
     previews[0].annotation = scene.annotation
     bpy.data.scenes.remove(scene)
     assert strip.scene is None
-    lifecycle.update()
+    reconcile.update()
     assert strip.scene is not None
     assert [strip.scene.annotation] == list(bpy.data.annotations)
     assert [strip.scene.camera.data] == list(bpy.data.cameras)
@@ -215,7 +214,7 @@ def test_the_users_annotations_stay_hidden(edit, effect, previews):
 def test_undo_shows_the_scribbles_again(bpy, edit, effect, previews):
     bpy.ops.ed.undo_push(message="before")
     by_strip(bpy, edit, effect)
-    lifecycle.update()
+    reconcile.update()
     bpy.ops.ed.undo_push(message="deleted")
     bpy.ops.ed.undo()
     edit = bpy.context.scene
@@ -223,29 +222,12 @@ def test_undo_shows_the_scribbles_again(bpy, edit, effect, previews):
 
 
 @pytest.mark.parametrize("has_effect", [False, True])
-def test_a_drawing_of_the_user_survives_an_autosave(bpy, edit, request, tmp_path, monkeypatch, has_effect):
+def test_a_drawing_of_the_user_survives_an_autosave(bpy, edit, request, tmp_path, has_effect):
     """Nothing is marked before it, and the file is not of an older version for that."""
     if has_effect:
         request.getfixturevalue("effect")
     with sequencer(bpy) as area:
         area.spaces.active.annotation = bpy.data.annotations.new("Shutter of mine")
-        monkeypatch.setattr(lifecycle, "leave_to_user", lambda: None)
         bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "autosave.blend"))
     bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "autosave.blend"))
     assert "Shutter of mine" in bpy.data.annotations
-
-
-def test_an_older_file_is_mended(bpy, edit, effect, previews, tmp_path, monkeypatch):
-    """One that was saved with the annotation of a deleted effect, before such were marked."""
-    left = bpy.data.annotations.new("Shutter deleted.mp4")
-    notes = bpy.data.annotations.new("Notes")
-    previews[0].annotation, previews[1].annotation = left, notes
-    effect.scene.annotation.virtual_shutter_made = effect.scene.camera.data.virtual_shutter_made = ""
-    edit.virtual_shutter.format = 0
-    monkeypatch.setattr(lifecycle, "leave_to_user", lambda: None)  # which older versions did not have
-    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "older.blend"))
-    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "older.blend"))
-    scene = bpy.data.scenes["Scene"].virtual_shutter.effects[0].scene
-    assert {annotation.name for annotation in bpy.data.annotations} == {scene.annotation.name, "Notes"}
-    assert scene.annotation.virtual_shutter_made == scene.virtual_shutter.identity
-    assert scene.camera.data.virtual_shutter_made == scene.virtual_shutter.identity

@@ -93,6 +93,28 @@ def snapshot(bpy):
     return result
 
 
+def marks(bpy):
+    """What handlers note of what belongs together, and which scenes, actions and annotations there are."""
+    made = [
+        (a.name, a.virtual_shutter_made, a.virtual_shutter_start, a.virtual_shutter_names, a.users)
+        for a in bpy.data.annotations
+    ]
+    scenes = [
+        (
+            scene.name,
+            scene.virtual_shutter.identity,
+            scene.annotation and scene.annotation.name,
+            scene.animation_data and scene.animation_data.action,
+            [(e.identity, e.source, e.start, e.scene) for e in scene.virtual_shutter.effects],
+            [(s.name, s.virtual_shutter_effect, s.virtual_shutter_source) for s in scene.sequence_editor.strips_all]
+            if scene.sequence_editor
+            else [],
+        )
+        for scene in bpy.data.scenes
+    ]
+    return made, scenes, [camera.virtual_shutter_made for camera in bpy.data.cameras]
+
+
 class Work(RuleBasedStateMachine):
     """Each step ends with an undo push, as an operator of a window does; there, handlers come after it."""
 
@@ -373,11 +395,11 @@ class Work(RuleBasedStateMachine):
 
     @invariant()
     def a_second_update_changes_nothing(self):
-        from shutter_addon.blender.editing import lifecycle
+        from shutter_addon.blender.editing import reconcile
 
-        before = snapshot(self.bpy), [s.name for s in self.bpy.data.scenes]
-        lifecycle.update()
-        assert (snapshot(self.bpy), [s.name for s in self.bpy.data.scenes]) == before
+        before = snapshot(self.bpy), marks(self.bpy)
+        reconcile.update()
+        assert (snapshot(self.bpy), marks(self.bpy)) == before
 
 
 def test_random_work(bpy, tmp_path):

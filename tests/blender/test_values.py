@@ -300,28 +300,28 @@ def test_what_nobody_renders_does_not_matter(bpy, edit, effect):
 @pytest.mark.parametrize("start", [NAN, 1e30])
 def test_keys_stay_where_they_are_when_the_start_is_none(bpy, edit, effect, start):
     from shutter_addon.blender.data import fcurves
-    from shutter_addon.blender.editing import lifecycle
+    from shutter_addon.blender.editing import reconcile
 
     def keys():
         return [tuple(point.co) for curve in fcurves.curves_under(edit, "") for point in curve.keyframe_points]
 
     before = keys()
     raw(effect, "start", start)
-    lifecycle.update()
+    reconcile.update()
     assert keys() == before
     assert edit.virtual_shutter.effects[0].start == 1
 
 
 def test_a_copy_has_the_same_impossible_choice(bpy, edit, effect):
     """Copies of what cannot be copied would come with every update, and never be finished."""
-    from shutter_addon.blender.editing import copies
+    from shutter_addon.blender.editing import reconcile
     from shutter_addon.blender.rendering import effect_source
 
     raw(effect, "position", 77)
     raw(effect.regions[0], "kind", 5)
     edit.sequence_editor.strips.new_scene("copy", effect.scene, 5, 100)
     for _ in range(3):
-        copies.adopt()
+        reconcile.tidy()
     assert len(edit.virtual_shutter.effects) == 2
     for scene in [effect.scene for effect in edit.virtual_shutter.effects]:
         with pytest.raises(effect_source.FAULTS, match="Position is none of its choices"):
@@ -333,7 +333,7 @@ def test_a_cut_strip_comes_back_with_its_impossible_choice(bpy, edit, effect):
 
     raw(effect, "position", 77)
     identity = effect.scene.virtual_shutter.identity
-    undelete.keep(edit, effect)
+    undelete.keep(effect)
     scene = undelete.restore(edit, identity)
     assert scene.virtual_shutter.identity == identity
     assert edit.virtual_shutter.effects[-1].position == ""
@@ -471,7 +471,7 @@ class Layout:
 def show(bpy, edit):
     """Calls what Blender calls where an effect is shown: handlers, polls, panels, gizmos."""
     from shutter_addon.blender.data import preview_areas, selection
-    from shutter_addon.blender.editing import lifecycle
+    from shutter_addon.blender.editing import reconcile
     from shutter_addon.blender.interface import (
         bar_editor,
         inbetween_operators,
@@ -482,7 +482,7 @@ def show(bpy, edit):
     )
     from shutter_addon.blender.rendering import invalidation
 
-    lifecycle.update()
+    reconcile.update()
     invalidation.invalidate_changed(edit)
     assert not invalidation.invalidate_changed(edit), "it would be drawn again and again"
     with sequencer(bpy) as area:

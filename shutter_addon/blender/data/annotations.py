@@ -11,7 +11,6 @@ from . import geometry
 # Pixels of a strip's side on the image, below which nobody sees where its scribbles are.
 _SMALLEST = 4
 USERS = "user"  # in place of an effect's identity: the annotation is the user's own, whatever its name
-GONE = "gone"  # in place of an identity: it was made for an effect that is gone
 
 
 def picture_size(effect) -> tuple[int, int]:

@@ -1,9 +1,12 @@
 """What changes along with a property of an effect: bars with the window, regions with names, scribbles with colors."""
 
+from __future__ import annotations
+
 from collections.abc import Callable, Container
 
 import numpy as np
 from bpy.app.translations import pgettext_rpt as rpt_
+from bpy.types import Context, FCurve, PropertyGroup
 
 from ...core.messages import EffectError
 from ...core.model import limits, presets, shutters
@@ -12,13 +15,13 @@ from .annotations import layer_of
 from .selection import active_region, active_shutter
 
 
-def changed(group, _context):
+def changed(group: PropertyGroup, _context: Context) -> None:
     """For update callbacks: the sequencer keeps finished frames, and knows nothing of what the effect's strips depend
     on."""
     strips.invalidate(group.id_data)
 
 
-def choose_region(effect) -> None:
+def choose_region(effect: PropertyGroup) -> None:
     """Makes a region of the active shutter the active one, the nearest in the list, unless it is one or there is none:
     the list shows that shutter's alone."""
     shutter = active_shutter(effect)
@@ -27,7 +30,7 @@ def choose_region(effect) -> None:
         effect.active_region = min(own, key=lambda i: abs(i - effect.active_region))
 
 
-def aim_pen(effect) -> None:
+def aim_pen(effect: PropertyGroup) -> None:
     """Strokes are drawn on the active region's layer from now on."""
     region = active_region(effect)
     layer = layer_of(effect, region) if region else None
@@ -46,7 +49,7 @@ def unique(name: str, taken: Container[str]) -> str:
     return wanted
 
 
-def rename(effect, old: str, new: str) -> str:
+def rename(effect: PropertyGroup, old: str, new: str) -> str:
     """The name that a shutter gets for a wish: a unique one. Its regions follow it."""
     others = [shutter.name for shutter in effect.shutters]
     others.remove(old)
@@ -59,7 +62,7 @@ def rename(effect, old: str, new: str) -> str:
     return new
 
 
-def rename_followed(effect, old: str, new: str) -> None:
+def rename_followed(effect: PropertyGroup, old: str, new: str) -> None:
     """Shutters that follow a region go on to do so under its new name, unless another region has the old one."""
     if [region.name for region in effect.regions].count(old) > 1:
         return
@@ -68,7 +71,7 @@ def rename_followed(effect, old: str, new: str) -> None:
             shutter.follow_region = new
 
 
-def forget_followed(effect, name: str) -> None:
+def forget_followed(effect: PropertyGroup, name: str) -> None:
     """Shutters follow nothing that followed a region of this name, unless there is one."""
     if name in [region.name for region in effect.regions]:
         return
@@ -77,14 +80,14 @@ def forget_followed(effect, name: str) -> None:
             shutter.follow, shutter.follow_region = "NOTHING", ""
 
 
-def bars(shutter) -> np.ndarray:
+def bars(shutter: PropertyGroup) -> np.ndarray:
     """A shutter's bars as they stand, float64 (L,)."""
     weights = np.empty(len(shutter.bars), dtype=np.float32)
     shutter.bars.foreach_get("weight", weights)
     return weights.astype(np.float64)
 
 
-def fit_bars(effect) -> None:
+def fit_bars(effect: PropertyGroup) -> None:
     """After a change of the window's length or its position: shutters that keep to a preset have its bars again, all
     others, their keys as well, keep their shape and share of light."""
     for index, shutter in enumerate(effect.shutters):
@@ -93,7 +96,7 @@ def fit_bars(effect) -> None:
             _change_bars(effect, index, lambda old: shutters.resample(old, effect.window))
 
 
-def fit_factor(effect) -> None:
+def fit_factor(effect: PropertyGroup) -> None:
     """After a change of the factor of in-between frames: the bars, keyed ones as well, stand for the same times, or are
     a preset's again.
 
@@ -105,7 +108,7 @@ def fit_factor(effect) -> None:
     if factor == effect.bars_per_frame:
         return
 
-    def multiplied(old: np.ndarray):
+    def multiplied(old: np.ndarray) -> np.ndarray:
         return shutters.multiplied(old, effect.bars_per_frame, factor, position)
 
     try:
@@ -123,7 +126,7 @@ def fit_factor(effect) -> None:
     effect.bars_per_frame, effect.window = factor, window
 
 
-def preset_of(effect, index: int) -> str:
+def preset_of(effect: PropertyGroup, index: int) -> str:
     """The preset that a shutter keeps to, a key of presets.PRESETS: the one that it was given last, as long as its bars
     are just those. "": none, as they were edited, or are keyed."""
     shutter, weights = effect.shutters[index], bars(effect.shutters[index])
@@ -136,7 +139,7 @@ def preset_of(effect, index: int) -> str:
     return shutter.preset if is_kept else ""
 
 
-def _made_again(effect, index: int, window: int, step: int) -> bool:
+def _made_again(effect: PropertyGroup, index: int, window: int, step: int) -> bool:
     """Gives a shutter that keeps to a preset its bars for a window, with `step` of them for a filmed frame; any other
     one forgets which it was given. Whether it keeps to one."""
     shutter = effect.shutters[index]
@@ -148,7 +151,7 @@ def _made_again(effect, index: int, window: int, step: int) -> bool:
     return bool(shutter.preset)
 
 
-def _change_bars(effect, index: int, change: Callable[[np.ndarray], np.ndarray]) -> None:
+def _change_bars(effect: PropertyGroup, index: int, change: Callable[[np.ndarray], np.ndarray]) -> None:
     """Gives a shutter other bars, and as many, at all its keys: those that `change` makes of the old ones."""
     shutter = effect.shutters[index]
     scene, path = effect.id_data, f"{effect.path_from_id()}.shutters[{index}].bars"
@@ -166,14 +169,14 @@ def _change_bars(effect, index: int, change: Callable[[np.ndarray], np.ndarray])
             fcurves.set_keys(scene, f"{path}[{k}].weight", 0, new, as_stored=True)
 
 
-def _bars_keyed(old: np.ndarray, keyed: dict, frame: float) -> np.ndarray:
+def _bars_keyed(old: np.ndarray, keyed: dict[int, FCurve], frame: float) -> np.ndarray:
     """The bars at a frame, where some have F-curves."""
     weights = old.copy()
     weights[list(keyed)] = [max(curve.evaluate(frame), 0.0) for curve in keyed.values()]
     return weights
 
 
-def color_layers(effect, shutter) -> None:
+def color_layers(effect: PropertyGroup, shutter: PropertyGroup) -> None:
     """Scribbles have the colour of their shutter."""
     for region in effect.regions:
         if region.shutter == shutter.name and (layer := layer_of(effect, region)) is not None:

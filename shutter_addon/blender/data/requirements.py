@@ -1,19 +1,24 @@
 """What an effect strip and its scene need so that Blender's sequencer asks the engine for the whole picture."""
 
+from __future__ import annotations
+
+from collections.abc import Iterator
+
 from bpy.app.translations import pgettext_rpt as rpt_
+from bpy.types import Object, Scene, Strip, bpy_struct
 
 from ...core.frames import frame_ranges
 from ...core.model.limits import MAX_FRAME
-from .strips import ENGINE, own_strips
+from .strips import ENGINE, all_strips, own_strips
 
 
-def left_out(scene) -> list[tuple[range, str]]:
+def left_out(scene: Scene) -> list[tuple[range, str]]:
     """The timeline frames that the sequencer leaves an effect out of, and why."""
     reasons = ((shown_frames(scene, strip), why) for strip in own_strips(scene) if (why := _why(strip)) is not None)
     return [(frames, why) for frames, why in reasons if frames]
 
 
-def _why(strip) -> str | None:
+def _why(strip: Strip) -> str | None:
     if strip.scene is None:
         return rpt_('the scene of "{strip}" was deleted').format(strip=strip.name)
     if camera(strip) is None:
@@ -25,7 +30,7 @@ def _why(strip) -> str | None:
     return None
 
 
-def settings(strip):
+def settings(strip: Strip) -> Iterator[tuple[bpy_struct, str, object]]:
     """Owner, name and value of what a strip's picture needs, besides a camera."""
     scene = strip.scene
     yield strip, "scene_input", "CAMERA"
@@ -38,26 +43,26 @@ def settings(strip):
         yield scene.view_layers[0], "use", True
 
 
-def _composites(scene) -> bool:
+def _composites(scene: Scene) -> bool:
     """Blender 5.3 has a list of effects in place of one tree, and calls that deprecated."""
     effects = getattr(scene, "compositor_effects", None)
     return scene.compositing_node_group is not None if effects is None else len(effects) > 0
 
 
-def camera(strip):
+def camera(strip: Strip) -> Object | None:
     """The camera that the strip's scene is shown through, or None."""
     bound = (marker.camera for marker in strip.scene.timeline_markers if marker.camera)
     return strip.scene_camera or strip.scene.camera or next(bound, None)
 
 
-def scenes_at(film, frames: range) -> list[tuple]:
+def scenes_at(film: Scene, frames: range) -> list[tuple[Scene, range]]:
     """What a film shows at some of its frames: (scene, frames) of itself, and of every scene in its Scene strips, which
     counts as a whole."""
     shown = {film: frames}
     new = [film]
     while new:
         scene = new.pop()
-        for strip in scene.sequence_editor.strips_all if scene.sequence_editor else ():
+        for strip in all_strips(scene):
             is_new = strip.type == "SCENE" and strip.scene and strip.scene not in shown
             if is_new and is_shown(scene, strip, shown[scene]):
                 shown[strip.scene] = range(-MAX_FRAME, MAX_FRAME + 1)
@@ -65,12 +70,12 @@ def scenes_at(film, frames: range) -> list[tuple]:
     return [(scene, at) for scene, at in shown.items() if scene.sequence_editor]
 
 
-def is_shown(scene, strip, frames: range) -> bool:
+def is_shown(scene: Scene, strip: Strip, frames: range) -> bool:
     """Whether a strip is shown at one of these timeline frames."""
     return bool(frame_ranges.common(shown_frames(scene, strip), frames))
 
 
-def shown_frames(scene, strip) -> range:
+def shown_frames(scene: Scene, strip: Strip) -> range:
     """The timeline frames at which a strip is shown: neither muted, nor in a meta strip that is not."""
     first, last = strip.left_handle, strip.right_handle
     while strip is not None:

@@ -1,10 +1,14 @@
 """Effect strips: a Scene strip above its source, and the scene, data and source that belong to it."""
 
+from __future__ import annotations
+
 import math
-from typing import Any
+from collections.abc import Iterable
+from typing import Any, NamedTuple
 
 import bpy
 from bpy.app.translations import pgettext_rpt as rpt_
+from bpy.types import PropertyGroup, Scene, Strip
 
 from ...core import revision
 from ...core.messages import EffectError
@@ -24,15 +28,15 @@ def is_carried(region) -> bool:
     return region.kind == "OUTLINE" and region.between != "STRAIGHT"
 
 
-def effect_strips(scene) -> list:
+def all_strips(scene: Scene) -> Iterable[Strip]:
+    """The scene's strips, those inside meta strips too."""
+    return scene.sequence_editor.strips_all if scene.sequence_editor else ()
+
+
+def effect_strips(scene: Scene) -> list[Strip]:
     """The scene's effect strips, those inside meta strips too."""
-    if scene.sequence_editor is None:
-        return []
-    return [
-        strip
-        for strip in scene.sequence_editor.strips_all
-        if strip.type == "SCENE" and strip.scene and strip.scene.render.engine == ENGINE
-    ]
+    found = [strip for strip in all_strips(scene) if strip.type == "SCENE" and strip.scene]
+    return [strip for strip in found if strip.scene.render.engine == ENGINE]
 
 
 def local_scenes() -> list:
@@ -51,14 +55,12 @@ def shown_scenes(scene) -> list:
     return shown
 
 
-def own_strips(scene) -> list:
+def own_strips(scene: Scene) -> list[Strip]:
     """The strips that were made for effects, those too whose scene has another engine or is gone."""
-    if scene.sequence_editor is None:
-        return []
-    return [strip for strip in scene.sequence_editor.strips_all if strip.type == "SCENE" and _is_own(strip)]
+    return [strip for strip in all_strips(scene) if strip.type == "SCENE" and _is_own(strip)]
 
 
-def _is_own(strip) -> bool:
+def _is_own(strip: Strip) -> bool:
     scene, identity = strip.scene, strip.virtual_shutter_effect
     if scene is None:
         return identity != ""
@@ -120,16 +122,28 @@ def source_of(scene: Any, effect: Any, strip: Any) -> Any:
     return source
 
 
-def with_sources(scene) -> list[tuple]:
-    """The effects that the scene's strips show, each with its strip and source; without those that lack a source."""
+class Shown(NamedTuple):
+    """An effect, its strip, and its source; None: it has none."""
+
+    effect: PropertyGroup
+    strip: Strip
+    source: Strip | None
+
+
+def shown_effects(scene: Scene) -> list[Shown]:
+    """The effects that the scene's strips show."""
     pairs = [(effect, strip) for strip in effect_strips(scene) if (effect := effect_of(scene, strip.scene))]
-    found = [(effect, strip, nearest_source(scene, effect, strip)) for effect, strip in pairs]
-    return [each for each in found if each[2] is not None]
+    return [Shown(effect, strip, nearest_source(scene, effect, strip)) for effect, strip in pairs]
+
+
+def with_sources(scene: Scene) -> list[Shown]:
+    """The effects that the scene's strips show, without those that lack a source."""
+    return [each for each in shown_effects(scene) if each.source is not None]
 
 
 def shown_sources(scene) -> set[str]:
     """Names of the strips that are sources of the scene's effect strips."""
-    return {source.name for _effect, _strip, source in with_sources(scene)}
+    return {each.source.name for each in shown_effects(scene) if each.source}
 
 
 def nearest_source(scene: Any, effect: Any, strip: Any) -> Any:

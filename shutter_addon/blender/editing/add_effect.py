@@ -1,23 +1,27 @@
 """A new effect: its strip above the source, and its scene."""
 
+from __future__ import annotations
+
 import uuid
+from collections.abc import Iterator
+from contextlib import contextmanager
 
 import bpy
 from bpy.app.translations import pgettext_data as data_
+from bpy.types import PropertyGroup, Scene, Strip
 
+from ...core.frames.frame_source import FrameSource
 from ...core.model.limits import MAX_FRAME
 from ...media import color
-from ..data import annotations, data_format, seen_alone, source_media
-from ..data.strips import ENGINE, effect_of, nearest_source, origin, overlap
-from . import copies
+from ..data import data_format, seen_alone, source_media
+from ..data.annotations import new_annotation
+from ..data.strips import ENGINE, Shown, effect_of, nearest_source, origin, overlap, shown_effects
 
 _COLOR = "COLOR_06"
-
-
 _LOOK = ("use_flip_x", "use_flip_y", "color_multiply", "color_saturation", "multiply_alpha")
 
 
-def add_effect(scene, source):
+def add_effect(scene: Scene, source: Strip) -> tuple[Strip, PropertyGroup]:
     """Puts a new effect on a movie, image or clip strip: its strip above the source, same range, transform and crop.
 
     Returns strip and effect; the effect has no shutter yet. MediaError: the source cannot be read."""
@@ -51,44 +55,55 @@ def add_effect(scene, source):
     return strip, effect_of(scene, effect_scene)  # again: an operator's update may move the collection's items
 
 
-def _is_kept(scene, source) -> bool:
+def _is_kept(scene: Scene, source: Strip) -> bool:
     config = source_media.spec(source).options["config"]
     return color.keeps(scene.sequencer_colorspace_settings.name, config)
 
 
-def choose_source(effect, strip, source) -> None:
+def choose_source(effect: PropertyGroup, strip: Strip, source: Strip) -> None:
     """Has an effect show another movie, image or clip strip. MediaError: it cannot be read."""
     medium, scene = source_media.open_media(source), effect.id_data
     medium.close()
     _mute(source, medium)
     source.virtual_shutter_source = effect.source = source.virtual_shutter_source or uuid.uuid4().hex
     if nearest_source(scene, effect, strip) != source:  # but a copy or another part of it
-        copies.own_source(scene, source)
+        own_source(source, shown_effects(scene))
         effect.source = source.virtual_shutter_source
     connect(scene, [strip, source, *source.connections])
 
 
-def _mute(source, medium) -> None:
+def own_source(source: Strip, shown: list[Shown]) -> None:
+    """Gives a source an identity that no other strip has; the effects that show it, of all those, go along."""
+    source.virtual_shutter_source = uuid.uuid4().hex
+    for effect in [each.effect for each in shown if each.source == source]:
+        effect.source = source.virtual_shutter_source
+
+
+def _mute(source: Strip, medium: FrameSource) -> None:
     """Through a transparent picture the plain source would show. An opaque one stays: mute the effect to see it."""
     if medium.alpha != "opaque" and not source.mute:
         source.mute = source.virtual_shutter_muted = True
 
 
-def connect(scene, connected) -> None:
+def connect(scene: Scene, connected: list[Strip]) -> None:
     """Connects strips, so that they are selected and moved together; each leaves the strips it was connected to."""
-    selected = [strip for strip in scene.sequence_editor.strips_all if strip.select]
-    for strip in selected:
-        strip.select = False
-    for strip in connected:
-        strip.select = True
-    # Blender has an operator only, which takes the selection; this override is all it asks for.
-    with bpy.context.temp_override(sequencer_scene=scene):
+    with selecting(scene, connected):
         bpy.ops.sequencer.connect(toggle=False)
-    for strip in connected:
-        strip.select = strip in selected
 
 
-def copy_look(source, strip) -> None:
+@contextmanager
+def selecting(scene: Scene, chosen: list[Strip]) -> Iterator[None]:
+    """For what Blender has an operator only, which takes the selection: these strips are it meanwhile."""
+    before = [(strip, strip.select) for strip in scene.sequence_editor.strips_all]
+    for strip, _is_selected in before:
+        strip.select = strip in chosen
+    with bpy.context.temp_override(sequencer_scene=scene):
+        yield
+    for strip, is_selected in before:
+        strip.select = is_selected
+
+
+def copy_look(source: Strip, strip: Strip) -> None:
     """Transform, crop, flip and colour of the source strip."""
     for group in ("transform", "crop"):
         old, new = getattr(source, group), getattr(strip, group)
@@ -99,7 +114,7 @@ def copy_look(source, strip) -> None:
         setattr(strip, name, getattr(source, name))
 
 
-def new_effect_scene(scene, identity: str, name: str, size):
+def new_effect_scene(scene: Scene, identity: str, name: str, size: tuple[int, int]) -> Scene:
     """An effect scene for an effect of the scene, with a camera and an empty annotation."""
     effect_scene = bpy.data.scenes.new(name)
     effect_scene.virtual_shutter.identity = identity
@@ -112,11 +127,11 @@ def new_effect_scene(scene, identity: str, name: str, size):
     # A Scene strip plays at its own scene's rate; at that of the timeline it shows one frame per timeline frame.
     effect_scene.render.fps, effect_scene.render.fps_base = scene.render.fps, scene.render.fps_base
     add_camera(effect_scene)
-    annotations.new_annotation(effect_scene, name)
+    new_annotation(effect_scene, name)
     return effect_scene
 
 
-def add_camera(scene) -> None:
+def add_camera(scene: Scene) -> None:
     """Without a camera, Blender renders a Scene strip empty and never asks the engine."""
     name = f"{scene.name} Camera"
     camera = bpy.data.objects.new(name, bpy.data.cameras.new(name))

@@ -1,23 +1,26 @@
-"""An effect goes along with its source.
+"""What an editor may have set on purpose on an effect's strip is made that of its source when asked for: place, crop,
+flip and colour, and the range. Scribbles stay where they lie on the picture.
 
-What could only be wrong follows by itself: the rate of the effect's scene, and the size of its picture. What an editor
-may have set on purpose is matched when asked for: place, crop, flip and colour of the strips, and their range.
-Scribbles stay where they lie on the picture.
+What could only be wrong follows by itself (reconcile.follow_sources).
 """
 
+from __future__ import annotations
+
 from collections import Counter
-from contextlib import contextmanager, suppress
-from typing import Any, NamedTuple
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import NamedTuple
 
 import bpy
 import mathutils
 import numpy as np
 from bpy.app.translations import pgettext_n as n_
+from bpy.types import AnnotationFrame, FCurve, PropertyGroup, Scene, Strip, StripModifier
 
 from ...core import revision
 from ...core.model.scribbles import mapped
-from ...media import MediaError, open_source
-from ..data import annotations, fcurves, geometry, seen_alone, source_media, strips
+from ..data import fcurves, geometry, strips
+from ..data.annotations import layer_of, picture_size
 from . import add_effect
 
 # What a strip looks like: what it is called, and the names of the strip's properties and groups.
@@ -28,86 +31,13 @@ _LOOK = {
     n_("color"): ("color_multiply", "color_saturation", "multiply_alpha"),
 }
 _RANGE = n_("range")
-_KEPT = 256
 _shown = revision.UntilChange()
-_headers: dict[tuple, "_Header | None"] = {}  # of media, by their keys: they are read once
 
 
-def forget() -> None:
-    """Forgets what media were read, before another file is loaded."""
-    _headers.clear()
-
-
-def follow(scene) -> None:
-    """Gives the effect scenes of a scene's effects its rate and views, and the size of their sources; has Blender mix
-    the strips' pixels as their sources'. A second call changes nothing."""
-    for strip in strips.effect_strips(scene):
-        if strip.scene.library is None:
-            _follow_edit(scene, strip.scene.render)
-    for effect, strip, source in strips.with_sources(scene):
-        if effect.scene.library is None and (header := _header(source)) is not None:
-            _follow_size(effect, strip, header.size)
-            _follow_mixing(scene, strip, source, header.is_encoded)
-
-
-def _follow_edit(scene, render) -> None:
-    # Blender crashes where an edit in stereo shows a scene that is not.
-    for name in ("fps", "fps_base", "use_multiview"):
-        if getattr(render, name) != getattr(scene.render, name):
-            setattr(render, name, getattr(scene.render, name))
-
-
-def _follow_size(effect, strip, size: tuple[int, int]) -> None:
-    if size != annotations.picture_size(effect):
-        with _scribbles_kept(effect, strip):
-            effect.scene.render.resolution_x, effect.scene.render.resolution_y = size
-
-
-def _follow_mixing(scene, strip, source, is_encoded: bool) -> None:
-    if strip.color_multiply not in (1, strips.IN_CODE_VALUES):
-        return
-    path = strip.path_from_id()
-    mixes = (
-        not seen_alone.has(strip.transform, seen_alone.IN_PLACE)
-        or strip.transform.filter.startswith("CUBIC")
-        or seen_alone.has_animation(scene, f"{path}.transform.")
-    )
-    same_space = source_media.reading(source)[0] == scene.sequencer_colorspace_settings.name
-    factor = strips.IN_CODE_VALUES if mixes and is_encoded and same_space else 1
-    if strip.color_multiply != factor and not seen_alone.has_animation(scene, f"{path}.color_multiply"):
-        strip.color_multiply = factor
-
-
-class _Header(NamedTuple):
-    """size: width and height of a source's picture, as a scene can have them; is_encoded: Blender keeps code values of
-    it, not light"""
-
-    size: tuple[int, int]
-    is_encoded: bool
-
-
-def _header(source) -> _Header | None:
-    """None: it cannot be read."""
-    with suppress(MediaError):
-        key = source_media.media_key(source)
-        if key not in _headers:
-            while len(_headers) >= _KEPT:
-                del _headers[next(iter(_headers))]
-            _headers[key] = None  # it is not tried again and again
-            spec = source_media.spec(source, key)
-            medium = open_source(spec.path, files=spec.files, **spec.options | {"colorspace": None})
-            medium.close()
-            side = bpy.types.RenderSettings.bl_rna.properties["resolution_x"]
-            width, height = (min(max(n, side.hard_min), side.hard_max) for n in (medium.width, medium.height))
-            _headers[key] = _Header((width, height), source_media.is_movie(source) or medium.dtype == np.uint8)
-        return _headers[key]
-    return None
-
-
-def strip_and_source(effect) -> Any:
-    """The strip of an effect and its source; None: it has one of them no more."""
+def strip_and_source(effect: PropertyGroup) -> list[Strip]:
+    """The strip of an effect and its source; empty: it has one of them no more."""
     shown = strips.with_sources(effect.id_data)
-    return next(((strip, source) for other, strip, source in shown if other == effect), None)
+    return next(([each.strip, each.source] for each in shown if each.effect == effect), [])
 
 
 class Shown(NamedTuple):
@@ -120,19 +50,19 @@ class Shown(NamedTuple):
     has_effects: bool
 
 
-def shown(effect) -> Shown | None:
+def shown(effect: PropertyGroup) -> Shown | None:
     """For what is drawn: worked out once until something changes. None: it has no source."""
     return _shown.get(effect.scene.session_uid, lambda: _compare(effect))
 
 
-def _compare(effect) -> Shown | None:
-    if (pair := strip_and_source(effect)) is None:
+def _compare(effect: PropertyGroup) -> Shown | None:
+    if not (pair := strip_and_source(effect)):
         return None
     lacks, has_effects = bool(missing_modifiers(*pair)), bool(effects_on(effect.id_data, pair[1]))
     return Shown(pair[1].name, differences(effect), lacks, has_effects)
 
 
-def differences(effect) -> list[str]:
+def differences(effect: PropertyGroup) -> list[str]:
     """What match would change, in words to be translated."""
     strip, source = strip_and_source(effect)
     look, wanted = _looks(strip), _looks(source)
@@ -142,11 +72,11 @@ def differences(effect) -> list[str]:
     return words
 
 
-def match(effect) -> Any:
+def match(effect: PropertyGroup) -> Strip | None:
     """Gives the effect's strip the look and the range of its source. Returns the neighbour in its channel that is in
     the way of the whole range, or None."""
     scene, (strip, source) = effect.id_data, strip_and_source(effect)
-    with _scribbles_kept(effect, strip):
+    with scribbles_kept(effect, strip):
         add_effect.copy_look(source, strip)
         for name in (name for names in _LOOK.values() for name in names):
             old, new = f"{source.path_from_id()}.{name}", f"{strip.path_from_id()}.{name}"
@@ -159,7 +89,7 @@ def match(effect) -> Any:
     return neighbor
 
 
-def _looks(strip) -> dict[str, str]:
+def _looks(strip: Strip) -> dict[str, str]:
     """What a strip looks like: values and keys, as words: "not a number" is never the same again."""
     path = f"{strip.path_from_id()}."
     curves = [curve for curve in fcurves.curves_under(strip.id_data, path) if not curve.mute]
@@ -169,7 +99,7 @@ def _looks(strip) -> dict[str, str]:
     }
 
 
-def _plain(value):
+def _plain(value: object) -> object:
     if value == strips.IN_CODE_VALUES:
         return 1.0
     if isinstance(value, bpy.types.bpy_struct):
@@ -178,7 +108,7 @@ def _plain(value):
     return tuple(value) if isinstance(value, bpy.types.bpy_prop_array | mathutils.Vector) else value
 
 
-def _keyed(curves, path: str) -> list:
+def _keyed(curves: list[FCurve], path: str) -> list:
     return sorted(
         (
             (curve.data_path.removeprefix(path), curve.array_index, curve.extrapolation),
@@ -189,7 +119,7 @@ def _keyed(curves, path: str) -> list:
     )
 
 
-def _goal(effect, strip, source) -> tuple[int, int, Any]:
+def _goal(effect: PropertyGroup, strip: Strip, source: Strip) -> tuple[int, int, Strip | None]:
     """The handles that an effect's strip would have from its source, or from the parts that this was cut into, short of
     the strips in its channel; and which of these stops it, or None. Where they leave no room at all it stays. An edge
     where another effect goes on with the same source stays as well."""
@@ -211,42 +141,30 @@ def _goal(effect, strip, source) -> tuple[int, int, Any]:
     return left, right, first or last
 
 
-def _slip(scene, strip, source, left: int, right: int) -> None:
+def _slip(scene: Scene, strip: Strip, source: Strip, left: int, right: int) -> None:
     """Has the effect's content, and with it its keys, go along with a source that has moved as a whole, or that begins
     before it: an effect shows nothing but its first frame there."""
     frames = int(source.content_start - strip.content_start)
     moved = frames == left - strip.left_handle == right - strip.right_handle
     if frames and (moved or (frames < 0 and left < strip.content_start)):
-        # Blender has an operator only, which takes the selection.
-        with _selected(scene, [strip]), bpy.context.temp_override(sequencer_scene=scene):
+        with add_effect.selecting(scene, [strip]):
             bpy.ops.sequencer.slip(offset=frames, ignore_connections=True)
 
 
 @contextmanager
-def _selected(scene, chosen):
-    """These strips are the selected ones meanwhile."""
-    before = [(strip, strip.select) for strip in scene.sequence_editor.strips_all]
-    for strip, _is_selected in before:
-        strip.select = strip in chosen
-    yield
-    for strip, is_selected in before:
-        strip.select = is_selected
-
-
-@contextmanager
-def _scribbles_kept(effect, strip):
+def scribbles_kept(effect: PropertyGroup, strip: Strip) -> Iterator[None]:
     """Has scribbles stay on the effect's picture while it is laid elsewhere: every drawing at its own frame."""
     before = places(effect, strip)
     yield
     put_back(effect, strip, before)
 
 
-def places(effect, strip) -> list[np.ndarray]:
+def places(effect: PropertyGroup, strip: Strip) -> list[np.ndarray]:
     """Where the picture of an effect lies on the image, at each of its drawings."""
     return [_place(effect, strip, drawing.frame_number) for drawing in _drawings(effect)]
 
 
-def put_back(effect, strip, before: list[np.ndarray]) -> None:
+def put_back(effect: PropertyGroup, strip: Strip, before: list[np.ndarray]) -> None:
     """Puts an effect's drawings where they lie on its picture; before: the places at which they do."""
     for drawing, old in zip(_drawings(effect), before, strict=True):
         new = _place(effect, strip, drawing.frame_number)
@@ -254,20 +172,20 @@ def put_back(effect, strip, before: list[np.ndarray]) -> None:
             _move(drawing, new @ np.linalg.inv(old))
 
 
-def _drawings(effect) -> list:
-    layers = {region.layer: annotations.layer_of(effect, region) for region in effect.regions}
+def _drawings(effect: PropertyGroup) -> list[AnnotationFrame]:
+    layers = {region.layer: layer_of(effect, region) for region in effect.regions}
     return [drawing for layer in layers.values() if layer for drawing in layer.frames]
 
 
-def _place(effect, strip, frame: int) -> np.ndarray:
+def _place(effect: PropertyGroup, strip: Strip, frame: int) -> np.ndarray:
     """Where an effect's picture lies on the image at a frame, as geometry.picture_to_image has it."""
     path = f"{strip.path_from_id()}.transform."
     curves = [curve for curve in fcurves.curves_under(effect.id_data, path) if not (curve.mute or curve.is_empty)]
     moved = {curve.data_path.removeprefix(path): curve.evaluate(frame) for curve in curves}
-    return geometry.picture_to_image(strip, annotations.picture_size(effect), **moved)
+    return geometry.picture_to_image(strip, picture_size(effect), **moved)
 
 
-def _move(drawing, change: np.ndarray) -> None:
+def _move(drawing: AnnotationFrame, change: np.ndarray) -> None:
     """Moves the strokes of a drawing on the image."""
     for stroke in drawing.strokes:
         points = np.empty((len(stroke.points), 3), np.float32)
@@ -276,7 +194,7 @@ def _move(drawing, change: np.ndarray) -> None:
         stroke.points.foreach_set("co", points.ravel())
 
 
-def missing_modifiers(part, source) -> list:
+def missing_modifiers(part: Strip, source: Strip) -> list[StripModifier]:
     """The source's modifiers that its effect lacks: the engine reads the medium, which has none."""
     own = Counter(modifier.type for modifier in part.modifiers)
     lacking = []
@@ -287,20 +205,19 @@ def missing_modifiers(part, source) -> list:
     return lacking
 
 
-def copy_modifiers(effect) -> None:
+def copy_modifiers(effect: PropertyGroup) -> None:
     """Gives the effect's strip the modifiers of its source that it lacks, keys included."""
     strip, source = strip_and_source(effect)
     append_modifiers(effect.id_data, source, strip, missing_modifiers(strip, source))
 
 
-def append_modifiers(scene, source, part, chosen: list | None = None) -> None:
+def append_modifiers(scene: Scene, source: Strip, part: Strip, chosen: list[StripModifier] | None = None) -> None:
     """Gives a strip the modifiers of another one, keys included; chosen: these alone."""
     if not source.modifiers:
         return
     count = len(part.modifiers)
     active, scene.sequence_editor.active_strip = scene.sequence_editor.active_strip, source
-    # Blender has an operator only, which takes all modifiers of the active strip.
-    with _selected(scene, [part]), bpy.context.temp_override(sequencer_scene=scene):
+    with add_effect.selecting(scene, [part]):  # and all modifiers of the active strip
         bpy.ops.sequencer.strip_modifier_copy(type="APPEND")
     scene.sequence_editor.active_strip = active
     for old, new in list(zip(source.modifiers, part.modifiers[count:], strict=True)):
@@ -310,7 +227,7 @@ def append_modifiers(scene, source, part, chosen: list | None = None) -> None:
             part.modifiers.remove(new)
 
 
-def effects_on(scene, source) -> list:
+def effects_on(scene: Scene, source: Strip) -> list[Strip]:
     """The effect strips of Blender's that have a source as input: what they make of it, the engine does not see."""
     inputs = ("input_1", "input_2")
     return [s for s in scene.sequence_editor.strips_all if any(getattr(s, name, None) == source for name in inputs)]

@@ -3,11 +3,10 @@
 from collections.abc import Callable
 
 from ..data import data_format
-from . import lifecycle
 
-# By the format that each leads to, in order. They are run as a file is loaded of which anything is older, and may find
-# newer scenes beside: what needs no change is left as it is.
-MIGRATIONS: tuple[tuple[int, Callable[[], None]], ...] = ((1, lifecycle.take_over),)
+# By the format that each leads to, in order; the first version's was 1. They are run as a file is loaded of which
+# anything is older, and may find newer scenes beside: what needs no change is left as it is.
+MIGRATIONS: tuple[tuple[int, Callable[[], None]], ...] = ()
 
 
 def migrate() -> None:

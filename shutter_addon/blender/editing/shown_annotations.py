@@ -6,9 +6,15 @@ A sequencer keeps its annotation in every one of its spaces, those too that lie 
 that is not shown: each is a user of it, and would bring it into the saved file.
 """
 
-import bpy
+from __future__ import annotations
 
-from ..data import annotations, selection
+from collections.abc import Iterator
+
+import bpy
+from bpy.types import ID, Annotation, SpaceSequenceEditor
+
+from ..data import selection
+from ..data.annotations import USERS
 from ..rendering import previews
 
 _emptied: set[int] = set()  # addresses of spaces whose annotation was an effect's, until none was seen or it went
@@ -26,13 +32,13 @@ def follow() -> None:
                 area.spaces.active.preview_overlay.show_annotation ^= True
 
 
-def is_laid_wrong(space) -> bool:
+def is_laid_wrong(space: SpaceSequenceEditor) -> bool:
     """Whether Blender shows an effect's annotation in a preview without the pen, or does not with it."""
     is_effects = space.annotation is not None and is_own(space.annotation)
     return is_effects and space.preview_overlay.show_annotation != previews.pen_is_down()
 
 
-def is_other(space, seen) -> bool:
+def is_other(space: SpaceSequenceEditor, seen: tuple | None) -> bool:
     """Whether a preview has to get another annotation, for what selection.seen has found in its scene."""
     wanted = seen[1].scene.annotation if seen else None
     if space.annotation is None:
@@ -40,12 +46,12 @@ def is_other(space, seen) -> bool:
     return space.annotation != wanted and is_own(space.annotation)
 
 
-def is_own(annotation) -> bool:
-    """Whether an annotation was made for an effect."""
-    return annotation.virtual_shutter_made not in ("", annotations.USERS)
+def is_own(made: ID) -> bool:
+    """Whether an annotation, or a camera, was made for an effect."""
+    return made.virtual_shutter_made not in ("", USERS)
 
 
-def give(space, annotation) -> None:
+def give(space: SpaceSequenceEditor, annotation: Annotation | None) -> None:
     """Makes an effect's annotation that of a preview; one of the user's goes on without it. None: takes it away until
     an effect is seen."""
     before = space.annotation
@@ -59,7 +65,7 @@ def give(space, annotation) -> None:
     (_emptied.discard if annotation else _emptied.add)(space.as_pointer())
 
 
-def let_go(annotation) -> None:
+def let_go(annotation: ID) -> None:
     """Takes an annotation away from all previews."""
     for space in _spaces():
         if space.annotation == annotation:
@@ -73,18 +79,13 @@ def before_undo() -> None:
             _emptied.add(space.as_pointer())
 
 
-def shown_by(annotation) -> int:
-    """How many previews have an annotation."""
-    return sum(space.annotation == annotation for space in _spaces())
-
-
 def forget() -> None:
     """Forgets the previews of a file, before another one is loaded."""
     _emptied.clear()
     _shown.clear()
 
 
-def _spaces():
+def _spaces() -> Iterator[SpaceSequenceEditor]:
     for screen in bpy.data.screens:
         for area in screen.areas:
             yield from (space for space in area.spaces if space.type == "SEQUENCE_EDITOR")

@@ -4,11 +4,13 @@ Copy Effect took.
 Blender's clipboard holds a Scene strip without its scene, and outlives the file that the strip was cut from.
 """
 
-from typing import Any
+from __future__ import annotations
 
 import bpy
+from bpy.types import PropertyGroup, Scene, Strip, bpy_prop_collection, bpy_struct
 
-from ..data import annotations, data_format, fcurves, property_copy, recipe_import, strips
+from ..data import data_format, fcurves, property_copy, recipe_import, strips
+from ..data.annotations import annotation
 from . import add_effect, match_source
 
 _MOST = 64
@@ -16,19 +18,19 @@ _COPIED = "copied"  # in place of an identity
 _OWN = {"name", "identity", "source", "start"}  # of an effect, what stays where another one is pasted over it
 # What effects point to, and where bpy.data has it.
 _POINTED = {"MovieClip": "movieclips", "Image": "images", "Mask": "masks"}
-_effects: dict = {}
+_effects: dict[str, dict] = {}
 
 
-def keep(scene, effect) -> None:
+def keep(effect: PropertyGroup) -> None:
     """Keeps an effect that is about to be removed, under its scene's identity: properties, F-curves, annotations."""
     if effect.scene is not None and effect.scene.virtual_shutter.identity:
-        _keep(effect.scene.virtual_shutter.identity, scene, effect)
+        _keep(effect.scene.virtual_shutter.identity, effect)
 
 
-def copy(effect, strip) -> None:
+def copy(effect: PropertyGroup, strip: Strip) -> None:
     """Keeps an effect, as its strip shows it, for `paste`."""
     first, skipped, places = strip.left_handle, strips.skipped(strip), match_source.places(effect, strip)
-    _keep(_COPIED, effect.id_data, effect, first=first, skipped=skipped, places=places)
+    _keep(_COPIED, effect, first=first, skipped=skipped, places=places)
 
 
 def has_copy() -> bool:
@@ -40,14 +42,14 @@ def forget_copy() -> None:
     _effects.pop(_COPIED, None)
 
 
-def paste(effect, strip) -> None:
+def paste(effect: PropertyGroup, strip: Strip) -> None:
     """Replaces an effect's shutters, regions, keys and options by those of the copied one. Frames count from the first
     that a strip shows; drawings lie on the picture as they did."""
     data, scene = _effects[_COPIED], effect.id_data
     recipe_import.clear(scene, effect)
     _restore(scene, effect, data, {name: value for name, value in data["effect"].items() if name not in _OWN})
     fcurves.move_curves(scene, effect.path_from_id() + ".", strip.left_handle - data["first"])
-    for drawing in [drawing for layer in annotations.annotation(effect).layers for drawing in layer.frames]:
+    for drawing in [drawing for layer in annotation(effect).layers for drawing in layer.frames]:
         drawing.frame_number += strip.left_handle - data["first"]
     match_source.put_back(effect, strip, data["places"])
     later = strips.skipped(strip) - data["skipped"]
@@ -59,8 +61,8 @@ def paste(effect, strip) -> None:
         region.offset -= later if region.timing == "TIMELINE" else 0
 
 
-def _keep(identity: str, scene, effect, **more) -> None:
-    effect_scene, path = effect.scene, effect.path_from_id()
+def _keep(identity: str, effect: PropertyGroup, **more: object) -> None:
+    scene, effect_scene, path = effect.id_data, effect.scene, effect.path_from_id()
     curves = [_plain(curve) for curve in fcurves.curves_under(scene, path + ".")]
     for curve in curves:
         curve["data_path"] = curve["data_path"].removeprefix(path)
@@ -81,13 +83,10 @@ def forget() -> None:
     _effects.clear()
 
 
-def restore(scene, identity: str):
+def restore(scene: Scene, identity: str) -> Scene | None:
     """Makes a kept effect again in a scene. Returns the effect scene; None: none was kept under this identity."""
     if (data := _effects.get(identity)) is None:
         return None
-    for made in (*bpy.data.annotations, *bpy.data.cameras):
-        if made.virtual_shutter_made == identity and made.library is None:
-            made.virtual_shutter_made = annotations.GONE  # of the scene before, which somebody removed
     effect_scene = add_effect.new_effect_scene(scene, identity, *data["scene"])
     effect = data_format.new_effect(scene, data["format"])
     effect.scene = effect_scene
@@ -95,7 +94,7 @@ def restore(scene, identity: str):
     return effect_scene
 
 
-def _restore(scene, effect, data: dict, content: dict) -> None:
+def _restore(scene: Scene, effect: PropertyGroup, data: dict, content: dict) -> None:
     """Gives an effect the content, keys and drawings of a kept one."""
     _fill(effect, content)
     for plain in data["curves"]:
@@ -104,12 +103,12 @@ def _restore(scene, effect, data: dict, content: dict) -> None:
         _fill(curve, plain | {"data_path": path})
         curve.update()
     for plain in data["layers"]:
-        _fill(annotations.annotation(effect).layers.new(plain["info"], set_active=False), plain)
+        _fill(annotation(effect).layers.new(plain["info"], set_active=False), plain)
 
 
-def _plain(struct) -> dict:
+def _plain(struct: bpy_struct) -> dict:
     """A struct of Blender's with all that is in it as plain data; of what it points to, the session_uid."""
-    plain: dict[str, Any] = {}
+    plain: dict[str, object] = {}
     for prop in struct.bl_rna.properties:
         name = prop.identifier
         if prop.type == "COLLECTION":
@@ -125,7 +124,7 @@ def _plain(struct) -> dict:
     return plain
 
 
-def _fill(struct, plain: dict) -> None:
+def _fill(struct: bpy_struct, plain: dict) -> None:
     for name, value in plain.items():
         if isinstance(value, list):
             for item in value:
@@ -139,7 +138,7 @@ def _fill(struct, plain: dict) -> None:
             property_copy.store(struct, name, value)
 
 
-def _add(collection, name: str, item: dict):
+def _add(collection: bpy_prop_collection, name: str, item: dict) -> bpy_struct:
     if name == "frames":
         return collection.new(item["frame_number"])
     if name == "modifiers":
