@@ -46,7 +46,6 @@ from shutter_addon.compute import (
     cpu,
     diffusion,
     diffusion_gpu,
-    edge_diffusion,
     edge_diffusion_gpu,
     guide,
 )
@@ -498,7 +497,7 @@ class Case:
         count = len(self.state.bars)
         got = self.compositor.coefficients(self.edges, count).copy()
         many = mock.patch.multiple(edge_diffusion_gpu, LAST_CYCLES=(4,) * 8, CYCLES=(4,) * 16)
-        with many, mock.patch.object(edge_diffusion, "ENOUGH", 0):
+        with many, mock.patch.multiple(diffusion, CYCLES=(4,) * 16, ENOUGH=0):
             self.diffuse("edges")
         return float(np.abs(self.compositor.coefficients(self.edges, count) - got).max() * 255)
 
@@ -564,12 +563,8 @@ class HostCase(Case):
         return None
 
     def _diffusion_error(self) -> float:
-        usual, count = diffusion.CYCLES, len(self.state.bars)
-        try:
-            diffusion.CYCLES = 12
-            expected = self.solver.solve(self.labels, count)
-        finally:
-            diffusion.CYCLES = usual
+        with mock.patch.multiple(diffusion, CYCLES=(4,) * 12, ENOUGH=0):
+            expected = self.solver.solve(self.labels, len(self.state.bars))
         return float(np.abs(self.handle - expected).max() * 255)
 
     def release(self) -> None:

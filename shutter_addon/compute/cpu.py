@@ -15,7 +15,6 @@ from ..core.model.frame_state import Options
 from ..core.pixels import compositor, layering
 from ..core.pixels.shown_levels import Display
 from .diffusion import diffuse
-from .edge_diffusion import diffuse_along_edges, follows_edges
 from .layer_frames import LARGEST, linear
 from .laying import Behind, Exposure
 from .request import Coefficients, Request
@@ -28,7 +27,7 @@ Moves = tuple[np.ndarray, np.ndarray]
 
 
 class Solver:
-    """compute.diffusion and compute.edge_diffusion, with the methods of compute.gpu.Solver. It ignores `warm`."""
+    """compute.diffusion, with the methods of compute.gpu.Solver. It ignores `warm`."""
 
     gave_up = False
 
@@ -41,9 +40,7 @@ class Solver:
         *,
         warm: bool = False,
     ) -> np.ndarray:
-        if guide is not None and follows_edges(labels, guide, strength):
-            return diffuse_along_edges(labels, count, guide, strength)
-        return diffuse(labels, count)
+        return diffuse(labels, count, guide, strength)
 
     def release(self) -> None:
         pass
@@ -114,7 +111,7 @@ class HostWindow:
         return self.frames.keys()
 
     def load(self, positions: np.ndarray, options: Options, shot: range) -> None:
-        """See RunningSums.load."""
+        """See running_sums.Sums.load."""
         self.shot = shot
         wanted = set(compositor.source_frames(options, positions, shot).tolist())
         self.frames = {index: frame for index, frame in self.frames.items() if index in wanted}

@@ -23,6 +23,7 @@ import numpy as np
 
 from ..devices.device import Device, Texture
 from ..devices.passes import Pass, read_pass
+from .diffusion import COLOURS, NOTHING
 
 # V-cycles of a solve that starts from nothing. Largest error × 255 after 1, 2, 3, 4 cycles: 3.9, 0.67, 0.66, 0.66 over
 # the scenes of the tests (median 2.1, 0.13, 0.07, 0.07), and 11, 1.6, 0.25, 0.24 over their lattices of dots. The error
@@ -46,10 +47,6 @@ BAND = 1
 # The prolongation to a cell on the line between two coarse cells: the share, 0 … 1, of what ties the cell to fixed
 # cells beside that line that counts against following the two.
 HOLD = 0.3
-# Coefficients below this are set to 0, so that a region enclosed by one shutter's scribble gets exactly that shutter.
-NOTHING = 1 / 4096
-# Cells (y, x) of 2 × 2 in the order of a smoothing sweep.
-_COLOURS = ((0, 0), (1, 1), (0, 1), (1, 0))
 
 
 def operators(ties: str) -> dict[str, Pass]:
@@ -269,7 +266,7 @@ class Diffusion:
         cells: int = 32
         colours: list[Any] = [0, 1]
         if not grid.finest:
-            cells, colours = 16, [(x, y) for y, x in _COLOURS if x < grid.size[0] and y < grid.size[1]]
+            cells, colours = 16, [(x, y) for y, x in COLOURS if x < grid.size[0] and y < grid.size[1]]
         values = grid.textures["solution"]
         for colour in (colours[::-1] if back else colours) * sweeps:
             self._run(self._pass(grid, "smooth"), grid, "near", cells, grid.layers, values=values, colour=colour)

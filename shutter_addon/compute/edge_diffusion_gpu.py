@@ -1,4 +1,4 @@
-"""compute.edge_diffusion on a device, at full size near scribbles alone until the last cycle."""
+"""compute.diffusion along edges on a device, at full size near scribbles alone until the last cycle."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ import numpy as np
 from ..core.pixels.conductances import cell_side, resistances
 from ..devices.device import Device, Texture
 from ..devices.passes import read_pass
-from .diffusion_gpu import FINISH, NOTHING, Diffusion, _Grid, operators
-from .edge_diffusion import CYCLES, SWEEPS, TWICE, first_solved, is_enough
+from .diffusion import CYCLES, NOTHING, SWEEPS, TWICE, first_solved, is_enough
+from .diffusion_gpu import FINISH, Diffusion, _Grid, operators
 
 # Where the guide's cells are larger than pixels: the iterations of conjugate gradients in each cycle, first of cycles
 # near scribbles alone, then of those everywhere. Largest error × 255 in frames of three films at 1920 × 1080: 0.6.
@@ -35,7 +35,7 @@ _SUM = read_pass("edge_diffusion", "SUM")
 
 
 class EdgeDiffusion(Diffusion):
-    """compute.edge_diffusion.diffuse_along_edges on a device; grids and passes are those of Diffusion, but for the
+    """compute.diffusion.diffuse along edges on a device; grids and passes are those of Diffusion, but for the
     pixels' own, and conjugate gradients on one of them."""
 
     finest = operators("LINKS")
@@ -46,8 +46,8 @@ class EdgeDiffusion(Diffusion):
         self._solved, self._sweeps = 0, 0
 
     def solve(self, labels: np.ndarray, count: int, guide: np.ndarray, strength: float) -> Texture:  # type: ignore[override]  # it has a guide
-        """As Diffusion.solve; guide and strength as for diffuse_along_edges. Some pixel has to be fixed, and some free.
-        Where the guide's cells are pixels, a number is read back after each cycle: whether it was enough.
+        """As Diffusion.solve; guide and strength as for compute.diffusion.diffuse. Some pixel has to be fixed, and some
+        free. Where the guide's cells are pixels, a number is read back after each cycle: whether it was enough.
 
         The result does not depend on what was solved before."""
         side = cell_side(guide.shape[:2], labels.shape)

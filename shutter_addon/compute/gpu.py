@@ -35,9 +35,9 @@ from .composition_passes import (
     way_of,
     way_sum,
 )
+from .diffusion import follows_edges
 from .diffusion_gpu import Diffusion
 from .displaying import Displaying
-from .edge_diffusion import follows_edges
 from .edge_diffusion_gpu import EdgeDiffusion
 from .laying import Laying
 from .matting import Matting
