@@ -12,7 +12,8 @@ from ..core.model.combining import AVERAGE, Combine
 from ..core.model.frame_state import Options
 from ..devices.llvmpipe import MOST_ITERATIONS
 from ..devices.passes import Pass, read_pass
-from .window import BLOCK, STORED_SUMS, Sums
+from .running_sums import STORED_SUMS, Sums
+from .window import BLOCK
 
 # Rows of pixels that one invocation of compose_sums composes.
 PAIR = 2
@@ -36,7 +37,7 @@ class LightFormat:
     premultiplied: whether the frames' colours are
     encoded: whether the sums are of encoded light (Options.light)
     levels: whether the picture is of levels, not scene-linear
-    cover: of weighted_window.WeightedSums
+    cover: of running_sums.WeightedSums
     combine: how frames are combined; kind: of the texture that has them; opaque: their alpha is 1"""
 
     decode: int

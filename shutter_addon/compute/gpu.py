@@ -43,9 +43,9 @@ from .laying import Laying
 from .matting import Matting
 from .mixing import Mixing
 from .request import Coefficients, Request
+from .running_sums import Sums, open_window
 from .tables import moved_tables, padded, table
-from .weighted_window import open_any
-from .window import BLOCK, PackedFrames, Sums, WholeFrames, Window, decoding
+from .window import BLOCK, PackedFrames, WholeFrames, Window, decoding
 
 
 def _extent(window: Sums) -> dict[str, Any]:
@@ -226,7 +226,7 @@ class GPUCompositor:
     ) -> Window:
         """A window of `capacity` frames on the device; moved: pictures of it have FrameState.following; shutters: of
         these pictures; summed: all of them average."""
-        return open_any(self.device, source, capacity, moved, shutters, summed)
+        return open_window(self.device, source, capacity, moved, shutters, summed)
 
     def solver(self) -> Solver:
         """A new solver. Its solution is valid until its next solve."""

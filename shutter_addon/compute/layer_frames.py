@@ -11,7 +11,7 @@ import numpy as np
 from ..core.frames import light
 from ..core.frames.frame_source import FrameSource
 from ..core.frames.planes import Planes
-from .running_sums import summable
+from .window import summable
 
 # Bytes of frames that are kept as they were read, for all windows and mattes that need them.
 RECENT_BYTES = 256 << 20
@@ -82,7 +82,7 @@ class WeightedFrames:
     weight: gives the weights (H, W) float32, 0 to 1, of a frame
     rest: whether the weights are what layers leave: then running sums hold what these take
     alone: the weights themselves, as alpha; colored: with the frames' colours, as a threshold asks for them
-    is_summable: whether running sums can be made of them (weighted_window.WeightedSums)
+    is_summable: whether running sums can be made of them (running_sums.WeightedSums)
     """
 
     alpha, transfer = "premultiplied", "linear"

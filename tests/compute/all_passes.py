@@ -14,6 +14,7 @@ from shutter_addon.compute import (
     laying,
     matting,
     mixing,
+    running_sums,
     window,
 )
 from shutter_addon.compute.composition_passes import (
@@ -85,7 +86,7 @@ def _layers():
         for way in _WAYS:
             yield composition(way, 3, stored, 2, light)
         for sent in ("colours", "planes", "before"):
-            yield window.accumulation(1, sent, cover == 1, cover == 2, cover)
+            yield running_sums.accumulation(1, sent, cover == 1, cover == 2, cover)
     for ends, opaque in itertools.product((True, False), repeat=2):
         yield laying.laying_pass(True, ends, opaque, plain=not opaque, plate=ends, levels=ends)
         yield laying.laying_pass(False, ends, opaque, plain=False, plate=False, levels=opaque)
@@ -93,7 +94,7 @@ def _layers():
 
 def _filling():
     for tiled, sent in itertools.product((True, False), ("colours", "numbers", "planes", "before")):
-        yield window.accumulation(1, sent, tiled, tiled)
+        yield running_sums.accumulation(1, sent, tiled, tiled)
     yield window.packing(1, True)
     yield window.packing(2, False)
     for adds in (False, True):

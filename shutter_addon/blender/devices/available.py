@@ -17,7 +17,7 @@ from .blender_gpu import BlenderDevice, opens_in_background
 from .gpu_relay import RelayedDevice
 
 CHOICES = ("auto", "gpu", "opengl", "blender", "cpu")  # gpu: opengl, or else blender
-# Given a Budget and `ask_others`, as PagedDevice.
+# Given a Budget and `ask_others`, as Device.
 OPEN: dict[str, Callable[..., Any]] = {
     "opengl": partial(open_compositor, "gpu"),
     "blender": lambda *memory: GPUCompositor(BlenderDevice(*memory)),
