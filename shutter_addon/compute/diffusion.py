@@ -109,7 +109,7 @@ class _Grid:
     takes: {(b, a): (H, W)} what cell (y, x) takes of the next grid's cell (y // 2 + b, x // 2 + a)
     """
 
-    def __init__(self, weights: Ties, diagonal: np.ndarray):
+    def __init__(self, weights: Ties, diagonal: np.ndarray) -> None:
         self.shape, self.weights, self.diagonal = diagonal.shape, weights, diagonal
         self.live = diagonal > 0
         self.inverse = np.divide(1, diagonal, where=self.live, out=np.zeros_like(diagonal))

@@ -90,7 +90,7 @@ class _Grid:
         changed: tiles of 4 × 4 cells whose operator may not be that of the last solve
     """
 
-    def __init__(self, device: Device, width: int, height: int, layers: int, finest: bool):
+    def __init__(self, device: Device, width: int, height: int, layers: int, finest: bool) -> None:
         self.size = width, height
         self.layers = layers
         self.finest = finest
@@ -113,7 +113,7 @@ class Diffusion:
 
     finest = operators("LABELS")  # those over the pixels
 
-    def __init__(self, device: Device):
+    def __init__(self, device: Device) -> None:
         self._device = device
         self._grids: list[_Grid] = []
         self._made_for: tuple[int, int, int] | None = None

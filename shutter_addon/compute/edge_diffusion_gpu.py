@@ -9,6 +9,7 @@ import numpy as np
 
 from ..core.pixels.conductances import cell_side, resistances
 from ..devices.device import Device, Texture
+from ..devices.named_textures import NamedTextures
 from ..devices.passes import read_pass
 from .diffusion import CYCLES, NOTHING, SWEEPS, TWICE, first_solved, is_enough
 from .diffusion_gpu import FINISH, Diffusion, _Grid, operators
@@ -40,9 +41,10 @@ class EdgeDiffusion(Diffusion):
 
     finest = operators("LINKS")
 
-    def __init__(self, device: Device):
+    def __init__(self, device: Device) -> None:
         super().__init__(device)
-        self._more: dict[str, Texture] = {}
+        self._textures = NamedTextures(device)
+        self._more: dict[str, Texture] = {}  # those, of the last solve
         self._solved, self._sweeps = 0, 0
 
     def solve(self, labels: np.ndarray, count: int, guide: np.ndarray, strength: float) -> Texture:  # type: ignore[override]  # it has a guide
@@ -76,23 +78,17 @@ class EdgeDiffusion(Diffusion):
         return self._grids[0].textures["solution"]
 
     def release(self) -> None:
-        for texture in self._more.values():
-            texture.release()
-        self._more = {}
+        self._textures.release()
         super().release()
 
     def _provide(self, cells: tuple[int, int]) -> None:
         """Makes the textures that plain diffusion has not. Those of conjugate gradients are zero: sums go over all of
         them, and passes leave out tiles where nothing is free."""
         grid, finest = self._grids[self._solved], self._grids[0]
-        vectors = dict.fromkeys(("residual", "guess", "direction", "answer"), (*grid.size, grid.layers, "rgba32f"))
-        sizes = vectors | {"resistances": (cells[1], cells[0], 1, "r32f")}
-        sizes |= {"sums": (4, 1, grid.layers, "rgba32f"), "parts": (PARTS, 1, grid.layers, "rgba32f")}
-        for name, size in sizes.items():
-            if name not in self._more or self._more[name].size != size[:3]:
-                if name in self._more:
-                    self._more.pop(name).release()
-                self._more[name] = self._device.texture(*size)
+        vectors = dict.fromkeys(("residual", "guess", "direction", "answer"), (*grid.size, grid.layers))
+        sizes = vectors | {"sums": (4, 1, grid.layers), "parts": (PARTS, 1, grid.layers)}
+        self._more = {name: self._textures.of(name, size, "rgba32f") for name, size in sizes.items()}
+        self._more["resistances"] = self._textures.of("resistances", (cells[1], cells[0], 1), "r32f")
         for name in vectors:
             self._clear(grid, self._more[name])
         if "links" not in finest.textures:

@@ -35,7 +35,7 @@ from .composition_passes import (
     way_of,
     way_sum,
 )
-from .diffusion import follows_edges
+from .diffusion import diffuse, follows_edges
 from .diffusion_gpu import Diffusion
 from .displaying import Displaying
 from .edge_diffusion_gpu import EdgeDiffusion
@@ -142,67 +142,67 @@ class Solver:
     gave_up: whether the device had no room for the last one, which NumPy did
     """
 
-    def __init__(self, device: Device):
+    def __init__(self, device: Device) -> None:
         self.gave_up = False
         self._device = device
-        self._sent: Texture | None = None
+        self._sent = NamedTextures(device)
         self._plain, self._edged = Diffusion(device), EdgeDiffusion(device)
-        self._refused: set = set()  # what the device had no room for
+        self._refused: set[tuple] = set()  # what the device had no room for
 
     def solve(
-        self, labels: np.ndarray, count: int, guide: Any = None, strength: float = 0.0, *, warm: bool = False
+        self,
+        labels: np.ndarray,
+        count: int,
+        guide: np.ndarray | None = None,
+        strength: float = 0.0,
+        *,
+        warm: bool = False,
     ) -> Texture:
         """As Diffusion.solve; along the edges of a guide (EdgeDiffusion.solve) where there are some to follow."""
         edges = follows_edges(labels, guide, strength)
         kind = labels.shape, count, edges
-        if kind not in self._refused:
+        self.gave_up = kind in self._refused
+        if not self.gave_up:
+            self._sent.release()
+            (self._plain if edges else self._edged).release()
             try:
-                return self._solved(labels, count, guide, strength, edges, warm)
+                if guide is not None and edges:
+                    return self._edged.solve(labels, count, guide, strength)
+                return self._plain.solve(labels, count, warm=warm)
             except NoDeviceError:
                 self._refused.add(kind)
+                self.gave_up = True
         self._free()
-        self.gave_up = True
-        return self._send(cpu.Solver().solve(labels, count, guide, strength))
-
-    def _solved(self, labels: np.ndarray, count: int, guide: Any, strength: float, edges: bool, warm: bool) -> Texture:
-        self.gave_up = False
-        self._free_sent()
-        if edges:
-            self._plain.release()
-            return self._edged.solve(labels, count, guide, strength)
-        self._edged.release()
-        return self._plain.solve(labels, count, warm=warm)
-
-    def _send(self, coefficients: np.ndarray) -> Texture:
-        """Coefficients (N, h, w) as a texture."""
-        count, height, width = coefficients.shape
-        sent = self._sent = self._device.texture(width, height, -(-count // 4), "rgba32f")
-        for layer in range(sent.size[2]):
-            four = coefficients[4 * layer : 4 * layer + 4]
-            values = np.zeros((height, width, 4), np.float32)
-            values[..., : len(four)] = np.moveaxis(four, 0, -1)
-            self._device.write(sent, values, layer)
-        return sent
-
-    def _free_sent(self) -> None:
-        if self._sent is not None:
-            self._sent.release()
-            self._sent = None
+        return filled(self._sent, "coefficients", in_fours(diffuse(labels, count, guide, strength)), "rgba32f")
 
     def _free(self) -> None:
         self._plain.release()
         self._edged.release()
-        self._free_sent()
+        self._sent.release()
 
     def release(self) -> None:
         self._free()
         self._refused.clear()  # others may have freed what was in the way
 
 
+def in_fours(values: np.ndarray) -> np.ndarray:
+    """Coefficients (N, h, w) as layers (⌈N/4⌉, h, w, 4) float32 of a texture."""
+    return np.moveaxis(padded(np.moveaxis(values, 0, -1)), 2, 0).astype(np.float32)
+
+
+def filled(textures: NamedTextures, name: str, values: np.ndarray, kind: str) -> Texture:
+    """The texture of a name, with values (layers, h, w, components)."""
+    layers, height, width, _ = values.shape
+    texture = textures.of(name, (width, height, layers), kind)
+    for layer in range(layers):
+        textures.device.write(texture, np.ascontiguousarray(values[layer]), layer)
+    return texture
+
+
 class GPUCompositor:
     """Composes on a Device; the same methods as CPUCompositor."""
 
-    def __init__(self, device: Device):
+    def __init__(self, device: Device) -> None:
         self.name = device.name
         self.device = device
         self._textures = NamedTextures(device)
@@ -246,12 +246,11 @@ class GPUCompositor:
 
     def constant(self, values: np.ndarray) -> Texture:
         """Coefficients (N,) of the whole picture, as a texture of one texel. Valid until the next call."""
-        return self._filled("constant", padded(values).astype(np.float32)[:, None, None, :], "rgba32f")
+        return self._filled("constant", in_fours(values[:, None, None]))
 
     def uploaded(self, values: np.ndarray) -> Texture:
         """Coefficients (N, h, w) as a texture, as a solver has them. Valid until the next call."""
-        planes = np.moveaxis(padded(np.moveaxis(values, 0, -1)), 2, 0)
-        return self._filled("uploaded", planes.astype(np.float32), "rgba32f")
+        return self._filled("uploaded", in_fours(values))
 
     def labels(self, values: np.ndarray) -> Texture:
         """Labels (H, W) uint16 as a texture r32ui. Valid until the next call."""
@@ -309,7 +308,7 @@ class GPUCompositor:
         else:
             rows = len(values) - 1
             program, given = _from_frames(way, window, request, rows, origin, shortened)
-            given["images"]["table"] = self._filled("table", values[None], "rgba32f")
+            given["images"]["table"] = self._filled("table", values[None])
         picture = window.levels() if levels else window.picture
         given["images"] |= {"picture": picture, "coefficients": coefficients.handle}
         lines = lines_of(way, combine)
@@ -390,7 +389,7 @@ class GPUCompositor:
         given["block_bits"] = (coefficients.block - 1).bit_length()
         given |= {"first": first, "last": last, "rows": len(values) - 1 - motions, "motions": motions}
         given |= {"seen_first": int(there[0]), "seen_last": int(there[-1]), "parts": len(values) - motions}
-        images = {"coefficients": coefficients.handle, "table": self._filled("table", values[None], "rgba32f")}
+        images = {"coefficients": coefficients.handle, "table": self._filled("table", values[None])}
         # What is left out is read in another's place: what lies in its own may be no number.
         slots = np.where(frames < 0, frames[there[0]], frames) % window.capacity
         sums = "sum", "other sum"
@@ -405,7 +404,7 @@ class GPUCompositor:
             before, after = held.start > 0, held.stop < window.capacity
             inside = (slots >= held.start) & (slots < held.stop)
             moves[:, 0, 0] = np.where(inside, slots - held.start, -1).repeat(motions)
-            images["moves"] = self._filled("moves", moves[None], "rgba32f")
+            images["moves"] = self._filled("moves", moves[None])
             images["summed"] = images.get("picture")
             sums = sums[::-1]
             images["picture"] = self._textures.of(sums[0], (width, height, 1), "rgba32f") if after else picture
@@ -426,12 +425,8 @@ class GPUCompositor:
             self.device.run(program, extent, textures={**images, "frames": stack}, images=images, **given)
         return picture
 
-    def _filled(self, name: str, values: np.ndarray, kind: str) -> Texture:
-        layers, height, width, _ = values.shape
-        texture = self._textures.of(name, (width, height, layers), kind)
-        for layer in range(layers):
-            self.device.write(texture, np.ascontiguousarray(values[layer]), layer)
-        return texture
+    def _filled(self, name: str, values: np.ndarray, kind: str = "rgba32f") -> Texture:
+        return filled(self._textures, name, values, kind)
 
     def release(self) -> None:
         with self.device.freeing():

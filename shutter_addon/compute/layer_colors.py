@@ -7,7 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from ..core.frames.planes import Planes, as_rgba
+from ..core.frames.frame_source import FrameSource
+from ..core.frames.planes import as_rgba
 from ..core.model.frame_state import Layers, Options
 from ..core.pixels import layering
 from ..core.pixels.decontamination import separated
@@ -28,7 +29,7 @@ class LayerColors:
     asked: by source frame whose covered places are taken from others, which these are, and how the camera moves there
     """
 
-    def __init__(self, source: Any, recent: RecentFrames, mattes: LayerMattes):
+    def __init__(self, source: FrameSource, recent: RecentFrames, mattes: LayerMattes) -> None:
         self._source, self._recent, self._mattes = source, recent, mattes
         self._kept: dict[int, dict] = {}
         self.asked: dict[int, dict[int, Motion]] = {}
@@ -49,7 +50,7 @@ class LayerColors:
         """Hashable: what `frames` of a layer, or with −1 of what lies behind all, changes in the source's."""
         return self._separates, self._options.plate_reach if layer < 0 and self._uncovers else None
 
-    def frames(self, layer: int) -> Any:
+    def frames(self, layer: int) -> FrameSource:
         """A source of frames with the colours of a layer, or with −1 of what lies behind all layers."""
         if self.changes(layer) == (False, None):
             return self._source
@@ -93,8 +94,7 @@ class LayerColors:
         return own, behind
 
     def _decoded(self, frame: int) -> np.ndarray:
-        read = self._source.decoded(frame)
-        return as_rgba(read) if isinstance(read, Planes) else read
+        return as_rgba(self._source.decoded(frame))
 
     def _changed_behind(self, frame: int) -> np.ndarray:
         picture, _ = self._behind(frame)

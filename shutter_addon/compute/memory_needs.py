@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -40,7 +40,7 @@ class _CountingDevice(Device):
 
     most: of bytes that were taken at the same time"""
 
-    def __init__(self, device: Device):
+    def __init__(self, device: Device) -> None:
         super().__init__(Budget(device.budget.limit))
         self.name, self.max_size, self.max_layers = device.name, device.max_size, device.max_layers
         self.most = 0
@@ -72,12 +72,12 @@ def of_window(device: Device, source: FrameSource, kind: Kind) -> Needs:
     return Needs(gpu, host, bool(sizes))
 
 
-def _read(source: FrameSource, kind: Kind) -> list[Any]:
+def _read(source: FrameSource, kind: Kind) -> list[FrameSource]:
     """What the windows of a picture read."""
     if not kind.layers:
         return [source]
-    recent: Any = RecentFrames(source)
-    weighted = [
+    recent = RecentFrames(source)
+    weighted: list[FrameSource] = [
         WeightedFrames(recent, _no_weight, rest=i < 0, alone=alone)
         for i in range(-1, kind.layers)
         for alone in ((False,) if source.alpha == "opaque" else (False, True))
@@ -86,13 +86,13 @@ def _read(source: FrameSource, kind: Kind) -> list[Any]:
     return weighted if recent.windows == len(weighted) else [recent, *weighted]
 
 
-def _no_weight(_frame: int) -> Any:
+def _no_weight(_frame: int) -> np.ndarray:
     raise NotImplementedError("nothing is read")
 
 
 def of_numpy_window(source: FrameSource, kind: Kind) -> Needs:
     """What windows need with NumPy."""
-    frames: list[Any] = [source, *(read for read in _read(source, kind) if isinstance(read, WeightedFrames))]
+    frames = [source, *(read for read in _read(source, kind) if isinstance(read, WeightedFrames))]
     return Needs(0, sum(kind.window * frame_bytes(read) for read in frames), False)
 
 

@@ -4,6 +4,7 @@ the fastest."""
 from __future__ import annotations
 
 from collections.abc import Collection
+from contextlib import suppress
 from typing import Any
 
 import numpy as np
@@ -23,18 +24,19 @@ from .window import BLOCK, Frames, PackedFrames, WholeFrames, Window, decoding, 
 TILE = 8, BLOCK
 
 
-def open_window(device: Device, source: Any, capacity: int, moved: bool, shutters: int, summed: bool = True) -> Window:
+def open_window(
+    device: Device, source: FrameSource, capacity: int, moved: bool, shutters: int, summed: bool = True
+) -> Window:
     """The fastest window of `capacity` frames: running sums if they can be made of the source and the device has room
     for them, else the frames. moved: what is seen of a frame lies elsewhere in it, so it has to be whole. shutters:
     those whose coefficients have to have room beside it. summed: all that is made of the frames are sums of them."""
-    weighted = isinstance(source, WeightedFrames)
     if moved:
-        return (PackedFrames if not weighted and summable(source) else WholeFrames)(device, source, capacity, shutters)
-    if summed and (source.is_summable if weighted else summable(source)):
-        try:
-            return (WeightedSums if weighted else Sums)(device, source, capacity, shutters)
-        except NoDeviceError:
-            pass
+        return (PackedFrames if summable(source) else WholeFrames)(device, source, capacity, shutters)
+    with suppress(NoDeviceError):
+        if summed and isinstance(source, WeightedFrames) and source.is_summable:
+            return WeightedSums(device, source, capacity, shutters)
+        if summed and summable(source):
+            return Sums(device, source, capacity, shutters)
     return Frames(device, source, capacity, shutters)
 
 
@@ -103,7 +105,7 @@ class Sums(Window):
 
     cover = 0
 
-    def __init__(self, device: Device, source: FrameSource, capacity: int, shutters: int = 1):
+    def __init__(self, device: Device, source: FrameSource, capacity: int, shutters: int = 1) -> None:
         self.layers = capacity + 1
         self.start = self.stop = 0
         self._frames: dict[int, int] = {}  # position: source frame
@@ -241,7 +243,7 @@ class WeightedSums(Sums):
     (core.pixels.layering), and of their weights, in textures rgba32ui: four fields of 32 bits. Where the weights are 1,
     its pictures have the bits of Sums."""
 
-    def __init__(self, device: Device, source: WeightedFrames, capacity: int, shutters: int = 1):
+    def __init__(self, device: Device, source: WeightedFrames, capacity: int, shutters: int = 1) -> None:
         self.cover, self._weight = 2 if source.rest else 1, source.weight
         super().__init__(device, source.base, capacity, shutters)
 

@@ -60,7 +60,7 @@ class Window:
     layers: int
     sends = anew = False
 
-    def __init__(self, device: Device, source: FrameSource, capacity: int, shutters: int):
+    def __init__(self, device: Device, source: FrameSource, capacity: int, shutters: int) -> None:
         self.device, self.source, self.capacity, self.shutters = device, source, capacity, shutters
         self.shot = range(source.count)
         self.textures: list[Texture] = []
@@ -98,7 +98,7 @@ class Window:
     def _check(self, size: int) -> None:
         """NoDeviceError: a window of so many bytes, with as large ones of the same picture, leaves too little of the
         device's memory."""
-        size *= getattr(self.source, "windows", 1)
+        size *= self.source.windows
         if size + beside(self.source, self.shutters) > self.device.budget.limit:
             raise NoDeviceError("over the budget")
 
@@ -139,7 +139,7 @@ class Frames(Window):
 
     _kind: str | None = None  # of its textures, if it is not that of the frames
 
-    def __init__(self, device: Device, source: FrameSource, capacity: int, shutters: int = 1):
+    def __init__(self, device: Device, source: FrameSource, capacity: int, shutters: int = 1) -> None:
         self.layers = capacity
         self._held: dict[int, int] = {}  # layer: source frame
         self._host: dict[int, np.ndarray] | None = None
@@ -160,10 +160,10 @@ class Frames(Window):
         device, source = self.device, self.source
         device.use(self)
         self._host, self.sends = {}, True
-        size = source.width * source.height * self.pixel_bytes * self.capacity * getattr(source, "windows", 1)
-        self.anew = getattr(source, "is_made", False) and size > device.budget.limit
+        size = source.width * source.height * self.pixel_bytes * self.capacity * source.windows
+        self.anew = source.is_made and size > device.budget.limit
         if self.anew:
-            source.keep(self.capacity)  # type: ignore[attr-defined]
+            source.keep(self.capacity)
         self._divide(int(device.budget.limit * SENT_SHARE))
         self.picture = device.texture(source.width, source.height, 1, "rgba32f")
 

@@ -54,7 +54,7 @@ class Texture:
     waiting: its content (layers, height, width, components) meanwhile
     """
 
-    def __init__(self, device: Device | None, size: tuple[int, int, int], kind: str, own: Any = None):
+    def __init__(self, device: Device | None, size: tuple[int, int, int], kind: str, own: Any = None) -> None:
         width, height, layers = size
         self.size, self.kind, self.bytes = size, kind, width * height * layers * TEXEL_BYTES[kind]
         self.device, self.own = device, own
@@ -93,7 +93,7 @@ class Device:
     max_layers: int
     takes_planes = False
 
-    def __init__(self, budget: Budget | None = None, ask_others: Callable[[], None] | None = None):
+    def __init__(self, budget: Budget | None = None, ask_others: Callable[[], None] | None = None) -> None:
         self.budget, self.ask_others = budget or Budget(), ask_others
         self._held: dict[Texture, None] = {}  # on the device, used longest ago first
         self._windows: dict[Holder, None] = {}  # likewise; the last one is in use

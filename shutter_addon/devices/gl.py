@@ -101,7 +101,7 @@ class GLDevice(Device):
 
     takes_planes = True
 
-    def __init__(self, budget: Budget | None = None, ask_others: Callable[[], None] | None = None):
+    def __init__(self, budget: Budget | None = None, ask_others: Callable[[], None] | None = None) -> None:
         super().__init__(budget, ask_others)
         backend: dict[str, Any] = {"backend": "egl"} if _EGL else {}
         try:

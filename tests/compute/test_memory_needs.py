@@ -21,7 +21,8 @@ WINDOW, SHUTTERS = 6, 3
 
 def source(dtype, alpha):
     shape = {"width": 70, "height": 50, "count": 20, "dtype": np.dtype(dtype)}
-    return SimpleNamespace(**shape, alpha=alpha, transfer="srgb", shots=None)
+    read_by = {"windows": 1, "is_made": False, "keep": None}
+    return SimpleNamespace(**shape, **read_by, alpha=alpha, transfer="srgb", shots=None)
 
 
 @pytest.fixture(scope="module")

@@ -82,7 +82,7 @@ class BlenderDevice(Device):
 
     What begins with _ gets and gives the gpu module's own textures; RelayedDevice has it called elsewhere."""
 
-    def __init__(self, budget: Budget | None = None, ask_others: Callable[[], None] | None = None):
+    def __init__(self, budget: Budget | None = None, ask_others: Callable[[], None] | None = None) -> None:
         super().__init__(budget, ask_others)
         self._shaders: dict[Pass, gpu.types.GPUShader] = {}
         self._spare: Texture | None = None

@@ -58,7 +58,7 @@ class RelayedDevice(BlenderDevice):
     Its own textures are lists of one, which the main thread empties: on Vulkan Blender crashes where another frees one.
     """
 
-    def __init__(self, *memory: Any):
+    def __init__(self, *memory: Any) -> None:
         super().__init__(*memory)
         self._passes: list[Future] = []
 
