@@ -4,7 +4,6 @@ the fastest."""
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
@@ -13,7 +12,7 @@ from ..core.model.frame_state import Options
 from ..devices.llvmpipe import MOST_ITERATIONS
 from ..devices.passes import Pass, read_pass
 from .running_sums import STORED_SUMS, Sums
-from .window import BLOCK
+from .window import BLOCK, Window
 
 # Rows of pixels that one invocation of compose_sums composes.
 PAIR = 2
@@ -151,7 +150,7 @@ def lines_of(way: str, combine: Combine = AVERAGE) -> int:
 
 
 def way_of(
-    window: Any,
+    window: Window,
     options: Options,
     values: np.ndarray,
     span: tuple[int, int],

@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 from itertools import pairwise
-from typing import Any
 
 import numpy as np
 
 from ..core.pixels.conductances import cell_side, resistances
-from ..devices.device import Device, Texture
-from ..devices.named_textures import NamedTextures
+from ..devices.device import Device, Given, Texture
 from ..devices.passes import read_pass
 from .diffusion import CYCLES, NOTHING, SWEEPS, TWICE, first_solved, is_enough
 from .diffusion_gpu import FINISH, Diffusion, _Grid, operators
@@ -43,8 +41,7 @@ class EdgeDiffusion(Diffusion):
 
     def __init__(self, device: Device) -> None:
         super().__init__(device)
-        self._textures = NamedTextures(device)
-        self._more: dict[str, Texture] = {}  # those, of the last solve
+        self._more: dict[str, Texture] = {}  # those of the last solve
         self._solved, self._sweeps = 0, 0
 
     def solve(self, labels: np.ndarray, count: int, guide: np.ndarray, strength: float) -> Texture:  # type: ignore[override]  # it has a guide
@@ -60,7 +57,7 @@ class EdgeDiffusion(Diffusion):
         self._device.write(self._grids[0].textures["labels"], np.ascontiguousarray(labels, dtype=np.uint32))
         self._device.write(self._more["resistances"], resistances(guide, strength)[..., None])
         self._list_tiles(labels, 0 if side == 1 else self._solved, anew=True)
-        placed: dict[str, Any] = {"guided": guide.shape[1::-1], "side": side, "resistances": self._more["resistances"]}
+        placed: Given = {"guided": guide.shape[1::-1], "side": side, "resistances": self._more["resistances"]}
         self._run(_LINKS, self._grids[0], "anew", 64, **placed)
         self._start(0)
         self._coarsen()
@@ -76,10 +73,6 @@ class EdgeDiffusion(Diffusion):
                     break
         self._run(FINISH, self._grids[0], "near", 64, nothing=NOTHING)
         return self._grids[0].textures["solution"]
-
-    def release(self) -> None:
-        self._textures.release()
-        super().release()
 
     def _provide(self, cells: tuple[int, int]) -> None:
         """Makes the textures that plain diffusion has not. Those of conjugate gradients are zero: sums go over all of

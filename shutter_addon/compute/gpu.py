@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from contextlib import AbstractContextManager
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 
@@ -13,7 +12,7 @@ from ..core.model.combining import AVERAGE, Combine
 from ..core.model.frame_state import Following, FrameState
 from ..core.pixels import compositor
 from ..core.pixels.shown_levels import Display
-from ..devices.device import Device, NoDeviceError, Texture
+from ..devices.device import Device, Given, NoDeviceError, Texture
 from ..devices.llvmpipe import MOST_ITERATIONS
 from ..devices.named_textures import NamedTextures
 from ..devices.passes import Pass
@@ -42,18 +41,18 @@ from .edge_diffusion_gpu import EdgeDiffusion
 from .laying import Laying
 from .matting import Matting
 from .mixing import Mixing
-from .request import Coefficients, Request
+from .request import Coefficients, Handle, Request
 from .running_sums import Sums, open_window
 from .tables import moved_tables, padded, table
 from .window import BLOCK, PackedFrames, WholeFrames, Window, decoding
 
 
-def _extent(window: Sums) -> dict[str, Any]:
+def _extent(window: Sums) -> Given:
     """Constants about running sums that all passes over them have."""
     return {"layers": window.layers, "held": window.stop - window.start, "unit": 1 / window.whole}
 
 
-def _from_sums(window: Sums, request: Request, values: np.ndarray, origin: int) -> tuple[Pass, dict[str, Any]]:
+def _from_sums(window: Sums, request: Request, values: np.ndarray, origin: int) -> tuple[Pass, Given]:
     """compose_sums for a table of pieces, and its arguments for Device.run but for the band's.
 
     origin: the position of the window's first frame"""
@@ -79,15 +78,15 @@ def _from_sums(window: Sums, request: Request, values: np.ndarray, origin: int) 
 
 
 def _from_frames(
-    way: str, window: Any, request: Request, rows: int, origin: int, shortened: bool
-) -> tuple[Pass, dict[str, Any]]:
+    way: str, window: Handle, request: Request, rows: int, origin: int, shortened: bool
+) -> tuple[Pass, Given]:
     """The pass of another way, and its arguments: as _from_sums.
 
     rows: pieces in the table; shortened: as for way_of"""
     state, direction = request.state, request.direction
     options, source, summed = state.options, window.source, isinstance(window, Sums)
     (combine,) = state.groups
-    given: dict[str, Any] = {"images": {}, "textures": {}, "rows": rows, "direction": direction}
+    given: Given = {"images": {}, "textures": {}, "rows": rows, "direction": direction}
     given["first"], given["last"] = state.open_span
     if summed:
         lowest, decode, edges = window.start, 0, 2 if shortened else 0
@@ -117,7 +116,7 @@ def _from_frames(
     return composition(way, -(-len(state.bars) // 4), stored, edges, light), given
 
 
-def _threshold(combine: Combine, request: Request, shot: range) -> dict[str, Any]:
+def _threshold(combine: Combine, request: Request, shot: range) -> Given:
     """The arguments of passes with a threshold."""
     if combine.threshold is None:
         return {}
@@ -277,7 +276,7 @@ class GPUCompositor:
         """The levels (H, W, 4) uint8 of an opaque scene-linear picture of `draw`, top row first."""
         return self._displaying.levels(drawn, display)
 
-    def draw(self, window: Any, request: Request, coefficients: Coefficients) -> Texture:
+    def draw(self, window: Handle, request: Request, coefficients: Coefficients) -> Texture:
         """The picture on the device, premultiplied: a texture array rgba32f of one layer, scene-linear, bottom row
         first; or of levels rgba8, display code values, top row first. It is one of the window's, valid until its next
         picture of the kind.
@@ -327,7 +326,7 @@ class GPUCompositor:
             )
         return picture
 
-    def _draw_ways(self, window: Any, request: Request, coefficients: Coefficients) -> Texture:
+    def _draw_ways(self, window: Handle, request: Request, coefficients: Coefficients) -> Texture:
         """As `draw`, of shutters that combine in several ways: a picture for each of these, mixed."""
         state, (width, height) = request.state, (window.source.width, window.source.height)
         groups = list(state.groups.values())
@@ -352,11 +351,11 @@ class GPUCompositor:
         selected = self._textures.of("selected", (width, height, groups), "rgba32f")
         share = self._textures.of("share", (width, height, 1), "r32f")
         images = {"coefficients": handle, "selected": selected, "share": share}
-        given: dict[str, Any] = {"size": (width, height), "count": len(chosen), "blocks": {"chosen": numbers}}
+        given: Given = {"size": (width, height), "count": len(chosen), "blocks": {"chosen": numbers}}
         self.device.run(selection(groups, count), (width, height), images=images, **given)
         return selected, share
 
-    def _draw_on_host(self, window: Any, request: Request, coefficients: Coefficients) -> Texture:
+    def _draw_on_host(self, window: Handle, request: Request, coefficients: Coefficients) -> Texture:
         """As `draw`, by NumPy: of medians whose frames are seen elsewhere, which passes over some of them at a time
         cannot find; and of those that take more iterations than a device has."""
         host, source, options = cpu.CPUCompositor(), window.source, request.state.options
@@ -385,7 +384,7 @@ class GPUCompositor:
         mixed = moves.shape[1] - 1
         most = BLOCK // 4 if packed and not shortened else 1
         way, quads = moved_way(options, values[: len(values) - motions], (first, last), motions, mixed, most)
-        given: dict[str, Any] = {"size": (width, height), "top": 0, "height": height}
+        given: Given = {"size": (width, height), "top": 0, "height": height}
         given["block_bits"] = (coefficients.block - 1).bit_length()
         given |= {"first": first, "last": last, "rows": len(values) - 1 - motions, "motions": motions}
         given |= {"seen_first": int(there[0]), "seen_last": int(there[-1]), "parts": len(values) - motions}
@@ -393,7 +392,7 @@ class GPUCompositor:
         # What is left out is read in another's place: what lies in its own may be no number.
         slots = np.where(frames < 0, frames[there[0]], frames) % window.capacity
         sums = "sum", "other sum"
-        picture: Any = window.levels() if request.levels else window.picture
+        picture: Handle = window.levels() if request.levels else window.picture
         alpha, decode = window.source.alpha, 0 if packed else decoding(window.transfer, options.light)
         (combine,) = state.groups
         light = LightFormat(

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
 from ..core.frames.frame_source import FrameSource
 from ..core.frames.planes import as_rgba
+from ..core.memo import Kept
 from ..core.model.frame_state import Layers, Options
 from ..core.pixels import layering
 from ..core.pixels.decontamination import separated
@@ -16,6 +17,7 @@ from . import plates
 from .layer_frames import LayerFrames, RecentFrames, linear, with_colors
 from .layer_mattes import LayerMattes
 
+T = TypeVar("T")
 # Frames of which both are kept, as several windows load them one after another.
 TOGETHER = 4
 
@@ -31,7 +33,7 @@ class LayerColors:
 
     def __init__(self, source: FrameSource, recent: RecentFrames, mattes: LayerMattes) -> None:
         self._source, self._recent, self._mattes = source, recent, mattes
-        self._kept: dict[int, dict] = {}
+        self._kept: Kept[tuple, Any] = Kept()
         self.asked: dict[int, dict[int, Motion]] = {}
         self.begin(None, Options(1), range(0))
 
@@ -72,13 +74,8 @@ class LayerColors:
     def _uncovers(self) -> bool:
         return self.layers.camera is not None and self._source.alpha == "opaque"
 
-    def _memo(self, frame: int, name: Any, make: Callable[[], Any]) -> Any:
-        kept = self._kept.setdefault(frame % TOGETHER, {})
-        if (frame, name) not in kept:
-            for other in [key for key in kept if key[0] != frame]:
-                del kept[other]
-            kept[frame, name] = make()
-        return kept[frame, name]
+    def _memo(self, frame: int, name: int | str, make: Callable[[], T]) -> T:
+        return self._kept.ask((frame, name), make, TOGETHER * (1 + len(self.layers.shutters)))
 
     def _separated(self, frame: int, layer: int) -> tuple[np.ndarray, np.ndarray]:
         """A frame with a layer's own colours, and with those behind it; −1: behind all layers."""

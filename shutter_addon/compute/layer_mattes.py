@@ -11,6 +11,7 @@ from ..core.memo import Kept
 from ..core.model.frame_state import FrameState, Layers
 from ..core.model.mattes import FileFrame, Matte, MatteReader, Ramp
 from ..core.pixels import layering
+from ..core.stopping import kept
 
 # Bytes of mattes that are kept, at most, beyond those of the window.
 KEPT_BYTES = 512 << 20
@@ -92,7 +93,12 @@ class LayerMattes:
         return values[: self._size[1], : self._size[0]]
 
     def _get(self, key: Hashable, make: Callable[[], np.ndarray]) -> np.ndarray:
-        return self._kept.ask(key, lambda: np.rint(make() * np.float32(_WHOLE)).astype(np.uint16), self._most)
+        def made() -> np.ndarray:
+            values = np.rint(make() * np.float32(_WHOLE)).astype(np.uint16)
+            kept()
+            return values
+
+        return self._kept.ask(key, made, self._most)
 
     def clear(self) -> None:
         """Forgets all mattes."""

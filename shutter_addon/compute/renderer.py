@@ -3,9 +3,9 @@ coefficients, composition."""
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Callable, Collection
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -13,6 +13,7 @@ from ..core.frames.frame_source import FrameSource
 from ..core.memo import Memo
 from ..core.model.frame_state import FrameState
 from ..core.model.mattes import MatteReader
+from ..devices.budget import Budget
 from ..devices.device import NoDeviceError
 from . import decoding_ahead, guide, window_frames
 from .cpu import CPUCompositor
@@ -24,24 +25,26 @@ if TYPE_CHECKING:
     from ..devices.gl import GLDevice
 
 
-def open_compositor(device: str = "gpu", *memory: Any) -> Compositor:
-    """The compositor "gpu", on OpenGL 4.3, or "cpu", on NumPy; memory: the arguments of GLDevice. NoDeviceError: there
+def open_compositor(
+    device: str = "gpu", budget: Budget | None = None, ask_others: Callable[[], None] | None = None
+) -> Compositor:
+    """The compositor "gpu", on OpenGL 4.3, or "cpu", on NumPy; budget, ask_others: as for Device. NoDeviceError: there
     is no OpenGL 4.3."""
     if device == "cpu":
         return CPUCompositor()
     from .gpu import GPUCompositor
 
-    return GPUCompositor(open_gl(*memory))
+    return GPUCompositor(open_gl(budget, ask_others))
 
 
-def open_gl(*memory: Any) -> GLDevice:
-    """A device on an OpenGL 4.3 context of its own; memory: the arguments of GLDevice. NoDeviceError: there is none, or
+def open_gl(budget: Budget | None = None, ask_others: Callable[[], None] | None = None) -> GLDevice:
+    """A device on an OpenGL 4.3 context of its own; budget, ask_others: as for Device. NoDeviceError: there is none, or
     no moderngl."""
     try:
         from ..devices.gl import GLDevice
     except ImportError as error:  # a package without wheels, or one for another Python
         raise NoDeviceError(f"the Python package moderngl cannot be loaded ({error})") from None
-    return GLDevice(*memory)
+    return GLDevice(budget, ask_others)
 
 
 class Renderer:

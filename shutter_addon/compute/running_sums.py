@@ -5,7 +5,6 @@ from __future__ import annotations
 
 from collections.abc import Collection
 from contextlib import suppress
-from typing import Any
 
 import numpy as np
 
@@ -15,7 +14,7 @@ from ..core.model.frame_state import Light, Options
 from ..core.pixels import compositor
 from ..core.stopping import kept
 from ..devices import llvmpipe
-from ..devices.device import TEXEL_BYTES, Device, NoDeviceError, Texture
+from ..devices.device import TEXEL_BYTES, Device, Given, NoDeviceError, Texture
 from ..devices.passes import Pass, read_pass
 from .layer_frames import WeightedFrames
 from .window import BLOCK, Frames, PackedFrames, WholeFrames, Window, decoding, summable
@@ -173,7 +172,7 @@ class Sums(Window):
         # A position that shows this frame already: it need not be read.
         same = next((position for position, held in self._frames.items() if held == frame), None)
         images: dict[str, Texture] = {}
-        given: dict[str, Any] = {"known": known % self.layers, "next": next_ % self.layers}
+        given: Given = {"known": known % self.layers, "next": next_ % self.layers}
         if same is None:
             sent, arguments = self._send(frame)
             given |= arguments | {"whole": float(self.whole)}
@@ -208,7 +207,7 @@ class Sums(Window):
             texture.release()
         self._sent = {}
 
-    def _send(self, index: int) -> tuple[str, dict[str, Any]]:
+    def _send(self, index: int) -> tuple[str, Given]:
         """Sends a source frame: as what (`accumulation`), and the arguments of the pass that adds it."""
         frame = self.source.decoded(index) if self.device.takes_planes else self.source.read(index)
         if isinstance(frame, Planes):
@@ -217,7 +216,7 @@ class Sums(Window):
         sent = self.device.send(self._sent["frame"], frame)
         return "colours" if sent is self._sent["frame"] else "numbers", {"textures": {"frame": sent}}
 
-    def _send_planes(self, frame: Planes) -> dict[str, Any]:
+    def _send_planes(self, frame: Planes) -> Given:
         self._hold("luma", "chroma")
         self.device.write(self._sent["luma"], _in_fours(frame.luma))
         for layer, plane in enumerate(frame.chroma):
@@ -255,7 +254,7 @@ class WeightedSums(Sums):
         """The texture that a frame's weights are sent to."""
         return self._extra.of("weights", (self.source.width, self.source.height, 1), "r32f")
 
-    def _send(self, index: int) -> tuple[str, dict[str, Any]]:
+    def _send(self, index: int) -> tuple[str, Given]:
         weights = self._weights()
         self.device.write(weights, np.ascontiguousarray(self._weight(index)[..., None]))
         sent, given = super()._send(index)

@@ -47,5 +47,4 @@ class Kept(dict[K, T]):
         self[key] = value
         while len(self) > most:
             del self[next(iter(self))]
-        kept()
         return value

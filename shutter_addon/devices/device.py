@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
 from contextlib import AbstractContextManager
-from typing import Any, Protocol
+from typing import Any, Protocol, TypeAlias
 
 import numpy as np
 
@@ -31,7 +31,9 @@ TEXEL_BYTES = {
 # Formats that can move to the host. Those of frames stay: a window that does not fit is kept on the host as a whole.
 MOVABLE = ("rgba32f", "r32f", "r32ui")
 
-Bound = Mapping[str, "Texture"]  # textures by the names that a pass has for them
+Bound: TypeAlias = Mapping[str, "Texture"]  # textures by the names that a pass has for them
+Given: TypeAlias = dict[str, Any]  # arguments of Device.run, by name
+Own: TypeAlias = Any  # what the library of a device has for a texture
 
 
 class NoDeviceError(RuntimeError):
@@ -54,14 +56,14 @@ class Texture:
     waiting: its content (layers, height, width, components) meanwhile
     """
 
-    def __init__(self, device: Device | None, size: tuple[int, int, int], kind: str, own: Any = None) -> None:
+    def __init__(self, device: Device | None, size: tuple[int, int, int], kind: str, own: Own = None) -> None:
         width, height, layers = size
         self.size, self.kind, self.bytes = size, kind, width * height * layers * TEXEL_BYTES[kind]
         self.device, self.own = device, own
         self.waiting: np.ndarray | None = None
 
     @property
-    def gpu(self) -> Any:
+    def gpu(self) -> Own:
         """`own`, on the device in any case."""
         if self.device is not None:
             self.device.bring((self,))
@@ -98,11 +100,11 @@ class Device:
         self._held: dict[Texture, None] = {}  # on the device, used longest ago first
         self._windows: dict[Holder, None] = {}  # likewise; the last one is in use
 
-    def current(self) -> AbstractContextManager[Any]:
+    def current(self) -> AbstractContextManager[Device]:
         """Makes the device usable on this thread until the `with` block ends. NoDeviceError: it cannot be, just now."""
         raise NotImplementedError
 
-    def freeing(self) -> AbstractContextManager[Any]:
+    def freeing(self) -> AbstractContextManager[Device]:
         """Makes textures of the device releasable until the `with` block ends, on any one thread, at any time."""
         raise NotImplementedError
 
@@ -195,7 +197,7 @@ class Device:
             self._free(own)
             self.budget.give_back(texture.bytes)
 
-    def _made(self, texture: Texture, beside: tuple[Texture, ...]) -> Any:
+    def _made(self, texture: Texture, beside: tuple[Texture, ...]) -> Own:
         width, height, layers = texture.size
         possible = max(width, height) <= self.max_size and layers <= self.max_layers
         while possible and texture.bytes <= self.budget.limit:
@@ -227,11 +229,11 @@ class Device:
             return True
         return False
 
-    def _make(self, width: int, height: int, layers: int, kind: str) -> Any:
+    def _make(self, width: int, height: int, layers: int, kind: str) -> Own:
         """What the library has for a texture. NoDeviceError: it has no room for it."""
         raise NotImplementedError
 
-    def _free(self, own: Any) -> None:
+    def _free(self, own: Own) -> None:
         """Frees what `_make` gave."""
         raise NotImplementedError
 
