@@ -67,26 +67,6 @@ class LightFormat:
         }
 
 
-@dataclass(frozen=True)
-class Moved:
-    """What is composed where shutters follow something.
-
-    quads: of pixels that an invocation composes
-    shutters: their number; mixed: motions that are mixed for a pixel
-    packed: whether the window holds PackedFrames; shortened: whether frames are left out
-    sharp: how frames are resampled (core.pixels.compositor.seen)
-    continued, unfinished: whether passes over other frames come before, and after"""
-
-    quads: int
-    shutters: int
-    mixed: int
-    packed: bool
-    shortened: bool
-    sharp: bool
-    continued: bool
-    unfinished: bool
-
-
 def composition(way: str, groups: int, stored: str, edges: int, light: LightFormat) -> Pass:
     """The pass compose_<way> for a way of `way_of` other than "sums".
 
@@ -122,24 +102,42 @@ def composition_of_sums(rows: float, groups: int, back: bool, tiled: bool, light
     )
 
 
-def composition_of_moved(way: str, moved: Moved, light: LightFormat) -> Pass:
-    """The pass of a way, "frames", "search" or "value", where shutters follow something."""
+def composition_of_moved(
+    way: str,
+    light: LightFormat,
+    *,
+    quads: int,
+    shutters: int,
+    mixed: int,
+    packed: bool,
+    shortened: bool,
+    sharp: bool,
+    continued: bool = False,
+    unfinished: bool = False,
+) -> Pass:
+    """The pass of a way, "frames", "search" or "value", where shutters follow something.
+
+    quads: of pixels that an invocation composes
+    shutters: their number; mixed: motions that are mixed for a pixel
+    packed: whether the window holds PackedFrames; shortened: whether frames are left out
+    sharp: how frames are resampled (core.pixels.compositor.seen)
+    continued, unfinished: whether passes over other frames come before, and after"""
     return read_pass(
         f"compose_{way}",
         MOVED=1,
-        PACKED=int(moved.packed),
-        CONTINUED=int(moved.continued),
-        UNFINISHED=int(moved.unfinished),
-        QUADS=moved.quads,
-        GROUPS=-(-moved.shutters // 4),
-        SHUTTERS=moved.shutters,
-        MIXED=moved.mixed,
+        PACKED=int(packed),
+        CONTINUED=int(continued),
+        UNFINISHED=int(unfinished),
+        QUADS=quads,
+        GROUPS=-(-shutters // 4),
+        SHUTTERS=shutters,
+        MIXED=mixed,
         SUMS=0,
         TILED=0,
-        EDGES=EDGES["shorten"] if moved.shortened else 0,
-        SHARP=int(moved.sharp),
+        EDGES=EDGES["shorten"] if shortened else 0,
+        SHARP=int(sharp),
         SQUARED=int(not light.encoded),
-        SEVERAL=int(moved.continued or moved.unfinished),
+        SEVERAL=int(continued or unfinished),
         **light.defines(),
     )
 

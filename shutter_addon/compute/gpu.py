@@ -22,7 +22,6 @@ from .composition_passes import (
     LEVELS,
     PICTURE,
     LightFormat,
-    Moved,
     composition,
     composition_of_moved,
     composition_of_sums,
@@ -408,7 +407,9 @@ class GPUCompositor:
             sums = sums[::-1]
             images["picture"] = self._textures.of(sums[0], (width, height, 1), "rgba32f") if after else picture
             # What has more to do for a pixel takes long to compile for many.
-            moved = Moved(
+            program = composition_of_moved(
+                way,
+                light,
                 quads=1 if before or after else quads,
                 shutters=len(state.bars),
                 mixed=mixed,
@@ -418,7 +419,6 @@ class GPUCompositor:
                 continued=before,
                 unfinished=after,
             )
-            program = composition_of_moved(way, moved, light)
             images["packed_frames"] = stack
             extent = width, -(-height // (4 * int(program.defines["QUADS"])))
             self.device.run(program, extent, textures={**images, "frames": stack}, images=images, **given)

@@ -15,6 +15,7 @@ from ..core.pixels import compositor
 from ..core.stopping import kept
 from ..devices import llvmpipe
 from ..devices.device import TEXEL_BYTES, Device, Given, NoDeviceError, Texture
+from ..devices.named_textures import NamedTextures
 from ..devices.passes import Pass, read_pass
 from .layer_frames import WeightedFrames
 from .window import BLOCK, Frames, PackedFrames, WholeFrames, Window, decoding, summable
@@ -114,12 +115,13 @@ class Sums(Window):
         # A workgroup reads all layers of its pixels. In tiles, they are one run of memory.
         texels, _, tiles = _in_tiles(source.width, source.height, self.layers)
         self.tiled = stores_rows(device) and texels <= device.max_size and tiles <= device.max_layers
-        self._sent: dict[str, Texture] = {}
+        self._sent = NamedTextures(device)
+        self._sent_as: tuple[str, ...] = ()  # their names
         super().__init__(device, source, capacity, shutters)
 
     def _allocate(self) -> None:
         self._allocate_bands(STORED_SUMS[self.cover], TEXEL_BYTES[STORED_SUMS[self.cover]])
-        self._hold("frame")
+        self._sent_to("frame")
 
     @property
     def held(self) -> Collection[int]:
@@ -191,39 +193,33 @@ class Sums(Window):
     def _size(self, height: int) -> tuple[int, int, int]:
         return _in_tiles(self.source.width, height, self.layers) if self.tiled else super()._size(height)
 
-    def _hold(self, *names: str) -> None:
-        """Has the textures that a frame is sent to: "frame", or "luma" and "chroma". The others go."""
-        if self._sent.keys() == set(names):
-            return
-        self._free_sent()
+    def _sent_to(self, *names: str) -> dict[str, Texture]:
+        """The textures that a frame is sent to: "frame", or "luma" and "chroma". The others go."""
+        if names != self._sent_as:
+            self._sent.release()
+            self._sent_as = names
         width, height = self.source.width, self.source.height
-        sizes = {"frame": (width, height, 1, "rgba8"), "luma": (-(-width // 4), height, 1, "r32ui")}
-        sizes["chroma"] = -(-width // 8), -(-height // 2), 2, "r32ui"
-        for name in names:
-            self._sent[name] = self.device.texture(*sizes[name])
-
-    def _free_sent(self) -> None:
-        for texture in self._sent.values():
-            texture.release()
-        self._sent = {}
+        sizes = {"frame": ((width, height, 1), "rgba8"), "luma": ((-(-width // 4), height, 1), "r32ui")}
+        sizes["chroma"] = (-(-width // 8), -(-height // 2), 2), "r32ui"
+        return {name: self._sent.of(name, *sizes[name]) for name in names}
 
     def _send(self, index: int) -> tuple[str, Given]:
         """Sends a source frame: as what (`accumulation`), and the arguments of the pass that adds it."""
         frame = self.source.decoded(index) if self.device.takes_planes else self.source.read(index)
         if isinstance(frame, Planes):
             return "planes", self._send_planes(frame)
-        self._hold("frame")
-        sent = self.device.send(self._sent["frame"], frame)
-        return "colours" if sent is self._sent["frame"] else "numbers", {"textures": {"frame": sent}}
+        own = self._sent_to("frame")["frame"]
+        sent = self.device.send(own, frame)
+        return "colours" if sent is own else "numbers", {"textures": {"frame": sent}}
 
     def _send_planes(self, frame: Planes) -> Given:
-        self._hold("luma", "chroma")
-        self.device.write(self._sent["luma"], _in_fours(frame.luma))
+        sent = self._sent_to("luma", "chroma")
+        self.device.write(sent["luma"], _in_fours(frame.luma))
         for layer, plane in enumerate(frame.chroma):
-            self.device.write(self._sent["chroma"], _in_fours(plane), layer)
+            self.device.write(sent["chroma"], _in_fours(plane), layer)
         matrix = frame.matrix
         return {
-            "images": self._sent,
+            "images": sent,
             "chroma_step": (chroma_step(self.source.width), chroma_step(self.source.height)),
             "luma_of": (matrix.offset, matrix.luma),
             "red_of": matrix.red_of_cr,
@@ -234,7 +230,7 @@ class Sums(Window):
     def release(self) -> None:
         self._frames, self._light = {}, None
         super().release()
-        self._free_sent()
+        self._sent.release()
 
 
 class WeightedSums(Sums):
