@@ -46,11 +46,9 @@ from shutter_addon.compute import (
     cpu,
     diffusion,
     diffusion_gpu,
-    edge_diffusion,
     edge_diffusion_gpu,
     guide,
 )
-from shutter_addon.compute.benchmark import BARS, Noise, bars, levels_apart, reference, shapes
 from shutter_addon.compute.gpu import GPUCompositor
 from shutter_addon.compute.layer_frames import WeightedFrames
 from shutter_addon.compute.laying import Behind, Exposure
@@ -58,7 +56,8 @@ from shutter_addon.compute.request import Coefficients, Request
 from shutter_addon.compute.tables import table as table_of
 from shutter_addon.compute.window import Frames
 from shutter_addon.core.frames import light
-from shutter_addon.core.model import mattes, scribbles, shutters
+from shutter_addon.core.frames.frame_source import FrameSource
+from shutter_addon.core.model import mattes, presets, scribbles, shutters
 from shutter_addon.core.model.combining import Combine
 from shutter_addon.core.model.frame_state import Following, FrameState, Layers, Options
 from shutter_addon.core.pixels import combined, compositor, layering
@@ -72,6 +71,73 @@ MATTES = ("matte", "matte_images", "matte_read", "matte_images_read", "matte_ble
 PASSES = ("compose", "accumulate", "diffuse", "diffuse_moved", "readback", "frame", *MATTES)
 MATTE_FRAMES = 24
 COPIED = 1 << 28  # bytes, beyond any cache
+# Bars that are constant over spans, and bars that change from frame to frame.
+BARS = {
+    "preset": ("ANGLE_360", "STILL", "TWO_CUTS", "ANGLE_180", "LAST", "CUTS", "ANGLE_90", "ANGLE_45"),
+    "smooth": ("RAMP_UP", "GAUSSIAN", "TRAIL", "TRIANGLE", "RAMP_DOWN", "STILL", "ANGLE_360", "ANGLE_180"),
+}
+
+
+class Noise(FrameSource):
+    """A clip of random frames, every one another cut of the same noise."""
+
+    path, fps, options = Path("noise"), None, {}
+    transfer, alpha, dtype, count = "srgb", "opaque", np.dtype(np.uint8), 100_000
+
+    def __init__(self, width: int, height: int):
+        self.width, self.height = width, height
+        self._size = width * height
+        rng = np.random.default_rng(0)
+        pixels = rng.integers(0, 256, (self._size + 1_000_003, 4), dtype=np.uint8)
+        pixels[:, 3] = 255
+        self._pixels = pixels
+
+    def close(self) -> None:
+        """There is no file."""
+
+    def read(self, index: int) -> np.ndarray:
+        start = index * 7919 % 1_000_003
+        return self._pixels[start : start + self._size].reshape(self.height, self.width, 4)
+
+
+def bars(kind: str, count: int, window: int) -> np.ndarray:
+    """Bars (count, window) of some shutters, of a kind of BARS or "random" ones."""
+    if kind == "random":
+        return np.random.default_rng(window).random((count, window))
+    return np.stack([presets.bars(name, window) for name in BARS[kind][:count]])
+
+
+def shapes(count: int) -> tuple[scribbles.Shape, ...]:
+    """The paper's two lines and two lassos, and more lines where there are more shutters."""
+    drawn = [
+        ("line", [[0.1, 0.1], [0.2, 0.8]]),
+        ("line", [[0.4, 0.9], [0.6, 0.7]]),
+        ("lasso", [[0.4, 0.2], [0.6, 0.2], [0.6, 0.4], [0.4, 0.4]]),
+        ("lasso", [[0.75, 0.5], [0.9, 0.5], [0.8, 0.7]]),
+        *(("line", [[0.1 * k, 0.02], [0.1 * k, 0.08]]) for k in range(1, 10)),
+    ]
+    shutter = itertools.cycle(range(count))
+    return tuple(
+        scribbles.Shape(shutter=next(shutter), kind=kind, width=0.02, strokes=(np.array(points),))
+        for kind, points in drawn[: max(count, 4)]
+    )
+
+
+def reference(state: FrameState, codes: np.ndarray, coefficients: np.ndarray) -> np.ndarray:
+    """The linear colours (P, 3) float64 of pixels: core.pixels.compositor's, a few at a time, for their weights are
+    large.
+
+    codes: (L, P, 4) uint8 of the window's frames; coefficients: (N, P)"""
+    frames = light.premultiplied(codes / 255.0, light.to_linear)[:, None]
+    c, present = coefficients[:, None].astype(np.float64), np.ones(len(frames), dtype=bool)
+    step = max(1, (1 << 21) // state.bars.size // len(frames))
+    parts = (slice(start, start + step) for start in range(0, codes.shape[1], step))
+    return np.concatenate([compositor.compose(state, frames[:, :, p], present, c[..., p])[0, :, :3] for p in parts])
+
+
+def levels_apart(picture: np.ndarray, expected: np.ndarray) -> float:
+    """The largest difference of linear colours, in 8-bit levels."""
+    return float(np.abs(light.to_encoded(picture) - light.to_encoded(expected)).max() * 255)
 
 
 @cache
@@ -431,7 +497,7 @@ class Case:
         count = len(self.state.bars)
         got = self.compositor.coefficients(self.edges, count).copy()
         many = mock.patch.multiple(edge_diffusion_gpu, LAST_CYCLES=(4,) * 8, CYCLES=(4,) * 16)
-        with many, mock.patch.object(edge_diffusion, "ENOUGH", 0):
+        with many, mock.patch.multiple(diffusion, CYCLES=(4,) * 16, ENOUGH=0):
             self.diffuse("edges")
         return float(np.abs(self.compositor.coefficients(self.edges, count) - got).max() * 255)
 
@@ -497,12 +563,8 @@ class HostCase(Case):
         return None
 
     def _diffusion_error(self) -> float:
-        usual, count = diffusion.CYCLES, len(self.state.bars)
-        try:
-            diffusion.CYCLES = 12
-            expected = self.solver.solve(self.labels, count)
-        finally:
-            diffusion.CYCLES = usual
+        with mock.patch.multiple(diffusion, CYCLES=(4,) * 12, ENOUGH=0):
+            expected = self.solver.solve(self.labels, len(self.state.bars))
         return float(np.abs(self.handle - expected).max() * 255)
 
     def release(self) -> None:

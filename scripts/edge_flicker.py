@@ -26,10 +26,10 @@ sys.path.insert(0, str(ROOT))
 from shutter_addon.compute import guide  # noqa: E402
 from shutter_addon.compute.renderer import Renderer, open_compositor  # noqa: E402
 from shutter_addon.compute.request import Request  # noqa: E402
+from shutter_addon.core.frames.source_wrapper import SourceWrapper  # noqa: E402
 from shutter_addon.core.model.frame_state import FrameState, Options  # noqa: E402
 from shutter_addon.core.model.scribbles import Shape  # noqa: E402
 from shutter_addon.media import open_source  # noqa: E402
-from shutter_addon.media.source import SourceWrapper  # noqa: E402
 
 # Film, its first frame here, and a stroke inside something that its picture shows.
 FILMS = (

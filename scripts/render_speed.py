@@ -58,6 +58,7 @@ from shutter_addon.compute.cpu import CPUCompositor
 from shutter_addon.compute.renderer import Renderer
 from shutter_addon.compute.request import Request
 from shutter_addon.core.frames import light
+from shutter_addon.core.frames.source_wrapper import SourceWrapper
 from shutter_addon.core.model import presets
 from shutter_addon.core.model.effect import Effect
 from shutter_addon.core.recipes import recipe_file
@@ -66,7 +67,6 @@ from shutter_addon.devices.gl import GLDevice
 from shutter_addon.media import MediaError, open_source
 from shutter_addon.media.cuts import ShotSource
 from shutter_addon.media.prefetch import PrefetchSource
-from shutter_addon.media.source import SourceWrapper
 
 ROOT = Path(__file__).resolve().parents[1]
 FOOTAGE = [ROOT / "assets" / name for name in ("bigbuckbunny.mp4", "pedestrians.avi")]

@@ -15,7 +15,6 @@ from ..devices.device import NoDeviceError
 from ..media.files import check_name
 from .commands import (
     bake_command,
-    benchmark_command,
     check_command,
     inbetween_command,
     join_command,
@@ -33,7 +32,6 @@ COMMANDS = (
     bake_command,
     check_command,
     join_command,
-    benchmark_command,
 )
 
 

@@ -4,7 +4,6 @@ the fastest."""
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
@@ -12,7 +11,8 @@ from ..core.model.combining import AVERAGE, Combine
 from ..core.model.frame_state import Options
 from ..devices.llvmpipe import MOST_ITERATIONS
 from ..devices.passes import Pass, read_pass
-from .window import BLOCK, STORED_SUMS, Sums
+from .running_sums import STORED_SUMS, Sums
+from .window import BLOCK, Window
 
 # Rows of pixels that one invocation of compose_sums composes.
 PAIR = 2
@@ -36,7 +36,7 @@ class LightFormat:
     premultiplied: whether the frames' colours are
     encoded: whether the sums are of encoded light (Options.light)
     levels: whether the picture is of levels, not scene-linear
-    cover: of weighted_window.WeightedSums
+    cover: of running_sums.WeightedSums
     combine: how frames are combined; kind: of the texture that has them; opaque: their alpha is 1"""
 
     decode: int
@@ -65,26 +65,6 @@ class LightFormat:
             "THRESHOLD": int(self.combine.threshold is not None),
             "LEVELS_OF": (2 if self.premultiplied else raw) if mode == MODES["median"] else 0,
         }
-
-
-@dataclass(frozen=True)
-class Moved:
-    """What is composed where shutters follow something.
-
-    quads: of pixels that an invocation composes
-    shutters: their number; mixed: motions that are mixed for a pixel
-    packed: whether the window holds PackedFrames; shortened: whether frames are left out
-    sharp: how frames are resampled (core.pixels.compositor.seen)
-    continued, unfinished: whether passes over other frames come before, and after"""
-
-    quads: int
-    shutters: int
-    mixed: int
-    packed: bool
-    shortened: bool
-    sharp: bool
-    continued: bool
-    unfinished: bool
 
 
 def composition(way: str, groups: int, stored: str, edges: int, light: LightFormat) -> Pass:
@@ -122,24 +102,42 @@ def composition_of_sums(rows: float, groups: int, back: bool, tiled: bool, light
     )
 
 
-def composition_of_moved(way: str, moved: Moved, light: LightFormat) -> Pass:
-    """The pass of a way, "frames", "search" or "value", where shutters follow something."""
+def composition_of_moved(
+    way: str,
+    light: LightFormat,
+    *,
+    quads: int,
+    shutters: int,
+    mixed: int,
+    packed: bool,
+    shortened: bool,
+    sharp: bool,
+    continued: bool = False,
+    unfinished: bool = False,
+) -> Pass:
+    """The pass of a way, "frames", "search" or "value", where shutters follow something.
+
+    quads: of pixels that an invocation composes
+    shutters: their number; mixed: motions that are mixed for a pixel
+    packed: whether the window holds PackedFrames; shortened: whether frames are left out
+    sharp: how frames are resampled (core.pixels.compositor.seen)
+    continued, unfinished: whether passes over other frames come before, and after"""
     return read_pass(
         f"compose_{way}",
         MOVED=1,
-        PACKED=int(moved.packed),
-        CONTINUED=int(moved.continued),
-        UNFINISHED=int(moved.unfinished),
-        QUADS=moved.quads,
-        GROUPS=-(-moved.shutters // 4),
-        SHUTTERS=moved.shutters,
-        MIXED=moved.mixed,
+        PACKED=int(packed),
+        CONTINUED=int(continued),
+        UNFINISHED=int(unfinished),
+        QUADS=quads,
+        GROUPS=-(-shutters // 4),
+        SHUTTERS=shutters,
+        MIXED=mixed,
         SUMS=0,
         TILED=0,
-        EDGES=EDGES["shorten"] if moved.shortened else 0,
-        SHARP=int(moved.sharp),
+        EDGES=EDGES["shorten"] if shortened else 0,
+        SHARP=int(sharp),
         SQUARED=int(not light.encoded),
-        SEVERAL=int(moved.continued or moved.unfinished),
+        SEVERAL=int(continued or unfinished),
         **light.defines(),
     )
 
@@ -150,7 +148,7 @@ def lines_of(way: str, combine: Combine = AVERAGE) -> int:
 
 
 def way_of(
-    window: Any,
+    window: Window,
     options: Options,
     values: np.ndarray,
     span: tuple[int, int],

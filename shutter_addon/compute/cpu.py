@@ -15,7 +15,6 @@ from ..core.model.frame_state import Options
 from ..core.pixels import compositor, layering
 from ..core.pixels.shown_levels import Display
 from .diffusion import diffuse
-from .edge_diffusion import diffuse_along_edges, follows_edges
 from .layer_frames import LARGEST, linear
 from .laying import Behind, Exposure
 from .request import Coefficients, Request
@@ -27,8 +26,15 @@ Tile = tuple[slice, slice]
 Moves = tuple[np.ndarray, np.ndarray]
 
 
-class Solver:
-    """compute.diffusion and compute.edge_diffusion, with the methods of compute.gpu.Solver. It ignores `warm`."""
+class _Stage:
+    """What has nothing on a device."""
+
+    def release(self) -> None:
+        """There is nothing to free."""
+
+
+class Solver(_Stage):
+    """compute.diffusion, with the methods of compute.gpu.Solver. It ignores `warm`."""
 
     gave_up = False
 
@@ -41,15 +47,10 @@ class Solver:
         *,
         warm: bool = False,
     ) -> np.ndarray:
-        if guide is not None and follows_edges(labels, guide, strength):
-            return diffuse_along_edges(labels, count, guide, strength)
-        return diffuse(labels, count)
-
-    def release(self) -> None:
-        pass
+        return diffuse(labels, count, guide, strength)
 
 
-class Matting:
+class Matting(_Stage):
     """core.model.mattes, with the methods of compute.matting.Matting."""
 
     def lay(
@@ -57,29 +58,22 @@ class Matting:
     ) -> np.ndarray:
         return mattes.blended(beneath, shown, [values for _, values in layers])
 
-    def release(self) -> None:
-        pass
 
-
-class Mixing:
+class Mixing(_Stage):
     """Shares of coefficients, with the methods of compute.mixing.Mixing."""
 
     def add(self, mixed: np.ndarray | None, added: np.ndarray, share: float, size: tuple[int, int]) -> np.ndarray:
         part = np.broadcast_to(added * np.float32(share), (len(added), *size))
         return part if mixed is None else mixed + part
 
-    def release(self) -> None:
-        pass
 
-
-class Laying:
+class Laying(_Stage):
     """core.pixels.layering, with the methods of compute.laying.Laying."""
-
-    def least(self, exposed: Exposure) -> np.ndarray:
-        return exposed.share[..., 3]
 
     def shares(self, exposed: Exposure) -> np.ndarray:
         return exposed.share[..., 3]
+
+    least = shares
 
     def around(self, exposed: Exposure) -> np.ndarray:
         return layering.with_plate(exposed.color, exposed.share[..., 3], None)
@@ -96,16 +90,13 @@ class Laying:
             picture = layering.laid_over(picture, layer.color, layer.share[..., 3])
         return CPUCompositor().over_black(picture) if levels else picture
 
-    def release(self) -> None:
-        pass
-
 
 class HostWindow:
     """A window of source frames in the host's memory. is_open, sends: see window.Window."""
 
     is_open, sends = True, False
 
-    def __init__(self, source: FrameSource):
+    def __init__(self, source: FrameSource) -> None:
         self.source, self.shot = source, range(source.count)
         self.frames: dict[int, np.ndarray] = {}
 
@@ -114,7 +105,7 @@ class HostWindow:
         return self.frames.keys()
 
     def load(self, positions: np.ndarray, options: Options, shot: range) -> None:
-        """See RunningSums.load."""
+        """See running_sums.Sums.load."""
         self.shot = shot
         wanted = set(windows.source_frames(options, positions, shot).tolist())
         self.frames = {index: frame for index, frame in self.frames.items() if index in wanted}
@@ -177,11 +168,12 @@ def _of_tile(coefficients: Coefficients, tile: Tile) -> np.ndarray:
     return c / c.sum(axis=0)
 
 
-class CPUCompositor:
+class CPUCompositor(_Stage):
     """Composes with NumPy; the same methods as GPUCompositor."""
 
     name = "NumPy"
     takes_planes = False
+    solver, matting, mixing, laying = Solver, Matting, Mixing, Laying
 
     def current(self) -> AbstractContextManager[CPUCompositor]:
         return nullcontext(self)
@@ -192,23 +184,13 @@ class CPUCompositor:
         """See GPUCompositor.window."""
         return HostWindow(source)
 
-    def solver(self) -> Solver:
-        return Solver()
-
-    def matting(self) -> Matting:
-        return Matting()
-
-    def mixing(self) -> Mixing:
-        return Mixing()
-
-    def laying(self) -> Laying:
-        return Laying()
-
     def constant(self, values: np.ndarray) -> np.ndarray:
         return np.asarray(values, dtype=np.float32)[:, None, None]
 
     def uploaded(self, values: np.ndarray) -> np.ndarray:
         return values
+
+    labels = uploaded
 
     def coefficients(self, handle: np.ndarray, count: int) -> np.ndarray:
         return handle[:count]
@@ -243,6 +225,3 @@ class CPUCompositor:
             made = compositor.compose(state, frames, indices >= 0, c, moved, sharp)
             picture[tile] = made.clip(-LARGEST, LARGEST)
         return self.over_black(picture) if request.levels else picture
-
-    def release(self) -> None:
-        pass

@@ -21,8 +21,10 @@ from typing import Any
 
 import numpy as np
 
-from ..devices.device import Device, Texture
+from ..devices.device import Device, Given, Texture
+from ..devices.named_textures import NamedTextures
 from ..devices.passes import Pass, read_pass
+from .diffusion import COLOURS, NOTHING
 
 # V-cycles of a solve that starts from nothing. Largest error × 255 after 1, 2, 3, 4 cycles: 3.9, 0.67, 0.66, 0.66 over
 # the scenes of the tests (median 2.1, 0.13, 0.07, 0.07), and 11, 1.6, 0.25, 0.24 over their lattices of dots. The error
@@ -46,10 +48,6 @@ BAND = 1
 # The prolongation to a cell on the line between two coarse cells: the share, 0 … 1, of what ties the cell to fixed
 # cells beside that line that counts against following the two.
 HOLD = 0.3
-# Coefficients below this are set to 0, so that a region enclosed by one shutter's scribble gets exactly that shutter.
-NOTHING = 1 / 4096
-# Cells (y, x) of 2 × 2 in the order of a smoothing sweep.
-_COLOURS = ((0, 0), (1, 1), (0, 1), (1, 0))
 
 
 def operators(ties: str) -> dict[str, Pass]:
@@ -93,7 +91,7 @@ class _Grid:
         changed: tiles of 4 × 4 cells whose operator may not be that of the last solve
     """
 
-    def __init__(self, device: Device, width: int, height: int, layers: int, finest: bool):
+    def __init__(self, device: Device, width: int, height: int, layers: int, finest: bool) -> None:
         self.size = width, height
         self.layers = layers
         self.finest = finest
@@ -115,12 +113,13 @@ class Diffusion:
     """compute.diffusion.diffuse on a device. Its textures are kept until the size or the number of shutters changes."""
 
     finest = operators("LABELS")  # those over the pixels
+    _tiles: Texture  # the lists of tiles of all grids
 
-    def __init__(self, device: Device):
+    def __init__(self, device: Device) -> None:
         self._device = device
         self._grids: list[_Grid] = []
         self._made_for: tuple[int, int, int] | None = None
-        self._tiles: Any = None
+        self._textures = NamedTextures(device)
 
     def solve(self, labels: np.ndarray, count: int, *, warm: bool = False) -> Texture:
         """Coefficients from labels (H, W) uint16, 0 free, 1 + shutter fixed: a texture array rgba32f, shutter i in
@@ -146,9 +145,8 @@ class Diffusion:
         for grid in self._grids:
             for texture in grid.textures.values():
                 texture.release()
-        if self._tiles is not None:
-            self._tiles.release()
-        self._grids, self._made_for, self._tiles = [], None, None
+        self._textures.release()
+        self._grids, self._made_for = [], None
 
     def _prepare(self, shape: tuple[int, ...], count: int) -> bool:
         """Makes the grids for a size (H, W) and a number of shutters. Whether they were there, with a solution."""
@@ -163,7 +161,7 @@ class Diffusion:
             width, height = (width + 1) // 2, (height + 1) // 2
             self._grids.append(_Grid(self._device, width, height, layers, False))
         tiles = sum(4 * grid.reached.size + grid.touched.size for grid in self._grids)
-        self._tiles = self._device.texture(256, -(-tiles // 256), 1, "r32f")
+        self._tiles = self._textures.of("tiles", (256, -(-tiles // 256), 1), "r32f")
         return False
 
     def _list_tiles(self, labels: np.ndarray, whole: int, *, anew: bool = False) -> None:
@@ -222,8 +220,9 @@ class Diffusion:
         for fine, coarse in pairwise(self._grids):
             weights, coarsen = (self._pass(fine, name) for name in ("weights", "coarsen"))
             self._run(weights, fine, "changed", 8, hold=HOLD)
-            to: dict[str, Any] = {"size": fine.size, "coarse": coarse.size, "next": coarse.textures["stencil"]}
-            self._run(coarsen, coarse, "changed", 16, **(fine.textures | to))
+            to: Given = {"size": fine.size, "coarse": coarse.size, "next": coarse.textures["stencil"]}
+            to |= fine.textures
+            self._run(coarsen, coarse, "changed", 16, **to)
 
     def _cycle(self, index: int) -> None:
         """A V-cycle over the grid of this index and all coarser ones."""
@@ -267,9 +266,9 @@ class Diffusion:
 
         back: in the opposite order"""
         cells: int = 32
-        colours: list[Any] = [0, 1]
+        colours: list[int | tuple[int, int]] = [0, 1]
         if not grid.finest:
-            cells, colours = 16, [(x, y) for y, x in _COLOURS if x < grid.size[0] and y < grid.size[1]]
+            cells, colours = 16, [(x, y) for y, x in COLOURS if x < grid.size[0] and y < grid.size[1]]
         values = grid.textures["solution"]
         for colour in (colours[::-1] if back else colours) * sweeps:
             self._run(self._pass(grid, "smooth"), grid, "near", cells, grid.layers, values=values, colour=colour)
@@ -283,7 +282,7 @@ class Diffusion:
             self._run(FINISH, grid, "near", 64, nothing=NOTHING)
             if index + 1 < len(self._grids):
                 coarse = self._grids[index + 1]
-                below: dict[str, Any] = {"coarse": coarse.size, "coarser": coarse.textures["solution"]}
+                below: Given = {"coarse": coarse.size, "coarser": coarse.textures["solution"]}
                 self._run(_EXPAND, grid, "far", 16, grid.layers, **below)
                 beyond = tuple(-(2 * m + 1) / (4 * m + 8) for m in self._margin(index))
                 self._run(_EXPAND_RIM, grid, "rim", 16, **below, beyond=beyond)

@@ -30,7 +30,7 @@ PICK = read_pass("display", "PICK")
 class Displaying:
     """Makes levels of pictures on a device."""
 
-    def __init__(self, device: Device):
+    def __init__(self, device: Device) -> None:
         self._device = device
         self._textures = NamedTextures(device)
         self._written: dict[str, tuple[Display, Texture]] = {}  # by name: what is of which display

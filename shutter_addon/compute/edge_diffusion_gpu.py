@@ -1,17 +1,16 @@
-"""compute.edge_diffusion on a device, at full size near scribbles alone until the last cycle."""
+"""compute.diffusion along edges on a device, at full size near scribbles alone until the last cycle."""
 
 from __future__ import annotations
 
 from itertools import pairwise
-from typing import Any
 
 import numpy as np
 
 from ..core.pixels.conductances import cell_side, resistances
-from ..devices.device import Device, Texture
+from ..devices.device import Device, Given, Texture
 from ..devices.passes import read_pass
-from .diffusion_gpu import FINISH, NOTHING, Diffusion, _Grid, operators
-from .edge_diffusion import CYCLES, SWEEPS, TWICE, first_solved, is_enough
+from .diffusion import CYCLES, NOTHING, SWEEPS, TWICE, first_solved, is_enough
+from .diffusion_gpu import FINISH, Diffusion, _Grid, operators
 
 # Where the guide's cells are larger than pixels: the iterations of conjugate gradients in each cycle, first of cycles
 # near scribbles alone, then of those everywhere. Largest error × 255 in frames of three films at 1920 × 1080: 0.6.
@@ -35,19 +34,19 @@ _SUM = read_pass("edge_diffusion", "SUM")
 
 
 class EdgeDiffusion(Diffusion):
-    """compute.edge_diffusion.diffuse_along_edges on a device; grids and passes are those of Diffusion, but for the
+    """compute.diffusion.diffuse along edges on a device; grids and passes are those of Diffusion, but for the
     pixels' own, and conjugate gradients on one of them."""
 
     finest = operators("LINKS")
 
-    def __init__(self, device: Device):
+    def __init__(self, device: Device) -> None:
         super().__init__(device)
-        self._more: dict[str, Texture] = {}
+        self._more: dict[str, Texture] = {}  # those of the last solve
         self._solved, self._sweeps = 0, 0
 
     def solve(self, labels: np.ndarray, count: int, guide: np.ndarray, strength: float) -> Texture:  # type: ignore[override]  # it has a guide
-        """As Diffusion.solve; guide and strength as for diffuse_along_edges. Some pixel has to be fixed, and some free.
-        Where the guide's cells are pixels, a number is read back after each cycle: whether it was enough.
+        """As Diffusion.solve; guide and strength as for compute.diffusion.diffuse. Some pixel has to be fixed, and some
+        free. Where the guide's cells are pixels, a number is read back after each cycle: whether it was enough.
 
         The result does not depend on what was solved before."""
         side = cell_side(guide.shape[:2], labels.shape)
@@ -58,7 +57,7 @@ class EdgeDiffusion(Diffusion):
         self._device.write(self._grids[0].textures["labels"], np.ascontiguousarray(labels, dtype=np.uint32))
         self._device.write(self._more["resistances"], resistances(guide, strength)[..., None])
         self._list_tiles(labels, 0 if side == 1 else self._solved, anew=True)
-        placed: dict[str, Any] = {"guided": guide.shape[1::-1], "side": side, "resistances": self._more["resistances"]}
+        placed: Given = {"guided": guide.shape[1::-1], "side": side, "resistances": self._more["resistances"]}
         self._run(_LINKS, self._grids[0], "anew", 64, **placed)
         self._start(0)
         self._coarsen()
@@ -75,24 +74,14 @@ class EdgeDiffusion(Diffusion):
         self._run(FINISH, self._grids[0], "near", 64, nothing=NOTHING)
         return self._grids[0].textures["solution"]
 
-    def release(self) -> None:
-        for texture in self._more.values():
-            texture.release()
-        self._more = {}
-        super().release()
-
     def _provide(self, cells: tuple[int, int]) -> None:
         """Makes the textures that plain diffusion has not. Those of conjugate gradients are zero: sums go over all of
         them, and passes leave out tiles where nothing is free."""
         grid, finest = self._grids[self._solved], self._grids[0]
-        vectors = dict.fromkeys(("residual", "guess", "direction", "answer"), (*grid.size, grid.layers, "rgba32f"))
-        sizes = vectors | {"resistances": (cells[1], cells[0], 1, "r32f")}
-        sizes |= {"sums": (4, 1, grid.layers, "rgba32f"), "parts": (PARTS, 1, grid.layers, "rgba32f")}
-        for name, size in sizes.items():
-            if name not in self._more or self._more[name].size != size[:3]:
-                if name in self._more:
-                    self._more.pop(name).release()
-                self._more[name] = self._device.texture(*size)
+        vectors = dict.fromkeys(("residual", "guess", "direction", "answer"), (*grid.size, grid.layers))
+        sizes = vectors | {"sums": (4, 1, grid.layers), "parts": (PARTS, 1, grid.layers)}
+        self._more = {name: self._textures.of(name, size, "rgba32f") for name, size in sizes.items()}
+        self._more["resistances"] = self._textures.of("resistances", (cells[1], cells[0], 1), "r32f")
         for name in vectors:
             self._clear(grid, self._more[name])
         if "links" not in finest.textures:

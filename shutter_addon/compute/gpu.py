@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from contextlib import AbstractContextManager
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 
@@ -13,7 +12,7 @@ from ..core.model import windows
 from ..core.model.combining import AVERAGE, Combine
 from ..core.model.frame_state import Following, FrameState
 from ..core.pixels.shown_levels import Display
-from ..devices.device import Device, NoDeviceError, Texture
+from ..devices.device import Device, Given, NoDeviceError, Texture
 from ..devices.llvmpipe import MOST_ITERATIONS
 from ..devices.named_textures import NamedTextures
 from ..devices.passes import Pass
@@ -23,7 +22,6 @@ from .composition_passes import (
     LEVELS,
     PICTURE,
     LightFormat,
-    Moved,
     composition,
     composition_of_moved,
     composition_of_sums,
@@ -35,25 +33,25 @@ from .composition_passes import (
     way_of,
     way_sum,
 )
+from .diffusion import diffuse, follows_edges
 from .diffusion_gpu import Diffusion
 from .displaying import Displaying
-from .edge_diffusion import follows_edges
 from .edge_diffusion_gpu import EdgeDiffusion
 from .laying import Laying
 from .matting import Matting
 from .mixing import Mixing
-from .request import Coefficients, Request
+from .request import Coefficients, Handle, Request
+from .running_sums import Sums, open_window
 from .tables import moved_tables, padded, table
-from .weighted_window import open_any
-from .window import BLOCK, PackedFrames, Sums, WholeFrames, Window, decoding
+from .window import BLOCK, PackedFrames, WholeFrames, Window, decoding
 
 
-def _extent(window: Sums) -> dict[str, Any]:
+def _extent(window: Sums) -> Given:
     """Constants about running sums that all passes over them have."""
     return {"layers": window.layers, "held": window.stop - window.start, "unit": 1 / window.whole}
 
 
-def _from_sums(window: Sums, request: Request, values: np.ndarray, origin: int) -> tuple[Pass, dict[str, Any]]:
+def _from_sums(window: Sums, request: Request, values: np.ndarray, origin: int) -> tuple[Pass, Given]:
     """compose_sums for a table of pieces, and its arguments for Device.run but for the band's.
 
     origin: the position of the window's first frame"""
@@ -79,15 +77,15 @@ def _from_sums(window: Sums, request: Request, values: np.ndarray, origin: int) 
 
 
 def _from_frames(
-    way: str, window: Any, request: Request, rows: int, origin: int, shortened: bool
-) -> tuple[Pass, dict[str, Any]]:
+    way: str, window: Handle, request: Request, rows: int, origin: int, shortened: bool
+) -> tuple[Pass, Given]:
     """The pass of another way, and its arguments: as _from_sums.
 
     rows: pieces in the table; shortened: as for way_of"""
     state, direction = request.state, request.direction
     options, source, summed = state.options, window.source, isinstance(window, Sums)
     (combine,) = state.groups
-    given: dict[str, Any] = {"images": {}, "textures": {}, "rows": rows, "direction": direction}
+    given: Given = {"images": {}, "textures": {}, "rows": rows, "direction": direction}
     given["first"], given["last"] = state.open_span
     if summed:
         lowest, decode, edges = window.start, 0, 2 if shortened else 0
@@ -117,7 +115,7 @@ def _from_frames(
     return composition(way, -(-len(state.bars) // 4), stored, edges, light), given
 
 
-def _threshold(combine: Combine, request: Request, shot: range) -> dict[str, Any]:
+def _threshold(combine: Combine, request: Request, shot: range) -> Given:
     """The arguments of passes with a threshold."""
     if combine.threshold is None:
         return {}
@@ -142,67 +140,67 @@ class Solver:
     gave_up: whether the device had no room for the last one, which NumPy did
     """
 
-    def __init__(self, device: Device):
+    def __init__(self, device: Device) -> None:
         self.gave_up = False
         self._device = device
-        self._sent: Texture | None = None
+        self._sent = NamedTextures(device)
         self._plain, self._edged = Diffusion(device), EdgeDiffusion(device)
-        self._refused: set = set()  # what the device had no room for
+        self._refused: set[tuple] = set()  # what the device had no room for
 
     def solve(
-        self, labels: np.ndarray, count: int, guide: Any = None, strength: float = 0.0, *, warm: bool = False
+        self,
+        labels: np.ndarray,
+        count: int,
+        guide: np.ndarray | None = None,
+        strength: float = 0.0,
+        *,
+        warm: bool = False,
     ) -> Texture:
         """As Diffusion.solve; along the edges of a guide (EdgeDiffusion.solve) where there are some to follow."""
         edges = follows_edges(labels, guide, strength)
         kind = labels.shape, count, edges
-        if kind not in self._refused:
+        self.gave_up = kind in self._refused
+        if not self.gave_up:
+            self._sent.release()
+            (self._plain if edges else self._edged).release()
             try:
-                return self._solved(labels, count, guide, strength, edges, warm)
+                if guide is not None and edges:
+                    return self._edged.solve(labels, count, guide, strength)
+                return self._plain.solve(labels, count, warm=warm)
             except NoDeviceError:
                 self._refused.add(kind)
+                self.gave_up = True
         self._free()
-        self.gave_up = True
-        return self._send(cpu.Solver().solve(labels, count, guide, strength))
-
-    def _solved(self, labels: np.ndarray, count: int, guide: Any, strength: float, edges: bool, warm: bool) -> Texture:
-        self.gave_up = False
-        self._free_sent()
-        if edges:
-            self._plain.release()
-            return self._edged.solve(labels, count, guide, strength)
-        self._edged.release()
-        return self._plain.solve(labels, count, warm=warm)
-
-    def _send(self, coefficients: np.ndarray) -> Texture:
-        """Coefficients (N, h, w) as a texture."""
-        count, height, width = coefficients.shape
-        sent = self._sent = self._device.texture(width, height, -(-count // 4), "rgba32f")
-        for layer in range(sent.size[2]):
-            four = coefficients[4 * layer : 4 * layer + 4]
-            values = np.zeros((height, width, 4), np.float32)
-            values[..., : len(four)] = np.moveaxis(four, 0, -1)
-            self._device.write(sent, values, layer)
-        return sent
-
-    def _free_sent(self) -> None:
-        if self._sent is not None:
-            self._sent.release()
-            self._sent = None
+        return filled(self._sent, "coefficients", in_fours(diffuse(labels, count, guide, strength)), "rgba32f")
 
     def _free(self) -> None:
         self._plain.release()
         self._edged.release()
-        self._free_sent()
+        self._sent.release()
 
     def release(self) -> None:
         self._free()
         self._refused.clear()  # others may have freed what was in the way
 
 
+def in_fours(values: np.ndarray) -> np.ndarray:
+    """Coefficients (N, h, w) as layers (⌈N/4⌉, h, w, 4) float32 of a texture."""
+    return np.moveaxis(padded(np.moveaxis(values, 0, -1)), 2, 0).astype(np.float32)
+
+
+def filled(textures: NamedTextures, name: str, values: np.ndarray, kind: str) -> Texture:
+    """The texture of a name, with values (layers, h, w, components)."""
+    layers, height, width, _ = values.shape
+    texture = textures.of(name, (width, height, layers), kind)
+    for layer in range(layers):
+        textures.device.write(texture, np.ascontiguousarray(values[layer]), layer)
+    return texture
+
+
 class GPUCompositor:
     """Composes on a Device; the same methods as CPUCompositor."""
 
-    def __init__(self, device: Device):
+    def __init__(self, device: Device) -> None:
         self.name = device.name
         self.device = device
         self._textures = NamedTextures(device)
@@ -226,7 +224,7 @@ class GPUCompositor:
     ) -> Window:
         """A window of `capacity` frames on the device; moved: pictures of it have FrameState.following; shutters: of
         these pictures; summed: all of them average."""
-        return open_any(self.device, source, capacity, moved, shutters, summed)
+        return open_window(self.device, source, capacity, moved, shutters, summed)
 
     def solver(self) -> Solver:
         """A new solver. Its solution is valid until its next solve."""
@@ -246,12 +244,11 @@ class GPUCompositor:
 
     def constant(self, values: np.ndarray) -> Texture:
         """Coefficients (N,) of the whole picture, as a texture of one texel. Valid until the next call."""
-        return self._filled("constant", padded(values).astype(np.float32)[:, None, None, :], "rgba32f")
+        return self._filled("constant", in_fours(values[:, None, None]))
 
     def uploaded(self, values: np.ndarray) -> Texture:
         """Coefficients (N, h, w) as a texture, as a solver has them. Valid until the next call."""
-        planes = np.moveaxis(padded(np.moveaxis(values, 0, -1)), 2, 0)
-        return self._filled("uploaded", planes.astype(np.float32), "rgba32f")
+        return self._filled("uploaded", in_fours(values))
 
     def labels(self, values: np.ndarray) -> Texture:
         """Labels (H, W) uint16 as a texture r32ui. Valid until the next call."""
@@ -278,7 +275,7 @@ class GPUCompositor:
         """The levels (H, W, 4) uint8 of an opaque scene-linear picture of `draw`, top row first."""
         return self._displaying.levels(drawn, display)
 
-    def draw(self, window: Any, request: Request, coefficients: Coefficients) -> Texture:
+    def draw(self, window: Handle, request: Request, coefficients: Coefficients) -> Texture:
         """The picture on the device, premultiplied: a texture array rgba32f of one layer, scene-linear, bottom row
         first; or of levels rgba8, display code values, top row first. It is one of the window's, valid until its next
         picture of the kind.
@@ -309,7 +306,7 @@ class GPUCompositor:
         else:
             rows = len(values) - 1
             program, given = _from_frames(way, window, request, rows, origin, shortened)
-            given["images"]["table"] = self._filled("table", values[None], "rgba32f")
+            given["images"]["table"] = self._filled("table", values[None])
         picture = window.levels() if levels else window.picture
         given["images"] |= {"picture": picture, "coefficients": coefficients.handle}
         lines = lines_of(way, combine)
@@ -328,7 +325,7 @@ class GPUCompositor:
             )
         return picture
 
-    def _draw_ways(self, window: Any, request: Request, coefficients: Coefficients) -> Texture:
+    def _draw_ways(self, window: Handle, request: Request, coefficients: Coefficients) -> Texture:
         """As `draw`, of shutters that combine in several ways: a picture for each of these, mixed."""
         state, (width, height) = request.state, (window.source.width, window.source.height)
         groups = list(state.groups.values())
@@ -353,11 +350,11 @@ class GPUCompositor:
         selected = self._textures.of("selected", (width, height, groups), "rgba32f")
         share = self._textures.of("share", (width, height, 1), "r32f")
         images = {"coefficients": handle, "selected": selected, "share": share}
-        given: dict[str, Any] = {"size": (width, height), "count": len(chosen), "blocks": {"chosen": numbers}}
+        given: Given = {"size": (width, height), "count": len(chosen), "blocks": {"chosen": numbers}}
         self.device.run(selection(groups, count), (width, height), images=images, **given)
         return selected, share
 
-    def _draw_on_host(self, window: Any, request: Request, coefficients: Coefficients) -> Texture:
+    def _draw_on_host(self, window: Handle, request: Request, coefficients: Coefficients) -> Texture:
         """As `draw`, by NumPy: of medians whose frames are seen elsewhere, which passes over some of them at a time
         cannot find; and of those that take more iterations than a device has."""
         host, source, options = cpu.CPUCompositor(), window.source, request.state.options
@@ -386,15 +383,15 @@ class GPUCompositor:
         mixed = moves.shape[1] - 1
         most = BLOCK // 4 if packed and not shortened else 1
         way, quads = moved_way(options, values[: len(values) - motions], (first, last), motions, mixed, most)
-        given: dict[str, Any] = {"size": (width, height), "top": 0, "height": height}
+        given: Given = {"size": (width, height), "top": 0, "height": height}
         given["block_bits"] = (coefficients.block - 1).bit_length()
         given |= {"first": first, "last": last, "rows": len(values) - 1 - motions, "motions": motions}
         given |= {"seen_first": int(there[0]), "seen_last": int(there[-1]), "parts": len(values) - motions}
-        images = {"coefficients": coefficients.handle, "table": self._filled("table", values[None], "rgba32f")}
+        images = {"coefficients": coefficients.handle, "table": self._filled("table", values[None])}
         # What is left out is read in another's place: what lies in its own may be no number.
         slots = np.where(frames < 0, frames[there[0]], frames) % window.capacity
         sums = "sum", "other sum"
-        picture: Any = window.levels() if request.levels else window.picture
+        picture: Handle = window.levels() if request.levels else window.picture
         alpha, decode = window.source.alpha, 0 if packed else decoding(window.transfer, options.light)
         (combine,) = state.groups
         light = LightFormat(
@@ -405,12 +402,14 @@ class GPUCompositor:
             before, after = held.start > 0, held.stop < window.capacity
             inside = (slots >= held.start) & (slots < held.stop)
             moves[:, 0, 0] = np.where(inside, slots - held.start, -1).repeat(motions)
-            images["moves"] = self._filled("moves", moves[None], "rgba32f")
+            images["moves"] = self._filled("moves", moves[None])
             images["summed"] = images.get("picture")
             sums = sums[::-1]
             images["picture"] = self._textures.of(sums[0], (width, height, 1), "rgba32f") if after else picture
             # What has more to do for a pixel takes long to compile for many.
-            moved = Moved(
+            program = composition_of_moved(
+                way,
+                light,
                 quads=1 if before or after else quads,
                 shutters=len(state.bars),
                 mixed=mixed,
@@ -420,18 +419,13 @@ class GPUCompositor:
                 continued=before,
                 unfinished=after,
             )
-            program = composition_of_moved(way, moved, light)
             images["packed_frames"] = stack
             extent = width, -(-height // (4 * int(program.defines["QUADS"])))
             self.device.run(program, extent, textures={**images, "frames": stack}, images=images, **given)
         return picture
 
-    def _filled(self, name: str, values: np.ndarray, kind: str) -> Texture:
-        layers, height, width, _ = values.shape
-        texture = self._textures.of(name, (width, height, layers), kind)
-        for layer in range(layers):
-            self.device.write(texture, np.ascontiguousarray(values[layer]), layer)
-        return texture
+    def _filled(self, name: str, values: np.ndarray, kind: str = "rgba32f") -> Texture:
+        return filled(self._textures, name, values, kind)
 
     def release(self) -> None:
         with self.device.freeing():

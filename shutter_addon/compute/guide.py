@@ -10,13 +10,13 @@ goes in a still picture would else make coefficients flicker. What moves differs
 from __future__ import annotations
 
 from collections.abc import Iterable
-from typing import Any
 
 import numpy as np
 
 from ..core.frames import light
 from ..core.frames.frame_source import FrameSource
 from ..core.frames.planes import Planes, as_rgba
+from ..core.frames.source_wrapper import SourceWrapper
 from ..core.memo import Memo
 from ..core.messages import UserError
 
@@ -52,13 +52,13 @@ def cell_of(short: int) -> int:
 class Guides:
     """Guides of one source's frames. Its frames are read and reduced once, as long as they are kept."""
 
-    def __init__(self, source: FrameSource):
+    def __init__(self, source: FrameSource) -> None:
         self._source = source
         self._short = min(source.width, source.height)
         self._cell = cell_of(self._short)
         self._kept: frozenset[int] = frozenset()
         self._reduced: dict[int, np.ndarray] = {}
-        self._made = Memo()
+        self._made: Memo[np.ndarray] = Memo()
 
     def keep(self, indices: Iterable[int]) -> None:
         """Says which frames may be needed from now on; all others are forgotten."""
@@ -110,14 +110,12 @@ class Guides:
         return np.rint(smooth * np.float32(_WHITE)).astype(np.uint16)
 
 
-class NotedSource:
+class NotedSource(SourceWrapper):
     """A source whose frames `guides` gets to see as they are read."""
 
-    def __init__(self, source: FrameSource, guides: Guides):
-        self._source, self._guides = source, guides
-
-    def __getattr__(self, name: str) -> Any:
-        return getattr(self._source, name)
+    def __init__(self, source: FrameSource, guides: Guides) -> None:
+        super().__init__(source)
+        self._guides = guides
 
     def read(self, index: int) -> np.ndarray:
         frame = self._source.read(index)

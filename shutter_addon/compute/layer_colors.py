@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
-from ..core.frames.planes import Planes, as_rgba
+from ..core.frames.frame_source import FrameSource
+from ..core.frames.planes import as_rgba
+from ..core.memo import Kept
 from ..core.model.frame_state import Layers, Options
 from ..core.pixels import layering
 from ..core.pixels.decontamination import separated
@@ -15,6 +17,7 @@ from . import plates
 from .layer_frames import LayerFrames, RecentFrames, linear, with_colors
 from .layer_mattes import LayerMattes
 
+T = TypeVar("T")
 # Frames of which both are kept, as several windows load them one after another.
 TOGETHER = 4
 
@@ -28,9 +31,9 @@ class LayerColors:
     asked: by source frame whose covered places are taken from others, which these are, and how the camera moves there
     """
 
-    def __init__(self, source: Any, recent: RecentFrames, mattes: LayerMattes):
+    def __init__(self, source: FrameSource, recent: RecentFrames, mattes: LayerMattes) -> None:
         self._source, self._recent, self._mattes = source, recent, mattes
-        self._kept: dict[int, dict] = {}
+        self._kept: Kept[tuple, Any] = Kept()
         self.asked: dict[int, dict[int, Motion]] = {}
         self.begin(None, Options(1), range(0))
 
@@ -49,7 +52,7 @@ class LayerColors:
         """Hashable: what `frames` of a layer, or with −1 of what lies behind all, changes in the source's."""
         return self._separates, self._options.plate_reach if layer < 0 and self._uncovers else None
 
-    def frames(self, layer: int) -> Any:
+    def frames(self, layer: int) -> FrameSource:
         """A source of frames with the colours of a layer, or with −1 of what lies behind all layers."""
         if self.changes(layer) == (False, None):
             return self._source
@@ -71,13 +74,8 @@ class LayerColors:
     def _uncovers(self) -> bool:
         return self.layers.camera is not None and self._source.alpha == "opaque"
 
-    def _memo(self, frame: int, name: Any, make: Callable[[], Any]) -> Any:
-        kept = self._kept.setdefault(frame % TOGETHER, {})
-        if (frame, name) not in kept:
-            for other in [key for key in kept if key[0] != frame]:
-                del kept[other]
-            kept[frame, name] = make()
-        return kept[frame, name]
+    def _memo(self, frame: int, name: int | str, make: Callable[[], T]) -> T:
+        return self._kept.ask((frame, name), make, TOGETHER * (1 + len(self.layers.shutters)))
 
     def _separated(self, frame: int, layer: int) -> tuple[np.ndarray, np.ndarray]:
         """A frame with a layer's own colours, and with those behind it; −1: behind all layers."""
@@ -93,8 +91,7 @@ class LayerColors:
         return own, behind
 
     def _decoded(self, frame: int) -> np.ndarray:
-        read = self._source.decoded(frame)
-        return as_rgba(read) if isinstance(read, Planes) else read
+        return as_rgba(self._source.decoded(frame))
 
     def _changed_behind(self, frame: int) -> np.ndarray:
         picture, _ = self._behind(frame)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections import OrderedDict
 from collections.abc import Callable, Iterable
 from typing import Any
 
@@ -11,48 +10,35 @@ import numpy as np
 from ..core.frames import light
 from ..core.frames.frame_source import FrameSource
 from ..core.frames.planes import Planes
-from .running_sums import summable
+from ..core.frames.source_wrapper import SourceWrapper
+from ..core.memo import Kept
+from .window import summable
 
 # Bytes of frames that are kept as they were read, for all windows and mattes that need them.
 RECENT_BYTES = 256 << 20
 LARGEST = np.finfo(np.float32).max  # of light
 
 
-class RecentFrames:
-    """A source that keeps the frames which were read last: each window of a layer reads all of them.
-
-    windows: how many of them there are, that have to have room beside one another"""
+class RecentFrames(SourceWrapper):
+    """A source that keeps the frames which were read last: each window of a layer reads all of them."""
 
     windows = 1
 
-    def __init__(self, source: FrameSource):
-        self.base = source
+    def __init__(self, source: FrameSource) -> None:
+        super().__init__(source)
         self.most = max(8, RECENT_BYTES // (4 * source.width * source.height * np.dtype(source.dtype).itemsize))
-        self._kept: OrderedDict[tuple[str, int], Any] = OrderedDict()
-
-    def __getattr__(self, name: str) -> Any:
-        return getattr(self.base, name)
+        self._kept: Kept[tuple[str, int], Any] = Kept()
 
     def read(self, index: int) -> np.ndarray:
-        return self._get("read", index)
+        return self._kept.ask(("read", index), lambda: self._source.read(index), self.most)
 
     def decoded(self, index: int) -> np.ndarray | Planes:
-        return self._get("decoded", index)
+        return self._kept.ask(("decoded", index), lambda: self._source.decoded(index), self.most)
 
     def want(self, indices: Iterable[int]) -> None:
         """Who reads through this says nothing of what comes next: the renderer does."""
 
-    def _get(self, way: str, index: int) -> Any:
-        key = way, index
-        if key not in self._kept:
-            self._kept[key] = getattr(self.base, way)(index)
-            while len(self._kept) > self.most:
-                self._kept.popitem(last=False)
-        self._kept.move_to_end(key)
-        return self._kept[key]
-
     def keep(self, count: int) -> None:
-        """Keeps so many frames, at least."""
         self.most = max(self.most, count)
 
     def clear(self) -> None:
@@ -60,29 +46,27 @@ class RecentFrames:
         self._kept.clear()
 
 
-class LayerFrames:
+class LayerFrames(SourceWrapper):
     """A source of what its frames show of a layer, or of what lies behind all.
 
     frame: gives a frame (H, W, 4), in the source's samples"""
 
-    def __init__(self, source: Any, frame: Callable[[int], np.ndarray]):
-        self.base, self.read = source, frame
+    def __init__(self, source: FrameSource, frame: Callable[[int], np.ndarray]) -> None:
+        super().__init__(source)
+        self._frame = frame
 
-    def __getattr__(self, name: str) -> Any:
-        return getattr(self.base, name)
-
-    def decoded(self, index: int) -> np.ndarray:
-        return self.read(index)
+    def read(self, index: int) -> np.ndarray:
+        return self._frame(index)
 
 
-class WeightedFrames:
+class WeightedFrames(SourceWrapper):
     """A FrameSource of frames that are premultiplied by weights, in linear light.
 
     source: the frames; opaque 8-bit ones become halves, all others float32
     weight: gives the weights (H, W) float32, 0 to 1, of a frame
     rest: whether the weights are what layers leave: then running sums hold what these take
     alone: the weights themselves, as alpha; colored: with the frames' colours, as a threshold asks for them
-    is_summable: whether running sums can be made of them (weighted_window.WeightedSums)
+    is_summable: whether running sums can be made of them (running_sums.WeightedSums)
     """
 
     alpha, transfer = "premultiplied", "linear"
@@ -90,19 +74,17 @@ class WeightedFrames:
 
     def __init__(
         self,
-        source: Any,
+        source: FrameSource,
         weight: Callable[[int], np.ndarray],
         *,
         rest: bool = False,
         alone: bool = False,
         colored: bool = False,
-    ):
+    ) -> None:
+        super().__init__(source)
         self.base, self.weight, self.rest, self.alone, self.colored = source, weight, rest, alone, colored
         is_short = np.dtype(source.dtype) == np.uint8 and source.alpha == "opaque"
         self.is_summable, self.dtype = is_short and not alone, np.dtype(np.float16 if is_short else np.float32)
-
-    def __getattr__(self, name: str) -> Any:
-        return getattr(self.base, name)
 
     def read(self, index: int) -> np.ndarray:
         weight = self.weight(index)
@@ -115,16 +97,14 @@ class WeightedFrames:
             seen[..., 3] = weight
         return seen.astype(self.dtype)
 
-    decoded = read
 
-
-def with_layers(source: Any, weighted: int, moves: bool) -> int:
+def with_layers(source: FrameSource, weighted: int, moves: bool) -> int:
     """How many windows a picture has, of which so many are weighted: where there are no running sums, the picture
     without layers is composed as well. moves: something is followed."""
     return weighted + int(moves or not summable(source))
 
 
-def linear(frame: np.ndarray, source: Any) -> np.ndarray:
+def linear(frame: np.ndarray, source: FrameSource) -> np.ndarray:
     """A source's frame (H, W, 4) in linear light, premultiplied, float32."""
     if frame.dtype.kind == "u":
         most = np.iinfo(frame.dtype).max
@@ -142,7 +122,7 @@ def linear(frame: np.ndarray, source: Any) -> np.ndarray:
     return made.clip(-LARGEST, LARGEST)  # an alpha may exceed 1
 
 
-def with_colors(frame: np.ndarray, colors: np.ndarray, where: np.ndarray, source: Any) -> np.ndarray:
+def with_colors(frame: np.ndarray, colors: np.ndarray, where: np.ndarray, source: FrameSource) -> np.ndarray:
     """An opaque source's frame (H, W, 4) with other colours (H, W, 3), in linear light, where (H, W) bool."""
     result, own = frame.copy(), colors[where]
     own = light.to_encoded(own) if source.transfer == "srgb" else own

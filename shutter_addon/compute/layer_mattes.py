@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections import OrderedDict
 from collections.abc import Callable, Hashable
+from functools import partial
 
 import numpy as np
 
+from ..core.memo import Kept
 from ..core.model.frame_state import FrameState, Layers
 from ..core.model.mattes import FileFrame, Matte, MatteReader, Ramp
 from ..core.pixels import layering
@@ -30,9 +31,10 @@ class LayerMattes:
         size: tuple[int, int],
         solve: Callable[[FrameState, int], np.ndarray],
         reader: MatteReader | None,
-    ):
+    ) -> None:
         self._size, self._solve, self._reader = size, solve, reader
-        self._kept: OrderedDict[Hashable, np.ndarray] = OrderedDict()
+        self._kept: Kept[Hashable, np.ndarray] = Kept()
+        self._most = max(KEPT_BYTES // (2 * size[0] * size[1]), 16)
 
     def of(self, layers: Layers, frame: int) -> list[np.ndarray]:
         """The mattes (H, W) float32, 0 to 1, of all layers in a source frame, with their opacities."""
@@ -80,28 +82,23 @@ class LayerMattes:
         """Of a layer that is drawn. Where no edges are followed, it is the same whatever the frame shows."""
         key = state.key, frame if state.options.edge_aware else None
         if (key, layer) not in self._kept:
-            coefficients = self._solve(state, frame)
-            for i, values in enumerate(coefficients[1:]):
-                self._keep((key, i), self._in_pixels(layering.matte_of(values), state.options.aggregate))
+            for i, values in enumerate(self._solve(state, frame)[1:]):
+                self._get((key, i), partial(self._in_pixels, values, state.options.aggregate))
         return self._get((key, layer), lambda: np.zeros(self._size[::-1]))
 
-    def _in_pixels(self, values: np.ndarray, block: int) -> np.ndarray:
+    def _in_pixels(self, coefficients: np.ndarray, block: int) -> np.ndarray:
+        values = layering.matte_of(coefficients)
         if block > 1:
             values = values.repeat(block, 0).repeat(block, 1)
         return values[: self._size[1], : self._size[0]]
 
     def _get(self, key: Hashable, make: Callable[[], np.ndarray]) -> np.ndarray:
-        if key not in self._kept:
-            self._keep(key, make())
-        self._kept.move_to_end(key)
-        return self._kept[key]
+        def made() -> np.ndarray:
+            values = np.rint(make() * np.float32(_WHOLE)).astype(np.uint16)
+            kept()
+            return values
 
-    def _keep(self, key: Hashable, values: np.ndarray) -> None:
-        self._kept[key] = np.rint(values * np.float32(_WHOLE)).astype(np.uint16)
-        most = max(KEPT_BYTES // (2 * self._size[0] * self._size[1]), 16)
-        while len(self._kept) > most:
-            self._kept.popitem(last=False)
-        kept()
+        return self._kept.ask(key, made, self._most)
 
     def clear(self) -> None:
         """Forgets all mattes."""

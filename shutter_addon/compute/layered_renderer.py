@@ -5,7 +5,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 
@@ -19,7 +18,7 @@ from .layer_colors import TOGETHER, LayerColors
 from .layer_frames import RecentFrames, WeightedFrames, with_layers
 from .layer_mattes import LayerMattes
 from .laying import Behind, Exposure
-from .request import Coefficients, Request
+from .request import Coefficients, Compositor, Handle, Request
 
 # How often windows are made smaller that have freed one another.
 _TRIES = 4
@@ -37,12 +36,12 @@ class LayeredRenderer:
 
     def __init__(
         self,
-        compositor: Any,
+        compositor: Compositor,
         source: FrameSource,
-        noted: Callable[[Any], Any],
+        noted: Callable[[FrameSource], FrameSource],
         mattes: MatteReader | None,
-        solve: Callable[[Any, FrameState, int], np.ndarray],
-    ):
+        solve: Callable[[FrameSource, FrameState, int], np.ndarray],
+    ) -> None:
         self._compositor, self._source = compositor, source
         self.recent = RecentFrames(source)
         self._noted = noted(self.recent)
@@ -51,7 +50,7 @@ class LayeredRenderer:
         self._colors = LayerColors(self._noted, self.recent, self.mattes)
         self._laying = compositor.laying()
         self._layers: Layers | None = None
-        self._windows: dict[tuple, Any] = {}
+        self._windows: dict[tuple, Handle] = {}
         self._loaded: dict[int, tuple] = {}  # by source frame in the windows: Layers.key_at
         self._crowd = 1  # by how much more room windows have to leave than what they are said to need
         self._kinds: np.ndarray | None = None  # of the last picture's pixels, where some lacked what lies behind
@@ -83,8 +82,8 @@ class LayeredRenderer:
         coefficients: Coefficients,
         positions: np.ndarray,
         shot: range,
-        plain: Callable[[], Any],
-    ) -> Any:
+        plain: Callable[[], Handle],
+    ) -> Handle:
         """The picture, as the compositor's `draw` gives it.
 
         behind: of what lies behind, without layers, and its coefficients
@@ -98,7 +97,7 @@ class LayeredRenderer:
         self._forget_changed(layers, parts)
         self._layers = layers
 
-        def composed() -> Any:
+        def composed() -> Handle:
             return self._composed(request, parts, coefficients, positions, shot, plain)
 
         for _ in range(_TRIES):
@@ -119,8 +118,8 @@ class LayeredRenderer:
         coefficients: Coefficients,
         positions: np.ndarray,
         shot: range,
-        plain: Callable[[], Any],
-    ) -> Any:
+        plain: Callable[[], Handle],
+    ) -> Handle:
         count = max(layer for layer, _ in parts) + 1
         moves = any(part.state.following is not None for part in parts.values())
         self.recent.windows = self._crowd * with_layers(self._source, len(parts), moves)
@@ -152,7 +151,7 @@ class LayeredRenderer:
                 parts[i, True] = replace(behind, state=replace(state, options=options))
         return parts
 
-    def _window(self, name: tuple[int, bool], part: Request, shutters: int) -> Any:
+    def _window(self, name: tuple[int, bool], part: Request, shutters: int) -> Handle:
         (layer, alone), moved, options = name, part.state.following is not None, part.state.options
         summed = part.state.averages
         has_threshold = any(combine.threshold is not None for combine in part.state.combines)
@@ -198,7 +197,7 @@ class LayeredRenderer:
                 return True
         return False
 
-    def _plate(self, request: Request, exposed: list[Exposure], shot: range, gain: Callable[[], np.ndarray]) -> Any:
+    def _plate(self, request: Request, exposed: list[Exposure], shot: range, gain: Callable[[], np.ndarray]) -> Handle:
         """See Behind.plate; gain: gives how bright (H, W) its pixels are."""
         layers, (bottom, *_) = request.state.layers, exposed
         self._kinds = None

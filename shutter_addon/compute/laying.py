@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from ..devices.device import Device, Texture
 from ..devices.named_textures import NamedTextures
 from ..devices.passes import Pass, read_pass
+from .request import Handle
 
 # Pixels along a side of the blocks whose least share is looked at.
 BLOCK = 16
@@ -20,8 +21,8 @@ class Exposure(NamedTuple):
     """What a layer's frames, or those behind all layers, were composed to: a picture, and one whose alpha is the share
     of the exposure that fell on them. Of opaque frames it is the same picture."""
 
-    color: Any
-    share: Any
+    color: Handle
+    share: Handle
 
 
 class Behind(NamedTuple):
@@ -32,8 +33,8 @@ class Behind(NamedTuple):
     plate: what lies there where too little of it is exposed; None: nowhere"""
 
     exposed: Exposure
-    plain: Any = None
-    plate: Any = None
+    plain: Handle | None = None
+    plate: Handle | None = None
 
 
 def laying_pass(begins: bool, ends: bool, opaque: bool, plain: bool, plate: bool, levels: bool) -> Pass:
@@ -52,7 +53,7 @@ def laying_pass(begins: bool, ends: bool, opaque: bool, plain: bool, plate: bool
 class Laying:
     """Lays layers over one another. What it gives is valid until its next."""
 
-    def __init__(self, device: Device):
+    def __init__(self, device: Device) -> None:
         self._device = device
         self._textures = NamedTextures(device)
 

@@ -23,7 +23,7 @@ def blend_pass(count: int, adds: bool) -> Pass:
 class Matting:
     """Lays mattes over coefficients. Values that it was given last stay on the device."""
 
-    def __init__(self, device: Device):
+    def __init__(self, device: Device) -> None:
         self._device = device
         self._textures = NamedTextures(device)
         self._values: Texture | None = None

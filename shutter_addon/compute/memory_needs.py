@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from ..core.frames.frame_source import FrameSource
 from ..devices.budget import Budget
-from ..devices.device import Device
-from ..devices.paging import PagedDevice
+from ..devices.device import Device, Texture
 from .layer_frames import RecentFrames, WeightedFrames, with_layers
-from .weighted_window import open_any
+from .running_sums import open_window
 from .window import beside
 
 
@@ -36,36 +35,36 @@ class Kind(NamedTuple):
     summed: bool = True
 
 
-class _CountingDevice(PagedDevice):
+class _CountingDevice(Device):
     """Counts the bytes of textures, within what a real device allows, which has the same ones make room for others.
 
     most: of bytes that were taken at the same time"""
 
-    def __init__(self, device: Device):
+    def __init__(self, device: Device) -> None:
         super().__init__(Budget(device.budget.limit))
         self.name, self.max_size, self.max_layers = device.name, device.max_size, device.max_layers
         self.most = 0
 
-    def _make(self, *_texture: Any) -> object:
+    def _make(self, *_texture: object) -> object:
         self.most = max(self.most, self.budget.used)
         return self
 
-    def _free(self, own: Any) -> None:
+    def _free(self, own: object) -> None:
         pass
 
-    def write(self, *_texture: Any, **_how: Any) -> None:
+    def write(self, *_texture: object, **_how: object) -> None:
         pass
 
-    def read(self, texture: Any) -> np.ndarray:
+    def read(self, texture: Texture) -> np.ndarray:
         return np.empty(0)
 
 
 def of_window(device: Device, source: FrameSource, kind: Kind) -> Needs:
     """What windows on a GPU need, with all that is made beside them. NoDeviceError: not even a picture has room on the
     device."""
-    counting: Any = _CountingDevice(device)
+    counting = _CountingDevice(device)
     asked = kind.window, kind.moved, kind.shutters, kind.summed
-    windows = [open_any(counting, frames, *asked) for frames in _read(source, kind)]
+    windows = [open_window(counting, frames, *asked) for frames in _read(source, kind)]
     gpu = min(counting.most + beside(source, kind.shutters), counting.budget.limit)
     sizes = {window: kind.window * frame_bytes(window.source) for window in windows if window.sends}
     anew = [size for window, size in sizes.items() if window.anew]  # one after the other, of frames that are kept
@@ -73,12 +72,12 @@ def of_window(device: Device, source: FrameSource, kind: Kind) -> Needs:
     return Needs(gpu, host, bool(sizes))
 
 
-def _read(source: FrameSource, kind: Kind) -> list[Any]:
+def _read(source: FrameSource, kind: Kind) -> list[FrameSource]:
     """What the windows of a picture read."""
     if not kind.layers:
         return [source]
-    recent: Any = RecentFrames(source)
-    weighted = [
+    recent = RecentFrames(source)
+    weighted: list[FrameSource] = [
         WeightedFrames(recent, _no_weight, rest=i < 0, alone=alone)
         for i in range(-1, kind.layers)
         for alone in ((False,) if source.alpha == "opaque" else (False, True))
@@ -87,13 +86,13 @@ def _read(source: FrameSource, kind: Kind) -> list[Any]:
     return weighted if recent.windows == len(weighted) else [recent, *weighted]
 
 
-def _no_weight(_frame: int) -> Any:
+def _no_weight(_frame: int) -> np.ndarray:
     raise NotImplementedError("nothing is read")
 
 
 def of_numpy_window(source: FrameSource, kind: Kind) -> Needs:
     """What windows need with NumPy."""
-    frames: list[Any] = [source, *(read for read in _read(source, kind) if isinstance(read, WeightedFrames))]
+    frames = [source, *(read for read in _read(source, kind) if isinstance(read, WeightedFrames))]
     return Needs(0, sum(kind.window * frame_bytes(read) for read in frames), False)
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from ..devices.device import Device, Texture
+from ..devices.named_textures import NamedTextures
 from ..devices.passes import Pass, read_pass
 
 
@@ -14,9 +15,9 @@ def mix_pass(begins: bool) -> Pass:
 class Mixing:
     """A sum of shares of coefficients."""
 
-    def __init__(self, device: Device):
+    def __init__(self, device: Device) -> None:
         self._device = device
-        self._sum: Texture | None = None
+        self._textures = NamedTextures(device)
 
     def add(self, mixed: Texture | None, added: Texture, share: float, size: tuple[int, int]) -> Texture:
         """The sum with one more share, a texture array rgba32f like a solver's, valid until the next sum is begun.
@@ -24,20 +25,17 @@ class Mixing:
         mixed: what was returned last; None: this begins a sum
         added: coefficients, a texture of a solver or of GPUCompositor.constant; size: (h, w) of the sum"""
         height, width = size
-        if self._sum is None or (mixed is None and self._sum.size != (width, height, added.size[2])):
-            self.release()
-            self._sum = self._device.texture(width, height, added.size[2], "rgba32f")
+        size_of_sum = (width, height, added.size[2]) if mixed is None else mixed.size
+        mixed_now = self._textures.of("sum", size_of_sum, "rgba32f")
         self._device.run(
             mix_pass(mixed is None),
-            self._sum.size,
-            images={"added": added, "mixed": self._sum},
+            size_of_sum,
+            images={"added": added, "mixed": mixed_now},
             size=(width, height),
             given=added.size[:2],
             share=share,
         )
-        return self._sum
+        return mixed_now
 
     def release(self) -> None:
-        if self._sum is not None:
-            self._sum.release()
-            self._sum = None
+        self._textures.release()

@@ -3,9 +3,9 @@ coefficients, composition."""
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Callable, Collection
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -13,57 +13,61 @@ from ..core.frames.frame_source import FrameSource
 from ..core.memo import Memo
 from ..core.model.frame_state import FrameState
 from ..core.model.mattes import MatteReader
+from ..devices.budget import Budget
 from ..devices.device import NoDeviceError
 from . import decoding_ahead, guide, window_frames
 from .cpu import CPUCompositor
 from .labelling import LabelLayer, grid, labelled, sole_of
 from .layered_renderer import LayeredRenderer
-from .request import Coefficients, Request
+from .request import Coefficients, Compositor, Handle, Request
 
 if TYPE_CHECKING:
     from ..devices.gl import GLDevice
-    from .gpu import GPUCompositor
 
 
-def open_compositor(device: str = "gpu", *memory: Any) -> CPUCompositor | GPUCompositor:
-    """The compositor "gpu", on OpenGL 4.3, or "cpu", on NumPy; memory: the arguments of GLDevice. NoDeviceError: there
+def open_compositor(
+    device: str = "gpu", budget: Budget | None = None, ask_others: Callable[[], None] | None = None
+) -> Compositor:
+    """The compositor "gpu", on OpenGL 4.3, or "cpu", on NumPy; budget, ask_others: as for Device. NoDeviceError: there
     is no OpenGL 4.3."""
     if device == "cpu":
         return CPUCompositor()
     from .gpu import GPUCompositor
 
-    return GPUCompositor(open_gl(*memory))
+    return GPUCompositor(open_gl(budget, ask_others))
 
 
-def open_gl(*memory: Any) -> GLDevice:
-    """A device on an OpenGL 4.3 context of its own; memory: the arguments of GLDevice. NoDeviceError: there is none, or
+def open_gl(budget: Budget | None = None, ask_others: Callable[[], None] | None = None) -> GLDevice:
+    """A device on an OpenGL 4.3 context of its own; budget, ask_others: as for Device. NoDeviceError: there is none, or
     no moderngl."""
     try:
         from ..devices.gl import GLDevice
     except ImportError as error:  # a package without wheels, or one for another Python
         raise NoDeviceError(f"the Python package moderngl cannot be loaded ({error})") from None
-    return GLDevice(*memory)
+    return GLDevice(budget, ask_others)
 
 
 class Renderer:
     """Pictures of one source. It keeps the window's frames, and the last result of each stage.
 
-    compositor: a CPUCompositor or a GPUCompositor
     mattes: what reads the mattes of its pictures; None: they have none
     shortages: what was slow in the last picture, as the device has no room: "window", every picture sends the frames;
     "diffusion", NumPy diffuses
     """
 
-    def __init__(self, compositor: Any, source: FrameSource, mattes: MatteReader | None = None):
+    def __init__(self, compositor: Compositor, source: FrameSource, mattes: MatteReader | None = None) -> None:
         self.compositor, self.source, self._mattes = compositor, source, mattes
         self._solver, self._matting, self._mixing = compositor.solver(), compositor.matting(), compositor.mixing()
         self._guides = guide.Guides(source)
         self._layered: LayeredRenderer | None = None
         self._scribbles: Renderer | None = None  # of layers
-        self._window: Any = None
+        self._window: Handle = None
         self._kind: tuple[int, bool, int, bool] | None = None
         self.shortages: set[str] = set()
-        self._kept_labels, self._kept_diffusion, self._kept_mattes, self._kept_picture = Memo(), Memo(), Memo(), Memo()
+        self._kept_labels: Memo[list[LabelLayer]] = Memo()
+        self._kept_diffusion: Memo[Handle] = Memo()
+        self._kept_mattes: Memo[Handle] = Memo()
+        self._kept_picture: Memo[Handle] = Memo()
 
     def picture(self, request: Request) -> np.ndarray:
         """The picture (H, W, 4), top row first: scene-linear float32, premultiplied. Of levels: 8-bit sRGB over black,
@@ -75,7 +79,7 @@ class Renderer:
                 return self.compositor.over_black(self.draw(replace(request, levels=False)))
             return self.compositor.read(self.draw(request))
 
-    def draw(self, request: Request) -> Any:
+    def draw(self, request: Request) -> Handle:
         """The picture on the device (GPUCompositor.draw); with NumPy an array, like `picture`'s. It is valid until the
         next picture of this renderer, and composed only if it is not the last one."""
         if request.state.layers is None and (self._window is None or not self._window.is_open):
@@ -83,21 +87,21 @@ class Renderer:
         with self.compositor.current():
             return self._kept_picture.get(request.key, lambda: self._composed(request), quick=request.quick)
 
-    def _composed(self, request: Request) -> Any:
+    def _composed(self, request: Request) -> Handle:
         wanted_later = self._want(request)
         request = self.slid(request)
         drawn = self._with_layers(request) if request.state.layers else self._plain(request)
         self.source.want(wanted_later)
         return drawn
 
-    def _plain(self, request: Request) -> Any:
+    def _plain(self, request: Request) -> Handle:
         labels = self.labels(request)
         # Before coefficients are solved for: the window reads the frames that guide the diffusion.
         window = self._loaded_window(request, labels)
         coefficients = self._coefficients(request, labels)
         return self.compositor.draw(window, self._exposing(request, labels), coefficients)
 
-    def _with_layers(self, request: Request) -> Any:
+    def _with_layers(self, request: Request) -> Handle:
         """The picture with what lies behind its layers, and each of them, exposed by itself."""
         behind = replace(request, state=replace(request.state, layers=None), levels=False)
         labels, shot = self.labels(behind), self.shot(request)
@@ -123,7 +127,7 @@ class Renderer:
             )
         return self._layered
 
-    def _solved_apart(self, source: Any, state: FrameState, index: int) -> np.ndarray:
+    def _solved_apart(self, source: FrameSource, state: FrameState, index: int) -> np.ndarray:
         """Coefficients (N, h, w) float32 of another state, at another frame: of layers."""
         if self._scribbles is None:
             self._scribbles = Renderer(self.compositor, source)
@@ -169,14 +173,14 @@ class Renderer:
         with self.compositor.current():
             return Coefficients(self.compositor.uploaded(values), 1)
 
-    def drawn_labels(self, request: Request) -> tuple[object, int]:
+    def drawn_labels(self, request: Request) -> tuple[Handle, int]:
         """Labels of the first layer on the device, a GPU: (texture array r32ui, block), top row first, each texel for
         block × block pixels. They are valid until the next call of any method."""
         with self.compositor.current():
             labels = self.compositor.labels(self.labels(request)[0].labels)
             return labels, request.state.options.aggregate
 
-    def drawn_holes(self, request: Request) -> tuple[object, int]:
+    def drawn_holes(self, request: Request) -> tuple[Handle, int]:
         """The picture's holes on the device, a GPU, like drawn_labels; 0 where there is none."""
         with self.compositor.current():
             self.draw(request)
@@ -271,7 +275,7 @@ class Renderer:
         sole = _sole(request, labels)
         return request if sole is None else replace(request, state=request.state.alone(sole))
 
-    def _loaded_window(self, request: Request, labels: list[LabelLayer]) -> Any:
+    def _loaded_window(self, request: Request, labels: list[LabelLayer]) -> Handle:
         """The window, with the frames loaded that the picture exposes."""
         window = self._window_for(request)
         self._keep_guides(request)
@@ -287,12 +291,12 @@ class Renderer:
         exposing = self._exposing(request, self.labels(request)).state
         return request.state.options.window, exposing.following is not None, len(request.state.bars), exposing.averages
 
-    def _window_for(self, request: Request) -> Any:
+    def _window_for(self, request: Request) -> Handle:
         kind = self._kind_for(request)
         if self._window is None or self._kind != kind or not self._window.is_open:
             self._drop_window()
             self._kind = kind
-            source: Any = self._layered.recent if self._layered else self.source  # whose windows read the same frames
+            source = self._layered.recent if self._layered else self.source  # whose windows read the same frames
             self._window = self.compositor.window(guide.NotedSource(source, self._guides), *kind)
         return self._window
 
@@ -309,7 +313,7 @@ class Renderer:
             return Coefficients(self.compositor.constant(np.ones(1)), self._everywhere)
         return Coefficients(self._with_mattes(request, labels), request.state.options.aggregate)
 
-    def _with_mattes(self, request: Request, labels: list[LabelLayer]) -> Any:
+    def _with_mattes(self, request: Request, labels: list[LabelLayer]) -> Handle:
         """Coefficients on the device, with the mattes laid over what the scribbles give. They are laid again only if
         either has changed since the last call."""
         state = request.state
@@ -324,13 +328,13 @@ class Renderer:
         key = state.mattes, [key for key, _ in values], count, sole, below
         return self._kept_mattes.get(key, lambda: self._matting.lay(beneath, state.mattes, values))
 
-    def _diffused(self, request: Request, labels: list[LabelLayer]) -> Any:
+    def _diffused(self, request: Request, labels: list[LabelLayer]) -> Handle:
         """Coefficients on the device. They are solved for only if labels or what guides them changed since the last
         call, or if the last solution was a quick one and this must not be."""
         options, count = request.state.options, len(request.state.bars)
         frames = self._guiding(request, self.shot(request)) if options.edge_aware else ()
 
-        def solve() -> Any:
+        def solve() -> Handle:
             self._keep_guides(request)
             guided = (self._guides.guide(frames, options.aggregate), options.edge_aware) if frames else ()
             mixed = self._solved_layers(labels, count, guided, request.quick)
@@ -340,12 +344,13 @@ class Renderer:
         key = count, frames and (frames, options.edge_aware), [layer.key for layer in labels]
         return self._kept_diffusion.get(key, solve, quick=request.quick)
 
-    def _solved_layers(self, layers: list[LabelLayer], count: int, guided: tuple, quick: bool) -> Any:
+    def _solved_layers(self, layers: list[LabelLayer], count: int, guided: tuple, quick: bool) -> Handle:
         """The coefficients of all layers, solved for one after the other and added up. A solution that another layer
         has begun from would depend on that one."""
         if len(layers) == 1:
             return self._solver.solve(layers[0].labels, count, *guided, warm=quick)
-        mixed = None
+        mixed: Handle = None
+        solved: Handle
         for layer in layers:
             if layer.sole is None:
                 solved = self._solver.solve(layer.labels, count, *guided)

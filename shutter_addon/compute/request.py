@@ -3,10 +3,19 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
 
 from ..core.model.frame_state import FrameState
 from ..core.pixels.shown_levels import Display
+
+if TYPE_CHECKING:
+    from .cpu import CPUCompositor
+    from .gpu import GPUCompositor
+
+Compositor: TypeAlias = "CPUCompositor | GPUCompositor"
+# What a compositor has on its device, which nothing else looks into: of a picture or of coefficients, on a GPU a
+# Texture, with NumPy an array; of the frames that are exposed, a window.Window or a cpu.HostWindow.
+Handle: TypeAlias = Any
 
 
 @dataclass(frozen=True)
@@ -42,5 +51,5 @@ class Coefficients(NamedTuple):
     handle: on a GPU a texture array rgba32f, four shutters per layer, top row first; with NumPy an array (N, h, w)
     block: each value is for block × block pixels; a single value is for the whole picture"""
 
-    handle: Any
+    handle: Handle
     block: int

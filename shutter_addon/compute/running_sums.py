@@ -1,25 +1,94 @@
-"""Running sums along time, for every device: which sums a window holds, and which it makes when it moves."""
+"""Running sums along time on a device: which sums a window holds, and which it makes when it moves; and which window is
+the fastest."""
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
 from collections.abc import Collection
+from contextlib import suppress
 
 import numpy as np
 
 from ..core.frames.frame_source import FrameSource
+from ..core.frames.planes import Planes, chroma_step
 from ..core.model import windows
 from ..core.model.frame_state import Light, Options
 from ..core.stopping import kept
+from ..devices import llvmpipe
+from ..devices.device import TEXEL_BYTES, Device, Given, NoDeviceError, Texture
+from ..devices.named_textures import NamedTextures
+from ..devices.passes import Pass, read_pass
+from .layer_frames import WeightedFrames
+from .window import BLOCK, Frames, PackedFrames, WholeFrames, Window, decoding, summable
+
+# A tile of running sums in pixels (across, down), as in shaders/include/sums.glsl.
+TILE = 8, BLOCK
 
 
-def summable(source: FrameSource) -> bool:
-    """Whether running sums can be made of a source: its frames are opaque, of 8 bits."""
-    return np.dtype(source.dtype) == np.uint8 and source.alpha == "opaque"
+def open_window(
+    device: Device, source: FrameSource, capacity: int, moved: bool, shutters: int, summed: bool = True
+) -> Window:
+    """The fastest window of `capacity` frames: running sums if they can be made of the source and the device has room
+    for them, else the frames. moved: what is seen of a frame lies elsewhere in it, so it has to be whole. shutters:
+    those whose coefficients have to have room beside it. summed: all that is made of the frames are sums of them."""
+    if moved:
+        return (PackedFrames if summable(source) else WholeFrames)(device, source, capacity, shutters)
+    with suppress(NoDeviceError):
+        if summed and isinstance(source, WeightedFrames) and source.is_summable:
+            return WeightedSums(device, source, capacity, shutters)
+        if summed and summable(source):
+            return Sums(device, source, capacity, shutters)
+    return Frames(device, source, capacity, shutters)
 
 
-class RunningSums(ABC):
-    """A window of running sums of a source's frames, in the light that is summed (Options.light).
+def stores_rows(device: Device) -> bool:
+    """Whether the device keeps textures in memory row by row."""
+    return llvmpipe.is_llvmpipe(device.name)
+
+
+def _in_tiles(width: int, height: int, layers: int) -> tuple[int, int, int]:
+    """The size of a texture for so many layers of pixels stored tile by tile: a row of texels has all layers of a tile,
+    a layer of texels a row of tiles."""
+    across, down = TILE
+    return across * down * layers, -(-width // across), -(-height // down)
+
+
+# What running sums are stored as, by COVER of shaders/include/sums.glsl.
+STORED_SUMS = ("rgba16ui", "rgba32ui", "rgba32ui")
+
+
+def accumulation(decode: int, sent: str, back: bool, tiled: bool, cover: int = 0) -> Pass:
+    """The pass that makes a layer of sums from its neighbour: with the frame between the two added, or subtracted.
+
+    decode: of `decoding`
+    sent: as what the frame was sent, "colours", "numbers" (Device.send) or "planes"; "before": it is taken as the
+    difference of two layers that hold it already
+    back: it is subtracted
+    tiled: the sums are stored in tiles
+    cover: of WeightedSums
+    """
+    return read_pass(
+        "accumulate",
+        DECODE=decode,
+        AGAIN=int(sent == "before"),
+        BACK=int(back),
+        TILED=int(tiled),
+        NUMBERS=int(sent == "numbers"),
+        PLANES=int(sent == "planes"),
+        COVER=cover,
+        STORED=STORED_SUMS[cover],
+    )
+
+
+def _in_fours(plane: np.ndarray) -> np.ndarray:
+    """Samples uint8 (h, w) as uint32 (h, ⌈w/4⌉), four side by side."""
+    if missing := -plane.shape[1] % 4:
+        plane = np.pad(plane, ((0, 0), (0, missing)))
+    return np.ascontiguousarray(plane).view(np.dtype("<u4"))
+
+
+class Sums(Window):
+    """A window of running sums of opaque 8-bit frames, in the light that is summed (Options.light), in textures
+    rgba16ui: three fields of 21 bits for each pixel.
 
     Layer p mod `layers` holds the sum at position p, for the positions from `start` to `stop`, both included: the light
     of all frames before p, counted from an arbitrary one. So sums mean something only in differences: that of
@@ -28,14 +97,31 @@ class RunningSums(ABC):
 
     A window that moves by a frame, onwards or back, makes one new layer. Sums are integers that wrap around, so that
     their differences are exact, whatever the window held before.
+
+    whole: what white is in a field
+    tiled: whether pixels are stored tile by tile, in TILE
+    cover: COVER of the shaders: 0, these are no layer's
     """
 
-    def __init__(self, source: FrameSource, capacity: int):
-        self.source, self.capacity, self.layers = source, capacity, capacity + 1
+    cover = 0
+
+    def __init__(self, device: Device, source: FrameSource, capacity: int, shutters: int = 1) -> None:
+        self.layers = capacity + 1
         self.start = self.stop = 0
-        self.shot = range(source.count)
         self._frames: dict[int, int] = {}  # position: source frame
         self._light: Light | None = None
+        # White is the largest 2ⁿ − 1 for which the sum of a whole window fits into 21 bits, and n is 16 at most.
+        self.whole = (1 << min(16, 21 - (capacity - 1).bit_length())) - 1
+        # A workgroup reads all layers of its pixels. In tiles, they are one run of memory.
+        texels, _, tiles = _in_tiles(source.width, source.height, self.layers)
+        self.tiled = stores_rows(device) and texels <= device.max_size and tiles <= device.max_layers
+        self._sent = NamedTextures(device)
+        self._sent_as: tuple[str, ...] = ()  # their names
+        super().__init__(device, source, capacity, shutters)
+
+    def _allocate(self) -> None:
+        self._allocate_bands(STORED_SUMS[self.cover], TEXEL_BYTES[STORED_SUMS[self.cover]])
+        self._sent_to("frame")
 
     @property
     def held(self) -> Collection[int]:
@@ -48,6 +134,7 @@ class RunningSums(ABC):
         positions: of core.model.windows.positions; the first and the last less than `capacity` apart
         shot: the source frames that the window may show (core.model.windows.source_frames)
         """
+        self.device.use(self)
         self.shot = shot
         first, last = int(positions.min()), int(positions.max()) + 1
         frames = windows.source_frames(options, np.arange(first, last), shot).tolist()
@@ -56,11 +143,11 @@ class RunningSums(ABC):
             self.start = self.stop = first
         while self.stop < last:
             self._keep(max(self.start, self.stop + 1 - self.capacity), self.stop)
-            self._extend(options.light, frames[self.stop - first], self.stop, self.stop + 1)
+            self._add(options.light, frames[self.stop - first], self.stop, self.stop + 1)
             self.stop += 1
         while self.start > first:
             self._keep(self.start, min(self.stop, self.start - 1 + self.capacity))
-            self._extend(options.light, frames[self.start - 1 - first], self.start, self.start - 1)
+            self._add(options.light, frames[self.start - 1 - first], self.start, self.start - 1)
             self.start -= 1
 
     def _continues(self, first: int, frames: list[int], options: Options) -> bool:
@@ -80,19 +167,92 @@ class RunningSums(ABC):
         self.start, self.stop = start, stop
         self._frames = {position: frame for position, frame in self._frames.items() if start <= position < stop}
 
-    def _extend(self, light: Light, frame: int, known: int, next_: int) -> None:
-        """As _add; notes the frame."""
+    def _add(self, light: Light, frame: int, known: int, next_: int) -> None:
+        """Makes the sum at position next_, from that at its neighbour `known` and the source frame between the two.
+
+        light: what is summed"""
+        # A position that shows this frame already: it need not be read.
         same = next((position for position, held in self._frames.items() if held == frame), None)
-        self._add(light, frame, same, known, next_)
+        images: dict[str, Texture] = {}
+        given: Given = {"known": known % self.layers, "next": next_ % self.layers}
+        if same is None:
+            sent, arguments = self._send(frame)
+            given |= arguments | {"whole": float(self.whole)}
+            images = given.pop("images", images)
+        else:
+            sent = "before"
+            given |= {"before": same % self.layers, "after": (same + 1) % self.layers}
+        decode = decoding(self.source.transfer, light)
+        program = accumulation(decode, sent, next_ < known, self.tiled, self.cover)
+        for top, height, sums in self.bands():
+            size = self.source.width, height
+            self.device.run(program, size, images=images | {"sums": sums}, size=size, top=top, **given)
         self._frames[min(known, next_)] = frame
         kept()
 
-    @abstractmethod
-    def _add(self, light: Light, frame: int, same: int | None, known: int, next_: int) -> None:
-        """Makes the sum at position next_, from that at its neighbour `known` and the source frame between the two.
+    def _size(self, height: int) -> tuple[int, int, int]:
+        return _in_tiles(self.source.width, height, self.layers) if self.tiled else super()._size(height)
 
-        light: what is summed
-        same: a position that shows this frame already, so that it need not be read; None: there is none"""
+    def _sent_to(self, *names: str) -> dict[str, Texture]:
+        """The textures that a frame is sent to: "frame", or "luma" and "chroma". The others go."""
+        if names != self._sent_as:
+            self._sent.release()
+            self._sent_as = names
+        width, height = self.source.width, self.source.height
+        sizes = {"frame": ((width, height, 1), "rgba8"), "luma": ((-(-width // 4), height, 1), "r32ui")}
+        sizes["chroma"] = (-(-width // 8), -(-height // 2), 2), "r32ui"
+        return {name: self._sent.of(name, *sizes[name]) for name in names}
+
+    def _send(self, index: int) -> tuple[str, Given]:
+        """Sends a source frame: as what (`accumulation`), and the arguments of the pass that adds it."""
+        frame = self.source.decoded(index) if self.device.takes_planes else self.source.read(index)
+        if isinstance(frame, Planes):
+            return "planes", self._send_planes(frame)
+        own = self._sent_to("frame")["frame"]
+        sent = self.device.send(own, frame)
+        return "colours" if sent is own else "numbers", {"textures": {"frame": sent}}
+
+    def _send_planes(self, frame: Planes) -> Given:
+        sent = self._sent_to("luma", "chroma")
+        self.device.write(sent["luma"], _in_fours(frame.luma))
+        for layer, plane in enumerate(frame.chroma):
+            self.device.write(sent["chroma"], _in_fours(plane), layer)
+        matrix = frame.matrix
+        return {
+            "images": sent,
+            "chroma_step": (chroma_step(self.source.width), chroma_step(self.source.height)),
+            "luma_of": (matrix.offset, matrix.luma),
+            "red_of": matrix.red_of_cr,
+            "green_of": (matrix.green_of_cb, matrix.green_of_cr),
+            "blue_of": matrix.blue_of_cb,
+        }
 
     def release(self) -> None:
         self._frames, self._light = {}, None
+        super().release()
+        self._sent.release()
+
+
+class WeightedSums(Sums):
+    """A window of running sums of opaque 8-bit frames that are weighted pixel by pixel, as layers are exposed
+    (core.pixels.layering), and of their weights, in textures rgba32ui: four fields of 32 bits. Where the weights are 1,
+    its pictures have the bits of Sums."""
+
+    def __init__(self, device: Device, source: WeightedFrames, capacity: int, shutters: int = 1) -> None:
+        self.cover, self._weight = 2 if source.rest else 1, source.weight
+        super().__init__(device, source.base, capacity, shutters)
+
+    def _allocate(self) -> None:
+        super()._allocate()
+        self._weights()
+
+    def _weights(self) -> Texture:
+        """The texture that a frame's weights are sent to."""
+        return self._extra.of("weights", (self.source.width, self.source.height, 1), "r32f")
+
+    def _send(self, index: int) -> tuple[str, Given]:
+        weights = self._weights()
+        self.device.write(weights, np.ascontiguousarray(self._weight(index)[..., None]))
+        sent, given = super()._send(index)
+        given["textures"] = given.get("textures", {}) | {"weights": weights}
+        return sent, given

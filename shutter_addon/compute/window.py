@@ -3,21 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Iterator
-from typing import Any
 
 import numpy as np
 
 from ..core import stopping
 from ..core.frames import light
 from ..core.frames.frame_source import FrameSource
-from ..core.frames.planes import Planes, chroma_step
 from ..core.model import windows
 from ..core.model.frame_state import Light, Options
 from ..devices import llvmpipe
 from ..devices.device import Device, NoDeviceError, Texture
-from ..devices.paging import TEXEL_BYTES
+from ..devices.named_textures import NamedTextures
 from ..devices.passes import Pass, read_pass
-from .running_sums import RunningSums, summable
 
 # Bytes of a texture array, at most.
 BAND_BYTES = llvmpipe.MOST_BYTES
@@ -28,26 +25,13 @@ SENT_SHARE, SENT_BYTES = 1 / 8, 64 << 20
 BLOCK = 16
 # Pixels by which packed frames are larger, as in shaders/include/packed.glsl.
 RIM = 5
-# A tile of running sums in pixels (across, down), as in shaders/include/sums.glsl.
-TILE = 8, BLOCK
 
 _STORED = {np.uint8: "rgba8", np.uint16: "rgba16", np.float16: "rgba16f", np.float32: "rgba32f"}
 
 
-def open_window(
-    device: Device, source: FrameSource, capacity: int, moved: bool, shutters: int, summed: bool = True
-) -> Window:
-    """The fastest window of `capacity` frames: running sums if the source is `summable` and the device has room for
-    them, else the frames. moved: what is seen of a frame lies elsewhere in it, so it has to be whole. shutters: those
-    whose coefficients have to have room beside it. summed: all that is made of the frames are sums of them."""
-    if moved:
-        return (PackedFrames if summable(source) else WholeFrames)(device, source, capacity, shutters)
-    if summed and summable(source):
-        try:
-            return Sums(device, source, capacity, shutters)
-        except NoDeviceError:
-            pass
-    return Frames(device, source, capacity, shutters)
+def summable(source: FrameSource) -> bool:
+    """Whether running sums can be made of a source: its frames are opaque, of 8 bits."""
+    return np.dtype(source.dtype) == np.uint8 and source.alpha == "opaque"
 
 
 def beside(source: FrameSource, shutters: int) -> int:
@@ -64,7 +48,7 @@ class Window:
     the same bits whatever was rendered before. Where another window needs its room, it is released.
 
     capacity: the most frames in a window
-    shutters: as for open_window
+    shutters: as for running_sums.open_window
     is_open: whether it has its textures; once released, it can show nothing any more
     sends: whether every picture sends the frames anew, for which the device has no room
     anew: whether it makes them anew as well (WeightedFrames): those of all its windows would take more of the host than
@@ -76,32 +60,35 @@ class Window:
     layers: int
     sends = anew = False
 
-    def __init__(self, device: Device, source: FrameSource, capacity: int, shutters: int):
+    def __init__(self, device: Device, source: FrameSource, capacity: int, shutters: int) -> None:
         self.device, self.source, self.capacity, self.shutters = device, source, capacity, shutters
         self.shot = range(source.count)
         self.textures: list[Texture] = []
         self.picture: Texture | None = None
-        self._levels: Texture | None = None
-        self._mixed: Texture | None = None
+        self._extra = NamedTextures(device)  # when they are first asked for
         device.use(self)
+        try:
+            self._allocate()
+        except NoDeviceError:
+            self.release()
+            raise
 
     @property
     def is_open(self) -> bool:
         return self.picture is not None
 
-    def _allocate(self, kind: str, pixel_bytes: int) -> None:
-        """Makes the texture arrays, of the format `kind`, and the picture. NoDeviceError: there is no room for all of
-        them; none is kept."""
+    def _allocate(self) -> None:
+        """Makes the texture arrays, and the picture. NoDeviceError: there is no room for all of them; none is kept."""
+        raise NotImplementedError
+
+    def _allocate_bands(self, kind: str, pixel_bytes: int) -> None:
+        """Makes a texture array of the format `kind` for each band of rows, and the picture."""
         source, row_bytes = self.source, self.source.width * pixel_bytes * self.layers
         self._cut(row_bytes, BAND_BYTES)
-        try:
-            self._check(row_bytes * source.height)
-            for top in self.tops:
-                self.textures.append(self.device.texture(*self._size(self._height(top)), kind))
-            self.picture = self.device.texture(source.width, source.height, 1, "rgba32f")
-        except NoDeviceError:
-            self.release()
-            raise
+        self._check(row_bytes * source.height)
+        for top in self.tops:
+            self.textures.append(self.device.texture(*self._size(self._height(top)), kind))
+        self.picture = self.device.texture(source.width, source.height, 1, "rgba32f")
 
     def _cut(self, row_bytes: int, most: int) -> None:
         """Cuts the picture into bands of so many bytes at most, but for those of a few rows."""
@@ -111,7 +98,7 @@ class Window:
     def _check(self, size: int) -> None:
         """NoDeviceError: a window of so many bytes, with as large ones of the same picture, leaves too little of the
         device's memory."""
-        size *= getattr(self.source, "windows", 1)
+        size *= self.source.windows
         if size + beside(self.source, self.shutters) > self.device.budget.limit:
             raise NoDeviceError("over the budget")
 
@@ -128,21 +115,18 @@ class Window:
             yield top, self._height(top), texture
 
     def levels(self) -> Texture:
-        """The texture that the compositor draws levels into, made when it is first asked for."""
-        if self._levels is None:
-            self._levels = self.device.texture(self.source.width, self.source.height, 1, "rgba8")
-        return self._levels
+        """The texture that the compositor draws levels into."""
+        return self._extra.of("levels", (self.source.width, self.source.height, 1), "rgba8")
 
     def mixed(self) -> Texture:
-        """The texture that pictures of several ways to combine are added up in, made when it is first asked for."""
-        if self._mixed is None:
-            self._mixed = self.device.texture(self.source.width, self.source.height, 1, "rgba32f")
-        return self._mixed
+        """The texture that pictures of several ways to combine are added up in."""
+        return self._extra.of("mixed", (self.source.width, self.source.height, 1), "rgba32f")
 
     def release(self) -> None:
-        for texture in (*self.textures, *filter(None, [self.picture, self._levels, self._mixed])):
+        for texture in (*self.textures, *filter(None, [self.picture])):
             texture.release()
-        self.textures, self.picture, self._levels, self._mixed = [], None, None, None
+        self._extra.release()
+        self.textures, self.picture = [], None
         self.device.forget(self)
 
 
@@ -155,8 +139,7 @@ class Frames(Window):
 
     _kind: str | None = None  # of its textures, if it is not that of the frames
 
-    def __init__(self, device: Device, source: FrameSource, capacity: int, shutters: int = 1):
-        super().__init__(device, source, capacity, shutters)
+    def __init__(self, device: Device, source: FrameSource, capacity: int, shutters: int = 1) -> None:
         self.layers = capacity
         self._held: dict[int, int] = {}  # layer: source frame
         self._host: dict[int, np.ndarray] | None = None
@@ -166,21 +149,27 @@ class Frames(Window):
         # The linear value of an encoded half can exceed the range of a half.
         stored = np.dtype(np.float32 if self._linearises else source.dtype)
         self.kind, self.pixel_bytes = self._kind or _STORED[stored.type], 8 if self._kind else 4 * stored.itemsize
+        super().__init__(device, source, capacity, shutters)
+
+    def _allocate(self) -> None:
         try:
-            self._allocate(self.kind, self.pixel_bytes)
+            self._allocate_all()
+            return
         except NoDeviceError:
-            device.use(self)
-            self._host, self.sends = {}, True
-            size = source.width * source.height * self.pixel_bytes * capacity * getattr(source, "windows", 1)
-            self.anew = getattr(source, "is_made", False) and size > device.budget.limit
-            if self.anew:
-                source.keep(capacity)  # type: ignore[attr-defined]
-            self._divide(int(device.budget.limit * SENT_SHARE))
-            try:
-                self.picture = device.texture(source.width, source.height, 1, "rgba32f")
-            except NoDeviceError:
-                self.release()
-                raise
+            Window.release(self)
+        device, source = self.device, self.source
+        device.use(self)
+        self._host, self.sends = {}, True
+        size = source.width * source.height * self.pixel_bytes * self.capacity * source.windows
+        self.anew = source.is_made and size > device.budget.limit
+        if self.anew:
+            source.keep(self.capacity)
+        self._divide(int(device.budget.limit * SENT_SHARE))
+        self.picture = device.texture(source.width, source.height, 1, "rgba32f")
+
+    def _allocate_all(self) -> None:
+        """Makes what holds all frames, and the picture. NoDeviceError: there is no room."""
+        self._allocate_bands(self.kind, self.pixel_bytes)
 
     def _divide(self, most: int) -> None:
         """Divides what is sent at a time, in parts of so many bytes at most if they can be."""
@@ -192,7 +181,7 @@ class Frames(Window):
         return self._held.values()
 
     def load(self, positions: np.ndarray, options: Options, shot: range) -> None:
-        """See RunningSums.load."""
+        """See running_sums.Sums.load."""
         self.shot = shot
         self.device.use(self)
         for index in sorted(set(windows.source_frames(options, positions, shot).tolist())):
@@ -261,19 +250,15 @@ class WholeFrames(Frames):
     layers: slots in a texture array
     """
 
-    def _allocate(self, kind: str, pixel_bytes: int) -> None:
+    def _allocate_all(self) -> None:
         source = self.source
         size = self._texels(source.width, source.height)
         self.rows, self.tops = source.height, range(0, source.height, source.height)
         self._divide(BAND_BYTES)
-        try:
-            self._check(size[0] * size[1] * pixel_bytes * self.capacity)
-            for _ in range(0, self.capacity, self.layers):
-                self.textures.append(self.device.texture(*size, self.layers, kind))
-            self.picture = self.device.texture(source.width, source.height, 1, "rgba32f")
-        except NoDeviceError:
-            Window.release(self)
-            raise
+        self._check(size[0] * size[1] * self.pixel_bytes * self.capacity)
+        for _ in range(0, self.capacity, self.layers):
+            self.textures.append(self.device.texture(*size, self.layers, self.kind))
+        self.picture = self.device.texture(source.width, source.height, 1, "rgba32f")
 
     def _texels(self, width: int, height: int) -> tuple[int, int]:
         """The size (across, down) of the texture for a frame of so many pixels."""
@@ -310,15 +295,15 @@ class PackedFrames(WholeFrames):
 
     _kind = "rgba16ui"
 
-    def __init__(self, device: Device, source: FrameSource, capacity: int, shutters: int = 1):
-        self._light: Light = "linear"
-        self._sent: Texture | None = None
-        super().__init__(device, source, capacity, shutters)
-        try:
-            self._sent = device.texture(source.width, source.height, 1, "rgba8")
-        except NoDeviceError:
-            self.release()
-            raise
+    _light: Light = "linear"
+
+    def _allocate(self) -> None:
+        super()._allocate()
+        self._sent()
+
+    def _sent(self) -> Texture:
+        """The texture that a frame is sent to."""
+        return self._extra.of("sent", (self.source.width, self.source.height, 1), "rgba8")
 
     def _texels(self, width: int, height: int) -> tuple[int, int]:
         return width + RIM, height + RIM
@@ -330,19 +315,12 @@ class PackedFrames(WholeFrames):
         super().load(positions, options, shot)
 
     def _send(self, texture: Texture, rows: np.ndarray, layer: int) -> None:
-        size = self.source.width, self.source.height
-        if self._sent is None:
-            raise ValueError("the window was released")
-        self.device.write(self._sent, rows, opaque=True)
+        size, sent = (self.source.width, self.source.height), self._sent()
+        self.device.write(sent, rows, opaque=True)
         program = packing(decoding(self.source.transfer, self._light), self._light == "linear")
-        textures, images = {"frame": self._sent}, {"packed_frames": texture}
+        textures, images = {"frame": sent}, {"packed_frames": texture}
         extent = self._texels(*size)
         self.device.run(program, extent, textures=textures, images=images, size=size, layer=layer)
-
-    def release(self) -> None:
-        super().release()
-        if self._sent is not None:
-            self._sent.release()
 
 
 def packing(decode: int, squared: bool) -> Pass:
@@ -355,144 +333,3 @@ def decoding(stored: str, light: str) -> int:
     2 made encoded. stored: the samples' transfer, "srgb" or "linear"."""
     summed = "srgb" if light == "encoded" else "linear"
     return 0 if stored == summed else 1 if summed == "linear" else 2
-
-
-def stores_rows(device: Device) -> bool:
-    """Whether the device keeps textures in memory row by row."""
-    return llvmpipe.is_llvmpipe(device.name)
-
-
-def _in_tiles(width: int, height: int, layers: int) -> tuple[int, int, int]:
-    """The size of a texture for so many layers of pixels stored tile by tile: a row of texels has all layers of a tile,
-    a layer of texels a row of tiles."""
-    across, down = TILE
-    return across * down * layers, -(-width // across), -(-height // down)
-
-
-# What running sums are stored as, by COVER of shaders/include/sums.glsl.
-STORED_SUMS = ("rgba16ui", "rgba32ui", "rgba32ui")
-
-
-def accumulation(decode: int, sent: str, back: bool, tiled: bool, cover: int = 0) -> Pass:
-    """The pass that makes a layer of sums from its neighbour: with the frame between the two added, or subtracted.
-
-    decode: of `decoding`
-    sent: as what the frame was sent, "colours", "numbers" (Device.send) or "planes"; "before": it is taken as the
-    difference of two layers that hold it already
-    back: it is subtracted
-    tiled: the sums are stored in tiles
-    cover: of WeightedSums
-    """
-    return read_pass(
-        "accumulate",
-        DECODE=decode,
-        AGAIN=int(sent == "before"),
-        BACK=int(back),
-        TILED=int(tiled),
-        NUMBERS=int(sent == "numbers"),
-        PLANES=int(sent == "planes"),
-        COVER=cover,
-        STORED=STORED_SUMS[cover],
-    )
-
-
-def _in_fours(plane: np.ndarray) -> np.ndarray:
-    """Samples uint8 (h, w) as uint32 (h, ⌈w/4⌉), four side by side."""
-    if missing := -plane.shape[1] % 4:
-        plane = np.pad(plane, ((0, 0), (0, missing)))
-    return np.ascontiguousarray(plane).view(np.dtype("<u4"))
-
-
-class Sums(RunningSums, Window):
-    """A window of running sums of opaque 8-bit frames, in textures rgba16ui: three fields of 21 bits for each pixel.
-
-    whole: what white is in a field
-    tiled: whether pixels are stored tile by tile, in TILE
-    cover: COVER of the shaders: 0, these are no layer's
-    """
-
-    cover = 0
-
-    def __init__(self, device: Device, source: FrameSource, capacity: int, shutters: int = 1):
-        Window.__init__(self, device, source, capacity, shutters)
-        RunningSums.__init__(self, source, capacity)
-        # White is the largest 2ⁿ − 1 for which the sum of a whole window fits into 21 bits, and n is 16 at most.
-        self.whole = (1 << min(16, 21 - (capacity - 1).bit_length())) - 1
-        # A workgroup reads all layers of its pixels. In tiles, they are one run of memory.
-        texels, _, tiles = _in_tiles(source.width, source.height, self.layers)
-        self.tiled = stores_rows(device) and texels <= device.max_size and tiles <= device.max_layers
-        self._sent: dict[str, Texture] = {}
-        self._allocate(STORED_SUMS[self.cover], TEXEL_BYTES[STORED_SUMS[self.cover]])
-        try:
-            self._hold("frame")
-        except NoDeviceError:
-            self.release()
-            raise
-
-    def load(self, positions: np.ndarray, options: Options, shot: range) -> None:
-        self.device.use(self)
-        super().load(positions, options, shot)
-
-    def _size(self, height: int) -> tuple[int, int, int]:
-        return _in_tiles(self.source.width, height, self.layers) if self.tiled else super()._size(height)
-
-    def _hold(self, *names: str) -> None:
-        """Has the textures that a frame is sent to: "frame", or "luma" and "chroma". The others go."""
-        if self._sent.keys() == set(names):
-            return
-        self._free_sent()
-        width, height = self.source.width, self.source.height
-        sizes = {"frame": (width, height, 1, "rgba8"), "luma": (-(-width // 4), height, 1, "r32ui")}
-        sizes["chroma"] = -(-width // 8), -(-height // 2), 2, "r32ui"
-        for name in names:
-            self._sent[name] = self.device.texture(*sizes[name])
-
-    def _free_sent(self) -> None:
-        for texture in self._sent.values():
-            texture.release()
-        self._sent = {}
-
-    def _send(self, index: int) -> tuple[str, dict[str, Any]]:
-        """Sends a source frame: as what (`accumulation`), and the arguments of the pass that adds it."""
-        frame = self.source.decoded(index) if self.device.takes_planes else self.source.read(index)
-        if isinstance(frame, Planes):
-            return "planes", self._send_planes(frame)
-        self._hold("frame")
-        sent = self.device.send(self._sent["frame"], frame)
-        return "colours" if sent is self._sent["frame"] else "numbers", {"textures": {"frame": sent}}
-
-    def _send_planes(self, frame: Planes) -> dict[str, Any]:
-        self._hold("luma", "chroma")
-        self.device.write(self._sent["luma"], _in_fours(frame.luma))
-        for layer, plane in enumerate(frame.chroma):
-            self.device.write(self._sent["chroma"], _in_fours(plane), layer)
-        matrix = frame.matrix
-        return {
-            "images": self._sent,
-            "chroma_step": (chroma_step(self.source.width), chroma_step(self.source.height)),
-            "luma_of": (matrix.offset, matrix.luma),
-            "red_of": matrix.red_of_cr,
-            "green_of": (matrix.green_of_cb, matrix.green_of_cr),
-            "blue_of": matrix.blue_of_cb,
-        }
-
-    def _add(self, light: Light, frame: int, same: int | None, known: int, next_: int) -> None:
-        images: dict[str, Texture] = {}
-        given: dict[str, Any] = {"known": known % self.layers, "next": next_ % self.layers}
-        if same is None:
-            sent, arguments = self._send(frame)
-            given |= arguments | {"whole": float(self.whole)}
-            images = given.pop("images", images)
-        else:
-            sent = "before"
-            given |= {"before": same % self.layers, "after": (same + 1) % self.layers}
-        decode = decoding(self.source.transfer, light)
-        program = accumulation(decode, sent, next_ < known, self.tiled, self.cover)
-        for top, height, sums in self.bands():
-            size = self.source.width, height
-            self.device.run(program, size, images=images | {"sums": sums}, size=size, top=top, **given)
-
-    def release(self) -> None:
-        RunningSums.release(self)
-        Window.release(self)
-        self._free_sent()

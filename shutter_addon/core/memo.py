@@ -1,16 +1,17 @@
-"""Memos: the last value of something, kept with the key of what it was made of."""
+"""Memos: the last value of something, or the last ones, kept with the key of what they were made of."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Hashable
-from typing import Any, TypeVar
+from typing import Generic, TypeVar
 
 from .stopping import kept
 
+K = TypeVar("K", bound=Hashable)
 T = TypeVar("T")
 
 
-class Memo:
+class Memo(Generic[T]):
     """The last value that was made, with its key of plain values: made again where the key is another one.
 
     made: how many values there were, which tells one from the next where their keys are equal
@@ -18,7 +19,7 @@ class Memo:
 
     def __init__(self) -> None:
         self.made = 0
-        self._kept: tuple[Hashable, Any, bool] | None = None  # the key, its value, and whether that is exact
+        self._kept: tuple[Hashable, T, bool] | None = None  # the key, its value, and whether that is exact
 
     def get(self, key: Hashable, make: Callable[[], T], *, quick: bool = False) -> T:
         """The value of a key: the last one, if it was its; else what `make` gives. Broken off, none is kept.
@@ -35,3 +36,15 @@ class Memo:
     def clear(self) -> None:
         """Lets go of the value."""
         self._kept = None
+
+
+class Kept(dict[K, T]):
+    """The last values that were asked for, by keys of plain values; asked for longest ago first."""
+
+    def ask(self, key: K, make: Callable[[], T], most: int) -> T:
+        """The value of a key: the kept one, or what `make` gives, which is kept beside most − 1 others."""
+        value = self.pop(key) if key in self else make()
+        self[key] = value
+        while len(self) > most:
+            del self[next(iter(self))]
+        return value

@@ -21,7 +21,7 @@ class EffectError(UserError, RuntimeError):
 
     words: what the sentence's braces stand for, so that an interface can translate the sentence (`template`)."""
 
-    def __init__(self, template: str, **words: object):
+    def __init__(self, template: str, **words: object) -> None:
         super().__init__(template.format(**words) if words else template)
         self.template, self.words = template, words
 

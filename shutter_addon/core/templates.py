@@ -9,7 +9,7 @@ import errno
 import os
 import re
 import string
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from functools import cache
 from pathlib import Path
 from typing import NamedTuple
@@ -128,29 +128,29 @@ def _texts(tree: ast.Module) -> Iterator[tuple[Text, Text]]:
 
 
 def _joined(node: ast.JoinedStr) -> Text:
-    literals, fields = [""], []
-    for part in node.values:
-        if isinstance(part, ast.Constant):
-            literals[-1] += str(part.value)
-        elif isinstance(part, ast.FormattedValue):
-            fields.append(ast.unparse(part.value))
-            literals.append("")
-    return Text(tuple(literals), tuple(fields))
+    parts = [part for part in node.values if isinstance(part, ast.Constant | ast.FormattedValue)]
+    return _of(
+        (str(part.value), None) if isinstance(part, ast.Constant) else ("", ast.unparse(part.value)) for part in parts
+    )
 
 
 def _text(node: ast.AST | None) -> Text | None:
     """None: it is no text of several words that `format` takes."""
     if not (isinstance(node, ast.Constant) and isinstance(node.value, str) and " " in node.value):
         return None
-    if "{" not in node.value:
-        return Text((" ".join(node.value.split()),), ())
-    literals, fields = [""], []
+    words = " ".join(node.value.split())
     try:
-        for literal, field, _format, _conversion in string.Formatter().parse(" ".join(node.value.split())):
-            literals[-1] += literal
-            if field is not None:
-                fields.append(field)
-                literals.append("")
+        return _of((literal, field) for literal, field, _format, _conversion in string.Formatter().parse(words))
     except ValueError:
         return None
+
+
+def _of(parts: Iterable[tuple[str, str | None]]) -> Text:
+    """parts: what is written, and the field behind it, if there is one"""
+    literals, fields = [""], []
+    for literal, field in parts:
+        literals[-1] += literal
+        if field is not None:
+            fields.append(field)
+            literals.append("")
     return Text(tuple(literals), tuple(fields))

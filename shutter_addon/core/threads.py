@@ -8,7 +8,7 @@ import queue
 import threading
 from collections.abc import Callable, Generator, Iterable
 from concurrent.futures import Future, ThreadPoolExecutor
-from typing import Any, TypeVar
+from typing import TypeVar
 
 from . import told
 from .stopping import check, once
@@ -17,7 +17,7 @@ T = TypeVar("T")
 _NAME = "Virtual Shutter"
 
 
-def start(function: Callable[..., Any], *arguments: Any) -> Future:
+def start(function: Callable[..., T], *arguments: object) -> Future[T]:
     """What a function will return or raise, called by a thread of its own, which ends with it. Python waits for it
     before it ends."""
     executor = pool(1)
@@ -31,7 +31,7 @@ def pool(workers: int | None = None) -> ThreadPoolExecutor:
     return ThreadPoolExecutor(workers, _NAME)
 
 
-def daemon(function: Callable[..., Any], *arguments: Any) -> threading.Thread:
+def daemon(function: Callable[..., object], *arguments: object) -> threading.Thread:
     """A thread that calls a function, which goes on until it is told to end. Python ends without it, and prints what it
     raises."""
     thread = threading.Thread(target=_noting, args=(function, *arguments), name=_NAME, daemon=True)
@@ -39,7 +39,7 @@ def daemon(function: Callable[..., Any], *arguments: Any) -> threading.Thread:
     return thread
 
 
-def _noting(function: Callable[..., Any], *arguments: Any) -> None:
+def _noting(function: Callable[..., object], *arguments: object) -> None:
     try:
         function(*arguments)
     except Exception as error:  # that nobody expected: others find no way to whoever waits

@@ -23,7 +23,7 @@ class Budget:
     used: those that are taken
     """
 
-    def __init__(self, limit: int | None = None):
+    def __init__(self, limit: int | None = None) -> None:
         self._limit, self.used = limit, 0
         self._lock = Lock()
 

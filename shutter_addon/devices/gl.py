@@ -12,11 +12,9 @@ from typing import Any, Self
 import moderngl
 import numpy as np
 
-from ..core import stopping
 from .budget import Budget, machine_memory
-from .device import NoDeviceError
+from .device import Device, NoDeviceError, Texture
 from .llvmpipe import is_llvmpipe
-from .paging import PagedDevice
 from .passes import Pass
 
 _EGL = sys.platform == "linux"
@@ -92,7 +90,7 @@ def _memory(context: moderngl.Context, renderer: str) -> int | None:
     return None
 
 
-class GLDevice(PagedDevice):
+class GLDevice(Device):
     """A Device on an OpenGL 4.3 context of its own; see Device. NoDeviceError: there is no OpenGL 4.3.
 
     It tells the budget what memory there is.
@@ -103,8 +101,8 @@ class GLDevice(PagedDevice):
 
     takes_planes = True
 
-    def __init__(self, budget: Budget | None = None, ask_others: Callable[[], None] | None = None):
-        super().__init__(budget or Budget(), ask_others)
+    def __init__(self, budget: Budget | None = None, ask_others: Callable[[], None] | None = None) -> None:
+        super().__init__(budget, ask_others)
         backend: dict[str, Any] = {"backend": "egl"} if _EGL else {}
         try:
             with _kept_context():
@@ -143,12 +141,12 @@ class GLDevice(PagedDevice):
     def _free(self, own: moderngl.TextureArray) -> None:
         own.release()
 
-    def write(self, texture: Any, array: np.ndarray, layer: int = 0, *, opaque: bool = False) -> None:
+    def write(self, texture: Texture, array: np.ndarray, layer: int = 0, *, opaque: bool = False) -> None:
         """See Device. `opaque` changes nothing here."""
         height, width = array.shape[:2]
         texture.gpu.write(array, viewport=(0, 0, layer, width, height, 1), alignment=1)
 
-    def read(self, texture: Any) -> np.ndarray:
+    def read(self, texture: Texture) -> np.ndarray:
         """See Device."""
         components, _, dtype = FORMATS[texture.kind]
         width, height, layers = texture.size
@@ -157,45 +155,27 @@ class GLDevice(PagedDevice):
         texture.gpu.read_into(array, alignment=1)
         return array
 
-    def run(
-        self,
-        program: Pass,
-        extent: tuple[int, ...],
-        /,
-        *,
-        textures: Mapping[str, Any] | None = None,
-        images: Mapping[str, Any] | None = None,
-        blocks: Mapping[str, np.ndarray] | None = None,
-        **constants: Any,
-    ) -> None:
-        """See Device."""
-        textures, images, blocks = textures or {}, images or {}, blocks or {}
-        stopping.check()
+    def _dispatch(self, program: Pass, groups: tuple[int, ...], textures: dict, images: dict, *given: Mapping) -> None:
         if program not in self._programs:
             shader = self._context.compute_shader(program.source)
             self._programs[program] = shader, {name: shader[name] for name in shader}
-        shader, used = self._programs[program]
-        self.bring([*(textures[name] for name in program.samplers), *(images[name] for name in program.images)])
-        for unit, name in enumerate(program.samplers):
-            textures[name].own.use(unit)
+        (shader, used), (blocks, constants) = self._programs[program], given
+        for unit, texture in enumerate(textures.values()):
+            texture.use(unit)
         for unit, (name, image) in enumerate(program.images.items()):
-            images[name].own.bind_to_image(unit, read=image.reads, write=image.writes)
+            images[name].bind_to_image(unit, read=image.reads, write=image.writes)
         for unit, name in enumerate(program.blocks):
             self._block(unit, blocks[name])
         for name, value in constants.items():
             if name in used:  # the compiler removes constants that a source does not use
                 used[name].value = value
-        self._dispatch(shader, *program.groups(extent))
-        self._context.memory_barrier()
-
-    def _dispatch(self, shader: moderngl.ComputeShader, *groups: int) -> None:
-        """Dispatches the shader. A software renderer returns only when the pass is done; on EGL the call goes through
-        ctypes, so that Python's other threads run meanwhile."""
+        # A software renderer returns only when the pass is done. By ctypes, Python's other threads run meanwhile.
         if _EGL:
             _gl("glUseProgram")(ctypes.c_uint(shader.glo))
             _gl("glDispatchCompute")(*map(ctypes.c_uint, groups))
         else:
             shader.run(*groups)
+        self._context.memory_barrier()
 
     def _block(self, unit: int, values: np.ndarray) -> None:
         buffer = self._blocks.get(unit)

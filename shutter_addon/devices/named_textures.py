@@ -8,8 +8,8 @@ from .device import Device, Texture
 class NamedTextures:
     """Textures of a device, each made anew where another size is asked for."""
 
-    def __init__(self, device: Device):
-        self._device = device
+    def __init__(self, device: Device) -> None:
+        self.device = device
         self._kept: dict[str, Texture] = {}
 
     def of(self, name: str, size: tuple[int, int, int], kind: str) -> Texture:
@@ -18,7 +18,7 @@ class NamedTextures:
         if texture is None or texture.size != size:
             if texture is not None:
                 texture.release()
-            texture = self._kept[name] = self._device.texture(*size, kind)
+            texture = self._kept[name] = self.device.texture(*size, kind)
         return texture
 
     def release(self) -> None:

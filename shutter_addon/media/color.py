@@ -8,8 +8,8 @@ from OpenImageIO import FLOAT, ColorConfig, ImageBuf, ImageBufAlgo
 
 from ..core.frames import light
 from ..core.frames.frame_source import FrameSource
+from ..core.frames.source_wrapper import SourceWrapper
 from .errors import MediaError
-from .source import SourceWrapper
 
 SCENE_LINEAR = "Linear Rec.709"  # of Blender's own configuration
 TRANSFERS = {"sRGB": "srgb", SCENE_LINEAR: "linear", "Non-Color": "linear"}

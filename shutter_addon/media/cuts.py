@@ -13,9 +13,9 @@ import numpy as np
 from ..core.frames import light
 from ..core.frames.frame_source import FrameSource
 from ..core.frames.planes import Planes, as_rgba
+from ..core.frames.source_wrapper import SourceWrapper
 from . import plain_cuts
 from .errors import MediaError
-from .source import SourceWrapper
 
 if TYPE_CHECKING:
     from scenedetect.scene_detector import SceneDetector

@@ -20,13 +20,13 @@ import numpy as np
 from ..core import stopping, threads
 from ..core.farm.claims import Claims
 from ..core.frames.frame_source import FrameSource
+from ..core.frames.source_wrapper import SourceWrapper
 from . import cuts, flow
 from .completeness import why_short
 from .errors import MediaError, NotBuiltError
 from .files import check_index
 from .inbetween_cache import InbetweenCache, pair_line, unwritable, write_picture
 from .inbetween_folders import State
-from .source import SourceWrapper
 
 MEMORY = 4 << 30  # bytes of all pairs that are built at the same time, and of the frames that are read ahead
 AHEAD = 640 << 20  # bytes of them for frames that are read ahead; enough to read none of 16 bits in 4K twice

@@ -8,8 +8,8 @@ import numpy as np
 from ..core import stopping, threads
 from ..core.frames.frame_source import FrameSource
 from ..core.frames.planes import Planes, as_rgba
+from ..core.frames.source_wrapper import SourceWrapper
 from .errors import MediaError
-from .source import SourceWrapper
 
 _PATIENCE = 0.1  # seconds between two looks at whether a frame is still wanted
 

@@ -8,8 +8,8 @@ from OpenImageIO import FLOAT, ROI, ImageBuf, ImageBufAlgo
 
 from ..core.frames.frame_source import FrameSource
 from ..core.frames.light import to_linear
+from ..core.frames.source_wrapper import SourceWrapper
 from .errors import MediaError
-from .source import SourceWrapper
 
 STRETCHED = 0.1  # by which share the sides may differ: Blender's movies have even ones
 

@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import DTypeLike
 
 from ..core.frames.frame_source import FrameSource
-from .source import SourceWrapper
+from ..core.frames.source_wrapper import SourceWrapper
 
 DIVISORS = 1, 2, 4
 

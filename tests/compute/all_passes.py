@@ -2,7 +2,6 @@
 
 import importlib.util
 import itertools
-from dataclasses import replace
 
 import pytest
 
@@ -14,11 +13,11 @@ from shutter_addon.compute import (
     laying,
     matting,
     mixing,
+    running_sums,
     window,
 )
 from shutter_addon.compute.composition_passes import (
     LightFormat,
-    Moved,
     composition,
     composition_of_moved,
     composition_of_sums,
@@ -42,7 +41,7 @@ def _composing():
 
     def moved(quads, packed, at=(False, False), **others):
         given = {"shutters": 3, "mixed": 3, "shortened": packed, "sharp": True} | others
-        return Moved(quads=quads, packed=packed, continued=at[0], unfinished=at[1], **given)
+        return {"quads": quads, "packed": packed, "continued": at[0], "unfinished": at[1], **given}
 
     for way, edges in itertools.product(("pieces", *_WAYS), (1, 2)):
         yield composition(way, 3, "frames", edges, light(edges == 2))
@@ -52,10 +51,10 @@ def _composing():
         yield composition_of_sums(rows, groups, back, tiled, light(back, encoded=True))
     for way, packed in itertools.product(_WAYS, (True, False)):
         for at in ((True, False), (False, True)):
-            yield composition_of_moved(way, moved(1, packed, at), light(True, premultiplied=False))
+            yield composition_of_moved(way, light(True, premultiplied=False), **moved(1, packed, at))
         others = {"shutters": 5, "mixed": 1, "shortened": False, "sharp": False}
         yield composition_of_moved(
-            way, moved(1 if way == "search" else 4, packed, **others), light(packed, encoded=True)
+            way, light(packed, encoded=True), **moved(1 if way == "search" else 4, packed, **others)
         )
 
 
@@ -68,11 +67,12 @@ def _combining():
             yield composition(way, 3, "frames", edges, light)
         if mode != "median":
             for quads, packed, at in ((4, True, (False, False)), (1, False, (True, False)), (1, False, (False, True))):
-                moved = Moved(quads, 3, 3, packed, True, True, *at)
+                moved = {"shutters": 3, "mixed": 3, "packed": packed, "shortened": True, "sharp": True}
+                moved |= {"continued": at[0], "unfinished": at[1]}
                 for each in (way, "value"):
                     own = quads if each != "search" else 1
                     light = LightFormat(1, False, False, at == (False, False), combine=combine)
-                    yield composition_of_moved(each, replace(moved, quads=own), light)
+                    yield composition_of_moved(each, light, quads=own, **moved)
     yield composition_passes.selection(2, 9)
     for begins, levels in ((True, False), (False, False), (False, True)):
         yield composition_passes.way_sum(begins, levels)
@@ -85,7 +85,7 @@ def _layers():
         for way in _WAYS:
             yield composition(way, 3, stored, 2, light)
         for sent in ("colours", "planes", "before"):
-            yield window.accumulation(1, sent, cover == 1, cover == 2, cover)
+            yield running_sums.accumulation(1, sent, cover == 1, cover == 2, cover)
     for ends, opaque in itertools.product((True, False), repeat=2):
         yield laying.laying_pass(True, ends, opaque, plain=not opaque, plate=ends, levels=ends)
         yield laying.laying_pass(False, ends, opaque, plain=False, plate=False, levels=opaque)
@@ -93,7 +93,7 @@ def _layers():
 
 def _filling():
     for tiled, sent in itertools.product((True, False), ("colours", "numbers", "planes", "before")):
-        yield window.accumulation(1, sent, tiled, tiled)
+        yield running_sums.accumulation(1, sent, tiled, tiled)
     yield window.packing(1, True)
     yield window.packing(2, False)
     for adds in (False, True):

@@ -9,7 +9,7 @@ import pytest
 from test_composition import SHAPES, footage, state
 from test_moved import following
 
-from shutter_addon.compute import window
+from shutter_addon.compute import running_sums, window
 from shutter_addon.compute.gpu import GPUCompositor
 from shutter_addon.compute.renderer import Renderer
 from shutter_addon.compute.request import Request
@@ -196,7 +196,7 @@ def test_several_effects_take_turns_and_show_the_same(limited):
     for index in range(2):
         for renderer, wanted in zip(renderers, alone, strict=True):
             assert np.array_equal(renderer.picture(Request(2 + index, moment())), wanted[index])
-            assert type(compositor.windows[-1]) is window.Sums
+            assert type(compositor.windows[-1]) is running_sums.Sums
             assert compositor.windows[-1].is_open
     assert len(compositor.windows) == 6
     assert sum(each.is_open for each in compositor.windows) == 1

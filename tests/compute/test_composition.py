@@ -5,7 +5,7 @@ import dataclasses
 import numpy as np
 import pytest
 
-from shutter_addon.compute import composition_passes, cpu, window
+from shutter_addon.compute import composition_passes, cpu, running_sums, window
 from shutter_addon.compute.cpu import CPUCompositor
 from shutter_addon.compute.gpu import GPUCompositor
 from shutter_addon.compute.renderer import Renderer, open_compositor
@@ -481,7 +481,7 @@ def test_bands_and_streaming_change_nothing(monkeypatch, resident):
 @pytest.mark.parametrize("size", [(37, 23), (1, 1), (70, 33)])
 def test_sums_lie_in_tiles_only_where_textures_are_rows(monkeypatch, rows, size):
     """And pictures are right both ways, in bands as well: software renderers have the tiles, GPUs have not."""
-    monkeypatch.setattr(window, "stores_rows", lambda device: rows)
+    monkeypatch.setattr(running_sums, "stores_rows", lambda device: rows)
     monkeypatch.setattr(window, "BAND_BYTES", size[0] * 8 * 17 * 32)
     rng = np.random.default_rng(20)
     device, source = open_compositor("gpu"), footage(rng, size=size)
@@ -501,7 +501,7 @@ def test_sums_lie_in_tiles_only_where_textures_are_rows(monkeypatch, rows, size)
 
 
 def test_a_window_too_long_or_a_picture_too_high_for_tiles_has_none(monkeypatch):
-    monkeypatch.setattr(window, "stores_rows", lambda device: True)
+    monkeypatch.setattr(running_sums, "stores_rows", lambda device: True)
     device, source = open_compositor("gpu"), footage(np.random.default_rng(21), count=3, size=(37, 65))
     rows_of_tiles = -(-source.height // 16)
     with device.current():

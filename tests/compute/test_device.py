@@ -76,11 +76,11 @@ def test_fours_of_whole_numbers_are_exact_or_refused(gpu_device):
         texture.release()
 
 
-def test_it_has_the_methods_and_attributes_of_the_protocol(gpu_device):
+def test_it_has_the_methods_and_attributes_of_every_device(gpu_device):
     for name in Device.__annotations__:
         assert hasattr(gpu_device, name), name
     methods = {name: method for name, method in vars(Device).items() if inspect.isfunction(method) and name[0] != "_"}
-    names = "current", "freeing", "texture", "write", "send", "read", "run", "use", "forget", "release"
+    names = "current", "freeing", "texture", "write", "send", "read", "run", "use", "forget", "release", "bring", "drop"
     assert tuple(methods) == names
     for name, method in methods.items():
         wanted, given = (

@@ -8,7 +8,7 @@ import exact_diffusion
 import numpy as np
 import pytest
 
-from shutter_addon.compute import cpu, edge_diffusion, gpu
+from shutter_addon.compute import cpu, diffusion, gpu
 from shutter_addon.core.model.scribbles import Shape, rasterise
 
 LEVEL = 1 / 255
@@ -348,7 +348,7 @@ def test_a_stroke_stays_within_its_object():
 
 def test_fewer_cycles_are_too_few(monkeypatch, exact):
     """The scenes are hard enough to tell."""
-    monkeypatch.setattr(edge_diffusion, "CYCLES", (4, 4))
+    monkeypatch.setattr(diffusion, "CYCLES", (4, 4))
     scenes = ("people", "narrow maze", "checks, 3", "a band")
     errors = [abs(cpu.Solver().solve(*SCENES[scene], 1.0) - exact(scene, 1.0)).max() for scene in scenes]
     assert max(errors) > LEVEL

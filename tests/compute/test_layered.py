@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from test_composition import LEVEL, ROUNDED, Footage, device, footage, state  # noqa: F401 – a fixture
 
-from shutter_addon.compute import layer_colors, layer_frames, layer_mattes, memory_needs, weighted_window
+from shutter_addon.compute import layer_colors, layer_frames, layer_mattes, memory_needs, running_sums
 from shutter_addon.compute.gpu import GPUCompositor
 from shutter_addon.compute.renderer import Renderer, open_compositor, open_gl
 from shutter_addon.compute.request import Request
@@ -470,7 +470,7 @@ def test_a_played_frame_uncovers_one(monkeypatch):
 
 
 def test_without_room_for_sums_the_frames_are_read(device, monkeypatch):  # noqa: F811
-    monkeypatch.setattr(weighted_window, "WeightedSums", _no_room)
+    monkeypatch.setattr(running_sums, "WeightedSums", _no_room)
     rng, matte = np.random.default_rng(12), discs()
     source = footage(rng, COUNT, SIZE)
     moment, _ = with_layers(drawn_state(rng, window=6), matte)

@@ -10,8 +10,8 @@ from shutter_addon.compute import memory_needs
 from shutter_addon.compute.cpu import CPUCompositor
 from shutter_addon.compute.layer_frames import WeightedFrames
 from shutter_addon.compute.renderer import open_gl
-from shutter_addon.compute.weighted_window import open_any
-from shutter_addon.compute.window import beside, open_window
+from shutter_addon.compute.running_sums import open_window
+from shutter_addon.compute.window import beside
 from shutter_addon.core.model.frame_state import Options
 from shutter_addon.devices.budget import Budget
 from shutter_addon.devices.device import NoDeviceError
@@ -21,7 +21,8 @@ WINDOW, SHUTTERS = 6, 3
 
 def source(dtype, alpha):
     shape = {"width": 70, "height": 50, "count": 20, "dtype": np.dtype(dtype)}
-    return SimpleNamespace(**shape, alpha=alpha, transfer="srgb", shots=None)
+    read_by = {"windows": 1, "is_made": False, "keep": None}
+    return SimpleNamespace(**shape, **read_by, alpha=alpha, transfer="srgb", shots=None)
 
 
 @pytest.fixture(scope="module")
@@ -56,7 +57,7 @@ def test_of_layers_on_a_gpu(dtype, alpha):
     if alpha != "opaque":
         weighted += [WeightedFrames(pictures, None, alone=True) for _ in range(3)] + [pictures]
     with open_gl(Budget(1 << 30)).current() as roomy:
-        windows = [open_any(roomy, frames, WINDOW, False, SHUTTERS) for frames in weighted]
+        windows = [open_window(roomy, frames, WINDOW, False, SHUTTERS) for frames in weighted]
         taken = roomy.budget.used
         for window in windows:
             window.release()
@@ -104,7 +105,7 @@ def test_of_layers_without_room_for_all_of_them(dtype):
         needs = memory_needs.of_window(device, pictures, kind)
         with device.current():
             frames = memory_needs._read(pictures, kind)  # which those are does not matter here
-            windows = [open_any(device, read, WINDOW, False, SHUTTERS) for read in frames]
+            windows = [open_window(device, read, WINDOW, False, SHUTTERS) for read in frames]
             assert needs.sends == any(window.sends for window in windows)
             for window in windows:
                 window.release()

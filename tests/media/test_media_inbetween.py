@@ -19,9 +19,9 @@ from footage import picture, save_image, see_through
 
 from shutter_addon.core import atomic_write
 from shutter_addon.core.farm import claims
+from shutter_addon.core.frames.source_wrapper import SourceWrapper
 from shutter_addon.media import MediaError, inbetween, inbetween_cache, inbetween_folders, open_source
 from shutter_addon.media.folder import Folder
-from shutter_addon.media.source import SourceWrapper
 
 ROOT = Path(__file__).parents[2]
 FACTOR, COUNT = 4, 6

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from shutter_addon.compute.renderer import open_gl
-from shutter_addon.compute.window import Sums
+from shutter_addon.compute.running_sums import Sums
 from shutter_addon.core.frames.planes import Planes
 from shutter_addon.core.model.frame_state import Options
 from shutter_addon.devices.device import NoDeviceError

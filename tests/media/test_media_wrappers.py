@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from shutter_addon.core.frames.frame_source import FrameSource
+from shutter_addon.core.frames.source_wrapper import SourceWrapper
 from shutter_addon.media import MediaError, PrefetchSource, open_source
 from shutter_addon.media.cuts import ShotSource
 from shutter_addon.media.inbetween import InbetweenSource
-from shutter_addon.media.source import SourceWrapper
 
 MEMBERS = {name for name in {*FrameSource.__annotations__, *vars(FrameSource)} if not name.startswith("_")}
 

@@ -19,7 +19,7 @@ from ...devices.budget import machine_memory
 from ...devices.device import NoDeviceError
 from ...media.files import stamp
 from ..data import missing_media, versions
-from ..devices import machine
+from ..devices import available
 from ..editing import saved_edit
 from ..output import edit_check, error_report, film_join, film_output, output_space, shared_frames
 from ..output.edit_check import EffectCheck
@@ -167,7 +167,8 @@ def _on_device(
     """The name of the device that will render, what is found of the effects (edit_check.effects), and the bytes that
     textures may take of a GPU; without a device, which is a fault, nothing of the effects."""
     try:
-        compositor, lesser = machine.open_device(render_settings.wanted(), render_settings.memory())
+        kind, lesser = available.choose(render_settings.wanted())
+        compositor = available.OPEN[kind](render_settings.memory())
     except NoDeviceError as error:
         faults.append(str(error))
         return None, [], None

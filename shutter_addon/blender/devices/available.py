@@ -3,7 +3,7 @@
 import threading
 from collections.abc import Callable
 from functools import cache, partial
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import bpy
 import gpu
@@ -11,14 +11,15 @@ from bpy.app.translations import pgettext_rpt as rpt_
 
 from ...compute.gpu import GPUCompositor
 from ...compute.renderer import open_compositor, open_gl
+from ...compute.request import Compositor
 from ...core import threads
 from ...devices.device import NoDeviceError
 from .blender_gpu import BlenderDevice, opens_in_background
 from .gpu_relay import RelayedDevice
 
 CHOICES = ("auto", "gpu", "opengl", "blender", "cpu")  # gpu: opengl, or else blender
-# Given a Budget and `ask_others`, as PagedDevice.
-OPEN: dict[str, Callable[..., Any]] = {
+# Given a Budget and `ask_others`, as Device.
+OPEN: dict[str, Callable[..., Compositor]] = {
     "opengl": partial(open_compositor, "gpu"),
     "blender": lambda *memory: GPUCompositor(BlenderDevice(*memory)),
     "relayed": lambda *memory: GPUCompositor(RelayedDevice(*memory)),  # Blender's from a thread of a window's job

@@ -9,23 +9,19 @@ from __future__ import annotations
 
 import subprocess
 import sys
-from collections.abc import Callable
-from contextlib import nullcontext
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from contextlib import AbstractContextManager, nullcontext
 from functools import cache
 from itertools import pairwise
-from typing import Any
 
 import bpy
 import gpu
 import numpy as np
 from bpy.app.translations import pgettext_rpt as rpt_
 
-from ...core import stopping
 from ...devices.budget import Budget, machine_memory
-from ...devices.device import NoDeviceError
+from ...devices.device import TEXEL_BYTES, Device, NoDeviceError, Texture
 from ...devices.llvmpipe import is_llvmpipe
-from ...devices.paging import TEXEL_BYTES, PagedDevice
 from ...devices.passes import Pass, read_pass
 
 TYPES = {"sampler2DArray": "FLOAT_2D_ARRAY", "usampler2DArray": "UINT_2D_ARRAY"}
@@ -69,7 +65,7 @@ def require_context() -> None:
         raise NoDeviceError(rpt_("Blender's GPU cannot be used until a window is drawn"))
 
 
-def free(*objects) -> None:
+def free(*objects: object) -> None:
     """Frees textures and shaders to which nothing else refers: now, or once Blender's GPU is current."""
     _unused.extend(objects)
     if has_context():
@@ -81,23 +77,13 @@ def free_unused() -> None:
     _unused.clear()
 
 
-@dataclass
-class Texture:
-    """A small texture array beside the device's own: its gpu.types.GPUTexture, (width, height, layers), and format (as
-    in GLSL)."""
-
-    gpu: gpu.types.GPUTexture
-    size: tuple[int, int, int]
-    kind: str
-
-
-class BlenderDevice(PagedDevice):
-    """A devices.device.Device, wherever Blender's GPU context is current: in draw handlers, or after gpu.init().
+class BlenderDevice(Device):
+    """A Device, wherever Blender's GPU context is current: in draw handlers, or after gpu.init().
 
     What begins with _ gets and gives the gpu module's own textures; RelayedDevice has it called elsewhere."""
 
-    def __init__(self, budget: Budget | None = None, ask_others: Callable[[], None] | None = None):
-        super().__init__(budget or Budget(), ask_others)
+    def __init__(self, budget: Budget | None = None, ask_others: Callable[[], None] | None = None) -> None:
+        super().__init__(budget, ask_others)
         self._shaders: dict[Pass, gpu.types.GPUShader] = {}
         self._spare: Texture | None = None
         self.name = gpu.platform.renderer_get()
@@ -105,17 +91,17 @@ class BlenderDevice(PagedDevice):
         self.max_size = gpu.capabilities.max_texture_size_get()
         self.budget.tell(machine_memory() if is_llvmpipe(self.name) else None)
 
-    def current(self):
+    def current(self) -> AbstractContextManager[BlenderDevice]:
         """See Device. NoDeviceError: Blender's GPU is not current on this thread."""
         require_context()
         free_unused()
         return self._cleared()
 
-    def freeing(self):
+    def freeing(self) -> AbstractContextManager[BlenderDevice]:
         """See Device."""
         return nullcontext(self)
 
-    def _cleared(self):
+    def _cleared(self) -> AbstractContextManager[BlenderDevice]:
         if gpu.platform.backend_type_get() == "OPENGL":
             self._let_go()
         return nullcontext(self)
@@ -127,7 +113,7 @@ class BlenderDevice(PagedDevice):
         bound in the other; and a new one that gets its number is taken for bound there, by Blender as by Mesa, so that
         passes would read and write the old one."""
         if self._spare is None:
-            self._spare = Texture(self._make(1, 1, 1, "rgba32f"), (1, 1, 1), "rgba32f")
+            self._spare = Texture(None, (1, 1, 1), "rgba32f", self._make(1, 1, 1, "rgba32f"))
         spares = dict.fromkeys((*LETTING_GO.samplers, *LETTING_GO.images), self._spare)
         self.run(LETTING_GO, (1, 1), textures=spares, images=spares, layer=0)
 
@@ -140,7 +126,7 @@ class BlenderDevice(PagedDevice):
     def _free(self, own: gpu.types.GPUTexture) -> None:
         free(own)
 
-    def write(self, texture: Any, array: np.ndarray, layer: int = 0, *, opaque: bool = False) -> None:
+    def write(self, texture: Texture, array: np.ndarray, layer: int = 0, *, opaque: bool = False) -> None:
         height, width = array.shape[:2]
         _, sent_format, packing = _exchanged(texture)
         if texture.kind == "rgba8" and opaque:
@@ -151,21 +137,21 @@ class BlenderDevice(PagedDevice):
             sent = (width, len(strip)), sent_format, _buffer("FLOAT", _packed(strip, packing))
             self._send(texture.gpu, unpacking(texture.kind, packing), sent, top, layer)
 
-    def send(self, texture: Any, frame: np.ndarray) -> Any:
+    def send(self, texture: Texture, frame: np.ndarray) -> Texture:
         """See Device. Numbers are what is sent anyway."""
         height, width = frame.shape[:2]
         if width * height * TEXEL_BYTES["r32f"] > _SENT_BYTES:
             return super().send(texture, frame)
         data = _buffer("FLOAT", _packed(frame, _OPAQUE_BYTES))
-        return Texture(_of_numbers((width, height), "R32F", data), (width, height, 1), "r32f")
+        return Texture(None, (width, height, 1), "r32f", _of_numbers((width, height), "R32F", data))
 
-    def _send(self, stored: gpu.types.GPUTexture, program: Pass, sent: tuple, top: int, layer: int):
+    def _send(self, stored: gpu.types.GPUTexture, program: Pass, sent: tuple, top: int, layer: int) -> None:
         """sent: arguments of _of_numbers, first the size"""
         textures, size = {"sent": _of_numbers(*sent)}, sent[0]
         constants = {"size": size, "top": top, "layer": layer}
         BlenderDevice._dispatch(self, program, program.groups(size), textures, {"stored": stored}, {}, constants)
 
-    def read(self, texture: Any) -> np.ndarray:
+    def read(self, texture: Texture) -> np.ndarray:
         """See Device."""
         width, height, layers = texture.size
         dtype, _, packing = _exchanged(texture)
@@ -178,27 +164,22 @@ class BlenderDevice(PagedDevice):
             array = np.rint(array * np.float32(np.iinfo(dtype).max))
         return array.astype(dtype, copy=False)
 
-    def _read(self, texture: gpu.types.GPUTexture, layer: int, box, components: int, kind: str, pixels) -> None:
+    def _read(
+        self,
+        texture: gpu.types.GPUTexture,
+        layer: int,
+        box: tuple[int, int, int, int],
+        components: int,
+        kind: str,
+        pixels: np.ndarray,
+    ) -> None:
         """By a framebuffer, for GPUTexture.read() gives a first layer alone."""
         framebuffer = gpu.types.GPUFrameBuffer(color_slots={"texture": texture, "layer": layer})
         with framebuffer.bind():
             framebuffer.read_color(*box, components, 0, kind, data=_buffer(kind, pixels))
 
-    def run(
-        self, program: Pass, extent: tuple[int, ...], /, *, textures=None, images=None, blocks=None, **constants
-    ) -> None:
-        stopping.check()
-        self.bring([*(textures[name] for name in program.samplers), *(images[name] for name in program.images)])
-        self._dispatch(
-            program,
-            program.groups(extent),
-            {name: textures[name].gpu for name in program.samplers},
-            {name: images[name].gpu for name in program.images},
-            blocks,
-            constants,
-        )
-
-    def _dispatch(self, program: Pass, groups: tuple[int, ...], textures, images, blocks, constants) -> None:
+    def _dispatch(self, program: Pass, groups: tuple[int, ...], textures: dict, images: dict, *given: Mapping) -> None:
+        blocks, constants = given
         shader = self._shaders.get(program)
         if shader is None:
             shader = self._shaders[program] = _compiled(program)

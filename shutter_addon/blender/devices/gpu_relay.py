@@ -5,22 +5,26 @@ An engine's own way to it (bl_use_gpu_context) holds a lock of Blender's for as 
 is drawn meanwhile.
 """
 
+from __future__ import annotations
+
 import queue
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from concurrent.futures import Future
-from contextlib import suppress
+from contextlib import AbstractContextManager, suppress
 from dataclasses import dataclass
+from typing import Any, TypeVar
 
 import bpy
 import gpu
 
-from ...devices.paging import PagedDevice
+from ...devices.device import Device
 from ...devices.passes import Pass
 from ..data import main_thread
 from .blender_gpu import BlenderDevice, has_context
 
+T = TypeVar("T")
 # Seconds of the main thread that calls take at once, if none takes longer: as many as all else took, within these.
 _LEAST, _MOST = 0.02, 0.05
 _GAP = 0.005  # seconds that the main thread waits there for the next call
@@ -54,32 +58,32 @@ class RelayedDevice(BlenderDevice):
     Its own textures are lists of one, which the main thread empties: on Vulkan Blender crashes where another frees one.
     """
 
-    def __init__(self, *memory):
+    def __init__(self, *memory: Any) -> None:
         super().__init__(*memory)
         self._passes: list[Future] = []
 
-    def current(self):
+    def current(self) -> AbstractContextManager[BlenderDevice]:
         """See Device. Whether Blender's GPU is current is for the main thread to see."""
         return self._cleared()
 
-    def _make(self, *arguments) -> list:
+    def _make(self, *arguments: Any) -> list:
         return self._wait_for(lambda: [BlenderDevice._make(self, *arguments)])
 
     def _free(self, own: list) -> None:
         _called(own.clear)
 
-    send = PagedDevice.send  # what others make would have to be freed there, too
+    send = Device.send  # what others make would have to be freed there, too
 
-    def _send(self, stored: list, *arguments) -> None:
+    def _send(self, stored: list, *arguments: Any) -> None:
         self._wait_for(lambda: BlenderDevice._send(self, *stored, *arguments))
 
-    def _read(self, texture: list, *arguments) -> None:
+    def _read(self, texture: list, *arguments: Any) -> None:
         self._wait_for(lambda: BlenderDevice._read(self, *texture, *arguments))
 
-    def _dispatch(self, program: Pass, groups: tuple[int, ...], textures: dict, images: dict, *arguments) -> None:
-        def dispatch():
+    def _dispatch(self, program: Pass, groups: tuple[int, ...], textures: dict, images: dict, *given: Mapping) -> None:
+        def dispatch() -> None:
             bound = ({name: own[0] for name, own in kind.items()} for kind in (textures, images))
-            BlenderDevice._dispatch(self, program, groups, *bound, *arguments)
+            BlenderDevice._dispatch(self, program, groups, *bound, *given)
 
         self._passes.append(_called(dispatch))
         if len(self._passes) > _AHEAD:
@@ -88,7 +92,7 @@ class RelayedDevice(BlenderDevice):
     def release(self) -> None:
         self._wait_for(lambda: BlenderDevice.release(self))
 
-    def _wait_for(self, function: Callable):
+    def _wait_for(self, function: Callable[[], T]) -> T:
         """What the function gives on the main thread, after all passes."""
         result = _called(function).result()
         passes, self._passes = self._passes, []
@@ -142,9 +146,9 @@ def _finish_some() -> None:
         _main.unfinished, _main.batch = 0, max(1, int(_main.batch * min(max(quick, 0.5), 2.0)))
 
 
-def _called(function: Callable) -> Future:
+def _called(function: Callable[[], T]) -> Future[T]:
     """The function, called on the main thread after all calls before."""
-    done: Future = Future()
+    done: Future[T] = Future()
     _calls.put((done, function))
     _keep_looking()
     with _lock:

@@ -14,13 +14,13 @@ from bpy.types import PropertyGroup
 from ...core import stopping, told
 from ...core.model.choices import CONTEXT
 from ...core.model.frame_state import FrameState
+from ...devices.device import Texture
 from ...media import MediaError
 from ...media.errors import NotBuiltError
 from ..data import annotations, preview_areas, selection, strips
 from ..data.preview_areas import Shown
 from ..data.snapshot import Snapshot
 from ..devices import blender_gpu
-from ..devices.blender_gpu import Texture
 from ..editing import outline_drawings, shown_annotations
 from ..rendering import (
     effect_source,
@@ -395,7 +395,7 @@ def _texture(palette) -> Texture:
     colors[:, :3] = palette
     size = len(colors), 1
     data = gpu.types.Buffer("FLOAT", colors.size, colors.reshape(-1))
-    return Texture(gpu.types.GPUTexture(size, layers=1, format="RGBA32F", data=data), (*size, 1), "rgba32f")
+    return Texture(None, (*size, 1), "rgba32f", gpu.types.GPUTexture(size, layers=1, format="RGBA32F", data=data))
 
 
 class _Notes:

@@ -5,19 +5,21 @@ import importlib
 import os
 import platform
 import re
+import subprocess
+import sys
 import tomllib
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import suppress
+from pathlib import Path
 
 import bpy
 import gpu
 
-from ...compute.benchmark import processor
 from ...core import templates, told
 from ...devices.budget import MEGABYTE, machine_memory
 from ...devices.device import NoDeviceError
 from ..data import preferences, versions
-from ..devices import available, machine
+from ..devices import available
 from ..rendering import render_settings
 from . import edit_structure
 
@@ -30,6 +32,7 @@ PACKAGES = {
     "moderngl": "moderngl",
     "PySceneDetect": "scenedetect",
 }
+BACKENDS = {"OPENGL": "OpenGL", "VULKAN": "Vulkan", "METAL": "Metal", "NONE": "nothing", "UNKNOWN": "unknown"}
 
 
 def text(scene) -> str:
@@ -78,7 +81,7 @@ def _version(module: str) -> str:
 
 def _device() -> Iterator[str]:
     with suppress(SystemError):  # in the background, where nobody has called gpu.init()
-        backend = machine.BACKENDS.get(gpu.platform.backend_type_get(), "unknown")
+        backend = BACKENDS.get(gpu.platform.backend_type_get(), "unknown")
         driver = f"{gpu.platform.renderer_get()}, {gpu.platform.vendor_get()}, {gpu.platform.version_get()}"
         yield f"- Blender's GPU: {backend}, {driver}"
     wanted = render_settings.wanted()
@@ -94,7 +97,19 @@ def _device() -> Iterator[str]:
     most, memory = render_settings.memory().limit // MEGABYTE, machine_memory()
     yield f"- GPU memory: {most} MB may be taken, {preferences.gpu_memory() or 'nothing'} is set in the preferences"
     in_all = "unknown" if memory is None else f"{memory / (1 << 30):.1f} GB"
-    yield f"- Processor: {processor()}, {os.cpu_count()} logical cores; memory: {in_all}"
+    yield f"- Processor: {_processor()}, {os.cpu_count()} logical cores; memory: {in_all}"
+
+
+def _processor() -> str:
+    """The processor's name, as far as the system tells."""
+    with suppress(OSError, subprocess.SubprocessError, StopIteration):
+        if sys.platform == "linux":
+            lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
+            return next(line for line in lines if line.startswith("model name")).partition(":")[2].strip()
+        if sys.platform == "darwin":
+            asked = ["sysctl", "-n", "machdep.cpu.brand_string"]
+            return subprocess.run(asked, capture_output=True, text=True, check=True, timeout=5).stdout.strip()
+    return platform.processor() or platform.machine()
 
 
 def without_paths(words: str) -> str:

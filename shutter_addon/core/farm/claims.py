@@ -32,7 +32,7 @@ class Claims:
 
     patience, beat: as PATIENCE and BEAT, in seconds"""
 
-    def __init__(self, folder: Path, patience: float | None = None, beat: float | None = None):
+    def __init__(self, folder: Path, patience: float | None = None, beat: float | None = None) -> None:
         self._folder = folder
         self._patience = PATIENCE if patience is None else patience
         self._beat = BEAT if beat is None else beat

@@ -5,14 +5,14 @@ from typing import Any
 
 import numpy as np
 
-from ..core.frames.frame_source import FrameSource
-from ..core.frames.planes import Planes
+from .frame_source import FrameSource
+from .planes import Planes
 
 
 class _Forwarded:
     """An attribute of the wrapped source, unless the wrapper sets its own."""
 
-    def __init__(self, name: str):
+    def __init__(self, name: str) -> None:
         self._name = name
 
     def __get__(self, wrapper: "SourceWrapper | None", _owner: type | None = None) -> Any:
@@ -22,7 +22,7 @@ class _Forwarded:
 class SourceWrapper(FrameSource):
     """A source around another one. It has all attributes and frames of that one, but for those that a subclass sets."""
 
-    def __init__(self, source: FrameSource):
+    def __init__(self, source: FrameSource) -> None:
         self._source = source
 
     def read(self, index: int) -> np.ndarray:
@@ -39,6 +39,9 @@ class SourceWrapper(FrameSource):
 
     def check(self, index: int) -> None:
         self._source.check(index)
+
+    def keep(self, count: int) -> None:
+        self._source.keep(count)
 
     def close(self) -> None:
         self._source.close()
