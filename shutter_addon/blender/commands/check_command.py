@@ -17,10 +17,8 @@ from ...core.frames import frame_ranges
 from ...core.messages import UserError, signed
 from ...devices.budget import machine_memory
 from ...devices.device import NoDeviceError
-from ...media.files import stamp
 from ..data import missing_media, versions
 from ..devices import machine
-from ..editing import saved_edit
 from ..output import edit_check, error_report, film_join, film_output, output_space, shared_frames
 from ..output.edit_check import EffectCheck
 from ..output.output_space import Need, in_units
@@ -54,12 +52,10 @@ def add(commands) -> None:
 
 
 def run(arguments) -> None:
-    opened = stamp(arguments.edit)
-    scene = saved_edit.open_edit(arguments.edit)
-    first, last = command_line.frames(arguments.frames, (scene.frame_start, scene.frame_end), "edit")
-    frames = range(first, last + 1)
-    with render_settings.using(render_settings.RenderSettings(arguments.device, gpu_memory=arguments.gpu_memory)):
-        report = _report(arguments, scene, frames, saved_edit.version(scene, arguments.edit, opened))
+    edit = command_line.open_edit(arguments.edit, arguments.frames)
+    scene = edit.scene
+    with command_line.rendered_by(arguments):
+        report = _report(arguments, scene, edit.frames, edit.version())
         if arguments.report:
             for found in (*report["notes"], *report["faults"]):
                 told.record(found)
@@ -114,7 +110,7 @@ def _report(arguments, scene, frames: range, version: EditVersion) -> dict:
     if arguments.movie and film_output.is_movie(arguments.movie):  # last: it changes the scene
         faults += _fault(film_join.rehearse, scene, arguments.movie, arguments.format or "png", frames)
     if arguments.output and not faults:
-        faults += _fault(_write_job, arguments.output, version)
+        faults += _fault(film_output.prepare, arguments.output) or _fault(job_file.write, arguments.output, version)
     return report
 
 
@@ -142,8 +138,7 @@ def _setting_faults(arguments, scene, frames: range) -> list[str]:
     read = [arguments.edit, *versions.read_files(scene)]
     faults = _fault(shared_frames.check_resumable, scene) if arguments.resume else []
     if arguments.output:
-        ends = frames[0], frames[-1]
-        faults += _fault(shared_frames.check, arguments.output, arguments.format, ends, read)
+        faults += _fault(shared_frames.check, arguments.output, arguments.format, frames, read)
     if arguments.movie:
         return faults + _fault(film_join.check, arguments.movie, [*read, *versions.sounds()])
     is_movie = scene.render.image_settings.media_type == "VIDEO"
@@ -194,8 +189,7 @@ def _disk(arguments, scene, frames: range, checks: list[EffectCheck], faults: li
     file_format, needs = arguments.format or "png", []
     frame = output_space.picture(*film_output.size(scene), film_output.FORMATS[file_format].bits // 8)
     if output := arguments.output:
-        pictures = film_output.pictures_of(output, file_format, (frames[0], frames[-1]))
-        left = sum(not path.exists() for path in pictures)
+        left = sum(not path.exists() for path in film_output.pictures_of(output, file_format, frames))
         needs.append(Need(output, left * frame, f"{left} frames"))
     if arguments.movie:
         needs.append(Need(arguments.movie.parent, 0, "the movie"))
@@ -211,11 +205,6 @@ def _disk(arguments, scene, frames: range, checks: list[EffectCheck], faults: li
         "inbetweens": sum(each.bytes for each in checks),
         "free": output_space.free(output) if output else None,
     }
-
-
-def _write_job(folder: Path, job: EditVersion) -> None:
-    film_output.prepare(folder)
-    job_file.write(folder, job)
 
 
 def _effect(check: EffectCheck) -> dict:

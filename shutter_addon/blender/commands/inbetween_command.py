@@ -38,10 +38,9 @@ def _build_edit(arguments) -> None:
     for name in ("factor", "method", "cache"):
         if getattr(arguments, name) is not None:
             raise film_output.OutputError(f"--{name}: is for a source; a saved edit says it itself")
-    scene = saved_edit.open_edit(arguments.source)
-    whole = scene.frame_start, scene.frame_end
-    scene.frame_start, scene.frame_end = command_line.frames(arguments.frames, whole, "edit")
-    build_lacking(scene)
+    edit = command_line.open_edit(arguments.source, arguments.frames)
+    edit.scene.frame_start, edit.scene.frame_end = edit.frames[0], edit.frames[-1]
+    build_lacking(edit.scene)
 
 
 def _build_source(arguments) -> None:
@@ -50,11 +49,11 @@ def _build_source(arguments) -> None:
             raise film_output.OutputError(f"--{name} is missing: only a saved edit (.blend) says it itself")
     path = arguments.source
     with command_line.opened(path) as medium:
-        first, last = command_line.frames(arguments.frames, (1, medium.count))
+        frames = command_line.frames(arguments.frames, range(1, medium.count + 1))
         strip = new_edit.make_source(path, medium)
     # A strip may read the file in another way, with a colour space of Blender's own choice.
     with source_media.open_media(strip) as medium:
-        pairs = range(first - 1, min(last, medium.count - 1))
+        pairs = range(frames[0] - 1, min(frames[-1], medium.count - 1))
         _build(medium, arguments.cache, arguments.factor, arguments.method or "quick", pairs)
 
 

@@ -9,7 +9,6 @@ from ...core import atomic_write
 from ...core.farm import job_file
 from ...core.recipes import recipe, recipe_file
 from ...media.completeness import is_whole_blend, why_short
-from ...media.files import stamp
 from ...media.matte_files import MatteFile
 from ..data import inbetween_settings, missing_media, preferences, versions
 from ..devices import available
@@ -59,21 +58,18 @@ def _render_edit(arguments) -> None:
         if getattr(arguments, name) is not None:
             option = f"--{name.replace('_', '-')}"
             raise film_output.OutputError(f"{option}: is for a source and a recipe; a saved edit is rendered as it is")
-    source, output, file_format = arguments.source, arguments.output, arguments.format or "png"
+    output, file_format = arguments.output, arguments.format or "png"
     if output is None:
         raise film_output.OutputError("nothing to do: give --output")
-    opened = stamp(source)
-    scene = saved_edit.open_edit(source)
-    whole = scene.frame_start, scene.frame_end
-    scene.frame_start, scene.frame_end = frames = command_line.frames(arguments.frames, whole, "edit")
-    for fault in missing_media.faults(scene, range(frames[0], frames[1] + 1), sources=True):
+    edit = command_line.open_edit(arguments.source, arguments.frames)
+    scene, frames = edit.scene, edit.frames
+    scene.frame_start, scene.frame_end = frames[0], frames[-1]
+    for fault in missing_media.faults(scene, frames, sources=True):
         raise film_output.OutputError(fault)  # Blender would render on without it
-    settings = render_settings.RenderSettings(arguments.device, gpu_memory=arguments.gpu_memory)
-    with render_settings.using(settings), shared_frames.of_same_footage(scene) as rendered:
-        version = saved_edit.version(scene, source, opened)
+    with command_line.rendered_by(arguments), shared_frames.of_same_footage(scene) as rendered:
+        version = edit.version()
         job_file.guard(output, version)
-        read = [source, *versions.read_files(scene)]
-        shared_frames.check(output, arguments.format, frames, read)
+        shared_frames.check(output, arguments.format, frames, [edit.path, *versions.read_files(scene)])
         _check_device(arguments)
         shared_frames.render(scene, output, file_format, version, rendered, resume=arguments.resume)
 
@@ -94,11 +90,11 @@ def _render_source(arguments) -> None:
             film_output.check(output, arguments.format, (medium.width, medium.height))
             if arguments.save and film_output.is_movie(output) and "#" in output.name:
                 raise film_output.OutputError(f"{output}: in a saved edit, Blender takes # for the frames' numbers")
-        frames = command_line.frames(arguments.frames, (1, new_edit.length(medium, source_recipe)))
+        frames = command_line.frames(arguments.frames, range(1, new_edit.length(medium, source_recipe) + 1))
         read = path, *command_line.files(medium), arguments.recipe, *_mattes(source_recipe, arguments.recipe.parent)
         film_output.spare(_written(arguments, file_format, frames), read)
         scene = new_edit.make_edit(path, medium, source_recipe, arguments.recipe.parent)
-    scene.frame_start, scene.frame_end = frames
+    scene.frame_start, scene.frame_end = frames[0], frames[-1]
     if output:
         _check_device(arguments)
         film_output.set_output(scene, output, file_format, alpha=medium.alpha != "opaque")
@@ -120,7 +116,7 @@ def _check_device(arguments) -> None:
     available.choose(arguments.device or preferences.device())
 
 
-def _written(arguments, file_format: str, frames: tuple[int, int]) -> list[Path]:
+def _written(arguments, file_format: str, frames: range) -> list[Path]:
     """All files that a render writes, but for in-between frames."""
     files = [arguments.save] if arguments.save else []
     if arguments.output and film_output.is_movie(arguments.output):

@@ -51,11 +51,12 @@ def run(arguments) -> None:
             filter(None, (arguments.output, arguments.report)),
             [arguments.source, *command_line.files(medium), arguments.recipe],
         )
-        first, last = command_line.frames(arguments.frames, (1, new_edit.length(medium, source_recipe)))
-        if not first <= arguments.frame <= last:
-            raise film_output.OutputError(f"--frame: {arguments.frame} is not within the frames {first}:{last}")
+        frames = command_line.frames(arguments.frames, range(1, new_edit.length(medium, source_recipe) + 1))
+        if arguments.frame not in frames:
+            fault = f"{arguments.frame} is not within the frames {frames[0]}:{frames[-1]}"
+            raise film_output.OutputError(f"--frame: {fault}")
         try:
-            tracked, stops = _followed(arguments, source_recipe, index, medium, range(first, last + 1))
+            tracked, stops = _followed(arguments, source_recipe, index, medium, frames)
         except tracking.TrackingError as error:
             raise tracking.TrackingError(f"{subject}: {error}") from None
         size = medium.width, medium.height
@@ -63,7 +64,7 @@ def run(arguments) -> None:
     with_keys = _keyed(source_recipe, index, placements, {arguments.frame}, size, thin=not arguments.all_keys)
     has_matte = index is not None and isinstance(source_recipe.regions[index], recipe.OutlineRegion)
     if not (arguments.hold or has_matte):  # a matte says itself where it is
-        with_keys = _ended(with_keys, index, tracked, stops, arguments.frame, range(first, last + 1))
+        with_keys = _ended(with_keys, index, tracked, stops, arguments.frame, frames)
     _write_track(arguments, with_keys, tracked, stops)
     for stop in stops:
         if stop.fault == tracking.SHOT_ENDS:

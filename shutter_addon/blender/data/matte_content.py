@@ -19,7 +19,16 @@ from ...media.carried_mattes import FOLDER, CarriedFile
 from ...media.files import stamp
 from ...media.matte_files import MatteFile
 from ...media.sequence import ImageFiles
-from . import inbetween_settings, mask_reading, matte_strips, source_media, strip_timing, strips, validation
+from . import (
+    external_files,
+    inbetween_settings,
+    mask_reading,
+    matte_strips,
+    source_media,
+    strip_timing,
+    strips,
+    validation,
+)
 
 
 def content(effect, strip, region, moves: Moves, frames, time: keyframes.Channel | None) -> keyframes.Channel:
@@ -66,7 +75,7 @@ def image_path(region) -> Path:
     if image.source not in ("FILE", "SEQUENCE", "MOVIE") or image.packed_file or not image.filepath:
         sentence = rpt_('{place}: image "{image}" is not a movie, image sequence or picture on disk')
         raise EffectError(sentence.format(place=place, image=image.name))
-    return Path(bpy.path.abspath(image.filepath, library=image.library))
+    return external_files.absolute(image, image.filepath)
 
 
 def image_file(region) -> MatteFile:

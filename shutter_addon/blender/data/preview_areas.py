@@ -6,11 +6,9 @@ from typing import Any
 
 import numpy as np
 
-from . import annotations, geometry, selection, strip_proxies, strips
+from . import annotations, geometry, seen_alone, selection, strip_proxies, strips
 
 _PERCENT = {"PROXY_25": 25, "PROXY_50": 50, "PROXY_75": 75, "PROXY_100": 100}
-_STANDARD = {"view_transform": "Standard", "look": "None", "exposure": 0.0, "gamma": 1.0}
-_STANDARD |= {"use_curve_mapping": False, "use_white_balance": False}
 _PLAIN_STRIP = {"blend_alpha": 1.0, "color_saturation": 1.0, "scene_input": "CAMERA"}
 _PLAIN_SPACE = {"display_mode": "IMAGE", "display_channel": 0, "show_overexposed": 0}
 
@@ -77,7 +75,7 @@ def look(context, scene, effect, strip) -> Look:
     areas = list(_areas_of(context, scene))
     scales = {area.spaces.active: _scale(context, scene, strip, area) for area in areas}
     scales = {space: scale for space, scale in scales.items() if math.isfinite(scale)}
-    is_plain = _is_plain(scene, strip) and all(_has(area.spaces.active, _PLAIN_SPACE) for area in areas)
+    is_plain = _is_plain(scene, strip) and all(seen_alone.has(area.spaces.active, _PLAIN_SPACE) for area in areas)
     if not scales:
         return Look(None, None, is_plain)
     space = max(scales, key=scales.__getitem__)
@@ -88,18 +86,14 @@ def _is_plain(scene, strip) -> bool:
     """Whether the scene shows a strip's picture as it is."""
     return (
         strip.blend_type in ("REPLACE", "ALPHA_OVER")
-        and _has(strip, _PLAIN_STRIP)
+        and seen_alone.has(strip, _PLAIN_STRIP)
         and strip.color_multiply in (1, strips.IN_CODE_VALUES)
         and all(modifier.mute for modifier in strip.modifiers)
         and scene.display_settings.display_device == "sRGB"
-        and _has(scene.view_settings, _STANDARD)
+        and seen_alone.has(scene.view_settings, seen_alone.STANDARD)
         and not scene.render.use_multiview
         and not scene.sequence_editor.show_overlay_frame
     )
-
-
-def _has(item, values: dict) -> bool:
-    return all(getattr(item, name) == value for name, value in values.items())
 
 
 def _proxy(scene, effect, strip, space) -> strip_proxies.Proxy | None:

@@ -20,8 +20,8 @@ _UNCROPPED = dict.fromkeys(("min_x", "min_y", "max_x", "max_y"), 0)
 _WHOLE = {"resolution_percentage": 100, "use_border": False, "use_multiview": False}
 _UNMARKED = {"use_stamp": False, "metadata_input": "SCENE"}
 _PLAIN_RENDER = _UNMARKED | {"use_sequencer": True, "frame_map_old": 100, "frame_map_new": 100}
-_STANDARD = {"view_transform": "Standard", "look": "None", "exposure": 0.0, "gamma": 1.0}
-_STANDARD |= {"use_curve_mapping": False, "use_white_balance": False}
+PLAIN_VIEW = {"look": "None", "exposure": 0.0, "gamma": 1.0, "use_curve_mapping": False, "use_white_balance": False}
+STANDARD = PLAIN_VIEW | {"view_transform": "Standard"}
 _LEVELS = {"color_depth": "8", "color_management": "FOLLOW_SCENE"}
 _MODES = "RGB", "RGBA"  # grey is made of light
 _FORMATS = ("FFMPEG", "PNG", "JPEG")
@@ -46,7 +46,7 @@ def hides(scene: Any, strip: Any) -> bool:
         and has(size, _WHOLE)
         and has(shown, _UNMARKED)
         and (shown.resolution_x, shown.resolution_y) == (size.resolution_x, size.resolution_y)
-        and not _is_animated(scene, strip)
+        and not has_animation(scene, f'sequence_editor.strips_all["{bpy.utils.escape_identifier(strip.name)}"]')
     )
 
 
@@ -96,7 +96,7 @@ def makes_levels(scene: Any) -> bool:
         and bpy.data.colorspace.working_space == "Linear Rec.709"
         and scene.sequencer_colorspace_settings.name == "sRGB"
         and scene.display_settings.display_device == "sRGB"
-        and has(scene.view_settings, _STANDARD)
+        and has(scene.view_settings, STANDARD)
         and has(scene.render.image_settings, _LEVELS)
         and scene.render.image_settings.file_format in _FORMATS
         and scene.render.image_settings.color_mode in _MODES
@@ -104,10 +104,6 @@ def makes_levels(scene: Any) -> bool:
         and scene.frame_subframe == 0
         and not any(has_animation(scene, name) for name in ("view_settings", "render.", "display_settings"))
     )
-
-
-def _is_animated(scene: Any, strip: Any) -> bool:
-    return has_animation(scene, f'sequence_editor.strips_all["{bpy.utils.escape_identifier(strip.name)}"]')
 
 
 def has_animation(scene: Any, part: str) -> bool:

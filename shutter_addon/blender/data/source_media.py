@@ -13,7 +13,7 @@ from ...media import MediaError, open_source
 from ...media.files import stamp
 from ...media.opening import with_proxy
 from ...media.sequence import by_number
-from . import strip_proxies
+from . import external_files, strip_proxies
 
 _AT_ONCE = 100  # files of a sequence, which may be long, that one look asks, beside the first and the last
 _REST = 1.0  # seconds from one look at them to the next: on a network's drive a look takes a while
@@ -203,11 +203,10 @@ def _files(strip):
             sentence = rpt_('strip "{strip}": undistorted or stabilized clips are not supported')
             raise MediaError(sentence.format(strip=strip.name))
         return _clip_files(strip)
-    library = strip.id_data.library
     if strip.type == "MOVIE":
-        movie = Path(bpy.path.abspath(strip.filepath, library=library))
+        movie = external_files.absolute(strip, strip.filepath)
         return 1, lambda _i: movie
-    folder, elements = Path(bpy.path.abspath(strip.directory, library=library)), strip.elements
+    folder, elements = external_files.absolute(strip, strip.directory), strip.elements
     if not elements:
         raise MediaError(rpt_('strip "{strip}" has no files').format(strip=strip.name))
     return len(elements), lambda i: folder / elements[i].filename
@@ -218,7 +217,7 @@ def _clip_files(strip):
     clip = strip.clip
     if clip is None:
         raise MediaError(rpt_('strip "{strip}" has no clip').format(strip=strip.name))
-    path = Path(bpy.path.abspath(clip.filepath, library=clip.library))
+    path = external_files.absolute(clip, clip.filepath)
     beside = by_number(path)
     if clip.source == "MOVIE" or beside is None:
         return 1, lambda _i: path

@@ -6,6 +6,7 @@ from pathlib import Path
 import bpy
 
 from ...media.files import stamp
+from . import external_files
 
 
 @dataclass(frozen=True)
@@ -28,12 +29,12 @@ def proxy_of(scene, strip, percent: int) -> Proxy | None:
     if by_strip and strip.proxy.use_proxy_custom_file:
         return _proxy(_absolute(strip.proxy.filepath))
     if strip.type == "MOVIE":
-        movie = _absolute(strip.filepath, strip.id_data.library)
+        movie = external_files.absolute(strip, strip.filepath)
         stream = f"_st{strip.stream_index}" if strip.stream_index else ""
         return _proxy(_folder(scene, strip, movie.parent) / movie.name / f"proxy_{percent}{stream}.avi")
     if scene.sequencer_colorspace_settings.name != "sRGB":  # what Blender keeps its pictures in
         return None
-    folder = _folder(scene, strip, _absolute(strip.directory, strip.id_data.library)) / "images" / str(percent)
+    folder = _folder(scene, strip, external_files.absolute(strip, strip.directory)) / "images" / str(percent)
     ends = strip.elements[0], strip.elements[-1]
     return _proxy(folder, *(of_image(folder, element.filename) for element in ends))
 
@@ -58,6 +59,6 @@ def _proxy(path: Path, *files: Path) -> Proxy | None:
     return None if None in stamps else Proxy(path, bool(files), stamps)
 
 
-def _absolute(path: str, library=None) -> Path:
-    """Footage is found from the file that its strip is in; folders of proxies Blender finds from the open one."""
-    return Path(bpy.path.abspath(path, library=library))
+def _absolute(path: str) -> Path:
+    """Blender finds folders of proxies from the file that is open, wherever their strip is from."""
+    return Path(bpy.path.abspath(path))

@@ -112,8 +112,7 @@ def _check(scene: Any, effect: Any, strip: Any, kind: Kind) -> None:
 
 
 def render(scene: Any, effect: Any, strip: Any, film: Film, told: Callable[[int], object]) -> None:
-    """Renders what is missing of a film. told: called with the number of frames that are there, and may
-    raise StoppedError.
+    """Renders what is missing of a film. told: called with the number of frames that are there, and may raise.
 
     One of FAULTS, OutputError, OSError: it cannot be made. InterruptedRenderError: it was stopped. What is finished
     stays, and the next call goes on from there."""

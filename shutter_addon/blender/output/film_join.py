@@ -15,13 +15,12 @@ from ...core.frames import frame_ranges
 from ...core.messages import signed
 from ...media import image_writing, rendered_pictures
 from ...media.rendered_pictures import RenderedPicture
-from ..data import requirements, strips
+from ..data import requirements, seen_alone, strips
 from ..rendering import render_job
 from . import film_output
 from .film_output import OutputError
 
 AT_ONCE = 1000  # pictures of a strip: Blender copies all that it has for each that is added
-_CHANGES = {"look": "None", "exposure": 0.0, "gamma": 1.0, "use_curve_mapping": False, "use_white_balance": False}
 
 
 def check(output: Path, read: list[Path]) -> None:
@@ -42,7 +41,7 @@ def rehearse(scene, output: Path, file_format: str, frames: range) -> None:
         folder, trial = Path(place), Path(place, f"movie{output.suffix}")
         _write_black(folder / f"{frames[0]:04d}.{file_format}", film_output.size(scene))
         try:
-            join(scene, folder, trial, (frames[0], frames[0]), "", progress=lambda *_: nullcontext(lambda: None))
+            join(scene, folder, trial, frames[:1], "", progress=lambda *_: nullcontext(lambda: None))
         except OutputError as error:
             raise type(error)(str(error).replace(str(trial), str(output))) from None
 
@@ -65,14 +64,14 @@ def _write_black(path: Path, size: tuple[int, int]) -> None:
         image_writing.write_grey(path, np.zeros((height, width), np.float32))
 
 
-def join(scene, folder: Path, output: Path, frames: tuple[int, int], key: str, progress=film_output.progress) -> None:
-    """Makes a movie of the rendered frames, first and last, in a folder; `scene` is changed, and not to be used again.
+def join(scene, folder: Path, output: Path, frames: range, key: str, progress=film_output.progress) -> None:
+    """Makes a movie of these rendered frames in a folder; `scene` is changed, and not to be used again.
 
     key: that of the edit; progress: as film_output.progress. OutputError, MediaError: frames are missing, broken,
     unlike each other or of another edit, or the movie cannot be written, which is there whole or not at all.
     InterruptedRenderError: by Ctrl-C or TERM."""
-    scene.frame_start, scene.frame_end = frames
-    paths = _pictures(folder, range(frames[0], frames[1] + 1, scene.frame_step))
+    scene.frame_start, scene.frame_end = frames[0], frames[-1]
+    paths = _pictures(folder, frames[:: scene.frame_step])
     size = film_output.size(scene)
     film_output.check(output, None, size)
     with progress(len(paths), "picture") as looked:
@@ -136,10 +135,9 @@ def _are(frames: list[int]) -> str:
     return f"{frame_ranges.in_words(frames)} {'is' if len(frames) == 1 else 'are'}"
 
 
-def say_what_is_left_out(folder: Path, frames: tuple[int, int]) -> None:
+def say_what_is_left_out(folder: Path, frames: range) -> None:
     """A word on stderr of pictures that are no frames of the edit."""
-    others = [frame for frame in _numbered(folder) if not frames[0] <= frame <= frames[1]]
-    if others:
+    if others := [frame for frame in _numbered(folder) if frame not in frames]:
         print(signed(f"{folder}: {_are(others)} not of the edit, and left out"), file=sys.stderr)
 
 
@@ -239,7 +237,7 @@ def _keep_colours(scene, suffix: str, first: RenderedPicture) -> str | None:
         shown.view_settings.view_transform = "Standard"
     except TypeError:
         raise OutputError("PNG frames need the view Standard, which this OpenColorIO configuration lacks") from None
-    for name, value in _CHANGES.items():
+    for name, value in seen_alone.PLAIN_VIEW.items():
         setattr(shown.view_settings, name, value)
     if first.samples == "uint8":
         scene.render.dither_intensity = 0  # it has been added to them

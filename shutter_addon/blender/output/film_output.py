@@ -113,9 +113,9 @@ def _identity(path: Path):
     return status.st_dev, status.st_ino
 
 
-def pictures_of(folder: Path, ending: str, frames: tuple[int, int]) -> list[Path]:
-    """The files of these frames, first and last, in a folder."""
-    return [folder / f"{frame:04d}.{ending}" for frame in range(frames[0], frames[1] + 1)]
+def pictures_of(folder: Path, ending: str, frames: range) -> list[Path]:
+    """The files of these frames in a folder."""
+    return [folder / f"{frame:04d}.{ending}" for frame in frames]
 
 
 def for_blender(path: str) -> str:
@@ -278,7 +278,7 @@ def message(error: RuntimeError) -> str:
 def _moved(part: Path, output: Path, scene, update: Callable[[], None], move: Callable[[Path, Path], object]):
     """Moves each finished picture from `part` to `output`, and calls both. Gives the pictures that are missing so
     far, by name; none of a movie's."""
-    frames = scene.frame_start, scene.frame_end
+    frames = range(scene.frame_start, scene.frame_end + 1)
     settings = scene.render.image_settings
     ending = next((name for name, kind in FORMATS.items() if settings.file_format == kind.blender), "")
     missing = {path.name: path for path in pictures_of(output, ending, frames)} if ending else {}

@@ -21,8 +21,8 @@ Stamps = dict[Path, tuple | None]  # rendered_pictures.stamp of pictures
 _PAUSE = 1.0  # seconds between two looks at what others have finished
 
 
-def check(folder: Path, file_format: str | None, frames: tuple[int, int], read: list[Path]) -> None:
-    """OutputError: an edit's frames, first and last, cannot be rendered there.
+def check(folder: Path, file_format: str | None, frames: range, read: list[Path]) -> None:
+    """OutputError: an edit's frames cannot be rendered there.
 
     file_format: None for PNG, where the folder is not to be taken for a file; read: what is not to be written over"""
     if film_output.is_movie(folder):
@@ -71,7 +71,8 @@ def render(scene, folder: Path, file_format: str, version: EditVersion, rendered
     film_output.prepare(folder)
     samples = film_output.FORMATS[file_format].samples
     is_finished = partial(_is_finished, film_output.size(scene), samples, version.key, {})
-    pictures = {frame: folder / f"{frame:04d}.{file_format}" for frame in range(scene.frame_start, scene.frame_end + 1)}
+    frames = range(scene.frame_start, scene.frame_end + 1)
+    pictures = dict(zip(frames, film_output.pictures_of(folder, file_format, frames), strict=True))
 
     def move(part, picture):
         job_file.guard(folder, version)  # again: it may be for a newer version by now

@@ -285,11 +285,6 @@ def was_drawn() -> None:
     looking.slice_of = looking.slice = None
 
 
-def is_composing() -> bool:
-    """Whether a picture that was begun is not there yet."""
-    return looking.slice is not None
-
-
 def is_going(context: Any) -> bool:
     """Whether the film plays, or may_be_late."""
     return _is_playing(context) or may_be_late()

@@ -9,9 +9,11 @@ import sys
 import threading
 import time
 from collections.abc import Callable, Iterator
+from concurrent.futures import Future, wait
 from contextlib import AbstractContextManager, contextmanager, suppress
 from dataclasses import dataclass
 from enum import Enum
+from itertools import chain
 from types import FrameType
 from typing import Any
 
@@ -162,12 +164,8 @@ def scripts_act() -> bool:
     handlers, own = bpy.app.handlers, __name__.split(".blender.")[0]
     lists: list[list] = [handlers.render_pre, handlers.render_post, handlers.render_write, handlers.render_stats]
     lists += [handlers.render_init, handlers.frame_change_pre, handlers.frame_change_post]  # of effects at each frame
-    return any(not _module(function).startswith(own) for functions in lists for function in functions)
-
-
-def _module(function: Any) -> str:
-    """Where a function, or what is partly given its arguments, is from."""
-    return str(getattr(getattr(function, "func", function), "__module__", ""))
+    functions = [getattr(each, "func", each) for each in chain(*lists)]  # of partial ones, what they call
+    return any(not str(getattr(function, "__module__", "")).startswith(own) for function in functions)
 
 
 def on_main_thread(function: Callable, ended: Callable[[], bool] | None = None) -> Any:
@@ -176,25 +174,22 @@ def on_main_thread(function: Callable, ended: Callable[[], bool] | None = None) 
     for long. Once it is called, its end is waited for."""
     if where() is not Where.JOB:
         return function()
-    chance, done, deadline, results = threading.Lock(), threading.Event(), time.monotonic() + _LONG, []
+    future: Future = Future()
+    deadline = time.monotonic() + _LONG
     ended = ended or (lambda: time.monotonic() > deadline)
 
     def call() -> None:
-        if chance.acquire(blocking=False):
+        if future.set_running_or_notify_cancel():
             try:
-                results.append((True, function()))
+                future.set_result(function())
             except Exception as error:
-                results.append((False, error))
-            done.set()
+                future.set_exception(error)
 
     main_thread.soon(call)
-    while not done.wait(_PATIENCE):
-        if ended() and chance.acquire(blocking=False):
+    while not wait([future], _PATIENCE).done:
+        if ended() and future.cancel():
             return None
-    good, value = results[0]
-    if not good:
-        raise value
-    return value
+    return future.result()
 
 
 def soon(function: Callable[[], None]) -> None:
@@ -223,11 +218,6 @@ def fail(text: str) -> None:
         _job.tell(text)
 
 
-def failure() -> str | None:
-    """The sentence that ended the render which runs or ran last; None: none had to."""
-    return _job.failure
-
-
 def cancel(ended: Callable[[], bool] | None = None) -> None:
     """Ends the render that runs, as soon as this returns to Blender: from a picture, or from what comes before a frame.
     (After one Blender would go on with the next, and crash.)
@@ -243,8 +233,14 @@ def cancel(ended: Callable[[], bool] | None = None) -> None:
 
 
 def _cancel_and_show() -> None:
+    """As _cancel, and says in the window what failed: reports of an engine within the sequencer reach nobody."""
     _cancel()
-    _show()
+    if _job.failure is not None:
+        text = sentence(_job.failure)
+        with bpy.context.temp_override(window=bpy.context.window_manager.windows[0]):
+            bpy.context.window_manager.popup_menu(
+                lambda menu, _context: menu.layout.label(text=text), title="Virtual Shutter", icon="ERROR"
+            )
 
 
 def _cancel() -> None:
@@ -287,16 +283,6 @@ def _remove_spent() -> None:
 def cancelling() -> bool:
     """Whether the small render runs whose error ends the other one."""
     return _job.cancelling
-
-
-def _show() -> None:
-    """Says in the window what failed: reports of an engine within the sequencer reach nobody."""
-    if _job.failure is not None:
-        text = sentence(_job.failure)
-        with bpy.context.temp_override(window=bpy.context.window_manager.windows[0]):
-            bpy.context.window_manager.popup_menu(
-                lambda menu, _context: menu.layout.label(text=text), title="Virtual Shutter", icon="ERROR"
-            )
 
 
 def leave(code: int) -> None:
