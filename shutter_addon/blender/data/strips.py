@@ -35,6 +35,11 @@ def effect_strips(scene) -> list:
     ]
 
 
+def scene_of_uid(uid: int | None) -> bpy.types.Scene | None:
+    """The scene of a session_uid, unless it is gone."""
+    return next((scene for scene in bpy.data.scenes if scene.session_uid == uid), None)
+
+
 def local_scenes() -> list:
     """The scenes that can be changed: linked ones cannot."""
     return [scene for scene in bpy.data.scenes if scene.library is None]

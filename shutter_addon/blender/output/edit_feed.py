@@ -7,15 +7,11 @@ picture by itself keeps its floats, as a script may save it as others than the e
 was once the render ends, or a file is saved or loaded meanwhile: from then on the engine renders.
 """
 
-import tempfile
 from contextlib import ExitStack
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-import bpy
-
-from ...core import atomic_write
 from ...core.pixels.shown_levels import Display
 from ...media import display_transfer
 from ..data import seen_alone, strips
@@ -23,9 +19,8 @@ from ..rendering import job_snapshots, pictures, render_context, render_job
 from ..rendering.effect_source import FULL, in_words
 from ..rendering.engine import say
 from ..rendering.render_job import Where
+from . import levels_file
 from .levels_file import LevelsFile, strip_above
-
-_NAME = "picture.tif"
 
 
 @dataclass
@@ -81,11 +76,6 @@ def before_frame(scene: Any) -> None:
         shown.mute = not is_fed
 
 
-def _strip(uid: int, name: str) -> Any:
-    scene = next((scene for scene in bpy.data.scenes if scene.session_uid == uid), None)
-    return scene.sequence_editor.strips_all.get(name) if scene and scene.sequence_editor else None
-
-
 def _feed(film: _Film, scene: Any, seen: seen_alone.Alone) -> bool:
     """Fills the file with the effect's levels. False: the engine has to render the frame, and to say what is wrong."""
     strip = seen.strip
@@ -114,10 +104,7 @@ def _feed(film: _Film, scene: Any, seen: seen_alone.Alone) -> bool:
 def _file(film: _Film, scene: Any) -> LevelsFile:
     """The file of the film, with a strip that shows it. OSError: it cannot be written."""
     if film.file is None:
-        size = scene.render.resolution_x, scene.render.resolution_y
-        atomic_write.clear_up(place := Path(tempfile.gettempdir()))
-        folder = film.changed.enter_context(atomic_write.part_folder(place))
-        film.file = film.changed.enter_context(LevelsFile(folder / _NAME, *size))
+        film.file = film.changed.enter_context(levels_file.temporary(scene))
         film.strip = _add_strip(film, scene, film.file.path)
     return film.file
 
@@ -132,8 +119,9 @@ def _add_strip(film: _Film, scene: Any, path: Path) -> str:
     name = strip.name
 
     def remove() -> None:
-        if (found := _strip(uid, name)) is not None:
-            editor = found.id_data.sequence_editor
+        scene = strips.scene_of_uid(uid)
+        editor = scene and scene.sequence_editor
+        if editor and (found := editor.strips_all.get(name)) is not None:
             editor.use_cache_raw, editor.use_cache_final = kept
             editor.strips.remove(found)
 

@@ -6,20 +6,18 @@ uncompressed file of the levels that the movie will have, above the effect strip
 """
 
 import struct
-import tempfile
 from contextlib import ExitStack, contextmanager, suppress
 from functools import partial
-from pathlib import Path
 
 import bpy
 
-from ...core import atomic_write
 from ...core.stopping import StoppedError
 from ..data import colour_configuration, snapshot, strips
 from ..rendering import pictures, render_context, render_job, render_settings
 from ..rendering.effect_source import in_words
 from ..rendering.engine import say
-from .levels_file import LevelsFile, strip_above
+from . import levels_file
+from .levels_file import LevelsFile
 
 
 @contextmanager
@@ -31,28 +29,17 @@ def feeding(scene):
     engine renders as ever."""
     with ExitStack() as until_the_end:
         if not colour_configuration.name():
-            with suppress(OSError, struct.error):  # of pictures beyond the 4 GB of a TIFF
-                atomic_write.clear_up(place := Path(tempfile.gettempdir()))
-                folder = until_the_end.enter_context(atomic_write.part_folder(place))
-                size = scene.render.resolution_x, scene.render.resolution_y
-                until_the_end.enter_context(_fed(scene, LevelsFile(folder / "picture.tif", *size)))
+            with suppress(OSError, struct.error):
+                picture = until_the_end.enter_context(levels_file.temporary(scene))
+                shown, editor = strips.effect_strips(scene)[0], scene.sequence_editor
+                strip = levels_file.strip_above(editor, picture.path, shown.left_handle, shown.right_handle)
+                until_the_end.callback(editor.strips.remove, strip)
+                filled = partial(_fill, shown, picture, [])
+                until_the_end.enter_context(render_job.calling(bpy.app.handlers.render_pre, filled))
         yield
 
 
-@contextmanager
-def _fed(scene, picture: "LevelsFile"):
-    effect_strip = strips.effect_strips(scene)[0]
-    strip = strip_above(scene.sequence_editor, picture.path, effect_strip.left_handle, effect_strip.right_handle)
-    filled = partial(fill, effect_strip, picture, [])
-    try:
-        with render_job.calling(bpy.app.handlers.render_pre, filled):
-            yield
-    finally:
-        scene.sequence_editor.strips.remove(strip)
-        picture.close()
-
-
-def fill(effect_strip, picture: "LevelsFile", film: list, scene, *_) -> None:
+def _fill(effect_strip, picture: LevelsFile, film: list, scene, *_) -> None:
     """Fills the file with the picture of the frame that is rendered next. film: the snapshot of all its frames, once it
     is read."""
     if not render_job.is_film(scene) or render_job.stopping():

@@ -33,7 +33,7 @@ _left_out: list[tuple[range, str]] = []  # of its film, see requirements.left_ou
 def begin(film: int) -> None:
     """Reads all effects for a job, on the main thread; film: session_uid of the scene that it renders."""
     _taken.clear()
-    film_scene = _scene(film)
+    film_scene = strips.scene_of_uid(film)
     for scene, effect, parts in shown_effects(film_scene) if film_scene else ():
         if effect.scene.session_uid in _taken:  # of a copied scene: the first counts, as for strips.find_effect
             continue
@@ -68,7 +68,7 @@ def end() -> None:
 def look(film: int) -> None:
     """Looks on the main thread whether the sequencer leaves effects out of a film, by its session_uid: an editor may
     delete a camera while it renders."""
-    scene = _scene(film)
+    scene = strips.scene_of_uid(film)
     _left_out[:] = requirements.left_out(scene) if scene else []
 
 
@@ -116,17 +116,13 @@ def _of_film(scene: Any, effect: Any, strip: Any, frame: float) -> Snapshot:
 
 
 def _late(uid: int, scene_frame: float) -> Snapshot | Exception:
-    if (effect_scene := _scene(uid)) is None:
+    if (effect_scene := strips.scene_of_uid(uid)) is None:
         return EffectError(rpt_("the effect was deleted while it was rendered"))
     try:
         scene, effect, strip = strips.find_effect(effect_scene, scene_frame)
         return snapshot.take(scene, effect, strip, (strips.timeline_frame(strip, scene_frame),))
     except effect_source.FAULTS as error:
         return error
-
-
-def _scene(uid: int) -> Any:
-    return next((scene for scene in bpy.data.scenes if scene.session_uid == uid), None)
 
 
 def shown_effects(film: Any) -> Iterator[tuple[Any, Any, list]]:
