@@ -1,12 +1,16 @@
 """What happens by itself: effects follow their strips, an old file's sources are closed, and a render that cannot show
 an effect ends."""
 
+from __future__ import annotations
+
 import inspect
 import sys
 from functools import partial
+from types import TracebackType
 
 import bpy
 from bpy.app.handlers import persistent
+from bpy.types import Depsgraph, Scene
 
 from ..core import revision, told
 from .data import data_format, inbetween_settings, preview_areas, source_media, strips, versions
@@ -17,8 +21,7 @@ from .rendering import invalidation, job_snapshots, render_job, sessions
 from .rendering.render_job import Where
 
 
-@persistent
-def _before_load(*_):
+def _before_load(*_) -> None:
     edit_feed.end()
     sharp_frame.forget()
     inbetween_operators.stop()
@@ -31,8 +34,7 @@ def _before_load(*_):
     lifecycle.forget()
 
 
-@persistent
-def _after_load(*_):
+def _after_load(*_) -> None:
     sharp_frame.listen()
     sessions.drop_removed()  # what a render job took up while the file was loaded
     if not data_format.is_file_newer():
@@ -43,14 +45,12 @@ def _after_load(*_):
     newer_files.tell(bpy.data.scenes)
 
 
-@persistent
-def _after_import(imported, *_):
+def _after_import(imported: bpy.types.BlendImportContext, *_) -> None:
     items = [item for item in imported.import_items if item.id_type == "SCENE"]
     newer_files.tell(item.id for item in items if item.id is not None)  # a name that was asked for may not be there
 
 
-@persistent
-def _before_save(*_):
+def _before_save(*_) -> None:
     edit_feed.end()
     lifecycle.update()  # a script may have removed strips, since Blender last told
     sharp_frame.give_back(bpy.context)
@@ -59,8 +59,7 @@ def _before_save(*_):
         data_format.stamp_saved(versions.extension())
 
 
-@persistent
-def _update(scene=None, depsgraph=None):
+def _update(scene: Scene | None = None, depsgraph: Depsgraph | None = None) -> None:
     revision.changed()
     if (film := render_job.film()) is not None and bpy.app.is_job_running("RENDER"):
         job_snapshots.look(film)
@@ -72,13 +71,11 @@ def _update(scene=None, depsgraph=None):
         preview_areas.redraw(bpy.context)
 
 
-@persistent
-def _before_undo(*_):
+def _before_undo(*_) -> None:
     shown_annotations.before_undo()
 
 
-@persistent
-def _after_undo(*_):
+def _after_undo(*_) -> None:
     revision.changed()
     undo_repair.find_lost()
     track_region.data_replaced()
@@ -88,8 +85,7 @@ def _after_undo(*_):
     shown_annotations.follow()
 
 
-@persistent
-def _before_render(scene, *_):
+def _before_render(scene: Scene, *_) -> None:
     if render_job.cancelling():
         return
     is_film = render_job.begin(scene)
@@ -122,8 +118,7 @@ def _prepare(film: int, in_job: bool) -> bool:
     return True
 
 
-@persistent
-def _before_frame(scene, *_):
+def _before_frame(scene: Scene, *_) -> None:
     if render_job.is_film(scene):
         if (sentence := job_snapshots.left_out(scene)) is not None:
             render_job.fail(sentence)
@@ -133,8 +128,7 @@ def _before_frame(scene, *_):
             edit_feed.before_frame(scene)
 
 
-@persistent
-def _after_render(scene, *_):
+def _after_render(scene: Scene, *_) -> None:
     if not render_job.is_film(scene):
         return  # of an effect, for a film or a preview
     invalidation.drop_spoilt_later()
@@ -144,7 +138,7 @@ def _after_render(scene, *_):
     source_media.rest(render_job.runs())
 
 
-def _drop_frames():
+def _drop_frames() -> None:
     """Drops the finished frames of all effects."""
     for scene in bpy.data.scenes:
         strips.invalidate(scene)
@@ -153,7 +147,7 @@ def _drop_frames():
 _hooks: list = []  # what Python called with errors that nobody caught before it called ours: one, or none
 
 
-def _uncaught(kind, error, trace) -> None:
+def _uncaught(kind: type[BaseException], error: BaseException, trace: TracebackType | None) -> None:
     """Keeps errors of the extension for Copy Report. Blender has Python print whatever operators, panels, handlers and
     timers raise, which calls this: there is no other place that all of them pass."""
     if told.is_ours(error):
@@ -178,9 +172,9 @@ HANDLERS = {
 }
 
 
-def register():
+def register() -> None:
     for name, function in HANDLERS.items():
-        getattr(bpy.app.handlers, name).append(function)
+        getattr(bpy.app.handlers, name).append(persistent(function))
     if not _hooks:
         _hooks.append(sys.excepthook)
         sys.excepthook = _uncaught
@@ -188,7 +182,7 @@ def register():
     bpy.app.timers.register(_drop_frames)
 
 
-def unregister():
+def unregister() -> None:
     for name, function in HANDLERS.items():
         getattr(bpy.app.handlers, name).remove(function)
     if bpy.app.timers.is_registered(_drop_frames):

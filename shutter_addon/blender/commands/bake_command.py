@@ -1,8 +1,12 @@
 """The command `bake`: the film of one effect of a saved edit, for an ordinary strip to show."""
 
+from __future__ import annotations
+
 import argparse
 import os
 from contextlib import suppress
+
+from bpy.types import PropertyGroup, Scene, Strip
 
 from ...core.messages import sentence
 from ..data import strips
@@ -12,7 +16,7 @@ from . import command_line
 from .command_line import place
 
 
-def add(commands) -> None:
+def add(commands: argparse._SubParsersAction) -> None:
     parser = commands.add_parser("bake", help="render one effect of a saved edit, for a strip to show")
     option = parser.add_argument
     option("source", type=place, help="a saved edit (.blend)")
@@ -25,7 +29,7 @@ def add(commands) -> None:
     parser.set_defaults(run=run)
 
 
-def run(arguments) -> None:
+def run(arguments: argparse.Namespace) -> None:
     scene = saved_edit.open_edit(arguments.source, arguments.scene)
     scene.frame_set(scene.frame_current)  # what drivers and keys say, once
     if arguments.attached:
@@ -59,7 +63,7 @@ def _check_parent(film: baked_film.Film) -> None:
             raise film_output.InterruptedRenderError(f"{film.place}: stopped")
 
 
-def _effect_strip(scene, name: str):
+def _effect_strip(scene: Scene, name: str) -> tuple[PropertyGroup, Strip]:
     """OutputError: the scene has no such effect strip."""
     for strip in strips.effect_strips(scene):
         if strip.name == name and (effect := strips.effect_of(scene, strip.scene)) is not None:

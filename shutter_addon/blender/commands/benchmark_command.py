@@ -1,5 +1,7 @@
 """The command `benchmark`: how fast this machine composes."""
 
+from __future__ import annotations
+
 import argparse
 import json
 import re
@@ -14,7 +16,7 @@ from . import command_line
 MOST_PIXELS, MOST_FRAMES = 16384, 256
 
 
-def add(commands) -> None:
+def add(commands: argparse._SubParsersAction) -> None:
     parser = commands.add_parser("benchmark", help="measure how fast this machine composes, for a bug report")
     parser.add_argument("--device", choices=available.CHOICES, help="as for render")
     parser.add_argument("--json", type=command_line.place, metavar="FILE.json", help="also write what was measured")
@@ -26,7 +28,7 @@ def add(commands) -> None:
     parser.set_defaults(run=run)
 
 
-def run(arguments) -> None:
+def run(arguments: argparse.Namespace) -> None:
     compositor, lesser = machine.open_device(arguments.device)
     steps = len(arguments.sizes) * (len(arguments.windows) + 1)
     try:

@@ -1,14 +1,19 @@
 """The command `check`: whether an edit can be rendered on this machine, and what that will take."""
 
+from __future__ import annotations
+
+import argparse
 import json
 import os
 import re
 import shlex
 import subprocess
 import sys
+from collections.abc import Callable
 from pathlib import Path
 
 import bpy
+from bpy.types import Scene
 
 from ...core import told
 from ...core.farm import chunks, job_file
@@ -27,7 +32,7 @@ from . import command_line
 from .command_line import place
 
 
-def add(commands) -> None:
+def add(commands: argparse._SubParsersAction) -> None:
     parser = commands.add_parser("check", help="find out whether an edit can be rendered here, and what that will take")
     option = parser.add_argument
     option("edit", metavar="FILE.blend", type=place, help="a saved edit")
@@ -51,7 +56,7 @@ def add(commands) -> None:
     parser.set_defaults(run=run)
 
 
-def run(arguments) -> None:
+def run(arguments: argparse.Namespace) -> None:
     edit = command_line.open_edit(arguments.edit, arguments.frames)
     scene = edit.scene
     with command_line.rendered_by(arguments):
@@ -70,7 +75,7 @@ def run(arguments) -> None:
         sys.exit(2)
 
 
-def _report(arguments, scene, frames: range, version: EditVersion) -> dict:
+def _report(arguments: argparse.Namespace, scene: Scene, frames: range, version: EditVersion) -> dict:
     """What is found, as JSON has it (docs/command.md)."""
     faults = [*_version_faults(scene), *_setting_faults(arguments, scene, frames)]
     notes: list[str] = []
@@ -114,7 +119,7 @@ def _report(arguments, scene, frames: range, version: EditVersion) -> dict:
     return report
 
 
-def _version_faults(scene) -> list[str]:
+def _version_faults(scene: Scene) -> list[str]:
     """Whether something newer than what is here has saved the file."""
     faults, saved, here = [], scene.virtual_shutter.version, versions.extension()
     if _numbers(saved) > _numbers(here):
@@ -133,7 +138,7 @@ def _numbers(version: str) -> list[int]:
     return [int(number) for number in re.findall(r"\d+", version)]
 
 
-def _setting_faults(arguments, scene, frames: range) -> list[str]:
+def _setting_faults(arguments: argparse.Namespace, scene: Scene, frames: range) -> list[str]:
     """Whether what the edit's output is can be written, and lie where it is wanted."""
     read = [arguments.edit, *versions.read_files(scene)]
     faults = _fault(shared_frames.check_resumable, scene) if arguments.resume else []
@@ -145,7 +150,7 @@ def _setting_faults(arguments, scene, frames: range) -> list[str]:
     return faults + _fault(film_output.check, Path("film.mp4" if is_movie else "frames"), None, film_output.size(scene))
 
 
-def _fault(check, *arguments) -> list[str]:
+def _fault(check: Callable, *arguments) -> list[str]:
     """The sentence of the error that a check raises, if it does."""
     try:
         check(*arguments)
@@ -157,7 +162,7 @@ def _fault(check, *arguments) -> list[str]:
 
 
 def _on_device(
-    scene, frames: range, faults: list[str], notes: list[str], *, find_cuts: bool
+    scene: Scene, frames: range, faults: list[str], notes: list[str], *, find_cuts: bool
 ) -> tuple[str | None, list[EffectCheck], int | None]:
     """The name of the device that will render, what is found of the effects (edit_check.effects), and the bytes that
     textures may take of a GPU; without a device, which is a fault, nothing of the effects."""
@@ -183,7 +188,9 @@ def _memory(checks: list[EffectCheck], limit: int | None) -> dict:
     return {"gpu": min(gpu, limit or gpu), "gpu_limit": limit, "host": host}
 
 
-def _disk(arguments, scene, frames: range, checks: list[EffectCheck], faults: list[str]) -> dict:
+def _disk(
+    arguments: argparse.Namespace, scene: Scene, frames: range, checks: list[EffectCheck], faults: list[str]
+) -> dict:
     """Bytes that the frames and the in-between frames that are missing take at most, as noise does, which is not
     compressed: no frame is rendered for this. Those that are there already are not counted."""
     file_format, needs = arguments.format or "png", []
@@ -220,7 +227,7 @@ def _effect(check: EffectCheck) -> dict:
     }
 
 
-def _builds(file: Path, scene, frames: range, checks: list[EffectCheck]) -> str | None:
+def _builds(file: Path, scene: Scene, frames: range, checks: list[EffectCheck]) -> str | None:
     """The command that builds the in-between frames that are missing; None: none is."""
     if not any(each.missing for each in checks):
         return None

@@ -1,5 +1,9 @@
 """The command `join`: rendered frames, and the sound of their edit, as a movie."""
 
+from __future__ import annotations
+
+import argparse
+
 from ...core.farm import job_file
 from ..data import missing_media, versions
 from ..output import film_join, film_output
@@ -7,7 +11,7 @@ from . import command_line
 from .command_line import place
 
 
-def add(commands) -> None:
+def add(commands: argparse._SubParsersAction) -> None:
     parser = commands.add_parser("join", help="make a movie of rendered frames, with the edit's sound and settings")
     option = parser.add_argument
     option("folder", metavar="FRAMES", type=place, help="the folder of the frames")
@@ -17,7 +21,7 @@ def add(commands) -> None:
     parser.set_defaults(run=run)
 
 
-def run(arguments) -> None:
+def run(arguments: argparse.Namespace) -> None:
     edit = command_line.open_edit(arguments.edit, arguments.frames)
     film_join.check(arguments.output, [edit.path, *versions.read_files(edit.scene), *versions.sounds()])
     for fault in missing_media.sound_faults(edit.scene, edit.frames):

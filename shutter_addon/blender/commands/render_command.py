@@ -1,9 +1,13 @@
 """The command `render`: from a source and a recipe to a finished film, through Blender's sequencer."""
 
+from __future__ import annotations
+
+import argparse
 from dataclasses import replace
 from pathlib import Path
 
 import bpy
+from bpy.types import Scene
 
 from ...core import atomic_write
 from ...core.farm import job_file
@@ -19,7 +23,7 @@ from . import command_line, inbetween_command
 from .command_line import place
 
 
-def add(commands) -> None:
+def add(commands: argparse._SubParsersAction) -> None:
     parser = commands.add_parser("render", help="render a source through a recipe, or a saved edit")
     option = parser.add_argument
     option("source", type=place, help="a movie, the first file of an image sequence, or a saved edit (.blend)")
@@ -45,14 +49,14 @@ def add(commands) -> None:
     parser.set_defaults(run=run)
 
 
-def run(arguments) -> None:
+def run(arguments: argparse.Namespace) -> None:
     if saved_edit.is_saved(arguments.source):
         _render_edit(arguments)
     else:
         _render_source(arguments)
 
 
-def _render_edit(arguments) -> None:
+def _render_edit(arguments: argparse.Namespace) -> None:
     """Renders a saved edit as it is."""
     for name in ("recipe", "weights", "save", "inbetween", "inbetween_method", "cache"):
         if getattr(arguments, name) is not None:
@@ -74,7 +78,7 @@ def _render_edit(arguments) -> None:
         shared_frames.render(scene, output, file_format, version, rendered, resume=arguments.resume)
 
 
-def _render_source(arguments) -> None:
+def _render_source(arguments: argparse.Namespace) -> None:
     """Makes an edit of a source and a recipe, and renders it."""
     if arguments.recipe is None:
         raise film_output.OutputError("--recipe is missing: only a saved edit (.blend) is rendered without one")
@@ -111,12 +115,12 @@ def _render_source(arguments) -> None:
             film_output.film(scene, output)
 
 
-def _check_device(arguments) -> None:
+def _check_device(arguments: argparse.Namespace) -> None:
     """NoDeviceError: there is none as it is wanted. Called before anything is written."""
     available.choose(arguments.device or preferences.device())
 
 
-def _written(arguments, file_format: str, frames: range) -> list[Path]:
+def _written(arguments: argparse.Namespace, file_format: str, frames: range) -> list[Path]:
     """All files that a render writes, but for in-between frames."""
     files = [arguments.save] if arguments.save else []
     if arguments.output and film_output.is_movie(arguments.output):
@@ -128,7 +132,7 @@ def _written(arguments, file_format: str, frames: range) -> list[Path]:
     return files
 
 
-def _mattes(source_recipe, folder: Path) -> list[Path]:
+def _mattes(source_recipe: recipe.Recipe, folder: Path) -> list[Path]:
     """The files of a recipe's mattes; folder: where the recipe lies. MediaError: there are none."""
     files = []
     for region in source_recipe.regions:
@@ -138,7 +142,7 @@ def _mattes(source_recipe, folder: Path) -> list[Path]:
     return files
 
 
-def _recipe(arguments) -> recipe.Recipe:
+def _recipe(arguments: argparse.Namespace) -> recipe.Recipe:
     """The recipe, with the in-between frames that were asked for."""
     source_recipe = recipe_file.load(arguments.recipe)
     if arguments.inbetween is not None:
@@ -146,12 +150,12 @@ def _recipe(arguments) -> recipe.Recipe:
     return replace(source_recipe, inbetween_method=arguments.inbetween_method or source_recipe.inbetween_method)
 
 
-def _cache(arguments) -> Path:
+def _cache(arguments: argparse.Namespace) -> Path:
     """The folder of in-between frames: where a saved edit will look for them, if it is to be saved."""
     return arguments.cache or (arguments.save or arguments.output).parent / inbetween_settings.FOLDER
 
 
-def _save(scene, path: Path) -> None:
+def _save(scene: Scene, path: Path) -> None:
     """Saves the edit, its paths relative to the file: it may be opened on another machine. OutputError: it cannot be
     saved whole; what stood there stays."""
     try:
@@ -161,7 +165,7 @@ def _save(scene, path: Path) -> None:
         raise film_output.OutputError(f"{path}: {error.strerror or error}") from None
 
 
-def _save_whole(scene, path: Path) -> None:
+def _save_whole(scene: Scene, path: Path) -> None:
     with atomic_write.part_folder(path.parent) as folder:
         part = folder / "edit.blend"
         try:

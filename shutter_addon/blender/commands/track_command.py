@@ -1,12 +1,18 @@
 """The command `track`: a recipe's region follows what it covers, or its camera what stands still."""
 
+from __future__ import annotations
+
+import argparse
 import json
 import sys
+from collections.abc import Iterator
 from contextlib import ExitStack, closing, contextmanager
 from dataclasses import replace
+from typing import Any
 
 from ...core import atomic_write
 from ...core.frames import retiming
+from ...core.frames.frame_source import FrameSource
 from ...core.messages import signed
 from ...core.model import outlines, presence
 from ...core.model.effect import OutlineRegion, Region
@@ -21,7 +27,7 @@ from . import command_line
 from .command_line import place
 
 
-def add(commands) -> None:
+def add(commands: argparse._SubParsersAction) -> None:
     parser = commands.add_parser("track", help="follow what a region covers, or the camera")
     option = parser.add_argument
     option("source", type=place, help="a movie, or the first file of an image sequence")
@@ -40,7 +46,7 @@ def add(commands) -> None:
     parser.set_defaults(run=run)
 
 
-def run(arguments) -> None:
+def run(arguments: argparse.Namespace) -> None:
     if arguments.camera == (arguments.region is not None):
         raise film_output.OutputError("track: either --region NAME or --camera, one of the two")
     source_recipe = recipe_file.load(arguments.recipe)
@@ -75,7 +81,7 @@ def run(arguments) -> None:
         print(signed(said), file=sys.stderr)
 
 
-def _region_index(arguments, source_recipe) -> int:
+def _region_index(arguments: argparse.Namespace, source_recipe: recipe.Recipe) -> int:
     names = [region.name for region in source_recipe.regions]
     if arguments.region not in names:
         raise film_output.OutputError(f'{arguments.recipe}: there is no region "{arguments.region}"')
@@ -86,11 +92,13 @@ def _region_index(arguments, source_recipe) -> int:
     return index
 
 
-def _followed(arguments, source_recipe, index: int | None, medium, frames: range) -> tuple[dict, list]:
+def _followed(
+    arguments: argparse.Namespace, source_recipe: recipe.Recipe, index: int | None, medium: FrameSource, frames: range
+) -> tuple[dict, list]:
     """What tracking of a region, or of the camera, found by frame, and where it ended before the last frame.
     TrackingError: at once."""
     effect = source_recipe.effect(medium.width / medium.height)
-    subject = effect.camera if index is None else effect.regions[index]
+    subject: Any = effect.camera if index is None else effect.regions[index]
     times = {frame: _shown(source_recipe, frame, medium.count) for frame in frames}
     filmed = filmed_frames.FilmedFrames(times, arguments.frame)
     with ExitStack() as ends:
@@ -119,7 +127,13 @@ def _followed(arguments, source_recipe, index: int | None, medium, frames: range
 
 
 @contextmanager
-def _cover(arguments, source_recipe, region: OutlineRegion, filmed, size: tuple[int, int]):
+def _cover(
+    arguments: argparse.Namespace,
+    source_recipe: recipe.Recipe,
+    region: OutlineRegion,
+    filmed: Any,
+    size: tuple[int, int],
+) -> Iterator[matte_tracking.Cover]:
     """What an outline covers at the places of filmed frames (media.matte_tracking.Cover)."""
     if region.between == "straight":
         yield matte_tracking.cover_within(filmed.seen(region.drawings).at, size)
@@ -132,16 +146,18 @@ def _cover(arguments, source_recipe, region: OutlineRegion, filmed, size: tuple[
             yield matte_tracking.cover_of(mattes, filmed.index_at, size)
 
 
-def _keyed(source_recipe, index: int | None, *placements, thin: bool) -> recipe.Recipe:
+def _keyed(source_recipe: recipe.Recipe, index: int | None, *placements, thin: bool) -> recipe.Recipe:
     """The recipe with placements as keys of a region, or of the camera; arguments: see region_keys."""
     if index is None:
         return region_keys.with_camera(source_recipe, *placements, thin=thin)
-    regions = list(source_recipe.regions)
+    regions: list[Any] = list(source_recipe.regions)
     regions[index] = region_keys.with_placements(regions[index], *placements, thin=thin)
     return replace(source_recipe, regions=regions)
 
 
-def _ended(source_recipe, index: int | None, tracked: dict, stops: list, start: int, frames: range) -> recipe.Recipe:
+def _ended(
+    source_recipe: recipe.Recipe, index: int | None, tracked: dict, stops: list, start: int, frames: range
+) -> recipe.Recipe:
     """The recipe whose region, or camera, counts only where it was tracked."""
     seen = [frame for frame, step in tracked.items() if step.confidence > 0]
     ends = [presence.Stop(stop.frame, stop.frame > start, stop.fault == tracking.SHOT_ENDS) for stop in stops]
@@ -154,14 +170,14 @@ def _ended(source_recipe, index: int | None, tracked: dict, stops: list, start: 
     return replace(source_recipe, regions=regions)
 
 
-def _shown(source_recipe, frame: float, count: int) -> float:
+def _shown(source_recipe: recipe.Recipe, frame: float, count: int) -> float:
     """Which of a source's frames, from 0 on, a recipe shows at a timeline frame; a fraction: an in-between one."""
     time, factor = source_recipe.time_at(frame), source_recipe.inbetween
     filmed = (frame if time is None else time) - 1
     return retiming.nearest(filmed, factor, (count - 1) * factor + 1) / factor
 
 
-def _write_track(arguments, result, tracked: dict, stops: list) -> None:
+def _write_track(arguments: argparse.Namespace, result: recipe.Recipe, tracked: dict, stops: list) -> None:
     """Writes the recipe, and the report of it, both whole or neither."""
     report = {
         **({"camera": True} if arguments.camera else {"region": arguments.region}),

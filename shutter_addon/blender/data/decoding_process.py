@@ -6,6 +6,8 @@ by several numbers. An answer is a line of JSON, and as many bytes behind it as 
 a line that reads as the script's last argument.
 """
 
+from __future__ import annotations
+
 import contextlib
 import faulthandler
 import json
@@ -22,7 +24,7 @@ IDLE = 30  # seconds without an open movie after which it ends
 class Movie:
     """A movie that is open. Its frames are counted from 0."""
 
-    def __init__(self, path: str, deinterlace: bool):
+    def __init__(self, path: str, deinterlace: bool) -> None:
         self._path = path
         self._ahead: tuple[int, np.ndarray] | None = None
         self._last, self._onward = -2, False

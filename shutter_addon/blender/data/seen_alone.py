@@ -1,9 +1,12 @@
 """What a film shows of an effect: whether its picture hides what lies below, is all that is seen, and becomes levels
 that are known beforehand."""
 
+from __future__ import annotations
+
 from typing import Any, NamedTuple
 
 import bpy
+from bpy.types import Scene, Strip, bpy_struct
 
 from . import colour_configuration, fcurves, strips
 
@@ -27,12 +30,12 @@ _MODES = "RGB", "RGBA"  # grey is made of light
 _FORMATS = ("FFMPEG", "PNG", "JPEG")
 
 
-def has(item: Any, values: dict[str, Any]) -> bool:
+def has(item: bpy_struct, values: dict[str, Any]) -> bool:
     """Whether an item's properties have these values."""
     return all(getattr(item, name) == value for name, value in values.items())
 
 
-def hides(scene: Any, strip: Any) -> bool:
+def hides(scene: Scene, strip: Strip) -> bool:
     """Whether an effect strip's picture, where it is opaque, stays as it is over all that lies below, at all frames."""
     size, shown = scene.render, strip.scene.render
     return (
@@ -55,11 +58,11 @@ class Alone(NamedTuple):
 
     is_blended: whether Blender lays it over something, which makes other bits of it"""
 
-    strip: Any
+    strip: Strip
     is_blended: bool
 
 
-def alone(scene: Any, frame: int, but: str | None = None) -> Alone | None:
+def alone(scene: Scene, frame: int, but: str | None = None) -> Alone | None:
     """What is seen of a scene at a frame, if it is an effect strip alone, by `hides`. but: the name of a strip that
     does not count."""
     editor = scene.sequence_editor
@@ -88,7 +91,7 @@ def alone(scene: Any, frame: int, but: str | None = None) -> Alone | None:
     return Alone(top, is_blended)
 
 
-def makes_levels(scene: Any) -> bool:
+def makes_levels(scene: Scene) -> bool:
     """Whether a scene's render makes levels of 8 bits of what its sequencer shows, by sRGB alone."""
     return (
         bpy.app.version < _KNOWN_TO
@@ -106,7 +109,7 @@ def makes_levels(scene: Any) -> bool:
     )
 
 
-def has_animation(scene: Any, part: str) -> bool:
+def has_animation(scene: Scene, part: str) -> bool:
     """Whether anything animates a property of the scene in whose path that is; of what the NLA does, it may."""
     animation = scene.animation_data
     if animation is None:

@@ -1,5 +1,7 @@
 """The medium of a source strip: what it is, opened as shutter_addon.media has it."""
 
+from __future__ import annotations
+
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -7,6 +9,7 @@ from pathlib import Path
 
 import bpy
 from bpy.app.translations import pgettext_rpt as rpt_
+from bpy.types import Strip
 
 from ...core.frames.frame_source import FrameSource
 from ...media import MediaError, open_source
@@ -32,17 +35,17 @@ class _Look:
     key: int = 0
 
 
-_specs: dict[tuple, "SourceSpec"] = {}  # by media_key
+_specs: dict[tuple, SourceSpec] = {}  # by media_key
 _looks: dict[tuple, _Look] = {}  # by scene and strip, or by image
 _resting = False  # while a film is rendered, all its files have been asked before it
 
 
-def media_key(strip) -> tuple:
+def media_key(strip: Strip) -> tuple:
     """What the strip reads and how; equal keys give the same frames."""
     return strip.type, *files_key(strip), *reading(strip)
 
 
-def files_key(strip) -> tuple:
+def files_key(strip: Strip) -> tuple:
     """The strip's files: the first and the last as they are now, and those between as they were when they were looked
     at: a hundred of them a second, in turn, and none while a film is rendered. MediaError: it has none."""
     count, path = _files(strip)
@@ -97,12 +100,12 @@ def between(place: tuple, count: int, path: Callable[[int], Path]) -> int:
     return look.key
 
 
-def stem(strip) -> str:
+def stem(strip: Strip) -> str:
     """The name of the strip's first file, without its suffix. MediaError: it has none."""
     return _files(strip)[1](0).stem
 
 
-def reading(strip) -> tuple:
+def reading(strip: Strip) -> tuple:
     """How the strip's files are read: colour space, alpha and the like."""
     clip = strip.clip if strip.type == "MOVIECLIP" else None
     reader = clip if strip.type == "MOVIECLIP" else strip
@@ -141,7 +144,7 @@ class SourceSpec:
         return with_proxy(medium, proxy.path, files=files, colorspace="Non-Color" if space == "Non-Color" else None)
 
 
-def spec(strip, key: tuple | None = None) -> SourceSpec:
+def spec(strip: Strip, key: tuple | None = None) -> SourceSpec:
     """What a source strip reads; key: its media_key, where that is known. MediaError: it has no files."""
     key = key or media_key(strip)
     if key not in _specs:
@@ -151,7 +154,7 @@ def spec(strip, key: tuple | None = None) -> SourceSpec:
     return _specs[key]
 
 
-def _spec(strip, key: tuple) -> SourceSpec:
+def _spec(strip: Strip, key: tuple) -> SourceSpec:
     count, path = _files(strip)
     config = Path(bpy.utils.system_resource("DATAFILES", path="colormanagement"), "config.ocio")  # finds folders only
     options = {
@@ -166,37 +169,37 @@ def _spec(strip, key: tuple) -> SourceSpec:
     )
 
 
-def open_media(strip) -> FrameSource:
+def open_media(strip: Strip) -> FrameSource:
     """The strip's medium, as Blender would show it. MediaError: it cannot be read."""
     return spec(strip).open()
 
 
-def files(strip) -> list[Path]:
+def files(strip: Strip) -> list[Path]:
     """The files of a movie, image or clip strip, there or not, whether or not an effect can read it so. MediaError: it
     has none."""
     count, path = _clip_files(strip) if strip.type == "MOVIECLIP" else _files(strip)
     return [path(index) for index in range(count)]
 
 
-def first_frame(strip) -> int:
+def first_frame(strip: Strip) -> int:
     """Which frame of the medium is the first of the strip's content."""
     return strip.clip.frame_offset if strip.type == "MOVIECLIP" and is_movie(strip) else 0
 
 
-def is_movie(strip) -> bool:
+def is_movie(strip: Strip) -> bool:
     """Whether a movie, image or clip strip reads a movie."""
     clip = strip.clip if strip.type == "MOVIECLIP" else None
     return strip.type == "MOVIE" or (clip is not None and clip.source == "MOVIE")
 
 
-def _alpha(strip) -> str | None:
+def _alpha(strip: Strip) -> str | None:
     """An image strip has its own idea of its files' alpha; a clip takes what is usual for them."""
     if strip.type == "MOVIECLIP":
         return None
     return "premultiplied" if strip.alpha_mode == "PREMUL" else "straight"
 
 
-def _files(strip):
+def _files(strip: Strip) -> tuple[int, Callable[[int], Path]]:
     """How many files the strip reads, and a function that gives the path of each."""
     if strip.type == "MOVIECLIP":
         if strip.clip is not None and (strip.undistort or strip.stabilize2d):
@@ -212,7 +215,7 @@ def _files(strip):
     return len(elements), lambda i: folder / elements[i].filename
 
 
-def _clip_files(strip):
+def _clip_files(strip: Strip) -> tuple[int, Callable[[int], Path]]:
     """A clip's movie, or its images by their numbers, without a gap."""
     clip = strip.clip
     if clip is None:

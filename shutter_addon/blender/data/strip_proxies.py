@@ -1,9 +1,12 @@
 """Where Blender's sequencer keeps the proxies of a strip."""
 
+from __future__ import annotations
+
 from dataclasses import dataclass
 from pathlib import Path
 
 import bpy
+from bpy.types import Scene, Strip
 
 from ...media.files import stamp
 from . import external_files
@@ -21,7 +24,7 @@ class Proxy:
     stamp: tuple
 
 
-def proxy_of(scene, strip, percent: int) -> Proxy | None:
+def proxy_of(scene: Scene, strip: Strip, percent: int) -> Proxy | None:
     """What Blender reads of a strip in previews of that size, in percent; None: the footage itself."""
     if strip.type not in ("MOVIE", "IMAGE") or not strip.use_proxy or not getattr(strip.proxy, f"build_{percent}"):
         return None
@@ -39,12 +42,12 @@ def proxy_of(scene, strip, percent: int) -> Proxy | None:
     return _proxy(folder, *(of_image(folder, element.filename) for element in ends))
 
 
-def of_image(folder: Path, image) -> Path:
+def of_image(folder: Path, image: str | Path) -> Path:
     """The proxy of an image file, by its name or path."""
     return folder / f"{Path(image).name}_proxy.jpg"
 
 
-def _folder(scene, strip, beside: Path) -> Path:
+def _folder(scene: Scene, strip: Strip, beside: Path) -> Path:
     """Where the strip's proxies lie; beside: the folder of its footage."""
     if scene.sequence_editor.proxy_storage == "PROJECT":
         return _absolute(scene.sequence_editor.proxy_dir or "//BL_proxy")

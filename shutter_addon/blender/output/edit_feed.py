@@ -7,10 +7,13 @@ picture by itself keeps its floats, as a script may save it as others than the e
 was once the render ends, or a file is saved or loaded meanwhile: from then on the engine renders.
 """
 
+from __future__ import annotations
+
 from contextlib import ExitStack
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+
+from bpy.types import Scene
 
 from ...core.pixels.shown_levels import Display
 from ...media import display_transfer
@@ -45,7 +48,7 @@ class _Film:
 _films: list[_Film] = []  # one, while it renders
 
 
-def begin(scene: Any) -> None:
+def begin(scene: Scene) -> None:
     """The render of an edit begins, on the main thread."""
     end()
     if render_job.where() is Where.BACKGROUND and scene.sequence_editor is not None:
@@ -58,7 +61,7 @@ def end() -> None:
         _films.pop().changed.close()
 
 
-def before_frame(scene: Any) -> None:
+def before_frame(scene: Scene) -> None:
     """Prepares the edit for its current frame."""
     if not _films or _films[0].scene != scene.session_uid:
         return
@@ -76,7 +79,7 @@ def before_frame(scene: Any) -> None:
         shown.mute = not is_fed
 
 
-def _feed(film: _Film, scene: Any, seen: seen_alone.Alone) -> bool:
+def _feed(film: _Film, scene: Scene, seen: seen_alone.Alone) -> bool:
     """Fills the file with the effect's levels. False: the engine has to render the frame, and to say what is wrong."""
     strip = seen.strip
     try:
@@ -101,7 +104,7 @@ def _feed(film: _Film, scene: Any, seen: seen_alone.Alone) -> bool:
     return True
 
 
-def _file(film: _Film, scene: Any) -> LevelsFile:
+def _file(film: _Film, scene: Scene) -> LevelsFile:
     """The file of the film, with a strip that shows it. OSError: it cannot be written."""
     if film.file is None:
         film.file = film.changed.enter_context(levels_file.temporary(scene))
@@ -109,7 +112,7 @@ def _file(film: _Film, scene: Any) -> LevelsFile:
     return film.file
 
 
-def _add_strip(film: _Film, scene: Any, path: Path) -> str:
+def _add_strip(film: _Film, scene: Scene, path: Path) -> str:
     editor, uid = scene.sequence_editor, scene.session_uid
     active, kept = editor.active_strip, (editor.use_cache_raw, editor.use_cache_final)
     first, last = min(scene.frame_start, scene.frame_current), max(scene.frame_end, scene.frame_current)

@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from contextlib import closing
 
 import bpy
+from bpy.types import PropertyGroup, Scene, Strip
 
 from ...core import templates
 from ...core.messages import UserError
@@ -14,7 +15,7 @@ from ..data import annotations, colour_configuration, fcurves, snapshot, source_
 from ..data.validation import word
 
 
-def lines(scene) -> list[str]:
+def lines(scene: Scene) -> list[str]:
     """Of a scene and its effects, as Markdown."""
     found = list(_of_scene(scene))
     for number, strip in enumerate(strips.effect_strips(scene), 1):
@@ -24,7 +25,7 @@ def lines(scene) -> list[str]:
     return found
 
 
-def _of_scene(scene) -> Iterator[str]:
+def _of_scene(scene: Scene) -> Iterator[str]:
     render, view = scene.render, scene.view_settings
     size = f"{render.resolution_x}×{render.resolution_y} at {render.resolution_percentage} %"
     rate = f"{render.fps / render.fps_base:g} fps"
@@ -48,7 +49,7 @@ def _of_scene(scene) -> Iterator[str]:
     yield f"- Effects: {len(scene.virtual_shutter.effects)}; other scenes with effects: {others}"
 
 
-def _of_effect(scene, effect, strip) -> Iterator[str]:
+def _of_effect(scene: Scene, effect: PropertyGroup, strip: Strip) -> Iterator[str]:
     options = [f"window {effect.window}", f"follow edges {effect.edge_aware:g}", *_chosen(effect)]
     yield f"- Options: {', '.join(dict.fromkeys(options))}"
     yield f"- Strip: {', '.join(_of_strip(strip))}"
@@ -63,7 +64,7 @@ def _of_effect(scene, effect, strip) -> Iterator[str]:
         yield f"- Cannot be shown at frame {frame}: {templates.plain(str(error))}"
 
 
-def _of_strip(strip) -> Iterator[str]:
+def _of_strip(strip: Strip) -> Iterator[str]:
     yield f"{strip.type} in channel {strip.channel}, frames {strip.left_handle} to {strip.right_handle - 1}"
     yield f"content of {strip.content_duration} from {strip.content_start:g}, blend {strip.blend_type}"
     if strip.parent_meta():
@@ -82,7 +83,7 @@ def _of_strip(strip) -> Iterator[str]:
     yield from (word for word, is_so in changes.items() if is_so)
 
 
-def _of_source(scene, effect, strip) -> Iterator[str]:
+def _of_source(scene: Scene, effect: PropertyGroup, strip: Strip) -> Iterator[str]:
     source = strips.nearest_source(scene, effect, strip)
     if source is None:
         yield "- Source: none"
@@ -102,7 +103,7 @@ def _of_source(scene, effect, strip) -> Iterator[str]:
         yield f"- Footage: {templates.plain(str(error))}"
 
 
-def _of_region(effect, region) -> list[str]:
+def _of_region(effect: PropertyGroup, region: PropertyGroup) -> list[str]:
     """Whose it is as a number: shutters are named."""
     names = [shutter.name for shutter in effect.shutters]
     words = [f"shutter {names.index(region.shutter) + 1 if region.shutter in names else 'none'}"]
@@ -111,7 +112,7 @@ def _of_region(effect, region) -> list[str]:
     return words + (["follows a clip"] if region.follow_clip else [])
 
 
-def _chosen(group) -> Iterator[str]:
+def _chosen(group: PropertyGroup) -> Iterator[str]:
     """What is otherwise in a property group than in a new one: enums, switches and whole numbers."""
     for prop in group.bl_rna.properties:
         name = prop.identifier
@@ -121,20 +122,20 @@ def _chosen(group) -> Iterator[str]:
                 yield f"{name} {value}"
 
 
-def _listed(scene, what: str, found: list[tuple]) -> Iterator[str]:
+def _listed(scene: Scene, what: str, found: list[tuple]) -> Iterator[str]:
     """Property groups with words that tell of each; equal ones in one line."""
     yield f"- {what}s: {len(found)}"
     lines = (", ".join([*words, *_chosen(group), f"{_keys(scene, group)} keys"]) for group, words in found)
     yield from (f"  - {times} × {line}" for line, times in Counter(lines).items())
 
 
-def _keys(scene, group) -> int:
+def _keys(scene: Scene, group: PropertyGroup) -> int:
     """How many keyframes there are of a property group and of all in it."""
     curves = fcurves.curves_under(scene, f"{group.path_from_id()}.")
     return sum(len(curve.keyframe_points) for curve in curves)
 
 
-def _word(owner, name: str) -> str:
+def _word(owner: PropertyGroup, name: str) -> str:
     """An enum's identifier; files can hold numbers that stand for none."""
     try:
         return word(owner, name)

@@ -1,14 +1,17 @@
 """A movie of rendered frames, with the sound and the output settings of the edit that they were rendered from."""
 
+from __future__ import annotations
+
 import re
 import sys
 import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, nullcontext
 from pathlib import Path
 
 import bpy
 import numpy as np
+from bpy.types import ImageFormatSettings, Scene
 
 from ...core import threads
 from ...core.frames import frame_ranges
@@ -31,7 +34,7 @@ def check(output: Path, read: list[Path]) -> None:
     film_output.spare([output], read)
 
 
-def rehearse(scene, output: Path, file_format: str, frames: range) -> None:
+def rehearse(scene: Scene, output: Path, file_format: str, frames: range) -> None:
     """Joins one black picture to a movie that is thrown away; `scene` is changed, and not to be used again.
 
     OutputError, MediaError, OSError: these frames, of such a format, could not be joined to that movie."""
@@ -46,7 +49,7 @@ def rehearse(scene, output: Path, file_format: str, frames: range) -> None:
             raise type(error)(str(error).replace(str(trial), str(output))) from None
 
 
-def _refuse_gaps(scene, file_format: str, frames: range) -> None:
+def _refuse_gaps(scene: Scene, file_format: str, frames: range) -> None:
     """OutputError: frames at which no strip is shown are transparent, and would be refused for it."""
     if file_format == "png" and scene.render.image_settings.color_mode == "RGBA" and _changes_transparency(scene):
         strips = [strip for strip in scene.sequence_editor.strips_all if strip.type not in ("SOUND", "META")]
@@ -64,7 +67,9 @@ def _write_black(path: Path, size: tuple[int, int]) -> None:
         image_writing.write_grey(path, np.zeros((height, width), np.float32))
 
 
-def join(scene, folder: Path, output: Path, frames: range, key: str, progress=film_output.progress) -> None:
+def join(
+    scene: Scene, folder: Path, output: Path, frames: range, key: str, progress: Callable = film_output.progress
+) -> None:
     """Makes a movie of these rendered frames in a folder; `scene` is changed, and not to be used again.
 
     key: that of the edit; progress: as film_output.progress. OutputError, MediaError: frames are missing, broken,
@@ -85,10 +90,10 @@ def join(scene, folder: Path, output: Path, frames: range, key: str, progress=fi
 
 
 @contextmanager
-def _ended_by_gaps(scene, paths: list[Path]):
+def _ended_by_gaps(scene: Scene, paths: list[Path]) -> Iterator[None]:
     """Inside, the film ends before a frame whose picture is gone by then: Blender would show a colour in its place."""
 
-    def look(rendered, *_):
+    def look(rendered: Scene, *_) -> None:
         if not render_job.is_film(rendered):
             return
         path = _picture_at(rendered.frame_current, scene, paths)
@@ -100,7 +105,7 @@ def _ended_by_gaps(scene, paths: list[Path]):
         yield
 
 
-def _picture_at(frame: int, scene, paths: list[Path]) -> Path:
+def _picture_at(frame: int, scene: Scene, paths: list[Path]) -> Path:
     return paths[(frame - scene.frame_start) // scene.frame_step]
 
 
@@ -186,7 +191,7 @@ def _by(size: tuple[int, int]) -> str:
     return "{}×{}".format(*size)
 
 
-def _refuse_transparency(scene, paths: list[Path], first: RenderedPicture) -> None:
+def _refuse_transparency(scene: Scene, paths: list[Path], first: RenderedPicture) -> None:
     """OutputError: PNG files of which Blender's own film would show other colours. It applies the view to what lies
     over black, where they have it applied to the colours that shine through."""
     if paths[0].suffix == ".png" and first.channels in (2, 4) and _changes_transparency(scene):
@@ -196,17 +201,17 @@ def _refuse_transparency(scene, paths: list[Path], first: RenderedPicture) -> No
                 raise OutputError(f"{path}: {words}; render EXR, or without transparency")
 
 
-def _changes_transparency(scene) -> bool:
+def _changes_transparency(scene: Scene) -> bool:
     return _shown(scene).view_settings.view_transform != "Standard"
 
 
-def _shown(scene):
+def _shown(scene: Scene) -> Scene | ImageFormatSettings:
     """What has the display and the view that the edit's output has."""
     settings = scene.render.image_settings
     return settings if settings.color_management == "OVERRIDE" else scene
 
 
-def _lay_over(scene, paths: list[Path], first: RenderedPicture) -> None:
+def _lay_over(scene: Scene, paths: list[Path], first: RenderedPicture) -> None:
     """Has the pictures cover all else that the edit shows. Its sounds are heard."""
     editor = scene.sequence_editor
     editor.display_stack(None)  # out of meta strips: Blender renders what was open when the file was saved
@@ -227,7 +232,7 @@ def _lay_over(scene, paths: list[Path], first: RenderedPicture) -> None:
             strip.colorspace_settings.name = space
 
 
-def _keep_colours(scene, suffix: str, first: RenderedPicture) -> str | None:
+def _keep_colours(scene: Scene, suffix: str, first: RenderedPicture) -> str | None:
     """Has the view of PNG files, which are finished, change nothing any more; the colour space that they are in. EXR
     files are scene-linear: None."""
     if suffix == ".exr":
@@ -244,7 +249,7 @@ def _keep_colours(scene, suffix: str, first: RenderedPicture) -> str | None:
     return shown.display_settings.display_device
 
 
-def _set_output(scene, output: Path, size: tuple[int, int]) -> None:
+def _set_output(scene: Scene, output: Path, size: tuple[int, int]) -> None:
     """The edit's own settings, if its output is a movie, else those of the command's films; the container by the
     output's ending. Nothing is burnt in again, and what else makes a picture of another size or place is off."""
     render = scene.render

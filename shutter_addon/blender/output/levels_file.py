@@ -45,7 +45,7 @@ def temporary(scene: bpy.types.Scene) -> Iterator[LevelsFile]:
 class LevelsFile:
     """An uncompressed TIFF of RGBA levels, whose pixels are replaced in place."""
 
-    def __init__(self, path: Path, width: int, height: int):
+    def __init__(self, path: Path, width: int, height: int) -> None:
         """OSError: it cannot be written. After this there is room for all that is written to it."""
         self.path = path
         self._padding, tiles = -width % _COLUMNS, -(-height // _ROWS)

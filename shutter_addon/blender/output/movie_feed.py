@@ -5,11 +5,15 @@ which take more of the processor than all else that it does for a frame. So the 
 uncompressed file of the levels that the movie will have, above the effect strip, which it then does not render.
 """
 
+from __future__ import annotations
+
 import struct
+from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager, suppress
 from functools import partial
 
 import bpy
+from bpy.types import Scene, Strip
 
 from ...core.stopping import StoppedError
 from ..data import colour_configuration, snapshot, strips
@@ -21,7 +25,7 @@ from .levels_file import LevelsFile
 
 
 @contextmanager
-def feeding(scene):
+def feeding(scene: Scene) -> Iterator[None]:
     """Inside, the movie of an edit of new_edit.make_edit is rendered from such files. It has the levels that Blender
     would give the effect's picture, but for one where rounding decides.
 
@@ -39,7 +43,7 @@ def feeding(scene):
         yield
 
 
-def _fill(effect_strip, picture: LevelsFile, film: list, scene, *_) -> None:
+def _fill(effect_strip: Strip, picture: LevelsFile, film: list, scene: Scene, *_) -> None:
     """Fills the file with the picture of the frame that is rendered next. film: the snapshot of all its frames, once it
     is read."""
     if not render_job.is_film(scene) or render_job.stopping():

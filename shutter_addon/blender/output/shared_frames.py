@@ -1,11 +1,15 @@
 """Frames of a saved edit in a folder that many machines may share: each is rendered by one of them, and once."""
 
+from __future__ import annotations
+
 import sys
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
+
+from bpy.types import Scene
 
 from ...core.farm import edit_version, job_file
 from ...core.farm.claims import Claims
@@ -33,7 +37,7 @@ def check(folder: Path, file_format: str | None, frames: range, read: list[Path]
     film_output.spare(film_output.pictures_of(folder, file_format or "png", frames), read)
 
 
-def check_resumable(scene) -> None:
+def check_resumable(scene: Scene) -> None:
     """OutputError: the edit's pictures do not say which version of it they are of."""
     if scene.render.use_stamp:
         words = "the edit burns metadata into its pictures, so that they carry no version; turn Burn Into Image off"
@@ -41,7 +45,7 @@ def check_resumable(scene) -> None:
 
 
 @contextmanager
-def of_same_footage(scene) -> Iterator[Stamps]:
+def of_same_footage(scene: Scene) -> Iterator[Stamps]:
     """Gives a dictionary for the pictures that are rendered inside, with their stamps. They are removed if the footage
     is written to meanwhile: they carry the key of what it was, and would count as finished. Pictures that others have
     put in their places stay. OutputError: it was written to."""
@@ -57,7 +61,9 @@ def of_same_footage(scene) -> Iterator[Stamps]:
             raise film_output.OutputError(f"{changed[0]}: was written to while frames were rendered from it")
 
 
-def render(scene, folder: Path, file_format: str, version: EditVersion, rendered: Stamps, *, resume: bool) -> None:
+def render(
+    scene: Scene, folder: Path, file_format: str, version: EditVersion, rendered: Stamps, *, resume: bool
+) -> None:
     """Renders the edit's frames, from its first to its last, to pictures that carry the key of its version.
 
     rendered: gets each picture with its stamp, as it is written
@@ -74,7 +80,7 @@ def render(scene, folder: Path, file_format: str, version: EditVersion, rendered
     frames = range(scene.frame_start, scene.frame_end + 1)
     pictures = dict(zip(frames, film_output.pictures_of(folder, file_format, frames), strict=True))
 
-    def move(part, picture):
+    def move(part: Path, picture: Path) -> None:
         job_file.guard(folder, version)  # again: it may be for a newer version by now
         stamp = rendered_pictures.stamp(part)
         part.replace(picture)
@@ -88,7 +94,14 @@ def render(scene, folder: Path, file_format: str, version: EditVersion, rendered
             write()
 
 
-def _render_missing(scene, folder: Path, pictures: dict[int, Path], is_finished, write, moved) -> None:
+def _render_missing(
+    scene: Scene,
+    folder: Path,
+    pictures: dict[int, Path],
+    is_finished: Callable[[Path], bool],
+    write: Callable[[], None],
+    moved: Callable[[], object],
+) -> None:
     missing, waits = dict(pictures), False
     with Claims(folder) as claims, film_output.stoppable() as stopped:
         while True:
@@ -128,7 +141,7 @@ def _claim_run(claims: Claims, missing: dict[int, Path], is_finished: Callable) 
     return run
 
 
-def _render_run(scene, claims: Claims, run: dict[int, Path], write: Callable) -> None:
+def _render_run(scene: Scene, claims: Claims, run: dict[int, Path], write: Callable) -> None:
     scene.frame_start, scene.frame_end = min(run), max(run)
     try:
         write()

@@ -2,11 +2,11 @@
 
 import inspect
 import sys
-from typing import Any
 
 import bpy
 import mathutils
 import numpy as np
+from bpy.types import Depsgraph, RenderEngine
 
 from ...core import told
 from ...core.messages import signed
@@ -21,7 +21,7 @@ class VirtualShutterEngine(bpy.types.RenderEngine):
     bl_label = "Virtual Shutter"
     bl_use_preview = False
 
-    def render(self, depsgraph: Any) -> None:
+    def render(self, depsgraph: Depsgraph) -> None:
         if render_job.cancelling():
             self.report({"ERROR"}, self.bl_label)  # whatever it says, it ends the other render
             return
@@ -34,7 +34,7 @@ class VirtualShutterEngine(bpy.types.RenderEngine):
             elif not self.test_break():
                 render_job.cancel(self.test_break)
 
-    def _render(self, depsgraph: Any, called_by_script: bool) -> None:
+    def _render(self, depsgraph: Depsgraph, called_by_script: bool) -> None:
         scene, width, height = depsgraph.scene, self.resolution_x, self.resolution_y
         asked, stopped = None, None
         if render_job.where() is Where.WINDOW and not (called_by_script or render_job.runs()):
@@ -97,7 +97,7 @@ def say(message: str) -> None:
     print(signed(message), file=sys.stderr, flush=True)
 
 
-def fail(engine: Any, sentence: str) -> None:
+def fail(engine: RenderEngine, sentence: str) -> None:
     """Says why there is no picture, and ends the render: Blender would go on and write the frame without the effect.
 
     A preview has its own way to say it, and nothing to end."""

@@ -4,6 +4,8 @@ Blender writes a frame whose engine failed without it, so a picture that is miss
 Blender finishes an open movie, up to the frame before, and calls `render_cancel`.
 """
 
+from __future__ import annotations
+
 import os
 import sys
 import threading
@@ -18,6 +20,7 @@ from types import FrameType
 from typing import Any
 
 import bpy
+from bpy.types import Scene
 
 from ...core import told
 from ...core.messages import sentence, signed
@@ -70,7 +73,7 @@ _job = _Job()
 _spent: list[tuple[str, str]] = []  # names of the scenes and cameras of small renders, see _cancel
 
 
-def begin(scene: Any) -> bool:
+def begin(scene: Scene) -> bool:
     """A render begins. True: that of a film or a picture; not of a scene in one, nor of a preview."""
     is_effect = scene.render.engine == ENGINE
     if _job.film is not None and (_job.begun or is_effect):
@@ -94,7 +97,7 @@ def film() -> int | None:
     return _job.film
 
 
-def is_film(scene: Any) -> bool:
+def is_film(scene: Scene) -> bool:
     """Whether this scene's frames are what is rendered; called before each of them."""
     if scene.session_uid != _job.film:
         return False
@@ -102,7 +105,7 @@ def is_film(scene: Any) -> bool:
     return True
 
 
-def end(scene: Any, alone: bool) -> None:
+def end(scene: Scene, alone: bool) -> None:
     """A render has ended. alone: no Python waits for it, Blender itself renders, and would go on or end with exit code
     1."""
     if scene.session_uid == _job.film:

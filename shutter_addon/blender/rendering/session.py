@@ -42,7 +42,7 @@ class RenderSession:
         choose: Callable[[], tuple[str, str | None]],
         ask_others: Callable[[], None],
         late: Late | None = None,
-    ):
+    ) -> None:
         """choose: gives the device, as available.choose; ask_others: called where the GPU has no room, has others free
         what they hold of it; late: see MatteValues."""
         self._choose, self._ask_others, self._late = choose, ask_others, late
