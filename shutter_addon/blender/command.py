@@ -8,33 +8,17 @@ import argparse
 import sys
 import traceback
 from contextlib import suppress
+from importlib import import_module
 from pathlib import Path
 
 from ..core.messages import UserError, signed
 from ..devices.device import NoDeviceError
 from ..media.files import check_name
-from .commands import (
-    bake_command,
-    benchmark_command,
-    check_command,
-    inbetween_command,
-    join_command,
-    render_command,
-    track_command,
-)
 from .output import film_output
 
 BAD_INPUT = 2
 PLACES = ("output", "save", "cache", "json", "source", "edit")  # where a fault may be that says not where
-COMMANDS = (
-    render_command,
-    inbetween_command,
-    track_command,
-    bake_command,
-    check_command,
-    join_command,
-    benchmark_command,
-)
+COMMANDS = "render", "inbetween", "track", "bake", "check", "join", "benchmark"
 
 
 def main(argv: list[str]) -> int:
@@ -78,5 +62,5 @@ def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser("shutter", description="Every pixel its own exposure.")
     commands = parser.add_subparsers(dest="command", required=True)
     for command in COMMANDS:
-        command.add(commands)
+        import_module(f".commands.{command}_command", __package__).add(commands)
     return parser

@@ -131,7 +131,7 @@ def _before_frame(scene: Scene, *_) -> None:
 def _after_render(scene: Scene, *_) -> None:
     if not render_job.is_film(scene):
         return  # of an effect, for a film or a preview
-    invalidation.drop_spoilt_later()
+    render_job.soon(invalidation.drop_spoilt)
     edit_feed.end()
     job_snapshots.end()
     render_job.end(scene, alone=not render_job.script_waits(inspect.currentframe()))

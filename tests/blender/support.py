@@ -136,7 +136,7 @@ class Asked:
         return self.session.picture(self.request)
 
     def coefficients(self):
-        return self.session.coefficients(self.request)
+        return self.session.run(self.renderer.coefficients, self.request)
 
     def check(self):
         self.renderer.check(self.request)

@@ -160,7 +160,7 @@ def test_a_draft_has_larger_blocks_where_edges_are_followed(add, film, monkeypat
     exact = request(edit, effect, strip, 3)
     draft = previews.draft(exact.request, exact.renderer.source)
     assert (exact.state.options.aggregate, draft.state.options.aggregate) == (1, 4)
-    assert exact.session.coefficients(draft).shape[1:] == (-(-SIZE[1] // 4), -(-SIZE[0] // 4))
+    assert exact.session.run(exact.renderer.coefficients, draft).shape[1:] == (-(-SIZE[1] // 4), -(-SIZE[0] // 4))
     effect.edge_aware = 0
     plain = request(edit, effect, strip, 3)
     assert previews.draft(plain.request, plain.renderer.source) is plain.request

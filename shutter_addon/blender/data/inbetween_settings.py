@@ -60,30 +60,26 @@ def settings(effect: PropertyGroup, given: Path | None = None) -> Settings:
 
 
 class BuiltStamps:
-    """Which in-between frames there are on disk, as stamps: equal ones, and none was built or removed meanwhile."""
+    """Which in-between frames there are on disk, as stamps: equal ones, and none was built or removed meanwhile.
+
+    is_held: while in-between frames are built stamps stay as they are: those that come count when the build has
+    ended"""
 
     _MOST = 64
 
     def __init__(self) -> None:
         self._known: dict[tuple, tuple] = {}
-        self._held = False
+        self.is_held = False
 
     def of(self, settings: Settings, stem: str) -> tuple:
         """The stamp of the frames of sources whose files have that stem."""
         key = *settings, stem
-        if not (self._held and key in self._known):
+        if not (self.is_held and key in self._known):
             self._known.pop(key, None)
             while len(self._known) >= self._MOST:
                 del self._known[next(iter(self._known))]
             self._known[key] = inbetween_cache.stamp(settings.folder, stem, settings.factor, settings.method)
         return self._known[key]
-
-    def hold(self) -> None:
-        """While in-between frames are built stamps stay as they are: those that come count when the build has ended."""
-        self._held = True
-
-    def release(self) -> None:
-        self._held = False
 
     def forget(self) -> None:
         """Forgets all: before another file is loaded."""

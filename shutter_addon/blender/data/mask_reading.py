@@ -30,19 +30,13 @@ _FARTHEST = 1e4
 _SHAPE_NUMBERS = 8
 
 
-def _layer_record() -> np.dtype:
-    return record("MaskLayer", "char name[64]", "ListBase splines", "ListBase splines_shapes")
-
-
-def _shape_record() -> np.dtype:
-    links = "MaskLayerShape *next", "MaskLayerShape *prev"
-    return record("MaskLayerShape", *links, "float *data", "int tot_vert", "int frame")
-
-
-def _parent_record() -> np.dtype:
-    """Where the track was (in mask space), or the plane's corners (in the clip)."""
-    names = "char parent[64]", "char sub_parent[64]"
-    return record("MaskParent", "ID *id", *names, "float parent_orig[2]", "float parent_corners_orig[4][2]")
+# Records of Blender's memory with their fields, as struct_dna.record takes them.
+_LAYER = "MaskLayer", "char name[64]", "ListBase splines", "ListBase splines_shapes"
+_LINKS = "MaskLayerShape *next", "MaskLayerShape *prev"
+_SHAPE = "MaskLayerShape", *_LINKS, "float *data", "int tot_vert", "int frame"
+# Where the track was (in mask space), or the plane's corners (in the clip).
+_PLACES = "float parent_orig[2]", "float parent_corners_orig[4][2]"
+_PARENT = "MaskParent", "ID *id", "char parent[64]", "char sub_parent[64]", *_PLACES
 
 
 class _Shape(NamedTuple):
@@ -199,7 +193,7 @@ def _shapes(layer: bpy.types.MaskLayer) -> list[_Shape] | None:
     if not layer.splines:
         return []
     try:
-        kind, raw = _shape_record(), read(_layer_record(), layer.as_pointer())
+        kind, raw = record(*_SHAPE), read(record(*_LAYER), layer.as_pointer())
     except LayoutError:
         return None
     ends = layer.splines[0].as_pointer(), layer.splines[-1].as_pointer()
@@ -233,7 +227,7 @@ def _families(
 def _parent_of(mask: bpy.types.Mask, parent: bpy.types.MaskParent) -> np.void:
     """EffectError: it cannot be read in this Blender."""
     with suppress(LayoutError):
-        raw = read(_parent_record(), parent.as_pointer())
+        raw = read(record(*_PARENT), parent.as_pointer())
         names = parent.parent.encode(), parent.sub_parent.encode()
         if raw["id"] == parent.id.as_pointer() and (text(raw["parent"]), text(raw["sub_parent"])) == names:
             return raw

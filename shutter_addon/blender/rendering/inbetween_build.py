@@ -145,7 +145,7 @@ def running() -> Build | None:
 def start(scene: Scene, effect: PropertyGroup, strip: Strip, factor: int | None = None) -> Build:
     """Begins a build; factor: see Build. EffectError, MediaError: it cannot begin."""
     _builds.running = Build(scene, effect, strip, factor)
-    inbetween_settings.built.hold()
+    inbetween_settings.built.is_held = True
     return _builds.running
 
 
@@ -153,7 +153,7 @@ def ended() -> None:
     """What the build that was stopped, or has run to its end, has built counts from now on."""
     if _builds.running is not None:
         _builds.left, _builds.running = (_builds.running.future,), None
-    inbetween_settings.built.release()
+    inbetween_settings.built.is_held = False
     _looks.clear()
 
 

@@ -18,7 +18,7 @@ from ...media import MediaError
 from ..data import fcurves, geometry, mask_reading, matte_content, matte_strips, snapshot, source_media, strips
 from ..data.snapshot import Snapshot, SourceFiles
 from ..data.strip_timing import retiming_keys
-from . import render_job, render_settings
+from . import render_settings
 
 _signatures: dict[int, int] = {}  # by effect scene
 _files: dict[int, tuple[int, dict[str, SourceFiles]]] = {}  # by effect scene: the revision of the look, files by source
@@ -96,12 +96,6 @@ def _drop(noted: set[int]) -> None:
         for strip in strips.effect_strips(scene):
             if strip.scene.session_uid in uids:
                 strip.invalidate_cache("RAW")
-
-
-def drop_spoilt_later() -> None:
-    """As drop_spoilt, from whatever thread."""
-    if _spoilt:
-        render_job.soon(drop_spoilt)
 
 
 def invalidate_changed(scene: Scene) -> bool:

@@ -152,10 +152,6 @@ class RenderSession:
                 request = self.request(snapshot, frame + step, context, FULL)
                 self._begun[snapshot.scene] = request.key, self._begin(request)
 
-    def coefficients(self, request: Request, stopped: Callable[[], bool] = never) -> np.ndarray:
-        """See Renderer.coefficients."""
-        return self.run(self.renderer(request.source).coefficients, request, stopped=stopped)
-
     def weights(self, request: Request, stopped: Callable[[], bool] = never) -> list[np.ndarray]:
         """Coefficients (h, w) of all shutters, and then the mattes of all layers, in blocks as large."""
         return self.run(_weights, self.renderer(request.source), request, stopped=stopped)
@@ -232,14 +228,8 @@ class RenderSession:
                 self._submit(renderer.close)
 
     def forget(self) -> None:
-        """Closes all sources and frees the device; where Blender's GPU is not current, once it is. A render job may
-        take up more meanwhile."""
-        self._drop_begun(list(self._begun))
-        for known in (self._shown, self._requests):
-            known.clear()
-        while self._renderers:
-            _place, (_key, renderer) = self._renderers.popitem()
-            self._submit(renderer.close)
+        """Closes all sources and frees the device; where Blender's GPU is not current, once it is."""
+        self.keep(set())
         compositor, self._compositor = self._compositor, None
         if compositor is not None:
             with suppress(NoDeviceError):
