@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import closing
 from functools import lru_cache
 from typing import NamedTuple
 
@@ -80,10 +81,7 @@ def _note(
 def _size(file: MatteFile) -> tuple[int, int, int] | str:
     """Width, height and number of frames, or why it cannot be read."""
     try:
-        source = file.open()
+        with closing(file.open()) as source:
+            return source.width, source.height, source.count
     except UserError as error:
         return str(error)
-    try:
-        return source.width, source.height, source.count
-    finally:
-        source.close()

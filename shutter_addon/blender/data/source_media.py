@@ -157,11 +157,12 @@ def spec(strip: Strip, key: tuple | None = None) -> SourceSpec:
 def _spec(strip: Strip, key: tuple) -> SourceSpec:
     count, path = _files(strip)
     config = Path(bpy.utils.system_resource("DATAFILES", path="colormanagement"), "config.ocio")  # finds folders only
+    alpha = "premultiplied" if strip.alpha_mode == "PREMUL" else "straight"  # whatever the files say
     options = {
         "stream": getattr(strip, "stream_index", 0),
         "colorspace": reading(strip)[0],
         "config": config,
-        "alpha": _alpha(strip),
+        "alpha": None if strip.type == "MOVIECLIP" else alpha,
         "deinterlace": strip.type == "MOVIE" and strip.use_deinterlace,
     }
     return SourceSpec(
@@ -190,13 +191,6 @@ def is_movie(strip: Strip) -> bool:
     """Whether a movie, image or clip strip reads a movie."""
     clip = strip.clip if strip.type == "MOVIECLIP" else None
     return strip.type == "MOVIE" or (clip is not None and clip.source == "MOVIE")
-
-
-def _alpha(strip: Strip) -> str | None:
-    """An image strip has its own idea of its files' alpha; a clip takes what is usual for them."""
-    if strip.type == "MOVIECLIP":
-        return None
-    return "premultiplied" if strip.alpha_mode == "PREMUL" else "straight"
 
 
 def _files(strip: Strip) -> tuple[int, Callable[[int], Path]]:

@@ -6,12 +6,13 @@ import hashlib
 import os
 import tomllib
 from collections.abc import Iterator
+from contextlib import suppress
 from functools import partial
 from itertools import groupby
 from pathlib import Path
 
 import bpy
-from bpy.types import Scene, Strip
+from bpy.types import Scene
 
 from ...core import threads
 from ...core.farm.edit_version import EditVersion, Footage
@@ -64,19 +65,13 @@ def _footage_files(scene: Scene) -> Iterator[list[Path]]:
     edits that it shows, and of all other data; without sound."""
     for shown in strips.shown_scenes(scene):
         for strip in shown.sequence_editor.strips_all:
-            if strip.type in strips.SOURCES and (files := _files_of(strip)):
-                yield files
+            if strip.type in strips.SOURCES:
+                with suppress(MediaError):  # it shows nothing
+                    yield source_media.files(strip)
     data = bpy.data
     for item in (*data.images, *data.movieclips, *data.fonts, *data.cache_files, *data.volumes, *data.libraries):
         if files := external_files.every(item):
             yield files
-
-
-def _files_of(strip: Strip) -> list[Path]:
-    try:
-        return source_media.files(strip)
-    except MediaError:  # it shows nothing
-        return []
 
 
 def _footage(files: list[Path]) -> Footage:
