@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import os
+from argparse import Namespace
 from contextlib import suppress
 
 from bpy.types import PropertyGroup, Scene, Strip
@@ -29,7 +30,7 @@ def add(commands: argparse._SubParsersAction) -> None:
     parser.set_defaults(run=run)
 
 
-def run(arguments: argparse.Namespace) -> None:
+def run(arguments: Namespace) -> None:
     scene = saved_edit.open_edit(arguments.source, arguments.scene)
     scene.frame_set(scene.frame_current)  # what drivers and keys say, once
     if arguments.attached:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import json
 import re
+from argparse import Namespace
 
 from ...compute import benchmark
 from ...core.messages import sentence
@@ -28,7 +29,7 @@ def add(commands: argparse._SubParsersAction) -> None:
     parser.set_defaults(run=run)
 
 
-def run(arguments: argparse.Namespace) -> None:
+def run(arguments: Namespace) -> None:
     compositor, lesser = machine.open_device(arguments.device)
     steps = len(arguments.sizes) * (len(arguments.windows) + 1)
     try:

@@ -9,6 +9,7 @@ import re
 import shlex
 import subprocess
 import sys
+from argparse import Namespace
 from collections.abc import Callable
 from pathlib import Path
 
@@ -56,7 +57,7 @@ def add(commands: argparse._SubParsersAction) -> None:
     parser.set_defaults(run=run)
 
 
-def run(arguments: argparse.Namespace) -> None:
+def run(arguments: Namespace) -> None:
     edit = command_line.open_edit(arguments.edit, arguments.frames)
     scene = edit.scene
     with command_line.rendered_by(arguments):
@@ -75,7 +76,7 @@ def run(arguments: argparse.Namespace) -> None:
         sys.exit(2)
 
 
-def _report(arguments: argparse.Namespace, scene: Scene, frames: range, version: EditVersion) -> dict:
+def _report(arguments: Namespace, scene: Scene, frames: range, version: EditVersion) -> dict:
     """What is found, as JSON has it (docs/command.md)."""
     faults = [*_version_faults(scene), *_setting_faults(arguments, scene, frames)]
     notes: list[str] = []
@@ -138,7 +139,7 @@ def _numbers(version: str) -> list[int]:
     return [int(number) for number in re.findall(r"\d+", version)]
 
 
-def _setting_faults(arguments: argparse.Namespace, scene: Scene, frames: range) -> list[str]:
+def _setting_faults(arguments: Namespace, scene: Scene, frames: range) -> list[str]:
     """Whether what the edit's output is can be written, and lie where it is wanted."""
     read = [arguments.edit, *versions.read_files(scene)]
     faults = _fault(shared_frames.check_resumable, scene) if arguments.resume else []
@@ -188,9 +189,7 @@ def _memory(checks: list[EffectCheck], limit: int | None) -> dict:
     return {"gpu": min(gpu, limit or gpu), "gpu_limit": limit, "host": host}
 
 
-def _disk(
-    arguments: argparse.Namespace, scene: Scene, frames: range, checks: list[EffectCheck], faults: list[str]
-) -> dict:
+def _disk(arguments: Namespace, scene: Scene, frames: range, checks: list[EffectCheck], faults: list[str]) -> dict:
     """Bytes that the frames and the in-between frames that are missing take at most, as noise does, which is not
     compressed: no frame is rendered for this. Those that are there already are not counted."""
     file_format, needs = arguments.format or "png", []

@@ -4,6 +4,7 @@ import argparse
 import os
 import re
 import sys
+from argparse import Namespace
 from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import NamedTuple, get_args
@@ -58,7 +59,7 @@ def add_device(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def rendered_by(arguments: argparse.Namespace) -> AbstractContextManager[None]:
+def rendered_by(arguments: Namespace) -> AbstractContextManager[None]:
     """Inside, renders are composed as these options say."""
     return render_settings.using(render_settings.RenderSettings(arguments.device, gpu_memory=arguments.gpu_memory))
 

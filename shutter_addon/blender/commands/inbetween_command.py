@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+from argparse import Namespace
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -34,14 +35,14 @@ def add(commands: argparse._SubParsersAction) -> None:
     parser.set_defaults(run=run)
 
 
-def run(arguments: argparse.Namespace) -> None:
+def run(arguments: Namespace) -> None:
     if saved_edit.is_saved(arguments.source):
         _build_edit(arguments)
     else:
         _build_source(arguments)
 
 
-def _build_edit(arguments: argparse.Namespace) -> None:
+def _build_edit(arguments: Namespace) -> None:
     for name in ("factor", "method", "cache"):
         if getattr(arguments, name) is not None:
             raise film_output.OutputError(f"--{name}: is for a source; a saved edit says it itself")
@@ -50,7 +51,7 @@ def _build_edit(arguments: argparse.Namespace) -> None:
     build_lacking(edit.scene)
 
 
-def _build_source(arguments: argparse.Namespace) -> None:
+def _build_source(arguments: Namespace) -> None:
     for name in ("factor", "cache"):
         if getattr(arguments, name) is None:
             raise film_output.OutputError(f"--{name} is missing: only a saved edit (.blend) says it itself")

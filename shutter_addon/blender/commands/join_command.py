@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+from argparse import Namespace
 
 from ...core.farm import job_file
 from ..data import missing_media, versions
@@ -21,7 +22,7 @@ def add(commands: argparse._SubParsersAction) -> None:
     parser.set_defaults(run=run)
 
 
-def run(arguments: argparse.Namespace) -> None:
+def run(arguments: Namespace) -> None:
     edit = command_line.open_edit(arguments.edit, arguments.frames)
     film_join.check(arguments.output, [edit.path, *versions.read_files(edit.scene), *versions.sounds()])
     for fault in missing_media.sound_faults(edit.scene, edit.frames):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+from argparse import Namespace
 from dataclasses import replace
 from pathlib import Path
 
@@ -49,14 +50,14 @@ def add(commands: argparse._SubParsersAction) -> None:
     parser.set_defaults(run=run)
 
 
-def run(arguments: argparse.Namespace) -> None:
+def run(arguments: Namespace) -> None:
     if saved_edit.is_saved(arguments.source):
         _render_edit(arguments)
     else:
         _render_source(arguments)
 
 
-def _render_edit(arguments: argparse.Namespace) -> None:
+def _render_edit(arguments: Namespace) -> None:
     """Renders a saved edit as it is."""
     for name in ("recipe", "weights", "save", "inbetween", "inbetween_method", "cache"):
         if getattr(arguments, name) is not None:
@@ -78,7 +79,7 @@ def _render_edit(arguments: argparse.Namespace) -> None:
         shared_frames.render(scene, output, file_format, version, rendered, resume=arguments.resume)
 
 
-def _render_source(arguments: argparse.Namespace) -> None:
+def _render_source(arguments: Namespace) -> None:
     """Makes an edit of a source and a recipe, and renders it."""
     if arguments.recipe is None:
         raise film_output.OutputError("--recipe is missing: only a saved edit (.blend) is rendered without one")
@@ -115,12 +116,12 @@ def _render_source(arguments: argparse.Namespace) -> None:
             film_output.film(scene, output)
 
 
-def _check_device(arguments: argparse.Namespace) -> None:
+def _check_device(arguments: Namespace) -> None:
     """NoDeviceError: there is none as it is wanted. Called before anything is written."""
     available.choose(arguments.device or preferences.device())
 
 
-def _written(arguments: argparse.Namespace, file_format: str, frames: range) -> list[Path]:
+def _written(arguments: Namespace, file_format: str, frames: range) -> list[Path]:
     """All files that a render writes, but for in-between frames."""
     files = [arguments.save] if arguments.save else []
     if arguments.output and film_output.is_movie(arguments.output):
@@ -142,7 +143,7 @@ def _mattes(source_recipe: recipe.Recipe, folder: Path) -> list[Path]:
     return files
 
 
-def _recipe(arguments: argparse.Namespace) -> recipe.Recipe:
+def _recipe(arguments: Namespace) -> recipe.Recipe:
     """The recipe, with the in-between frames that were asked for."""
     source_recipe = recipe_file.load(arguments.recipe)
     if arguments.inbetween is not None:
@@ -150,7 +151,7 @@ def _recipe(arguments: argparse.Namespace) -> recipe.Recipe:
     return replace(source_recipe, inbetween_method=arguments.inbetween_method or source_recipe.inbetween_method)
 
 
-def _cache(arguments: argparse.Namespace) -> Path:
+def _cache(arguments: Namespace) -> Path:
     """The folder of in-between frames: where a saved edit will look for them, if it is to be saved."""
     return arguments.cache or (arguments.save or arguments.output).parent / inbetween_settings.FOLDER
 

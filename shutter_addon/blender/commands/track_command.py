@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import json
 import sys
+from argparse import Namespace
 from collections.abc import Iterator
 from contextlib import ExitStack, closing, contextmanager
 from dataclasses import replace
@@ -46,7 +47,7 @@ def add(commands: argparse._SubParsersAction) -> None:
     parser.set_defaults(run=run)
 
 
-def run(arguments: argparse.Namespace) -> None:
+def run(arguments: Namespace) -> None:
     if arguments.camera == (arguments.region is not None):
         raise film_output.OutputError("track: either --region NAME or --camera, one of the two")
     source_recipe = recipe_file.load(arguments.recipe)
@@ -81,7 +82,7 @@ def run(arguments: argparse.Namespace) -> None:
         print(signed(said), file=sys.stderr)
 
 
-def _region_index(arguments: argparse.Namespace, source_recipe: recipe.Recipe) -> int:
+def _region_index(arguments: Namespace, source_recipe: recipe.Recipe) -> int:
     names = [region.name for region in source_recipe.regions]
     if arguments.region not in names:
         raise film_output.OutputError(f'{arguments.recipe}: there is no region "{arguments.region}"')
@@ -93,7 +94,7 @@ def _region_index(arguments: argparse.Namespace, source_recipe: recipe.Recipe) -
 
 
 def _followed(
-    arguments: argparse.Namespace, source_recipe: recipe.Recipe, index: int | None, medium: FrameSource, frames: range
+    arguments: Namespace, source_recipe: recipe.Recipe, index: int | None, medium: FrameSource, frames: range
 ) -> tuple[dict, list]:
     """What tracking of a region, or of the camera, found by frame, and where it ended before the last frame.
     TrackingError: at once."""
@@ -128,11 +129,7 @@ def _followed(
 
 @contextmanager
 def _cover(
-    arguments: argparse.Namespace,
-    source_recipe: recipe.Recipe,
-    region: OutlineRegion,
-    filmed: Any,
-    size: tuple[int, int],
+    arguments: Namespace, source_recipe: recipe.Recipe, region: OutlineRegion, filmed: Any, size: tuple[int, int]
 ) -> Iterator[matte_tracking.Cover]:
     """What an outline covers at the places of filmed frames (media.matte_tracking.Cover)."""
     if region.between == "straight":
@@ -177,7 +174,7 @@ def _shown(source_recipe: recipe.Recipe, frame: float, count: int) -> float:
     return retiming.nearest(filmed, factor, (count - 1) * factor + 1) / factor
 
 
-def _write_track(arguments: argparse.Namespace, result: recipe.Recipe, tracked: dict, stops: list) -> None:
+def _write_track(arguments: Namespace, result: recipe.Recipe, tracked: dict, stops: list) -> None:
     """Writes the recipe, and the report of it, both whole or neither."""
     report = {
         **({"camera": True} if arguments.camera else {"region": arguments.region}),

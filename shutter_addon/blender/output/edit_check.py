@@ -34,6 +34,8 @@ from ..rendering.render_settings import RenderSettings
 from ..rendering.session import RenderSession
 from . import output_space
 
+Compositor = CPUCompositor | GPUCompositor
+
 
 @dataclass
 class EffectCheck:
@@ -72,9 +74,7 @@ class EffectCheck:
         return chunk_size(self.window, self.factor) if self.window else LEAST
 
 
-def effects(
-    scene: Scene, frames: range, compositor: CPUCompositor | GPUCompositor, *, find_cuts: bool
-) -> list[EffectCheck]:
+def effects(scene: Scene, frames: range, compositor: Compositor, *, find_cuts: bool) -> list[EffectCheck]:
     """Looks at the effects that the scene's frames show, those of scenes in it included.
 
     compositor: of the device that will render. Files are opened, and of each the first and the last frame that is
@@ -102,9 +102,7 @@ def _shown_effects(film: Scene, frames: range) -> Iterator[tuple]:
             yield scene, effect, parts[0], shown
 
 
-def _effect(
-    session: RenderSession, shown: tuple, compositor: CPUCompositor | GPUCompositor, find_cuts: bool
-) -> EffectCheck:
+def _effect(session: RenderSession, shown: tuple, compositor: Compositor, find_cuts: bool) -> EffectCheck:
     """shown: of _shown_effects"""
     scene, effect, strip, frames = shown
     check = EffectCheck(scene=scene, name=strip.name, frames=frames, shutters=len(effect.shutters))
@@ -250,9 +248,7 @@ def _notes(
     return notes
 
 
-def _needs(
-    source: FrameSource, requests: dict[float, Request], compositor: CPUCompositor | GPUCompositor
-) -> memory_needs.Needs:
+def _needs(source: FrameSource, requests: dict[float, Request], compositor: Compositor) -> memory_needs.Needs:
     """The most that one of the windows needs, decoded frames included."""
     device, most = getattr(compositor, "device", None), memory_needs.Needs(0, 0, False)
     for kind in {_kind(request.state) for request in requests.values()}:

@@ -23,6 +23,7 @@ from ..rendering import render_job
 from . import movie_feed
 
 INTERRUPTED = 130
+Move = Callable[[Path, Path], object]  # moves a picture to its place
 
 # Ending: container, codec, audio codec (Blender's names).
 MOVIES = {
@@ -199,9 +200,7 @@ def film(scene: Scene, output: Path) -> None:
         write(scene, output, moved)
 
 
-def write(
-    scene: Scene, output: Path, moved: Callable[[], None], move: Callable[[Path, Path], object] = Path.replace
-) -> None:
+def write(scene: Scene, output: Path, moved: Callable[[], None], move: Move = Path.replace) -> None:
     """Renders the frames of any edit to a movie, or to the pictures that its settings say in a prepared folder. Blender
     writes into a folder beside the output, and what is finished moves out of it.
 
@@ -280,9 +279,7 @@ def message(error: RuntimeError) -> str:
 
 
 @contextmanager
-def _moved(
-    part: Path, output: Path, scene: Scene, update: Callable[[], None], move: Callable[[Path, Path], object]
-) -> Iterator[dict[str, Path]]:
+def _moved(part: Path, output: Path, scene: Scene, update: Callable[[], None], move: Move) -> Iterator[dict[str, Path]]:
     """Moves each finished picture from `part` to `output`, and calls both. Gives the pictures that are missing so
     far, by name; none of a movie's."""
     frames = range(scene.frame_start, scene.frame_end + 1)

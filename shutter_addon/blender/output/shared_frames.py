@@ -95,12 +95,7 @@ def render(
 
 
 def _render_missing(
-    scene: Scene,
-    folder: Path,
-    pictures: dict[int, Path],
-    is_finished: Callable[[Path], bool],
-    write: Callable[[], None],
-    moved: Callable[[], object],
+    scene: Scene, folder: Path, pictures: dict[int, Path], is_finished: Callable, write: Callable, moved: Callable
 ) -> None:
     missing, waits = dict(pictures), False
     with Claims(folder) as claims, film_output.stoppable() as stopped:
