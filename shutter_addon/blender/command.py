@@ -5,16 +5,15 @@ what it says.
 """
 
 import argparse
-import sys
 import traceback
-from contextlib import suppress
 from importlib import import_module
 from pathlib import Path
 
-from ..core.messages import UserError, signed
+from ..core.messages import UserError
 from ..devices.device import NoDeviceError
 from ..media.files import check_name
 from .output import film_output
+from .rendering import render_job
 
 BAD_INPUT = 2
 PLACES = ("output", "save", "cache", "json", "source", "edit")  # where a fault may be that says not where
@@ -53,8 +52,7 @@ def main(argv: list[str]) -> int:
 
 
 def _refuse(reason: str, code: int = BAD_INPUT) -> int:
-    with suppress(OSError):  # nobody reads it
-        print(signed(reason), file=sys.stderr)
+    render_job.say(reason)
     return code
 
 

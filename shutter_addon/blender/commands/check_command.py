@@ -20,7 +20,7 @@ from ...core import told
 from ...core.farm import chunks, job_file
 from ...core.farm.edit_version import EditVersion
 from ...core.frames import frame_ranges
-from ...core.messages import UserError, signed
+from ...core.messages import UserError
 from ...devices.budget import machine_memory
 from ...devices.device import NoDeviceError
 from ..data import missing_media, versions
@@ -28,7 +28,7 @@ from ..devices import machine
 from ..output import edit_check, error_report, film_join, film_output, output_space, shared_frames
 from ..output.edit_check import EffectCheck
 from ..output.output_space import Need, in_units
-from ..rendering import render_settings
+from ..rendering import render_job, render_settings
 from . import command_line
 from .command_line import place
 
@@ -71,7 +71,7 @@ def run(arguments: Namespace) -> None:
         else:
             command_line.tell("\n".join(_lines(report)))
     for fault in report["faults"]:
-        print(signed(fault), file=sys.stderr)
+        render_job.say(fault)
     if report["faults"]:
         sys.exit(2)
 

@@ -5,6 +5,7 @@ import os
 import re
 import sys
 from argparse import Namespace
+from collections.abc import Iterable
 from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import NamedTuple, get_args
@@ -13,7 +14,7 @@ from bpy.types import Scene
 
 from ...core.farm.edit_version import EditVersion
 from ...core.frames.frame_source import FrameSource
-from ...core.messages import sentence, signed
+from ...core.messages import sentence
 from ...core.recipes import recipe
 from ...media import open_source
 from ...media.files import stamp
@@ -22,7 +23,7 @@ from ..data import inbetween_settings
 from ..devices import available
 from ..editing import saved_edit
 from ..output import film_output
-from ..rendering import render_settings
+from ..rendering import render_job, render_settings
 
 FACTORS = get_args(recipe.Factor)  # 1: none
 METHODS = tuple(inbetween_settings.METHODS.values())
@@ -64,11 +65,18 @@ def rendered_by(arguments: Namespace) -> AbstractContextManager[None]:
     return render_settings.using(render_settings.RenderSettings(arguments.device, gpu_memory=arguments.gpu_memory))
 
 
+def refuse(arguments: Namespace, names: Iterable[str], why: str) -> None:
+    """OutputError: one of these options is given, which is for something else."""
+    for name in names:
+        if getattr(arguments, name) is not None:
+            raise film_output.OutputError(f"--{name.replace('_', '-')}: {why}")
+
+
 def opened(path: Path) -> FrameSource:
     """The source, with a word on stderr of files that were left out."""
     medium = open_source(path)
     if left_out := medium.left_out:
-        print(signed(left_out), file=sys.stderr)
+        render_job.say(left_out)
     return medium
 
 

@@ -43,9 +43,7 @@ def run(arguments: Namespace) -> None:
 
 
 def _build_edit(arguments: Namespace) -> None:
-    for name in ("factor", "method", "cache"):
-        if getattr(arguments, name) is not None:
-            raise film_output.OutputError(f"--{name}: is for a source; a saved edit says it itself")
+    command_line.refuse(arguments, ("factor", "method", "cache"), "is for a source; a saved edit says it itself")
     edit = command_line.open_edit(arguments.source, arguments.frames)
     edit.scene.frame_start, edit.scene.frame_end = edit.frames[0], edit.frames[-1]
     build_lacking(edit.scene)

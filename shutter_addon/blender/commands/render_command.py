@@ -59,10 +59,8 @@ def run(arguments: Namespace) -> None:
 
 def _render_edit(arguments: Namespace) -> None:
     """Renders a saved edit as it is."""
-    for name in ("recipe", "weights", "save", "inbetween", "inbetween_method", "cache"):
-        if getattr(arguments, name) is not None:
-            option = f"--{name.replace('_', '-')}"
-            raise film_output.OutputError(f"{option}: is for a source and a recipe; a saved edit is rendered as it is")
+    names = "recipe", "weights", "save", "inbetween", "inbetween_method", "cache"
+    command_line.refuse(arguments, names, "is for a source and a recipe; a saved edit is rendered as it is")
     output, file_format = arguments.output, arguments.format or "png"
     if output is None:
         raise film_output.OutputError("nothing to do: give --output")

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 import json
-import sys
 from argparse import Namespace
 from collections.abc import Iterator
 from contextlib import ExitStack, closing, contextmanager
@@ -14,7 +13,6 @@ from typing import Any
 from ...core import atomic_write
 from ...core.frames import retiming
 from ...core.frames.frame_source import FrameSource
-from ...core.messages import signed
 from ...core.model import outlines, presence
 from ...core.model.effect import OutlineRegion, Region
 from ...core.recipes import recipe, recipe_file, region_keys
@@ -24,6 +22,7 @@ from ...media.cuts import ShotSource
 from ...media.footage import Footage
 from ..editing import new_edit
 from ..output import film_output
+from ..rendering import render_job
 from . import command_line
 from .command_line import place
 
@@ -79,7 +78,7 @@ def run(arguments: Namespace) -> None:
             said = f"{subject}: tracked to frame {near}, where the shot ends"
         else:
             said = f"{subject}: not tracked from frame {stop.frame} on: {stop.fault}"
-        print(signed(said), file=sys.stderr)
+        render_job.say(said)
 
 
 def _region_index(arguments: Namespace, source_recipe: recipe.Recipe) -> int:

@@ -20,7 +20,6 @@ from ...media import display_transfer
 from ..data import seen_alone, strips
 from ..rendering import job_snapshots, pictures, render_context, render_job
 from ..rendering.effect_source import FULL, in_words
-from ..rendering.engine import say
 from ..rendering.render_job import Where
 from . import levels_file
 from .levels_file import LevelsFile, strip_above
@@ -87,7 +86,7 @@ def _feed(film: _Film, scene: Scene, seen: seen_alone.Alone) -> bool:
         snapshot, frame = job_snapshots.of(strip.scene, int(shown))
         transfer = display_transfer.blended if seen.is_blended else display_transfer.shown
         display = Display(scene.render.dither_intensity, transfer)
-        context = render_context.of_render(say, render_job.stopping, display=display)
+        context = render_context.of_render(render_job.say, render_job.stopping, display=display)
         source = context.renderer(context.request(snapshot, frame, FULL)).source
         size = scene.render.resolution_x, scene.render.resolution_y
         if source.alpha != "opaque" or (source.width, source.height) != size:

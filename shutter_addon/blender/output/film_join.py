@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-import sys
 import tempfile
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, nullcontext
@@ -15,7 +14,6 @@ from bpy.types import ImageFormatSettings, Scene
 
 from ...core import threads
 from ...core.frames import frame_ranges
-from ...core.messages import signed
 from ...media import image_writing, rendered_pictures
 from ...media.rendered_pictures import RenderedPicture
 from ..data import requirements, seen_alone, strips
@@ -143,7 +141,7 @@ def _are(frames: list[int]) -> str:
 def say_what_is_left_out(folder: Path, frames: range) -> None:
     """A word on stderr of pictures that are no frames of the edit."""
     if others := [frame for frame in _numbered(folder) if frame not in frames]:
-        print(signed(f"{folder}: {_are(others)} not of the edit, and left out"), file=sys.stderr)
+        render_job.say(f"{folder}: {_are(others)} not of the edit, and left out")
 
 
 def _common(paths: list[Path], looked: Callable, size: tuple[int, int], key: str) -> RenderedPicture:

@@ -19,7 +19,6 @@ from ...core.stopping import StoppedError
 from ..data import colour_configuration, snapshot, strips
 from ..rendering import pictures, render_context, render_job, render_settings
 from ..rendering.effect_source import in_words
-from ..rendering.engine import say
 from . import levels_file
 from .levels_file import LevelsFile
 
@@ -52,7 +51,7 @@ def _fill(effect_strip: Strip, picture: LevelsFile, film: list, scene: Scene, *_
         if not film:
             effect, frames = strips.effect_of(scene, effect_strip.scene), range(scene.frame_start, scene.frame_end + 1)
             film.append(snapshot.take(scene, effect, effect_strip, frames, folder=render_settings.settings().inbetween))
-        context = render_context.of_render(say, render_job.stopping, levels=True)
+        context = render_context.of_render(render_job.say, render_job.stopping, levels=True)
         picture.write(pictures.picture(context, film[0], scene.frame_current))
         context.session.begin_next(film[0], scene.frame_current, context)
     except BaseException as error:  # Blender would print it, and write the picture again that was there before

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -15,9 +14,9 @@ from ...core.farm import edit_version, job_file
 from ...core.farm.claims import Claims
 from ...core.farm.edit_version import EditVersion
 from ...core.frames import frame_ranges
-from ...core.messages import signed
 from ...media import rendered_pictures
 from ..data import versions
+from ..rendering import render_job
 from . import film_output
 
 RUN = 8  # frames that are claimed at once
@@ -114,7 +113,7 @@ def _render_missing(
             else:
                 if not waits:
                     words = f"waiting for {frame_ranges.in_words(list(missing))}, which other workers have claimed"
-                    print(signed(f"{folder}: {words}"), file=sys.stderr)
+                    render_job.say(f"{folder}: {words}")
                 waits = True
                 time.sleep(_PAUSE)
         claims.clear(map(_name, pictures.values()))

@@ -1,7 +1,6 @@
 """The render engine of effect scenes: Blender's sequencer calls it for every frame it needs of an effect strip."""
 
 import inspect
-import sys
 
 import bpy
 import mathutils
@@ -87,14 +86,9 @@ class VirtualShutterEngine(bpy.types.RenderEngine):
     def _say(self, message: str) -> None:
         told.record(message)
         if bpy.app.background:
-            say(message)
+            render_job.say(message)
         else:
             self.report({"WARNING"}, signed(message))
-
-
-def say(message: str) -> None:
-    """Says something of a render in the background."""
-    print(signed(message), file=sys.stderr, flush=True)
 
 
 def fail(engine: RenderEngine, sentence: str) -> None:

@@ -33,7 +33,8 @@ _PATIENCE = 0.1  # seconds between two looks at whether a render has ended
 _LONG = 10.0  # seconds
 
 
-def _to_stderr(text: str) -> None:
+def say(text: str) -> None:
+    """Says something on stderr."""
     with suppress(OSError, AttributeError):  # nobody reads it, or there is no stderr
         print(signed(text), file=sys.stderr, flush=True)
 
@@ -64,7 +65,7 @@ class _Job:
     begun: bool = False
     stopping: bool = False
     failure: str | None = None
-    tell: Callable[[str], None] = _to_stderr
+    tell: Callable[[str], None] = say
     cancelling: bool = False
     waited_for: bool = False
 
