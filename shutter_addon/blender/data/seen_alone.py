@@ -3,7 +3,8 @@ that are known beforehand."""
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from collections.abc import Mapping
+from typing import NamedTuple
 
 import bpy
 from bpy.types import Scene, Strip, bpy_struct
@@ -30,7 +31,7 @@ _MODES = "RGB", "RGBA"  # grey is made of light
 _FORMATS = ("FFMPEG", "PNG", "JPEG")
 
 
-def has(item: bpy_struct, values: dict[str, Any]) -> bool:
+def has(item: bpy_struct, values: Mapping[str, object]) -> bool:
     """Whether an item's properties have these values."""
     return all(getattr(item, name) == value for name, value in values.items())
 

@@ -7,7 +7,7 @@ import time
 from concurrent.futures import Future, wait
 from contextlib import suppress
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from bpy.types import PropertyGroup, Scene, Strip
 
@@ -106,7 +106,9 @@ class Build:
         self._stopped = threading.Event()
         self.future = threads.start(self._build, _builds.left, medium, pairs)
 
-    def _build(self, before: tuple[Future, ...], medium: FrameSource, pairs: list[int] | None) -> Any:
+    def _build(
+        self, before: tuple[Future, ...], medium: FrameSource, pairs: list[int] | None
+    ) -> inbetween_folders.State:
         wait(before)
         with medium:
             return build(medium, *self.settings, update=self._update, cancelled=self._stopped.is_set, pairs=pairs)

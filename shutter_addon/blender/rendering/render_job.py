@@ -17,7 +17,7 @@ from dataclasses import dataclass
 from enum import Enum
 from itertools import chain
 from types import FrameType
-from typing import Any
+from typing import TypeVar
 
 import bpy
 from bpy.types import Scene
@@ -28,6 +28,7 @@ from ..data import main_thread
 from ..data.property_copy import for_a_while
 from ..data.strips import ENGINE
 
+T = TypeVar("T")
 BAD_INPUT = 2
 _PATIENCE = 0.1  # seconds between two looks at whether a render has ended
 _LONG = 10.0  # seconds
@@ -172,13 +173,13 @@ def scripts_act() -> bool:
     return any(not str(getattr(function, "__module__", "")).startswith(own) for function in functions)
 
 
-def on_main_thread(function: Callable, ended: Callable[[], bool] | None = None) -> Any:
+def on_main_thread(function: Callable[[], T], ended: Callable[[], bool] | None = None) -> T | None:
     """What a function gives on Blender's main thread, where its data and its operators belong; None: it was not waited
     for, and is not called any more. ended: whether nobody waits for it any longer; without it, the window is not waited
     for long. Once it is called, its end is waited for."""
     if where() is not Where.JOB:
         return function()
-    future: Future = Future()
+    future: Future[T] = Future()
     deadline = time.monotonic() + _LONG
     ended = ended or (lambda: time.monotonic() > deadline)
 
