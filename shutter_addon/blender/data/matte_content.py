@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection
+from collections.abc import Callable
 from contextlib import closing
 from dataclasses import dataclass
 from fractions import Fraction
@@ -18,31 +18,20 @@ from ...core.masks.mask import MaskShape
 from ...core.messages import EffectError
 from ...core.model import keyframes, mattes, outlines
 from ...core.model.effect import Moves, PlacedRamp
+from ...core.model.keyframes import Channel
 from ...media import MediaError
 from ...media.carried_mattes import FOLDER, CarriedFile
 from ...media.files import stamp
 from ...media.matte_files import MatteFile
 from ...media.sequence import ImageFiles
-from . import (
-    external_files,
-    inbetween_settings,
-    mask_reading,
-    matte_strips,
-    source_media,
-    strip_timing,
-    strips,
-    validation,
-)
+from . import inbetween_settings, mask_reading, matte_strips, source_media, strip_timing, strips, validation
+from .external_files import absolute
+from .sampled import Frames
 
 
 def content(
-    effect: PropertyGroup,
-    strip: Strip,
-    region: PropertyGroup,
-    moves: Moves,
-    frames: Collection[float],
-    time: keyframes.Channel | None,
-) -> keyframes.Channel:
+    effect: PropertyGroup, strip: Strip, region: PropertyGroup, moves: Moves, frames: Frames, time: Channel | None
+) -> Channel:
     """The channel of a matte or a ramp, sampled at timeline frames; strip: the effect strip that shows it, moves:
     the region's, time: see core.model.effect.Effect. EffectError, MediaError: there is none."""
     scene = effect.id_data
@@ -55,7 +44,7 @@ def content(
     if matte == "STRIP":
         return _strip_frames(strip, region, frames)
     if matte == "MASK":
-        return _mask_shapes(scene, effect, strip, region, frames, time)
+        return _mask_shapes(effect, strip, region, frames, time)
     first = strips.origin(strip) if validation.word(region, "timing") == "TIMELINE" else None
     return mattes.FileFrames(file=image_file(region), offset=validation.number(region, "offset"), first=first)
 
@@ -86,7 +75,7 @@ def image_path(region: PropertyGroup) -> Path:
     if image.source not in ("FILE", "SEQUENCE", "MOVIE") or image.packed_file or not image.filepath:
         sentence = rpt_('{place}: image "{image}" is not a movie, image sequence or picture on disk')
         raise EffectError(sentence.format(place=place, image=image.name))
-    return external_files.absolute(image, image.filepath)
+    return absolute(image, image.filepath)
 
 
 def image_file(region: PropertyGroup) -> MatteFile:
@@ -111,20 +100,15 @@ def _listed(path: Path, _stamp: tuple) -> list[Path]:
 
 
 def _mask_shapes(
-    scene: Scene,
-    effect: PropertyGroup,
-    strip: Strip,
-    region: PropertyGroup,
-    frames: Collection[float],
-    time: keyframes.Channel | None,
-) -> keyframes.Channel:
+    effect: PropertyGroup, strip: Strip, region: PropertyGroup, frames: Frames, time: Channel | None
+) -> Channel:
     """A mask's shapes at the source's frames, of which the first is the mask's start, as a Mask strip on it has it."""
     mask = region.mask
     if mask is None:
         raise EffectError(rpt_("{place}: it has no mask").format(place=validation.place(region)))
     if not mask_reading.moves(mask):
         return keyframes.Constant(_tried(mask_reading.mask_at, mask, mask.frame_start))
-    filmed = shown_frame(scene, effect, strip, time)
+    filmed = shown_frame(effect.id_data, effect, strip, time)
 
     def shape(frame: float) -> MaskShape:
         return mask_reading.mask_at(mask, mask.frame_start + filmed(frame))
@@ -132,9 +116,7 @@ def _mask_shapes(
     return keyframes.Samples({frame: _tried(shape, frame) for frame in frames})
 
 
-def shown_frame(
-    scene: Scene, effect: PropertyGroup, strip: Strip, time: keyframes.Channel | None
-) -> Callable[[float], float]:
+def shown_frame(scene: Scene, effect: PropertyGroup, strip: Strip, time: Channel | None) -> Callable[[float], float]:
     """What gives the source's frame that an effect strip shows at a timeline frame: filmed ones counted from 0, those
     between them in parts. time: see `content`. EffectError, MediaError: it cannot be known."""
     source = strips.source_of(scene, effect, strip)
@@ -181,7 +163,7 @@ def _tried(function: Callable, *arguments) -> object:
         return error
 
 
-def _strip_frames(strip: Strip, region: PropertyGroup, frames: Collection[float]) -> keyframes.Channel:
+def _strip_frames(strip: Strip, region: PropertyGroup, frames: Frames) -> Channel:
     parts, word = matte_strips.parts_for(region, strip), channel(region)
     shown = {
         part.name: mattes.FileFrames(file=_of_strip(part, word), timing=strip_timing.timing_of(part)) for part in parts
