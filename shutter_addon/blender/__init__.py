@@ -1,85 +1,53 @@
 """Everything that touches bpy: properties, engine, strips, commands."""
 
-from . import handlers
-from .data import main_thread, movie_decoding, preferences, properties
-from .interface import (
-    bake_operators,
-    bar_editor,
-    copy_operators,
-    full_quality,
-    gizmo_keymaps,
-    icons,
-    inbetween_operators,
-    layer_operators,
-    matte_operators,
-    menus,
-    newer_files,
-    note_buttons,
-    numeric_operators,
-    operators,
-    option_panels,
-    outline_gizmo,
-    outline_operators,
-    outline_points,
-    panels,
-    preview,
-    probe_gizmo,
-    readout_operators,
-    recipe_operators,
-    region_gizmo,
-    report_operators,
-    sharp_frame,
-    split_gizmo,
-    track_operators,
-    translations,
-)
-from .rendering import engine
+from importlib import import_module
+
+import bpy
 
 # Blender gets the `classes` of each, and loses its `TIMERS`; all else that it gets, `register` and `unregister` know.
-_modules = (
-    main_thread,
-    translations,
-    preferences,
-    properties,
-    movie_decoding,
-    engine,
-    icons,
-    sharp_frame,
-    preview,
-    operators,
-    inbetween_operators,
-    layer_operators,
-    track_operators,
-    matte_operators,
-    readout_operators,
-    outline_operators,
-    outline_points,
-    recipe_operators,
-    copy_operators,
-    bake_operators,
-    full_quality,
-    report_operators,
-    numeric_operators,
-    option_panels,
-    panels,
-    menus,
-    note_buttons,
-    newer_files,
-    gizmo_keymaps,
-    bar_editor,
-    region_gizmo,
-    outline_gizmo,
-    split_gizmo,
-    probe_gizmo,
-    handlers,
+_MODULES = (
+    "data.main_thread",
+    "interface.translations",
+    "data.preferences",
+    "data.properties",
+    "data.movie_decoding",
+    "rendering.engine",
+    "interface.icons",
+    "interface.sharp_frame",
+    "interface.preview",
+    "interface.operators",
+    "interface.inbetween_operators",
+    "interface.layer_operators",
+    "interface.track_operators",
+    "interface.matte_operators",
+    "interface.readout_operators",
+    "interface.outline_operators",
+    "interface.outline_points",
+    "interface.recipe_operators",
+    "interface.copy_operators",
+    "interface.bake_operators",
+    "interface.full_quality",
+    "interface.report_operators",
+    "interface.numeric_operators",
+    "interface.option_panels",
+    "interface.panels",
+    "interface.menus",
+    "interface.note_buttons",
+    "interface.newer_files",
+    "interface.gizmo_keymaps",
+    "interface.bar_editor",
+    "interface.region_gizmo",
+    "interface.outline_gizmo",
+    "interface.split_gizmo",
+    "interface.probe_gizmo",
+    "handlers",
 )
+_modules = [import_module(f".{name}", __package__) for name in _MODULES]
 _commands: list = []
 
 
 def register() -> None:
     """Registers everything with Blender, the command included."""
-    import bpy
-
     for module in _modules:
         for cls in getattr(module, "classes", ()):
             bpy.utils.register_class(cls)
@@ -90,8 +58,6 @@ def register() -> None:
 
 def unregister() -> None:
     """Leaves nothing behind."""
-    import bpy
-
     bpy.utils.unregister_cli_command(_commands.pop())
     for module in reversed(_modules):
         if hasattr(module, "unregister"):

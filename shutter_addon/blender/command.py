@@ -5,34 +5,19 @@ what it says.
 """
 
 import argparse
-import sys
 import traceback
-from contextlib import suppress
+from importlib import import_module
 from pathlib import Path
 
-from ..core.messages import UserError, signed
+from ..core.messages import UserError
 from ..devices.device import NoDeviceError
 from ..media.files import check_name
-from .commands import (
-    bake_command,
-    check_command,
-    inbetween_command,
-    join_command,
-    render_command,
-    track_command,
-)
 from .output import film_output
+from .rendering import render_job
 
 BAD_INPUT = 2
 PLACES = ("output", "save", "cache", "json", "source", "edit")  # where a fault may be that says not where
-COMMANDS = (
-    render_command,
-    inbetween_command,
-    track_command,
-    bake_command,
-    check_command,
-    join_command,
-)
+COMMANDS = "render", "inbetween", "track", "bake", "check", "join"
 
 
 def main(argv: list[str]) -> int:
@@ -67,8 +52,7 @@ def main(argv: list[str]) -> int:
 
 
 def _refuse(reason: str, code: int = BAD_INPUT) -> int:
-    with suppress(OSError):  # nobody reads it
-        print(signed(reason), file=sys.stderr)
+    render_job.say(reason)
     return code
 
 
@@ -76,5 +60,5 @@ def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser("shutter", description="Every pixel its own exposure.")
     commands = parser.add_subparsers(dest="command", required=True)
     for command in COMMANDS:
-        command.add(commands)
+        import_module(f".commands.{command}_command", __package__).add(commands)
     return parser

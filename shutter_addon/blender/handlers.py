@@ -1,12 +1,16 @@
 """What happens by itself: effects follow their strips, an old file's sources are closed, and a render that cannot show
 an effect ends."""
 
+from __future__ import annotations
+
 import inspect
 import sys
 from functools import partial
+from types import TracebackType
 
 import bpy
 from bpy.app.handlers import persistent
+from bpy.types import Depsgraph, Scene
 
 from ..core import revision, told
 from .data import data_format, inbetween_settings, preview_areas, source_media, strips, versions
@@ -17,8 +21,7 @@ from .rendering import invalidation, job_snapshots, render_job, sessions
 from .rendering.render_job import Where
 
 
-@persistent
-def _before_load(*_):
+def _before_load(*_) -> None:
     edit_feed.end()
     sharp_frame.forget()
     inbetween_operators.stop()
@@ -31,8 +34,7 @@ def _before_load(*_):
     reconcile.forget()
 
 
-@persistent
-def _after_load(*_):
+def _after_load(*_) -> None:
     sharp_frame.listen()
     sessions.drop_removed()  # what a render job took up while the file was loaded
     if not data_format.is_file_newer():
@@ -42,14 +44,12 @@ def _after_load(*_):
     newer_files.tell(bpy.data.scenes)
 
 
-@persistent
-def _after_import(imported, *_):
+def _after_import(imported: bpy.types.BlendImportContext, *_) -> None:
     items = [item for item in imported.import_items if item.id_type == "SCENE"]
     newer_files.tell(item.id for item in items if item.id is not None)  # a name that was asked for may not be there
 
 
-@persistent
-def _before_save(*_):
+def _before_save(*_) -> None:
     edit_feed.end()
     reconcile.update()  # a script may have removed strips, since Blender last told
     sharp_frame.give_back(bpy.context)
@@ -57,8 +57,7 @@ def _before_save(*_):
         data_format.stamp_saved(versions.extension())
 
 
-@persistent
-def _update(scene=None, depsgraph=None):
+def _update(scene: Scene | None = None, depsgraph: Depsgraph | None = None) -> None:
     revision.changed()
     if (film := render_job.film()) is not None and bpy.app.is_job_running("RENDER"):
         job_snapshots.look(film)
@@ -70,13 +69,11 @@ def _update(scene=None, depsgraph=None):
         preview_areas.redraw(bpy.context)
 
 
-@persistent
-def _before_undo(*_):
+def _before_undo(*_) -> None:
     shown_annotations.before_undo()
 
 
-@persistent
-def _after_undo(*_):
+def _after_undo(*_) -> None:
     revision.changed()
     reconcile.find_lost()
     track_region.data_replaced()
@@ -86,8 +83,7 @@ def _after_undo(*_):
     shown_annotations.follow()
 
 
-@persistent
-def _before_render(scene, *_):
+def _before_render(scene: Scene, *_) -> None:
     if render_job.cancelling():
         return
     is_film = render_job.begin(scene)
@@ -118,8 +114,7 @@ def _prepare(film: int, in_job: bool) -> bool:
     return True
 
 
-@persistent
-def _before_frame(scene, *_):
+def _before_frame(scene: Scene, *_) -> None:
     if render_job.is_film(scene):
         if (sentence := job_snapshots.left_out(scene)) is not None:
             render_job.fail(sentence)
@@ -129,18 +124,17 @@ def _before_frame(scene, *_):
             edit_feed.before_frame(scene)
 
 
-@persistent
-def _after_render(scene, *_):
+def _after_render(scene: Scene, *_) -> None:
     if not render_job.is_film(scene):
         return  # of an effect, for a film or a preview
-    invalidation.drop_spoilt_later()
+    render_job.soon(invalidation.drop_spoilt)
     edit_feed.end()
     job_snapshots.end()
     render_job.end(scene, alone=not render_job.script_waits(inspect.currentframe()))
     source_media.rest(render_job.runs())
 
 
-def _drop_frames():
+def _drop_frames() -> None:
     """Drops the finished frames of all effects."""
     for scene in bpy.data.scenes:
         strips.invalidate(scene)
@@ -149,7 +143,7 @@ def _drop_frames():
 _hooks: list = []  # what Python called with errors that nobody caught before it called ours: one, or none
 
 
-def _uncaught(kind, error, trace) -> None:
+def _uncaught(kind: type[BaseException], error: BaseException, trace: TracebackType | None) -> None:
     """Keeps errors of the extension for Copy Report. Blender has Python print whatever operators, panels, handlers and
     timers raise, which calls this: there is no other place that all of them pass."""
     if told.is_ours(error):
@@ -174,9 +168,9 @@ HANDLERS = {
 }
 
 
-def register():
+def register() -> None:
     for name, function in HANDLERS.items():
-        getattr(bpy.app.handlers, name).append(function)
+        getattr(bpy.app.handlers, name).append(persistent(function))
     if not _hooks:
         _hooks.append(sys.excepthook)
         sys.excepthook = _uncaught
@@ -184,7 +178,7 @@ def register():
     bpy.app.timers.register(_drop_frames)
 
 
-def unregister():
+def unregister() -> None:
     for name, function in HANDLERS.items():
         getattr(bpy.app.handlers, name).remove(function)
     if bpy.app.timers.is_registered(_drop_frames):

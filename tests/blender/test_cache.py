@@ -218,12 +218,12 @@ def test_stamps_of_in_between_frames_are_bounded(effect, tmp_path, monkeypatch):
     cache, asked = inbetween_settings.inbetween_cache, []
     stamp = cache.stamp
     monkeypatch.setattr(cache, "stamp", lambda folder, *given: asked.append(folder.name) or stamp(folder, *given))
-    inbetween_settings.built.hold()  # of what is known nothing is asked
+    inbetween_settings.built.is_held = True  # of what is known nothing is asked
     try:
         for number in (*range(128), 127, 100, 0):
             snapshot.source_files(effect, source, tmp_path / f"{number}")
     finally:
-        inbetween_settings.built.release()
+        inbetween_settings.built.is_held = False
     assert asked == [f"{number}" for number in (*range(128), 0)]
 
 

@@ -411,14 +411,14 @@ def test_the_edit_is_put_back(bpy, edit, made, tmp_path, how):
 
 
 def test_what_cannot_be_written_is_left_to_the_engine(edit, made, compared, monkeypatch):
-    from shutter_addon.blender.output import edit_feed
+    from shutter_addon.blender.output import levels_file
 
     made()
 
     def no_room(*_):
         raise OSError(28, "No space left on device", "picture.tif")
 
-    monkeypatch.setattr(edit_feed, "LevelsFile", no_room)
+    monkeypatch.setattr(levels_file, "LevelsFile", no_room)
     assert compared() == []
 
 

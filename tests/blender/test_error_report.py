@@ -135,15 +135,15 @@ def test_what_the_edit_is_made_of(bpy, named):
     assert f"- Saved: by Blender {blender}, version {extension} of the extension" in text
     assert "- Strips: 1 IMAGE, 1 SCENE" in text
     assert "view Standard" in line(text, "- Colors:")
-    assert line(text, "- Options:").startswith("- Options: window 4, position START, interpolation DISPLACEMENT")
+    assert line(text, "- Options:").startswith("- Options: window 4, follow edges 0")
     assert line(text, "- Strip:").startswith(f"- Strip: SCENE in channel {strip.channel}, frames 1 to 6")
     assert "- Footage: png, 3 channels of uint8, 40×24, no rate, 6 frames, read as uint8, alpha opaque" in text
     assert "- Shutters: 2" in text
-    assert "  - 1 × AVERAGE, 4 bars, moves with NOTHING, length FRAMES, 8 keys" in text
-    assert "  - 1 × AVERAGE, 4 bars, moves with NOTHING, length FRAMES, 0 keys" in text
+    assert "  - 1 × 4 bars, 8 keys" in text
+    assert "  - 1 × 4 bars, 0 keys" in text
     assert "- Regions: 3" in text
-    assert "  - 2 × LINE, shutter 2, 1 drawings, 1 strokes, 0 keys" in text
-    assert "  - 1 × RAMP, shutter 1, RADIAL, blend OVER, 0 keys" in text
+    assert "  - 2 × shutter 2, 1 drawings, 1 strokes, 0 keys" in text
+    assert "  - 1 × shutter 1, kind RAMP, ramp RADIAL, 0 keys" in text
     assert "- Keys: 8 of the effect, 0 of the camera" in text
     assert "Cannot be shown" not in text
     effect.shutters[1].combine, effect.regions[0].is_layer = "LIGHTEST", True
@@ -151,8 +151,8 @@ def test_what_the_edit_is_made_of(bpy, named):
     source = next(strip for strip in edit.sequence_editor.strips_all if strip.type == "IMAGE")
     source.use_reverse_frames, source.strobe = True, 3
     text = report(edit)
-    assert "  - 1 × LIGHTEST, 4 bars" in text
-    assert "  - 1 × LINE, shutter 2, 1 drawings, 1 strokes, layer, 0 keys" in text
+    assert "  - 1 × 4 bars, combine LIGHTEST" in text
+    assert "  - 1 × shutter 2, 1 drawings, 1 strokes, is_layer True, 0 keys" in text
     assert line(text, "- Strip:").endswith(", muted")
     assert "reversed, strobe 3; parts: 1" in line(text, "- Source:")
 

@@ -1,20 +1,23 @@
 """The command `bake`: the film of one effect of a saved edit, for an ordinary strip to show."""
 
+from __future__ import annotations
+
 import argparse
 import os
+from argparse import Namespace
 from contextlib import suppress
 
+from bpy.types import PropertyGroup, Scene, Strip
+
 from ...core.messages import sentence
-from ...core.stopping import StoppedError
 from ..data import strips
 from ..editing import saved_edit
 from ..output import baked_film, film_output
-from ..rendering import render_settings
 from . import command_line
 from .command_line import place
 
 
-def add(commands) -> None:
+def add(commands: argparse._SubParsersAction) -> None:
     parser = commands.add_parser("bake", help="render one effect of a saved edit, for a strip to show")
     option = parser.add_argument
     option("source", type=place, help="a saved edit (.blend)")
@@ -27,7 +30,7 @@ def add(commands) -> None:
     parser.set_defaults(run=run)
 
 
-def run(arguments) -> None:
+def run(arguments: Namespace) -> None:
     scene = saved_edit.open_edit(arguments.source, arguments.scene)
     scene.frame_set(scene.frame_current)  # what drivers and keys say, once
     if arguments.attached:
@@ -35,22 +38,10 @@ def run(arguments) -> None:
         os.set_blocking(0, False)
     effect, strip = _effect_strip(scene, arguments.strip)
     film = baked_film.film_of(scene, effect, strip, baked_film.KINDS[arguments.format], arguments.output)
-    try:
-        _render(arguments, scene, effect, strip, film)
-    except StoppedError:
-        raise film_output.InterruptedRenderError(f"{film.place}: stopped") from None
-    command_line.tell(str(film.place))
-
-
-def _render(arguments, scene, effect, strip, film: baked_film.Film) -> None:
-    """StoppedError: it was begun by a Blender that has ended."""
     if arguments.attached:
-        _check_parent()
+        _check_parent(film)
     total = len(film.frames)
-    with (
-        render_settings.using(render_settings.RenderSettings(arguments.device, gpu_memory=arguments.gpu_memory)),
-        film_output.progress(total, "frame") as moved,
-    ):
+    with command_line.rendered_by(arguments), film_output.progress(total, "frame") as moved:
         finished = 0
 
         def told(done: int) -> None:
@@ -59,19 +50,21 @@ def _render(arguments, scene, effect, strip, film: baked_film.Film) -> None:
             finished = done
             command_line.tell(f"{done} of {total}")
             if arguments.attached:
-                _check_parent()
+                _check_parent(film)
 
         baked_film.render(scene, effect, strip, film, told)
+    command_line.tell(str(film.place))
 
 
-def _check_parent() -> None:
-    """StoppedError: nobody holds the other end of this process's input any more."""
+def _check_parent(film: baked_film.Film) -> None:
+    """InterruptedRenderError: it was begun by a Blender that has ended. Nobody holds the other end of this process's
+    input any more."""
     with suppress(OSError):  # there is nothing to read, as somebody does
         if not os.read(0, 1):
-            raise StoppedError
+            raise film_output.InterruptedRenderError(f"{film.place}: stopped")
 
 
-def _effect_strip(scene, name: str):
+def _effect_strip(scene: Scene, name: str) -> tuple[PropertyGroup, Strip]:
     """OutputError: the scene has no such effect strip."""
     for strip in strips.effect_strips(scene):
         if strip.name == name and (effect := strips.effect_of(scene, strip.scene)) is not None:

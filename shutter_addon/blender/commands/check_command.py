@@ -1,35 +1,38 @@
 """The command `check`: whether an edit can be rendered on this machine, and what that will take."""
 
+from __future__ import annotations
+
+import argparse
 import json
 import os
 import re
 import shlex
 import subprocess
 import sys
+from argparse import Namespace
+from collections.abc import Callable
 from pathlib import Path
 
 import bpy
+from bpy.types import Scene
 
 from ...core import told
 from ...core.farm import chunks, job_file
 from ...core.farm.edit_version import EditVersion
 from ...core.frames import frame_ranges
-from ...core.messages import UserError, signed
+from ...core.messages import UserError
 from ...devices.budget import machine_memory
 from ...devices.device import NoDeviceError
-from ...media.files import stamp
 from ..data import missing_media, versions
-from ..devices import available
-from ..editing import saved_edit
 from ..output import edit_check, error_report, film_join, film_output, output_space, shared_frames
 from ..output.edit_check import EffectCheck
 from ..output.output_space import Need, in_units
-from ..rendering import render_settings
+from ..rendering import render_job, render_settings
 from . import command_line
 from .command_line import place
 
 
-def add(commands) -> None:
+def add(commands: argparse._SubParsersAction) -> None:
     parser = commands.add_parser("check", help="find out whether an edit can be rendered here, and what that will take")
     option = parser.add_argument
     option("edit", metavar="FILE.blend", type=place, help="a saved edit")
@@ -53,13 +56,11 @@ def add(commands) -> None:
     parser.set_defaults(run=run)
 
 
-def run(arguments) -> None:
-    opened = stamp(arguments.edit)
-    scene = saved_edit.open_edit(arguments.edit)
-    first, last = command_line.frames(arguments.frames, (scene.frame_start, scene.frame_end), "edit")
-    frames = range(first, last + 1)
-    with render_settings.using(render_settings.RenderSettings(arguments.device, gpu_memory=arguments.gpu_memory)):
-        report = _report(arguments, scene, frames, saved_edit.version(scene, arguments.edit, opened))
+def run(arguments: Namespace) -> None:
+    edit = command_line.open_edit(arguments.edit, arguments.frames)
+    scene = edit.scene
+    with command_line.rendered_by(arguments):
+        report = _report(arguments, scene, edit.frames, edit.version())
         if arguments.report:
             for found in (*report["notes"], *report["faults"]):
                 told.record(found)
@@ -69,12 +70,12 @@ def run(arguments) -> None:
         else:
             command_line.tell("\n".join(_lines(report)))
     for fault in report["faults"]:
-        print(signed(fault), file=sys.stderr)
+        render_job.say(fault)
     if report["faults"]:
         sys.exit(2)
 
 
-def _report(arguments, scene, frames: range, version: EditVersion) -> dict:
+def _report(arguments: Namespace, scene: Scene, frames: range, version: EditVersion) -> dict:
     """What is found, as JSON has it (docs/command.md)."""
     faults = [*_version_faults(scene), *_setting_faults(arguments, scene, frames)]
     notes: list[str] = []
@@ -114,11 +115,11 @@ def _report(arguments, scene, frames: range, version: EditVersion) -> dict:
     if arguments.movie and film_output.is_movie(arguments.movie):  # last: it changes the scene
         faults += _fault(film_join.rehearse, scene, arguments.movie, arguments.format or "png", frames)
     if arguments.output and not faults:
-        faults += _fault(_write_job, arguments.output, version)
+        faults += _fault(film_output.prepare, arguments.output) or _fault(job_file.write, arguments.output, version)
     return report
 
 
-def _version_faults(scene) -> list[str]:
+def _version_faults(scene: Scene) -> list[str]:
     """Whether something newer than what is here has saved the file."""
     faults, saved, here = [], scene.virtual_shutter.version, versions.extension()
     if _numbers(saved) > _numbers(here):
@@ -137,20 +138,19 @@ def _numbers(version: str) -> list[int]:
     return [int(number) for number in re.findall(r"\d+", version)]
 
 
-def _setting_faults(arguments, scene, frames: range) -> list[str]:
+def _setting_faults(arguments: Namespace, scene: Scene, frames: range) -> list[str]:
     """Whether what the edit's output is can be written, and lie where it is wanted."""
     read = [arguments.edit, *versions.read_files(scene)]
     faults = _fault(shared_frames.check_resumable, scene) if arguments.resume else []
     if arguments.output:
-        ends = frames[0], frames[-1]
-        faults += _fault(shared_frames.check, arguments.output, arguments.format, ends, read)
+        faults += _fault(shared_frames.check, arguments.output, arguments.format, frames, read)
     if arguments.movie:
         return faults + _fault(film_join.check, arguments.movie, [*read, *versions.sounds()])
     is_movie = scene.render.image_settings.media_type == "VIDEO"
     return faults + _fault(film_output.check, Path("film.mp4" if is_movie else "frames"), None, film_output.size(scene))
 
 
-def _fault(check, *arguments) -> list[str]:
+def _fault(check: Callable, *arguments) -> list[str]:
     """The sentence of the error that a check raises, if it does."""
     try:
         check(*arguments)
@@ -162,7 +162,7 @@ def _fault(check, *arguments) -> list[str]:
 
 
 def _on_device(
-    scene, frames: range, faults: list[str], notes: list[str], *, find_cuts: bool
+    scene: Scene, frames: range, faults: list[str], notes: list[str], *, find_cuts: bool
 ) -> tuple[str | None, list[EffectCheck], int | None]:
     """The name of the device that will render, what is found of the effects (edit_check.effects), and the bytes that
     textures may take of a GPU; without a device, which is a fault, nothing of the effects."""
@@ -189,14 +189,13 @@ def _memory(checks: list[EffectCheck], limit: int | None) -> dict:
     return {"gpu": min(gpu, limit or gpu), "gpu_limit": limit, "host": host}
 
 
-def _disk(arguments, scene, frames: range, checks: list[EffectCheck], faults: list[str]) -> dict:
+def _disk(arguments: Namespace, scene: Scene, frames: range, checks: list[EffectCheck], faults: list[str]) -> dict:
     """Bytes that the frames and the in-between frames that are missing take at most, as noise does, which is not
     compressed: no frame is rendered for this. Those that are there already are not counted."""
     file_format, needs = arguments.format or "png", []
     frame = output_space.picture(*film_output.size(scene), film_output.FORMATS[file_format].bits // 8)
     if output := arguments.output:
-        pictures = film_output.pictures_of(output, file_format, (frames[0], frames[-1]))
-        left = sum(not path.exists() for path in pictures)
+        left = sum(not path.exists() for path in film_output.pictures_of(output, file_format, frames))
         needs.append(Need(output, left * frame, f"{left} frames"))
     if arguments.movie:
         needs.append(Need(arguments.movie.parent, 0, "the movie"))
@@ -214,11 +213,6 @@ def _disk(arguments, scene, frames: range, checks: list[EffectCheck], faults: li
     }
 
 
-def _write_job(folder: Path, job: EditVersion) -> None:
-    film_output.prepare(folder)
-    job_file.write(folder, job)
-
-
 def _effect(check: EffectCheck) -> dict:
     return {
         "strip": check.name,
@@ -232,7 +226,7 @@ def _effect(check: EffectCheck) -> dict:
     }
 
 
-def _builds(file: Path, scene, frames: range, checks: list[EffectCheck]) -> str | None:
+def _builds(file: Path, scene: Scene, frames: range, checks: list[EffectCheck]) -> str | None:
     """The command that builds the in-between frames that are missing; None: none is."""
     if not any(each.missing for each in checks):
         return None

@@ -4,16 +4,27 @@ import argparse
 import os
 import re
 import sys
+from argparse import Namespace
+from collections.abc import Iterable
+from contextlib import AbstractContextManager
 from pathlib import Path
+from typing import NamedTuple
 
-from ...core.messages import sentence, signed
+from bpy.types import Scene
+
+from ...core.farm.edit_version import EditVersion
+from ...core.frames.frame_source import FrameSource
+from ...core.messages import sentence
 from ...core.model.fields import fields_of
 from ...core.model.frame_state import Options
 from ...media import open_source
+from ...media.files import stamp
 from ...media.sequence import by_number
 from ..data import inbetween_settings
 from ..devices import available
+from ..editing import saved_edit
 from ..output import film_output
+from ..rendering import render_job, render_settings
 
 FACTORS = fields_of(Options)["step"].words  # 1: none
 METHODS = tuple(inbetween_settings.METHODS.values())
@@ -50,33 +61,69 @@ def add_device(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def opened(path: Path):
+def rendered_by(arguments: Namespace) -> AbstractContextManager[None]:
+    """Inside, renders are composed as these options say."""
+    return render_settings.using(render_settings.RenderSettings(arguments.device, gpu_memory=arguments.gpu_memory))
+
+
+def refuse(arguments: Namespace, names: Iterable[str], why: str) -> None:
+    """OutputError: one of these options is given, which is for something else."""
+    for name in names:
+        if getattr(arguments, name) is not None:
+            raise film_output.OutputError(f"--{name.replace('_', '-')}: {why}")
+
+
+def opened(path: Path) -> FrameSource:
     """The source, with a word on stderr of files that were left out."""
     medium = open_source(path)
     if left_out := medium.left_out:
-        print(signed(left_out), file=sys.stderr)
+        render_job.say(left_out)
     return medium
 
 
-def files(medium) -> list[Path]:
+def files(medium: FrameSource) -> list[Path]:
     """The source's files, also those that are missing in an image sequence: it would show them, were they there."""
     files = medium.files
     beside = by_number(files[0], listed=True) if len(files) > 1 else None
     return [*files, *(map(beside, range(len(files))) if beside else ())]
 
 
-def frames(text: str | None, whole: tuple[int, int], what: str = "clip") -> tuple[int, int]:
-    """First and last timeline frame of `A:B` (or `A-B`, as schedulers name chunks), of `A` alone, or of the whole.
-    OutputError: what is rendered has no such frames."""
+class Edit(NamedTuple):
+    """A saved edit that is open.
+
+    frames: those of its timeline that are asked for; whole: all; opened: the file's stamp, before it was"""
+
+    path: Path
+    scene: Scene
+    frames: range
+    whole: range
+    opened: tuple[int, int] | None
+
+    def version(self) -> EditVersion:
+        """See saved_edit.version."""
+        return saved_edit.version(self.scene, self.path, self.opened)
+
+
+def open_edit(path: Path, asked: str | None) -> Edit:
+    """Opens a saved edit; asked: as for `frames`. SavedEditError, OutputError: there is no such edit, or frame."""
+    opened = stamp(path)
+    scene = saved_edit.open_edit(path)
+    whole = range(scene.frame_start, scene.frame_end + 1)
+    return Edit(path, scene, frames(asked, whole, "edit"), whole, opened)
+
+
+def frames(text: str | None, whole: range, what: str = "clip") -> range:
+    """The timeline frames of `A:B` (or `A-B`, as schedulers name chunks), of `A` alone, or of the whole. OutputError:
+    what is rendered has no such frames."""
     if text is None:
         return whole
     numbers = re.fullmatch(r"(\d{1,9})(?:[:-](\d{1,9}))?", text)
     if not numbers:
         raise film_output.OutputError(f'--frames: "{sentence(text, 40)}" is not A:B')
     first, last = int(numbers[1]), int(numbers[2] or numbers[1])
-    if not whole[0] <= first <= last <= whole[1]:
-        raise film_output.OutputError(f"--frames: {text} is not within the {what}'s frames {whole[0]}:{whole[1]}")
-    return first, last
+    if not whole[0] <= first <= last <= whole[-1]:
+        raise film_output.OutputError(f"--frames: {text} is not within the {what}'s frames {whole[0]}:{whole[-1]}")
+    return range(first, last + 1)
 
 
 def tell(text: str) -> None:

@@ -1,8 +1,16 @@
 """The command `inbetween`: a source's in-between frames alone, or all that a saved edit needs."""
 
+from __future__ import annotations
+
+import argparse
+from argparse import Namespace
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+from bpy.types import Scene
+
+from ...core.frames.frame_source import FrameSource
 from ...media import inbetween
 from ..data import inbetween_settings, requirements, snapshot, source_media
 from ..editing import new_edit, saved_edit
@@ -12,7 +20,7 @@ from . import command_line
 from .command_line import place
 
 
-def add(commands) -> None:
+def add(commands: argparse._SubParsersAction) -> None:
     parser = commands.add_parser("inbetween", help="build a source's in-between frames, or those that an edit needs")
     option = parser.add_argument
     option("source", type=place, help="a movie, the first file of an image sequence, or a saved edit (.blend)")
@@ -27,38 +35,35 @@ def add(commands) -> None:
     parser.set_defaults(run=run)
 
 
-def run(arguments) -> None:
+def run(arguments: Namespace) -> None:
     if saved_edit.is_saved(arguments.source):
         _build_edit(arguments)
     else:
         _build_source(arguments)
 
 
-def _build_edit(arguments) -> None:
-    for name in ("factor", "method", "cache"):
-        if getattr(arguments, name) is not None:
-            raise film_output.OutputError(f"--{name}: is for a source; a saved edit says it itself")
-    scene = saved_edit.open_edit(arguments.source)
-    whole = scene.frame_start, scene.frame_end
-    scene.frame_start, scene.frame_end = command_line.frames(arguments.frames, whole, "edit")
-    build_lacking(scene)
+def _build_edit(arguments: Namespace) -> None:
+    command_line.refuse(arguments, ("factor", "method", "cache"), "is for a source; a saved edit says it itself")
+    edit = command_line.open_edit(arguments.source, arguments.frames)
+    edit.scene.frame_start, edit.scene.frame_end = edit.frames[0], edit.frames[-1]
+    build_lacking(edit.scene)
 
 
-def _build_source(arguments) -> None:
+def _build_source(arguments: Namespace) -> None:
     for name in ("factor", "cache"):
         if getattr(arguments, name) is None:
             raise film_output.OutputError(f"--{name} is missing: only a saved edit (.blend) says it itself")
     path = arguments.source
     with command_line.opened(path) as medium:
-        first, last = command_line.frames(arguments.frames, (1, medium.count))
+        frames = command_line.frames(arguments.frames, range(1, medium.count + 1))
         strip = new_edit.make_source(path, medium)
     # A strip may read the file in another way, with a colour space of Blender's own choice.
     with source_media.open_media(strip) as medium:
-        pairs = range(first - 1, min(last, medium.count - 1))
+        pairs = range(frames[0] - 1, min(frames[-1], medium.count - 1))
         _build(medium, arguments.cache, arguments.factor, arguments.method or "quick", pairs)
 
 
-def build_lacking(film) -> None:
+def build_lacking(film: Scene) -> None:
     """Builds the in-between frames that a film's frames need, of all effects that it shows, where they are looked
     for."""
     film.frame_set(film.frame_start)
@@ -90,7 +95,7 @@ def needed_pairs(shown: snapshot.Snapshot) -> set[int]:
     return pairs
 
 
-def _build(medium, folder: Path, factor: int, method: str, pairs) -> None:
+def _build(medium: FrameSource, folder: Path, factor: int, method: str, pairs: Sequence[int]) -> None:
     """Builds the in-betweens of these pairs of source frames, each given by its first, in ascending order."""
     with film_output.stoppable() as stopped, film_output.progress(len(pairs), "pair") as moved:
         told: dict = {"update": lambda *_: moved(), "cancelled": lambda: bool(stopped)}

@@ -1,15 +1,18 @@
 """The command `join`: rendered frames, and the sound of their edit, as a movie."""
 
+from __future__ import annotations
+
+import argparse
+from argparse import Namespace
+
 from ...core.farm import job_file
-from ...media.files import stamp
 from ..data import missing_media, versions
-from ..editing import saved_edit
 from ..output import film_join, film_output
 from . import command_line
 from .command_line import place
 
 
-def add(commands) -> None:
+def add(commands: argparse._SubParsersAction) -> None:
     parser = commands.add_parser("join", help="make a movie of rendered frames, with the edit's sound and settings")
     option = parser.add_argument
     option("folder", metavar="FRAMES", type=place, help="the folder of the frames")
@@ -19,15 +22,12 @@ def add(commands) -> None:
     parser.set_defaults(run=run)
 
 
-def run(arguments) -> None:
-    opened = stamp(arguments.edit)
-    scene = saved_edit.open_edit(arguments.edit)
-    whole = scene.frame_start, scene.frame_end
-    frames = command_line.frames(arguments.frames, whole, "edit")
-    film_join.check(arguments.output, [arguments.edit, *versions.read_files(scene), *versions.sounds()])
-    for fault in missing_media.sound_faults(scene, range(frames[0], frames[1] + 1)):
+def run(arguments: Namespace) -> None:
+    edit = command_line.open_edit(arguments.edit, arguments.frames)
+    film_join.check(arguments.output, [edit.path, *versions.read_files(edit.scene), *versions.sounds()])
+    for fault in missing_media.sound_faults(edit.scene, edit.frames):
         raise film_output.OutputError(fault)  # Blender would make a silent film
-    film_join.say_what_is_left_out(arguments.folder, whole)
-    version = saved_edit.version(scene, arguments.edit, opened)
+    film_join.say_what_is_left_out(arguments.folder, edit.whole)
+    version = edit.version()
     job_file.guard(arguments.folder, version)
-    film_join.join(scene, arguments.folder, arguments.output, frames, version.key)
+    film_join.join(edit.scene, arguments.folder, arguments.output, edit.frames, version.key)

@@ -1,16 +1,20 @@
 """The command `render`: from a source and a recipe to a finished film, through Blender's sequencer."""
 
+from __future__ import annotations
+
+import argparse
+from argparse import Namespace
 from dataclasses import replace
 from pathlib import Path
 
 import bpy
+from bpy.types import Scene
 
 from ...core import atomic_write
 from ...core.farm import job_file
 from ...core.model.effect import Effect
 from ...core.recipes import recipe, recipe_file
 from ...media.completeness import is_whole_blend, why_short
-from ...media.files import stamp
 from ...media.matte_files import MatteFile
 from ..data import inbetween_settings, missing_media, preferences, versions
 from ..devices import available
@@ -21,7 +25,7 @@ from . import command_line, inbetween_command
 from .command_line import place
 
 
-def add(commands) -> None:
+def add(commands: argparse._SubParsersAction) -> None:
     parser = commands.add_parser("render", help="render a source through a recipe, or a saved edit")
     option = parser.add_argument
     option("source", type=place, help="a movie, the first file of an image sequence, or a saved edit (.blend)")
@@ -47,39 +51,34 @@ def add(commands) -> None:
     parser.set_defaults(run=run)
 
 
-def run(arguments) -> None:
+def run(arguments: Namespace) -> None:
     if saved_edit.is_saved(arguments.source):
         _render_edit(arguments)
     else:
         _render_source(arguments)
 
 
-def _render_edit(arguments) -> None:
+def _render_edit(arguments: Namespace) -> None:
     """Renders a saved edit as it is."""
-    for name in ("recipe", "weights", "save", "inbetween", "inbetween_method", "cache"):
-        if getattr(arguments, name) is not None:
-            option = f"--{name.replace('_', '-')}"
-            raise film_output.OutputError(f"{option}: is for a source and a recipe; a saved edit is rendered as it is")
-    source, output, file_format = arguments.source, arguments.output, arguments.format or "png"
+    names = "recipe", "weights", "save", "inbetween", "inbetween_method", "cache"
+    command_line.refuse(arguments, names, "is for a source and a recipe; a saved edit is rendered as it is")
+    output, file_format = arguments.output, arguments.format or "png"
     if output is None:
         raise film_output.OutputError("nothing to do: give --output")
-    opened = stamp(source)
-    scene = saved_edit.open_edit(source)
-    whole = scene.frame_start, scene.frame_end
-    scene.frame_start, scene.frame_end = frames = command_line.frames(arguments.frames, whole, "edit")
-    for fault in missing_media.faults(scene, range(frames[0], frames[1] + 1), sources=True):
+    edit = command_line.open_edit(arguments.source, arguments.frames)
+    scene, frames = edit.scene, edit.frames
+    scene.frame_start, scene.frame_end = frames[0], frames[-1]
+    for fault in missing_media.faults(scene, frames, sources=True):
         raise film_output.OutputError(fault)  # Blender would render on without it
-    settings = render_settings.RenderSettings(arguments.device, gpu_memory=arguments.gpu_memory)
-    with render_settings.using(settings), shared_frames.of_same_footage(scene) as rendered:
-        version = saved_edit.version(scene, source, opened)
+    with command_line.rendered_by(arguments), shared_frames.of_same_footage(scene) as rendered:
+        version = edit.version()
         job_file.guard(output, version)
-        read = [source, *versions.read_files(scene)]
-        shared_frames.check(output, arguments.format, frames, read)
+        shared_frames.check(output, arguments.format, frames, [edit.path, *versions.read_files(scene)])
         _check_device(arguments)
         shared_frames.render(scene, output, file_format, version, rendered, resume=arguments.resume)
 
 
-def _render_source(arguments) -> None:
+def _render_source(arguments: Namespace) -> None:
     """Makes an edit of a source and a recipe, and renders it."""
     if arguments.recipe is None:
         raise film_output.OutputError("--recipe is missing: only a saved edit (.blend) is rendered without one")
@@ -95,11 +94,11 @@ def _render_source(arguments) -> None:
             film_output.check(output, arguments.format, (medium.width, medium.height))
             if arguments.save and film_output.is_movie(output) and "#" in output.name:
                 raise film_output.OutputError(f"{output}: in a saved edit, Blender takes # for the frames' numbers")
-        frames = command_line.frames(arguments.frames, (1, new_edit.length(medium, source_recipe)))
+        frames = command_line.frames(arguments.frames, range(1, new_edit.length(medium, source_recipe) + 1))
         read = path, *command_line.files(medium), arguments.recipe, *_mattes(source_recipe, arguments.recipe.parent)
         film_output.spare(_written(arguments, file_format, frames), read)
         scene = new_edit.make_edit(path, medium, source_recipe, arguments.recipe.parent)
-    scene.frame_start, scene.frame_end = frames
+    scene.frame_start, scene.frame_end = frames[0], frames[-1]
     if output:
         _check_device(arguments)
         film_output.set_output(scene, output, file_format, alpha=medium.alpha != "opaque")
@@ -116,12 +115,12 @@ def _render_source(arguments) -> None:
             film_output.film(scene, output)
 
 
-def _check_device(arguments) -> None:
+def _check_device(arguments: Namespace) -> None:
     """NoDeviceError: there is none as it is wanted. Called before anything is written."""
     available.choose(arguments.device or preferences.device())
 
 
-def _written(arguments, file_format: str, frames: tuple[int, int]) -> list[Path]:
+def _written(arguments: Namespace, file_format: str, frames: range) -> list[Path]:
     """All files that a render writes, but for in-between frames."""
     files = [arguments.save] if arguments.save else []
     if arguments.output and film_output.is_movie(arguments.output):
@@ -133,7 +132,7 @@ def _written(arguments, file_format: str, frames: tuple[int, int]) -> list[Path]
     return files
 
 
-def _mattes(source_recipe, folder: Path) -> list[Path]:
+def _mattes(source_recipe: Effect, folder: Path) -> list[Path]:
     """The files of a recipe's mattes; folder: where the recipe lies. MediaError: there are none."""
     files = []
     for content in recipe.contents(source_recipe):
@@ -142,7 +141,7 @@ def _mattes(source_recipe, folder: Path) -> list[Path]:
     return files
 
 
-def _recipe(arguments) -> Effect:
+def _recipe(arguments: Namespace) -> Effect:
     """The recipe, with the in-between frames that were asked for."""
     source_recipe = recipe_file.load(arguments.recipe)
     if arguments.inbetween is not None:
@@ -150,12 +149,12 @@ def _recipe(arguments) -> Effect:
     return replace(source_recipe, inbetween_method=arguments.inbetween_method or source_recipe.inbetween_method)
 
 
-def _cache(arguments) -> Path:
+def _cache(arguments: Namespace) -> Path:
     """The folder of in-between frames: where a saved edit will look for them, if it is to be saved."""
     return arguments.cache or (arguments.save or arguments.output).parent / inbetween_settings.FOLDER
 
 
-def _save(scene, path: Path) -> None:
+def _save(scene: Scene, path: Path) -> None:
     """Saves the edit, its paths relative to the file: it may be opened on another machine. OutputError: it cannot be
     saved whole; what stood there stays."""
     try:
@@ -165,7 +164,7 @@ def _save(scene, path: Path) -> None:
         raise film_output.OutputError(f"{path}: {error.strerror or error}") from None
 
 
-def _save_whole(scene, path: Path) -> None:
+def _save_whole(scene: Scene, path: Path) -> None:
     with atomic_write.part_folder(path.parent) as folder:
         part = folder / "edit.blend"
         try:

@@ -1,12 +1,17 @@
 """The command `track`: a recipe's region follows what it covers, or its camera what stands still."""
 
+from __future__ import annotations
+
+import argparse
 import json
-import sys
+from argparse import Namespace
+from collections.abc import Iterator
 from contextlib import ExitStack, closing, contextmanager
 from dataclasses import replace
+from typing import Any
 
 from ...core import atomic_write
-from ...core.messages import signed
+from ...core.frames.frame_source import FrameSource
 from ...core.model import outlines, presence
 from ...core.model.clip import nearest
 from ...core.model.effect import Effect, OutlineRegion, Region
@@ -17,11 +22,12 @@ from ...media.cuts import ShotSource
 from ...media.footage import Footage
 from ..editing import new_edit
 from ..output import film_output
+from ..rendering import render_job
 from . import command_line
 from .command_line import place
 
 
-def add(commands) -> None:
+def add(commands: argparse._SubParsersAction) -> None:
     parser = commands.add_parser("track", help="follow what a region covers, or the camera")
     option = parser.add_argument
     option("source", type=place, help="a movie, or the first file of an image sequence")
@@ -40,7 +46,7 @@ def add(commands) -> None:
     parser.set_defaults(run=run)
 
 
-def run(arguments) -> None:
+def run(arguments: Namespace) -> None:
     if arguments.camera == (arguments.region is not None):
         raise film_output.OutputError("track: either --region NAME or --camera, one of the two")
     source_recipe = recipe_file.load(arguments.recipe)
@@ -51,11 +57,12 @@ def run(arguments) -> None:
             filter(None, (arguments.output, arguments.report)),
             [arguments.source, *command_line.files(medium), arguments.recipe],
         )
-        first, last = command_line.frames(arguments.frames, (1, new_edit.length(medium, source_recipe)))
-        if not first <= arguments.frame <= last:
-            raise film_output.OutputError(f"--frame: {arguments.frame} is not within the frames {first}:{last}")
+        frames = command_line.frames(arguments.frames, range(1, new_edit.length(medium, source_recipe) + 1))
+        if arguments.frame not in frames:
+            fault = f"{arguments.frame} is not within the frames {frames[0]}:{frames[-1]}"
+            raise film_output.OutputError(f"--frame: {fault}")
         try:
-            tracked, stops = _followed(arguments, source_recipe, index, medium, range(first, last + 1))
+            tracked, stops = _followed(arguments, source_recipe, index, medium, frames)
         except tracking.TrackingError as error:
             raise tracking.TrackingError(f"{subject}: {error}") from None
         size = medium.width, medium.height
@@ -63,7 +70,7 @@ def run(arguments) -> None:
     with_keys = _keyed(source_recipe, index, placements, {arguments.frame}, size, thin=not arguments.all_keys)
     has_matte = index is not None and isinstance(source_recipe.regions[index], OutlineRegion)
     if not (arguments.hold or has_matte):  # a matte says itself where it is
-        with_keys = _ended(with_keys, index, tracked, stops, arguments.frame, range(first, last + 1))
+        with_keys = _ended(with_keys, index, tracked, stops, arguments.frame, frames)
     _write_track(arguments, with_keys, tracked, stops)
     for stop in stops:
         if stop.fault == tracking.SHOT_ENDS:
@@ -71,10 +78,10 @@ def run(arguments) -> None:
             said = f"{subject}: tracked to frame {near}, where the shot ends"
         else:
             said = f"{subject}: not tracked from frame {stop.frame} on: {stop.fault}"
-        print(signed(said), file=sys.stderr)
+        render_job.say(said)
 
 
-def _region_index(arguments, source_recipe) -> int:
+def _region_index(arguments: Namespace, source_recipe: Effect) -> int:
     names = [region.name for region in source_recipe.regions]
     if arguments.region not in names:
         raise film_output.OutputError(f'{arguments.recipe}: there is no region "{arguments.region}"')
@@ -85,11 +92,13 @@ def _region_index(arguments, source_recipe) -> int:
     return index
 
 
-def _followed(arguments, source_recipe, index: int | None, medium, frames: range) -> tuple[dict, list]:
+def _followed(
+    arguments: Namespace, source_recipe: Effect, index: int | None, medium: FrameSource, frames: range
+) -> tuple[dict, list]:
     """What tracking of a region, or of the camera, found by frame, and where it ended before the last frame.
     TrackingError: at once."""
     effect = source_recipe.for_picture(medium.width / medium.height)
-    subject = effect.camera if index is None else effect.regions[index]
+    subject: Any = effect.camera if index is None else effect.regions[index]
     times = {frame: _shown(source_recipe, frame, medium.count) for frame in frames}
     filmed = filmed_frames.FilmedFrames(times, arguments.frame)
     with ExitStack() as ends:
@@ -118,7 +127,9 @@ def _followed(arguments, source_recipe, index: int | None, medium, frames: range
 
 
 @contextmanager
-def _cover(arguments, source_recipe, region: OutlineRegion, filmed, size: tuple[int, int]):
+def _cover(
+    arguments: Namespace, source_recipe: Effect, region: OutlineRegion, filmed: Any, size: tuple[int, int]
+) -> Iterator[matte_tracking.Cover]:
     """What an outline covers at the places of filmed frames (media.matte_tracking.Cover)."""
     if region.between == "straight":
         yield matte_tracking.cover_within(filmed.seen(region.drawings).at, size)
@@ -131,16 +142,16 @@ def _cover(arguments, source_recipe, region: OutlineRegion, filmed, size: tuple[
             yield matte_tracking.cover_of(mattes, filmed.index_at, size)
 
 
-def _keyed(source_recipe, index: int | None, *placements, thin: bool) -> Effect:
+def _keyed(source_recipe: Effect, index: int | None, *placements, thin: bool) -> Effect:
     """The recipe with placements as keys of a region, or of the camera; arguments: see region_keys."""
     if index is None:
         return region_keys.with_camera(source_recipe, *placements, thin=thin)
-    regions = list(source_recipe.regions)
+    regions: list[Any] = list(source_recipe.regions)
     regions[index] = region_keys.with_placements(regions[index], *placements, thin=thin)
     return source_recipe.with_parts(regions)
 
 
-def _ended(source_recipe, index: int | None, tracked: dict, stops: list, start: int, frames: range) -> Effect:
+def _ended(source_recipe: Effect, index: int | None, tracked: dict, stops: list, start: int, frames: range) -> Effect:
     """The recipe whose region, or camera, counts only where it was tracked."""
     seen = [frame for frame, step in tracked.items() if step.confidence > 0]
     ends = [presence.Stop(stop.frame, stop.frame > start, stop.fault == tracking.SHOT_ENDS) for stop in stops]
@@ -154,14 +165,14 @@ def _ended(source_recipe, index: int | None, tracked: dict, stops: list, start: 
     return source_recipe.with_parts(regions)
 
 
-def _shown(source_recipe, frame: float, count: int) -> float:
+def _shown(source_recipe: Effect, frame: float, count: int) -> float:
     """Which of a source's frames, from 0 on, a recipe shows at a timeline frame; a fraction: an in-between one."""
     factor = source_recipe.options.at(1).step
     filmed = (source_recipe.time.at(frame)[0] if source_recipe.time else frame) - 1
     return nearest(filmed, factor, (count - 1) * factor + 1) / factor
 
 
-def _write_track(arguments, result, tracked: dict, stops: list) -> None:
+def _write_track(arguments: Namespace, result: Effect, tracked: dict, stops: list) -> None:
     """Writes the recipe, and the report of it, both whole or neither."""
     report = {
         **({"camera": True} if arguments.camera else {"region": arguments.region}),

@@ -1,9 +1,14 @@
 """Scribbles: Blender's annotation layers and strokes, and where they lie on an effect's picture."""
 
+from __future__ import annotations
+
+from typing import Any
+
 import bpy
 import numpy as np
 from bpy.app.translations import pgettext_data as data_
 from bpy.app.translations import pgettext_rpt as rpt_
+from bpy.types import Annotation, AnnotationFrame, PropertyGroup, Scene, Strip
 
 from ...core.messages import EffectError
 from . import geometry
@@ -13,12 +18,12 @@ _SMALLEST = 4
 USERS = "user"  # in place of an effect's identity: the annotation is the user's own, whatever its name
 
 
-def picture_size(effect) -> tuple[int, int]:
+def picture_size(effect: PropertyGroup) -> tuple[int, int]:
     """Width and height of the effect's picture, which are its source's."""
     return effect.scene.render.resolution_x, effect.scene.render.resolution_y
 
 
-def image_to_picture(strip, size: tuple[int, int], **moved: float) -> np.ndarray | None:
+def image_to_picture(strip: Strip, size: tuple[int, int], **moved: float) -> np.ndarray | None:
     """Matrix (3, 3) from the sequencer's image to fractions of the strip's picture; None where the strip is scaled to
     nothing that can be seen. size, moved: as geometry.picture_to_image has them. EffectError: its transform is none."""
     matrix = geometry.picture_to_image(strip, size, **moved)
@@ -29,7 +34,7 @@ def image_to_picture(strip, size: tuple[int, int], **moved: float) -> np.ndarray
     return np.linalg.inv(matrix)
 
 
-def strokes_of(drawing) -> list[np.ndarray]:
+def strokes_of(drawing: AnnotationFrame) -> list[np.ndarray]:
     """The strokes (n, 2) float64 of an annotation's frame, in the sequencer's image space; empty ones left out."""
     strokes = []
     for stroke in drawing.strokes:
@@ -39,7 +44,7 @@ def strokes_of(drawing) -> list[np.ndarray]:
     return [points for points in strokes if len(points)]
 
 
-def add_stroke(drawing, points: np.ndarray) -> None:
+def add_stroke(drawing: AnnotationFrame, points: np.ndarray) -> None:
     """Adds a stroke (n, 2), in the sequencer's image space, to an annotation's frame."""
     stroke = drawing.strokes.new()
     stroke.display_mode = "2DSPACE"
@@ -49,26 +54,26 @@ def add_stroke(drawing, points: np.ndarray) -> None:
     stroke.points.foreach_set("co", places.ravel())
 
 
-def layer_of(effect, region):
+def layer_of(effect: PropertyGroup, region: PropertyGroup) -> Any:
     """The annotation layer of a region, or None."""
     annotation = effect.scene and effect.scene.annotation
     return annotation.layers.get(region.layer) if annotation else None
 
 
-def is_hidden(effect, region) -> bool:
+def is_hidden(effect: PropertyGroup, region: PropertyGroup) -> bool:
     """Whether the user has hidden a region's lines."""
     layer = layer_of(effect, region)
     return layer is not None and layer.annotation_hide
 
 
-def annotation(effect):
+def annotation(effect: PropertyGroup) -> Annotation:
     """What the effect's scribbles are drawn on; made where somebody has removed it."""
     if effect.scene.annotation is None:
         new_annotation(effect.scene, data_("Scribbles {effect}").format(effect=effect.name))
     return effect.scene.annotation
 
 
-def new_annotation(scene, name: str) -> None:
+def new_annotation(scene: Scene, name: str) -> None:
     """Gives an effect's scene an empty annotation, which goes with it."""
     scene.annotation = bpy.data.annotations.new(name)
     scene.annotation.virtual_shutter_made = scene.virtual_shutter.identity

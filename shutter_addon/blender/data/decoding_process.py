@@ -6,6 +6,8 @@ by several numbers. An answer is a line of JSON, and as many bytes behind it as 
 a line that reads as the script's last argument.
 """
 
+from __future__ import annotations
+
 import contextlib
 import faulthandler
 import json
@@ -22,7 +24,7 @@ IDLE = 30  # seconds without an open movie after which it ends
 class Movie:
     """A movie that is open. Its frames are counted from 0."""
 
-    def __init__(self, path: str, deinterlace: bool):
+    def __init__(self, path: str, deinterlace: bool) -> None:
         self._path = path
         self._ahead: tuple[int, np.ndarray] | None = None
         self._last, self._onward = -2, False
@@ -98,26 +100,19 @@ class Movies:
     """Those that are open, the one that was asked for last at the end."""
 
     def __init__(self) -> None:
-        self._open: dict[int, Movie] = {}
-
-    @property
-    def last(self) -> Movie:
-        return next(reversed(self._open.values()))
-
-    def __len__(self) -> int:
-        return len(self._open)
+        self.open: dict[int, Movie] = {}
 
     def get(self, number: int, path: str, deinterlace: bool) -> Movie:
         """It, opened if it is not."""
-        movie = self._open.pop(number, None) or Movie(path, deinterlace)
-        while len(self._open) >= OPENED:
-            self.close(next(iter(self._open)))
-        self._open[number] = movie
+        movie = self.open.pop(number, None) or Movie(path, deinterlace)
+        while len(self.open) >= OPENED:
+            self.close(next(iter(self.open)))
+        self.open[number] = movie
         return movie
 
     def close(self, number: int) -> None:
         """Closes it, if it is open."""
-        if movie := self._open.pop(number, None):
+        if movie := self.open.pop(number, None):
             movie.close()
 
 
@@ -153,7 +148,7 @@ def main() -> None:
     answers.write(f"\n{sys.argv[-1]}\n".encode())
     while True:
         answers.flush()
-        if not movies:  # a watch that needs no thread of Python's: it ends the process
+        if not movies.open:  # a watch that needs no thread of Python's: it ends the process
             faulthandler.dump_traceback_later(IDLE, exit=True, file=null)
         if not (line := questions.readline()):
             return
@@ -165,7 +160,7 @@ def main() -> None:
         if frame is not None:
             answers.write(frame.data)
             answers.flush()
-            movies.last.read_on()
+            next(reversed(movies.open.values())).read_on()
 
 
 if __name__ == "__main__":

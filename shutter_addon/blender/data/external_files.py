@@ -1,9 +1,12 @@
 """The files beside the .blend file that images, volumes, sounds, libraries and the like name."""
 
+from __future__ import annotations
+
 from collections.abc import Iterator
 from pathlib import Path
 
 import bpy
+from bpy.types import ID, Image, Strip
 
 from ...media import MediaError
 from ...media.sequence import ImageFiles, numbered_alike
@@ -11,7 +14,7 @@ from ...media.sequence import ImageFiles, numbered_alike
 _MADE = "GENERATED", "VIEWER"  # sources of images that are in no file
 
 
-def named(item) -> list[Path]:
+def named(item: ID) -> list[Path]:
     """The file of an ID; of an image in tiles one for each; of a sequence the one that it names. Empty: it is packed,
     or made by Blender."""
     source = getattr(item, "source", "FILE")
@@ -20,24 +23,24 @@ def named(item) -> list[Path]:
     return [absolute(item, name) for name in (_tiles(item) if source == "TILED" else [item.filepath])]
 
 
-def every(item) -> list[Path]:
+def every(item: ID) -> list[Path]:
     """As `named`, but of a sequence all files that are there, in order."""
     return [file for path in named(item) for file in _sequence(item, path)]
 
 
-def absolute(owner, path: str) -> Path:
+def absolute(owner: ID | Strip, path: str) -> Path:
     """An absolute path, where an ID or a strip of one names it."""
     library = owner.library if isinstance(owner, bpy.types.ID) else owner.id_data.library
     return Path(bpy.path.abspath(path, library=library))
 
 
-def _tiles(image) -> Iterator[str]:
+def _tiles(image: Image) -> Iterator[str]:
     for tile in image.tiles:
         v, u = divmod(tile.number - 1001, 10)
         yield image.filepath.replace("<UDIM>", str(tile.number)).replace("<UVTILE>", f"u{u + 1}_v{v + 1}")
 
 
-def _sequence(item, path: Path) -> list[Path]:
+def _sequence(item: ID, path: Path) -> list[Path]:
     if not (getattr(item, "is_sequence", False) or getattr(item, "source", "") == "SEQUENCE"):
         return [path]
     try:

@@ -1,13 +1,16 @@
 """Where a strip's picture lies on the sequencer's image."""
 
+from __future__ import annotations
+
 import numpy as np
+from bpy.types import Region, Strip
 
 # The numbers of a strip's transform that can be keyed.
 TRANSFORM = ("offset_x", "offset_y", "scale_x", "scale_y", "rotation")
 
 
 @np.errstate(invalid="ignore")  # the result is then not finite, which annotations.image_to_picture reports
-def picture_to_image(strip, size: tuple[int, int], **moved: float) -> np.ndarray:
+def picture_to_image(strip: Strip, size: tuple[int, int], **moved: float) -> np.ndarray:
     """Matrix (3, 3) from fractions of the strip's picture to the sequencer's image space.
 
     Image space, as annotations have it: pixels, origin at the image's centre, y up. size: the picture's, in pixels;
@@ -32,12 +35,12 @@ def is_invertible(matrix: np.ndarray) -> bool:
         return bool(np.isfinite(matrix).all() and np.isfinite(1 / np.linalg.det(matrix)))
 
 
-def picture_to_region(strip, size: tuple[int, int], region) -> np.ndarray:
+def picture_to_region(strip: Strip, size: tuple[int, int], region: Region) -> np.ndarray:
     """Matrix (3, 3) from fractions of the strip's picture to pixels of a preview's region."""
     return image_to_region(region) @ picture_to_image(strip, size)
 
 
-def image_to_region(region) -> np.ndarray:
+def image_to_region(region: Region) -> np.ndarray:
     """Matrix (3, 3) from the sequencer's image space to pixels of a preview's region."""
     # view_to_region rounds to whole pixels, region_to_view does not; and its last pixel is what is drawn at the edge.
     (left, bottom), (right, top) = (

@@ -1,10 +1,13 @@
 """In-between frames of an effect: where they lie, and how they are made."""
 
+from __future__ import annotations
+
 from pathlib import Path
 from typing import NamedTuple
 
 import bpy
 from bpy.app.translations import pgettext_rpt as rpt_
+from bpy.types import PropertyGroup
 
 from ...core.messages import EffectError
 from ...core.model.effect import Method
@@ -23,7 +26,7 @@ class Settings(NamedTuple):
     method: Method
 
 
-def folder(effect) -> Path:
+def folder(effect: PropertyGroup) -> Path:
     """The folder of the effect's in-between frames. EffectError: there is none, beside a file that is not saved,
     or of an extension that is not installed."""
     if validation.word(effect, "inbetween_place") == "USER":
@@ -39,48 +42,44 @@ def folder(effect) -> Path:
     return Path(file).parent / FOLDER
 
 
-def factor(effect) -> int:
+def factor(effect: PropertyGroup) -> int:
     """How many frames there are for each of the source; 1: in-between frames are off. EffectError: it is none of those
     there are."""
     return int(validation.word(effect, "inbetween"))
 
 
-def method(effect) -> Method:
+def method(effect: PropertyGroup) -> Method:
     """One of media.flow.METHODS."""
     return METHODS[validation.word(effect, "inbetween_method")]
 
 
-def settings(effect, given: Path | None = None) -> Settings:
+def settings(effect: PropertyGroup, given: Path | None = None) -> Settings:
     """The effect's settings, as media.inbetween takes them; given: a folder in place of its own. EffectError: there is
     no folder."""
     return Settings(given or folder(effect), factor(effect), method(effect))
 
 
 class BuiltStamps:
-    """Which in-between frames there are on disk, as stamps: equal ones, and none was built or removed meanwhile."""
+    """Which in-between frames there are on disk, as stamps: equal ones, and none was built or removed meanwhile.
+
+    is_held: while in-between frames are built stamps stay as they are: those that come count when the build has
+    ended"""
 
     _MOST = 64
 
-    def __init__(self):
+    def __init__(self) -> None:
         self._known: dict[tuple, tuple] = {}
-        self._held = False
+        self.is_held = False
 
     def of(self, settings: Settings, stem: str) -> tuple:
         """The stamp of the frames of sources whose files have that stem."""
         key = *settings, stem
-        if not (self._held and key in self._known):
+        if not (self.is_held and key in self._known):
             self._known.pop(key, None)
             while len(self._known) >= self._MOST:
                 del self._known[next(iter(self._known))]
             self._known[key] = inbetween_cache.stamp(settings.folder, stem, settings.factor, settings.method)
         return self._known[key]
-
-    def hold(self) -> None:
-        """While in-between frames are built stamps stay as they are: those that come count when the build has ended."""
-        self._held = True
-
-    def release(self) -> None:
-        self._held = False
 
     def forget(self) -> None:
         """Forgets all: before another file is loaded."""

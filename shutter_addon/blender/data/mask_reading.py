@@ -5,15 +5,18 @@ from Blender's memory (struct_dna), and checked against what the API has. Where 
 taken as Blender has it when it is read, at whatever frame that is.
 """
 
+from __future__ import annotations
+
 from bisect import bisect_right
 from collections.abc import Callable, Iterator
 from contextlib import suppress
 from itertools import chain
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import bpy
 import numpy as np
 from bpy.app.translations import pgettext_rpt as rpt_
+from numpy.typing import ArrayLike
 
 from ...core.masks import mask_handles, mask_outlines
 from ...core.masks.mask import MaskLayer, MaskShape, MaskSpline
@@ -27,19 +30,13 @@ _FARTHEST = 1e4
 _SHAPE_NUMBERS = 8
 
 
-def _layer_record() -> np.dtype:
-    return record("MaskLayer", "char name[64]", "ListBase splines", "ListBase splines_shapes")
-
-
-def _shape_record() -> np.dtype:
-    links = "MaskLayerShape *next", "MaskLayerShape *prev"
-    return record("MaskLayerShape", *links, "float *data", "int tot_vert", "int frame")
-
-
-def _parent_record() -> np.dtype:
-    """Where the track was (in mask space), or the plane's corners (in the clip)."""
-    names = "char parent[64]", "char sub_parent[64]"
-    return record("MaskParent", "ID *id", *names, "float parent_orig[2]", "float parent_corners_orig[4][2]")
+# Records of Blender's memory with their fields, as struct_dna.record takes them.
+_LAYER = "MaskLayer", "char name[64]", "ListBase splines", "ListBase splines_shapes"
+_LINKS = "MaskLayerShape *next", "MaskLayerShape *prev"
+_SHAPE = "MaskLayerShape", *_LINKS, "float *data", "int tot_vert", "int frame"
+# Where the track was (in mask space), or the plane's corners (in the clip).
+_PLACES = "float parent_orig[2]", "float parent_corners_orig[4][2]"
+_PARENT = "MaskParent", "ID *id", "char parent[64]", "char sub_parent[64]", *_PLACES
 
 
 class _Shape(NamedTuple):
@@ -76,7 +73,7 @@ def motion(mask: bpy.types.Mask) -> Iterator[tuple]:
         yield tuple(numbers.tobytes() for numbers in _markers(track, *place))
 
 
-def _tracks(mask: bpy.types.Mask) -> Iterator[Any]:
+def _tracks(mask: bpy.types.Mask) -> Iterator[bpy.types.MovieTrackingTrack]:
     """The tracks, of points and planes, that are parents of a mask's points."""
     points = [point for layer in mask.layers for spline in layer.splines for point in spline.points]
     for clip, name, track in {(p.parent.id, p.parent.parent, p.parent.sub_parent) for p in points}:
@@ -101,7 +98,7 @@ def moves(mask: bpy.types.Mask) -> bool:
     return bool(fcurves.curves_under(mask, "")) or next(motion(mask), None) is not None
 
 
-def _layer_at(mask, layer, shapes: list[_Shape], frame: float) -> MaskLayer:
+def _layer_at(mask: bpy.types.Mask, layer: bpy.types.MaskLayer, shapes: list[_Shape], frame: float) -> MaskLayer:
     keyed = _keyed_points(layer, shapes, frame)
     splines, at = [], 0
     for spline in layer.splines:
@@ -117,13 +114,15 @@ def _layer_at(mask, layer, shapes: list[_Shape], frame: float) -> MaskLayer:
     )
 
 
-def _alpha_at(mask, layer, frame: float) -> float:
+def _alpha_at(mask: bpy.types.Mask, layer: bpy.types.MaskLayer, frame: float) -> float:
     path = f'layers["{bpy.utils.escape_identifier(layer.name)}"].alpha'
     curve = fcurves.find_curve(mask, path)
     return layer.alpha if curve is None or curve.mute or curve.is_empty else curve.evaluate(frame)
 
 
-def _spline_at(mask, spline, frame: float, keyed: np.ndarray | None) -> MaskSpline:
+def _spline_at(
+    mask: bpy.types.Mask, spline: bpy.types.MaskSpline, frame: float, keyed: np.ndarray | None
+) -> MaskSpline:
     """keyed: its points by shape keys, as `_keyed_points` has them; None: as they stand."""
     points, weights = _standing_points(spline) if keyed is None else (keyed[:, :6].reshape(-1, 3, 2), keyed[:, 6])
     types = np.stack([_numbers(spline, f"handle_{side}_type", np.int32) for side in ("left", "right")], axis=1)
@@ -152,19 +151,19 @@ def _spline_at(mask, spline, frame: float, keyed: np.ndarray | None) -> MaskSpli
     )
 
 
-def _standing_points(spline) -> tuple[np.ndarray, np.ndarray]:
+def _standing_points(spline: bpy.types.MaskSpline) -> tuple[np.ndarray, np.ndarray]:
     places = [_numbers(spline, name, np.float32, 2) for name in ("handle_left", "co", "handle_right")]
     return np.stack(places, axis=1).astype(np.float64), _numbers(spline, "weight", np.float32).astype(np.float64)
 
 
-def _numbers(spline, name: str, kind, size: int = 1) -> np.ndarray:
+def _numbers(spline: bpy.types.MaskSpline, name: str, kind: type, size: int = 1) -> np.ndarray:
     """A property of all points of a spline: (n,), or (n, size)."""
-    numbers = np.empty(len(spline.points) * size, kind)
+    numbers: np.ndarray = np.empty(len(spline.points) * size, kind)
     spline.points.foreach_get(name, numbers)
     return numbers if size == 1 else numbers.reshape(-1, size)
 
 
-def _checked(mask, numbers) -> np.ndarray:
+def _checked(mask: bpy.types.Mask, numbers: ArrayLike) -> np.ndarray:
     """Numbers of a mask. EffectError: one is none, or too far off."""
     numbers = np.asarray(numbers, np.float64)
     if not (np.abs(numbers) <= _FARTHEST).all():
@@ -173,7 +172,7 @@ def _checked(mask, numbers) -> np.ndarray:
     return numbers
 
 
-def _keyed_points(layer, shapes: list[_Shape], frame: float) -> np.ndarray | None:
+def _keyed_points(layer: bpy.types.MaskLayer, shapes: list[_Shape], frame: float) -> np.ndarray | None:
     """The points of all splines of a layer (n, 8) by its shape keys, which are held before the first and behind the
     last; None where it has none that fit."""
     if not shapes:
@@ -188,13 +187,13 @@ def _keyed_points(layer, shapes: list[_Shape], frame: float) -> np.ndarray | Non
     return first + (last - first) * share
 
 
-def _shapes(layer) -> list[_Shape] | None:
+def _shapes(layer: bpy.types.MaskLayer) -> list[_Shape] | None:
     """The shape keys of a layer, in order, from Blender's memory; None: they cannot be read in this Blender. No address
     is followed before the record that has it was found to be what the API says, or what leads there."""
     if not layer.splines:
         return []
     try:
-        kind, raw = _shape_record(), read(_layer_record(), layer.as_pointer())
+        kind, raw = record(*_SHAPE), read(record(*_LAYER), layer.as_pointer())
     except LayoutError:
         return None
     ends = layer.splines[0].as_pointer(), layer.splines[-1].as_pointer()
@@ -212,7 +211,9 @@ def _shapes(layer) -> list[_Shape] | None:
     return shapes if last == before else None
 
 
-def _families(mask, spline) -> list[tuple[bpy.types.MaskParent, np.void, list[int]]]:
+def _families(
+    mask: bpy.types.Mask, spline: bpy.types.MaskSpline
+) -> list[tuple[bpy.types.MaskParent, np.void, list[int]]]:
     """The tracks of clips that are parents of a spline's points: each as Python has it, as it lies in memory, and the
     indices of its children. EffectError: not in this Blender."""
     children: dict = {}
@@ -223,10 +224,10 @@ def _families(mask, spline) -> list[tuple[bpy.types.MaskParent, np.void, list[in
     return list(children.values())
 
 
-def _parent_of(mask, parent) -> np.void:
+def _parent_of(mask: bpy.types.Mask, parent: bpy.types.MaskParent) -> np.void:
     """EffectError: it cannot be read in this Blender."""
     with suppress(LayoutError):
-        raw = read(_parent_record(), parent.as_pointer())
+        raw = read(record(*_PARENT), parent.as_pointer())
         names = parent.parent.encode(), parent.sub_parent.encode()
         if raw["id"] == parent.id.as_pointer() and (text(raw["parent"]), text(raw["sub_parent"])) == names:
             return raw
@@ -237,7 +238,7 @@ def _parent_of(mask, parent) -> np.void:
     raise EffectError(sentence.format(mask=mask.name))
 
 
-def _parent_matrix(parent, raw: np.void, frame: float) -> np.ndarray:
+def _parent_matrix(parent: bpy.types.MaskParent, raw: np.void, frame: float) -> np.ndarray:
     """How a track (3, 3) has moved its children since they got it, in mask space; no motion where there is none."""
     clip, matrix = parent.id, np.eye(3)
     tracked = clip.tracking.objects.get(parent.parent)
@@ -261,7 +262,9 @@ def _parent_matrix(parent, raw: np.void, frame: float) -> np.ndarray:
     return to_mask @ mask_handles.homography(raw["parent_corners_orig"], now) @ np.linalg.inv(to_mask)
 
 
-def _between_markers(track, name: str, size: int, frame: float, find: Callable) -> np.ndarray:
+def _between_markers(
+    track: bpy.types.MovieTrackingTrack, name: str, size: int, frame: float, find: Callable
+) -> np.ndarray:
     """A property (size,) of a track's marker at a frame of the clip: what lies between those of two consecutive frames,
     elsewhere that of the one which `find` finds."""
     frames, values = _markers(track, name, size)
@@ -273,7 +276,7 @@ def _between_markers(track, name: str, size: int, frame: float, find: Callable) 
     return values[index]
 
 
-def _markers(track, name: str, size: int) -> tuple[np.ndarray, np.ndarray]:
+def _markers(track: bpy.types.MovieTrackingTrack, name: str, size: int) -> tuple[np.ndarray, np.ndarray]:
     """Of a track's markers the frames (n,), and a property (n, size)."""
     frames, values = np.empty(len(track.markers), np.int32), np.empty((len(track.markers), size), np.float32)
     track.markers.foreach_get("frame", frames)
@@ -296,7 +299,7 @@ def _halved(frames: list[int], frame: int) -> int:
     return right
 
 
-def _mask_from_clip(clip) -> np.ndarray:
+def _mask_from_clip(clip: bpy.types.MovieClip) -> np.ndarray:
     """The matrix (3, 3) from fractions of a clip's picture to mask space."""
     width, height = clip.size
     height *= clip.display_aspect[1] / clip.display_aspect[0] / clip.tracking.camera.pixel_aspect

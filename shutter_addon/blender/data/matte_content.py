@@ -1,6 +1,8 @@
 """What the mattes and ramps of an effect show, as plain data (core.model.mattes.Content)."""
 
-from collections.abc import Callable, Collection
+from __future__ import annotations
+
+from collections.abc import Callable
 from contextlib import closing
 from fractions import Fraction
 from functools import lru_cache
@@ -8,20 +10,27 @@ from pathlib import Path
 
 import bpy
 from bpy.app.translations import pgettext_rpt as rpt_
+from bpy.types import PropertyGroup, Scene, Strip
 
+from ...core.masks.mask import MaskShape
 from ...core.messages import EffectError
 from ...core.model import keyframes, mattes, outlines
 from ...core.model.clip import Clip
 from ...core.model.effect import Moves, PlacedRamp
+from ...core.model.keyframes import Channel
 from ...media import MediaError
 from ...media.carried_mattes import FOLDER, CarriedFile
 from ...media.files import stamp
 from ...media.matte_files import MatteFile
 from ...media.sequence import ImageFiles
 from . import inbetween_settings, mask_reading, matte_strips, source_media, strip_timing, strips, validation
+from .external_files import absolute
+from .sampled import Frames
 
 
-def content(effect, strip, region, moves: Moves, frames, time: keyframes.Channel | None) -> keyframes.Channel:
+def content(
+    effect: PropertyGroup, strip: Strip, region: PropertyGroup, moves: Moves, frames: Frames, time: Channel | None
+) -> Channel:
     """The channel of a matte or a ramp, sampled at timeline frames; strip: the effect strip that shows it, moves:
     the region's, time: see core.model.effect.Effect. EffectError, MediaError: there is none."""
     scene = effect.id_data
@@ -34,12 +43,12 @@ def content(effect, strip, region, moves: Moves, frames, time: keyframes.Channel
     if matte == "STRIP":
         return _strip_frames(strip, region, frames)
     if matte == "MASK":
-        return _mask_shapes(scene, effect, strip, region, frames, time)
+        return _mask_shapes(effect, strip, region, frames, time)
     first = strips.origin(strip) if validation.word(region, "timing") == "TIMELINE" else None
     return mattes.FileFrames(file=image_file(region), offset=validation.number(region, "offset"), first=first)
 
 
-def carried_file(effect, strip, drawn: dict[int, outlines.Curves]) -> CarriedFile:
+def carried_file(effect: PropertyGroup, strip: Strip, drawn: dict[int, outlines.Curves]) -> CarriedFile:
     """What gives the mattes of an outline in the frames of the source, by the curves at some of them. EffectError,
     MediaError: there is no source."""
     spec = source_media.spec(strips.source_of(effect.id_data, effect, strip))
@@ -47,7 +56,7 @@ def carried_file(effect, strip, drawn: dict[int, outlines.Curves]) -> CarriedFil
     return CarriedFile(footage=spec, drawings=tuple(sorted(drawn.items())), folder=place / FOLDER)
 
 
-def channel(region) -> str:
+def channel(region: PropertyGroup) -> str:
     """The channel that is read of a matte, as a recipe has it. EffectError: it has no name."""
     word = validation.word(region, "channel")
     if word != "NAMED":
@@ -57,7 +66,7 @@ def channel(region) -> str:
     return region.channel_name
 
 
-def image_path(region) -> Path:
+def image_path(region: PropertyGroup) -> Path:
     """The file of a matte that is an image. EffectError: it has none."""
     place, image = validation.place(region), region.image
     if image is None:
@@ -65,10 +74,10 @@ def image_path(region) -> Path:
     if image.source not in ("FILE", "SEQUENCE", "MOVIE") or image.packed_file or not image.filepath:
         sentence = rpt_('{place}: image "{image}" is not a movie, image sequence or picture on disk')
         raise EffectError(sentence.format(place=place, image=image.name))
-    return Path(bpy.path.abspath(image.filepath, library=image.library))
+    return absolute(image, image.filepath)
 
 
-def image_file(region) -> MatteFile:
+def image_file(region: PropertyGroup) -> MatteFile:
     """A matte that is an image, to be read. EffectError: it has no file."""
     path = image_path(region)
     files = (path,) if region.image.source == "FILE" else None
@@ -81,7 +90,7 @@ def image_file(region) -> MatteFile:
 
 
 @lru_cache(64)
-def _listed(path: Path, _stamp) -> list[Path]:
+def _listed(path: Path, _stamp: tuple) -> list[Path]:
     """The files of an image sequence, listed anew where its folder has changed."""
     try:
         return ImageFiles(path).files
@@ -89,22 +98,24 @@ def _listed(path: Path, _stamp) -> list[Path]:
         return []
 
 
-def _mask_shapes(scene, effect, strip, region, frames, time: keyframes.Channel | None) -> keyframes.Channel:
+def _mask_shapes(
+    effect: PropertyGroup, strip: Strip, region: PropertyGroup, frames: Frames, time: Channel | None
+) -> Channel:
     """A mask's shapes at the source's frames, of which the first is the mask's start, as a Mask strip on it has it."""
     mask = region.mask
     if mask is None:
         raise EffectError(rpt_("{place}: it has no mask").format(place=validation.place(region)))
     if not mask_reading.moves(mask):
         return keyframes.Constant(_tried(mask_reading.mask_at, mask, mask.frame_start))
-    filmed = shown_frame(scene, effect, strip, time)
+    filmed = shown_frame(effect.id_data, effect, strip, time)
 
-    def shape(frame):
+    def shape(frame: float) -> MaskShape:
         return mask_reading.mask_at(mask, mask.frame_start + filmed(frame))
 
     return keyframes.Samples({frame: _tried(shape, frame) for frame in frames})
 
 
-def shown_frame(scene, effect, strip, time: keyframes.Channel | None) -> Callable[[float], float]:
+def shown_frame(scene: Scene, effect: PropertyGroup, strip: Strip, time: Channel | None) -> Callable[[float], float]:
     """What gives the source's frame that an effect strip shows at a timeline frame: filmed ones counted from 0, those
     between them in parts. time: see `content`. EffectError, MediaError: it cannot be known."""
     source = strips.source_of(scene, effect, strip)
@@ -123,7 +134,7 @@ def _movie(spec: source_media.SourceSpec) -> tuple[int, Fraction | None]:
         return movie.count, movie.fps
 
 
-def _tried(function: Callable, *arguments):
+def _tried(function: Callable, *arguments) -> object:
     """The result, or the EffectError in its place, which is raised where the value is asked for."""
     try:
         return function(*arguments)
@@ -131,7 +142,7 @@ def _tried(function: Callable, *arguments):
         return error
 
 
-def _strip_frames(strip, region, frames: Collection[float]) -> keyframes.Channel:
+def _strip_frames(strip: Strip, region: PropertyGroup, frames: Frames) -> Channel:
     parts, word = matte_strips.parts_for(region, strip), channel(region)
     shown = {
         part.name: mattes.FileFrames(file=_of_strip(part, word), timing=strip_timing.timing_of(part)) for part in parts
@@ -141,7 +152,7 @@ def _strip_frames(strip, region, frames: Collection[float]) -> keyframes.Channel
     return keyframes.Samples({f: shown[matte_strips.part_at(parts, f).name].at(f) for f in frames})
 
 
-def _of_strip(strip, word: str) -> MatteFile:
+def _of_strip(strip: Strip, word: str) -> MatteFile:
     """A channel of what a movie, image or clip strip reads. MediaError: it has no files."""
     spec = source_media.spec(strip)
     return MatteFile(path=spec.path, channel=word, files=spec.files, stream=spec.options["stream"], stamp=spec.key)

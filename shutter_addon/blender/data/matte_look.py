@@ -1,13 +1,18 @@
 """What a panel says of a matte: how large and how long it is, and what is wrong with it."""
 
+from __future__ import annotations
+
+from contextlib import closing
 from functools import lru_cache
 from typing import NamedTuple
 
 from bpy.app.translations import pgettext_iface as iface_
 from bpy.app.translations import pgettext_rpt as rpt_
+from bpy.types import PropertyGroup, Scene, Strip
 
 from ...core import revision
 from ...core.messages import UserError, translated
+from ...core.model import keyframes
 from ...core.model.mattes import FileFrames
 from ...media.matte_files import MatteFile
 from . import matte_strips, snapshot
@@ -24,13 +29,13 @@ class Look(NamedTuple):
     note: str = ""
 
 
-def look(scene, effect, strip, region) -> Look:
+def look(scene: Scene, effect: PropertyGroup, strip: Strip, region: PropertyGroup) -> Look:
     """The look at a region that is a matte, taken once until something changes."""
     index = list(effect.regions).index(region)
     return _looks.get((effect.scene.session_uid, index, strip.name), lambda: _look(scene, effect, strip, index))
 
 
-def _look(scene, effect, strip, index: int) -> Look:
+def _look(scene: Scene, effect: PropertyGroup, strip: Strip, index: int) -> Look:
     frame, region = strip.left_handle, effect.regions[index]
     try:
         with translated(rpt_):
@@ -51,7 +56,9 @@ def _look(scene, effect, strip, index: int) -> Look:
     return Look(text, note=_note(scene, effect, strip, region, content, count))
 
 
-def _note(scene, effect, strip, region, content, count: int) -> str:
+def _note(
+    scene: Scene, effect: PropertyGroup, strip: Strip, region: PropertyGroup, content: keyframes.Channel, count: int
+) -> str:
     """That a matte is shorter than what it is for."""
     if region.matte == "STRIP":
         ends = max(part.right_handle for part in matte_strips.parts_for(region, strip))
@@ -74,10 +81,7 @@ def _note(scene, effect, strip, region, content, count: int) -> str:
 def _size(file: MatteFile) -> tuple[int, int, int] | str:
     """Width, height and number of frames, or why it cannot be read."""
     try:
-        source = file.open()
+        with closing(file.open()) as source:
+            return source.width, source.height, source.count
     except UserError as error:
         return str(error)
-    try:
-        return source.width, source.height, source.count
-    finally:
-        source.close()

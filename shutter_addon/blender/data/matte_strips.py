@@ -1,19 +1,22 @@
 """Strips of the scene that are mattes: found by an identity, so that they may be renamed and cut."""
 
+from __future__ import annotations
+
 import uuid
 
 from bpy.app.translations import pgettext_rpt as rpt_
+from bpy.types import PropertyGroup, Strip
 
 from ...core.messages import EffectError
 from . import strips, validation
 
 
-def strip_name(region) -> str:
+def strip_name(region: PropertyGroup) -> str:
     """The name of the first strip that is a region's matte; "": there is none."""
     return next((strip.name for strip in _with_identity(region)), "")
 
 
-def choose_strip(region, name: str) -> None:
+def choose_strip(region: PropertyGroup, name: str) -> None:
     """Makes a strip a region's matte, by its name, with the other parts of it, if it was cut; no strip, where none is
     called so."""
     editor = region.id_data.sequence_editor
@@ -31,12 +34,12 @@ def choose_strip(region, name: str) -> None:
     region.strip = strip.virtual_shutter_matte
 
 
-def _is_part(other, strip) -> bool:
+def _is_part(other: Strip, strip: Strip) -> bool:
     """Whether a strip and another one that has its identity were cut from one."""
     return strips.origin(other) == strips.origin(strip) and not _overlap(_content(other), _content(strip))
 
 
-def strips_of(region) -> list:
+def strips_of(region: PropertyGroup) -> list:
     """The movie, image and clip strips that have the identity of a region's matte: several, where it was cut or copied.
     EffectError: there is none."""
     matching = _with_identity(region)
@@ -50,7 +53,7 @@ def strips_of(region) -> list:
     return shown
 
 
-def parts_for(region, effect_strip) -> list:
+def parts_for(region: PropertyGroup, effect_strip: Strip) -> list:
     """The parts of the strip that is a region's matte, where an effect strip shows it: of copies, the nearest in time.
     EffectError: there is none."""
     copies: list[list] = []
@@ -67,7 +70,7 @@ def parts_for(region, effect_strip) -> list:
     return sorted(nearest, key=lambda part: part.left_handle)
 
 
-def _content(strip) -> tuple[float, float]:
+def _content(strip: Strip) -> tuple[float, float]:
     """What a strip shows of its content, from frame to frame."""
     return strip.left_handle - strips.origin(strip), strip.right_handle - strips.origin(strip)
 
@@ -81,12 +84,12 @@ def _apart(one: tuple[float, float], other: tuple[float, float]) -> tuple[float,
     return max(other[0] - one[1], one[0] - other[1], 0), abs(other[0] - one[0])
 
 
-def part_at(parts: list, frame: float):
+def part_at(parts: list, frame: float) -> Strip:
     """Of the parts of a strip that was cut the one that shows a timeline frame, or the nearest."""
     return min(parts, key=lambda part: max(part.left_handle - frame, frame - part.right_handle + 1, 0))
 
 
-def _with_identity(region) -> list:
+def _with_identity(region: PropertyGroup) -> list:
     editor = region.id_data.sequence_editor
     strips_all = editor.strips_all if editor and region.strip else ()
     return [strip for strip in strips_all if strip.virtual_shutter_matte == region.strip]

@@ -1,8 +1,11 @@
 """Media of an edit that are not there, or cannot be read."""
 
+from __future__ import annotations
+
 from collections.abc import Callable, Iterator
 
 import bpy
+from bpy.types import ID, Scene, Strip
 
 from ...core.frames import frame_ranges
 from ...media import MediaError, open_source
@@ -10,7 +13,7 @@ from ...media.files import check_file, check_sound
 from . import external_files, requirements, strips, used_data
 
 
-def faults(scene, frames: range, *, sources: bool) -> list[str]:
+def faults(scene: Scene, frames: range, *, sources: bool) -> list[str]:
     """A sentence for each file that the pictures of these frames need and that cannot be had: of movie, image and clip
     strips, of images, volumes, caches and fonts that what is shown uses, and of libraries. Edits that it shows count as
     a whole; files of mattes are not looked for.
@@ -24,22 +27,22 @@ def faults(scene, frames: range, *, sources: bool) -> list[str]:
     return list(dict.fromkeys(sentences))
 
 
-def sound_faults(scene, frames: range) -> list[str]:
+def sound_faults(scene: Scene, frames: range) -> list[str]:
     """As `faults`, of sound strips."""
     return _of_strips(scene, frames, ("SOUND",), sources=False)
 
 
-def _clips(scene) -> set:
+def _clips(scene: Scene) -> set:
     """Those of the strips, which are looked at as such."""
     shown = (strip for each in strips.shown_scenes(scene) for strip in each.sequence_editor.strips_all)
     return {strip.clip for strip in shown if strip.type == "MOVIECLIP"}
 
 
-def _words(item, fault: str) -> str:
+def _words(item: ID, fault: str) -> str:
     return f'{item.bl_rna.name.lower()} "{item.name}": {fault}'
 
 
-def _of_strips(scene, frames: range, kinds: tuple[str, ...], *, sources: bool) -> list[str]:
+def _of_strips(scene: Scene, frames: range, kinds: tuple[str, ...], *, sources: bool) -> list[str]:
     sentences = []
     for shown, wanted in requirements.scenes_at(scene, frames):
         others = () if sources else strips.shown_sources(shown)
@@ -50,7 +53,7 @@ def _of_strips(scene, frames: range, kinds: tuple[str, ...], *, sources: bool) -
     return sentences
 
 
-def _of_strip(strip, frames: range) -> Iterator[str]:
+def _of_strip(strip: Strip, frames: range) -> Iterator[str]:
     if strip.type == "MOVIE":
         yield from _fault(lambda: open_source(external_files.absolute(strip, strip.filepath)).close())
     elif strip.type == "IMAGE":
@@ -64,7 +67,7 @@ def _of_strip(strip, frames: range) -> Iterator[str]:
         yield from _of_item(strip.sound, check_sound) if strip.sound else ["it has no sound"]
 
 
-def _of_item(item, check: Callable = check_file) -> Iterator[str]:
+def _of_item(item: ID, check: Callable = check_file) -> Iterator[str]:
     """Of a sound, a library, an image or the like; of a sequence its first file. check: raises MediaError for a
     file."""
     for path in external_files.named(item):

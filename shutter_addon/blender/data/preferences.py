@@ -2,6 +2,7 @@
 
 import bpy
 from bpy.props import EnumProperty, IntProperty
+from bpy.types import Context
 
 from ...core.model.choices import CONTEXT
 
@@ -34,7 +35,7 @@ class ShutterPreferences(bpy.types.AddonPreferences):
         translation_context=CONTEXT,
     )
 
-    def draw(self, _context):
+    def draw(self, _context: Context) -> None:
         self.layout.prop(self, "device")
         self.layout.prop(self, "gpu_memory")
         self.layout.operator("shutter.copy_report", icon="COPYDOWN")

@@ -1,16 +1,16 @@
 """Blender's areas that show a preview, and what they show of an effect: read of Blender's data here alone."""
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Any
 
+import bpy
 import numpy as np
+from bpy.types import Area, Context, PropertyGroup, Scene, Space, Strip
 
-from . import annotations, geometry, selection, strip_proxies, strips
+from . import annotations, geometry, seen_alone, selection, strip_proxies, strips
 
 _PERCENT = {"PROXY_25": 25, "PROXY_50": 50, "PROXY_75": 75, "PROXY_100": 100}
-_STANDARD = {"view_transform": "Standard", "look": "None", "exposure": 0.0, "gamma": 1.0}
-_STANDARD |= {"use_curve_mapping": False, "use_white_balance": False}
 _PLAIN_STRIP = {"blend_alpha": 1.0, "color_saturation": 1.0, "scene_input": "CAMERA"}
 _PLAIN_SPACE = {"display_mode": "IMAGE", "display_channel": 0, "show_overexposed": 0}
 
@@ -21,9 +21,9 @@ class Shown:
 
     strips_above: whether others hide it; hides_strokes: by region that is drawn, whether its lines are hidden"""
 
-    scene: Any
-    effect: Any
-    strip: Any
+    scene: Scene
+    effect: PropertyGroup
+    strip: Strip
     strips_above: bool
     hides_strokes: tuple[bool, ...]
 
@@ -41,7 +41,7 @@ class Look:
     is_plain: bool
 
 
-def previews(context):
+def previews(context: Context) -> Iterator[tuple[bpy.types.Window, Area]]:
     """Window and area of every sequencer that shows a preview."""
     for window in context.window_manager.windows:
         for area in window.screen.areas:
@@ -49,18 +49,18 @@ def previews(context):
                 yield window, area
 
 
-def redraw(context) -> None:
+def redraw(context: Context) -> None:
     """Draws all previews again."""
     for _window, area in previews(context):
         area.tag_redraw()  # of the area alone, Blender's picture and ours
 
 
-def preview_region(area):
+def preview_region(area: Area) -> bpy.types.Region:
     """The region of a sequencer's area that shows the picture."""
     return next(region for region in area.regions if region.type == "PREVIEW")
 
 
-def shown(context, channel: int = 0) -> Shown | None:
+def shown(context: Context, channel: int = 0) -> Shown | None:
     """The effect strip under the playhead that the preview shows, as selection.seen has it. channel: that the preview
     has to show, 0: all."""
     scene, space = selection.scene_of(context), context.space_data
@@ -72,37 +72,33 @@ def shown(context, channel: int = 0) -> Shown | None:
     return Shown(scene=scene, effect=effect, strip=strip, strips_above=above, hides_strokes=hidden)
 
 
-def look(context, scene, effect, strip) -> Look:
+def look(context: Context, scene: Scene, effect: PropertyGroup, strip: Strip) -> Look:
     """How an effect's picture is looked at."""
     areas = list(_areas_of(context, scene))
     scales = {area.spaces.active: _scale(context, scene, strip, area) for area in areas}
     scales = {space: scale for space, scale in scales.items() if math.isfinite(scale)}
-    is_plain = _is_plain(scene, strip) and all(_has(area.spaces.active, _PLAIN_SPACE) for area in areas)
+    is_plain = _is_plain(scene, strip) and all(seen_alone.has(area.spaces.active, _PLAIN_SPACE) for area in areas)
     if not scales:
         return Look(None, None, is_plain)
     space = max(scales, key=scales.__getitem__)
     return Look(scales[space], _proxy(scene, effect, strip, space), is_plain)
 
 
-def _is_plain(scene, strip) -> bool:
+def _is_plain(scene: Scene, strip: Strip) -> bool:
     """Whether the scene shows a strip's picture as it is."""
     return (
         strip.blend_type in ("REPLACE", "ALPHA_OVER")
-        and _has(strip, _PLAIN_STRIP)
+        and seen_alone.has(strip, _PLAIN_STRIP)
         and strip.color_multiply in (1, strips.IN_CODE_VALUES)
         and all(modifier.mute for modifier in strip.modifiers)
         and scene.display_settings.display_device == "sRGB"
-        and _has(scene.view_settings, _STANDARD)
+        and seen_alone.has(scene.view_settings, seen_alone.STANDARD)
         and not scene.render.use_multiview
         and not scene.sequence_editor.show_overlay_frame
     )
 
 
-def _has(item, values: dict) -> bool:
-    return all(getattr(item, name) == value for name, value in values.items())
-
-
-def _proxy(scene, effect, strip, space) -> strip_proxies.Proxy | None:
+def _proxy(scene: Scene, effect: PropertyGroup, strip: Strip, space: Space) -> strip_proxies.Proxy | None:
     """What Blender reads of an effect's source in a preview; None: the footage itself."""
     source, percent = strips.nearest_source(scene, effect, strip), _PERCENT.get(space.proxy_render_size)
     if source is None or percent is None or not space.use_proxies:
@@ -110,7 +106,7 @@ def _proxy(scene, effect, strip, space) -> strip_proxies.Proxy | None:
     return strip_proxies.proxy_of(scene, source, percent)
 
 
-def _scale(context, scene, strip, area) -> float:
+def _scale(context: Context, scene: Scene, strip: Strip, area: Area) -> float:
     """How wide or high a pixel of the source is in a preview: in its picture, which is as small as Blender's menu has
     it; and on the screen, where our handler draws."""
     space = area.spaces.active
@@ -130,7 +126,7 @@ def _pixel(matrix: np.ndarray, size: tuple[int, int]) -> float:
     return float(np.max(np.hypot(*matrix[:2, :2]) / size))
 
 
-def _areas_of(context, scene):
+def _areas_of(context: Context, scene: Scene) -> Iterator[Area]:
     """The areas in which a scene's preview is drawn."""
     for window, area in previews(context):
         shows = getattr(window.workspace, "sequencer_scene", None) or window.scene

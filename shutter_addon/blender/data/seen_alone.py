@@ -1,9 +1,13 @@
 """What a film shows of an effect: whether its picture hides what lies below, is all that is seen, and becomes levels
 that are known beforehand."""
 
-from typing import Any, NamedTuple
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import NamedTuple
 
 import bpy
+from bpy.types import Scene, Strip, bpy_struct
 
 from . import colour_configuration, fcurves, strips
 
@@ -20,19 +24,19 @@ _UNCROPPED = dict.fromkeys(("min_x", "min_y", "max_x", "max_y"), 0)
 _WHOLE = {"resolution_percentage": 100, "use_border": False, "use_multiview": False}
 _UNMARKED = {"use_stamp": False, "metadata_input": "SCENE"}
 _PLAIN_RENDER = _UNMARKED | {"use_sequencer": True, "frame_map_old": 100, "frame_map_new": 100}
-_STANDARD = {"view_transform": "Standard", "look": "None", "exposure": 0.0, "gamma": 1.0}
-_STANDARD |= {"use_curve_mapping": False, "use_white_balance": False}
+PLAIN_VIEW = {"look": "None", "exposure": 0.0, "gamma": 1.0, "use_curve_mapping": False, "use_white_balance": False}
+STANDARD = PLAIN_VIEW | {"view_transform": "Standard"}
 _LEVELS = {"color_depth": "8", "color_management": "FOLLOW_SCENE"}
 _MODES = "RGB", "RGBA"  # grey is made of light
 _FORMATS = ("FFMPEG", "PNG", "JPEG")
 
 
-def has(item: Any, values: dict[str, Any]) -> bool:
+def has(item: bpy_struct, values: Mapping[str, object]) -> bool:
     """Whether an item's properties have these values."""
     return all(getattr(item, name) == value for name, value in values.items())
 
 
-def hides(scene: Any, strip: Any) -> bool:
+def hides(scene: Scene, strip: Strip) -> bool:
     """Whether an effect strip's picture, where it is opaque, stays as it is over all that lies below, at all frames."""
     size, shown = scene.render, strip.scene.render
     return (
@@ -46,7 +50,7 @@ def hides(scene: Any, strip: Any) -> bool:
         and has(size, _WHOLE)
         and has(shown, _UNMARKED)
         and (shown.resolution_x, shown.resolution_y) == (size.resolution_x, size.resolution_y)
-        and not _is_animated(scene, strip)
+        and not has_animation(scene, f'sequence_editor.strips_all["{bpy.utils.escape_identifier(strip.name)}"]')
     )
 
 
@@ -55,11 +59,11 @@ class Alone(NamedTuple):
 
     is_blended: whether Blender lays it over something, which makes other bits of it"""
 
-    strip: Any
+    strip: Strip
     is_blended: bool
 
 
-def alone(scene: Any, frame: int, but: str | None = None) -> Alone | None:
+def alone(scene: Scene, frame: int, but: str | None = None) -> Alone | None:
     """What is seen of a scene at a frame, if it is an effect strip alone, by `hides`. but: the name of a strip that
     does not count."""
     editor = scene.sequence_editor
@@ -88,7 +92,7 @@ def alone(scene: Any, frame: int, but: str | None = None) -> Alone | None:
     return Alone(top, is_blended)
 
 
-def makes_levels(scene: Any) -> bool:
+def makes_levels(scene: Scene) -> bool:
     """Whether a scene's render makes levels of 8 bits of what its sequencer shows, by sRGB alone."""
     return (
         bpy.app.version < _KNOWN_TO
@@ -96,7 +100,7 @@ def makes_levels(scene: Any) -> bool:
         and bpy.data.colorspace.working_space == "Linear Rec.709"
         and scene.sequencer_colorspace_settings.name == "sRGB"
         and scene.display_settings.display_device == "sRGB"
-        and has(scene.view_settings, _STANDARD)
+        and has(scene.view_settings, STANDARD)
         and has(scene.render.image_settings, _LEVELS)
         and scene.render.image_settings.file_format in _FORMATS
         and scene.render.image_settings.color_mode in _MODES
@@ -106,11 +110,7 @@ def makes_levels(scene: Any) -> bool:
     )
 
 
-def _is_animated(scene: Any, strip: Any) -> bool:
-    return has_animation(scene, f'sequence_editor.strips_all["{bpy.utils.escape_identifier(strip.name)}"]')
-
-
-def has_animation(scene: Any, part: str) -> bool:
+def has_animation(scene: Scene, part: str) -> bool:
     """Whether anything animates a property of the scene in whose path that is; of what the NLA does, it may."""
     animation = scene.animation_data
     if animation is None:

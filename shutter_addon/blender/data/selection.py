@@ -1,19 +1,22 @@
 """What is seen, and what is active: the scene, the strip, its effect, and the effect's shutter and region."""
 
+from __future__ import annotations
+
 from typing import Any
 
 from bpy.app.translations import pgettext_rpt as rpt_
+from bpy.types import Context, PropertyGroup, Scene, Strip
 
 from . import strips
 from .strips import SOURCES, effect_of, effect_strips
 
 
-def scene_of(context: Any) -> Any:
+def scene_of(context: Context) -> Any:
     """The scene whose sequencer the context shows, or None."""
     return getattr(context, "sequencer_scene", None) or context.scene
 
 
-def active_strip(context):
+def active_strip(context: Context) -> Any:
     """The active strip of the context's scene, or None; in place of a movie's sound, which is the active one after both
     were added, the movie."""
     scene = scene_of(context)
@@ -23,7 +26,7 @@ def active_strip(context):
     return next((other for other in strip.connections if other.type in SOURCES), strip)
 
 
-def active(context):
+def active(context: Context) -> Any:
     """Scene, effect and effect strip that the interface shows and changes: those of the active strip, which may be the
     source as well, if it is selected; else those that are seen. None: that strip has no effect, or nothing has."""
     scene, strip = scene_of(context), active_strip(context)
@@ -40,13 +43,13 @@ def active(context):
     return (scene, effect_of(scene, nearest.scene), nearest) if nearest else None
 
 
-def in_picture(context):
+def in_picture(context: Context) -> Any:
     """What is active, where it is seen; else None: nothing in the picture belongs to it."""
     shown = active(context)
     return shown if shown and seen(shown[0]) == shown else None
 
 
-def seen(scene):
+def seen(scene: Scene) -> Any:
     """Scene, effect and effect strip that previews of a scene show at the playhead: of several the active strip's own,
     then those of the active strip's source, as the other half of a cut one, then the highest. None: no effect."""
     scene_strips = [strip for strip in visible(scene) if strip.type == "SCENE" and strip.scene]
@@ -59,7 +62,7 @@ def seen(scene):
     return scene, effect, strip
 
 
-def visible(scene) -> list:
+def visible(scene: Scene) -> list:
     """Strips with a picture under the playhead, not muted, of the scene or of the meta strip that is open."""
     editor, frame = scene and scene.sequence_editor, scene and scene.frame_current
     if not editor:
@@ -75,7 +78,7 @@ def visible(scene) -> list:
     ]
 
 
-def why_unseen(scene, strip) -> str:
+def why_unseen(scene: Scene, strip: Strip) -> str:
     """Why nothing of an effect strip is in the picture, and what to do, as a sentence."""
     if not strips.is_at(strip, scene.frame_current):
         return rpt_("Move the playhead onto the Shutter strip")
@@ -86,7 +89,7 @@ def why_unseen(scene, strip) -> str:
     return rpt_("Open the meta strip that the Shutter strip is in")
 
 
-def _effects_of(scene, strip) -> list:
+def _effects_of(scene: Scene, strip: Strip | None) -> list:
     """The effect that a strip shows, or those of the source that it is."""
     if strip is None:
         return []
@@ -96,7 +99,7 @@ def _effects_of(scene, strip) -> list:
     return [effect for effect in scene.virtual_shutter.effects if effect.source == identity != ""]
 
 
-def _baked_part(scene, strip):
+def _baked_part(scene: Scene, strip: Strip) -> Any:
     """Scene, effect and effect strip that a baked strip was made of; None: it is no baked strip. Copies have the same
     identity: the one counts that shares frames with it."""
     parts = [part for part in of_bake(scene, strip) if part.type == "SCENE" and part.scene]
@@ -105,37 +108,37 @@ def _baked_part(scene, strip):
     return next(((scene, effect, part) for effect, part in shown if effect), None)
 
 
-def of_bake(scene, strip) -> list:
+def of_bake(scene: Scene, strip: Strip) -> list:
     """All strips that belong to the same bake as a strip, and that itself; none, if it belongs to none."""
     identity = strip.virtual_shutter_bake.identity
     found = scene.sequence_editor.strips_all if identity else ()
     return [other for other in found if other.virtual_shutter_bake.identity == identity]
 
 
-def choose(scene, strip) -> None:
+def choose(scene: Scene, strip: Strip) -> None:
     """Makes a strip the active and only selected one."""
     for other in scene.sequence_editor.strips_all:
         other.select = other == strip
     scene.sequence_editor.active_strip = strip
 
 
-def effect_of_item(item):
+def effect_of_item(item: PropertyGroup) -> PropertyGroup:
     """The effect that a shutter or a region belongs to."""
     path = item.path_from_id()
     return item.id_data.path_resolve(path[: path.index("]") + 1])
 
 
-def moving(effect, index: int | None):
+def moving(effect: PropertyGroup, index: int | None) -> PropertyGroup:
     """The region of an index; None: the camera. What both can do, functions take by such an index."""
     return effect.camera if index is None else effect.regions[index]
 
 
-def active_shutter(effect):
+def active_shutter(effect: PropertyGroup) -> Any:
     """The shutter that is chosen in the list, or None."""
     return effect.shutters[effect.active_shutter] if 0 <= effect.active_shutter < len(effect.shutters) else None
 
 
-def active_region(effect):
+def active_region(effect: PropertyGroup) -> Any:
     """The region that is chosen in the list, if it is one of the active shutter's; or None."""
     region = effect.regions[effect.active_region] if 0 <= effect.active_region < len(effect.regions) else None
     shutter = active_shutter(effect)

@@ -1,5 +1,7 @@
 """The medium of a source strip: what it is, opened as shutter_addon.media has it."""
 
+from __future__ import annotations
+
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -7,13 +9,14 @@ from pathlib import Path
 
 import bpy
 from bpy.app.translations import pgettext_rpt as rpt_
+from bpy.types import Strip
 
 from ...core.frames.frame_source import FrameSource
 from ...media import MediaError, open_source
 from ...media.files import stamp
 from ...media.opening import with_proxy
 from ...media.sequence import by_number
-from . import strip_proxies
+from . import external_files, strip_proxies
 
 _AT_ONCE = 100  # files of a sequence, which may be long, that one look asks, beside the first and the last
 _REST = 1.0  # seconds from one look at them to the next: on a network's drive a look takes a while
@@ -32,17 +35,17 @@ class _Look:
     key: int = 0
 
 
-_specs: dict[tuple, "SourceSpec"] = {}  # by media_key
+_specs: dict[tuple, SourceSpec] = {}  # by media_key
 _looks: dict[tuple, _Look] = {}  # by scene and strip, or by image
 _resting = False  # while a film is rendered, all its files have been asked before it
 
 
-def media_key(strip) -> tuple:
+def media_key(strip: Strip) -> tuple:
     """What the strip reads and how; equal keys give the same frames."""
     return strip.type, *files_key(strip), *reading(strip)
 
 
-def files_key(strip) -> tuple:
+def files_key(strip: Strip) -> tuple:
     """The strip's files: the first and the last as they are now, and those between as they were when they were looked
     at: a hundred of them a second, in turn, and none while a film is rendered. MediaError: it has none."""
     count, path = _files(strip)
@@ -97,12 +100,12 @@ def between(place: tuple, count: int, path: Callable[[int], Path]) -> int:
     return look.key
 
 
-def stem(strip) -> str:
+def stem(strip: Strip) -> str:
     """The name of the strip's first file, without its suffix. MediaError: it has none."""
     return _files(strip)[1](0).stem
 
 
-def reading(strip) -> tuple:
+def reading(strip: Strip) -> tuple:
     """How the strip's files are read: colour space, alpha and the like."""
     clip = strip.clip if strip.type == "MOVIECLIP" else None
     reader = clip if strip.type == "MOVIECLIP" else strip
@@ -141,7 +144,7 @@ class SourceSpec:
         return with_proxy(medium, proxy.path, files=files, colorspace="Non-Color" if space == "Non-Color" else None)
 
 
-def spec(strip, key: tuple | None = None) -> SourceSpec:
+def spec(strip: Strip, key: tuple | None = None) -> SourceSpec:
     """What a source strip reads; key: its media_key, where that is known. MediaError: it has no files."""
     key = key or media_key(strip)
     if key not in _specs:
@@ -151,14 +154,15 @@ def spec(strip, key: tuple | None = None) -> SourceSpec:
     return _specs[key]
 
 
-def _spec(strip, key: tuple) -> SourceSpec:
+def _spec(strip: Strip, key: tuple) -> SourceSpec:
     count, path = _files(strip)
     config = Path(bpy.utils.system_resource("DATAFILES", path="colormanagement"), "config.ocio")  # finds folders only
+    alpha = "premultiplied" if strip.alpha_mode == "PREMUL" else "straight"  # whatever the files say
     options = {
         "stream": getattr(strip, "stream_index", 0),
         "colorspace": reading(strip)[0],
         "config": config,
-        "alpha": _alpha(strip),
+        "alpha": None if strip.type == "MOVIECLIP" else alpha,
         "deinterlace": strip.type == "MOVIE" and strip.use_deinterlace,
     }
     return SourceSpec(
@@ -166,59 +170,51 @@ def _spec(strip, key: tuple) -> SourceSpec:
     )
 
 
-def open_media(strip) -> FrameSource:
+def open_media(strip: Strip) -> FrameSource:
     """The strip's medium, as Blender would show it. MediaError: it cannot be read."""
     return spec(strip).open()
 
 
-def files(strip) -> list[Path]:
+def files(strip: Strip) -> list[Path]:
     """The files of a movie, image or clip strip, there or not, whether or not an effect can read it so. MediaError: it
     has none."""
     count, path = _clip_files(strip) if strip.type == "MOVIECLIP" else _files(strip)
     return [path(index) for index in range(count)]
 
 
-def first_frame(strip) -> int:
+def first_frame(strip: Strip) -> int:
     """Which frame of the medium is the first of the strip's content."""
     return strip.clip.frame_offset if strip.type == "MOVIECLIP" and is_movie(strip) else 0
 
 
-def is_movie(strip) -> bool:
+def is_movie(strip: Strip) -> bool:
     """Whether a movie, image or clip strip reads a movie."""
     clip = strip.clip if strip.type == "MOVIECLIP" else None
     return strip.type == "MOVIE" or (clip is not None and clip.source == "MOVIE")
 
 
-def _alpha(strip) -> str | None:
-    """An image strip has its own idea of its files' alpha; a clip takes what is usual for them."""
-    if strip.type == "MOVIECLIP":
-        return None
-    return "premultiplied" if strip.alpha_mode == "PREMUL" else "straight"
-
-
-def _files(strip):
+def _files(strip: Strip) -> tuple[int, Callable[[int], Path]]:
     """How many files the strip reads, and a function that gives the path of each."""
     if strip.type == "MOVIECLIP":
         if strip.clip is not None and (strip.undistort or strip.stabilize2d):
             sentence = rpt_('strip "{strip}": undistorted or stabilized clips are not supported')
             raise MediaError(sentence.format(strip=strip.name))
         return _clip_files(strip)
-    library = strip.id_data.library
     if strip.type == "MOVIE":
-        movie = Path(bpy.path.abspath(strip.filepath, library=library))
+        movie = external_files.absolute(strip, strip.filepath)
         return 1, lambda _i: movie
-    folder, elements = Path(bpy.path.abspath(strip.directory, library=library)), strip.elements
+    folder, elements = external_files.absolute(strip, strip.directory), strip.elements
     if not elements:
         raise MediaError(rpt_('strip "{strip}" has no files').format(strip=strip.name))
     return len(elements), lambda i: folder / elements[i].filename
 
 
-def _clip_files(strip):
+def _clip_files(strip: Strip) -> tuple[int, Callable[[int], Path]]:
     """A clip's movie, or its images by their numbers, without a gap."""
     clip = strip.clip
     if clip is None:
         raise MediaError(rpt_('strip "{strip}" has no clip').format(strip=strip.name))
-    path = Path(bpy.path.abspath(clip.filepath, library=clip.library))
+    path = external_files.absolute(clip, clip.filepath)
     beside = by_number(path)
     if clip.source == "MOVIE" or beside is None:
         return 1, lambda _i: path

@@ -23,7 +23,7 @@ LAID = ("OUTLINE", *MATTES)  # kinds of mattes, which are laid over what scribbl
 IN_CODE_VALUES = 1 + 2**-23
 
 
-def is_carried(region) -> bool:
+def is_carried(region: PropertyGroup) -> bool:
     """Whether a region is an outline that the footage's own motion carries from drawing to drawing."""
     return region.kind == "OUTLINE" and region.between != "STRAIGHT"
 
@@ -39,12 +39,17 @@ def effect_strips(scene: Scene) -> list[Strip]:
     return [strip for strip in found if strip.scene.render.engine == ENGINE]
 
 
+def scene_of_uid(uid: int | None) -> Any:
+    """The scene of a session_uid, unless it is gone."""
+    return next((scene for scene in bpy.data.scenes if scene.session_uid == uid), None)
+
+
 def local_scenes() -> list:
     """The scenes that can be changed: linked ones cannot."""
     return [scene for scene in bpy.data.scenes if scene.library is None]
 
 
-def shown_scenes(scene) -> list:
+def shown_scenes(scene: Scene) -> list:
     """The scene, and those that its Scene strips show."""
     shown, new = [], [scene]
     while new:
@@ -67,12 +72,12 @@ def _is_own(strip: Strip) -> bool:
     return scene.render.engine == ENGINE or scene.virtual_shutter.identity == identity != ""
 
 
-def effect_of(scene, effect_scene):
+def effect_of(scene: Scene, effect_scene: Scene) -> Any:
     """The scene's effect that an effect scene shows, or None."""
     return next((effect for effect in scene.virtual_shutter.effects if effect.scene == effect_scene), None)
 
 
-def find_effect(effect_scene: Any, scene_frame: float | None = None) -> tuple[Any, Any, Any]:
+def find_effect(effect_scene: Scene, scene_frame: float | None = None) -> tuple[Scene, PropertyGroup, Strip]:
     """Scene, effect and one of its strips for an effect scene: the part of a cut one that shows a frame of the effect
     scene, or the first. EffectError: nothing uses it any more."""
     for scene in bpy.data.scenes:
@@ -85,32 +90,32 @@ def find_effect(effect_scene: Any, scene_frame: float | None = None) -> tuple[An
     raise EffectError(rpt_('scene "{scene}" belongs to no Shutter strip').format(scene=effect_scene.name))
 
 
-def origin(strip) -> float:
+def origin(strip: Strip) -> float:
     """Timeline frame at which the strip's untrimmed content would start: the same for all parts of a cut strip."""
     return strip.content_start - strip.content_trim_start
 
 
-def skipped(strip) -> int:
+def skipped(strip: Strip) -> int:
     """How many frames of its content a strip leaves out before the first that it shows."""
     return math.floor(strip.left_handle - origin(strip))
 
 
-def overlap(a, b) -> bool:
+def overlap(a: Strip, b: Strip) -> bool:
     """Whether two strips share timeline frames."""
     return a.left_handle < b.right_handle and b.left_handle < a.right_handle
 
 
-def is_at(strip, frame: float) -> bool:
+def is_at(strip: Strip, frame: float) -> bool:
     """Whether a strip lies at a timeline frame."""
     return strip.left_handle <= frame < strip.right_handle
 
 
-def timeline_frame(strip, scene_frame: float) -> float:
+def timeline_frame(strip: Strip, scene_frame: float) -> float:
     """The timeline frame at which an effect strip shows a frame of its scene."""
     return origin(strip) + scene_frame - strip.scene.frame_start
 
 
-def source_of(scene: Any, effect: Any, strip: Any) -> Any:
+def source_of(scene: Scene, effect: PropertyGroup, strip: Strip) -> Strip:
     """The effect's source strip: of those with its identity (parts of a cut strip, copies) the nearest in time, then
     that in the same meta strip, the connected one, the nearest below. EffectError: there is none any more, or none that
     has frames."""
@@ -141,15 +146,16 @@ def with_sources(scene: Scene) -> list[Shown]:
     return [each for each in shown_effects(scene) if each.source is not None]
 
 
-def shown_sources(scene) -> set[str]:
+def shown_sources(scene: Scene) -> set[str]:
     """Names of the strips that are sources of the scene's effect strips."""
     return {each.source.name for each in shown_effects(scene) if each.source}
 
 
-def nearest_source(scene: Any, effect: Any, strip: Any) -> Any:
+def nearest_source(scene: Scene, effect: PropertyGroup, strip: Strip) -> Any:
     """What source_of finds, or None."""
+    connected = list(strip.connections)  # as a pair stays that is duplicated
 
-    def distance(other):
+    def distance(other: Strip) -> tuple:
         apart = max(other.left_handle - strip.right_handle + 1, strip.left_handle - other.right_handle + 1, 0)
         elsewhere = other.parent_meta() != strip.parent_meta()
         return (
@@ -160,17 +166,16 @@ def nearest_source(scene: Any, effect: Any, strip: Any) -> Any:
             abs(strip.channel - other.channel),
         )
 
-    connected = list(strip.connections)  # as a pair stays that is duplicated
     candidates = [other for other in _with_identity(scene, effect.source) if other.type in SOURCES]
     return min(candidates, key=distance, default=None)
 
 
-def _with_identity(scene, identity: str) -> list:
+def _with_identity(scene: Scene, identity: str) -> list:
     """The scene's strips that an effect with this source is for, whatever they are."""
     return [strip for strip in scene.sequence_editor.strips_all if strip.virtual_shutter_source == identity != ""]
 
 
-def invalidate(scene, effect_scene=None) -> None:
+def invalidate(scene: Scene, effect_scene: Scene | None = None) -> None:
     """Drops the finished frames of a scene's effect strips; of those that show one effect scene, if given."""
     revision.changed()
     for strip in effect_strips(scene):
@@ -178,13 +183,13 @@ def invalidate(scene, effect_scene=None) -> None:
             strip.invalidate_cache("RAW")  # and with them all that was composed of them
 
 
-def drawn_regions(effect) -> list:
+def drawn_regions(effect: PropertyGroup) -> list:
     """The regions of strokes that have a shutter, in order: those that an effect's state has shapes of."""
     names = {shutter.name for shutter in effect.shutters}
     return [region for region in effect.regions if region.shutter in names and region.kind not in MATTES]
 
 
-def matte_regions(effect) -> list:
+def matte_regions(effect: PropertyGroup) -> list:
     """The regions of mattes and ramps that have a shutter, in order: those that lie over the others."""
     names = {shutter.name for shutter in effect.shutters}
     return [region for region in effect.regions if region.shutter in names and region.kind in MATTES]

@@ -4,6 +4,8 @@ Every .blend file ends with a description of all records (SDNA), which Blender w
 sizes its compiler has compared with the memory's (dna_verify.cc). A file of nothing else is written once and read.
 """
 
+from __future__ import annotations
+
 import ctypes
 import math
 import re
@@ -60,7 +62,7 @@ def text(field: bytes) -> bytes:
     return field.partition(b"\0")[0]
 
 
-def _format(kind: str, stars: str, dimensions: str):
+def _format(kind: str, stars: str, dimensions: str) -> object:
     shape = tuple(map(int, re.findall(r"\d+", dimensions)))
     if stars:
         return np.uintp, shape

@@ -1,13 +1,18 @@
 """The versions of the extension, of Blender, and of the edit that is open."""
 
+from __future__ import annotations
+
 import hashlib
 import os
 import tomllib
+from collections.abc import Iterator
+from contextlib import suppress
 from functools import partial
 from itertools import groupby
 from pathlib import Path
 
 import bpy
+from bpy.types import Scene
 
 from ...core import threads
 from ...core.farm.edit_version import EditVersion, Footage
@@ -30,7 +35,7 @@ def blender() -> str:
     return ".".join(map(str, bpy.app.version))
 
 
-def of_edit(scene) -> EditVersion:
+def of_edit(scene: Scene) -> EditVersion:
     """The version of an edit, as it is in the .blend file that is open. OSError: the file is gone."""
     with open(bpy.data.filepath, "rb") as file:
         blend = hashlib.file_digest(file, "sha256").hexdigest()
@@ -40,7 +45,7 @@ def of_edit(scene) -> EditVersion:
     )
 
 
-def read_files(scene) -> list[Path]:
+def read_files(scene: Scene) -> list[Path]:
     """All files that the edit's pictures are made of, beside the .blend file."""
     return [path for files in _footage_files(scene) for path in files]
 
@@ -50,29 +55,23 @@ def sounds() -> list[Path]:
     return [path for sound in bpy.data.sounds for path in external_files.named(sound)]
 
 
-def stamps(scene) -> dict[Path, tuple[int, int] | None]:
+def stamps(scene: Scene) -> dict[Path, tuple[int, int] | None]:
     """The stamp of each of `read_files`."""
     return {path: stamp(path) for path in read_files(scene)}
 
 
-def _footage_files(scene):
+def _footage_files(scene: Scene) -> Iterator[list[Path]]:
     """What the edit's pictures are made of beside the .blend file, as lists of files: of its strips, of those of the
     edits that it shows, and of all other data; without sound."""
     for shown in strips.shown_scenes(scene):
         for strip in shown.sequence_editor.strips_all:
-            if strip.type in strips.SOURCES and (files := _files_of(strip)):
-                yield files
+            if strip.type in strips.SOURCES:
+                with suppress(MediaError):  # it shows nothing
+                    yield source_media.files(strip)
     data = bpy.data
     for item in (*data.images, *data.movieclips, *data.fonts, *data.cache_files, *data.volumes, *data.libraries):
         if files := external_files.every(item):
             yield files
-
-
-def _files_of(strip) -> list[Path]:
-    try:
-        return source_media.files(strip)
-    except MediaError:  # it shows nothing
-        return []
 
 
 def _footage(files: list[Path]) -> Footage:

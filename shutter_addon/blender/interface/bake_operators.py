@@ -125,7 +125,7 @@ def _windows() -> list:
 
 def _lay(job: bake_job.BakeJob) -> str | None:
     """Puts a finished film where its effect strip is by now. A sentence: there is none any more, or no room."""
-    scene = next((scene for scene in bpy.data.scenes if scene.session_uid == job.scene), None)
+    scene = strips.scene_of_uid(job.scene)
     parts = [s for s in strips.effect_strips(scene) if _identity(s) == job.effect] if scene else []
     if not parts:
         return rpt_('the strip that was baked is gone; its film is "{path}"').format(path=job.film.place)

@@ -11,10 +11,10 @@ import sys
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import bpy
 from bpy.app.translations import pgettext_rpt as rpt_
+from bpy.types import PropertyGroup, Scene, Strip
 
 from ...core import atomic_write
 from ...core.messages import EffectError, signed
@@ -75,7 +75,7 @@ class BakeJob:
             self.copy.unlink(missing_ok=True)
 
 
-def start(scene: Any, effect: Any, strip: Any, film: Film) -> BakeJob:
+def start(scene: Scene, effect: PropertyGroup, strip: Strip, film: Film) -> BakeJob:
     """Begins to bake a film. EffectError, OSError: it cannot be begun."""
     edit = Path(bpy.data.filepath)
     film.place.parent.mkdir(parents=True, exist_ok=True)
@@ -119,7 +119,7 @@ def _clear_up(folder: Path, edit: Path) -> None:
     atomic_write.clear_up(folder)
 
 
-def _words(scene: Any, strip: Any, film: Film) -> list[str]:
+def _words(scene: Scene, strip: Strip, film: Film) -> list[str]:
     """The command's options. Names may begin with a dash."""
     kind = next(name for name, kind in KINDS.items() if kind == film.kind)
     names = [f"--scene={scene.name}", f"--strip={strip.name}", f"--format={kind}", f"--output={film.place.parent}"]

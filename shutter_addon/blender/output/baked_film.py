@@ -11,11 +11,12 @@ from contextlib import suppress
 from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
-from typing import Any, Literal
+from typing import Literal
 
 import bpy
 import numpy as np
 from bpy.app.translations import pgettext_rpt as rpt_
+from bpy.types import PropertyGroup, Scene, Strip
 
 from ...core import atomic_write
 from ...core.farm import edit_version
@@ -69,7 +70,7 @@ class Film:
         return all(picture.is_file() and is_whole_picture(picture) for picture in self.pictures)
 
 
-def film_of(scene: Any, effect: Any, strip: Any, kind: Kind, folder: Path | None = None) -> Film:
+def film_of(scene: Scene, effect: PropertyGroup, strip: Strip, kind: Kind, folder: Path | None = None) -> Film:
     """What would be baked of an effect strip as it is now. folder: where; None: beside the .blend file.
 
     EffectError, MediaError: it cannot be."""
@@ -89,7 +90,7 @@ def default_folder() -> Path:
     return Path(bpy.data.filepath).parent / FOLDER
 
 
-def _check(scene: Any, effect: Any, strip: Any, kind: Kind) -> None:
+def _check(scene: Scene, effect: PropertyGroup, strip: Strip, kind: Kind) -> None:
     """EffectError: the strip's film would not be its picture."""
     if getattr(strip, "retiming_keys", ()) or strip.strobe > 1 or strip.use_reverse_frames:
         raise EffectError(
@@ -111,9 +112,8 @@ def _check(scene: Any, effect: Any, strip: Any, kind: Kind) -> None:
             raise EffectError(rpt_("a movie has no light above white: bake to OpenEXR"))
 
 
-def render(scene: Any, effect: Any, strip: Any, film: Film, told: Callable[[int], object]) -> None:
-    """Renders what is missing of a film. told: called with the number of frames that are there, and may
-    raise StoppedError.
+def render(scene: Scene, effect: PropertyGroup, strip: Strip, film: Film, told: Callable[[int], object]) -> None:
+    """Renders what is missing of a film. told: called with the number of frames that are there, and may raise.
 
     One of FAULTS, OutputError, OSError: it cannot be made. InterruptedRenderError: it was stopped. What is finished
     stays, and the next call goes on from there."""

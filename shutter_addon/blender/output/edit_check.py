@@ -1,5 +1,7 @@
 """Whether an edit can be rendered on this machine, as far as can be told without rendering it."""
 
+from __future__ import annotations
+
 import math
 import os
 import re
@@ -9,12 +11,16 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 import bpy
+from bpy.types import PropertyGroup, Scene, Strip
 
 from ...compute import decoding_ahead, memory_needs
+from ...compute.cpu import CPUCompositor
+from ...compute.gpu import GPUCompositor
 from ...compute.renderer import Renderer
 from ...compute.request import Request
 from ...core.farm.chunks import LEAST, chunk_size
 from ...core.frames import frame_ranges
+from ...core.frames.frame_source import FrameSource
 from ...core.messages import UserError
 from ...core.model.frame_state import FrameState
 from ...core.model.mattes import FileFrame
@@ -27,6 +33,8 @@ from ..rendering.render_context import RenderContext
 from ..rendering.render_settings import RenderSettings
 from ..rendering.session import RenderSession
 from . import output_space
+
+Compositor = CPUCompositor | GPUCompositor
 
 
 @dataclass
@@ -66,7 +74,7 @@ class EffectCheck:
         return chunk_size(self.window, self.factor) if self.window else LEAST
 
 
-def effects(scene, frames: range, compositor, *, find_cuts: bool) -> list[EffectCheck]:
+def effects(scene: Scene, frames: range, compositor: Compositor, *, find_cuts: bool) -> list[EffectCheck]:
     """Looks at the effects that the scene's frames show, those of scenes in it included.
 
     compositor: of the device that will render. Files are opened, and of each the first and the last frame that is
@@ -81,7 +89,7 @@ def effects(scene, frames: range, compositor, *, find_cuts: bool) -> list[Effect
         session.forget()
 
 
-def _shown_effects(film, frames: range) -> Iterator[tuple]:
+def _shown_effects(film: Scene, frames: range) -> Iterator[tuple]:
     """(scene, effect, strip, frames) of every effect that is shown at one of the film's frames."""
     wanted = dict(requirements.scenes_at(film, frames))
     for scene, effect, parts in job_snapshots.shown_effects(film):
@@ -94,7 +102,7 @@ def _shown_effects(film, frames: range) -> Iterator[tuple]:
             yield scene, effect, parts[0], shown
 
 
-def _effect(session: RenderSession, shown: tuple, compositor, find_cuts: bool) -> EffectCheck:
+def _effect(session: RenderSession, shown: tuple, compositor: Compositor, find_cuts: bool) -> EffectCheck:
     """shown: of _shown_effects"""
     scene, effect, strip, frames = shown
     check = EffectCheck(scene=scene, name=strip.name, frames=frames, shutters=len(effect.shutters))
@@ -135,7 +143,7 @@ def _requests(session: RenderSession, taken: snapshot.Snapshot, check: EffectChe
     return requests
 
 
-def _look_at_footage(check: EffectCheck, effect, strip) -> bool:
+def _look_at_footage(check: EffectCheck, effect: PropertyGroup, strip: Strip) -> bool:
     """Whether the footage can be opened; and whether it is what it was when the edit was saved: the effect's scene has
     the size of it."""
     try:
@@ -183,7 +191,7 @@ def _look_at_frames(check: EffectCheck, renderer: Renderer, requests: dict[float
         check.notes.append("in-between frames are counted as if there were no cuts, beyond which none are needed")
 
 
-def _unreadable(source, indices: set[int], step: int = 1) -> list[str]:
+def _unreadable(source: FrameSource, indices: set[int], step: int = 1) -> list[str]:
     """What is wrong with the files of these filmed frames: those that are not there, and the first and the last frame
     if they cannot be decoded."""
     files, missing = source.files, []
@@ -205,7 +213,7 @@ def _unreadable(source, indices: set[int], step: int = 1) -> list[str]:
     return faults
 
 
-def _look_at_mattes(check: EffectCheck, source, requests: dict[float, Request]) -> None:
+def _look_at_mattes(check: EffectCheck, source: FrameSource, requests: dict[float, Request]) -> None:
     shown: dict = {}
     for request in requests.values():
         layers = request.state.layers
@@ -227,7 +235,9 @@ def _look_at_mattes(check: EffectCheck, source, requests: dict[float, Request]) 
             check.faults.append(str(error))
 
 
-def _notes(check: EffectCheck, taken: snapshot.Snapshot, requests: dict[float, Request], source) -> list[str]:
+def _notes(
+    check: EffectCheck, taken: snapshot.Snapshot, requests: dict[float, Request], source: FrameSource
+) -> list[str]:
     notes = list({sentence: None for request in requests.values() for sentence in pictures.unread(taken, request)})
     if source.by_blender:
         notes.append(pictures.SLOW_DECODING)
@@ -238,7 +248,7 @@ def _notes(check: EffectCheck, taken: snapshot.Snapshot, requests: dict[float, R
     return notes
 
 
-def _needs(source, requests: dict[float, Request], compositor) -> memory_needs.Needs:
+def _needs(source: FrameSource, requests: dict[float, Request], compositor: Compositor) -> memory_needs.Needs:
     """The most that one of the windows needs, decoded frames included."""
     device, most = getattr(compositor, "device", None), memory_needs.Needs(0, 0, False)
     for kind in {_kind(request.state) for request in requests.values()}:
@@ -257,13 +267,13 @@ def _kind(state: FrameState) -> memory_needs.Kind:
     return memory_needs.Kind(state.options.window, moved, count, layers, state.averages)
 
 
-def left_out(scene, frames: range) -> list[str]:
+def left_out(scene: Scene, frames: range) -> list[str]:
     """Why the sequencer leaves effects out of some of these frames."""
     reasons = [why for shown, why in requirements.left_out(scene) if frame_ranges.common(shown, frames)]
     return list(dict.fromkeys(reasons))
 
 
-def stale_films(scene, frames: range) -> list[str]:
+def stale_films(scene: Scene, frames: range) -> list[str]:
     """Which baked strips that are shown at some of these frames are not of their effect as it is now."""
     found = []
     for shown, _at in requirements.scenes_at(scene, frames):

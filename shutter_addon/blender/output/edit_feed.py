@@ -7,25 +7,22 @@ picture by itself keeps its floats, as a script may save it as others than the e
 was once the render ends, or a file is saved or loaded meanwhile: from then on the engine renders.
 """
 
-import tempfile
+from __future__ import annotations
+
 from contextlib import ExitStack
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
 
-import bpy
+from bpy.types import Scene
 
-from ...core import atomic_write
 from ...core.pixels.shown_levels import Display
 from ...media import display_transfer
 from ..data import seen_alone, strips
 from ..rendering import job_snapshots, pictures, render_context, render_job
 from ..rendering.effect_source import FULL, in_words
-from ..rendering.engine import say
 from ..rendering.render_job import Where
+from . import levels_file
 from .levels_file import LevelsFile, strip_above
-
-_NAME = "picture.tif"
 
 
 @dataclass
@@ -50,7 +47,7 @@ class _Film:
 _films: list[_Film] = []  # one, while it renders
 
 
-def begin(scene: Any) -> None:
+def begin(scene: Scene) -> None:
     """The render of an edit begins, on the main thread."""
     end()
     if render_job.where() is Where.BACKGROUND and scene.sequence_editor is not None:
@@ -63,7 +60,7 @@ def end() -> None:
         _films.pop().changed.close()
 
 
-def before_frame(scene: Any) -> None:
+def before_frame(scene: Scene) -> None:
     """Prepares the edit for its current frame."""
     if not _films or _films[0].scene != scene.session_uid:
         return
@@ -81,12 +78,7 @@ def before_frame(scene: Any) -> None:
         shown.mute = not is_fed
 
 
-def _strip(uid: int, name: str) -> Any:
-    scene = next((scene for scene in bpy.data.scenes if scene.session_uid == uid), None)
-    return scene.sequence_editor.strips_all.get(name) if scene and scene.sequence_editor else None
-
-
-def _feed(film: _Film, scene: Any, seen: seen_alone.Alone) -> bool:
+def _feed(film: _Film, scene: Scene, seen: seen_alone.Alone) -> bool:
     """Fills the file with the effect's levels. False: the engine has to render the frame, and to say what is wrong."""
     strip = seen.strip
     try:
@@ -94,7 +86,7 @@ def _feed(film: _Film, scene: Any, seen: seen_alone.Alone) -> bool:
         snapshot, frame = job_snapshots.of(strip.scene, int(shown))
         transfer = display_transfer.blended if seen.is_blended else display_transfer.shown
         display = Display(scene.render.dither_intensity, transfer)
-        context = render_context.of_render(say, render_job.stopping, display=display)
+        context = render_context.of_render(render_job.say, render_job.stopping, display=display)
         source = context.renderer(context.request(snapshot, frame, FULL)).source
         size = scene.render.resolution_x, scene.render.resolution_y
         if source.alpha != "opaque" or (source.width, source.height) != size:
@@ -111,18 +103,15 @@ def _feed(film: _Film, scene: Any, seen: seen_alone.Alone) -> bool:
     return True
 
 
-def _file(film: _Film, scene: Any) -> LevelsFile:
+def _file(film: _Film, scene: Scene) -> LevelsFile:
     """The file of the film, with a strip that shows it. OSError: it cannot be written."""
     if film.file is None:
-        size = scene.render.resolution_x, scene.render.resolution_y
-        atomic_write.clear_up(place := Path(tempfile.gettempdir()))
-        folder = film.changed.enter_context(atomic_write.part_folder(place))
-        film.file = film.changed.enter_context(LevelsFile(folder / _NAME, *size))
+        film.file = film.changed.enter_context(levels_file.temporary(scene))
         film.strip = _add_strip(film, scene, film.file.path)
     return film.file
 
 
-def _add_strip(film: _Film, scene: Any, path: Path) -> str:
+def _add_strip(film: _Film, scene: Scene, path: Path) -> str:
     editor, uid = scene.sequence_editor, scene.session_uid
     active, kept = editor.active_strip, (editor.use_cache_raw, editor.use_cache_final)
     first, last = min(scene.frame_start, scene.frame_current), max(scene.frame_end, scene.frame_current)
@@ -132,8 +121,9 @@ def _add_strip(film: _Film, scene: Any, path: Path) -> str:
     name = strip.name
 
     def remove() -> None:
-        if (found := _strip(uid, name)) is not None:
-            editor = found.id_data.sequence_editor
+        scene = strips.scene_of_uid(uid)
+        editor = scene and scene.sequence_editor
+        if editor and (found := editor.strips_all.get(name)) is not None:
             editor.use_cache_raw, editor.use_cache_final = kept
             editor.strips.remove(found)
 

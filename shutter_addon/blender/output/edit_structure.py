@@ -2,10 +2,11 @@
 
 import re
 from collections import Counter
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from contextlib import closing
 
 import bpy
+from bpy.types import PropertyGroup, Scene, Strip
 
 from ...core import templates
 from ...core.messages import UserError
@@ -13,13 +14,10 @@ from ...media.file_kind import file_kind
 from ..data import annotations, colour_configuration, fcurves, snapshot, source_media, strips
 from ..data.validation import word
 
-_OPTIONS = ("position", "interpolation", "light", "exposure", "edges", "aggregate", "inbetween", "inbetween_method")
-_SWITCHES = ("stop_at_cuts", "decontaminate", "border", "use_source_time")
 
-
-def lines(scene) -> list[str]:
+def lines(scene: Scene) -> list[str]:
     """Of a scene and its effects, as Markdown."""
-    found = [*_of_scene(scene)]
+    found = list(_of_scene(scene))
     for number, strip in enumerate(strips.effect_strips(scene), 1):
         effect = strips.effect_of(scene, strip.scene)
         found += ["", f"Effect {number}", ""]
@@ -27,10 +25,11 @@ def lines(scene) -> list[str]:
     return found
 
 
-def _of_scene(scene) -> Iterator[str]:
+def _of_scene(scene: Scene) -> Iterator[str]:
     render, view = scene.render, scene.view_settings
     size = f"{render.resolution_x}×{render.resolution_y} at {render.resolution_percentage} %"
-    yield f"- Frames: {scene.frame_start} to {scene.frame_end}, at {scene.frame_current}; {size}, {_rate(render)} fps"
+    rate = f"{render.fps / render.fps_base:g} fps"
+    yield f"- Frames: {scene.frame_start} to {scene.frame_end}, at {scene.frame_current}; {size}, {rate}"
     saved = scene.virtual_shutter.version
     by = saved if re.fullmatch(r"[\d.]{1,20}", saved) else "none"  # a script may have written anything there
     yield f"- Saved: by Blender {'.'.join(map(str, bpy.data.version))}, version {by} of the extension"
@@ -44,23 +43,20 @@ def _of_scene(scene) -> Iterator[str]:
     }
     yield f"- Colors: {', '.join(f'{what} {_standard(name)}' for what, name in colours.items())}"
     all_strips = scene.sequence_editor.strips_all if scene.sequence_editor else ()
-    yield f"- Strips: {_counted(strip.type for strip in all_strips) or 'none'}"
+    counts = sorted(Counter(strip.type for strip in all_strips).items())
+    yield f"- Strips: {', '.join(f'{count} {kind}' for kind, count in counts) or 'none'}"
     others = sum(bool(other.virtual_shutter.effects) for other in bpy.data.scenes if other != scene)
     yield f"- Effects: {len(scene.virtual_shutter.effects)}; other scenes with effects: {others}"
 
 
-def _of_effect(scene, effect, strip) -> Iterator[str]:
-    options = [f"{name} {_word(effect, name)}" for name in _OPTIONS]
-    options += [f"{name} {'on' if getattr(effect, name) else 'off'}" for name in _SWITCHES]
-    yield f"- Options: window {effect.window}, {', '.join(options)}, follow edges {effect.edge_aware:g}"
+def _of_effect(scene: Scene, effect: PropertyGroup, strip: Strip) -> Iterator[str]:
+    options = [f"window {effect.window}", f"follow edges {effect.edge_aware:g}", *_chosen(effect)]
+    yield f"- Options: {', '.join(dict.fromkeys(options))}"
     yield f"- Strip: {', '.join(_of_strip(strip))}"
     yield from _of_source(scene, effect, strip)
-    path = effect.path_from_id()
-    yield f"- Keys: {_keys(scene, path)} of the effect, {_keys(scene, f'{path}.camera')} of the camera"
-    shutters = [_of_shutter(scene, path, index, shutter) for index, shutter in enumerate(effect.shutters)]
-    yield from _listed("Shutter", len(shutters), shutters)
-    regions = [_of_region(scene, effect, index, region) for index, region in enumerate(effect.regions)]
-    yield from _listed("Region", len(regions), regions)
+    yield f"- Keys: {_keys(scene, effect)} of the effect, {_keys(scene, effect.camera)} of the camera"
+    yield from _listed(scene, "Shutter", [(shutter, [f"{len(shutter.bars)} bars"]) for shutter in effect.shutters])
+    yield from _listed(scene, "Region", [(region, _of_region(effect, region)) for region in effect.regions])
     frame = min(max(scene.frame_current, strip.left_handle), strip.right_handle - 1)
     try:
         snapshot.take(scene, effect, strip, (frame,)).effect.at(frame)
@@ -68,7 +64,7 @@ def _of_effect(scene, effect, strip) -> Iterator[str]:
         yield f"- Cannot be shown at frame {frame}: {templates.plain(str(error))}"
 
 
-def _of_strip(strip) -> Iterator[str]:
+def _of_strip(strip: Strip) -> Iterator[str]:
     yield f"{strip.type} in channel {strip.channel}, frames {strip.left_handle} to {strip.right_handle - 1}"
     yield f"content of {strip.content_duration} from {strip.content_start:g}, blend {strip.blend_type}"
     if strip.parent_meta():
@@ -87,7 +83,7 @@ def _of_strip(strip) -> Iterator[str]:
     yield from (word for word, is_so in changes.items() if is_so)
 
 
-def _of_source(scene, effect, strip) -> Iterator[str]:
+def _of_source(scene: Scene, effect: PropertyGroup, strip: Strip) -> Iterator[str]:
     source = strips.nearest_source(scene, effect, strip)
     if source is None:
         yield "- Source: none"
@@ -107,58 +103,44 @@ def _of_source(scene, effect, strip) -> Iterator[str]:
         yield f"- Footage: {templates.plain(str(error))}"
 
 
-def _of_shutter(scene, path: str, index: int, shutter) -> str:
-    words = [_word(shutter, "combine"), f"{len(shutter.bars)} bars", f"moves with {_word(shutter, 'follow')}"]
-    words += [f"length {_word(shutter, 'length')}", f"{_keys(scene, f'{path}.shutters[{index}]')} keys"]
-    words += ["threshold"] if shutter.use_threshold else []
-    return ", ".join(words + (["by luminance"] if shutter.by_luminance else []))
-
-
-def _of_region(scene, effect, index: int, region) -> str:
+def _of_region(effect: PropertyGroup, region: PropertyGroup) -> list[str]:
     """Whose it is as a number: shutters are named."""
     names = [shutter.name for shutter in effect.shutters]
-    owner = names.index(region.shutter) + 1 if region.shutter in names else "none"
-    words = [_word(region, "kind"), f"shutter {owner}"]
-    if region.kind == "MATTE":
-        words += [f"from {_word(region, 'matte')}", f"channel {_word(region, 'channel')}", _word(region, "timing")]
-    elif region.kind == "RAMP":
-        words.append(_word(region, "ramp"))
-    else:
-        layer = annotations.layer_of(effect, region)
-        drawings = layer.frames if layer else ()
-        words += [f"{len(drawings)} drawings", f"{sum(len(drawing.strokes) for drawing in drawings)} strokes"]
-    words += [f"between {_word(region, 'between')}"] if region.kind == "OUTLINE" else []
-    words += [f"blend {_word(region, 'blend')}"] if region.kind in strips.LAID else []
-    words += ["layer"] if region.is_layer else []
-    words += [f"follows {_word(region, 'follow_kind')}"] if region.follow_clip else []
-    return ", ".join([*words, f"{_keys(scene, f'{effect.path_from_id()}.regions[{index}]')} keys"])
+    words = [f"shutter {names.index(region.shutter) + 1 if region.shutter in names else 'none'}"]
+    if layer := annotations.layer_of(effect, region):
+        words += [f"{len(layer.frames)} drawings", f"{sum(len(drawing.strokes) for drawing in layer.frames)} strokes"]
+    return words + (["follows a clip"] if region.follow_clip else [])
 
 
-def _listed(what: str, count: int, found: list[str]) -> Iterator[str]:
-    """Equal ones in one line."""
-    yield f"- {what}s: {count}"
-    yield from (f"  - {times} × {words}" for words, times in Counter(found).items())
+def _chosen(group: PropertyGroup) -> Iterator[str]:
+    """What is otherwise in a property group than in a new one: enums, switches and whole numbers."""
+    for prop in group.bl_rna.properties:
+        name = prop.identifier
+        if prop.type in ("ENUM", "BOOLEAN", "INT") and not (prop.is_hidden or name.startswith("active_")):
+            value = _word(group, name) if prop.type == "ENUM" else getattr(group, name)
+            if value != prop.default:
+                yield f"{name} {value}"
 
 
-def _keys(scene, path: str) -> int:
-    """How many keyframes there are of a thing and of all in it."""
-    return sum(len(curve.keyframe_points) for curve in fcurves.curves_under(scene, f"{path}."))
+def _listed(scene: Scene, what: str, found: list[tuple]) -> Iterator[str]:
+    """Property groups with words that tell of each; equal ones in one line."""
+    yield f"- {what}s: {len(found)}"
+    lines = (", ".join([*words, *_chosen(group), f"{_keys(scene, group)} keys"]) for group, words in found)
+    yield from (f"  - {times} × {line}" for line, times in Counter(lines).items())
 
 
-def _word(owner, name: str) -> str:
+def _keys(scene: Scene, group: PropertyGroup) -> int:
+    """How many keyframes there are of a property group and of all in it."""
+    curves = fcurves.curves_under(scene, f"{group.path_from_id()}.")
+    return sum(len(curve.keyframe_points) for curve in curves)
+
+
+def _word(owner: PropertyGroup, name: str) -> str:
     """An enum's identifier; files can hold numbers that stand for none."""
     try:
         return word(owner, name)
     except UserError:
         return "unknown"
-
-
-def _counted(words: Iterable[str]) -> str:
-    return ", ".join(f"{count} {word}" for word, count in sorted(Counter(words).items()))
-
-
-def _rate(render) -> str:
-    return f"{render.fps / render.fps_base:g}"
 
 
 def _standard(name: str) -> str:

@@ -1,6 +1,8 @@
 """What a report of an error should have in it, as short Markdown: versions, the device, what the edit is made of, and
 the last errors and warnings. Nothing in it names what is the user's: no strip, no scene, no file, no folder."""
 
+from __future__ import annotations
+
 import importlib
 import os
 import platform
@@ -14,6 +16,7 @@ from pathlib import Path
 
 import bpy
 import gpu
+from bpy.types import Scene
 
 from ...core import templates, told
 from ...devices.budget import MEGABYTE, machine_memory
@@ -35,7 +38,7 @@ PACKAGES = {
 BACKENDS = {"OPENGL": "OpenGL", "VULKAN": "Vulkan", "METAL": "Metal", "NONE": "nothing", "UNKNOWN": "unknown"}
 
 
-def text(scene) -> str:
+def text(scene: Scene | None) -> str:
     """The report; scene: whose sequencer is shown, or None. On the main thread."""
     lines = ["### Virtual Shutter: report of an error", "", *_told(_versions), *_told(_device)]
     lines += ["", "Edit", "", *_told(lambda: edit_structure.lines(scene) if scene else ["- none"])]

@@ -1,27 +1,27 @@
 """A movie of rendered frames, with the sound and the output settings of the edit that they were rendered from."""
 
+from __future__ import annotations
+
 import re
-import sys
 import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, nullcontext
 from pathlib import Path
 
 import bpy
 import numpy as np
+from bpy.types import ImageFormatSettings, Scene
 
 from ...core import threads
 from ...core.frames import frame_ranges
-from ...core.messages import signed
 from ...media import image_writing, rendered_pictures
 from ...media.rendered_pictures import RenderedPicture
-from ..data import requirements, strips
+from ..data import requirements, seen_alone, strips
 from ..rendering import render_job
 from . import film_output
 from .film_output import OutputError
 
 AT_ONCE = 1000  # pictures of a strip: Blender copies all that it has for each that is added
-_CHANGES = {"look": "None", "exposure": 0.0, "gamma": 1.0, "use_curve_mapping": False, "use_white_balance": False}
 
 
 def check(output: Path, read: list[Path]) -> None:
@@ -32,7 +32,7 @@ def check(output: Path, read: list[Path]) -> None:
     film_output.spare([output], read)
 
 
-def rehearse(scene, output: Path, file_format: str, frames: range) -> None:
+def rehearse(scene: Scene, output: Path, file_format: str, frames: range) -> None:
     """Joins one black picture to a movie that is thrown away; `scene` is changed, and not to be used again.
 
     OutputError, MediaError, OSError: these frames, of such a format, could not be joined to that movie."""
@@ -42,12 +42,12 @@ def rehearse(scene, output: Path, file_format: str, frames: range) -> None:
         folder, trial = Path(place), Path(place, f"movie{output.suffix}")
         _write_black(folder / f"{frames[0]:04d}.{file_format}", film_output.size(scene))
         try:
-            join(scene, folder, trial, (frames[0], frames[0]), "", progress=lambda *_: nullcontext(lambda: None))
+            join(scene, folder, trial, frames[:1], "", progress=lambda *_: nullcontext(lambda: None))
         except OutputError as error:
             raise type(error)(str(error).replace(str(trial), str(output))) from None
 
 
-def _refuse_gaps(scene, file_format: str, frames: range) -> None:
+def _refuse_gaps(scene: Scene, file_format: str, frames: range) -> None:
     """OutputError: frames at which no strip is shown are transparent, and would be refused for it."""
     if file_format == "png" and scene.render.image_settings.color_mode == "RGBA" and _changes_transparency(scene):
         strips = [strip for strip in scene.sequence_editor.strips_all if strip.type not in ("SOUND", "META")]
@@ -65,14 +65,16 @@ def _write_black(path: Path, size: tuple[int, int]) -> None:
         image_writing.write_grey(path, np.zeros((height, width), np.float32))
 
 
-def join(scene, folder: Path, output: Path, frames: tuple[int, int], key: str, progress=film_output.progress) -> None:
-    """Makes a movie of the rendered frames, first and last, in a folder; `scene` is changed, and not to be used again.
+def join(
+    scene: Scene, folder: Path, output: Path, frames: range, key: str, progress: Callable = film_output.progress
+) -> None:
+    """Makes a movie of these rendered frames in a folder; `scene` is changed, and not to be used again.
 
     key: that of the edit; progress: as film_output.progress. OutputError, MediaError: frames are missing, broken,
     unlike each other or of another edit, or the movie cannot be written, which is there whole or not at all.
     InterruptedRenderError: by Ctrl-C or TERM."""
-    scene.frame_start, scene.frame_end = frames
-    paths = _pictures(folder, range(frames[0], frames[1] + 1, scene.frame_step))
+    scene.frame_start, scene.frame_end = frames[0], frames[-1]
+    paths = _pictures(folder, frames[:: scene.frame_step])
     size = film_output.size(scene)
     film_output.check(output, None, size)
     with progress(len(paths), "picture") as looked:
@@ -86,10 +88,10 @@ def join(scene, folder: Path, output: Path, frames: tuple[int, int], key: str, p
 
 
 @contextmanager
-def _ended_by_gaps(scene, paths: list[Path]):
+def _ended_by_gaps(scene: Scene, paths: list[Path]) -> Iterator[None]:
     """Inside, the film ends before a frame whose picture is gone by then: Blender would show a colour in its place."""
 
-    def look(rendered, *_):
+    def look(rendered: Scene, *_) -> None:
         if not render_job.is_film(rendered):
             return
         path = _picture_at(rendered.frame_current, scene, paths)
@@ -101,7 +103,7 @@ def _ended_by_gaps(scene, paths: list[Path]):
         yield
 
 
-def _picture_at(frame: int, scene, paths: list[Path]) -> Path:
+def _picture_at(frame: int, scene: Scene, paths: list[Path]) -> Path:
     return paths[(frame - scene.frame_start) // scene.frame_step]
 
 
@@ -136,11 +138,10 @@ def _are(frames: list[int]) -> str:
     return f"{frame_ranges.in_words(frames)} {'is' if len(frames) == 1 else 'are'}"
 
 
-def say_what_is_left_out(folder: Path, frames: tuple[int, int]) -> None:
+def say_what_is_left_out(folder: Path, frames: range) -> None:
     """A word on stderr of pictures that are no frames of the edit."""
-    others = [frame for frame in _numbered(folder) if not frames[0] <= frame <= frames[1]]
-    if others:
-        print(signed(f"{folder}: {_are(others)} not of the edit, and left out"), file=sys.stderr)
+    if others := [frame for frame in _numbered(folder) if frame not in frames]:
+        render_job.say(f"{folder}: {_are(others)} not of the edit, and left out")
 
 
 def _common(paths: list[Path], looked: Callable, size: tuple[int, int], key: str) -> RenderedPicture:
@@ -188,7 +189,7 @@ def _by(size: tuple[int, int]) -> str:
     return "{}×{}".format(*size)
 
 
-def _refuse_transparency(scene, paths: list[Path], first: RenderedPicture) -> None:
+def _refuse_transparency(scene: Scene, paths: list[Path], first: RenderedPicture) -> None:
     """OutputError: PNG files of which Blender's own film would show other colours. It applies the view to what lies
     over black, where they have it applied to the colours that shine through."""
     if paths[0].suffix == ".png" and first.channels in (2, 4) and _changes_transparency(scene):
@@ -198,17 +199,17 @@ def _refuse_transparency(scene, paths: list[Path], first: RenderedPicture) -> No
                 raise OutputError(f"{path}: {words}; render EXR, or without transparency")
 
 
-def _changes_transparency(scene) -> bool:
+def _changes_transparency(scene: Scene) -> bool:
     return _shown(scene).view_settings.view_transform != "Standard"
 
 
-def _shown(scene):
+def _shown(scene: Scene) -> Scene | ImageFormatSettings:
     """What has the display and the view that the edit's output has."""
     settings = scene.render.image_settings
     return settings if settings.color_management == "OVERRIDE" else scene
 
 
-def _lay_over(scene, paths: list[Path], first: RenderedPicture) -> None:
+def _lay_over(scene: Scene, paths: list[Path], first: RenderedPicture) -> None:
     """Has the pictures cover all else that the edit shows. Its sounds are heard."""
     editor = scene.sequence_editor
     editor.display_stack(None)  # out of meta strips: Blender renders what was open when the file was saved
@@ -229,7 +230,7 @@ def _lay_over(scene, paths: list[Path], first: RenderedPicture) -> None:
             strip.colorspace_settings.name = space
 
 
-def _keep_colours(scene, suffix: str, first: RenderedPicture) -> str | None:
+def _keep_colours(scene: Scene, suffix: str, first: RenderedPicture) -> str | None:
     """Has the view of PNG files, which are finished, change nothing any more; the colour space that they are in. EXR
     files are scene-linear: None."""
     if suffix == ".exr":
@@ -239,14 +240,14 @@ def _keep_colours(scene, suffix: str, first: RenderedPicture) -> str | None:
         shown.view_settings.view_transform = "Standard"
     except TypeError:
         raise OutputError("PNG frames need the view Standard, which this OpenColorIO configuration lacks") from None
-    for name, value in _CHANGES.items():
+    for name, value in seen_alone.PLAIN_VIEW.items():
         setattr(shown.view_settings, name, value)
     if first.samples == "uint8":
         scene.render.dither_intensity = 0  # it has been added to them
     return shown.display_settings.display_device
 
 
-def _set_output(scene, output: Path, size: tuple[int, int]) -> None:
+def _set_output(scene: Scene, output: Path, size: tuple[int, int]) -> None:
     """The edit's own settings, if its output is a movie, else those of the command's films; the container by the
     output's ending. Nothing is burnt in again, and what else makes a picture of another size or place is off."""
     render = scene.render

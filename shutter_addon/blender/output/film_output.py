@@ -1,15 +1,18 @@
 """Where a film goes: a movie, or a folder of pictures; each file whole or not at all."""
 
+from __future__ import annotations
+
 import itertools
 import os
 import signal
 import sys
-from collections.abc import Callable, Collection, Iterable
-from contextlib import contextmanager, nullcontext, suppress
+from collections.abc import Callable, Collection, Iterable, Iterator
+from contextlib import AbstractContextManager, contextmanager, nullcontext, suppress
 from pathlib import Path
 from typing import NamedTuple
 
 import bpy
+from bpy.types import ImageFormatSettings, RenderSettings, Scene
 
 from ...core import atomic_write
 from ...core.messages import UserError, of_file
@@ -20,6 +23,7 @@ from ..rendering import render_job
 from . import movie_feed
 
 INTERRUPTED = 130
+Move = Callable[[Path, Path], object]  # moves a picture to its place
 
 # Ending: container, codec, audio codec (Blender's names).
 MOVIES = {
@@ -62,7 +66,7 @@ def is_movie(path: Path) -> bool:
     return path.suffix.lower() in MOVIES
 
 
-def size(scene) -> tuple[int, int]:
+def size(scene: Scene) -> tuple[int, int]:
     """Width and height of the pictures that Blender renders of a scene, in pixels."""
     render = scene.render
     return tuple(n * render.resolution_percentage // 100 for n in (render.resolution_x, render.resolution_y))
@@ -92,7 +96,7 @@ def check_folder(path: Path, file_format: str | None) -> None:
 
 def spare(written: Iterable[Path], read: Collection[Path]) -> None:
     """OutputError: a file that would be written is one that is read, whatever link leads to it, or is written twice."""
-    taken = {os.path.realpath(path): path for path in read}
+    taken: dict[object, Path] = {os.path.realpath(path): path for path in read}
     taken |= {identity: path for path in read if (identity := _identity(path)) is not None}
     places = set()
     for path in written:
@@ -104,7 +108,7 @@ def spare(written: Iterable[Path], read: Collection[Path]) -> None:
             raise OutputError(f"{path}: would be written over {other}, which is read; choose another place")
 
 
-def _identity(path: Path):
+def _identity(path: Path) -> tuple[int, int] | None:
     """Equal for all paths of a file; None: there is none."""
     try:
         status = os.stat(path)
@@ -113,9 +117,9 @@ def _identity(path: Path):
     return status.st_dev, status.st_ino
 
 
-def pictures_of(folder: Path, ending: str, frames: tuple[int, int]) -> list[Path]:
-    """The files of these frames, first and last, in a folder."""
-    return [folder / f"{frame:04d}.{ending}" for frame in range(frames[0], frames[1] + 1)]
+def pictures_of(folder: Path, ending: str, frames: range) -> list[Path]:
+    """The files of these frames in a folder."""
+    return [folder / f"{frame:04d}.{ending}" for frame in frames]
 
 
 def for_blender(path: str) -> str:
@@ -128,7 +132,7 @@ def for_blender(path: str) -> str:
     return path.replace("{", "{{").replace("}", "}}")
 
 
-def set_output(scene, path: Path, file_format: str, *, alpha: bool) -> None:
+def set_output(scene: Scene, path: Path, file_format: str, *, alpha: bool) -> None:
     """Where and how the edit's render goes: a movie by its ending, else a folder of pictures named by frame.
 
     alpha: pictures keep the source's transparency. OutputError: Blender cannot write there."""
@@ -146,20 +150,20 @@ def set_output(scene, path: Path, file_format: str, *, alpha: bool) -> None:
     settings.color_mode = "RGBA" if alpha else "RGB"
 
 
-def set_place(render, path: Path) -> None:
+def set_place(render: RenderSettings, path: Path) -> None:
     """Where the edit's render goes, and that it says nothing of its making. OutputError: Blender cannot write there."""
     render.use_file_extension = not is_movie(path)
     _stamp_nothing(render)
     render.filepath = for_blender(str(path) if is_movie(path) else f"{path}{os.sep}")
 
 
-def _has_sound(scene) -> bool:
+def _has_sound(scene: Scene) -> bool:
     """Whether a scene has sound strips, or one that it shows."""
     shown_strips = [strip for shown in strips.shown_scenes(scene) for strip in shown.sequence_editor.strips_all]
     return any(strip.type == "SOUND" for strip in shown_strips)
 
 
-def set_pictures(scene, file_format: str, note: str) -> None:
+def set_pictures(scene: Scene, file_format: str, note: str) -> None:
     """What pictures a saved edit's render writes: every frame anew, as colours are set in the edit, with a note in
     their metadata."""
     settings, render = scene.render.image_settings, scene.render
@@ -173,19 +177,19 @@ def set_pictures(scene, file_format: str, note: str) -> None:
         render.use_stamp_note, render.stamp_note_text = True, note
 
 
-def _set_format(settings, kind: PictureFormat) -> None:
+def _set_format(settings: ImageFormatSettings, kind: PictureFormat) -> None:
     settings.file_format, settings.color_depth = kind.blender, str(kind.bits)
     if kind.blender == "OPEN_EXR":
         settings.exr_codec = "ZIP"  # lossless, and with checksums, by which a damaged file is known
 
 
-def _stamp_nothing(render) -> None:
+def _stamp_nothing(render: RenderSettings) -> None:
     """No time or place of the render in pictures: equal pixels are equal files."""
     for name in _STAMPS:
         setattr(render, name, False)
 
 
-def film(scene, output: Path) -> None:
+def film(scene: Scene, output: Path) -> None:
     """Renders an edit of new_edit.make_edit to a movie or a folder.
 
     OutputError: it cannot be rendered or written; finished pictures stay, and of a movie what was finished, under a
@@ -196,7 +200,7 @@ def film(scene, output: Path) -> None:
         write(scene, output, moved)
 
 
-def write(scene, output: Path, moved: Callable[[], None], move: Callable[[Path, Path], object] = Path.replace) -> None:
+def write(scene: Scene, output: Path, moved: Callable[[], None], move: Move = Path.replace) -> None:
     """Renders the frames of any edit to a movie, or to the pictures that its settings say in a prepared folder. Blender
     writes into a folder beside the output, and what is finished moves out of it.
 
@@ -238,7 +242,7 @@ def prepare(folder: Path) -> None:
 
 
 @contextmanager
-def whole(path: Path | None):
+def whole(path: Path | None) -> Iterator[Path | None]:
     """What to write in place of a file, so that it is there whole or not at all; None for none."""
     if path is None:
         yield None
@@ -275,15 +279,15 @@ def message(error: RuntimeError) -> str:
 
 
 @contextmanager
-def _moved(part: Path, output: Path, scene, update: Callable[[], None], move: Callable[[Path, Path], object]):
+def _moved(part: Path, output: Path, scene: Scene, update: Callable[[], None], move: Move) -> Iterator[dict[str, Path]]:
     """Moves each finished picture from `part` to `output`, and calls both. Gives the pictures that are missing so
     far, by name; none of a movie's."""
-    frames = scene.frame_start, scene.frame_end
+    frames = range(scene.frame_start, scene.frame_end + 1)
     settings = scene.render.image_settings
     ending = next((name for name, kind in FORMATS.items() if settings.file_format == kind.blender), "")
     missing = {path.name: path for path in pictures_of(output, ending, frames)} if ending else {}
 
-    def moved(*_):
+    def moved(*_) -> None:
         update()
         try:
             os.utime(part)  # a movie's encoder may not write for long: nobody shall take it for left behind
@@ -306,7 +310,7 @@ def in_words(error: Exception, place: Path | str) -> str:
 
 
 @contextmanager
-def progress(count: int, unit: str):
+def progress(count: int, unit: str) -> Iterator[Callable]:
     """A progress bar on a terminal; gives what moves it on by one, or by as many as it is told."""
     try:
         from tqdm import tqdm
@@ -318,14 +322,14 @@ def progress(count: int, unit: str):
 
 
 @contextmanager
-def stoppable():
+def stoppable() -> Iterator[list[int]]:
     """Ctrl-C and a farm's TERM end the render after its frame, so that an open movie is finished; a second time, at
     once. Gives a list with the signal that came, if any.
 
     No exception gets through Blender: it prints it and renders on."""
     signals: list[int] = []
 
-    def stop(number, _frame):
+    def stop(number: int, _frame: object) -> None:
         if signals:
             render_job.leave(INTERRUPTED)
         signals.append(number)
@@ -339,13 +343,13 @@ def stoppable():
             signal.signal(number, handler or signal.SIG_DFL)  # None: Blender's own, which Python cannot put back
 
 
-def _uncached(scene):
+def _uncached(scene: Scene) -> AbstractContextManager[None]:
     """Each frame is rendered once: those that Blender would keep would fill gigabytes."""
     names = ("use_cache_raw", "use_cache_final") if scene.sequence_editor else ()
     return for_a_while((scene.sequence_editor, name, False) for name in names)
 
 
-def _without_sources(scene):
+def _without_sources(scene: Scene) -> AbstractContextManager[None]:
     """Spares Blender what no frame shows: the source lies wholly below its effect, but Blender takes any Scene strip
     for transparent: it would decode the source and blend the two, 2/5 of all its work."""
     sources = [scene.sequence_editor.strips_all[name] for name in strips.shown_sources(scene)]
@@ -353,7 +357,7 @@ def _without_sources(scene):
 
 
 @contextmanager
-def quiet():
+def quiet() -> Iterator[None]:
     """Keeps Blender's log of every saved frame off the terminal; what goes wrong comes as an exception."""
     if sys.stdout is not None:
         with suppress(OSError):  # nobody reads it

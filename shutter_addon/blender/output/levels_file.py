@@ -1,12 +1,18 @@
 """A file of finished levels that Blender's sequencer shows, picture after picture."""
 
+from __future__ import annotations
+
 import os
 import struct
+import tempfile
+from collections.abc import Iterator
+from contextlib import closing, contextmanager
 from pathlib import Path
-from typing import Any, Self
 
+import bpy
 import numpy as np
 
+from ...core import atomic_write
 from ..data import strips
 
 # Rows of a tile of the file; its columns are a multiple of 16. A TIFF without tiles takes twice the time: Blender reads
@@ -14,7 +20,7 @@ from ..data import strips
 _ROWS, _COLUMNS = 64, 16
 
 
-def strip_above(editor: Any, path: Path, first: int, stop: int) -> Any:
+def strip_above(editor: bpy.types.SequenceEditor, path: Path, first: int, stop: int) -> bpy.types.ImageStrip:
     """A strip of that file which covers all others from one timeline frame to another. ValueError: there is no channel
     above them."""
     channel = max((strip.channel for strip in editor.strips), default=0) + 1
@@ -25,10 +31,21 @@ def strip_above(editor: Any, path: Path, first: int, stop: int) -> Any:
     return strip
 
 
+@contextmanager
+def temporary(scene: bpy.types.Scene) -> Iterator[LevelsFile]:
+    """A file for the pictures of a scene. OSError, struct.error (beyond the 4 GB of a TIFF): there is no room for
+    it."""
+    atomic_write.clear_up(place := Path(tempfile.gettempdir()))
+    with atomic_write.part_folder(place) as folder:
+        file = LevelsFile(folder / "picture.tif", scene.render.resolution_x, scene.render.resolution_y)
+        with closing(file):
+            yield file
+
+
 class LevelsFile:
     """An uncompressed TIFF of RGBA levels, whose pixels are replaced in place."""
 
-    def __init__(self, path: Path, width: int, height: int):
+    def __init__(self, path: Path, width: int, height: int) -> None:
         """OSError: it cannot be written. After this there is room for all that is written to it."""
         self.path = path
         self._padding, tiles = -width % _COLUMNS, -(-height // _ROWS)
@@ -47,12 +64,6 @@ class LevelsFile:
 
     def close(self) -> None:
         self._file.close()
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.close()
 
 
 def _tiff_head(width: int, height: int, columns: int, tiles: int) -> bytes:

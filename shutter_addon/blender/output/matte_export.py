@@ -5,12 +5,13 @@ from __future__ import annotations
 
 import os
 import re
-from collections.abc import Iterator
+from collections.abc import Hashable, Iterator
 from contextlib import closing
 from pathlib import Path
 from typing import Any
 
 from bpy.app.translations import pgettext_rpt as rpt_
+from bpy.types import PropertyGroup, Scene, Strip
 
 from ...core import atomic_write
 from ...core.messages import EffectError, translated
@@ -24,7 +25,7 @@ from ..data import matte_content, matte_strips, recipe_export, snapshot, source_
 from ..rendering import effect_source
 
 
-def recipe_for(scene, effect, strip, path: Path) -> Effect:
+def recipe_for(scene: Scene, effect: PropertyGroup, strip: Strip, path: Path) -> Effect:
     """An effect as a recipe that is to lie at a path. What it cannot point to is written into a folder beside it, "NAME
     mattes". One of effect_source.FAULTS: the effect cannot be rendered as it stands, or a matte cannot be read or
     written. OSError: there can be no such folder."""
@@ -37,7 +38,7 @@ def recipe_for(scene, effect, strip, path: Path) -> Effect:
     return recipe_export.recipe_of(scene, effect, strip, words)
 
 
-def save(scene, effect, strip, region, folder: Path, word: str) -> int:
+def save(scene: Scene, effect: PropertyGroup, strip: Strip, region: PropertyGroup, folder: Path, word: str) -> int:
     """Writes what a matte, a ramp or an outline shows at each timeline frame of the effect strip: FRAME.png, grey of 16
     bits, or FRAME.exr, float, its channel Y. All of them are written or none; how many they are. One of
     effect_source.FAULTS: the matte cannot be read, or the pictures cannot be written. OSError: nor their folder."""
@@ -50,12 +51,12 @@ def save(scene, effect, strip, region, folder: Path, word: str) -> int:
     return len(frames)
 
 
-def _ramp(region) -> RampContent:
+def _ramp(region: PropertyGroup) -> RampContent:
     ramp: Any = validation.word(region, "ramp").lower() if region.kind == "RAMP" else "linear"
     return RampContent(ramp)
 
 
-def _folder(region, path: Path, number: int) -> Path | None:
+def _folder(region: PropertyGroup, path: Path, number: int) -> Path | None:
     """Where the pictures of a matte are written; None: a recipe can say what it is."""
     if region.kind == "RAMP" or (region.matte == "IMAGE" and not _is_one_of_many(region)):
         return None
@@ -63,13 +64,13 @@ def _folder(region, path: Path, number: int) -> Path | None:
     return path.with_name(f"{path.stem} mattes") / f"{number} {name}"
 
 
-def _is_one_of_many(region) -> bool:
+def _is_one_of_many(region: PropertyGroup) -> bool:
     """Whether a matte is a single picture that a recipe would take for the first of a sequence."""
     path = matte_content.image_path(region)
     return region.image.source == "FILE" and path.exists() and ImageFiles(path).count > 1
 
 
-def _read(scene, effect, strip, regions: list) -> Iterator[Path]:
+def _read(scene: Scene, effect: PropertyGroup, strip: Strip, regions: list) -> Iterator[Path]:
     """A file of each medium that is read while mattes are written, or by those that are not."""
     yield source_media.spec(strips.source_of(scene, effect, strip)).path
     for region in regions:
@@ -88,7 +89,9 @@ def _spare(folders: list[Path | None], read: Iterator[Path]) -> None:
             raise EffectError(sentence.format(folder=folder))
 
 
-def _words(scene, effect, strip, region, folder: Path | None, path: Path) -> FileContent | RampContent:
+def _words(
+    scene: Scene, effect: PropertyGroup, strip: Strip, region: PropertyGroup, folder: Path | None, path: Path
+) -> FileContent | RampContent:
     if region.kind == "RAMP":
         return _ramp(region)
     if folder is not None:
@@ -101,7 +104,7 @@ def _words(scene, effect, strip, region, folder: Path | None, path: Path) -> Fil
     return FileContent(path=named, channel=channel, offset=offset, timing=region.timing.lower())
 
 
-def _write(scene, effect, strip, region, folder: Path) -> Path:
+def _write(scene: Scene, effect: PropertyGroup, strip: Strip, region: PropertyGroup, folder: Path) -> Path:
     """Writes what a matte shows at each timeline frame of the effect strip, or one picture, if it shows that at all of
     them; the first one's path."""
     folder.mkdir(parents=True, exist_ok=True)
@@ -120,7 +123,9 @@ def _name(number: int, word: str = "png") -> str:
     return f"{number:04d}.{word}"
 
 
-def _write_frames(scene, effect, strip, region, folder: Path, word: str = "png") -> Iterator[tuple[int, Any]]:
+def _write_frames(
+    scene: Scene, effect: PropertyGroup, strip: Strip, region: PropertyGroup, folder: Path, word: str = "png"
+) -> Iterator[tuple[int, Hashable]]:
     """Writes what a matte shows at each timeline frame of the effect strip: gives the frame, and a key that is equal
     for equal ones."""
     frames = range(strip.left_handle, strip.right_handle)

@@ -5,25 +5,26 @@ which take more of the processor than all else that it does for a frame. So the 
 uncompressed file of the levels that the movie will have, above the effect strip, which it then does not render.
 """
 
+from __future__ import annotations
+
 import struct
-import tempfile
+from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager, suppress
 from functools import partial
-from pathlib import Path
 
 import bpy
+from bpy.types import Scene, Strip
 
-from ...core import atomic_write
 from ...core.stopping import StoppedError
 from ..data import colour_configuration, snapshot, strips
 from ..rendering import pictures, render_context, render_job, render_settings
 from ..rendering.effect_source import in_words
-from ..rendering.engine import say
-from .levels_file import LevelsFile, strip_above
+from . import levels_file
+from .levels_file import LevelsFile
 
 
 @contextmanager
-def feeding(scene):
+def feeding(scene: Scene) -> Iterator[None]:
     """Inside, the movie of an edit of new_edit.make_edit is rendered from such files. It has the levels that Blender
     would give the effect's picture, but for one where rounding decides.
 
@@ -31,28 +32,17 @@ def feeding(scene):
     engine renders as ever."""
     with ExitStack() as until_the_end:
         if not colour_configuration.name():
-            with suppress(OSError, struct.error):  # of pictures beyond the 4 GB of a TIFF
-                atomic_write.clear_up(place := Path(tempfile.gettempdir()))
-                folder = until_the_end.enter_context(atomic_write.part_folder(place))
-                size = scene.render.resolution_x, scene.render.resolution_y
-                until_the_end.enter_context(_fed(scene, LevelsFile(folder / "picture.tif", *size)))
+            with suppress(OSError, struct.error):
+                picture = until_the_end.enter_context(levels_file.temporary(scene))
+                shown, editor = strips.effect_strips(scene)[0], scene.sequence_editor
+                strip = levels_file.strip_above(editor, picture.path, shown.left_handle, shown.right_handle)
+                until_the_end.callback(editor.strips.remove, strip)
+                filled = partial(_fill, shown, picture, [])
+                until_the_end.enter_context(render_job.calling(bpy.app.handlers.render_pre, filled))
         yield
 
 
-@contextmanager
-def _fed(scene, picture: "LevelsFile"):
-    effect_strip = strips.effect_strips(scene)[0]
-    strip = strip_above(scene.sequence_editor, picture.path, effect_strip.left_handle, effect_strip.right_handle)
-    filled = partial(fill, effect_strip, picture, [])
-    try:
-        with render_job.calling(bpy.app.handlers.render_pre, filled):
-            yield
-    finally:
-        scene.sequence_editor.strips.remove(strip)
-        picture.close()
-
-
-def fill(effect_strip, picture: "LevelsFile", film: list, scene, *_) -> None:
+def _fill(effect_strip: Strip, picture: LevelsFile, film: list, scene: Scene, *_) -> None:
     """Fills the file with the picture of the frame that is rendered next. film: the snapshot of all its frames, once it
     is read."""
     if not render_job.is_film(scene) or render_job.stopping():
@@ -61,7 +51,7 @@ def fill(effect_strip, picture: "LevelsFile", film: list, scene, *_) -> None:
         if not film:
             effect, frames = strips.effect_of(scene, effect_strip.scene), range(scene.frame_start, scene.frame_end + 1)
             film.append(snapshot.take(scene, effect, effect_strip, frames, folder=render_settings.settings().inbetween))
-        context = render_context.of_render(say, render_job.stopping, levels=True)
+        context = render_context.of_render(render_job.say, render_job.stopping, levels=True)
         picture.write(pictures.picture(context, film[0], scene.frame_current))
         context.session.begin_next(film[0], scene.frame_current, context)
     except BaseException as error:  # Blender would print it, and write the picture again that was there before

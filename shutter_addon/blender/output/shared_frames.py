@@ -1,19 +1,22 @@
 """Frames of a saved edit in a folder that many machines may share: each is rendered by one of them, and once."""
 
-import sys
+from __future__ import annotations
+
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
 
+from bpy.types import Scene
+
 from ...core.farm import edit_version, job_file
 from ...core.farm.claims import Claims
 from ...core.farm.edit_version import EditVersion
 from ...core.frames import frame_ranges
-from ...core.messages import signed
 from ...media import rendered_pictures
 from ..data import versions
+from ..rendering import render_job
 from . import film_output
 
 RUN = 8  # frames that are claimed at once
@@ -21,8 +24,8 @@ Stamps = dict[Path, tuple | None]  # rendered_pictures.stamp of pictures
 _PAUSE = 1.0  # seconds between two looks at what others have finished
 
 
-def check(folder: Path, file_format: str | None, frames: tuple[int, int], read: list[Path]) -> None:
-    """OutputError: an edit's frames, first and last, cannot be rendered there.
+def check(folder: Path, file_format: str | None, frames: range, read: list[Path]) -> None:
+    """OutputError: an edit's frames cannot be rendered there.
 
     file_format: None for PNG, where the folder is not to be taken for a file; read: what is not to be written over"""
     if film_output.is_movie(folder):
@@ -33,7 +36,7 @@ def check(folder: Path, file_format: str | None, frames: tuple[int, int], read: 
     film_output.spare(film_output.pictures_of(folder, file_format or "png", frames), read)
 
 
-def check_resumable(scene) -> None:
+def check_resumable(scene: Scene) -> None:
     """OutputError: the edit's pictures do not say which version of it they are of."""
     if scene.render.use_stamp:
         words = "the edit burns metadata into its pictures, so that they carry no version; turn Burn Into Image off"
@@ -41,7 +44,7 @@ def check_resumable(scene) -> None:
 
 
 @contextmanager
-def of_same_footage(scene) -> Iterator[Stamps]:
+def of_same_footage(scene: Scene) -> Iterator[Stamps]:
     """Gives a dictionary for the pictures that are rendered inside, with their stamps. They are removed if the footage
     is written to meanwhile: they carry the key of what it was, and would count as finished. Pictures that others have
     put in their places stay. OutputError: it was written to."""
@@ -57,7 +60,9 @@ def of_same_footage(scene) -> Iterator[Stamps]:
             raise film_output.OutputError(f"{changed[0]}: was written to while frames were rendered from it")
 
 
-def render(scene, folder: Path, file_format: str, version: EditVersion, rendered: Stamps, *, resume: bool) -> None:
+def render(
+    scene: Scene, folder: Path, file_format: str, version: EditVersion, rendered: Stamps, *, resume: bool
+) -> None:
     """Renders the edit's frames, from its first to its last, to pictures that carry the key of its version.
 
     rendered: gets each picture with its stamp, as it is written
@@ -71,9 +76,10 @@ def render(scene, folder: Path, file_format: str, version: EditVersion, rendered
     film_output.prepare(folder)
     samples = film_output.FORMATS[file_format].samples
     is_finished = partial(_is_finished, film_output.size(scene), samples, version.key, {})
-    pictures = {frame: folder / f"{frame:04d}.{file_format}" for frame in range(scene.frame_start, scene.frame_end + 1)}
+    frames = range(scene.frame_start, scene.frame_end + 1)
+    pictures = dict(zip(frames, film_output.pictures_of(folder, file_format, frames), strict=True))
 
-    def move(part, picture):
+    def move(part: Path, picture: Path) -> None:
         job_file.guard(folder, version)  # again: it may be for a newer version by now
         stamp = rendered_pictures.stamp(part)
         part.replace(picture)
@@ -87,7 +93,9 @@ def render(scene, folder: Path, file_format: str, version: EditVersion, rendered
             write()
 
 
-def _render_missing(scene, folder: Path, pictures: dict[int, Path], is_finished, write, moved) -> None:
+def _render_missing(
+    scene: Scene, folder: Path, pictures: dict[int, Path], is_finished: Callable, write: Callable, moved: Callable
+) -> None:
     missing, waits = dict(pictures), False
     with Claims(folder) as claims, film_output.stoppable() as stopped:
         while True:
@@ -105,7 +113,7 @@ def _render_missing(scene, folder: Path, pictures: dict[int, Path], is_finished,
             else:
                 if not waits:
                     words = f"waiting for {frame_ranges.in_words(list(missing))}, which other workers have claimed"
-                    print(signed(f"{folder}: {words}"), file=sys.stderr)
+                    render_job.say(f"{folder}: {words}")
                 waits = True
                 time.sleep(_PAUSE)
         claims.clear(map(_name, pictures.values()))
@@ -127,7 +135,7 @@ def _claim_run(claims: Claims, missing: dict[int, Path], is_finished: Callable) 
     return run
 
 
-def _render_run(scene, claims: Claims, run: dict[int, Path], write: Callable) -> None:
+def _render_run(scene: Scene, claims: Claims, run: dict[int, Path], write: Callable) -> None:
     scene.frame_start, scene.frame_end = min(run), max(run)
     try:
         write()

@@ -6,7 +6,7 @@ from __future__ import annotations
 import threading
 from collections.abc import Callable
 from concurrent.futures import Future, wait
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeVar
 
 from ...core import stopping
 from ...core.stopping import StoppedError
@@ -14,6 +14,7 @@ from ..devices import gpu_relay
 from ..devices.blender_gpu import require_context
 from .render_job import Where, where
 
+T = TypeVar("T")
 _PATIENCE = 0.1  # seconds between two looks at whether a picture is still wanted
 
 
@@ -39,7 +40,7 @@ class Work(NamedTuple):
             raise
 
 
-def result_of(future: Future, relayed: bool, stopped: Callable[[], bool]) -> Any:
+def result_of(future: Future[T], relayed: bool, stopped: Callable[[], bool]) -> T:
     """The future's result. StoppedError: it is not waited for any longer. NoDeviceError: it cannot be waited for, as
     Blender's GPU is not current."""
     is_window = where() is Where.WINDOW
@@ -51,7 +52,7 @@ def result_of(future: Future, relayed: bool, stopped: Callable[[], bool]) -> Any
     return future.result()
 
 
-def broken_off(stopped: Callable[[], bool], function: Callable[..., Any], *arguments: Any) -> Any:
+def broken_off(stopped: Callable[[], bool], function: Callable[..., T], *arguments: object) -> T:
     """What a function gives, unless it is broken off."""
     with stopping.once(stopped):
         return function(*arguments)

@@ -1,12 +1,11 @@
 """The render engine of effect scenes: Blender's sequencer calls it for every frame it needs of an effect strip."""
 
 import inspect
-import sys
-from typing import Any
 
 import bpy
 import mathutils
 import numpy as np
+from bpy.types import Depsgraph, RenderEngine
 
 from ...core import told
 from ...core.messages import signed
@@ -21,7 +20,7 @@ class VirtualShutterEngine(bpy.types.RenderEngine):
     bl_label = "Virtual Shutter"
     bl_use_preview = False
 
-    def render(self, depsgraph: Any) -> None:
+    def render(self, depsgraph: Depsgraph) -> None:
         if render_job.cancelling():
             self.report({"ERROR"}, self.bl_label)  # whatever it says, it ends the other render
             return
@@ -34,7 +33,7 @@ class VirtualShutterEngine(bpy.types.RenderEngine):
             elif not self.test_break():
                 render_job.cancel(self.test_break)
 
-    def _render(self, depsgraph: Any, called_by_script: bool) -> None:
+    def _render(self, depsgraph: Depsgraph, called_by_script: bool) -> None:
         scene, width, height = depsgraph.scene, self.resolution_x, self.resolution_y
         asked, stopped = None, None
         if render_job.where() is Where.WINDOW and not (called_by_script or render_job.runs()):
@@ -87,17 +86,12 @@ class VirtualShutterEngine(bpy.types.RenderEngine):
     def _say(self, message: str) -> None:
         told.record(message)
         if bpy.app.background:
-            say(message)
+            render_job.say(message)
         else:
             self.report({"WARNING"}, signed(message))
 
 
-def say(message: str) -> None:
-    """Says something of a render in the background."""
-    print(signed(message), file=sys.stderr, flush=True)
-
-
-def fail(engine: Any, sentence: str) -> None:
+def fail(engine: RenderEngine, sentence: str) -> None:
     """Says why there is no picture, and ends the render: Blender would go on and write the frame without the effect.
 
     A preview has its own way to say it, and nothing to end."""

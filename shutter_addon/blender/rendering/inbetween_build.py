@@ -1,11 +1,15 @@
 """In-between frames of an effect: how far they are built, the build in a thread of its own, and their removal."""
 
+from __future__ import annotations
+
 import threading
 import time
 from concurrent.futures import Future, wait
 from contextlib import suppress
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import NamedTuple
+
+from bpy.types import PropertyGroup, Scene, Strip
 
 from ...core import threads
 from ...core.frames.frame_source import FrameSource
@@ -41,14 +45,14 @@ class _Builds:
     """running: the build that runs; left: of the last one, what it was in the middle of when it was stopped, which it
     still ends"""
 
-    running: "Build | None" = None
+    running: Build | None = None
     left: tuple[Future, ...] = ()
 
 
 _builds = _Builds()
 
 
-def look(scene: Any, effect: Any, strip: Any) -> Look:
+def look(scene: Scene, effect: PropertyGroup, strip: Strip) -> Look:
     """How things are, or were a second ago. MediaError, EffectError: there is no source, or no place for frames."""
     source = strips.source_of(scene, effect, strip)
     settings = inbetween_settings.settings(effect)
@@ -89,7 +93,7 @@ class Build:
     scene: session_uid of the effect's scene; done, total: pairs of neighbouring source frames; settings: what it builds
     future: how far it came, an inbetween_folders.State; or MediaError"""
 
-    def __init__(self, scene: Any, effect: Any, strip: Any, factor: int | None = None):
+    def __init__(self, scene: Scene, effect: PropertyGroup, strip: Strip, factor: int | None = None) -> None:
         """factor: builds what the strip needs with it, in place of all of the source with its own. EffectError,
         MediaError: it cannot begin."""
         self.settings = inbetween_settings.settings(effect)
@@ -102,7 +106,9 @@ class Build:
         self._stopped = threading.Event()
         self.future = threads.start(self._build, _builds.left, medium, pairs)
 
-    def _build(self, before: Any, medium: FrameSource, pairs: list[int] | None) -> Any:
+    def _build(
+        self, before: tuple[Future, ...], medium: FrameSource, pairs: list[int] | None
+    ) -> inbetween_folders.State:
         wait(before)
         with medium:
             return build(medium, *self.settings, update=self._update, cancelled=self._stopped.is_set, pairs=pairs)
@@ -121,7 +127,9 @@ class Build:
         self._stopped.set()
 
 
-def _needed(scene: Any, effect: Any, strip: Any, medium: FrameSource, settings: Any) -> list[int]:
+def _needed(
+    scene: Scene, effect: PropertyGroup, strip: Strip, medium: FrameSource, settings: inbetween_settings.Settings
+) -> list[int]:
     frames = range(strip.left_handle, strip.right_handle)
     try:
         return strobing.pairs(snapshot.take(scene, effect, strip, frames), medium, settings.factor)
@@ -136,10 +144,10 @@ def running() -> Build | None:
     return _builds.running
 
 
-def start(scene: Any, effect: Any, strip: Any, factor: int | None = None) -> Build:
+def start(scene: Scene, effect: PropertyGroup, strip: Strip, factor: int | None = None) -> Build:
     """Begins a build; factor: see Build. EffectError, MediaError: it cannot begin."""
     _builds.running = Build(scene, effect, strip, factor)
-    inbetween_settings.built.hold()
+    inbetween_settings.built.is_held = True
     return _builds.running
 
 
@@ -147,11 +155,11 @@ def ended() -> None:
     """What the build that was stopped, or has run to its end, has built counts from now on."""
     if _builds.running is not None:
         _builds.left, _builds.running = (_builds.running.future,), None
-    inbetween_settings.built.release()
+    inbetween_settings.built.is_held = False
     _looks.clear()
 
 
-def purge(effect: Any, source: Any) -> tuple[int, list[tuple]]:
+def purge(effect: PropertyGroup, source: Strip) -> tuple[int, list[tuple]]:
     """Removes the in-between frames of an effect's source strip, of every factor and method; the bytes that they took,
     and the folders where other files stay, with their number. EffectError, MediaError, OSError: it cannot be done."""
     wait(_builds.left)

@@ -4,11 +4,13 @@ Blender knows of a strip's own properties only. Properties of the effect drop fr
 strokes and the source are compared with what they were, as no callback tells of them.
 """
 
+from __future__ import annotations
+
 from collections.abc import Hashable, Iterator
-from typing import Any
 
 import bpy
 import numpy as np
+from bpy.types import Annotation, FCurve, Mask, PropertyGroup, Scene, Strip, bpy_prop_collection
 
 from ...core import revision
 from ...core.messages import EffectError
@@ -16,7 +18,7 @@ from ...media import MediaError
 from ..data import fcurves, geometry, mask_reading, matte_content, matte_strips, snapshot, source_media, strips
 from ..data.snapshot import Snapshot, SourceFiles
 from ..data.strip_timing import retiming_keys
-from . import render_job, render_settings
+from . import render_settings
 
 _signatures: dict[int, int] = {}  # by effect scene
 _files: dict[int, tuple[int, dict[str, SourceFiles]]] = {}  # by effect scene: the revision of the look, files by source
@@ -33,7 +35,7 @@ _TIMING = (
 )
 
 
-def current(scene: Any, effect: Any, strip: Any, frame: float) -> Snapshot:
+def current(scene: Scene, effect: PropertyGroup, strip: Strip, frame: float) -> Snapshot:
     """The snapshot of an effect strip at a timeline frame, for what is drawn: taken once until something changes.
     EffectError, MediaError: as snapshot.take."""
     uid = effect.scene.session_uid
@@ -96,13 +98,7 @@ def _drop(noted: set[int]) -> None:
                 strip.invalidate_cache("RAW")
 
 
-def drop_spoilt_later() -> None:
-    """As drop_spoilt, from whatever thread."""
-    if _spoilt:
-        render_job.soon(drop_spoilt)
-
-
-def invalidate_changed(scene: Any) -> bool:
+def invalidate_changed(scene: Scene) -> bool:
     """Drops the finished frames of the scene's effects whose keys, strokes or source have changed since the last call;
     whether there are any.
 
@@ -126,7 +122,7 @@ def invalidate_changed(scene: Any) -> bool:
     return changed
 
 
-def _signature(scene: Any, effect: Any, strip: Any, looked: dict) -> Iterator[Hashable]:
+def _signature(scene: Scene, effect: PropertyGroup, strip: Strip, looked: dict) -> Iterator[Hashable]:
     """All that the effect's pictures depend on, but for properties with an update callback. looked: gets what the
     source reads, by the effect's scene."""
     for shutter in effect.shutters:
@@ -149,14 +145,14 @@ def _signature(scene: Any, effect: Any, strip: Any, looked: dict) -> Iterator[Ha
         yield from _source(effect, source, looked)
 
 
-def _curve(curve: Any) -> Iterator[Hashable]:
+def _curve(curve: FCurve) -> Iterator[Hashable]:
     yield curve.array_index, curve.mute, curve.extrapolation
     yield from _keys(curve.keyframe_points)
     for modifier in curve.modifiers:
         yield from (repr(getattr(modifier, p.identifier)) for p in modifier.bl_rna.properties if p.type != "POINTER")
 
 
-def _keys(points: Any) -> Iterator[Hashable]:
+def _keys(points: bpy_prop_collection) -> Iterator[Hashable]:
     for name in ("handle_left", "co", "handle_right"):
         yield _bytes(points, name, 2, np.float32)
     interpolations = _bytes(points, "interpolation", 1, np.int32)
@@ -167,14 +163,14 @@ def _keys(points: Any) -> Iterator[Hashable]:
             yield _bytes(points, name, 1, np.float32)
 
 
-def _strokes(annotation: Any, layer: str) -> Iterator[Hashable]:
+def _strokes(annotation: Annotation | None, layer: str) -> Iterator[Hashable]:
     for drawing in annotation.layers[layer].frames if annotation and layer in annotation.layers else ():
         yield drawing.frame_number
         for stroke in drawing.strokes:
             yield _bytes(stroke.points, "co", 3, np.float32)
 
 
-def _matte(region: Any) -> Iterator[Hashable]:
+def _matte(region: PropertyGroup) -> Iterator[Hashable]:
     """What a matte shows, but for properties of the region."""
     try:
         if region.matte == "IMAGE":
@@ -188,7 +184,7 @@ def _matte(region: Any) -> Iterator[Hashable]:
         yield str(error)
 
 
-def _mask(mask: Any) -> Iterator[Hashable]:
+def _mask(mask: Mask) -> Iterator[Hashable]:
     # Blender tells of these; many points take long to read.
     yield _masks.get(mask.session_uid, lambda: hash((mask.frame_start, mask_reading.mask_at(mask, mask.frame_start))))
     yield from mask_reading.motion(mask)
@@ -197,12 +193,12 @@ def _mask(mask: Any) -> Iterator[Hashable]:
         yield from _curve(curve)
 
 
-def _timing(source: Any) -> Iterator[Hashable]:
+def _timing(source: Strip) -> Iterator[Hashable]:
     yield tuple(getattr(source, name) for name in _TIMING)
     yield retiming_keys(source)
 
 
-def _source(effect: Any, source: Any, looked: dict) -> Iterator[Hashable]:
+def _source(effect: PropertyGroup, source: Strip, looked: dict) -> Iterator[Hashable]:
     yield from _timing(source)
     yield source_media.reading(source)
     try:
@@ -214,7 +210,7 @@ def _source(effect: Any, source: Any, looked: dict) -> Iterator[Hashable]:
         yield files
 
 
-def _bytes(collection: Any, name: str, size: int, dtype: type) -> bytes:
+def _bytes(collection: bpy_prop_collection, name: str, size: int, dtype: type) -> bytes:
     values: np.ndarray = np.empty(size * len(collection), dtype)
     collection.foreach_get(name, values)
     return values.tobytes()

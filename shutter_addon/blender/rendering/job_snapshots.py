@@ -7,13 +7,15 @@ every frame of the film, and not again. What was not read then (a strip that was
 effect strip skips to) is read on the main thread when it is asked for.
 """
 
+from __future__ import annotations
+
 import math
 from collections.abc import Callable, Iterator
-from typing import Any
 
 import bpy
 import numpy as np
 from bpy.app.translations import pgettext_rpt as rpt_
+from bpy.types import PropertyGroup, Scene, Strip
 
 from ...core.messages import EffectError
 from ...core.stopping import StoppedError
@@ -33,7 +35,7 @@ _left_out: list[tuple[range, str]] = []  # of its film, see requirements.left_ou
 def begin(film: int) -> None:
     """Reads all effects for a job, on the main thread; film: session_uid of the scene that it renders."""
     _taken.clear()
-    film_scene = _scene(film)
+    film_scene = strips.scene_of_uid(film)
     for scene, effect, parts in shown_effects(film_scene) if film_scene else ():
         if effect.scene.session_uid in _taken:  # of a copied scene: the first counts, as for strips.find_effect
             continue
@@ -68,17 +70,17 @@ def end() -> None:
 def look(film: int) -> None:
     """Looks on the main thread whether the sequencer leaves effects out of a film, by its session_uid: an editor may
     delete a camera while it renders."""
-    scene = _scene(film)
+    scene = strips.scene_of_uid(film)
     _left_out[:] = requirements.left_out(scene) if scene else []
 
 
-def left_out(scene: Any) -> str | None:
+def left_out(scene: Scene) -> str | None:
     """Why the sequencer leaves an effect out of a film's current frame; None: it does not."""
     reasons = _left_out if render_job.where() is Where.JOB else requirements.left_out(scene)
     return next((why for frames, why in reasons if scene.frame_current in frames), None)
 
 
-def of(effect_scene: Any, scene_frame: float, ended: Callable[[], bool] | None = None) -> tuple[Snapshot, float]:
+def of(effect_scene: Scene, scene_frame: float, ended: Callable[[], bool] | None = None) -> tuple[Snapshot, float]:
     """The snapshot of an effect scene, and the timeline frame at which it shows one of its own frames. One of
     effect_source.FAULTS: there is none. ended: whether nobody waits for it any longer."""
     uid = effect_scene.session_uid
@@ -102,7 +104,7 @@ def of(effect_scene: Any, scene_frame: float, ended: Callable[[], bool] | None =
     return _of_film(scene, effect, strip, frame), frame
 
 
-def _of_film(scene: Any, effect: Any, strip: Any, frame: float) -> Snapshot:
+def _of_film(scene: Scene, effect: PropertyGroup, strip: Strip, frame: float) -> Snapshot:
     """The snapshot of an effect in the background."""
     key, frames = (effect.scene.session_uid, strip.name), {frame, frame + scene.frame_step}
     is_again = key in _films and not render_job.scripts_act()
@@ -116,7 +118,7 @@ def _of_film(scene: Any, effect: Any, strip: Any, frame: float) -> Snapshot:
 
 
 def _late(uid: int, scene_frame: float) -> Snapshot | Exception:
-    if (effect_scene := _scene(uid)) is None:
+    if (effect_scene := strips.scene_of_uid(uid)) is None:
         return EffectError(rpt_("the effect was deleted while it was rendered"))
     try:
         scene, effect, strip = strips.find_effect(effect_scene, scene_frame)
@@ -125,11 +127,7 @@ def _late(uid: int, scene_frame: float) -> Snapshot | Exception:
         return error
 
 
-def _scene(uid: int) -> Any:
-    return next((scene for scene in bpy.data.scenes if scene.session_uid == uid), None)
-
-
-def shown_effects(film: Any) -> Iterator[tuple[Any, Any, list]]:
+def shown_effects(film: Scene) -> Iterator[tuple[Scene, PropertyGroup, list[Strip]]]:
     """The effects that a film's scene shows, and the scenes in its Scene strips: each with its scene and with the
     strips that show it."""
     for scene in strips.shown_scenes(film):
@@ -139,7 +137,7 @@ def shown_effects(film: Any) -> Iterator[tuple[Any, Any, list]]:
                 yield scene, effect, parts
 
 
-def asked_frames(scene: Any, parts: Any, is_film: bool) -> set[float]:
+def asked_frames(scene: Scene, parts: list[Strip], is_film: bool) -> set[float]:
     """The timeline frames at which the parts of an effect may be asked for: those of the film, or in another scene,
     which strips show, all."""
     first, last = scene.frame_start, scene.frame_end

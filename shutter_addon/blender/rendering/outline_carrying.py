@@ -8,7 +8,6 @@ from collections.abc import Callable
 from concurrent.futures import Future
 from contextlib import closing
 from dataclasses import dataclass, field
-from typing import Any
 
 import bpy
 
@@ -121,7 +120,7 @@ def stop() -> None:
     _running.clear()
 
 
-def forget(*_: Any) -> None:
+def forget(*_: object) -> None:
     """Ends what runs: when a file is loaded, and when the extension goes."""
     stop()
     _wanted.clear()

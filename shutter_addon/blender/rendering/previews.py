@@ -11,7 +11,9 @@ import math
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Any, NamedTuple
+from typing import NamedTuple
+
+from bpy.types import Context, Scene
 
 from ...compute.renderer import Renderer
 from ...compute.request import Request
@@ -119,7 +121,7 @@ class _Looking:
 looking = _Looking()
 
 
-def for_engine(context: Any, effect_scene: Any) -> Asked | None:
+def for_engine(context: Context, effect_scene: Scene) -> Asked | None:
     """What the engine is asked for while Blender draws a preview; None: somebody else asks. One of
     effect_source.FAULTS: the effect cannot be shown."""
     region, looking.decision = context.region, None
@@ -153,7 +155,7 @@ def take_decision() -> Decision | None:
     return decision
 
 
-def for_drawing(context: Any, shown: Shown, decision: Decision | None) -> Drawing:
+def for_drawing(context: Context, shown: Shown, decision: Decision | None) -> Drawing:
     """What our draw handler draws. decision: the engine's; it holds unless something has changed since. One of
     effect_source.FAULTS: the effect cannot be shown."""
     settings, snapshot = context.window_manager.virtual_shutter, _snapshot(shown)
@@ -179,17 +181,17 @@ def for_drawing(context: Any, shown: Shown, decision: Decision | None) -> Drawin
     )
 
 
-def request_of(context: Any, shown: Shown) -> Request:
+def request_of(context: Context, shown: Shown) -> Request:
     """What our draw handler draws of the effect strip at the current frame. One of effect_source.FAULTS: it cannot be
     shown."""
     return _drafted(context, shown, _decide(context, shown, _look(context, shown), _snapshot(shown)).request)
 
 
-def _look(context: Any, shown: Shown) -> Look:
+def _look(context: Context, shown: Shown) -> Look:
     return preview_areas.look(context, shown.scene, shown.effect, shown.strip)
 
 
-def _decide(context: Any, shown: Shown, look: Look, snapshot: Snapshot) -> Decision:
+def _decide(context: Context, shown: Shown, look: Look, snapshot: Snapshot) -> Decision:
     render = render_context.of_drawing()
     request = _requested(context, render, shown, snapshot, look)
     return Decision(snapshot, request, _is_drawn(context, shown, look, render.renderer(request).source))
@@ -199,7 +201,7 @@ def _snapshot(shown: Shown) -> Snapshot:
     return invalidation.current(shown.scene, shown.effect, shown.strip, shown.scene.frame_current)
 
 
-def _requested(context: Any, render: RenderContext, shown: Shown, snapshot: Snapshot, look: Look) -> Request:
+def _requested(context: Context, render: RenderContext, shown: Shown, snapshot: Snapshot, look: Look) -> Request:
     """The picture in the previews' detail: in full, while it is looked at so. That ends here with the frame and with a
     change of the effect."""
     frame = shown.scene.frame_current
@@ -225,7 +227,7 @@ def _detail(look: Look) -> effect_source.Detail:
     return effect_source.Detail(divisor, look.proxy)
 
 
-def _is_drawn(context: Any, shown: Shown, look: Look, source: FrameSource) -> bool:
+def _is_drawn(context: Context, shown: Shown, look: Look, source: FrameSource) -> bool:
     """Whether our draw handler shows the result, or in another view what covers it, in place of what Blender makes of
     the engine's picture: wherever both are the same, in all previews of the scene. Not a still picture of full size:
     what is drawn passes through 8 bits on its way to the screen, and lacks shades next to black."""
@@ -241,7 +243,7 @@ def _is_drawn(context: Any, shown: Shown, look: Look, source: FrameSource) -> bo
     )
 
 
-def _drafted(context: Any, shown: Shown, request: Request) -> Request:
+def _drafted(context: Context, shown: Shown, request: Request) -> Request:
     is_result = context.window_manager.virtual_shutter.view in RESULTS and _is_rendered(shown)
     if looking.whole is not None or (is_result and not is_going(context)):
         return request
@@ -265,7 +267,7 @@ def _is_rendered(shown: Shown) -> bool:
     return shown.scene.render.sequencer_gl_preview == "RENDERED"
 
 
-def _time_up(context: Any, key: tuple) -> Slice:
+def _time_up(context: Context, key: tuple) -> Slice:
     """What says whether a picture, by its request's key, has been composed for so long that Blender has to look at its
     keys: it goes on when it is drawn again."""
     if _is_playing(context):
@@ -285,17 +287,12 @@ def was_drawn() -> None:
     looking.slice_of = looking.slice = None
 
 
-def is_composing() -> bool:
-    """Whether a picture that was begun is not there yet."""
-    return looking.slice is not None
-
-
-def is_going(context: Any) -> bool:
+def is_going(context: Context) -> bool:
     """Whether the film plays, or may_be_late."""
     return _is_playing(context) or may_be_late()
 
 
-def _is_playing(context: Any) -> bool:
+def _is_playing(context: Context) -> bool:
     return any(window.screen.is_animation_playing for window in context.window_manager.windows)
 
 
@@ -317,7 +314,7 @@ def may_be_late() -> bool:
     return time.monotonic() < looking.late_until
 
 
-def is_read(context: Any) -> bool:
+def is_read(context: Context) -> bool:
     """Whether somebody reads the sequencer's picture from the window, for whom it has to be whole."""
     tool = context.workspace and context.workspace.tools.from_space_sequencer("PREVIEW", create=False)
     return bool(_READERS & render_job.operators_running()) or (tool is not None and tool.idname == _READING_TOOL)

@@ -4,18 +4,23 @@ Blender writes a frame whose engine failed without it, so a picture that is miss
 Blender finishes an open movie, up to the frame before, and calls `render_cancel`.
 """
 
+from __future__ import annotations
+
 import os
 import sys
 import threading
 import time
 from collections.abc import Callable, Iterator
+from concurrent.futures import Future, wait
 from contextlib import AbstractContextManager, contextmanager, suppress
 from dataclasses import dataclass
 from enum import Enum
+from itertools import chain
 from types import FrameType
-from typing import Any
+from typing import TypeVar
 
 import bpy
+from bpy.types import Scene
 
 from ...core import told
 from ...core.messages import sentence, signed
@@ -23,12 +28,14 @@ from ..data import main_thread
 from ..data.property_copy import for_a_while
 from ..data.strips import ENGINE
 
+T = TypeVar("T")
 BAD_INPUT = 2
 _PATIENCE = 0.1  # seconds between two looks at whether a render has ended
 _LONG = 10.0  # seconds
 
 
-def _to_stderr(text: str) -> None:
+def say(text: str) -> None:
+    """Says something on stderr."""
     with suppress(OSError, AttributeError):  # nobody reads it, or there is no stderr
         print(signed(text), file=sys.stderr, flush=True)
 
@@ -59,7 +66,7 @@ class _Job:
     begun: bool = False
     stopping: bool = False
     failure: str | None = None
-    tell: Callable[[str], None] = _to_stderr
+    tell: Callable[[str], None] = say
     cancelling: bool = False
     waited_for: bool = False
 
@@ -68,7 +75,7 @@ _job = _Job()
 _spent: list[tuple[str, str]] = []  # names of the scenes and cameras of small renders, see _cancel
 
 
-def begin(scene: Any) -> bool:
+def begin(scene: Scene) -> bool:
     """A render begins. True: that of a film or a picture; not of a scene in one, nor of a preview."""
     is_effect = scene.render.engine == ENGINE
     if _job.film is not None and (_job.begun or is_effect):
@@ -92,7 +99,7 @@ def film() -> int | None:
     return _job.film
 
 
-def is_film(scene: Any) -> bool:
+def is_film(scene: Scene) -> bool:
     """Whether this scene's frames are what is rendered; called before each of them."""
     if scene.session_uid != _job.film:
         return False
@@ -100,7 +107,7 @@ def is_film(scene: Any) -> bool:
     return True
 
 
-def end(scene: Any, alone: bool) -> None:
+def end(scene: Scene, alone: bool) -> None:
     """A render has ended. alone: no Python waits for it, Blender itself renders, and would go on or end with exit code
     1."""
     if scene.session_uid == _job.film:
@@ -162,39 +169,32 @@ def scripts_act() -> bool:
     handlers, own = bpy.app.handlers, __name__.split(".blender.")[0]
     lists: list[list] = [handlers.render_pre, handlers.render_post, handlers.render_write, handlers.render_stats]
     lists += [handlers.render_init, handlers.frame_change_pre, handlers.frame_change_post]  # of effects at each frame
-    return any(not _module(function).startswith(own) for functions in lists for function in functions)
+    functions = [getattr(each, "func", each) for each in chain(*lists)]  # of partial ones, what they call
+    return any(not str(getattr(function, "__module__", "")).startswith(own) for function in functions)
 
 
-def _module(function: Any) -> str:
-    """Where a function, or what is partly given its arguments, is from."""
-    return str(getattr(getattr(function, "func", function), "__module__", ""))
-
-
-def on_main_thread(function: Callable, ended: Callable[[], bool] | None = None) -> Any:
+def on_main_thread(function: Callable[[], T], ended: Callable[[], bool] | None = None) -> T | None:
     """What a function gives on Blender's main thread, where its data and its operators belong; None: it was not waited
     for, and is not called any more. ended: whether nobody waits for it any longer; without it, the window is not waited
     for long. Once it is called, its end is waited for."""
     if where() is not Where.JOB:
         return function()
-    chance, done, deadline, results = threading.Lock(), threading.Event(), time.monotonic() + _LONG, []
+    future: Future[T] = Future()
+    deadline = time.monotonic() + _LONG
     ended = ended or (lambda: time.monotonic() > deadline)
 
     def call() -> None:
-        if chance.acquire(blocking=False):
+        if future.set_running_or_notify_cancel():
             try:
-                results.append((True, function()))
+                future.set_result(function())
             except Exception as error:
-                results.append((False, error))
-            done.set()
+                future.set_exception(error)
 
     main_thread.soon(call)
-    while not done.wait(_PATIENCE):
-        if ended() and chance.acquire(blocking=False):
+    while not wait([future], _PATIENCE).done:
+        if ended() and future.cancel():
             return None
-    good, value = results[0]
-    if not good:
-        raise value
-    return value
+    return future.result()
 
 
 def soon(function: Callable[[], None]) -> None:
@@ -223,11 +223,6 @@ def fail(text: str) -> None:
         _job.tell(text)
 
 
-def failure() -> str | None:
-    """The sentence that ended the render which runs or ran last; None: none had to."""
-    return _job.failure
-
-
 def cancel(ended: Callable[[], bool] | None = None) -> None:
     """Ends the render that runs, as soon as this returns to Blender: from a picture, or from what comes before a frame.
     (After one Blender would go on with the next, and crash.)
@@ -243,8 +238,14 @@ def cancel(ended: Callable[[], bool] | None = None) -> None:
 
 
 def _cancel_and_show() -> None:
+    """As _cancel, and says in the window what failed: reports of an engine within the sequencer reach nobody."""
     _cancel()
-    _show()
+    if _job.failure is not None:
+        text = sentence(_job.failure)
+        with bpy.context.temp_override(window=bpy.context.window_manager.windows[0]):
+            bpy.context.window_manager.popup_menu(
+                lambda menu, _context: menu.layout.label(text=text), title="Virtual Shutter", icon="ERROR"
+            )
 
 
 def _cancel() -> None:
@@ -287,16 +288,6 @@ def _remove_spent() -> None:
 def cancelling() -> bool:
     """Whether the small render runs whose error ends the other one."""
     return _job.cancelling
-
-
-def _show() -> None:
-    """Says in the window what failed: reports of an engine within the sequencer reach nobody."""
-    if _job.failure is not None:
-        text = sentence(_job.failure)
-        with bpy.context.temp_override(window=bpy.context.window_manager.windows[0]):
-            bpy.context.window_manager.popup_menu(
-                lambda menu, _context: menu.layout.label(text=text), title="Virtual Shutter", icon="ERROR"
-            )
 
 
 def leave(code: int) -> None:

@@ -23,7 +23,7 @@ from ...media.matte_values import Late, MatteValues
 from ..data.snapshot import Snapshot
 from ..devices import available
 from . import render_settings
-from .device_work import Work, broken_off, result_of
+from .device_work import T, Work, broken_off, result_of
 from .effect_source import FAULTS, FULL, Detail, SourceKey, clip_of
 
 if TYPE_CHECKING:
@@ -41,7 +41,7 @@ class RenderSession:
         choose: Callable[[], tuple[str, str | None]],
         ask_others: Callable[[], None],
         late: Late | None = None,
-    ):
+    ) -> None:
         """choose: gives the device, as available.choose; ask_others: called where the GPU has no room, has others free
         what they hold of it; late: see MatteValues."""
         self._choose, self._ask_others, self._late = choose, ask_others, late
@@ -66,11 +66,11 @@ class RenderSession:
         """Whether the device belongs to a thread of its own; otherwise to whichever calls."""
         return self.device != "blender"
 
-    def run(self, function: Callable[..., Any], *arguments: Any, stopped: Callable[[], bool] = never) -> Any:
+    def run(self, function: Callable[..., T], *arguments: object, stopped: Callable[[], bool] = never) -> T:
         """The result of a function that uses the device. StoppedError: it is not waited for any longer, and ends."""
         return self._submit(function, *arguments, stopped=stopped).result(stopped)
 
-    def _submit(self, function: Callable[..., Any], *arguments: Any, stopped: Callable[[], bool] = never) -> Work:
+    def _submit(self, function: Callable, *arguments: object, stopped: Callable[[], bool] = never) -> Work:
         """A function that uses the device, called after those before it. stopped: asked where it is called at once."""
         ended = threading.Event()
         if self.threaded:

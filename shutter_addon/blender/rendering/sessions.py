@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import bpy
 
 from ..devices import available, gpu_relay
@@ -67,7 +65,7 @@ def drop_removed() -> None:
         session.keep(scenes)
 
 
-def forget(*_: Any) -> None:
+def forget(*_: object) -> None:
     """Closes all sources and frees the devices: when a file is loaded, and when the extension goes."""
     outline_carrying.forget()
     for session in SESSIONS:

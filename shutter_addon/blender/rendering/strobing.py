@@ -4,6 +4,8 @@ how many in-between frames help, and what these cost.
 It is measured in a thread that touches no bpy, of a few frames of the footage, and only when the interface says so
 (`advance`): drawing asks for what is known, and never waits."""
 
+from __future__ import annotations
+
 import threading
 from collections.abc import Callable
 from concurrent.futures import Future, wait
@@ -14,6 +16,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from bpy.app.translations import pgettext_rpt as rpt_
+from bpy.types import PropertyGroup, Strip
 
 from ...compute.renderer import Renderer
 from ...compute.request import Request
@@ -76,7 +79,7 @@ class Looked(NamedTuple):
     is_busy: bool
 
 
-def look(effect: Any, strip: Any, snapshot: Snapshot, renderer: Renderer, request: Request) -> Looked:
+def look(effect: PropertyGroup, strip: Strip, snapshot: Snapshot, renderer: Renderer, request: Request) -> Looked:
     """Looks at a picture's exposure. What is not known is asked for."""
     _measuring.wanted, before = None, last(effect)
     frame, known = effect.id_data.frame_current, _look(effect, strip, snapshot, renderer, request)
@@ -84,13 +87,15 @@ def look(effect: Any, strip: Any, snapshot: Snapshot, renderer: Renderer, reques
     return Looked(known=known, is_new=known != before, is_busy=is_busy())
 
 
-def last(effect: Any) -> Strobing | None:
+def last(effect: PropertyGroup) -> Strobing | None:
     """What the last look has found, if it was at the effect's current frame."""
     frame, known = _last_looks.get(effect.scene.session_uid, (None, None))
     return known if frame == effect.id_data.frame_current else None
 
 
-def _look(effect: Any, strip: Any, snapshot: Snapshot, renderer: Renderer, request: Request) -> Strobing | None:
+def _look(
+    effect: PropertyGroup, strip: Strip, snapshot: Snapshot, renderer: Renderer, request: Request
+) -> Strobing | None:
     ways = _ways(renderer, request)
     pairs = _chosen(sorted(ways))
     if lacking := [pair for pair in pairs if (snapshot.source.key, pair) not in _moved]:
@@ -168,7 +173,7 @@ def _factor(state: FrameState, ratio: float) -> int | None:
     return next((factor for factor in possible if factor >= ratio * now), possible[-1] if possible else None)
 
 
-def _count(strip: Any, snapshot: Snapshot, source: Any, request: Request) -> int:
+def _count(strip: Strip, snapshot: Snapshot, source: Any, request: Request) -> int:
     """About how many pairs the strip's pictures need, or a few more."""
     options = request.state.options
     all_pairs = source.filmed - 1
