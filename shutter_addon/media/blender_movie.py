@@ -24,7 +24,7 @@ class BlenderMovie(FrameSource):
 
     transfer, by_blender = "srgb", True
 
-    def __init__(self, path: str | Path, *, deinterlace: bool = False):
+    def __init__(self, path: str | Path, *, deinterlace: bool = False) -> None:
         self.path = check_file(path)
         check_name(self.path.absolute())
         self.options = {"stream": 0, "deinterlace": bool(deinterlace)}
@@ -63,7 +63,7 @@ class BlenderMovie(FrameSource):
 class BlenderMovieChannel(BlenderMovie):
     """One channel of a movie's frames, as movie.MovieChannel has it; but a grey movie has luminance by its RGB too."""
 
-    def __init__(self, path: str | Path, channel: str):
+    def __init__(self, path: str | Path, channel: str) -> None:
         """channel: one of CHANNELS. MediaError: it is another one, or the movie cannot be read."""
         if channel not in CHANNELS:
             raise no_channel(check_file(path), channel, CHANNELS)

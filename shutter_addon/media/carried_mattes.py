@@ -84,7 +84,7 @@ class CarriedMattes:
 
     def __init__(
         self, source: FrameSource, drawings: tuple[tuple[int, outlines.Curves], ...], folder: Path | None = None
-    ):
+    ) -> None:
         self._source = source if isinstance(source, ShotSource) else ShotSource(source)
         self.width, self.height = source.width, source.height
         self.count = self.filmed = source.count

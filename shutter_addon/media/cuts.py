@@ -240,7 +240,7 @@ class ShotSource(SourceWrapper):
     what is decided without a frame that cannot be read is decided again.
     """
 
-    def __init__(self, source: FrameSource, step: int = 1):
+    def __init__(self, source: FrameSource, step: int = 1) -> None:
         super().__init__(source)
         self.step = step
         self.filmed = (source.count - 1) // step + 1  # how many frames are

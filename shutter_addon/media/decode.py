@@ -59,7 +59,7 @@ class FrameReader:
     Memory: the frame on screen, its successor, and what the decoder holds. Not for two threads at once.
     """
 
-    def __init__(self, path: Path, number: int = 0):
+    def __init__(self, path: Path, number: int = 0) -> None:
         """number: which of the file's video streams. Raises MediaError if nothing of it can be decoded."""
         self._path, self._number, self._threads = path, number, "AUTO"
         self._container: InputContainer | None = None
@@ -209,7 +209,7 @@ class _Run:
     passed: the latest time of a frame before it
     """
 
-    def __init__(self, file: File, landmarks: _Landmarks, seeking: bool):
+    def __init__(self, file: File, landmarks: _Landmarks, seeking: bool) -> None:
         self.file, self._landmarks = file, landmarks
         self.fault, self.is_first = "", not seeking
         self._awaited: list[int] = []

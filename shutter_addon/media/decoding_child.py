@@ -54,7 +54,7 @@ def is_lent() -> bool:
 class Movie:
     """A movie that can be asked for. The process opens it when it is, for itself and no other one of the same file."""
 
-    def __init__(self, path: Path, deinterlace: bool):
+    def __init__(self, path: Path, deinterlace: bool) -> None:
         self._known = {"number": next(_numbers), "path": str(path.absolute()), "deinterlace": deinterlace}
 
     def about(self) -> dict:

@@ -18,6 +18,6 @@ def lacks_opencv(what: str) -> MediaError:
 class NotBuiltError(MediaError):
     """An in-between frame is not built; factor: of in-between frames."""
 
-    def __init__(self, sentence: str, factor: int):
+    def __init__(self, sentence: str, factor: int) -> None:
         super().__init__(sentence)
         self.factor = factor

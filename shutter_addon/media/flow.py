@@ -118,7 +118,7 @@ METHODS: dict[str, tuple[Flow, ...]] = {
 class _Paths:
     """Where the pixels of two pictures go from one to the other."""
 
-    def __init__(self, luma: list[np.ndarray], flow: Flow):
+    def __init__(self, luma: list[np.ndarray], flow: Flow) -> None:
         self._shape = luma[0].shape
         self._sides = [_carriers(a, b, flow) for a, b in (luma, luma[::-1])]
 

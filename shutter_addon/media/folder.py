@@ -22,7 +22,7 @@ class Folder:
 
     Windows opens no folders: what a name stands for is looked at just before. Everything here may raise OSError."""
 
-    def __init__(self, path: str | Path, within: Folder | None = None):
+    def __init__(self, path: str | Path, within: Folder | None = None) -> None:
         """path: a name where it lies within another folder. OSError: there is none, or it is a link."""
         self.path: Path = within.path / path if within else Path(path)
         place = within._at(path) if within else {"path": path}

@@ -22,7 +22,7 @@ class Footage:
 
     size: width and height of the pictures; index_at: the source's frame that is shown at a timeline frame"""
 
-    def __init__(self, source: FrameSource, index_at: Callable[[int], int]):
+    def __init__(self, source: FrameSource, index_at: Callable[[int], int]) -> None:
         """MediaError: OpenCV is missing."""
         registration.check()
         self._source, self._index_at = source, index_at

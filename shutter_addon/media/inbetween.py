@@ -44,7 +44,7 @@ class InbetweenSource(SourceWrapper):
     Frame i·factor is the source's frame i. Those between come from the cache in `folder`; where the pair is a cut, they
     are the nearer source frame, and where it is two equal frames, the first."""
 
-    def __init__(self, source: FrameSource, folder: str | Path, factor: int, method: str):
+    def __init__(self, source: FrameSource, folder: str | Path, factor: int, method: str) -> None:
         super().__init__(source)
         self.factor = factor
         self._cache = InbetweenCache(source, folder, factor, method)
@@ -222,7 +222,7 @@ class _Near:
 
     The latter are kept for their own pair, as far as AHEAD allows; the rest are read again."""
 
-    def __init__(self, source: FrameSource):
+    def __init__(self, source: FrameSource) -> None:
         self._source = source
         self._most = 2 + _ahead(source)
         self._frames: dict[int, np.ndarray] = {}  # the pair's frames, and those that are kept for their pair

@@ -62,7 +62,7 @@ class InbetweenCache:
     kinds: {pair: "same" or "cut"} of pairs without pictures
     """
 
-    def __init__(self, source: FrameSource, folder: str | Path, factor: int, method: str):
+    def __init__(self, source: FrameSource, folder: str | Path, factor: int, method: str) -> None:
         self.source, self.factor, self.method = source, factor, method
         made_of = {
             "maker": MAKER,

@@ -49,7 +49,7 @@ class MatteSource:
 
     def __init__(
         self, path: Path, channel: str = "luminance", *, files: Sequence[str | Path] | None = None, stream: int = 0
-    ):
+    ) -> None:
         """As MatteFile has them."""
         self._frames = open_channel(path, channel, files=files, stream=stream)
         self.path, self.count = self._frames.path, self._frames.count

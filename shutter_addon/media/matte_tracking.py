@@ -81,7 +81,9 @@ def follow_cover(
 
 
 class _MatteTrack(tracking.Track):
-    def __init__(self, region: Subject, cover: Cover, footage: Footage, motion: Motion, frames: Collection[int]):
+    def __init__(
+        self, region: Subject, cover: Cover, footage: Footage, motion: Motion, frames: Collection[int]
+    ) -> None:
         super().__init__(region, footage, motion, frames)
         self._cover = cover
 
@@ -104,7 +106,7 @@ class _MatteTrack(tracking.Track):
 class _Pursuit:
     """The motion of what a matte covers, from one frame to those after it."""
 
-    def __init__(self, cover: Cover, footage: Footage, frame: int, motion: Motion):
+    def __init__(self, cover: Cover, footage: Footage, frame: int, motion: Motion) -> None:
         self._cover, self._footage, self._way = cover, footage, motion
         self._last, self._motion, self.reason = frame, Similarity(), COVERED
 

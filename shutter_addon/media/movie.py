@@ -57,7 +57,7 @@ class MovieSource(FrameSource):
         deinterlace: bool = False,
         divisor: int = 1,
         size: tuple[int, int] | None = None,
-    ):
+    ) -> None:
         """divisor: how many times smaller than the file's the frames are each way (ReducedSource)
         size: what opaque frames are fitted to, width and height, in place of `divisor`"""
         self.path = check_file(path)
@@ -195,7 +195,7 @@ class MovieSource(FrameSource):
 class MovieChannel(MovieSource):
     """One channel of a movie's frames: those of MovieSource, whose attributes it has."""
 
-    def __init__(self, path: str | Path, channel: str, *, stream: int = 0):
+    def __init__(self, path: str | Path, channel: str, *, stream: int = 0) -> None:
         """channel: one of CHANNELS. MediaError: it is another one, or the movie cannot be read."""
         if channel not in CHANNELS:
             raise no_channel(check_file(path), channel, CHANNELS)

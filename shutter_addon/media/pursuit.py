@@ -48,7 +48,9 @@ class PartPursuit:
 
     reason: why it was not found in the last one"""
 
-    def __init__(self, part: Part, footage: Footage, frame: int, motion: Motion, known: Similarity | None = None):
+    def __init__(
+        self, part: Part, footage: Footage, frame: int, motion: Motion, known: Similarity | None = None
+    ) -> None:
         """frame: the part's; known: the motion up to a frame in which the part is, but cannot be seen; the next one
         comes after that. None: it comes after the part's."""
         self._first, self._footage, self._motion, self.reason = part, footage, motion, COVERED

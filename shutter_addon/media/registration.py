@@ -90,7 +90,7 @@ class Part:
     Weights of the corners say how much each one counts; `learn` lowers those of corners that move otherwise, as
     those of the background do."""
 
-    def __init__(self, picture: np.ndarray, weight: np.ndarray):
+    def __init__(self, picture: np.ndarray, weight: np.ndarray) -> None:
         """weight: (H, W) float32, 0 to 1: how much each pixel belongs to it; there has to be one above 0."""
         self.weight, self._whole = weight, picture
         x, y, width, height = cv2.boundingRect((weight > 0).astype(np.uint8))

@@ -49,7 +49,7 @@ class ImageFiles:
     path: the first file; files: those there are, in order; count: of frames
     """
 
-    def __init__(self, path: str | Path, files: Sequence[str | Path] | None = None):
+    def __init__(self, path: str | Path, files: Sequence[str | Path] | None = None) -> None:
         """MediaError: there is no first file, or its folder cannot be listed."""
         path = Path(path)
         self.left_out = ""
@@ -87,7 +87,7 @@ class SequenceSource(FrameSource):
         files: Sequence[str | Path] | None = None,
         fps: Fraction | None = None,
         alpha: str | None = None,
-    ):
+    ) -> None:
         self._files = ImageFiles(path, files)
         self.path, self.count, self.left_out = self._files.path, self._files.count, self._files.left_out
         self.fps = fps
@@ -149,7 +149,7 @@ class SequenceChannel:
 
     fps = None
 
-    def __init__(self, path: str | Path, channel: str, *, files: Sequence[str | Path] | None = None):
+    def __init__(self, path: str | Path, channel: str, *, files: Sequence[str | Path] | None = None) -> None:
         """channel: one of CHANNELS, or the name of one of the files' own. MediaError: they have none of that name."""
         self._files = ImageFiles(path, files)
         self.path, self.count = self._files.path, self._files.count

@@ -12,7 +12,7 @@ from ..core.frames.planes import Planes
 class _Forwarded:
     """An attribute of the wrapped source, unless the wrapper sets its own."""
 
-    def __init__(self, name: str):
+    def __init__(self, name: str) -> None:
         self._name = name
 
     def __get__(self, wrapper: "SourceWrapper | None", _owner: type | None = None) -> Any:
@@ -22,7 +22,7 @@ class _Forwarded:
 class SourceWrapper(FrameSource):
     """A source around another one. It has all attributes and frames of that one, but for those that a subclass sets."""
 
-    def __init__(self, source: FrameSource):
+    def __init__(self, source: FrameSource) -> None:
         self._source = source
 
     def read(self, index: int) -> np.ndarray:

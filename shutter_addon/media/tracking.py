@@ -119,7 +119,7 @@ class Pursuit(Protocol):
 class Track(ABC):
     """What tracking a subject, a region or the camera, needs to know."""
 
-    def __init__(self, subject: Subject, footage: Footage, motion: Motion, frames: Collection[int]):
+    def __init__(self, subject: Subject, footage: Footage, motion: Motion, frames: Collection[int]) -> None:
         """frames: all at which the subject's centre is asked for."""
         self._subject, self._footage, self._motion = subject, footage, motion
         centres = {frame: subject.centre(frame) for frame in frames}
@@ -238,7 +238,7 @@ class Track(ABC):
 class _RegionTrack(Track):
     """Tracks what a region covers."""
 
-    def __init__(self, region: Drawn, footage: Footage, motion: Motion, frames: Collection[int]):
+    def __init__(self, region: Drawn, footage: Footage, motion: Motion, frames: Collection[int]) -> None:
         super().__init__(region, footage, motion, frames)
         self._region = region
         self._doubted: dict[int, int | None] = {}
