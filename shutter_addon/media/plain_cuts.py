@@ -1,5 +1,5 @@
-"""What cuts.py asks PySceneDetect's detectors, answered by NumPy alone where that is missing: the same sums of the same
-samples. Pictures are RGB (H, W, 3) uint8."""
+"""What PySceneDetect's detectors say of pictures, computed by NumPy alone: the same sums of the same samples, without
+OpenCV, which PySceneDetect needs. Pictures are RGB (H, W, 3) uint8."""
 
 from __future__ import annotations
 

@@ -502,14 +502,13 @@ BUILDER = """
 import sys, time
 sys.path.insert(0, "tests/media")
 from test_media_inbetween import blend, build
-from shutter_addon.media import cuts, open_source
+from shutter_addon.media import open_source
 
 def slow(*frames):
     for picture in blend(*frames):
         time.sleep(0.01)
         yield picture
 
-cuts.has_pyscenedetect()  # loads PySceneDetect
 print("ready", flush=True)
 sys.stdin.readline()
 build(open_source(sys.argv[1]), sys.argv[2], between=slow)

@@ -28,7 +28,6 @@ PACKAGES = {
     "PyAV": "av",
     "OpenCV": "cv2",
     "moderngl": "moderngl",
-    "PySceneDetect": "scenedetect",
 }
 
 
