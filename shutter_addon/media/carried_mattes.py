@@ -23,9 +23,9 @@ from ..core import stopping
 from ..core.farm.claims import Claims
 from ..core.frames.frame_source import FrameSource
 from ..core.model import outlines, scribbles
-from . import carrying, flow
+from . import carrying, flow, opencv
 from .cuts import ShotSource
-from .errors import MediaError, lacks_opencv
+from .errors import MediaError
 from .files import check_name
 from .folder import own_folder
 from .image_writing import write_levels
@@ -72,8 +72,7 @@ class CarriedFile:
 
     def open(self) -> CarriedMattes:
         """MediaError: the footage cannot be read, or OpenCV is missing."""
-        if not carrying.is_possible():
-            raise lacks_opencv("outlines are tracked by")
+        opencv.check("outlines are tracked by", "ximgproc")
         return CarriedMattes(self.footage.open(), self.drawings, self.folder)
 
 

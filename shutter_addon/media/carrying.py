@@ -25,11 +25,7 @@ import numpy as np
 from ..core import stopping
 from ..core.frames.light import to_linear
 from . import flow
-
-try:
-    import cv2
-except ImportError:  # a package without wheels; the extension registers without it
-    cv2 = None
+from .opencv import cv2
 
 WORKING = 512
 SLIM = 4  # pixels of a side that the working picture keeps: so many as a picture has at least that Blender renders
@@ -84,11 +80,6 @@ class Carried:
 
 # Frames as they are displayed: (H, W, 3) uint8 of a source frame.
 Frames = Callable[[int], np.ndarray]
-
-
-def is_possible() -> bool:
-    """Whether the libraries are there that this takes."""
-    return hasattr(cv2, "ximgproc")
 
 
 def working_size(width: int, height: int) -> tuple[int, int]:

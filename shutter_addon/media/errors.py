@@ -7,14 +7,6 @@ class MediaError(UserError):
     """One clear sentence for the user, naming the file."""
 
 
-def lacks_opencv(what: str) -> MediaError:
-    """That OpenCV is missing; what: a sentence's beginning, as "tracking needs"."""
-    return MediaError(
-        f"{what} the Python package opencv-contrib-python-headless; "
-        "install the zip of Virtual Shutter that is made for your system"
-    )
-
-
 class NotBuiltError(MediaError):
     """An in-between frame is not built; factor: of in-between frames."""
 

@@ -14,12 +14,8 @@ import numpy as np
 
 from ..core import stopping
 from ..core.frames import light
-from .errors import lacks_opencv
-
-try:
-    import cv2
-except ImportError:  # a package without wheels; the extension registers without it
-    cv2 = None
+from . import opencv
+from .opencv import cv2
 
 STEP = 2  # pixels between the vectors that are carried; all pixels gain nothing and take four times as long
 SMALLEST = 16  # pixels; OpenCV's flows need about as many, smaller pictures are cross-faded
@@ -29,8 +25,7 @@ ALIKE = 8  # levels of 255 by which the ends of a vector may differ before anoth
 
 def check() -> None:
     """MediaError: OpenCV is missing, or has no contributed modules."""
-    if not hasattr(cv2, "optflow"):  # another add-on may bring an OpenCV without it
-        raise lacks_opencv("in-between frames need")
+    opencv.check("in-between frames need", "optflow")
 
 
 def between(

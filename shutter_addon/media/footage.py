@@ -9,7 +9,7 @@ import numpy as np
 from ..core import stopping
 from ..core.frames import light
 from ..core.frames.frame_source import FrameSource
-from . import registration
+from . import opencv, registration
 
 WIDTH = 960  # pixels of the pictures that are compared, at most, along their longer side
 AHEAD = 8  # frames that the source may decode in advance
@@ -24,7 +24,7 @@ class Footage:
 
     def __init__(self, source: FrameSource, index_at: Callable[[int], int]) -> None:
         """MediaError: OpenCV is missing."""
-        registration.check()
+        opencv.check("tracking needs")
         self._source, self._index_at = source, index_at
         share = min(1.0, WIDTH / max(source.width, source.height))
         self.size = max(1, round(source.width * share)), max(1, round(source.height * share))

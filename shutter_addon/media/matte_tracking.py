@@ -15,14 +15,10 @@ from . import flow, tracking
 from .carried_mattes import CarriedFile, CarriedMattes
 from .carrying import box_around
 from .footage import Footage
+from .opencv import cv2
 from .pursuit import COVERED, LEFT, Sighting
 from .registration import Part
 from .tracking import Subject, Tracked, TrackingError
-
-try:
-    import cv2
-except ImportError:  # a package without wheels; the extension registers without it
-    cv2 = None
 
 EMPTY = "the outline encloses nothing here"
 

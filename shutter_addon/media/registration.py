@@ -14,12 +14,7 @@ from typing import Any, get_args
 import numpy as np
 
 from ..core.model.motions import Motion, Similarity
-from .errors import lacks_opencv
-
-try:
-    import cv2
-except ImportError:  # a package without wheels; the extension registers without it
-    cv2 = None
+from .opencv import cv2
 
 # What may change beside the location, each with what comes before it.
 MOTIONS = get_args(Motion)
@@ -40,12 +35,6 @@ _TRACED = 13  # side of the windows by which points are traced through pictures
 _NOISE = 16.0  # levels² of contrast that noise may have: they make no two pictures unlike
 # Beyond these the motion between two pictures is none that a film has.
 _MOST_SCALE, _MOST_TURN = 1.5, 0.8
-
-
-def check() -> None:
-    """MediaError: OpenCV is missing."""
-    if cv2 is None:
-        raise lacks_opencv("tracking needs")
 
 
 def grey(frame: np.ndarray, size: tuple[int, int], alpha: str = "opaque") -> np.ndarray:

@@ -17,7 +17,7 @@ import numpy as np
 import pytest
 from footage import COUNT, cut_file, damage_frame, make_movie, number, picture, save_image
 
-from shutter_addon.media import MediaError, decoding_child, flow, inbetween, open_source, opening
+from shutter_addon.media import MediaError, decoding_child, inbetween, open_source, opencv, opening
 from shutter_addon.media.blender_movie import BlenderMovie, BlenderMovieChannel, frame_rate
 from shutter_addon.media.file_kind import file_kind
 from shutter_addon.media.inbetween import InbetweenSource
@@ -373,7 +373,7 @@ def test_in_between_frames_that_are_built_already_are_used(coloured, tmp_path, m
     with open_source(path) as by_pyav:
         inbetween.build(by_pyav, tmp_path, 2, "quick")
         built = InbetweenSource(by_pyav, tmp_path, 2, "quick").read(1)
-    monkeypatch.setattr(flow, "cv2", None)
+    monkeypatch.setattr(opencv, "cv2", None)
     with BlenderMovie(path) as source:
         assert inbetween.build(source, tmp_path, 2, "quick").name == "ready"
         assert np.array_equal(InbetweenSource(source, tmp_path, 2, "quick").read(1), built)

@@ -24,7 +24,7 @@ from ...core.model import shutters
 from ...core.model.frame_state import FrameState
 from ...core.model.motions import Similarity
 from ...core.pixels import compositor
-from ...media import MediaError, inbetween, steps
+from ...media import MediaError, inbetween, opencv, steps
 from ...media.cuts import ShotSource
 from ..data import inbetween_settings
 from ..data.snapshot import Snapshot
@@ -238,7 +238,7 @@ def forget() -> None:
 def _measure_motion(spec: SourceSpec, lacking: list[int]) -> None:
     for pair in lacking:
         _moved[spec.key, pair] = None  # what cannot be read is not tried again
-    if not steps.is_possible():
+    if opencv.cv2 is None:
         return
     with suppress(MediaError, OSError), spec.open() as medium:
         for pair in lacking:
