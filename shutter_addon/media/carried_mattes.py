@@ -165,7 +165,8 @@ class CarriedMattes:
             path = self._path(index, first, last)
             with Claims(path.parent, _PATIENCE, _BEAT) as claims:
                 try:
-                    while not _taken(claims, path.parent, name):
+                    own_folder(path.parent)
+                    while not claims.take(name):
                         stopping.check()
                         time.sleep(_PAUSE)
                 except OSError as error:
@@ -280,12 +281,6 @@ class CarriedMattes:
     def _keep(self, path: Path, carried: carrying.Carried) -> None:
         """Writes a matte whole or not at all. MediaError: it cannot be written."""
         write_levels(path, carried.matte, f"{CONFIDENCE}{carried.confidence:.3f}")
-
-
-def _taken(claims: Claims, folder: Path, name: str) -> bool:
-    """As Claims.take. OSError: the folder cannot be written to, or is a link."""
-    with own_folder(folder):
-        return claims.take(name)
 
 
 def _use_elsewhere(parent: Path | None) -> str:

@@ -35,7 +35,8 @@ LAYERS = 26
 _PAUSE = 1.0  # seconds between two looks at what other processes have built
 
 # What makes the frames of a pair: flow.between, or what stands for it.
-Between = Callable[..., Iterator[np.ndarray]]
+Pictures = Iterator[np.ndarray]
+Between = Callable[..., Pictures]
 
 
 class InbetweenSource(SourceWrapper):
@@ -92,7 +93,6 @@ def build(
     folder: str | Path,
     factor: int,
     method: str,
-    frames: tuple[int, int] | None = None,
     update: Callable[[int, int], None] = lambda done, total: None,
     cancelled: Callable[[], bool] = lambda: False,
     between: Between | None = None,
@@ -101,12 +101,10 @@ def build(
     """Builds in-between frames in `folder`. Pictures that are there are checked, and damaged ones are built again.
 
     factor: 2 or more; method: one of flow.METHODS
-    frames: first and last source frame of a chunk (default: all), both included; the in-between frames after the last
-        one belong to the chunk
     update: called with the number of finished pairs and that of all
     cancelled: called often, from several threads; True ends the build, and finished pairs are kept
     between: makes a pair's frames, in place of flow.between
-    pairs: those to build, each by its first source frame, ascending; in place of `frames`
+    pairs: those to build, each by its first source frame, ascending (default: all)
 
     After a build that was killed, the next one goes on where that was. Several processes may build in the same folder,
     and share the pairs: one that another is building is waited for, and built here if that one is killed. The files are
@@ -114,7 +112,7 @@ def build(
     build came. MediaError: a package that is needed is missing, or a frame cannot be read or written, and finished
     pairs are kept; or the source was written to meanwhile."""
     cache = InbetweenCache(source, folder, factor, method)
-    pairs = _pairs(source, frames) if pairs is None else pairs
+    pairs = range(source.count - 1) if pairs is None else pairs
     cache.load()
     if between is None and not cache.finished().issuperset(pairs):
         flow.check()
@@ -182,14 +180,6 @@ def cost(source: FrameSource, pair: int, method: str, between: Between | None = 
     return Cost(max(when[1] - when[0] - frame, 0.0), frame, size)
 
 
-def _pairs(source: FrameSource, frames: tuple[int, int] | None) -> range:
-    """The pairs whose first frame is in the chunk. MediaError: the source has no such frames."""
-    first, last = frames or (0, source.count - 1)
-    if not 0 <= first <= last < source.count:
-        raise MediaError(f"{source.path.name}: has frames 0 to {source.count - 1}, not {first} to {last}")
-    return range(first, min(last + 1, source.count - 1))
-
-
 def _tasks(
     cache: InbetweenCache,
     pairs: list[int],
@@ -213,8 +203,9 @@ def _tasks(
             yield lambda: True
         else:
             first, second, kind = near.pair(pair)
-            make = partial(_note_kind, kind) if kind else partial(_make, first, second, between, cancelled)
-            yield partial(_build_claimed, claims, cache, pair, make)
+            source = cache.source
+            made = kind or between(first, second, cache.factor, cache.method, source.transfer, source.alpha)
+            yield partial(_make, cache, claims, pair, made, cancelled)
 
 
 class _Near:
@@ -288,36 +279,22 @@ def _finished_by_another(cache: InbetweenCache, pair: int) -> bool:
     return cache.is_sound(pair)
 
 
-def _build_claimed(
-    claims: Claims, cache: InbetweenCache, pair: int, make: Callable[[InbetweenCache, int], bool]
+def _make(
+    cache: InbetweenCache, claims: Claims, pair: int, made: str | Pictures, cancelled: Callable[[], bool]
 ) -> bool:
+    """Builds a claimed pair: notes its kind, or writes its pictures. Whether it is finished."""
     try:
-        return make(cache, pair)
+        if isinstance(made, str):
+            cache.note(pair_line(pair, made))
+            return True
+        with suppress(stopping.StoppedError), stopping.once(cancelled):
+            for index, picture in zip(cache.steps(pair), made, strict=True):
+                stopping.check()
+                cache.write(index, picture)
+            return True
+        return False
     finally:
         claims.release(_claim(pair))
-
-
-def _make(
-    first: np.ndarray,
-    second: np.ndarray,
-    between: Between,
-    cancelled: Callable[[], bool],
-    cache: InbetweenCache,
-    pair: int,
-) -> bool:
-    source = cache.source
-    pictures = between(first, second, cache.factor, cache.method, source.transfer, source.alpha)
-    with suppress(stopping.StoppedError), stopping.once(cancelled):
-        for index, picture in zip(cache.steps(pair), pictures, strict=True):
-            stopping.check()
-            cache.write(index, picture)
-        return True
-    return False
-
-
-def _note_kind(kind: str, cache: InbetweenCache, pair: int) -> bool:
-    cache.note(pair_line(pair, kind))
-    return True
 
 
 def _in_parallel(tasks: Iterable[Callable[[], bool]], workers: int) -> Iterator[bool]:

@@ -86,8 +86,8 @@ class InbetweenCache:
             return
         digests: dict[int, set[str]] = {}
         kinds: dict[int, str] = {}
-        with suppress(OSError), Folder(self.folder) as folder:
-            checks = read_checks(folder)
+        with suppress(OSError):
+            checks = read_checks(Folder(self.folder))
             for name, known in checks.digests.items():
                 if self._is_between(frame := int(name[:8])) and name == self._name(frame):
                     digests[frame] = known
@@ -111,8 +111,8 @@ class InbetweenCache:
     def finished(self) -> set[int]:
         """The finished pairs: those of a kind, and those whose pictures all have digests and files. None is opened."""
         names = set()
-        with suppress(OSError), Folder(self.folder) as folder:
-            names = {entry.name for entry in folder.files()}
+        with suppress(OSError):
+            names = {entry.name for entry in Folder(self.folder).files()}
         there = {frame for frame in self.digests if self._name(frame) in names}
         pairs = {frame // self.factor for frame in there}
         return self.kinds.keys() | {pair for pair in pairs if there.issuperset(self.steps(pair))}
@@ -145,13 +145,14 @@ class InbetweenCache:
         MediaError: the folder cannot be written to."""
         text = (json.dumps(self.manifest, indent=1, sort_keys=True) + "\n").encode()
         try:
-            with own_folder(self.folder) as folder, folder.make(CHECKS):
-                if content_of(folder, MANIFEST) != text:
-                    with atomic_write.writing(self.folder / MANIFEST) as part:
-                        part.write_bytes(text)
-                for part in atomic_write.left_behind(self.folder):
-                    with suppress(OSError):  # another user's, or cleared by others meanwhile
-                        folder.remove_part(part.name, HALF.fullmatch)
+            folder = own_folder(self.folder)
+            folder.make(CHECKS)
+            if content_of(folder, MANIFEST) != text:
+                with atomic_write.writing(self.folder / MANIFEST) as part:
+                    part.write_bytes(text)
+            for part in atomic_write.left_behind(self.folder):
+                with suppress(OSError):  # another user's, or cleared by others meanwhile
+                    folder.remove_part(part.name, HALF.fullmatch)
         except OSError as error:
             raise unwritable(self.folder, error) from None
 
@@ -173,8 +174,7 @@ class InbetweenCache:
     def note(self, line: str) -> None:
         """Appends a line to this build's checks. MediaError: it cannot be written."""
         try:
-            with Folder(self.folder) as folder, folder.folder(CHECKS) as checks:
-                checks.append(f"{self._token}.sha256", f"{line}\n".encode())
+            Folder(self.folder).folder(CHECKS).append(f"{self._token}.sha256", f"{line}\n".encode())
         except OSError as error:
             self._token = secrets.token_hex(4)  # that file may end in half a line: go on in another
             raise unwritable(self.folder, error) from None
@@ -184,8 +184,8 @@ class InbetweenCache:
         may be of what the source has become."""
         if identity(self.source) == self.manifest["source"]:
             return
-        with suppress(OSError), Folder(self.folder) as folder, folder.folder(CHECKS) as checks:
-            checks.remove(f"{self._token}.sha256")
+        with suppress(OSError):
+            Folder(self.folder).folder(CHECKS).remove(f"{self._token}.sha256")
         raise MediaError(f"{self.source.path}: was written to while in-between frames were built; build them again")
 
     def _name(self, frame: int) -> str:
@@ -198,9 +198,8 @@ class InbetweenCache:
         """Whether a frame's picture matches one of its digests, and is of the source's size and samples."""
         path, digests = self.picture(frame), self.digests.get(frame)
         try:
-            with Folder(self.folder) as folder:
-                if not digests or folder.digest(path.name, LARGEST_PICTURE) not in digests:
-                    return False
+            if not digests or Folder(self.folder).digest(path.name, LARGEST_PICTURE) not in digests:
+                return False
         except OSError:
             return False
         if image := self._open(path):
@@ -296,12 +295,11 @@ def folder_stamp(folder: Path) -> tuple | None:
     """A value that changes when files are made or removed in a cache's folder, or its checks change. None: there is no
     such folder."""
     try:
-        with Folder(folder) as opened:
-            changed = opened.status(".").st_mtime_ns
-            with suppress(OSError), opened.folder(CHECKS) as checks:
-                files = [(entry.name, entry.stat(follow_symlinks=False)) for entry in checks.entries()]
-                return changed, *sorted((name, info.st_size, info.st_mtime_ns) for name, info in files)
-            return (changed,)
+        opened, changed = Folder(folder), folder.lstat().st_mtime_ns
+        with suppress(OSError):
+            files = [(entry.name, entry.stat(follow_symlinks=False)) for entry in opened.folder(CHECKS).entries()]
+            return changed, *sorted((name, info.st_size, info.st_mtime_ns) for name, info in files)
+        return (changed,)
     except OSError:
         return None
 
@@ -343,16 +341,16 @@ class Checks(NamedTuple):
 def read_checks(cache: Folder) -> Checks:
     checks = Checks(digests={}, kinds={}, own=[], unreadable=[])
     try:
-        with cache.folder(CHECKS) as folder:
-            for name in [entry.name for entry in folder.files() if entry.name.endswith(".sha256")]:
-                try:
-                    with folder.open(name, LARGEST_CHECKS) as file:
-                        if _read_lines(file, checks) and _CHECKS.fullmatch(name):
-                            checks.own.append(name)
-                except PermissionError as error:
-                    checks.unreadable.append(error)
-                except OSError:  # removed meanwhile, or larger than any of ours
-                    continue
+        folder = cache.folder(CHECKS)
+        for name in [entry.name for entry in folder.files() if entry.name.endswith(".sha256")]:
+            try:
+                with folder.open(name, LARGEST_CHECKS) as file:
+                    if _read_lines(file, checks) and _CHECKS.fullmatch(name):
+                        checks.own.append(name)
+            except PermissionError as error:
+                checks.unreadable.append(error)
+            except OSError:  # removed meanwhile, or larger than any of ours
+                continue
     except PermissionError as error:
         checks.unreadable.append(error)
     except OSError:  # there are no checks

@@ -178,15 +178,16 @@ def _make_movie(film: Film, shown: Callable, _size: tuple[int, int], fps: Fracti
 
 def _prepare(place: Path) -> None:
     """OSError: it cannot be made, or is a link, which a stranger may have put there."""
-    with own_folder(place):
-        atomic_write.clear_up(place)
+    own_folder(place)
+    atomic_write.clear_up(place)
 
 
 def _remove_parts(film: Film) -> None:
     """Removes the parts of a movie that is finished, and what killed processes left there, and no other file."""
     parts = [path for path, _frames in film.parts]
     names, place = {path.name for path in parts}, parts[0].parent
-    with suppress(OSError), Folder(place) as folder:
+    with suppress(OSError):
+        folder = Folder(place)
         for entry in folder.entries():
             if entry.name in names:
                 folder.remove(entry.name)
