@@ -23,7 +23,6 @@ from av.video.stream import VideoStream
 
 from ..core.frames.frame_source import FrameSource
 from ..core.frames.planes import Matrix, Planes, matrix
-from .channels import CHANNELS, no_channel
 from .decode import FrameReader, fraction, reason
 from .deinterlace import blur_rows, has_fields, interpolate_fields, samples_of
 from .errors import MediaError
@@ -115,6 +114,14 @@ class MovieSource(FrameSource):
             rgba = partial(self._picture, index, frame)
             return Planes(luma=luma, chroma=(cb, cr), matrix=to_rgb, rgba=rgba)
 
+    def grey(self, index: int) -> np.ndarray | None:
+        """The frame's luma (height, width, 1), where that is the luminance of its colours; else None."""
+        with self._named(index):
+            frame = self._frame(index)
+            if not _is_grey(frame):
+                return None
+            return self._upright(self._converted(frame, "gray16le" if self.dtype == np.uint16 else "gray"))[..., None]
+
     def _frame(self, index: int) -> av.VideoFrame:
         check_index(self, index)
         frame = self._reader.frame_at(self._reader.start + _round(index * self._step), self._step)
@@ -190,33 +197,6 @@ class MovieSource(FrameSource):
             if isinstance(held, dict):
                 held.clear()
         self._graph = self._graph_key = None
-
-
-class MovieChannel(MovieSource):
-    """One channel of a movie's frames: those of MovieSource, whose attributes it has."""
-
-    def __init__(self, path: str | Path, channel: str, *, stream: int = 0) -> None:
-        """channel: one of CHANNELS. MediaError: it is another one, or the movie cannot be read."""
-        if channel not in CHANNELS:
-            raise no_channel(check_file(path), channel, CHANNELS)
-        super().__init__(path, stream=stream)
-        self._channel = channel
-
-    def read(self, index: int) -> np.ndarray:
-        """The samples (height, width, n) that the channel is made of: n is 3, RGB, for the luminance of colours, 0 for
-        the alpha of an opaque movie, 1 otherwise. Raises what MovieSource raises."""
-        if self._channel == "alpha" and self.alpha == "opaque":
-            return np.empty((self.height, self.width, 0), self.dtype)
-        return super().read(index)
-
-    def decoded(self, index: int) -> np.ndarray | Planes:
-        return self.read(index)
-
-    def _pixels(self, frame: av.VideoFrame) -> np.ndarray:
-        if self._channel == "luminance" and _is_grey(frame):
-            grey = self._converted(frame, "gray16le" if self.dtype == np.uint16 else "gray")
-            return self._upright(grey)[..., None]
-        return super()._pixels(frame)[..., CHANNELS[self._channel]]
 
 
 def _is_opaque_yuv(pixels: VideoFormat) -> bool:

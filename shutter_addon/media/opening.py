@@ -6,19 +6,17 @@ from collections.abc import Sequence
 from fractions import Fraction
 from functools import cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from ..core.frames.frame_source import FrameSource
 from . import decoding_child
-from .blender_movie import BlenderMovie, BlenderMovieChannel
+from .blender_movie import BlenderMovie
+from .channels import CHANNELS, MovieChannel, no_channel
 from .color import in_colorspace
 from .errors import MediaError
 from .files import check_file
 from .reduced import smaller
 from .sequence import IMAGE_SUFFIXES, SequenceChannel, SequenceSource
-
-if TYPE_CHECKING:
-    from .movie import MovieChannel
 
 Size = tuple[int, int]  # width and height
 
@@ -51,7 +49,7 @@ def open_source(
     path = Path(path)
     source: FrameSource
     if _is_movie(path, files):
-        source = _opened_movie(path, stream=stream, deinterlace=deinterlace, divisor=divisor, size=size)
+        source = _opened_movie(path, stream, deinterlace, divisor, size)
     else:
         source = smaller(SequenceSource(path, files=files, fps=fps, alpha=alpha), divisor)
     try:
@@ -78,14 +76,18 @@ def with_proxy(source: FrameSource, path: str | Path, **options: Any) -> FrameSo
 
 def open_channel(
     path: str | Path, channel: str, *, files: Sequence[str | Path] | None = None, stream: int = 0
-) -> SequenceChannel | MovieChannel | BlenderMovieChannel:
+) -> SequenceChannel | MovieChannel:
     """Opens what `open_source` opens, for one channel alone. MediaError: it cannot be read, or has no such channel.
 
     channel: one of channels.CHANNELS, or the name of a channel of the images' own; files, stream: see open_source"""
     path = Path(path)
-    if _is_movie(path, files):
-        return _opened_channel(path, channel, stream)
-    return SequenceChannel(path, channel, files=files)
+    if not _is_movie(path, files):
+        return SequenceChannel(path, channel, files=files)
+    movie = _opened_movie(path, stream)
+    if channel in CHANNELS:
+        return MovieChannel(movie, channel)
+    movie.close()
+    raise no_channel(path, channel, CHANNELS)
 
 
 @cache
@@ -103,7 +105,9 @@ def _is_movie(path: Path, files: Sequence[str | Path] | None) -> bool:
     return files is None and path.suffix.lower() not in IMAGE_SUFFIXES
 
 
-def _opened_movie(path: Path, *, stream: int, deinterlace: bool, divisor: int, size: Size | None) -> FrameSource:
+def _opened_movie(
+    path: Path, stream: int, deinterlace: bool = False, divisor: int = 1, size: Size | None = None
+) -> FrameSource:
     """See open_source. Only PyAV's frames are fitted to a size."""
     if missing_pyav():
         _check_lent(path, stream)
@@ -111,15 +115,6 @@ def _opened_movie(path: Path, *, stream: int, deinterlace: bool, divisor: int, s
     from .movie import MovieSource
 
     return MovieSource(path, stream=stream, deinterlace=deinterlace, divisor=divisor, size=size)
-
-
-def _opened_channel(path: Path, channel: str, stream: int) -> MovieChannel | BlenderMovieChannel:
-    if missing_pyav():
-        _check_lent(path, stream)
-        return BlenderMovieChannel(path, channel)
-    from .movie import MovieChannel
-
-    return MovieChannel(path, channel, stream=stream)
 
 
 def _check_lent(path: Path, stream: int) -> None:

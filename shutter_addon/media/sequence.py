@@ -72,7 +72,31 @@ class ImageFiles:
         return self.files[bisect.bisect_right(self._starts, index) - 1]
 
 
-class SequenceSource(FrameSource):
+class _Sequence(FrameSource):
+    """What has the files of an image sequence: see ImageFiles."""
+
+    def __init__(self, path: str | Path, files: Sequence[str | Path] | None) -> None:
+        self._files = ImageFiles(path, files)
+        self.path, self.count, self.left_out = self._files.path, self._files.count, self._files.left_out
+
+    @property
+    def files(self) -> list[Path]:
+        """The file of each frame."""
+        return [self._files[index] for index in range(self.count)]
+
+    def _file(self, index: int) -> Path:
+        """MediaError: it is missing. IndexError: there is no such frame."""
+        check_index(self, index)
+        return check_file(self._files[index])
+
+    def _check_size(self, path: Path, size: tuple[int, int], window: str = "") -> None:
+        """MediaError unless it is the first one's."""
+        if size != (self.width, self.height):
+            first = f"{self.path.name} is {self.width}×{self.height}"
+            raise MediaError(f"{path.name}: is {size[0]}×{size[1]}{window}, but {first}")
+
+
+class SequenceSource(_Sequence):
     """Images as frames: see ImageFiles for which file is which frame.
 
     Samples are as stored: straight alpha stays straight, EXIF orientation is left alone, and of an EXR the data window
@@ -88,8 +112,7 @@ class SequenceSource(FrameSource):
         fps: Fraction | None = None,
         alpha: str | None = None,
     ) -> None:
-        self._files = ImageFiles(path, files)
-        self.path, self.count, self.left_out = self._files.path, self._files.count, self._files.left_out
+        super().__init__(path, files)
         self.fps = fps
         with _opened(self.path) as (_image, spec, layer):
             self.width, self.height = spec.width, spec.height
@@ -99,15 +122,9 @@ class SequenceSource(FrameSource):
         self.alpha = (alpha or self._usual_alpha()) if has_alpha else "opaque"
         self.options = {}
 
-    @property
-    def files(self) -> list[Path]:
-        """The file of each frame."""
-        return [self._files[index] for index in range(self.count)]
-
     def read(self, index: int) -> np.ndarray:
         """MediaError: the file is missing, damaged or unlike the first."""
-        check_index(self, index)
-        path = check_file(self._files[index])
+        path = self._file(index)
         with _opened(path) as (image, spec, layer):
             self._check_like_first(path, spec)
             return self._expand(_samples(image, spec, layer, path))
@@ -115,7 +132,7 @@ class SequenceSource(FrameSource):
     def _check_like_first(self, path: Path, spec: ImageSpec) -> None:
         size, dtype = (spec.width, spec.height), _dtype(spec)
         whole = size == (spec.full_width, spec.full_height)
-        _check_size_like_first(self, path, size, "" if whole else " (its data window)")
+        self._check_size(path, size, "" if whole else " (its data window)")
         if dtype != self.dtype:
             raise MediaError(f"{path.name}: has {dtype} samples, but {self.path.name} has {self.dtype}")
 
@@ -133,59 +150,36 @@ class SequenceSource(FrameSource):
         picture[..., 3] = samples[..., -1] if channels in ALPHA else opaque
         return picture
 
-    def close(self) -> None:
-        """Nothing stays open between frames."""
 
-
-class SequenceChannel:
+class SequenceChannel(_Sequence):
     """One channel of the images of a sequence: see ImageFiles for which file is which frame.
 
     Samples are as stored, of any type. All frames must have the first one's size. An EXR's picture is its display
     window, since mattes are often cropped to what they cover: what its data window leaves out is 0. Where that is
     larger all around, it is the picture, as in Blender.
-
-    path: the first file; width, height: pixels; count: of frames; fps: none
     """
 
     fps = None
 
     def __init__(self, path: str | Path, channel: str, *, files: Sequence[str | Path] | None = None) -> None:
         """channel: one of CHANNELS, or the name of one of the files' own. MediaError: they have none of that name."""
-        self._files = ImageFiles(path, files)
-        self.path, self.count = self._files.path, self._files.count
+        super().__init__(path, files)
         self._layer_of = partial(_channel_named, channel)
         with _opened(self.path, self._layer_of) as (image, spec, _positions):
             _, _, self.width, self.height = _picture_window(image, spec, self.path)
-
-    @property
-    def files(self) -> list[Path]:
-        """The file of each frame."""
-        return [self._files[index] for index in range(self.count)]
 
     def read(self, index: int) -> np.ndarray:
         """The samples (height, width, n) that the channel is made of, top row first: n is 3, RGB, for the luminance of
         colours, 0 for the alpha of an opaque image, 1 otherwise.
 
         Raises MediaError for a file that is missing, damaged or unlike the first, IndexError outside 0 … count-1."""
-        check_index(self, index)
-        path = check_file(self._files[index])
+        path = self._file(index)
         with _opened(path, self._layer_of) as (image, spec, positions):
             window = _picture_window(image, spec, path)
-            _check_size_like_first(self, path, window[2:])
+            self._check_size(path, window[2:])
             if not positions:
                 return np.empty((self.height, self.width, 0), np.uint8)
             return _in_window(_samples(image, spec, positions, path), spec, window)
-
-    def close(self) -> None:
-        """Nothing stays open between frames."""
-
-
-def _check_size_like_first(
-    sequence: SequenceSource | SequenceChannel, path: Path, size: tuple[int, int], window: str = ""
-) -> None:
-    if size != (sequence.width, sequence.height):
-        first = f"{sequence.path.name} is {sequence.width}×{sequence.height}"
-        raise MediaError(f"{path.name}: is {size[0]}×{size[1]}{window}, but {first}")
 
 
 def _picture_window(image: ImageInput, spec: ImageSpec, path: Path) -> Window:

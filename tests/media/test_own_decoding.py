@@ -18,7 +18,8 @@ import pytest
 from footage import COUNT, cut_file, damage_frame, make_movie, number, picture, save_image
 
 from shutter_addon.media import MediaError, decoding_child, inbetween, open_source, opencv, opening
-from shutter_addon.media.blender_movie import BlenderMovie, BlenderMovieChannel, frame_rate
+from shutter_addon.media.blender_movie import BlenderMovie, frame_rate
+from shutter_addon.media.channels import MovieChannel
 from shutter_addon.media.file_kind import file_kind
 from shutter_addon.media.inbetween import InbetweenSource
 from shutter_addon.media.opening import open_channel
@@ -216,12 +217,15 @@ def _no_pyav(monkeypatch):
 def test_channels_are_those_that_pyav_decodes(coloured):
     for name in ("bt709.mp4", "alpha_png.mov", "ten_bits.mp4", "gray.mkv"):
         for channel in ("luminance", "red", "green", "blue", "alpha"):
-            with open_channel(coloured[name], channel) as theirs, BlenderMovieChannel(coloured[name], channel) as ours:
+            with (
+                open_channel(coloured[name], channel) as theirs,
+                MovieChannel(BlenderMovie(coloured[name]), channel) as ours,
+            ):
                 one, other = ours.read(1), theirs.read(1)  # PyAV's luminance of grey pictures is their luma
                 assert one.shape == other.shape or (name, channel) == ("gray.mkv", "luminance")
                 assert not one.size or np.abs(one.astype(int) - other).max() == 0
     with pytest.raises(MediaError, match=r"^gray\.mkv: has no channel depth, but luminance"):
-        BlenderMovieChannel(coloured["gray.mkv"], "depth")
+        open_channel(coloured["gray.mkv"], "depth")
 
 
 @pytest.mark.usefixtures("_no_pyav")
