@@ -1,7 +1,7 @@
 """Mattes of the frames between two drawings of an outline, carried there by the footage's own motion.
 
 Dense flow, joined from frame to frame, says where in each drawing's frame lies what a pixel shows. Where flow between
-the two frames alone, or the motion of the camera or of the subject, leads to what is more alike, that is believed. Any
+the two frames alone, or the motion of the camera or of the subject, leads to what is more alike, that is believed. Each
 of them errs by a few pixels, so everything within REACH of that place votes, a vote counting by how alike the colours
 are around both ends (non-local means: Buades et al. 2005, "A non-local algorithm for image denoising"; votes for
 labels: Coupé et al. 2011, "Patch-based segmentation using expert priors"). Both drawings vote, the nearer with more

@@ -4,6 +4,7 @@ import os
 from pathlib import Path
 from typing import Protocol
 
+from . import pyav
 from .errors import MediaError
 
 PIXELS = 1 << 28  # 16384×16384; FFmpeg decodes no more either, and a damaged header may promise anything
@@ -39,10 +40,10 @@ def stamp(path: str | Path) -> tuple[int, int] | None:
 def check_sound(path: str | Path) -> None:
     """MediaError unless it is a file that has sound; without PyAV, unless it is a file."""
     path = check_file(path)
-    try:
-        import av
-    except ImportError:
+    if pyav.missing():
         return
+    import av
+
     try:
         with av.open(check_name(path)) as container:
             has_sound = bool(container.streams.audio)

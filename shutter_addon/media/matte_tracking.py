@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import closing
 from functools import lru_cache
-from typing import Any
 
 import numpy as np
 
@@ -35,7 +34,14 @@ _AGREEING = 0.5  # share of the points that do, from which on a step is sure
 
 
 def follow_carried(
-    region: Subject, carried: tuple[CarriedFile, Mapping[float, int]], footage: Footage, *where: Any, **how: Any
+    region: Subject,
+    carried: tuple[CarriedFile, Mapping[float, int]],
+    footage: Footage,
+    start: int,
+    frames: range,
+    *,
+    motion: Motion = "location",
+    anchors: Collection[int] = (),
 ) -> Iterator[Tracked]:
     """As tracking.follow, of what a carried outline encloses.
 
@@ -43,7 +49,8 @@ def follow_carried(
     frames show. MediaError: a matte cannot be carried."""
     file, shown = carried
     with closing(file.open()) as mattes:
-        yield from follow_cover(region, cover_of(mattes, shown.__getitem__, footage.size), footage, *where, **how)
+        cover = cover_of(mattes, shown.__getitem__, footage.size)
+        yield from follow_cover(region, cover, footage, start, frames, motion=motion, anchors=anchors)
 
 
 def cover_of(mattes: CarriedMattes, shown: Callable[[int], int], size: tuple[int, int]) -> Cover:

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from fractions import Fraction
-from functools import cache
+from functools import partial
 from pathlib import Path
-from typing import Any
 
 from ..core.frames.frame_source import FrameSource
-from . import decoding_child
+from . import decoding_child, pyav
 from .blender_movie import BlenderMovie
 from .channels import CHANNELS, MovieChannel, no_channel
 from .color import in_colorspace
@@ -59,17 +58,25 @@ def open_source(
         raise
 
 
-def with_proxy(source: FrameSource, path: str | Path, **options: Any) -> FrameSource:
+def with_proxy(
+    source: FrameSource,
+    path: str | Path,
+    *,
+    files: Sequence[str | Path] | None = None,
+    colorspace: str | None = None,
+    config: str | Path | None = None,
+) -> FrameSource:
     """The source with its frames read from a proxy; the source itself, where there is none that fits.
 
-    path, options: of the proxy, as open_source takes them"""
+    path, files, colorspace, config: of the proxy, as open_source takes them"""
+    opened = partial(open_source, path, files=files, colorspace=colorspace, config=config)
     try:
         from .proxy import ProxySource, fits
 
-        with open_source(path, **options) as proxy:
+        with opened() as proxy:
             if not fits(proxy, source):
                 return source
-        return ProxySource(source, open_source(path, size=(source.width, source.height), **options))
+        return ProxySource(source, opened(size=(source.width, source.height)))
     except (ImportError, MediaError):  # without PyAV nothing is fitted
         return source
 
@@ -90,17 +97,6 @@ def open_channel(
     raise no_channel(path, channel, CHANNELS)
 
 
-@cache
-def missing_pyav() -> str:
-    """Why PyAV does not decode movies, in Python's words, so that a second Blender does, where one is lent; "": it
-    does."""
-    try:
-        from .movie import MovieSource  # noqa: F401
-    except ImportError as error:
-        return str(error)
-    return ""
-
-
 def _is_movie(path: Path, files: Sequence[str | Path] | None) -> bool:
     return files is None and path.suffix.lower() not in IMAGE_SUFFIXES
 
@@ -109,7 +105,7 @@ def _opened_movie(
     path: Path, stream: int, deinterlace: bool = False, divisor: int = 1, size: Size | None = None
 ) -> FrameSource:
     """See open_source. Only PyAV's frames are fitted to a size."""
-    if missing_pyav():
+    if pyav.missing():
         _check_lent(path, stream)
         return smaller(BlenderMovie(path, deinterlace=deinterlace), divisor)
     from .movie import MovieSource
@@ -124,6 +120,6 @@ def _check_lent(path: Path, stream: int) -> None:
     check_file(path)
     what = f"video stream {stream} of a movie needs" if decoding_child.is_lent() else "movies need"
     raise MediaError(
-        f"{path.name}: {what} the Python package PyAV ({missing_pyav()}); "
+        f"{path.name}: {what} the Python package PyAV ({pyav.missing()}); "
         "install the zip of Virtual Shutter that is made for your system, or use an image sequence"
     )

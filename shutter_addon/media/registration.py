@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
-from typing import Any, get_args
+from typing import get_args
 
 import numpy as np
 
@@ -25,6 +25,7 @@ _QUALITY = 0.01  # of a corner, as a share of the best one's
 _WEAKEST = 2e-4  # the same, whatever the best one is: noise of some levels has less
 _LEVELS = 3  # a motion between two frames is found up to about 2 ** _LEVELS half windows
 _WINDOWS = 9, 21  # sides of the windows that are compared, in pixels: for small and for large parts
+_UNTIL = 3, 30, 0.01  # OpenCV's own: after 30 steps, or at one of less than 0.01 pixels
 _THERE_AND_BACK = 1.0  # pixels from where a corner started that it may come back to
 _HYPOTHESES = 300
 _SOUGHT = 64  # pixels to which a part is made smaller to be sought, or compared as a whole
@@ -85,7 +86,7 @@ class Part:
         x, y, width, height = cv2.boundingRect((weight > 0).astype(np.uint8))
         self.box = x, y, width, height
         side = int(np.clip(max(width, height) / 4, *_WINDOWS)) // 2 * 2 + 1
-        self._window = side, side
+        self._side = side
         margin = side * 2
         left, top = max(x - margin, 0), max(y - margin, 0)
         crop = np.s_[top : y + height + margin, left : x + width + margin]
@@ -218,13 +219,8 @@ class Part:
 
     def _flow(self, picture: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Where each corner is in a picture, and whether it comes back from there."""
-        options: dict[str, Any] = {"winSize": self._window, "maxLevel": _LEVELS}
-        options["criteria"] = (cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 30, 0.01)
-        start = _pairs(self.points - self._origin)
-        there, forth, _ = cv2.calcOpticalFlowPyrLK(self._picture, picture, start, None, **options)
-        again, back, _ = cv2.calcOpticalFlowPyrLK(picture, self._picture, there, None, **options)
-        close = np.hypot(*(again - start).T) < _THERE_AND_BACK
-        return _plane(there) + self._origin, forth.ravel().astype(bool) & back.ravel().astype(bool) & close.ravel()
+        there, is_good = _there_and_back(self._picture, picture, self.points - self._origin, self._side)
+        return there + self._origin, is_good
 
     def _likeness(self, picture: np.ndarray, motion: Similarity) -> float:
         """Correlation of the part's pixels with those in another picture, as far as they lie in it; both smaller."""
@@ -243,11 +239,6 @@ def traced(pictures: Sequence[np.ndarray], points: np.ndarray, step: np.ndarray)
 
     step: (n,) how they may move up to the second picture; they go on like that, more or less"""
     places = np.full(len(points), complex(np.nan, np.nan))
-    options: dict[str, Any] = {
-        "winSize": (_TRACED, _TRACED),
-        "maxLevel": _LEVELS,
-        "flags": cv2.OPTFLOW_USE_INITIAL_FLOW,
-    }
     left = np.arange(len(points))
     reach = _SOUGHT + len(pictures) * int(np.abs(step).max())
     low = [max(int(side.min()) - reach, 0) for side in (points.imag, points.real)]
@@ -255,14 +246,27 @@ def traced(pictures: Sequence[np.ndarray], points: np.ndarray, step: np.ndarray)
     pictures = [np.ascontiguousarray(each[low[0] : high[0], low[1] : high[1]]) for each in pictures]
     points = points - complex(low[1], low[0])
     for first, second in pairwise(pictures):
-        there, good, _ = cv2.calcOpticalFlowPyrLK(first, second, _pairs(points), _pairs(points + step), **options)
-        again, back, _ = cv2.calcOpticalFlowPyrLK(second, first, there, _pairs(points), **options)
-        close = (good & back).ravel().astype(bool) & (np.abs(_plane(again) - points) < _THERE_AND_BACK)
-        if not close.any():
+        there, is_good = _there_and_back(first, second, points, _TRACED, step)
+        if not is_good.any():
             return places
-        left, step, points = left[close], (_plane(there) - points)[close], _plane(there)[close]
+        left, step, points = left[is_good], (there - points)[is_good], there[is_good]
     places[left] = points + complex(low[1], low[0])
     return places
+
+
+def _there_and_back(
+    first: np.ndarray, second: np.ndarray, points: np.ndarray, side: int, step: np.ndarray | None = None
+) -> tuple[np.ndarray, np.ndarray]:
+    """Where points (n,) of a picture are in another one, and whether they come back from there (n,) bool.
+
+    side: of the windows that are compared, in pixels; step: (n,) how they may move"""
+    ways = None, None, (side, side), _LEVELS, _UNTIL, cv2.OPTFLOW_USE_INITIAL_FLOW
+    start = _pairs(points)
+    guess = start.copy() if step is None else _pairs(points + step)
+    there, forth, _ = cv2.calcOpticalFlowPyrLK(first, second, start, guess, *ways)
+    guess = there.copy() if step is None else start.copy()
+    again, back, _ = cv2.calcOpticalFlowPyrLK(second, first, there, guess, *ways)
+    return _plane(there), (forth & back).ravel().astype(bool) & (np.abs(_plane(again) - points) < _THERE_AND_BACK)
 
 
 def correlation(first: np.ndarray, second: np.ndarray, weight: np.ndarray) -> float:

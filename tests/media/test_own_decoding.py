@@ -17,7 +17,7 @@ import numpy as np
 import pytest
 from footage import COUNT, cut_file, damage_frame, make_movie, number, picture, save_image
 
-from shutter_addon.media import MediaError, decoding_child, inbetween, open_source, opencv, opening
+from shutter_addon.media import MediaError, decoding_child, inbetween, open_source, opencv, pyav
 from shutter_addon.media.blender_movie import BlenderMovie, frame_rate
 from shutter_addon.media.channels import MovieChannel
 from shutter_addon.media.file_kind import file_kind
@@ -209,9 +209,9 @@ def test_frame_rates_are_those_of_films():
 def _no_pyav(monkeypatch):
     monkeypatch.setitem(sys.modules, "shutter_addon.media.movie", None)
     monkeypatch.setitem(sys.modules, "av", None)
-    opening.missing_pyav.cache_clear()
+    pyav.missing.cache_clear()
     yield
-    opening.missing_pyav.cache_clear()
+    pyav.missing.cache_clear()
 
 
 def test_channels_are_those_that_pyav_decodes(coloured):

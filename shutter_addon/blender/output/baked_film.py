@@ -21,7 +21,7 @@ from ...core import atomic_write
 from ...core.farm import edit_version
 from ...core.messages import EffectError
 from ...core.stopping import StoppedError
-from ...media import film_parts, image_writing, rendered_pictures
+from ...media import film_parts, image_writing, pyav, rendered_pictures
 from ...media.blender_movie import frame_rate
 from ...media.completeness import is_whole_movie, is_whole_picture
 from ...media.errors import MediaError
@@ -97,9 +97,9 @@ def _check(scene: Any, effect: Any, strip: Any, kind: Kind) -> None:
         )
     if kind != "MOVIE":
         return
-    if package := film_parts.missing_package():
+    if pyav.missing():
         sentence = rpt_("the Python package {package} is missing, which movies need: bake to OpenEXR")
-        raise EffectError(sentence.format(package=package))
+        raise EffectError(sentence.format(package="av"))
     if colour_configuration.name():
         raise EffectError(
             rpt_("movies are baked in Blender's own colours: with another configuration, bake to OpenEXR")
