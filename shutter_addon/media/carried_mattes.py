@@ -11,7 +11,6 @@ from bisect import bisect_left, bisect_right
 from collections.abc import Hashable, Iterator
 from contextlib import closing, contextmanager
 from dataclasses import dataclass, replace
-from fractions import Fraction
 from functools import cached_property
 from pathlib import Path
 from typing import Protocol
@@ -31,6 +30,7 @@ from .folder import own_folder
 from .image_writing import write_levels
 from .inbetween_cache import identity, manifest_key
 from .outline_tracing import traced
+from .source import SourceWrapper
 
 FOLDER = "virtual_shutter_mattes"
 CONFIDENCE = "confidence "  # what a file's description says (carrying.Carried)
@@ -76,7 +76,7 @@ class CarriedFile:
         return CarriedMattes(self.footage.open(), self.drawings, self.folder)
 
 
-class CarriedMattes:
+class CarriedMattes(SourceWrapper):
     """The mattes, a core.model.mattes.MatteSource; close it. Its frames are the source's filmed ones."""
 
     step = 1
@@ -84,10 +84,9 @@ class CarriedMattes:
     def __init__(
         self, source: FrameSource, drawings: tuple[tuple[int, outlines.Curves], ...], folder: Path | None = None
     ) -> None:
-        self._source = source if isinstance(source, ShotSource) else ShotSource(source)
-        self.width, self.height = source.width, source.height
-        self.count = self.filmed = source.count
-        self.fps: Fraction | None = source.fps
+        super().__init__(source)
+        self._shots = source if isinstance(source, ShotSource) else ShotSource(source)
+        self.filmed = self.count
         self._drawings = {frame: curves for frame, curves in drawings if 0 <= frame < self.count}
         self._frames = sorted(self._drawings)
         self._drawing_keys: dict[int, str] = {}  # previews ask for paths again and again
@@ -180,7 +179,7 @@ class CarriedMattes:
 
     def close(self) -> None:
         """Closes the footage; a later read opens it again."""
-        self._source.close()
+        self._shots.close()
 
     def _near(self, index: int) -> tuple[int | None, int | None]:
         """The drawings before and behind a frame that are near enough; twice its own."""
@@ -195,8 +194,8 @@ class CarriedMattes:
         """Those of them that lie in the frame's shot."""
         if first == last:
             return first, last
-        shot = self._source.around(index, *(index if end is None else end for end in (first, last)))
-        self._source.release()
+        shot = self._shots.around(index, *(index if end is None else end for end in (first, last)))
+        self._shots.release()
         return (first if first in shot else None), (last if last in shot else None)
 
     def _made(self, index: int, first: int | None, last: int | None) -> Iterator[carrying.Carried]:
@@ -221,10 +220,10 @@ class CarriedMattes:
             return range(first + 1, last)
         if first is not None:
             end = min(first + min(-(-(index - first) // BLOCK) * BLOCK, carrying.FARTHEST), self.count - 1)
-            return range(first + 1, min(end + 1, self._source.around(index, first, end).stop))
+            return range(first + 1, min(end + 1, self._shots.around(index, first, end).stop))
         assert last is not None
         start = max(last - min(-(-(last - index) // BLOCK) * BLOCK, carrying.FARTHEST), 0)
-        return range(max(start, self._source.around(index, start, last).start), last)
+        return range(max(start, self._shots.around(index, start, last).start), last)
 
     def _fading(self, carried: list[carrying.Carried]) -> Iterator[carrying.Carried]:
         """Mattes away from their only drawing, which fade where it can be trusted no longer."""
@@ -235,7 +234,7 @@ class CarriedMattes:
             yield each if share == 1 else replace(each, matte=np.rint(each.matte * share).astype(np.uint8))
 
     def _picture(self, frame: int) -> np.ndarray:
-        return flow.displayed(self._source.read(frame), self._source.transfer, self._source.alpha)
+        return flow.displayed(self._shots.read(frame), self.transfer, self.alpha)
 
     def _drawing(self, frame: int) -> carrying.Drawing:
         size = carrying.working_size(self.width, self.height)
@@ -262,7 +261,7 @@ class CarriedMattes:
     @cached_property
     def _folder(self) -> str:
         """The name of this footage's folder."""
-        return f"{self._source.path.stem[:40]}-{manifest_key(identity(self._source))}"
+        return f"{self.path.stem[:40]}-{manifest_key(identity(self._source))}"
 
     def _kept(self, path: Path) -> np.ndarray | None:
         """The matte (H, W) uint8 of a file; None: there is none of ours, or it is damaged."""

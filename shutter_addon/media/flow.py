@@ -68,6 +68,13 @@ def resized(luma: np.ndarray, size: tuple[int, int]) -> np.ndarray:
     return cv2.resize(luma, size, interpolation=cv2.INTER_AREA)
 
 
+def of_rows(luma: np.ndarray, most: int) -> np.ndarray:
+    """A grey picture, made smaller where it has more rows."""
+    height, width = luma.shape
+    rows = min(most, height)
+    return resized(luma, (max(1, round(width * rows / height)), rows))
+
+
 def vectors(first: np.ndarray, second: np.ndarray) -> np.ndarray:
     """Where the pixels of a small picture (H, W) uint8 go in another one, quickly: vectors (H, W, 2) in pixels."""
     return np.nan_to_num(_dis(first, second, finest=0, stride=4), posinf=0, neginf=0)

@@ -139,13 +139,7 @@ def estimate(source: FrameSource, factor: int) -> int:
     """About how many bytes the files of all in-between frames of a source will have: the mean of three source frames,
     written as in-between frames are, times their number. MediaError: these frames cannot be read or written."""
     samples = {source.count * part // 6 for part in (1, 3, 5)}
-    with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder, "picture.png" if source.dtype.kind == "u" else "picture.exr")
-        sizes = []
-        for index in samples:
-            if not write_picture(path, source.read(index), source.alpha):
-                raise MediaError(f"{folder}: a picture could not be written whole ({why_short(path.parent)})")
-            sizes.append(path.stat().st_size)
+    sizes = list(_sizes(source, map(source.read, samples)))
     return (source.count - 1) * (factor - 1) * sum(sizes) // len(sizes)
 
 
@@ -168,16 +162,23 @@ def cost(source: FrameSource, pair: int, method: str, between: Between | None = 
     time take hardly less each, as one has all processors already. between: as for `build`. MediaError: they cannot be
     made."""
     between = between or flow.between
-    when = [time.perf_counter()]
+    when, sizes = [time.perf_counter()], [0]
+    first, second = source.read(pair), source.read(pair + 1)
+    for size in _sizes(source, islice(between(first, second, 4, method, source.transfer, source.alpha), 2)):
+        when.append(time.perf_counter())
+        sizes.append(size)
+    frame = when[2] - when[1]
+    return Cost(max(when[1] - when[0] - frame, 0.0), frame, sizes[-1])
+
+
+def _sizes(source: FrameSource, pictures: Iterable[np.ndarray]) -> Iterator[int]:
+    """The bytes of each of these pictures, written as a source's in-between frames are. MediaError: it cannot be."""
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder, "picture.png" if source.dtype.kind == "u" else "picture.exr")
-        first, second = source.read(pair), source.read(pair + 1)
-        for picture in islice(between(first, second, 4, method, source.transfer, source.alpha), 2):
-            write_picture(path, picture, source.alpha)
-            when.append(time.perf_counter())
-        size = path.stat().st_size if path.exists() else 0
-    frame = when[2] - when[1]
-    return Cost(max(when[1] - when[0] - frame, 0.0), frame, size)
+        for picture in pictures:
+            if not write_picture(path, picture, source.alpha):
+                raise MediaError(f"{folder}: a picture could not be written whole ({why_short(path.parent)})")
+            yield path.stat().st_size
 
 
 def _tasks(

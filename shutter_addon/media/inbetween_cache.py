@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
-from OpenImageIO import ImageInput, ImageOutput, ImageSpec, geterror
+from OpenImageIO import ImageInput, ImageSpec, geterror
 
 from ..core import atomic_write
 from ..core.frames.frame_source import FrameSource
@@ -23,6 +23,8 @@ from .completeness import is_whole_picture, why_short
 from .errors import MediaError
 from .files import check_name
 from .folder import Folder, own_folder
+from .image_writing import put
+from .sequence import expanded
 
 VERSION = 3  # raise it when in-betweens of the same frames change, or the folder's format does: older ones get stale
 MANIFEST, CHECKS = "manifest.json", "checks"
@@ -133,11 +135,7 @@ class InbetweenCache:
                 f"{path}: this in-between frame cannot be decoded; remove in-between frames, and build again"
             )
         image.close()
-        picture = np.empty((*samples.shape[:2], 4), samples.dtype)
-        picture[..., : samples.shape[2]] = samples
-        if samples.shape[2] == 3:
-            picture[..., 3] = np.iinfo(samples.dtype).max if samples.dtype.kind == "u" else 1
-        return picture
+        return expanded(samples)
 
     def prepare(self) -> None:
         """Makes the folder and its manifest, and removes half-written files of builds that were killed.
@@ -261,17 +259,13 @@ def write_picture(path: Path, picture: np.ndarray, alpha: str) -> bool:
     alpha: a source's; "opaque": RGB is written, else RGBA as it is, premultiplied or not
     OSError, MediaError: it cannot be written."""
     height, width, _ = picture.shape
-    name, spec = check_name(path), _spec(width, height, picture.dtype, alpha)
+    spec = _spec(width, height, picture.dtype, alpha)
     spec["oiio:UnassociatedAlpha"] = 1
     spec["DateTime"] = "1970:01:01 00:00:00"  # an EXR's; without it, it is the time of writing
     spec["png:compressionLevel"] = 1
     spec["png:filter"] = 0x20  # "up" alone: half the time of a choice for each row, and files as small
     spec["compression"] = "piz"
-    if (output := ImageOutput.create(name)) is None:
-        raise MediaError(f"{path}: cannot be written ({geterror()})")
-    samples = np.ascontiguousarray(picture[..., : spec.nchannels])
-    written = output.open(name, spec) and output.write_image(samples)
-    return output.close() and written and is_whole_picture(path)
+    return put(path, spec, picture[..., : spec.nchannels]) is None and is_whole_picture(path)
 
 
 _SHAPE = (

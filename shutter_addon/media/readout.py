@@ -70,9 +70,7 @@ def of_source(source: FrameSource, indices: Sequence[int], *, columns: bool = Fa
 def _small(source: FrameSource, index: int, *, columns: bool) -> np.ndarray:
     stopping.check()
     luma = flow.luma(source.read(index), source.transfer, source.alpha)
-    luma = np.ascontiguousarray(luma.T) if columns else luma
-    rows = min(ROWS, luma.shape[0])
-    return flow.resized(luma, (max(1, round(luma.shape[1] * rows / luma.shape[0])), rows))
+    return flow.of_rows(np.ascontiguousarray(luma.T) if columns else luma, ROWS)
 
 
 def of_pictures(pictures: Sequence[np.ndarray]) -> Readout:

@@ -127,7 +127,7 @@ class SequenceSource(_Sequence):
         path = self._file(index)
         with _opened(path) as (image, spec, layer):
             self._check_like_first(path, spec)
-            return self._expand(_samples(image, spec, layer, path))
+            return expanded(_samples(image, spec, layer, path))
 
     def _check_like_first(self, path: Path, spec: ImageSpec) -> None:
         size, dtype = (spec.width, spec.height), _dtype(spec)
@@ -141,14 +141,15 @@ class SequenceSource(_Sequence):
         deep_tiff = self.path.suffix.lower() in (".tif", ".tiff") and self.dtype == np.uint16
         return "premultiplied" if self.transfer == "linear" or deep_tiff else "straight"
 
-    def _expand(self, samples: np.ndarray) -> np.ndarray:
-        """Y, YA, RGB or RGBA samples as RGBA."""
-        picture = np.empty((self.height, self.width, 4), self.dtype)
-        channels = samples.shape[2]
-        picture[..., :3] = samples[..., : 1 if channels < 3 else 3]
-        opaque = np.iinfo(self.dtype).max if self.dtype.kind == "u" else 1
-        picture[..., 3] = samples[..., -1] if channels in ALPHA else opaque
-        return picture
+
+def expanded(samples: np.ndarray) -> np.ndarray:
+    """Y, YA, RGB or RGBA samples (height, width, n) as RGBA, of new memory."""
+    height, width, channels = samples.shape
+    picture = np.empty((height, width, 4), samples.dtype)
+    picture[..., :3] = samples[..., : 1 if channels < 3 else 3]
+    opaque = np.iinfo(samples.dtype).max if samples.dtype.kind == "u" else 1
+    picture[..., 3] = samples[..., -1] if channels in ALPHA else opaque
+    return picture
 
 
 class SequenceChannel(_Sequence):

@@ -56,7 +56,4 @@ def step(moved: Moved, before: Similarity, after: Similarity) -> float:
 
 
 def _small(source: FrameSource, index: int) -> np.ndarray:
-    luma = flow.luma(source.read(index), source.transfer, source.alpha)
-    rows = min(ROWS, luma.shape[0])
-    size = max(1, round(luma.shape[1] * rows / luma.shape[0])), rows
-    return flow.resized(luma, size)
+    return flow.of_rows(flow.luma(source.read(index), source.transfer, source.alpha), ROWS)
