@@ -7,7 +7,6 @@ from __future__ import annotations
 import errno
 import tempfile
 import time
-from bisect import bisect_left, bisect_right
 from collections.abc import Hashable, Iterator
 from contextlib import closing, contextmanager
 from dataclasses import dataclass, replace
@@ -88,7 +87,6 @@ class CarriedMattes(SourceWrapper):
         self._shots = source if isinstance(source, ShotSource) else ShotSource(source)
         self.filmed = self.count
         self._drawings = {frame: curves for frame, curves in drawings if 0 <= frame < self.count}
-        self._frames = sorted(self._drawings)
         self._drawing_keys: dict[int, str] = {}  # previews ask for paths again and again
         self._parent = folder
 
@@ -151,7 +149,7 @@ class CarriedMattes(SourceWrapper):
         """A frame's matte (H, W) uint8, which is kept then, as are those that are carried with it."""
         matte = None
         for made in self._made(index, *self._in_shot(index, first, last)):
-            self._keep(self._path(made.frame, first, last), made)
+            write_levels(self._path(made.frame, first, last), made.matte, f"{CONFIDENCE}{made.confidence:.3f}")
             if made.frame == index:
                 matte = made.matte
         return matte
@@ -183,11 +181,8 @@ class CarriedMattes(SourceWrapper):
 
     def _near(self, index: int) -> tuple[int | None, int | None]:
         """The drawings before and behind a frame that are near enough; twice its own."""
-        before, behind = bisect_right(self._frames, index) - 1, bisect_left(self._frames, index)
-        first = self._frames[before] if before >= 0 else None
-        last = self._frames[behind] if behind < len(self._frames) else None
-        first = first if first is not None and index - first <= carrying.FARTHEST else None
-        last = last if last is not None and last - index <= carrying.FARTHEST else None
+        first = max((frame for frame in self._drawings if index - carrying.FARTHEST <= frame <= index), default=None)
+        last = min((frame for frame in self._drawings if index <= frame <= index + carrying.FARTHEST), default=None)
         return first, last
 
     def _in_shot(self, index: int, first: int | None, last: int | None) -> tuple[int | None, int | None]:
@@ -276,10 +271,6 @@ class CarriedMattes(SourceWrapper):
             return None
         samples = image.get_pixels("uint8")
         return None if samples is None or image.has_error else samples[..., 0]
-
-    def _keep(self, path: Path, carried: carrying.Carried) -> None:
-        """Writes a matte whole or not at all. MediaError: it cannot be written."""
-        write_levels(path, carried.matte, f"{CONFIDENCE}{carried.confidence:.3f}")
 
 
 def _use_elsewhere(parent: Path | None) -> str:

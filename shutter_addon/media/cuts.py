@@ -305,15 +305,12 @@ class ShotSource(SourceWrapper):
         except MediaError:
             return None
         made = self._signatures[index] = signature(frame, self.transfer, self.alpha)
-        self._hand_over(index * self.step, frame)
+        self._handed[index * self.step] = frame
+        while len(self._handed) > 1 and len(self._handed) * frame.nbytes > _HANDED_BYTES:
+            del self._handed[next(iter(self._handed))]
         while len(self._signatures) > _KEPT:
             del self._signatures[next(iter(self._signatures))]
         return made
-
-    def _hand_over(self, index: int, frame: np.ndarray | Planes) -> None:
-        self._handed[index] = frame
-        while len(self._handed) > 1 and len(self._handed) * frame.nbytes > _HANDED_BYTES:
-            del self._handed[next(iter(self._handed))]
 
 
 def _run(signatures: Mapping[int, Signature | None], start: int, step: int) -> list[Signature]:

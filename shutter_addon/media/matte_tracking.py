@@ -16,7 +16,6 @@ from .carrying import box_around
 from .footage import Footage
 from .opencv import cv2
 from .pursuit import COVERED, LEFT, Sighting
-from .registration import Part
 from .tracking import Subject, Tracked, TrackingError
 
 EMPTY = "the outline encloses nothing here"
@@ -90,17 +89,9 @@ class _MatteTrack(tracking.Track):
         super().__init__(region, footage, motion, frames)
         self._cover = cover
 
-    def both_ways(self, start: int, frames: range, anchors: Collection[int]) -> Iterator[Tracked]:
-        """See Track.both_ways."""
-        if not (self._cover(start) > _INSIDE).any():
+    def _check(self, frame: int) -> None:
+        if not (self._cover(frame) > _INSIDE).any():
             raise TrackingError(EMPTY)
-        return self._both_ways(start, range(min(frames), max(frames) + 1), {*anchors} - {start})
-
-    def _part(self, frame: int) -> tuple[Part, float]:
-        raise TrackingError(EMPTY)  # it has no corners, and is known by its matte
-
-    def _has_part(self, frame: int) -> bool:
-        return bool((self._cover(frame) > _INSIDE).any())
 
     def _pursuit(self, start: int) -> tuple[int, _Pursuit, float]:
         return start, _Pursuit(self._cover, self._footage, start, self._motion), 1.0

@@ -157,9 +157,7 @@ class PartPursuit:
     def _leaves(self, picture: np.ndarray) -> bool:
         """Whether most of the part would lie outside of the picture if it went on."""
         places = self._speed.after(self._speed).after(self._known)(self._first.points)
-        height, width = picture.shape
-        inside = (places.real >= 0) & (places.real < width) & (places.imag >= 0) & (places.imag < height)
-        return inside.mean() < 0.5
+        return bool(registration.inside(picture, places).mean() < 0.5)
 
 
 @dataclass(frozen=True)

@@ -169,13 +169,8 @@ class Part:
     def astray(self, picture: np.ndarray, known: Similarity) -> tuple[np.ndarray, np.ndarray]:
         """Its corners that are found in a picture, around where a motion has them: where they were in its own, and how
         many pixels each has moved otherwise."""
-        size = self._picture.shape[::-1]
-        back = cv2.warpAffine(picture, matrix(known, self._origin), size, flags=cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP)
-        moved, good = self._flow(back)
-        there = known(self.points)
-        good &= (
-            (there.real >= 0) & (there.real < picture.shape[1]) & (there.imag >= 0) & (there.imag < picture.shape[0])
-        )
+        moved, good = self._flow(picture, known)
+        good &= inside(picture, known(self.points))
         return self.points[good], np.abs(moved - self.points)[good]
 
     def again(self, picture: np.ndarray, motion: Similarity) -> Part | None:
@@ -189,15 +184,11 @@ class Part:
         self._believed += np.where(match.seen, 0.2 * (wanted - self._believed), 0)
 
     def _match(self, picture: np.ndarray, guess: Similarity, motion: Motion) -> Match | None:
-        size = self._picture.shape[::-1]
-        back = cv2.warpAffine(picture, matrix(guess, self._origin), size, flags=cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP)
-        there = guess(self.points)
-        seen = (there.real >= 2) & (there.real < picture.shape[1] - 2)
-        seen &= (there.imag >= 2) & (there.imag < picture.shape[0] - 2)
+        seen = inside(picture, guess(self.points), 2)
         total, weights = self._believed.sum(), np.where(seen, self._believed, 0)
         if seen.sum() < FEWEST[motion] or weights.sum() <= 0.02 * total:
             return None
-        moved, good = self._flow(back)
+        moved, good = self._flow(picture, guess)
         good &= seen
         tolerance = max(1.0, max(picture.shape) / 640)
         fitted = fit(self.points, moved, np.where(good, weights, 0), motion, tolerance)
@@ -217,9 +208,11 @@ class Part:
             held=found(self.points[agreeing]),
         )
 
-    def _flow(self, picture: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Where each corner is in a picture, and whether it comes back from there."""
-        there, is_good = _there_and_back(self._picture, picture, self.points - self._origin, self._side)
+    def _flow(self, picture: np.ndarray, guess: Similarity) -> tuple[np.ndarray, np.ndarray]:
+        """Where each corner is in a picture that is taken back by a guess, and whether it comes back from there."""
+        size, flags = self._picture.shape[::-1], cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP
+        back = cv2.warpAffine(picture, matrix(guess, self._origin), size, flags=flags)
+        there, is_good = _there_and_back(self._picture, back, self.points - self._origin, self._side)
         return there + self._origin, is_good
 
     def _likeness(self, picture: np.ndarray, motion: Similarity) -> float:
@@ -376,6 +369,13 @@ def _plane(pairs: np.ndarray) -> np.ndarray:
 
 def _pairs(points: np.ndarray) -> np.ndarray:
     return np.stack([points.real, points.imag], axis=-1).astype(np.float32, order="C").reshape(-1, 1, 2)
+
+
+def inside(picture: np.ndarray, points: np.ndarray, margin: float = 0) -> np.ndarray:
+    """Which points (n,) lie in a picture (H, W), a margin in pixels away from its edges (n,) bool."""
+    height, width = picture.shape
+    across = (points.real >= margin) & (points.real < width - margin)
+    return across & (points.imag >= margin) & (points.imag < height - margin)
 
 
 def matrix(motion: Similarity, origin: complex = 0) -> np.ndarray:

@@ -135,9 +135,13 @@ class Track(ABC):
             self._parts[frame] = self._part(frame)
         return self._parts[frame]
 
-    @abstractmethod
     def _part(self, frame: int) -> tuple[Part, float]:
         """As `part`, which keeps it."""
+        raise NotImplementedError
+
+    def _check(self, frame: int) -> None:
+        """TrackingError: at that frame there is nothing to follow."""
+        self.part(frame)
 
     @abstractmethod
     def _pursuit(self, start: int) -> tuple[int, Pursuit, float]:
@@ -145,7 +149,7 @@ class Track(ABC):
 
     def both_ways(self, start: int, frames: range, anchors: Collection[int]) -> Iterator[Tracked]:
         """As `follow`. TrackingError, at once: nothing can be tracked from there."""
-        self.part(start)
+        self._check(start)
         return self._both_ways(start, range(min(frames), max(frames) + 1), {*anchors} - {start})
 
     def _both_ways(self, start: int, frames: range, anchors: set[int]) -> Iterator[Tracked]:
@@ -214,7 +218,7 @@ class Track(ABC):
 
     def _has_part(self, frame: int) -> bool:
         try:
-            self.part(frame)
+            self._check(frame)
         except TrackingError:
             return False
         return True
