@@ -127,12 +127,12 @@ class FrameReader:
         return run.next is None or time - run.next.time <= max(KEPT_DECODING, self._landmarks.longest) * step
 
     def _run_at(self, time: float, step: float) -> _Run:
-        if self._run and (self._is_near(self._run, time, step) or self._seek(self._run.file, time, step)):
-            return self._run
-        return self._restart()
-
-    def _seek(self, file: File, time: float, step: float) -> bool:
-        return any(self._run_from(file, round(time - back * step), time) for back in (0, 3, 50, 400))
+        if (run := self._run) is None:
+            return self._restart()
+        if self._is_near(run, time, step):
+            return run
+        found = any(self._run_from(run.file, round(time - back * step), time) for back in (0, 3, 50, 400))
+        return self._run if found and self._run else self._restart()
 
     def _run_from(self, file: File, start: int, time: float) -> bool:
         """Decodes on from a key frame near `start`; whether what comes out there is clean, and not after a time."""
@@ -254,7 +254,8 @@ class _Run:
                     floor = time_of(packet)
             if floor is None:
                 continue
-            self._await(packet, floor)
+            if packet is not None and packet.pts is not None and packet.pts >= floor:
+                heapq.heappush(self._awaited, packet.pts)
             for frame in self._decode(packet):
                 time = time_of(frame) or 0  # a raw stream has none, nor a length: MovieSource does not accept it
                 if time < floor:
@@ -288,10 +289,6 @@ class _Run:
         except (av.error.FFmpegError, ValueError) as error:  # ValueError: of a decoder that could not be opened
             self.fault = f"{DAMAGED} ({reason(error)})"
             return []
-
-    def _await(self, packet: Packet | None, floor: float) -> None:
-        if packet is not None and packet.pts is not None and packet.pts >= floor:
-            heapq.heappush(self._awaited, packet.pts)
 
     def _settle(self, time: float) -> None:
         """Notes which frames before that time never came. Without an error they were not meant to be shown."""

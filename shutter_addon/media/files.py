@@ -2,8 +2,8 @@
 
 import os
 from pathlib import Path
-from typing import Protocol
 
+from ..core.frames.frame_source import FrameSource
 from . import pyav
 from .errors import MediaError
 
@@ -75,14 +75,7 @@ def check_size(name: str, width: int, height: int) -> None:
         raise MediaError(f"{name}: {width}×{height} are too many pixels, or none; up to 16384×16384 can be read")
 
 
-class Frames(Protocol):
-    """What has so many frames."""
-
-    path: Path
-    count: int
-
-
-def check_index(source: Frames, index: int) -> None:
+def check_index(source: FrameSource, index: int) -> None:
     """IndexError unless the source has a frame of that index."""
     if not 0 <= index < source.count:
         raise IndexError(f"frame {index} of {source.path.name}: it has frames 0 to {source.count - 1}")

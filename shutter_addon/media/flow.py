@@ -60,7 +60,7 @@ def luma(frame: np.ndarray, transfer: str, alpha: str) -> np.ndarray:
 
 def displayed(frame: np.ndarray, transfer: str, alpha: str) -> np.ndarray:
     """A frame (H, W, 4) of a source, as it is displayed, in colours (H, W, 3) uint8; transfer, alpha: the source's."""
-    return np.ascontiguousarray(_levels(_encoded(frame, transfer, alpha))[..., :3])
+    return np.ascontiguousarray(levels(_encoded(frame, transfer, alpha))[..., :3])
 
 
 def resized(luma: np.ndarray, size: tuple[int, int]) -> np.ndarray:
@@ -235,8 +235,8 @@ def _encoded(frame: np.ndarray, transfer: str, alpha: str) -> np.ndarray:
     return light.premultiplied(light.straight(rgba) if alpha == "premultiplied" else rgba, convert)
 
 
-def _levels(samples: np.ndarray) -> np.ndarray:
-    """As uint8."""
+def levels(samples: np.ndarray) -> np.ndarray:
+    """Samples as levels of 8 bits."""
     if samples.dtype == np.uint16:
         return (samples >> 8).astype(np.uint8)
     if samples.dtype != np.uint8:
@@ -246,7 +246,7 @@ def _levels(samples: np.ndarray) -> np.ndarray:
 
 def _luma(samples: np.ndarray) -> np.ndarray:
     """(H, W) uint8, which DIS needs."""
-    samples = _levels(samples)
+    samples = levels(samples)
     return cv2.cvtColor(np.ascontiguousarray(samples[..., :3]), cv2.COLOR_RGB2GRAY)
 
 

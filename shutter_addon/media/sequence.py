@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import bisect
+import itertools
 import re
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from fractions import Fraction
 from functools import lru_cache, partial
-from itertools import pairwise
 from pathlib import Path
 from stat import S_ISREG
 
@@ -217,7 +217,7 @@ def _numbered(path: Path) -> tuple[list[int], list[Path], Path | None]:
         if number >= 0 and (number not in by_frame or len(digits) == len(first)):
             by_frame[number] = file
     numbers = sorted(by_frame)
-    gaps = (i for i, (a, b) in enumerate(pairwise(numbers), 1) if b - a > MISSING + 1 or b >= LONGEST)
+    gaps = (i for i, (a, b) in enumerate(itertools.pairwise(numbers), 1) if b - a > MISSING + 1 or b >= LONGEST)
     end = next(gaps, len(numbers))
     files = [by_frame[number] for number in numbers]
     return numbers[:end], files[:end], files[end] if end < len(files) else None
@@ -287,22 +287,27 @@ def _had_alpha(path: Path, _size: int, _mtime: int) -> bool:
         return len(layer) in ALPHA
 
 
+def _parts(image: ImageInput) -> Iterator[ImageSpec]:
+    """What describes each part of an image, which is the one that is read then."""
+    for part in itertools.count():
+        if not image.seek_subimage(part, 0):
+            return
+        yield image.spec()
+
+
 def _first_colours(image: ImageInput, path: Path) -> Layer:
     """(spec, positions) of the channels that Blender shows."""
     spec = whole = image.spec()
     if image.format_name() != "openexr":
         return spec, [*range(min(spec.nchannels, 4))]
     names: list[str] = []
-    part = 0
-    while image.seek_subimage(part, 0):
-        spec = image.spec()
+    for spec in _parts(image):
         layer = _colour_channels(spec.channelnames)
         if layer and not spec.deep:
             if (spec.width, spec.height) != (whole.width, whole.height):
                 raise MediaError(f"{path.name}: its parts have different data windows")
             return spec, layer
         names += [f"deep {name}" for name in spec.channelnames] if spec.deep else spec.channelnames
-        part += 1
     raise MediaError(f"{path.name}: no colour channels, only {', '.join(names)}")
 
 
@@ -310,14 +315,11 @@ def _channel_named(channel: str, image: ImageInput, path: Path) -> Layer:
     """(spec, positions) of a channel: three for the luminance of colours, none for the alpha of an opaque image.
     What an EXR calls "red" itself is that: coefficients have the names of shutters."""
     names: list[str] = []
-    part, is_exr = 0, image.format_name() == "openexr"
-    while (is_exr or channel not in CHANNELS) and image.seek_subimage(part, 0):
-        spec = image.spec()
-        if not spec.deep:
-            if channel in spec.channelnames:
-                return spec, [spec.channelnames.index(channel)]
-            names += spec.channelnames
-        part += 1
+    is_exr = image.format_name() == "openexr"
+    for spec in _parts(image) if is_exr or channel not in CHANNELS else ():
+        if channel in spec.channelnames and not spec.deep:
+            return spec, [spec.channelnames.index(channel)]
+        names += [] if spec.deep else spec.channelnames
     if channel not in CHANNELS:
         raise no_channel(path, channel, names if is_exr else CHANNELS)
     spec, layer = _first_colours(image, path)
