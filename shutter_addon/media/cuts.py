@@ -101,7 +101,7 @@ def is_cut(before: list[Signature], after: list[Signature]) -> bool:
 
 def may_be_cut(before: Signature, after: Signature) -> bool:
     """Whether `is_cut` can be true of these two neighbours, as far as they alone tell."""
-    return _differ(before, after, NOISE) and _unlike(before, after, APART)
+    return _differ(before, after, NOISE) and plain_cuts.unlike(before, after, BITS) >= APART
 
 
 def _all_changes(before: Signature, after: Signature) -> bool:
@@ -109,7 +109,7 @@ def _all_changes(before: Signature, after: Signature) -> bool:
     in common wherever the camera may have jumped."""
     jumps = product(*(range(-(length // REACH), length // REACH + 1) for length in before.shape[:2]))
     return all(_differ(*parts, 0.0, PART) for parts in zip(_parts(before), _parts(after), strict=True)) and all(
-        _unlike(_shared(before, y, x), _shared(after, -y, -x), MOVED) for y, x in jumps
+        plain_cuts.unlike(_shared(before, y, x), _shared(after, -y, -x), BITS) >= MOVED for y, x in jumps
     )
 
 
@@ -131,16 +131,12 @@ def _differ(before: Signature, after: Signature, least: float, share: float = 1.
     # threshold, and need not be.
     if np.abs(_brightness(before) - _brightness(after)).mean() + 1 < threshold:
         return False
-    return plain_cuts.change(_whole(before), _whole(after)) >= threshold
+    return plain_cuts.change(before, after) >= threshold
 
 
 def _brightness(picture: Signature) -> np.ndarray:
     """The largest colour, which is compared; quicker than by `max` along so short an axis."""
     return np.maximum(np.maximum(picture[..., 0], picture[..., 1]), picture[..., 2])
-
-
-def _unlike(before: Signature, after: Signature, apart: float) -> bool:
-    return plain_cuts.unlike(_whole(before), _whole(after), BITS) >= apart
 
 
 def _stands_out(before: list[Signature], after: list[Signature]) -> bool:
@@ -150,11 +146,7 @@ def _stands_out(before: list[Signature], after: list[Signature]) -> bool:
     known = len(before) + len(after) - 2
     ratio = RATIO * 2 * WINDOW / known if known else RATIO
     before, after = ([*side, *[side[-1]] * (WINDOW + 1 - len(side))] for side in (before, after))
-    return plain_cuts.stands_out(list(map(_whole, [*before[::-1], *after])), WINDOW + 1, ratio, NOISE)
-
-
-def _whole(picture: Signature) -> np.ndarray:
-    return np.rint(picture).clip(0, 255).astype(np.uint8)
+    return plain_cuts.stands_out([*before[::-1], *after], WINDOW + 1, ratio, NOISE)
 
 
 def _moving(pictures: list[Signature]) -> list[Signature]:

@@ -8,7 +8,7 @@ import re
 import secrets
 import stat
 import zlib
-from contextlib import suppress
+from contextlib import closing, suppress
 from functools import lru_cache, partial
 from io import BufferedReader
 from pathlib import Path
@@ -121,20 +121,19 @@ class InbetweenCache:
 
     def is_sound(self, pair: int) -> bool:
         """Whether a pair is finished and all its pictures match their digests. It reads them."""
-        return pair in self.kinds or all(self._is_sound(frame) for frame in self.steps(pair))
+        return pair in self.kinds or all((image := self._sound(frame)) and image.close() for frame in self.steps(pair))
 
     def read(self, frame: int) -> np.ndarray:
         """A frame's picture (height, width, 4), as `write` was given it. MediaError: it is damaged or gone."""
         path = self.picture(frame)
-        if not self._is_sound(frame):
+        if (image := self._sound(frame)) is None:
             raise MediaError(f"{path}: this in-between frame is damaged or gone; build in-between frames again")
-        image = self._open(path)
-        samples = image.read_image(0, 0, 0, self._spec.nchannels, self._spec.format) if image else None
-        if image is None or samples is None or image.has_error:
-            raise MediaError(
-                f"{path}: this in-between frame cannot be decoded; remove in-between frames, and build again"
-            )
-        image.close()
+        with closing(image):
+            samples = image.read_image(0, 0, 0, self._spec.nchannels, self._spec.format)
+            if samples is None or image.has_error:
+                raise MediaError(
+                    f"{path}: this in-between frame cannot be decoded; remove in-between frames, and build again"
+                )
         return expanded(samples)
 
     def prepare(self) -> None:
@@ -192,17 +191,13 @@ class InbetweenCache:
     def _is_between(self, frame: int) -> bool:
         return 0 < frame < (self.source.count - 1) * self.factor and frame % self.factor != 0
 
-    def _is_sound(self, frame: int) -> bool:
-        """Whether a frame's picture matches one of its digests, and is of the source's size and samples."""
+    def _sound(self, frame: int) -> ImageInput | None:
+        """A frame's opened picture, if it matches one of its digests, and is of the source's size and samples."""
         path, digests = self.picture(frame), self.digests.get(frame)
-        try:
-            if not digests or Folder(self.folder).digest(path.name, LARGEST_PICTURE) not in digests:
-                return False
-        except OSError:
-            return False
-        if image := self._open(path):
-            image.close()
-        return image is not None
+        with suppress(OSError):
+            if digests and Folder(self.folder).digest(path.name, LARGEST_PICTURE) in digests:
+                return self._open(path)
+        return None
 
     def _open(self, path: Path) -> ImageInput | None:
         """The opened image file, if it is as `write_picture` makes them for this source; else None."""

@@ -44,7 +44,7 @@ def lit(frames, gain=1.0, more=0.0):
 
 def test_the_quick_look_rules_out_no_cut(monkeypatch):
     """What it rules out by pictures that are not rounded is none where they are."""
-    monkeypatch.setattr(media_cuts, "_unlike", lambda *_: True)  # the other question: any two pictures are
+    monkeypatch.setattr(plain_cuts, "unlike", lambda *_: 1.0)  # the other question: any two pictures are
     chance = np.random.default_rng(0)
     rounded = (np.full((18, 32, 3), level, np.float32) for level in (100.49, 126.51))  # by 27 levels, but for rounding
     pairs = [tuple(rounded)]
@@ -61,7 +61,7 @@ def test_the_quick_look_rules_out_no_cut(monkeypatch):
 def differs(before, after) -> bool:
     """Whether two pictures, rounded, differ as much as at a cut."""
     threshold = max(media_cuts.CHANGE * min(max(before.mean(), after.mean()) / media_cuts.GREY, 1.0), media_cuts.NOISE)
-    return plain_cuts.change(*(np.rint(picture).astype(np.uint8) for picture in (before, after))) >= threshold
+    return plain_cuts.change(before, after) >= threshold
 
 
 def test_films_without_cuts_have_none(film, bunny):
