@@ -8,6 +8,6 @@ def missing() -> str:
     """Why PyAV does not decode movies, in Python's words; "": it does."""
     try:
         from .movie import MovieSource  # noqa: F401
-    except ImportError as error:
+    except (ImportError, AttributeError) as error:  # the latter of one before 19
         return str(error)
     return ""
