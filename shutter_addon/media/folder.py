@@ -7,7 +7,6 @@ import hashlib
 import os
 import stat
 from collections.abc import Callable
-from contextlib import suppress
 from io import BufferedReader
 from pathlib import Path
 
@@ -27,12 +26,6 @@ class Folder:
     def folder(self, name: str) -> Folder:
         """A folder in this one."""
         return Folder(self.path / name)
-
-    def make(self, name: str) -> Folder:
-        """A folder in this one, new if there is none."""
-        with suppress(FileExistsError):
-            (self.path / name).mkdir()
-        return self.folder(name)
 
     def entries(self) -> list[os.DirEntry]:
         """All that lies here."""

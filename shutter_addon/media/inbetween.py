@@ -24,7 +24,7 @@ from . import cuts, flow
 from .completeness import why_short
 from .errors import MediaError, NotBuiltError
 from .files import check_index
-from .inbetween_cache import InbetweenCache, pair_line, unwritable, write_picture
+from .inbetween_cache import InbetweenCache, pair_line, write_picture
 from .inbetween_folders import State
 from .source import SourceWrapper
 
@@ -197,7 +197,10 @@ def _tasks(
             return
         if cache.is_sound(pair):
             yield lambda: True
-        elif not _take(cache, claims, pair):
+            continue
+        with cache.writable():
+            is_taken = claims.take(_claim(pair))
+        if not is_taken:
             others.append(pair)
         elif _finished_by_another(cache, pair):
             claims.release(_claim(pair))
@@ -262,13 +265,6 @@ class _Near:
 def _claim(pair: int) -> str:
     """The name of a pair's claim."""
     return f"{pair:08d}"
-
-
-def _take(cache: InbetweenCache, claims: Claims, pair: int) -> bool:
-    try:
-        return claims.take(_claim(pair))
-    except OSError as error:
-        raise unwritable(cache.folder, error) from None
 
 
 def _finished_by_another(cache: InbetweenCache, pair: int) -> bool:

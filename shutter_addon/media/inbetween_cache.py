@@ -8,7 +8,8 @@ import re
 import secrets
 import stat
 import zlib
-from contextlib import closing, suppress
+from collections.abc import Iterator
+from contextlib import closing, contextmanager, suppress
 from functools import lru_cache, partial
 from io import BufferedReader
 from pathlib import Path
@@ -141,40 +142,42 @@ class InbetweenCache:
 
         MediaError: the folder cannot be written to."""
         text = (json.dumps(self.manifest, indent=1, sort_keys=True) + "\n").encode()
-        try:
+        with self.writable():
             folder = own_folder(self.folder)
-            folder.make(CHECKS)
+            own_folder(self.folder / CHECKS)
             if content_of(folder, MANIFEST) != text:
                 with atomic_write.writing(self.folder / MANIFEST) as part:
                     part.write_bytes(text)
             for part in atomic_write.left_behind(self.folder):
                 with suppress(OSError):  # another user's, or cleared by others meanwhile
                     folder.remove_part(part.name, HALF.fullmatch)
-        except OSError as error:
-            raise unwritable(self.folder, error) from None
 
     def write(self, frame: int, picture: np.ndarray) -> None:
         """Writes a frame's picture (height, width, 4) whole or not at all, and its digest. MediaError: it cannot be
         written."""
         path = self.picture(frame)
-        try:
-            with atomic_write.writing(path) as part:
-                if not write_picture(part, picture, self.source.alpha):
-                    reason = why_short(part.parent)
-                    raise MediaError(f"{self.folder}: an in-between frame could not be written whole ({reason})")
-                # Before the picture is moved to its place: then each of our pictures there has its line, even if this
-                # process is killed.
-                self.note(f"{_sha256(part)}  {path.name}")
-        except OSError as error:
-            raise unwritable(self.folder, error) from None
+        with self.writable(), atomic_write.writing(path) as part:
+            if not write_picture(part, picture, self.source.alpha):
+                reason = why_short(part.parent)
+                raise MediaError(f"{self.folder}: an in-between frame could not be written whole ({reason})")
+            # Before the picture is moved to its place: then each of our pictures there has its line, even if this
+            # process is killed.
+            self.note(f"{_sha256(part)}  {path.name}")
 
     def note(self, line: str) -> None:
         """Appends a line to this build's checks. MediaError: it cannot be written."""
-        try:
+        with self.writable():
             Folder(self.folder).folder(CHECKS).append(f"{self._token}.sha256", f"{line}\n".encode())
+
+    @contextmanager
+    def writable(self) -> Iterator[None]:
+        """Inside, a MediaError stands for an OSError: the folder cannot be written to."""
+        try:
+            yield
         except OSError as error:
             self._token = secrets.token_hex(4)  # that file may end in half a line: go on in another
-            raise unwritable(self.folder, error) from None
+            reason = error.strerror or error
+            raise MediaError(f"{self.folder}: in-between frames cannot be written there ({reason})") from None
 
     def confirm(self) -> None:
         """MediaError: the source was written to since this was made. What this build has finished counts no longer: it
@@ -390,8 +393,3 @@ def relative_path(path: Path, folder: str | Path) -> str:
         return Path(os.path.relpath(path, folder)).as_posix()
     except ValueError:  # another drive
         return path.absolute().as_posix()
-
-
-def unwritable(folder: Path, error: OSError) -> MediaError:
-    """The sentence about a folder of in-between frames that cannot be written to."""
-    return MediaError(f"{folder}: in-between frames cannot be written there ({error.strerror or error})")
