@@ -99,8 +99,7 @@ class FrameReader:
         run = self._run_at(time, step)
         if run.is_first and run.next is not None and time <= _known(run).time == run.next.time:
             # Of key frames that are all at that time, a seek finds the last one, as Blender does.
-            found = self._run_from(run.file, run.next.time, run.next.time)
-            run = self._run if found and self._run else self._restart()
+            run = self._run_from(run.file, run.next.time, run.next.time) or self._restart()
         while run.next is not None and _known(run).time < time and run.next.time <= time:
             run.advance()
         shown = _known(run)
@@ -131,23 +130,21 @@ class FrameReader:
             return self._restart()
         if self._is_near(run, time, step):
             return run
-        found = any(self._run_from(run.file, round(time - back * step), time) for back in (0, 3, 50, 400))
-        return self._run if found and self._run else self._restart()
+        tries = (self._run_from(run.file, round(time - back * step), time) for back in (0, 3, 50, 400))
+        return next(filter(None, tries), None) or self._restart()
 
-    def _run_from(self, file: File, start: int, time: float) -> bool:
-        """Decodes on from a key frame near `start`; whether what comes out there is clean, and not after a time."""
+    def _run_from(self, file: File, start: int, time: float) -> _Run | None:
+        """Decodes on from a key frame near `start`. None: what comes out there is not clean, or after a time."""
         try:
             file.container.seek(start, stream=file.stream)
         except av.error.FFmpegError:
-            return False
+            return None
         file.codec.flush_buffers()
-        shown = self._begin(file, seeking=True).shown
+        run = self._begin(file, seeking=True)
+        if (shown := run.shown) is None or shown.time > time:
+            return None
         # No I frame: a wrong index or a gradual refresh. What follows would lack references.
-        return (
-            shown is not None
-            and shown.time <= time
-            and (shown.frame.key_frame or shown.frame.pict_type == PictureType.I)
-        )
+        return run if shown.frame.key_frame or shown.frame.pict_type == PictureType.I else None
 
     def _restart(self) -> _Run:
         """Decodes on from the start. Not by a seek: with an edit list or without an index that ends elsewhere."""
