@@ -162,7 +162,7 @@ class InbetweenCache:
                 raise MediaError(f"{self.folder}: an in-between frame could not be written whole ({reason})")
             # Before the picture is moved to its place: then each of our pictures there has its line, even if this
             # process is killed.
-            self.note(f"{_sha256(part)}  {path.name}")
+            self.note(f"{Folder(part.parent).digest(part.name, LARGEST_PICTURE)}  {path.name}")
 
     def note(self, line: str) -> None:
         """Appends a line to this build's checks. MediaError: it cannot be written."""
@@ -380,11 +380,6 @@ def content_hash(path: Path, size: int, _mtime: int, whole: int) -> bytes:
             file.seek(max(size - BLOCK, 0) * block // (BLOCKS - 1))
             digest.update(file.read(BLOCK))
         return digest.digest()
-
-
-def _sha256(path: Path) -> str:
-    with path.open("rb") as file:
-        return hashlib.file_digest(file, "sha256").hexdigest()
 
 
 def relative_path(path: Path, folder: str | Path) -> str:
