@@ -27,15 +27,12 @@ ROOT = Path(__file__).resolve().parents[1]
 # brings may be in here: an extension's wheels come before Blender's own modules, for all of Blender.
 WHEELS = (
     "av==19.0.2",
-    "click==8.2.1",  # PySceneDetect requires it, before 8.3
     "glcontext==3.1.0",
     "moderngl==5.13.0",
     "opencv-contrib-python-headless==5.0.0.93",
-    "platformdirs==4.14.8",  # PySceneDetect requires it
-    "scenedetect==0.6.7.1",
     "tqdm==4.70.1",
 )
-ALSO = {"windows-x64": ("colorama==0.4.6",)}  # click and tqdm require it there
+ALSO = {"windows-x64": ("colorama==0.4.6",)}  # tqdm requires it there
 # By Blender's name of a system, the one that pip looks for: as old as PyAV's wheels allow.
 SYSTEMS = {"linux-x64": "manylinux_2_28_x86_64", "windows-x64": "win_amd64", "macos-arm64": "macosx_14_0_arm64"}
 BLENDERS_PYTHON = "3.13"  # of official builds of 5.2

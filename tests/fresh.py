@@ -4,7 +4,7 @@ import os
 import subprocess
 
 # The extension's modules that a Blender of a distribution may have for its own Python, and an official one has not.
-PACKAGES = ("av", "cv2", "glcontext", "moderngl", "scenedetect", "tqdm")
+PACKAGES = ("av", "cv2", "glcontext", "moderngl", "tqdm")
 INSTALL = ("--command", "extension", "install-file", "-r", "user_default", "-e")
 
 

@@ -21,8 +21,7 @@ NAME = "bl_ext.user_default.virtual_shutter"
 MAKE_EDIT = ROOT / "tests" / "blender" / "installed.py"
 LACKING = ROOT / "tests" / "blender" / "lacking.py"
 SYSTEM = {"linux": "linux-x64", "win32": "windows-x64", "darwin": "macos-arm64"}[sys.platform]
-WHEELS = {"av", "glcontext", "moderngl", "opencv_contrib_python_headless", "scenedetect", "tqdm"}
-REQUIRED = {"click", "platformdirs"}  # by PySceneDetect; Windows's console needs colorama besides
+WHEELS = {"av", "glcontext", "moderngl", "opencv_contrib_python_headless", "tqdm"}
 RECIPE = {
     "version": 1,
     "window": 4,
@@ -100,7 +99,7 @@ def test_a_zip_with_wheels_holds_those_of_its_system(dist, system, tag):
     licences = {name for name in names if name.startswith("licenses/")}
     assert names - wheels - licences == sources()
     own = {"colorama"} if system == "windows_x64" else set()
-    assert {name.split("/")[1].split("-")[0] for name in wheels} == WHEELS | REQUIRED | own
+    assert {name.split("/")[1].split("-")[0] for name in wheels} == WHEELS | own
     for name in wheels:
         python, abi, platform = name.removesuffix(".whl").split("-")[-3:]
         assert platform == "any" or platform.endswith(tag)
@@ -273,25 +272,6 @@ except NoDeviceError as error:
     assert forced.startswith("the Python package moderngl cannot be loaded")
 
 
-def test_pyscenedetect_finds_cuts_without_what_its_command_needs():
-    code = """
-from shutter_addon.media import cuts
-print(cuts.has_pyscenedetect(), 'scenedetect._cli' in sys.modules)
-"""
-    assert without(["click", "platformdirs"], code).split() == ["True", "False"]
-    for package in ("scenedetect", "cv2"):
-        assert without([package], code).split()[0] == "False"
-
-
-def test_pyscenedetect_is_loaded_where_cuts_are_looked_for():
-    assert (
-        without(
-            [], "import shutter_addon.media.cuts, shutter_addon.media.inbetween\nprint('scenedetect' in sys.modules)"
-        )
-        == "False\n"
-    )
-
-
 class Installation:
     """A real Blender with user folders of its own."""
 
@@ -406,7 +386,7 @@ def test_installed_without_wheels(blender, dist, bunny, recipe, tmp_path):
     nothing else, of what needs a package."""
     hidden = blender.user / "scripts" / "startup" / "hidden.py"
     hidden.parent.mkdir(parents=True)
-    hidden.write_text(f"import sys\nsys.modules |= dict.fromkeys({REQUIRED | {*PACKAGES}})\ndef register(): pass\n")
+    hidden.write_text(f"import sys\nsys.modules |= dict.fromkeys({PACKAGES})\ndef register(): pass\n")
     (path,) = dist[0].glob("*-no_wheels.zip")
     blender.run("--command", "extension", "validate", path)
     blender.install(path)

@@ -53,7 +53,7 @@ REVIEWED: dict[str, set[str]] = {
         "_keep_looking",
         "ask",
     },
-    "editing/track_region.py": {"_each", "_follow_drawn", "track.<lambda>"},
+    "editing/track_region.py": {"_each", "track.<lambda>"},
     "rendering/device_work.py": {"broken_off"},
     "rendering/inbetween_build.py": {"Build._build", "Build._update", "Build.stop", "_estimated", "running"},
     "rendering/outline_carrying.py": {"_Carrying._carry"},

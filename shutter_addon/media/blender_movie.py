@@ -10,7 +10,6 @@ import numpy as np
 
 from ..core.frames.frame_source import FrameSource
 from . import decoding_child
-from .channels import CHANNELS, no_channel
 from .errors import MediaError
 from .files import OTHER, check_file, check_index, check_name, check_size, is_other
 
@@ -24,7 +23,7 @@ class BlenderMovie(FrameSource):
 
     transfer, by_blender = "srgb", True
 
-    def __init__(self, path: str | Path, *, deinterlace: bool = False):
+    def __init__(self, path: str | Path, *, deinterlace: bool = False) -> None:
         self.path = check_file(path)
         check_name(self.path.absolute())
         self.options = {"stream": 0, "deinterlace": bool(deinterlace)}
@@ -58,23 +57,6 @@ class BlenderMovie(FrameSource):
 
     def close(self) -> None:
         self._movie.close()
-
-
-class BlenderMovieChannel(BlenderMovie):
-    """One channel of a movie's frames, as movie.MovieChannel has it; but a grey movie has luminance by its RGB too."""
-
-    def __init__(self, path: str | Path, channel: str):
-        """channel: one of CHANNELS. MediaError: it is another one, or the movie cannot be read."""
-        if channel not in CHANNELS:
-            raise no_channel(check_file(path), channel, CHANNELS)
-        super().__init__(path)
-        self._channel = channel
-
-    def read(self, index: int) -> np.ndarray:
-        """The samples (height, width, n) that the channel is made of, n as for movie.MovieChannel."""
-        if self._channel == "alpha" and self.alpha == "opaque":
-            return np.empty((self.height, self.width, 0), self.dtype)
-        return super().read(index)[..., CHANNELS[self._channel]]
 
 
 def frame_rate(number: float) -> Fraction:

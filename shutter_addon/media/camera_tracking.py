@@ -56,7 +56,7 @@ def follow_camera(
 class _CameraTrack(tracking.Track):
     def __init__(
         self, camera: Subject, regions: Sequence[Drawn], footage: Footage, motion: Motion, frames: Collection[int]
-    ):
+    ) -> None:
         super().__init__(camera, footage, motion, frames)
         self._regions = regions
         self._begun: dict[int, Placement] = {}  # where it has begun anew
@@ -128,7 +128,7 @@ class _Pursuit:
 
     reason = UNLIKE
 
-    def __init__(self, part_at: Callable[[int], Part], footage: Footage, frame: int, motion: Motion):
+    def __init__(self, part_at: Callable[[int], Part], footage: Footage, frame: int, motion: Motion) -> None:
         """part_at: what of a frame stands still; TrackingError: too little"""
         self._part_at, self._footage, self._motion = part_at, footage, motion
         self._anchor = part_at(frame), frame, Similarity()  # with the motion from the first frame to it

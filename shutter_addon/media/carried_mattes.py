@@ -7,11 +7,9 @@ from __future__ import annotations
 import errno
 import tempfile
 import time
-from bisect import bisect_left, bisect_right
 from collections.abc import Hashable, Iterator
 from contextlib import closing, contextmanager
 from dataclasses import dataclass, replace
-from fractions import Fraction
 from functools import cached_property
 from pathlib import Path
 from typing import Protocol
@@ -22,10 +20,11 @@ from OpenImageIO import ImageBuf, ImageInput
 from ..core import stopping
 from ..core.farm.claims import Claims
 from ..core.frames.frame_source import FrameSource
+from ..core.frames.source_wrapper import SourceWrapper
 from ..core.model import outlines, scribbles
-from . import carrying, flow
+from . import carrying, flow, opencv
 from .cuts import ShotSource
-from .errors import MediaError, lacks_opencv
+from .errors import MediaError
 from .files import check_name
 from .folder import own_folder
 from .image_writing import write_levels
@@ -72,25 +71,21 @@ class CarriedFile:
 
     def open(self) -> CarriedMattes:
         """MediaError: the footage cannot be read, or OpenCV is missing."""
-        if not carrying.is_possible():
-            raise lacks_opencv("outlines are tracked by")
+        opencv.check("outlines are tracked by", "ximgproc")
         return CarriedMattes(self.footage.open(), self.drawings, self.folder)
 
 
-class CarriedMattes:
+class CarriedMattes(SourceWrapper):
     """The mattes, a core.model.mattes.MatteSource; close it. Its frames are the source's filmed ones."""
 
     step = 1
 
     def __init__(
         self, source: FrameSource, drawings: tuple[tuple[int, outlines.Curves], ...], folder: Path | None = None
-    ):
-        self._source = source if isinstance(source, ShotSource) else ShotSource(source)
-        self.width, self.height = source.width, source.height
-        self.count = source.count
-        self.fps: Fraction | None = source.fps
+    ) -> None:
+        super().__init__(source)
+        self._shots = source if isinstance(source, ShotSource) else ShotSource(source)
         self._drawings = {frame: curves for frame, curves in drawings if 0 <= frame < self.count}
-        self._frames = sorted(self._drawings)
         self._drawing_keys: dict[int, str] = {}  # previews ask for paths again and again
         self._parent = folder
 
@@ -153,7 +148,7 @@ class CarriedMattes:
         """A frame's matte (H, W) uint8, which is kept then, as are those that are carried with it."""
         matte = None
         for made in self._made(index, *self._in_shot(index, first, last)):
-            self._keep(self._path(made.frame, first, last), made)
+            write_levels(self._path(made.frame, first, last), made.matte, f"{CONFIDENCE}{made.confidence:.3f}")
             if made.frame == index:
                 matte = made.matte
         return matte
@@ -166,7 +161,8 @@ class CarriedMattes:
             path = self._path(index, first, last)
             with Claims(path.parent, _PATIENCE, _BEAT) as claims:
                 try:
-                    while not _taken(claims, path.parent, name):
+                    own_folder(path.parent)
+                    while not claims.take(name):
                         stopping.check()
                         time.sleep(_PAUSE)
                 except OSError as error:
@@ -180,23 +176,20 @@ class CarriedMattes:
 
     def close(self) -> None:
         """Closes the footage; a later read opens it again."""
-        self._source.close()
+        self._shots.close()
 
     def _near(self, index: int) -> tuple[int | None, int | None]:
         """The drawings before and behind a frame that are near enough; twice its own."""
-        before, behind = bisect_right(self._frames, index) - 1, bisect_left(self._frames, index)
-        first = self._frames[before] if before >= 0 else None
-        last = self._frames[behind] if behind < len(self._frames) else None
-        first = first if first is not None and index - first <= carrying.FARTHEST else None
-        last = last if last is not None and last - index <= carrying.FARTHEST else None
+        first = max((frame for frame in self._drawings if index - carrying.FARTHEST <= frame <= index), default=None)
+        last = min((frame for frame in self._drawings if index <= frame <= index + carrying.FARTHEST), default=None)
         return first, last
 
     def _in_shot(self, index: int, first: int | None, last: int | None) -> tuple[int | None, int | None]:
         """Those of them that lie in the frame's shot."""
         if first == last:
             return first, last
-        shot = self._source.around(index, *(index if end is None else end for end in (first, last)))
-        self._source.release()
+        shot = self._shots.around(index, *(index if end is None else end for end in (first, last)))
+        self._shots.release()
         return (first if first in shot else None), (last if last in shot else None)
 
     def _made(self, index: int, first: int | None, last: int | None) -> Iterator[carrying.Carried]:
@@ -221,10 +214,10 @@ class CarriedMattes:
             return range(first + 1, last)
         if first is not None:
             end = min(first + min(-(-(index - first) // BLOCK) * BLOCK, carrying.FARTHEST), self.count - 1)
-            return range(first + 1, min(end + 1, self._source.around(index, first, end).stop))
+            return range(first + 1, min(end + 1, self._shots.around(index, first, end).stop))
         assert last is not None
         start = max(last - min(-(-(last - index) // BLOCK) * BLOCK, carrying.FARTHEST), 0)
-        return range(max(start, self._source.around(index, start, last).start), last)
+        return range(max(start, self._shots.around(index, start, last).start), last)
 
     def _fading(self, carried: list[carrying.Carried]) -> Iterator[carrying.Carried]:
         """Mattes away from their only drawing, which fade where it can be trusted no longer."""
@@ -235,7 +228,7 @@ class CarriedMattes:
             yield each if share == 1 else replace(each, matte=np.rint(each.matte * share).astype(np.uint8))
 
     def _picture(self, frame: int) -> np.ndarray:
-        return flow.displayed(self._source.read(frame), self._source.transfer, self._source.alpha)
+        return flow.displayed(self._shots.read(frame), self.transfer, self.alpha)
 
     def _drawing(self, frame: int) -> carrying.Drawing:
         size = carrying.working_size(self.width, self.height)
@@ -262,7 +255,7 @@ class CarriedMattes:
     @cached_property
     def _folder(self) -> str:
         """The name of this footage's folder."""
-        return f"{self._source.path.stem[:40]}-{manifest_key(identity(self._source))}"
+        return f"{self.path.stem[:40]}-{manifest_key(identity(self._source))}"
 
     def _kept(self, path: Path) -> np.ndarray | None:
         """The matte (H, W) uint8 of a file; None: there is none of ours, or it is damaged."""
@@ -277,16 +270,6 @@ class CarriedMattes:
             return None
         samples = image.get_pixels("uint8")
         return None if samples is None or image.has_error else samples[..., 0]
-
-    def _keep(self, path: Path, carried: carrying.Carried) -> None:
-        """Writes a matte whole or not at all. MediaError: it cannot be written."""
-        write_levels(path, carried.matte, f"{CONFIDENCE}{carried.confidence:.3f}")
-
-
-def _taken(claims: Claims, folder: Path, name: str) -> bool:
-    """As Claims.take. OSError: the folder cannot be written to, or is a link."""
-    with own_folder(folder):
-        return claims.take(name)
 
 
 def _use_elsewhere(parent: Path | None) -> str:

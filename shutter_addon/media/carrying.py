@@ -1,7 +1,7 @@
 """Mattes of the frames between two drawings of an outline, carried there by the footage's own motion.
 
 Dense flow, joined from frame to frame, says where in each drawing's frame lies what a pixel shows. Where flow between
-the two frames alone, or the motion of the camera or of the subject, leads to what is more alike, that is believed. Any
+the two frames alone, or the motion of the camera or of the subject, leads to what is more alike, that is believed. Each
 of them errs by a few pixels, so everything within REACH of that place votes, a vote counting by how alike the colours
 are around both ends (non-local means: Buades et al. 2005, "A non-local algorithm for image denoising"; votes for
 labels: Coupé et al. 2011, "Patch-based segmentation using expert priors"). Both drawings vote, the nearer with more
@@ -25,11 +25,7 @@ import numpy as np
 from ..core import stopping
 from ..core.frames.light import to_linear
 from . import flow
-
-try:
-    import cv2
-except ImportError:  # a package without wheels; the extension registers without it
-    cv2 = None
+from .opencv import cv2
 
 WORKING = 512
 SLIM = 4  # pixels of a side that the working picture keeps: so many as a picture has at least that Blender renders
@@ -84,11 +80,6 @@ class Carried:
 
 # Frames as they are displayed: (H, W, 3) uint8 of a source frame.
 Frames = Callable[[int], np.ndarray]
-
-
-def is_possible() -> bool:
-    """Whether the libraries are there that this takes."""
-    return hasattr(cv2, "ximgproc")
 
 
 def working_size(width: int, height: int) -> tuple[int, int]:

@@ -50,7 +50,7 @@ class ColorSource(SourceWrapper):
 
     transfer, dtype = "linear", np.dtype(np.float32)
 
-    def __init__(self, source: FrameSource, name: str, config: str | Path | None):
+    def __init__(self, source: FrameSource, name: str, config: str | Path | None) -> None:
         if config is None or name not in ColorConfig(str(config)).getColorSpaceNames():
             raise MediaError(f"{source.path.name}: unknown colour space {name}")
         super().__init__(source)

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import OpenImageIO
 
+from . import pyav
 from .files import check_name
 
 UNKNOWN = "nothing says why"  # why a file is short
@@ -30,19 +31,17 @@ def is_whole_picture(path: Path) -> bool:
 
 def is_whole_movie(path: Path, count: int) -> bool:
     """Whether a movie holds that many pictures, without decoding them; without PyAV, whether there is anything."""
-    try:
-        import av  # noqa: F401
-    except ImportError:
+    if pyav.missing():
         return path.is_file() and path.stat().st_size > 0
     return whole_pictures(path) >= count
 
 
 def whole_pictures(path: Path) -> int:
     """How many pictures a movie holds, without decoding them; 0: it cannot be read, or PyAV is missing."""
-    try:
-        import av
-    except ImportError:
+    if pyav.missing():
         return 0
+    import av
+
     try:
         with av.open(str(path)) as container:
             return sum(packet.size > 0 for packet in container.demux(video=0))

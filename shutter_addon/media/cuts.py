@@ -1,12 +1,11 @@
-"""Cuts within a source, found by PySceneDetect or as it finds them, and frames that repeat the one before: decisions
-about few neighbouring frames, made of a small picture of each; and a source that knows where its shots end."""
+"""Cuts within a source, found as PySceneDetect finds them, and frames that repeat the one before: decisions about few
+neighbouring frames, made of a small picture of each; and a source that knows where its shots end."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from functools import cache, lru_cache
+from functools import lru_cache
 from itertools import pairwise, product
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -16,9 +15,6 @@ from ..core.frames.planes import Planes, as_rgba
 from ..core.frames.source_wrapper import SourceWrapper
 from . import plain_cuts
 from .errors import MediaError
-
-if TYPE_CHECKING:
-    from scenedetect.scene_detector import SceneDetector
 
 # The frames on each side of two neighbours that have a say in whether there is a cut between them: in so many, a film
 # animated on threes shows as many pictures as PySceneDetect compares.
@@ -85,21 +81,11 @@ def _blocks(length: int, most: int) -> tuple[np.ndarray, np.ndarray]:
     return edges[:-1], np.diff(edges)
 
 
-@cache
-def has_pyscenedetect() -> bool:
-    """Whether PySceneDetect finds cuts; else plain_cuts does. The first call loads it, which takes some 0.2 s."""
-    try:
-        import scenedetect.detectors  # noqa: F401
-    except ImportError:  # a package without wheels: it needs OpenCV as well
-        return False
-    return True
-
-
 def is_cut(before: list[Signature], after: list[Signature]) -> bool:
     """Whether there is a cut between the frames before[-1] and after[0].
 
     before, after: signatures of up to NEIGHBOURS successive frames on each side, fewer at the clip's ends alone.
-    There is one where PySceneDetect's HashDetector finds that the pictures have nothing in common, its ContentDetector
+    There is one where HashDetector (plain_cuts) finds that the pictures have nothing in common, its ContentDetector
     that brightness changes, and its AdaptiveDetector that it changes by far more than between neighbours. The first
     two are asked as well about what comes a little later or came a little earlier, for what passes is no cut; then
     ContentDetector about each part, and HashDetector about what the pictures share if the camera has jumped. Not
@@ -115,7 +101,7 @@ def is_cut(before: list[Signature], after: list[Signature]) -> bool:
 
 def may_be_cut(before: Signature, after: Signature) -> bool:
     """Whether `is_cut` can be true of these two neighbours, as far as they alone tell."""
-    return _differ(before, after, NOISE) and _unlike(before, after, APART)
+    return _differ(before, after, NOISE) and plain_cuts.unlike(before, after, BITS) >= APART
 
 
 def _all_changes(before: Signature, after: Signature) -> bool:
@@ -123,7 +109,7 @@ def _all_changes(before: Signature, after: Signature) -> bool:
     in common wherever the camera may have jumped."""
     jumps = product(*(range(-(length // REACH), length // REACH + 1) for length in before.shape[:2]))
     return all(_differ(*parts, 0.0, PART) for parts in zip(_parts(before), _parts(after), strict=True)) and all(
-        _unlike(_shared(before, y, x), _shared(after, -y, -x), MOVED) for y, x in jumps
+        plain_cuts.unlike(_shared(before, y, x), _shared(after, -y, -x), BITS) >= MOVED for y, x in jumps
     )
 
 
@@ -141,28 +127,16 @@ def _shared(picture: Signature, down: int, right: int) -> Signature:
 def _differ(before: Signature, after: Signature, least: float, share: float = 1.0) -> bool:
     """Whether brightness changes by that share of what a cut changes, and by no fewer levels than `least`."""
     threshold = max(share * CHANGE * min(max(before.mean(), after.mean()) / GREY, 1.0), least)
-    # PySceneDetect rounds both pictures first, which moves their mean difference by 1 at most. Most neighbours are far
-    # below the threshold, and need not be asked about, which takes long.
+    # Both pictures are rounded first, which moves their mean difference by 1 at most. Most neighbours are far below the
+    # threshold, and need not be.
     if np.abs(_brightness(before) - _brightness(after)).mean() + 1 < threshold:
         return False
-    if not has_pyscenedetect():
-        return plain_cuts.change(_whole(before), _whole(after)) >= threshold
-    from scenedetect.detectors import ContentDetector
-
-    return _finds(ContentDetector(threshold, min_scene_len=0, luma_only=True), [before, after], 1)
+    return plain_cuts.change(before, after) >= threshold
 
 
 def _brightness(picture: Signature) -> np.ndarray:
-    """The largest colour, which PySceneDetect compares; quicker than by `max` along so short an axis."""
+    """The largest colour, which is compared; quicker than by `max` along so short an axis."""
     return np.maximum(np.maximum(picture[..., 0], picture[..., 1]), picture[..., 2])
-
-
-def _unlike(before: Signature, after: Signature, apart: float) -> bool:
-    if not has_pyscenedetect():
-        return plain_cuts.unlike(_whole(before), _whole(after), BITS) >= apart
-    from scenedetect.detectors import HashDetector
-
-    return _finds(HashDetector(apart, BITS, min_scene_len=0), [before, after], 1)
 
 
 def _stands_out(before: list[Signature], after: list[Signature]) -> bool:
@@ -172,23 +146,7 @@ def _stands_out(before: list[Signature], after: list[Signature]) -> bool:
     known = len(before) + len(after) - 2
     ratio = RATIO * 2 * WINDOW / known if known else RATIO
     before, after = ([*side, *[side[-1]] * (WINDOW + 1 - len(side))] for side in (before, after))
-    pictures = [*before[::-1], *after]
-    if not has_pyscenedetect():
-        return plain_cuts.stands_out(list(map(_whole, pictures)), WINDOW + 1, ratio, NOISE)
-    from scenedetect.detectors import AdaptiveDetector
-
-    detector = AdaptiveDetector(ratio, min_scene_len=0, window_width=WINDOW, min_content_val=NOISE, luma_only=True)
-    return _finds(detector, pictures, WINDOW + 1)
-
-
-def _finds(detector: SceneDetector, pictures: list[Signature], index: int) -> bool:
-    """Whether a fresh detector finds a cut before that picture, of all."""
-    whole = (_whole(picture)[..., ::-1].copy() for picture in pictures)  # OpenCV has BGR
-    return index in [cut for i, picture in enumerate(whole) for cut in detector.process_frame(i, picture)]
-
-
-def _whole(picture: Signature) -> np.ndarray:
-    return np.rint(picture).clip(0, 255).astype(np.uint8)
+    return plain_cuts.stands_out([*before[::-1], *after], WINDOW + 1, ratio, NOISE)
 
 
 def _moving(pictures: list[Signature]) -> list[Signature]:
@@ -240,7 +198,7 @@ class ShotSource(SourceWrapper):
     what is decided without a frame that cannot be read is decided again.
     """
 
-    def __init__(self, source: FrameSource, step: int = 1):
+    def __init__(self, source: FrameSource, step: int = 1) -> None:
         super().__init__(source)
         self.step = step
         self.filmed = (source.count - 1) // step + 1  # how many frames are
@@ -339,15 +297,12 @@ class ShotSource(SourceWrapper):
         except MediaError:
             return None
         made = self._signatures[index] = signature(frame, self.transfer, self.alpha)
-        self._hand_over(index * self.step, frame)
+        self._handed[index * self.step] = frame
+        while len(self._handed) > 1 and len(self._handed) * frame.nbytes > _HANDED_BYTES:
+            del self._handed[next(iter(self._handed))]
         while len(self._signatures) > _KEPT:
             del self._signatures[next(iter(self._signatures))]
         return made
-
-    def _hand_over(self, index: int, frame: np.ndarray | Planes) -> None:
-        self._handed[index] = frame
-        while len(self._handed) > 1 and len(self._handed) * frame.nbytes > _HANDED_BYTES:
-            del self._handed[next(iter(self._handed))]
 
 
 def _run(signatures: Mapping[int, Signature | None], start: int, step: int) -> list[Signature]:

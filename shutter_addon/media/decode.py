@@ -59,7 +59,7 @@ class FrameReader:
     Memory: the frame on screen, its successor, and what the decoder holds. Not for two threads at once.
     """
 
-    def __init__(self, path: Path, number: int = 0):
+    def __init__(self, path: Path, number: int = 0) -> None:
         """number: which of the file's video streams. Raises MediaError if nothing of it can be decoded."""
         self._path, self._number, self._threads = path, number, "AUTO"
         self._container: InputContainer | None = None
@@ -99,8 +99,7 @@ class FrameReader:
         run = self._run_at(time, step)
         if run.is_first and run.next is not None and time <= _known(run).time == run.next.time:
             # Of key frames that are all at that time, a seek finds the last one, as Blender does.
-            found = self._run_from(run.file, run.next.time, run.next.time)
-            run = self._run if found and self._run else self._restart()
+            run = self._run_from(run.file, run.next.time, run.next.time) or self._restart()
         while run.next is not None and _known(run).time < time and run.next.time <= time:
             run.advance()
         shown = _known(run)
@@ -127,27 +126,25 @@ class FrameReader:
         return run.next is None or time - run.next.time <= max(KEPT_DECODING, self._landmarks.longest) * step
 
     def _run_at(self, time: float, step: float) -> _Run:
-        if self._run and (self._is_near(self._run, time, step) or self._seek(self._run.file, time, step)):
-            return self._run
-        return self._restart()
+        if (run := self._run) is None:
+            return self._restart()
+        if self._is_near(run, time, step):
+            return run
+        tries = (self._run_from(run.file, round(time - back * step), time) for back in (0, 3, 50, 400))
+        return next(filter(None, tries), None) or self._restart()
 
-    def _seek(self, file: File, time: float, step: float) -> bool:
-        return any(self._run_from(file, round(time - back * step), time) for back in (0, 3, 50, 400))
-
-    def _run_from(self, file: File, start: int, time: float) -> bool:
-        """Decodes on from a key frame near `start`; whether what comes out there is clean, and not after a time."""
+    def _run_from(self, file: File, start: int, time: float) -> _Run | None:
+        """Decodes on from a key frame near `start`. None: what comes out there is not clean, or after a time."""
         try:
             file.container.seek(start, stream=file.stream)
         except av.error.FFmpegError:
-            return False
+            return None
         file.codec.flush_buffers()
-        shown = self._begin(file, seeking=True).shown
+        run = self._begin(file, seeking=True)
+        if (shown := run.shown) is None or shown.time > time:
+            return None
         # No I frame: a wrong index or a gradual refresh. What follows would lack references.
-        return (
-            shown is not None
-            and shown.time <= time
-            and (shown.frame.key_frame or shown.frame.pict_type == PictureType.I)
-        )
+        return run if shown.frame.key_frame or shown.frame.pict_type == PictureType.I else None
 
     def _restart(self) -> _Run:
         """Decodes on from the start. Not by a seek: with an edit list or without an index that ends elsewhere."""
@@ -209,7 +206,7 @@ class _Run:
     passed: the latest time of a frame before it
     """
 
-    def __init__(self, file: File, landmarks: _Landmarks, seeking: bool):
+    def __init__(self, file: File, landmarks: _Landmarks, seeking: bool) -> None:
         self.file, self._landmarks = file, landmarks
         self.fault, self.is_first = "", not seeking
         self._awaited: list[int] = []
@@ -254,7 +251,8 @@ class _Run:
                     floor = time_of(packet)
             if floor is None:
                 continue
-            self._await(packet, floor)
+            if packet is not None and packet.pts is not None and packet.pts >= floor:
+                heapq.heappush(self._awaited, packet.pts)
             for frame in self._decode(packet):
                 time = time_of(frame) or 0  # a raw stream has none, nor a length: MovieSource does not accept it
                 if time < floor:
@@ -289,10 +287,6 @@ class _Run:
             self.fault = f"{DAMAGED} ({reason(error)})"
             return []
 
-    def _await(self, packet: Packet | None, floor: float) -> None:
-        if packet is not None and packet.pts is not None and packet.pts >= floor:
-            heapq.heappush(self._awaited, packet.pts)
-
     def _settle(self, time: float) -> None:
         """Notes which frames before that time never came. Without an error they were not meant to be shown."""
         while self._awaited and self._awaited[0] <= time:
@@ -314,7 +308,7 @@ def time_of(item: Packet | av.VideoFrame) -> int | None:
 
 
 def fraction(rational: AVRational | Fraction | None) -> Fraction:
-    """PyAV's rational, in its earlier versions a Fraction, as one; 0 where there is none."""
+    """PyAV's rational as a Fraction; 0 where there is none."""
     return Fraction(rational.numerator, rational.denominator) if rational and rational.denominator else Fraction(0)
 
 
@@ -327,8 +321,7 @@ def reason(error: Exception) -> str:
 def _tags(codec: VideoCodecContext) -> Tags:
     # libswscale takes what it does not know for BT.601.
     space = {1: 1, 4: 4, 7: 7, 9: 9, 10: 9}.get(int(codec.colorspace), 5)
-    side_data = getattr(codec, "coded_side_data", {})  # PyAV before 19 has none, and pictures lie as they are stored
-    return Tags(space, codec.color_range == ColorRange.JPEG, _turns(side_data.get("display_matrix")))
+    return Tags(space, codec.color_range == ColorRange.JPEG, _turns(codec.coded_side_data.get("display_matrix")))
 
 
 def _turns(display_matrix: bytes | None) -> int:

@@ -9,7 +9,7 @@ import subprocess
 import threading
 from contextlib import suppress
 from pathlib import Path
-from typing import IO, NoReturn
+from typing import IO
 
 import numpy as np
 
@@ -54,7 +54,7 @@ def is_lent() -> bool:
 class Movie:
     """A movie that can be asked for. The process opens it when it is, for itself and no other one of the same file."""
 
-    def __init__(self, path: Path, deinterlace: bool):
+    def __init__(self, path: Path, deinterlace: bool) -> None:
         self._known = {"number": next(_numbers), "path": str(path.absolute()), "deinterlace": deinterlace}
 
     def about(self) -> dict:
@@ -77,7 +77,7 @@ def _ask(wanted: dict) -> tuple[dict, np.ndarray | None]:
         for _ in range(2):  # it may have ended for want of work, or with another movie
             if (answer := _answer(wanted)) is not None:
                 return answer
-    _fail("the Blender that decodes it has ended")
+    raise MediaError("the Blender that decodes it has ended")
 
 
 def _answer(wanted: dict) -> tuple[dict, np.ndarray | None] | None:
@@ -105,7 +105,7 @@ def _asked(process: subprocess.Popen[bytes], question: bytes) -> tuple[dict, np.
     process.stdin.flush()
     said = json.loads(_line(process.stdout))
     if "error" in said:
-        _fail(said["error"])
+        raise MediaError(said["error"])
     if not said["bytes"]:
         return said, None
     frame = np.empty(said["shape"], said["dtype"])
@@ -125,7 +125,7 @@ def _started() -> subprocess.Popen[bytes]:
     """MediaError: it cannot be. _EndedError: it ended before it was ready."""
     global _process
     if _command is None:
-        _fail("no Blender decodes it any more")
+        raise MediaError("no Blender decodes it any more")
     try:
         _process = subprocess.Popen(
             [*_command, READY],
@@ -137,14 +137,14 @@ def _started() -> subprocess.Popen[bytes]:
             creationflags=getattr(subprocess, "CREATE_NO_WINDOW", 0),
         )
     except OSError as error:
-        _fail(f"the Blender that decodes it cannot be started: {error.strerror or error}")
+        raise MediaError(f"the Blender that decodes it cannot be started: {error.strerror or error}") from None
     assert _process.stdout is not None
     _enlarge(_process.stdout)
     try:  # by a thread, as Windows waits for no pipe for some time only
         threads.start(_wait, _process.stdout).result(STARTING)
     except TimeoutError:
         _kill()
-        _fail(f"the Blender that decodes it is not ready after {STARTING} seconds")
+        raise MediaError(f"the Blender that decodes it is not ready after {STARTING} seconds") from None
     return _process
 
 
@@ -181,7 +181,3 @@ def _end() -> None:
     except subprocess.TimeoutExpired:
         process.kill()
         process.wait()
-
-
-def _fail(reason: str) -> NoReturn:
-    raise MediaError(reason)

@@ -7,17 +7,9 @@ class MediaError(UserError):
     """One clear sentence for the user, naming the file."""
 
 
-def lacks_opencv(what: str) -> MediaError:
-    """That OpenCV is missing; what: a sentence's beginning, as "tracking needs"."""
-    return MediaError(
-        f"{what} the Python package opencv-contrib-python-headless; "
-        "install the zip of Virtual Shutter that is made for your system"
-    )
-
-
 class NotBuiltError(MediaError):
     """An in-between frame is not built; factor: of in-between frames."""
 
-    def __init__(self, sentence: str, factor: int):
+    def __init__(self, sentence: str, factor: int) -> None:
         super().__init__(sentence)
         self.factor = factor

@@ -2,8 +2,9 @@
 
 import os
 from pathlib import Path
-from typing import Protocol
 
+from ..core.frames.frame_source import FrameSource
+from . import pyav
 from .errors import MediaError
 
 PIXELS = 1 << 28  # 16384×16384; FFmpeg decodes no more either, and a damaged header may promise anything
@@ -39,10 +40,10 @@ def stamp(path: str | Path) -> tuple[int, int] | None:
 def check_sound(path: str | Path) -> None:
     """MediaError unless it is a file that has sound; without PyAV, unless it is a file."""
     path = check_file(path)
-    try:
-        import av
-    except ImportError:
+    if pyav.missing():
         return
+    import av
+
     try:
         with av.open(check_name(path)) as container:
             has_sound = bool(container.streams.audio)
@@ -74,14 +75,7 @@ def check_size(name: str, width: int, height: int) -> None:
         raise MediaError(f"{name}: {width}×{height} are too many pixels, or none; up to 16384×16384 can be read")
 
 
-class Frames(Protocol):
-    """What has so many frames."""
-
-    path: Path
-    count: int
-
-
-def check_index(source: Frames, index: int) -> None:
+def check_index(source: FrameSource, index: int) -> None:
     """IndexError unless the source has a frame of that index."""
     if not 0 <= index < source.count:
         raise IndexError(f"frame {index} of {source.path.name}: it has frames 0 to {source.count - 1}")

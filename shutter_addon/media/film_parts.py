@@ -1,9 +1,11 @@
 """A movie that is written in parts, each whole or not at all, so that one that was broken off goes on where it was."""
 
+from __future__ import annotations
+
 from collections.abc import Iterable, Sequence
 from fractions import Fraction
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -12,20 +14,16 @@ from .completeness import is_whole_movie
 from .errors import MediaError
 from .files import check_name
 
+if TYPE_CHECKING:
+    from av import VideoFrame
+    from av.container import OutputContainer
+    from av.video.stream import VideoStream
+
 LENGTH = 32  # frames of a part
 ENDING = ".mp4"
 # Fine enough that 99 % of levels are within 3. Whole frames at short distances, and none that wait for later ones: who
 # jumps about in an edit sees the frame at once.
 _OPTIONS = {"crf": "8", "preset": "fast", "tune": "fastdecode", "g": "12", "bf": "0"}
-
-
-def missing_package() -> str | None:
-    """The Python package that movies need and that is not there; None: it is."""
-    try:
-        import av  # noqa: F401
-    except ImportError:
-        return "av"
-    return None
 
 
 def write_part(path: Path, pictures: Iterable[np.ndarray], fps: Fraction) -> None:
@@ -51,7 +49,7 @@ def write_part(path: Path, pictures: Iterable[np.ndarray], fps: Fraction) -> Non
         raise _unwritten(path, error) from None
 
 
-def _stream(container: Any, shape: Sequence[int], fps: Fraction) -> Any:
+def _stream(container: OutputContainer, shape: Sequence[int], fps: Fraction) -> VideoStream:
     stream = container.add_stream("libx264", rate=fps, options=_OPTIONS)
     stream.height, stream.width = shape[:2]
     stream.pix_fmt = "yuv420p" if shape[0] % 2 == shape[1] % 2 == 0 else "yuv444p"  # odd sizes have no halves
@@ -61,7 +59,7 @@ def _stream(container: Any, shape: Sequence[int], fps: Fraction) -> Any:
     return stream
 
 
-def _frame(picture: np.ndarray, stream: Any, index: int) -> Any:
+def _frame(picture: np.ndarray, stream: VideoStream, index: int) -> VideoFrame:
     import av
 
     levels = np.ascontiguousarray(picture[..., :3])

@@ -26,7 +26,7 @@ class FilmedFrames:
 
     indices: which ones; frames: all places; start: that of the timeline frame from which is tracked"""
 
-    def __init__(self, times: Mapping[int, float], start: int):
+    def __init__(self, times: Mapping[int, float], start: int) -> None:
         """times: by timeline frame, in filmed frames from 0 on; a fraction stands for an in-between frame.
         start: one of the timeline frames"""
         self._times, self._begin = times, start
@@ -117,7 +117,7 @@ def _centre(subject: Subject, frame: int) -> np.ndarray:
 
 
 class _Seen(Generic[S]):
-    def __init__(self, subject: S, frames: list[int]):
+    def __init__(self, subject: S, frames: list[int]) -> None:
         self._subject: S = subject
         self._frames = frames
 

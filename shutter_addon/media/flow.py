@@ -14,12 +14,8 @@ import numpy as np
 
 from ..core import stopping
 from ..core.frames import light
-from .errors import lacks_opencv
-
-try:
-    import cv2
-except ImportError:  # a package without wheels; the extension registers without it
-    cv2 = None
+from . import opencv
+from .opencv import cv2
 
 STEP = 2  # pixels between the vectors that are carried; all pixels gain nothing and take four times as long
 SMALLEST = 16  # pixels; OpenCV's flows need about as many, smaller pictures are cross-faded
@@ -29,8 +25,7 @@ ALIKE = 8  # levels of 255 by which the ends of a vector may differ before anoth
 
 def check() -> None:
     """MediaError: OpenCV is missing, or has no contributed modules."""
-    if not hasattr(cv2, "optflow"):  # another add-on may bring an OpenCV without it
-        raise lacks_opencv("in-between frames need")
+    opencv.check("in-between frames need", "optflow")
 
 
 def between(
@@ -65,12 +60,19 @@ def luma(frame: np.ndarray, transfer: str, alpha: str) -> np.ndarray:
 
 def displayed(frame: np.ndarray, transfer: str, alpha: str) -> np.ndarray:
     """A frame (H, W, 4) of a source, as it is displayed, in colours (H, W, 3) uint8; transfer, alpha: the source's."""
-    return np.ascontiguousarray(_levels(_encoded(frame, transfer, alpha))[..., :3])
+    return np.ascontiguousarray(levels(_encoded(frame, transfer, alpha))[..., :3])
 
 
 def resized(luma: np.ndarray, size: tuple[int, int]) -> np.ndarray:
     """A smaller grey picture, of this width and height."""
     return cv2.resize(luma, size, interpolation=cv2.INTER_AREA)
+
+
+def of_rows(luma: np.ndarray, most: int) -> np.ndarray:
+    """A grey picture, made smaller where it has more rows."""
+    height, width = luma.shape
+    rows = min(most, height)
+    return resized(luma, (max(1, round(width * rows / height)), rows))
 
 
 def vectors(first: np.ndarray, second: np.ndarray) -> np.ndarray:
@@ -118,7 +120,7 @@ METHODS: dict[str, tuple[Flow, ...]] = {
 class _Paths:
     """Where the pixels of two pictures go from one to the other."""
 
-    def __init__(self, luma: list[np.ndarray], flow: Flow):
+    def __init__(self, luma: list[np.ndarray], flow: Flow) -> None:
         self._shape = luma[0].shape
         self._sides = [_carriers(a, b, flow) for a, b in (luma, luma[::-1])]
 
@@ -233,8 +235,8 @@ def _encoded(frame: np.ndarray, transfer: str, alpha: str) -> np.ndarray:
     return light.premultiplied(light.straight(rgba) if alpha == "premultiplied" else rgba, convert)
 
 
-def _levels(samples: np.ndarray) -> np.ndarray:
-    """As uint8."""
+def levels(samples: np.ndarray) -> np.ndarray:
+    """Samples as levels of 8 bits."""
     if samples.dtype == np.uint16:
         return (samples >> 8).astype(np.uint8)
     if samples.dtype != np.uint8:
@@ -244,7 +246,7 @@ def _levels(samples: np.ndarray) -> np.ndarray:
 
 def _luma(samples: np.ndarray) -> np.ndarray:
     """(H, W) uint8, which DIS needs."""
-    samples = _levels(samples)
+    samples = levels(samples)
     return cv2.cvtColor(np.ascontiguousarray(samples[..., :3]), cv2.COLOR_RGB2GRAY)
 
 

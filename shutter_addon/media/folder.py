@@ -7,57 +7,40 @@ import hashlib
 import os
 import stat
 from collections.abc import Callable
-from contextlib import suppress
 from io import BufferedReader
 from pathlib import Path
-from typing import Any, Self
 
-_OPENS = os.open in os.supports_dir_fd and os.scandir in os.supports_fd
 _PLAIN = sum(getattr(os, name, 0) for name in ("O_NOFOLLOW", "O_NONBLOCK", "O_NOCTTY", "O_BINARY"))
 _JUNCTION = 0xA0000003  # st_reparse_tag of a folder on Windows that leads to another
 
 
 class Folder:
-    """A folder itself, open: what is done in it by name is done there, whatever becomes of its path meanwhile.
+    """A folder itself. What a name in it stands for is looked at just before it is used; what is opened is looked at
+    again. Everything here may raise OSError."""
 
-    Windows opens no folders: what a name stands for is looked at just before. Everything here may raise OSError."""
-
-    def __init__(self, path: str | Path, within: Folder | None = None):
-        """path: a name where it lies within another folder. OSError: there is none, or it is a link."""
-        self.path: Path = within.path / path if within else Path(path)
-        place = within._at(path) if within else {"path": path}
-        self._descriptor: int | None = None
-        _check(os.stat(**place, follow_symlinks=False), stat.S_ISDIR, errno.ENOTDIR)
-        if _OPENS:
-            self._descriptor = os.open(**place, flags=os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW)
+    def __init__(self, path: Path) -> None:
+        """OSError: there is none, or it is a link."""
+        self.path = path
+        _check(path.lstat(), stat.S_ISDIR, errno.ENOTDIR)
 
     def folder(self, name: str) -> Folder:
         """A folder in this one."""
-        return Folder(name, self)
-
-    def make(self, name: str) -> Folder:
-        """A folder in this one, new if there is none."""
-        with suppress(FileExistsError):
-            os.mkdir(**self._at(name))
-        return self.folder(name)
+        return Folder(self.path / name)
 
     def entries(self) -> list[os.DirEntry]:
         """All that lies here."""
-        with os.scandir(self.path if self._descriptor is None else self._descriptor) as entries:
+        with os.scandir(self.path) as entries:
             return list(entries)
 
     def files(self) -> list[os.DirEntry]:
         """The plain files that lie here."""
         return [entry for entry in self.entries() if entry.is_file(follow_symlinks=False)]
 
-    def status(self, name: str) -> os.stat_result:
-        """That of the name itself, if it is a link."""
-        return os.stat(**self._at(name), follow_symlinks=False)
-
     def open(self, name: str, most: int) -> BufferedReader:
         """A plain file of at most so many bytes, to be read."""
-        _check(self.status(name), stat.S_ISREG, errno.EINVAL)
-        file = os.fdopen(os.open(**self._at(name), flags=os.O_RDONLY | _PLAIN), "rb")
+        path = self.path / name
+        _check(path.lstat(), stat.S_ISREG, errno.EINVAL)
+        file = os.fdopen(os.open(path, os.O_RDONLY | _PLAIN), "rb")
         status = os.fstat(file.fileno())
         if not stat.S_ISREG(status.st_mode) or status.st_size > most:
             file.close()
@@ -77,7 +60,7 @@ class Folder:
     def append(self, name: str, data: bytes) -> None:
         """Writes at the end of a plain file that has no other name; it is made if there is none."""
         flags = os.O_WRONLY | os.O_APPEND | os.O_CREAT | _PLAIN
-        with os.fdopen(os.open(**self._at(name), flags=flags, mode=0o666), "ab") as file:
+        with os.fdopen(os.open(self.path / name, flags, 0o666), "ab") as file:
             status = os.fstat(file.fileno())
             if not stat.S_ISREG(status.st_mode) or status.st_nlink != 1:
                 raise _error(errno.EEXIST)
@@ -85,38 +68,19 @@ class Folder:
 
     def remove(self, name: str) -> int:
         """Removes a plain file, by this name. Gives its bytes."""
-        status = self.status(name)
+        path = self.path / name
+        status = path.lstat()
         _check(status, stat.S_ISREG, errno.EINVAL)
-        os.unlink(**self._at(name))
+        path.unlink()
         return status.st_size
-
-    def remove_folder(self, name: str) -> None:
-        """Removes an empty folder."""
-        os.rmdir(**self._at(name))
 
     def remove_part(self, name: str, is_ours: Callable[[str], object]) -> None:
         """Removes a folder in this one, with the plain files in it whose names are of ours."""
-        with self.folder(name) as part:
-            for entry in part.files():
-                if is_ours(entry.name):
-                    part.remove(entry.name)
-        self.remove_folder(name)
-
-    def close(self) -> None:
-        if self._descriptor is not None:
-            os.close(self._descriptor)
-            self._descriptor = None
-
-    def _at(self, name: str | Path) -> dict[str, Any]:
-        if self._descriptor is None:
-            return {"path": self.path / name}
-        return {"path": name, "dir_fd": self._descriptor}
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.close()
+        part = self.folder(name)
+        for entry in part.files():
+            if is_ours(entry.name):
+                part.remove(entry.name)
+        part.path.rmdir()
 
 
 def own_folder(path: Path) -> Folder:

@@ -9,7 +9,7 @@ import numpy as np
 from ..core import stopping
 from ..core.frames import light
 from ..core.frames.frame_source import FrameSource
-from . import registration
+from . import flow, opencv, registration
 
 WIDTH = 960  # pixels of the pictures that are compared, at most, along their longer side
 AHEAD = 8  # frames that the source may decode in advance
@@ -22,9 +22,9 @@ class Footage:
 
     size: width and height of the pictures; index_at: the source's frame that is shown at a timeline frame"""
 
-    def __init__(self, source: FrameSource, index_at: Callable[[int], int]):
+    def __init__(self, source: FrameSource, index_at: Callable[[int], int]) -> None:
         """MediaError: OpenCV is missing."""
-        registration.check()
+        opencv.check("tracking needs")
         self._source, self._index_at = source, index_at
         share = min(1.0, WIDTH / max(source.width, source.height))
         self.size = max(1, round(source.width * share)), max(1, round(source.height * share))
@@ -79,12 +79,7 @@ class Footage:
         """Over black: colours that are hidden may be anything."""
         alpha = self._source.alpha
         if frame.dtype != np.uint8:
-            frame, alpha = _levels(light.over_black(frame, alpha), self._source.transfer), "opaque"
+            frame = light.over_black(frame, alpha)
+            is_light = self._source.transfer == "linear" and frame.dtype.kind == "f"
+            frame, alpha = flow.levels(light.to_encoded(frame) if is_light else frame), "opaque"
         return registration.grey(frame, self.size, alpha)
-
-
-def _levels(frame: np.ndarray, transfer: str) -> np.ndarray:
-    """Samples, of 16 bits or floats from 0 to 1, as levels of 8 bits, as they are shown."""
-    if frame.dtype == np.uint16:
-        return (frame >> 8).astype(np.uint8)
-    return np.rint(255 * (light.to_encoded(frame) if transfer == "linear" else frame)).astype(np.uint8)

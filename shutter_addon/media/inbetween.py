@@ -25,7 +25,7 @@ from . import cuts, flow
 from .completeness import why_short
 from .errors import MediaError, NotBuiltError
 from .files import check_index
-from .inbetween_cache import InbetweenCache, pair_line, unwritable, write_picture
+from .inbetween_cache import InbetweenCache, pair_line, write_picture
 from .inbetween_folders import State
 
 MEMORY = 4 << 30  # bytes of all pairs that are built at the same time, and of the frames that are read ahead
@@ -35,7 +35,8 @@ LAYERS = 26
 _PAUSE = 1.0  # seconds between two looks at what other processes have built
 
 # What makes the frames of a pair: flow.between, or what stands for it.
-Between = Callable[..., Iterator[np.ndarray]]
+Pictures = Iterator[np.ndarray]
+Between = Callable[..., Pictures]
 
 
 class InbetweenSource(SourceWrapper):
@@ -44,7 +45,7 @@ class InbetweenSource(SourceWrapper):
     Frame i·factor is the source's frame i. Those between come from the cache in `folder`; where the pair is a cut, they
     are the nearer source frame, and where it is two equal frames, the first."""
 
-    def __init__(self, source: FrameSource, folder: str | Path, factor: int, method: str):
+    def __init__(self, source: FrameSource, folder: str | Path, factor: int, method: str) -> None:
         super().__init__(source)
         self.factor = factor
         self._cache = InbetweenCache(source, folder, factor, method)
@@ -92,7 +93,6 @@ def build(
     folder: str | Path,
     factor: int,
     method: str,
-    frames: tuple[int, int] | None = None,
     update: Callable[[int, int], None] = lambda done, total: None,
     cancelled: Callable[[], bool] = lambda: False,
     between: Between | None = None,
@@ -101,12 +101,10 @@ def build(
     """Builds in-between frames in `folder`. Pictures that are there are checked, and damaged ones are built again.
 
     factor: 2 or more; method: one of flow.METHODS
-    frames: first and last source frame of a chunk (default: all), both included; the in-between frames after the last
-        one belong to the chunk
     update: called with the number of finished pairs and that of all
     cancelled: called often, from several threads; True ends the build, and finished pairs are kept
     between: makes a pair's frames, in place of flow.between
-    pairs: those to build, each by its first source frame, ascending; in place of `frames`
+    pairs: those to build, each by its first source frame, ascending (default: all)
 
     After a build that was killed, the next one goes on where that was. Several processes may build in the same folder,
     and share the pairs: one that another is building is waited for, and built here if that one is killed. The files are
@@ -114,7 +112,7 @@ def build(
     build came. MediaError: a package that is needed is missing, or a frame cannot be read or written, and finished
     pairs are kept; or the source was written to meanwhile."""
     cache = InbetweenCache(source, folder, factor, method)
-    pairs = _pairs(source, frames) if pairs is None else pairs
+    pairs = range(source.count - 1) if pairs is None else pairs
     cache.load()
     if between is None and not cache.finished().issuperset(pairs):
         flow.check()
@@ -141,13 +139,7 @@ def estimate(source: FrameSource, factor: int) -> int:
     """About how many bytes the files of all in-between frames of a source will have: the mean of three source frames,
     written as in-between frames are, times their number. MediaError: these frames cannot be read or written."""
     samples = {source.count * part // 6 for part in (1, 3, 5)}
-    with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder, "picture.png" if source.dtype.kind == "u" else "picture.exr")
-        sizes = []
-        for index in samples:
-            if not write_picture(path, source.read(index), source.alpha):
-                raise MediaError(f"{folder}: a picture could not be written whole ({why_short(path.parent)})")
-            sizes.append(path.stat().st_size)
+    sizes = list(_sizes(source, map(source.read, samples)))
     return (source.count - 1) * (factor - 1) * sum(sizes) // len(sizes)
 
 
@@ -170,24 +162,23 @@ def cost(source: FrameSource, pair: int, method: str, between: Between | None = 
     time take hardly less each, as one has all processors already. between: as for `build`. MediaError: they cannot be
     made."""
     between = between or flow.between
-    when = [time.perf_counter()]
+    when, sizes = [time.perf_counter()], [0]
+    first, second = source.read(pair), source.read(pair + 1)
+    for size in _sizes(source, islice(between(first, second, 4, method, source.transfer, source.alpha), 2)):
+        when.append(time.perf_counter())
+        sizes.append(size)
+    frame = when[2] - when[1]
+    return Cost(max(when[1] - when[0] - frame, 0.0), frame, sizes[-1])
+
+
+def _sizes(source: FrameSource, pictures: Iterable[np.ndarray]) -> Iterator[int]:
+    """The bytes of each of these pictures, written as a source's in-between frames are. MediaError: it cannot be."""
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder, "picture.png" if source.dtype.kind == "u" else "picture.exr")
-        first, second = source.read(pair), source.read(pair + 1)
-        for picture in islice(between(first, second, 4, method, source.transfer, source.alpha), 2):
-            write_picture(path, picture, source.alpha)
-            when.append(time.perf_counter())
-        size = path.stat().st_size if path.exists() else 0
-    frame = when[2] - when[1]
-    return Cost(max(when[1] - when[0] - frame, 0.0), frame, size)
-
-
-def _pairs(source: FrameSource, frames: tuple[int, int] | None) -> range:
-    """The pairs whose first frame is in the chunk. MediaError: the source has no such frames."""
-    first, last = frames or (0, source.count - 1)
-    if not 0 <= first <= last < source.count:
-        raise MediaError(f"{source.path.name}: has frames 0 to {source.count - 1}, not {first} to {last}")
-    return range(first, min(last + 1, source.count - 1))
+        for picture in pictures:
+            if not write_picture(path, picture, source.alpha):
+                raise MediaError(f"{folder}: a picture could not be written whole ({why_short(path.parent)})")
+            yield path.stat().st_size
 
 
 def _tasks(
@@ -206,15 +197,19 @@ def _tasks(
             return
         if cache.is_sound(pair):
             yield lambda: True
-        elif not _take(cache, claims, pair):
+            continue
+        with cache.writable():
+            is_taken = claims.take(_claim(pair))
+        if not is_taken:
             others.append(pair)
         elif _finished_by_another(cache, pair):
             claims.release(_claim(pair))
             yield lambda: True
         else:
             first, second, kind = near.pair(pair)
-            make = partial(_note_kind, kind) if kind else partial(_make, first, second, between, cancelled)
-            yield partial(_build_claimed, claims, cache, pair, make)
+            source = cache.source
+            made = kind or between(first, second, cache.factor, cache.method, source.transfer, source.alpha)
+            yield partial(_make, cache, claims, pair, made, cancelled)
 
 
 class _Near:
@@ -222,7 +217,7 @@ class _Near:
 
     The latter are kept for their own pair, as far as AHEAD allows; the rest are read again."""
 
-    def __init__(self, source: FrameSource):
+    def __init__(self, source: FrameSource) -> None:
         self._source = source
         self._most = 2 + _ahead(source)
         self._frames: dict[int, np.ndarray] = {}  # the pair's frames, and those that are kept for their pair
@@ -272,13 +267,6 @@ def _claim(pair: int) -> str:
     return f"{pair:08d}"
 
 
-def _take(cache: InbetweenCache, claims: Claims, pair: int) -> bool:
-    try:
-        return claims.take(_claim(pair))
-    except OSError as error:
-        raise unwritable(cache.folder, error) from None
-
-
 def _finished_by_another(cache: InbetweenCache, pair: int) -> bool:
     """Whether a pair was finished since the cache was read. Only its pictures are looked for: of a pair without any,
     the note is made again."""
@@ -288,36 +276,22 @@ def _finished_by_another(cache: InbetweenCache, pair: int) -> bool:
     return cache.is_sound(pair)
 
 
-def _build_claimed(
-    claims: Claims, cache: InbetweenCache, pair: int, make: Callable[[InbetweenCache, int], bool]
+def _make(
+    cache: InbetweenCache, claims: Claims, pair: int, made: str | Pictures, cancelled: Callable[[], bool]
 ) -> bool:
+    """Builds a claimed pair: notes its kind, or writes its pictures. Whether it is finished."""
     try:
-        return make(cache, pair)
+        if isinstance(made, str):
+            cache.note(pair_line(pair, made))
+            return True
+        with suppress(stopping.StoppedError), stopping.once(cancelled):
+            for index, picture in zip(cache.steps(pair), made, strict=True):
+                stopping.check()
+                cache.write(index, picture)
+            return True
+        return False
     finally:
         claims.release(_claim(pair))
-
-
-def _make(
-    first: np.ndarray,
-    second: np.ndarray,
-    between: Between,
-    cancelled: Callable[[], bool],
-    cache: InbetweenCache,
-    pair: int,
-) -> bool:
-    source = cache.source
-    pictures = between(first, second, cache.factor, cache.method, source.transfer, source.alpha)
-    with suppress(stopping.StoppedError), stopping.once(cancelled):
-        for index, picture in zip(cache.steps(pair), pictures, strict=True):
-            stopping.check()
-            cache.write(index, picture)
-        return True
-    return False
-
-
-def _note_kind(kind: str, cache: InbetweenCache, pair: int) -> bool:
-    cache.note(pair_line(pair, kind))
-    return True
 
 
 def _in_parallel(tasks: Iterable[Callable[[], bool]], workers: int) -> Iterator[bool]:

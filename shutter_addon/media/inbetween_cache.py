@@ -8,14 +8,15 @@ import re
 import secrets
 import stat
 import zlib
-from contextlib import suppress
+from collections.abc import Iterator
+from contextlib import closing, contextmanager, suppress
 from functools import lru_cache, partial
 from io import BufferedReader
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
-from OpenImageIO import ImageInput, ImageOutput, ImageSpec, geterror
+from OpenImageIO import ImageInput, ImageSpec, geterror
 
 from ..core import atomic_write
 from ..core.frames.frame_source import FrameSource
@@ -23,6 +24,8 @@ from .completeness import is_whole_picture, why_short
 from .errors import MediaError
 from .files import check_name
 from .folder import Folder, own_folder
+from .image_writing import put
+from .sequence import expanded
 
 VERSION = 3  # raise it when in-betweens of the same frames change, or the folder's format does: older ones get stale
 MANIFEST, CHECKS = "manifest.json", "checks"
@@ -62,7 +65,7 @@ class InbetweenCache:
     kinds: {pair: "same" or "cut"} of pairs without pictures
     """
 
-    def __init__(self, source: FrameSource, folder: str | Path, factor: int, method: str):
+    def __init__(self, source: FrameSource, folder: str | Path, factor: int, method: str) -> None:
         self.source, self.factor, self.method = source, factor, method
         made_of = {
             "maker": MAKER,
@@ -86,8 +89,8 @@ class InbetweenCache:
             return
         digests: dict[int, set[str]] = {}
         kinds: dict[int, str] = {}
-        with suppress(OSError), Folder(self.folder) as folder:
-            checks = read_checks(folder)
+        with suppress(OSError):
+            checks = read_checks(Folder(self.folder))
             for name, known in checks.digests.items():
                 if self._is_between(frame := int(name[:8])) and name == self._name(frame):
                     digests[frame] = known
@@ -111,81 +114,78 @@ class InbetweenCache:
     def finished(self) -> set[int]:
         """The finished pairs: those of a kind, and those whose pictures all have digests and files. None is opened."""
         names = set()
-        with suppress(OSError), Folder(self.folder) as folder:
-            names = {entry.name for entry in folder.files()}
+        with suppress(OSError):
+            names = {entry.name for entry in Folder(self.folder).files()}
         there = {frame for frame in self.digests if self._name(frame) in names}
         pairs = {frame // self.factor for frame in there}
         return self.kinds.keys() | {pair for pair in pairs if there.issuperset(self.steps(pair))}
 
     def is_sound(self, pair: int) -> bool:
         """Whether a pair is finished and all its pictures match their digests. It reads them."""
-        return pair in self.kinds or all(self._is_sound(frame) for frame in self.steps(pair))
+        return pair in self.kinds or all((image := self._sound(frame)) and image.close() for frame in self.steps(pair))
 
     def read(self, frame: int) -> np.ndarray:
         """A frame's picture (height, width, 4), as `write` was given it. MediaError: it is damaged or gone."""
         path = self.picture(frame)
-        if not self._is_sound(frame):
+        if (image := self._sound(frame)) is None:
             raise MediaError(f"{path}: this in-between frame is damaged or gone; build in-between frames again")
-        image = self._open(path)
-        samples = image.read_image(0, 0, 0, self._spec.nchannels, self._spec.format) if image else None
-        if image is None or samples is None or image.has_error:
-            raise MediaError(
-                f"{path}: this in-between frame cannot be decoded; remove in-between frames, and build again"
-            )
-        image.close()
-        picture = np.empty((*samples.shape[:2], 4), samples.dtype)
-        picture[..., : samples.shape[2]] = samples
-        if samples.shape[2] == 3:
-            picture[..., 3] = np.iinfo(samples.dtype).max if samples.dtype.kind == "u" else 1
-        return picture
+        with closing(image):
+            samples = image.read_image(0, 0, 0, self._spec.nchannels, self._spec.format)
+            if samples is None or image.has_error:
+                raise MediaError(
+                    f"{path}: this in-between frame cannot be decoded; remove in-between frames, and build again"
+                )
+        return expanded(samples)
 
     def prepare(self) -> None:
         """Makes the folder and its manifest, and removes half-written files of builds that were killed.
 
         MediaError: the folder cannot be written to."""
         text = (json.dumps(self.manifest, indent=1, sort_keys=True) + "\n").encode()
-        try:
-            with own_folder(self.folder) as folder, folder.make(CHECKS):
-                if content_of(folder, MANIFEST) != text:
-                    with atomic_write.writing(self.folder / MANIFEST) as part:
-                        part.write_bytes(text)
-                for part in atomic_write.left_behind(self.folder):
-                    with suppress(OSError):  # another user's, or cleared by others meanwhile
-                        folder.remove_part(part.name, HALF.fullmatch)
-        except OSError as error:
-            raise unwritable(self.folder, error) from None
+        with self.writable():
+            folder = own_folder(self.folder)
+            own_folder(self.folder / CHECKS)
+            if content_of(folder, MANIFEST) != text:
+                with atomic_write.writing(self.folder / MANIFEST) as part:
+                    part.write_bytes(text)
+            for part in atomic_write.left_behind(self.folder):
+                with suppress(OSError):  # another user's, or cleared by others meanwhile
+                    folder.remove_part(part.name, HALF.fullmatch)
 
     def write(self, frame: int, picture: np.ndarray) -> None:
         """Writes a frame's picture (height, width, 4) whole or not at all, and its digest. MediaError: it cannot be
         written."""
         path = self.picture(frame)
-        try:
-            with atomic_write.writing(path) as part:
-                if not write_picture(part, picture, self.source.alpha):
-                    reason = why_short(part.parent)
-                    raise MediaError(f"{self.folder}: an in-between frame could not be written whole ({reason})")
-                # Before the picture is moved to its place: then each of our pictures there has its line, even if this
-                # process is killed.
-                self.note(f"{_sha256(part)}  {path.name}")
-        except OSError as error:
-            raise unwritable(self.folder, error) from None
+        with self.writable(), atomic_write.writing(path) as part:
+            if not write_picture(part, picture, self.source.alpha):
+                reason = why_short(part.parent)
+                raise MediaError(f"{self.folder}: an in-between frame could not be written whole ({reason})")
+            # Before the picture is moved to its place: then each of our pictures there has its line, even if this
+            # process is killed.
+            self.note(f"{Folder(part.parent).digest(part.name, LARGEST_PICTURE)}  {path.name}")
 
     def note(self, line: str) -> None:
         """Appends a line to this build's checks. MediaError: it cannot be written."""
+        with self.writable():
+            Folder(self.folder).folder(CHECKS).append(f"{self._token}.sha256", f"{line}\n".encode())
+
+    @contextmanager
+    def writable(self) -> Iterator[None]:
+        """Inside, a MediaError stands for an OSError: the folder cannot be written to."""
         try:
-            with Folder(self.folder) as folder, folder.folder(CHECKS) as checks:
-                checks.append(f"{self._token}.sha256", f"{line}\n".encode())
+            yield
         except OSError as error:
             self._token = secrets.token_hex(4)  # that file may end in half a line: go on in another
-            raise unwritable(self.folder, error) from None
+            reason = error.strerror or error
+            raise MediaError(f"{self.folder}: in-between frames cannot be written there ({reason})") from None
 
     def confirm(self) -> None:
         """MediaError: the source was written to since this was made. What this build has finished counts no longer: it
         may be of what the source has become."""
         if identity(self.source) == self.manifest["source"]:
             return
-        with suppress(OSError), Folder(self.folder) as folder, folder.folder(CHECKS) as checks:
-            checks.remove(f"{self._token}.sha256")
+        with suppress(OSError):
+            Folder(self.folder).folder(CHECKS).remove(f"{self._token}.sha256")
         raise MediaError(f"{self.source.path}: was written to while in-between frames were built; build them again")
 
     def _name(self, frame: int) -> str:
@@ -194,18 +194,13 @@ class InbetweenCache:
     def _is_between(self, frame: int) -> bool:
         return 0 < frame < (self.source.count - 1) * self.factor and frame % self.factor != 0
 
-    def _is_sound(self, frame: int) -> bool:
-        """Whether a frame's picture matches one of its digests, and is of the source's size and samples."""
+    def _sound(self, frame: int) -> ImageInput | None:
+        """A frame's opened picture, if it matches one of its digests, and is of the source's size and samples."""
         path, digests = self.picture(frame), self.digests.get(frame)
-        try:
-            with Folder(self.folder) as folder:
-                if not digests or folder.digest(path.name, LARGEST_PICTURE) not in digests:
-                    return False
-        except OSError:
-            return False
-        if image := self._open(path):
-            image.close()
-        return image is not None
+        with suppress(OSError):
+            if digests and Folder(self.folder).digest(path.name, LARGEST_PICTURE) in digests:
+                return self._open(path)
+        return None
 
     def _open(self, path: Path) -> ImageInput | None:
         """The opened image file, if it is as `write_picture` makes them for this source; else None."""
@@ -262,17 +257,13 @@ def write_picture(path: Path, picture: np.ndarray, alpha: str) -> bool:
     alpha: a source's; "opaque": RGB is written, else RGBA as it is, premultiplied or not
     OSError, MediaError: it cannot be written."""
     height, width, _ = picture.shape
-    name, spec = check_name(path), _spec(width, height, picture.dtype, alpha)
+    spec = _spec(width, height, picture.dtype, alpha)
     spec["oiio:UnassociatedAlpha"] = 1
     spec["DateTime"] = "1970:01:01 00:00:00"  # an EXR's; without it, it is the time of writing
     spec["png:compressionLevel"] = 1
     spec["png:filter"] = 0x20  # "up" alone: half the time of a choice for each row, and files as small
     spec["compression"] = "piz"
-    if (output := ImageOutput.create(name)) is None:
-        raise MediaError(f"{path}: cannot be written ({geterror()})")
-    samples = np.ascontiguousarray(picture[..., : spec.nchannels])
-    written = output.open(name, spec) and output.write_image(samples)
-    return output.close() and written and is_whole_picture(path)
+    return put(path, spec, picture[..., : spec.nchannels]) is None and is_whole_picture(path)
 
 
 _SHAPE = (
@@ -296,12 +287,11 @@ def folder_stamp(folder: Path) -> tuple | None:
     """A value that changes when files are made or removed in a cache's folder, or its checks change. None: there is no
     such folder."""
     try:
-        with Folder(folder) as opened:
-            changed = opened.status(".").st_mtime_ns
-            with suppress(OSError), opened.folder(CHECKS) as checks:
-                files = [(entry.name, entry.stat(follow_symlinks=False)) for entry in checks.entries()]
-                return changed, *sorted((name, info.st_size, info.st_mtime_ns) for name, info in files)
-            return (changed,)
+        opened, changed = Folder(folder), folder.lstat().st_mtime_ns
+        with suppress(OSError):
+            files = [(entry.name, entry.stat(follow_symlinks=False)) for entry in opened.folder(CHECKS).entries()]
+            return changed, *sorted((name, info.st_size, info.st_mtime_ns) for name, info in files)
+        return (changed,)
     except OSError:
         return None
 
@@ -343,16 +333,16 @@ class Checks(NamedTuple):
 def read_checks(cache: Folder) -> Checks:
     checks = Checks(digests={}, kinds={}, own=[], unreadable=[])
     try:
-        with cache.folder(CHECKS) as folder:
-            for name in [entry.name for entry in folder.files() if entry.name.endswith(".sha256")]:
-                try:
-                    with folder.open(name, LARGEST_CHECKS) as file:
-                        if _read_lines(file, checks) and _CHECKS.fullmatch(name):
-                            checks.own.append(name)
-                except PermissionError as error:
-                    checks.unreadable.append(error)
-                except OSError:  # removed meanwhile, or larger than any of ours
-                    continue
+        folder = cache.folder(CHECKS)
+        for name in [entry.name for entry in folder.files() if entry.name.endswith(".sha256")]:
+            try:
+                with folder.open(name, LARGEST_CHECKS) as file:
+                    if _read_lines(file, checks) and _CHECKS.fullmatch(name):
+                        checks.own.append(name)
+            except PermissionError as error:
+                checks.unreadable.append(error)
+            except OSError:  # removed meanwhile, or larger than any of ours
+                continue
     except PermissionError as error:
         checks.unreadable.append(error)
     except OSError:  # there are no checks
@@ -392,19 +382,9 @@ def content_hash(path: Path, size: int, _mtime: int, whole: int) -> bytes:
         return digest.digest()
 
 
-def _sha256(path: Path) -> str:
-    with path.open("rb") as file:
-        return hashlib.file_digest(file, "sha256").hexdigest()
-
-
 def relative_path(path: Path, folder: str | Path) -> str:
     """The path relative to the folder, so that it holds after both are moved together."""
     try:
         return Path(os.path.relpath(path, folder)).as_posix()
     except ValueError:  # another drive
         return path.absolute().as_posix()
-
-
-def unwritable(folder: Path, error: OSError) -> MediaError:
-    """The sentence about a folder of in-between frames that cannot be written to."""
-    return MediaError(f"{folder}: in-between frames cannot be written there ({error.strerror or error})")

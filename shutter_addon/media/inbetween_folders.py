@@ -87,8 +87,8 @@ def purge(
     MediaError: something cannot be removed, or `folder` is a link."""
     names = _chosen(folder, source)
     try:
-        with Folder(folder) as top:
-            return sum(_remove(top, name, left) for name in names)
+        top = Folder(Path(folder))
+        return sum(_remove(top, name, left) for name in names)
     except (FileNotFoundError, NotADirectoryError):
         return 0
     except OSError as error:
@@ -105,10 +105,11 @@ def forget() -> None:
 def _caches(folder: str | Path) -> list[tuple[str, dict]]:
     """(name, manifest) of every cache in `folder`."""
     caches = []
-    with suppress(OSError), Folder(folder) as top:
+    with suppress(OSError):
+        top = Folder(Path(folder))
         for entry in sorted(top.entries(), key=lambda entry: entry.name):
-            with suppress(OSError), top.folder(entry.name) as cache:
-                if (manifest := _manifest(cache)) is not None:
+            with suppress(OSError):
+                if (manifest := _manifest(top.folder(entry.name))) is not None:
                     caches.append((entry.name, manifest))
     return caches
 
@@ -149,44 +150,45 @@ def _other_files(cache: Folder, checks: Checks) -> Iterator[tuple[Folder, str]]:
     yield from ((cache, entry.name) for entry in cache.files() if claims.is_claim(entry.name))
     for entry in cache.entries():
         if atomic_write.is_part(entry.name):
-            with suppress(OSError), cache.folder(entry.name) as part:
+            with suppress(OSError):
+                part = cache.folder(entry.name)
                 yield from ((part, file.name) for file in part.files() if HALF.fullmatch(file.name))
     if checks.own:
-        with cache.folder(CHECKS) as folder:
-            yield from ((folder, name) for name in checks.own)
+        folder = cache.folder(CHECKS)
+        yield from ((folder, name) for name in checks.own)
     yield cache, MANIFEST
 
 
 def _size(folder: Path) -> int:
-    with suppress(OSError), Folder(folder) as cache:
+    with suppress(OSError):
+        cache = Folder(folder)
         checks = read_checks(cache)
         if not checks.unreadable:
             pictures = sum(entry.stat(follow_symlinks=False).st_size for entry in _pictures(cache, checks))
-            return pictures + sum(place.status(name).st_size for place, name in _other_files(cache, checks))
+            return pictures + sum((place.path / name).lstat().st_size for place, name in _other_files(cache, checks))
     return 0
 
 
 def _remove(top: Folder, name: str, left: Callable[[Path, int], None]) -> int:
     try:
-        with top.folder(name) as cache:
-            if _manifest(cache) is None:  # another folder than a moment ago
-                return 0
-            checks = read_checks(cache)
-            if checks.unreadable:
-                raise checks.unreadable[0]
-            with threads.pool(READERS) as pool:
-                names = [entry.name for entry in _pictures(cache, checks)]
-                freed = sum(pool.map(partial(_remove_picture, cache, checks), names))
-            freed += sum(place.remove(file) for place, file in _other_files(cache, checks))
-            for entry in cache.entries():
-                if entry.name == CHECKS or atomic_write.is_part(entry.name):
-                    with suppress(OSError):  # it is not empty: others' files are in it
-                        cache.remove_folder(entry.name)
-            count = len(cache.entries())
-        if count:
-            left(top.path / name, count)
+        cache = top.folder(name)
+        if _manifest(cache) is None:  # another folder than a moment ago
+            return 0
+        checks = read_checks(cache)
+        if checks.unreadable:
+            raise checks.unreadable[0]
+        with threads.pool(READERS) as pool:
+            names = [entry.name for entry in _pictures(cache, checks)]
+            freed = sum(pool.map(partial(_remove_picture, cache, checks), names))
+        freed += sum(place.remove(file) for place, file in _other_files(cache, checks))
+        for entry in cache.entries():
+            if entry.name == CHECKS or atomic_write.is_part(entry.name):
+                with suppress(OSError):  # it is not empty: others' files are in it
+                    Path(entry.path).rmdir()
+        if count := len(cache.entries()):
+            left(cache.path, count)
         else:
-            top.remove_folder(name)
+            cache.path.rmdir()
     except OSError as error:
         raise _irremovable(top.path / name, error) from None
     return freed

@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Hashable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Self
 
 import numpy as np
 
 from ..core.frames.light import REC709
+from ..core.frames.source_wrapper import SourceWrapper
 from .opening import open_channel
 
 
@@ -35,7 +35,7 @@ class MatteFile:
         return MatteSource(self.path, self.channel, files=self.files, stream=self.stream)
 
 
-class MatteSource:
+class MatteSource(SourceWrapper):
     """The frames of a matte; close it, or use it in a `with`. Not for two threads at once.
 
     Values are samples as they are stored: no transfer function, no colour space, alpha neither multiplied nor divided;
@@ -45,33 +45,18 @@ class MatteSource:
     fps: frames per second, None for images; files: the movie, or those of the frames
     """
 
-    step = 1  # it has no in-between frames
-
     def __init__(
         self, path: Path, channel: str = "luminance", *, files: Sequence[str | Path] | None = None, stream: int = 0
-    ):
+    ) -> None:
         """As MatteFile has them."""
-        self._frames = open_channel(path, channel, files=files, stream=stream)
-        self.path, self.count = self._frames.path, self._frames.count
-        self.width, self.height = self._frames.width, self._frames.height
-        self.fps, self.files = self._frames.fps, self._frames.files
+        super().__init__(open_channel(path, channel, files=files, stream=stream))
 
     def read(self, index: int) -> np.ndarray:
         """The values of a frame, a new array (height, width) float32, 0 … 1, top row first; what is no number is 0.
 
         index: from 0; before the first frame that one is given, beyond the last the last. Ascending is fastest.
         MediaError: the frame is missing, damaged, or of another size than the first."""
-        return _values(self._frames.read(min(max(index, 0), self.count - 1)))
-
-    def close(self) -> None:
-        """Closes the file; a later read opens it again."""
-        self._frames.close()
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.close()
+        return _values(self._source.read(min(max(index, 0), self.count - 1)))
 
 
 def _values(samples: np.ndarray) -> np.ndarray:

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
-from contextlib import closing
+from contextlib import AbstractContextManager, closing, contextmanager, nullcontext
 from functools import lru_cache
-from typing import Any
 
 import numpy as np
 
@@ -15,19 +14,16 @@ from . import flow, tracking
 from .carried_mattes import CarriedFile, CarriedMattes
 from .carrying import box_around
 from .footage import Footage
+from .opencv import cv2
 from .pursuit import COVERED, LEFT, Sighting
-from .registration import Part
 from .tracking import Subject, Tracked, TrackingError
-
-try:
-    import cv2
-except ImportError:  # a package without wheels; the extension registers without it
-    cv2 = None
 
 EMPTY = "the outline encloses nothing here"
 
-# The share (h, w) float32 of each pixel that a matte covers at a timeline frame, of the footage's pictures.
+# The share (h, w) float32 of each pixel that a matte covers at a timeline frame, of the footage's pictures; and what
+# gives that for pictures of a width and height, as long as it is entered.
 Cover = Callable[[int], np.ndarray]
+Covers = Callable[[tuple[int, int]], AbstractContextManager[Cover]]
 
 _INSIDE = 0.9  # of a matte: its soft edge may move with what is behind it
 _AROUND = 24  # pixels around a matte, in which flow is found
@@ -36,18 +32,6 @@ _FEWEST = 24
 _BACK = 1.0  # pixels that flow forth and back may be off, of 640
 _ALIKE = 2.0  # pixels of 640 within which a point moves as the subject does
 _AGREEING = 0.5  # share of the points that do, from which on a step is sure
-
-
-def follow_carried(
-    region: Subject, carried: tuple[CarriedFile, Mapping[float, int]], footage: Footage, *where: Any, **how: Any
-) -> Iterator[Tracked]:
-    """As tracking.follow, of what a carried outline encloses.
-
-    region: says where its centre is; carried: what gives the mattes, and the source's filmed frames that timeline
-    frames show. MediaError: a matte cannot be carried."""
-    file, shown = carried
-    with closing(file.open()) as mattes:
-        yield from follow_cover(region, cover_of(mattes, shown.__getitem__, footage.size), footage, *where, **how)
 
 
 def cover_of(mattes: CarriedMattes, shown: Callable[[int], int], size: tuple[int, int]) -> Cover:
@@ -60,14 +44,23 @@ def cover_of(mattes: CarriedMattes, shown: Callable[[int], int], size: tuple[int
     return cover
 
 
-def cover_within(drawn: Callable[[int], Sequence], size: tuple[int, int]) -> Cover:
+def cover_within(drawn: Callable[[int], Sequence], size: tuple[int, int]) -> AbstractContextManager[Cover]:
     """What curves enclose that are known at every timeline frame."""
-    return lambda frame: outlines.coverage(drawn(frame), *size)
+    return nullcontext(lambda frame: outlines.coverage(drawn(frame), *size))
+
+
+@contextmanager
+def carried_cover(carried: tuple[CarriedFile, Mapping[float, int]], size: tuple[int, int]) -> Iterator[Cover]:
+    """What a carried outline encloses; carried: what gives the mattes, and the source's filmed frames that timeline
+    frames show. MediaError, then and later: a matte cannot be carried."""
+    file, shown = carried
+    with closing(file.open()) as mattes:
+        yield cover_of(mattes, shown.__getitem__, size)
 
 
 def follow_cover(
     region: Subject,
-    cover: Cover,
+    covers: Covers,
     footage: Footage,
     start: int,
     frames: range,
@@ -75,27 +68,23 @@ def follow_cover(
     motion: Motion = "location",
     anchors: Collection[int] = (),
 ) -> Iterator[Tracked]:
-    """As tracking.follow, of what a matte covers."""
+    """As tracking.follow, of what a matte covers; region: says where its centre is."""
     tracking.check_frames(start, frames)
-    return _MatteTrack(region, cover, footage, motion, {*frames, *anchors}).both_ways(start, frames, anchors)
+    with covers(footage.size) as cover:
+        track = _MatteTrack(region, cover, footage, motion, {*frames, *anchors})
+        yield from track.both_ways(start, frames, anchors)
 
 
 class _MatteTrack(tracking.Track):
-    def __init__(self, region: Subject, cover: Cover, footage: Footage, motion: Motion, frames: Collection[int]):
+    def __init__(
+        self, region: Subject, cover: Cover, footage: Footage, motion: Motion, frames: Collection[int]
+    ) -> None:
         super().__init__(region, footage, motion, frames)
         self._cover = cover
 
-    def both_ways(self, start: int, frames: range, anchors: Collection[int]) -> Iterator[Tracked]:
-        """See Track.both_ways."""
-        if not (self._cover(start) > _INSIDE).any():
+    def _check(self, frame: int) -> None:
+        if not (self._cover(frame) > _INSIDE).any():
             raise TrackingError(EMPTY)
-        return self._both_ways(start, range(min(frames), max(frames) + 1), {*anchors} - {start})
-
-    def _part(self, frame: int) -> tuple[Part, float]:
-        raise TrackingError(EMPTY)  # it has no corners, and is known by its matte
-
-    def _has_part(self, frame: int) -> bool:
-        return bool((self._cover(frame) > _INSIDE).any())
 
     def _pursuit(self, start: int) -> tuple[int, _Pursuit, float]:
         return start, _Pursuit(self._cover, self._footage, start, self._motion), 1.0
@@ -104,7 +93,7 @@ class _MatteTrack(tracking.Track):
 class _Pursuit:
     """The motion of what a matte covers, from one frame to those after it."""
 
-    def __init__(self, cover: Cover, footage: Footage, frame: int, motion: Motion):
+    def __init__(self, cover: Cover, footage: Footage, frame: int, motion: Motion) -> None:
         self._cover, self._footage, self._way = cover, footage, motion
         self._last, self._motion, self.reason = frame, Similarity(), COVERED
 

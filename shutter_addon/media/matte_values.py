@@ -25,7 +25,7 @@ class MatteValues:
     late: is told of each matte of an outline that would have to be carried first, by its file and frame: a straight one
     stands in for it; None: it is carried"""
 
-    def __init__(self, width: int, height: int, step: int = 1, late: Late | None = None):
+    def __init__(self, width: int, height: int, step: int = 1, late: Late | None = None) -> None:
         self._size, self._step, self._late = (width, height), step, late
         self._sources: dict[MatteFile, MatteSource] = {}
         self._made: list[tuple[Hashable, np.ndarray]] = []

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import gc
 import math
 import re
 import threading
@@ -15,15 +14,13 @@ from pathlib import Path
 import av
 import numpy as np
 from av.container import InputContainer
-from av.filter import Graph
 from av.stream import Stream
 from av.video.format import VideoFormat
-from av.video.reformatter import ColorRange
+from av.video.reformatter import ColorRange, Interpolation, VideoReformatter
 from av.video.stream import VideoStream
 
 from ..core.frames.frame_source import FrameSource
 from ..core.frames.planes import Matrix, Planes, matrix
-from .channels import CHANNELS, no_channel
 from .decode import FrameReader, fraction, reason
 from .deinterlace import blur_rows, has_fields, interpolate_fields, samples_of
 from .errors import MediaError
@@ -31,8 +28,8 @@ from .files import check_file, check_index
 from .reduced import reduced, reduced_size
 
 # Blender's choice for YUV to RGB; libswscale's defaults are a level too dark and smear colours.
-SCALER = "neighbor+accurate_rnd+full_chroma_int"
-REDUCER = "area+accurate_rnd+full_chroma_int"  # the same, where frames become smaller
+SCALER = Interpolation.POINT | Interpolation.ACCURATE_RND | Interpolation.FULL_CHR_H_INT
+REDUCER = Interpolation.AREA | Interpolation.ACCURATE_RND | Interpolation.FULL_CHR_H_INT  # where frames become smaller
 _NO_COUNT = 1 << 31  # frames: Blender has no number for so many, and a header that claims them is damaged
 _UNSPECIFIED = 2  # in ITU-T H.273
 _PLANAR_420 = frozenset({"yuv420p", "yuvj420p"})
@@ -57,14 +54,13 @@ class MovieSource(FrameSource):
         deinterlace: bool = False,
         divisor: int = 1,
         size: tuple[int, int] | None = None,
-    ):
+    ) -> None:
         """divisor: how many times smaller than the file's the frames are each way (ReducedSource)
         size: what opaque frames are fitted to, width and height, in place of `divisor`"""
         self.path = check_file(path)
         self._deinterlace, self._divisor, self._fitted_to = deinterlace, divisor, size
         self.options = {"stream": stream, "deinterlace": bool(deinterlace)}
-        self._graph: Graph | None = None
-        self._graph_key: tuple | None = None
+        self._to_planes, self._to_packed = VideoReformatter(), VideoReformatter()
         self._converting = threading.Lock()  # planes are converted on any thread
         self._reader = FrameReader(self.path, stream)
         try:
@@ -115,13 +111,22 @@ class MovieSource(FrameSource):
             rgba = partial(self._picture, index, frame)
             return Planes(luma=luma, chroma=(cb, cr), matrix=to_rgb, rgba=rgba)
 
+    def grey(self, index: int) -> np.ndarray | None:
+        """The frame's luma (height, width, 1), where that is the luminance of its colours; else None."""
+        with self._named(index):
+            frame = self._frame(index)
+            if not _is_grey(frame):
+                return None
+            return self._upright(self._converted(frame, "gray16le" if self.dtype == np.uint16 else "gray"))[..., None]
+
     def _frame(self, index: int) -> av.VideoFrame:
         check_index(self, index)
         frame = self._reader.frame_at(self._reader.start + _round(index * self._step), self._step)
         if not frame.format.is_rgb:
             frame.colorspace, frame.color_range = self._tags.colorspace, self._range
-        # Light is converted later; libavfilter refuses frames with values that it does not know.
+        # Light is converted later; and Blender has libswscale take chroma where it takes what is not specified.
         frame.color_primaries = frame.color_trc = _UNSPECIFIED
+        frame.chroma_location = 0
         return frame
 
     @contextmanager
@@ -154,69 +159,24 @@ class MovieSource(FrameSource):
 
     def _converted(self, frame: av.VideoFrame, pix_fmt: str) -> np.ndarray:
         with self._converting:
-            graph = self._graph_for(frame, pix_fmt)
-            graph.vpush(frame)
-            return graph.vpull().to_ndarray()
+            # libswscale takes twice as long for packed colours with alpha as for planes, and then those from these.
+            if pix_fmt == "rgba" and _is_opaque_yuv(frame.format):
+                frame = self._reformatted(self._to_planes, frame, "gbrp")
+            return self._reformatted(self._to_packed, frame, pix_fmt).to_ndarray()
+
+    def _reformatted(self, by: VideoReformatter, frame: av.VideoFrame, pix_fmt: str) -> av.VideoFrame:
+        samples = ColorRange.JPEG if frame.format.is_rgb else frame.color_range
+        width, height = self._size
+        return by.reformat(frame, width, height, pix_fmt, None, None, self._scaler, samples, ColorRange.JPEG)
 
     def _upright(self, picture: np.ndarray) -> np.ndarray:
         return np.require(np.rot90(picture, -self._turns), requirements=["C", "W"])
-
-    def _graph_for(self, frame: av.VideoFrame, pix_fmt: str) -> Graph:
-        key = (frame.format.name, frame.width, frame.height, frame.colorspace, frame.color_range, pix_fmt)
-        if self._graph is None or key != self._graph_key:
-            self._drop_graph()
-            graph = av.filter.Graph()
-            scale = "scale", "{}:{}:flags={}".format(*self._size, self._scaler)
-            # libswscale takes twice as long for packed colours with alpha as for planes, and then those from these.
-            by_planes = [scale, ("format", "gbrp")] if pix_fmt == "rgba" and _is_opaque_yuv(frame.format) else []
-            nodes = [
-                graph.add_buffer(width=key[1], height=key[2], format=frame.format, time_base=Fraction(1)),
-                *(graph.add(*filter_) for filter_ in (*by_planes, scale, ("format", pix_fmt), ("buffersink",))),
-            ]
-            graph.link_nodes(*nodes).configure()
-            self._graph, self._graph_key = graph, key
-        return self._graph
 
     def close(self) -> None:
         """Closes the file and ends all threads; a later read opens it again."""
         self._reader.close()
         with self._converting:
-            self._drop_graph()
-
-    def _drop_graph(self) -> None:
-        """Ends its threads. PyAV's graph and its filters refer to each other, and it has no close: the dicts in which
-        it holds them are emptied, or the threads would wait for the garbage collector."""
-        for held in gc.get_referents(self._graph):
-            if isinstance(held, dict):
-                held.clear()
-        self._graph = self._graph_key = None
-
-
-class MovieChannel(MovieSource):
-    """One channel of a movie's frames: those of MovieSource, whose attributes it has."""
-
-    def __init__(self, path: str | Path, channel: str, *, stream: int = 0):
-        """channel: one of CHANNELS. MediaError: it is another one, or the movie cannot be read."""
-        if channel not in CHANNELS:
-            raise no_channel(check_file(path), channel, CHANNELS)
-        super().__init__(path, stream=stream)
-        self._channel = channel
-
-    def read(self, index: int) -> np.ndarray:
-        """The samples (height, width, n) that the channel is made of: n is 3, RGB, for the luminance of colours, 0 for
-        the alpha of an opaque movie, 1 otherwise. Raises what MovieSource raises."""
-        if self._channel == "alpha" and self.alpha == "opaque":
-            return np.empty((self.height, self.width, 0), self.dtype)
-        return super().read(index)
-
-    def decoded(self, index: int) -> np.ndarray | Planes:
-        return self.read(index)
-
-    def _pixels(self, frame: av.VideoFrame) -> np.ndarray:
-        if self._channel == "luminance" and _is_grey(frame):
-            grey = self._converted(frame, "gray16le" if self.dtype == np.uint16 else "gray")
-            return self._upright(grey)[..., None]
-        return super()._pixels(frame)[..., CHANNELS[self._channel]]
+            self._to_planes, self._to_packed = VideoReformatter(), VideoReformatter()
 
 
 def _is_opaque_yuv(pixels: VideoFormat) -> bool:

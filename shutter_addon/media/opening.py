@@ -4,21 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from fractions import Fraction
-from functools import cache
+from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
 
 from ..core.frames.frame_source import FrameSource
-from . import decoding_child
-from .blender_movie import BlenderMovie, BlenderMovieChannel
+from . import decoding_child, pyav
+from .blender_movie import BlenderMovie
+from .channels import CHANNELS, MovieChannel, no_channel
 from .color import in_colorspace
 from .errors import MediaError
 from .files import check_file
 from .reduced import smaller
 from .sequence import IMAGE_SUFFIXES, SequenceChannel, SequenceSource
-
-if TYPE_CHECKING:
-    from .movie import MovieChannel
 
 Size = tuple[int, int]  # width and height
 
@@ -51,7 +48,7 @@ def open_source(
     path = Path(path)
     source: FrameSource
     if _is_movie(path, files):
-        source = _opened_movie(path, stream=stream, deinterlace=deinterlace, divisor=divisor, size=size)
+        source = _opened_movie(path, stream, deinterlace, divisor, size)
     else:
         source = smaller(SequenceSource(path, files=files, fps=fps, alpha=alpha), divisor)
     try:
@@ -61,65 +58,59 @@ def open_source(
         raise
 
 
-def with_proxy(source: FrameSource, path: str | Path, **options: Any) -> FrameSource:
+def with_proxy(
+    source: FrameSource,
+    path: str | Path,
+    *,
+    files: Sequence[str | Path] | None = None,
+    colorspace: str | None = None,
+    config: str | Path | None = None,
+) -> FrameSource:
     """The source with its frames read from a proxy; the source itself, where there is none that fits.
 
-    path, options: of the proxy, as open_source takes them"""
+    path, files, colorspace, config: of the proxy, as open_source takes them"""
+    opened = partial(open_source, path, files=files, colorspace=colorspace, config=config)
     try:
         from .proxy import ProxySource, fits
 
-        with open_source(path, **options) as proxy:
+        with opened() as proxy:
             if not fits(proxy, source):
                 return source
-        return ProxySource(source, open_source(path, size=(source.width, source.height), **options))
+        return ProxySource(source, opened(size=(source.width, source.height)))
     except (ImportError, MediaError):  # without PyAV nothing is fitted
         return source
 
 
 def open_channel(
     path: str | Path, channel: str, *, files: Sequence[str | Path] | None = None, stream: int = 0
-) -> SequenceChannel | MovieChannel | BlenderMovieChannel:
+) -> SequenceChannel | MovieChannel:
     """Opens what `open_source` opens, for one channel alone. MediaError: it cannot be read, or has no such channel.
 
     channel: one of channels.CHANNELS, or the name of a channel of the images' own; files, stream: see open_source"""
     path = Path(path)
-    if _is_movie(path, files):
-        return _opened_channel(path, channel, stream)
-    return SequenceChannel(path, channel, files=files)
-
-
-@cache
-def missing_pyav() -> str:
-    """Why PyAV does not decode movies, in Python's words, so that a second Blender does, where one is lent; "": it
-    does."""
-    try:
-        from .movie import MovieSource  # noqa: F401
-    except ImportError as error:
-        return str(error)
-    return ""
+    if not _is_movie(path, files):
+        return SequenceChannel(path, channel, files=files)
+    movie = _opened_movie(path, stream)
+    if channel in CHANNELS:
+        return MovieChannel(movie, channel)
+    movie.close()
+    raise no_channel(path, channel, CHANNELS)
 
 
 def _is_movie(path: Path, files: Sequence[str | Path] | None) -> bool:
     return files is None and path.suffix.lower() not in IMAGE_SUFFIXES
 
 
-def _opened_movie(path: Path, *, stream: int, deinterlace: bool, divisor: int, size: Size | None) -> FrameSource:
+def _opened_movie(
+    path: Path, stream: int, deinterlace: bool = False, divisor: int = 1, size: Size | None = None
+) -> FrameSource:
     """See open_source. Only PyAV's frames are fitted to a size."""
-    if missing_pyav():
+    if pyav.missing():
         _check_lent(path, stream)
         return smaller(BlenderMovie(path, deinterlace=deinterlace), divisor)
     from .movie import MovieSource
 
     return MovieSource(path, stream=stream, deinterlace=deinterlace, divisor=divisor, size=size)
-
-
-def _opened_channel(path: Path, channel: str, stream: int) -> MovieChannel | BlenderMovieChannel:
-    if missing_pyav():
-        _check_lent(path, stream)
-        return BlenderMovieChannel(path, channel)
-    from .movie import MovieChannel
-
-    return MovieChannel(path, channel, stream=stream)
 
 
 def _check_lent(path: Path, stream: int) -> None:
@@ -129,6 +120,6 @@ def _check_lent(path: Path, stream: int) -> None:
     check_file(path)
     what = f"video stream {stream} of a movie needs" if decoding_child.is_lent() else "movies need"
     raise MediaError(
-        f"{path.name}: {what} the Python package PyAV ({missing_pyav()}); "
+        f"{path.name}: {what} the Python package PyAV ({pyav.missing()}); "
         "install the zip of Virtual Shutter that is made for your system, or use an image sequence"
     )

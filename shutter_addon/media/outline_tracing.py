@@ -5,12 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from ..core.model.outlines import Curves, curves
-from .errors import lacks_opencv
-
-try:
-    import cv2
-except ImportError:  # a package without wheels; the extension registers without it
-    cv2 = None
+from . import opencv
+from .opencv import cv2
 
 FINE = 4  # contours are followed in mattes so many times as large
 SPOT = 6.0  # pixels: what covers no more of them is no part of a subject
@@ -22,8 +18,7 @@ def traced(matte: np.ndarray, off: float = 0.5) -> Curves:
 
     matte: (height, width) float32, 0 to 1; off: how far curves may be from its contours, in pixels
     MediaError: OpenCV is missing."""
-    if cv2 is None:
-        raise lacks_opencv("outlines are traced by")
+    opencv.check("outlines are traced by")
     rows, columns = (np.flatnonzero(matte.max(axis=axis) > 0.5) for axis in (1, 0))
     if not rows.size:
         return ()

@@ -10,14 +10,10 @@ from __future__ import annotations
 import numpy as np
 
 from ..core.model.outlines import Curves
+from . import opencv
 from .carrying import working_size
-from .errors import lacks_opencv
+from .opencv import cv2
 from .outline_tracing import traced
-
-try:
-    import cv2
-except ImportError:  # a package without wheels; the extension registers without it
-    cv2 = None
 
 ROUNDS = 6
 # Of what is drawn: beyond that it is no subject; within that it may be; of a lasso, so deep inside it surely is.
@@ -40,8 +36,7 @@ def proposed(picture: np.ndarray, drawn: np.ndarray, *, encloses: bool) -> Curve
 
     drawn: (h, w) bool, working_shape's: what strokes cover, or what they enclose
     MediaError: OpenCV is missing."""
-    if cv2 is None:
-        raise lacks_opencv("outlines are proposed by")
+    opencv.check("outlines are proposed by")
     if not drawn.any():
         return ()
     small = cv2.resize(picture, drawn.shape[::-1], interpolation=cv2.INTER_AREA)
@@ -60,8 +55,7 @@ def proposed(picture: np.ndarray, drawn: np.ndarray, *, encloses: bool) -> Curve
 def along_edges(picture: np.ndarray, start: np.ndarray, end: np.ndarray) -> np.ndarray:
     """The way (n, 2) from one point (2,) to another along the edges of a picture (H, W, 3) uint8, all in fractions of
     it, y up; straight where it is short. Both ends go to the edges beside them. MediaError: OpenCV is missing."""
-    if cv2 is None:
-        raise lacks_opencv("outlines are snapped by")
+    opencv.check("outlines are snapped by")
     height, width = working_shape(picture)
     size = np.array([width, height])
     ends = np.stack([start, end])

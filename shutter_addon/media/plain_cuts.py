@@ -1,5 +1,5 @@
-"""What cuts.py asks PySceneDetect's detectors, answered by NumPy alone where that is missing: the same sums of the same
-samples. Pictures are RGB (H, W, 3) uint8."""
+"""What PySceneDetect's detectors say of pictures, computed by NumPy alone: the same sums of the same samples, without
+OpenCV, which PySceneDetect needs. Pictures are RGB (H, W, 3) in levels, which are rounded."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ _GREY = np.array([9798, 19235, 3735])  # OpenCV's, in 1 / 32768
 
 def change(before: np.ndarray, after: np.ndarray) -> float:
     """ContentDetector's score of luma alone: by how many levels the largest colour differs on average."""
-    return float(np.abs(before.max(axis=-1).astype(int) - after.max(axis=-1)).mean())
+    return float(np.abs(_whole(before).max(axis=-1).astype(int) - _whole(after).max(axis=-1)).mean())
 
 
 def stands_out(pictures: list[np.ndarray], index: int, ratio: float, least: float) -> bool:
@@ -32,10 +32,14 @@ def unlike(before: np.ndarray, after: np.ndarray, bits: int) -> float:
     return np.count_nonzero(_hash(before, bits) != _hash(after, bits)) / bits**2
 
 
+def _whole(picture: np.ndarray) -> np.ndarray:
+    return np.rint(picture).clip(0, 255).astype(np.uint8)
+
+
 def _hash(picture: np.ndarray, bits: int) -> np.ndarray:
     """Which of the lowest frequencies are above their median."""
     size = 2 * bits
-    small = _resized((picture @ _GREY + (1 << 14)) >> 15, size)
+    small = _resized((_whole(picture) @ _GREY + (1 << 14)) >> 15, size)
     waves = _waves(size)[:bits]
     low = np.float32(waves @ np.float32(small / max(small.max(), 1)) @ waves.T)
     return np.greater(low, np.median(low))

@@ -20,7 +20,7 @@ class PrefetchSource(SourceWrapper):
     The frames of the last `want` are kept until the next one: they are what it holds in memory.
     """
 
-    def __init__(self, source: FrameSource, *, planes: bool = False):
+    def __init__(self, source: FrameSource, *, planes: bool = False) -> None:
         """planes: frames lie decoded as the source's `decoded` gives them, which `read` then has to convert"""
         super().__init__(source)
         self._fetch = source.decoded if planes else source.read

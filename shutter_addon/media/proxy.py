@@ -20,7 +20,7 @@ class ProxySource(SourceWrapper):
 
     from_proxy = True
 
-    def __init__(self, source: FrameSource, proxy: FrameSource):
+    def __init__(self, source: FrameSource, proxy: FrameSource) -> None:
         super().__init__(source)
         self._proxy = proxy
         source.close()  # until a frame is wanted of it

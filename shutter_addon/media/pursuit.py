@@ -48,7 +48,9 @@ class PartPursuit:
 
     reason: why it was not found in the last one"""
 
-    def __init__(self, part: Part, footage: Footage, frame: int, motion: Motion, known: Similarity | None = None):
+    def __init__(
+        self, part: Part, footage: Footage, frame: int, motion: Motion, known: Similarity | None = None
+    ) -> None:
         """frame: the part's; known: the motion up to a frame in which the part is, but cannot be seen; the next one
         comes after that. None: it comes after the part's."""
         self._first, self._footage, self._motion, self.reason = part, footage, motion, COVERED
@@ -155,9 +157,7 @@ class PartPursuit:
     def _leaves(self, picture: np.ndarray) -> bool:
         """Whether most of the part would lie outside of the picture if it went on."""
         places = self._speed.after(self._speed).after(self._known)(self._first.points)
-        height, width = picture.shape
-        inside = (places.real >= 0) & (places.real < width) & (places.imag >= 0) & (places.imag < height)
-        return inside.mean() < 0.5
+        return bool(registration.inside(picture, places).mean() < 0.5)
 
 
 @dataclass(frozen=True)

@@ -17,13 +17,9 @@ import numpy as np
 
 from ..core import stopping
 from ..core.frames.frame_source import FrameSource
-from . import flow
-from .errors import MediaError, lacks_opencv
-
-try:
-    import cv2
-except ImportError:  # a package without wheels; the extension registers without it
-    cv2 = None
+from . import flow, opencv
+from .errors import MediaError
+from .opencv import cv2
 
 ROWS = 540  # of the pictures that are looked at, at most
 FRAMES = 48  # one after the other, that are looked at
@@ -64,8 +60,7 @@ def of_source(source: FrameSource, indices: Sequence[int], *, columns: bool = Fa
     another in one shot. columns: the sensor reads column by column, from the left.
 
     ReadoutError: it cannot be told. MediaError: the frames cannot be read, or OpenCV is missing."""
-    if cv2 is None:
-        raise lacks_opencv("the readout is found by")
+    opencv.check("the readout is found by")
     first = max((len(indices) - FRAMES) // 2, 0)
     chosen = indices[first : first + FRAMES]
     source.want(chosen)
@@ -75,9 +70,7 @@ def of_source(source: FrameSource, indices: Sequence[int], *, columns: bool = Fa
 def _small(source: FrameSource, index: int, *, columns: bool) -> np.ndarray:
     stopping.check()
     luma = flow.luma(source.read(index), source.transfer, source.alpha)
-    luma = np.ascontiguousarray(luma.T) if columns else luma
-    rows = min(ROWS, luma.shape[0])
-    return flow.resized(luma, (max(1, round(luma.shape[1] * rows / luma.shape[0])), rows))
+    return flow.of_rows(np.ascontiguousarray(luma.T) if columns else luma, ROWS)
 
 
 def of_pictures(pictures: Sequence[np.ndarray]) -> Readout:

@@ -12,7 +12,7 @@ DIVISORS = 1, 2, 4
 class ReducedSource(SourceWrapper):
     """A source whose frames are the other's, `divisor` times smaller each way; a last pixel stands for what is left."""
 
-    def __init__(self, source: FrameSource, divisor: int):
+    def __init__(self, source: FrameSource, divisor: int) -> None:
         super().__init__(source)
         self._divisor = divisor
         self.width, self.height = (reduced_size(length, divisor) for length in (source.width, source.height))

@@ -9,17 +9,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
-from typing import Any, get_args
+from typing import get_args
 
 import numpy as np
 
 from ..core.model.motions import Motion, Similarity
-from .errors import lacks_opencv
-
-try:
-    import cv2
-except ImportError:  # a package without wheels; the extension registers without it
-    cv2 = None
+from .opencv import cv2
 
 # What may change beside the location, each with what comes before it.
 MOTIONS = get_args(Motion)
@@ -30,6 +25,7 @@ _QUALITY = 0.01  # of a corner, as a share of the best one's
 _WEAKEST = 2e-4  # the same, whatever the best one is: noise of some levels has less
 _LEVELS = 3  # a motion between two frames is found up to about 2 ** _LEVELS half windows
 _WINDOWS = 9, 21  # sides of the windows that are compared, in pixels: for small and for large parts
+_UNTIL = 3, 30, 0.01  # OpenCV's own: after 30 steps, or at one of less than 0.01 pixels
 _THERE_AND_BACK = 1.0  # pixels from where a corner started that it may come back to
 _HYPOTHESES = 300
 _SOUGHT = 64  # pixels to which a part is made smaller to be sought, or compared as a whole
@@ -40,12 +36,6 @@ _TRACED = 13  # side of the windows by which points are traced through pictures
 _NOISE = 16.0  # levels² of contrast that noise may have: they make no two pictures unlike
 # Beyond these the motion between two pictures is none that a film has.
 _MOST_SCALE, _MOST_TURN = 1.5, 0.8
-
-
-def check() -> None:
-    """MediaError: OpenCV is missing."""
-    if cv2 is None:
-        raise lacks_opencv("tracking needs")
 
 
 def grey(frame: np.ndarray, size: tuple[int, int], alpha: str = "opaque") -> np.ndarray:
@@ -90,13 +80,13 @@ class Part:
     Weights of the corners say how much each one counts; `learn` lowers those of corners that move otherwise, as
     those of the background do."""
 
-    def __init__(self, picture: np.ndarray, weight: np.ndarray):
+    def __init__(self, picture: np.ndarray, weight: np.ndarray) -> None:
         """weight: (H, W) float32, 0 to 1: how much each pixel belongs to it; there has to be one above 0."""
         self.weight, self._whole = weight, picture
         x, y, width, height = cv2.boundingRect((weight > 0).astype(np.uint8))
         self.box = x, y, width, height
         side = int(np.clip(max(width, height) / 4, *_WINDOWS)) // 2 * 2 + 1
-        self._window = side, side
+        self._side = side
         margin = side * 2
         left, top = max(x - margin, 0), max(y - margin, 0)
         crop = np.s_[top : y + height + margin, left : x + width + margin]
@@ -179,13 +169,8 @@ class Part:
     def astray(self, picture: np.ndarray, known: Similarity) -> tuple[np.ndarray, np.ndarray]:
         """Its corners that are found in a picture, around where a motion has them: where they were in its own, and how
         many pixels each has moved otherwise."""
-        size = self._picture.shape[::-1]
-        back = cv2.warpAffine(picture, matrix(known, self._origin), size, flags=cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP)
-        moved, good = self._flow(back)
-        there = known(self.points)
-        good &= (
-            (there.real >= 0) & (there.real < picture.shape[1]) & (there.imag >= 0) & (there.imag < picture.shape[0])
-        )
+        moved, good = self._flow(picture, known)
+        good &= inside(picture, known(self.points))
         return self.points[good], np.abs(moved - self.points)[good]
 
     def again(self, picture: np.ndarray, motion: Similarity) -> Part | None:
@@ -199,15 +184,11 @@ class Part:
         self._believed += np.where(match.seen, 0.2 * (wanted - self._believed), 0)
 
     def _match(self, picture: np.ndarray, guess: Similarity, motion: Motion) -> Match | None:
-        size = self._picture.shape[::-1]
-        back = cv2.warpAffine(picture, matrix(guess, self._origin), size, flags=cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP)
-        there = guess(self.points)
-        seen = (there.real >= 2) & (there.real < picture.shape[1] - 2)
-        seen &= (there.imag >= 2) & (there.imag < picture.shape[0] - 2)
+        seen = inside(picture, guess(self.points), 2)
         total, weights = self._believed.sum(), np.where(seen, self._believed, 0)
         if seen.sum() < FEWEST[motion] or weights.sum() <= 0.02 * total:
             return None
-        moved, good = self._flow(back)
+        moved, good = self._flow(picture, guess)
         good &= seen
         tolerance = max(1.0, max(picture.shape) / 640)
         fitted = fit(self.points, moved, np.where(good, weights, 0), motion, tolerance)
@@ -227,15 +208,12 @@ class Part:
             held=found(self.points[agreeing]),
         )
 
-    def _flow(self, picture: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Where each corner is in a picture, and whether it comes back from there."""
-        options: dict[str, Any] = {"winSize": self._window, "maxLevel": _LEVELS}
-        options["criteria"] = (cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 30, 0.01)
-        start = _pairs(self.points - self._origin)
-        there, forth, _ = cv2.calcOpticalFlowPyrLK(self._picture, picture, start, None, **options)
-        again, back, _ = cv2.calcOpticalFlowPyrLK(picture, self._picture, there, None, **options)
-        close = np.hypot(*(again - start).T) < _THERE_AND_BACK
-        return _plane(there) + self._origin, forth.ravel().astype(bool) & back.ravel().astype(bool) & close.ravel()
+    def _flow(self, picture: np.ndarray, guess: Similarity) -> tuple[np.ndarray, np.ndarray]:
+        """Where each corner is in a picture that is taken back by a guess, and whether it comes back from there."""
+        size, flags = self._picture.shape[::-1], cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP
+        back = cv2.warpAffine(picture, matrix(guess, self._origin), size, flags=flags)
+        there, is_good = _there_and_back(self._picture, back, self.points - self._origin, self._side)
+        return there + self._origin, is_good
 
     def _likeness(self, picture: np.ndarray, motion: Similarity) -> float:
         """Correlation of the part's pixels with those in another picture, as far as they lie in it; both smaller."""
@@ -254,11 +232,6 @@ def traced(pictures: Sequence[np.ndarray], points: np.ndarray, step: np.ndarray)
 
     step: (n,) how they may move up to the second picture; they go on like that, more or less"""
     places = np.full(len(points), complex(np.nan, np.nan))
-    options: dict[str, Any] = {
-        "winSize": (_TRACED, _TRACED),
-        "maxLevel": _LEVELS,
-        "flags": cv2.OPTFLOW_USE_INITIAL_FLOW,
-    }
     left = np.arange(len(points))
     reach = _SOUGHT + len(pictures) * int(np.abs(step).max())
     low = [max(int(side.min()) - reach, 0) for side in (points.imag, points.real)]
@@ -266,14 +239,27 @@ def traced(pictures: Sequence[np.ndarray], points: np.ndarray, step: np.ndarray)
     pictures = [np.ascontiguousarray(each[low[0] : high[0], low[1] : high[1]]) for each in pictures]
     points = points - complex(low[1], low[0])
     for first, second in pairwise(pictures):
-        there, good, _ = cv2.calcOpticalFlowPyrLK(first, second, _pairs(points), _pairs(points + step), **options)
-        again, back, _ = cv2.calcOpticalFlowPyrLK(second, first, there, _pairs(points), **options)
-        close = (good & back).ravel().astype(bool) & (np.abs(_plane(again) - points) < _THERE_AND_BACK)
-        if not close.any():
+        there, is_good = _there_and_back(first, second, points, _TRACED, step)
+        if not is_good.any():
             return places
-        left, step, points = left[close], (_plane(there) - points)[close], _plane(there)[close]
+        left, step, points = left[is_good], (there - points)[is_good], there[is_good]
     places[left] = points + complex(low[1], low[0])
     return places
+
+
+def _there_and_back(
+    first: np.ndarray, second: np.ndarray, points: np.ndarray, side: int, step: np.ndarray | None = None
+) -> tuple[np.ndarray, np.ndarray]:
+    """Where points (n,) of a picture are in another one, and whether they come back from there (n,) bool.
+
+    side: of the windows that are compared, in pixels; step: (n,) how they may move"""
+    ways = None, None, (side, side), _LEVELS, _UNTIL, cv2.OPTFLOW_USE_INITIAL_FLOW
+    start = _pairs(points)
+    guess = start.copy() if step is None else _pairs(points + step)
+    there, forth, _ = cv2.calcOpticalFlowPyrLK(first, second, start, guess, *ways)
+    guess = there.copy() if step is None else start.copy()
+    again, back, _ = cv2.calcOpticalFlowPyrLK(second, first, there, guess, *ways)
+    return _plane(there), (forth & back).ravel().astype(bool) & (np.abs(_plane(again) - points) < _THERE_AND_BACK)
 
 
 def correlation(first: np.ndarray, second: np.ndarray, weight: np.ndarray) -> float:
@@ -383,6 +369,13 @@ def _plane(pairs: np.ndarray) -> np.ndarray:
 
 def _pairs(points: np.ndarray) -> np.ndarray:
     return np.stack([points.real, points.imag], axis=-1).astype(np.float32, order="C").reshape(-1, 1, 2)
+
+
+def inside(picture: np.ndarray, points: np.ndarray, margin: float = 0) -> np.ndarray:
+    """Which points (n,) lie in a picture (H, W), a margin in pixels away from its edges (n,) bool."""
+    height, width = picture.shape
+    across = (points.real >= margin) & (points.real < width - margin)
+    return across & (points.imag >= margin) & (points.imag < height - margin)
 
 
 def matrix(motion: Similarity, origin: complex = 0) -> np.ndarray:

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import bisect
+import itertools
 import re
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from fractions import Fraction
 from functools import lru_cache, partial
-from itertools import pairwise
 from pathlib import Path
 from stat import S_ISREG
 
@@ -49,7 +49,7 @@ class ImageFiles:
     path: the first file; files: those there are, in order; count: of frames
     """
 
-    def __init__(self, path: str | Path, files: Sequence[str | Path] | None = None):
+    def __init__(self, path: str | Path, files: Sequence[str | Path] | None = None) -> None:
         """MediaError: there is no first file, or its folder cannot be listed."""
         path = Path(path)
         self.left_out = ""
@@ -72,7 +72,31 @@ class ImageFiles:
         return self.files[bisect.bisect_right(self._starts, index) - 1]
 
 
-class SequenceSource(FrameSource):
+class _Sequence(FrameSource):
+    """What has the files of an image sequence: see ImageFiles."""
+
+    def __init__(self, path: str | Path, files: Sequence[str | Path] | None) -> None:
+        self._files = ImageFiles(path, files)
+        self.path, self.count, self.left_out = self._files.path, self._files.count, self._files.left_out
+
+    @property
+    def files(self) -> list[Path]:
+        """The file of each frame."""
+        return [self._files[index] for index in range(self.count)]
+
+    def _file(self, index: int) -> Path:
+        """MediaError: it is missing. IndexError: there is no such frame."""
+        check_index(self, index)
+        return check_file(self._files[index])
+
+    def _check_size(self, path: Path, size: tuple[int, int], window: str = "") -> None:
+        """MediaError unless it is the first one's."""
+        if size != (self.width, self.height):
+            first = f"{self.path.name} is {self.width}×{self.height}"
+            raise MediaError(f"{path.name}: is {size[0]}×{size[1]}{window}, but {first}")
+
+
+class SequenceSource(_Sequence):
     """Images as frames: see ImageFiles for which file is which frame.
 
     Samples are as stored: straight alpha stays straight, EXIF orientation is left alone, and of an EXR the data window
@@ -87,9 +111,8 @@ class SequenceSource(FrameSource):
         files: Sequence[str | Path] | None = None,
         fps: Fraction | None = None,
         alpha: str | None = None,
-    ):
-        self._files = ImageFiles(path, files)
-        self.path, self.count, self.left_out = self._files.path, self._files.count, self._files.left_out
+    ) -> None:
+        super().__init__(path, files)
         self.fps = fps
         with _opened(self.path) as (_image, spec, layer):
             self.width, self.height = spec.width, spec.height
@@ -99,23 +122,17 @@ class SequenceSource(FrameSource):
         self.alpha = (alpha or self._usual_alpha()) if has_alpha else "opaque"
         self.options = {}
 
-    @property
-    def files(self) -> list[Path]:
-        """The file of each frame."""
-        return [self._files[index] for index in range(self.count)]
-
     def read(self, index: int) -> np.ndarray:
         """MediaError: the file is missing, damaged or unlike the first."""
-        check_index(self, index)
-        path = check_file(self._files[index])
+        path = self._file(index)
         with _opened(path) as (image, spec, layer):
             self._check_like_first(path, spec)
-            return self._expand(_samples(image, spec, layer, path))
+            return expanded(_samples(image, spec, layer, path))
 
     def _check_like_first(self, path: Path, spec: ImageSpec) -> None:
         size, dtype = (spec.width, spec.height), _dtype(spec)
         whole = size == (spec.full_width, spec.full_height)
-        _check_size_like_first(self, path, size, "" if whole else " (its data window)")
+        self._check_size(path, size, "" if whole else " (its data window)")
         if dtype != self.dtype:
             raise MediaError(f"{path.name}: has {dtype} samples, but {self.path.name} has {self.dtype}")
 
@@ -124,68 +141,46 @@ class SequenceSource(FrameSource):
         deep_tiff = self.path.suffix.lower() in (".tif", ".tiff") and self.dtype == np.uint16
         return "premultiplied" if self.transfer == "linear" or deep_tiff else "straight"
 
-    def _expand(self, samples: np.ndarray) -> np.ndarray:
-        """Y, YA, RGB or RGBA samples as RGBA."""
-        picture = np.empty((self.height, self.width, 4), self.dtype)
-        channels = samples.shape[2]
-        picture[..., :3] = samples[..., : 1 if channels < 3 else 3]
-        opaque = np.iinfo(self.dtype).max if self.dtype.kind == "u" else 1
-        picture[..., 3] = samples[..., -1] if channels in ALPHA else opaque
-        return picture
 
-    def close(self) -> None:
-        """Nothing stays open between frames."""
+def expanded(samples: np.ndarray) -> np.ndarray:
+    """Y, YA, RGB or RGBA samples (height, width, n) as RGBA, of new memory."""
+    height, width, channels = samples.shape
+    picture = np.empty((height, width, 4), samples.dtype)
+    picture[..., :3] = samples[..., : 1 if channels < 3 else 3]
+    opaque = np.iinfo(samples.dtype).max if samples.dtype.kind == "u" else 1
+    picture[..., 3] = samples[..., -1] if channels in ALPHA else opaque
+    return picture
 
 
-class SequenceChannel:
+class SequenceChannel(_Sequence):
     """One channel of the images of a sequence: see ImageFiles for which file is which frame.
 
     Samples are as stored, of any type. All frames must have the first one's size. An EXR's picture is its display
     window, since mattes are often cropped to what they cover: what its data window leaves out is 0. Where that is
     larger all around, it is the picture, as in Blender.
-
-    path: the first file; width, height: pixels; count: of frames; fps: none
     """
 
     fps = None
 
-    def __init__(self, path: str | Path, channel: str, *, files: Sequence[str | Path] | None = None):
+    def __init__(self, path: str | Path, channel: str, *, files: Sequence[str | Path] | None = None) -> None:
         """channel: one of CHANNELS, or the name of one of the files' own. MediaError: they have none of that name."""
-        self._files = ImageFiles(path, files)
-        self.path, self.count = self._files.path, self._files.count
+        super().__init__(path, files)
         self._layer_of = partial(_channel_named, channel)
         with _opened(self.path, self._layer_of) as (image, spec, _positions):
             _, _, self.width, self.height = _picture_window(image, spec, self.path)
-
-    @property
-    def files(self) -> list[Path]:
-        """The file of each frame."""
-        return [self._files[index] for index in range(self.count)]
 
     def read(self, index: int) -> np.ndarray:
         """The samples (height, width, n) that the channel is made of, top row first: n is 3, RGB, for the luminance of
         colours, 0 for the alpha of an opaque image, 1 otherwise.
 
         Raises MediaError for a file that is missing, damaged or unlike the first, IndexError outside 0 … count-1."""
-        check_index(self, index)
-        path = check_file(self._files[index])
+        path = self._file(index)
         with _opened(path, self._layer_of) as (image, spec, positions):
             window = _picture_window(image, spec, path)
-            _check_size_like_first(self, path, window[2:])
+            self._check_size(path, window[2:])
             if not positions:
                 return np.empty((self.height, self.width, 0), np.uint8)
             return _in_window(_samples(image, spec, positions, path), spec, window)
-
-    def close(self) -> None:
-        """Nothing stays open between frames."""
-
-
-def _check_size_like_first(
-    sequence: SequenceSource | SequenceChannel, path: Path, size: tuple[int, int], window: str = ""
-) -> None:
-    if size != (sequence.width, sequence.height):
-        first = f"{sequence.path.name} is {sequence.width}×{sequence.height}"
-        raise MediaError(f"{path.name}: is {size[0]}×{size[1]}{window}, but {first}")
 
 
 def _picture_window(image: ImageInput, spec: ImageSpec, path: Path) -> Window:
@@ -222,7 +217,7 @@ def _numbered(path: Path) -> tuple[list[int], list[Path], Path | None]:
         if number >= 0 and (number not in by_frame or len(digits) == len(first)):
             by_frame[number] = file
     numbers = sorted(by_frame)
-    gaps = (i for i, (a, b) in enumerate(pairwise(numbers), 1) if b - a > MISSING + 1 or b >= LONGEST)
+    gaps = (i for i, (a, b) in enumerate(itertools.pairwise(numbers), 1) if b - a > MISSING + 1 or b >= LONGEST)
     end = next(gaps, len(numbers))
     files = [by_frame[number] for number in numbers]
     return numbers[:end], files[:end], files[end] if end < len(files) else None
@@ -292,22 +287,27 @@ def _had_alpha(path: Path, _size: int, _mtime: int) -> bool:
         return len(layer) in ALPHA
 
 
+def _parts(image: ImageInput) -> Iterator[ImageSpec]:
+    """What describes each part of an image, which is the one that is read then."""
+    for part in itertools.count():
+        if not image.seek_subimage(part, 0):
+            return
+        yield image.spec()
+
+
 def _first_colours(image: ImageInput, path: Path) -> Layer:
     """(spec, positions) of the channels that Blender shows."""
     spec = whole = image.spec()
     if image.format_name() != "openexr":
         return spec, [*range(min(spec.nchannels, 4))]
     names: list[str] = []
-    part = 0
-    while image.seek_subimage(part, 0):
-        spec = image.spec()
+    for spec in _parts(image):
         layer = _colour_channels(spec.channelnames)
         if layer and not spec.deep:
             if (spec.width, spec.height) != (whole.width, whole.height):
                 raise MediaError(f"{path.name}: its parts have different data windows")
             return spec, layer
         names += [f"deep {name}" for name in spec.channelnames] if spec.deep else spec.channelnames
-        part += 1
     raise MediaError(f"{path.name}: no colour channels, only {', '.join(names)}")
 
 
@@ -315,14 +315,11 @@ def _channel_named(channel: str, image: ImageInput, path: Path) -> Layer:
     """(spec, positions) of a channel: three for the luminance of colours, none for the alpha of an opaque image.
     What an EXR calls "red" itself is that: coefficients have the names of shutters."""
     names: list[str] = []
-    part, is_exr = 0, image.format_name() == "openexr"
-    while (is_exr or channel not in CHANNELS) and image.seek_subimage(part, 0):
-        spec = image.spec()
-        if not spec.deep:
-            if channel in spec.channelnames:
-                return spec, [spec.channelnames.index(channel)]
-            names += spec.channelnames
-        part += 1
+    is_exr = image.format_name() == "openexr"
+    for spec in _parts(image) if is_exr or channel not in CHANNELS else ():
+        if channel in spec.channelnames and not spec.deep:
+            return spec, [spec.channelnames.index(channel)]
+        names += [] if spec.deep else spec.channelnames
     if channel not in CHANNELS:
         raise no_channel(path, channel, names if is_exr else CHANNELS)
     spec, layer = _first_colours(image, path)

@@ -25,14 +25,9 @@ class Moved(NamedTuple):
     after: np.ndarray
 
 
-def is_possible() -> bool:
-    """Whether OpenCV is there."""
-    return getattr(flow, "cv2", None) is not None
-
-
 def moved(source: FrameSource, index: int) -> Moved | None:
-    """What moves from a frame to the next one; None: that cannot be told, as across a cut. It reads both. `is_possible`
-    has to be. MediaError: they cannot be read."""
+    """What moves from a frame to the next one; None: that cannot be told, as across a cut. It reads both. It takes
+    OpenCV. MediaError: they cannot be read."""
     first, second = (_small(source, i) for i in (index, index + 1))
     if min(first.shape) < flow.SMALLEST:
         return None
@@ -61,7 +56,4 @@ def step(moved: Moved, before: Similarity, after: Similarity) -> float:
 
 
 def _small(source: FrameSource, index: int) -> np.ndarray:
-    luma = flow.luma(source.read(index), source.transfer, source.alpha)
-    rows = min(ROWS, luma.shape[0])
-    size = max(1, round(luma.shape[1] * rows / luma.shape[0])), rows
-    return flow.resized(luma, size)
+    return flow.of_rows(flow.luma(source.read(index), source.transfer, source.alpha), ROWS)

@@ -119,7 +119,7 @@ class Pursuit(Protocol):
 class Track(ABC):
     """What tracking a subject, a region or the camera, needs to know."""
 
-    def __init__(self, subject: Subject, footage: Footage, motion: Motion, frames: Collection[int]):
+    def __init__(self, subject: Subject, footage: Footage, motion: Motion, frames: Collection[int]) -> None:
         """frames: all at which the subject's centre is asked for."""
         self._subject, self._footage, self._motion = subject, footage, motion
         centres = {frame: subject.centre(frame) for frame in frames}
@@ -135,9 +135,13 @@ class Track(ABC):
             self._parts[frame] = self._part(frame)
         return self._parts[frame]
 
-    @abstractmethod
     def _part(self, frame: int) -> tuple[Part, float]:
         """As `part`, which keeps it."""
+        raise NotImplementedError
+
+    def _check(self, frame: int) -> None:
+        """TrackingError: at that frame there is nothing to follow."""
+        self.part(frame)
 
     @abstractmethod
     def _pursuit(self, start: int) -> tuple[int, Pursuit, float]:
@@ -145,7 +149,7 @@ class Track(ABC):
 
     def both_ways(self, start: int, frames: range, anchors: Collection[int]) -> Iterator[Tracked]:
         """As `follow`. TrackingError, at once: nothing can be tracked from there."""
-        self.part(start)
+        self._check(start)
         return self._both_ways(start, range(min(frames), max(frames) + 1), {*anchors} - {start})
 
     def _both_ways(self, start: int, frames: range, anchors: set[int]) -> Iterator[Tracked]:
@@ -214,7 +218,7 @@ class Track(ABC):
 
     def _has_part(self, frame: int) -> bool:
         try:
-            self.part(frame)
+            self._check(frame)
         except TrackingError:
             return False
         return True
@@ -238,7 +242,7 @@ class Track(ABC):
 class _RegionTrack(Track):
     """Tracks what a region covers."""
 
-    def __init__(self, region: Drawn, footage: Footage, motion: Motion, frames: Collection[int]):
+    def __init__(self, region: Drawn, footage: Footage, motion: Motion, frames: Collection[int]) -> None:
         super().__init__(region, footage, motion, frames)
         self._region = region
         self._doubted: dict[int, int | None] = {}

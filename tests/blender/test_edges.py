@@ -133,7 +133,7 @@ def test_in_betweens_that_it_needs_are_told_and_built(bpy, add, film, tmp_path):
         open_source(film) as source,
     ):
         edit, effect, strip = add(film, data)
-        inbetween.build(source, tmp_path / "cache", 2, "quick", frames=(3, 4), between=between)
+        inbetween.build(source, tmp_path / "cache", 2, "quick", pairs=range(3, 4), between=between)
         wanted = request(edit, effect, strip, 1)
         assert wanted.index == 5
         with pytest.raises(MediaError, match="in-between frames of frame 3 are missing"):
@@ -146,7 +146,7 @@ def test_in_betweens_that_it_needs_are_told_and_built(bpy, add, film, tmp_path):
         from shutter_addon.blender.data import snapshot
 
         assert needed_pairs(snapshot.take(edit, effect, strip, (1,), folder=tmp_path / "cache")) == {2, 3}
-        inbetween.build(source, tmp_path / "cache", 2, "quick", frames=(2, 2), between=between)
+        inbetween.build(source, tmp_path / "cache", 2, "quick", pairs=range(2, 3), between=between)
         sessions.forget()
         request(edit, effect, strip, 1).picture()
 

@@ -169,7 +169,7 @@ def test_what_is_missing_is_said_and_what_is_built_is_shown(cache, film, add, ed
         with pytest.raises(MediaError, match=r"in-between frames of frame 2 are missing"):
             way()
     with open_source(first) as source:
-        build(source, cache, frames=(1, 2))
+        build(source, cache, pairs=range(1, 3))
     same_pixels(light.to_encoded(picture()[..., :3]) * 255, shown(frames, range(4, 10)), 1)
     effect.inbetween = "1"  # a frame and a half
     same_pixels(light.to_encoded(picture()[..., :3]) * 255, shown(frames, (4, 4, 8)), 1)
@@ -207,7 +207,7 @@ def test_finished_frames_are_dropped_when_in_betweens_come_and_go(cache, film, a
     assert invalidation.invalidate_changed(edit)
     assert not invalidation.invalidate_changed(edit)
     with open_source(first) as source:
-        build(source, cache, frames=(0, 0))
+        build(source, cache, pairs=range(1))
     assert invalidation.invalidate_changed(edit)
 
 

@@ -137,9 +137,9 @@ def test_in_between_frames_make_steps_smaller(add):
 
 def test_without_opencv_nothing_is_said(add, monkeypatch):
     from shutter_addon.blender.rendering import strobing
-    from shutter_addon.media import flow
+    from shutter_addon.media import opencv
 
-    monkeypatch.setattr(flow, "cv2", None)
+    monkeypatch.setattr(opencv, "cv2", None)
     edit, effect, strip = add(12, np.ones(4))
     assert looked(edit, effect, strip) is None
     assert not strobing.is_busy()

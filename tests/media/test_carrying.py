@@ -13,7 +13,7 @@ import pytest
 from shutter_addon.core.frames.light import to_encoded, to_linear
 from shutter_addon.core.model import outlines
 from shutter_addon.core.model.mattes import FileFrame, Matte
-from shutter_addon.media import carried_mattes, carrying, image_writing, matte_tracking, outline_tracing
+from shutter_addon.media import carried_mattes, carrying, image_writing, matte_tracking, opencv, outline_tracing
 from shutter_addon.media.errors import MediaError
 from shutter_addon.media.matte_values import MatteValues
 
@@ -354,6 +354,6 @@ def test_no_drawing_is_no_matte(footage):
 
 
 def test_without_opencv(footage, monkeypatch):
-    monkeypatch.setattr(carrying, "cv2", None)
+    monkeypatch.setattr(opencv, "cv2", None)
     with pytest.raises(MediaError, match="opencv-contrib-python-headless"):
         carried_mattes.CarriedFile(footage, drawings(0)).open()

@@ -1,5 +1,7 @@
 """The motion of what a matte covers, against the truth: a subject over a ground that moves otherwise."""
 
+from contextlib import nullcontext
+
 import cv2
 import numpy as np
 import pytest
@@ -74,8 +76,12 @@ class Still:
         return np.array([0.4, 0.4])
 
 
+def covers(cover):
+    return lambda _size: nullcontext(cover)
+
+
 def test_from_frame_to_frame():
-    steps = list(matte_tracking.follow_cover(Still(), lambda frame: scene(frame)[1], Footage(), 4, range(9)))
+    steps = list(matte_tracking.follow_cover(Still(), covers(lambda frame: scene(frame)[1]), Footage(), 4, range(9)))
     places = {step.frame: np.multiply(step.placement.location, SIZE) for step in steps}
     assert sorted(places) == list(range(9))
     for frame, (x, y) in places.items():
@@ -88,8 +94,8 @@ def test_it_ends_where_there_is_no_matte():
         matte = scene(frame)[1]
         return matte if frame < 6 else 0 * matte
 
-    steps = list(matte_tracking.follow_cover(Still(), cover, Footage(), 4, range(4, 40)))
+    steps = list(matte_tracking.follow_cover(Still(), covers(cover), Footage(), 4, range(4, 40)))
     assert [step.frame for step in steps] == [4, 5, 6]
     assert steps[-1].fault == "the subject has left the picture"
     with pytest.raises(matte_tracking.TrackingError, match="the outline encloses nothing here"):
-        list(matte_tracking.follow_cover(Still(), cover, Footage(), 6, range(4, 40)))
+        list(matte_tracking.follow_cover(Still(), covers(cover), Footage(), 6, range(4, 40)))

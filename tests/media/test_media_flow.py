@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from shutter_addon.core.frames import light
-from shutter_addon.media import MediaError, flow, open_source
+from shutter_addon.media import MediaError, flow, open_source, opencv
 
 HEIGHT, WIDTH = 96, 160
 METHODS = tuple(flow.METHODS)
@@ -191,7 +191,7 @@ def test_one_frame_after_the_other_has_none_between():
 
 def test_without_opencv_it_is_one_sentence(monkeypatch):
     for found in (None, types.ModuleType("cv2")):  # none, and one without the contributed modules
-        monkeypatch.setattr(flow, "cv2", found)
+        monkeypatch.setattr(opencv, "cv2", found)
         with pytest.raises(MediaError, match="need the Python package opencv-contrib-python-headless"):
             next(flow.between(pan(0), pan(8), 2))
 

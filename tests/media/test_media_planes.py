@@ -118,12 +118,13 @@ def test_what_has_no_planes_of_chroma_alone(pixels):
 
 
 def test_a_conversion_that_fails_is_said_of_its_frame(bunny, monkeypatch):
-    def fails():
-        raise av.error.MemoryError(12, "Cannot allocate memory")
+    class Failing:
+        def reformat(self, *_):
+            raise av.error.MemoryError(12, "Cannot allocate memory")
 
+    monkeypatch.setattr(movie, "VideoReformatter", Failing)
     with open_source(bunny) as source:
         planes = source.decoded(5)
-        monkeypatch.setattr(av.filter, "Graph", fails)
         for converted in (planes.rgba, lambda: source.read(5)):
             with pytest.raises(MediaError, match=r"^frame 5 of .* cannot be decoded"):
                 converted()

@@ -17,8 +17,9 @@ import numpy as np
 import pytest
 from footage import COUNT, cut_file, damage_frame, make_movie, number, picture, save_image
 
-from shutter_addon.media import MediaError, decoding_child, flow, inbetween, open_source, opening
-from shutter_addon.media.blender_movie import BlenderMovie, BlenderMovieChannel, frame_rate
+from shutter_addon.media import MediaError, decoding_child, inbetween, open_source, opencv, pyav
+from shutter_addon.media.blender_movie import BlenderMovie, frame_rate
+from shutter_addon.media.channels import MovieChannel
 from shutter_addon.media.file_kind import file_kind
 from shutter_addon.media.inbetween import InbetweenSource
 from shutter_addon.media.opening import open_channel
@@ -208,20 +209,23 @@ def test_frame_rates_are_those_of_films():
 def _no_pyav(monkeypatch):
     monkeypatch.setitem(sys.modules, "shutter_addon.media.movie", None)
     monkeypatch.setitem(sys.modules, "av", None)
-    opening.missing_pyav.cache_clear()
+    pyav.missing.cache_clear()
     yield
-    opening.missing_pyav.cache_clear()
+    pyav.missing.cache_clear()
 
 
 def test_channels_are_those_that_pyav_decodes(coloured):
     for name in ("bt709.mp4", "alpha_png.mov", "ten_bits.mp4", "gray.mkv"):
         for channel in ("luminance", "red", "green", "blue", "alpha"):
-            with open_channel(coloured[name], channel) as theirs, BlenderMovieChannel(coloured[name], channel) as ours:
+            with (
+                open_channel(coloured[name], channel) as theirs,
+                MovieChannel(BlenderMovie(coloured[name]), channel) as ours,
+            ):
                 one, other = ours.read(1), theirs.read(1)  # PyAV's luminance of grey pictures is their luma
                 assert one.shape == other.shape or (name, channel) == ("gray.mkv", "luminance")
                 assert not one.size or np.abs(one.astype(int) - other).max() == 0
     with pytest.raises(MediaError, match=r"^gray\.mkv: has no channel depth, but luminance"):
-        BlenderMovieChannel(coloured["gray.mkv"], "depth")
+        open_channel(coloured["gray.mkv"], "depth")
 
 
 @pytest.mark.usefixtures("_no_pyav")
@@ -373,7 +377,7 @@ def test_in_between_frames_that_are_built_already_are_used(coloured, tmp_path, m
     with open_source(path) as by_pyav:
         inbetween.build(by_pyav, tmp_path, 2, "quick")
         built = InbetweenSource(by_pyav, tmp_path, 2, "quick").read(1)
-    monkeypatch.setattr(flow, "cv2", None)
+    monkeypatch.setattr(opencv, "cv2", None)
     with BlenderMovie(path) as source:
         assert inbetween.build(source, tmp_path, 2, "quick").name == "ready"
         assert np.array_equal(InbetweenSource(source, tmp_path, 2, "quick").read(1), built)

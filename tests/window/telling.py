@@ -72,12 +72,10 @@ def tell(story, backend, folder, *, before=(), **given):
 def packages(folder):
     """A folder of what tracking needs besides what the Blender of a distribution has."""
     import cv2
-    import scenedetect
 
     folder.mkdir()
     site = Path(cv2.__file__).parents[1]
-    assert site == Path(scenedetect.__file__).parents[1]
-    for name in ("cv2", "scenedetect", "click", "platformdirs", "tqdm", *(p.name for p in site.glob("opencv*.libs"))):
+    for name in ("cv2", "tqdm", *(p.name for p in site.glob("opencv*.libs"))):
         (folder / name).symlink_to(site / name)
     return folder
 

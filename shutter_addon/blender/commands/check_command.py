@@ -24,6 +24,7 @@ from ...core.messages import UserError
 from ...devices.budget import machine_memory
 from ...devices.device import NoDeviceError
 from ..data import missing_media, versions
+from ..devices import available
 from ..output import edit_check, error_report, film_join, film_output, output_space, shared_frames
 from ..output.edit_check import EffectCheck
 from ..output.output_space import Need, in_units

@@ -8,6 +8,7 @@ from argparse import Namespace
 from collections.abc import Iterator
 from contextlib import ExitStack, closing, contextmanager
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 from ...core import atomic_write
@@ -111,8 +112,8 @@ def _followed(
             regions = [filmed.seen(region) for region in drawn]
             steps = camera_tracking.follow_camera(filmed.seen(subject), regions, *what, motion=arguments.motion)
         elif isinstance(subject, OutlineRegion):
-            cover = ends.enter_context(_cover(arguments, source_recipe, subject, filmed, footage.size))
-            steps = matte_tracking.follow_cover(filmed.seen(subject), cover, *what, motion=arguments.motion)
+            covers = partial(_cover, arguments, source_recipe, subject, filmed)
+            steps = matte_tracking.follow_cover(filmed.seen(subject), covers, *what, motion=arguments.motion)
         else:
             steps = tracking.follow(filmed.seen(subject), *what, motion=arguments.motion)
         tracked = []
@@ -132,7 +133,8 @@ def _cover(
 ) -> Iterator[matte_tracking.Cover]:
     """What an outline covers at the places of filmed frames (media.matte_tracking.Cover)."""
     if region.between == "straight":
-        yield matte_tracking.cover_within(filmed.seen(region.drawings).at, size)
+        with matte_tracking.cover_within(filmed.seen(region.drawings).at, size) as cover:
+            yield cover
         return
     with command_line.opened(arguments.source) as medium:
         drawings, drawn = region.drawings, {}

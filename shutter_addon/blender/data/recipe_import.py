@@ -87,16 +87,16 @@ def matte_image(path: str | Path, channel: str = "luminance"):
     """The movie, image sequence or picture at a path, to which a region can point. MediaError: there is none, or none
     with such a channel."""
     with MatteFile(path=Path(path), channel=channel).open() as matte:
-        path, count = matte.path, matte.count
-    name = _kept(check_name(path))
-    is_sequence = path.suffix.lower() in IMAGE_SUFFIXES and count > 1
+        found, count = Path(matte.path), matte.count
+    name = _kept(check_name(found))
+    is_sequence = found.suffix.lower() in IMAGE_SUFFIXES and count > 1
     if is_sequence and (known := _sequence_at(name)) is not None:
         return known
     try:
         image = bpy.data.images.load(name, check_existing=not is_sequence)  # one that is there may be no sequence
     except RuntimeError as error:  # its path is longer than Blender's may be
         sentence = rpt_("{file}: Blender cannot read it ({error})")
-        raise MediaError(sentence.format(file=path.name, error=error)) from None
+        raise MediaError(sentence.format(file=found.name, error=error)) from None
     if is_sequence:
         image.source = "SEQUENCE"
     return image

@@ -260,15 +260,11 @@ def _region(scene, effect, strip, index, frames, here: Tracked) -> _Subject:
     follow: Callable = partial(tracking.follow, shape)
     if strips.is_carried(effect.regions[index]):
         carried = snapshot.carried_outline(scene, effect, strip, index, frames)
-        follow = partial(matte_tracking.follow_carried, shape, carried)
+        follow = partial(matte_tracking.follow_cover, shape, partial(matte_tracking.carried_cover, carried))
     elif effect.regions[index].kind == "OUTLINE":
-        follow = partial(_follow_drawn, shape)
+        cover = partial(matte_tracking.cover_within, shape.drawings.at)
+        follow = partial(matte_tracking.follow_cover, shape, cover)
     return _Subject(follow, lambda: motions.offsets(shape.drawings.at(here.frame)))
-
-
-def _follow_drawn(shape, footage: Footage, *where: Any, **how: Any) -> Iterator[Tracked]:
-    cover = matte_tracking.cover_within(shape.drawings.at, footage.size)
-    return matte_tracking.follow_cover(shape, cover, footage, *where, **how)
 
 
 def _camera(scene, effect, strip, _index, frames, here: Tracked) -> _Subject:

@@ -112,8 +112,8 @@ def start(scene: Scene, effect: PropertyGroup, strip: Strip, film: Film) -> Bake
 def _clear_up(folder: Path, edit: Path) -> None:
     """Removes what bakes left behind that were killed: logs, and the copies of an edit that these name."""
     for left in atomic_write.left_behind(folder):
-        with suppress(OSError), Folder(left) as log:
-            name = log.read(_MANIFEST, 1024).decode(errors="replace")
+        with suppress(OSError):
+            name = Folder(left).read(_MANIFEST, 1024).decode(errors="replace")
             if _COPY.fullmatch(name):
                 edit.with_name(name).unlink(missing_ok=True)
     atomic_write.clear_up(folder)

@@ -22,7 +22,7 @@ from ...core import atomic_write
 from ...core.farm import edit_version
 from ...core.messages import EffectError
 from ...core.stopping import StoppedError
-from ...media import film_parts, image_writing, rendered_pictures
+from ...media import film_parts, image_writing, pyav, rendered_pictures
 from ...media.blender_movie import frame_rate
 from ...media.completeness import is_whole_movie, is_whole_picture
 from ...media.errors import MediaError
@@ -98,9 +98,9 @@ def _check(scene: Scene, effect: PropertyGroup, strip: Strip, kind: Kind) -> Non
         )
     if kind != "MOVIE":
         return
-    if package := film_parts.missing_package():
+    if pyav.missing():
         sentence = rpt_("the Python package {package} is missing, which movies need: bake to OpenEXR")
-        raise EffectError(sentence.format(package=package))
+        raise EffectError(sentence.format(package="av"))
     if colour_configuration.name():
         raise EffectError(
             rpt_("movies are baked in Blender's own colours: with another configuration, bake to OpenEXR")
@@ -178,15 +178,16 @@ def _make_movie(film: Film, shown: Callable, _size: tuple[int, int], fps: Fracti
 
 def _prepare(place: Path) -> None:
     """OSError: it cannot be made, or is a link, which a stranger may have put there."""
-    with own_folder(place):
-        atomic_write.clear_up(place)
+    own_folder(place)
+    atomic_write.clear_up(place)
 
 
 def _remove_parts(film: Film) -> None:
     """Removes the parts of a movie that is finished, and what killed processes left there, and no other file."""
     parts = [path for path, _frames in film.parts]
     names, place = {path.name for path in parts}, parts[0].parent
-    with suppress(OSError), Folder(place) as folder:
+    with suppress(OSError):
+        folder = Folder(place)
         for entry in folder.entries():
             if entry.name in names:
                 folder.remove(entry.name)

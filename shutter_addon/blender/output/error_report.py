@@ -33,7 +33,6 @@ PACKAGES = {
     "PyAV": "av",
     "OpenCV": "cv2",
     "moderngl": "moderngl",
-    "PySceneDetect": "scenedetect",
 }
 BACKENDS = {"OPENGL": "OpenGL", "VULKAN": "Vulkan", "METAL": "Metal", "NONE": "nothing", "UNKNOWN": "unknown"}
 

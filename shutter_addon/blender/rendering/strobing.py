@@ -26,7 +26,7 @@ from ...core.messages import translated
 from ...core.model import shutters, windows
 from ...core.model.frame_state import FrameState
 from ...core.model.motions import Similarity
-from ...media import MediaError, inbetween, steps
+from ...media import MediaError, inbetween, opencv, steps
 from ..data import inbetween_settings
 from ..data.snapshot import Snapshot
 from ..data.source_media import SourceSpec
@@ -244,7 +244,7 @@ def forget() -> None:
 def _measure_motion(spec: SourceSpec, lacking: list[int]) -> None:
     for pair in lacking:
         _moved[spec.key, pair] = None  # what cannot be read is not tried again
-    if not steps.is_possible():
+    if opencv.cv2 is None:
         return
     with suppress(MediaError, OSError), spec.open() as medium:
         for pair in lacking:

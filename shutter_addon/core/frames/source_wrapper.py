@@ -1,7 +1,6 @@
 """A source around another one: what every wrapper shares."""
 
 from collections.abc import Iterable
-from typing import Any
 
 import numpy as np
 
@@ -15,7 +14,7 @@ class _Forwarded:
     def __init__(self, name: str) -> None:
         self._name = name
 
-    def __get__(self, wrapper: "SourceWrapper | None", _owner: type | None = None) -> Any:
+    def __get__(self, wrapper: "SourceWrapper | None", _owner: type | None = None) -> object:
         return self if wrapper is None else getattr(wrapper._source, self._name)
 
 
