@@ -92,8 +92,8 @@ def repair(scene: Any, effect: Any, strip: Any, share: float, side: str) -> None
     built. Nothing has changed then."""
     backward = _is_backward(scene, effect, strip)
     known = of(effect)
-    if known is None:
-        _check_room(effect)
+    if known is None and (sentence := collection_edits.why_full(effect, regions=1, shutters=2)):
+        raise EffectError(sentence)
     if inbetween_settings.factor(effect) == 1:  # what is built already is there without OpenCV
         flow.check()
     _make_room(effect)
@@ -120,12 +120,6 @@ def _is_backward(scene: Any, effect: Any, strip: Any) -> bool:
         time = sampled.source_time(Curves(scene), effect.path_from_id(), effect, (frame,))
         return bool(time.at(frame)[1])
     return bool(timing_of(strips.source_of(scene, effect, strip)).use_reverse_frames)
-
-
-def _check_room(effect) -> None:
-    for collection, more in (("shutters", 2), ("regions", 1)):
-        if sentence := collection_edits.why_full(effect, collection, more):
-            raise EffectError(sentence)
 
 
 def _make_room(effect) -> None:

@@ -5,7 +5,7 @@ can go along; at the end they are thinned to those that the motion needs within 
 """
 
 import math
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Generator, Iterable, Iterator
 from contextlib import closing
 from dataclasses import dataclass, replace
 from functools import partial
@@ -120,7 +120,7 @@ def track(
     *,
     all_keys: bool = False,
     patience: float | None = None,
-) -> Iterator[int | None]:
+) -> Generator[int | None, None, None]:
     """Tracks a region or the camera from the current frame through timeline frames (frames_to_track). Gives each frame
     once it is keyed. Closed early, it keeps what it has. It ends without another key where the region is not there any
     more.

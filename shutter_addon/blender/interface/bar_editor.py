@@ -11,7 +11,9 @@ from bpy.types import Gizmo, GizmoGroup
 from ...core.messages import EffectError
 from ..data import consistency, selection
 from ..editing import bar_edits, track_region
-from . import drawing, gizmo_keymaps
+from . import drawing
+from .gizmo_groups import TWEAK, Dragged, WithKeys
+from .operator_bases import own_classes
 
 _MARGIN, _HEIGHT, _BAR = 16, 96, 16  # in units of the interface
 _PAD, _HEADER = 8, 18
@@ -100,13 +102,7 @@ def _key_colors() -> dict:
     return {"animated": theme.inner_anim, "keyed": theme.inner_key, "changed": theme.inner_changed}
 
 
-class SHUTTER_GT_bars(Gizmo):
-    bl_idname = "SHUTTER_GT_bars"
-
-    def setup(self):
-        self.use_draw_modal = True
-        self.use_grab_cursor = False
-
+class SHUTTER_GT_bars(Dragged, Gizmo):
     def draw(self, context):
         if (seen := selection.in_picture(context)) is None:
             return
@@ -181,20 +177,17 @@ def marked(boxes, combine: str, thickness: float) -> list[tuple[float, float, fl
 
 
 def _draw(place: Layout, shutter, values, states) -> None:
-    left, bottom, right, top = place.box
+    left, bottom, right, _top = place.box
     edges = np.linspace(left, right, place.count + 1)
-    heights = bottom + np.minimum(values / place.top, 1.0) * (top - bottom)
     thin, foot = drawing.line_width(), drawing.ui_scale() * 3
-    gap = thin if edges[1] - edges[0] > 3 * thin else 0.0
     colors = _key_colors()
     drawing.rectangles([place.frame], [drawing.BACK])
-    boxes = [(a, bottom, b - gap, max(h, bottom + thin)) for a, b, h in zip(edges, edges[1:], heights, strict=False)]
-    drawing.rectangles(boxes, np.tile((*shutter.color, 0.95), (place.count, 1)))
+    boxes = drawing.bars(place.box, np.minimum(values / place.top, 1.0), (*shutter.color, 0.95))
     marks = marked(boxes, shutter.combine, foot)
     drawing.rectangles(marks, np.tile((0.0, 0.0, 0.0, 0.7), (len(marks), 1)))
     keyed = [i for i, state in enumerate(states) if state]
     drawing.rectangles(
-        [(edges[i], bottom - foot - thin, edges[i + 1] - gap, bottom - thin) for i in keyed],
+        [(boxes[i][0], bottom - foot - thin, boxes[i][2], bottom - thin) for i in keyed],
         [(*colors[states[i]][:3], 1.0) for i in keyed],
     )
     ticks = range(0, place.count + 1, max(1, 4 * (place.count // 32), 4 if place.count > 8 else 1))
@@ -215,29 +208,20 @@ def _draw_header(place: Layout, shutter, index: int, words: str) -> None:
     drawing.text(start, bottom, words)
 
 
-class SHUTTER_GGT_bars(GizmoGroup):
-    bl_idname = "SHUTTER_GGT_bars"
+class SHUTTER_GGT_bars(WithKeys, GizmoGroup):
     bl_label = "Shutter Bars"
-    bl_space_type = "SEQUENCE_EDITOR"
-    bl_region_type = "PREVIEW"
-    bl_options = {"PERSISTENT"}
+    gizmo = SHUTTER_GT_bars
+    shortcuts = (
+        ("shutter.bar_set", "LEFTMOUSE", "DOUBLE_CLICK", {}),
+        TWEAK,
+        ("shutter.bars_key", "I", "PRESS", {}),
+        ("shutter.bars_unkey", "I", "PRESS", {"alt": True}),
+    )
 
     @classmethod
     def poll(cls, context):
         seen = selection.in_picture(context)
         return seen is not None and selection.active_shutter(seen[1]) is not None and seen[0].is_editable
 
-    @classmethod
-    def setup_keymap(cls, keyconfig):
-        keymap = gizmo_keymaps.new(cls, keyconfig)
-        keymap.keymap_items.new("shutter.bar_set", "LEFTMOUSE", "DOUBLE_CLICK")
-        keymap.keymap_items.new("gizmogroup.gizmo_tweak", "LEFTMOUSE", "PRESS", any=True)
-        keymap.keymap_items.new("shutter.bars_key", "I", "PRESS")
-        keymap.keymap_items.new("shutter.bars_unkey", "I", "PRESS", alt=True)
-        return keymap
 
-    def setup(self, _context):
-        self.bars = self.gizmos.new(SHUTTER_GT_bars.bl_idname)
-
-
-classes = (SHUTTER_GT_bars, SHUTTER_GGT_bars)
+classes = own_classes(globals())

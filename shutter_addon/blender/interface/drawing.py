@@ -11,6 +11,8 @@ from mathutils import Matrix
 
 from ...core.pixels import patterns
 
+Box = tuple[float, float, float, float]  # left, bottom, right, top, in pixels of a region
+
 SIZE = 11  # of texts, in points
 BACK = (0.08, 0.08, 0.08, 0.8)  # behind texts and bars, so that they are read over any footage
 
@@ -60,6 +62,18 @@ def rectangles(boxes, colors) -> None:
     first = 4 * np.arange(len(left), dtype=np.int32)[:, None]
     triangles = (first + np.array([0, 1, 2, 0, 2, 3], dtype=np.int32)).reshape(-1, 3)
     _draw("TRIS", corners, np.repeat(np.asarray(colors, dtype=np.float32), 4, axis=0), triangles)
+
+
+def bars(box, shares: np.ndarray, color) -> list[Box]:
+    """Bars side by side in a box, as high as their shares (n,) of it, 0 to 1, and never nothing; their boxes."""
+    left, bottom, right, top = box
+    edges = np.linspace(left, right, len(shares) + 1)
+    thin = line_width()
+    gap = thin if edges[1] - edges[0] > 3 * thin else 0.0
+    heights = np.maximum(bottom + shares * (top - bottom), bottom + thin)
+    boxes = [(a, bottom, b - gap, height) for a, b, height in zip(edges, edges[1:], heights, strict=False)]
+    rectangles(boxes, np.tile(color, (len(boxes), 1)))
+    return boxes
 
 
 def swatch(left: float, bottom: float, size: float, shutter, index: int) -> None:

@@ -9,7 +9,7 @@ from bpy.types import Operator
 
 from ..data import preview_areas
 from ..rendering import previews
-from .operator_bases import refused
+from .operator_bases import Named, own_classes
 
 _TICK = 0.1  # seconds between two looks at whether it has ended
 
@@ -28,16 +28,15 @@ class _View:
 _before: _View | None = None
 
 
-class SHUTTER_OT_full_quality(Operator):
+class SHUTTER_OT_full_quality(Named, Operator):
     """Show this frame as it will be rendered, each of its pixels on one of the screen's, or end that"""
 
-    bl_idname = "shutter.full_quality"
     bl_label = "Full Quality"
     bl_options = {"REGISTER"}
 
     @classmethod
-    def poll(cls, context):
-        return _shown(context) is not None or refused(cls, rpt_("No preview shows a Shutter strip"))
+    def refusal(cls, context):
+        return None if _shown(context) is not None else rpt_("No preview shows a Shutter strip")
 
     def execute(self, context):
         if previews.looking.whole is not None:
@@ -127,7 +126,7 @@ def forget() -> None:
     _before = previews.looking.whole = None
 
 
-classes = (SHUTTER_OT_full_quality,)
+classes = own_classes(globals())
 TIMERS = (_end_when_over,)
 
 

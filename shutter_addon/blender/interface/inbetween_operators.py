@@ -14,9 +14,8 @@ from ...core.messages import EffectError
 from ..data import inbetween_settings, selection, strips
 from ..data.choices import INBETWEENS
 from ..rendering import inbetween_build, strobing
-from ..rendering.effect_source import FAULTS
 from .note_buttons import Button
-from .operator_bases import UNDOABLE, OfEffect, redraw, refused, report_error, report_warning
+from .operator_bases import UNDOABLE, OfEffect, is_escape, own_classes, redraw, report_warning
 
 TICK = 0.25  # seconds
 _RUNS = n_("In-between frames are being built; Esc stops that")
@@ -97,54 +96,48 @@ class _OfInbetweens(OfEffect):
     bl_options = {"REGISTER"}
 
     @classmethod
-    def possible(cls, effect):
+    def why_not(cls, effect):
         if inbetween_build.running() is not None:
-            return refused(cls, rpt_(_RUNS))
+            return rpt_(_RUNS)
         try:
             inbetween_settings.settings(effect)
         except EffectError as error:
-            return refused(cls, str(error))
-        return True
+            return str(error)
+        return None
 
 
 class _Building(_OfInbetweens):
     """Builds, and shows how far it is."""
 
-    _wanted: int | None = None  # factor of what the strip needs; None: all of the source's, of the effect's own
+    def wanted(self) -> int | None:
+        """Factor of what the strip needs; None: all of the source's, of the effect's own."""
+        return None
 
     def invoke(self, context, _event):
-        if bpy.app.background:
-            return self.execute(context)
-        if not self._begin(context):
-            return {"CANCELLED"}
-        context.window_manager.modal_handler_add(self)
-        return {"RUNNING_MODAL"}
+        return self.tried(self._begin, context, bpy.app.background)
 
     def execute(self, context):
-        if not self._begin(context):
-            return {"CANCELLED"}
-        wait([self._build.future])
-        return self._finish(context)
+        return self.tried(self._begin, context, True)
 
-    def _begin(self, context) -> bool:
+    def _begin(self, context, waits: bool) -> set[str]:
         scene, effect, strip = selection.active(context)
-        try:
-            self._build = inbetween_build.start(scene, effect, strip, self._wanted)
-        except FAULTS as error:
-            report_error(self, str(error))
-            return False
+        self._build = inbetween_build.start(scene, effect, strip, self.wanted())
         _show_start(context)
-        return True
+        if waits:
+            wait([self._build.future])
+            return self._finish(context)
+        context.window_manager.modal_handler_add(self)
+        return {"RUNNING_MODAL"}
 
     def modal(self, context, event):
         if inbetween_build.running() is not self._build:  # a file was loaded
             return {"CANCELLED"}
-        if event.type == "ESC" and event.value == "PRESS":
+        if is_escape(event):
             self._build.stop()
-            return self._finish(context)
+            return self.tried(self._finish, context)
         if event.type == "TIMER":
             if self._build.future.done():
-                return self._finish(context)
+                return self.tried(self._finish, context)
             if all(scene.session_uid != self._build.scene for scene in bpy.data.scenes):  # the effect was deleted
                 self._build.stop()
             sentence = rpt_("Building in-between frames: {done} of {total}, Esc to stop")
@@ -157,57 +150,49 @@ class _Building(_OfInbetweens):
         if inbetween_build.running() is self._build:
             stop()
 
-    def _finish(self, context):
+    def _finish(self, context) -> set[str]:
         inbetween_build.ended()
         _show_end()
         redraw(context)
-        try:
-            state = self._build.result()
-        except FAULTS as error:
-            report_error(self, str(error))
-            return {"CANCELLED"}
+        state = self._build.result()
         if state.name == "ready":
             self.report({"INFO"}, rpt_("In-between frames are built"))
-            return self._built()
+            return self.built()
         sentence = rpt_("Stopped: {done} of {total} are built")
         report_warning(self, sentence.format(done=state.done, total=state.total))
         return {"CANCELLED"}
 
-    def _built(self):
+    def built(self) -> set[str]:
+        """Called once all is built."""
         return {"FINISHED"}
 
 
 class SHUTTER_OT_inbetween_build(_Building, Operator):
     """Build the in-between frames that are missing, as files that are kept (Esc stops, and keeps what is built)"""
 
-    bl_idname = "shutter.inbetween_build"
     bl_label = "Build In-Between Frames"
 
     @classmethod
-    def possible(cls, effect):
-        if effect.inbetween == "1":
-            return refused(cls, rpt_("Choose a factor first"))
-        return super().possible(effect)
+    def why_not(cls, effect):
+        return rpt_("Choose a factor first") if effect.inbetween == "1" else super().why_not(effect)
 
 
 class SHUTTER_OT_smooth_streaks(_Building, Operator):
     """Build the in-between frames that smooth streaks take, and use them (Esc stops, and keeps what is built)"""
 
-    bl_idname = "shutter.smooth_streaks"
     bl_label = "Smooth Streaks"
     bl_options = UNDOABLE
 
     factor: EnumProperty(name="Factor", items=INBETWEENS[1:])
 
     @classmethod
-    def possible(cls, effect):  # what else is wrong is reported: where it is clicked, nothing is greyed out
-        return inbetween_build.running() is None or refused(cls, rpt_(_RUNS))
+    def why_not(cls, effect):  # what else is wrong is reported: where it is clicked, nothing is greyed out
+        return rpt_(_RUNS) if inbetween_build.running() is not None else None
 
-    def _begin(self, context) -> bool:
-        self._wanted = int(self.factor)
-        return super()._begin(context)
+    def wanted(self) -> int | None:
+        return int(self.factor)
 
-    def _built(self):
+    def built(self) -> set[str]:
         """The factor is set now, so that the picture never lacks frames, and nothing is left of a build that was
         stopped."""
         effects = (effect for scene in bpy.data.scenes for effect in scene.virtual_shutter.effects)
@@ -221,7 +206,6 @@ class SHUTTER_OT_smooth_streaks(_Building, Operator):
 class SHUTTER_OT_inbetween_purge(_OfInbetweens, Operator):
     """Remove the files of all in-between frames of the effect's source, of every factor and method"""
 
-    bl_idname = "shutter.inbetween_purge"
     bl_label = "Remove In-Between Frames"
 
     def invoke(self, context, event):
@@ -235,21 +219,15 @@ class SHUTTER_OT_inbetween_purge(_OfInbetweens, Operator):
             translate=False,
         )
 
-    def change(self, context, effect):
-        scene, effect, strip = selection.active(context)
-        try:
-            freed, left = inbetween_build.purge(effect, strips.source_of(scene, effect, strip))
-        except FAULTS as error:
-            report_error(self, str(error))
-            return {"CANCELLED"}
+    def change(self, _context, effect):
+        freed, left = inbetween_build.purge(effect, strips.source_of(self.edit, effect, self.effect_strip))
         self.report({"INFO"}, rpt_("Removed {size}").format(size=size_in_words(freed)))
         for place, count in left:
             sentence = rpt_('"{folder}": other files stay there ({count})')
             report_warning(self, messages.sentence(sentence.format(folder=place, count=count)))
-        return None
 
 
-classes = (SHUTTER_OT_inbetween_build, SHUTTER_OT_smooth_streaks, SHUTTER_OT_inbetween_purge)
+classes = own_classes(globals())
 
 
 def unregister():

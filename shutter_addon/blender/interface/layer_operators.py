@@ -3,13 +3,12 @@
 from bpy.types import Operator
 
 from ..editing import bar_edits, layer_presets
-from .operator_bases import OfRegion
+from .operator_bases import OfRegion, own_classes
 
 
 class SHUTTER_OT_sharp_subject(OfRegion, Operator):
     """Keep the active region sharp before all else, which is exposed for long and without it"""
 
-    bl_idname = "shutter.sharp_subject"
     bl_label = "Sharp Subject"
 
     def change(self, context, effect):
@@ -19,11 +18,10 @@ class SHUTTER_OT_sharp_subject(OfRegion, Operator):
 class SHUTTER_OT_clean_trail(OfRegion, Operator):
     """Have the active region leave a trail before all else, which stays sharp"""
 
-    bl_idname = "shutter.clean_trail"
     bl_label = "Trail"
 
     def change(self, context, effect):
         layer_presets.clean_trail(effect, effect.active_region, bar_edits.auto_key(context))
 
 
-classes = (SHUTTER_OT_sharp_subject, SHUTTER_OT_clean_trail)
+classes = own_classes(globals())

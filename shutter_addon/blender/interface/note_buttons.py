@@ -2,10 +2,12 @@
 
 from dataclasses import dataclass, field
 
-from bpy.types import Gizmo, GizmoGroup
+from bpy.types import Context, Gizmo, GizmoGroup
 
 from ..data import preview_areas
 from . import drawing
+from .gizmo_groups import InPreview
+from .operator_bases import own_classes
 
 HEIGHT = 19  # in units of the interface
 _PAD = 8
@@ -21,7 +23,7 @@ class Button:
     values: dict = field(default_factory=dict)
 
 
-places: dict[tuple[int, str], tuple[tuple, Button]] = {}  # by region and operator: left, bottom, right, top
+places: dict[tuple[int, str], tuple[drawing.Box, Button]] = {}  # by region and operator
 
 
 def clear(region) -> None:
@@ -41,11 +43,13 @@ def place(region, left: float, bottom: float, button: Button) -> None:
     places[region.as_pointer(), button.operator] = box, button
 
 
-class SHUTTER_GT_note_button(Gizmo):
-    bl_idname = "SHUTTER_GT_note_button"
+def _placed(context: Context, operator: str) -> tuple[drawing.Box, Button] | None:
+    return places.get((context.region.as_pointer(), operator))
 
+
+class SHUTTER_GT_note_button(Gizmo):
     def draw(self, context):
-        if (placed := places.get((context.region.as_pointer(), self.operator))) is None:
+        if (placed := _placed(context, self.operator)) is None:
             return
         (left, bottom, right, top), button = placed
         look = context.preferences.themes[0].user_interface.wcol_tool
@@ -58,18 +62,14 @@ class SHUTTER_GT_note_button(Gizmo):
             drawing.text(left + _PAD * unit, bottom + 6 * unit, button.label, color=(*color, 1.0))
 
     def test_select(self, context, location):
-        if (placed := places.get((context.region.as_pointer(), self.operator))) is None:
+        if (placed := _placed(context, self.operator)) is None:
             return -1
         (left, bottom, right, top), _button = placed
         return 0 if left <= location[0] <= right and bottom <= location[1] <= top else -1
 
 
-class SHUTTER_GGT_note_buttons(GizmoGroup):
-    bl_idname = "SHUTTER_GGT_note_buttons"
+class SHUTTER_GGT_note_buttons(InPreview, GizmoGroup):
     bl_label = "Buttons of Notes"
-    bl_space_type = "SEQUENCE_EDITOR"
-    bl_region_type = "PREVIEW"
-    bl_options = {"PERSISTENT"}
 
     @classmethod
     def poll(cls, context):
@@ -77,18 +77,18 @@ class SHUTTER_GGT_note_buttons(GizmoGroup):
 
     def setup(self, _context):
         for operator in OPERATORS:
-            gizmo = self.gizmos.new(SHUTTER_GT_note_button.bl_idname)
+            gizmo = self.gizmos.new(SHUTTER_GT_note_button.__name__)
             gizmo.operator = operator
             gizmo.target_set_operator(operator)
 
     def draw_prepare(self, context):
         for gizmo in self.gizmos:
-            placed = places.get((context.region.as_pointer(), gizmo.operator))
+            placed = _placed(context, gizmo.operator)
             for name, value in (placed[1].values if placed else {}).items():
                 setattr(gizmo.target_set_operator(gizmo.operator), name, value)
 
 
-classes = (SHUTTER_GT_note_button, SHUTTER_GGT_note_buttons)
+classes = own_classes(globals())
 
 
 def unregister():

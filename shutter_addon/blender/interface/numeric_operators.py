@@ -6,17 +6,17 @@ from bpy.app.translations import pgettext_rpt as rpt_
 from bpy.props import FloatProperty, FloatVectorProperty, IntProperty
 from bpy.types import Operator
 
+from ...core.messages import EffectError
 from ...core.model.limits import MAX_DEGREES, MAX_DISTANCE, MAX_SCALE
 from ..data import annotations, preview_areas, selection
 from ..editing import drawn_places, region_edits
-from .operator_bases import OfEffect, OfRegion, report_error
+from .operator_bases import OfEffect, OfRegion, own_classes
 from .region_gizmo import wants_keys
 
 
 class SHUTTER_OT_region_transform(OfRegion, Operator):
     """Move, turn and scale the active region by numbers, as its handles in the preview do"""
 
-    bl_idname = "shutter.region_transform"
     bl_label = "Transform Region"
 
     location: FloatVectorProperty(
@@ -63,7 +63,6 @@ class SHUTTER_OT_region_transform(OfRegion, Operator):
 class SHUTTER_OT_probe_pixel(OfEffect, Operator):
     """Probe a pixel that is named by its numbers, and not the one under the pointer"""
 
-    bl_idname = "shutter.probe_pixel"
     bl_label = "Probe Pixel"
     bl_options = {"REGISTER"}
     only_seen = True
@@ -89,13 +88,11 @@ class SHUTTER_OT_probe_pixel(OfEffect, Operator):
         width, height = annotations.picture_size(effect)
         if self.column > width or self.row > height:
             sentence = rpt_("The picture has {width} × {height} pixels")
-            report_error(self, sentence.format(width=width, height=height))
-            return {"CANCELLED"}
+            raise EffectError(sentence.format(width=width, height=height))
         live = context.window_manager.virtual_shutter
         live.live = live.probe = True
         live.probe_at = (self.column - 0.5) / width, (self.row - 0.5) / height
         preview_areas.redraw(context)
-        return None
 
 
-classes = (SHUTTER_OT_region_transform, SHUTTER_OT_probe_pixel)
+classes = own_classes(globals())

@@ -9,9 +9,11 @@ from bpy.types import Gizmo, GizmoGroup
 from ...core.messages import UserError
 from ...core.model import outlines
 from ...core.model.scribbles import mapped
-from ..data import annotations, geometry, selection
+from ..data import annotations, selection
 from ..editing import outline_drawings, track_region
-from . import drawing, gizmo_keymaps, region_gizmo
+from . import drawing, region_gizmo
+from .gizmo_groups import Dragged, WithKeys, on_picture, to_region
+from .operator_bases import own_classes
 
 _CARRIED = (0.2, 0.9, 1.0, 0.9)
 _NEAR = 6  # units of the interface, within which the pointer is at a curve
@@ -19,13 +21,8 @@ _REACH = 0.08  # parts of the picture's height, along the curve, that are pulled
 _MORE = 1.25  # times, with a turn of the wheel
 
 
-class SHUTTER_GT_outline(Gizmo):
+class SHUTTER_GT_outline(Dragged, Gizmo):
     """The curves."""
-
-    bl_idname = "SHUTTER_GT_outline"
-
-    def setup(self):
-        self.use_draw_modal = True
 
     def draw(self, context):
         if context.screen.is_animation_playing:
@@ -33,7 +30,7 @@ class SHUTTER_GT_outline(Gizmo):
         if not (curves := _curves(context)):
             return
         _scene, effect, strip = selection.in_picture(context)
-        matrix = _to_region(context, effect, strip)
+        matrix = to_region(effect, strip, context.region)
         for points in self.mended() if self.is_modal else curves:
             width = 2 if self.is_highlight or self.is_modal else 1
             drawing.lines(mapped(matrix, np.array(points)), _CARRIED, closed=True, width=width)
@@ -100,23 +97,16 @@ def _aspect(effect) -> float:
     return width / height
 
 
-def _to_region(context, effect, strip) -> np.ndarray:
-    return geometry.picture_to_region(strip, annotations.picture_size(effect), context.region)
-
-
 def _on_picture(context, effect, strip, location) -> tuple[tuple[float, float], float]:
     """A point of the preview's region in fractions of the picture, and how many of the region's pixels that is high."""
-    matrix = _to_region(context, effect, strip)
-    x, y = mapped(np.linalg.inv(matrix), np.array([location], dtype=np.float64))[0]
+    matrix = to_region(effect, strip, context.region)
+    x, y = on_picture(matrix, *location)
     return (float(x), float(y)), float(np.hypot(*matrix[:2, 1]))
 
 
-class SHUTTER_GGT_outline(GizmoGroup):
-    bl_idname = "SHUTTER_GGT_outline"
+class SHUTTER_GGT_outline(WithKeys, GizmoGroup):
     bl_label = "Shutter Outline"
-    bl_space_type = "SEQUENCE_EDITOR"
-    bl_region_type = "PREVIEW"
-    bl_options = {"PERSISTENT"}
+    gizmo = SHUTTER_GT_outline
 
     @classmethod
     def poll(cls, context):
@@ -124,14 +114,5 @@ class SHUTTER_GGT_outline(GizmoGroup):
             return False
         return selection.active_region(selection.in_picture(context)[1]).kind == "OUTLINE"
 
-    @classmethod
-    def setup_keymap(cls, keyconfig):
-        keymap = gizmo_keymaps.new(cls, keyconfig)
-        keymap.keymap_items.new("gizmogroup.gizmo_tweak", "LEFTMOUSE", "PRESS", any=True)
-        return keymap
 
-    def setup(self, _context):
-        self.gizmos.new(SHUTTER_GT_outline.bl_idname)
-
-
-classes = (SHUTTER_GT_outline, SHUTTER_GGT_outline)
+classes = own_classes(globals())

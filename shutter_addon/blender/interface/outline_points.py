@@ -5,13 +5,13 @@ import numpy as np
 from bpy.app.translations import pgettext_rpt as rpt_
 from bpy.types import Operator
 
-from ...core.messages import UserError
 from ...core.model.scribbles import mapped
 from ...media import outlining
-from ..data import annotations, geometry, preview_areas, selection
+from ..data import preview_areas, selection
 from ..editing import outline_drawings, track_region
 from . import drawing, sharp_frame
-from .operator_bases import redraw, report_error, report_warning
+from .gizmo_groups import on_picture, to_region
+from .operator_bases import own_classes, redraw, report_warning
 from .outline_operators import OfOutline
 
 _COLOR = (0.2, 0.9, 1.0, 0.9)
@@ -25,7 +25,6 @@ _STEP, _FINE = 10, 1  # units of the interface that an arrow key moves the point
 class SHUTTER_OT_outline_points(OfOutline, Operator):
     """Draw a curve of the active outline point by point, along the picture's edges (Ctrl for straight lines)"""
 
-    bl_idname = "shutter.outline_points"
     bl_label = "Draw by Points"
 
     def invoke(self, context, _event):
@@ -35,11 +34,7 @@ class SHUTTER_OT_outline_points(OfOutline, Operator):
             report_warning(self, rpt_("Open a sequencer with a preview to draw"))
             return {"CANCELLED"}
         self._area = context.area if context.area in areas else areas[0]
-        try:
-            self._picture = outline_drawings.picture_now(scene, effect, strip)
-            outlining.along_edges(self._picture, np.zeros(2), np.zeros(2))  # that it can, before anything is drawn
-        except UserError as error:
-            report_error(self, str(error))
+        if self.tried(self._read, scene, effect, strip) == {"CANCELLED"}:
             return {"CANCELLED"}
         self._target, self._frame = track_region.Target.of(effect, effect.active_region), scene.frame_current
         self._strip, self._ways, self._next, self._is_down = strip.name, [], np.zeros((0, 2)), False
@@ -52,6 +47,10 @@ class SHUTTER_OT_outline_points(OfOutline, Operator):
         context.workspace.status_text_set(sentence)
         context.window_manager.modal_handler_add(self)
         return {"RUNNING_MODAL"}
+
+    def _read(self, scene, effect, strip) -> None:
+        self._picture = outline_drawings.picture_now(scene, effect, strip)
+        outlining.along_edges(self._picture, np.zeros(2), np.zeros(2))  # that it can, before anything is drawn
 
     def execute(self, _context):
         report_warning(self, rpt_("Open a sequencer with a preview to draw"))  # it is drawn in a window alone
@@ -120,12 +119,10 @@ class SHUTTER_OT_outline_points(OfOutline, Operator):
         first = self._ways[1][0]
         curve = np.concatenate([*self._ways[1:], self._way(first, False)])
         steps = np.hypot(*np.diff(curve, axis=0, append=curve[:1]).T)
-        try:
-            outline_drawings.add(effect, strip, region, curve[steps > 0], self._frame)
-        except UserError as error:
-            report_error(self, str(error))
-            return self._ended(context, {"CANCELLED"})
-        return self._ended(context, {"FINISHED"})
+        return self._ended(
+            context,
+            self.tried(outline_drawings.add, effect, strip, region, curve[steps > 0], self._frame),
+        )
 
     def _ended(self, context, result):
         self.cancel(context)
@@ -158,14 +155,12 @@ class SHUTTER_OT_outline_points(OfOutline, Operator):
 
     def _to_region(self) -> np.ndarray:
         _scene, effect, strip = self._there()
-        region = preview_areas.preview_region(self._area)
-        return geometry.picture_to_region(strip, annotations.picture_size(effect), region)
+        return to_region(effect, strip, preview_areas.preview_region(self._area))
 
     def _on_picture(self, event) -> np.ndarray:
         """Where the pointer is, in fractions of the picture."""
         region = preview_areas.preview_region(self._area)
-        pointer = np.array([[event.mouse_x - region.x, event.mouse_y - region.y]], np.float64)
-        return mapped(np.linalg.inv(self._to_region()), pointer)[0]
+        return on_picture(self._to_region(), event.mouse_x - region.x, event.mouse_y - region.y)
 
     def _apart(self, *points: np.ndarray) -> float:
         """How far two points are from each other, in pixels of the region."""
@@ -178,4 +173,4 @@ class SHUTTER_OT_outline_points(OfOutline, Operator):
         drawing.lines(mapped(self._to_region(), curve), _COLOR, width=2)
 
 
-classes = (SHUTTER_OT_outline_points,)
+classes = own_classes(globals())

@@ -12,6 +12,8 @@ from ...core.model.scribbles import mapped
 from ..data import annotations, geometry, preview_areas
 from ..rendering import effect_source, previews, probe, render_context
 from . import drawing
+from .gizmo_groups import InPreview, on_picture, to_region
+from .operator_bases import own_classes
 
 _WIDTH, _HEIGHT, _LINE, _PAD, _APART = 180, 64, 17, 8, 14  # in units of the interface
 _MARK = (1.0, 1.0, 1.0, 0.9)
@@ -45,7 +47,7 @@ def layout(point, size, count: int, unit: float) -> Layout:
 
 def _to_region(context, shown) -> np.ndarray | None:
     """Matrix from fractions of the shown picture to the region's pixels; None: nothing is seen of it."""
-    matrix = geometry.picture_to_region(shown.strip, annotations.picture_size(shown.effect), context.region)
+    matrix = to_region(shown.effect, shown.strip, context.region)
     return matrix if geometry.is_invertible(matrix) else None
 
 
@@ -56,8 +58,6 @@ def _is_cropped(strip, size, point) -> bool:
 
 class SHUTTER_GT_probe(Gizmo):
     """It follows the pointer, and is never hit: clicks go to whatever lies there."""
-
-    bl_idname = "SHUTTER_GT_probe"
 
     def draw(self, context):
         shown, at = preview_areas.shown(context), tuple(context.window_manager.virtual_shutter.probe_at)
@@ -79,8 +79,8 @@ class SHUTTER_GT_probe(Gizmo):
         """Blender asks whenever the pointer moves: nothing else tells of it without taking events from others."""
         shown = preview_areas.shown(context)
         if shown is not None and (matrix := _to_region(context, shown)) is not None:
-            centre = np.array([location], dtype=np.float64) + 0.5
-            context.window_manager.virtual_shutter.probe_at = mapped(np.linalg.inv(matrix), centre)[0]
+            x, y = location
+            context.window_manager.virtual_shutter.probe_at = on_picture(matrix, x + 0.5, y + 0.5)
         return -1
 
 
@@ -100,7 +100,8 @@ def _draw(region, point, shutters, probed: probe.Probed, of_layers: list[tuple[s
     drawing.lines([(x - arm, y), (x + arm, y)], _MARK, width=1)
     drawing.lines([(x, y - arm), (x, y + arm)], _MARK, width=1)
     drawing.rectangles([place.frame], [drawing.BACK])
-    _draw_bars(place.bars, probed.bars, (*(probed.coefficients @ colors), 0.95))
+    shares = probed.bars / max(1.0, probed.bars.max())
+    drawing.bars(place.bars, shares, (*(probed.coefficients @ colors), 0.95))
     left, _, right, _ = place.bars
     for bottom, (name, share) in zip(place.lines[len(shutters) :], of_layers, strict=True):
         drawing.text(left, bottom, name, until=right - 44 * unit)
@@ -111,22 +112,9 @@ def _draw(region, point, shutters, probed: probe.Probed, of_layers: list[tuple[s
         drawing.text(right - 38 * unit, bottom, f"{share:.1%}")
 
 
-def _draw_bars(box, bars, color) -> None:
-    left, bottom, right, top = box
-    edges = np.linspace(left, right, len(bars) + 1)
-    thin = drawing.line_width()
-    heights = bottom + np.maximum(bars / max(1.0, bars.max()) * (top - bottom), thin)
-    gap = thin if edges[1] - edges[0] > 3 * thin else 0.0
-    boxes = [(a, bottom, b - gap, height) for a, b, height in zip(edges, edges[1:], heights, strict=False)]
-    drawing.rectangles(boxes, np.tile(color, (len(bars), 1)))
-
-
-class SHUTTER_GGT_probe(GizmoGroup):
-    bl_idname = "SHUTTER_GGT_probe"
+class SHUTTER_GGT_probe(InPreview, GizmoGroup):
     bl_label = "Probe"
-    bl_space_type = "SEQUENCE_EDITOR"
-    bl_region_type = "PREVIEW"
-    bl_options = {"PERSISTENT"}
+    gizmo = SHUTTER_GT_probe
 
     @classmethod
     def poll(cls, context):
@@ -135,8 +123,5 @@ class SHUTTER_GGT_probe(GizmoGroup):
             return False
         return preview_areas.shown(context) is not None
 
-    def setup(self, _context):
-        self.gizmos.new(SHUTTER_GT_probe.bl_idname)
 
-
-classes = (SHUTTER_GT_probe, SHUTTER_GGT_probe)
+classes = own_classes(globals())

@@ -12,10 +12,12 @@ from ...core import revision
 from ...core.messages import EffectError
 from ...core.model import scribbles
 from ...core.model.scribbles import mapped
-from ..data import annotations, geometry, selection, snapshot, validation
+from ..data import annotations, selection, snapshot, validation
 from ..editing import bar_edits, drawn_places, region_edits, track_region
 from ..editing.motion_keys import MotionKeys
-from . import drawing, gizmo_keymaps
+from . import drawing
+from .gizmo_groups import TWEAK, Dragged, WithKeys, on_picture, to_region
+from .operator_bases import own_classes
 
 _RADIUS = 7  # of a handle, in units of the interface
 _NEAREST = 0.03  # of the corner's handle to the centre's, in parts of the picture
@@ -34,10 +36,6 @@ class Place:
     corner: np.ndarray
     to_region: np.ndarray
     aspect: float
-
-    def on_picture(self, point) -> np.ndarray:
-        """A point of the region, in fractions of the picture."""
-        return mapped(np.linalg.inv(self.to_region), np.array([point], dtype=np.float64))[0]
 
 
 _strokes = revision.UntilChange()
@@ -80,9 +78,9 @@ def place(context) -> Place | None:
         region.scale,
         width / height,
     )
-    to_region = geometry.picture_to_region(strip, (width, height), context.region)
-    centre, corner = mapped(to_region, np.stack([middle + np.array(region.location), moved]))
-    return Place(centre=centre, corner=corner, to_region=to_region, aspect=width / height)
+    matrix = to_region(effect, strip, context.region)
+    centre, corner = mapped(matrix, np.stack([middle + np.array(region.location), moved]))
+    return Place(centre=centre, corner=corner, to_region=matrix, aspect=width / height)
 
 
 def outline(context, where: Place) -> list[np.ndarray]:
@@ -95,13 +93,8 @@ def outline(context, where: Place) -> list[np.ndarray]:
     return [mapped(where.to_region, points) for points in moved]
 
 
-class SHUTTER_GT_region(Gizmo):
+class SHUTTER_GT_region(Dragged, Gizmo):
     """One handle; `turns`: turns and scales, or moves."""
-
-    bl_idname = "SHUTTER_GT_region"
-
-    def setup(self):
-        self.use_draw_modal = True
 
     def draw(self, context):
         if (where := place(context)) is None:
@@ -151,7 +144,7 @@ class SHUTTER_GT_region(Gizmo):
         return {"RUNNING_MODAL"}
 
     def _move(self, region, point, snap: bool):
-        moved = self.where.on_picture(point) - self.where.on_picture(self.grabbed)
+        moved = on_picture(self.where.to_region, *point) - on_picture(self.where.to_region, *self.grabbed)
         if snap:  # along one axis
             moved[np.abs(moved * (self.where.aspect, 1)).argmin()] = 0
         region.location = np.array(self.before[0]) + moved
@@ -197,12 +190,9 @@ def _is_drawing(context) -> bool:
     return tool is not None and tool.idname.startswith("builtin.annotate")
 
 
-class SHUTTER_GGT_region(GizmoGroup):
-    bl_idname = "SHUTTER_GGT_region"
+class SHUTTER_GGT_region(WithKeys, GizmoGroup):
     bl_label = "Shutter Region"
-    bl_space_type = "SEQUENCE_EDITOR"
-    bl_region_type = "PREVIEW"
-    bl_options = {"PERSISTENT"}
+    shortcuts = (TWEAK, ("shutter.region_key", "I", "PRESS", {}))
 
     @classmethod
     def poll(cls, context):
@@ -212,16 +202,9 @@ class SHUTTER_GGT_region(GizmoGroup):
             return False
         return seen is not None and seen[0].is_editable and selection.active_region(seen[1]) is not None
 
-    @classmethod
-    def setup_keymap(cls, keyconfig):
-        keymap = gizmo_keymaps.new(cls, keyconfig)
-        keymap.keymap_items.new("gizmogroup.gizmo_tweak", "LEFTMOUSE", "PRESS", any=True)
-        keymap.keymap_items.new("shutter.region_key", "I", "PRESS")
-        return keymap
-
     def setup(self, _context):
         for turns in (False, True):
-            self.gizmos.new(SHUTTER_GT_region.bl_idname).turns = turns
+            self.gizmos.new(SHUTTER_GT_region.__name__).turns = turns
 
 
-classes = (SHUTTER_GT_region, SHUTTER_GGT_region)
+classes = own_classes(globals())

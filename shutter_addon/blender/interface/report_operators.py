@@ -6,13 +6,12 @@ from bpy.types import Operator
 
 from ..data import selection
 from ..output import error_report
-from .operator_bases import Mixin, report_error
+from .operator_bases import Mixin, Named, own_classes, report_error
 
 
-class SHUTTER_OT_copy_report(Operator):
+class SHUTTER_OT_copy_report(Named, Operator):
     """Copy versions, device, kinds and numbers of the edit, and last errors: no names, no paths. Nothing is sent"""
 
-    bl_idname = "shutter.copy_report"
     bl_label = "Copy Report"
 
     def execute(self, context):
@@ -34,4 +33,4 @@ class Report(Mixin):
         self.layout.operator("shutter.copy_report", icon="COPYDOWN")
 
 
-classes = (SHUTTER_OT_copy_report,)
+classes = own_classes(globals())

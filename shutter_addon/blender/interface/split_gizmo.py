@@ -4,8 +4,10 @@ import numpy as np
 from bpy.types import Gizmo, GizmoGroup
 
 from ...core.model.scribbles import mapped
-from ..data import annotations, geometry, preview_areas
+from ..data import geometry, preview_areas
 from . import drawing
+from .gizmo_groups import Dragged, InPreview, on_picture, to_region
+from .operator_bases import own_classes
 
 _REACH = 8  # of the pointer, in units of the interface
 _COLOR = (1.0, 1.0, 1.0, 0.9)
@@ -16,7 +18,7 @@ def _to_region(context) -> np.ndarray | None:
     settings = context.window_manager.virtual_shutter
     if not settings.live or settings.view != "SPLIT" or (shown := preview_areas.shown(context)) is None:
         return None
-    matrix = geometry.picture_to_region(shown.strip, annotations.picture_size(shown.effect), context.region)
+    matrix = to_region(shown.effect, shown.strip, context.region)
     return matrix if geometry.is_invertible(matrix) else None
 
 
@@ -25,12 +27,7 @@ def _line(context, matrix) -> np.ndarray:
     return mapped(matrix, np.array([(at, 0.0), (at, 1.0)]))
 
 
-class SHUTTER_GT_split(Gizmo):
-    bl_idname = "SHUTTER_GT_split"
-
-    def setup(self):
-        self.use_draw_modal = True
-
+class SHUTTER_GT_split(Dragged, Gizmo):
     def draw(self, context):
         if (matrix := _to_region(context)) is None:
             return
@@ -56,8 +53,8 @@ class SHUTTER_GT_split(Gizmo):
 
     def modal(self, context, event, _tweak):
         if (matrix := _to_region(context)) is not None:
-            point = np.array([(event.mouse_region_x, event.mouse_region_y)], dtype=np.float64)
-            context.window_manager.virtual_shutter.split = mapped(np.linalg.inv(matrix), point)[0, 0]
+            at = on_picture(matrix, event.mouse_region_x, event.mouse_region_y)
+            context.window_manager.virtual_shutter.split = at[0]
         return {"RUNNING_MODAL"}
 
     def exit(self, context, cancel):
@@ -65,20 +62,14 @@ class SHUTTER_GT_split(Gizmo):
             context.window_manager.virtual_shutter.split = self.before
 
 
-class SHUTTER_GGT_split(GizmoGroup):
-    bl_idname = "SHUTTER_GGT_split"
+class SHUTTER_GGT_split(InPreview, GizmoGroup):
     bl_label = "Split View"
-    bl_space_type = "SEQUENCE_EDITOR"
-    bl_region_type = "PREVIEW"
-    bl_options = {"PERSISTENT"}
+    gizmo = SHUTTER_GT_split
 
     @classmethod
     def poll(cls, context):
         settings = context.window_manager.virtual_shutter
         return settings.live and settings.view == "SPLIT" and preview_areas.shown(context) is not None
 
-    def setup(self, _context):
-        self.gizmos.new(SHUTTER_GT_split.bl_idname)
 
-
-classes = (SHUTTER_GT_split, SHUTTER_GGT_split)
+classes = own_classes(globals())

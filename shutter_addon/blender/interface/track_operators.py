@@ -3,34 +3,26 @@ those that make a panning shot of that, or a tripod."""
 
 import math
 import time
-from typing import Any
 
 import bpy
 from bpy.app.translations import pgettext_rpt as rpt_
 from bpy.props import EnumProperty, IntProperty
-from bpy.types import Operator
+from bpy.types import Operator, PropertyGroup
 
 from ..data import selection, validation
 from ..data.choices import CONTEXT
-from ..editing import (
-    bar_edits,
-    follow_stabilization,
-    follow_track,
-    layer_presets,
-    panning_shot,
-    track_region,
-    tripod,
-)
+from ..editing import bar_edits, follow_stabilization, follow_track, layer_presets, panning_shot, track_region, tripod
 from ..rendering.effect_source import FAULTS
 from .operator_bases import (
+    Beside,
     Mixin,
     OfEffect,
     OfRegion,
     OfShutter,
     OfStrokes,
+    is_escape,
+    own_classes,
     redraw,
-    refused,
-    report_error,
     report_warning,
 )
 
@@ -55,14 +47,16 @@ _DIRECTION = EnumProperty(
 )
 
 
-class _Tracks(Mixin):
-    """Tracks what has an `index`, as for selection.moving, from the current frame in a `direction` of DIRECTIONS."""
+def _index(operator: Operator, effect: PropertyGroup) -> int | None:
+    """What an operator works on, as for selection.moving: the active region, or the camera."""
+    return effect.active_region if isinstance(operator, OfRegion) else None
+
+
+class _Tracks(Beside):
+    """Tracks the active region, or the camera, from the current frame in a `direction` of DIRECTIONS."""
 
     bl_options = {"UNDO"}
     only_seen = True
-
-    def index(self, effect) -> int | None:
-        return effect.active_region
 
     def is_ready(self, scene, effect, strip) -> bool:
         """Whether nothing has to be tracked. EffectError: what comes after tracking cannot be done."""
@@ -72,32 +66,37 @@ class _Tracks(Mixin):
         """Called once all is tracked, and not after Esc. EffectError: what comes after tracking cannot be done."""
 
     def invoke(self, context, _event):
-        return self._run(context, float("inf") if bpy.app.background else _TICK)
+        return self.tried(self._run, context, math.inf if bpy.app.background else _TICK)
 
     def execute(self, context):
-        return self._run(context, float("inf"))
+        return self.tried(self._run, context, math.inf)
 
     def _run(self, context, seconds: float):
         """Tracks for a while, and then whenever Blender has time."""
-        try:
-            self._begin(context, None if math.isinf(seconds) else _PATIENCE)
-            goes_on = self._go_on(seconds)
-        except FAULTS as error:
-            report_error(self, str(error))
-            return {"CANCELLED"}
-        if not goes_on:
+        scene, effect, strip = selection.active(context)
+        index = _index(self, effect)
+        moving, patience = selection.moving(effect, index), None if math.isinf(seconds) else _PATIENCE
+        self._target, self._start = track_region.Target.of(effect, index), scene.frame_current
+        self._done: set[int] = set()
+        if self.is_ready(scene, effect, strip):
             return self._finish(context)
-        self._timer = context.window_manager.event_timer_add(_TICK, window=context.window)
+        self._frames = track_region.frames_to_track(scene, strip, self.direction, moving.track_until)
+        motion, all_keys = validation.word(moving, "motion"), moving.track_all_keys
+        self._frame = self._start
+        self._steps = track_region.track(
+            scene, effect, strip, index, self._frames, motion, all_keys=all_keys, patience=patience
+        )
+        if not self._go_on(seconds):
+            return self._finish(context)
         context.window_manager.progress_begin(0, len(self._frames))
-        context.window_manager.modal_handler_add(self)
         self._show(context)
-        return {"RUNNING_MODAL"}
+        return self.go_on(context, _TICK)
 
     def modal(self, context, event):
         if self._target.effect() is None:  # undone or removed in another window, or another file was loaded
             self.cancel(context)
             return {"CANCELLED"}
-        is_stopped = is_ended = event.type == "ESC" and event.value == "PRESS"
+        is_stopped = is_ended = is_escape(event)
         if event.type == "TIMER":
             # What it takes to draw a frame, tracking takes as well, unless Esc would have to wait.
             try:
@@ -115,38 +114,17 @@ class _Tracks(Mixin):
 
     def _finish(self, context, is_stopped: bool = False):
         self._tell()
-        try:
-            if not is_stopped and self._target.effect() is not None:
-                self.ended(context)
-        except FAULTS as error:
-            report_error(self, str(error))
-            if not self._done:
-                return {"CANCELLED"}
+        has_ended = not is_stopped and self._target.effect() is not None
+        if has_ended and self.tried(self.ended, context) == {"CANCELLED"} and not self._done:
+            return {"CANCELLED"}
         redraw(context)
         return {"FINISHED"}  # what was tracked can be undone
 
     def cancel(self, context):
         """It has ended, or its window was closed."""
         self._steps.close()
-        context.window_manager.event_timer_remove(self._timer)
         context.window_manager.progress_end()
-        context.workspace.status_text_set(None)
-
-    def _begin(self, context, patience: float | None):
-        scene, effect, strip = selection.active(context)
-        index = self.index(effect)
-        moving = selection.moving(effect, index)
-        self._target, self._start = track_region.Target.of(effect, index), scene.frame_current
-        self._done: set[int] = set()
-        self._steps: Any = iter(())
-        if self.is_ready(scene, effect, strip):
-            return
-        self._frames = track_region.frames_to_track(scene, strip, self.direction, moving.track_until)
-        motion, all_keys = validation.word(moving, "motion"), moving.track_all_keys
-        self._frame = self._start
-        self._steps = track_region.track(
-            scene, effect, strip, index, self._frames, motion, all_keys=all_keys, patience=patience
-        )
+        super().cancel(context)
 
     def _go_on(self, seconds: float) -> bool:
         """Tracks for a while; whether there is more to track. One of FAULTS: there is nothing to track at all."""
@@ -197,26 +175,17 @@ class _Tracks(Mixin):
                     self.report({"INFO"}, words)
 
 
-class _OfCamera:
-    """The camera, in place of a region."""
-
-    def index(self, _effect):
-        return None
-
-
 class SHUTTER_OT_track(_Tracks, OfStrokes, Operator):
     """Key the active region by what it covers here, up to your own keys (Esc stops and keeps the tracked frames)"""
 
-    bl_idname = "shutter.track"
     bl_label = "Track Region"
 
     direction: _DIRECTION
 
 
-class SHUTTER_OT_track_camera(_OfCamera, _Tracks, OfEffect, Operator):
+class SHUTTER_OT_track_camera(_Tracks, OfEffect, Operator):
     """Key the camera by what the regions leave free, up to your own keys (Esc stops and keeps the tracked frames)"""
 
-    bl_idname = "shutter.track_camera"
     bl_label = "Track Camera"
 
     direction: _DIRECTION
@@ -225,7 +194,6 @@ class SHUTTER_OT_track_camera(_OfCamera, _Tracks, OfEffect, Operator):
 class SHUTTER_OT_panning_shot(_Tracks, OfStrokes, Operator):
     """Keep the active region sharp while all else streaks past it (tracks the region unless it has keys)"""
 
-    bl_idname = "shutter.panning_shot"
     bl_label = "Panning Shot"
 
     direction = "BOTH"
@@ -237,10 +205,9 @@ class SHUTTER_OT_panning_shot(_Tracks, OfStrokes, Operator):
         layer_presets.panning_shot(self._target.effect(), self._target.index, bar_edits.auto_key(context))
 
 
-class SHUTTER_OT_tripod(_OfCamera, _Tracks, OfShutter, Operator):
+class SHUTTER_OT_tripod(_Tracks, OfShutter, Operator):
     """Expose for long as if the camera had stood still (tracks the camera unless it has keys)"""
 
-    bl_idname = "shutter.tripod"
     bl_label = "Stabilize Exposure"
 
     direction = "BOTH"
@@ -263,98 +230,70 @@ class _Looks(Mixin):
         options={"SKIP_SAVE"},
     )
 
-    def index(self, effect) -> int | None:
-        return effect.active_region
-
     def change(self, _context, effect):
-        scene = effect.id_data
-        if self.properties.is_property_set("frame"):
-            scene.frame_set(self.frame)
-            return {"FINISHED"}
-        frame = track_region.next_unsure(effect, self.index(effect), scene.frame_current)
+        frame: int | None = self.frame
+        if not self.properties.is_property_set("frame"):
+            frame = track_region.next_unsure(effect, _index(self, effect), self.edit.frame_current)
         if frame is None:
             self.report({"INFO"}, "No other stretch of unsure frames lies ahead")
             return {"CANCELLED"}
-        scene.frame_set(frame)
-        return {"FINISHED"}
+        self.edit.frame_set(frame)
+        return None
 
 
 class SHUTTER_OT_track_look(_Looks, OfRegion, Operator):
     """Go to a frame that tracking is not sure of"""
 
-    bl_idname = "shutter.track_look"
     bl_label = "Next Unsure Frame"
 
 
-class SHUTTER_OT_track_camera_look(_OfCamera, _Looks, OfEffect, Operator):
+class SHUTTER_OT_track_camera_look(_Looks, OfEffect, Operator):
     """Go to a frame that tracking of the camera is not sure of"""
 
-    bl_idname = "shutter.track_camera_look"
     bl_label = "Next Unsure Camera Frame"
 
 
-class _Follows(Mixin):
-    """Keys a region or the camera by what it is set to follow."""
-
-    def change(self, context, effect):
-        self.key(*selection.active(context))
-
-
-class SHUTTER_OT_follow(_Follows, OfStrokes, Operator):
+class SHUTTER_OT_follow(OfStrokes, Operator):
     """Key the active region by a track of a movie clip, from where the region is at this frame"""
 
-    bl_idname = "shutter.follow"
     bl_label = "Follow Track"
 
-    def key(self, scene, effect, strip):
-        follow_track.follow(scene, effect, strip, effect.active_region)
-
     @classmethod
-    def possible(cls, effect):
-        if not super().possible(effect):
-            return False
-        return selection.active_region(effect).follow_clip is not None or refused(cls, rpt_("Choose a clip first"))
+    def why_not(cls, effect):
+        if sentence := super().why_not(effect):
+            return sentence
+        return None if selection.active_region(effect).follow_clip is not None else rpt_("Choose a clip first")
+
+    def change(self, _context, effect):
+        follow_track.follow(self.edit, effect, self.effect_strip, effect.active_region)
 
 
-class SHUTTER_OT_follow_update(_Follows, OfStrokes, Operator):
+class SHUTTER_OT_follow_update(OfStrokes, Operator):
     """Key the active region anew by what it follows, after the track has changed"""
 
-    bl_idname = "shutter.follow_update"
     bl_label = "Update Followed Track"
 
-    def key(self, scene, effect, strip):
-        follow_track.update(scene, effect, strip, effect.active_region)
-
     @classmethod
-    def possible(cls, effect):
-        if not super().possible(effect):
-            return False
-        return bool(selection.active_region(effect).follow_stamp) or refused(
-            cls, rpt_("The region follows no track yet")
-        )
+    def why_not(cls, effect):
+        if sentence := super().why_not(effect):
+            return sentence
+        return None if selection.active_region(effect).follow_stamp else rpt_("The region follows no track yet")
+
+    def change(self, _context, effect):
+        follow_track.update(self.edit, effect, self.effect_strip, effect.active_region)
 
 
-class SHUTTER_OT_follow_stabilization(_Follows, OfEffect, Operator):
+class SHUTTER_OT_follow_stabilization(OfEffect, Operator):
     """Key the camera by the 2D stabilization of a movie clip, from where the camera is at this frame"""
 
-    bl_idname = "shutter.follow_stabilization"
     bl_label = "Follow Stabilization"
 
-    key = staticmethod(follow_stabilization.follow)
-
     @classmethod
-    def possible(cls, effect):
-        return effect.camera.follow_clip is not None or refused(cls, rpt_("Choose a clip first"))
+    def why_not(cls, effect):
+        return None if effect.camera.follow_clip is not None else rpt_("Choose a clip first")
+
+    def change(self, _context, effect):
+        follow_stabilization.follow(self.edit, effect, self.effect_strip)
 
 
-classes = (
-    SHUTTER_OT_track,
-    SHUTTER_OT_track_camera,
-    SHUTTER_OT_panning_shot,
-    SHUTTER_OT_tripod,
-    SHUTTER_OT_track_look,
-    SHUTTER_OT_track_camera_look,
-    SHUTTER_OT_follow,
-    SHUTTER_OT_follow_update,
-    SHUTTER_OT_follow_stabilization,
-)
+classes = own_classes(globals())
