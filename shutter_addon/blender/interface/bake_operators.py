@@ -143,11 +143,8 @@ def forget() -> None:
 
 class Bake(WithEffect):
     bl_label = "Bake"
-    bl_options = {"DEFAULT_CLOSED"}
 
-    def draw(self, context):
-        layout = self.layout
-        scene, effect, strip = selection.active(context)
+    def draw_effect(self, layout, scene, effect, strip):
         job = next((job for job in _running if job.effect == effect.identity), None)
         if job is not None:
             done, total = job.done(), len(job.film.frames)

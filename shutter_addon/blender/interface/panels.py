@@ -15,19 +15,10 @@ from ..rendering import inbetween_build, strobing
 from . import icons, inbetween_operators
 from .bake_operators import Bake
 from .note_buttons import Button
-from .operator_bases import Mixin
+from .operator_bases import Mixin, own_classes
 from .option_panels import Inbetween, Options
-from .panel_parts import WIDEST, WithEffect, draw_list, sentence
-from .region_panels import (
-    Camera,
-    Follow,
-    Regions,
-    Track,
-    Transform,
-    draw_tracked,
-    draw_tracking,
-    tracking_icon,
-)
+from .panel_parts import WIDEST, WithEffect, draw_list, draw_moves, draw_operators, draw_properties, sentence
+from .region_panels import Camera, Follow, Regions, Track, Transform, draw_tracked, draw_tracking, tracking_icon
 from .report_operators import Report
 
 
@@ -92,20 +83,16 @@ class SHUTTER_MT_regions(Menu):
         outline = layout.operator("shutter.draw", text="Draw Outline", icon=_ICONS["OUTLINE"])
         outline.new, outline.kind = True, "OUTLINE"
         layout.separator()
-        layout.operator("shutter.matte_add", icon="FILE_MOVIE")
-        layout.operator_menu_enum("shutter.matte_strip", "strip", icon="SEQUENCE")
-        for operator, icon in (("shutter.matte_mask", "MOD_MASK"), ("shutter.outline_from_mask", _ICONS["OUTLINE"])):
-            if bpy.data.masks:
-                layout.operator_menu_enum(operator, "mask", icon=icon)
-            else:
-                layout.operator(operator, icon=icon)  # greyed out; its tooltip says why
-        layout.operator_menu_enum("shutter.ramp_add", "ramp", icon="IPO_EASE_IN_OUT")
+        draw_operators(layout, ("matte_add", "FILE_MOVIE"), ("matte_strip", "SEQUENCE", "strip"))
+        # Without a mask they are greyed out; their tooltips say why.
+        mask = ("mask",) if bpy.data.masks else ()
+        draw_operators(layout, ("matte_mask", "MOD_MASK", *mask), ("outline_from_mask", _ICONS["OUTLINE"], *mask))
+        draw_operators(layout, ("ramp_add", "IPO_EASE_IN_OUT", "ramp"))
         layout.separator()
-        layout.operator_menu_enum("shutter.time_map", "ramp", icon="TIME")
-        layout.operator_menu_enum("shutter.rolling_shutter", "side", icon="CAMERA_DATA")
-        layout.operator_menu_enum("shutter.find_readout", "reads", icon="VIEWZOOM")
+        draw_operators(layout, ("time_map", "TIME", "ramp"), ("rolling_shutter", "CAMERA_DATA", "side"))
+        draw_operators(layout, ("find_readout", "VIEWZOOM", "reads"))
         layout.separator()
-        layout.operator_menu_enum("shutter.region_take", "layer", icon="GREASEPENCIL")
+        draw_operators(layout, ("region_take", "GREASEPENCIL", "layer"))
 
 
 class SHUTTER_MT_shutters(Menu):
@@ -115,14 +102,11 @@ class SHUTTER_MT_shutters(Menu):
         layout = self.layout
         layout.menu("SHUTTER_MT_presets", icon="PRESET")
         layout.separator()
-        layout.operator("shutter.shutter_duplicate", icon="DUPLICATE")
-        layout.operator("shutter.shutter_move", text="Move Up", icon="TRIA_UP").direction = "UP"
-        layout.operator("shutter.shutter_move", text="Move Down", icon="TRIA_DOWN").direction = "DOWN"
+        draw_operators(layout, ("shutter_duplicate", "DUPLICATE"))
+        draw_moves(layout, "shutter")
         layout.separator()
-        layout.operator("shutter.effect_copy", icon="COPYDOWN")
-        layout.operator("shutter.effect_paste", icon="PASTEDOWN")
-        layout.operator("shutter.recipe_import", icon="IMPORT")
-        layout.operator("shutter.recipe_export", icon="EXPORT")
+        draw_operators(layout, ("effect_copy", "COPYDOWN"), ("effect_paste", "PASTEDOWN"))
+        draw_operators(layout, ("recipe_import", "IMPORT"), ("recipe_export", "EXPORT"))
 
 
 class _Shutters(Mixin):
@@ -134,36 +118,31 @@ class _Shutters(Mixin):
         layout = self.layout
         active = selection.active(context)
         if active is None:
-            layout.operator("shutter.draw", icon="GREASEPENCIL")
-            layout.operator("shutter.add_effect", icon="ADD")
+            draw_operators(layout, ("draw", "GREASEPENCIL"), ("add_effect", "ADD"))
             return
         effect = active[1]
         _draw_live(layout, context)
         _draw_source(layout, effect)
         draw_list(layout, effect, "shutter", effect.shutters, "SHUTTER_MT_shutters")
         row = layout.row(align=True)
-        row.operator("shutter.draw", icon="GREASEPENCIL")
-        row.operator("shutter.erase")
+        draw_operators(row, ("draw", "GREASEPENCIL"), ("erase",))
         row.menu("SHUTTER_MT_regions", text="", icon="DOWNARROW_HLT")
         draw_tracking(layout, effect.active_region)
-        row = layout.row(align=True)
-        for button in ("sharp_subject", "panning_shot", "clean_trail"):
-            row.operator(f"shutter.{button}")
+        draw_operators(layout.row(align=True), ("sharp_subject",), ("panning_shot",), ("clean_trail",))
 
 
 class _Exposure(WithEffect):
     """What the active shutter makes of the frames."""
 
     bl_label = ""
+    bl_options = set()
 
     def draw_header(self, context):
         if (shutter := selection.active_shutter(selection.active(context)[1])) is not None:
             words = iface_('Exposure of "{shutter}"').format(shutter=shutter.name)
             self.layout.label(text=words, translate=False)
 
-    def draw(self, context):
-        layout, active = self.layout, selection.active(context)
-        effect = active[1]
+    def draw_effect(self, layout, scene, effect, strip):
         if (shutter := selection.active_shutter(effect)) is None:
             return
         row = layout.row(align=True)
@@ -172,14 +151,13 @@ class _Exposure(WithEffect):
         row.menu("SHUTTER_MT_presets", text=label, icon="PRESET", translate=False)
         row.operator("shutter.bars_key", text="", icon="KEY_HLT")
         row.operator("shutter.bars_unkey", text="", icon="KEY_DEHLT")
-        layout.use_property_split = True
         layout.prop(effect, "window")
         layout.prop(shutter, "length")
         if shutter.length == "MOTION" and shutter.follow != "NOTHING":
             layout.prop(shutter, "trail")
         _draw_combine(layout, shutter)
         layout.operator("shutter.tripod", icon="CON_CAMERASOLVER")
-        _draw_bars(layout, active)
+        _draw_bars(layout, scene, effect, strip)
 
 
 def _draw_combine(layout, shutter) -> None:
@@ -197,9 +175,8 @@ def _draw_combine(layout, shutter) -> None:
         layout.prop(shutter, "softness")
 
 
-def _draw_bars(layout, active) -> None:
+def _draw_bars(layout, scene, effect, strip) -> None:
     """What the active shutter's bars come to."""
-    scene, effect, strip = active
     try:
         bars = bar_edits.shown(effect, effect.active_shutter).bars
     except EffectError as error:
@@ -294,19 +271,15 @@ class _Move(WithEffect):
     """What the exposure moves with."""
 
     bl_label = "Exposure Moves With"
-    bl_options = {"DEFAULT_CLOSED"}
 
-    def draw(self, context):
-        layout, effect = self.layout, selection.active(context)[1]
+    def draw_effect(self, layout, _scene, effect, _strip):
         if (shutter := selection.active_shutter(effect)) is None:
             return
-        layout.use_property_split = True
         layout.prop(shutter, "follow")
         if shutter.follow == "REGION":
             layout.prop_search(shutter, "follow_region", effect, "regions", text="Region")
         if shutter.follow != "NOTHING":
-            for name in ("follow_motion", "follow_smooth"):
-                layout.prop(shutter, name)
+            draw_properties(layout, shutter, "follow_motion", "follow_smooth")
         if shutter.follow == "CAMERA":
             draw_tracking(layout, None)
 
@@ -369,8 +342,7 @@ def _strip_entry(self, context):
     if strip.type in strips.SOURCES:
         self.layout.operator("shutter.draw", text="Draw Shutter", icon="GREASEPENCIL")
         self.layout.operator("shutter.add_effect")
-    self.layout.operator("shutter.effect_copy", icon="COPYDOWN")
-    self.layout.operator("shutter.effect_paste", icon="PASTEDOWN")
+    draw_operators(self.layout, ("effect_copy", "COPYDOWN"), ("effect_paste", "PASTEDOWN"))
 
 
 MENUS = {
@@ -380,12 +352,7 @@ MENUS = {
 }
 
 classes = (
-    SHUTTER_UL_shutters,
-    SHUTTER_UL_regions,
-    SHUTTER_MT_presets,
-    SHUTTER_MT_regions,
-    SHUTTER_MT_shutters,
-    SHUTTER_PT_notes,
+    *own_classes(globals()),
     *_panels("STRIP_PT_shutter", _InProperties),
     *_panels("SEQUENCER_PT_shutter", _InSidebar),
 )

@@ -10,17 +10,19 @@ from ..data import matte_look, selection, strips, validation
 from ..data.choices import CONTEXT
 from ..editing import follow_track, outline_drawings, track_region
 from . import track_operators
-from .panel_parts import WithEffect, draw_list, sentence
+from .panel_parts import WithEffect, draw_list, draw_properties, sentence
 
-OF_KIND = {"LINE": "width", "OUTLINE": "between", "RAMP": "ramp"}  # the property that each kind adds
+_PLACEMENT = "location", "rotation", "scale"
+_TRACKING = "motion", "track_until", "track_all_keys", "track_ends"
+_OF_KIND = {"LINE": "width", "OUTLINE": "between", "RAMP": "ramp"}  # the property that each kind adds
 
 
 class Regions(WithEffect):
     bl_label = "Regions"
+    bl_options = set()
 
-    def draw(self, context):
-        layout = self.layout
-        scene, effect, strip = selection.active(context)
+    def draw_effect(self, layout, scene, effect, strip):
+        layout.use_property_split = False
         shutter = selection.active_shutter(effect)
         own = [region for region in effect.regions if shutter and region.shutter == shutter.name]
         draw_list(layout, effect, "region", own)
@@ -29,8 +31,8 @@ class Regions(WithEffect):
             row = layout.row(align=True)
             row.operator_menu_enum("shutter.region_assign", "shutter", text=region.shutter, translate=False)
             row.prop(region, "kind", text="")
-            if region.kind in OF_KIND:
-                row.prop(region, OF_KIND[region.kind], text=None if region.kind == "LINE" else "")
+            if region.kind in _OF_KIND:
+                row.prop(region, _OF_KIND[region.kind], text=None if region.kind == "LINE" else "")
         layout.use_property_split = True
         if region is None or region.kind not in strips.LAID:
             layout.prop(effect, "edge_aware")
@@ -60,8 +62,7 @@ def _draw_matte(layout, look, region) -> None:
         layout.template_ID(region, "image", open="image.open")
         if region.image is not None:
             layout.prop(region.image, "source")
-        layout.prop(region, "timing")
-        layout.prop(region, "offset")
+        draw_properties(layout, region, "timing", "offset")
     elif region.matte == "STRIP":
         layout.prop_search(region, "strip_name", region.id_data.sequence_editor, "strips_all", text="Strip")
     else:
@@ -141,60 +142,42 @@ def _draw_camera_gaps(layout, effect) -> None:
         sentence(layout, text.format(first=gap.first, last=gap.last), "INFO")
 
 
-def _active_region(context):
-    return selection.active_region(selection.active(context)[1])
-
-
 class _WithRegion(WithEffect):
+    """A panel of the active region."""
+
     @classmethod
     def poll(cls, context):
-        return super().poll(context) and _active_region(context) is not None
+        return super().poll(context) and selection.active_region(selection.active(context)[1]) is not None
+
+    def draw_effect(self, layout, _scene, effect, _strip):
+        self.draw_region(layout, selection.active_region(effect))
 
 
 class Transform(_WithRegion):
     bl_label = "Transform"
-    bl_options = {"DEFAULT_CLOSED"}
 
-    def draw(self, context):
-        layout = self.layout
-        layout.use_property_split = True
-        region = _active_region(context)
-        column = layout.column(align=True)
-        for name in ("location", "rotation", "scale"):
-            column.prop(region, name)
+    def draw_region(self, layout, region):
+        draw_properties(layout.column(align=True), region, *_PLACEMENT)
         layout.operator("shutter.region_key", text="Insert Keyframes", icon="KEY_HLT")
 
 
 class Track(_WithRegion):
     bl_label = "Track"
     bl_translation_context = CONTEXT
-    bl_options = {"DEFAULT_CLOSED"}
 
     @classmethod
     def poll(cls, context):
-        return super().poll(context) and _active_region(context).kind not in strips.MATTES
+        return super().poll(context) and selection.active_region(selection.active(context)[1]).kind not in strips.MATTES
 
-    def draw(self, context):
-        layout = self.layout
-        layout.use_property_split = True
-        _draw_track_options(layout, _active_region(context))
-
-
-def _draw_track_options(layout, moving) -> None:
-    for name in ("motion", "track_until", "track_all_keys", "track_ends"):
-        layout.prop(moving, name)
+    def draw_region(self, layout, region):
+        draw_properties(layout, region, *_TRACKING)
 
 
 class Follow(_WithRegion):
     bl_label = "Follow Track"
-    bl_options = {"DEFAULT_CLOSED"}
 
-    def draw(self, context):
-        layout = self.layout
-        layout.use_property_split = True
-        region = _active_region(context)
-        layout.prop(region, "follow_clip")
-        layout.prop(region, "follow_kind")
+    def draw_region(self, layout, region):
+        draw_properties(layout, region, "follow_clip", "follow_kind")
         if region.follow_clip is not None:
             _draw_tracks(layout, region, region.follow_clip.tracking)
         if follow_track.is_changed(region):
@@ -217,7 +200,6 @@ class Camera(WithEffect):
     """Its numbers, and how they are found; the shutter that follows it has the buttons that track it."""
 
     bl_label = "Camera"
-    bl_options = {"DEFAULT_CLOSED"}
 
     @classmethod
     def poll(cls, context):
@@ -225,14 +207,7 @@ class Camera(WithEffect):
             shutter.follow == "CAMERA" for shutter in selection.active(context)[1].shutters
         )
 
-    def draw(self, context):
-        layout = self.layout
-        layout.use_property_split = True
-        camera = selection.active(context)[1].camera
-        column = layout.column(align=True)
-        for name in ("location", "rotation", "scale"):
-            column.prop(camera, name)
-        layout.prop(camera, "influence")
-        _draw_track_options(layout, camera)
-        layout.prop(camera, "follow_clip")
+    def draw_effect(self, layout, _scene, effect, _strip):
+        draw_properties(layout.column(align=True), effect.camera, *_PLACEMENT)
+        draw_properties(layout, effect.camera, "influence", *_TRACKING, "follow_clip")
         layout.operator("shutter.follow_stabilization", icon="TRACKER")
