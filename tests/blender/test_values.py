@@ -116,7 +116,7 @@ def ramp(effect, kind="RAMP", **values):
     """A new ramp or matte of the second shutter."""
     from shutter_addon.blender.editing import region_edits
 
-    return region_edits.add_matte(effect, effect.shutters[1], kind, "Ramp", **values)
+    return region_edits.add_region(effect, effect.shutters[1], kind, "Ramp", **values)
 
 
 def image(effect):

@@ -5,6 +5,7 @@ from typing import NamedTuple
 import bpy
 import numpy as np
 from bpy.app.translations import pgettext_iface as iface_
+from bpy.types import PropertyGroup
 
 from ...core import revision
 from ...core.model import shutters
@@ -72,21 +73,25 @@ def paint(effect, index: int, weights, key: bool = False) -> None:
 
 def key_bars(effect, index: int) -> None:
     """Keys all bars of a shutter at the current frame, as Blender's own key buttons do."""
-    path, group = f"{effect.path_from_id()}.shutters[{index}].bars", effect.shutters[index].name
     # Between keys the bars stand where their F-curves are, a cross-fade: the picture is made with others.
-    set_bars(effect.shutters[index], bars_now(effect, index))
-    scene = effect.id_data
-    for k in range(len(effect.shutters[index].bars)):
+    shutter, scene = effect.shutters[index], effect.id_data
+    set_bars(shutter, bars_now(effect, index))
+    for path in _paths(effect, index):
         # Without a frame Blender takes that of the window's scene, which may be another one.
-        scene.keyframe_insert(f"{path}[{k}].weight", group=group, frame=scene.frame_current)
+        scene.keyframe_insert(path, group=shutter.name, frame=scene.frame_current)
+
+
+def _paths(effect: PropertyGroup, index: int) -> list[str]:
+    """Of the weights of a shutter's bars, from the scene."""
+    path = f"{effect.path_from_id()}.shutters[{index}].bars"
+    return [f"{path}[{k}].weight" for k in range(len(effect.shutters[index].bars))]
 
 
 def unkey_bars(effect, index: int) -> bool:
     """Deletes the keys of a shutter's bars at the current frame; whether there were any."""
-    scene, path = effect.id_data, f"{effect.path_from_id()}.shutters[{index}].bars"
+    scene = effect.id_data
     curves = fcurves.Curves(scene)
-    keyed = [k for k in range(len(effect.shutters[index].bars)) if curves.find(f"{path}[{k}].weight")]
-    deleted = [_deleted(scene, f"{path}[{k}].weight") for k in keyed]
+    deleted = [_deleted(scene, path) for path in _paths(effect, index) if curves.find(path)]
     return any(deleted)
 
 
@@ -122,12 +127,10 @@ def shown(effect, index: int) -> BarsShown:
 
 def key_state(effect, index: int) -> list[str]:
     """See BarsShown.states."""
-    scene, path = effect.id_data, f"{effect.path_from_id()}.shutters[{index}].bars"
+    scene = effect.id_data
     curves = fcurves.Curves(scene)
-    return [
-        _state(curves.find(f"{path}[{k}].weight"), bar.weight, scene)
-        for k, bar in enumerate(effect.shutters[index].bars)
-    ]
+    bars_and_paths = zip(effect.shutters[index].bars, _paths(effect, index), strict=True)
+    return [_state(curves.find(path), bar.weight, scene) for bar, path in bars_and_paths]
 
 
 def _state(curve, value: float, scene) -> str:

@@ -8,7 +8,6 @@ import math
 from collections.abc import Callable
 from functools import partial
 
-import numpy as np
 from bpy.app.translations import pgettext_rpt as rpt_
 
 from ...core.messages import EffectError
@@ -82,11 +81,8 @@ def _stabilization(clip, aspect: float) -> Stabilization:
     settings, value, tracks = clip.tracking.stabilization, _values(clip), []
     used = [{track.name for track in each} for each in (settings.tracks, settings.rotation_tracks)]
     for track in clip.tracking.objects[0].tracks:
-        frames, shown = follow_track.marker_frames(track.markers)
-        places = np.empty(2 * len(frames), np.float32)
-        track.markers.foreach_get("co", places)
-        places = places.reshape(-1, 2)[shown] * (aspect, 1)
-        markers = dict(zip(frames[shown].tolist(), (places @ (1, 1j)).tolist(), strict=True))
+        frames, places = follow_track.markers_of(track)
+        markers = dict(zip(frames.tolist(), (places * (aspect, 1) @ (1, 1j)).tolist(), strict=True))
         location, turn = (track.name in names for names in used)
         if location or turn:
             weight = partial(value, track, "weight_stab")

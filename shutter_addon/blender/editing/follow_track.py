@@ -11,6 +11,7 @@ from pathlib import Path
 import bpy
 import numpy as np
 from bpy.app.translations import pgettext_rpt as rpt_
+from bpy.types import MovieClip, MovieTrackingTrack
 
 from ...core import revision
 from ...core.messages import EffectError, translated
@@ -95,33 +96,39 @@ def _markers(region) -> list[tuple[str, np.ndarray, np.ndarray]]:
         raise EffectError(rpt_("Choose a clip first"))
     holder = clip.tracking.objects.get(region.follow_object) if region.follow_object else clip.tracking.objects[0]
     if holder is None:
-        raise EffectError(_missing(clip, region.follow_object))
+        raise _missing(clip, region.follow_object)
     if region.follow_kind == "OBJECT":
         return [_track_markers(track) for track in holder.tracks]
     named = (holder.plane_tracks if region.follow_kind == "PLANE" else holder.tracks).get(region.follow_track)
     if named is None:
-        raise EffectError(_missing(clip, region.follow_track))
+        raise _missing(clip, region.follow_track)
     return _corners(named) if region.follow_kind == "PLANE" else [_track_markers(named)]
 
 
-def _missing(clip, name: str) -> str:
-    return rpt_('clip "{clip}" has no track "{track}"').format(clip=clip.name, track=name)
+def _missing(clip: MovieClip, name: str) -> EffectError:
+    return EffectError(rpt_('clip "{clip}" has no track "{track}"').format(clip=clip.name, track=name))
 
 
-def _track_markers(track) -> tuple[str, np.ndarray, np.ndarray]:
-    frames, shown = marker_frames(track.markers)
+def _track_markers(track: MovieTrackingTrack) -> tuple[str, np.ndarray, np.ndarray]:
+    frames, places = markers_of(track)
+    return track.name, frames, places + np.array(track.offset, np.float32)
+
+
+def markers_of(track: MovieTrackingTrack) -> tuple[np.ndarray, np.ndarray]:
+    """The frames (n,) of a track's markers that are not muted, ascending, and where these are (n, 2)."""
+    frames, shown = _marker_frames(track.markers)
     places = np.empty(2 * len(frames), np.float32)
     track.markers.foreach_get("co", places)
-    return track.name, frames[shown], places.reshape(-1, 2)[shown] + np.array(track.offset, np.float32)
+    return frames[shown], places.reshape(-1, 2)[shown]
 
 
 def _corners(plane) -> list[tuple[str, np.ndarray, np.ndarray]]:
-    frames, shown = marker_frames(plane.markers)
+    frames, shown = _marker_frames(plane.markers)
     places = np.array([[tuple(corner) for corner in marker.corners] for marker in plane.markers], np.float32)
     return [(str(k), frames[shown], places[shown, k]) for k in range(4)]
 
 
-def marker_frames(markers) -> tuple[np.ndarray, np.ndarray]:
+def _marker_frames(markers) -> tuple[np.ndarray, np.ndarray]:
     """The frames (n,) of markers, ascending, and which of them are not muted."""
     frames, muted = np.empty(len(markers), np.int32), np.empty(len(markers), bool)
     markers.foreach_get("frame", frames)
@@ -196,31 +203,6 @@ def _place_at(frames: np.ndarray, places: np.ndarray, time: float) -> np.ndarray
     return before + (time - np.floor(time)) * (after - before)
 
 
-class _Follower:
-    """Carries a region or the camera along what it follows; arguments: see `followed`."""
-
-    def __init__(self, subject, frames: list[int], moves: dict[int, dict[int, Similarity]], size):
-        self._subject, self._known, self._moves, self._size = subject, sorted(moves), moves, size
-        self._centres = {frame: subject.centre(frame) for frame in frames}
-
-    def at(self, frame: int, near: Placement) -> Placement | None:
-        """The placement at a frame, its rotation next to another one's: between two known frames blended from both.
-        None: too few points are there."""
-        before = self._known[max(bisect_right(self._known, frame) - 1, 0)]
-        after = self._known[min(bisect_left(self._known, frame), len(self._known) - 1)]
-        first, second = self._carried(before, frame, near), self._carried(after, frame, near)
-        if first is None or second is None or before == after:
-            return first or second
-        return motions.between(first, second, (frame - before) / (after - before))
-
-    def _carried(self, origin: int, frame: int, near: Placement) -> Placement | None:
-        motion = self._moves[origin].get(frame)
-        if motion is None:
-            return None
-        centres = self._centres[origin], self._centres[frame]
-        return motions.unwound(motions.carried(self._subject.placement(origin), motion, *centres, self._size), near)
-
-
 def followed(
     subject, frames: list[int], moves: dict[int, dict[int, Similarity]], start: int, size
 ) -> dict[int, Placement]:
@@ -228,22 +210,40 @@ def followed(
 
     subject: a core.model.effect.Region or Camera; frames: ascending; moves: by frame at which the placement is known,
     `start` among them, the motions of the picture to other frames"""
-    follower, result = _Follower(subject, frames, moves, size), {start: subject.placement(start)}
-    for way in ([f for f in frames if f > start], [f for f in reversed(frames) if f < start]):
+    known, centres = sorted(moves), {frame: subject.centre(frame) for frame in frames}
+    result = {start: subject.placement(start)}
+
+    def carried(origin: int, frame: int, near: Placement) -> Placement | None:
+        """The placement at a frame, its rotation next to another one's; None: too few points are there."""
+        if (motion := moves[origin].get(frame)) is None:
+            return None
+        moved = motions.carried(subject.placement(origin), motion, centres[origin], centres[frame], size)
+        return motions.unwound(moved, near)
+
+    for way in _ways(frames, start):
         near = result[start]
         for frame in way:
-            placement = follower.at(frame, near)
+            before = known[max(bisect_right(known, frame) - 1, 0)]
+            after = known[min(bisect_left(known, frame), len(known) - 1)]
+            first, second = carried(before, frame, near), carried(after, frame, near)
+            placement = first or second
+            if first and second and before != after:  # blended from both
+                placement = motions.between(first, second, (frame - before) / (after - before))
             if placement is not None:
                 near = result[frame] = placement
     return dict(sorted(result.items()))
+
+
+def _ways(frames: list[int], start: int) -> tuple[list[int], list[int]]:
+    """The frames after one, and those before it, backward."""
+    return [frame for frame in frames if frame > start], [frame for frame in reversed(frames) if frame < start]
 
 
 def _motions(points: dict[int, Points], origin: int) -> dict[int, Similarity]:
     """By frame the motion from the points of one frame; where too few of these are left, by way of the frame before."""
     by_frame = {origin: Similarity()}
     enough = min(2, len(points[origin]))
-    frames = sorted(points)
-    for way in ([f for f in frames if f > origin], [f for f in reversed(frames) if f < origin]):
+    for way in _ways(sorted(points), origin):
         before = origin
         for frame in way:
             for base in (origin, before):

@@ -1,9 +1,14 @@
-"""What one click makes of a subject that is drawn, or has a matte: it becomes a layer, which leaves no ghost."""
+"""What one click makes of a subject that is drawn, or has a matte: it becomes a layer, which leaves no ghost; and of
+footage that was held in the hand: an exposure for which the camera stands still."""
 
 from bpy.app.translations import pgettext_data as data_
+from bpy.app.translations import pgettext_rpt as rpt_
+from bpy.types import PropertyGroup, Scene, Strip
 
-from ..data import consistency
-from . import region_edits, shutter_edits
+from ...core.messages import EffectError
+from ..data import consistency, snapshot
+from . import region_edits, shutter_edits, track_region
+from .motion_keys import MotionKeys
 
 SMOOTHNESS = 6  # frames before and after each: half a second in all
 
@@ -34,6 +39,35 @@ def panning_shot(effect, index: int, key: bool = False) -> None:
     default.follow_region = region.name
     # Turns and scales of a small subject are unsure, and whirl what is far from it; and a camera on its head has mass.
     default.follow_motion, default.follow_smooth = "LOCATION", SMOOTHNESS
+
+
+def can_pan(scene: Scene, effect: PropertyGroup, strip: Strip, index: int) -> bool:
+    """Whether a region has keys of motion, and those that were tracked reach the current frame; without, it has to be
+    tracked before its panning shot. EffectError: it has keys, and no strokes that could be followed."""
+    if not MotionKeys(effect, index, "SCALE").reach(scene.frame_current):
+        return False
+    if not snapshot.strokes_at(scene, effect, strip, index, scene.frame_current):
+        raise EffectError(rpt_("the region has no strokes to follow"))
+    return True
+
+
+def can_stand(effect: PropertyGroup) -> bool:
+    """Whether the camera has keys of motion, and those that were tracked reach the current frame, whose shot may be
+    another one; without, it has to be tracked before it stands still."""
+    return MotionKeys(effect, None, "SCALE").reach(effect.id_data.frame_current)
+
+
+def tripod(effect: PropertyGroup, key: bool = False) -> None:
+    """Has the active shutter follow the camera, open for a whole window that lies around the frame. Where it has no
+    region, and so holds nowhere, the default one takes its place.
+
+    key: keys the bars at the current frame. EffectError: the window has no length, and nothing has changed."""
+    index, name = effect.active_shutter, effect.shutters[effect.active_shutter].name
+    if not any(region.shutter == name for region in effect.regions):
+        index = 0
+    shutter_edits.follow(effect, index, "CAMERA", key)
+    effect.active_shutter = index
+    track_region.key_ends(effect, None)  # the window lies elsewhere now
 
 
 def _as_layer(effect, index: int) -> int:

@@ -6,7 +6,7 @@ Annotations have no key types in Blender 5.2: a drawing that was made and one's 
 from bisect import bisect
 from contextlib import closing
 from functools import lru_cache
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from bpy.app.translations import pgettext_rpt as rpt_
@@ -139,7 +139,7 @@ def outline_it(scene, effect, strip, index: int) -> bool:
     return True
 
 
-def carried_frames(scene, effect, strip, index: int) -> tuple[Any, dict[int, int]]:
+def carried_frames(scene, effect, strip, index: int) -> tuple[CarriedFile, dict[int, int]]:
     """What gives the mattes of an outline (media.carried_mattes.CarriedFile), and which frames of the source the frames
     of its strip show, by timeline frame. EffectError, MediaError: nothing is carried."""
     frames = range(strip.left_handle, strip.right_handle)

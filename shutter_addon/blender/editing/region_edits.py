@@ -1,6 +1,7 @@
 """An effect's regions and their annotation layers: added, removed, moved, keyed."""
 
 import numpy as np
+from bpy.types import PropertyGroup
 
 from ..data import selection, strips
 from ..data.annotations import annotation, layer_of
@@ -8,12 +9,18 @@ from ..data.consistency import bars, choose_region, color_layers, forget_followe
 from . import collection_edits, motion_keys
 
 
-def add_region(effect, shutter, kind: str = "LINE", name: str = ""):
-    """Appends a region of a shutter, on an empty annotation layer of its own, and makes it the active one."""
+def add_region(
+    effect: PropertyGroup, shutter: PropertyGroup, kind: str = "LINE", name: str = "", **values: object
+) -> PropertyGroup:
+    """Appends a region of a shutter, with these values of its properties and, unless it is a matte or a ramp, on an
+    empty annotation layer of its own; and makes it the active one."""
     region = effect.regions.add()
     region.name = unique(name or shutter.name, {r.name for r in effect.regions})
     region.shutter, region.kind = shutter.name, kind
-    new_layer(effect, region)
+    if kind not in strips.MATTES:
+        new_layer(effect, region)
+    for prop, value in values.items():
+        setattr(region, prop, value)
     effect.active_region = len(effect.regions) - 1
     return region
 
@@ -41,17 +48,6 @@ def _undrawn(effect, shutter):
         return None
     layer = layer_of(effect, region)
     return None if layer is not None and any(drawing.strokes for drawing in layer.frames) else region
-
-
-def add_matte(effect, shutter, kind: str = "MATTE", name: str = "", **values):
-    """Appends a matte or a ramp of a shutter, with these values of its properties, and makes it the active region."""
-    region = effect.regions.add()
-    region.name = unique(name or shutter.name, {r.name for r in effect.regions})
-    region.shutter, region.kind = shutter.name, kind
-    for prop, value in values.items():
-        setattr(region, prop, value)
-    effect.active_region = len(effect.regions) - 1
-    return region
 
 
 def new_layer(effect, region):

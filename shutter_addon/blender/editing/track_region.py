@@ -15,6 +15,7 @@ import bpy
 import numpy as np
 from bpy.app.translations import pgettext_n as n_
 from bpy.app.translations import pgettext_rpt as rpt_
+from bpy.types import PropertyGroup
 
 from ...core import revision, threads
 from ...core.messages import EffectError, translated
@@ -179,10 +180,13 @@ def track(
 def stops(effect, index: int | None) -> list[tuple[int, str, bool]]:
     """The timeline frames at which tracking stopped, ascending, why, in the user's language, and whether that is a
     fault: the end of a shot is none."""
-    known = [stop for stop in selection.moving(effect, index).stops if math.isfinite(effect.start + stop.frame)]
-    return sorted(
-        (round(effect.start + stop.frame), rpt_(stop.fault), stop.fault != tracking.SHOT_ENDS) for stop in known
-    )
+    return sorted((frame, rpt_(stop.fault), stop.fault != tracking.SHOT_ENDS) for frame, stop in _stops(effect, index))
+
+
+def _stops(effect: PropertyGroup, index: int | None) -> list[tuple[int, PropertyGroup]]:
+    """By timeline frame, where tracking stopped."""
+    known = [(effect.start + stop.frame, stop) for stop in selection.moving(effect, index).stops]
+    return [(round(frame), stop) for frame, stop in known if math.isfinite(frame)]
 
 
 def gaps(effect, index: int | None) -> list[presence.Gap]:
@@ -194,11 +198,8 @@ def _track(effect, index: int | None) -> tuple[list[int], list[presence.Stop]]:
     """The timeline frames at which it was found, and where its track ended."""
     frames, confidence = MotionKeys(effect, index, "LOCATION").confidence()
     seen = np.round(frames[confidence > 0]).astype(int).tolist()
-    known = [stop for stop in selection.moving(effect, index).stops if math.isfinite(effect.start + stop.frame)]
-    return seen, [
-        presence.Stop(round(effect.start + stop.frame), stop.forward, stop.fault == tracking.SHOT_ENDS)
-        for stop in known
-    ]
+    ends = [presence.Stop(at, stop.forward, stop.fault == tracking.SHOT_ENDS) for at, stop in _stops(effect, index)]
+    return seen, ends
 
 
 def key_ends(effect, index: int | None) -> None:

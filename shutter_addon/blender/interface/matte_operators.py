@@ -38,7 +38,7 @@ class SHUTTER_OT_matte_add(Adds, ImportHelper, Operator):
         name = self.channel_name
         image = recipe_import.matte_image(bpy.path.abspath(chosen_file(self)), name or "luminance")
         channel = {"channel": "NAMED", "channel_name": name} if name else {}
-        region_edits.add_matte(effect, selection.active_shutter(effect), name=image.name, image=image, **channel)
+        region_edits.add_region(effect, selection.active_shutter(effect), "MATTE", image.name, image=image, **channel)
 
 
 @kept
@@ -56,7 +56,7 @@ class SHUTTER_OT_matte_strip(Adds, Operator):
     strip: EnumProperty(name="Strip", items=strip_items, translation_context=contexts.no_translation)
 
     def change(self, _context, effect):
-        region = region_edits.add_matte(effect, selection.active_shutter(effect), name=self.strip, matte="STRIP")
+        region = region_edits.add_region(effect, selection.active_shutter(effect), "MATTE", self.strip, matte="STRIP")
         matte_strips.choose_strip(region, self.strip)
 
 
@@ -87,7 +87,7 @@ class SHUTTER_OT_matte_mask(_OfMask, Operator):
 
     def change(self, _context, effect):
         mask = self.chosen()
-        region_edits.add_matte(effect, selection.active_shutter(effect), name=mask.name, matte="MASK", mask=mask)
+        region_edits.add_region(effect, selection.active_shutter(effect), "MATTE", mask.name, matte="MASK", mask=mask)
 
 
 class SHUTTER_OT_outline_from_mask(_OfMask, Operator):
@@ -139,7 +139,7 @@ class SHUTTER_OT_ramp_add(Adds, Operator):
     ramp: EnumProperty(name="Ramp", description="How the ramp runs", items=RAMPS)
 
     def change(self, _context, effect):
-        region_edits.add_matte(effect, selection.active_shutter(effect), "RAMP", ramp=self.ramp)
+        region_edits.add_region(effect, selection.active_shutter(effect), "RAMP", ramp=self.ramp)
 
 
 class SHUTTER_OT_time_map(Adds, Operator):

@@ -11,7 +11,7 @@ from bpy.types import Operator, PropertyGroup
 
 from ..data import selection, validation
 from ..data.choices import CONTEXT
-from ..editing import bar_edits, follow_stabilization, follow_track, layer_presets, panning_shot, track_region, tripod
+from ..editing import bar_edits, follow_stabilization, follow_track, layer_presets, track_region
 from ..rendering.effect_source import FAULTS
 from .operator_bases import (
     Beside,
@@ -199,7 +199,7 @@ class SHUTTER_OT_panning_shot(_Tracks, OfStrokes, Operator):
     direction = "BOTH"
 
     def is_ready(self, scene, effect, strip):
-        return panning_shot.is_ready(scene, effect, strip, effect.active_region)
+        return layer_presets.can_pan(scene, effect, strip, effect.active_region)
 
     def ended(self, context):
         layer_presets.panning_shot(self._target.effect(), self._target.index, bar_edits.auto_key(context))
@@ -213,10 +213,10 @@ class SHUTTER_OT_tripod(_Tracks, OfShutter, Operator):
     direction = "BOTH"
 
     def is_ready(self, _edit, effect, _strip):
-        return tripod.is_ready(effect)
+        return layer_presets.can_stand(effect)
 
     def ended(self, context):
-        tripod.set_up(self._target.effect(), bar_edits.auto_key(context))
+        layer_presets.tripod(self._target.effect(), bar_edits.auto_key(context))
 
 
 class _Looks(Mixin):
