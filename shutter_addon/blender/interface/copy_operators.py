@@ -1,14 +1,22 @@
-"""Operators that give an effect to another clip, and its shutters and regions to another effect."""
+"""Operators that give an effect to another clip, its shutters and regions to another effect or a recipe, and a report
+to whoever helps."""
 
+from pathlib import Path
+
+import bpy
 from bpy.app.translations import contexts
 from bpy.app.translations import pgettext_rpt as rpt_
-from bpy.props import EnumProperty
+from bpy.props import EnumProperty, StringProperty
 from bpy.types import Operator
+from bpy_extras.io_utils import ExportHelper, ImportHelper
 
-from ..data import data_format
+from ...core.messages import UserError
+from ...core.recipes import recipe_file
+from ..data import data_format, recipe_import, selection
 from ..editing import add_effect, undelete
+from ..output import error_report, matte_export
 from .matte_operators import strip_items
-from .operator_bases import OfEffect, own_classes, report_warning
+from .operator_bases import Named, OfEffect, chosen_file, own_classes, report_error, report_warning
 from .operators import MakesEffect
 
 
@@ -46,6 +54,53 @@ class SHUTTER_OT_effect_paste(MakesEffect, OfEffect, Operator):
 
     def change(self, _context, effect):
         undelete.paste(effect, self.effect_strip)
+
+
+class SHUTTER_OT_recipe_import(OfEffect, ImportHelper, Operator):
+    """Replace the shutters, regions, keyframes and options of the effect with those of a recipe file"""
+
+    bl_label = "Import Recipe"
+    filename_ext = ".json"
+    filter_glob: StringProperty(default="*.json", options={"HIDDEN"})
+
+    def change(self, _context, effect):
+        path = Path(chosen_file(self))
+        recipe_import.apply(self.edit, effect, self.effect_strip, recipe_file.load(path), path.parent)
+
+
+class SHUTTER_OT_recipe_export(OfEffect, ExportHelper, Operator):
+    """Save the shutters, regions, keyframes and options of the effect as a recipe file"""
+
+    bl_label = "Export Recipe"
+    bl_options = {"REGISTER"}
+    filename_ext = ".json"
+    filter_glob: StringProperty(default="*.json", options={"HIDDEN"})
+
+    def change(self, _context, effect):
+        path = chosen_file(self)
+        try:
+            recipe_file.save(matte_export.recipe_for(self.edit, effect, self.effect_strip, Path(path)), path)
+        except OSError as error:
+            raise UserError(f"{path}: {error.strerror or error}") from None
+        if data_format.is_newer(self.edit):
+            words = rpt_('Saved "{path}", without what a newer version of Virtual Shutter has added')
+            report_warning(self, words.format(path=path))
+        else:
+            self.report({"INFO"}, rpt_('Saved "{path}"').format(path=path))
+
+
+class SHUTTER_OT_copy_report(Named, Operator):
+    """Copy versions, device, kinds and numbers of the edit, and last errors: no names, no paths. Nothing is sent"""
+
+    bl_label = "Copy Report"
+
+    def execute(self, context):
+        if bpy.app.background:
+            report_error(self, rpt_("Without a window there is no clipboard: use the command check with --report"))
+            return {"CANCELLED"}
+        context.window_manager.clipboard = error_report.text(selection.scene_of(context))
+        self.report({"INFO"}, rpt_("Report copied: paste it into your message, and read it before you send it"))
+        return {"FINISHED"}
 
 
 classes = own_classes(globals())

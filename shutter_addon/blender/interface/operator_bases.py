@@ -44,6 +44,12 @@ def report_warning(operator: Operator, sentence: str) -> None:
     operator.report({"WARNING"}, sentence)
 
 
+def popup(context: Context, words: str, **looks: str) -> None:
+    """Says a sentence that is already translated beside the pointer."""
+    show = context.window_manager.popup_menu
+    show(lambda menu, _context: menu.layout.label(text=words, translate=False), **looks)
+
+
 def is_escape(event: Event) -> bool:
     return event.type == "ESC" and event.value == "PRESS"
 

@@ -19,7 +19,6 @@ from .operator_bases import Mixin, own_classes
 from .option_panels import Inbetween, Options
 from .panel_parts import WIDEST, WithEffect, draw_list, draw_moves, draw_operators, draw_properties, sentence
 from .region_panels import Camera, Follow, Regions, Track, Transform, draw_tracked, draw_tracking, tracking_icon
-from .report_operators import Report
 
 
 class SHUTTER_UL_shutters(UIList):
@@ -284,6 +283,16 @@ class _Move(WithEffect):
             draw_tracking(layout, None)
 
 
+class _Report(Mixin):
+    """The last of the tab, whether there is an effect or not."""
+
+    bl_label = "Report"
+    bl_options = {"HIDE_HEADER"}
+
+    def draw(self, _context):
+        self.layout.operator("shutter.copy_report", icon="COPYDOWN")
+
+
 class _InProperties:
     bl_space_type = "PROPERTIES"
     bl_region_type = "WINDOW"
@@ -318,7 +327,7 @@ _PANELS = {
     "_options": (Options, ""),
     "_inbetween": (Inbetween, ""),
     "_bake": (Bake, ""),
-    "_report": (Report, ""),
+    "_report": (_Report, ""),
 }
 
 

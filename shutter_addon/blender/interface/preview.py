@@ -1,5 +1,6 @@
 """The live preview: what is drawn over the sequencer's picture, composed on Blender's GPU: views, and scribbles."""
 
+from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import replace
 
@@ -11,6 +12,8 @@ from bpy.app.translations import pgettext_rpt as rpt_
 from bpy.props import BoolProperty, EnumProperty, FloatProperty, FloatVectorProperty, PointerProperty
 from bpy.types import PropertyGroup
 
+from ...compute.renderer import Renderer
+from ...compute.request import Request
 from ...core import stopping, told
 from ...core.model.frame_state import FrameState
 from ...media import MediaError
@@ -36,6 +39,7 @@ from ..rendering import (
 from ..rendering.previews import Decision, Drawing
 from . import drawing, inbetween_operators, note_buttons, preview_quad, sharp_frame
 from .note_buttons import Button
+from .operator_bases import soon
 from .preview_quad import Quad
 
 VIEWS = (
@@ -75,11 +79,8 @@ def _redraw_when_still() -> float | None:
     return None
 
 
-def _follow_once() -> None:
-    shown_annotations.follow()
-
-
 _HOLES = (1.0, 0.55, 0.0), (0.75, 0.2, 0.9)  # the colours of compute.plates.TAKEN and FILLED
+Colors = Sequence[Sequence[float]]  # display code values
 _NAVIGATION = 56  # units at the right of a preview, where Blender's own buttons lie
 _STILL = 0.4  # seconds after which a frame that is shown stays
 _SOON = 0.1  # seconds
@@ -136,11 +137,11 @@ def _draw() -> None:
     # Blender tells nobody of strokes that are drawn or erased, but it draws the preview again.
     scene = selection.scene_of(context)
     if scene is not None and scene.library is None and invalidation.invalidate_changed(scene):
-        bpy.app.timers.register(_redraw_once)  # what is tagged while it is drawn is not drawn again
+        soon(_redraw_once)  # what is tagged while it is drawn is not drawn again
     sharp_frame.follow_pen()
     space = context.space_data
     if shown_annotations.is_laid_wrong(space) or shown_annotations.is_other(space, selection.seen(scene)):
-        bpy.app.timers.register(_follow_once)  # nothing may be changed while it is drawn
+        soon(shown_annotations.follow)  # nothing may be changed while it is drawn
     if sharp_frame.is_shown(space):
         _show_sharp(context, preview_areas.shown(context, space.display_channel))
     # A stroke that is being drawn would lie below our picture: Blender's own shows the same.
@@ -165,8 +166,8 @@ def _show(context, shown: Shown, decision: Decision | None, say) -> None:
     """Shows the effect, or says why not. decision: what the engine was asked for."""
     try:
         wanted = previews.for_drawing(context, shown, decision)
-        if previews.is_going(context) and not bpy.app.timers.is_registered(_redraw_when_still):
-            bpy.app.timers.register(_redraw_when_still, first_interval=_SOON)
+        if previews.is_going(context):
+            soon(_redraw_when_still, _SOON)
         quad = Quad(context.region, shown.strip, annotations.picture_size(shown.effect))
         try:
             if wanted.decision.is_late:
@@ -176,7 +177,7 @@ def _show(context, shown: Shown, decision: Decision | None, say) -> None:
         except stopping.StoppedError:
             say(rpt_("Composing…"))
             _show_strokes(context, quad, shown, wanted.decision.snapshot)
-            bpy.app.timers.register(_redraw_once)
+            soon(_redraw_once)
     except effect_source.FAULTS as error:
         previews.was_drawn()
         _tell_fault(error, say)
@@ -207,15 +208,17 @@ def _show_picture(context, quad: Quad, shown: Shown, wanted: Drawing, say) -> No
     if wanted.draws_result:
         texture = renderer.draw(replace(request, quick=previews.is_going(context), levels=True))
         quad.draw("PICTURE", {"picture": texture}, wanted.left, 1.0, opacity=shown.strip.blend_alpha)
+    colors = [shutter.color for shutter in shown.effect.shutters]
     if settings.view == "SCRIBBLES":
-        _show_scribbles(quad, shown.effect, renderer, request)
+        _show_scribbles(quad, colors, renderer.drawn_labels(request), renderer)
     elif settings.view == "COEFFICIENTS":
-        _show_coefficients(quad, shown.effect, renderer, request, "COEFFICIENTS", 0.75)
+        _show_coefficients(quad, colors, renderer, request, "COEFFICIENTS", 0.75)
     else:
         if settings.view == "HOLES":
-            _show_holes(quad, renderer, request)
+            holes = renderer.drawn_holes(replace(request, quick=True, levels=True))
+            _show_scribbles(quad, _HOLES, holes, renderer)
         if settings.view == "EDGES":
-            _show_coefficients(quad, shown.effect, renderer, request, "EDGES", 1.0)
+            _show_coefficients(quad, colors, renderer, request, "EDGES", 1.0)
         _show_strokes(context, quad, shown, wanted.decision.snapshot)
     previews.was_drawn()
     _tell_carrying(say)
@@ -259,8 +262,8 @@ def _tell_strobing(looked: strobing.Looked, place: int, say) -> None:
     """Says, in that place among what is said, that the exposure has too few frames, and gives the way to more."""
     if looked.known is not None and inbetween_build.running() is None:
         say(inbetween_operators.strobing_in_words(looked.known), inbetween_operators.smoothing(looked.known), place)
-    if looked.is_new and not bpy.app.timers.is_registered(_redraw_panels):
-        bpy.app.timers.register(_redraw_panels)  # which may have been drawn before
+    if looked.is_new:
+        soon(_redraw_panels)  # which may have been drawn before
     if looked.is_busy:
         if bpy.app.timers.is_registered(_measure):
             bpy.app.timers.unregister(_measure)
@@ -355,41 +358,27 @@ def _show_source(quad, shown: Shown, renderer, request, right: float) -> None:
     quad.draw("PICTURE", {"picture": texture}, 0.0, right, opacity=shown.strip.blend_alpha)
 
 
-def _show_scribbles(quad, effect, renderer, request) -> None:
-    labels, block = renderer.drawn_labels(request)
-    quad.draw(
-        "SCRIBBLES",
-        {"labels": labels, "palette": _palette(effect)},
-        opacity=0.7,
-        block=block,
-        size=_size(renderer),
-    )
-
-
-def _show_holes(quad, renderer, request) -> None:
-    kinds, block = renderer.drawn_holes(replace(request, quick=True, levels=True))
-    textures = {"labels": kinds, "palette": _texture(_HOLES)}
+def _show_scribbles(quad: Quad, colors: Colors, drawn: tuple[object, int], renderer: Renderer) -> None:
+    """Labels of a picture in their colours."""
+    labels, block = drawn
+    textures = {"labels": labels, "palette": _palette(colors)}
     quad.draw("SCRIBBLES", textures, opacity=0.7, block=block, size=_size(renderer))
 
 
-def _show_coefficients(quad, effect, renderer, request, step: str, opacity: float) -> None:
+def _show_coefficients(
+    quad: Quad, colors: Colors, renderer: Renderer, request: Request, step: str, opacity: float
+) -> None:
     coefficients, block = renderer.drawn_with_layers(replace(request, quick=True))
-    count = len(request.state.bars)
-    textures = {"coefficients": coefficients, "palette": _palette(effect)}
-    unit = float(drawing.ui_scale())
+    textures = {"coefficients": coefficients, "palette": _palette(colors)}
+    count, unit = len(request.state.bars), float(drawing.ui_scale())
     quad.draw(step, textures, opacity=opacity, block=block, count=count, size=_size(renderer), unit=unit)
 
 
-def _size(renderer) -> tuple[int, int]:
+def _size(renderer: Renderer) -> tuple[int, int]:
     return renderer.source.width, renderer.source.height
 
 
-def _palette(effect) -> Texture:
-    """The shutters' colours, display code values, side by side."""
-    return _texture([shutter.color for shutter in effect.shutters])
-
-
-def _texture(palette) -> Texture:
+def _palette(palette: Colors) -> Texture:
     """Colours, display code values, side by side."""
     colors = np.ones((len(palette), 4), dtype=np.float32)
     colors[:, :3] = palette
@@ -430,7 +419,7 @@ class _Notes:
 
 
 classes = (ShutterPreview,)
-TIMERS = _redraw_once, _redraw_when_still, _follow_once, _redraw_panels, _measure
+TIMERS = _redraw_once, _redraw_when_still, shown_annotations.follow, _redraw_panels, _measure
 _handler = None
 
 

@@ -17,7 +17,7 @@ from ..editing import bar_edits, drawn_places, region_edits, track_region
 from ..editing.motion_keys import MotionKeys
 from . import drawing
 from .gizmo_groups import TWEAK, Dragged, WithKeys, on_picture, to_region
-from .operator_bases import own_classes
+from .operator_bases import own_classes, popup
 
 _RADIUS = 7  # of a handle, in units of the interface
 _NEAREST = 0.03  # of the corner's handle to the centre's, in parts of the picture
@@ -180,8 +180,7 @@ def _key(context, effect, index: int) -> None:
     try:
         region_edits.key_region(effect, index)
     except EffectError as error:
-        sentence, show = str(error), context.window_manager.popup_menu
-        show(lambda menu, _context: menu.layout.label(text=sentence, translate=False), icon="ERROR")
+        popup(context, str(error), icon="ERROR")
 
 
 def _is_drawing(context) -> bool:

@@ -10,6 +10,7 @@ import bpy
 
 from ..data import preview_areas, selection, strips
 from ..rendering.previews import pen_is_down
+from .operator_bases import soon
 
 _TOOLS = "builtin.annotate"  # how the tools' names begin
 
@@ -76,9 +77,9 @@ def follow_pen() -> None:
     """For what draws a preview, which may change nothing: what the pen asks for comes right after."""
     was_down, _pen.is_down = _pen.is_down, pen_is_down()
     if _pen.is_down and not _pen.channel:
-        _soon(_show)
+        soon(_show)
     elif was_down and not _pen.is_down:
-        _soon(_lay_down)
+        soon(_lay_down)
 
 
 def is_shown(space) -> bool:
@@ -108,11 +109,6 @@ def _lay_down() -> None:
 
 _OWNER = object()  # of what Blender tells of tools
 TIMERS = (_show, _lay_down)
-
-
-def _soon(change) -> None:
-    if not bpy.app.timers.is_registered(change):
-        bpy.app.timers.register(change)
 
 
 def listen() -> None:

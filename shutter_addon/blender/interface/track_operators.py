@@ -1,5 +1,5 @@
 """Operators that key a region or the camera by the footage: as what is seen moves, or as a movie clip's tracks do; and
-those that make a panning shot of that, or a tripod."""
+those that make layers of regions, a panning shot, or a tripod."""
 
 import math
 import time
@@ -294,6 +294,24 @@ class SHUTTER_OT_follow_stabilization(OfEffect, Operator):
 
     def change(self, _context, effect):
         follow_stabilization.follow(self.edit, effect, self.effect_strip)
+
+
+class SHUTTER_OT_sharp_subject(OfRegion, Operator):
+    """Keep the active region sharp before all else, which is exposed for long and without it"""
+
+    bl_label = "Sharp Subject"
+
+    def change(self, context, effect):
+        layer_presets.sharp_subject(effect, effect.active_region, bar_edits.auto_key(context))
+
+
+class SHUTTER_OT_clean_trail(OfRegion, Operator):
+    """Have the active region leave a trail before all else, which stays sharp"""
+
+    bl_label = "Trail"
+
+    def change(self, context, effect):
+        layer_presets.clean_trail(effect, effect.active_region, bar_edits.auto_key(context))
 
 
 classes = own_classes(globals())
