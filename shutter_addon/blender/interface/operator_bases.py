@@ -81,9 +81,9 @@ class Named(Mixin):
     @classmethod
     def poll(cls, context: Context) -> bool:
         """Greys the operator out where there is a reason, and says it."""
-        if (sentence := cls.refusal(context)) is not None:
+        if sentence := cls.refusal(context):
             cls.poll_message_set(sentence)
-        return sentence is None
+        return not sentence
 
     @classmethod
     def refusal(cls, context: Context) -> str | None:

@@ -300,9 +300,8 @@ class SHUTTER_OT_draw(MakesEffect, OfShutter, Operator):
 
     @classmethod
     def why_not(cls, effect):
-        if sentence := super().why_not(effect):
-            return sentence
-        return None if selection.active_region(effect) is not None else collection_edits.why_full(effect, regions=1)
+        new_ones = 1 if selection.active_region(effect) is None else 0
+        return super().why_not(effect) or collection_edits.why_full(effect, regions=new_ones)
 
     def change(self, context, effect):
         region = selection.active_region(effect)
