@@ -4,7 +4,9 @@ import uuid
 
 import bpy
 from bpy.app.translations import pgettext_data as data_
+from bpy.types import PropertyGroup, Scene, Strip
 
+from ...core.frames.frame_source import FrameSource
 from ...core.model.limits import MAX_FRAME
 from ...media import color
 from ..data import annotations, data_format, seen_alone, source_media
@@ -17,7 +19,7 @@ _COLOR = "COLOR_06"
 _LOOK = ("use_flip_x", "use_flip_y", "color_multiply", "color_saturation", "multiply_alpha")
 
 
-def add_effect(scene, source):
+def add_effect(scene: Scene, source: Strip) -> tuple[Strip, PropertyGroup]:
     """Puts a new effect on a movie, image or clip strip: its strip above the source, same range, transform and crop.
 
     Returns strip and effect; the effect has no shutter yet. MediaError: the source cannot be read."""
@@ -51,12 +53,12 @@ def add_effect(scene, source):
     return strip, effect_of(scene, effect_scene)  # again: an operator's update may move the collection's items
 
 
-def _is_kept(scene, source) -> bool:
+def _is_kept(scene: Scene, source: Strip) -> bool:
     config = source_media.spec(source).options["config"]
     return color.keeps(scene.sequencer_colorspace_settings.name, config)
 
 
-def choose_source(effect, strip, source) -> None:
+def choose_source(effect: PropertyGroup, strip: Strip, source: Strip) -> None:
     """Has an effect show another movie, image or clip strip. MediaError: it cannot be read."""
     medium, scene = source_media.open_media(source), effect.id_data
     medium.close()
@@ -68,13 +70,13 @@ def choose_source(effect, strip, source) -> None:
     connect(scene, [strip, source, *source.connections])
 
 
-def _mute(source, medium) -> None:
+def _mute(source: Strip, medium: FrameSource) -> None:
     """Through a transparent picture the plain source would show. An opaque one stays: mute the effect to see it."""
     if medium.alpha != "opaque" and not source.mute:
         source.mute = source.virtual_shutter_muted = True
 
 
-def connect(scene, connected) -> None:
+def connect(scene: Scene, connected: list[Strip]) -> None:
     """Connects strips, so that they are selected and moved together; each leaves the strips it was connected to."""
     selected = [strip for strip in scene.sequence_editor.strips_all if strip.select]
     for strip in selected:
@@ -88,7 +90,7 @@ def connect(scene, connected) -> None:
         strip.select = strip in selected
 
 
-def copy_look(source, strip) -> None:
+def copy_look(source: Strip, strip: Strip) -> None:
     """Transform, crop, flip and colour of the source strip."""
     for group in ("transform", "crop"):
         old, new = getattr(source, group), getattr(strip, group)
@@ -99,7 +101,7 @@ def copy_look(source, strip) -> None:
         setattr(strip, name, getattr(source, name))
 
 
-def new_effect_scene(scene, identity: str, name: str, size):
+def new_effect_scene(scene: Scene, identity: str, name: str, size: tuple[int, int]) -> Scene:
     """An effect scene for an effect of the scene, with a camera and an empty annotation."""
     effect_scene = bpy.data.scenes.new(name)
     effect_scene.virtual_shutter.identity = identity
@@ -116,7 +118,7 @@ def new_effect_scene(scene, identity: str, name: str, size):
     return effect_scene
 
 
-def add_camera(scene) -> None:
+def add_camera(scene: Scene) -> None:
     """Without a camera, Blender renders a Scene strip empty and never asks the engine."""
     name = f"{scene.name} Camera"
     camera = bpy.data.objects.new(name, bpy.data.cameras.new(name))

@@ -9,6 +9,7 @@ from collections.abc import Callable
 from functools import partial
 
 from bpy.app.translations import pgettext_rpt as rpt_
+from bpy.types import MovieClip, MovieTrackingStabilization, PropertyGroup, Scene, Strip, bpy_struct
 
 from ...core.messages import EffectError
 from ...core.model import motions
@@ -20,7 +21,7 @@ from . import follow_track, motion_keys
 from .motion_keys import MotionKeys
 
 
-def follow(scene, effect, strip) -> None:
+def follow(scene: Scene, effect: PropertyGroup, strip: Strip) -> None:
     """Keys the camera by the stabilization of its clip, from where it is now, at the current frame. EffectError,
     MediaError: there is nothing to follow, and nothing has changed."""
     camera, start, size = effect.camera, scene.frame_current, annotations.picture_size(effect)
@@ -44,13 +45,13 @@ def follow(scene, effect, strip) -> None:
     camera.stops.clear()
 
 
-def _motion(settings) -> str:
+def _motion(settings: MovieTrackingStabilization) -> str:
     if not settings.use_stabilize_rotation:
         return "LOCATION"
     return "SCALE" if settings.use_stabilize_scale else "ROTATION"
 
 
-def unstabilized(clip, size) -> Callable[[float], Similarity]:
+def unstabilized(clip: MovieClip, size: tuple[int, int]) -> Callable[[float], Similarity]:
     """The motion of the picture from where stabilization lays it to where the clip has it, at a time in the clip's
     frames. EffectError: the clip is not stabilized."""
     settings = clip.tracking.stabilization
@@ -77,7 +78,7 @@ def unstabilized(clip, size) -> Callable[[float], Similarity]:
     return between
 
 
-def _stabilization(clip, aspect: float) -> Stabilization:
+def _stabilization(clip: MovieClip, aspect: float) -> Stabilization:
     settings, value, tracks = clip.tracking.stabilization, _values(clip), []
     used = [{track.name for track in each} for each in (settings.tracks, settings.rotation_tracks)]
     for track in clip.tracking.objects[0].tracks:
@@ -91,11 +92,11 @@ def _stabilization(clip, aspect: float) -> Stabilization:
     return Stabilization(tracks, settings.anchor_frame, turned=turned, scaled=turned and settings.use_stabilize_scale)
 
 
-def _values(clip) -> Callable:
+def _values(clip: MovieClip) -> Callable:
     """What a number of a clip is at one of its frames."""
     curves = fcurves.Curves(clip)
 
-    def at(owner, name: str, frame: int, axis: int | None = None) -> float:
+    def at(owner: bpy_struct, name: str, frame: int, axis: int | None = None) -> float:
         curve = curves.find(f"{owner.path_from_id()}.{name}", axis or 0)
         if curve is not None:
             return curve.evaluate(frame + clip.frame_start - 1)
@@ -104,7 +105,7 @@ def _values(clip) -> Callable:
     return at
 
 
-def _in_pixels(motion: Similarity, size) -> Similarity:
+def _in_pixels(motion: Similarity, size: tuple[int, int]) -> Similarity:
     """A motion in heights of the picture, y up, as one in pixels, y down."""
     turn, origin = motion.turn.conjugate(), motions.pixel((0, 0), size)
     return Similarity(turn, origin - turn * origin + size[1] * motion.shift.conjugate())

@@ -11,11 +11,20 @@ from pathlib import Path
 import bpy
 import numpy as np
 from bpy.app.translations import pgettext_rpt as rpt_
-from bpy.types import MovieClip, MovieTrackingTrack
+from bpy.types import (
+    MovieClip,
+    MovieTrackingMarkers,
+    MovieTrackingPlaneTrack,
+    MovieTrackingTrack,
+    PropertyGroup,
+    Scene,
+    Strip,
+)
 
 from ...core import revision
 from ...core.messages import EffectError, translated
 from ...core.model import motions
+from ...core.model.effect import Camera, Region
 from ...core.model.motions import Placement, Similarity
 from ..data import annotations, snapshot, source_media, strips, validation
 from ..rendering import effect_source
@@ -25,7 +34,7 @@ from .motion_keys import MotionKeys
 Points = dict[str, complex]  # where markers are in the picture, in pixels as motions.Similarity counts them
 
 
-def follow(scene, effect, strip, index: int) -> None:
+def follow(scene: Scene, effect: PropertyGroup, strip: Strip, index: int) -> None:
     """Keys a region by what it is set to follow, from where it is now, at the current frame. EffectError, MediaError:
     it cannot be followed, and nothing has changed."""
     start = scene.frame_current
@@ -35,22 +44,22 @@ def follow(scene, effect, strip, index: int) -> None:
     _key(scene, effect, strip, index, points)
 
 
-def update(scene, effect, strip, index: int) -> None:
+def update(scene: Scene, effect: PropertyGroup, strip: Strip, index: int) -> None:
     """Keys a region anew by what it follows, from where it is at the frame at which it began to. EffectError,
     MediaError: it cannot be followed, and nothing has changed."""
     _key(scene, effect, strip, index, _points(scene, effect, strip, index, _start(effect, index)))
 
 
-def _start(effect, index: int) -> int:
+def _start(effect: PropertyGroup, index: int) -> int:
     return round(effect.start + validation.number(effect.regions[index], "follow_frame"))
 
 
-def _keys(effect, index: int) -> MotionKeys:
+def _keys(effect: PropertyGroup, index: int) -> MotionKeys:
     region = effect.regions[index]
     return MotionKeys(effect, index, "LOCATION" if region.follow_kind == "TRACK" else region.motion)
 
 
-def _key(scene, effect, strip, index: int, points: dict[int, Points]) -> None:
+def _key(scene: Scene, effect: PropertyGroup, strip: Strip, index: int, points: dict[int, Points]) -> None:
     region, start, size = effect.regions[index], _start(effect, index), annotations.picture_size(effect)
     keys = _keys(effect, index)
     known = sorted({start, *(frame for frame in keys.edited(range(min(points), max(points) + 1)) if frame in points)})
@@ -65,7 +74,7 @@ def _key(scene, effect, strip, index: int, points: dict[int, Points]) -> None:
     region.stops.clear()
 
 
-def is_changed(region) -> bool:
+def is_changed(region: PropertyGroup) -> bool:
     """Whether a region follows what has changed since; for what is drawn."""
     if not region.follow_stamp:
         return False
@@ -76,7 +85,7 @@ def is_changed(region) -> bool:
 _stamps = revision.UntilChange()
 
 
-def stamp(region) -> str:
+def stamp(region: PropertyGroup) -> str:
     """Changes with the markers that a region follows; empty where there are none."""
     try:
         markers = _markers(region)
@@ -88,7 +97,7 @@ def stamp(region) -> str:
     return digest.hexdigest()
 
 
-def _markers(region) -> list[tuple[str, np.ndarray, np.ndarray]]:
+def _markers(region: PropertyGroup) -> list[tuple[str, np.ndarray, np.ndarray]]:
     """Of each point that a region follows its name, the clip's frames (n,) at which it has a marker, ascending, and
     where that is (n, 2), in fractions of the picture. EffectError: the clip has nothing of that name."""
     clip = region.follow_clip
@@ -122,13 +131,13 @@ def markers_of(track: MovieTrackingTrack) -> tuple[np.ndarray, np.ndarray]:
     return frames[shown], places.reshape(-1, 2)[shown]
 
 
-def _corners(plane) -> list[tuple[str, np.ndarray, np.ndarray]]:
+def _corners(plane: MovieTrackingPlaneTrack) -> list[tuple[str, np.ndarray, np.ndarray]]:
     frames, shown = _marker_frames(plane.markers)
     places = np.array([[tuple(corner) for corner in marker.corners] for marker in plane.markers], np.float32)
     return [(str(k), frames[shown], places[shown, k]) for k in range(4)]
 
 
-def _marker_frames(markers) -> tuple[np.ndarray, np.ndarray]:
+def _marker_frames(markers: MovieTrackingMarkers) -> tuple[np.ndarray, np.ndarray]:
     """The frames (n,) of markers, ascending, and which of them are not muted."""
     frames, muted = np.empty(len(markers), np.int32), np.empty(len(markers), bool)
     markers.foreach_get("frame", frames)
@@ -136,7 +145,7 @@ def _marker_frames(markers) -> tuple[np.ndarray, np.ndarray]:
     return frames, ~muted
 
 
-def _points(scene, effect, strip, index: int, start: int) -> dict[int, Points]:
+def _points(scene: Scene, effect: PropertyGroup, strip: Strip, index: int, start: int) -> dict[int, Points]:
     """By timeline frame of the strip the points that a region follows, as the strip shows them. EffectError,
     MediaError: there is nothing that it can follow from the frame `start` on."""
     region = effect.regions[index]
@@ -158,7 +167,7 @@ def _points(scene, effect, strip, index: int, start: int) -> dict[int, Points]:
     return by_frame
 
 
-def clip_times(scene, effect, strip, clip) -> dict[int, float]:
+def clip_times(scene: Scene, effect: PropertyGroup, strip: Strip, clip: MovieClip) -> dict[int, float]:
     """By timeline frame of the strip what it shows, in the clip's frames: in-between frames lie between two of them.
     EffectError, MediaError: the strip does not show the clip's footage."""
     frames = range(strip.left_handle, strip.right_handle)
@@ -169,13 +178,13 @@ def clip_times(scene, effect, strip, clip) -> dict[int, float]:
         return {frame: effect_source.source_index(shown, frame, source)[0] / source.step + first for frame in frames}
 
 
-def _points_at(tracks, time: float, size) -> Points:
+def _points_at(tracks: list, time: float, size: tuple[int, int]) -> Points:
     """Of the markers (see _markers) those that there are at a time in the clip's frames."""
     at_time = {name: _place_at(frames, places, time) for name, frames, places in tracks}
     return {name: motions.pixel(place, size) for name, place in at_time.items() if place is not None}
 
 
-def _check_footage(source, clip) -> None:
+def _check_footage(source: Strip, clip: MovieClip) -> None:
     """EffectError: a clip begins with another file than a strip does. MediaError: the strip has no files."""
     first = _file(source.clip) if source.type == "MOVIECLIP" and source.clip else source_media.spec(source).path
     if first.resolve() != _file(clip).resolve():
@@ -183,11 +192,11 @@ def _check_footage(source, clip) -> None:
         raise EffectError(sentence.format(clip=clip.name, strip=source.name))
 
 
-def _file(clip) -> Path:
+def _file(clip: MovieClip) -> Path:
     return Path(bpy.path.abspath(clip.filepath, library=clip.library))
 
 
-def _first_frame(source, clip) -> int:
+def _first_frame(source: Strip, clip: MovieClip) -> int:
     """The clip's frame that the first frame of a strip's medium is."""
     if source.type == "MOVIECLIP" and not source_media.first_frame(source):
         return 1
@@ -204,13 +213,18 @@ def _place_at(frames: np.ndarray, places: np.ndarray, time: float) -> np.ndarray
 
 
 def followed(
-    subject, frames: list[int], moves: dict[int, dict[int, Similarity]], start: int, size
+    subject: Region | Camera,
+    frames: list[int],
+    moves: dict[int, dict[int, Similarity]],
+    start: int,
+    size: tuple[int, int],
 ) -> dict[int, Placement]:
     """By frame the placement of a region or the camera, carried from the frames at which that is known.
 
     subject: a core.model.effect.Region or Camera; frames: ascending; moves: by frame at which the placement is known,
     `start` among them, the motions of the picture to other frames"""
-    known, centres = sorted(moves), {frame: subject.centre(frame) for frame in frames}
+    known, placed = sorted(moves), ((frame, subject.centre(frame)) for frame in frames)
+    centres = {frame: centre for frame, centre in placed if centre is not None}
     result = {start: subject.placement(start)}
 
     def carried(origin: int, frame: int, near: Placement) -> Placement | None:

@@ -13,14 +13,14 @@ from .motion_keys import MotionKeys
 SMOOTHNESS = 6  # frames before and after each: half a second in all
 
 
-def sharp_subject(effect, index: int, key: bool = False) -> None:
+def sharp_subject(effect: PropertyGroup, index: int, key: bool = False) -> None:
     """A region is sharp before all else, which is exposed for a whole window around the frame. key: keys the bars."""
     place = _as_layer(effect, index)
     shutter_edits.apply_preset(effect, place, "STILL", key)
     shutter_edits.apply_preset(effect, 0, "ANGLE_360", key)
 
 
-def clean_trail(effect, index: int, key: bool = False) -> None:
+def clean_trail(effect: PropertyGroup, index: int, key: bool = False) -> None:
     """A region leaves a trail, over a whole window around the frame, before all else, which is sharp. key: keys the
     bars."""
     place = _as_layer(effect, index)
@@ -28,7 +28,7 @@ def clean_trail(effect, index: int, key: bool = False) -> None:
     shutter_edits.apply_preset(effect, 0, "STILL", key)
 
 
-def panning_shot(effect, index: int, key: bool = False) -> None:
+def panning_shot(effect: PropertyGroup, index: int, key: bool = False) -> None:
     """As sharp_subject; and the exposure of all else moves with the region, as a camera's that pans with it. key: keys
     the bars."""
     sharp_subject(effect, index, key)
@@ -70,7 +70,7 @@ def tripod(effect: PropertyGroup, key: bool = False) -> None:
     track_region.key_ends(effect, None)  # the window lies elsewhere now
 
 
-def _as_layer(effect, index: int) -> int:
+def _as_layer(effect: PropertyGroup, index: int) -> int:
     """Makes a region a layer of a shutter of its own, which moves with nothing, as the default one; the place of that
     shutter."""
     region = effect.regions[index]

@@ -53,7 +53,7 @@ class Repair(NamedTuple):
     side: str
 
 
-def of(effect) -> Repair | None:
+def of(effect: PropertyGroup) -> Repair | None:
     """The repair that an effect has, however its shutters and its ramp are called; None: it has none."""
     step = inbetween_settings.factor(effect)
     if step == 1 or not effect.shutters:
@@ -72,13 +72,13 @@ def of(effect) -> Repair | None:
     return None
 
 
-def _moment(shutter) -> float:
+def _moment(shutter: PropertyGroup) -> float:
     """The middle of a shutter's open time, in bars from the middle of the first; none: it is never open."""
     weights = bars(shutter)
     return float((weights * np.arange(len(weights))).sum() / weights.sum()) if weights.any() else math.nan
 
 
-def _shown(effect) -> tuple[int, int]:
+def _shown(effect: PropertyGroup) -> tuple[int, int]:
     """The bar of the shown frame, where the source runs forward, and where it runs backward."""
     step = inbetween_settings.factor(effect)
     options = Options(validation.number(effect, "window"), position="center", step=step)
@@ -123,7 +123,7 @@ def _is_backward(scene: Scene, effect: PropertyGroup, strip: Strip) -> bool:
     return bool(timing_of(strips.source_of(scene, effect, strip)).use_reverse_frames)
 
 
-def _make_room(effect) -> None:
+def _make_room(effect: PropertyGroup) -> None:
     """Has the effect show in-between frames, if it has none, and the filmed frames on both sides of the shown one."""
     step, window = inbetween_settings.factor(effect), validation.number(effect, "window")
     filmed = max(-(-window // step), FILMED)

@@ -4,7 +4,7 @@ import bpy
 from bpy.app.translations import pgettext_iface as iface_
 from bpy.app.translations import pgettext_rpt as rpt_
 from bpy.props import EnumProperty
-from bpy.types import Operator
+from bpy.types import Context, Operator, PropertyGroup, Scene, Strip, UILayout
 
 from ...core import messages, revision
 from ...core.messages import EffectError, UserError
@@ -39,10 +39,10 @@ class SHUTTER_OT_bake(OfEffect, Operator):
     file_format: EnumProperty(name="Format", items=FORMATS)
 
     @classmethod
-    def why_not(cls, effect):
+    def why_not(cls, effect: PropertyGroup) -> str | None:
         return rpt_("An effect is being baked") if _is_baking() else None
 
-    def change(self, _context, effect):
+    def change(self, _context: Context, effect: PropertyGroup) -> set[str] | None:
         _failures.pop(effect.identity, None)
         baked_strips.check(self.edit, self.effect_strip)
         film = baked_film.film_of(self.edit, effect, self.effect_strip, self.file_format)
@@ -65,10 +65,10 @@ class SHUTTER_OT_bake_stop(Named, Operator):
     bl_label = "Stop Baking"
 
     @classmethod
-    def refusal(cls, _context):
+    def refusal(cls, _context: Context) -> str | None:
         return None if _running else rpt_("No effect is being baked")
 
-    def execute(self, context):
+    def execute(self, context: Context) -> set[str]:
         stop()
         redraw(context)
         return {"FINISHED"}
@@ -80,13 +80,13 @@ class SHUTTER_OT_unbake(OfEffect, Operator):
     bl_label = "Unbake"
 
     @classmethod
-    def refusal(cls, context):
+    def refusal(cls, context: Context) -> str | None:
         if sentence := super().refusal(context):
             return sentence
         is_baked = bool(selection.active(context)[2].virtual_shutter_bake.identity)
         return None if is_baked else rpt_("The effect is not baked")
 
-    def change(self, _context, _effect):
+    def change(self, _context: Context, _effect: PropertyGroup) -> None:
         baked_strips.unbake(self.edit, self.effect_strip)
 
 
@@ -144,7 +144,7 @@ def forget() -> None:
 class Bake(WithEffect):
     bl_label = "Bake"
 
-    def draw_effect(self, layout, scene, effect, strip):
+    def draw_effect(self, layout: UILayout, scene: Scene, effect: PropertyGroup, strip: Strip) -> None:
         job = next((job for job in _running if job.effect == effect.identity), None)
         if job is not None:
             done, total = job.done(), len(job.film.frames)
@@ -164,7 +164,7 @@ class Bake(WithEffect):
             layout.operator("shutter.unbake")
 
 
-def _draw_state(layout, scene, effect, strip) -> None:
+def _draw_state(layout: UILayout, scene: Scene, effect: PropertyGroup, strip: Strip) -> None:
     if not baked_strips.baked_of(scene, strip):
         sentence(layout, iface_("The baked strip was deleted"), "ERROR")
     elif (is_stale := baked_strips.known_stale(scene, effect, strip)) is None:
@@ -192,5 +192,5 @@ classes = own_classes(globals())
 TIMERS = _look, _ask_whether_stale
 
 
-def unregister():
+def unregister() -> None:
     forget()

@@ -7,7 +7,7 @@ import bpy
 from bpy.app.translations import contexts
 from bpy.app.translations import pgettext_rpt as rpt_
 from bpy.props import EnumProperty, StringProperty
-from bpy.types import Operator
+from bpy.types import Context, Operator, PropertyGroup
 from bpy_extras.io_utils import ExportHelper, ImportHelper
 
 from ...core.messages import UserError
@@ -27,7 +27,7 @@ class SHUTTER_OT_source(OfEffect, Operator):
 
     strip: EnumProperty(name="Strip", items=strip_items, translation_context=contexts.no_translation)
 
-    def change(self, _context, effect):
+    def change(self, _context: Context, effect: PropertyGroup) -> None:
         add_effect.choose_source(effect, self.effect_strip, self.edit.sequence_editor.strips_all[self.strip])
 
 
@@ -37,7 +37,7 @@ class SHUTTER_OT_effect_copy(OfEffect, Operator):
     bl_label = "Copy Effect"
     bl_options = {"REGISTER"}
 
-    def change(self, _context, effect):
+    def change(self, _context: Context, effect: PropertyGroup) -> None:
         undelete.copy(effect, self.effect_strip)
         if data_format.is_newer(self.edit):
             report_warning(self, rpt_("Copied, without what a newer version of Virtual Shutter has added"))
@@ -49,10 +49,10 @@ class SHUTTER_OT_effect_paste(MakesEffect, OfEffect, Operator):
     bl_label = "Paste Effect"
 
     @classmethod
-    def refusal(cls, context):
+    def refusal(cls, context: Context) -> str | None:
         return super().refusal(context) if undelete.has_copy() else rpt_("Copy an effect first")
 
-    def change(self, _context, effect):
+    def change(self, _context: Context, effect: PropertyGroup) -> None:
         undelete.paste(effect, self.effect_strip)
 
 
@@ -63,7 +63,7 @@ class SHUTTER_OT_recipe_import(OfEffect, ImportHelper, Operator):
     filename_ext = ".json"
     filter_glob: StringProperty(default="*.json", options={"HIDDEN"})
 
-    def change(self, _context, effect):
+    def change(self, _context: Context, effect: PropertyGroup) -> None:
         path = Path(chosen_file(self))
         recipe_import.apply(self.edit, effect, self.effect_strip, recipe_file.load(path), path.parent)
 
@@ -76,7 +76,7 @@ class SHUTTER_OT_recipe_export(OfEffect, ExportHelper, Operator):
     filename_ext = ".json"
     filter_glob: StringProperty(default="*.json", options={"HIDDEN"})
 
-    def change(self, _context, effect):
+    def change(self, _context: Context, effect: PropertyGroup) -> None:
         path = chosen_file(self)
         try:
             recipe_file.save(matte_export.recipe_for(self.edit, effect, self.effect_strip, Path(path)), path)
@@ -94,7 +94,7 @@ class SHUTTER_OT_copy_report(Named, Operator):
 
     bl_label = "Copy Report"
 
-    def execute(self, context):
+    def execute(self, context: Context) -> set[str]:
         if bpy.app.background:
             report_error(self, rpt_("Without a window there is no clipboard: use the command check with --report"))
             return {"CANCELLED"}

@@ -7,7 +7,7 @@ from bpy.app.translations import pgettext_iface as iface_
 from bpy.app.translations import pgettext_n as n_
 from bpy.app.translations import pgettext_rpt as rpt_
 from bpy.props import EnumProperty
-from bpy.types import Operator
+from bpy.types import Context, Event, Operator, PropertyGroup
 
 from ...core import messages
 from ...core.messages import EffectError
@@ -30,7 +30,7 @@ def stop() -> None:
     _show_end()
 
 
-def _show_start(context) -> None:
+def _show_start(context: Context) -> None:
     global _timer
     if not bpy.app.background:
         _timer = context.window_manager.event_timer_add(TICK, window=context.window)
@@ -51,7 +51,7 @@ def _say(sentence: str | None) -> None:
         workspace.status_text_set(sentence)
 
 
-def redraw_panels(context) -> None:
+def redraw_panels(context: Context) -> None:
     """Draws panels again, and no preview."""
     kinds = {"SEQUENCE_EDITOR": "UI", "PROPERTIES": "WINDOW"}
     for window in context.window_manager.windows:
@@ -96,7 +96,7 @@ class _OfInbetweens(OfEffect):
     bl_options = {"REGISTER"}
 
     @classmethod
-    def why_not(cls, effect):
+    def why_not(cls, effect: PropertyGroup) -> str | None:
         if inbetween_build.running() is not None:
             return rpt_(_RUNS)
         try:
@@ -113,13 +113,13 @@ class _Building(_OfInbetweens):
         """Factor of what the strip needs; None: all of the source's, of the effect's own."""
         return None
 
-    def invoke(self, context, _event):
+    def invoke(self, context: Context, _event: Event) -> set[str]:
         return self.tried(self._begin, context, bpy.app.background)
 
-    def execute(self, context):
+    def execute(self, context: Context) -> set[str]:
         return self.tried(self._begin, context, True)
 
-    def _begin(self, context, waits: bool) -> set[str]:
+    def _begin(self, context: Context, waits: bool) -> set[str]:
         scene, effect, strip = selection.active(context)
         self._build = inbetween_build.start(scene, effect, strip, self.wanted())
         _show_start(context)
@@ -129,7 +129,7 @@ class _Building(_OfInbetweens):
         context.window_manager.modal_handler_add(self)
         return {"RUNNING_MODAL"}
 
-    def modal(self, context, event):
+    def modal(self, context: Context, event: Event) -> set[str]:
         if inbetween_build.running() is not self._build:  # a file was loaded
             return {"CANCELLED"}
         if is_escape(event):
@@ -145,12 +145,12 @@ class _Building(_OfInbetweens):
             redraw_panels(context)
         return {"PASS_THROUGH"}
 
-    def cancel(self, _context):
+    def cancel(self, _context: Context) -> None:
         """Its window was closed."""
         if inbetween_build.running() is self._build:
             stop()
 
-    def _finish(self, context) -> set[str]:
+    def _finish(self, context: Context) -> set[str]:
         inbetween_build.ended()
         _show_end()
         redraw(context)
@@ -173,7 +173,7 @@ class SHUTTER_OT_inbetween_build(_Building, Operator):
     bl_label = "Build In-Between Frames"
 
     @classmethod
-    def why_not(cls, effect):
+    def why_not(cls, effect: PropertyGroup) -> str | None:
         return rpt_("Choose a factor first") if effect.inbetween == "1" else super().why_not(effect)
 
 
@@ -186,7 +186,8 @@ class SHUTTER_OT_smooth_streaks(_Building, Operator):
     factor: EnumProperty(name="Factor", items=INBETWEENS[1:])
 
     @classmethod
-    def why_not(cls, effect):  # what else is wrong is reported: where it is clicked, nothing is greyed out
+    def why_not(cls, effect: PropertyGroup) -> str | None:
+        # What else is wrong is reported: where it is clicked, nothing is greyed out.
         return rpt_(_RUNS) if inbetween_build.running() is not None else None
 
     def wanted(self) -> int | None:
@@ -208,7 +209,7 @@ class SHUTTER_OT_inbetween_purge(_OfInbetweens, Operator):
 
     bl_label = "Remove In-Between Frames"
 
-    def invoke(self, context, event):
+    def invoke(self, context: Context, event: Event) -> set[str]:
         return context.window_manager.invoke_confirm(
             self,
             event,
@@ -219,7 +220,7 @@ class SHUTTER_OT_inbetween_purge(_OfInbetweens, Operator):
             translate=False,
         )
 
-    def change(self, _context, effect):
+    def change(self, _context: Context, effect: PropertyGroup) -> None:
         freed, left = inbetween_build.purge(effect, strips.source_of(self.edit, effect, self.effect_strip))
         self.report({"INFO"}, rpt_("Removed {size}").format(size=size_in_words(freed)))
         for place, count in left:
@@ -230,5 +231,5 @@ class SHUTTER_OT_inbetween_purge(_OfInbetweens, Operator):
 classes = own_classes(globals())
 
 
-def unregister():
+def unregister() -> None:
     stop()

@@ -6,7 +6,7 @@ import bpy
 from bpy.app.translations import contexts
 from bpy.app.translations import pgettext_rpt as rpt_
 from bpy.props import BoolProperty, EnumProperty, StringProperty
-from bpy.types import Context, Mask, Operator
+from bpy.types import Context, Mask, Operator, PropertyGroup
 from bpy_extras.io_utils import ImportHelper
 
 from ...core.messages import UserError
@@ -34,7 +34,7 @@ class SHUTTER_OT_matte_add(Adds, ImportHelper, Operator):
     filter_image: BoolProperty(default=True, options={"HIDDEN", "SKIP_SAVE"})
     filter_folder: BoolProperty(default=True, options={"HIDDEN", "SKIP_SAVE"})
 
-    def change(self, _context, effect):
+    def change(self, _context: Context, effect: PropertyGroup) -> None:
         name = self.channel_name
         image = recipe_import.matte_image(bpy.path.abspath(chosen_file(self)), name or "luminance")
         channel = {"channel": "NAMED", "channel_name": name} if name else {}
@@ -55,7 +55,7 @@ class SHUTTER_OT_matte_strip(Adds, Operator):
 
     strip: EnumProperty(name="Strip", items=strip_items, translation_context=contexts.no_translation)
 
-    def change(self, _context, effect):
+    def change(self, _context: Context, effect: PropertyGroup) -> None:
         region = region_edits.add_region(effect, selection.active_shutter(effect), "MATTE", self.strip, matte="STRIP")
         matte_strips.choose_strip(region, self.strip)
 
@@ -71,7 +71,7 @@ class _OfMask(Adds):
     mask: EnumProperty(name="Mask", items=_masks, translation_context=contexts.no_translation)
 
     @classmethod
-    def why_not(cls, effect):
+    def why_not(cls, effect: PropertyGroup) -> str | None:
         if sentence := super().why_not(effect):
             return sentence
         return None if bpy.data.masks else rpt_("There is no mask: draw one in the Mask mode of an image or clip")
@@ -85,7 +85,7 @@ class SHUTTER_OT_matte_mask(_OfMask, Operator):
 
     bl_label = "Matte from Mask"
 
-    def change(self, _context, effect):
+    def change(self, _context: Context, effect: PropertyGroup) -> None:
         mask = self.chosen()
         region_edits.add_region(effect, selection.active_shutter(effect), "MATTE", mask.name, matte="MASK", mask=mask)
 
@@ -95,7 +95,7 @@ class SHUTTER_OT_outline_from_mask(_OfMask, Operator):
 
     bl_label = "Outline from Mask"
 
-    def change(self, _context, effect):
+    def change(self, _context: Context, effect: PropertyGroup) -> None:
         shutter = selection.active_shutter(effect)
         outline_masks.from_mask(self.edit, effect, self.effect_strip, shutter, self.chosen())
 
@@ -115,13 +115,13 @@ class SHUTTER_OT_matte_export(OfRegion, ImportHelper, Operator):
     filter_folder: BoolProperty(default=True, options={"HIDDEN", "SKIP_SAVE"})
 
     @classmethod
-    def why_not(cls, effect):
+    def why_not(cls, effect: PropertyGroup) -> str | None:
         if sentence := super().why_not(effect):
             return sentence
         is_laid = selection.active_region(effect).kind in strips.LAID
         return None if is_laid else rpt_("The region is no matte, ramp or outline")
 
-    def change(self, _context, effect):
+    def change(self, _context: Context, effect: PropertyGroup) -> None:
         folder = Path(bpy.path.abspath(self.directory or str(Path(self.filepath).parent)))
         region, word = selection.active_region(effect), self.format.lower()
         try:
@@ -138,7 +138,7 @@ class SHUTTER_OT_ramp_add(Adds, Operator):
 
     ramp: EnumProperty(name="Ramp", description="How the ramp runs", items=RAMPS)
 
-    def change(self, _context, effect):
+    def change(self, _context: Context, effect: PropertyGroup) -> None:
         region_edits.add_region(effect, selection.active_shutter(effect), "RAMP", ramp=self.ramp)
 
 
@@ -151,7 +151,7 @@ class SHUTTER_OT_time_map(Adds, Operator):
 
     more = {"regions": 1, "shutters": 2}
 
-    def change(self, _context, effect):
+    def change(self, _context: Context, effect: PropertyGroup) -> None:
         time_map.add(effect, self.ramp)
 
 

@@ -10,7 +10,7 @@ from .panel_parts import draw_moves, draw_operators
 class SHUTTER_MT_strip(Menu):
     bl_label = "Shutter"
 
-    def draw(self, _context):
+    def draw(self, _context: Context) -> None:
         layout = self.layout
         draw_operators(layout, ("add_effect", "ADD"), ("draw", "GREASEPENCIL"), ("erase",))
         layout.separator()
@@ -24,7 +24,7 @@ class SHUTTER_MT_strip(Menu):
 class SHUTTER_MT_of_shutter(Menu):
     bl_label = "Shutters"
 
-    def draw(self, _context):
+    def draw(self, _context: Context) -> None:
         layout = self.layout
         draw_operators(layout, ("shutter_add", "ADD"), ("shutter_remove", "REMOVE"))
         layout.menu_contents("SHUTTER_MT_shutters")
@@ -33,7 +33,7 @@ class SHUTTER_MT_of_shutter(Menu):
 class SHUTTER_MT_of_region(Menu):
     bl_label = "Regions"
 
-    def draw(self, _context):
+    def draw(self, _context: Context) -> None:
         layout = self.layout
         layout.menu_contents("SHUTTER_MT_regions")
         layout.separator()
@@ -88,7 +88,7 @@ def _menu(end: str, label: str, *groups: list[tuple[str, ...]]) -> type[Menu]:
 class SHUTTER_MT_of_preview(Menu):
     bl_label = "Preview"
 
-    def draw(self, context):
+    def draw(self, context: Context) -> None:
         layout, live = self.layout, context.window_manager.virtual_shutter
         layout.operator("shutter.full_quality")
         layout.separator()
@@ -100,7 +100,7 @@ class SHUTTER_MT_of_preview(Menu):
         layout.operator("shutter.probe_pixel")
 
 
-def _entry(self, _context):
+def _entry(self, _context: Context) -> None:
     self.layout.separator()
     self.layout.menu(SHUTTER_MT_strip.__name__)
 
@@ -108,9 +108,9 @@ def _entry(self, _context):
 classes = (*own_classes(globals()), *(_menu(end, *what) for end, what in _GROUPS.items()))
 
 
-def register():
+def register() -> None:
     bpy.types.SEQUENCER_MT_strip.append(_entry)
 
 
-def unregister():
+def unregister() -> None:
     bpy.types.SEQUENCER_MT_strip.remove(_entry)

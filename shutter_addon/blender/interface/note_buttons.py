@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass, field
 
-from bpy.types import Context, Gizmo, GizmoGroup
+from bpy.types import Context, Gizmo, GizmoGroup, Region
 
 from ..data import preview_areas
 from . import drawing
@@ -26,7 +26,7 @@ class Button:
 places: dict[tuple[int, str], tuple[drawing.Box, Button]] = {}  # by region and operator
 
 
-def clear(region) -> None:
+def clear(region: Region) -> None:
     """Takes all buttons from a region."""
     for key in [key for key in places if key[0] == region.as_pointer()]:
         del places[key]
@@ -37,7 +37,7 @@ def width(button: Button) -> float:
     return drawing.text_width(button.label) + 2 * _PAD * drawing.ui_scale()
 
 
-def place(region, left: float, bottom: float, button: Button) -> None:
+def place(region: Region, left: float, bottom: float, button: Button) -> None:
     """Puts a button into a region: its gizmo draws it."""
     box = left, bottom, left + width(button), bottom + HEIGHT * drawing.ui_scale()
     places[region.as_pointer(), button.operator] = box, button
@@ -48,7 +48,7 @@ def _placed(context: Context, operator: str) -> tuple[drawing.Box, Button] | Non
 
 
 class SHUTTER_GT_note_button(Gizmo):
-    def draw(self, context):
+    def draw(self, context: Context) -> None:
         if (placed := _placed(context, self.operator)) is None:
             return
         (left, bottom, right, top), button = placed
@@ -61,7 +61,7 @@ class SHUTTER_GT_note_button(Gizmo):
             color = look.text_sel if self.is_highlight else look.text
             drawing.text(left + _PAD * unit, bottom + 6 * unit, button.label, color=(*color, 1.0))
 
-    def test_select(self, context, location):
+    def test_select(self, context: Context, location: tuple[int, int]) -> int:
         if (placed := _placed(context, self.operator)) is None:
             return -1
         (left, bottom, right, top), _button = placed
@@ -72,16 +72,16 @@ class SHUTTER_GGT_note_buttons(InPreview, GizmoGroup):
     bl_label = "Buttons of Notes"
 
     @classmethod
-    def poll(cls, context):
+    def poll(cls, context: Context) -> bool:
         return context.window_manager.virtual_shutter.live and preview_areas.shown(context) is not None
 
-    def setup(self, _context):
+    def setup(self, _context: Context) -> None:
         for operator in OPERATORS:
             gizmo = self.gizmos.new(SHUTTER_GT_note_button.__name__)
             gizmo.operator = operator
             gizmo.target_set_operator(operator)
 
-    def draw_prepare(self, context):
+    def draw_prepare(self, context: Context) -> None:
         for gizmo in self.gizmos:
             placed = _placed(context, gizmo.operator)
             for name, value in (placed[1].values if placed else {}).items():
@@ -91,5 +91,5 @@ class SHUTTER_GGT_note_buttons(InPreview, GizmoGroup):
 classes = own_classes(globals())
 
 
-def unregister():
+def unregister() -> None:
     places.clear()

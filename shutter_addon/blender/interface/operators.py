@@ -5,7 +5,7 @@ from bpy.app.translations import contexts
 from bpy.app.translations import pgettext_iface as iface_
 from bpy.app.translations import pgettext_rpt as rpt_
 from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty
-from bpy.types import Context, Operator
+from bpy.types import Annotation, Context, Event, Operator, PropertyGroup
 
 from ...core.messages import EffectError
 from ...core.model import presets
@@ -47,10 +47,10 @@ class SHUTTER_OT_add_effect(Named, Operator):
     bl_options = UNDOABLE
 
     @classmethod
-    def refusal(cls, context):
+    def refusal(cls, context: Context) -> str | None:
         return why_no_effect(context)
 
-    def execute(self, context):
+    def execute(self, context: Context) -> set[str]:
         return self.tried(give_effect, context)
 
 
@@ -79,10 +79,10 @@ class MakesEffect(Mixin):
     """Gives the active strip an effect first, if that has none."""
 
     @classmethod
-    def refusal(cls, context):
+    def refusal(cls, context: Context) -> str | None:
         return why_no_effect(context) if selection.active(context) is None else super().refusal(context)
 
-    def execute(self, context):
+    def execute(self, context: Context) -> set[str]:
         if selection.active(context) is None and self.tried(give_effect, context) == {"CANCELLED"}:
             return {"CANCELLED"}
         return super().execute(context)
@@ -94,12 +94,12 @@ class SHUTTER_OT_match_source(OfEffect, Operator):
     bl_label = "Match Source"
 
     @classmethod
-    def why_not(cls, effect):
+    def why_not(cls, effect: PropertyGroup) -> str | None:
         if (shown := match_source.shown(effect)) is None:
             return rpt_("The Shutter strip has no source any more")
         return None if shown.differences else rpt_("The Shutter strip is like its source")
 
-    def change(self, _context, effect):
+    def change(self, _context: Context, effect: PropertyGroup) -> None:
         if (neighbor := match_source.match(effect)) is not None:
             sentence = rpt_('"{neighbor}" is in the way: "{strip}" has not the whole range of its source')
             report_warning(self, sentence.format(neighbor=neighbor.name, strip=self.effect_strip.name))
@@ -111,16 +111,16 @@ class SHUTTER_OT_copy_modifiers(OfEffect, Operator):
     bl_label = "Copy Modifiers"
 
     @classmethod
-    def why_not(cls, effect):
+    def why_not(cls, effect: PropertyGroup) -> str | None:
         if (shown := match_source.shown(effect)) is not None and shown.lacks_modifiers:
             return None
         return rpt_("The Shutter strip has the modifiers of its source")
 
-    def change(self, _context, effect):
+    def change(self, _context: Context, effect: PropertyGroup) -> None:
         match_source.copy_modifiers(effect)
 
 
-def show_panel(context) -> None:
+def show_panel(context: Context) -> None:
     """Opens the sidebar's Shutter tab beside the picture: in the Properties editor it is below all other panels."""
     for _window, area in preview_areas.previews(context):
         area.spaces.active.show_region_ui = True
@@ -150,10 +150,10 @@ class SHUTTER_OT_shutter_add(OfEffect, Operator):
     bl_label = "Add Shutter"
 
     @classmethod
-    def why_not(cls, effect):
+    def why_not(cls, effect: PropertyGroup) -> str | None:
         return collection_edits.why_full(effect, shutters=1)
 
-    def change(self, _context, effect):
+    def change(self, _context: Context, effect: PropertyGroup) -> None:
         shutter_edits.add_shutter(effect)
 
 
@@ -164,7 +164,7 @@ class SHUTTER_OT_shutter_duplicate(Adds, Operator):
 
     more = {"shutters": 1}
 
-    def change(self, _context, effect):
+    def change(self, _context: Context, effect: PropertyGroup) -> None:
         shutter_edits.duplicate_shutter(effect, effect.active_shutter)
 
 
@@ -174,12 +174,12 @@ class SHUTTER_OT_shutter_remove(OfShutter, Operator):
     bl_label = "Remove Shutter"
 
     @classmethod
-    def why_not(cls, effect):
+    def why_not(cls, effect: PropertyGroup) -> str | None:
         if len(effect.shutters) == 1:
             return rpt_("The last shutter of an effect cannot be removed")
         return super().why_not(effect)
 
-    def change(self, _context, effect):
+    def change(self, _context: Context, effect: PropertyGroup) -> None:
         shutter_edits.remove_shutter(effect, effect.active_shutter)
 
 
@@ -188,7 +188,7 @@ class SHUTTER_OT_shutter_move(Move, OfShutter, Operator):
 
     bl_label = "Move Shutter"
 
-    def change(self, _context, effect):
+    def change(self, _context: Context, effect: PropertyGroup) -> set[str] | None:
         index = effect.active_shutter
         to = self.target(list(range(len(effect.shutters))), index)
         if to == index:
@@ -213,7 +213,7 @@ class SHUTTER_OT_preset(OfShutter, Operator):
 
     preset: EnumProperty(name="Preset", items=_presets, translation_context=CONTEXT)
 
-    def change(self, context, effect):
+    def change(self, context: Context, effect: PropertyGroup) -> None:
         shutter_edits.apply_preset(effect, effect.active_shutter, self.preset, bar_edits.auto_key(context))
 
 
@@ -222,7 +222,7 @@ class SHUTTER_OT_bars_key(OfShutter, Operator):
 
     bl_label = "Insert Bar Keyframes"
 
-    def change(self, _context, effect):
+    def change(self, _context: Context, effect: PropertyGroup) -> None:
         bar_edits.key_bars(effect, effect.active_shutter)
 
 
@@ -231,7 +231,7 @@ class SHUTTER_OT_bars_unkey(OfShutter, Operator):
 
     bl_label = "Delete Bar Keyframes"
 
-    def change(self, _context, effect):
+    def change(self, _context: Context, effect: PropertyGroup) -> set[str] | None:
         if not bar_edits.unkey_bars(effect, effect.active_shutter):
             report_warning(self, rpt_("No bar has a keyframe at the current frame"))
             return {"CANCELLED"}
@@ -246,7 +246,7 @@ class SHUTTER_OT_bar_set(OfShutter, Operator):
     bar: IntProperty(name="Bar", description="Number of the bar, from 1", default=1, min=1)
     weight: FloatProperty(name="Weight", description="How much the bar's frame contributes", min=0.0, soft_max=1.0)
 
-    def invoke(self, context, event):
+    def invoke(self, context: Context, event: Event) -> set[str]:
         from .bar_editor import bar_under
 
         effect = selection.active(context)[1]
@@ -260,17 +260,17 @@ class SHUTTER_OT_bar_set(OfShutter, Operator):
         title = iface_("Bar {number}").format(number=self.bar) if self.is_pointed_at else ""
         return context.window_manager.invoke_props_dialog(self, width=200, title=title)
 
-    def _read(self, effect):
+    def _read(self, effect: PropertyGroup) -> None:
         bars = bar_edits.bars_now(effect, effect.active_shutter)
         self.weight = bars[min(self.bar, len(bars)) - 1]
 
-    def draw(self, _context):
+    def draw(self, _context: Context) -> None:
         self.layout.activate_init = True
         if not getattr(self, "is_pointed_at", False):  # from a menu, by keys
             self.layout.prop(self, "bar")
         self.layout.prop(self, "weight")
 
-    def change(self, context, effect):
+    def change(self, context: Context, effect: PropertyGroup) -> None:
         weights = bar_edits.bars_now(effect, effect.active_shutter)
         if self.bar > len(weights):
             raise EffectError(rpt_("The shutter has {count} bars").format(count=len(weights)))
@@ -299,11 +299,11 @@ class SHUTTER_OT_draw(MakesEffect, OfShutter, Operator):
     )
 
     @classmethod
-    def why_not(cls, effect):
+    def why_not(cls, effect: PropertyGroup) -> str | None:
         new_ones = 1 if selection.active_region(effect) is None else 0
         return super().why_not(effect) or collection_edits.why_full(effect, regions=new_ones)
 
-    def change(self, context, effect):
+    def change(self, context: Context, effect: PropertyGroup) -> None:
         region = selection.active_region(effect)
         if self.new or region is None or region.kind in strips.MATTES:
             if sentence := collection_edits.why_full(effect, regions=1):  # poll() does not know what `new` is
@@ -321,13 +321,13 @@ class SHUTTER_OT_erase(OfStrokes, Operator):
     bl_label = "Erase"
     only_seen = True
 
-    def change(self, context, effect):
+    def change(self, context: Context, effect: PropertyGroup) -> None:
         drawn_places.begin(effect, self.effect_strip, effect.active_region, erases=True)
         if not drawing_tool(context, effect, selection.active_region(effect), "builtin.annotate_eraser"):
             self.report({"INFO"}, "Open a sequencer with a preview to erase")
 
 
-def drawing_tool(context, effect, region, tool: str) -> bool:
+def drawing_tool(context: Context, effect: PropertyGroup, region: PropertyGroup, tool: str) -> bool:
     """Makes the region's layer the active annotation of every preview, and the tool theirs; whether there is one."""
     if annotations.layer_of(effect, region) is None:
         region_edits.new_layer(effect, region)
@@ -344,7 +344,7 @@ def _layers(context: Context) -> list[tuple]:
     return [(layer.info, layer.info, "") for layer in layers]
 
 
-def annotation_of(context):
+def annotation_of(context: Context) -> Annotation | None:
     """The annotation that the first preview shows."""
     return next((area.spaces.active.annotation for _window, area in preview_areas.previews(context)), None)
 
@@ -358,15 +358,16 @@ class SHUTTER_OT_region_take(Adds, Operator):
     layer: EnumProperty(name="Layer", items=_layers, translation_context=contexts.no_translation)
 
     @classmethod
-    def refusal(cls, context):
+    def refusal(cls, context: Context) -> str | None:
         if sentence := super().refusal(context):
             return sentence
         if not region_edits.free_layers(selection.active(context)[1], annotation_of(context)):
             return rpt_("The preview shows no annotation layer that is not a region yet")
         return None
 
-    def change(self, context, effect):
-        layer = annotation_of(context).layers[self.layer]
+    def change(self, context: Context, effect: PropertyGroup) -> None:
+        free = region_edits.free_layers(effect, annotation_of(context))
+        layer = next(layer for layer in free if layer.info == self.layer)
         region_edits.take_layer(effect, selection.active_shutter(effect), layer)
         for _window, area in preview_areas.previews(context):
             shown_annotations.give(area.spaces.active, effect.scene.annotation)
@@ -385,7 +386,7 @@ class SHUTTER_OT_region_assign(OfRegion, Operator):
 
     shutter: EnumProperty(name="Shutter", items=_shutters, translation_context=contexts.no_translation)
 
-    def change(self, _context, effect):
+    def change(self, _context: Context, effect: PropertyGroup) -> None:
         region_edits.assign_region(effect, effect.active_region, effect.shutters[int(self.shutter)])
 
 
@@ -394,7 +395,7 @@ class SHUTTER_OT_region_remove(OfRegion, Operator):
 
     bl_label = "Remove Region"
 
-    def change(self, _context, effect):
+    def change(self, _context: Context, effect: PropertyGroup) -> None:
         region_edits.remove_region(effect, effect.active_region)
 
 
@@ -403,7 +404,7 @@ class SHUTTER_OT_region_move(Move, OfRegion, Operator):
 
     bl_label = "Move Region"
 
-    def change(self, _context, effect):
+    def change(self, _context: Context, effect: PropertyGroup) -> set[str] | None:
         index, name = effect.active_region, selection.active_shutter(effect).name
         listed = [i for i, region in enumerate(effect.regions) if region.shutter == name]
         if (to := self.target(listed, index)) == index:
@@ -417,7 +418,7 @@ class SHUTTER_OT_region_key(OfRegion, Operator):
 
     bl_label = "Insert Region Keyframes"
 
-    def change(self, _context, effect):
+    def change(self, _context: Context, effect: PropertyGroup) -> None:
         region_edits.key_region(effect, effect.active_region)
 
 

@@ -3,6 +3,7 @@
 import bpy
 from bpy.app.translations import pgettext_iface as iface_
 from bpy.app.translations import pgettext_n as n_
+from bpy.types import PropertyGroup, Scene, Strip, UILayout
 
 from ..rendering import inbetween_build
 from ..rendering.effect_source import FAULTS
@@ -14,7 +15,7 @@ from .panel_parts import WithEffect, draw_properties, sentence
 class Options(WithEffect):
     bl_label = "Options"
 
-    def draw_effect(self, layout, _scene, effect, _strip):
+    def draw_effect(self, layout: UILayout, _scene: Scene, effect: PropertyGroup, _strip: Strip) -> None:
         names = "position", "interpolation", "light", "exposure", "edges", "stop_at_cuts", "aggregate", "border"
         draw_properties(layout, effect, *names)
         column = layout.column()
@@ -31,7 +32,7 @@ class Options(WithEffect):
 class Inbetween(WithEffect):
     bl_label = "In-Between Frames"
 
-    def draw_effect(self, layout, scene, effect, strip):
+    def draw_effect(self, layout: UILayout, scene: Scene, effect: PropertyGroup, strip: Strip) -> None:
         build = inbetween_build.running()
         if build is not None and build.scene != effect.scene.session_uid:
             build = None  # of another effect
@@ -64,7 +65,7 @@ _STATES = {
 }
 
 
-def _draw_look(layout, look) -> None:
+def _draw_look(layout: UILayout, look: inbetween_build.Look) -> None:
     words, icon = _STATES[look.state.name]
     words = iface_(words).format(done=look.state.done, total=look.state.total)
     column = layout.column(align=True)

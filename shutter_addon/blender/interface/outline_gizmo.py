@@ -4,7 +4,7 @@ import bpy
 import numpy as np
 from bpy.app.translations import contexts
 from bpy.app.translations import pgettext_iface as iface_
-from bpy.types import Gizmo, GizmoGroup
+from bpy.types import Context, Event, Gizmo, GizmoGroup, PropertyGroup, Strip
 
 from ...core.messages import UserError
 from ...core.model import outlines
@@ -24,7 +24,7 @@ _MORE = 1.25  # times, with a turn of the wheel
 class SHUTTER_GT_outline(Dragged, Gizmo):
     """The curves."""
 
-    def draw(self, context):
+    def draw(self, context: Context) -> None:
         if context.screen.is_animation_playing:
             return
         if not (curves := _curves(context)):
@@ -35,7 +35,7 @@ class SHUTTER_GT_outline(Dragged, Gizmo):
             width = 2 if self.is_highlight or self.is_modal else 1
             drawing.lines(mapped(matrix, np.array(points)), _CARRIED, closed=True, width=width)
 
-    def test_select(self, context, location):
+    def test_select(self, context: Context, location: tuple[int, int]) -> int:
         curves = _curves(context)
         if not curves:
             return -1
@@ -44,7 +44,7 @@ class SHUTTER_GT_outline(Dragged, Gizmo):
         _index, apart = outlines.nearest(curves, point, _aspect(effect))
         return 0 if apart * height <= drawing.ui_scale() * _NEAR else -1
 
-    def invoke(self, context, event):
+    def invoke(self, context: Context, event: Event) -> set[str]:
         if not (curves := _curves(context)):
             return {"CANCELLED"}
         scene, effect, strip = selection.in_picture(context)
@@ -55,10 +55,10 @@ class SHUTTER_GT_outline(Dragged, Gizmo):
         self.pulled, _apart = outlines.nearest(curves, self.grabbed, self.aspect)
         return {"RUNNING_MODAL"}
 
-    def mended(self):
+    def mended(self) -> outlines.Curves:
         return outlines.dragged(self.curves, self.pulled, self.grabbed, self.by, self.reach, self.aspect)
 
-    def modal(self, context, event, _tweak):
+    def modal(self, context: Context, event: Event, _tweak: set[str]) -> set[str]:
         if (effect := self.target.effect()) is None or (strip := self._strip(effect)) is None:
             return {"RUNNING_MODAL"}
         if event.type in {"WHEELUPMOUSE", "WHEELDOWNMOUSE"}:
@@ -68,7 +68,7 @@ class SHUTTER_GT_outline(Dragged, Gizmo):
         context.area.tag_redraw()
         return {"RUNNING_MODAL"}
 
-    def exit(self, context, cancel):
+    def exit(self, context: Context, cancel: bool) -> None:
         if cancel or not any(self.by) or (effect := self.target.effect()) is None:
             return
         if (strip := self._strip(effect)) is None:
@@ -77,11 +77,11 @@ class SHUTTER_GT_outline(Dragged, Gizmo):
         context.area.tag_redraw()
         bpy.ops.ed.undo_push(message=iface_("Mend Outline", contexts.operator_default))
 
-    def _strip(self, effect):
+    def _strip(self, effect: PropertyGroup) -> Strip | None:
         return effect.id_data.sequence_editor.strips_all.get(self.strip)
 
 
-def _curves(context) -> outlines.Curves:
+def _curves(context: Context) -> outlines.Curves:
     """The active outline's at the current frame, where it is seen."""
     if (seen := selection.in_picture(context)) is None:  # while it plays, it may just have gone
         return ()
@@ -92,12 +92,14 @@ def _curves(context) -> outlines.Curves:
         return ()
 
 
-def _aspect(effect) -> float:
+def _aspect(effect: PropertyGroup) -> float:
     width, height = annotations.picture_size(effect)
     return width / height
 
 
-def _on_picture(context, effect, strip, location) -> tuple[tuple[float, float], float]:
+def _on_picture(
+    context: Context, effect: PropertyGroup, strip: Strip, location: tuple[int, int]
+) -> tuple[tuple[float, float], float]:
     """A point of the preview's region in fractions of the picture, and how many of the region's pixels that is high."""
     matrix = to_region(effect, strip, context.region)
     x, y = on_picture(matrix, *location)
@@ -109,7 +111,7 @@ class SHUTTER_GGT_outline(WithKeys, GizmoGroup):
     gizmo = SHUTTER_GT_outline
 
     @classmethod
-    def poll(cls, context):
+    def poll(cls, context: Context) -> bool:
         if not region_gizmo.SHUTTER_GGT_region.poll(context):
             return False
         return selection.active_region(selection.in_picture(context)[1]).kind == "OUTLINE"

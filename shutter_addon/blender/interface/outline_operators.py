@@ -5,7 +5,7 @@ from contextlib import closing
 import bpy
 from bpy.app.translations import pgettext_rpt as rpt_
 from bpy.props import IntProperty
-from bpy.types import Operator
+from bpy.types import Context, Event, Operator, PropertyGroup
 
 from ...core.messages import UserError
 from ..data import selection, strips
@@ -23,7 +23,7 @@ class OfOutline(OfRegion):
     only_seen = True
 
     @classmethod
-    def why_not(cls, effect):
+    def why_not(cls, effect: PropertyGroup) -> str | None:
         if sentence := super().why_not(effect):
             return sentence
         return None if selection.active_region(effect).kind == "OUTLINE" else rpt_("The region is no outline")
@@ -34,17 +34,17 @@ class _Carries(Beside, OfOutline):
 
     bl_options = {"REGISTER"}
 
-    def carried(self, context) -> set[str] | None:
+    def carried(self, context: Context) -> set[str] | None:
         """Called once all is carried. One of FAULTS: what comes then cannot be done."""
         return None
 
-    def execute(self, context):
+    def execute(self, context: Context) -> set[str]:
         return self.tried(self._begin, context, True)
 
-    def invoke(self, context, _event):
+    def invoke(self, context: Context, _event: Event) -> set[str]:
         return self.tried(self._begin, context, bpy.app.background)
 
-    def _begin(self, context, waits: bool) -> set[str] | None:
+    def _begin(self, context: Context, waits: bool) -> set[str] | None:
         scene, effect, strip = selection.active(context)
         self._target = track_region.Target.of(effect, effect.active_region)
         if not strips.is_carried(selection.active_region(effect)):
@@ -61,7 +61,7 @@ class _Carries(Beside, OfOutline):
         outline_carrying.carry(file, frames, show_carried)
         return self.go_on(context, _TICK)
 
-    def modal(self, context, event):
+    def modal(self, context: Context, event: Event) -> set[str]:
         progress = outline_carrying.progress()
         is_stopped = self._target.effect() is None or is_escape(event)
         if is_stopped:
@@ -74,7 +74,7 @@ class _Carries(Beside, OfOutline):
         self.cancel(context)
         return {"CANCELLED"} if is_stopped else self.tried(self._end, context)
 
-    def _end(self, context) -> set[str] | None:
+    def _end(self, context: Context) -> set[str] | None:
         if (failure := outline_carrying.failure(self._file)) is not None:
             raise UserError(failure)
         return self.carried(context)
@@ -91,7 +91,7 @@ class SHUTTER_OT_outline_needed(_Carries, Operator):
 
     bl_label = "Next Drawing Needed"
 
-    def carried(self, context):
+    def carried(self, context: Context) -> set[str] | None:
         scene, effect, strip = selection.active(context)
         needed = outline_drawings.next_needed(scene, effect, strip, self._target.index)
         if needed.frame is None:
@@ -118,7 +118,7 @@ class SHUTTER_OT_outline_mask(_Carries, Operator):
         soft_max=50,
     )
 
-    def carried(self, context):
+    def carried(self, context: Context) -> None:
         mask = outline_masks.to_mask(context, selection.active(context), self._target.index, self.step)
         self.report({"INFO"}, rpt_('Made the mask "{mask}"').format(mask=mask.name))
 
@@ -128,7 +128,7 @@ class SHUTTER_OT_outline_draw(OfOutline, Operator):
 
     bl_label = "Insert Outline Drawing"
 
-    def change(self, _context, effect):
+    def change(self, _context: Context, effect: PropertyGroup) -> set[str] | None:
         scene, strip, index = self.edit, self.effect_strip, effect.active_region
         curves = outline_drawings.curves_now(scene, effect, strip, index)
         if not curves:
@@ -150,7 +150,7 @@ class SHUTTER_OT_outline_it(OfStrokes, Operator):
         options={"SKIP_SAVE"},
     )
 
-    def change(self, _context, effect):
+    def change(self, _context: Context, effect: PropertyGroup) -> set[str] | None:
         if self.properties.is_property_set("frame"):
             self.edit.frame_set(self.frame)
         if not outline_drawings.outline_it(self.edit, effect, self.effect_strip, effect.active_region):

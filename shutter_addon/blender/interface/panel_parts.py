@@ -1,5 +1,7 @@
 """What panels are made of: sentences, lists, and when there is an effect to show."""
 
+from collections.abc import Sequence
+
 import bpy
 from bpy.app.translations import contexts
 from bpy.app.translations import pgettext_n as n_
@@ -17,7 +19,7 @@ WIDEST = 360  # units of the interface that a sentence takes at most, as a popov
 _MOST_ROWS = 5  # of a list; the rest is scrolled to
 
 
-def sentence(layout, words: str, icon: str = "NONE", room: float = 1.0, is_quiet: bool = False) -> None:
+def sentence(layout: UILayout, words: str, icon: str = "NONE", room: float = 1.0, is_quiet: bool = False) -> None:
     """A sentence, already translated, in as many lines as the panel's width takes; room: its share of that width."""
     if icon == "ERROR":
         told.shown(words)
@@ -34,7 +36,9 @@ def sentence(layout, words: str, icon: str = "NONE", room: float = 1.0, is_quiet
         row.label(text=line, icon=icon if i == 0 or icon == "NONE" else "BLANK1", translate=False)
 
 
-def draw_list(layout, effect, kind: str, items, menu: str | None = None) -> None:
+def draw_list(
+    layout: UILayout, effect: PropertyGroup, kind: str, items: Sequence[PropertyGroup], menu: str | None = None
+) -> None:
     """The list of shutters or regions, as high as it has to be, and the buttons beside it."""
     row = layout.row()
     row.template_list(

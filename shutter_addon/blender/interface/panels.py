@@ -4,7 +4,7 @@ from collections.abc import Iterator
 
 import bpy
 from bpy.app.translations import pgettext_iface as iface_
-from bpy.types import Menu, Panel, UIList
+from bpy.types import Context, Menu, Panel, PropertyGroup, Scene, Strip, UILayout, UIList
 
 from ...core.messages import EffectError
 from ...core.model import presets
@@ -22,7 +22,17 @@ from .region_panels import Camera, Follow, Regions, Track, Transform, draw_track
 
 
 class SHUTTER_UL_shutters(UIList):
-    def draw_item(self, _context, layout, effect, shutter, _icon, _active, _property, index):
+    def draw_item(
+        self,
+        _context: Context,
+        layout: UILayout,
+        effect: PropertyGroup,
+        shutter: PropertyGroup,
+        _icon: str,
+        _active: int,
+        _property: str,
+        index: int,
+    ) -> None:
         row = layout.row(align=True)
         color = row.row(align=True)
         color.ui_units_x = 1.0
@@ -45,7 +55,17 @@ _ICONS = {
 
 
 class SHUTTER_UL_regions(UIList):
-    def draw_item(self, _context, layout, effect, region, _icon, _active, _property, _index):
+    def draw_item(
+        self,
+        _context: Context,
+        layout: UILayout,
+        effect: PropertyGroup,
+        region: PropertyGroup,
+        _icon: str,
+        _active: int,
+        _property: str,
+        _index: int,
+    ) -> None:
         row = layout.row(align=True)
         row.label(text="", icon=_ICONS.get(region.kind, "ERROR"))
         row.prop(region, "name", text="", emboss=False)
@@ -60,7 +80,7 @@ class SHUTTER_UL_regions(UIList):
         if layer is not None:
             row.prop(layer, "annotation_hide", text="", emboss=False)
 
-    def filter_items(self, _context, effect, _property):
+    def filter_items(self, _context: Context, effect: PropertyGroup, _property: str) -> tuple[list[int], list[int]]:
         """Those of the active shutter."""
         shutter = selection.active_shutter(effect)
         own = [bool(shutter) and region.shutter == shutter.name for region in effect.regions]
@@ -70,14 +90,14 @@ class SHUTTER_UL_regions(UIList):
 class SHUTTER_MT_presets(Menu):
     bl_label = "Presets"
 
-    def draw(self, _context):
+    def draw(self, _context: Context) -> None:
         self.layout.operator_enum("shutter.preset", "preset")
 
 
 class SHUTTER_MT_regions(Menu):
     bl_label = "Region Specials"
 
-    def draw(self, _context):
+    def draw(self, _context: Context) -> None:
         layout = self.layout
         outline = layout.operator("shutter.draw", text="Draw Outline", icon=_ICONS["OUTLINE"])
         outline.new, outline.kind = True, "OUTLINE"
@@ -97,7 +117,7 @@ class SHUTTER_MT_regions(Menu):
 class SHUTTER_MT_shutters(Menu):
     bl_label = "Shutter Specials"
 
-    def draw(self, _context):
+    def draw(self, _context: Context) -> None:
         layout = self.layout
         layout.menu("SHUTTER_MT_presets", icon="PRESET")
         layout.separator()
@@ -113,7 +133,7 @@ class _Shutters(Mixin):
 
     bl_label = "Shutter"
 
-    def draw(self, context):
+    def draw(self, context: Context) -> None:
         layout = self.layout
         active = selection.active(context)
         if active is None:
@@ -136,12 +156,12 @@ class _Exposure(WithEffect):
     bl_label = ""
     bl_options = set()
 
-    def draw_header(self, context):
+    def draw_header(self, context: Context) -> None:
         if (shutter := selection.active_shutter(selection.active(context)[1])) is not None:
             words = iface_('Exposure of "{shutter}"').format(shutter=shutter.name)
             self.layout.label(text=words, translate=False)
 
-    def draw_effect(self, layout, scene, effect, strip):
+    def draw_effect(self, layout: UILayout, scene: Scene, effect: PropertyGroup, strip: Strip) -> None:
         if (shutter := selection.active_shutter(effect)) is None:
             return
         row = layout.row(align=True)
@@ -159,7 +179,7 @@ class _Exposure(WithEffect):
         _draw_bars(layout, scene, effect, strip)
 
 
-def _draw_combine(layout, shutter) -> None:
+def _draw_combine(layout: UILayout, shutter: PropertyGroup) -> None:
     """What the shutter makes of the frames."""
     layout.prop(shutter, "combine")
     if shutter.combine not in ("LIGHTEST", "DARKEST"):
@@ -174,7 +194,7 @@ def _draw_combine(layout, shutter) -> None:
         layout.prop(shutter, "softness")
 
 
-def _draw_bars(layout, scene, effect, strip) -> None:
+def _draw_bars(layout: UILayout, scene: Scene, effect: PropertyGroup, strip: Strip) -> None:
     """What the active shutter's bars come to."""
     try:
         bars = bar_edits.shown(effect, effect.active_shutter).bars
@@ -187,7 +207,7 @@ def _draw_bars(layout, scene, effect, strip) -> None:
     sentence(layout, words, "NONE" if is_open else "ERROR", is_quiet=is_open)
 
 
-def _draw_live(layout, context):
+def _draw_live(layout: UILayout, context: Context) -> None:
     live = getattr(context.window_manager, "virtual_shutter", None)
     if live is None:
         return
@@ -205,14 +225,14 @@ def _draw_live(layout, context):
     notes.popover("SHUTTER_PT_notes", text="", icon="ERROR" if notes.alert else "INFO")
 
 
-def _draw_source(layout, effect) -> None:
+def _draw_source(layout: UILayout, effect: PropertyGroup) -> None:
     """Which clip the effect is for, and the choice of another."""
     shown = match_source.shown(effect)
     words = iface_("Source: {strip}").format(strip=shown.source) if shown else iface_("Choose Source")
     layout.operator_menu_enum("shutter.source", "strip", text=words, icon="SEQUENCE", translate=False)
 
 
-def _notes(context) -> Iterator[tuple[str, Button | None]]:
+def _notes(context: Context) -> Iterator[tuple[str, Button | None]]:
     """What is to be said of the active effect, and the button that helps; one without a label has its operator's."""
     scene, effect, strip = selection.active(context)
     if (newer := data_format.note([scene, *bpy.data.scenes])) is not None:
@@ -233,7 +253,7 @@ def _notes(context) -> Iterator[tuple[str, Button | None]]:
         yield inbetween_operators.strobing_in_words(exposure), inbetween_operators.smoothing(exposure)
 
 
-def _tracked(effect) -> list[int | None]:
+def _tracked(effect: PropertyGroup) -> list[int | None]:
     """What may have been tracked of what the tab shows (selection.moving)."""
     region = [effect.active_region] if selection.active_region(effect) is not None else []
     shutter = selection.active_shutter(effect)
@@ -249,10 +269,10 @@ class SHUTTER_PT_notes(Panel):
     bl_ui_units_x = WIDEST // 20
 
     @classmethod
-    def poll(cls, context):
+    def poll(cls, context: Context) -> bool:
         return selection.active(context) is not None
 
-    def draw(self, context):
+    def draw(self, context: Context) -> None:
         layout, effect = self.layout, selection.active(context)[1]
         for words, button in _notes(context):
             column = layout.column(align=True)
@@ -271,7 +291,7 @@ class _Move(WithEffect):
 
     bl_label = "Exposure Moves With"
 
-    def draw_effect(self, layout, _scene, effect, _strip):
+    def draw_effect(self, layout: UILayout, _scene: Scene, effect: PropertyGroup, _strip: Strip) -> None:
         if (shutter := selection.active_shutter(effect)) is None:
             return
         layout.prop(shutter, "follow")
@@ -289,7 +309,7 @@ class _Report(Mixin):
     bl_label = "Report"
     bl_options = {"HIDE_HEADER"}
 
-    def draw(self, _context):
+    def draw(self, _context: Context) -> None:
         self.layout.operator("shutter.copy_report", icon="COPYDOWN")
 
 
@@ -299,7 +319,7 @@ class _InProperties:
     bl_context = "strip"
 
     @classmethod
-    def poll(cls, context):
+    def poll(cls, context: Context) -> bool:
         strip = selection.active_strip(context)
         return strip is not None and (strip.type in strips.SOURCES or selection.active(context) is not None)
 
@@ -310,7 +330,7 @@ class _InSidebar:
     bl_category = "Shutter"
 
     @classmethod
-    def poll(cls, context):
+    def poll(cls, context: Context) -> bool:
         return selection.active_strip(context) is not None or selection.active(context) is not None
 
 
@@ -338,12 +358,12 @@ def _panels(start: str, place: type) -> list[type]:
     ]
 
 
-def _add_entry(self, _context):
+def _add_entry(self, _context: Context) -> None:
     self.layout.separator()
     self.layout.operator("shutter.add_effect", text="Shutter")
 
 
-def _strip_entry(self, context):
+def _strip_entry(self, context: Context) -> None:
     strip = selection.active_strip(context)
     if strip is None or not (strip.type in strips.SOURCES or selection.active(context)):
         return
@@ -367,11 +387,11 @@ classes = (
 )
 
 
-def register():
+def register() -> None:
     for menu, entry in MENUS.items():
         getattr(bpy.types, menu).append(entry)
 
 
-def unregister():
+def unregister() -> None:
     for menu, entry in MENUS.items():
         getattr(bpy.types, menu).remove(entry)

@@ -10,7 +10,7 @@ import numpy as np
 from bpy.app.translations import pgettext_iface as iface_
 from bpy.app.translations import pgettext_rpt as rpt_
 from bpy.props import BoolProperty, EnumProperty, FloatProperty, FloatVectorProperty, PointerProperty
-from bpy.types import PropertyGroup
+from bpy.types import Context, PropertyGroup, Region
 
 from ...compute.renderer import Renderer
 from ...compute.request import Request
@@ -57,12 +57,12 @@ VIEWS = (
 )
 
 
-def redraw(_settings, _context) -> None:
+def redraw(_settings: PropertyGroup | None, _context: Context) -> None:
     """Draws all previews again: for what is called at changes of properties."""
     preview_areas.redraw(bpy.context)
 
 
-def _view_chosen(settings, context) -> None:
+def _view_chosen(settings: PropertyGroup, context: Context) -> None:
     sharp_frame.give_back(context)
     redraw(settings, context)
 
@@ -162,7 +162,7 @@ def _draw() -> None:
         say.draw()
 
 
-def _show(context, shown: Shown, decision: Decision | None, say) -> None:
+def _show(context: Context, shown: Shown, decision: Decision | None, say: "_Notes") -> None:
     """Shows the effect, or says why not. decision: what the engine was asked for."""
     try:
         wanted = previews.for_drawing(context, shown, decision)
@@ -183,7 +183,7 @@ def _show(context, shown: Shown, decision: Decision | None, say) -> None:
         _tell_fault(error, say)
 
 
-def _tell_unseen(context, say) -> None:
+def _tell_unseen(context: Context, say: "_Notes") -> None:
     """Says why nothing of the active effect is in the picture, where no other one is."""
     active = selection.active(context)
     if active is None or selection.seen(active[0]) or not context.space_data.show_overlays:
@@ -193,7 +193,7 @@ def _tell_unseen(context, say) -> None:
         say.draw()
 
 
-def _show_picture(context, quad: Quad, shown: Shown, wanted: Drawing, say) -> None:
+def _show_picture(context: Context, quad: Quad, shown: Shown, wanted: Drawing, say: "_Notes") -> None:
     settings, renderer, request = context.window_manager.virtual_shutter, wanted.renderer, wanted.request
     is_still = not context.screen.is_animation_playing
     if context.space_data.show_overlays:
@@ -232,7 +232,7 @@ def _show_picture(context, quad: Quad, shown: Shown, wanted: Drawing, say) -> No
         _tell_strobing(looked, after_detail, say)
 
 
-def _warn(shown: Shown, say) -> None:
+def _warn(shown: Shown, say: "_Notes") -> None:
     """Says what a picture that is drawn over the sequencer's cannot show."""
     if shown.strips_above:
         say(rpt_("The strips above are hidden in this view"))
@@ -240,7 +240,7 @@ def _warn(shown: Shown, say) -> None:
         say(rpt_("This view has the view transform Standard"))
 
 
-def _tell_detail(wanted: Drawing, size: tuple[int, int], is_still: bool, say) -> None:
+def _tell_detail(wanted: Drawing, size: tuple[int, int], is_still: bool, say: "_Notes") -> None:
     """Says in what the picture is less than a render's; size: of that. And gives the way to see that one, and back."""
     source = wanted.renderer.source
     if previews.looking.whole is not None:
@@ -258,7 +258,7 @@ def _tell_detail(wanted: Drawing, size: tuple[int, int], is_still: bool, say) ->
         say(rpt_("Preview: {what}").format(what=", ".join(less)), button)
 
 
-def _tell_strobing(looked: strobing.Looked, place: int, say) -> None:
+def _tell_strobing(looked: strobing.Looked, place: int, say: "_Notes") -> None:
     """Says, in that place among what is said, that the exposure has too few frames, and gives the way to more."""
     if looked.known is not None and inbetween_build.running() is None:
         say(inbetween_operators.strobing_in_words(looked.known), inbetween_operators.smoothing(looked.known), place)
@@ -281,7 +281,7 @@ def _measure() -> float | None:
     return inbetween_operators.TICK if strobing.is_busy() else None
 
 
-def _show_sharp(context, shown: Shown | None) -> None:
+def _show_sharp(context: Context, shown: Shown | None) -> None:
     """What is drawn over the sharp frame."""
     say = _Notes(context.region)
     say(rpt_("The sharp frame, to draw on: the result comes with the stroke"))
@@ -293,7 +293,7 @@ def _show_sharp(context, shown: Shown | None) -> None:
             _show_strokes(context, quad, shown, snapshot)
 
 
-def _tell_missing(renderer, request, say) -> None:
+def _tell_missing(renderer: Renderer, request: Request, say: "_Notes") -> None:
     """Says in the preview what the engine can only report."""
     try:
         renderer.check(request)
@@ -301,7 +301,7 @@ def _tell_missing(renderer, request, say) -> None:
         _tell_fault(error, say)
 
 
-def _tell_carrying(say) -> None:
+def _tell_carrying(say: "_Notes") -> None:
     """Has mattes carried that the picture lacks, and says so."""
     fault, progress = outline_carrying.begin(show_carried), outline_carrying.progress()
     if fault is not None:
@@ -322,7 +322,7 @@ def show_carried() -> None:
     preview_areas.redraw(bpy.context)
 
 
-def _tell_fault(error: Exception, say) -> None:
+def _tell_fault(error: Exception, say: "_Notes") -> None:
     """Says why there is no picture."""
     told.shown(error)
     if isinstance(error, NotBuiltError) and inbetween_build.running() is None:
@@ -332,7 +332,7 @@ def _tell_fault(error: Exception, say) -> None:
         say(rpt_("Shutter: {fault}").format(fault=error))
 
 
-def _show_strokes(context, quad, shown: Shown, snapshot: Snapshot) -> None:
+def _show_strokes(context: Context, quad: Quad, shown: Shown, snapshot: Snapshot) -> None:
     """The scribbles where they are by now."""
     if not context.space_data.show_overlays:
         return
@@ -345,7 +345,7 @@ def _show_strokes(context, quad, shown: Shown, snapshot: Snapshot) -> None:
             drawing.lines(quad.on_region(points), color, closed=shape.kind == "lasso", width=2)
 
 
-def _show_source(quad, shown: Shown, renderer, request, right: float) -> None:
+def _show_source(quad: Quad, shown: Shown, renderer: Renderer, request: Request, right: float) -> None:
     """The source's own frame, from the left edge on: that of a shutter that is open for it alone."""
     options = replace(request.state.options, step=1)  # no in-between frames come first in reverse
     still = np.zeros((1, options.window))
@@ -390,18 +390,19 @@ def _palette(palette: Colors) -> Texture:
 class _Notes:
     """Sentences at the upper left of a region, each with a button or none."""
 
-    def __init__(self, region):
-        self._region, self._lines = region, []
+    def __init__(self, region: Region) -> None:
+        self._region = region
+        self._lines: list[tuple[str, Button | None]] = []
 
     @property
     def count(self) -> int:
         return len(self._lines)
 
-    def __call__(self, sentence: str, button: Button | None = None, place: int | None = None):
+    def __call__(self, sentence: str, button: Button | None = None, place: int | None = None) -> None:
         """Says a sentence after all others, or in a place among them."""
         self._lines.insert(self.count if place is None else place, (sentence, button))
 
-    def draw(self):
+    def draw(self) -> None:
         unit = drawing.ui_scale()
         y = self._region.height - 18 * unit
         left, right = 16 * unit, self._region.width - _NAVIGATION * unit
@@ -423,14 +424,14 @@ TIMERS = _redraw_once, _redraw_when_still, shown_annotations.follow, _redraw_pan
 _handler = None
 
 
-def register():
+def register() -> None:
     global _handler
     bpy.types.WindowManager.virtual_shutter = PointerProperty(type=ShutterPreview)
     # After the sequencer's picture and before annotations and gizmos, which stay visible.
     _handler = bpy.types.SpaceSequenceEditor.draw_handler_add(_draw, (), "PREVIEW", "POST_VIEW")
 
 
-def unregister():
+def unregister() -> None:
     global _handler
     bpy.types.SpaceSequenceEditor.draw_handler_remove(_handler, "PREVIEW")
     _handler = None

@@ -1,11 +1,12 @@
 """The probe: a pixel's shutter as bars, and its coefficients as shares, beside it in the preview."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import bpy
 import numpy as np
 from bpy.app.translations import pgettext_iface as iface_
-from bpy.types import Gizmo, GizmoGroup
+from bpy.types import Context, Gizmo, GizmoGroup, PropertyGroup, Region, Strip
 
 from ...compute import plates
 from ...core.model.scribbles import mapped
@@ -30,7 +31,7 @@ class Layout:
     lines: tuple[float, ...]
 
 
-def layout(point, size, count: int, unit: float) -> Layout:
+def layout(point: Sequence[float], size: tuple[int, int], count: int, unit: float) -> Layout:
     """The layout for a point of a region of this size with `count` shutters; unit: of the interface, in pixels.
 
     The box lies at the right of the point and below it, or on the other side where the region ends."""
@@ -45,13 +46,13 @@ def layout(point, size, count: int, unit: float) -> Layout:
     return Layout((left, top - height, left + width, top), bars, lines)
 
 
-def _to_region(context, shown) -> np.ndarray | None:
+def _to_region(context: Context, shown: preview_areas.Shown) -> np.ndarray | None:
     """Matrix from fractions of the shown picture to the region's pixels; None: nothing is seen of it."""
     matrix = to_region(shown.effect, shown.strip, context.region)
     return matrix if geometry.is_invertible(matrix) else None
 
 
-def _is_cropped(strip, size, point) -> bool:
+def _is_cropped(strip: Strip, size: tuple[int, int], point: Sequence[float]) -> bool:
     crop, (x, y) = strip.crop, np.asarray(point) * size
     return not (crop.min_x <= x < size[0] - crop.max_x and crop.min_y <= y < size[1] - crop.max_y)
 
@@ -59,7 +60,7 @@ def _is_cropped(strip, size, point) -> bool:
 class SHUTTER_GT_probe(Gizmo):
     """It follows the pointer, and is never hit: clicks go to whatever lies there."""
 
-    def draw(self, context):
+    def draw(self, context: Context) -> None:
         shown, at = preview_areas.shown(context), tuple(context.window_manager.virtual_shutter.probe_at)
         if shown is None or (matrix := _to_region(context, shown)) is None:
             return
@@ -75,7 +76,7 @@ class SHUTTER_GT_probe(Gizmo):
             point = mapped(matrix, np.array([at]))[0]
             _draw(context.region, point, shown.effect.shutters, probed, _of_layers(shown, probed))
 
-    def test_select(self, context, location):
+    def test_select(self, context: Context, location: tuple[int, int]) -> int:
         """Blender asks whenever the pointer moves: nothing else tells of it without taking events from others."""
         shown = preview_areas.shown(context)
         if shown is not None and (matrix := _to_region(context, shown)) is not None:
@@ -84,7 +85,7 @@ class SHUTTER_GT_probe(Gizmo):
         return -1
 
 
-def _of_layers(shown, probed: probe.Probed) -> list[tuple[str, str]]:
+def _of_layers(shown: preview_areas.Shown, probed: probe.Probed) -> list[tuple[str, str]]:
     """Of each layer its name and how much of it covers the pixel; and what takes the place of what lies behind."""
     regions = [region for region in shown.effect.regions if region.is_layer and region.opacity > 0]
     lines = [(region.name, f"{share:.1%}") for region, share in zip(regions, probed.layers, strict=False)]
@@ -92,7 +93,13 @@ def _of_layers(shown, probed: probe.Probed) -> list[tuple[str, str]]:
     return [*lines, (words[probed.hole], "")] if probed.hole in words else lines
 
 
-def _draw(region, point, shutters, probed: probe.Probed, of_layers: list[tuple[str, str]]) -> None:
+def _draw(
+    region: Region,
+    point: Sequence[float],
+    shutters: Sequence[PropertyGroup],
+    probed: probe.Probed,
+    of_layers: list[tuple[str, str]],
+) -> None:
     unit = drawing.ui_scale()
     place = layout(point, (region.width, region.height), len(shutters) + len(of_layers), unit)
     colors = np.array([shutter.color for shutter in shutters])
@@ -117,7 +124,7 @@ class SHUTTER_GGT_probe(InPreview, GizmoGroup):
     gizmo = SHUTTER_GT_probe
 
     @classmethod
-    def poll(cls, context):
+    def poll(cls, context: Context) -> bool:
         settings = context.window_manager.virtual_shutter
         if not (settings.live and settings.probe) or bpy.app.is_job_running("RENDER"):
             return False

@@ -1,11 +1,12 @@
 """Operators that repair what a rolling shutter has skewed, and find how long its readout is."""
 
+from collections.abc import Iterator
 from contextlib import contextmanager
 
 from bpy.app.translations import pgettext_iface as iface_
 from bpy.app.translations import pgettext_rpt as rpt_
 from bpy.props import EnumProperty, FloatProperty
-from bpy.types import Operator
+from bpy.types import Context, Operator, PropertyGroup, Window
 
 from ...core.messages import EffectError
 from ..data.choices import CONTEXT, READOUT_UNITS, READS, SIDES
@@ -14,7 +15,7 @@ from .operator_bases import OfEffect, own_classes
 
 
 @contextmanager
-def _waiting(window):
+def _waiting(window: Window | None) -> Iterator[None]:
     """Inside, the pointer shows that it takes some seconds."""
     if window is not None:
         window.cursor_modal_set("WAIT")
@@ -29,7 +30,7 @@ class _OfReadout(OfEffect):
     """Needs room for what a repair adds, unless there is one."""
 
     @classmethod
-    def why_not(cls, effect):
+    def why_not(cls, effect: PropertyGroup) -> str | None:
         try:
             has_repair = rolling_shutter.of(effect) is not None
         except EffectError as error:
@@ -74,14 +75,14 @@ class SHUTTER_OT_rolling_shutter(_OfReadout, Operator):
         options={"SKIP_SAVE"},
     )
 
-    def draw(self, _context):
+    def draw(self, _context: Context) -> None:
         layout = self.layout
         layout.use_property_split = True
         layout.prop(self, "side")
         layout.prop(self, "unit")
         layout.prop(self, "readout" if self.unit == "PERCENT" else "milliseconds")
 
-    def change(self, _context, effect):
+    def change(self, _context: Context, effect: PropertyGroup) -> None:
         known = rolling_shutter.of(effect)
         if known is not None and not self.properties.is_property_set("readout"):
             self.readout = 100 * known.readout  # from the menu, another side keeps it
@@ -103,7 +104,7 @@ class SHUTTER_OT_find_readout(_OfReadout, Operator):
         translation_context=CONTEXT,
     )
 
-    def change(self, context, effect):
+    def change(self, context: Context, effect: PropertyGroup) -> None:
         with _waiting(context.window):
             found, side = rolling_shutter.find(
                 self.edit, effect, self.effect_strip, "TOP" if self.reads == "ROWS" else "LEFT"

@@ -3,6 +3,7 @@
 import math
 
 from bpy.app.translations import pgettext_iface as iface_
+from bpy.types import Context, MovieTracking, PropertyGroup, Scene, Strip, UILayout
 
 from ...core.messages import EffectError
 from ...media.pursuit import SURE
@@ -21,7 +22,7 @@ class Regions(WithEffect):
     bl_label = "Regions"
     bl_options = set()
 
-    def draw_effect(self, layout, scene, effect, strip):
+    def draw_effect(self, layout: UILayout, scene: Scene, effect: PropertyGroup, strip: Strip) -> None:
         layout.use_property_split = False
         shutter = selection.active_shutter(effect)
         own = [region for region in effect.regions if shutter and region.shutter == shutter.name]
@@ -55,7 +56,7 @@ class Regions(WithEffect):
             sentence(layout, str(error), "ERROR")
 
 
-def _draw_matte(layout, look, region) -> None:
+def _draw_matte(layout: UILayout, look: matte_look.Look, region: PropertyGroup) -> None:
     """What the matte is, and what is wrong with it."""
     layout.prop(region, "matte")
     if region.matte == "IMAGE":
@@ -76,7 +77,7 @@ def _draw_matte(layout, look, region) -> None:
             sentence(layout, text, icon)
 
 
-def _draw_blend(layout, region) -> None:
+def _draw_blend(layout: UILayout, region: PropertyGroup) -> None:
     """How a matte or a ramp lies over what is beneath."""
     for name in ("opacity", "feather", "invert", "blend"):
         row = layout.row()
@@ -85,7 +86,7 @@ def _draw_blend(layout, region) -> None:
     layout.operator("shutter.matte_export")
 
 
-def draw_tracking(layout, index: int | None) -> None:
+def draw_tracking(layout: UILayout, index: int | None) -> None:
     """The buttons that track a region or the camera (selection.moving)."""
     row = layout.row(align=True)
     track = "shutter.track_camera" if index is None else "shutter.track"
@@ -97,7 +98,7 @@ def draw_tracking(layout, index: int | None) -> None:
     row.operator(f"{track}_look", text="", icon="VIEWZOOM")
 
 
-def tracking_icon(effect, index: int | None) -> str | None:
+def tracking_icon(effect: PropertyGroup, index: int | None) -> str | None:
     """Of what `draw_tracked` draws; None: nothing."""
     stops = track_region.stops(effect, index)
     if track_region.lost(effect, index) or any(is_fault for _, _, is_fault in stops):
@@ -106,7 +107,7 @@ def tracking_icon(effect, index: int | None) -> str | None:
     return "INFO" if is_tracked or stops else None
 
 
-def draw_tracked(layout, effect, index: int | None) -> None:
+def draw_tracked(layout: UILayout, effect: PropertyGroup, index: int | None) -> None:
     """How sure tracking of a region or the camera was of the current frame, where it was lost, and where it stopped."""
     look = "shutter.track_camera_look" if index is None else "shutter.track_look"
     confidence = track_region.confidence_at(effect, index, effect.id_data.frame_current)
@@ -130,7 +131,7 @@ def draw_tracked(layout, effect, index: int | None) -> None:
         button.frame = outline_drawings.nearest(effect, index, wrong[0])
 
 
-def _draw_camera_gaps(layout, effect) -> None:
+def _draw_camera_gaps(layout: UILayout, effect: PropertyGroup) -> None:
     """The frames at which the camera is not tracked."""
     for gap in track_region.gaps(effect, None):
         if math.isinf(gap.last):
@@ -146,17 +147,17 @@ class _WithRegion(WithEffect):
     """A panel of the active region."""
 
     @classmethod
-    def poll(cls, context):
+    def poll(cls, context: Context) -> bool:
         return super().poll(context) and selection.active_region(selection.active(context)[1]) is not None
 
-    def draw_effect(self, layout, _scene, effect, _strip):
+    def draw_effect(self, layout: UILayout, _scene: Scene, effect: PropertyGroup, _strip: Strip) -> None:
         self.draw_region(layout, selection.active_region(effect))
 
 
 class Transform(_WithRegion):
     bl_label = "Transform"
 
-    def draw_region(self, layout, region):
+    def draw_region(self, layout: UILayout, region: PropertyGroup) -> None:
         draw_properties(layout.column(align=True), region, *_PLACEMENT)
         layout.operator("shutter.region_key", text="Insert Keyframes", icon="KEY_HLT")
 
@@ -166,17 +167,17 @@ class Track(_WithRegion):
     bl_translation_context = CONTEXT
 
     @classmethod
-    def poll(cls, context):
+    def poll(cls, context: Context) -> bool:
         return super().poll(context) and selection.active_region(selection.active(context)[1]).kind not in strips.MATTES
 
-    def draw_region(self, layout, region):
+    def draw_region(self, layout: UILayout, region: PropertyGroup) -> None:
         draw_properties(layout, region, *_TRACKING)
 
 
 class Follow(_WithRegion):
     bl_label = "Follow Track"
 
-    def draw_region(self, layout, region):
+    def draw_region(self, layout: UILayout, region: PropertyGroup) -> None:
         draw_properties(layout, region, "follow_clip", "follow_kind")
         if region.follow_clip is not None:
             _draw_tracks(layout, region, region.follow_clip.tracking)
@@ -187,7 +188,7 @@ class Follow(_WithRegion):
         row.operator("shutter.follow_update", text="Update", icon="FILE_REFRESH")
 
 
-def _draw_tracks(layout, region, tracking) -> None:
+def _draw_tracks(layout: UILayout, region: PropertyGroup, tracking: MovieTracking) -> None:
     layout.prop_search(region, "follow_object", tracking, "objects")
     objects = tracking.objects
     holder = objects.get(region.follow_object) if region.follow_object else objects[0]
@@ -202,12 +203,12 @@ class Camera(WithEffect):
     bl_label = "Camera"
 
     @classmethod
-    def poll(cls, context):
+    def poll(cls, context: Context) -> bool:
         return super().poll(context) and any(
             shutter.follow == "CAMERA" for shutter in selection.active(context)[1].shutters
         )
 
-    def draw_effect(self, layout, _scene, effect, _strip):
+    def draw_effect(self, layout: UILayout, _scene: Scene, effect: PropertyGroup, _strip: Strip) -> None:
         draw_properties(layout.column(align=True), effect.camera, *_PLACEMENT)
         draw_properties(layout, effect.camera, "influence", *_TRACKING, "follow_clip")
         layout.operator("shutter.follow_stabilization", icon="TRACKER")

@@ -7,7 +7,7 @@ import time
 import bpy
 from bpy.app.translations import pgettext_rpt as rpt_
 from bpy.props import EnumProperty, IntProperty
-from bpy.types import Operator, PropertyGroup
+from bpy.types import Context, Event, Operator, PropertyGroup, Scene, Strip
 
 from ..data import selection, validation
 from ..data.choices import CONTEXT
@@ -58,20 +58,20 @@ class _Tracks(Beside):
     bl_options = {"UNDO"}
     only_seen = True
 
-    def is_ready(self, scene, effect, strip) -> bool:
+    def is_ready(self, scene: Scene, effect: PropertyGroup, strip: Strip) -> bool:
         """Whether nothing has to be tracked. EffectError: what comes after tracking cannot be done."""
         return False
 
-    def ended(self, context) -> None:
+    def ended(self, context: Context) -> None:
         """Called once all is tracked, and not after Esc. EffectError: what comes after tracking cannot be done."""
 
-    def invoke(self, context, _event):
+    def invoke(self, context: Context, _event: Event) -> set[str]:
         return self.tried(self._run, context, math.inf if bpy.app.background else _TICK)
 
-    def execute(self, context):
+    def execute(self, context: Context) -> set[str]:
         return self.tried(self._run, context, math.inf)
 
-    def _run(self, context, seconds: float):
+    def _run(self, context: Context, seconds: float) -> set[str]:
         """Tracks for a while, and then whenever Blender has time."""
         scene, effect, strip = selection.active(context)
         index = _index(self, effect)
@@ -92,7 +92,7 @@ class _Tracks(Beside):
         self._show(context)
         return self.go_on(context, _TICK)
 
-    def modal(self, context, event):
+    def modal(self, context: Context, event: Event) -> set[str]:
         if self._target.effect() is None:  # undone or removed in another window, or another file was loaded
             self.cancel(context)
             return {"CANCELLED"}
@@ -112,7 +112,7 @@ class _Tracks(Beside):
             self._go_to(self._start)
         return self._finish(context, is_stopped)
 
-    def _finish(self, context, is_stopped: bool = False):
+    def _finish(self, context: Context, is_stopped: bool = False) -> set[str]:
         self._tell()
         has_ended = not is_stopped and self._target.effect() is not None
         if has_ended and self.tried(self.ended, context) == {"CANCELLED"} and not self._done:
@@ -120,7 +120,7 @@ class _Tracks(Beside):
         redraw(context)
         return {"FINISHED"}  # what was tracked can be undone
 
-    def cancel(self, context):
+    def cancel(self, context: Context) -> None:
         """It has ended, or its window was closed."""
         self._steps.close()
         context.window_manager.progress_end()
@@ -142,11 +142,11 @@ class _Tracks(Beside):
             report_warning(self, str(error))
         return False
 
-    def _go_to(self, frame: int):
+    def _go_to(self, frame: int) -> None:
         if (effect := self._target.effect()) is not None:
             effect.id_data.frame_set(frame)
 
-    def _show(self, context):
+    def _show(self, context: Context) -> None:
         self._go_to(self._frame)
         done, total = len(self._done), len(self._frames) - 1
         context.window_manager.progress_update(done)
@@ -155,7 +155,7 @@ class _Tracks(Beside):
         redraw(context)
         self._shown = time.perf_counter()
 
-    def _tell(self):
+    def _tell(self) -> None:
         if (effect := self._target.effect()) is None or not self._done:
             return
         sentence = rpt_("Frames {first} to {last} are tracked")
@@ -198,10 +198,10 @@ class SHUTTER_OT_panning_shot(_Tracks, OfStrokes, Operator):
 
     direction = "BOTH"
 
-    def is_ready(self, scene, effect, strip):
+    def is_ready(self, scene: Scene, effect: PropertyGroup, strip: Strip) -> bool:
         return layer_presets.can_pan(scene, effect, strip, effect.active_region)
 
-    def ended(self, context):
+    def ended(self, context: Context) -> None:
         layer_presets.panning_shot(self._target.effect(), self._target.index, bar_edits.auto_key(context))
 
 
@@ -212,10 +212,10 @@ class SHUTTER_OT_tripod(_Tracks, OfShutter, Operator):
 
     direction = "BOTH"
 
-    def is_ready(self, _edit, effect, _strip):
+    def is_ready(self, _edit: Scene, effect: PropertyGroup, _strip: Strip) -> bool:
         return layer_presets.can_stand(effect)
 
-    def ended(self, context):
+    def ended(self, context: Context) -> None:
         layer_presets.tripod(self._target.effect(), bar_edits.auto_key(context))
 
 
@@ -230,7 +230,7 @@ class _Looks(Mixin):
         options={"SKIP_SAVE"},
     )
 
-    def change(self, _context, effect):
+    def change(self, _context: Context, effect: PropertyGroup) -> set[str] | None:
         frame: int | None = self.frame
         if not self.properties.is_property_set("frame"):
             frame = track_region.next_unsure(effect, _index(self, effect), self.edit.frame_current)
@@ -259,12 +259,12 @@ class SHUTTER_OT_follow(OfStrokes, Operator):
     bl_label = "Follow Track"
 
     @classmethod
-    def why_not(cls, effect):
+    def why_not(cls, effect: PropertyGroup) -> str | None:
         if sentence := super().why_not(effect):
             return sentence
         return None if selection.active_region(effect).follow_clip is not None else rpt_("Choose a clip first")
 
-    def change(self, _context, effect):
+    def change(self, _context: Context, effect: PropertyGroup) -> None:
         follow_track.follow(self.edit, effect, self.effect_strip, effect.active_region)
 
 
@@ -274,12 +274,12 @@ class SHUTTER_OT_follow_update(OfStrokes, Operator):
     bl_label = "Update Followed Track"
 
     @classmethod
-    def why_not(cls, effect):
+    def why_not(cls, effect: PropertyGroup) -> str | None:
         if sentence := super().why_not(effect):
             return sentence
         return None if selection.active_region(effect).follow_stamp else rpt_("The region follows no track yet")
 
-    def change(self, _context, effect):
+    def change(self, _context: Context, effect: PropertyGroup) -> None:
         follow_track.update(self.edit, effect, self.effect_strip, effect.active_region)
 
 
@@ -289,10 +289,10 @@ class SHUTTER_OT_follow_stabilization(OfEffect, Operator):
     bl_label = "Follow Stabilization"
 
     @classmethod
-    def why_not(cls, effect):
+    def why_not(cls, effect: PropertyGroup) -> str | None:
         return None if effect.camera.follow_clip is not None else rpt_("Choose a clip first")
 
-    def change(self, _context, effect):
+    def change(self, _context: Context, effect: PropertyGroup) -> None:
         follow_stabilization.follow(self.edit, effect, self.effect_strip)
 
 
@@ -301,7 +301,7 @@ class SHUTTER_OT_sharp_subject(OfRegion, Operator):
 
     bl_label = "Sharp Subject"
 
-    def change(self, context, effect):
+    def change(self, context: Context, effect: PropertyGroup) -> None:
         layer_presets.sharp_subject(effect, effect.active_region, bar_edits.auto_key(context))
 
 
@@ -310,7 +310,7 @@ class SHUTTER_OT_clean_trail(OfRegion, Operator):
 
     bl_label = "Trail"
 
-    def change(self, context, effect):
+    def change(self, context: Context, effect: PropertyGroup) -> None:
         layer_presets.clean_trail(effect, effect.active_region, bar_edits.auto_key(context))
 
 
