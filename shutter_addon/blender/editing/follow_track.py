@@ -64,8 +64,7 @@ def _key(scene: Scene, effect: PropertyGroup, strip: Strip, index: int, points: 
     keys = _keys(effect, index)
     known = sorted({start, *(frame for frame in keys.edited(range(min(points), max(points) + 1)) if frame in points)})
     shape = snapshot.region_at(scene, effect, strip, index, points)
-    moves = {frame: _motions(points, frame) for frame in known}
-    placements = followed(shape, sorted(points), moves, start, size)
+    placements = followed(shape, sorted(points), {frame: _motions(points, frame) for frame in known}, start, size)
     kept = motions.thinned(placements, motions.offsets(shape.drawings.at(start)), size, known)
     frames = range(min(placements), max(placements) + 1)
     confidence = {frame: float(frame in placements) for frame in frames}

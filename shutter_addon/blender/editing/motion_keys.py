@@ -51,8 +51,7 @@ class MotionKeys:
 
     def edited(self, frames: range) -> list[int]:
         """The whole frames, among these, at which the editor has set a key."""
-        curves = (self._curve(name, component) for name, component in _COMPONENTS[: _COUNTS[self.motion]])
-        keys = map(_read, filter(None, curves))
+        keys = map(_read, self._curves(_COUNTS[self.motion]))
         keyed = {frame for all_frames, made in keys for frame in all_frames[~made].tolist()}
         return sorted(int(frame) for frame in keyed if frame in frames)
 
@@ -63,8 +62,7 @@ class MotionKeys:
 
     def are_several(self) -> bool:
         """Whether a channel of the motion has keys at more than one frame: with one alone the region stands still."""
-        curves = (self._curve(name, component) for name, component in _COMPONENTS[: _COUNTS[self.motion]])
-        return any(len(curve.keyframe_points) > 1 for curve in filter(None, curves))
+        return any(len(curve.keyframe_points) > 1 for curve in self._curves(_COUNTS[self.motion]))
 
     def reach(self, frame: int) -> bool:
         """Whether there are keys of a motion, and tracking, if any of them come from it, has come through a frame."""
@@ -82,7 +80,7 @@ class MotionKeys:
         becomes of the keys between, and wherever the editor has moved the first and the last of them."""
         tracked = self.confidence()[0]
         beside = tracked[np.isin(tracked, (first - 1, last + 1))].tolist()
-        for curve in filter(None, (self._curve(name, component) for name, component in _COMPONENTS)):
+        for curve in self._curves():
             for frame, value in _as_tracked(curve, (first, last), beside).items():
                 _insert(curve, frame, value)
 
@@ -136,6 +134,11 @@ class MotionKeys:
         if curve.is_empty:
             fcurves.remove_curves(self.effect.id_data, path)
             setattr(moving, name, whole)
+
+    def _curves(self, count: int = len(_COMPONENTS)) -> list[fcurves.Timed]:
+        """Of the first components, those that are keyed."""
+        found = (self._curve(name, component) for name, component in _COMPONENTS[:count])
+        return [curve for curve in found if curve is not None]
 
     def _curve(self, name: str, component: int = 0, *, new: bool = False):
         moving = selection.moving(self.effect, self.index)

@@ -28,8 +28,9 @@ def to_mask(context: Context, of: tuple[Scene, PropertyGroup, Strip], index: int
     if not any(curves for _frame, curves in keys):
         raise EffectError(rpt_("Nothing is drawn in the outline"))
     size = annotations.picture_size(effect)
+    last = int(snapshot.last_shown(scene, effect, strip))
     mask = bpy.data.masks.new(effect.regions[index].name)
-    mask.frame_start, mask.frame_end = 1, max(_length(scene, effect, strip), keys[-1][0] + 1)
+    mask.frame_start, mask.frame_end = 1, max(last, keys[-1][0]) + 1
     chains = outline_chains.chains(keys, size[0] / size[1])
     try:
         with _mask_editor(context, mask):
@@ -70,10 +71,6 @@ def _keys(
     frames = sorted({*drawn, *range(drawn[0], drawn[-1], step)}) if drawn else []
     with closing(file.open()) as mattes:
         return [(frame, mattes.curves(frame)) for frame in frames]
-
-
-def _length(scene: Scene, effect: PropertyGroup, strip: Strip) -> int:
-    return int(snapshot.last_shown(scene, effect, strip)) + 1
 
 
 def _in_mask(points: np.ndarray, size: tuple[int, int]) -> np.ndarray:

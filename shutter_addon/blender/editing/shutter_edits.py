@@ -70,10 +70,8 @@ def _free_color(effect: PropertyGroup) -> tuple[float, float, float]:
 def duplicate_shutter(effect: PropertyGroup, index: int) -> PropertyGroup:
     """A copy of a shutter, with its keys, behind it; regions stay with the original."""
     scene, path, color = effect.id_data, f"{effect.path_from_id()}.shutters", _free_color(effect)
-    effect.shutters.add()
-    last = len(effect.shutters) - 1
-    old, new = effect.shutters[index], effect.shutters[last]
-    property_copy.copy_properties(old, new)
+    last, new = len(effect.shutters), effect.shutters.add()
+    property_copy.copy_properties(effect.shutters[index], new)
     new.color = color
     fcurves.copy_curves(scene, f"{path}[{index}].", scene, f"{path}[{last}].")
     move_shutter(effect, last, index + 1)
