@@ -34,7 +34,7 @@ def _show_start(context: Context) -> None:
     global _timer
     if not bpy.app.background:
         _timer = context.window_manager.event_timer_add(TICK, window=context.window)
-    redraw_panels(context)
+    redraw_panels()
 
 
 def _show_end() -> None:
@@ -51,10 +51,10 @@ def _say(sentence: str | None) -> None:
         workspace.status_text_set(sentence)
 
 
-def redraw_panels(context: Context) -> None:
-    """Draws panels again, and no preview."""
+def redraw_panels() -> None:
+    """Draws panels again, and no preview; a timer as well."""
     kinds = {"SEQUENCE_EDITOR": "UI", "PROPERTIES": "WINDOW"}
-    for window in context.window_manager.windows:
+    for window in bpy.context.window_manager.windows:
         for area in window.screen.areas:
             for region in area.regions:
                 if region.type == kinds.get(area.type):
@@ -142,7 +142,7 @@ class _Building(_OfInbetweens):
                 self._build.stop()
             sentence = rpt_("Building in-between frames: {done} of {total}, Esc to stop")
             _say(sentence.format(done=self._build.done, total=self._build.total))
-            redraw_panels(context)
+            redraw_panels()
         return {"PASS_THROUGH"}
 
     def cancel(self, _context: Context) -> None:
@@ -229,6 +229,7 @@ class SHUTTER_OT_inbetween_purge(_OfInbetweens, Operator):
 
 
 classes = own_classes(globals())
+TIMERS = (redraw_panels,)
 
 
 def unregister() -> None:

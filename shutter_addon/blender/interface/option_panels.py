@@ -1,6 +1,5 @@
 """Panels of what an effect is made with: its options and in-between frames."""
 
-import bpy
 from bpy.app.translations import pgettext_iface as iface_
 from bpy.app.translations import pgettext_n as n_
 from bpy.types import PropertyGroup, Scene, Strip, UILayout
@@ -78,11 +77,4 @@ def _draw_look(layout: UILayout, look: inbetween_build.Look) -> None:
             size = inbetween_operators.size_in_words(look.estimate)
             column.label(text=iface_("About {size} when built").format(size=size), icon="BLANK1", translate=False)
         elif look.estimate is None:
-            soon(_redraw, inbetween_operators.TICK)
-
-
-def _redraw() -> None:
-    inbetween_operators.redraw_panels(bpy.context)
-
-
-TIMERS = (_redraw,)
+            soon(inbetween_operators.redraw_panels, inbetween_operators.TICK)

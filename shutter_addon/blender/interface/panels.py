@@ -22,17 +22,7 @@ from .region_panels import Camera, Follow, Regions, Track, Transform, draw_track
 
 
 class SHUTTER_UL_shutters(UIList):
-    def draw_item(
-        self,
-        _context: Context,
-        layout: UILayout,
-        effect: PropertyGroup,
-        shutter: PropertyGroup,
-        _icon: str,
-        _active: int,
-        _property: str,
-        index: int,
-    ) -> None:
+    def draw_item(self, _context, layout, effect, shutter, _icon, _active, _property, index):
         row = layout.row(align=True)
         color = row.row(align=True)
         color.ui_units_x = 1.0
@@ -55,17 +45,7 @@ _ICONS = {
 
 
 class SHUTTER_UL_regions(UIList):
-    def draw_item(
-        self,
-        _context: Context,
-        layout: UILayout,
-        effect: PropertyGroup,
-        region: PropertyGroup,
-        _icon: str,
-        _active: int,
-        _property: str,
-        _index: int,
-    ) -> None:
+    def draw_item(self, _context, layout, effect, region, _icon, _active, _property, _index):
         row = layout.row(align=True)
         row.label(text="", icon=_ICONS.get(region.kind, "ERROR"))
         row.prop(region, "name", text="", emboss=False)

@@ -263,15 +263,11 @@ def _tell_strobing(looked: strobing.Looked, place: int, say: "_Notes") -> None:
     if looked.known is not None and inbetween_build.running() is None:
         say(inbetween_operators.strobing_in_words(looked.known), inbetween_operators.smoothing(looked.known), place)
     if looked.is_new:
-        soon(_redraw_panels)  # which may have been drawn before
+        soon(inbetween_operators.redraw_panels)  # which may have been drawn before
     if looked.is_busy:
         if bpy.app.timers.is_registered(_measure):
             bpy.app.timers.unregister(_measure)
         bpy.app.timers.register(_measure, first_interval=_STILL)  # once a frame stays
-
-
-def _redraw_panels() -> None:
-    inbetween_operators.redraw_panels(bpy.context)
 
 
 def _measure() -> float | None:
@@ -420,7 +416,7 @@ class _Notes:
 
 
 classes = (ShutterPreview,)
-TIMERS = _redraw_once, _redraw_when_still, shown_annotations.follow, _redraw_panels, _measure
+TIMERS = _redraw_once, _redraw_when_still, shown_annotations.follow, _measure
 _handler = None
 
 
