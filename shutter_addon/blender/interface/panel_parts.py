@@ -98,7 +98,13 @@ class WithEffect(Mixin):
 
     @classmethod
     def poll(cls, context: Context) -> bool:
-        return super().poll(context) and selection.active(context) is not None
+        active = selection.active(context) if super().poll(context) else None
+        return active is not None and cls.shows(active[1])
+
+    @classmethod
+    def shows(cls, effect: PropertyGroup) -> bool:
+        """Whether there is anything to show of an effect."""
+        return True
 
     def draw(self, context: Context) -> None:
         self.layout.use_property_split = True

@@ -3,7 +3,7 @@
 import math
 
 from bpy.app.translations import pgettext_iface as iface_
-from bpy.types import Context, MovieTracking, PropertyGroup, Scene, Strip, UILayout
+from bpy.types import MovieTracking, PropertyGroup, Scene, Strip, UILayout
 
 from ...core.messages import EffectError
 from ...media.pursuit import SURE
@@ -147,8 +147,8 @@ class _WithRegion(WithEffect):
     """A panel of the active region."""
 
     @classmethod
-    def poll(cls, context: Context) -> bool:
-        return super().poll(context) and selection.active_region(selection.active(context)[1]) is not None
+    def shows(cls, effect: PropertyGroup) -> bool:
+        return selection.active_region(effect) is not None
 
     def draw_effect(self, layout: UILayout, _scene: Scene, effect: PropertyGroup, _strip: Strip) -> None:
         self.draw_region(layout, selection.active_region(effect))
@@ -167,8 +167,8 @@ class Track(_WithRegion):
     bl_translation_context = CONTEXT
 
     @classmethod
-    def poll(cls, context: Context) -> bool:
-        return super().poll(context) and selection.active_region(selection.active(context)[1]).kind not in strips.MATTES
+    def shows(cls, effect: PropertyGroup) -> bool:
+        return super().shows(effect) and selection.active_region(effect).kind not in strips.MATTES
 
     def draw_region(self, layout: UILayout, region: PropertyGroup) -> None:
         draw_properties(layout, region, *_TRACKING)
@@ -203,10 +203,8 @@ class Camera(WithEffect):
     bl_label = "Camera"
 
     @classmethod
-    def poll(cls, context: Context) -> bool:
-        return super().poll(context) and any(
-            shutter.follow == "CAMERA" for shutter in selection.active(context)[1].shutters
-        )
+    def shows(cls, effect: PropertyGroup) -> bool:
+        return any(shutter.follow == "CAMERA" for shutter in effect.shutters)
 
     def draw_effect(self, layout: UILayout, _scene: Scene, effect: PropertyGroup, _strip: Strip) -> None:
         draw_properties(layout.column(align=True), effect.camera, *_PLACEMENT)
