@@ -11,15 +11,7 @@ from pathlib import Path
 import bpy
 import numpy as np
 from bpy.app.translations import pgettext_rpt as rpt_
-from bpy.types import (
-    MovieClip,
-    MovieTrackingMarkers,
-    MovieTrackingPlaneTrack,
-    MovieTrackingTrack,
-    PropertyGroup,
-    Scene,
-    Strip,
-)
+from bpy.types import MovieClip, MovieTrackingTrack, PropertyGroup, Scene, Strip
 
 from ...core import revision
 from ...core.messages import EffectError, translated
@@ -31,6 +23,7 @@ from ..rendering import effect_source
 from . import motion_keys
 from .motion_keys import MotionKeys
 
+Moves = dict[int, dict[int, Similarity]]  # by two frames, the motion of the picture from the one to the other
 Points = dict[str, complex]  # where markers are in the picture, in pixels as motions.Similarity counts them
 
 
@@ -130,13 +123,13 @@ def markers_of(track: MovieTrackingTrack) -> tuple[np.ndarray, np.ndarray]:
     return frames[shown], places.reshape(-1, 2)[shown]
 
 
-def _corners(plane: MovieTrackingPlaneTrack) -> list[tuple[str, np.ndarray, np.ndarray]]:
+def _corners(plane: bpy.types.MovieTrackingPlaneTrack) -> list[tuple[str, np.ndarray, np.ndarray]]:
     frames, shown = _marker_frames(plane.markers)
     places = np.array([[tuple(corner) for corner in marker.corners] for marker in plane.markers], np.float32)
     return [(str(k), frames[shown], places[shown, k]) for k in range(4)]
 
 
-def _marker_frames(markers: MovieTrackingMarkers) -> tuple[np.ndarray, np.ndarray]:
+def _marker_frames(markers: bpy.types.MovieTrackingMarkers) -> tuple[np.ndarray, np.ndarray]:
     """The frames (n,) of markers, ascending, and which of them are not muted."""
     frames, muted = np.empty(len(markers), np.int32), np.empty(len(markers), bool)
     markers.foreach_get("frame", frames)
@@ -212,11 +205,7 @@ def _place_at(frames: np.ndarray, places: np.ndarray, time: float) -> np.ndarray
 
 
 def followed(
-    subject: Region | Camera,
-    frames: list[int],
-    moves: dict[int, dict[int, Similarity]],
-    start: int,
-    size: tuple[int, int],
+    subject: Region | Camera, frames: list[int], moves: Moves, start: int, size: tuple[int, int]
 ) -> dict[int, Placement]:
     """By frame the placement of a region or the camera, carried from the frames at which that is known.
 
