@@ -1,6 +1,7 @@
 """Odd .blend data: impossible values of an effect, its strips and scenes, and what it needs gone or of another kind.
 Then its panels are drawn, it is exported, and a frame is rendered, twice."""
 
+import inspect
 import json
 import math
 import threading
@@ -248,7 +249,8 @@ def _draw(bpy, _folder):
 
     for panel in panels.classes:
         if issubclass(panel, bpy.types.Panel) and panel.poll(bpy.context):
-            panel.draw(SimpleNamespace(layout=_Layout()), bpy.context)
+            functions = {name: each for name, each in inspect.getmembers(panel) if inspect.isfunction(each)}
+            type("Drawn", (), {**functions, "layout": _Layout()})().draw(bpy.context)
     if found := selection.active(bpy.context):
         effect = found[1]
         for i, shutter in enumerate(effect.shutters):

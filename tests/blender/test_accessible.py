@@ -72,7 +72,7 @@ def test_a_region_is_moved_by_numbers_and_keyed_where_blender_keys_by_itself(bpy
     from shutter_addon.blender.data import fcurves
     from shutter_addon.blender.editing import region_edits
 
-    region = region_edits.add_matte(effect, effect.shutters[1], "RAMP")
+    region = region_edits.add_region(effect, effect.shutters[1], "RAMP")
     values = {"location": (0.25, -0.5), "rotation": 0.5, "scale": 2.0}
     assert bpy.ops.shutter.region_transform(**values) == {"FINISHED"}
     assert tuple(region.location) == (0.25, -0.5)

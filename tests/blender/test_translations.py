@@ -38,7 +38,7 @@ def _placeholders(text: str) -> list:
 # Blender looks up what these get; an f-string would be another message each time.
 LOOKED_UP = {"iface_", "rpt_", "data_", "report"}
 # What these get is shown as it is.
-SHOWN = {"refused", "poll_message_set", "say", "undo_push", "EffectError", "MediaError", "RecipeError"}
+SHOWN = {"poll_message_set", "say", "undo_push", "EffectError", "MediaError", "RecipeError"}
 
 
 def test_no_message_misses_its_translation():
@@ -51,6 +51,25 @@ def test_no_message_misses_its_translation():
             given = {type(word) for word in (*call.args, *(keyword.value for keyword in call.keywords))}
             assert not (name in LOOKED_UP | SHOWN and ast.JoinedStr in given), f"{path.name}:{call.lineno}"
             assert not (name in SHOWN and ast.Constant in given), f"{path.name}:{call.lineno}"
+
+
+# What these return is shown as it is.
+TELLING = {"refusal", "why_not", "why_no_effect", "why_full"}
+
+
+def test_no_refusal_misses_its_translation():
+    import messages
+
+    functions = (each for path in messages.SOURCES for each in ast.walk(ast.parse(path.read_text("utf-8"))))
+    telling = [each for each in functions if isinstance(each, ast.FunctionDef) and each.name in TELLING]
+    assert {function.name for function in telling} == TELLING
+    for function in telling:
+        for returned in (each.value for each in ast.walk(function) if isinstance(each, ast.Return)):
+            ends = [returned.body, returned.orelse] if isinstance(returned, ast.IfExp) else [returned]
+            words = [
+                end for end in ends if isinstance(end, ast.JoinedStr) or isinstance(getattr(end, "value", None), str)
+            ]
+            assert not words, f"{function.name}: {ast.unparse(returned)}"
 
 
 def test_texts_are_in_blenders_style(bpy):

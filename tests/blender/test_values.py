@@ -1,5 +1,6 @@
 """Files with values that no effect can have: a picture or one sentence, and no trace anywhere."""
 
+import inspect
 import math
 import random
 import subprocess
@@ -115,7 +116,7 @@ def ramp(effect, kind="RAMP", **values):
     """A new ramp or matte of the second shutter."""
     from shutter_addon.blender.editing import region_edits
 
-    return region_edits.add_matte(effect, effect.shutters[1], kind, "Ramp", **values)
+    return region_edits.add_region(effect, effect.shutters[1], kind, "Ramp", **values)
 
 
 def image(effect):
@@ -498,8 +499,8 @@ def show(bpy, edit):
             split_gizmo.SHUTTER_GGT_split.poll(context)
             for cls in panels.classes:
                 if issubclass(cls, bpy.types.Panel) and cls.poll(context):
-                    drawn = type("Drawn", (), {"layout": Layout()})()
-                    next(base for base in cls.__mro__ if "draw" in vars(base)).draw(drawn, context)
+                    functions = {name: each for name, each in inspect.getmembers(cls) if inspect.isfunction(each)}
+                    type("Drawn", (), {**functions, "layout": Layout()})().draw(context)
             found = selection.active(context)
             for region in found[1].regions if found else ():
                 panels.SHUTTER_UL_regions.draw_item(None, context, Layout(), found[1], region, 0, None, "", 0)

@@ -39,25 +39,18 @@ def add_effect(scene: Scene, source: Strip) -> tuple[Strip, PropertyGroup]:
     strip.blend_type = source.blend_type
     copy_look(source, strip)
     _mute(source, medium)
-    if not _is_kept(scene, source) and medium.alpha == "opaque" and seen_alone.hides(scene, strip):
+    config = source_media.spec(source).options["config"]
+    keeps = color.keeps(scene.sequencer_colorspace_settings.name, config)
+    if not keeps and medium.alpha == "opaque" and seen_alone.hides(scene, strip):
         strip.blend_type = "REPLACE"  # Blender changes colours as it lays strips over others
     effect = data_format.new_effect(scene, data_format.FORMAT)
-    effect.name, effect.scene, effect.source, effect.start = (
-        strip.name,
-        effect_scene,
-        source.virtual_shutter_source,
-        origin(strip),
-    )
+    effect.name, effect.scene, effect.start = strip.name, effect_scene, origin(strip)
+    effect.source = source.virtual_shutter_source
     strip.virtual_shutter_effect = effect.identity = effect_scene.virtual_shutter.identity
     scene.render.sequencer_gl_preview = "RENDERED"  # or the preview shows the effect's empty scene
     strip.color_tag = _COLOR
     connect(scene, [strip, source, *source.connections])
     return strip, effect_of(scene, effect_scene)  # again: an operator's update may move the collection's items
-
-
-def _is_kept(scene: Scene, source: Strip) -> bool:
-    config = source_media.spec(source).options["config"]
-    return color.keeps(scene.sequencer_colorspace_settings.name, config)
 
 
 def choose_source(effect: PropertyGroup, strip: Strip, source: Strip) -> None:

@@ -8,11 +8,11 @@ from __future__ import annotations
 import uuid
 from contextlib import suppress
 from pathlib import Path
-from typing import Any
 
 import bpy
 from bpy.app.translations import pgettext_data as data_
 from bpy.app.translations import pgettext_rpt as rpt_
+from bpy.types import MetaStrip, PropertyGroup, Scene, SequenceEditor, Strip, StripsTopLevel
 
 from ...core.messages import EffectError
 from ...core.revision import UntilChange
@@ -25,7 +25,7 @@ _CURVES = "transform.", "crop.", "blend_alpha", "color_multiply", "color_saturat
 _states = UntilChange()
 
 
-def check(scene: Any, strip: Any) -> None:
+def check(scene: Scene, strip: Strip) -> None:
     """EffectError: no film could stand in for an effect strip, and why."""
     if match_source.effects_on(scene, strip):
         sentence = rpt_('"{strip}" is the input of another strip, which would not show the baked one')
@@ -33,7 +33,7 @@ def check(scene: Any, strip: Any) -> None:
     _channel(scene, strip)
 
 
-def lay(scene: Any, strip: Any, film: Film) -> Any:
+def lay(scene: Scene, strip: Strip, film: Film) -> Strip:
     """Puts a finished film in the place of the effect strip that it was baked of, and mutes that; the new strip. That
     of an older bake goes. EffectError: there is no room for it."""
     owner = strip.parent_meta() or scene.sequence_editor
@@ -67,7 +67,7 @@ def lay(scene: Any, strip: Any, film: Film) -> Any:
     return baked
 
 
-def _channel(scene: Any, strip: Any) -> int:
+def _channel(scene: Scene, strip: Strip) -> int:
     """The first channel above an effect strip that has room beside it, and is not muted. EffectError: there is none."""
     owner = strip.parent_meta() or scene.sequence_editor
     for channel in range(strip.channel + 1, strips.CHANNELS + 1):
@@ -77,17 +77,17 @@ def _channel(scene: Any, strip: Any) -> int:
     raise EffectError(sentence.format(strip=strip.name))
 
 
-def _is_free(owner: Any, strip: Any, channel: int) -> bool:
+def _is_free(owner: SequenceEditor | MetaStrip, strip: Strip, channel: int) -> bool:
     return not any(other.channel == channel and strips.overlap(other, strip) for other in owner.strips)
 
 
-def _move(owner: Any, strip: Any, channel: int) -> None:
+def _move(owner: SequenceEditor | MetaStrip, strip: Strip, channel: int) -> None:
     """Moves a strip to a channel, where there is room: Blender would shift it in time."""
     if _is_free(owner, strip, channel):
         strip.channel = channel
 
 
-def _new_strip(level: Any, name: str, film: Film, channel: int, start: int) -> Any:
+def _new_strip(level: StripsTopLevel, name: str, film: Film, channel: int, start: int) -> Strip:
     if film.kind == "MOVIE":
         return level.new_movie(name, _relative(film.place), channel, start)
     first, *others = film.pictures
@@ -104,13 +104,13 @@ def _relative(path: Path) -> str:
     return str(path)
 
 
-def _copy_curves(scene: Any, strip: Any, baked: Any) -> None:
+def _copy_curves(scene: Scene, strip: Strip, baked: Strip) -> None:
     old, new = strip.path_from_id(), baked.path_from_id()
     for end in _CURVES:
         fcurves.copy_curves(scene, f"{old}.{end}", scene, f"{new}.{end}")
 
 
-def _note(strip: Any, baked: Any, film: Film, channel: int) -> None:
+def _note(strip: Strip, baked: Strip, film: Film, channel: int) -> None:
     """Says of both strips that they belong together, and of which version the film is. channel: the effect strip's
     own"""
     identity = uuid.uuid4().hex
@@ -120,7 +120,7 @@ def _note(strip: Any, baked: Any, film: Film, channel: int) -> None:
         bake.first, bake.count, bake.channel = film.frames.start, len(film.frames), channel
 
 
-def baked_of(scene: Any, strip: Any) -> list:
+def baked_of(scene: Scene, strip: Strip) -> list:
     """The baked strips, or their parts, of an effect strip and all that it was cut into: those that begin with it.
     Copies that were moved elsewhere are none of them."""
     start = round(strips.origin(strip))
@@ -128,14 +128,14 @@ def baked_of(scene: Any, strip: Any) -> list:
     return [part for part in parts if round(strips.origin(part)) - part.virtual_shutter_bake.first == start]
 
 
-def effect_parts(scene: Any, strip: Any) -> list:
+def effect_parts(scene: Scene, strip: Strip) -> list:
     """What an effect strip that was baked has been cut into; none, if it was not."""
     start = round(strips.origin(strip))
     parts = (other for other in selection.of_bake(scene, strip) if round(strips.origin(other)) == start)
     return [part for part in parts if part.type == "SCENE"]
 
 
-def unbake(scene: Any, strip: Any) -> None:
+def unbake(scene: Scene, strip: Strip) -> None:
     """Removes what is baked of an effect strip, and shows the effect again. Files stay."""
     parts = effect_parts(scene, strip)
     for baked in baked_of(scene, strip):
@@ -149,16 +149,16 @@ def unbake(scene: Any, strip: Any) -> None:
                 bake.property_unset(prop.identifier)
 
 
-def is_stale(scene: Any, effect: Any, strip: Any) -> bool:
+def is_stale(scene: Scene, effect: PropertyGroup, strip: Strip) -> bool:
     """Whether an effect has changed since its strip was baked: its pictures would be others. True as well where it has
     none any more."""
     return _states.get(_place(scene, effect, strip), lambda: effect_version.is_changed(scene, effect, strip))
 
 
-def known_stale(scene: Any, effect: Any, strip: Any) -> bool | None:
+def known_stale(scene: Scene, effect: PropertyGroup, strip: Strip) -> bool | None:
     """As is_stale, where that has been asked since something changed; None: it has not."""
     return _states.known(_place(scene, effect, strip))
 
 
-def _place(scene: Any, effect: Any, strip: Any) -> tuple:
+def _place(scene: Scene, effect: PropertyGroup, strip: Strip) -> tuple:
     return scene.session_uid, effect.identity, strip.name

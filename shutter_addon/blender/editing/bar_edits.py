@@ -1,10 +1,12 @@
 """A shutter's bars: painted, keyed, and as they are at the current frame."""
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import bpy
 import numpy as np
 from bpy.app.translations import pgettext_iface as iface_
+from bpy.types import Context, FCurve, PropertyGroup, Scene, Strip
 
 from ...core import revision
 from ...core.model import shutters
@@ -14,7 +16,7 @@ from ..data.consistency import bars
 from ..rendering import effect_source, invalidation, render_context
 
 
-def summary(weights, combine: str = "AVERAGE") -> str:
+def summary(weights: np.ndarray, combine: str = "AVERAGE") -> str:
     """A shutter's bars (L,) in words: its angle, and how many of the frames that is; or how many it combines otherwise
     (choices.COMBINES)."""
     if not shutters.exposure(weights):
@@ -28,7 +30,7 @@ def summary(weights, combine: str = "AVERAGE") -> str:
     return words.format(angle=f"{angle:.0f}", frames=f"{angle / 360 * window:.3g}", window=window)
 
 
-def open_for(scene, effect, strip, index: int) -> str | None:
+def open_for(scene: Scene, effect: PropertyGroup, strip: Strip, index: int) -> str | None:
     """For how many frames a shutter is open at the current frame whose trail has a length, in words; None: its bars say
     that, or there is no picture. For what is drawn: worked out once, with all that the live preview shows, until
     something changes."""
@@ -45,19 +47,19 @@ def open_for(scene, effect, strip, index: int) -> str | None:
     return words.format(frames=f"{state.open_for[index]:.3g}", window=state.options.window)
 
 
-def set_bars(shutter, weights) -> None:
+def set_bars(shutter: PropertyGroup, weights: Sequence[float] | np.ndarray) -> None:
     """Gives a shutter these bars (L,); those that stay are not touched."""
     for bar, weight in zip(shutter.bars, weights, strict=True):
         if bar.weight != np.float32(weight):
             bar.weight = weight
 
 
-def auto_key(context) -> bool:
+def auto_key(context: Context) -> bool:
     """Whether Blender's auto keying is on."""
     return context.scene.tool_settings.use_keyframe_insert_auto
 
 
-def paint(effect, index: int, weights, key: bool = False) -> None:
+def paint(effect: PropertyGroup, index: int, weights: Sequence[float] | np.ndarray, key: bool = False) -> None:
     """Gives a shutter bars (L,) as an editor does at the current frame, and as many as it may lack or have too many;
     key: and keys them there."""
     shutter = effect.shutters[index]
@@ -70,27 +72,31 @@ def paint(effect, index: int, weights, key: bool = False) -> None:
         key_bars(effect, index)
 
 
-def key_bars(effect, index: int) -> None:
+def key_bars(effect: PropertyGroup, index: int) -> None:
     """Keys all bars of a shutter at the current frame, as Blender's own key buttons do."""
-    path, group = f"{effect.path_from_id()}.shutters[{index}].bars", effect.shutters[index].name
     # Between keys the bars stand where their F-curves are, a cross-fade: the picture is made with others.
-    set_bars(effect.shutters[index], bars_now(effect, index))
-    scene = effect.id_data
-    for k in range(len(effect.shutters[index].bars)):
+    shutter, scene = effect.shutters[index], effect.id_data
+    set_bars(shutter, bars_now(effect, index))
+    for path in _paths(effect, index):
         # Without a frame Blender takes that of the window's scene, which may be another one.
-        scene.keyframe_insert(f"{path}[{k}].weight", group=group, frame=scene.frame_current)
+        scene.keyframe_insert(path, group=shutter.name, frame=scene.frame_current)
 
 
-def unkey_bars(effect, index: int) -> bool:
+def _paths(effect: PropertyGroup, index: int) -> list[str]:
+    """Of the weights of a shutter's bars, from the scene."""
+    path = f"{effect.path_from_id()}.shutters[{index}].bars"
+    return [f"{path}[{k}].weight" for k in range(len(effect.shutters[index].bars))]
+
+
+def unkey_bars(effect: PropertyGroup, index: int) -> bool:
     """Deletes the keys of a shutter's bars at the current frame; whether there were any."""
-    scene, path = effect.id_data, f"{effect.path_from_id()}.shutters[{index}].bars"
+    scene = effect.id_data
     curves = fcurves.Curves(scene)
-    keyed = [k for k in range(len(effect.shutters[index].bars)) if curves.find(f"{path}[{k}].weight")]
-    deleted = [_deleted(scene, f"{path}[{k}].weight") for k in keyed]
+    deleted = [_deleted(scene, path) for path in _paths(effect, index) if curves.find(path)]
     return any(deleted)
 
 
-def _deleted(scene, path: str) -> bool:
+def _deleted(scene: Scene, path: str) -> bool:
     try:
         return scene.keyframe_delete(path, frame=scene.frame_current)
     except RuntimeError:  # no key at this frame
@@ -108,29 +114,27 @@ class BarsShown(NamedTuple):
 _shown = revision.UntilChange()
 
 
-def shown(effect, index: int) -> BarsShown:
+def shown(effect: PropertyGroup, index: int) -> BarsShown:
     """What bars_now and key_state say, for what is drawn: worked out once until something changes."""
     scene = effect.id_data
     key = effect.scene.session_uid, index, scene.frame_float
 
-    def read():
+    def read() -> BarsShown:
         states = key_state(effect, index)
         return BarsShown(_bars_now(effect, index, states), states)
 
     return _shown.get(key, read)
 
 
-def key_state(effect, index: int) -> list[str]:
+def key_state(effect: PropertyGroup, index: int) -> list[str]:
     """See BarsShown.states."""
-    scene, path = effect.id_data, f"{effect.path_from_id()}.shutters[{index}].bars"
+    scene = effect.id_data
     curves = fcurves.Curves(scene)
-    return [
-        _state(curves.find(f"{path}[{k}].weight"), bar.weight, scene)
-        for k, bar in enumerate(effect.shutters[index].bars)
-    ]
+    bars_and_paths = zip(effect.shutters[index].bars, _paths(effect, index), strict=True)
+    return [_state(curves.find(path), bar.weight, scene) for bar, path in bars_and_paths]
 
 
-def _state(curve, value: float, scene) -> str:
+def _state(curve: FCurve | None, value: float, scene: Scene) -> str:
     if curve is None:
         return ""
     frame = scene.frame_current_final  # by which keys are stretched
@@ -139,7 +143,7 @@ def _state(curve, value: float, scene) -> str:
     return "keyed" if any(abs(key.co[0] - frame) < 1e-3 for key in curve.keyframe_points) else "animated"
 
 
-def bars_now(effect, index: int) -> np.ndarray:
+def bars_now(effect: PropertyGroup, index: int) -> np.ndarray:
     """Bars (L,) that the picture at the current frame is made with, interpolated between keys.
 
     Bars that were changed since, and not keyed yet, count as they stand. EffectError: the picture cannot be made.
@@ -147,7 +151,7 @@ def bars_now(effect, index: int) -> np.ndarray:
     return _bars_now(effect, index, key_state(effect, index))
 
 
-def _bars_now(effect, index: int, states: list[str]) -> np.ndarray:
+def _bars_now(effect: PropertyGroup, index: int, states: list[str]) -> np.ndarray:
     if "changed" in states:
         return bars(effect.shutters[index])
     return snapshot.bars_at(effect.id_data, effect, index, effect.id_data.frame_float)

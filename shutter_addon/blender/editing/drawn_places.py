@@ -4,6 +4,7 @@ from contextlib import suppress
 from itertools import repeat
 
 import numpy as np
+from bpy.types import PropertyGroup, Strip
 
 from ...core.messages import EffectError
 from ...core.model.effect import Drawings
@@ -14,7 +15,7 @@ from . import outline_drawings, region_edits
 from .motion_keys import MotionKeys
 
 
-def hold(effect, index: int) -> None:
+def hold(effect: PropertyGroup, index: int) -> None:
     """Notes where a region was as its drawings were made, before it is moved: from then on they move with it."""
     region, curves = effect.regions[index], Curves(effect.id_data)
     if region.kind not in strips.LAID:
@@ -22,7 +23,7 @@ def hold(effect, index: int) -> None:
         _note(effect, region, _origins(sampled.drawings(curves, path, effect, region, None, ())))
 
 
-def begin(effect, strip, index: int, *, erases: bool = False) -> None:
+def begin(effect: PropertyGroup, strip: Strip, index: int, *, erases: bool = False) -> None:
     """Makes the current frame ready for the pen: what it draws is seen there. What is drawn at that frame already is
     stored where it is seen; for the eraser, so is all of the region that is seen elsewhere than it is stored.
     EffectError: the region lies nowhere."""
@@ -46,7 +47,7 @@ def _origins(drawings: Drawings) -> dict[float, Placement]:
     return dict(zip(drawings.frames, drawings.origins or repeat(Placement()), strict=False))
 
 
-def _note(effect, region, origins: dict[float, Placement]) -> None:
+def _note(effect: PropertyGroup, region: PropertyGroup, origins: dict[float, Placement]) -> None:
     region.drawn.clear()
     for frame, origin in origins.items():
         noted = region.drawn.add()

@@ -8,8 +8,8 @@ import math
 from collections.abc import Callable
 from functools import partial
 
-import numpy as np
 from bpy.app.translations import pgettext_rpt as rpt_
+from bpy.types import MovieClip, MovieTrackingStabilization, PropertyGroup, Scene, Strip, bpy_struct
 
 from ...core.messages import EffectError
 from ...core.model import motions
@@ -21,7 +21,7 @@ from . import follow_track, motion_keys
 from .motion_keys import MotionKeys
 
 
-def follow(scene, effect, strip) -> None:
+def follow(scene: Scene, effect: PropertyGroup, strip: Strip) -> None:
     """Keys the camera by the stabilization of its clip, from where it is now, at the current frame. EffectError,
     MediaError: there is nothing to follow, and nothing has changed."""
     camera, start, size = effect.camera, scene.frame_current, annotations.picture_size(effect)
@@ -45,13 +45,13 @@ def follow(scene, effect, strip) -> None:
     camera.stops.clear()
 
 
-def _motion(settings) -> str:
+def _motion(settings: MovieTrackingStabilization) -> str:
     if not settings.use_stabilize_rotation:
         return "LOCATION"
     return "SCALE" if settings.use_stabilize_scale else "ROTATION"
 
 
-def unstabilized(clip, size) -> Callable[[float], Similarity]:
+def unstabilized(clip: MovieClip, size: tuple[int, int]) -> Callable[[float], Similarity]:
     """The motion of the picture from where stabilization lays it to where the clip has it, at a time in the clip's
     frames. EffectError: the clip is not stabilized."""
     settings = clip.tracking.stabilization
@@ -78,15 +78,12 @@ def unstabilized(clip, size) -> Callable[[float], Similarity]:
     return between
 
 
-def _stabilization(clip, aspect: float) -> Stabilization:
+def _stabilization(clip: MovieClip, aspect: float) -> Stabilization:
     settings, value, tracks = clip.tracking.stabilization, _values(clip), []
     used = [{track.name for track in each} for each in (settings.tracks, settings.rotation_tracks)]
     for track in clip.tracking.objects[0].tracks:
-        frames, shown = follow_track.marker_frames(track.markers)
-        places = np.empty(2 * len(frames), np.float32)
-        track.markers.foreach_get("co", places)
-        places = places.reshape(-1, 2)[shown] * (aspect, 1)
-        markers = dict(zip(frames[shown].tolist(), (places @ (1, 1j)).tolist(), strict=True))
+        frames, places = follow_track.markers_of(track)
+        markers = dict(zip(frames.tolist(), (places * (aspect, 1) @ (1, 1j)).tolist(), strict=True))
         location, turn = (track.name in names for names in used)
         if location or turn:
             weight = partial(value, track, "weight_stab")
@@ -95,11 +92,11 @@ def _stabilization(clip, aspect: float) -> Stabilization:
     return Stabilization(tracks, settings.anchor_frame, turned=turned, scaled=turned and settings.use_stabilize_scale)
 
 
-def _values(clip) -> Callable:
+def _values(clip: MovieClip) -> Callable:
     """What a number of a clip is at one of its frames."""
     curves = fcurves.Curves(clip)
 
-    def at(owner, name: str, frame: int, axis: int | None = None) -> float:
+    def at(owner: bpy_struct, name: str, frame: int, axis: int | None = None) -> float:
         curve = curves.find(f"{owner.path_from_id()}.{name}", axis or 0)
         if curve is not None:
             return curve.evaluate(frame + clip.frame_start - 1)
@@ -108,7 +105,7 @@ def _values(clip) -> Callable:
     return at
 
 
-def _in_pixels(motion: Similarity, size) -> Similarity:
+def _in_pixels(motion: Similarity, size: tuple[int, int]) -> Similarity:
     """A motion in heights of the picture, y up, as one in pixels, y down."""
     turn, origin = motion.turn.conjugate(), motions.pixel((0, 0), size)
     return Similarity(turn, origin - turn * origin + size[1] * motion.shift.conjugate())

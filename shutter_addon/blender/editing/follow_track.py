@@ -11,20 +11,23 @@ from pathlib import Path
 import bpy
 import numpy as np
 from bpy.app.translations import pgettext_rpt as rpt_
+from bpy.types import MovieClip, MovieTrackingTrack, PropertyGroup, Scene, Strip
 
 from ...core import revision
 from ...core.messages import EffectError, translated
 from ...core.model import motions
+from ...core.model.effect import Camera, Region
 from ...core.model.motions import Placement, Similarity
 from ..data import annotations, snapshot, source_media, strips, validation
 from ..rendering import effect_source
 from . import motion_keys
 from .motion_keys import MotionKeys
 
+Moves = dict[int, dict[int, Similarity]]  # by two frames, the motion of the picture from the one to the other
 Points = dict[str, complex]  # where markers are in the picture, in pixels as motions.Similarity counts them
 
 
-def follow(scene, effect, strip, index: int) -> None:
+def follow(scene: Scene, effect: PropertyGroup, strip: Strip, index: int) -> None:
     """Keys a region by what it is set to follow, from where it is now, at the current frame. EffectError, MediaError:
     it cannot be followed, and nothing has changed."""
     start = scene.frame_current
@@ -34,28 +37,27 @@ def follow(scene, effect, strip, index: int) -> None:
     _key(scene, effect, strip, index, points)
 
 
-def update(scene, effect, strip, index: int) -> None:
+def update(scene: Scene, effect: PropertyGroup, strip: Strip, index: int) -> None:
     """Keys a region anew by what it follows, from where it is at the frame at which it began to. EffectError,
     MediaError: it cannot be followed, and nothing has changed."""
     _key(scene, effect, strip, index, _points(scene, effect, strip, index, _start(effect, index)))
 
 
-def _start(effect, index: int) -> int:
+def _start(effect: PropertyGroup, index: int) -> int:
     return round(effect.start + validation.number(effect.regions[index], "follow_frame"))
 
 
-def _keys(effect, index: int) -> MotionKeys:
+def _keys(effect: PropertyGroup, index: int) -> MotionKeys:
     region = effect.regions[index]
     return MotionKeys(effect, index, "LOCATION" if region.follow_kind == "TRACK" else region.motion)
 
 
-def _key(scene, effect, strip, index: int, points: dict[int, Points]) -> None:
+def _key(scene: Scene, effect: PropertyGroup, strip: Strip, index: int, points: dict[int, Points]) -> None:
     region, start, size = effect.regions[index], _start(effect, index), annotations.picture_size(effect)
     keys = _keys(effect, index)
     known = sorted({start, *(frame for frame in keys.edited(range(min(points), max(points) + 1)) if frame in points)})
     shape = snapshot.region_at(scene, effect, strip, index, points)
-    moves = {frame: _motions(points, frame) for frame in known}
-    placements = followed(shape, sorted(points), moves, start, size)
+    placements = followed(shape, sorted(points), {frame: _motions(points, frame) for frame in known}, start, size)
     kept = motions.thinned(placements, motions.offsets(shape.drawings.at(start)), size, known)
     frames = range(min(placements), max(placements) + 1)
     confidence = {frame: float(frame in placements) for frame in frames}
@@ -64,7 +66,7 @@ def _key(scene, effect, strip, index: int, points: dict[int, Points]) -> None:
     region.stops.clear()
 
 
-def is_changed(region) -> bool:
+def is_changed(region: PropertyGroup) -> bool:
     """Whether a region follows what has changed since; for what is drawn."""
     if not region.follow_stamp:
         return False
@@ -75,7 +77,7 @@ def is_changed(region) -> bool:
 _stamps = revision.UntilChange()
 
 
-def stamp(region) -> str:
+def stamp(region: PropertyGroup) -> str:
     """Changes with the markers that a region follows; empty where there are none."""
     try:
         markers = _markers(region)
@@ -87,7 +89,7 @@ def stamp(region) -> str:
     return digest.hexdigest()
 
 
-def _markers(region) -> list[tuple[str, np.ndarray, np.ndarray]]:
+def _markers(region: PropertyGroup) -> list[tuple[str, np.ndarray, np.ndarray]]:
     """Of each point that a region follows its name, the clip's frames (n,) at which it has a marker, ascending, and
     where that is (n, 2), in fractions of the picture. EffectError: the clip has nothing of that name."""
     clip = region.follow_clip
@@ -95,33 +97,39 @@ def _markers(region) -> list[tuple[str, np.ndarray, np.ndarray]]:
         raise EffectError(rpt_("Choose a clip first"))
     holder = clip.tracking.objects.get(region.follow_object) if region.follow_object else clip.tracking.objects[0]
     if holder is None:
-        raise EffectError(_missing(clip, region.follow_object))
+        raise _missing(clip, region.follow_object)
     if region.follow_kind == "OBJECT":
         return [_track_markers(track) for track in holder.tracks]
     named = (holder.plane_tracks if region.follow_kind == "PLANE" else holder.tracks).get(region.follow_track)
     if named is None:
-        raise EffectError(_missing(clip, region.follow_track))
+        raise _missing(clip, region.follow_track)
     return _corners(named) if region.follow_kind == "PLANE" else [_track_markers(named)]
 
 
-def _missing(clip, name: str) -> str:
-    return rpt_('clip "{clip}" has no track "{track}"').format(clip=clip.name, track=name)
+def _missing(clip: MovieClip, name: str) -> EffectError:
+    return EffectError(rpt_('clip "{clip}" has no track "{track}"').format(clip=clip.name, track=name))
 
 
-def _track_markers(track) -> tuple[str, np.ndarray, np.ndarray]:
-    frames, shown = marker_frames(track.markers)
+def _track_markers(track: MovieTrackingTrack) -> tuple[str, np.ndarray, np.ndarray]:
+    frames, places = markers_of(track)
+    return track.name, frames, places + np.array(track.offset, np.float32)
+
+
+def markers_of(track: MovieTrackingTrack) -> tuple[np.ndarray, np.ndarray]:
+    """The frames (n,) of a track's markers that are not muted, ascending, and where these are (n, 2)."""
+    frames, shown = _marker_frames(track.markers)
     places = np.empty(2 * len(frames), np.float32)
     track.markers.foreach_get("co", places)
-    return track.name, frames[shown], places.reshape(-1, 2)[shown] + np.array(track.offset, np.float32)
+    return frames[shown], places.reshape(-1, 2)[shown]
 
 
-def _corners(plane) -> list[tuple[str, np.ndarray, np.ndarray]]:
-    frames, shown = marker_frames(plane.markers)
+def _corners(plane: bpy.types.MovieTrackingPlaneTrack) -> list[tuple[str, np.ndarray, np.ndarray]]:
+    frames, shown = _marker_frames(plane.markers)
     places = np.array([[tuple(corner) for corner in marker.corners] for marker in plane.markers], np.float32)
     return [(str(k), frames[shown], places[shown, k]) for k in range(4)]
 
 
-def marker_frames(markers) -> tuple[np.ndarray, np.ndarray]:
+def _marker_frames(markers: bpy.types.MovieTrackingMarkers) -> tuple[np.ndarray, np.ndarray]:
     """The frames (n,) of markers, ascending, and which of them are not muted."""
     frames, muted = np.empty(len(markers), np.int32), np.empty(len(markers), bool)
     markers.foreach_get("frame", frames)
@@ -129,7 +137,7 @@ def marker_frames(markers) -> tuple[np.ndarray, np.ndarray]:
     return frames, ~muted
 
 
-def _points(scene, effect, strip, index: int, start: int) -> dict[int, Points]:
+def _points(scene: Scene, effect: PropertyGroup, strip: Strip, index: int, start: int) -> dict[int, Points]:
     """By timeline frame of the strip the points that a region follows, as the strip shows them. EffectError,
     MediaError: there is nothing that it can follow from the frame `start` on."""
     region = effect.regions[index]
@@ -151,7 +159,7 @@ def _points(scene, effect, strip, index: int, start: int) -> dict[int, Points]:
     return by_frame
 
 
-def clip_times(scene, effect, strip, clip) -> dict[int, float]:
+def clip_times(scene: Scene, effect: PropertyGroup, strip: Strip, clip: MovieClip) -> dict[int, float]:
     """By timeline frame of the strip what it shows, in the clip's frames: in-between frames lie between two of them.
     EffectError, MediaError: the strip does not show the clip's footage."""
     frames = range(strip.left_handle, strip.right_handle)
@@ -163,13 +171,13 @@ def clip_times(scene, effect, strip, clip) -> dict[int, float]:
         return {frame: clip.shown(frame).source_frame / clip.step + first for frame in frames}
 
 
-def _points_at(tracks, time: float, size) -> Points:
+def _points_at(tracks: list, time: float, size: tuple[int, int]) -> Points:
     """Of the markers (see _markers) those that there are at a time in the clip's frames."""
     at_time = {name: _place_at(frames, places, time) for name, frames, places in tracks}
     return {name: motions.pixel(place, size) for name, place in at_time.items() if place is not None}
 
 
-def _check_footage(source, clip) -> None:
+def _check_footage(source: Strip, clip: MovieClip) -> None:
     """EffectError: a clip begins with another file than a strip does. MediaError: the strip has no files."""
     first = _file(source.clip) if source.type == "MOVIECLIP" and source.clip else source_media.spec(source).path
     if first.resolve() != _file(clip).resolve():
@@ -177,11 +185,11 @@ def _check_footage(source, clip) -> None:
         raise EffectError(sentence.format(clip=clip.name, strip=source.name))
 
 
-def _file(clip) -> Path:
+def _file(clip: MovieClip) -> Path:
     return Path(bpy.path.abspath(clip.filepath, library=clip.library))
 
 
-def _first_frame(source, clip) -> int:
+def _first_frame(source: Strip, clip: MovieClip) -> int:
     """The clip's frame that the first frame of a strip's medium is."""
     if source.type == "MOVIECLIP" and not source_media.first_frame(source):
         return 1
@@ -197,54 +205,48 @@ def _place_at(frames: np.ndarray, places: np.ndarray, time: float) -> np.ndarray
     return before + (time - np.floor(time)) * (after - before)
 
 
-class _Follower:
-    """Carries a region or the camera along what it follows; arguments: see `followed`."""
-
-    def __init__(self, subject, frames: list[int], moves: dict[int, dict[int, Similarity]], size):
-        self._subject, self._known, self._moves, self._size = subject, sorted(moves), moves, size
-        self._centres = {frame: subject.centre(frame) for frame in frames}
-
-    def at(self, frame: int, near: Placement) -> Placement | None:
-        """The placement at a frame, its rotation next to another one's: between two known frames blended from both.
-        None: too few points are there."""
-        before = self._known[max(bisect_right(self._known, frame) - 1, 0)]
-        after = self._known[min(bisect_left(self._known, frame), len(self._known) - 1)]
-        first, second = self._carried(before, frame, near), self._carried(after, frame, near)
-        if first is None or second is None or before == after:
-            return first or second
-        return motions.between(first, second, (frame - before) / (after - before))
-
-    def _carried(self, origin: int, frame: int, near: Placement) -> Placement | None:
-        motion = self._moves[origin].get(frame)
-        if motion is None:
-            return None
-        centres = self._centres[origin], self._centres[frame]
-        return motions.unwound(motions.carried(self._subject.placement(origin), motion, *centres, self._size), near)
-
-
 def followed(
-    subject, frames: list[int], moves: dict[int, dict[int, Similarity]], start: int, size
+    subject: Region | Camera, frames: list[int], moves: Moves, start: int, size: tuple[int, int]
 ) -> dict[int, Placement]:
     """By frame the placement of a region or the camera, carried from the frames at which that is known.
 
     subject: a core.model.effect.Region or Camera; frames: ascending; moves: by frame at which the placement is known,
     `start` among them, the motions of the picture to other frames"""
-    follower, result = _Follower(subject, frames, moves, size), {start: subject.placement(start)}
-    for way in ([f for f in frames if f > start], [f for f in reversed(frames) if f < start]):
+    known, placed = sorted(moves), ((frame, subject.centre(frame)) for frame in frames)
+    centres = {frame: centre for frame, centre in placed if centre is not None}
+    result = {start: subject.placement(start)}
+
+    def carried(origin: int, frame: int, near: Placement) -> Placement | None:
+        """The placement at a frame, its rotation next to another one's; None: too few points are there."""
+        if (motion := moves[origin].get(frame)) is None:
+            return None
+        moved = motions.carried(subject.placement(origin), motion, centres[origin], centres[frame], size)
+        return motions.unwound(moved, near)
+
+    for way in _ways(frames, start):
         near = result[start]
         for frame in way:
-            placement = follower.at(frame, near)
+            before = known[max(bisect_right(known, frame) - 1, 0)]
+            after = known[min(bisect_left(known, frame), len(known) - 1)]
+            first, second = carried(before, frame, near), carried(after, frame, near)
+            placement = first or second
+            if first and second and before != after:  # blended from both
+                placement = motions.between(first, second, (frame - before) / (after - before))
             if placement is not None:
                 near = result[frame] = placement
     return dict(sorted(result.items()))
+
+
+def _ways(frames: list[int], start: int) -> tuple[list[int], list[int]]:
+    """The frames after one, and those before it, backward."""
+    return [frame for frame in frames if frame > start], [frame for frame in reversed(frames) if frame < start]
 
 
 def _motions(points: dict[int, Points], origin: int) -> dict[int, Similarity]:
     """By frame the motion from the points of one frame; where too few of these are left, by way of the frame before."""
     by_frame = {origin: Similarity()}
     enough = min(2, len(points[origin]))
-    frames = sorted(points)
-    for way in ([f for f in frames if f > origin], [f for f in reversed(frames) if f < origin]):
+    for way in _ways(sorted(points), origin):
         before = origin
         for frame in way:
             for base in (origin, before):

@@ -8,7 +8,7 @@ A key that the editor sets bends the frames around it, as keys do, until trackin
 tracked again are where tracking had left them.
 """
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -17,6 +17,7 @@ import numpy as np
 from bpy.app.translations import pgettext_iface as iface_
 from bpy.app.translations import pgettext_n as n_
 from bpy.app.translations import pgettext_rpt as rpt_
+from bpy.types import PropertyGroup, Scene
 
 from ...core.messages import EffectError
 from ...core.model import presence
@@ -50,8 +51,7 @@ class MotionKeys:
 
     def edited(self, frames: range) -> list[int]:
         """The whole frames, among these, at which the editor has set a key."""
-        curves = (self._curve(name, component) for name, component in _COMPONENTS[: _COUNTS[self.motion]])
-        keys = map(_read, filter(None, curves))
+        keys = map(_read, self._curves(_COUNTS[self.motion]))
         keyed = {frame for all_frames, made in keys for frame in all_frames[~made].tolist()}
         return sorted(int(frame) for frame in keyed if frame in frames)
 
@@ -62,8 +62,7 @@ class MotionKeys:
 
     def are_several(self) -> bool:
         """Whether a channel of the motion has keys at more than one frame: with one alone the region stands still."""
-        curves = (self._curve(name, component) for name, component in _COMPONENTS[: _COUNTS[self.motion]])
-        return any(len(curve.keyframe_points) > 1 for curve in filter(None, curves))
+        return any(len(curve.keyframe_points) > 1 for curve in self._curves(_COUNTS[self.motion]))
 
     def reach(self, frame: int) -> bool:
         """Whether there are keys of a motion, and tracking, if any of them come from it, has come through a frame."""
@@ -81,7 +80,7 @@ class MotionKeys:
         becomes of the keys between, and wherever the editor has moved the first and the last of them."""
         tracked = self.confidence()[0]
         beside = tracked[np.isin(tracked, (first - 1, last + 1))].tolist()
-        for curve in filter(None, (self._curve(name, component) for name, component in _COMPONENTS)):
+        for curve in self._curves():
             for frame, value in _as_tracked(curve, (first, last), beside).items():
                 _insert(curve, frame, value)
 
@@ -136,6 +135,11 @@ class MotionKeys:
             fcurves.remove_curves(self.effect.id_data, path)
             setattr(moving, name, whole)
 
+    def _curves(self, count: int = len(_COMPONENTS)) -> list[fcurves.Timed]:
+        """Of the first components, those that are keyed."""
+        found = (self._curve(name, component) for name, component in _COMPONENTS[:count])
+        return [curve for curve in found if curve is not None]
+
     def _curve(self, name: str, component: int = 0, *, new: bool = False):
         moving = selection.moving(self.effect, self.index)
         scene, path = self.effect.id_data, f"{moving.path_from_id()}.{name}"
@@ -145,7 +149,7 @@ class MotionKeys:
         return curve and fcurves.Timed(curve, scene)
 
 
-def check_curves(effect, index: int | None) -> None:
+def check_curves(effect: PropertyGroup, index: int | None) -> None:
     """EffectError: an F-curve of where a region or the camera is cannot be keyed, or its keys would do nothing."""
     moving = selection.moving(effect, index)
     for name in (*CHANNELS, "confidence", ENDS[index is None]):
@@ -157,7 +161,14 @@ def check_curves(effect, index: int | None) -> None:
                     raise EffectError(rpt_(sentence).format(place=validation.place(moving), channel=label))
 
 
-def insert(effect, index: int | None, channels=CHANNELS, *, keep_tracked: bool = False, begins: bool = False) -> None:
+def insert(
+    effect: PropertyGroup,
+    index: int | None,
+    channels: Sequence[str] = CHANNELS,
+    *,
+    keep_tracked: bool = False,
+    begins: bool = False,
+) -> None:
     """Keys channels of a region or of the camera at the scene's current frame; where tracking has made a key, it is the
     editor's from now on, and sure. EffectError: as check_curves says.
 
@@ -191,7 +202,7 @@ def runs(frames: Iterable[int]) -> list[tuple[int, int]]:
     return [(ordered[first], ordered[last]) for first, last in zip(firsts, lasts, strict=True)]
 
 
-def _curves(scene, path: str) -> list[fcurves.Timed]:
+def _curves(scene: Scene, path: str) -> list[fcurves.Timed]:
     return [fcurves.Timed(curve, scene) for curve in fcurves.curves_under(scene, path)]
 
 
@@ -199,7 +210,7 @@ def _keys_at(curve: fcurves.Timed, frame: float) -> list:
     return [curve.keyframe_points[i] for i in np.flatnonzero(curve.points()[:, 0] == frame).tolist()]
 
 
-def _tracked_value(curve, frame: float) -> float:
+def _tracked_value(curve: fcurves.Timed, frame: float) -> float:
     """What tracking has made of a frame, for a key that the editor sets there; of the editor's key there, what it
     keeps."""
     for key in _keys_at(curve, frame):
@@ -208,7 +219,7 @@ def _tracked_value(curve, frame: float) -> float:
     return NOTHING_KEPT if curve.is_empty else curve.evaluate(frame)
 
 
-def _as_tracked(curve, edited: tuple[int, int], frames: list[float]) -> dict[float, float]:
+def _as_tracked(curve: fcurves.Timed, edited: tuple[int, int], frames: list[float]) -> dict[float, float]:
     """The values of an F-curve at frames without a key, with what tracking said of two frames that the editor may have
     keyed since; it is forgotten after this."""
     moved = []
@@ -228,7 +239,7 @@ def _values(placement: Placement) -> tuple[float, ...]:
     return *placement.location, np.radians(placement.rotation), placement.scale
 
 
-def _replace(curve, values: dict[int, float], tracked: Iterable[int]) -> None:
+def _replace(curve: fcurves.Timed, values: dict[int, float], tracked: Iterable[int]) -> None:
     """Makes keys of these values by frame, in place of those that were made at the frames that were tracked."""
     points, (frames, made) = curve.keyframe_points, _read(curve)
     within = np.isin(frames, list(tracked))
@@ -243,12 +254,12 @@ def _replace(curve, values: dict[int, float], tracked: Iterable[int]) -> None:
     curve.update()
 
 
-def _insert(curve, frame: float, value: float, ease: str = "LINEAR") -> None:
+def _insert(curve: fcurves.Timed, frame: float, value: float, ease: str = "LINEAR") -> None:
     key = curve.insert(frame, value, options={"FAST"}, keyframe_type=MADE)
     key.interpolation, key.back = ease, key.co[1]
 
 
-def _read(curve) -> tuple[np.ndarray, np.ndarray]:
+def _read(curve: fcurves.Timed) -> tuple[np.ndarray, np.ndarray]:
     """The frames (n,) of an F-curve's keys, and which of them were made and are as they were made."""
     points, count = curve.points(), len(curve.keyframe_points)
     types, kept = np.empty(count, np.int32), np.empty(count, np.float32)

@@ -2,11 +2,14 @@
 
 import math
 import os
-from contextlib import suppress
+from contextlib import AbstractContextManager, suppress
 from pathlib import Path
 
 import bpy
+from bpy.types import Scene, SequenceEditor, Strip
 
+from ...core.frames.frame_source import FrameSource
+from ...core.model.effect import Effect
 from ...core.model.limits import MAX_FRAME
 from ..data import recipe_import
 from ..data.property_copy import for_a_while
@@ -15,7 +18,7 @@ from . import add_effect
 _PATHS = {"MOVIE": "filepath", "IMAGE": "directory", "SOUND": "filepath"}  # the property of a strip of that type
 
 
-def make_edit(path: Path, medium, source_recipe, folder: Path):
+def make_edit(path: Path, medium: FrameSource, source_recipe: Effect, folder: Path) -> Scene:
     """An edit of one source strip (an opened medium's) under one effect strip; its scene. folder: of the recipe.
     MediaError: the recipe has mattes that cannot be read."""
     source = make_source(path, medium)
@@ -28,7 +31,7 @@ def make_edit(path: Path, medium, source_recipe, folder: Path):
     return scene
 
 
-def make_source(path: Path, medium):
+def make_source(path: Path, medium: FrameSource) -> Strip:
     """A source strip (an opened medium's), alone in an edit that fits it."""
     bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
     scene = bpy.context.scene
@@ -49,14 +52,14 @@ def make_source(path: Path, medium):
     return _add_source(editor, path, medium)
 
 
-def length(medium, source_recipe) -> int:
+def length(medium: FrameSource, source_recipe: Effect) -> int:
     """How many timeline frames the edit has: the source's, and more where its time is keyed beyond them; as many as
     Blender has at most."""
     keys = source_recipe.time.keys if source_recipe.time else ()
     return min(max([medium.count, *(math.ceil(frame) for frame, _ in keys)]), MAX_FRAME)
 
 
-def _add_source(editor, path: Path, medium):
+def _add_source(editor: SequenceEditor, path: Path, medium: FrameSource) -> Strip:
     name = path.name
     if medium.fps is not None:
         if medium.has_audio:
@@ -68,7 +71,7 @@ def _add_source(editor, path: Path, medium):
     return strip
 
 
-def paths_relative(scene, folder: Path):
+def paths_relative(scene: Scene, folder: Path) -> AbstractContextManager[None]:
     """Inside, the edit's paths are relative to the folder that it is saved in, as far as there is such a path."""
     owners = [(scene.render, "filepath")]
     for strip in scene.sequence_editor.strips_all:

@@ -6,10 +6,11 @@ Annotations have no key types in Blender 5.2: a drawing that was made and one's 
 from bisect import bisect
 from contextlib import closing
 from functools import lru_cache
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from bpy.app.translations import pgettext_rpt as rpt_
+from bpy.types import AnnotationFrame, PropertyGroup, Scene, Strip
 
 from ...core import revision
 from ...core.messages import EffectError
@@ -37,7 +38,7 @@ class Needed(NamedTuple):
 _shown = revision.UntilChange()
 
 
-def curves_now(scene, effect, strip, index: int) -> outlines.Curves:
+def curves_now(scene: Scene, effect: PropertyGroup, strip: Strip, index: int) -> outlines.Curves:
     """The curves of an outline at the current frame, in fractions of the picture: drawn, carried, or straight where
     nothing is carried yet. EffectError, MediaError: there are none."""
     frame = scene.frame_current
@@ -53,7 +54,7 @@ def _opened(file: CarriedFile) -> CarriedMattes:
     return file.open()
 
 
-def shown_curves(scene, effect, strip, index: int) -> outlines.Curves:
+def shown_curves(scene: Scene, effect: PropertyGroup, strip: Strip, index: int) -> outlines.Curves:
     """As curves_now, read once until something changes: for what is drawn."""
     key = effect.scene.session_uid, strip.name, index, scene.frame_current
     return _shown.get(key, lambda: curves_now(scene, effect, strip, index))
@@ -64,7 +65,7 @@ def carried() -> None:
     _shown.clear()
 
 
-def draw(effect, strip, region, curves: outlines.Curves, frame: int) -> None:
+def draw(effect: PropertyGroup, strip: Strip, region: PropertyGroup, curves: outlines.Curves, frame: int) -> None:
     """Makes curves the drawing of a region at a timeline frame, in place of one that is there. EffectError: the strip
     is scaled to nothing."""
     layer = layer_of(effect, region) or region_edits.new_layer(effect, region)
@@ -74,7 +75,7 @@ def draw(effect, strip, region, curves: outlines.Curves, frame: int) -> None:
     _add(layer.frames.new(frame), to_image, curves)
 
 
-def add(effect, strip, region, curve: np.ndarray, frame: int) -> None:
+def add(effect: PropertyGroup, strip: Strip, region: PropertyGroup, curve: np.ndarray, frame: int) -> None:
     """Adds a curve (n, 2), in fractions of the picture, to the drawing of a region at a timeline frame. EffectError: as
     draw."""
     layer = layer_of(effect, region) or region_edits.new_layer(effect, region)
@@ -83,20 +84,20 @@ def add(effect, strip, region, curve: np.ndarray, frame: int) -> None:
     _add(there[0] if there else layer.frames.new(frame), to_image, [curve])
 
 
-def _to_image(effect, strip) -> np.ndarray:
+def _to_image(effect: PropertyGroup, strip: Strip) -> np.ndarray:
     to_image = geometry.picture_to_image(strip, annotations.picture_size(effect))
     if not geometry.is_invertible(to_image):
         raise EffectError(rpt_('strip "{strip}" is scaled to nothing').format(strip=strip.name))
     return to_image
 
 
-def _add(drawing, to_image: np.ndarray, curves) -> None:
+def _add(drawing: AnnotationFrame, to_image: np.ndarray, curves: outlines.Curves | list[np.ndarray]) -> None:
     revision.changed()  # Blender tells of no strokes
     for points in curves:
         annotations.add_stroke(drawing, mapped(to_image, np.asarray(points)))
 
 
-def picture_now(scene, effect, strip) -> np.ndarray:
+def picture_now(scene: Scene, effect: PropertyGroup, strip: Strip) -> np.ndarray:
     """The source's frame (H, W, 3) uint8 that is seen at the current frame. EffectError, MediaError: there is none."""
     shown = snapshot.take(scene, effect, strip, (scene.frame_current,))
     with effect_source.open_source(shown) as source:
@@ -104,14 +105,14 @@ def picture_now(scene, effect, strip) -> np.ndarray:
         return flow.displayed(samples, source.transfer, source.alpha)
 
 
-def nearest(effect, index: int, frame: int) -> int:
+def nearest(effect: PropertyGroup, index: int, frame: int) -> int:
     """The timeline frame of a region's drawing that is nearest to a frame; that itself, where there is none."""
     layer = layer_of(effect, effect.regions[index])
     drawn = [drawing.frame_number for drawing in layer.frames] if layer else []
     return min(drawn, key=lambda each: abs(each - frame), default=frame)
 
 
-def outline_it(scene, effect, strip, index: int) -> bool:
+def outline_it(scene: Scene, effect: PropertyGroup, strip: Strip, index: int) -> bool:
     """Makes a region the outline of the subject that its strokes run over, or are drawn around, at the current frame;
     what was drawn at other frames of an outline stays. Whether there is one. EffectError, MediaError: there are no
     strokes, or no picture."""
@@ -139,7 +140,7 @@ def outline_it(scene, effect, strip, index: int) -> bool:
     return True
 
 
-def carried_frames(scene, effect, strip, index: int) -> tuple[Any, dict[int, int]]:
+def carried_frames(scene: Scene, effect: PropertyGroup, strip: Strip, index: int) -> tuple[CarriedFile, dict[int, int]]:
     """What gives the mattes of an outline (media.carried_mattes.CarriedFile), and which frames of the source the frames
     of its strip show, by timeline frame. EffectError, MediaError: nothing is carried."""
     frames = range(strip.left_handle, strip.right_handle)
@@ -147,7 +148,7 @@ def carried_frames(scene, effect, strip, index: int) -> tuple[Any, dict[int, int
     return file, {int(frame): number for frame, number in shown.items()}
 
 
-def next_needed(scene, effect, strip, index: int) -> Needed:
+def next_needed(scene: Scene, effect: PropertyGroup, strip: Strip, index: int) -> Needed:
     """Where in the strip a drawing of an outline that is carried helps most: of the stretches between drawings, and
     beyond the first and the last, in the one that is least sure altogether; there, where as much of the doubt lies
     before it as behind it. EffectError, MediaError: nothing is carried."""

@@ -6,6 +6,7 @@ from contextlib import closing, contextmanager
 import bpy
 import numpy as np
 from bpy.app.translations import pgettext_rpt as rpt_
+from bpy.types import Context, Mask, MaskSpline, PropertyGroup, Scene, Strip
 
 from ...core.messages import EffectError
 from ...core.model import outline_chains, outlines
@@ -15,7 +16,7 @@ from ..data import annotations, fcurves, mask_reading, snapshot, strips
 from . import outline_drawings, region_edits
 
 
-def to_mask(context, of, index: int, step: int):
+def to_mask(context: Context, of: tuple[Scene, PropertyGroup, Strip], index: int, step: int) -> Mask:
     """A new mask of an outline, whose frames are the source's, from its start on; each curve that comes and goes has a
     layer, and what two of them enclose lies outside.
 
@@ -27,8 +28,9 @@ def to_mask(context, of, index: int, step: int):
     if not any(curves for _frame, curves in keys):
         raise EffectError(rpt_("Nothing is drawn in the outline"))
     size = annotations.picture_size(effect)
+    last = int(snapshot.last_shown(scene, effect, strip))
     mask = bpy.data.masks.new(effect.regions[index].name)
-    mask.frame_start, mask.frame_end = 1, max(_length(scene, effect, strip), keys[-1][0] + 1)
+    mask.frame_start, mask.frame_end = 1, max(last, keys[-1][0]) + 1
     chains = outline_chains.chains(keys, size[0] / size[1])
     try:
         with _mask_editor(context, mask):
@@ -41,7 +43,7 @@ def to_mask(context, of, index: int, step: int):
     return mask
 
 
-def from_mask(scene, effect, strip, shutter, mask):
+def from_mask(scene: Scene, effect: PropertyGroup, strip: Strip, shutter: PropertyGroup, mask: Mask) -> PropertyGroup:
     """A new region: an outline with a drawing for each frame at which something is said of a mask. EffectError,
     MediaError: the mask cannot be read or encloses nothing there, or OpenCV is missing."""
     size = annotations.picture_size(effect)
@@ -58,7 +60,9 @@ def from_mask(scene, effect, strip, shutter, mask):
     return region
 
 
-def _keys(scene, effect, strip, index: int, step: int) -> list[tuple[int, outlines.Curves]]:
+def _keys(
+    scene: Scene, effect: PropertyGroup, strip: Strip, index: int, step: int
+) -> list[tuple[int, outlines.Curves]]:
     """The curves of an outline, at the source's frames that get a shape key, ascending."""
     if not (strips.is_carried(effect.regions[index]) and step):
         return sorted(snapshot.drawn_outline(scene, effect, strip, index).items())
@@ -69,16 +73,12 @@ def _keys(scene, effect, strip, index: int, step: int) -> list[tuple[int, outlin
         return [(frame, mattes.curves(frame)) for frame in frames]
 
 
-def _length(scene, effect, strip) -> int:
-    return int(snapshot.last_shown(scene, effect, strip)) + 1
-
-
 def _in_mask(points: np.ndarray, size: tuple[int, int]) -> np.ndarray:
     """Points (..., 2) in mask space (core.masks.mask), of fractions of the picture."""
     return (points - 0.5) * np.array(size) / max(size) + 0.5
 
 
-def _add_layer(mask, name: str, chain: outline_chains.Chain, size: tuple[int, int]) -> None:
+def _add_layer(mask: Mask, name: str, chain: outline_chains.Chain, size: tuple[int, int]) -> None:
     """A layer of one spline, which is there from its first frame on until it is gone."""
     layer = mask.layers.new(name=name)
     layer.blend, layer.alpha = "DIFFERENCE", 1.0  # Blender's own begin with 0 where a script makes them
@@ -96,13 +96,13 @@ def _add_layer(mask, name: str, chain: outline_chains.Chain, size: tuple[int, in
         fcurves.set_keys(mask, f'layers["{bpy.utils.escape_identifier(layer.name)}"].alpha', 0, keys)
 
 
-def _place(spline, points: np.ndarray) -> None:
+def _place(spline: MaskSpline, points: np.ndarray) -> None:
     flat = np.ascontiguousarray(points, np.float32).ravel()
     for name in ("co", "handle_left", "handle_right"):
         spline.points.foreach_set(name, flat)
 
 
-def _insert_keys(context, mask, chains: list[outline_chains.Chain], size: tuple[int, int]) -> None:
+def _insert_keys(context: Context, mask: Mask, chains: list[outline_chains.Chain], size: tuple[int, int]) -> None:
     """Blender gives shape keys to selected layers, at its current frame."""
     edited = context.window.scene
     current = edited.frame_current
@@ -125,7 +125,7 @@ def _insert_keys(context, mask, chains: list[outline_chains.Chain], size: tuple[
 
 
 @contextmanager
-def _mask_editor(context, mask) -> Iterator[None]:
+def _mask_editor(context: Context, mask: Mask) -> Iterator[None]:
     """Where Blender's operators on masks run: the area becomes an editor of one for a moment. EffectError: there is no
     window."""
     window = context.window
@@ -146,7 +146,7 @@ def _mask_editor(context, mask) -> Iterator[None]:
         area.ui_type = before
 
 
-def _drawn_frames(scene, effect, strip, mask) -> dict[int, int]:
+def _drawn_frames(scene: Scene, effect: PropertyGroup, strip: Strip, mask: Mask) -> dict[int, int]:
     """The timeline frames of the strip that get a drawing, and the source's that they show: those of a mask's keys, and
     the ends, where it has some beyond them."""
     frames = range(strip.left_handle, strip.right_handle)

@@ -1,6 +1,7 @@
 """An effect's regions and their annotation layers: added, removed, moved, keyed."""
 
 import numpy as np
+from bpy.types import Annotation, AnnotationFrame, AnnotationLayer, PropertyGroup
 
 from ..data import selection, strips
 from ..data.annotations import annotation, layer_of
@@ -8,17 +9,23 @@ from ..data.consistency import bars, choose_region, color_layers, forget_followe
 from . import collection_edits, motion_keys
 
 
-def add_region(effect, shutter, kind: str = "LINE", name: str = ""):
-    """Appends a region of a shutter, on an empty annotation layer of its own, and makes it the active one."""
+def add_region(
+    effect: PropertyGroup, shutter: PropertyGroup, kind: str = "LINE", name: str = "", **values: object
+) -> PropertyGroup:
+    """Appends a region of a shutter, with these values of its properties and, unless it is a matte or a ramp, on an
+    empty annotation layer of its own; and makes it the active one."""
     region = effect.regions.add()
     region.name = unique(name or shutter.name, {r.name for r in effect.regions})
     region.shutter, region.kind = shutter.name, kind
-    new_layer(effect, region)
+    if kind not in strips.MATTES:
+        new_layer(effect, region)
+    for prop, value in values.items():
+        setattr(region, prop, value)
     effect.active_region = len(effect.regions) - 1
     return region
 
 
-def first_drawn(effect, shutter, kind: str):
+def first_drawn(effect: PropertyGroup, shutter: PropertyGroup, kind: str) -> PropertyGroup:
     """Appends a region for strokes, as add_region does; the active one of that shutter becomes it while it has none.
     The first of an effect, of a shutter that is sharp, follows edges, unless the editor has said how much: a subject is
     meant, and no spot of it."""
@@ -34,7 +41,7 @@ def first_drawn(effect, shutter, kind: str):
     return region
 
 
-def _undrawn(effect, shutter):
+def _undrawn(effect: PropertyGroup, shutter: PropertyGroup) -> PropertyGroup | None:
     """The active region, where it is a shutter's and nothing is drawn in it; None: it is not so."""
     region = selection.active_region(effect)
     if region is None or region.kind in strips.MATTES or region.shutter != shutter.name:
@@ -43,18 +50,7 @@ def _undrawn(effect, shutter):
     return None if layer is not None and any(drawing.strokes for drawing in layer.frames) else region
 
 
-def add_matte(effect, shutter, kind: str = "MATTE", name: str = "", **values):
-    """Appends a matte or a ramp of a shutter, with these values of its properties, and makes it the active region."""
-    region = effect.regions.add()
-    region.name = unique(name or shutter.name, {r.name for r in effect.regions})
-    region.shutter, region.kind = shutter.name, kind
-    for prop, value in values.items():
-        setattr(region, prop, value)
-    effect.active_region = len(effect.regions) - 1
-    return region
-
-
-def new_layer(effect, region):
+def new_layer(effect: PropertyGroup, region: PropertyGroup) -> AnnotationLayer:
     """Gives a region an empty annotation layer, named after it and in its shutter's colour."""
     layer = annotation(effect).layers.new(region.name, set_active=True)
     layer.color = effect.shutters[region.shutter].color
@@ -62,7 +58,7 @@ def new_layer(effect, region):
     return layer
 
 
-def remove_region(effect, index: int) -> None:
+def remove_region(effect: PropertyGroup, index: int) -> None:
     """Removes a region, its keys and its annotation layer."""
     layer = layer_of(effect, effect.regions[index])
     if layer is not None:
@@ -74,13 +70,13 @@ def remove_region(effect, index: int) -> None:
     choose_region(effect)
 
 
-def move_region(effect, index: int, to: int) -> None:
+def move_region(effect: PropertyGroup, index: int, to: int) -> None:
     """Moves a region in the list; later ones lie over earlier ones."""
     collection_edits.move(effect, "regions", index, to)
     effect.active_region = to
 
 
-def assign_region(effect, index: int, shutter) -> None:
+def assign_region(effect: PropertyGroup, index: int, shutter: PropertyGroup) -> None:
     """Gives a region to another shutter, which becomes the active one."""
     effect.regions[index].shutter = shutter.name
     color_layers(effect, shutter)
@@ -88,7 +84,7 @@ def assign_region(effect, index: int, shutter) -> None:
     effect.active_shutter = list(effect.shutters).index(shutter)
 
 
-def take_layer(effect, shutter, layer):
+def take_layer(effect: PropertyGroup, shutter: PropertyGroup, layer: AnnotationLayer) -> PropertyGroup:
     """A region of a shutter from any annotation layer, whose drawings are copied unless it is one of the effect's."""
     own = effect.scene.annotation and layer.id_data == effect.scene.annotation
     region = add_region(effect, shutter, name=layer.info)
@@ -100,7 +96,7 @@ def take_layer(effect, shutter, layer):
     return region
 
 
-def _copy_strokes(old, new) -> None:
+def _copy_strokes(old: AnnotationFrame, new: AnnotationFrame) -> None:
     for stroke in old.strokes:
         copy = new.strokes.new()
         copy.display_mode = "2DSPACE"
@@ -110,12 +106,12 @@ def _copy_strokes(old, new) -> None:
         copy.points.foreach_set("co", flat)
 
 
-def free_layers(effect, annotation) -> list:
+def free_layers(effect: PropertyGroup, annotation: Annotation | None) -> list:
     """Layers of an annotation that are no region yet."""
     taken = {region.layer for region in effect.regions} if annotation == effect.scene.annotation else set()
     return [layer for layer in annotation.layers if layer.info not in taken] if annotation else []
 
 
-def key_region(effect, index: int) -> None:
+def key_region(effect: PropertyGroup, index: int) -> None:
     """Keys where the editor has put a region at the current frame. EffectError: it cannot be keyed."""
     motion_keys.insert(effect, index, keep_tracked=True)

@@ -8,12 +8,13 @@ that both moments are whole in-between frames, and what lies between two of thes
 """
 
 import math
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from bpy.app.translations import pgettext_data as data_
 from bpy.app.translations import pgettext_n as n_
 from bpy.app.translations import pgettext_rpt as rpt_
+from bpy.types import PropertyGroup, Scene, Strip
 
 from ...core.messages import EffectError
 from ...core.model import shutters
@@ -24,7 +25,7 @@ from ..data import inbetween_settings, sampled, snapshot, source_media, strips, 
 from ..data.consistency import bars
 from ..data.fcurves import Curves
 from ..data.strip_timing import timing_of
-from . import bar_edits, collection_edits, region_edits, shutter_edits
+from . import bar_edits, collection_edits, time_map
 
 # In-between frames where there are none: the first of these that there is room for.
 FACTORS = 8, 4, 2
@@ -52,7 +53,7 @@ class Repair(NamedTuple):
     side: str
 
 
-def of(effect) -> Repair | None:
+def of(effect: PropertyGroup) -> Repair | None:
     """The repair that an effect has, however its shutters and its ramp are called; None: it has none."""
     step = inbetween_settings.factor(effect)
     if step == 1 or not effect.shutters:
@@ -71,20 +72,20 @@ def of(effect) -> Repair | None:
     return None
 
 
-def _moment(shutter) -> float:
+def _moment(shutter: PropertyGroup) -> float:
     """The middle of a shutter's open time, in bars from the middle of the first; none: it is never open."""
     weights = bars(shutter)
     return float((weights * np.arange(len(weights))).sum() / weights.sum()) if weights.any() else math.nan
 
 
-def _shown(effect) -> tuple[int, int]:
+def _shown(effect: PropertyGroup) -> tuple[int, int]:
     """The bar of the shown frame, where the source runs forward, and where it runs backward."""
     step = inbetween_settings.factor(effect)
     options = Options(validation.number(effect, "window"), position="center", step=step)
     return options.before, options.before + step - 1
 
 
-def repair(scene: Any, effect: Any, strip: Any, share: float, side: str) -> None:
+def repair(scene: Scene, effect: PropertyGroup, strip: Strip, share: float, side: str) -> None:
     """Repairs the readout of an effect's source, or changes the repair that it has.
 
     share: as Repair.readout, 0 to 1; side: likewise
@@ -92,8 +93,8 @@ def repair(scene: Any, effect: Any, strip: Any, share: float, side: str) -> None
     built. Nothing has changed then."""
     backward = _is_backward(scene, effect, strip)
     known = of(effect)
-    if known is None:
-        _check_room(effect)
+    if known is None and (sentence := collection_edits.why_full(effect, regions=1, shutters=2)):
+        raise EffectError(sentence)
     if inbetween_settings.factor(effect) == 1:  # what is built already is there without OpenCV
         flow.check()
     _make_room(effect)
@@ -113,7 +114,7 @@ def repair(scene: Any, effect: Any, strip: Any, share: float, side: str) -> None
     effect.active_region = list(effect.regions).index(region)
 
 
-def _is_backward(scene: Any, effect: Any, strip: Any) -> bool:
+def _is_backward(scene: Scene, effect: PropertyGroup, strip: Strip) -> bool:
     """Whether the source runs backward at the current frame: its next frames are those that were filmed before."""
     frame = scene.frame_current
     if effect.use_source_time:
@@ -122,38 +123,28 @@ def _is_backward(scene: Any, effect: Any, strip: Any) -> bool:
     return bool(timing_of(strips.source_of(scene, effect, strip)).use_reverse_frames)
 
 
-def _check_room(effect) -> None:
-    for collection, more in (("shutters", 2), ("regions", 1)):
-        if sentence := collection_edits.why_full(effect, collection, more):
-            raise EffectError(sentence)
-
-
-def _make_room(effect) -> None:
+def _make_room(effect: PropertyGroup) -> None:
     """Has the effect show in-between frames, if it has none, and the filmed frames on both sides of the shown one."""
     step, window = inbetween_settings.factor(effect), validation.number(effect, "window")
     filmed = max(-(-window // step), FILMED)
-    factor = step
     if step == 1:
-        possible = [factor for factor in FACTORS if filmed * factor <= shutters.MAX_WINDOW]
-        if not possible:
+        factor = next((factor for factor in FACTORS if filmed * factor <= shutters.MAX_WINDOW), None)
+        if factor is None:
             sentence = rpt_("in-between frames of {count} frames are too many: set Frames to {most} or fewer")
             raise EffectError(sentence.format(count=filmed, most=shutters.MAX_WINDOW // FACTORS[-1]))
-        factor = possible[0]
     if window < FILMED * step:
         effect.window = FILMED * step
-    if factor != step:
+    if step == 1:
         effect.inbetween = str(factor)
 
 
-def _begin(effect):
+def _begin(effect: PropertyGroup) -> PropertyGroup:
     """The two shutters, the first of which is the default, and the ramp; which is returned."""
-    earlier = shutter_edits.add_shutter(effect, data_("Earlier"))
-    shutter_edits.move_shutter(effect, list(effect.shutters).index(earlier), 0)
-    later = shutter_edits.add_shutter(effect, data_("Later"))
-    return region_edits.add_matte(effect, later, "RAMP", data_("Rolling Shutter"), ramp="LINEAR")
+    earlier, later = (data_("Earlier"), "ANGLE_360"), (data_("Later"), "ANGLE_360")
+    return time_map.ramp_between(effect, earlier, later, data_("Rolling Shutter"), "LINEAR")
 
 
-def share_of(scene: Any, effect: Any, strip: Any, milliseconds: float) -> float:
+def share_of(scene: Scene, effect: PropertyGroup, strip: Strip, milliseconds: float) -> float:
     """What share of the time from a filmed frame to the next a time is. EffectError: it is longer than that.
     MediaError: the footage cannot be read."""
     with source_media.open_media(strips.source_of(scene, effect, strip)) as medium:
@@ -165,7 +156,7 @@ def share_of(scene: Any, effect: Any, strip: Any, milliseconds: float) -> float:
     return share
 
 
-def find(scene: Any, effect: Any, strip: Any, side: str) -> tuple[readout.Readout, str]:
+def find(scene: Scene, effect: PropertyGroup, strip: Strip, side: str) -> tuple[readout.Readout, str]:
     """The readout of an effect's source, by what it shows around the current frame; and the side that is read first:
     that one, or the one across. EffectError: it cannot be found, and why, or there is none. MediaError: the footage
     cannot be read."""

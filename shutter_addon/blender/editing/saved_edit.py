@@ -3,6 +3,7 @@
 from pathlib import Path
 
 import bpy
+from bpy.types import Scene
 
 from ...core.farm.edit_version import EditVersion
 from ...core.messages import UserError, sentence
@@ -22,7 +23,7 @@ def is_saved(path: Path) -> bool:
     return path.suffix.lower() == ENDING
 
 
-def open_edit(path: Path, name: str | None = None):
+def open_edit(path: Path, name: str | None = None) -> Scene:
     """Opens a .blend file, none of whose scripts is run: it may be a stranger's. Its scene of that name; None: the
     active one, which Blender would render. SavedEditError: it cannot be opened, or shows no edit."""
     if not path.is_file():
@@ -51,7 +52,7 @@ def open_edit(path: Path, name: str | None = None):
     return scene
 
 
-def version(scene, path: Path, opened: tuple[int, int] | None) -> EditVersion:
+def version(scene: Scene, path: Path, opened: tuple[int, int] | None) -> EditVersion:
     """The version of an edit that was opened from a file.
 
     opened: its stamp before (media.files.stamp). SavedEditError: it was saved over since, so that its key would be
@@ -62,7 +63,7 @@ def version(scene, path: Path, opened: tuple[int, int] | None) -> EditVersion:
     return current
 
 
-def _scripts(scene) -> list[tuple]:
+def _scripts(scene: Scene) -> list[tuple]:
     """(owner, driver) of each driver that Blender does not evaluate because it could do anything, of all that the
     edit's pictures are made of."""
     used = used_data.used(scene, range(scene.frame_start, scene.frame_end + 1))
@@ -77,11 +78,11 @@ def _scripts(scene) -> list[tuple]:
     return [(owner, driver) for owner, driver in complex_ones if not driver.is_valid]
 
 
-def _driven(item) -> list:
+def _driven(item: bpy.types.ID) -> list:
     """The driver curves of an ID, and of the nodes that are its own."""
     animations = (getattr(each, "animation_data", None) for each in (item, getattr(item, "node_tree", None)))
     return [curve for animation in animations if animation for curve in animation.drivers]
 
 
-def _has_strips(scene) -> bool:
+def _has_strips(scene: Scene) -> bool:
     return bool(scene.sequence_editor and scene.sequence_editor.strips)

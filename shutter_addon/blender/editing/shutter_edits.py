@@ -2,6 +2,7 @@
 
 import numpy as np
 from bpy.app.translations import pgettext_data as data_
+from bpy.types import PropertyGroup
 
 from ...core.model import presets
 from ..data import fcurves, property_copy, validation
@@ -27,7 +28,7 @@ COLORS = (
 # Shutters
 
 
-def start(effect) -> None:
+def start(effect: PropertyGroup) -> None:
     """What a new effect begins with: a long shutter everywhere, and a sharp one to scribble with.
 
     With the border, the first scribble is sharp around itself; without, it would be the only one, and hold everywhere.
@@ -38,7 +39,7 @@ def start(effect) -> None:
     add_shutter(effect, data_("Sharp"), "STILL")
 
 
-def add_shutter(effect, name: str = "", preset: str = "ANGLE_360"):
+def add_shutter(effect: PropertyGroup, name: str = "", preset: str = "ANGLE_360") -> PropertyGroup:
     """Appends a shutter, fully open unless another preset is given, and makes it the active one. EffectError: the
     window has no length, and nothing has changed."""
     color = _free_color(effect)
@@ -50,7 +51,7 @@ def add_shutter(effect, name: str = "", preset: str = "ANGLE_360"):
     return shutter
 
 
-def apply_preset(effect, index: int, preset: str, key: bool = False) -> None:
+def apply_preset(effect: PropertyGroup, index: int, preset: str, key: bool = False) -> None:
     """Gives a shutter the bars of a preset, which it keeps to (consistency.preset_of); key: keys them at the current
     frame. EffectError: the window has no length, and nothing has changed."""
     shutter, window = effect.shutters[index], validation.number(effect, "window")
@@ -59,20 +60,18 @@ def apply_preset(effect, index: int, preset: str, key: bool = False) -> None:
     bar_edits.paint(effect, index, weights, key)
 
 
-def _free_color(effect) -> tuple[float, float, float]:
+def _free_color(effect: PropertyGroup) -> tuple[float, float, float]:
     """The first colour that no shutter has; where all are taken, they begin anew."""
     used = np.array([shutter.color for shutter in effect.shutters]).reshape(-1, 3)
     free = [color for color in COLORS if not np.isclose(used, color, atol=1e-3).all(axis=1).any()]
     return free[0] if free else COLORS[len(used) % len(COLORS)]
 
 
-def duplicate_shutter(effect, index: int):
+def duplicate_shutter(effect: PropertyGroup, index: int) -> PropertyGroup:
     """A copy of a shutter, with its keys, behind it; regions stay with the original."""
     scene, path, color = effect.id_data, f"{effect.path_from_id()}.shutters", _free_color(effect)
-    effect.shutters.add()
-    last = len(effect.shutters) - 1
-    old, new = effect.shutters[index], effect.shutters[last]
-    property_copy.copy_properties(old, new)
+    last, new = len(effect.shutters), effect.shutters.add()
+    property_copy.copy_properties(effect.shutters[index], new)
     new.color = color
     fcurves.copy_curves(scene, f"{path}[{index}].", scene, f"{path}[{last}].")
     move_shutter(effect, last, index + 1)
@@ -80,7 +79,7 @@ def duplicate_shutter(effect, index: int):
     return effect.shutters[index + 1]
 
 
-def follow(effect, index: int, subject: str, key: bool) -> None:
+def follow(effect: PropertyGroup, index: int, subject: str, key: bool) -> None:
     """Has a shutter follow its region ("REGION") or the camera ("CAMERA"), open for a whole window that lies around the
     frame; key: keys the bars at the current frame. EffectError: the window has no length, and nothing has changed."""
     apply_preset(effect, index, "ANGLE_360", key)
@@ -89,7 +88,7 @@ def follow(effect, index: int, subject: str, key: bool) -> None:
     shutter.follow_motion, shutter.follow_smooth = "SCALE", 0
 
 
-def remove_shutter(effect, index: int) -> None:
+def remove_shutter(effect: PropertyGroup, index: int) -> None:
     """Removes a shutter, its keys and its regions. The first of those that remain is the default."""
     name = effect.shutters[index].name
     for i in reversed([i for i, region in enumerate(effect.regions) if region.shutter == name]):
@@ -98,7 +97,7 @@ def remove_shutter(effect, index: int) -> None:
     effect.active_shutter = min(effect.active_shutter, max(len(effect.shutters) - 1, 0))
 
 
-def move_shutter(effect, index: int, to: int) -> None:
+def move_shutter(effect: PropertyGroup, index: int, to: int) -> None:
     """Moves a shutter in the list; whichever comes first is the default."""
     collection_edits.move(effect, "shutters", index, to)
     effect.active_shutter = to

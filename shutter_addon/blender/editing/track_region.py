@@ -5,7 +5,7 @@ can go along; at the end they are thinned to those that the motion needs within 
 """
 
 import math
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
 from contextlib import closing
 from dataclasses import dataclass, replace
 from functools import partial
@@ -15,6 +15,7 @@ import bpy
 import numpy as np
 from bpy.app.translations import pgettext_n as n_
 from bpy.app.translations import pgettext_rpt as rpt_
+from bpy.types import PropertyGroup, Scene, Strip
 
 from ...core import revision, threads
 from ...core.messages import EffectError, translated
@@ -66,10 +67,10 @@ class Target:
     known: tuple
 
     @classmethod
-    def of(cls, effect, index: int | None) -> "Target":
+    def of(cls, effect: PropertyGroup, index: int | None) -> "Target":
         return cls(effect.scene.session_uid, index, cls._known(effect, index))
 
-    def effect(self):
+    def effect(self) -> PropertyGroup | None:
         """The effect, or None: it is gone, has another region there, lies elsewhere, or something was undone."""
         for scene in bpy.data.scenes:
             for effect in scene.virtual_shutter.effects:
@@ -79,7 +80,7 @@ class Target:
         return None
 
     @staticmethod
-    def _known(effect, index: int | None) -> tuple:
+    def _known(effect: PropertyGroup, index: int | None) -> tuple:
         layer = None if index is None else effect.regions[index].layer
         return _replaced.number, effect.id_data.session_uid, effect.start, layer
 
@@ -93,7 +94,7 @@ class _Subject(NamedTuple):
     tolerance: float = 1.0
 
 
-def frames_to_track(scene, strip, direction: str, until: int = 0) -> range:
+def frames_to_track(scene: Scene, strip: Strip, direction: str, until: int = 0) -> range:
     """The timeline frames from the current one FORWARD, BACKWARD or in BOTH directions: as far as the strip goes, and
     not beyond the frame `until`, unless that is 0. EffectError: the current one is none of the strip's, or `until` does
     not lie in that direction."""
@@ -111,16 +112,16 @@ def frames_to_track(scene, strip, direction: str, until: int = 0) -> range:
 
 
 def track(
-    scene,
-    effect,
-    strip,
+    scene: Scene,
+    effect: PropertyGroup,
+    strip: Strip,
     index: int | None,
     frames: range,
     motion: str,
     *,
     all_keys: bool = False,
     patience: float | None = None,
-) -> Iterator[int | None]:
+) -> Generator[int | None, None, None]:
     """Tracks a region or the camera from the current frame through timeline frames (frames_to_track). Gives each frame
     once it is keyed. Closed early, it keeps what it has. It ends without another key where the region is not there any
     more.
@@ -135,7 +136,10 @@ def track(
     # Those beyond the frames that are tracked tell how the subject looks as well.
     anchors = [frame for frame in keys.edited(range(strip.left_handle, strip.right_handle)) if frame != start]
     here, known = Tracked(frame=start, placement=placement_now(moving), confidence=1.0), sorted({*frames, *anchors})
-    subject = (_camera if index is None else _region)(scene, effect, strip, index, known, here)
+    if index is None:
+        subject = _camera(scene, effect, strip, known, here)
+    else:
+        subject = _region(scene, effect, strip, index, known, here)
     tracked, stops = {start: here}, []
     reach = (
         max((a for a in anchors if frames[0] <= a < start), default=frames[0]),
@@ -177,32 +181,32 @@ def track(
         raise EffectError(rpt_(stops[0].fault))
 
 
-def stops(effect, index: int | None) -> list[tuple[int, str, bool]]:
+def stops(effect: PropertyGroup, index: int | None) -> list[tuple[int, str, bool]]:
     """The timeline frames at which tracking stopped, ascending, why, in the user's language, and whether that is a
     fault: the end of a shot is none."""
-    known = [stop for stop in selection.moving(effect, index).stops if math.isfinite(effect.start + stop.frame)]
-    return sorted(
-        (round(effect.start + stop.frame), rpt_(stop.fault), stop.fault != tracking.SHOT_ENDS) for stop in known
-    )
+    return sorted((frame, rpt_(stop.fault), stop.fault != tracking.SHOT_ENDS) for frame, stop in _stops(effect, index))
 
 
-def gaps(effect, index: int | None) -> list[presence.Gap]:
+def _stops(effect: PropertyGroup, index: int | None) -> list[tuple[int, PropertyGroup]]:
+    """By timeline frame, where tracking stopped."""
+    known = [(effect.start + stop.frame, stop) for stop in selection.moving(effect, index).stops]
+    return [(round(frame), stop) for frame, stop in known if math.isfinite(frame)]
+
+
+def gaps(effect: PropertyGroup, index: int | None) -> list[presence.Gap]:
     """The timeline frames without a track, from its ends on, ascending."""
     return presence.gaps(*_track(effect, index))
 
 
-def _track(effect, index: int | None) -> tuple[list[int], list[presence.Stop]]:
+def _track(effect: PropertyGroup, index: int | None) -> tuple[list[int], list[presence.Stop]]:
     """The timeline frames at which it was found, and where its track ended."""
     frames, confidence = MotionKeys(effect, index, "LOCATION").confidence()
     seen = np.round(frames[confidence > 0]).astype(int).tolist()
-    known = [stop for stop in selection.moving(effect, index).stops if math.isfinite(effect.start + stop.frame)]
-    return seen, [
-        presence.Stop(round(effect.start + stop.frame), stop.forward, stop.fault == tracking.SHOT_ENDS)
-        for stop in known
-    ]
+    ends = [presence.Stop(at, stop.forward, stop.fault == tracking.SHOT_ENDS) for at, stop in _stops(effect, index)]
+    return seen, ends
 
 
-def key_ends(effect, index: int | None) -> None:
+def key_ends(effect: PropertyGroup, index: int | None) -> None:
     """Keys how much it counts by where its track ends, or takes such keys back; an outline's matte itself says where it
     is."""
     keys, (seen, stops), fades = MotionKeys(effect, index, "SCALE"), _track(effect, index), []
@@ -215,19 +219,19 @@ def key_ends(effect, index: int | None) -> None:
     keys.fade(motion_keys.ENDS[index is None], fades)
 
 
-def _reach(effect) -> int:
+def _reach(effect: PropertyGroup) -> int:
     """The frames over which the camera's influence fades: so no exposure reaches one whose motion nobody knows."""
     window, position = validation.number(effect, "window"), validation.word(effect, "position").lower()
     return max(Options(window=window, position=position, step=inbetween_settings.factor(effect)).reach, presence.FADE)
 
 
-def confidence_at(effect, index: int | None, frame: float) -> float | None:
+def confidence_at(effect: PropertyGroup, index: int | None, frame: float) -> float | None:
     """How sure tracking was of a timeline frame, 0 to 1; None: it did not come there."""
     frames, confidence = MotionKeys(effect, index, "LOCATION").confidence()
     return next(iter(confidence[frames == frame].tolist()), None)
 
 
-def next_unsure(effect, index: int | None, frame: float) -> int | None:
+def next_unsure(effect: PropertyGroup, index: int | None, frame: float) -> int | None:
     """The least sure timeline frame of the first stretch of unsure ones that begins after a frame, or None."""
     frames, confidence = MotionKeys(effect, index, "LOCATION").confidence()
     unsure = (frames <= limits.MAX_FRAME) & (confidence < pursuit.SURE)
@@ -238,7 +242,7 @@ def next_unsure(effect, index: int | None, frame: float) -> int | None:
     return int(frames[begins[0] + confidence[begins[0] : begins[0] + stretch].argmin()])
 
 
-def lost(effect, index: int | None) -> tuple[int, str] | None:
+def lost(effect: PropertyGroup, index: int | None) -> tuple[int, str] | None:
     """The timeline frame from which on tracking is not sure for long, and what it says of that, in the user's language;
     None: there is none."""
     frame = pursuit.lost(*MotionKeys(effect, index, "LOCATION").confidence())
@@ -255,7 +259,9 @@ def lost(effect, index: int | None) -> tuple[int, str] | None:
     return frame, words.format(frame=frame)
 
 
-def _region(scene, effect, strip, index, frames, here: Tracked) -> _Subject:
+def _region(
+    scene: Scene, effect: PropertyGroup, strip: Strip, index: int, frames: Sequence[int], here: Tracked
+) -> _Subject:
     shape = _standing(snapshot.region_at(scene, effect, strip, index, frames), here)
     follow: Callable = partial(tracking.follow, shape)
     if strips.is_carried(effect.regions[index]):
@@ -267,7 +273,7 @@ def _region(scene, effect, strip, index, frames, here: Tracked) -> _Subject:
     return _Subject(follow, lambda: motions.offsets(shape.drawings.at(here.frame)))
 
 
-def _camera(scene, effect, strip, _index, frames, here: Tracked) -> _Subject:
+def _camera(scene: Scene, effect: PropertyGroup, strip: Strip, frames: Sequence[int], here: Tracked) -> _Subject:
     """The camera, and all regions, which are left out."""
     camera = _standing(snapshot.camera_at(scene, effect, frames), here)
     drawn = [i for i, region in enumerate(effect.regions) if region.kind not in strips.MATTES]
@@ -301,7 +307,7 @@ def _each(follow: Callable[[], Iterator[Tracked]]) -> Iterator[Tracked]:
     yield from follow()
 
 
-def _thinned(effect, subject: _Subject, tracked: dict[int, Tracked], kept: set[int]) -> list[int]:
+def _thinned(effect: PropertyGroup, subject: _Subject, tracked: dict[int, Tracked], kept: set[int]) -> list[int]:
     placements, size = {frame: each.placement for frame, each in tracked.items()}, annotations.picture_size(effect)
     return motions.thinned(placements, subject.points(), size, kept, subject.tolerance)
 
@@ -310,7 +316,9 @@ def _write(keys: MotionKeys, kept: Iterable[Tracked], tracked: Iterable[Tracked]
     keys.write({t.frame: t.placement for t in kept}, {t.frame: t.confidence for t in tracked})
 
 
-def _mark(effect, index: int | None, tracked: dict[int, Tracked], stops: list[Tracked], reach: tuple[int, int]) -> None:
+def _mark(
+    effect: PropertyGroup, index: int | None, tracked: dict[int, Tracked], stops: list[Tracked], reach: tuple[int, int]
+) -> None:
     """Notes where tracking stopped, in place of what was noted of frames that it came through, and of those behind a
     stop up to where it was to go.
 

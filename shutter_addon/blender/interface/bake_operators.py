@@ -4,14 +4,14 @@ import bpy
 from bpy.app.translations import pgettext_iface as iface_
 from bpy.app.translations import pgettext_rpt as rpt_
 from bpy.props import EnumProperty
-from bpy.types import Operator
+from bpy.types import Context, Operator, PropertyGroup, Scene, Strip, UILayout
 
 from ...core import messages, revision
-from ...core.messages import EffectError
+from ...core.messages import EffectError, UserError
 from ..data import selection, strips
 from ..editing import baked_strips
 from ..output import bake_job, baked_film, film_output
-from .operator_bases import UNDOABLE, OfEffect, redraw, refused, report_error
+from .operator_bases import Named, OfEffect, own_classes, redraw
 from .panel_parts import WithEffect, sentence
 
 TICK = 0.5  # seconds from one look at the job to the next
@@ -34,45 +34,41 @@ def _is_baking() -> bool:
 class SHUTTER_OT_bake(OfEffect, Operator):
     """Render the effect beside Blender, and put the film above it as a strip. Frames that are finished are kept"""
 
-    bl_idname = "shutter.bake"
     bl_label = "Bake to Strip"
 
     file_format: EnumProperty(name="Format", items=FORMATS)
 
     @classmethod
-    def possible(cls, effect):
-        return not _is_baking() or refused(cls, rpt_("An effect is being baked"))
+    def why_not(cls, effect: PropertyGroup) -> str | None:
+        return rpt_("An effect is being baked") if _is_baking() else None
 
-    def change(self, context, effect):
-        scene, effect, strip = selection.active(context)
+    def change(self, _context: Context, effect: PropertyGroup) -> set[str] | None:
         _failures.pop(effect.identity, None)
-        baked_strips.check(scene, strip)
-        film = baked_film.film_of(scene, effect, strip, self.file_format)
+        baked_strips.check(self.edit, self.effect_strip)
+        film = baked_film.film_of(self.edit, effect, self.effect_strip, self.file_format)
         try:
             if bpy.app.background:
-                baked_film.render(scene, effect, strip, film, lambda _done: None)
+                baked_film.render(self.edit, effect, self.effect_strip, film, lambda _done: None)
             if film.is_finished():
-                baked_strips.lay(scene, strip, film)
+                baked_strips.lay(self.edit, self.effect_strip, film)
                 return None
-            _running.append(bake_job.start(scene, effect, strip, film))
+            _running.append(bake_job.start(self.edit, effect, self.effect_strip, film))
         except (film_output.OutputError, OSError) as error:
-            report_error(self, film_output.in_words(error, film.place))
-            return {"CANCELLED"}
+            raise UserError(film_output.in_words(error, film.place)) from None
         bpy.app.timers.register(_look, first_interval=TICK)
         return {"CANCELLED"}  # nothing has changed yet that could be undone
 
 
-class SHUTTER_OT_bake_stop(Operator):
+class SHUTTER_OT_bake_stop(Named, Operator):
     """Stop the bake that runs. Frames that are finished stay, and the next bake goes on from there"""
 
-    bl_idname = "shutter.bake_stop"
     bl_label = "Stop Baking"
 
     @classmethod
-    def poll(cls, _context):
-        return bool(_running) or refused(cls, rpt_("No effect is being baked"))
+    def refusal(cls, _context: Context) -> str | None:
+        return None if _running else rpt_("No effect is being baked")
 
-    def execute(self, context):
+    def execute(self, context: Context) -> set[str]:
         stop()
         redraw(context)
         return {"FINISHED"}
@@ -81,20 +77,17 @@ class SHUTTER_OT_bake_stop(Operator):
 class SHUTTER_OT_unbake(OfEffect, Operator):
     """Remove the baked strip, and show the effect again. The baked files stay"""
 
-    bl_idname = "shutter.unbake"
     bl_label = "Unbake"
-    bl_options = UNDOABLE
 
     @classmethod
-    def poll(cls, context):
-        if not super().poll(context):
-            return False
+    def refusal(cls, context: Context) -> str | None:
+        if sentence := super().refusal(context):
+            return sentence
         is_baked = bool(selection.active(context)[2].virtual_shutter_bake.identity)
-        return is_baked or refused(cls, rpt_("The effect is not baked"))
+        return None if is_baked else rpt_("The effect is not baked")
 
-    def change(self, context, effect):
-        scene, _effect, strip = selection.active(context)
-        baked_strips.unbake(scene, strip)
+    def change(self, _context: Context, _effect: PropertyGroup) -> None:
+        baked_strips.unbake(self.edit, self.effect_strip)
 
 
 def _look() -> float | None:
@@ -107,7 +100,8 @@ def _look() -> float | None:
         if job.done():
             job.drop_copy()
         return TICK
-    if bpy.app.is_job_running("RENDER") or any(window.modal_operators for window in _windows()):
+    windows = bpy.context.window_manager.windows
+    if bpy.app.is_job_running("RENDER") or any(window.modal_operators for window in windows):
         return TICK  # a film is rendered of strips that would change, or a strip is being dragged
     try:
         if (failure := job.failure()) is None:
@@ -119,27 +113,19 @@ def _look() -> float | None:
     return None
 
 
-def _windows() -> list:
-    return list(bpy.context.window_manager.windows)
-
-
 def _lay(job: bake_job.BakeJob) -> str | None:
     """Puts a finished film where its effect strip is by now. A sentence: there is none any more, or no room."""
     scene = strips.scene_of_uid(job.scene)
-    parts = [s for s in strips.effect_strips(scene) if _identity(s) == job.effect] if scene else []
+    parts = [s for s in strips.effect_strips(scene) if s.scene.virtual_shutter.identity == job.effect] if scene else []
     if not parts:
         return rpt_('the strip that was baked is gone; its film is "{path}"').format(path=job.film.place)
     try:
         baked_strips.lay(scene, next((part for part in parts if part.name == job.strip), parts[0]), job.film)
     except (EffectError, RuntimeError) as error:
         return messages.sentence(error)
-    with bpy.context.temp_override(window=_windows()[0]):
+    with bpy.context.temp_override(window=bpy.context.window_manager.windows[0]):
         bpy.ops.ed.undo_push(message=SHUTTER_OT_bake.bl_label)
     return None
-
-
-def _identity(strip) -> str:
-    return strip.scene.virtual_shutter.identity
 
 
 def stop() -> None:
@@ -157,11 +143,8 @@ def forget() -> None:
 
 class Bake(WithEffect):
     bl_label = "Bake"
-    bl_options = {"DEFAULT_CLOSED"}
 
-    def draw(self, context):
-        layout = self.layout
-        scene, effect, strip = selection.active(context)
+    def draw_effect(self, layout: UILayout, scene: Scene, effect: PropertyGroup, strip: Strip) -> None:
         job = next((job for job in _running if job.effect == effect.identity), None)
         if job is not None:
             done, total = job.done(), len(job.film.frames)
@@ -181,7 +164,7 @@ class Bake(WithEffect):
             layout.operator("shutter.unbake")
 
 
-def _draw_state(layout, scene, effect, strip) -> None:
+def _draw_state(layout: UILayout, scene: Scene, effect: PropertyGroup, strip: Strip) -> None:
     if not baked_strips.baked_of(scene, strip):
         sentence(layout, iface_("The baked strip was deleted"), "ERROR")
     elif (is_stale := baked_strips.known_stale(scene, effect, strip)) is None:
@@ -205,9 +188,9 @@ def _ask_whether_stale() -> float | None:
     return None
 
 
-classes = SHUTTER_OT_bake, SHUTTER_OT_bake_stop, SHUTTER_OT_unbake
+classes = own_classes(globals())
 TIMERS = _look, _ask_whether_stale
 
 
-def unregister():
+def unregister() -> None:
     forget()

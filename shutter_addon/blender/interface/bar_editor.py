@@ -1,17 +1,20 @@
 """The bar editor: a gizmo in the sequencer's preview that shows the active shutter's bars, to paint and to key."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import bpy
 import numpy as np
 from bpy.app.translations import contexts
 from bpy.app.translations import pgettext_iface as iface_
-from bpy.types import Gizmo, GizmoGroup
+from bpy.types import Context, Event, Gizmo, GizmoGroup, PropertyGroup
 
 from ...core.messages import EffectError
 from ..data import consistency, selection
 from ..editing import bar_edits, track_region
-from . import drawing, gizmo_keymaps
+from . import drawing
+from .gizmo_groups import TWEAK, Dragged, WithKeys
+from .operator_bases import own_classes
 
 _MARGIN, _HEIGHT, _BAR = 16, 96, 16  # in units of the interface
 _PAD, _HEADER = 8, 18
@@ -45,7 +48,7 @@ class Layout:
         return left <= x < right and bottom <= y < top
 
 
-def layout(width: float, bars, unit: float) -> Layout:
+def layout(width: float, bars: np.ndarray, unit: float) -> Layout:
     """The bar editor's place at the lower left of a region of this width for bars (L,); unit: of the interface, in
     pixels."""
     margin, pad = _MARGIN * unit, _PAD * unit
@@ -56,11 +59,13 @@ def layout(width: float, bars, unit: float) -> Layout:
     return Layout(frame=frame, box=box, count=len(bars), top=max(1.0, float(np.max(bars, initial=0.0))))
 
 
-def _layout(context, bars) -> Layout:
+def _layout(context: Context, bars: np.ndarray) -> Layout:
     return layout(context.region.width, bars, drawing.ui_scale())
 
 
-def painted(values, place: Layout, start, end, snap: bool) -> np.ndarray:
+def painted(
+    values: np.ndarray, place: Layout, start: tuple[float, float], end: tuple[float, float], snap: bool
+) -> np.ndarray:
     """Bars (L,) after a stroke from one point to another: every bar it crosses takes the stroke's height there."""
     result = np.array(values, dtype=np.float64)
     first, last = place.bar_at(start[0]), place.bar_at(end[0])
@@ -73,7 +78,7 @@ def painted(values, place: Layout, start, end, snap: bool) -> np.ndarray:
     return result
 
 
-def bar_under(context, x: float, y: float) -> int | None:
+def bar_under(context: Context, x: float, y: float) -> int | None:
     """The bar of the active shutter at a point of the preview's region, or None."""
     seen = selection.in_picture(context)
     if seen is None or context.region is None or context.region.type != "PREVIEW":
@@ -84,7 +89,7 @@ def bar_under(context, x: float, y: float) -> int | None:
     return place.bar_at(x) if place.contains(x, y) else None
 
 
-def _shown(effect) -> bar_edits.BarsShown | None:
+def _shown(effect: PropertyGroup) -> bar_edits.BarsShown | None:
     """Bars that the editor shows; None: there is no shutter, or none that a picture can be made with."""
     if selection.active_shutter(effect) is None:
         return None
@@ -100,14 +105,8 @@ def _key_colors() -> dict:
     return {"animated": theme.inner_anim, "keyed": theme.inner_key, "changed": theme.inner_changed}
 
 
-class SHUTTER_GT_bars(Gizmo):
-    bl_idname = "SHUTTER_GT_bars"
-
-    def setup(self):
-        self.use_draw_modal = True
-        self.use_grab_cursor = False
-
-    def draw(self, context):
+class SHUTTER_GT_bars(Dragged, Gizmo):
+    def draw(self, context: Context) -> None:
         if (seen := selection.in_picture(context)) is None:
             return
         scene, effect, strip = seen
@@ -120,10 +119,10 @@ class SHUTTER_GT_bars(Gizmo):
         _draw(place, shutter, *shown)
         _draw_header(place, shutter, effect.active_shutter, f"{shutter.name}   {words}")
 
-    def test_select(self, context, location):
+    def test_select(self, context: Context, location: tuple[int, int]) -> int:
         return 0 if bar_under(context, *location) is not None else -1
 
-    def invoke(self, context, event):
+    def invoke(self, context: Context, event: Event) -> set[str]:
         effect = selection.active(context)[1]
         self.index = effect.active_shutter
         self.target = track_region.Target.of(effect, None)  # while it plays, another may come into the picture
@@ -136,7 +135,7 @@ class SHUTTER_GT_bars(Gizmo):
         self.paints = False  # a click does not, nor the two of a double click
         return {"RUNNING_MODAL"}
 
-    def modal(self, context, event, tweak):
+    def modal(self, context: Context, event: Event, tweak: set[str]) -> set[str]:
         mouse = event.mouse_region_x, event.mouse_region_y
         threshold = _THRESHOLD * drawing.ui_scale()
         self.paints = self.paints or max(abs(a - b) for a, b in zip(mouse, self.mouse, strict=True)) >= threshold
@@ -148,7 +147,7 @@ class SHUTTER_GT_bars(Gizmo):
             self._paint(context, point, snap)
         return {"RUNNING_MODAL"}
 
-    def _paint(self, context, point, snap: bool):
+    def _paint(self, context: Context, point: tuple[float, float], snap: bool) -> None:
         if (effect := self.target.effect()) is None:
             return
         self.values = painted(self.values, self.place, self.point, point, snap)
@@ -156,7 +155,7 @@ class SHUTTER_GT_bars(Gizmo):
         self.point = point
         context.area.tag_redraw()
 
-    def exit(self, context, cancel):
+    def exit(self, context: Context, cancel: bool) -> None:
         effect = self.target.effect()
         if effect is None or not self.paints:
             return
@@ -168,7 +167,7 @@ class SHUTTER_GT_bars(Gizmo):
         bpy.ops.ed.undo_push(message=iface_("Paint Bars", contexts.operator_default))
 
 
-def marked(boxes, combine: str, thickness: float) -> list[tuple[float, float, float, float]]:
+def marked(boxes: Sequence[drawing.Box], combine: str, thickness: float) -> list[tuple[float, float, float, float]]:
     """What tells at the bars' boxes (left, bottom, right, top), to all eyes, that they do not average: a line below
     the upper ends of bars that keep the lightest, above the feet of those that keep the darkest, and across the middle
     of those of a median."""
@@ -180,21 +179,18 @@ def marked(boxes, combine: str, thickness: float) -> list[tuple[float, float, fl
     return [(left, start, right, start + thickness) for (left, _, right, _), start in open_ones]
 
 
-def _draw(place: Layout, shutter, values, states) -> None:
-    left, bottom, right, top = place.box
+def _draw(place: Layout, shutter: PropertyGroup, values: np.ndarray, states: list[str]) -> None:
+    left, bottom, right, _top = place.box
     edges = np.linspace(left, right, place.count + 1)
-    heights = bottom + np.minimum(values / place.top, 1.0) * (top - bottom)
     thin, foot = drawing.line_width(), drawing.ui_scale() * 3
-    gap = thin if edges[1] - edges[0] > 3 * thin else 0.0
     colors = _key_colors()
     drawing.rectangles([place.frame], [drawing.BACK])
-    boxes = [(a, bottom, b - gap, max(h, bottom + thin)) for a, b, h in zip(edges, edges[1:], heights, strict=False)]
-    drawing.rectangles(boxes, np.tile((*shutter.color, 0.95), (place.count, 1)))
+    boxes = drawing.bars(place.box, np.minimum(values / place.top, 1.0), (*shutter.color, 0.95))
     marks = marked(boxes, shutter.combine, foot)
     drawing.rectangles(marks, np.tile((0.0, 0.0, 0.0, 0.7), (len(marks), 1)))
     keyed = [i for i, state in enumerate(states) if state]
     drawing.rectangles(
-        [(edges[i], bottom - foot - thin, edges[i + 1] - gap, bottom - thin) for i in keyed],
+        [(boxes[i][0], bottom - foot - thin, boxes[i][2], bottom - thin) for i in keyed],
         [(*colors[states[i]][:3], 1.0) for i in keyed],
     )
     ticks = range(0, place.count + 1, max(1, 4 * (place.count // 32), 4 if place.count > 8 else 1))
@@ -204,7 +200,7 @@ def _draw(place: Layout, shutter, values, states) -> None:
     )
 
 
-def _draw_header(place: Layout, shutter, index: int, words: str) -> None:
+def _draw_header(place: Layout, shutter: PropertyGroup, index: int, words: str) -> None:
     """Above the bars: what the shutter looks like in mattes, and words."""
     unit, (left, _, _, top) = drawing.ui_scale(), place.box
     bottom = top + 4 * unit
@@ -215,29 +211,20 @@ def _draw_header(place: Layout, shutter, index: int, words: str) -> None:
     drawing.text(start, bottom, words)
 
 
-class SHUTTER_GGT_bars(GizmoGroup):
-    bl_idname = "SHUTTER_GGT_bars"
+class SHUTTER_GGT_bars(WithKeys, GizmoGroup):
     bl_label = "Shutter Bars"
-    bl_space_type = "SEQUENCE_EDITOR"
-    bl_region_type = "PREVIEW"
-    bl_options = {"PERSISTENT"}
+    gizmo = SHUTTER_GT_bars
+    shortcuts = (
+        ("shutter.bar_set", "LEFTMOUSE", "DOUBLE_CLICK", {}),
+        TWEAK,
+        ("shutter.bars_key", "I", "PRESS", {}),
+        ("shutter.bars_unkey", "I", "PRESS", {"alt": True}),
+    )
 
     @classmethod
-    def poll(cls, context):
+    def poll(cls, context: Context) -> bool:
         seen = selection.in_picture(context)
         return seen is not None and selection.active_shutter(seen[1]) is not None and seen[0].is_editable
 
-    @classmethod
-    def setup_keymap(cls, keyconfig):
-        keymap = gizmo_keymaps.new(cls, keyconfig)
-        keymap.keymap_items.new("shutter.bar_set", "LEFTMOUSE", "DOUBLE_CLICK")
-        keymap.keymap_items.new("gizmogroup.gizmo_tweak", "LEFTMOUSE", "PRESS", any=True)
-        keymap.keymap_items.new("shutter.bars_key", "I", "PRESS")
-        keymap.keymap_items.new("shutter.bars_unkey", "I", "PRESS", alt=True)
-        return keymap
 
-    def setup(self, _context):
-        self.bars = self.gizmos.new(SHUTTER_GT_bars.bl_idname)
-
-
-classes = (SHUTTER_GT_bars, SHUTTER_GGT_bars)
+classes = own_classes(globals())

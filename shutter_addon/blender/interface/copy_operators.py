@@ -1,56 +1,106 @@
-"""Operators that give an effect to another clip, and its shutters and regions to another effect."""
+"""Operators that give an effect to another clip, its shutters and regions to another effect or a recipe, and a report
+to whoever helps."""
 
+from pathlib import Path
+
+import bpy
 from bpy.app.translations import contexts
 from bpy.app.translations import pgettext_rpt as rpt_
-from bpy.props import EnumProperty
-from bpy.types import Operator
+from bpy.props import EnumProperty, StringProperty
+from bpy.types import Context, Operator, PropertyGroup
+from bpy_extras.io_utils import ExportHelper, ImportHelper
 
-from ..data import data_format, selection
+from ...core.messages import UserError
+from ...core.recipes import recipe_file
+from ..data import data_format, recipe_import, selection
 from ..editing import add_effect, undelete
+from ..output import error_report, matte_export
 from .matte_operators import strip_items
-from .operator_bases import OfEffect, refused, report_warning
+from .operator_bases import Named, OfEffect, chosen_file, own_classes, report_error, report_warning
 from .operators import MakesEffect
 
 
 class SHUTTER_OT_source(OfEffect, Operator):
     """Give the effect another clip: the movie, image or clip strip whose frames it exposes"""
 
-    bl_idname = "shutter.source"
     bl_label = "Choose Source"
 
     strip: EnumProperty(name="Strip", items=strip_items, translation_context=contexts.no_translation)
 
-    def change(self, context, effect):
-        scene, _effect, strip = selection.active(context)
-        add_effect.choose_source(effect, strip, scene.sequence_editor.strips_all[self.strip])
+    def change(self, _context: Context, effect: PropertyGroup) -> None:
+        add_effect.choose_source(effect, self.effect_strip, self.edit.sequence_editor.strips_all[self.strip])
 
 
 class SHUTTER_OT_effect_copy(OfEffect, Operator):
     """Copy the shutters, regions, keyframes and options of the effect, for other strips and scenes of this file"""
 
-    bl_idname = "shutter.effect_copy"
     bl_label = "Copy Effect"
     bl_options = {"REGISTER"}
 
-    def change(self, context, effect):
-        scene, _effect, strip = selection.active(context)
-        undelete.copy(effect, strip)
-        if data_format.is_newer(scene):
+    def change(self, _context: Context, effect: PropertyGroup) -> None:
+        undelete.copy(effect, self.effect_strip)
+        if data_format.is_newer(self.edit):
             report_warning(self, rpt_("Copied, without what a newer version of Virtual Shutter has added"))
 
 
 class SHUTTER_OT_effect_paste(MakesEffect, OfEffect, Operator):
     """Give the active strip the copied effect; where it has one, that is replaced"""
 
-    bl_idname = "shutter.effect_paste"
     bl_label = "Paste Effect"
 
     @classmethod
-    def poll(cls, context):
-        return super().poll(context) if undelete.has_copy() else refused(cls, rpt_("Copy an effect first"))
+    def refusal(cls, context: Context) -> str | None:
+        return super().refusal(context) if undelete.has_copy() else rpt_("Copy an effect first")
 
-    def change(self, context, effect):
-        undelete.paste(effect, selection.active(context)[2])
+    def change(self, _context: Context, effect: PropertyGroup) -> None:
+        undelete.paste(effect, self.effect_strip)
 
 
-classes = SHUTTER_OT_source, SHUTTER_OT_effect_copy, SHUTTER_OT_effect_paste
+class SHUTTER_OT_recipe_import(OfEffect, ImportHelper, Operator):
+    """Replace the shutters, regions, keyframes and options of the effect with those of a recipe file"""
+
+    bl_label = "Import Recipe"
+    filename_ext = ".json"
+    filter_glob: StringProperty(default="*.json", options={"HIDDEN"})
+
+    def change(self, _context: Context, effect: PropertyGroup) -> None:
+        path = Path(chosen_file(self))
+        recipe_import.apply(self.edit, effect, self.effect_strip, recipe_file.load(path), path.parent)
+
+
+class SHUTTER_OT_recipe_export(OfEffect, ExportHelper, Operator):
+    """Save the shutters, regions, keyframes and options of the effect as a recipe file"""
+
+    bl_label = "Export Recipe"
+    bl_options = {"REGISTER"}
+    filename_ext = ".json"
+    filter_glob: StringProperty(default="*.json", options={"HIDDEN"})
+
+    def change(self, _context: Context, effect: PropertyGroup) -> None:
+        path = chosen_file(self)
+        try:
+            recipe_file.save(matte_export.recipe_for(self.edit, effect, self.effect_strip, Path(path)), path)
+        except OSError as error:
+            raise UserError(f"{path}: {error.strerror or error}") from None
+        if data_format.is_newer(self.edit):
+            words = rpt_('Saved "{path}", without what a newer version of Virtual Shutter has added')
+            report_warning(self, words.format(path=path))
+        else:
+            self.report({"INFO"}, rpt_('Saved "{path}"').format(path=path))
+
+
+class SHUTTER_OT_copy_report(Named, Operator):
+    """Copy versions, device, kinds and numbers of the edit, and last errors: no names, no paths. Nothing is sent"""
+
+    bl_label = "Copy Report"
+
+    def execute(self, context: Context) -> set[str]:
+        if bpy.app.background:
+            report_error(self, rpt_("Without a window there is no clipboard: use the command check with --report"))
+            return {"CANCELLED"}
+        context.window_manager.clipboard = error_report.text(selection.scene_of(context))
+        self.report({"INFO"}, rpt_("Report copied: paste it into your message, and read it before you send it"))
+        return {"FINISHED"}
+
+
+classes = own_classes(globals())

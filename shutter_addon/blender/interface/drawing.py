@@ -1,15 +1,20 @@
 """Flat shapes and texts in a region, in its pixels."""
 
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 
 import blf
 import bpy
 import gpu
 import numpy as np
+from bpy.types import PropertyGroup, Region
 from gpu_extras.batch import batch_for_shader
 from mathutils import Matrix
+from numpy.typing import ArrayLike
 
 from ...core.pixels import patterns
+
+Box = tuple[float, float, float, float]  # left, bottom, right, top, in pixels of a region
 
 SIZE = 11  # of texts, in points
 BACK = (0.08, 0.08, 0.08, 0.8)  # behind texts and bars, so that they are read over any footage
@@ -40,7 +45,7 @@ def wrapped(words: str, width: float, size: float | None = None) -> list[str]:
 
 
 @contextmanager
-def pixel_space(region):
+def pixel_space(region: Region) -> Iterator[None]:
     """Coordinates are the region's pixels, whatever was drawn before: Blender's own state varies in draw handlers."""
     with gpu.matrix.push_pop(), gpu.matrix.push_pop_projection():
         gpu.matrix.load_identity()
@@ -51,7 +56,7 @@ def pixel_space(region):
         yield
 
 
-def rectangles(boxes, colors) -> None:
+def rectangles(boxes: Sequence[Box] | np.ndarray, colors: ArrayLike) -> None:
     """Filled boxes (n, 4) of left, bottom, right, top; colors: (n, 4), display code values with straight alpha."""
     if not len(boxes):
         return
@@ -62,7 +67,20 @@ def rectangles(boxes, colors) -> None:
     _draw("TRIS", corners, np.repeat(np.asarray(colors, dtype=np.float32), 4, axis=0), triangles)
 
 
-def swatch(left: float, bottom: float, size: float, shutter, index: int) -> None:
+def bars(box: Box, shares: np.ndarray, color: Sequence[float]) -> list[Box]:
+    """Bars side by side in a box, as high as their shares (n,) of it, 0 to 1, and never nothing; their boxes."""
+    left, bottom, right, top = box
+    edges = np.linspace(left, right, len(shares) + 1)
+    thin = line_width()
+    gap = thin if edges[1] - edges[0] > 3 * thin else 0.0
+    heights = np.maximum(bottom + shares * (top - bottom), bottom + thin)
+    ends = zip(edges.tolist(), edges[1:].tolist(), heights.tolist(), strict=False)
+    boxes = [(start, bottom, end - gap, height) for start, end, height in ends]
+    rectangles(boxes, np.tile(color, (len(boxes), 1)))
+    return boxes
+
+
+def swatch(left: float, bottom: float, size: float, shutter: PropertyGroup, index: int) -> None:
     """A square of a shutter's colour and of the pattern that it has at an index of the list, as mattes show it."""
     left, bottom = round(left), round(bottom)
     rectangles([(left, bottom, left + size, bottom + size)], [(*shutter.color, 1.0)])
@@ -73,7 +91,7 @@ def swatch(left: float, bottom: float, size: float, shutter, index: int) -> None
     rectangles(np.hstack([corners, corners + 1]), np.tile(ink, (len(corners), 1)))
 
 
-def lines(points, color, closed: bool = False, width: float = 1.0) -> None:
+def lines(points: ArrayLike, color: Sequence[float], closed: bool = False, width: float = 1.0) -> None:
     """A line through points (n, 2); width: in widths of Blender's own lines."""
     points = np.asarray(points, dtype=np.float32)
     if len(points) < 2:
@@ -89,7 +107,14 @@ def lines(points, color, closed: bool = False, width: float = 1.0) -> None:
     gpu.state.blend_set("NONE")
 
 
-def text(x: float, y: float, words: str, size: float = SIZE, color=(1, 1, 1, 0.9), until: float | None = None) -> None:
+def text(
+    x: float,
+    y: float,
+    words: str,
+    size: float = SIZE,
+    color: Sequence[float] = (1, 1, 1, 0.9),
+    until: float | None = None,
+) -> None:
     """Words with their lower left corner at a point; until: the x where they are cut off."""
     blf.size(0, size * ui_scale())
     blf.color(0, *color)
@@ -117,7 +142,7 @@ def text_width(words: str, size: float = SIZE) -> float:
     return blf.dimensions(0, words)[0]
 
 
-def _draw(kind: str, corners, colors, indices) -> None:
+def _draw(kind: str, corners: np.ndarray, colors: ArrayLike, indices: np.ndarray) -> None:
     shader = gpu.shader.from_builtin("SMOOTH_COLOR")
     gpu.state.blend_set("ALPHA")
     batch_for_shader(shader, kind, {"pos": corners, "color": colors}, indices=indices).draw(shader)

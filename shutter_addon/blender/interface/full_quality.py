@@ -5,11 +5,11 @@ from dataclasses import dataclass
 
 import bpy
 from bpy.app.translations import pgettext_rpt as rpt_
-from bpy.types import Operator
+from bpy.types import Area, Context, Operator, Region, Window
 
 from ..data import preview_areas
 from ..rendering import previews
-from .operator_bases import refused
+from .operator_bases import Named, own_classes
 
 _TICK = 0.1  # seconds between two looks at whether it has ended
 
@@ -28,30 +28,29 @@ class _View:
 _before: _View | None = None
 
 
-class SHUTTER_OT_full_quality(Operator):
+class SHUTTER_OT_full_quality(Named, Operator):
     """Show this frame as it will be rendered, each of its pixels on one of the screen's, or end that"""
 
-    bl_idname = "shutter.full_quality"
     bl_label = "Full Quality"
     bl_options = {"REGISTER"}
 
     @classmethod
-    def poll(cls, context):
-        return _shown(context) is not None or refused(cls, rpt_("No preview shows a Shutter strip"))
+    def refusal(cls, context: Context) -> str | None:
+        return None if _shown(context) is not None else rpt_("No preview shows a Shutter strip")
 
-    def execute(self, context):
+    def execute(self, context: Context) -> set[str]:
         if previews.looking.whole is not None:
             previews.looking.whole = None
             _end()
-        else:
-            window, area, shown = _shown(context)
+        elif found := _shown(context):
+            window, area, shown = found
             previews.looking.whole = previews.Whole(shown.effect.scene.session_uid, shown.scene.frame_current)
             shown.strip.invalidate_cache("RAW")
             _begin(window, area)
         return {"FINISHED"}
 
 
-def _shown(context):
+def _shown(context: Context) -> tuple[Window, Area, preview_areas.Shown] | None:
     """Window and area of the preview that is looked at, the context's own or another, and what it shows; or None."""
     areas = sorted(preview_areas.previews(context), key=lambda pair: pair[1] != context.area)
     for window, area in areas:
@@ -61,7 +60,7 @@ def _shown(context):
     return None
 
 
-def _begin(window, area) -> None:
+def _begin(window: Window, area: Area) -> None:
     global _before
     space, region = area.spaces.active, preview_areas.preview_region(area)
     rows, centre = _view_of(region)
@@ -98,7 +97,7 @@ def _end() -> None:
     preview_areas.redraw(bpy.context)
 
 
-def _view_of(region) -> tuple[float, tuple[float, float]]:
+def _view_of(region: Region) -> tuple[float, tuple[float, float]]:
     """How many rows of the sequencer's picture a region shows, and what lies in its centre."""
     size = region.width, region.height
     (left, bottom), (right, top) = (region.view2d.region_to_view(*at) for at in ((0, 0), size))
@@ -106,14 +105,14 @@ def _view_of(region) -> tuple[float, tuple[float, float]]:
     return (top - bottom) * (region.height - 1) / region.height, ((left + right) / 2, (bottom + top) / 2)
 
 
-def _zoom(window, area, rows: float) -> None:
+def _zoom(window: Window, area: Area, rows: float) -> None:
     region = preview_areas.preview_region(area)
     with bpy.context.temp_override(window=window, area=area, region=region):
         # The operator shows the height divided by the ratio, and a half, rounded up.
         bpy.ops.sequencer.view_zoom_ratio(ratio=region.height / (rows - 0.6))
 
 
-def _centre(window, area, centre) -> None:
+def _centre(window: Window, area: Area, centre: tuple[float, float]) -> None:
     region = preview_areas.preview_region(area)
     rows, now = _view_of(region)
     x, y = ((wanted - here) * region.height / rows for wanted, here in zip(centre, now, strict=True))
@@ -127,9 +126,9 @@ def forget() -> None:
     _before = previews.looking.whole = None
 
 
-classes = (SHUTTER_OT_full_quality,)
+classes = own_classes(globals())
 TIMERS = (_end_when_over,)
 
 
-def unregister():
+def unregister() -> None:
     forget()

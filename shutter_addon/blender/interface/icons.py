@@ -27,7 +27,7 @@ def _icon(collection: str, name: str) -> int:
     return icons[name].icon_id if name in icons else 0
 
 
-def _drawn(bars) -> np.ndarray:
+def _drawn(bars: np.ndarray) -> np.ndarray:
     """Bars as a picture (size, size, 4), bottom row first."""
     picture = np.zeros((_SIZE, _SIZE, 4), dtype=np.float32)
     width = _SIZE // len(bars)
@@ -37,7 +37,7 @@ def _drawn(bars) -> np.ndarray:
     return picture
 
 
-def _painted(index: int):
+def _painted(index: int) -> np.ndarray:
     """A pattern as a picture (size, size, 4), bottom row first."""
     y, x = (np.mgrid[:_SIZE, :_SIZE] + 0.5) * _UNITS / _SIZE
     picture = np.ones((_SIZE, _SIZE, 4), dtype=np.float32)
@@ -45,7 +45,7 @@ def _painted(index: int):
     return picture
 
 
-def register():
+def register() -> None:
     _make("presets", {name: _drawn(presets.bars(name, _WINDOW)) for name in presets.PRESETS})
     _make("patterns", {str(index): _painted(index) for index in range(patterns.COUNT)})
 
@@ -58,6 +58,6 @@ def _make(collection: str, pictures: dict) -> None:
         icon.icon_pixels_float = icon.image_pixels_float = picture.ravel()
 
 
-def unregister():
+def unregister() -> None:
     while _collections:
         bpy.utils.previews.remove(_collections.popitem()[1])

@@ -7,16 +7,15 @@ from bpy.app.translations import pgettext_iface as iface_
 from bpy.app.translations import pgettext_n as n_
 from bpy.app.translations import pgettext_rpt as rpt_
 from bpy.props import EnumProperty
-from bpy.types import Operator
+from bpy.types import Context, Event, Operator, PropertyGroup
 
 from ...core import messages
 from ...core.messages import EffectError
 from ...core.model.choices import INBETWEENS
 from ..data import inbetween_settings, selection, strips
 from ..rendering import inbetween_build, strobing
-from ..rendering.effect_source import FAULTS
 from .note_buttons import Button
-from .operator_bases import UNDOABLE, OfEffect, redraw, refused, report_error, report_warning
+from .operator_bases import UNDOABLE, OfEffect, is_escape, own_classes, redraw, report_warning
 
 TICK = 0.25  # seconds
 _RUNS = n_("In-between frames are being built; Esc stops that")
@@ -31,11 +30,11 @@ def stop() -> None:
     _show_end()
 
 
-def _show_start(context) -> None:
+def _show_start(context: Context) -> None:
     global _timer
     if not bpy.app.background:
         _timer = context.window_manager.event_timer_add(TICK, window=context.window)
-    redraw_panels(context)
+    redraw_panels()
 
 
 def _show_end() -> None:
@@ -52,10 +51,10 @@ def _say(sentence: str | None) -> None:
         workspace.status_text_set(sentence)
 
 
-def redraw_panels(context) -> None:
-    """Draws panels again, and no preview."""
+def redraw_panels() -> None:
+    """Draws panels again, and no preview; a timer as well."""
     kinds = {"SEQUENCE_EDITOR": "UI", "PROPERTIES": "WINDOW"}
-    for window in context.window_manager.windows:
+    for window in bpy.context.window_manager.windows:
         for area in window.screen.areas:
             for region in area.regions:
                 if region.type == kinds.get(area.type):
@@ -97,117 +96,104 @@ class _OfInbetweens(OfEffect):
     bl_options = {"REGISTER"}
 
     @classmethod
-    def possible(cls, effect):
+    def why_not(cls, effect: PropertyGroup) -> str | None:
         if inbetween_build.running() is not None:
-            return refused(cls, rpt_(_RUNS))
+            return rpt_(_RUNS)
         try:
             inbetween_settings.settings(effect)
         except EffectError as error:
-            return refused(cls, str(error))
-        return True
+            return str(error)
+        return None
 
 
 class _Building(_OfInbetweens):
     """Builds, and shows how far it is."""
 
-    _wanted: int | None = None  # factor of what the strip needs; None: all of the source's, of the effect's own
+    def wanted(self) -> int | None:
+        """Factor of what the strip needs; None: all of the source's, of the effect's own."""
+        return None
 
-    def invoke(self, context, _event):
-        if bpy.app.background:
-            return self.execute(context)
-        if not self._begin(context):
-            return {"CANCELLED"}
+    def invoke(self, context: Context, _event: Event) -> set[str]:
+        return self.tried(self._begin, context, bpy.app.background)
+
+    def execute(self, context: Context) -> set[str]:
+        return self.tried(self._begin, context, True)
+
+    def _begin(self, context: Context, waits: bool) -> set[str]:
+        scene, effect, strip = selection.active(context)
+        self._build = inbetween_build.start(scene, effect, strip, self.wanted())
+        _show_start(context)
+        if waits:
+            wait([self._build.future])
+            return self._finish(context)
         context.window_manager.modal_handler_add(self)
         return {"RUNNING_MODAL"}
 
-    def execute(self, context):
-        if not self._begin(context):
-            return {"CANCELLED"}
-        wait([self._build.future])
-        return self._finish(context)
-
-    def _begin(self, context) -> bool:
-        scene, effect, strip = selection.active(context)
-        try:
-            self._build = inbetween_build.start(scene, effect, strip, self._wanted)
-        except FAULTS as error:
-            report_error(self, str(error))
-            return False
-        _show_start(context)
-        return True
-
-    def modal(self, context, event):
+    def modal(self, context: Context, event: Event) -> set[str]:
         if inbetween_build.running() is not self._build:  # a file was loaded
             return {"CANCELLED"}
-        if event.type == "ESC" and event.value == "PRESS":
+        if is_escape(event):
             self._build.stop()
-            return self._finish(context)
+            return self.tried(self._finish, context)
         if event.type == "TIMER":
             if self._build.future.done():
-                return self._finish(context)
+                return self.tried(self._finish, context)
             if all(scene.session_uid != self._build.scene for scene in bpy.data.scenes):  # the effect was deleted
                 self._build.stop()
             sentence = rpt_("Building in-between frames: {done} of {total}, Esc to stop")
             _say(sentence.format(done=self._build.done, total=self._build.total))
-            redraw_panels(context)
+            redraw_panels()
         return {"PASS_THROUGH"}
 
-    def cancel(self, _context):
+    def cancel(self, _context: Context) -> None:
         """Its window was closed."""
         if inbetween_build.running() is self._build:
             stop()
 
-    def _finish(self, context):
+    def _finish(self, context: Context) -> set[str]:
         inbetween_build.ended()
         _show_end()
         redraw(context)
-        try:
-            state = self._build.result()
-        except FAULTS as error:
-            report_error(self, str(error))
-            return {"CANCELLED"}
+        state = self._build.result()
         if state.name == "ready":
             self.report({"INFO"}, rpt_("In-between frames are built"))
-            return self._built()
+            return self.built()
         sentence = rpt_("Stopped: {done} of {total} are built")
         report_warning(self, sentence.format(done=state.done, total=state.total))
         return {"CANCELLED"}
 
-    def _built(self):
+    def built(self) -> set[str]:
+        """Called once all is built."""
         return {"FINISHED"}
 
 
 class SHUTTER_OT_inbetween_build(_Building, Operator):
     """Build the in-between frames that are missing, as files that are kept (Esc stops, and keeps what is built)"""
 
-    bl_idname = "shutter.inbetween_build"
     bl_label = "Build In-Between Frames"
 
     @classmethod
-    def possible(cls, effect):
-        if effect.inbetween == "1":
-            return refused(cls, rpt_("Choose a factor first"))
-        return super().possible(effect)
+    def why_not(cls, effect: PropertyGroup) -> str | None:
+        return rpt_("Choose a factor first") if effect.inbetween == "1" else super().why_not(effect)
 
 
 class SHUTTER_OT_smooth_streaks(_Building, Operator):
     """Build the in-between frames that smooth streaks take, and use them (Esc stops, and keeps what is built)"""
 
-    bl_idname = "shutter.smooth_streaks"
     bl_label = "Smooth Streaks"
     bl_options = UNDOABLE
 
     factor: EnumProperty(name="Factor", items=INBETWEENS[1:])
 
     @classmethod
-    def possible(cls, effect):  # what else is wrong is reported: where it is clicked, nothing is greyed out
-        return inbetween_build.running() is None or refused(cls, rpt_(_RUNS))
+    def why_not(cls, effect: PropertyGroup) -> str | None:
+        # What else is wrong is reported: where it is clicked, nothing is greyed out.
+        return rpt_(_RUNS) if inbetween_build.running() is not None else None
 
-    def _begin(self, context) -> bool:
-        self._wanted = int(self.factor)
-        return super()._begin(context)
+    def wanted(self) -> int | None:
+        return int(self.factor)
 
-    def _built(self):
+    def built(self) -> set[str]:
         """The factor is set now, so that the picture never lacks frames, and nothing is left of a build that was
         stopped."""
         effects = (effect for scene in bpy.data.scenes for effect in scene.virtual_shutter.effects)
@@ -221,10 +207,9 @@ class SHUTTER_OT_smooth_streaks(_Building, Operator):
 class SHUTTER_OT_inbetween_purge(_OfInbetweens, Operator):
     """Remove the files of all in-between frames of the effect's source, of every factor and method"""
 
-    bl_idname = "shutter.inbetween_purge"
     bl_label = "Remove In-Between Frames"
 
-    def invoke(self, context, event):
+    def invoke(self, context: Context, event: Event) -> set[str]:
         return context.window_manager.invoke_confirm(
             self,
             event,
@@ -235,22 +220,17 @@ class SHUTTER_OT_inbetween_purge(_OfInbetweens, Operator):
             translate=False,
         )
 
-    def change(self, context, effect):
-        scene, effect, strip = selection.active(context)
-        try:
-            freed, left = inbetween_build.purge(effect, strips.source_of(scene, effect, strip))
-        except FAULTS as error:
-            report_error(self, str(error))
-            return {"CANCELLED"}
+    def change(self, _context: Context, effect: PropertyGroup) -> None:
+        freed, left = inbetween_build.purge(effect, strips.source_of(self.edit, effect, self.effect_strip))
         self.report({"INFO"}, rpt_("Removed {size}").format(size=size_in_words(freed)))
         for place, count in left:
             sentence = rpt_('"{folder}": other files stay there ({count})')
             report_warning(self, messages.sentence(sentence.format(folder=place, count=count)))
-        return None
 
 
-classes = (SHUTTER_OT_inbetween_build, SHUTTER_OT_smooth_streaks, SHUTTER_OT_inbetween_purge)
+classes = own_classes(globals())
+TIMERS = (redraw_panels,)
 
 
-def unregister():
+def unregister() -> None:
     stop()

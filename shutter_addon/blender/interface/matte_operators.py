@@ -6,32 +6,21 @@ import bpy
 from bpy.app.translations import contexts
 from bpy.app.translations import pgettext_rpt as rpt_
 from bpy.props import BoolProperty, EnumProperty, StringProperty
-from bpy.types import Operator
+from bpy.types import Context, Mask, Operator, PropertyGroup
 from bpy_extras.io_utils import ImportHelper
 
-from ...core.messages import EffectError
+from ...core.messages import UserError
 from ...core.model.choices import RAMPS
 from ...core.model.limits import MAX_CHANNEL
-from ...core.recipes.recipe import RecipeError
-from ...media import MediaError
 from ..data import matte_strips, recipe_import, selection, strips
 from ..editing import outline_masks, region_edits, time_map
 from ..output import matte_export
-from .operator_bases import OfRegion, OfShutter, chosen_file, has_room, refused, report_error
+from .operator_bases import Adds, OfRegion, chosen_file, kept, own_classes
 
 
-class _AddsRegion(OfShutter):
-    """Adds a region to the active shutter."""
-
-    @classmethod
-    def possible(cls, effect):
-        return super().possible(effect) and has_room(cls, effect, "regions")
-
-
-class SHUTTER_OT_matte_add(_AddsRegion, ImportHelper, Operator):
+class SHUTTER_OT_matte_add(Adds, ImportHelper, Operator):
     """Make a movie, an image sequence or a picture the matte of the active shutter"""
 
-    bl_idname = "shutter.matte_add"
     bl_label = "Matte from File"
 
     channel_name: StringProperty(
@@ -45,89 +34,75 @@ class SHUTTER_OT_matte_add(_AddsRegion, ImportHelper, Operator):
     filter_image: BoolProperty(default=True, options={"HIDDEN", "SKIP_SAVE"})
     filter_folder: BoolProperty(default=True, options={"HIDDEN", "SKIP_SAVE"})
 
-    def change(self, _context, effect):
+    def change(self, _context: Context, effect: PropertyGroup) -> None:
         name = self.channel_name
-        try:
-            image = recipe_import.matte_image(bpy.path.abspath(chosen_file(self)), name or "luminance")
-        except (MediaError, RecipeError) as error:
-            raise EffectError(str(error)) from None
+        image = recipe_import.matte_image(bpy.path.abspath(chosen_file(self)), name or "luminance")
         channel = {"channel": "NAMED", "channel_name": name} if name else {}
-        region_edits.add_matte(effect, selection.active_shutter(effect), name=image.name, image=image, **channel)
+        region_edits.add_region(effect, selection.active_shutter(effect), "MATTE", image.name, image=image, **channel)
 
 
-_strip_items: list = []
-
-
-def strip_items(_self, context):
+@kept
+def strip_items(context: Context) -> list[tuple]:
     scene = selection.scene_of(context)
     all_strips = scene.sequence_editor.strips_all if scene and scene.sequence_editor else ()
-    _strip_items[:] = [(strip.name, strip.name, "") for strip in all_strips if strip.type in strips.SOURCES]
-    return _strip_items
+    return [(strip.name, strip.name, "") for strip in all_strips if strip.type in strips.SOURCES]
 
 
-class SHUTTER_OT_matte_strip(_AddsRegion, Operator):
+class SHUTTER_OT_matte_strip(Adds, Operator):
     """Make a movie, image or clip strip of the edit the matte of the active shutter, muted or not"""
 
-    bl_idname = "shutter.matte_strip"
     bl_label = "Matte from Strip"
 
     strip: EnumProperty(name="Strip", items=strip_items, translation_context=contexts.no_translation)
 
-    def change(self, _context, effect):
-        region = region_edits.add_matte(effect, selection.active_shutter(effect), name=self.strip, matte="STRIP")
+    def change(self, _context: Context, effect: PropertyGroup) -> None:
+        region = region_edits.add_region(effect, selection.active_shutter(effect), "MATTE", self.strip, matte="STRIP")
         matte_strips.choose_strip(region, self.strip)
 
 
-_mask_items: list = []
+@kept
+def _masks(_context: Context) -> list[tuple]:
+    return [(mask.name_full, mask.name_full, "") for mask in bpy.data.masks]
 
 
-def _masks(_self, _context):
-    _mask_items[:] = [(mask.name_full, mask.name_full, "") for mask in bpy.data.masks]
-    return _mask_items
-
-
-class _OfMask(_AddsRegion):
+class _OfMask(Adds):
     """Adds a region that a mask makes."""
 
     mask: EnumProperty(name="Mask", items=_masks, translation_context=contexts.no_translation)
 
     @classmethod
-    def possible(cls, effect):
-        return super().possible(effect) and (
-            bool(bpy.data.masks)
-            or refused(cls, rpt_("There is no mask: draw one in the Mask mode of an image or clip"))
-        )
+    def why_not(cls, effect: PropertyGroup) -> str | None:
+        if sentence := super().why_not(effect):
+            return sentence
+        return None if bpy.data.masks else rpt_("There is no mask: draw one in the Mask mode of an image or clip")
 
-    def chosen(self):
+    def chosen(self) -> Mask:
         return next(mask for mask in bpy.data.masks if mask.name_full == self.mask)
 
 
 class SHUTTER_OT_matte_mask(_OfMask, Operator):
     """Make a mask the matte of the active shutter"""
 
-    bl_idname = "shutter.matte_mask"
     bl_label = "Matte from Mask"
 
-    def change(self, _context, effect):
+    def change(self, _context: Context, effect: PropertyGroup) -> None:
         mask = self.chosen()
-        region_edits.add_matte(effect, selection.active_shutter(effect), name=mask.name, matte="MASK", mask=mask)
+        region_edits.add_region(effect, selection.active_shutter(effect), "MATTE", mask.name, matte="MASK", mask=mask)
 
 
 class SHUTTER_OT_outline_from_mask(_OfMask, Operator):
     """Make an outline of the active shutter that is drawn at each key of a mask"""
 
-    bl_idname = "shutter.outline_from_mask"
     bl_label = "Outline from Mask"
 
-    def change(self, context, effect):
-        scene, _effect, strip = selection.active(context)
-        outline_masks.from_mask(scene, effect, strip, selection.active_shutter(effect), self.chosen())
+    def change(self, _context: Context, effect: PropertyGroup) -> None:
+        shutter = selection.active_shutter(effect)
+        outline_masks.from_mask(self.edit, effect, self.effect_strip, shutter, self.chosen())
 
 
 class SHUTTER_OT_matte_export(OfRegion, ImportHelper, Operator):
     """Write what the active matte or outline shows at each frame of its strip as pictures, for any other program"""
 
-    bl_idname = "shutter.matte_export"
     bl_label = "Export Matte"
     bl_options = {"REGISTER"}
 
@@ -140,61 +115,44 @@ class SHUTTER_OT_matte_export(OfRegion, ImportHelper, Operator):
     filter_folder: BoolProperty(default=True, options={"HIDDEN", "SKIP_SAVE"})
 
     @classmethod
-    def possible(cls, effect):
-        if not super().possible(effect):
-            return False
-        return selection.active_region(effect).kind in strips.LAID or refused(
-            cls, rpt_("The region is no matte, ramp or outline")
-        )
+    def why_not(cls, effect: PropertyGroup) -> str | None:
+        if sentence := super().why_not(effect):
+            return sentence
+        is_laid = selection.active_region(effect).kind in strips.LAID
+        return None if is_laid else rpt_("The region is no matte, ramp or outline")
 
-    def change(self, context, effect):
-        scene, _effect, strip = selection.active(context)
+    def change(self, _context: Context, effect: PropertyGroup) -> None:
         folder = Path(bpy.path.abspath(self.directory or str(Path(self.filepath).parent)))
+        region, word = selection.active_region(effect), self.format.lower()
         try:
-            region, word = selection.active_region(effect), self.format.lower()
-            count = matte_export.save(scene, effect, strip, region, folder, word)
+            count = matte_export.save(self.edit, effect, self.effect_strip, region, folder, word)
         except OSError as error:
-            sentence = f"{folder}: {error.strerror or error}"
-            report_error(self, sentence)
-            return {"CANCELLED"}
+            raise UserError(f"{folder}: {error.strerror or error}") from None
         self.report({"INFO"}, rpt_('Saved {count} pictures in "{folder}"').format(count=count, folder=folder))
-        return None
 
 
-class SHUTTER_OT_ramp_add(_AddsRegion, Operator):
+class SHUTTER_OT_ramp_add(Adds, Operator):
     """Make a ramp across the picture the matte of the active shutter"""
 
-    bl_idname = "shutter.ramp_add"
     bl_label = "Ramp"
 
     ramp: EnumProperty(name="Ramp", description="How the ramp runs", items=RAMPS)
 
-    def change(self, _context, effect):
-        region_edits.add_matte(effect, selection.active_shutter(effect), "RAMP", ramp=self.ramp)
+    def change(self, _context: Context, effect: PropertyGroup) -> None:
+        region_edits.add_region(effect, selection.active_shutter(effect), "RAMP", ramp=self.ramp)
 
 
-class SHUTTER_OT_time_map(_AddsRegion, Operator):
+class SHUTTER_OT_time_map(Adds, Operator):
     """Show every pixel at its own moment: a ramp from the first of the frames to the last (slit-scan)"""
 
-    bl_idname = "shutter.time_map"
     bl_label = "Time Map"
 
     ramp: EnumProperty(name="Ramp", description="How the ramp runs", items=RAMPS)
 
-    @classmethod
-    def possible(cls, effect):
-        return super().possible(effect) and has_room(cls, effect, "shutters", 2)
+    more = {"regions": 1, "shutters": 2}
 
-    def change(self, _context, effect):
+    def change(self, _context: Context, effect: PropertyGroup) -> None:
         time_map.add(effect, self.ramp)
 
 
-classes = (
-    SHUTTER_OT_matte_add,
-    SHUTTER_OT_matte_strip,
-    SHUTTER_OT_matte_mask,
-    SHUTTER_OT_outline_from_mask,
-    SHUTTER_OT_matte_export,
-    SHUTTER_OT_ramp_add,
-    SHUTTER_OT_time_map,
-)
+classes = own_classes(globals())

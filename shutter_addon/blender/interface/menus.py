@@ -1,144 +1,94 @@
 """The menu Strip ▸ Shutter: every operator, so that Blender's search finds it, and keys reach it."""
 
 import bpy
-from bpy.types import Menu
+from bpy.types import Context, Menu
+
+from .operator_bases import own_classes
+from .panel_parts import draw_moves, draw_operators
 
 
 class SHUTTER_MT_strip(Menu):
     bl_label = "Shutter"
 
-    def draw(self, _context):
+    def draw(self, _context: Context) -> None:
         layout = self.layout
-        layout.operator("shutter.add_effect", icon="ADD")
-        layout.operator("shutter.draw", icon="GREASEPENCIL")
-        layout.operator("shutter.erase")
+        draw_operators(layout, ("add_effect", "ADD"), ("draw", "GREASEPENCIL"), ("erase",))
         layout.separator()
-        layout.operator("shutter.effect_copy", icon="COPYDOWN")
-        layout.operator("shutter.effect_paste", icon="PASTEDOWN")
-        for menu in (
-            SHUTTER_MT_of_shutter,
-            SHUTTER_MT_of_bars,
-            SHUTTER_MT_of_region,
-            SHUTTER_MT_of_outline,
-            SHUTTER_MT_of_track,
-            SHUTTER_MT_of_camera,
-            SHUTTER_MT_of_footage,
-            SHUTTER_MT_of_bake,
-            SHUTTER_MT_of_preview,
-        ):
-            layout.menu(menu.__name__)
+        draw_operators(layout, ("effect_copy", "COPYDOWN"), ("effect_paste", "PASTEDOWN"))
+        for end in ("shutter", "bars", "region", "outline", "track", "camera", "footage", "bake", "preview"):
+            layout.menu(f"SHUTTER_MT_of_{end}")
         layout.separator()
-        layout.operator("shutter.copy_report", icon="COPYDOWN")
+        draw_operators(layout, ("copy_report", "COPYDOWN"))
 
 
 class SHUTTER_MT_of_shutter(Menu):
     bl_label = "Shutters"
 
-    def draw(self, _context):
+    def draw(self, _context: Context) -> None:
         layout = self.layout
-        layout.operator("shutter.shutter_add", icon="ADD")
-        layout.operator("shutter.shutter_remove", icon="REMOVE")
+        draw_operators(layout, ("shutter_add", "ADD"), ("shutter_remove", "REMOVE"))
         layout.menu_contents("SHUTTER_MT_shutters")
-
-
-class SHUTTER_MT_of_bars(Menu):
-    bl_label = "Bars"
-
-    def draw(self, _context):
-        layout = self.layout
-        layout.operator("shutter.bar_set")
-        layout.operator_menu_enum("shutter.preset", "preset", icon="PRESET")
-        layout.separator()
-        layout.operator("shutter.bars_key", icon="KEY_HLT")
-        layout.operator("shutter.bars_unkey", icon="KEY_DEHLT")
 
 
 class SHUTTER_MT_of_region(Menu):
     bl_label = "Regions"
 
-    def draw(self, _context):
+    def draw(self, _context: Context) -> None:
         layout = self.layout
         layout.menu_contents("SHUTTER_MT_regions")
         layout.separator()
-        layout.operator("shutter.region_transform")
-        layout.operator("shutter.region_key", icon="KEY_HLT")
-        layout.operator_menu_enum("shutter.region_assign", "shutter")
-        layout.operator("shutter.region_move", text="Move Up", icon="TRIA_UP").direction = "UP"
-        layout.operator("shutter.region_move", text="Move Down", icon="TRIA_DOWN").direction = "DOWN"
-        layout.operator("shutter.region_remove", icon="REMOVE")
-        layout.operator("shutter.matte_export", icon="EXPORT")
+        draw_operators(layout, ("region_transform",), ("region_key", "KEY_HLT"), ("region_assign", "NONE", "shutter"))
+        draw_moves(layout, "region")
+        draw_operators(layout, ("region_remove", "REMOVE"), ("matte_export", "EXPORT"))
         layout.separator()
-        layout.operator("shutter.sharp_subject", icon="RENDERLAYERS")
-        layout.operator("shutter.clean_trail", icon="CURVE_PATH")
+        draw_operators(layout, ("sharp_subject", "RENDERLAYERS"), ("clean_trail", "CURVE_PATH"))
 
 
-class SHUTTER_MT_of_outline(Menu):
-    bl_label = "Outline"
-
-    def draw(self, _context):
-        layout = self.layout
-        layout.operator("shutter.outline_it")
-        layout.operator("shutter.outline_points")
-        layout.operator("shutter.outline_draw")
-        layout.separator()
-        layout.operator("shutter.outline_carry")
-        layout.operator("shutter.outline_needed")
-        layout.operator("shutter.outline_mask")
-
-
-class SHUTTER_MT_of_track(Menu):
-    bl_label = "Track"
-
-    def draw(self, _context):
-        layout = self.layout
-        layout.operator_menu_enum("shutter.track", "direction")
-        layout.operator("shutter.track_look")
-        layout.operator("shutter.panning_shot", icon="CON_FOLLOWTRACK")
-        layout.separator()
-        layout.operator("shutter.follow", icon="TRACKER")
-        layout.operator("shutter.follow_update", icon="FILE_REFRESH")
-
-
-class SHUTTER_MT_of_camera(Menu):
-    bl_label = "Camera"
-
-    def draw(self, _context):
-        layout = self.layout
-        layout.operator_menu_enum("shutter.track_camera", "direction")
-        layout.operator("shutter.track_camera_look")
-        layout.operator("shutter.tripod", icon="CON_CAMERASOLVER")
-        layout.separator()
-        layout.operator("shutter.follow_stabilization", icon="TRACKER")
+# Of operators alone: by the end of its name, what a menu is called, and its groups (panel_parts.draw_operators).
+_GROUPS: dict[str, tuple] = {
+    "bars": (
+        "Bars",
+        [("bar_set",), ("preset", "PRESET", "preset")],
+        [("bars_key", "KEY_HLT"), ("bars_unkey", "KEY_DEHLT")],
+    ),
+    "outline": (
+        "Outline",
+        [("outline_it",), ("outline_points",), ("outline_draw",)],
+        [("outline_carry",), ("outline_needed",), ("outline_mask",)],
+    ),
+    "track": (
+        "Track",
+        [("track", "NONE", "direction"), ("track_look",), ("panning_shot", "CON_FOLLOWTRACK")],
+        [("follow", "TRACKER"), ("follow_update", "FILE_REFRESH")],
+    ),
+    "camera": (
+        "Camera",
+        [("track_camera", "NONE", "direction"), ("track_camera_look",), ("tripod", "CON_CAMERASOLVER")],
+        [("follow_stabilization", "TRACKER")],
+    ),
+    "footage": (
+        "Footage",
+        [("source", "NONE", "strip"), ("match_source",), ("copy_modifiers",)],
+        [("smooth_streaks", "NONE", "factor"), ("inbetween_build",), ("inbetween_purge",)],
+    ),
+    "bake": ("Bake", [("bake",), ("bake_stop",), ("unbake",)]),
+}
 
 
-class SHUTTER_MT_of_footage(Menu):
-    bl_label = "Footage"
+def _menu(end: str, label: str, *groups: list[tuple[str, ...]]) -> type[Menu]:
+    def draw(self: Menu, _context: Context) -> None:
+        for i, group in enumerate(groups):
+            if i:
+                self.layout.separator()
+            draw_operators(self.layout, *group)
 
-    def draw(self, _context):
-        layout = self.layout
-        layout.operator_menu_enum("shutter.source", "strip")
-        layout.operator("shutter.match_source")
-        layout.operator("shutter.copy_modifiers")
-        layout.separator()
-        layout.operator_menu_enum("shutter.smooth_streaks", "factor")
-        layout.operator("shutter.inbetween_build")
-        layout.operator("shutter.inbetween_purge")
-
-
-class SHUTTER_MT_of_bake(Menu):
-    bl_label = "Bake"
-
-    def draw(self, _context):
-        layout = self.layout
-        layout.operator("shutter.bake")
-        layout.operator("shutter.bake_stop")
-        layout.operator("shutter.unbake")
+    return type(f"SHUTTER_MT_of_{end}", (Menu,), {"bl_label": label, "draw": draw})
 
 
 class SHUTTER_MT_of_preview(Menu):
     bl_label = "Preview"
 
-    def draw(self, context):
+    def draw(self, context: Context) -> None:
         layout, live = self.layout, context.window_manager.virtual_shutter
         layout.operator("shutter.full_quality")
         layout.separator()
@@ -150,28 +100,17 @@ class SHUTTER_MT_of_preview(Menu):
         layout.operator("shutter.probe_pixel")
 
 
-def _entry(self, _context):
+def _entry(self, _context: Context) -> None:
     self.layout.separator()
     self.layout.menu(SHUTTER_MT_strip.__name__)
 
 
-classes = (
-    SHUTTER_MT_strip,
-    SHUTTER_MT_of_shutter,
-    SHUTTER_MT_of_bars,
-    SHUTTER_MT_of_region,
-    SHUTTER_MT_of_outline,
-    SHUTTER_MT_of_track,
-    SHUTTER_MT_of_camera,
-    SHUTTER_MT_of_footage,
-    SHUTTER_MT_of_bake,
-    SHUTTER_MT_of_preview,
-)
+classes = (*own_classes(globals()), *(_menu(end, *what) for end, what in _GROUPS.items()))
 
 
-def register():
+def register() -> None:
     bpy.types.SEQUENCER_MT_strip.append(_entry)
 
 
-def unregister():
+def unregister() -> None:
     bpy.types.SEQUENCER_MT_strip.remove(_entry)

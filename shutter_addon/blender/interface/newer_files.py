@@ -8,6 +8,7 @@ import bpy
 from ...core import told
 from ...core.messages import sentence, signed
 from ..data import data_format
+from .operator_bases import popup, soon
 
 _words: list[str] = []  # of the sentence that waits for the window, or was shown last
 
@@ -22,19 +23,14 @@ def tell(scenes: Iterable) -> None:
         print(signed(words), file=sys.stderr)
     else:  # while a file is loaded, its windows are not there yet
         _words[:] = [sentence(words)]
-        if not bpy.app.timers.is_registered(_show):
-            bpy.app.timers.register(_show, first_interval=0.0)
+        soon(_show)
 
 
 def _show() -> None:
     """A timer, once."""
-    (words,), manager = _words, bpy.context.window_manager
-    if not manager.windows:
-        return
-    with bpy.context.temp_override(window=manager.windows[0]):
-        manager.popup_menu(
-            lambda menu, _context: menu.layout.label(text=words, translate=False), title="Virtual Shutter", icon="INFO"
-        )
+    if windows := bpy.context.window_manager.windows:
+        with bpy.context.temp_override(window=windows[0]):
+            popup(bpy.context, *_words, title="Virtual Shutter", icon="INFO")
 
 
 TIMERS = (_show,)

@@ -2,10 +2,12 @@
 
 from dataclasses import dataclass, field
 
-from bpy.types import Gizmo, GizmoGroup
+from bpy.types import Context, Gizmo, GizmoGroup, Region
 
 from ..data import preview_areas
 from . import drawing
+from .gizmo_groups import InPreview
+from .operator_bases import own_classes
 
 HEIGHT = 19  # in units of the interface
 _PAD = 8
@@ -21,10 +23,10 @@ class Button:
     values: dict = field(default_factory=dict)
 
 
-places: dict[tuple[int, str], tuple[tuple, Button]] = {}  # by region and operator: left, bottom, right, top
+places: dict[tuple[int, str], tuple[drawing.Box, Button]] = {}  # by region and operator
 
 
-def clear(region) -> None:
+def clear(region: Region) -> None:
     """Takes all buttons from a region."""
     for key in [key for key in places if key[0] == region.as_pointer()]:
         del places[key]
@@ -35,17 +37,19 @@ def width(button: Button) -> float:
     return drawing.text_width(button.label) + 2 * _PAD * drawing.ui_scale()
 
 
-def place(region, left: float, bottom: float, button: Button) -> None:
+def place(region: Region, left: float, bottom: float, button: Button) -> None:
     """Puts a button into a region: its gizmo draws it."""
     box = left, bottom, left + width(button), bottom + HEIGHT * drawing.ui_scale()
     places[region.as_pointer(), button.operator] = box, button
 
 
-class SHUTTER_GT_note_button(Gizmo):
-    bl_idname = "SHUTTER_GT_note_button"
+def _placed(context: Context, operator: str) -> tuple[drawing.Box, Button] | None:
+    return places.get((context.region.as_pointer(), operator))
 
-    def draw(self, context):
-        if (placed := places.get((context.region.as_pointer(), self.operator))) is None:
+
+class SHUTTER_GT_note_button(Gizmo):
+    def draw(self, context: Context) -> None:
+        if (placed := _placed(context, self.operator)) is None:
             return
         (left, bottom, right, top), button = placed
         look = context.preferences.themes[0].user_interface.wcol_tool
@@ -57,39 +61,35 @@ class SHUTTER_GT_note_button(Gizmo):
             color = look.text_sel if self.is_highlight else look.text
             drawing.text(left + _PAD * unit, bottom + 6 * unit, button.label, color=(*color, 1.0))
 
-    def test_select(self, context, location):
-        if (placed := places.get((context.region.as_pointer(), self.operator))) is None:
+    def test_select(self, context: Context, location: tuple[int, int]) -> int:
+        if (placed := _placed(context, self.operator)) is None:
             return -1
         (left, bottom, right, top), _button = placed
         return 0 if left <= location[0] <= right and bottom <= location[1] <= top else -1
 
 
-class SHUTTER_GGT_note_buttons(GizmoGroup):
-    bl_idname = "SHUTTER_GGT_note_buttons"
+class SHUTTER_GGT_note_buttons(InPreview, GizmoGroup):
     bl_label = "Buttons of Notes"
-    bl_space_type = "SEQUENCE_EDITOR"
-    bl_region_type = "PREVIEW"
-    bl_options = {"PERSISTENT"}
 
     @classmethod
-    def poll(cls, context):
+    def poll(cls, context: Context) -> bool:
         return context.window_manager.virtual_shutter.live and preview_areas.shown(context) is not None
 
-    def setup(self, _context):
+    def setup(self, _context: Context) -> None:
         for operator in OPERATORS:
-            gizmo = self.gizmos.new(SHUTTER_GT_note_button.bl_idname)
+            gizmo = self.gizmos.new(SHUTTER_GT_note_button.__name__)
             gizmo.operator = operator
             gizmo.target_set_operator(operator)
 
-    def draw_prepare(self, context):
+    def draw_prepare(self, context: Context) -> None:
         for gizmo in self.gizmos:
-            placed = places.get((context.region.as_pointer(), gizmo.operator))
+            placed = _placed(context, gizmo.operator)
             for name, value in (placed[1].values if placed else {}).items():
                 setattr(gizmo.target_set_operator(gizmo.operator), name, value)
 
 
-classes = (SHUTTER_GT_note_button, SHUTTER_GGT_note_buttons)
+classes = own_classes(globals())
 
 
-def unregister():
+def unregister() -> None:
     places.clear()

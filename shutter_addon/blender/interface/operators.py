@@ -5,7 +5,7 @@ from bpy.app.translations import contexts
 from bpy.app.translations import pgettext_iface as iface_
 from bpy.app.translations import pgettext_rpt as rpt_
 from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty
-from bpy.types import Operator
+from bpy.types import Annotation, Context, Event, Operator, PropertyGroup
 
 from ...core.messages import EffectError
 from ...core.model import presets
@@ -21,76 +21,69 @@ from ..editing import (
     shown_annotations,
     shutter_edits,
 )
-from ..rendering.effect_source import FAULTS
 from . import icons, sharp_frame
 from .operator_bases import (
     UNDOABLE,
+    Adds,
     Mixin,
     Move,
+    Named,
     OfEffect,
     OfRegion,
     OfShutter,
     OfStrokes,
-    has_room,
+    kept,
+    own_classes,
     redraw,
-    refused,
-    report_error,
     report_warning,
+    soon,
 )
 
 
-class SHUTTER_OT_add_effect(Operator):
+class SHUTTER_OT_add_effect(Named, Operator):
     """Add a Shutter strip above the active strip, which gives every pixel an exposure of its own"""
 
-    bl_idname = "shutter.add_effect"
     bl_label = "Add Shutter Strip"
     bl_options = UNDOABLE
 
     @classmethod
-    def poll(cls, context):
-        return takes_effect(cls, context)
+    def refusal(cls, context: Context) -> str | None:
+        return why_no_effect(context)
 
-    def execute(self, context):
-        return {"FINISHED"} if effect_added(self, context) else {"CANCELLED"}
+    def execute(self, context: Context) -> set[str]:
+        return self.tried(give_effect, context)
 
 
-def takes_effect(cls, context) -> bool:
-    """For poll(): whether the active strip can be given an effect."""
+def why_no_effect(context: Context) -> str | None:
+    """Why the active strip cannot be given an effect; None: it can."""
     scene, source = selection.scene_of(context), selection.active_strip(context)
     if scene is None or source is None:
-        return refused(cls, rpt_("Select a movie, image or clip strip"))
+        return rpt_("Select a movie, image or clip strip")
     if not scene.is_editable:
-        return refused(cls, rpt_("The edit is linked from another file"))
-    if source.type not in strips.SOURCES:
-        return refused(cls, rpt_("The active strip is not a movie, image or clip strip"))
-    return True
+        return rpt_("The edit is linked from another file")
+    return None if source.type in strips.SOURCES else rpt_("The active strip is not a movie, image or clip strip")
 
 
-def effect_added(operator, context) -> bool:
-    """Gives the active strip an effect, and shows it; the operator says why it cannot be."""
-    scene, source = selection.scene_of(context), selection.active_strip(context)
-    try:
-        strip, effect = add_effect.add_effect(scene, source)
-    except FAULTS as error:
-        report_error(operator, str(error))
-        return False
+def give_effect(context: Context) -> None:
+    """Gives the active strip an effect, and shows it. One of FAULTS: it cannot be."""
+    scene = selection.scene_of(context)
+    strip, effect = add_effect.add_effect(scene, selection.active_strip(context))
     shutter_edits.start(effect)
     selection.choose(scene, strip)
     if not bpy.app.background:
         show_panel(context)
     redraw(context)
-    return True
 
 
 class MakesEffect(Mixin):
     """Gives the active strip an effect first, if that has none."""
 
     @classmethod
-    def poll(cls, context):
-        return takes_effect(cls, context) if selection.active(context) is None else super().poll(context)
+    def refusal(cls, context: Context) -> str | None:
+        return why_no_effect(context) if selection.active(context) is None else super().refusal(context)
 
-    def execute(self, context):
-        if selection.active(context) is None and not effect_added(self, context):
+    def execute(self, context: Context) -> set[str]:
+        if selection.active(context) is None and self.tried(give_effect, context) == {"CANCELLED"}:
             return {"CANCELLED"}
         return super().execute(context)
 
@@ -98,49 +91,42 @@ class MakesEffect(Mixin):
 class SHUTTER_OT_match_source(OfEffect, Operator):
     """Give the Shutter strip transform, crop, flip, color and range of its source (scribbles stay on the picture)"""
 
-    bl_idname = "shutter.match_source"
     bl_label = "Match Source"
 
     @classmethod
-    def possible(cls, effect):
+    def why_not(cls, effect: PropertyGroup) -> str | None:
         if (shown := match_source.shown(effect)) is None:
-            return refused(cls, rpt_("The Shutter strip has no source any more"))
-        if not shown.differences:
-            return refused(cls, rpt_("The Shutter strip is like its source"))
-        return True
+            return rpt_("The Shutter strip has no source any more")
+        return None if shown.differences else rpt_("The Shutter strip is like its source")
 
-    def change(self, context, effect):
+    def change(self, _context: Context, effect: PropertyGroup) -> None:
         if (neighbor := match_source.match(effect)) is not None:
-            strip = selection.active(context)[2]
             sentence = rpt_('"{neighbor}" is in the way: "{strip}" has not the whole range of its source')
-            report_warning(self, sentence.format(neighbor=neighbor.name, strip=strip.name))
+            report_warning(self, sentence.format(neighbor=neighbor.name, strip=self.effect_strip.name))
 
 
 class SHUTTER_OT_copy_modifiers(OfEffect, Operator):
     """Copy the modifiers of the source to the Shutter strip, which shows the source's file as it is"""
 
-    bl_idname = "shutter.copy_modifiers"
     bl_label = "Copy Modifiers"
 
     @classmethod
-    def possible(cls, effect):
-        shown = match_source.shown(effect)
-        if shown is None or not shown.lacks_modifiers:
-            return refused(cls, rpt_("The Shutter strip has the modifiers of its source"))
-        return True
+    def why_not(cls, effect: PropertyGroup) -> str | None:
+        if (shown := match_source.shown(effect)) is not None and shown.lacks_modifiers:
+            return None
+        return rpt_("The Shutter strip has the modifiers of its source")
 
-    def change(self, _context, effect):
+    def change(self, _context: Context, effect: PropertyGroup) -> None:
         match_source.copy_modifiers(effect)
 
 
-def show_panel(context) -> None:
+def show_panel(context: Context) -> None:
     """Opens the sidebar's Shutter tab beside the picture: in the Properties editor it is below all other panels."""
     for _window, area in preview_areas.previews(context):
         area.spaces.active.show_region_ui = True
     # A sidebar has tabs once it has been drawn, which a slow window does late, and one without room never.
     _waits[:] = [0.1] * 30
-    if not bpy.app.timers.is_registered(_choose_tab):
-        bpy.app.timers.register(_choose_tab, first_interval=0.1)
+    soon(_choose_tab, 0.1)
 
 
 _waits: list[float] = []
@@ -161,54 +147,48 @@ def _choose_tab() -> float | None:
 class SHUTTER_OT_shutter_add(OfEffect, Operator):
     """Add a shutter that is fully open"""
 
-    bl_idname = "shutter.shutter_add"
     bl_label = "Add Shutter"
 
     @classmethod
-    def possible(cls, effect):
-        return has_room(cls, effect, "shutters")
+    def why_not(cls, effect: PropertyGroup) -> str | None:
+        return collection_edits.why_full(effect, shutters=1)
 
-    def change(self, _context, effect):
+    def change(self, _context: Context, effect: PropertyGroup) -> None:
         shutter_edits.add_shutter(effect)
 
 
-class SHUTTER_OT_shutter_duplicate(OfShutter, Operator):
+class SHUTTER_OT_shutter_duplicate(Adds, Operator):
     """Add a copy of the active shutter, keyframes included"""
 
-    bl_idname = "shutter.shutter_duplicate"
     bl_label = "Duplicate Shutter"
 
-    @classmethod
-    def possible(cls, effect):
-        return super().possible(effect) and has_room(cls, effect, "shutters")
+    more = {"shutters": 1}
 
-    def change(self, _context, effect):
+    def change(self, _context: Context, effect: PropertyGroup) -> None:
         shutter_edits.duplicate_shutter(effect, effect.active_shutter)
 
 
 class SHUTTER_OT_shutter_remove(OfShutter, Operator):
     """Remove the active shutter and its regions"""
 
-    bl_idname = "shutter.shutter_remove"
     bl_label = "Remove Shutter"
 
     @classmethod
-    def possible(cls, effect):
+    def why_not(cls, effect: PropertyGroup) -> str | None:
         if len(effect.shutters) == 1:
-            return refused(cls, rpt_("The last shutter of an effect cannot be removed"))
-        return super().possible(effect)
+            return rpt_("The last shutter of an effect cannot be removed")
+        return super().why_not(effect)
 
-    def change(self, _context, effect):
+    def change(self, _context: Context, effect: PropertyGroup) -> None:
         shutter_edits.remove_shutter(effect, effect.active_shutter)
 
 
 class SHUTTER_OT_shutter_move(Move, OfShutter, Operator):
     """Move the active shutter in the list (the first one is the default, which holds where nothing is scribbled)"""
 
-    bl_idname = "shutter.shutter_move"
     bl_label = "Move Shutter"
 
-    def change(self, _context, effect):
+    def change(self, _context: Context, effect: PropertyGroup) -> set[str] | None:
         index = effect.active_shutter
         to = self.target(list(range(len(effect.shutters))), index)
         if to == index:
@@ -217,47 +197,41 @@ class SHUTTER_OT_shutter_move(Move, OfShutter, Operator):
         return None
 
 
-_preset_items: list = []
-
-
-def _presets(_self, _context):
-    """With icons, which exist only once the extension is registered; Blender needs the list kept."""
-    _preset_items[:] = [
+@kept
+def _presets(_context: Context) -> list[tuple]:
+    """With icons, which exist only once the extension is registered."""
+    return [
         (name, label, description, icons.of(name), i)
         for i, (name, (label, description, _make)) in enumerate(presets.PRESETS.items())
     ]
-    return _preset_items
 
 
 class SHUTTER_OT_preset(OfShutter, Operator):
     """Give the active shutter the bars of a preset"""
 
-    bl_idname = "shutter.preset"
     bl_label = "Apply Shutter Preset"
 
     preset: EnumProperty(name="Preset", items=_presets, translation_context=CONTEXT)
 
-    def change(self, context, effect):
+    def change(self, context: Context, effect: PropertyGroup) -> None:
         shutter_edits.apply_preset(effect, effect.active_shutter, self.preset, bar_edits.auto_key(context))
 
 
 class SHUTTER_OT_bars_key(OfShutter, Operator):
     """Insert keyframes for all bars of the active shutter at the current frame"""
 
-    bl_idname = "shutter.bars_key"
     bl_label = "Insert Bar Keyframes"
 
-    def change(self, _context, effect):
+    def change(self, _context: Context, effect: PropertyGroup) -> None:
         bar_edits.key_bars(effect, effect.active_shutter)
 
 
 class SHUTTER_OT_bars_unkey(OfShutter, Operator):
     """Delete the keyframes of all bars of the active shutter at the current frame"""
 
-    bl_idname = "shutter.bars_unkey"
     bl_label = "Delete Bar Keyframes"
 
-    def change(self, _context, effect):
+    def change(self, _context: Context, effect: PropertyGroup) -> set[str] | None:
         if not bar_edits.unkey_bars(effect, effect.active_shutter):
             report_warning(self, rpt_("No bar has a keyframe at the current frame"))
             return {"CANCELLED"}
@@ -267,13 +241,12 @@ class SHUTTER_OT_bars_unkey(OfShutter, Operator):
 class SHUTTER_OT_bar_set(OfShutter, Operator):
     """Set the weight of a bar as a number"""
 
-    bl_idname = "shutter.bar_set"
     bl_label = "Set Bar Weight"
 
     bar: IntProperty(name="Bar", description="Number of the bar, from 1", default=1, min=1)
     weight: FloatProperty(name="Weight", description="How much the bar's frame contributes", min=0.0, soft_max=1.0)
 
-    def invoke(self, context, event):
+    def invoke(self, context: Context, event: Event) -> set[str]:
         from .bar_editor import bar_under
 
         effect = selection.active(context)[1]
@@ -282,35 +255,32 @@ class SHUTTER_OT_bar_set(OfShutter, Operator):
         self.is_pointed_at = place is not None
         if place is not None:
             self.bar = place + 1
-        try:
-            bars = bar_edits.bars_now(effect, effect.active_shutter)
-        except EffectError as error:
-            report_error(self, str(error))
+        if self.tried(self._read, effect) == {"CANCELLED"}:
             return {"CANCELLED"}
-        self.weight = bars[min(self.bar, len(bars)) - 1]
         title = iface_("Bar {number}").format(number=self.bar) if self.is_pointed_at else ""
         return context.window_manager.invoke_props_dialog(self, width=200, title=title)
 
-    def draw(self, _context):
+    def _read(self, effect: PropertyGroup) -> None:
+        bars = bar_edits.bars_now(effect, effect.active_shutter)
+        self.weight = bars[min(self.bar, len(bars)) - 1]
+
+    def draw(self, _context: Context) -> None:
         self.layout.activate_init = True
         if not getattr(self, "is_pointed_at", False):  # from a menu, by keys
             self.layout.prop(self, "bar")
         self.layout.prop(self, "weight")
 
-    def change(self, context, effect):
+    def change(self, context: Context, effect: PropertyGroup) -> None:
         weights = bar_edits.bars_now(effect, effect.active_shutter)
         if self.bar > len(weights):
-            report_error(self, rpt_("The shutter has {count} bars").format(count=len(weights)))
-            return {"CANCELLED"}
+            raise EffectError(rpt_("The shutter has {count} bars").format(count=len(weights)))
         weights[self.bar - 1] = self.weight
         bar_edits.paint(effect, effect.active_shutter, weights, bar_edits.auto_key(context))
-        return None
 
 
 class SHUTTER_OT_draw(MakesEffect, OfShutter, Operator):
     """Draw on the sharp frame where the active shutter holds (at another frame, this redraws the active region)"""
 
-    bl_idname = "shutter.draw"
     bl_label = "Draw"
     only_seen = True
 
@@ -329,18 +299,17 @@ class SHUTTER_OT_draw(MakesEffect, OfShutter, Operator):
     )
 
     @classmethod
-    def possible(cls, effect):
-        if not super().possible(effect):
-            return False
-        return selection.active_region(effect) is not None or has_room(cls, effect, "regions")
+    def why_not(cls, effect: PropertyGroup) -> str | None:
+        new_ones = 1 if selection.active_region(effect) is None else 0
+        return super().why_not(effect) or collection_edits.why_full(effect, regions=new_ones)
 
-    def change(self, context, effect):
+    def change(self, context: Context, effect: PropertyGroup) -> None:
         region = selection.active_region(effect)
         if self.new or region is None or region.kind in strips.MATTES:
-            if sentence := collection_edits.why_full(effect, "regions"):  # poll() does not know what `new` is
+            if sentence := collection_edits.why_full(effect, regions=1):  # poll() does not know what `new` is
                 raise EffectError(sentence)
             region = region_edits.first_drawn(effect, selection.active_shutter(effect), self.kind)
-        drawn_places.begin(effect, selection.active(context)[2], effect.active_region)
+        drawn_places.begin(effect, self.effect_strip, effect.active_region)
         if not drawing_tool(context, effect, region, "builtin.annotate"):
             self.report({"INFO"}, "Open a sequencer with a preview to draw")
         sharp_frame.show(context)
@@ -349,17 +318,16 @@ class SHUTTER_OT_draw(MakesEffect, OfShutter, Operator):
 class SHUTTER_OT_erase(OfStrokes, Operator):
     """Erase strokes of the active region in the preview"""
 
-    bl_idname = "shutter.erase"
     bl_label = "Erase"
     only_seen = True
 
-    def change(self, context, effect):
-        drawn_places.begin(effect, selection.active(context)[2], effect.active_region, erases=True)
+    def change(self, context: Context, effect: PropertyGroup) -> None:
+        drawn_places.begin(effect, self.effect_strip, effect.active_region, erases=True)
         if not drawing_tool(context, effect, selection.active_region(effect), "builtin.annotate_eraser"):
             self.report({"INFO"}, "Open a sequencer with a preview to erase")
 
 
-def drawing_tool(context, effect, region, tool: str) -> bool:
+def drawing_tool(context: Context, effect: PropertyGroup, region: PropertyGroup, tool: str) -> bool:
     """Makes the region's layer the active annotation of every preview, and the tool theirs; whether there is one."""
     if annotations.layer_of(effect, region) is None:
         region_edits.new_layer(effect, region)
@@ -369,88 +337,74 @@ def drawing_tool(context, effect, region, tool: str) -> bool:
     return sharp_frame.take_up(context, tool)
 
 
-_layer_items: list = []
-
-
-def _layers(_self, context):
+@kept
+def _layers(context: Context) -> list[tuple]:
     active = selection.active(context)
     layers = region_edits.free_layers(active[1], annotation_of(context)) if active else []
-    _layer_items[:] = [(layer.info, layer.info, "") for layer in layers]
-    return _layer_items
+    return [(layer.info, layer.info, "") for layer in layers]
 
 
-def annotation_of(context):
+def annotation_of(context: Context) -> Annotation | None:
     """The annotation that the first preview shows."""
     return next((area.spaces.active.annotation for _window, area in preview_areas.previews(context)), None)
 
 
-class SHUTTER_OT_region_take(OfShutter, Operator):
+class SHUTTER_OT_region_take(Adds, Operator):
     """Make an annotation layer of the preview a region of the active shutter"""
 
-    bl_idname = "shutter.region_take"
     bl_label = "Add Region from Annotation Layer"
     only_seen = True
 
     layer: EnumProperty(name="Layer", items=_layers, translation_context=contexts.no_translation)
 
     @classmethod
-    def possible(cls, effect):
-        return super().possible(effect) and has_room(cls, effect, "regions")
-
-    @classmethod
-    def poll(cls, context):
-        if not super().poll(context):
-            return False
+    def refusal(cls, context: Context) -> str | None:
+        if sentence := super().refusal(context):
+            return sentence
         if not region_edits.free_layers(selection.active(context)[1], annotation_of(context)):
-            return refused(cls, rpt_("The preview shows no annotation layer that is not a region yet"))
-        return True
+            return rpt_("The preview shows no annotation layer that is not a region yet")
+        return None
 
-    def change(self, context, effect):
-        layer = annotation_of(context).layers[self.layer]
+    def change(self, context: Context, effect: PropertyGroup) -> None:
+        free = region_edits.free_layers(effect, annotation_of(context))
+        layer = next(layer for layer in free if layer.info == self.layer)
         region_edits.take_layer(effect, selection.active_shutter(effect), layer)
         for _window, area in preview_areas.previews(context):
             shown_annotations.give(area.spaces.active, effect.scene.annotation)
 
 
-_shutter_items: list = []
-
-
-def _shutters(_self, context):
+@kept
+def _shutters(context: Context) -> list[tuple]:
     active = selection.active(context)
-    shutters = active[1].shutters if active else []
-    _shutter_items[:] = [(str(i), shutter.name, "") for i, shutter in enumerate(shutters)]
-    return _shutter_items
+    return [(str(i), shutter.name, "") for i, shutter in enumerate(active[1].shutters)] if active else []
 
 
 class SHUTTER_OT_region_assign(OfRegion, Operator):
     """Assign the active region to another shutter"""
 
-    bl_idname = "shutter.region_assign"
     bl_label = "Assign Region to Shutter"
 
     shutter: EnumProperty(name="Shutter", items=_shutters, translation_context=contexts.no_translation)
 
-    def change(self, _context, effect):
+    def change(self, _context: Context, effect: PropertyGroup) -> None:
         region_edits.assign_region(effect, effect.active_region, effect.shutters[int(self.shutter)])
 
 
 class SHUTTER_OT_region_remove(OfRegion, Operator):
     """Remove the active region and its strokes"""
 
-    bl_idname = "shutter.region_remove"
     bl_label = "Remove Region"
 
-    def change(self, _context, effect):
+    def change(self, _context: Context, effect: PropertyGroup) -> None:
         region_edits.remove_region(effect, effect.active_region)
 
 
 class SHUTTER_OT_region_move(Move, OfRegion, Operator):
     """Move the active region in the list (later ones lie over earlier ones)"""
 
-    bl_idname = "shutter.region_move"
     bl_label = "Move Region"
 
-    def change(self, _context, effect):
+    def change(self, _context: Context, effect: PropertyGroup) -> set[str] | None:
         index, name = effect.active_region, selection.active_shutter(effect).name
         listed = [i for i, region in enumerate(effect.regions) if region.shutter == name]
         if (to := self.target(listed, index)) == index:
@@ -462,31 +416,11 @@ class SHUTTER_OT_region_move(Move, OfRegion, Operator):
 class SHUTTER_OT_region_key(OfRegion, Operator):
     """Insert keyframes for location, rotation and scale of the active region at the current frame"""
 
-    bl_idname = "shutter.region_key"
     bl_label = "Insert Region Keyframes"
 
-    def change(self, _context, effect):
+    def change(self, _context: Context, effect: PropertyGroup) -> None:
         region_edits.key_region(effect, effect.active_region)
 
 
-classes = (
-    SHUTTER_OT_add_effect,
-    SHUTTER_OT_match_source,
-    SHUTTER_OT_copy_modifiers,
-    SHUTTER_OT_shutter_add,
-    SHUTTER_OT_shutter_duplicate,
-    SHUTTER_OT_shutter_remove,
-    SHUTTER_OT_shutter_move,
-    SHUTTER_OT_preset,
-    SHUTTER_OT_bars_key,
-    SHUTTER_OT_bars_unkey,
-    SHUTTER_OT_bar_set,
-    SHUTTER_OT_draw,
-    SHUTTER_OT_erase,
-    SHUTTER_OT_region_take,
-    SHUTTER_OT_region_assign,
-    SHUTTER_OT_region_remove,
-    SHUTTER_OT_region_move,
-    SHUTTER_OT_region_key,
-)
+classes = own_classes(globals())
 TIMERS = (_choose_tab,)

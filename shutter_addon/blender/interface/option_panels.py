@@ -1,30 +1,25 @@
 """Panels of what an effect is made with: its options and in-between frames."""
 
-import bpy
 from bpy.app.translations import pgettext_iface as iface_
 from bpy.app.translations import pgettext_n as n_
+from bpy.types import PropertyGroup, Scene, Strip, UILayout
 
-from ..data import selection
 from ..rendering import inbetween_build
 from ..rendering.effect_source import FAULTS
 from . import inbetween_operators
-from .panel_parts import WithEffect, sentence
+from .operator_bases import soon
+from .panel_parts import WithEffect, draw_properties, sentence
 
 
 class Options(WithEffect):
     bl_label = "Options"
-    bl_options = {"DEFAULT_CLOSED"}
 
-    def draw(self, context):
-        layout = self.layout
-        effect = selection.active(context)[1]
-        layout.use_property_split = True
-        for name in ("position", "interpolation", "light", "exposure", "edges", "stop_at_cuts", "aggregate", "border"):
-            layout.prop(effect, name)
+    def draw_effect(self, layout: UILayout, _scene: Scene, effect: PropertyGroup, _strip: Strip) -> None:
+        names = "position", "interpolation", "light", "exposure", "edges", "stop_at_cuts", "aggregate", "border"
+        draw_properties(layout, effect, *names)
         column = layout.column()
         column.active = any(region.is_layer for region in effect.regions)
-        for name in ("decontaminate", "plate_reach"):
-            column.prop(effect, name)
+        draw_properties(column, effect, "decontaminate", "plate_reach")
         layout.prop(effect, "use_source_time")
         column = layout.column()
         column.active = effect.use_source_time
@@ -35,23 +30,18 @@ class Options(WithEffect):
 
 class Inbetween(WithEffect):
     bl_label = "In-Between Frames"
-    bl_options = {"DEFAULT_CLOSED"}
 
-    def draw(self, context):
-        layout = self.layout
-        scene, effect, strip = selection.active(context)
+    def draw_effect(self, layout: UILayout, scene: Scene, effect: PropertyGroup, strip: Strip) -> None:
         build = inbetween_build.running()
         if build is not None and build.scene != effect.scene.session_uid:
             build = None  # of another effect
         column = layout.column()
-        column.use_property_split = True
         column.enabled = build is None
         column.prop(effect, "inbetween", text="Factor")
         column = column.column()
         is_on = effect.inbetween != "1"
         column.active = is_on
-        column.prop(effect, "inbetween_method")
-        column.prop(effect, "inbetween_place")
+        draw_properties(column, effect, "inbetween_method", "inbetween_place")
         if build is not None:
             progress = iface_("{done} of {total}").format(done=build.done, total=build.total)
             layout.progress(factor=build.done / max(build.total, 1), text=progress, translate=False)
@@ -74,7 +64,7 @@ _STATES = {
 }
 
 
-def _draw_look(layout, look) -> None:
+def _draw_look(layout: UILayout, look: inbetween_build.Look) -> None:
     words, icon = _STATES[look.state.name]
     words = iface_(words).format(done=look.state.done, total=look.state.total)
     column = layout.column(align=True)
@@ -87,16 +77,4 @@ def _draw_look(layout, look) -> None:
             size = inbetween_operators.size_in_words(look.estimate)
             column.label(text=iface_("About {size} when built").format(size=size), icon="BLANK1", translate=False)
         elif look.estimate is None:
-            _redraw_later()
-
-
-def _redraw_later() -> None:
-    if not bpy.app.timers.is_registered(_redraw):
-        bpy.app.timers.register(_redraw, first_interval=inbetween_operators.TICK)
-
-
-def _redraw() -> None:
-    inbetween_operators.redraw_panels(bpy.context)
-
-
-TIMERS = (_redraw,)
+            soon(inbetween_operators.redraw_panels, inbetween_operators.TICK)

@@ -4,14 +4,16 @@ import bpy
 import numpy as np
 from bpy.app.translations import contexts
 from bpy.app.translations import pgettext_iface as iface_
-from bpy.types import Gizmo, GizmoGroup
+from bpy.types import Context, Event, Gizmo, GizmoGroup, PropertyGroup, Strip
 
 from ...core.messages import UserError
 from ...core.model import outlines
 from ...core.model.scribbles import mapped
-from ..data import annotations, geometry, selection
+from ..data import annotations, selection
 from ..editing import outline_drawings, track_region
-from . import drawing, gizmo_keymaps, region_gizmo
+from . import drawing, region_gizmo
+from .gizmo_groups import Dragged, WithKeys, on_picture, to_region
+from .operator_bases import own_classes
 
 _CARRIED = (0.2, 0.9, 1.0, 0.9)
 _NEAR = 6  # units of the interface, within which the pointer is at a curve
@@ -19,26 +21,21 @@ _REACH = 0.08  # parts of the picture's height, along the curve, that are pulled
 _MORE = 1.25  # times, with a turn of the wheel
 
 
-class SHUTTER_GT_outline(Gizmo):
+class SHUTTER_GT_outline(Dragged, Gizmo):
     """The curves."""
 
-    bl_idname = "SHUTTER_GT_outline"
-
-    def setup(self):
-        self.use_draw_modal = True
-
-    def draw(self, context):
+    def draw(self, context: Context) -> None:
         if context.screen.is_animation_playing:
             return
         if not (curves := _curves(context)):
             return
         _scene, effect, strip = selection.in_picture(context)
-        matrix = _to_region(context, effect, strip)
+        matrix = to_region(effect, strip, context.region)
         for points in self.mended() if self.is_modal else curves:
             width = 2 if self.is_highlight or self.is_modal else 1
             drawing.lines(mapped(matrix, np.array(points)), _CARRIED, closed=True, width=width)
 
-    def test_select(self, context, location):
+    def test_select(self, context: Context, location: tuple[int, int]) -> int:
         curves = _curves(context)
         if not curves:
             return -1
@@ -47,7 +44,7 @@ class SHUTTER_GT_outline(Gizmo):
         _index, apart = outlines.nearest(curves, point, _aspect(effect))
         return 0 if apart * height <= drawing.ui_scale() * _NEAR else -1
 
-    def invoke(self, context, event):
+    def invoke(self, context: Context, event: Event) -> set[str]:
         if not (curves := _curves(context)):
             return {"CANCELLED"}
         scene, effect, strip = selection.in_picture(context)
@@ -58,10 +55,10 @@ class SHUTTER_GT_outline(Gizmo):
         self.pulled, _apart = outlines.nearest(curves, self.grabbed, self.aspect)
         return {"RUNNING_MODAL"}
 
-    def mended(self):
+    def mended(self) -> outlines.Curves:
         return outlines.dragged(self.curves, self.pulled, self.grabbed, self.by, self.reach, self.aspect)
 
-    def modal(self, context, event, _tweak):
+    def modal(self, context: Context, event: Event, _tweak: set[str]) -> set[str]:
         if (effect := self.target.effect()) is None or (strip := self._strip(effect)) is None:
             return {"RUNNING_MODAL"}
         if event.type in {"WHEELUPMOUSE", "WHEELDOWNMOUSE"}:
@@ -71,7 +68,7 @@ class SHUTTER_GT_outline(Gizmo):
         context.area.tag_redraw()
         return {"RUNNING_MODAL"}
 
-    def exit(self, context, cancel):
+    def exit(self, context: Context, cancel: bool) -> None:
         if cancel or not any(self.by) or (effect := self.target.effect()) is None:
             return
         if (strip := self._strip(effect)) is None:
@@ -80,11 +77,11 @@ class SHUTTER_GT_outline(Gizmo):
         context.area.tag_redraw()
         bpy.ops.ed.undo_push(message=iface_("Mend Outline", contexts.operator_default))
 
-    def _strip(self, effect):
+    def _strip(self, effect: PropertyGroup) -> Strip | None:
         return effect.id_data.sequence_editor.strips_all.get(self.strip)
 
 
-def _curves(context) -> outlines.Curves:
+def _curves(context: Context) -> outlines.Curves:
     """The active outline's at the current frame, where it is seen."""
     if (seen := selection.in_picture(context)) is None:  # while it plays, it may just have gone
         return ()
@@ -95,43 +92,29 @@ def _curves(context) -> outlines.Curves:
         return ()
 
 
-def _aspect(effect) -> float:
+def _aspect(effect: PropertyGroup) -> float:
     width, height = annotations.picture_size(effect)
     return width / height
 
 
-def _to_region(context, effect, strip) -> np.ndarray:
-    return geometry.picture_to_region(strip, annotations.picture_size(effect), context.region)
-
-
-def _on_picture(context, effect, strip, location) -> tuple[tuple[float, float], float]:
+def _on_picture(
+    context: Context, effect: PropertyGroup, strip: Strip, location: tuple[int, int]
+) -> tuple[tuple[float, float], float]:
     """A point of the preview's region in fractions of the picture, and how many of the region's pixels that is high."""
-    matrix = _to_region(context, effect, strip)
-    x, y = mapped(np.linalg.inv(matrix), np.array([location], dtype=np.float64))[0]
+    matrix = to_region(effect, strip, context.region)
+    x, y = on_picture(matrix, *location)
     return (float(x), float(y)), float(np.hypot(*matrix[:2, 1]))
 
 
-class SHUTTER_GGT_outline(GizmoGroup):
-    bl_idname = "SHUTTER_GGT_outline"
+class SHUTTER_GGT_outline(WithKeys, GizmoGroup):
     bl_label = "Shutter Outline"
-    bl_space_type = "SEQUENCE_EDITOR"
-    bl_region_type = "PREVIEW"
-    bl_options = {"PERSISTENT"}
+    gizmo = SHUTTER_GT_outline
 
     @classmethod
-    def poll(cls, context):
+    def poll(cls, context: Context) -> bool:
         if not region_gizmo.SHUTTER_GGT_region.poll(context):
             return False
         return selection.active_region(selection.in_picture(context)[1]).kind == "OUTLINE"
 
-    @classmethod
-    def setup_keymap(cls, keyconfig):
-        keymap = gizmo_keymaps.new(cls, keyconfig)
-        keymap.keymap_items.new("gizmogroup.gizmo_tweak", "LEFTMOUSE", "PRESS", any=True)
-        return keymap
 
-    def setup(self, _context):
-        self.gizmos.new(SHUTTER_GT_outline.bl_idname)
-
-
-classes = (SHUTTER_GT_outline, SHUTTER_GGT_outline)
+classes = own_classes(globals())

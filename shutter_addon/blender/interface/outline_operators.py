@@ -5,13 +5,13 @@ from contextlib import closing
 import bpy
 from bpy.app.translations import pgettext_rpt as rpt_
 from bpy.props import IntProperty
-from bpy.types import Operator
+from bpy.types import Context, Event, Operator, PropertyGroup
 
+from ...core.messages import UserError
 from ..data import selection, strips
 from ..editing import outline_drawings, outline_masks, track_region
 from ..rendering import outline_carrying
-from ..rendering.effect_source import FAULTS
-from .operator_bases import UNDOABLE, Mixin, OfRegion, OfStrokes, redraw, refused, report_error, report_warning
+from .operator_bases import UNDOABLE, Beside, OfRegion, OfStrokes, is_escape, own_classes, redraw, report_warning
 from .preview import show_carried
 
 _TICK = 0.1  # seconds from one look at what is carried to the next
@@ -23,37 +23,28 @@ class OfOutline(OfRegion):
     only_seen = True
 
     @classmethod
-    def possible(cls, effect):
-        if not super().possible(effect):
-            return False
-        is_outline = selection.active_region(effect).kind == "OUTLINE"
-        return is_outline or refused(cls, rpt_("The region is no outline"))
+    def why_not(cls, effect: PropertyGroup) -> str | None:
+        if sentence := super().why_not(effect):
+            return sentence
+        return None if selection.active_region(effect).kind == "OUTLINE" else rpt_("The region is no outline")
 
 
-class _Carries(Mixin):
+class _Carries(Beside, OfOutline):
     """Carries the active outline through its strip, beside Blender, and then does something with it."""
 
     bl_options = {"REGISTER"}
 
-    def carried(self, context):
+    def carried(self, context: Context) -> set[str] | None:
         """Called once all is carried. One of FAULTS: what comes then cannot be done."""
-        return {"FINISHED"}
+        return None
 
-    def execute(self, context):
-        return self._tried(self._begin, context, True)
+    def execute(self, context: Context) -> set[str]:
+        return self.tried(self._begin, context, True)
 
-    def invoke(self, context, _event):
-        return self._tried(self._begin, context, bpy.app.background)
+    def invoke(self, context: Context, _event: Event) -> set[str]:
+        return self.tried(self._begin, context, bpy.app.background)
 
-    def _tried(self, step, *arguments):
-        """What a step of it returns; what it raises of FAULTS is reported."""
-        try:
-            return step(*arguments)
-        except FAULTS as error:
-            report_error(self, str(error))
-            return {"CANCELLED"}
-
-    def _begin(self, context, waits: bool):
+    def _begin(self, context: Context, waits: bool) -> set[str] | None:
         scene, effect, strip = selection.active(context)
         self._target = track_region.Target.of(effect, effect.active_region)
         if not strips.is_carried(selection.active_region(effect)):
@@ -68,13 +59,11 @@ class _Carries(Mixin):
             return self.carried(context)
         self._file = file
         outline_carrying.carry(file, frames, show_carried)
-        self._timer = context.window_manager.event_timer_add(_TICK, window=context.window)
-        context.window_manager.modal_handler_add(self)
-        return {"RUNNING_MODAL"}
+        return self.go_on(context, _TICK)
 
-    def modal(self, context, event):
+    def modal(self, context: Context, event: Event) -> set[str]:
         progress = outline_carrying.progress()
-        is_stopped = self._target.effect() is None or (event.type == "ESC" and event.value == "PRESS")
+        is_stopped = self._target.effect() is None or is_escape(event)
         if is_stopped:
             outline_carrying.stop()
             show_carried()
@@ -83,33 +72,26 @@ class _Carries(Mixin):
             context.workspace.status_text_set(sentence.format(done=progress[0], total=progress[1]))
             return {"PASS_THROUGH"}
         self.cancel(context)
-        if is_stopped:
-            return {"CANCELLED"}
+        return {"CANCELLED"} if is_stopped else self.tried(self._end, context)
+
+    def _end(self, context: Context) -> set[str] | None:
         if (failure := outline_carrying.failure(self._file)) is not None:
-            report_error(self, failure)
-            return {"CANCELLED"}
-        return self._tried(self.carried, context)
-
-    def cancel(self, context):
-        """It has ended, or its window was closed."""
-        context.window_manager.event_timer_remove(self._timer)
-        context.workspace.status_text_set(None)
+            raise UserError(failure)
+        return self.carried(context)
 
 
-class SHUTTER_OT_outline_carry(_Carries, OfOutline, Operator):
+class SHUTTER_OT_outline_carry(_Carries, Operator):
     """Track the active outline through its strip now (Esc stops and keeps the tracked frames)"""
 
-    bl_idname = "shutter.outline_carry"
     bl_label = "Track Outline"
 
 
-class SHUTTER_OT_outline_needed(_Carries, OfOutline, Operator):
+class SHUTTER_OT_outline_needed(_Carries, Operator):
     """Go to the middle of the frames at which the outline is least sure, tracking it first"""
 
-    bl_idname = "shutter.outline_needed"
     bl_label = "Next Drawing Needed"
 
-    def carried(self, context):
+    def carried(self, context: Context) -> set[str] | None:
         scene, effect, strip = selection.active(context)
         needed = outline_drawings.next_needed(scene, effect, strip, self._target.index)
         if needed.frame is None:
@@ -119,13 +101,12 @@ class SHUTTER_OT_outline_needed(_Carries, OfOutline, Operator):
         sentence = rpt_("Frame {frame}: the outline is sure by {share:.0f} %")
         self.report({"INFO"}, sentence.format(frame=needed.frame, share=100 * needed.confidence))
         redraw(context)
-        return {"FINISHED"}
+        return None
 
 
-class SHUTTER_OT_outline_mask(_Carries, OfOutline, Operator):
+class SHUTTER_OT_outline_mask(_Carries, Operator):
     """Make a Blender mask with shape keys of the active outline, tracking it first"""
 
-    bl_idname = "shutter.outline_mask"
     bl_label = "Outline to Mask"
     bl_options = UNDOABLE
 
@@ -137,34 +118,29 @@ class SHUTTER_OT_outline_mask(_Carries, OfOutline, Operator):
         soft_max=50,
     )
 
-    def carried(self, context):
-        scene, effect, strip = selection.active(context)
-        mask = outline_masks.to_mask(context, (scene, effect, strip), self._target.index, self.step)
+    def carried(self, context: Context) -> None:
+        mask = outline_masks.to_mask(context, selection.active(context), self._target.index, self.step)
         self.report({"INFO"}, rpt_('Made the mask "{mask}"').format(mask=mask.name))
-        return {"FINISHED"}
 
 
 class SHUTTER_OT_outline_draw(OfOutline, Operator):
     """Make the outline that is tracked to the current frame a drawing of its own, to be mended"""
 
-    bl_idname = "shutter.outline_draw"
     bl_label = "Insert Outline Drawing"
 
-    def change(self, context, effect):
-        scene, _effect, strip = selection.active(context)
-        region = selection.active_region(effect)
-        curves = outline_drawings.curves_now(scene, effect, strip, effect.active_region)
+    def change(self, _context: Context, effect: PropertyGroup) -> set[str] | None:
+        scene, strip, index = self.edit, self.effect_strip, effect.active_region
+        curves = outline_drawings.curves_now(scene, effect, strip, index)
         if not curves:
             report_warning(self, rpt_("The outline encloses nothing at the current frame"))
             return {"CANCELLED"}
-        outline_drawings.draw(effect, strip, region, curves, scene.frame_current)
+        outline_drawings.draw(effect, strip, effect.regions[index], curves, scene.frame_current)
         return None
 
 
 class SHUTTER_OT_outline_it(OfStrokes, Operator):
     """Make the active region an outline of the subject that its strokes run over, or go around, at this frame"""
 
-    bl_idname = "shutter.outline_it"
     bl_label = "Find Outline"
     only_seen = True
 
@@ -174,20 +150,13 @@ class SHUTTER_OT_outline_it(OfStrokes, Operator):
         options={"SKIP_SAVE"},
     )
 
-    def change(self, context, effect):
-        scene, _effect, strip = selection.active(context)
+    def change(self, _context: Context, effect: PropertyGroup) -> set[str] | None:
         if self.properties.is_property_set("frame"):
-            scene.frame_set(self.frame)
-        if not outline_drawings.outline_it(scene, effect, strip, effect.active_region):
+            self.edit.frame_set(self.frame)
+        if not outline_drawings.outline_it(self.edit, effect, self.effect_strip, effect.active_region):
             report_warning(self, rpt_("No subject is told from what is around it"))
             return {"CANCELLED"}
         return None
 
 
-classes = (
-    SHUTTER_OT_outline_carry,
-    SHUTTER_OT_outline_needed,
-    SHUTTER_OT_outline_mask,
-    SHUTTER_OT_outline_draw,
-    SHUTTER_OT_outline_it,
-)
+classes = own_classes(globals())

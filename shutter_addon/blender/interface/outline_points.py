@@ -3,15 +3,15 @@
 import bpy
 import numpy as np
 from bpy.app.translations import pgettext_rpt as rpt_
-from bpy.types import Operator
+from bpy.types import Context, Event, Operator, PropertyGroup, Scene, Strip
 
-from ...core.messages import UserError
 from ...core.model.scribbles import mapped
 from ...media import outlining
-from ..data import annotations, geometry, preview_areas, selection
+from ..data import preview_areas, selection
 from ..editing import outline_drawings, track_region
 from . import drawing, sharp_frame
-from .operator_bases import redraw, report_error, report_warning
+from .gizmo_groups import on_picture, to_region
+from .operator_bases import own_classes, redraw, report_warning
 from .outline_operators import OfOutline
 
 _COLOR = (0.2, 0.9, 1.0, 0.9)
@@ -25,24 +25,20 @@ _STEP, _FINE = 10, 1  # units of the interface that an arrow key moves the point
 class SHUTTER_OT_outline_points(OfOutline, Operator):
     """Draw a curve of the active outline point by point, along the picture's edges (Ctrl for straight lines)"""
 
-    bl_idname = "shutter.outline_points"
     bl_label = "Draw by Points"
 
-    def invoke(self, context, _event):
+    def invoke(self, context: Context, _event: Event) -> set[str]:
         scene, effect, strip = selection.active(context)
         areas = [area for window, area in preview_areas.previews(context) if window == context.window]
         if not areas:
             report_warning(self, rpt_("Open a sequencer with a preview to draw"))
             return {"CANCELLED"}
         self._area = context.area if context.area in areas else areas[0]
-        try:
-            self._picture = outline_drawings.picture_now(scene, effect, strip)
-            outlining.along_edges(self._picture, np.zeros(2), np.zeros(2))  # that it can, before anything is drawn
-        except UserError as error:
-            report_error(self, str(error))
+        if self.tried(self._read, scene, effect, strip) == {"CANCELLED"}:
             return {"CANCELLED"}
         self._target, self._frame = track_region.Target.of(effect, effect.active_region), scene.frame_current
-        self._strip, self._ways, self._next, self._is_down = strip.name, [], np.zeros((0, 2)), False
+        self._strip, self._next, self._is_down = strip.name, np.zeros((0, 2)), False
+        self._ways: list[np.ndarray] = []
         sharp_frame.show(context)
         self._drawn = bpy.types.SpaceSequenceEditor.draw_handler_add(self._draw, (), "PREVIEW", "POST_PIXEL")
         sentence = rpt_(
@@ -53,11 +49,15 @@ class SHUTTER_OT_outline_points(OfOutline, Operator):
         context.window_manager.modal_handler_add(self)
         return {"RUNNING_MODAL"}
 
-    def execute(self, _context):
+    def _read(self, scene: Scene, effect: PropertyGroup, strip: Strip) -> None:
+        self._picture = outline_drawings.picture_now(scene, effect, strip)
+        outlining.along_edges(self._picture, np.zeros(2), np.zeros(2))  # that it can, before anything is drawn
+
+    def execute(self, _context: Context) -> set[str]:
         report_warning(self, rpt_("Open a sequencer with a preview to draw"))  # it is drawn in a window alone
         return {"CANCELLED"}
 
-    def modal(self, context, event):
+    def modal(self, context: Context, event: Event) -> set[str]:
         there, has_preview = self._there(), self._area.type == "SEQUENCE_EDITOR"
         has_preview = has_preview and self._area.spaces.active.view_type != "SEQUENCER"
         if there is None or there[0].frame_current != self._frame or not has_preview:
@@ -70,7 +70,7 @@ class SHUTTER_OT_outline_points(OfOutline, Operator):
             return self._pointed(context, event)
         return self._key(context, event) if event.type in _KEYS else {"PASS_THROUGH"}
 
-    def _pointed(self, context, event):
+    def _pointed(self, context: Context, event: Event) -> set[str]:
         """A click or the space bar adds a point; dragging adds one after the other."""
         point = self._on_picture(event)
         if event.type in {"LEFTMOUSE", "SPACE"} and event.value in {"PRESS", "DOUBLE_CLICK"}:
@@ -84,7 +84,7 @@ class SHUTTER_OT_outline_points(OfOutline, Operator):
         self._area.tag_redraw()
         return {"RUNNING_MODAL"}
 
-    def _stepped(self, context, event):
+    def _stepped(self, context: Context, event: Event) -> set[str]:
         """An arrow key moves the pointer, from elsewhere to the preview's middle first."""
         region = preview_areas.preview_region(self._area)
         x, y = region.x + region.width // 2, region.y + region.height // 2
@@ -97,7 +97,7 @@ class SHUTTER_OT_outline_points(OfOutline, Operator):
         context.window.cursor_warp(x, y)
         return {"RUNNING_MODAL"}
 
-    def _key(self, context, event):
+    def _key(self, context: Context, event: Event) -> set[str]:
         if event.value == "PRESS":
             if event.type in {"ESC", "RIGHTMOUSE"}:
                 return self._ended(context, {"CANCELLED"})
@@ -109,7 +109,7 @@ class SHUTTER_OT_outline_points(OfOutline, Operator):
                 self._area.tag_redraw()
         return {"RUNNING_MODAL"}
 
-    def _closed(self, context):
+    def _closed(self, context: Context) -> set[str]:
         """The curve becomes one of the drawing at this frame."""
         if len(self._ways) < 3:
             report_warning(self, rpt_("A curve has three points at least"))
@@ -120,19 +120,17 @@ class SHUTTER_OT_outline_points(OfOutline, Operator):
         first = self._ways[1][0]
         curve = np.concatenate([*self._ways[1:], self._way(first, False)])
         steps = np.hypot(*np.diff(curve, axis=0, append=curve[:1]).T)
-        try:
-            outline_drawings.add(effect, strip, region, curve[steps > 0], self._frame)
-        except UserError as error:
-            report_error(self, str(error))
-            return self._ended(context, {"CANCELLED"})
-        return self._ended(context, {"FINISHED"})
+        return self._ended(
+            context,
+            self.tried(outline_drawings.add, effect, strip, region, curve[steps > 0], self._frame),
+        )
 
-    def _ended(self, context, result):
+    def _ended(self, context: Context, result: set[str]) -> set[str]:
         self.cancel(context)
         redraw(context)
         return result
 
-    def cancel(self, context):
+    def cancel(self, context: Context) -> None:
         """It has ended, or its window was closed."""
         bpy.types.SpaceSequenceEditor.draw_handler_remove(self._drawn, "PREVIEW")
         context.workspace.status_text_set(None)
@@ -142,7 +140,7 @@ class SHUTTER_OT_outline_points(OfOutline, Operator):
         """Scene, effect and strip as Blender has them now; None: they are gone."""
         effect = self._target.effect()
         strip = effect and effect.id_data.sequence_editor.strips_all.get(self._strip)
-        return None if strip is None else (effect.id_data, effect, strip)
+        return (effect.id_data, effect, strip) if effect is not None and strip is not None else None
 
     def _way(self, point: np.ndarray, is_straight: bool) -> np.ndarray:
         """From the last point to another one; the first is on its own."""
@@ -151,31 +149,29 @@ class SHUTTER_OT_outline_points(OfOutline, Operator):
         last = self._ways[-1][-1]
         return np.stack([last, point]) if is_straight else outlining.along_edges(self._picture, last, point)
 
-    def _is_over(self, event) -> bool:
+    def _is_over(self, event: Event) -> bool:
         region = preview_areas.preview_region(self._area)
         x, y = event.mouse_x - region.x, event.mouse_y - region.y
         return 0 <= x < region.width and 0 <= y < region.height
 
     def _to_region(self) -> np.ndarray:
         _scene, effect, strip = self._there()
-        region = preview_areas.preview_region(self._area)
-        return geometry.picture_to_region(strip, annotations.picture_size(effect), region)
+        return to_region(effect, strip, preview_areas.preview_region(self._area))
 
-    def _on_picture(self, event) -> np.ndarray:
+    def _on_picture(self, event: Event) -> np.ndarray:
         """Where the pointer is, in fractions of the picture."""
         region = preview_areas.preview_region(self._area)
-        pointer = np.array([[event.mouse_x - region.x, event.mouse_y - region.y]], np.float64)
-        return mapped(np.linalg.inv(self._to_region()), pointer)[0]
+        return on_picture(self._to_region(), event.mouse_x - region.x, event.mouse_y - region.y)
 
     def _apart(self, *points: np.ndarray) -> float:
         """How far two points are from each other, in pixels of the region."""
         return float(np.hypot(*np.diff(mapped(self._to_region(), np.stack(points)), axis=0)[0]))
 
-    def _draw(self):
+    def _draw(self) -> None:
         if bpy.context.area != self._area or self._there() is None or not self._ways:
             return
         curve = np.concatenate([*self._ways, self._next])
         drawing.lines(mapped(self._to_region(), curve), _COLOR, width=2)
 
 
-classes = (SHUTTER_OT_outline_points,)
+classes = own_classes(globals())

@@ -1,6 +1,11 @@
 """What panels are made of: sentences, lists, and when there is an effect to show."""
 
+from collections.abc import Sequence
+
 import bpy
+from bpy.app.translations import contexts
+from bpy.app.translations import pgettext_n as n_
+from bpy.types import Context, PropertyGroup, Scene, Strip, UILayout
 
 from ...core import told
 from ..data import selection
@@ -14,7 +19,7 @@ WIDEST = 360  # units of the interface that a sentence takes at most, as a popov
 _MOST_ROWS = 5  # of a list; the rest is scrolled to
 
 
-def sentence(layout, words: str, icon: str = "NONE", room: float = 1.0, is_quiet: bool = False) -> None:
+def sentence(layout: UILayout, words: str, icon: str = "NONE", room: float = 1.0, is_quiet: bool = False) -> None:
     """A sentence, already translated, in as many lines as the panel's width takes; room: its share of that width."""
     if icon == "ERROR":
         told.shown(words)
@@ -31,15 +36,20 @@ def sentence(layout, words: str, icon: str = "NONE", room: float = 1.0, is_quiet
         row.label(text=line, icon=icon if i == 0 or icon == "NONE" else "BLANK1", translate=False)
 
 
-def _rows(items) -> int:
-    """Of a list of so many."""
-    return min(max(len(items), 1), _MOST_ROWS)
-
-
-def draw_list(layout, effect, kind: str, items, menu: str | None = None) -> None:
+def draw_list(
+    layout: UILayout, effect: PropertyGroup, kind: str, items: Sequence[PropertyGroup], menu: str | None = None
+) -> None:
     """The list of shutters or regions, as high as it has to be, and the buttons beside it."""
     row = layout.row()
-    row.template_list(f"SHUTTER_UL_{kind}s", "", effect, f"{kind}s", effect, f"active_{kind}", rows=_rows(items))
+    row.template_list(
+        f"SHUTTER_UL_{kind}s",
+        "",
+        effect,
+        f"{kind}s",
+        effect,
+        f"active_{kind}",
+        rows=min(max(len(items), 1), _MOST_ROWS),
+    )
     column = row.column(align=True)
     if kind == "shutter":
         column.operator("shutter.shutter_add", text="", icon="ADD")
@@ -49,11 +59,56 @@ def draw_list(layout, effect, kind: str, items, menu: str | None = None) -> None
     if menu:
         column.menu(menu, text="", icon="DOWNARROW_HLT")
     elif len(items) > 1:
-        column.operator(f"shutter.{kind}_move", text="", icon="TRIA_UP").direction = "UP"
-        column.operator(f"shutter.{kind}_move", text="", icon="TRIA_DOWN").direction = "DOWN"
+        draw_moves(column, kind, has_text=False)
+
+
+def draw_moves(layout: UILayout, kind: str, *, has_text: bool = True) -> None:
+    """What moves the active shutter or region in its list."""
+    ways = (
+        ("UP", n_("Move Up", contexts.operator_default), "TRIA_UP"),
+        ("DOWN", n_("Move Down", contexts.operator_default), "TRIA_DOWN"),
+    )
+    for direction, text, icon in ways:
+        layout.operator(f"shutter.{kind}_move", text=text if has_text else "", icon=icon).direction = direction
+
+
+def draw_operators(layout: UILayout, *entries: tuple[str, ...]) -> None:
+    """Operators of ours: see _draw_operator."""
+    for entry in entries:
+        _draw_operator(layout, *entry)
+
+
+def _draw_operator(layout: UILayout, name: str, icon: str = "NONE", prop: str = "") -> None:
+    """prop: whose items are a menu of their own"""
+    if prop:
+        layout.operator_menu_enum(f"shutter.{name}", prop, icon=icon)
+    else:
+        layout.operator(f"shutter.{name}", icon=icon)
+
+
+def draw_properties(layout: UILayout, owner: bpy.types.bpy_struct, *names: str) -> None:
+    for name in names:
+        layout.prop(owner, name)
 
 
 class WithEffect(Mixin):
+    """A panel of the effect, closed at first."""
+
+    bl_options = {"DEFAULT_CLOSED"}
+
     @classmethod
-    def poll(cls, context):
-        return super().poll(context) and selection.active(context) is not None
+    def poll(cls, context: Context) -> bool:
+        active = selection.active(context) if super().poll(context) else None
+        return active is not None and cls.shows(active[1])
+
+    @classmethod
+    def shows(cls, effect: PropertyGroup) -> bool:
+        """Whether there is anything to show of an effect."""
+        return True
+
+    def draw(self, context: Context) -> None:
+        self.layout.use_property_split = True
+        self.draw_effect(self.layout, *selection.active(context))
+
+    def draw_effect(self, layout: UILayout, scene: Scene, effect: PropertyGroup, strip: Strip) -> None:
+        raise NotImplementedError

@@ -4,7 +4,7 @@ from collections.abc import Iterator
 
 import bpy
 from bpy.app.translations import pgettext_iface as iface_
-from bpy.types import Menu, Panel, UIList
+from bpy.types import Context, Menu, Panel, PropertyGroup, Scene, Strip, UILayout, UIList
 
 from ...core.messages import EffectError
 from ...core.model import presets
@@ -15,20 +15,10 @@ from ..rendering import inbetween_build, strobing
 from . import icons, inbetween_operators
 from .bake_operators import Bake
 from .note_buttons import Button
-from .operator_bases import Mixin
+from .operator_bases import Mixin, own_classes
 from .option_panels import Inbetween, Options
-from .panel_parts import WIDEST, WithEffect, draw_list, sentence
-from .region_panels import (
-    Camera,
-    Follow,
-    Regions,
-    Track,
-    Transform,
-    draw_tracked,
-    draw_tracking,
-    tracking_icon,
-)
-from .report_operators import Report
+from .panel_parts import WIDEST, WithEffect, draw_list, draw_moves, draw_operators, draw_properties, sentence
+from .region_panels import Camera, Follow, Regions, Track, Transform, draw_tracked, draw_tracking, tracking_icon
 
 
 class SHUTTER_UL_shutters(UIList):
@@ -70,7 +60,7 @@ class SHUTTER_UL_regions(UIList):
         if layer is not None:
             row.prop(layer, "annotation_hide", text="", emboss=False)
 
-    def filter_items(self, _context, effect, _property):
+    def filter_items(self, _context: Context, effect: PropertyGroup, _property: str) -> tuple[list[int], list[int]]:
         """Those of the active shutter."""
         shutter = selection.active_shutter(effect)
         own = [bool(shutter) and region.shutter == shutter.name for region in effect.regions]
@@ -80,49 +70,42 @@ class SHUTTER_UL_regions(UIList):
 class SHUTTER_MT_presets(Menu):
     bl_label = "Presets"
 
-    def draw(self, _context):
+    def draw(self, _context: Context) -> None:
         self.layout.operator_enum("shutter.preset", "preset")
 
 
 class SHUTTER_MT_regions(Menu):
     bl_label = "Region Specials"
 
-    def draw(self, _context):
+    def draw(self, _context: Context) -> None:
         layout = self.layout
         outline = layout.operator("shutter.draw", text="Draw Outline", icon=_ICONS["OUTLINE"])
         outline.new, outline.kind = True, "OUTLINE"
         layout.separator()
-        layout.operator("shutter.matte_add", icon="FILE_MOVIE")
-        layout.operator_menu_enum("shutter.matte_strip", "strip", icon="SEQUENCE")
-        for operator, icon in (("shutter.matte_mask", "MOD_MASK"), ("shutter.outline_from_mask", _ICONS["OUTLINE"])):
-            if bpy.data.masks:
-                layout.operator_menu_enum(operator, "mask", icon=icon)
-            else:
-                layout.operator(operator, icon=icon)  # greyed out; its tooltip says why
-        layout.operator_menu_enum("shutter.ramp_add", "ramp", icon="IPO_EASE_IN_OUT")
+        draw_operators(layout, ("matte_add", "FILE_MOVIE"), ("matte_strip", "SEQUENCE", "strip"))
+        # Without a mask they are greyed out; their tooltips say why.
+        mask = ("mask",) if bpy.data.masks else ()
+        draw_operators(layout, ("matte_mask", "MOD_MASK", *mask), ("outline_from_mask", _ICONS["OUTLINE"], *mask))
+        draw_operators(layout, ("ramp_add", "IPO_EASE_IN_OUT", "ramp"))
         layout.separator()
-        layout.operator_menu_enum("shutter.time_map", "ramp", icon="TIME")
-        layout.operator_menu_enum("shutter.rolling_shutter", "side", icon="CAMERA_DATA")
-        layout.operator_menu_enum("shutter.find_readout", "reads", icon="VIEWZOOM")
+        draw_operators(layout, ("time_map", "TIME", "ramp"), ("rolling_shutter", "CAMERA_DATA", "side"))
+        draw_operators(layout, ("find_readout", "VIEWZOOM", "reads"))
         layout.separator()
-        layout.operator_menu_enum("shutter.region_take", "layer", icon="GREASEPENCIL")
+        draw_operators(layout, ("region_take", "GREASEPENCIL", "layer"))
 
 
 class SHUTTER_MT_shutters(Menu):
     bl_label = "Shutter Specials"
 
-    def draw(self, _context):
+    def draw(self, _context: Context) -> None:
         layout = self.layout
         layout.menu("SHUTTER_MT_presets", icon="PRESET")
         layout.separator()
-        layout.operator("shutter.shutter_duplicate", icon="DUPLICATE")
-        layout.operator("shutter.shutter_move", text="Move Up", icon="TRIA_UP").direction = "UP"
-        layout.operator("shutter.shutter_move", text="Move Down", icon="TRIA_DOWN").direction = "DOWN"
+        draw_operators(layout, ("shutter_duplicate", "DUPLICATE"))
+        draw_moves(layout, "shutter")
         layout.separator()
-        layout.operator("shutter.effect_copy", icon="COPYDOWN")
-        layout.operator("shutter.effect_paste", icon="PASTEDOWN")
-        layout.operator("shutter.recipe_import", icon="IMPORT")
-        layout.operator("shutter.recipe_export", icon="EXPORT")
+        draw_operators(layout, ("effect_copy", "COPYDOWN"), ("effect_paste", "PASTEDOWN"))
+        draw_operators(layout, ("recipe_import", "IMPORT"), ("recipe_export", "EXPORT"))
 
 
 class _Shutters(Mixin):
@@ -130,40 +113,35 @@ class _Shutters(Mixin):
 
     bl_label = "Shutter"
 
-    def draw(self, context):
+    def draw(self, context: Context) -> None:
         layout = self.layout
         active = selection.active(context)
         if active is None:
-            layout.operator("shutter.draw", icon="GREASEPENCIL")
-            layout.operator("shutter.add_effect", icon="ADD")
+            draw_operators(layout, ("draw", "GREASEPENCIL"), ("add_effect", "ADD"))
             return
         effect = active[1]
         _draw_live(layout, context)
         _draw_source(layout, effect)
         draw_list(layout, effect, "shutter", effect.shutters, "SHUTTER_MT_shutters")
         row = layout.row(align=True)
-        row.operator("shutter.draw", icon="GREASEPENCIL")
-        row.operator("shutter.erase")
+        draw_operators(row, ("draw", "GREASEPENCIL"), ("erase",))
         row.menu("SHUTTER_MT_regions", text="", icon="DOWNARROW_HLT")
         draw_tracking(layout, effect.active_region)
-        row = layout.row(align=True)
-        for button in ("sharp_subject", "panning_shot", "clean_trail"):
-            row.operator(f"shutter.{button}")
+        draw_operators(layout.row(align=True), ("sharp_subject",), ("panning_shot",), ("clean_trail",))
 
 
 class _Exposure(WithEffect):
     """What the active shutter makes of the frames."""
 
     bl_label = ""
+    bl_options = set()
 
-    def draw_header(self, context):
+    def draw_header(self, context: Context) -> None:
         if (shutter := selection.active_shutter(selection.active(context)[1])) is not None:
             words = iface_('Exposure of "{shutter}"').format(shutter=shutter.name)
             self.layout.label(text=words, translate=False)
 
-    def draw(self, context):
-        layout, active = self.layout, selection.active(context)
-        effect = active[1]
+    def draw_effect(self, layout: UILayout, scene: Scene, effect: PropertyGroup, strip: Strip) -> None:
         if (shutter := selection.active_shutter(effect)) is None:
             return
         row = layout.row(align=True)
@@ -172,17 +150,16 @@ class _Exposure(WithEffect):
         row.menu("SHUTTER_MT_presets", text=label, icon="PRESET", translate=False)
         row.operator("shutter.bars_key", text="", icon="KEY_HLT")
         row.operator("shutter.bars_unkey", text="", icon="KEY_DEHLT")
-        layout.use_property_split = True
         layout.prop(effect, "window")
         layout.prop(shutter, "length")
         if shutter.length == "MOTION" and shutter.follow != "NOTHING":
             layout.prop(shutter, "trail")
         _draw_combine(layout, shutter)
         layout.operator("shutter.tripod", icon="CON_CAMERASOLVER")
-        _draw_bars(layout, active)
+        _draw_bars(layout, scene, effect, strip)
 
 
-def _draw_combine(layout, shutter) -> None:
+def _draw_combine(layout: UILayout, shutter: PropertyGroup) -> None:
     """What the shutter makes of the frames."""
     layout.prop(shutter, "combine")
     if shutter.combine not in ("LIGHTEST", "DARKEST"):
@@ -197,9 +174,8 @@ def _draw_combine(layout, shutter) -> None:
         layout.prop(shutter, "softness")
 
 
-def _draw_bars(layout, active) -> None:
+def _draw_bars(layout: UILayout, scene: Scene, effect: PropertyGroup, strip: Strip) -> None:
     """What the active shutter's bars come to."""
-    scene, effect, strip = active
     try:
         bars = bar_edits.shown(effect, effect.active_shutter).bars
     except EffectError as error:
@@ -211,7 +187,7 @@ def _draw_bars(layout, active) -> None:
     sentence(layout, words, "NONE" if is_open else "ERROR", is_quiet=is_open)
 
 
-def _draw_live(layout, context):
+def _draw_live(layout: UILayout, context: Context) -> None:
     live = getattr(context.window_manager, "virtual_shutter", None)
     if live is None:
         return
@@ -229,14 +205,14 @@ def _draw_live(layout, context):
     notes.popover("SHUTTER_PT_notes", text="", icon="ERROR" if notes.alert else "INFO")
 
 
-def _draw_source(layout, effect) -> None:
+def _draw_source(layout: UILayout, effect: PropertyGroup) -> None:
     """Which clip the effect is for, and the choice of another."""
     shown = match_source.shown(effect)
     words = iface_("Source: {strip}").format(strip=shown.source) if shown else iface_("Choose Source")
     layout.operator_menu_enum("shutter.source", "strip", text=words, icon="SEQUENCE", translate=False)
 
 
-def _notes(context) -> Iterator[tuple[str, Button | None]]:
+def _notes(context: Context) -> Iterator[tuple[str, Button | None]]:
     """What is to be said of the active effect, and the button that helps; one without a label has its operator's."""
     scene, effect, strip = selection.active(context)
     if (newer := data_format.note([scene, *bpy.data.scenes])) is not None:
@@ -257,7 +233,7 @@ def _notes(context) -> Iterator[tuple[str, Button | None]]:
         yield inbetween_operators.strobing_in_words(exposure), inbetween_operators.smoothing(exposure)
 
 
-def _tracked(effect) -> list[int | None]:
+def _tracked(effect: PropertyGroup) -> list[int | None]:
     """What may have been tracked of what the tab shows (selection.moving)."""
     region = [effect.active_region] if selection.active_region(effect) is not None else []
     shutter = selection.active_shutter(effect)
@@ -273,10 +249,10 @@ class SHUTTER_PT_notes(Panel):
     bl_ui_units_x = WIDEST // 20
 
     @classmethod
-    def poll(cls, context):
+    def poll(cls, context: Context) -> bool:
         return selection.active(context) is not None
 
-    def draw(self, context):
+    def draw(self, context: Context) -> None:
         layout, effect = self.layout, selection.active(context)[1]
         for words, button in _notes(context):
             column = layout.column(align=True)
@@ -294,21 +270,27 @@ class _Move(WithEffect):
     """What the exposure moves with."""
 
     bl_label = "Exposure Moves With"
-    bl_options = {"DEFAULT_CLOSED"}
 
-    def draw(self, context):
-        layout, effect = self.layout, selection.active(context)[1]
+    def draw_effect(self, layout: UILayout, _scene: Scene, effect: PropertyGroup, _strip: Strip) -> None:
         if (shutter := selection.active_shutter(effect)) is None:
             return
-        layout.use_property_split = True
         layout.prop(shutter, "follow")
         if shutter.follow == "REGION":
             layout.prop_search(shutter, "follow_region", effect, "regions", text="Region")
         if shutter.follow != "NOTHING":
-            for name in ("follow_motion", "follow_smooth"):
-                layout.prop(shutter, name)
+            draw_properties(layout, shutter, "follow_motion", "follow_smooth")
         if shutter.follow == "CAMERA":
             draw_tracking(layout, None)
+
+
+class _Report(Mixin):
+    """The last of the tab, whether there is an effect or not."""
+
+    bl_label = "Report"
+    bl_options = {"HIDE_HEADER"}
+
+    def draw(self, _context: Context) -> None:
+        self.layout.operator("shutter.copy_report", icon="COPYDOWN")
 
 
 class _InProperties:
@@ -317,7 +299,7 @@ class _InProperties:
     bl_context = "strip"
 
     @classmethod
-    def poll(cls, context):
+    def poll(cls, context: Context) -> bool:
         strip = selection.active_strip(context)
         return strip is not None and (strip.type in strips.SOURCES or selection.active(context) is not None)
 
@@ -328,7 +310,7 @@ class _InSidebar:
     bl_category = "Shutter"
 
     @classmethod
-    def poll(cls, context):
+    def poll(cls, context: Context) -> bool:
         return selection.active_strip(context) is not None or selection.active(context) is not None
 
 
@@ -345,7 +327,7 @@ _PANELS = {
     "_options": (Options, ""),
     "_inbetween": (Inbetween, ""),
     "_bake": (Bake, ""),
-    "_report": (Report, ""),
+    "_report": (_Report, ""),
 }
 
 
@@ -356,12 +338,12 @@ def _panels(start: str, place: type) -> list[type]:
     ]
 
 
-def _add_entry(self, _context):
+def _add_entry(self, _context: Context) -> None:
     self.layout.separator()
     self.layout.operator("shutter.add_effect", text="Shutter")
 
 
-def _strip_entry(self, context):
+def _strip_entry(self, context: Context) -> None:
     strip = selection.active_strip(context)
     if strip is None or not (strip.type in strips.SOURCES or selection.active(context)):
         return
@@ -369,8 +351,7 @@ def _strip_entry(self, context):
     if strip.type in strips.SOURCES:
         self.layout.operator("shutter.draw", text="Draw Shutter", icon="GREASEPENCIL")
         self.layout.operator("shutter.add_effect")
-    self.layout.operator("shutter.effect_copy", icon="COPYDOWN")
-    self.layout.operator("shutter.effect_paste", icon="PASTEDOWN")
+    draw_operators(self.layout, ("effect_copy", "COPYDOWN"), ("effect_paste", "PASTEDOWN"))
 
 
 MENUS = {
@@ -380,22 +361,17 @@ MENUS = {
 }
 
 classes = (
-    SHUTTER_UL_shutters,
-    SHUTTER_UL_regions,
-    SHUTTER_MT_presets,
-    SHUTTER_MT_regions,
-    SHUTTER_MT_shutters,
-    SHUTTER_PT_notes,
+    *own_classes(globals()),
     *_panels("STRIP_PT_shutter", _InProperties),
     *_panels("SEQUENCER_PT_shutter", _InSidebar),
 )
 
 
-def register():
+def register() -> None:
     for menu, entry in MENUS.items():
         getattr(bpy.types, menu).append(entry)
 
 
-def unregister():
+def unregister() -> None:
     for menu, entry in MENUS.items():
         getattr(bpy.types, menu).remove(entry)

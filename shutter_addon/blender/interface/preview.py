@@ -1,5 +1,6 @@
 """The live preview: what is drawn over the sequencer's picture, composed on Blender's GPU: views, and scribbles."""
 
+from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import replace
 
@@ -9,8 +10,10 @@ import numpy as np
 from bpy.app.translations import pgettext_iface as iface_
 from bpy.app.translations import pgettext_rpt as rpt_
 from bpy.props import BoolProperty, EnumProperty, FloatProperty, FloatVectorProperty, PointerProperty
-from bpy.types import PropertyGroup
+from bpy.types import Context, PropertyGroup, Region
 
+from ...compute.renderer import Renderer
+from ...compute.request import Request
 from ...core import stopping, told
 from ...core.model.choices import CONTEXT
 from ...core.model.frame_state import FrameState
@@ -36,6 +39,7 @@ from ..rendering import (
 from ..rendering.previews import Decision, Drawing
 from . import drawing, inbetween_operators, note_buttons, preview_quad, sharp_frame
 from .note_buttons import Button
+from .operator_bases import soon
 from .preview_quad import Quad
 
 VIEWS = (
@@ -53,12 +57,12 @@ VIEWS = (
 )
 
 
-def redraw(_settings, _context) -> None:
+def redraw(_settings: PropertyGroup | None, _context: Context) -> None:
     """Draws all previews again: for what is called at changes of properties."""
     preview_areas.redraw(bpy.context)
 
 
-def _view_chosen(settings, context) -> None:
+def _view_chosen(settings: PropertyGroup, context: Context) -> None:
     sharp_frame.give_back(context)
     redraw(settings, context)
 
@@ -75,11 +79,8 @@ def _redraw_when_still() -> float | None:
     return None
 
 
-def _follow_once() -> None:
-    shown_annotations.follow()
-
-
 _HOLES = (1.0, 0.55, 0.0), (0.75, 0.2, 0.9)  # the colours of compute.plates.TAKEN and FILLED
+Colors = Sequence[Sequence[float]]  # display code values
 _NAVIGATION = 56  # units at the right of a preview, where Blender's own buttons lie
 _STILL = 0.4  # seconds after which a frame that is shown stays
 _SOON = 0.1  # seconds
@@ -136,11 +137,11 @@ def _draw() -> None:
     # Blender tells nobody of strokes that are drawn or erased, but it draws the preview again.
     scene = selection.scene_of(context)
     if scene is not None and scene.library is None and invalidation.invalidate_changed(scene):
-        bpy.app.timers.register(_redraw_once)  # what is tagged while it is drawn is not drawn again
+        soon(_redraw_once)  # what is tagged while it is drawn is not drawn again
     sharp_frame.follow_pen()
     space = context.space_data
     if shown_annotations.is_laid_wrong(space) or shown_annotations.is_other(space, selection.seen(scene)):
-        bpy.app.timers.register(_follow_once)  # nothing may be changed while it is drawn
+        soon(shown_annotations.follow)  # nothing may be changed while it is drawn
     if sharp_frame.is_shown(space):
         _show_sharp(context, preview_areas.shown(context, space.display_channel))
     # A stroke that is being drawn would lie below our picture: Blender's own shows the same.
@@ -161,12 +162,12 @@ def _draw() -> None:
         say.draw()
 
 
-def _show(context, shown: Shown, decision: Decision | None, say) -> None:
+def _show(context: Context, shown: Shown, decision: Decision | None, say: "_Notes") -> None:
     """Shows the effect, or says why not. decision: what the engine was asked for."""
     try:
         wanted = previews.for_drawing(context, shown, decision)
-        if previews.is_going(context) and not bpy.app.timers.is_registered(_redraw_when_still):
-            bpy.app.timers.register(_redraw_when_still, first_interval=_SOON)
+        if previews.is_going(context):
+            soon(_redraw_when_still, _SOON)
         quad = Quad(context.region, shown.strip, annotations.picture_size(shown.effect))
         try:
             if wanted.decision.is_late:
@@ -176,13 +177,13 @@ def _show(context, shown: Shown, decision: Decision | None, say) -> None:
         except stopping.StoppedError:
             say(rpt_("Composing…"))
             _show_strokes(context, quad, shown, wanted.decision.snapshot)
-            bpy.app.timers.register(_redraw_once)
+            soon(_redraw_once)
     except effect_source.FAULTS as error:
         previews.was_drawn()
         _tell_fault(error, say)
 
 
-def _tell_unseen(context, say) -> None:
+def _tell_unseen(context: Context, say: "_Notes") -> None:
     """Says why nothing of the active effect is in the picture, where no other one is."""
     active = selection.active(context)
     if active is None or selection.seen(active[0]) or not context.space_data.show_overlays:
@@ -192,7 +193,7 @@ def _tell_unseen(context, say) -> None:
         say.draw()
 
 
-def _show_picture(context, quad: Quad, shown: Shown, wanted: Drawing, say) -> None:
+def _show_picture(context: Context, quad: Quad, shown: Shown, wanted: Drawing, say: "_Notes") -> None:
     settings, renderer, request = context.window_manager.virtual_shutter, wanted.renderer, wanted.request
     is_still = not context.screen.is_animation_playing
     if context.space_data.show_overlays:
@@ -207,15 +208,17 @@ def _show_picture(context, quad: Quad, shown: Shown, wanted: Drawing, say) -> No
     if wanted.draws_result:
         texture = renderer.draw(replace(request, quick=previews.is_going(context), levels=True))
         quad.draw("PICTURE", {"picture": texture}, wanted.left, 1.0, opacity=shown.strip.blend_alpha)
+    colors = [shutter.color for shutter in shown.effect.shutters]
     if settings.view == "SCRIBBLES":
-        _show_scribbles(quad, shown.effect, renderer, request)
+        _show_scribbles(quad, colors, renderer.drawn_labels(request), renderer)
     elif settings.view == "COEFFICIENTS":
-        _show_coefficients(quad, shown.effect, renderer, request, "COEFFICIENTS", 0.75)
+        _show_coefficients(quad, colors, renderer, request, "COEFFICIENTS", 0.75)
     else:
         if settings.view == "HOLES":
-            _show_holes(quad, renderer, request)
+            holes = renderer.drawn_holes(replace(request, quick=True, levels=True))
+            _show_scribbles(quad, _HOLES, holes, renderer)
         if settings.view == "EDGES":
-            _show_coefficients(quad, shown.effect, renderer, request, "EDGES", 1.0)
+            _show_coefficients(quad, colors, renderer, request, "EDGES", 1.0)
         _show_strokes(context, quad, shown, wanted.decision.snapshot)
     previews.was_drawn()
     _tell_carrying(say)
@@ -229,7 +232,7 @@ def _show_picture(context, quad: Quad, shown: Shown, wanted: Drawing, say) -> No
         _tell_strobing(looked, after_detail, say)
 
 
-def _warn(shown: Shown, say) -> None:
+def _warn(shown: Shown, say: "_Notes") -> None:
     """Says what a picture that is drawn over the sequencer's cannot show."""
     if shown.strips_above:
         say(rpt_("The strips above are hidden in this view"))
@@ -237,7 +240,7 @@ def _warn(shown: Shown, say) -> None:
         say(rpt_("This view has the view transform Standard"))
 
 
-def _tell_detail(wanted: Drawing, size: tuple[int, int], is_still: bool, say) -> None:
+def _tell_detail(wanted: Drawing, size: tuple[int, int], is_still: bool, say: "_Notes") -> None:
     """Says in what the picture is less than a render's; size: of that. And gives the way to see that one, and back."""
     source = wanted.renderer.source
     if previews.looking.whole is not None:
@@ -255,20 +258,16 @@ def _tell_detail(wanted: Drawing, size: tuple[int, int], is_still: bool, say) ->
         say(rpt_("Preview: {what}").format(what=", ".join(less)), button)
 
 
-def _tell_strobing(looked: strobing.Looked, place: int, say) -> None:
+def _tell_strobing(looked: strobing.Looked, place: int, say: "_Notes") -> None:
     """Says, in that place among what is said, that the exposure has too few frames, and gives the way to more."""
     if looked.known is not None and inbetween_build.running() is None:
         say(inbetween_operators.strobing_in_words(looked.known), inbetween_operators.smoothing(looked.known), place)
-    if looked.is_new and not bpy.app.timers.is_registered(_redraw_panels):
-        bpy.app.timers.register(_redraw_panels)  # which may have been drawn before
+    if looked.is_new:
+        soon(inbetween_operators.redraw_panels)  # which may have been drawn before
     if looked.is_busy:
         if bpy.app.timers.is_registered(_measure):
             bpy.app.timers.unregister(_measure)
         bpy.app.timers.register(_measure, first_interval=_STILL)  # once a frame stays
-
-
-def _redraw_panels() -> None:
-    inbetween_operators.redraw_panels(bpy.context)
 
 
 def _measure() -> float | None:
@@ -278,7 +277,7 @@ def _measure() -> float | None:
     return inbetween_operators.TICK if strobing.is_busy() else None
 
 
-def _show_sharp(context, shown: Shown | None) -> None:
+def _show_sharp(context: Context, shown: Shown | None) -> None:
     """What is drawn over the sharp frame."""
     say = _Notes(context.region)
     say(rpt_("The sharp frame, to draw on: the result comes with the stroke"))
@@ -290,7 +289,7 @@ def _show_sharp(context, shown: Shown | None) -> None:
             _show_strokes(context, quad, shown, snapshot)
 
 
-def _tell_missing(renderer, request, say) -> None:
+def _tell_missing(renderer: Renderer, request: Request, say: "_Notes") -> None:
     """Says in the preview what the engine can only report."""
     try:
         renderer.check(request)
@@ -298,7 +297,7 @@ def _tell_missing(renderer, request, say) -> None:
         _tell_fault(error, say)
 
 
-def _tell_carrying(say) -> None:
+def _tell_carrying(say: "_Notes") -> None:
     """Has mattes carried that the picture lacks, and says so."""
     fault, progress = outline_carrying.begin(show_carried), outline_carrying.progress()
     if fault is not None:
@@ -319,7 +318,7 @@ def show_carried() -> None:
     preview_areas.redraw(bpy.context)
 
 
-def _tell_fault(error: Exception, say) -> None:
+def _tell_fault(error: Exception, say: "_Notes") -> None:
     """Says why there is no picture."""
     told.shown(error)
     if isinstance(error, NotBuiltError) and inbetween_build.running() is None:
@@ -329,7 +328,7 @@ def _tell_fault(error: Exception, say) -> None:
         say(rpt_("Shutter: {fault}").format(fault=error))
 
 
-def _show_strokes(context, quad, shown: Shown, snapshot: Snapshot) -> None:
+def _show_strokes(context: Context, quad: Quad, shown: Shown, snapshot: Snapshot) -> None:
     """The scribbles where they are by now."""
     if not context.space_data.show_overlays:
         return
@@ -342,7 +341,7 @@ def _show_strokes(context, quad, shown: Shown, snapshot: Snapshot) -> None:
             drawing.lines(quad.on_region(points), color, closed=shape.kind == "lasso", width=2)
 
 
-def _show_source(quad, shown: Shown, renderer, request, right: float) -> None:
+def _show_source(quad: Quad, shown: Shown, renderer: Renderer, request: Request, right: float) -> None:
     """The source's own frame, from the left edge on: that of a shutter that is open for it alone."""
     options = replace(request.state.options, step=1)  # no in-between frames come first in reverse
     still = np.zeros((1, options.window))
@@ -355,41 +354,27 @@ def _show_source(quad, shown: Shown, renderer, request, right: float) -> None:
     quad.draw("PICTURE", {"picture": texture}, 0.0, right, opacity=shown.strip.blend_alpha)
 
 
-def _show_scribbles(quad, effect, renderer, request) -> None:
-    labels, block = renderer.drawn_labels(request)
-    quad.draw(
-        "SCRIBBLES",
-        {"labels": labels, "palette": _palette(effect)},
-        opacity=0.7,
-        block=block,
-        size=_size(renderer),
-    )
-
-
-def _show_holes(quad, renderer, request) -> None:
-    kinds, block = renderer.drawn_holes(replace(request, quick=True, levels=True))
-    textures = {"labels": kinds, "palette": _texture(_HOLES)}
+def _show_scribbles(quad: Quad, colors: Colors, drawn: tuple[object, int], renderer: Renderer) -> None:
+    """Labels of a picture in their colours."""
+    labels, block = drawn
+    textures = {"labels": labels, "palette": _palette(colors)}
     quad.draw("SCRIBBLES", textures, opacity=0.7, block=block, size=_size(renderer))
 
 
-def _show_coefficients(quad, effect, renderer, request, step: str, opacity: float) -> None:
+def _show_coefficients(
+    quad: Quad, colors: Colors, renderer: Renderer, request: Request, step: str, opacity: float
+) -> None:
     coefficients, block = renderer.drawn_with_layers(replace(request, quick=True))
-    count = len(request.state.bars)
-    textures = {"coefficients": coefficients, "palette": _palette(effect)}
-    unit = float(drawing.ui_scale())
+    textures = {"coefficients": coefficients, "palette": _palette(colors)}
+    count, unit = len(request.state.bars), float(drawing.ui_scale())
     quad.draw(step, textures, opacity=opacity, block=block, count=count, size=_size(renderer), unit=unit)
 
 
-def _size(renderer) -> tuple[int, int]:
+def _size(renderer: Renderer) -> tuple[int, int]:
     return renderer.source.width, renderer.source.height
 
 
-def _palette(effect) -> Texture:
-    """The shutters' colours, display code values, side by side."""
-    return _texture([shutter.color for shutter in effect.shutters])
-
-
-def _texture(palette) -> Texture:
+def _palette(palette: Colors) -> Texture:
     """Colours, display code values, side by side."""
     colors = np.ones((len(palette), 4), dtype=np.float32)
     colors[:, :3] = palette
@@ -401,18 +386,19 @@ def _texture(palette) -> Texture:
 class _Notes:
     """Sentences at the upper left of a region, each with a button or none."""
 
-    def __init__(self, region):
-        self._region, self._lines = region, []
+    def __init__(self, region: Region) -> None:
+        self._region = region
+        self._lines: list[tuple[str, Button | None]] = []
 
     @property
     def count(self) -> int:
         return len(self._lines)
 
-    def __call__(self, sentence: str, button: Button | None = None, place: int | None = None):
+    def __call__(self, sentence: str, button: Button | None = None, place: int | None = None) -> None:
         """Says a sentence after all others, or in a place among them."""
         self._lines.insert(self.count if place is None else place, (sentence, button))
 
-    def draw(self):
+    def draw(self) -> None:
         unit = drawing.ui_scale()
         y = self._region.height - 18 * unit
         left, right = 16 * unit, self._region.width - _NAVIGATION * unit
@@ -430,18 +416,18 @@ class _Notes:
 
 
 classes = (ShutterPreview,)
-TIMERS = _redraw_once, _redraw_when_still, _follow_once, _redraw_panels, _measure
+TIMERS = _redraw_once, _redraw_when_still, shown_annotations.follow, _measure
 _handler = None
 
 
-def register():
+def register() -> None:
     global _handler
     bpy.types.WindowManager.virtual_shutter = PointerProperty(type=ShutterPreview)
     # After the sequencer's picture and before annotations and gizmos, which stay visible.
     _handler = bpy.types.SpaceSequenceEditor.draw_handler_add(_draw, (), "PREVIEW", "POST_VIEW")
 
 
-def unregister():
+def unregister() -> None:
     global _handler
     bpy.types.SpaceSequenceEditor.draw_handler_remove(_handler, "PREVIEW")
     _handler = None

@@ -2,7 +2,10 @@
 
 import gpu
 import numpy as np
+from bpy.types import Region, Strip
+from gpu.types import GPUBatch, GPUShader
 from gpu_extras.batch import batch_for_shader
+from numpy.typing import ArrayLike
 
 from ...core.model.scribbles import mapped
 from ...devices.passes import read_pass
@@ -13,7 +16,7 @@ from ..devices import blender_gpu
 class Quad:
     """Where a strip's picture lies in a preview's region, its crop considered."""
 
-    def __init__(self, region, strip, size):
+    def __init__(self, region: Region, strip: Strip, size: tuple[int, int]) -> None:
         self._matrix = geometry.picture_to_region(strip, size, region)
         render = strip.id_data.render
         half = np.array([render.resolution_x, render.resolution_y]) / 2
@@ -22,7 +25,7 @@ class Quad:
         self._low = np.array([crop.min_x / width, crop.min_y / height])
         self._high = 1 - np.array([crop.max_x / width, crop.max_y / height])
 
-    def on_region(self, points) -> np.ndarray:
+    def on_region(self, points: ArrayLike) -> np.ndarray:
         """Points (n, 2) of the strip's picture, in fractions, in pixels of the region."""
         return mapped(self._matrix, np.asarray(points, dtype=np.float64))
 
@@ -43,7 +46,7 @@ class Quad:
         self._clipped(batch_for_shader(shader, "TRI_STRIP", where), shader)
         gpu.state.blend_set("NONE")
 
-    def _clipped(self, batch, shader) -> None:
+    def _clipped(self, batch: GPUBatch, shader: GPUShader) -> None:
         """Draws as much as lies in the sequencer's image, which shows no more of a strip."""
         left, bottom, width, height = before = gpu.state.scissor_get()
         low = np.maximum(np.rint(self._image[0]), (left, bottom))
@@ -59,7 +62,7 @@ class Quad:
 _shaders: dict = {}
 
 
-def shader_of(name: str):
+def shader_of(name: str) -> GPUShader:
     """What draws by a step of shaders/show.glsl, compiled once."""
     if name not in _shaders:
         quad, shown = read_pass("show", "QUAD"), read_pass("show", name)

@@ -1,17 +1,20 @@
 """The probe: a pixel's shutter as bars, and its coefficients as shares, beside it in the preview."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import bpy
 import numpy as np
 from bpy.app.translations import pgettext_iface as iface_
-from bpy.types import Gizmo, GizmoGroup
+from bpy.types import Context, Gizmo, GizmoGroup, PropertyGroup, Region, Strip
 
 from ...compute import plates
 from ...core.model.scribbles import mapped
 from ..data import annotations, geometry, preview_areas
 from ..rendering import effect_source, previews, probe, render_context
 from . import drawing
+from .gizmo_groups import InPreview, on_picture, to_region
+from .operator_bases import own_classes
 
 _WIDTH, _HEIGHT, _LINE, _PAD, _APART = 180, 64, 17, 8, 14  # in units of the interface
 _MARK = (1.0, 1.0, 1.0, 0.9)
@@ -28,7 +31,7 @@ class Layout:
     lines: tuple[float, ...]
 
 
-def layout(point, size, count: int, unit: float) -> Layout:
+def layout(point: Sequence[float], size: tuple[int, int], count: int, unit: float) -> Layout:
     """The layout for a point of a region of this size with `count` shutters; unit: of the interface, in pixels.
 
     The box lies at the right of the point and below it, or on the other side where the region ends."""
@@ -43,13 +46,13 @@ def layout(point, size, count: int, unit: float) -> Layout:
     return Layout((left, top - height, left + width, top), bars, lines)
 
 
-def _to_region(context, shown) -> np.ndarray | None:
+def _to_region(context: Context, shown: preview_areas.Shown) -> np.ndarray | None:
     """Matrix from fractions of the shown picture to the region's pixels; None: nothing is seen of it."""
-    matrix = geometry.picture_to_region(shown.strip, annotations.picture_size(shown.effect), context.region)
+    matrix = to_region(shown.effect, shown.strip, context.region)
     return matrix if geometry.is_invertible(matrix) else None
 
 
-def _is_cropped(strip, size, point) -> bool:
+def _is_cropped(strip: Strip, size: tuple[int, int], point: Sequence[float]) -> bool:
     crop, (x, y) = strip.crop, np.asarray(point) * size
     return not (crop.min_x <= x < size[0] - crop.max_x and crop.min_y <= y < size[1] - crop.max_y)
 
@@ -57,9 +60,7 @@ def _is_cropped(strip, size, point) -> bool:
 class SHUTTER_GT_probe(Gizmo):
     """It follows the pointer, and is never hit: clicks go to whatever lies there."""
 
-    bl_idname = "SHUTTER_GT_probe"
-
-    def draw(self, context):
+    def draw(self, context: Context) -> None:
         shown, at = preview_areas.shown(context), tuple(context.window_manager.virtual_shutter.probe_at)
         if shown is None or (matrix := _to_region(context, shown)) is None:
             return
@@ -75,16 +76,16 @@ class SHUTTER_GT_probe(Gizmo):
             point = mapped(matrix, np.array([at]))[0]
             _draw(context.region, point, shown.effect.shutters, probed, _of_layers(shown, probed))
 
-    def test_select(self, context, location):
+    def test_select(self, context: Context, location: tuple[int, int]) -> int:
         """Blender asks whenever the pointer moves: nothing else tells of it without taking events from others."""
         shown = preview_areas.shown(context)
         if shown is not None and (matrix := _to_region(context, shown)) is not None:
-            centre = np.array([location], dtype=np.float64) + 0.5
-            context.window_manager.virtual_shutter.probe_at = mapped(np.linalg.inv(matrix), centre)[0]
+            x, y = location
+            context.window_manager.virtual_shutter.probe_at = on_picture(matrix, x + 0.5, y + 0.5)
         return -1
 
 
-def _of_layers(shown, probed: probe.Probed) -> list[tuple[str, str]]:
+def _of_layers(shown: preview_areas.Shown, probed: probe.Probed) -> list[tuple[str, str]]:
     """Of each layer its name and how much of it covers the pixel; and what takes the place of what lies behind."""
     regions = [region for region in shown.effect.regions if region.is_layer and region.opacity > 0]
     lines = [(region.name, f"{share:.1%}") for region, share in zip(regions, probed.layers, strict=False)]
@@ -92,7 +93,13 @@ def _of_layers(shown, probed: probe.Probed) -> list[tuple[str, str]]:
     return [*lines, (words[probed.hole], "")] if probed.hole in words else lines
 
 
-def _draw(region, point, shutters, probed: probe.Probed, of_layers: list[tuple[str, str]]) -> None:
+def _draw(
+    region: Region,
+    point: Sequence[float],
+    shutters: Sequence[PropertyGroup],
+    probed: probe.Probed,
+    of_layers: list[tuple[str, str]],
+) -> None:
     unit = drawing.ui_scale()
     place = layout(point, (region.width, region.height), len(shutters) + len(of_layers), unit)
     colors = np.array([shutter.color for shutter in shutters])
@@ -100,7 +107,8 @@ def _draw(region, point, shutters, probed: probe.Probed, of_layers: list[tuple[s
     drawing.lines([(x - arm, y), (x + arm, y)], _MARK, width=1)
     drawing.lines([(x, y - arm), (x, y + arm)], _MARK, width=1)
     drawing.rectangles([place.frame], [drawing.BACK])
-    _draw_bars(place.bars, probed.bars, (*(probed.coefficients @ colors), 0.95))
+    shares = probed.bars / max(1.0, probed.bars.max())
+    drawing.bars(place.bars, shares, (*(probed.coefficients @ colors), 0.95))
     left, _, right, _ = place.bars
     for bottom, (name, share) in zip(place.lines[len(shutters) :], of_layers, strict=True):
         drawing.text(left, bottom, name, until=right - 44 * unit)
@@ -111,32 +119,16 @@ def _draw(region, point, shutters, probed: probe.Probed, of_layers: list[tuple[s
         drawing.text(right - 38 * unit, bottom, f"{share:.1%}")
 
 
-def _draw_bars(box, bars, color) -> None:
-    left, bottom, right, top = box
-    edges = np.linspace(left, right, len(bars) + 1)
-    thin = drawing.line_width()
-    heights = bottom + np.maximum(bars / max(1.0, bars.max()) * (top - bottom), thin)
-    gap = thin if edges[1] - edges[0] > 3 * thin else 0.0
-    boxes = [(a, bottom, b - gap, height) for a, b, height in zip(edges, edges[1:], heights, strict=False)]
-    drawing.rectangles(boxes, np.tile(color, (len(bars), 1)))
-
-
-class SHUTTER_GGT_probe(GizmoGroup):
-    bl_idname = "SHUTTER_GGT_probe"
+class SHUTTER_GGT_probe(InPreview, GizmoGroup):
     bl_label = "Probe"
-    bl_space_type = "SEQUENCE_EDITOR"
-    bl_region_type = "PREVIEW"
-    bl_options = {"PERSISTENT"}
+    gizmo = SHUTTER_GT_probe
 
     @classmethod
-    def poll(cls, context):
+    def poll(cls, context: Context) -> bool:
         settings = context.window_manager.virtual_shutter
         if not (settings.live and settings.probe) or bpy.app.is_job_running("RENDER"):
             return False
         return preview_areas.shown(context) is not None
 
-    def setup(self, _context):
-        self.gizmos.new(SHUTTER_GT_probe.bl_idname)
 
-
-classes = (SHUTTER_GT_probe, SHUTTER_GGT_probe)
+classes = own_classes(globals())

@@ -6,16 +6,18 @@ import bpy
 import numpy as np
 from bpy.app.translations import contexts
 from bpy.app.translations import pgettext_iface as iface_
-from bpy.types import Gizmo, GizmoGroup
+from bpy.types import Context, Event, Gizmo, GizmoGroup, PropertyGroup, Scene, Strip
 
 from ...core import revision
 from ...core.messages import EffectError
 from ...core.model import scribbles
 from ...core.model.scribbles import mapped
-from ..data import annotations, geometry, selection, snapshot, validation
+from ..data import annotations, selection, snapshot, validation
 from ..editing import bar_edits, drawn_places, region_edits, track_region
 from ..editing.motion_keys import MotionKeys
-from . import drawing, gizmo_keymaps
+from . import drawing
+from .gizmo_groups import TWEAK, Dragged, WithKeys, on_picture, to_region
+from .operator_bases import own_classes, popup
 
 _RADIUS = 7  # of a handle, in units of the interface
 _NEAREST = 0.03  # of the corner's handle to the centre's, in parts of the picture
@@ -35,15 +37,11 @@ class Place:
     to_region: np.ndarray
     aspect: float
 
-    def on_picture(self, point) -> np.ndarray:
-        """A point of the region, in fractions of the picture."""
-        return mapped(np.linalg.inv(self.to_region), np.array([point], dtype=np.float64))[0]
-
 
 _strokes = revision.UntilChange()
 
 
-def _strokes_now(scene, effect, strip) -> list[np.ndarray]:
+def _strokes_now(scene: Scene, effect: PropertyGroup, strip: Strip) -> list[np.ndarray]:
     """The active region's strokes, or the line of a ramp, not moved yet: read once until something changes."""
     index, frame = effect.active_region, scene.frame_float
     region = effect.regions[index]
@@ -53,7 +51,7 @@ def _strokes_now(scene, effect, strip) -> list[np.ndarray]:
     return _strokes.get(key, lambda: snapshot.strokes_at(scene, effect, strip, index, frame))
 
 
-def place(context) -> Place | None:
+def place(context: Context) -> Place | None:
     """The place of the active region's handles, or None where none is seen, or nothing of it is drawn."""
     seen = selection.in_picture(context)
     region = selection.active_region(seen[1]) if seen else None
@@ -80,12 +78,12 @@ def place(context) -> Place | None:
         region.scale,
         width / height,
     )
-    to_region = geometry.picture_to_region(strip, (width, height), context.region)
-    centre, corner = mapped(to_region, np.stack([middle + np.array(region.location), moved]))
-    return Place(centre=centre, corner=corner, to_region=to_region, aspect=width / height)
+    matrix = to_region(effect, strip, context.region)
+    centre, corner = mapped(matrix, np.stack([middle + np.array(region.location), moved]))
+    return Place(centre=centre, corner=corner, to_region=matrix, aspect=width / height)
 
 
-def outline(context, where: Place) -> list[np.ndarray]:
+def outline(context: Context, where: Place) -> list[np.ndarray]:
     """The active region's strokes (n, 2) where its properties have it, keyed or not, in pixels of the preview's
     region."""
     scene, effect, strip = selection.active(context)
@@ -95,15 +93,10 @@ def outline(context, where: Place) -> list[np.ndarray]:
     return [mapped(where.to_region, points) for points in moved]
 
 
-class SHUTTER_GT_region(Gizmo):
+class SHUTTER_GT_region(Dragged, Gizmo):
     """One handle; `turns`: turns and scales, or moves."""
 
-    bl_idname = "SHUTTER_GT_region"
-
-    def setup(self):
-        self.use_draw_modal = True
-
-    def draw(self, context):
+    def draw(self, context: Context) -> None:
         if (where := place(context)) is None:
             return
         if self.is_modal:  # what is keyed is shown where its keys have it
@@ -120,13 +113,13 @@ class SHUTTER_GT_region(Gizmo):
             drawing.lines([(x - radius, y), (x + radius, y)], _MARK)
             drawing.lines([(x, y - radius), (x, y + radius)], _MARK)
 
-    def test_select(self, context, location):
+    def test_select(self, context: Context, location: tuple[int, int]) -> int:
         if (where := place(context)) is None:
             return -1
         handle = where.corner if self.turns else where.centre
         return 0 if np.hypot(*(handle - location)) <= drawing.ui_scale() * _RADIUS * 1.5 else -1
 
-    def invoke(self, context, event):
+    def invoke(self, context: Context, event: Event) -> set[str]:
         if (where := place(context)) is None:  # while it plays, it may just have gone
             return {"CANCELLED"}
         effect = selection.active(context)[1]
@@ -139,7 +132,7 @@ class SHUTTER_GT_region(Gizmo):
         self.where = where
         return {"RUNNING_MODAL"}
 
-    def modal(self, context, event, tweak):
+    def modal(self, context: Context, event: Event, tweak: set[str]) -> set[str]:
         mouse = event.mouse_region_x, event.mouse_region_y
         fine = 0.1 if "PRECISE" in tweak or event.shift else 1.0
         point = np.array(self.grabbed) + fine * (np.array(mouse) - self.grabbed)
@@ -150,20 +143,20 @@ class SHUTTER_GT_region(Gizmo):
         context.area.tag_redraw()
         return {"RUNNING_MODAL"}
 
-    def _move(self, region, point, snap: bool):
-        moved = self.where.on_picture(point) - self.where.on_picture(self.grabbed)
+    def _move(self, region: PropertyGroup, point: np.ndarray, snap: bool) -> None:
+        moved = on_picture(self.where.to_region, *point) - on_picture(self.where.to_region, *self.grabbed)
         if snap:  # along one axis
             moved[np.abs(moved * (self.where.aspect, 1)).argmin()] = 0
         region.location = np.array(self.before[0]) + moved
 
-    def _turn(self, region, point, snap: bool):
+    def _turn(self, region: PropertyGroup, point: np.ndarray, snap: bool) -> None:
         start, end = np.array(self.grabbed) - self.where.centre, np.array(point) - self.where.centre
         turned = np.arctan2(end[1], end[0]) - np.arctan2(start[1], start[0])
         rotation = self.before[1] + (turned + np.pi) % (2 * np.pi) - np.pi
         region.rotation = np.radians(round(np.degrees(rotation) / 5) * 5) if snap else rotation
         region.scale = self.before[2] * max(np.hypot(*end) / max(np.hypot(*start), 1.0), 0.01)
 
-    def exit(self, context, cancel):
+    def exit(self, context: Context, cancel: bool) -> None:
         if (effect := self.target.effect()) is None:
             return
         index = self.target.index
@@ -177,51 +170,40 @@ class SHUTTER_GT_region(Gizmo):
         bpy.ops.ed.undo_push(message=iface_("Transform Region", contexts.operator_default))
 
 
-def wants_keys(context, effect, index: int) -> bool:
+def wants_keys(context: Context, effect: PropertyGroup, index: int) -> bool:
     """Whether a region that the editor moves is keyed: Blender's Auto Keying is on, or tracking has made keys of it."""
     return bar_edits.auto_key(context) or MotionKeys(effect, index, effect.regions[index].motion).are_made()
 
 
-def _key(context, effect, index: int) -> None:
+def _key(context: Context, effect: PropertyGroup, index: int) -> None:
     """Keys the region, or says why it cannot be: gizmos have no reports."""
     try:
         region_edits.key_region(effect, index)
     except EffectError as error:
-        sentence, show = str(error), context.window_manager.popup_menu
-        show(lambda menu, _context: menu.layout.label(text=sentence, translate=False), icon="ERROR")
+        popup(context, str(error), icon="ERROR")
 
 
-def _is_drawing(context) -> bool:
+def _is_drawing(context: Context) -> bool:
     """Whether the preview's tool draws strokes, or erases them."""
     tool = context.workspace.tools.from_space_sequencer(context.space_data.view_type)
     return tool is not None and tool.idname.startswith("builtin.annotate")
 
 
-class SHUTTER_GGT_region(GizmoGroup):
-    bl_idname = "SHUTTER_GGT_region"
+class SHUTTER_GGT_region(WithKeys, GizmoGroup):
     bl_label = "Shutter Region"
-    bl_space_type = "SEQUENCE_EDITOR"
-    bl_region_type = "PREVIEW"
-    bl_options = {"PERSISTENT"}
+    shortcuts = (TWEAK, ("shutter.region_key", "I", "PRESS", {}))
 
     @classmethod
-    def poll(cls, context):
+    def poll(cls, context: Context) -> bool:
         settings, seen = context.window_manager.virtual_shutter, selection.in_picture(context)
         # A handle under the pointer would take it from the probe, and a stroke from the pen.
         if (settings.live and settings.probe) or _is_drawing(context):
             return False
         return seen is not None and seen[0].is_editable and selection.active_region(seen[1]) is not None
 
-    @classmethod
-    def setup_keymap(cls, keyconfig):
-        keymap = gizmo_keymaps.new(cls, keyconfig)
-        keymap.keymap_items.new("gizmogroup.gizmo_tweak", "LEFTMOUSE", "PRESS", any=True)
-        keymap.keymap_items.new("shutter.region_key", "I", "PRESS")
-        return keymap
-
-    def setup(self, _context):
+    def setup(self, _context: Context) -> None:
         for turns in (False, True):
-            self.gizmos.new(SHUTTER_GT_region.bl_idname).turns = turns
+            self.gizmos.new(SHUTTER_GT_region.__name__).turns = turns
 
 
-classes = (SHUTTER_GT_region, SHUTTER_GGT_region)
+classes = own_classes(globals())

@@ -3,6 +3,7 @@
 import math
 
 from bpy.app.translations import pgettext_iface as iface_
+from bpy.types import MovieTracking, PropertyGroup, Scene, Strip, UILayout
 
 from ...core.messages import EffectError
 from ...core.model.choices import CONTEXT
@@ -10,17 +11,19 @@ from ...media.pursuit import SURE
 from ..data import matte_look, selection, strips, validation
 from ..editing import follow_track, outline_drawings, track_region
 from . import track_operators
-from .panel_parts import WithEffect, draw_list, sentence
+from .panel_parts import WithEffect, draw_list, draw_properties, sentence
 
-OF_KIND = {"LINE": "width", "OUTLINE": "between", "RAMP": "ramp"}  # the property that each kind adds
+_PLACEMENT = "location", "rotation", "scale"
+_TRACKING = "motion", "track_until", "track_all_keys", "track_ends"
+_OF_KIND = {"LINE": "width", "OUTLINE": "between", "RAMP": "ramp"}  # the property that each kind adds
 
 
 class Regions(WithEffect):
     bl_label = "Regions"
+    bl_options = set()
 
-    def draw(self, context):
-        layout = self.layout
-        scene, effect, strip = selection.active(context)
+    def draw_effect(self, layout: UILayout, scene: Scene, effect: PropertyGroup, strip: Strip) -> None:
+        layout.use_property_split = False
         shutter = selection.active_shutter(effect)
         own = [region for region in effect.regions if shutter and region.shutter == shutter.name]
         draw_list(layout, effect, "region", own)
@@ -29,8 +32,8 @@ class Regions(WithEffect):
             row = layout.row(align=True)
             row.operator_menu_enum("shutter.region_assign", "shutter", text=region.shutter, translate=False)
             row.prop(region, "kind", text="")
-            if region.kind in OF_KIND:
-                row.prop(region, OF_KIND[region.kind], text=None if region.kind == "LINE" else "")
+            if region.kind in _OF_KIND:
+                row.prop(region, _OF_KIND[region.kind], text=None if region.kind == "LINE" else "")
         layout.use_property_split = True
         if region is None or region.kind not in strips.LAID:
             layout.prop(effect, "edge_aware")
@@ -53,15 +56,14 @@ class Regions(WithEffect):
             sentence(layout, str(error), "ERROR")
 
 
-def _draw_matte(layout, look, region) -> None:
+def _draw_matte(layout: UILayout, look: matte_look.Look, region: PropertyGroup) -> None:
     """What the matte is, and what is wrong with it."""
     layout.prop(region, "matte")
     if region.matte == "IMAGE":
         layout.template_ID(region, "image", open="image.open")
         if region.image is not None:
             layout.prop(region.image, "source")
-        layout.prop(region, "timing")
-        layout.prop(region, "offset")
+        draw_properties(layout, region, "timing", "offset")
     elif region.matte == "STRIP":
         layout.prop_search(region, "strip_name", region.id_data.sequence_editor, "strips_all", text="Strip")
     else:
@@ -75,7 +77,7 @@ def _draw_matte(layout, look, region) -> None:
             sentence(layout, text, icon)
 
 
-def _draw_blend(layout, region) -> None:
+def _draw_blend(layout: UILayout, region: PropertyGroup) -> None:
     """How a matte or a ramp lies over what is beneath."""
     for name in ("opacity", "feather", "invert", "blend"):
         row = layout.row()
@@ -84,7 +86,7 @@ def _draw_blend(layout, region) -> None:
     layout.operator("shutter.matte_export")
 
 
-def draw_tracking(layout, index: int | None) -> None:
+def draw_tracking(layout: UILayout, index: int | None) -> None:
     """The buttons that track a region or the camera (selection.moving)."""
     row = layout.row(align=True)
     track = "shutter.track_camera" if index is None else "shutter.track"
@@ -96,7 +98,7 @@ def draw_tracking(layout, index: int | None) -> None:
     row.operator(f"{track}_look", text="", icon="VIEWZOOM")
 
 
-def tracking_icon(effect, index: int | None) -> str | None:
+def tracking_icon(effect: PropertyGroup, index: int | None) -> str | None:
     """Of what `draw_tracked` draws; None: nothing."""
     stops = track_region.stops(effect, index)
     if track_region.lost(effect, index) or any(is_fault for _, _, is_fault in stops):
@@ -105,7 +107,7 @@ def tracking_icon(effect, index: int | None) -> str | None:
     return "INFO" if is_tracked or stops else None
 
 
-def draw_tracked(layout, effect, index: int | None) -> None:
+def draw_tracked(layout: UILayout, effect: PropertyGroup, index: int | None) -> None:
     """How sure tracking of a region or the camera was of the current frame, where it was lost, and where it stopped."""
     look = "shutter.track_camera_look" if index is None else "shutter.track_look"
     confidence = track_region.confidence_at(effect, index, effect.id_data.frame_current)
@@ -129,7 +131,7 @@ def draw_tracked(layout, effect, index: int | None) -> None:
         button.frame = outline_drawings.nearest(effect, index, wrong[0])
 
 
-def _draw_camera_gaps(layout, effect) -> None:
+def _draw_camera_gaps(layout: UILayout, effect: PropertyGroup) -> None:
     """The frames at which the camera is not tracked."""
     for gap in track_region.gaps(effect, None):
         if math.isinf(gap.last):
@@ -141,60 +143,42 @@ def _draw_camera_gaps(layout, effect) -> None:
         sentence(layout, text.format(first=gap.first, last=gap.last), "INFO")
 
 
-def _active_region(context):
-    return selection.active_region(selection.active(context)[1])
-
-
 class _WithRegion(WithEffect):
+    """A panel of the active region."""
+
     @classmethod
-    def poll(cls, context):
-        return super().poll(context) and _active_region(context) is not None
+    def shows(cls, effect: PropertyGroup) -> bool:
+        return selection.active_region(effect) is not None
+
+    def draw_effect(self, layout: UILayout, _scene: Scene, effect: PropertyGroup, _strip: Strip) -> None:
+        self.draw_region(layout, selection.active_region(effect))
 
 
 class Transform(_WithRegion):
     bl_label = "Transform"
-    bl_options = {"DEFAULT_CLOSED"}
 
-    def draw(self, context):
-        layout = self.layout
-        layout.use_property_split = True
-        region = _active_region(context)
-        column = layout.column(align=True)
-        for name in ("location", "rotation", "scale"):
-            column.prop(region, name)
+    def draw_region(self, layout: UILayout, region: PropertyGroup) -> None:
+        draw_properties(layout.column(align=True), region, *_PLACEMENT)
         layout.operator("shutter.region_key", text="Insert Keyframes", icon="KEY_HLT")
 
 
 class Track(_WithRegion):
     bl_label = "Track"
     bl_translation_context = CONTEXT
-    bl_options = {"DEFAULT_CLOSED"}
 
     @classmethod
-    def poll(cls, context):
-        return super().poll(context) and _active_region(context).kind not in strips.MATTES
+    def shows(cls, effect: PropertyGroup) -> bool:
+        return super().shows(effect) and selection.active_region(effect).kind not in strips.MATTES
 
-    def draw(self, context):
-        layout = self.layout
-        layout.use_property_split = True
-        _draw_track_options(layout, _active_region(context))
-
-
-def _draw_track_options(layout, moving) -> None:
-    for name in ("motion", "track_until", "track_all_keys", "track_ends"):
-        layout.prop(moving, name)
+    def draw_region(self, layout: UILayout, region: PropertyGroup) -> None:
+        draw_properties(layout, region, *_TRACKING)
 
 
 class Follow(_WithRegion):
     bl_label = "Follow Track"
-    bl_options = {"DEFAULT_CLOSED"}
 
-    def draw(self, context):
-        layout = self.layout
-        layout.use_property_split = True
-        region = _active_region(context)
-        layout.prop(region, "follow_clip")
-        layout.prop(region, "follow_kind")
+    def draw_region(self, layout: UILayout, region: PropertyGroup) -> None:
+        draw_properties(layout, region, "follow_clip", "follow_kind")
         if region.follow_clip is not None:
             _draw_tracks(layout, region, region.follow_clip.tracking)
         if follow_track.is_changed(region):
@@ -204,7 +188,7 @@ class Follow(_WithRegion):
         row.operator("shutter.follow_update", text="Update", icon="FILE_REFRESH")
 
 
-def _draw_tracks(layout, region, tracking) -> None:
+def _draw_tracks(layout: UILayout, region: PropertyGroup, tracking: MovieTracking) -> None:
     layout.prop_search(region, "follow_object", tracking, "objects")
     objects = tracking.objects
     holder = objects.get(region.follow_object) if region.follow_object else objects[0]
@@ -217,22 +201,12 @@ class Camera(WithEffect):
     """Its numbers, and how they are found; the shutter that follows it has the buttons that track it."""
 
     bl_label = "Camera"
-    bl_options = {"DEFAULT_CLOSED"}
 
     @classmethod
-    def poll(cls, context):
-        return super().poll(context) and any(
-            shutter.follow == "CAMERA" for shutter in selection.active(context)[1].shutters
-        )
+    def shows(cls, effect: PropertyGroup) -> bool:
+        return any(shutter.follow == "CAMERA" for shutter in effect.shutters)
 
-    def draw(self, context):
-        layout = self.layout
-        layout.use_property_split = True
-        camera = selection.active(context)[1].camera
-        column = layout.column(align=True)
-        for name in ("location", "rotation", "scale"):
-            column.prop(camera, name)
-        layout.prop(camera, "influence")
-        _draw_track_options(layout, camera)
-        layout.prop(camera, "follow_clip")
+    def draw_effect(self, layout: UILayout, _scene: Scene, effect: PropertyGroup, _strip: Strip) -> None:
+        draw_properties(layout.column(align=True), effect.camera, *_PLACEMENT)
+        draw_properties(layout, effect.camera, "influence", *_TRACKING, "follow_clip")
         layout.operator("shutter.follow_stabilization", icon="TRACKER")

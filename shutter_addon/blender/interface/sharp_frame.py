@@ -7,9 +7,11 @@ the stroke. It is a setting of the previews, which files keep: before one is sav
 from dataclasses import dataclass
 
 import bpy
+from bpy.types import Context, SpaceSequenceEditor
 
 from ..data import preview_areas, selection, strips
 from ..rendering.previews import pen_is_down
+from .operator_bases import soon
 
 _TOOLS = "builtin.annotate"  # how the tools' names begin
 
@@ -27,7 +29,7 @@ class _Pen:
 _pen = _Pen()
 
 
-def take_up(context, tool: str) -> bool:
+def take_up(context: Context, tool: str) -> bool:
     """Makes a pen the tool of the previews, until a stroke is finished; whether there is a preview."""
     before = context.workspace.tools.from_space_sequencer("PREVIEW", create=False)
     if before is None or not before.idname.startswith(_TOOLS):
@@ -35,7 +37,7 @@ def take_up(context, tool: str) -> bool:
     return _choose(context, tool)
 
 
-def _choose(context, tool: str) -> bool:
+def _choose(context: Context, tool: str) -> bool:
     areas = list(preview_areas.previews(context))
     for window, area in areas:
         with context.temp_override(window=window, area=area, region=preview_areas.preview_region(area)):
@@ -44,7 +46,7 @@ def _choose(context, tool: str) -> bool:
     return bool(areas)
 
 
-def show(context) -> None:
+def show(context: Context) -> None:
     """Shows the source of the active effect, if that is beside it and not muted, where the pen draws for the effect."""
     active = selection.active(context)
     source = active and strips.nearest_source(*active)
@@ -58,7 +60,7 @@ def show(context) -> None:
             space.display_channel = _pen.channel
 
 
-def give_back(context) -> None:
+def give_back(context: Context) -> None:
     """The previews show the result again."""
     for _window, area in preview_areas.previews(context) if _pen.channel else ():
         if area.spaces.active.display_channel == _pen.channel:
@@ -76,12 +78,12 @@ def follow_pen() -> None:
     """For what draws a preview, which may change nothing: what the pen asks for comes right after."""
     was_down, _pen.is_down = _pen.is_down, pen_is_down()
     if _pen.is_down and not _pen.channel:
-        _soon(_show)
+        soon(_show)
     elif was_down and not _pen.is_down:
-        _soon(_lay_down)
+        soon(_lay_down)
 
 
-def is_shown(space) -> bool:
+def is_shown(space: SpaceSequenceEditor) -> bool:
     """Whether a preview shows the sharp frame for the pen."""
     return bool(_pen.channel) and space.display_channel == _pen.channel
 
@@ -110,11 +112,6 @@ _OWNER = object()  # of what Blender tells of tools
 TIMERS = (_show, _lay_down)
 
 
-def _soon(change) -> None:
-    if not bpy.app.timers.is_registered(change):
-        bpy.app.timers.register(change)
-
-
 def listen() -> None:
     """Asks Blender to tell of tools; it forgets that with every file that is opened."""
     tools = bpy.types.WorkSpace, "tools"
@@ -122,10 +119,10 @@ def listen() -> None:
     bpy.msgbus.subscribe_rna(key=tools, owner=_OWNER, args=(), notify=_tool_chosen)
 
 
-def register():
+def register() -> None:
     listen()
 
 
-def unregister():
+def unregister() -> None:
     bpy.msgbus.clear_by_owner(_OWNER)
     give_back(bpy.context)

@@ -1,36 +1,28 @@
 """Operators that key a region or the camera by the footage: as what is seen moves, or as a movie clip's tracks do; and
-those that make a panning shot of that, or a tripod."""
+those that make layers of regions, a panning shot, or a tripod."""
 
 import math
 import time
-from typing import Any
 
 import bpy
 from bpy.app.translations import pgettext_rpt as rpt_
 from bpy.props import EnumProperty, IntProperty
-from bpy.types import Operator
+from bpy.types import Context, Event, Operator, PropertyGroup, Scene, Strip
 
 from ...core.model.choices import CONTEXT
 from ..data import selection, validation
-from ..editing import (
-    bar_edits,
-    follow_stabilization,
-    follow_track,
-    layer_presets,
-    panning_shot,
-    track_region,
-    tripod,
-)
+from ..editing import bar_edits, follow_stabilization, follow_track, layer_presets, track_region
 from ..rendering.effect_source import FAULTS
 from .operator_bases import (
+    Beside,
     Mixin,
     OfEffect,
     OfRegion,
     OfShutter,
     OfStrokes,
+    is_escape,
+    own_classes,
     redraw,
-    refused,
-    report_error,
     report_warning,
 )
 
@@ -55,49 +47,56 @@ _DIRECTION = EnumProperty(
 )
 
 
-class _Tracks(Mixin):
-    """Tracks what has an `index`, as for selection.moving, from the current frame in a `direction` of DIRECTIONS."""
+def _index(operator: Operator, effect: PropertyGroup) -> int | None:
+    """What an operator works on, as for selection.moving: the active region, or the camera."""
+    return effect.active_region if isinstance(operator, OfRegion) else None
+
+
+class _Tracks(Beside):
+    """Tracks the active region, or the camera, from the current frame in a `direction` of DIRECTIONS."""
 
     bl_options = {"UNDO"}
     only_seen = True
 
-    def index(self, effect) -> int | None:
-        return effect.active_region
-
-    def is_ready(self, scene, effect, strip) -> bool:
+    def is_ready(self, scene: Scene, effect: PropertyGroup, strip: Strip) -> bool:
         """Whether nothing has to be tracked. EffectError: what comes after tracking cannot be done."""
         return False
 
-    def ended(self, context) -> None:
+    def ended(self, context: Context) -> None:
         """Called once all is tracked, and not after Esc. EffectError: what comes after tracking cannot be done."""
 
-    def invoke(self, context, _event):
-        return self._run(context, float("inf") if bpy.app.background else _TICK)
+    def invoke(self, context: Context, _event: Event) -> set[str]:
+        return self.tried(self._run, context, math.inf if bpy.app.background else _TICK)
 
-    def execute(self, context):
-        return self._run(context, float("inf"))
+    def execute(self, context: Context) -> set[str]:
+        return self.tried(self._run, context, math.inf)
 
-    def _run(self, context, seconds: float):
+    def _run(self, context: Context, seconds: float) -> set[str]:
         """Tracks for a while, and then whenever Blender has time."""
-        try:
-            self._begin(context, None if math.isinf(seconds) else _PATIENCE)
-            goes_on = self._go_on(seconds)
-        except FAULTS as error:
-            report_error(self, str(error))
-            return {"CANCELLED"}
-        if not goes_on:
+        scene, effect, strip = selection.active(context)
+        index = _index(self, effect)
+        moving, patience = selection.moving(effect, index), None if math.isinf(seconds) else _PATIENCE
+        self._target, self._start = track_region.Target.of(effect, index), scene.frame_current
+        self._done: set[int] = set()
+        if self.is_ready(scene, effect, strip):
             return self._finish(context)
-        self._timer = context.window_manager.event_timer_add(_TICK, window=context.window)
+        self._frames = track_region.frames_to_track(scene, strip, self.direction, moving.track_until)
+        motion, all_keys = validation.word(moving, "motion"), moving.track_all_keys
+        self._frame = self._start
+        self._steps = track_region.track(
+            scene, effect, strip, index, self._frames, motion, all_keys=all_keys, patience=patience
+        )
+        if not self._go_on(seconds):
+            return self._finish(context)
         context.window_manager.progress_begin(0, len(self._frames))
-        context.window_manager.modal_handler_add(self)
         self._show(context)
-        return {"RUNNING_MODAL"}
+        return self.go_on(context, _TICK)
 
-    def modal(self, context, event):
+    def modal(self, context: Context, event: Event) -> set[str]:
         if self._target.effect() is None:  # undone or removed in another window, or another file was loaded
             self.cancel(context)
             return {"CANCELLED"}
-        is_stopped = is_ended = event.type == "ESC" and event.value == "PRESS"
+        is_stopped = is_ended = is_escape(event)
         if event.type == "TIMER":
             # What it takes to draw a frame, tracking takes as well, unless Esc would have to wait.
             try:
@@ -113,40 +112,19 @@ class _Tracks(Mixin):
             self._go_to(self._start)
         return self._finish(context, is_stopped)
 
-    def _finish(self, context, is_stopped: bool = False):
+    def _finish(self, context: Context, is_stopped: bool = False) -> set[str]:
         self._tell()
-        try:
-            if not is_stopped and self._target.effect() is not None:
-                self.ended(context)
-        except FAULTS as error:
-            report_error(self, str(error))
-            if not self._done:
-                return {"CANCELLED"}
+        has_ended = not is_stopped and self._target.effect() is not None
+        if has_ended and self.tried(self.ended, context) == {"CANCELLED"} and not self._done:
+            return {"CANCELLED"}
         redraw(context)
         return {"FINISHED"}  # what was tracked can be undone
 
-    def cancel(self, context):
+    def cancel(self, context: Context) -> None:
         """It has ended, or its window was closed."""
         self._steps.close()
-        context.window_manager.event_timer_remove(self._timer)
         context.window_manager.progress_end()
-        context.workspace.status_text_set(None)
-
-    def _begin(self, context, patience: float | None):
-        scene, effect, strip = selection.active(context)
-        index = self.index(effect)
-        moving = selection.moving(effect, index)
-        self._target, self._start = track_region.Target.of(effect, index), scene.frame_current
-        self._done: set[int] = set()
-        self._steps: Any = iter(())
-        if self.is_ready(scene, effect, strip):
-            return
-        self._frames = track_region.frames_to_track(scene, strip, self.direction, moving.track_until)
-        motion, all_keys = validation.word(moving, "motion"), moving.track_all_keys
-        self._frame = self._start
-        self._steps = track_region.track(
-            scene, effect, strip, index, self._frames, motion, all_keys=all_keys, patience=patience
-        )
+        super().cancel(context)
 
     def _go_on(self, seconds: float) -> bool:
         """Tracks for a while; whether there is more to track. One of FAULTS: there is nothing to track at all."""
@@ -164,11 +142,11 @@ class _Tracks(Mixin):
             report_warning(self, str(error))
         return False
 
-    def _go_to(self, frame: int):
+    def _go_to(self, frame: int) -> None:
         if (effect := self._target.effect()) is not None:
             effect.id_data.frame_set(frame)
 
-    def _show(self, context):
+    def _show(self, context: Context) -> None:
         self._go_to(self._frame)
         done, total = len(self._done), len(self._frames) - 1
         context.window_manager.progress_update(done)
@@ -177,7 +155,7 @@ class _Tracks(Mixin):
         redraw(context)
         self._shown = time.perf_counter()
 
-    def _tell(self):
+    def _tell(self) -> None:
         if (effect := self._target.effect()) is None or not self._done:
             return
         sentence = rpt_("Frames {first} to {last} are tracked")
@@ -197,26 +175,17 @@ class _Tracks(Mixin):
                     self.report({"INFO"}, words)
 
 
-class _OfCamera:
-    """The camera, in place of a region."""
-
-    def index(self, _effect):
-        return None
-
-
 class SHUTTER_OT_track(_Tracks, OfStrokes, Operator):
     """Key the active region by what it covers here, up to your own keys (Esc stops and keeps the tracked frames)"""
 
-    bl_idname = "shutter.track"
     bl_label = "Track Region"
 
     direction: _DIRECTION
 
 
-class SHUTTER_OT_track_camera(_OfCamera, _Tracks, OfEffect, Operator):
+class SHUTTER_OT_track_camera(_Tracks, OfEffect, Operator):
     """Key the camera by what the regions leave free, up to your own keys (Esc stops and keeps the tracked frames)"""
 
-    bl_idname = "shutter.track_camera"
     bl_label = "Track Camera"
 
     direction: _DIRECTION
@@ -225,31 +194,29 @@ class SHUTTER_OT_track_camera(_OfCamera, _Tracks, OfEffect, Operator):
 class SHUTTER_OT_panning_shot(_Tracks, OfStrokes, Operator):
     """Keep the active region sharp while all else streaks past it (tracks the region unless it has keys)"""
 
-    bl_idname = "shutter.panning_shot"
     bl_label = "Panning Shot"
 
     direction = "BOTH"
 
-    def is_ready(self, scene, effect, strip):
-        return panning_shot.is_ready(scene, effect, strip, effect.active_region)
+    def is_ready(self, scene: Scene, effect: PropertyGroup, strip: Strip) -> bool:
+        return layer_presets.can_pan(scene, effect, strip, effect.active_region)
 
-    def ended(self, context):
+    def ended(self, context: Context) -> None:
         layer_presets.panning_shot(self._target.effect(), self._target.index, bar_edits.auto_key(context))
 
 
-class SHUTTER_OT_tripod(_OfCamera, _Tracks, OfShutter, Operator):
+class SHUTTER_OT_tripod(_Tracks, OfShutter, Operator):
     """Expose for long as if the camera had stood still (tracks the camera unless it has keys)"""
 
-    bl_idname = "shutter.tripod"
     bl_label = "Stabilize Exposure"
 
     direction = "BOTH"
 
-    def is_ready(self, _edit, effect, _strip):
-        return tripod.is_ready(effect)
+    def is_ready(self, _edit: Scene, effect: PropertyGroup, _strip: Strip) -> bool:
+        return layer_presets.can_stand(effect)
 
-    def ended(self, context):
-        tripod.set_up(self._target.effect(), bar_edits.auto_key(context))
+    def ended(self, context: Context) -> None:
+        layer_presets.tripod(self._target.effect(), bar_edits.auto_key(context))
 
 
 class _Looks(Mixin):
@@ -263,98 +230,88 @@ class _Looks(Mixin):
         options={"SKIP_SAVE"},
     )
 
-    def index(self, effect) -> int | None:
-        return effect.active_region
-
-    def change(self, _context, effect):
-        scene = effect.id_data
-        if self.properties.is_property_set("frame"):
-            scene.frame_set(self.frame)
-            return {"FINISHED"}
-        frame = track_region.next_unsure(effect, self.index(effect), scene.frame_current)
+    def change(self, _context: Context, effect: PropertyGroup) -> set[str] | None:
+        frame: int | None = self.frame
+        if not self.properties.is_property_set("frame"):
+            frame = track_region.next_unsure(effect, _index(self, effect), self.edit.frame_current)
         if frame is None:
             self.report({"INFO"}, "No other stretch of unsure frames lies ahead")
             return {"CANCELLED"}
-        scene.frame_set(frame)
-        return {"FINISHED"}
+        self.edit.frame_set(frame)
+        return None
 
 
 class SHUTTER_OT_track_look(_Looks, OfRegion, Operator):
     """Go to a frame that tracking is not sure of"""
 
-    bl_idname = "shutter.track_look"
     bl_label = "Next Unsure Frame"
 
 
-class SHUTTER_OT_track_camera_look(_OfCamera, _Looks, OfEffect, Operator):
+class SHUTTER_OT_track_camera_look(_Looks, OfEffect, Operator):
     """Go to a frame that tracking of the camera is not sure of"""
 
-    bl_idname = "shutter.track_camera_look"
     bl_label = "Next Unsure Camera Frame"
 
 
-class _Follows(Mixin):
-    """Keys a region or the camera by what it is set to follow."""
-
-    def change(self, context, effect):
-        self.key(*selection.active(context))
-
-
-class SHUTTER_OT_follow(_Follows, OfStrokes, Operator):
+class SHUTTER_OT_follow(OfStrokes, Operator):
     """Key the active region by a track of a movie clip, from where the region is at this frame"""
 
-    bl_idname = "shutter.follow"
     bl_label = "Follow Track"
 
-    def key(self, scene, effect, strip):
-        follow_track.follow(scene, effect, strip, effect.active_region)
-
     @classmethod
-    def possible(cls, effect):
-        if not super().possible(effect):
-            return False
-        return selection.active_region(effect).follow_clip is not None or refused(cls, rpt_("Choose a clip first"))
+    def why_not(cls, effect: PropertyGroup) -> str | None:
+        if sentence := super().why_not(effect):
+            return sentence
+        return None if selection.active_region(effect).follow_clip is not None else rpt_("Choose a clip first")
+
+    def change(self, _context: Context, effect: PropertyGroup) -> None:
+        follow_track.follow(self.edit, effect, self.effect_strip, effect.active_region)
 
 
-class SHUTTER_OT_follow_update(_Follows, OfStrokes, Operator):
+class SHUTTER_OT_follow_update(OfStrokes, Operator):
     """Key the active region anew by what it follows, after the track has changed"""
 
-    bl_idname = "shutter.follow_update"
     bl_label = "Update Followed Track"
 
-    def key(self, scene, effect, strip):
-        follow_track.update(scene, effect, strip, effect.active_region)
-
     @classmethod
-    def possible(cls, effect):
-        if not super().possible(effect):
-            return False
-        return bool(selection.active_region(effect).follow_stamp) or refused(
-            cls, rpt_("The region follows no track yet")
-        )
+    def why_not(cls, effect: PropertyGroup) -> str | None:
+        if sentence := super().why_not(effect):
+            return sentence
+        return None if selection.active_region(effect).follow_stamp else rpt_("The region follows no track yet")
+
+    def change(self, _context: Context, effect: PropertyGroup) -> None:
+        follow_track.update(self.edit, effect, self.effect_strip, effect.active_region)
 
 
-class SHUTTER_OT_follow_stabilization(_Follows, OfEffect, Operator):
+class SHUTTER_OT_follow_stabilization(OfEffect, Operator):
     """Key the camera by the 2D stabilization of a movie clip, from where the camera is at this frame"""
 
-    bl_idname = "shutter.follow_stabilization"
     bl_label = "Follow Stabilization"
 
-    key = staticmethod(follow_stabilization.follow)
-
     @classmethod
-    def possible(cls, effect):
-        return effect.camera.follow_clip is not None or refused(cls, rpt_("Choose a clip first"))
+    def why_not(cls, effect: PropertyGroup) -> str | None:
+        return None if effect.camera.follow_clip is not None else rpt_("Choose a clip first")
+
+    def change(self, _context: Context, effect: PropertyGroup) -> None:
+        follow_stabilization.follow(self.edit, effect, self.effect_strip)
 
 
-classes = (
-    SHUTTER_OT_track,
-    SHUTTER_OT_track_camera,
-    SHUTTER_OT_panning_shot,
-    SHUTTER_OT_tripod,
-    SHUTTER_OT_track_look,
-    SHUTTER_OT_track_camera_look,
-    SHUTTER_OT_follow,
-    SHUTTER_OT_follow_update,
-    SHUTTER_OT_follow_stabilization,
-)
+class SHUTTER_OT_sharp_subject(OfRegion, Operator):
+    """Keep the active region sharp before all else, which is exposed for long and without it"""
+
+    bl_label = "Sharp Subject"
+
+    def change(self, context: Context, effect: PropertyGroup) -> None:
+        layer_presets.sharp_subject(effect, effect.active_region, bar_edits.auto_key(context))
+
+
+class SHUTTER_OT_clean_trail(OfRegion, Operator):
+    """Have the active region leave a trail before all else, which stays sharp"""
+
+    bl_label = "Trail"
+
+    def change(self, context: Context, effect: PropertyGroup) -> None:
+        layer_presets.clean_trail(effect, effect.active_region, bar_edits.auto_key(context))
+
+
+classes = own_classes(globals())

@@ -1,0 +1,68 @@
+"""What gizmos in previews and their groups share; and the groups' keymaps, which Blender leaves behind."""
+
+import bpy
+import numpy as np
+from bpy.types import Context, Gizmo, KeyConfig, KeyMap, PropertyGroup, Region, Strip
+
+from ...core.model.scribbles import mapped
+from ..data import annotations, geometry
+from .operator_bases import Mixin
+
+TWEAK = ("gizmogroup.gizmo_tweak", "LEFTMOUSE", "PRESS", {"any": True})
+
+_made: set[str] = set()  # of which groups
+
+
+class Dragged(Mixin):
+    """A gizmo that is drawn while it is dragged as well."""
+
+    def setup(self) -> None:
+        self.use_draw_modal = True
+
+
+class InPreview(Mixin):
+    """A group in previews of a single gizmo."""
+
+    bl_space_type = "SEQUENCE_EDITOR"
+    bl_region_type = "PREVIEW"
+    bl_options = {"PERSISTENT"}
+    gizmo: type[Gizmo]
+
+    def setup(self, _context: Context) -> None:
+        self.gizmos.new(self.gizmo.__name__)
+
+
+class WithKeys(InPreview):
+    """A group with a keymap, in which Blender's own key for the pen is the pen's still.
+
+    shortcuts: operator, type and value of the event, and what else Blender has of a key"""
+
+    shortcuts: tuple[tuple[str, str, str, dict], ...] = (TWEAK,)
+
+    @classmethod
+    def setup_keymap(cls, keyconfig: KeyConfig) -> KeyMap:
+        _made.add(cls.__name__)
+        keymap = keyconfig.keymaps.new(cls.__name__, space_type=cls.bl_space_type, region_type="WINDOW")
+        pen = keymap.keymap_items.new("gpencil.annotate", "LEFTMOUSE", "PRESS", key_modifier="D")
+        pen.properties.mode, pen.properties.wait_for_input = "DRAW", False
+        for *event, more in cls.shortcuts:
+            keymap.keymap_items.new(*event, **more)
+        return keymap
+
+
+def to_region(effect: PropertyGroup, strip: Strip, region: Region) -> np.ndarray:
+    """Matrix from fractions of an effect's picture to pixels of a preview's region."""
+    return geometry.picture_to_region(strip, annotations.picture_size(effect), region)
+
+
+def on_picture(matrix: np.ndarray, x: float, y: float) -> np.ndarray:
+    """A point of a region, in fractions of the picture; matrix: as to_region."""
+    return mapped(np.linalg.inv(matrix), np.array([(x, y)], np.float64))[0]
+
+
+def unregister() -> None:
+    """Once the groups are gone."""
+    keyconfigs = bpy.context.window_manager.keyconfigs
+    for keyconfig in filter(None, (keyconfigs.default, keyconfigs.user)):
+        for keymap in [keymap for keymap in keyconfig.keymaps if keymap.name in _made]:
+            keyconfig.keymaps.remove(keymap)
