@@ -306,6 +306,27 @@ def test_pasted_strips_have_their_effect(bpy, edit, add, images, render, cut):
     assert len(set(identities)) == len(identities)
 
 
+def test_a_shared_camera_goes_with_the_last_effect(bpy, edit, add):
+    """Parts of a cut strip share it, even where the first has gone and come back with a camera of its own."""
+    first = add()
+    second = first.split(11, "SOFT")
+    update(bpy)
+    assert first.scene.camera == second.scene.camera
+    for s in edit.sequence_editor.strips:
+        s.select = s == first
+    with sequencer(bpy) as area, bpy.context.temp_override(region=area.regions[-1]):
+        bpy.ops.sequencer.copy()
+        bpy.ops.sequencer.delete()
+        update(bpy)
+        edit.frame_set(101)
+        bpy.ops.sequencer.paste()
+    update(bpy)
+    assert census(bpy)["cameras"] == 2
+    edit.sequence_editor.strips.remove(second)
+    update(bpy)
+    assert census(bpy) == {"scenes": 2, "cameras": 1, "objects": 1, "annotations": 1, "actions": 1}
+
+
 def test_a_cut_strip_pasted_into_another_edit(bpy, edit, add, render):
     add()
     before = render(edit, [5])[5]

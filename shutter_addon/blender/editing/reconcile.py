@@ -103,9 +103,7 @@ def _find_action(scene: Scene) -> None:
 
 def _find_scenes(scenes: list[Scene]) -> None:
     """Effects and strips that lost their effect scene, or were pasted without, get it by its identity."""
-    every = [scene for scene in bpy.data.scenes if scene.render.engine == strips.ENGINE]
-    known = {scene.virtual_shutter.identity: scene for scene in reversed(every)}  # linked ones come last
-    known.pop("", None)
+    known = {scene.virtual_shutter.identity: scene for scene in reversed(_oldest_first(_effect_scenes()))}
     for scene in scenes:
         for effect in scene.virtual_shutter.effects:
             is_lost = effect.scene is None or effect.scene.virtual_shutter.identity != effect.identity
@@ -375,7 +373,8 @@ def _remove_left() -> None:
     for made in (*bpy.data.annotations, *bpy.data.cameras):
         if made.library is not None or made in used or not shown_annotations.is_own(made):
             continue
-        if made.virtual_shutter_made not in identities:
+        # Copies of an effect scene share its camera, which may outlive that whose identity it has.
+        if made.virtual_shutter_made not in identities or isinstance(made, bpy.types.Camera):
             shown_annotations.let_go(made)
             bpy.data.batch_remove([each for each in bpy.data.objects if each.data == made and not each.users])
             if not made.users:
