@@ -244,14 +244,12 @@ def _ratio(a: np.ndarray, b: np.ndarray) -> np.ndarray:
 
 
 def _prolonged(grid: _Grid, coarse: np.ndarray) -> np.ndarray:
-    total = np.zeros((len(coarse), *grid.shape), np.float32)
+    height, width = grid.shape
+    doubled = np.pad(coarse, ((0, 0), (0, 1), (0, 1)), mode="edge").repeat(2, axis=1).repeat(2, axis=2)
+    total = np.zeros((len(coarse), height, width), np.float32)
     for (b, a), weights in grid.takes.items():
         stopping.check()
-        rows, columns = (
-            np.minimum(np.arange(n) // 2 + k, count - 1)
-            for n, k, count in zip(grid.shape, (b, a), coarse.shape[1:], strict=True)
-        )
-        total += weights * coarse[:, rows][:, :, columns]
+        total += weights * doubled[:, 2 * b : 2 * b + height, 2 * a : 2 * a + width]
     return total
 
 
@@ -262,7 +260,8 @@ def _restricted(grid: _Grid, values: np.ndarray) -> np.ndarray:
     for (b, a), weights in grid.takes.items():
         stopping.check()
         shares = np.pad(weights * values, ((0, 0), (0, grid.shape[0] % 2), (0, grid.shape[1] % 2)))
-        total[:, b : b + height, a : a + width] += shares.reshape(len(values), height, 2, width, 2).sum(axis=(2, 4))
+        rows = shares[:, ::2] + shares[:, 1::2]
+        total[:, b : b + height, a : a + width] += rows[:, :, ::2] + rows[:, :, 1::2]
     return total[:, :height, :width]
 
 
