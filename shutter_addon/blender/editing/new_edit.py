@@ -10,6 +10,7 @@ from bpy.types import Scene, SequenceEditor, Strip
 
 from ...core.frames.frame_source import FrameSource
 from ...core.model.effect import Effect
+from ...core.model.keyframes import SourceTime
 from ...core.model.limits import MAX_FRAME
 from ..data import recipe_import
 from ..data.property_copy import for_a_while
@@ -55,8 +56,9 @@ def make_source(path: Path, medium: FrameSource) -> Strip:
 def length(medium: FrameSource, source_recipe: Effect) -> int:
     """How many timeline frames the edit has: the source's, and more where its time is keyed beyond them; as many as
     Blender has at most."""
-    keys = source_recipe.time.keys if source_recipe.time else ()
-    return min(max([medium.count, *(math.ceil(frame) for frame, _ in keys)]), MAX_FRAME)
+    time = source_recipe.time
+    keys = [math.ceil(frame) for frame, _ in time.keys] if isinstance(time, SourceTime) else []
+    return min(max([medium.count, *keys]), MAX_FRAME)
 
 
 def _add_source(editor: SequenceEditor, path: Path, medium: FrameSource) -> Strip:
