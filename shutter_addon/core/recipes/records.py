@@ -72,7 +72,7 @@ def _type_of(each: Field) -> Any:
 
 def _record(name: str, kinds: tuple[type, ...], **special: tuple[Any, Any]) -> type:
     """Build a class of what a recipe says: fields of the model, and special ones, by name their type and default."""
-    said = {name: special[name] for name in ("version", "kind") if name in special}
+    said: dict[str, Any] = {name: special[name] for name in ("version", "kind") if name in special}
     said |= {each.recipe: (_type_of(each), each.absent) for each in fields_of(*kinds).values() if each.recipe} | special
     columns: list[Any] = []
     for word, (kind, default) in said.items():
