@@ -97,6 +97,7 @@ def composition(way: str, groups: int, stored: str, edges: int, light: LightForm
     return read_pass(
         f"compose_{way}",
         MOVED=0,
+        VALUE=int(way == "value"),
         PACKED=0,
         CONTINUED=0,
         UNFINISHED=0,
@@ -127,6 +128,7 @@ def composition_of_moved(way: str, moved: Moved, light: LightFormat) -> Pass:
     return read_pass(
         f"compose_{way}",
         MOVED=1,
+        VALUE=int(way == "value"),
         PACKED=int(moved.packed),
         CONTINUED=int(moved.continued),
         UNFINISHED=int(moved.unfinished),
