@@ -66,6 +66,7 @@ CLEAR = 1 / 16  # less than this of what lies behind layers is too little
 UNCOVERED = 1 - 2e-5  # where more of it is seen, no layer is in the way
 SEEN, BORROWED = 0.9, 63 / 64  # what another frame has to show to be taken, and how much that counts
 ROUNDING = 1e-5  # in float32, of weights and times
+HALFWAY = 2e-4  # of a level: so near the middle of two, float32 cannot tell which is the nearest
 HALVINGS = 44  # of the bisection: what is left is far below what float32 holds
 
 
@@ -744,9 +745,11 @@ def uncovered(recipe, frame, footage, index, direction, layers):
             share[found] = (seen + (1 - seen) * BORROWED)[found]
             lacks = lacks & ~found
         colour = to_encoded(mixed[..., :3]) if footage.transfer == "srgb" else mixed[..., :3]
-        if footage.levels:
-            colour = np.rint(colour.clip(0, 1) * footage.levels) / footage.levels
         changed = share != clear[source]
+        if footage.levels:
+            levels = colour.clip(0, 1) * footage.levels
+            doubtful[source] += changed & (np.abs(levels % 1 - 0.5) < HALFWAY).any(axis=-1)
+            colour = np.rint(levels) / footage.levels
         samples[source][changed, :3] = colour[changed]
         counts[source] = share
     return footage._replace(samples=samples), counts, doubtful
