@@ -28,8 +28,8 @@ What neither the paper nor the manual says is taken from the product; these are 
   picture to the opposite one; a feather is a Gaussian of a quarter of its width, of which a pixel has what it covers;
 - of shutters that combine alike, the lightest and darkest frames are weighted by the displaced bars over the mixed
   peak of theirs; a median at exactly half of all weights is the mean of both its neighbours;
-- a premultiplied colour without cover (alpha 0) is light that is added to what lies below (as in Blender). What it is
-  among encoded values, nothing says; there this is no reference.
+- a premultiplied colour without cover (alpha 0) is light that is added to what lies below (as in Blender), and to a
+  threshold as light as a layer has of it. What it is among encoded values, nothing says; there this is no reference.
 
 A recipe is its JSON as a dictionary. Pictures are (H, W, 4) float64 with the top row first, scene-linear and
 premultiplied; coefficients are (N, h, w), of the pixels or of the blocks that share a shutter.
@@ -829,7 +829,8 @@ def exposed(recipe, frame, footage, index, direction, given, weights=None):
             plain = recipe | {"light": "linear", "exposure": "normalized"}
             seen = [f if f is None else summed(footage, f, "linear") for f in frames]
             shares = [
-                f if f is None else whole(sight) * of[f][..., None] for f, sight in zip(frames, seen, strict=True)
+                f if f is None else whole(sight * of[f][..., None]) * of[f][..., None]
+                for f, sight in zip(frames, seen, strict=True)
             ]
             cover = one_way(plain, way, window, shares)[0][..., 3]
         total += of_pixels(share)[..., None] * made
