@@ -7,7 +7,7 @@
 // i mod `layers`; or with SUMS the running sums instead, from position `lowest` on, the shot's ends extended: position
 // i's in that layer.
 // With MOVED shutters follow something: see moved.glsl.
-// COMBINE: frames are not averaged (combine.glsl); 0: they are.
+// COMBINE: frames are not averaged (combine.glsl); 0: they are. VALUE: bars are mixed by value (compose_value.glsl).
 // GROUPS of four shutters, TILED, EDGES, DECODE, PREMULTIPLIED, ENCODED: see compute/composition_passes.py. Software renderers run both
 // sides of every branch: what is costly stands in loops or behind these definitions.
 layout(local_size_x = 64) in;
@@ -159,7 +159,12 @@ void start_quad(int quad) {
   centre[quad] = vec4(0.0);
   start_light(quad);
 #if COMBINE == 1 || COMBINE == 2
+#  if VALUE
+  gain[quad] = vec4(1.0);
+  centre[quad] = mixed(quad, 0, 0);  // these weights count, but their sum is not 1
+#  else
   gain[quad] = mixed(quad, 0, 0);
+#  endif
 #endif
 }
 
@@ -220,7 +225,7 @@ void expose(int quad, int frame, vec4 weight) {
 #if EDGES == 2  // shorten
 #  if COMBINE == 3
   centre[quad] += scan == 0 ? weight * (float(frame) + 0.5) : vec4(0.0);
-#  else
+#  elif !VALUE
   centre[quad] += weight * (float(frame) + 0.5);
 #  endif
   int index = origin + direction * frame;

@@ -184,7 +184,9 @@ void fold_sight(int quad, int frame) {
 void expose(int quad, int frame, vec4 weight) {
   int row = frame * motions + motion;
   vec4 place = imageLoad(moves, ivec3(0, row, 0));
+#if !COMBINE || !VALUE
   centre[quad] += weight * (float(frame) + 0.5);
+#endif
   weight *= place.y;
 #if COMBINE
   weight *= gain[quad];

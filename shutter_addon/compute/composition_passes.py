@@ -77,6 +77,7 @@ def composition(way: str, groups: int, stored: str, edges: int, light: LightForm
     return read_pass(
         f"compose_{way}",
         MOVED=0,
+        VALUE=int(way == "value"),
         PACKED=0,
         CONTINUED=0,
         UNFINISHED=0,
@@ -125,6 +126,7 @@ def composition_of_moved(
     return read_pass(
         f"compose_{way}",
         MOVED=1,
+        VALUE=int(way == "value"),
         PACKED=int(packed),
         CONTINUED=int(continued),
         UNFINISHED=int(unfinished),

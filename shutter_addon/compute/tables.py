@@ -21,7 +21,8 @@ def padded(values: np.ndarray) -> np.ndarray:
 def table(state: FrameState) -> np.ndarray:
     """The table (1 + rows, columns, 4) float32 that shaders/include/compose.glsl describes.
 
-    Row 0: the gains; of the lightest and the darkest what makes the highest weight 1 (core.pixels.combined).
+    Row 0: the gains; of the lightest and the darkest what makes the highest weight 1 (core.pixels.combined), by value
+    the middle of the shutters' times.
     Displacement: a row per piece of the quantiles: starts, ends, then dz, the time by which the shutters differ at most
     at either, and z at its start. Value: a row per frame of the shutters' open span, how much it counts.
     """
@@ -51,9 +52,12 @@ def _pieces_of(content: bytes, dtype: np.dtype, shape: tuple[int, ...]) -> np.nd
 
 def _gains(state: FrameState) -> np.ndarray:
     (combine,) = state.groups
-    if combine.mode not in ("lightest", "darkest") or state.options.interpolation == "value":
+    if combine.mode not in ("lightest", "darkest"):
         return state.gains
-    return state.bars.sum(axis=1) / state.bars.max(axis=1)
+    exposures = state.bars.sum(axis=1)
+    if state.options.interpolation == "value":
+        return state.bars @ (np.arange(state.bars.shape[1]) + 0.5) / exposures
+    return exposures / state.bars.max(axis=1)
 
 
 def _bars(state: FrameState) -> np.ndarray:

@@ -97,6 +97,19 @@ def test_all_that_is_exposed_is_left_out(device, mode, kind, index, position):
 
 
 @pytest.mark.parametrize("follows", [False, True])
+@pytest.mark.parametrize("combines", [(LIGHTEST,), (DARKEST, DARKEST), (MEDIAN, MEDIAN)])
+def test_the_middle_of_what_is_left_out_is_that_of_an_average(device, combines, follows):
+    """Of several bars that all count 1, which of two frames is the nearest."""
+    rng = np.random.default_rng(11)
+    moment = combining(rng, *combines, interpolation="value", edges="shorten", position="end")
+    moment.bars[:] = [[0, 0.7, 0.7, 0.7, 0.7, 0, 0, 0, 0], [0, 0, 0, 0.2, 0.2, 0, 0, 0, 0]][: len(combines)]
+    if follows:
+        shifts = np.arange(20)[:, None] * np.linspace(0.7, 0.3 - 0.3j, len(combines))
+        moment = dataclasses.replace(moment, following=Following(0, np.ones_like(shifts), shifts))
+    check(device, footage(rng), moment, 18, -1)
+
+
+@pytest.mark.parametrize("follows", [False, True])
 def test_the_shown_frame_may_be_left_out(device, follows):
     """Played in reverse, a filmed frame begins with its last in-between frame, which the clip's end does not have."""
     rng = np.random.default_rng(6)

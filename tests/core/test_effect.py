@@ -1,5 +1,7 @@
 """The effect as plain data: channels, and what is wrong at one frame alone."""
 
+import dataclasses
+
 import numpy as np
 import pytest
 
@@ -119,6 +121,8 @@ def test_time_that_stands_still_runs_as_it_came():
     assert time.at(40) == (5, True)
     jump = SourceTime(Keys((1.0, 11.0), (10.0, 5.0), ("constant",) * 2), ((1.0, "constant"), (11.0, "constant")))
     assert jump.at(20) == (5, False)
+    still = dataclasses.replace(time, numbers=Keys(frames, (2.8467, 2.8467, 7.0), eases))
+    assert {still.at(frame / 2) for frame in range(2, 22)} == {(2.8467, False)}
 
 
 def test_strokes_lie_where_their_placement_has_them():

@@ -21,14 +21,15 @@ What neither the paper nor the manual says is taken from the product; these are 
   are laid over one another in linear light; weighted frames are seen linearly between pixels; where no layer is in the
   way, all is as without them;
 - where the camera has keys that move, what layers cover of opaque footage is, in each exposed frame, that of the
-  nearest frame which shows nine tenths of it, the earlier of two, and counts by a 64th less than what is seen;
+  nearest frame which shows nine tenths of it, the earlier of two, and counts by a 64th less than what is seen; both
+  together count by a 1024th less than a frame in whose way no layer is, so that it is taken however little it is;
 - what an outline covers of a pixel is told by eight lines across it, each to its exact places;
 - mattes lie over what scribbles give, whichever comes first in the list; a ramp at rest runs from one corner of the
   picture to the opposite one; a feather is a Gaussian of a quarter of its width, of which a pixel has what it covers;
 - of shutters that combine alike, the lightest and darkest frames are weighted by the displaced bars over the mixed
   peak of theirs; a median at exactly half of all weights is the mean of both its neighbours;
-- a premultiplied colour without cover (alpha 0) is light that is added to what lies below (as in Blender). What it is
-  among encoded values, nothing says; there this is no reference.
+- a premultiplied colour without cover (alpha 0) is light that is added to what lies below (as in Blender), and to a
+  threshold as light as a layer has of it. What it is among encoded values, nothing says; there this is no reference.
 
 A recipe is its JSON as a dictionary. Pictures are (H, W, 4) float64 with the top row first, scene-linear and
 premultiplied; coefficients are (N, h, w), of the pixels or of the blocks that share a shutter.
@@ -65,7 +66,9 @@ EARLIER = 1e-3  # by so much of a frame an earlier one is preferred
 CLEAR = 1 / 16  # less than this of what lies behind layers is too little
 UNCOVERED = 1 - 2e-5  # where more of it is seen, no layer is in the way
 SEEN, BORROWED = 0.9, 63 / 64  # what another frame has to show to be taken, and how much that counts
+MOST = 1 - 1 / 1024  # of what a frame and another one show together
 ROUNDING = 1e-5  # in float32, of weights and times
+HALFWAY = 2e-4  # of a level: so near the middle of two, float32 cannot tell which is the nearest
 HALVINGS = 44  # of the bisection: what is left is far below what float32 holds
 
 
@@ -741,12 +744,14 @@ def uncovered(recipe, frame, footage, index, direction, layers):
             seen = clear[source]
             plate = sampled(summed(footage, other, "linear"), places, False)
             mixed[found] = (seen[..., None] * light + (1 - seen[..., None]) * plate)[found]
-            share[found] = (seen + (1 - seen) * BORROWED)[found]
+            share[found] = np.minimum(seen + (1 - seen) * BORROWED, MOST)[found]
             lacks = lacks & ~found
         colour = to_encoded(mixed[..., :3]) if footage.transfer == "srgb" else mixed[..., :3]
-        if footage.levels:
-            colour = np.rint(colour.clip(0, 1) * footage.levels) / footage.levels
         changed = share != clear[source]
+        if footage.levels:
+            levels = colour.clip(0, 1) * footage.levels
+            doubtful[source] += changed & (np.abs(levels % 1 - 0.5) < HALFWAY).any(axis=-1)
+            colour = np.rint(levels) / footage.levels
         samples[source][changed, :3] = colour[changed]
         counts[source] = share
     return footage._replace(samples=samples), counts, doubtful
@@ -824,7 +829,8 @@ def exposed(recipe, frame, footage, index, direction, given, weights=None):
             plain = recipe | {"light": "linear", "exposure": "normalized"}
             seen = [f if f is None else summed(footage, f, "linear") for f in frames]
             shares = [
-                f if f is None else whole(sight) * of[f][..., None] for f, sight in zip(frames, seen, strict=True)
+                f if f is None else whole(sight * of[f][..., None]) * of[f][..., None]
+                for f, sight in zip(frames, seen, strict=True)
             ]
             cover = one_way(plain, way, window, shares)[0][..., 3]
         total += of_pixels(share)[..., None] * made

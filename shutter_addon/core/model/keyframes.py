@@ -85,7 +85,8 @@ class Keys:
 
     def at(self, frame: float) -> np.ndarray:
         before, after, share = eased_span(self.frames, self.eases, frame)
-        return (1 - share) * np.asarray(self.values[before]) + share * np.asarray(self.values[after])
+        first, second = np.asarray(self.values[before]), np.asarray(self.values[after])
+        return first + share * (second - first)  # equal ones stay what they are, to the last bit
 
 
 @dataclass(frozen=True)
