@@ -1,7 +1,8 @@
 """The effect as plain data: shutters, regions, options and source time, each a value or a channel over time.
 
-A recipe gives one (Recipe.effect), and so does an effect strip in Blender (blender/data/snapshot.py). Frames are those
-of whoever made it: a recipe's count from 1, Blender's are the edit's timeline frames.
+A recipe gives one (core/recipes/recipe_file.py), and so does an effect strip in Blender (blender/data/snapshot.py).
+Frames are those of whoever made it: a recipe's count from 1, Blender's are the edit's timeline frames. What each
+property is, its field says (fields.py).
 """
 
 from __future__ import annotations
