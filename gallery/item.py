@@ -81,7 +81,8 @@ class Shot:
         """The scribbles in their shutters' colours, a little transparent, over the darkened footage."""
         picture = self.source(frame) * np.float32(dim)
         height, width = picture.shape[:2]
-        labels = scribbles.rasterise(self.effect.drawn_at(frame), width, height, border=self.contents.options.border)
+        border = self.contents.options.at(1).border
+        labels = scribbles.rasterise(self.effect.drawn_at(frame), width, height, border=border)
         picture[labels > 0] = 0.25 * picture[labels > 0] + 0.75 * self._colors[labels[labels > 0] - 1]
         return picture
 

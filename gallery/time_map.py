@@ -14,7 +14,7 @@ def footage(_folder):
 
 def still(shots):
     linear, angle = shots
-    last = FRAME + linear.contents.window - 1
+    last = FRAME + linear.contents.options.at(1).window - 1
     return stills.sheet(
         stills.row(
             Panel(linear.result(FRAME)[CROP], "Time runs down, 1.3 seconds from top to bottom"),

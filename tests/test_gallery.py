@@ -101,7 +101,7 @@ def test_time_maps_are_frames_put_together(name, times):
     source, effect = open_source(time_map.footage(None)), recipe_file.load(HERE / f"{name}.json")
     height, width, shown = source.height, source.width, time_map.FRAME - 1
     renderer = Renderer(open_compositor(), source, MatteValues(width, height))
-    request = Request(shown, effect.at(time_map.FRAME, width / height))
+    request = Request(shown, effect.for_picture(width / height).at(time_map.FRAME))
     made = light.to_encoded(renderer.picture(request)[..., :3]) * 255
     frames = np.stack([source.read(shown + k)[..., :3] for k in range(33)])
     time, (y, x) = times(height, width), np.mgrid[:height, :width]

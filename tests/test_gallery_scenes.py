@@ -70,8 +70,9 @@ def test_an_objects_matte_is_rendered_beside_it(tmp_path):
     """The recipe names its file and its channel. It covers what is red there, in part at its edges."""
     picture = ImageBuf(run(FIRST_FRAME, tmp_path / "footage", "object_matte").splitlines()[-1]).get_pixels()
     (region,) = recipe_file.load(ROOT / "gallery" / "object_matte.json").regions
-    assert region.channel == f"{object_matte.NAME}.V"
-    values = MatteFile(tmp_path / region.path, region.channel).open().read(0)
+    content = region.content
+    assert content.channel == f"{object_matte.NAME}.V"
+    values = MatteFile(tmp_path / content.path, content.channel).open().read(0)
     assert values.shape == picture.shape[:2]
     assert 0.02 < values.mean() < 0.2
     assert ((values > 0) & (values < 1)).any()

@@ -48,7 +48,7 @@ def of_sources() -> set:
 
 
 def _classes():
-    modules = [module for module in vars(blender).values() if inspect.ismodule(module)]
+    modules = blender._modules
     return [cls for module in modules for cls in getattr(module, "classes", ())]
 
 

@@ -40,11 +40,14 @@ def whole(bpy, effect, tmp_path):
     shutter = effect.shutters[1]
     shutter.follow, shutter.length, shutter.combine, shutter.use_threshold = "CAMERA", "MOTION", "LIGHTEST", True
     region_edits.add_region(effect, shutter, "LINE", "line")
-    region_edits.add_matte(effect, shutter, "RAMP", "ramp")
+    region_edits.add_region(effect, shutter, "RAMP", "ramp")
     region_edits.add_region(effect, shutter, "OUTLINE", "outline").between = "STRAIGHT"
     matte = write_frames(tmp_path / "matte", np.zeros((1, 4, 4, 3), np.uint8))
-    region_edits.add_matte(effect, shutter, "MATTE", "matte").image = bpy.data.images.load(str(matte))
+    region_edits.add_region(effect, shutter, "MATTE", "matte").image = bpy.data.images.load(str(matte))
     return effect
+
+
+EXPORTED = Options, model.Effect, model.Camera, model.Shutter
 
 
 def _other(field: Field):
@@ -67,7 +70,7 @@ def _in_blender(field: Field, value):
 
 @pytest.mark.parametrize(("kind", "name"), EVERY, ids=[f"{kind.__name__} {name}" for kind, name in EVERY])
 def test_a_field_counts_everywhere(whole, kind, name):
-    from shutter_addon.blender.data import effect_version, fcurves, snapshot, strips
+    from shutter_addon.blender.data import effect_version, fcurves, recipe_export, snapshot, strips
     from shutter_addon.blender.data.property_copy import copy_properties
 
     field, (group_of, model_of) = fields_of(kind)[name], KINDS[kind]
@@ -97,6 +100,13 @@ def test_a_field_counts_everywhere(whole, kind, name):
     assert kind in CONTENT or seen() == pytest.approx(other)
     is_unseen = isinstance(field.default, tuple) or (isinstance(field.default, str) and not field.choices)
     assert (version() == was) == is_unseen
+
+    if kind in EXPORTED:
+        exported = model_of(
+            recipe_export.recipe_of(scene, effect, strip, (model.RampContent(), model.FileContent("x.png")))
+        )
+        value = getattr(exported.at(1) if kind is Options else exported, name)
+        assert (value.at(1) if field.is_channel else value) == pytest.approx(other)
 
     copy = scene.virtual_shutter.effects.add()
     copy_properties(effect, copy)

@@ -176,7 +176,7 @@ def test_an_outline_gets_keys_of_what_it_encloses(track, film, tmp_path, between
     assert [key.frame for key in found] == list(range(1, COUNT + 1))
     for key in found:
         assert key.location == pytest.approx(expected(key.frame), abs=1 / WIDTH)
-    assert recipe_file.load(tmp_path / "t.json").regions[1].strokes == [list(map(tuple, box[0]))]
+    assert said(tmp_path / "t.json").regions[1].strokes == [list(map(tuple, box[0]))]
 
 
 @pytest.mark.parametrize(

@@ -8,6 +8,7 @@ from bpy.app.translations import pgettext_n as n_
 from bpy.types import Context, PropertyGroup, Scene, Strip, UILayout
 
 from ...core import told
+from ...core.model.fields import fields_of
 from ..data import selection
 from . import drawing
 from .operator_bases import Mixin
@@ -34,6 +35,13 @@ def sentence(layout: UILayout, words: str, icon: str = "NONE", room: float = 1.0
         row = column.row()
         row.scale_y = 0.8 if i else 1.0
         row.label(text=line, icon=icon if i == 0 or icon == "NONE" else "BLANK1", translate=False)
+
+
+def draw_fields(layout: UILayout, owner: PropertyGroup, kind: type) -> None:
+    """The properties that the fields of a class of the model have panels show by themselves."""
+    for field in fields_of(kind).values():
+        if field.shown:
+            layout.prop(owner, field.blender)
 
 
 def draw_list(

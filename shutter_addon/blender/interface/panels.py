@@ -9,6 +9,7 @@ from bpy.types import Context, Menu, Panel, PropertyGroup, Scene, Strip, UILayou
 from ...core.messages import EffectError
 from ...core.model import presets
 from ...core.model.choices import CONTEXT
+from ...core.model.effect import Shutter
 from ..data import annotations, consistency, data_format, selection, strips
 from ..editing import bar_edits, match_source
 from ..rendering import inbetween_build, strobing
@@ -17,7 +18,16 @@ from .bake_operators import Bake
 from .note_buttons import Button
 from .operator_bases import Mixin, own_classes
 from .option_panels import Inbetween, Options
-from .panel_parts import WIDEST, WithEffect, draw_list, draw_moves, draw_operators, draw_properties, sentence
+from .panel_parts import (
+    WIDEST,
+    WithEffect,
+    draw_fields,
+    draw_list,
+    draw_moves,
+    draw_operators,
+    draw_properties,
+    sentence,
+)
 from .region_panels import Camera, Follow, Regions, Track, Transform, draw_tracked, draw_tracking, tracking_icon
 
 
@@ -155,6 +165,7 @@ class _Exposure(WithEffect):
         if shutter.length == "MOTION" and shutter.follow != "NOTHING":
             layout.prop(shutter, "trail")
         _draw_combine(layout, shutter)
+        draw_fields(layout, shutter, Shutter)
         layout.operator("shutter.tripod", icon="CON_CAMERASOLVER")
         _draw_bars(layout, scene, effect, strip)
 

@@ -141,7 +141,8 @@ def _are(frames: list[int]) -> str:
 def say_what_is_left_out(folder: Path, frames: range) -> None:
     """A word on stderr of pictures that are no frames of the edit."""
     if others := [frame for frame in _numbered(folder) if frame not in frames]:
-        render_job.say(f"{folder}: {_are(others)} not of the edit, and left out")
+        words = f"{folder}: {_are(others)} not of the edit, and left out"
+        render_job.say(words)
 
 
 def _common(paths: list[Path], looked: Callable, size: tuple[int, int], key: str) -> RenderedPicture:

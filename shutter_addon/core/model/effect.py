@@ -19,7 +19,7 @@ from ..messages import EffectError
 from . import combining, keyframes, limits, mattes, motions, outlines, scribbles, shutters
 from .choices import BETWEEN, BLENDS, CHANNELS, COMBINES, CONTEXT, LENGTHS, METHODS, MOTIONS, RAMPS, TIMINGS
 from .drawings import Drawings as Drawings
-from .fields import MISSING, choice, color, number, switch, text, whole
+from .fields import MISSING, choice, color, fields_of, number, switch, text, whole
 from .frame_state import FrameState
 from .keyframes import Bars, Channel
 from .motions import Placement
@@ -414,9 +414,10 @@ class Effect:
     @cached_property
     def is_still(self) -> bool:
         """Whether its state is known to be the same at every frame."""
+        channels = [name for name, each in fields_of(Shutter).items() if each.is_channel]
+        numbers = [getattr(shutter, name) for shutter in self.shutters for name in channels]
         bars = (shutter.bars for shutter in self.shutters)
-        thresholds = [each for shutter in self.shutters for each in (shutter.threshold, shutter.softness)]
-        return keyframes.are_still(self.options, self.edge_aware, *bars, *thresholds, *self.regions)
+        return keyframes.are_still(self.options, self.edge_aware, *bars, *numbers, *self.regions)
 
     def at(self, frame: float) -> FrameState:
         """The effect at a frame. EffectError: no picture can be made of it."""

@@ -30,6 +30,7 @@ class Field:
     keyed: whether Blender's F-curves may change it; keyed_in_recipe: whether a recipe's keys may
     is_channel: whether the model has a channel of it (keyframes.Channel), not the value
     blender, recipe: its names there; recipe "": it has none
+    shown: whether its panel shows it by itself, below what it draws by hand
     told: whether a recipe says it even where it is as `absent`
     subtype, context: of Blender's property, and of the translation of its label
     since: the version of the extension in which it appeared"""
@@ -48,6 +49,7 @@ class Field:
     is_channel: bool = False
     keyed_in_recipe: bool = False
     told: bool = True
+    shown: bool = False
     subtype: str = "NONE"
     precision: int = 2
     context: str = "*"

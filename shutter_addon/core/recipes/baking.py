@@ -8,7 +8,7 @@ whole frame, recipe and effect agree within TOLERANCE.
 
 import itertools
 import math
-from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Container, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from decimal import Decimal
 from functools import cache
@@ -31,6 +31,7 @@ from ..model.effect import (
     Shutter,
     Subject,
 )
+from ..model.fields import fields_of
 from ..model.frame_state import Interpolation
 from ..model.keyframes import Bars, Channel, Constant, Ease, Keys, Samples, SourceTime
 from . import recipe, recipe_file
@@ -54,7 +55,7 @@ def baked(effect: Effect, shown: range, contents: Iterable[FileContent | RampCon
     names = _different([shutter.name for shutter in effect.shutters])
     called, words = _region_names(effect), iter(contents)
     made = [_region(region, name, words, shown) for region, name in zip(effect.regions, called, strict=True)]
-    camera = Camera(moves=_moves(effect.camera, {}, shown), influence=_number(effect.camera.influence, shown))
+    camera = Camera(moves=_moves(effect.camera, {}, shown), **_said(effect.camera, (), shown))
     # A region without strokes says nothing of how anything moves.
     followed = {id(old): new for old, new in zip(effect.regions, made, strict=True)} | {id(effect.camera): camera}
     shutters = [
@@ -66,9 +67,8 @@ def baked(effect: Effect, shown: range, contents: Iterable[FileContent | RampCon
         regions=tuple(region for region in made if region),
         options=Constant(options),
         time=_time(effect.time, shown) if effect.time else None,
-        edge_aware=_number(effect.edge_aware, shown),
-        inbetween_method=effect.inbetween_method,
         camera=camera,
+        **_said(effect, (), shown),
     )
     return recipe_file.parse(recipe_file.dump(sampled))
 
@@ -105,21 +105,33 @@ def _region_names(effect: Effect) -> list[str]:
 def _shutter(
     effect: Effect, index: int, name: str, follow: Subject | None, interpolation: Interpolation, shown: range
 ) -> Shutter:
-    """A shutter, with what it makes of frames; what counts nothing is as it is at first."""
+    """A shutter whose numbers have the recipe's keys; what counts nothing is as it is at first."""
     shutter = effect.shutters[index]
-    red, green, blue = (_short(component) for component in shutter.color)
-    said: dict[str, Any] = {"combine": shutter.combine, "length": shutter.length}
-    if shutter.combine in ("lightest", "darkest"):
-        said["by_luminance"] = shutter.by_luminance
-        if shutter.use_threshold:
-            said |= {"use_threshold": True, "threshold": _number(shutter.threshold, shown)}
-            said["softness"] = _number(shutter.softness, shown)
-    if follow:
-        said |= {"follow": follow, "follow_motion": shutter.follow_motion, "follow_smooth": shutter.follow_smooth}
-        said["trail"] = _number(shutter.trail, shown)
-    elif shutter.length == "motion":
+    unused = set() if follow else {"follow_motion", "follow_smooth", "trail"}
+    if shutter.combine not in ("lightest", "darkest"):
+        unused |= {"by_luminance", "use_threshold", "threshold", "softness"}
+    elif not shutter.use_threshold:
+        unused |= {"threshold", "softness"}
+    said = _said(shutter, unused, shown)
+    if shutter.length == "motion" and not follow:
         said["length"] = "frames"
-    return Shutter(name=name, color=(red, green, blue), bars=_bars(effect, index, interpolation, shown), **said)
+    red, green, blue = (_short(component) for component in shutter.color)
+    said |= {"name": name, "color": (red, green, blue), "follow": follow}
+    return Shutter(bars=_bars(effect, index, interpolation, shown), **said)
+
+
+def _said(part: Any, unused: Container[str], shown: range) -> dict[str, Any]:
+    """What fields define of a part of an effect, but for those that are unused."""
+    said: dict[str, Any] = {}
+    kind: Any = type(part)
+    for name, each in fields_of(kind).items():
+        if name in unused:
+            continue
+        value = getattr(part, name)
+        if each.is_channel:
+            value = _number(value, shown) if each.keyed_in_recipe else Constant(_short(value.at(shown.start)))
+        said[name] = value
+    return said
 
 
 def _bars(effect: Effect, index: int, interpolation: Interpolation, shown: range) -> Bars:
@@ -183,12 +195,9 @@ def _region(
     region: Region | MatteRegion, name: str, contents: Iterator[FileContent | RampContent], shown: range
 ) -> Region | MatteRegion | None:
     """A region whose numbers have the recipe's keys; None: nothing is drawn."""
-    said: dict[str, Any] = {"name": name, "opacity": _number(region.opacity, shown)}
-    if isinstance(region, MatteRegion):
-        said["feather"] = _number(region.feather, shown)
+    said = _said(region, (), shown) | {"name": name}
     if isinstance(region, Region):
         said["kind"] = Constant(region.kind.at(shown.start))
-        said["width"] = Constant(_short(region.width.at(shown.start)))
     if isinstance(region, MatteRegion) and not isinstance(region, OutlineRegion):
         return replace(region, content=next(contents), moves=_moves(region, {}, shown), **said)
     assert isinstance(region, Region | OutlineRegion)
