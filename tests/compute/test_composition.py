@@ -655,7 +655,7 @@ def test_two_effects_share_a_device(device):
 def test_no_gl_says_so(monkeypatch):
     from shutter_addon.devices import gl
 
-    def fail(self):
+    def fail(self, *_memory):
         raise NoDeviceError("no OpenGL 4.3: none here")
 
     monkeypatch.setattr(gl.GLDevice, "__init__", fail)
