@@ -17,7 +17,7 @@ class NamedTextures:
         texture = self._kept.get(name)
         if texture is None or texture.size != size:
             if texture is not None:
-                texture.release()
+                self._kept.pop(name).release()  # before there may be no room for the new one
             texture = self._kept[name] = self.device.texture(*size, kind)
         return texture
 

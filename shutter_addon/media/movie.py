@@ -165,6 +165,8 @@ class MovieSource(FrameSource):
             return self._reformatted(self._to_packed, frame, pix_fmt).to_ndarray()
 
     def _reformatted(self, by: VideoReformatter, frame: av.VideoFrame, pix_fmt: str) -> av.VideoFrame:
+        if frame.interlaced_frame:  # libswscale would scale each field by itself
+            frame = _as_progressive(frame)
         samples = ColorRange.JPEG if frame.format.is_rgb else frame.color_range
         width, height = self._size
         return by.reformat(frame, width, height, pix_fmt, None, None, self._scaler, samples, ColorRange.JPEG)
@@ -177,6 +179,19 @@ class MovieSource(FrameSource):
         self._reader.close()
         with self._converting:
             self._to_planes, self._to_packed = VideoReformatter(), VideoReformatter()
+
+
+def _as_progressive(frame: av.VideoFrame) -> av.VideoFrame:
+    """A copy of a frame that does not say that it has fields; PyAV cannot take that from the frame itself."""
+    copy = av.VideoFrame(frame.width, frame.height, frame.format.name)
+    for own, plane in zip(frame.planes, copy.planes, strict=True):
+        rows = np.frombuffer(own, np.uint8)[: own.height * own.line_size].reshape(own.height, own.line_size)
+        width = min(own.line_size, plane.line_size)
+        target = np.frombuffer(plane, np.uint8)[: own.height * plane.line_size].reshape(own.height, plane.line_size)
+        target[:, :width] = rows[:, :width]
+    for name in ("colorspace", "color_range", "color_primaries", "color_trc"):
+        setattr(copy, name, getattr(frame, name))
+    return copy
 
 
 def _is_opaque_yuv(pixels: VideoFormat) -> bool:

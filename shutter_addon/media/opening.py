@@ -90,11 +90,9 @@ def open_channel(
     path = Path(path)
     if not _is_movie(path, files):
         return SequenceChannel(path, channel, files=files)
-    movie = _opened_movie(path, stream)
-    if channel in CHANNELS:
-        return MovieChannel(movie, channel)
-    movie.close()
-    raise no_channel(path, channel, CHANNELS)
+    if channel not in CHANNELS:
+        raise no_channel(check_file(path), channel, CHANNELS)
+    return MovieChannel(_opened_movie(path, stream), channel)
 
 
 def _is_movie(path: Path, files: Sequence[str | Path] | None) -> bool:

@@ -64,8 +64,7 @@ def _set_fields(scene, owner, path: str, part: Any, first: float, **curve) -> No
 
 
 def _fields(part: Any) -> Iterable[tuple[str, Field]]:
-    kind: Any = type(part)
-    return fields_of(kind).items()
+    return fields_of(type(part)).items()
 
 
 def _set_channel(scene, owner, path: str, name: str, channel: keyframes.Channel, first: float, **curve) -> None:

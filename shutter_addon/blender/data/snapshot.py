@@ -293,7 +293,7 @@ def _shutter(
         bars = keyframes.Bars(keyframes.Constant(bars))
     unused = [] if shutter.use_threshold else ["threshold", "softness"]
     if validation.word(shutter, "follow") == "NOTHING" or shutter.length != "MOTION":
-        unused.append("trail")
+        unused += ["trail"] if shutter.length != "MOTION" else ["trail", "length"]
     return model.Shutter(bars=bars, **sampled.sampled_fields(curves, shutter, path, model.Shutter, frames, unused))
 
 
@@ -404,8 +404,10 @@ def _any_region(sampling: _Sampling, index: int, shutter: int) -> model.Region |
     else:
         content = sampled.tried(matte_content.content, effect, sampling.strip, region, moves, frames, sampling.time)
     fields = sampled.tried(sampled.sampled_fields, curves, region, path, kind, frames)
-    if isinstance(fields, UserError):  # it is told where the matte is asked for
-        content, fields = fields, {"name": region.name}
+    if isinstance(fields, UserError):  # of a choice; it is told where the matte is asked for
+        content = content if isinstance(content, UserError) else fields
+        choices = [name for name, each in fields_of(kind).items() if each.choices]
+        fields = sampled.sampled_fields(curves, region, path, kind, frames, choices)
     if isinstance(content, UserError):
         content = keyframes.Constant(content)
     return kind(shutter=shutter, content=content, moves=moves, **drawn, **fields)

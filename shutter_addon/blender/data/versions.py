@@ -67,7 +67,8 @@ def _footage_files(scene: Scene) -> Iterator[list[Path]]:
         for strip in shown.sequence_editor.strips_all:
             if strip.type in strips.SOURCES:
                 with suppress(MediaError):  # it shows nothing
-                    yield source_media.files(strip)
+                    if files := source_media.files(strip):
+                        yield files
     data = bpy.data
     for item in (*data.images, *data.movieclips, *data.fonts, *data.cache_files, *data.volumes, *data.libraries):
         if files := external_files.every(item):

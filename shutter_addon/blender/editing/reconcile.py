@@ -28,6 +28,8 @@ from ..data.property_copy import copy_properties
 from ..rendering import invalidation, render_job, sessions
 from . import add_effect, collection_edits, match_source, shown_annotations, undelete
 
+# What an effect scene has as its edit; Blender crashes where one in stereo shows a scene that is not.
+_OF_EDIT = "fps", "fps_base", "use_multiview"
 _names: dict[int, list[str]] = {}  # of layers, by session_uid of their annotation, as they were at the last update
 
 
@@ -261,14 +263,15 @@ def _identify(shown: list[strips.Shown]) -> None:
         if group.identity in identities:
             group.identity = uuid.uuid4().hex
         identities.add(group.identity)
-        if scene.annotation is not None and scene.annotation.library is None:
-            if scene.annotation in drawn:
+        if scene.annotation is not None:
+            if scene.annotation in drawn or scene.annotation.library is not None:
                 scene.annotation = scene.annotation.copy()
             drawn.add(scene.annotation)
             if shown_annotations.is_own(scene.annotation):
                 _give(scene.annotation, "virtual_shutter_made", group.identity)
-    for effect, strip, _source in shown:
-        _give(strip, "virtual_shutter_effect", effect.scene.virtual_shutter.identity)
+    for strip in [strip for scene in strips.local_scenes() for strip in strips.effect_strips(scene)]:
+        _give(strip, "virtual_shutter_effect", strip.scene.virtual_shutter.identity)
+    for effect, _strip, _source in shown:
         _give(effect, "identity", effect.scene.virtual_shutter.identity)
 
 
@@ -386,11 +389,13 @@ def _remove_left() -> None:
 def follow_sources(shown: list[strips.Shown]) -> None:
     """Gives effect scenes the rate and views of the scene that shows them, and the size of their sources; has Blender
     mix the strips' pixels as their sources'."""
+    for strip in [strip for scene in strips.local_scenes() for strip in strips.effect_strips(scene)]:
+        if strip.scene.library is None:
+            for name in _OF_EDIT:
+                _give(strip.scene.render, name, getattr(strip.id_data.render, name))
     for effect, strip, source in shown:
         if strip.scene.library is not None:
             continue
-        for name in ("fps", "fps_base", "use_multiview"):  # Blender crashes where an edit in stereo shows a plain scene
-            _give(strip.scene.render, name, getattr(strip.id_data.render, name))
         with suppress(MediaError):
             header = _header(source_media.spec(source)) if source else None
             if header is not None:

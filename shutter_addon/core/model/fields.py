@@ -101,9 +101,13 @@ def _field(label: str, description: str, default: Any, made: Any = None, **more:
     return dataclasses.field(default_factory=factory, metadata={"said": (label, description, default, said)})
 
 
-@cache
 def fields_of(*kinds: type) -> dict[str, Field]:
     """Give the Fields of classes, by the name of the model's field."""
+    return _fields_of(kinds)
+
+
+@cache
+def _fields_of(kinds: tuple[type, ...]) -> dict[str, Field]:
     found: dict[str, Field] = {}
     for kind in kinds:
         for each in dataclasses.fields(kind):

@@ -123,8 +123,7 @@ def _shutter(
 def _said(part: Any, unused: Container[str], shown: range) -> dict[str, Any]:
     """What fields define of a part of an effect, but for those that are unused."""
     said: dict[str, Any] = {}
-    kind: Any = type(part)
-    for name, each in fields_of(kind).items():
+    for name, each in fields_of(type(part)).items():
         if name in unused:
             continue
         value = getattr(part, name)
