@@ -137,7 +137,7 @@ class ProcessorTime:
         with ExitStack() as kept:
             kept.enter_context(self._timed(GLDevice, "run", "_passes"))
             kept.enter_context(self._timed(GLDevice, "texture", "_passes"))
-            kept.enter_context(self._timed(movie_feed, "_fill", "_engine"))
+            kept.enter_context(self._timed(movie_feed, "_fill", "_engine"))  # what a frame costs has no other name
             kept.enter_context(self._timed(VirtualShutterEngine, "render", "_engine"))
             yield
 
