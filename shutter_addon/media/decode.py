@@ -321,7 +321,8 @@ def reason(error: Exception) -> str:
 def _tags(codec: VideoCodecContext) -> Tags:
     # libswscale takes what it does not know for BT.601.
     space = {1: 1, 4: 4, 7: 7, 9: 9, 10: 9}.get(int(codec.colorspace), 5)
-    return Tags(space, codec.color_range == ColorRange.JPEG, _turns(codec.coded_side_data.get("display_matrix")))
+    side_data = getattr(codec, "coded_side_data", {})  # PyAV before 19 has none, and pictures lie as they are stored
+    return Tags(space, codec.color_range == ColorRange.JPEG, _turns(side_data.get("display_matrix")))
 
 
 def _turns(display_matrix: bytes | None) -> int:

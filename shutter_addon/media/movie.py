@@ -31,6 +31,8 @@ from .reduced import reduced, reduced_size
 SCALER = Interpolation.POINT | Interpolation.ACCURATE_RND | Interpolation.FULL_CHR_H_INT
 REDUCER = Interpolation.AREA | Interpolation.ACCURATE_RND | Interpolation.FULL_CHR_H_INT  # where frames become smaller
 _NO_COUNT = 1 << 31  # frames: Blender has no number for so many, and a header that claims them is damaged
+# Whether a frame tells where its chroma lies: with PyAV 19.
+_TELLS_CHROMA = hasattr(av.VideoFrame, "chroma_location")
 _UNSPECIFIED = 2  # in ITU-T H.273
 _PLANAR_420 = frozenset({"yuv420p", "yuvj420p"})
 _PLANAR_YUV = re.compile(r"yuv[aj]?4\d\dp(\d+le)?")
@@ -126,7 +128,8 @@ class MovieSource(FrameSource):
             frame.colorspace, frame.color_range = self._tags.colorspace, self._range
         # Light is converted later; and Blender has libswscale take chroma where it takes what is not specified.
         frame.color_primaries = frame.color_trc = _UNSPECIFIED
-        frame.chroma_location = 0
+        if _TELLS_CHROMA:
+            frame.chroma_location = 0
         return frame
 
     @contextmanager
@@ -165,8 +168,8 @@ class MovieSource(FrameSource):
             return self._reformatted(self._to_packed, frame, pix_fmt).to_ndarray()
 
     def _reformatted(self, by: VideoReformatter, frame: av.VideoFrame, pix_fmt: str) -> av.VideoFrame:
-        if frame.interlaced_frame:  # libswscale would scale each field by itself
-            frame = _as_progressive(frame)
+        if frame.interlaced_frame or not _TELLS_CHROMA:  # libswscale would scale each field by itself
+            frame = _untold(frame)
         samples = ColorRange.JPEG if frame.format.is_rgb else frame.color_range
         width, height = self._size
         return by.reformat(frame, width, height, pix_fmt, None, None, self._scaler, samples, ColorRange.JPEG)
@@ -181,8 +184,9 @@ class MovieSource(FrameSource):
             self._to_planes, self._to_packed = VideoReformatter(), VideoReformatter()
 
 
-def _as_progressive(frame: av.VideoFrame) -> av.VideoFrame:
-    """A copy of a frame that does not say that it has fields; PyAV cannot take that from the frame itself."""
+def _untold(frame: av.VideoFrame) -> av.VideoFrame:
+    """A copy of a frame that does not say that it has fields, nor where its chroma lies: PyAV cannot take the former from
+    the frame itself, and before 19 not the latter."""
     copy = av.VideoFrame(frame.width, frame.height, frame.format.name)
     for own, plane in zip(frame.planes, copy.planes, strict=True):
         rows = np.frombuffer(own, np.uint8)[: own.height * own.line_size].reshape(own.height, own.line_size)

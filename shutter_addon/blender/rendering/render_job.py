@@ -223,6 +223,11 @@ def fail(text: str) -> None:
         _job.tell(text)
 
 
+def failure() -> str | None:
+    """The sentence that ended the render which runs or ran last; None: none had to."""
+    return _job.failure
+
+
 def cancel(ended: Callable[[], bool] | None = None) -> None:
     """Ends the render that runs, as soon as this returns to Blender: from a picture, or from what comes before a frame.
     (After one Blender would go on with the next, and crash.)
