@@ -185,8 +185,8 @@ class MovieSource(FrameSource):
 
 
 def _untold(frame: av.VideoFrame) -> av.VideoFrame:
-    """A copy of a frame that does not say that it has fields, nor where its chroma lies: PyAV cannot take the former from
-    the frame itself, and before 19 not the latter."""
+    """A copy of a frame that does not say that it has fields, nor where its chroma lies: PyAV cannot take the former
+    from the frame itself, and before 19 not the latter."""
     copy = av.VideoFrame(frame.width, frame.height, frame.format.name)
     for own, plane in zip(frame.planes, copy.planes, strict=True):
         rows = np.frombuffer(own, np.uint8)[: own.height * own.line_size].reshape(own.height, own.line_size)
