@@ -91,12 +91,11 @@ def _solved(labels: np.ndarray, shutters: np.ndarray, across: np.ndarray, down: 
     while grids[-1].shape != (1, 1):
         grids.append(_coarser(grids[-1]))
     solved = min(solved, len(grids) - 1)
-    solution, change = (labels == shutters[:, None, None] + 1).astype(np.float32), 0.0
+    solution = (labels == shutters[:, None, None] + 1).astype(np.float32)
     for iterations in CYCLES:
         correction = _cycle(grids, _unbalanced(solution, across, down) * grids[0].live, solved, iterations)
         solution += correction
-        before, change = change, float(np.abs(correction).max())
-        if is_enough(change, before):
+        if np.abs(correction).max() < ENOUGH:
             break
     return solution
 
