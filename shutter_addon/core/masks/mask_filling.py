@@ -11,7 +11,9 @@ from itertools import pairwise
 
 import numpy as np
 
-from .mask_outlines import crossings, ranges
+from .. import scanlines
+from ..scanlines import ranges
+from .mask_outlines import crossings
 
 # Pixels that are computed at once: what their numbers take stays in a processor's cache.
 _BLOCK = 1 << 14
@@ -27,46 +29,12 @@ def fill(value: np.ndarray, polygons: list[np.ndarray], solver: str, holes: bool
     first cut down to its outer loops.
     """
     if solver == "SWEEP_LINE":
-        loops = [loop for polygon in polygons for loop in (_outer_loops(polygon) if overlap else [polygon])]
-        for group in [loops] if holes else [[loop] for loop in loops]:
-            _fill_together(value, group, lambda winding: winding % 2 != 0)
-        return
-    for group in [polygons] if holes else [[loop] for loop in polygons + _outer_borders(polygons)]:
-        _fill_together(value, group, lambda winding: winding != 0)
-
-
-def _fill_together(value: np.ndarray, polygons: list[np.ndarray], rule: Callable[[np.ndarray], np.ndarray]) -> None:
-    """Sets the pixels to 1 whose winding number is one by the rule."""
-    height, width = value.shape
-    row, left, right, winding = _spans(polygons, height)
-    inside = rule(winding)
-    start = np.ceil(np.clip(left[inside] * width - 0.5, 0, width)).astype(int)
-    stop = np.floor(np.clip(right[inside] * width + 0.5, 0, width)).astype(int)
-    for y, a, b in zip(row[inside].tolist(), start.tolist(), stop.tolist(), strict=True):
-        value[y, a:b] = 1
-
-
-def _spans(polygons: list[np.ndarray], height: int) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Along the middle of each row of pixels, what lies between two edges that follow each other: row, left, right and
-    winding number (n,) each, in order."""
-    none = np.zeros((0, 2))
-    start = np.concatenate([none, *polygons])
-    end = np.concatenate([none, *(np.roll(p, -1, axis=0) for p in polygons)])
-    edge, row, x = _at_rows(start, end, height)
-    order = np.lexsort((x, row))
-    row, x = row[order], x[order]
-    winding = np.cumsum(np.where(end[:, 1] > start[:, 1], 1, -1)[edge[order]])
-    same = row[1:] == row[:-1]
-    return row[:-1][same], x[:-1][same], x[1:][same], winding[:-1][same]
-
-
-def _at_rows(start: np.ndarray, end: np.ndarray, height: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Where edges (n, 2) cross the middles of rows of pixels: index of edge, row, x (m,) each."""
-    lowest, highest = np.minimum(start[:, 1], end[:, 1]), np.maximum(start[:, 1], end[:, 1])
-    first, last = (np.clip(np.ceil(y * height - 0.5), 0, height).astype(int) for y in (lowest, highest))
-    edge, row = ranges(first, last)
-    share = ((row + 0.5) / height - start[edge, 1]) / (end[edge, 1] - start[edge, 1])
-    return edge, row, start[edge, 0] + (end[edge, 0] - start[edge, 0]) * share
+        filled = [loop for polygon in polygons for loop in (_outer_loops(polygon) if overlap else [polygon])]
+    else:
+        filled = polygons if holes else polygons + _outer_borders(polygons)
+    in_pixels = [polygon * value.shape[::-1] for polygon in filled]
+    for group in [in_pixels] if holes else [[polygon] for polygon in in_pixels]:
+        scanlines.fill(value, group, 1, odd=solver == "SWEEP_LINE", seam=_SEAM)
 
 
 def _outer_borders(polygons: list[np.ndarray]) -> list[np.ndarray]:
