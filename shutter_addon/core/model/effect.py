@@ -40,6 +40,15 @@ class Moves:
     rotation: Channel = field(default=keyframes.Constant(0.0))
     scale: Channel = field(default=keyframes.Constant(1.0))
 
+    @staticmethod
+    def keyed(keys: Sequence[tuple[float, Placement, keyframes.Ease]]) -> Moves:
+        """Those of keys: of each its frame, where something lies there, and the ease of the span that it begins."""
+        if not keys:
+            return Moves()
+        frames, placements, eases = zip(*keys, strict=True)
+        columns = zip(*((placed.location, placed.rotation, placed.scale) for placed in placements), strict=True)
+        return Moves(*(keyframes.Keys(frames, values, eases) for values in columns))
+
     @property
     def is_still(self) -> bool:
         """Whether it is known to lie there at every frame."""

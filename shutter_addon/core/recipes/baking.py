@@ -34,6 +34,7 @@ from ..model.effect import (
 from ..model.fields import fields_of
 from ..model.frame_state import Interpolation
 from ..model.keyframes import Bars, Channel, Constant, Ease, Keys, Samples, SourceTime
+from ..model.motions import Placement
 from . import recipe, recipe_file
 
 # Of the largest bar, of fractions of the picture, of degrees; of the larger key's value where that is above 1.
@@ -214,14 +215,12 @@ def _region(
 
 def _moves(moving: Subject, words: Mapping[float, Ease], shown: range) -> Moves:
     """Location, rotation and scale with the recipe's keys; words: see _keys."""
-    eased = _move_keys(moving, words, shown)
-    if not eased:
-        return Moves()
-    x, y, degrees, scale = zip(*(_place(moving, frame) for frame, _ in eased), strict=True)
-    locations = tuple((_short(left), _short(up)) for left, up in zip(x, y, strict=True))
-    frames, eases = tuple(_frame(frame, shown) for frame, _ in eased), tuple(ease for _, ease in eased)
-    columns = locations, tuple(map(_short_degrees, degrees)), tuple(map(_short, scale))
-    return Moves(*(Keys(frames, values, eases) for values in columns))
+    keys = []
+    for frame, ease in _move_keys(moving, words, shown):
+        x, y, degrees, scale = _place(moving, frame)
+        placed = Placement((_short(x), _short(y)), _short_degrees(degrees), _short(scale))
+        keys.append((_frame(frame, shown), placed, ease))
+    return Moves.keyed(keys)
 
 
 def _move_keys(moving: Subject, words: Mapping[float, Ease], shown: range) -> _Eased:
