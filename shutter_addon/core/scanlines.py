@@ -10,19 +10,22 @@ from collections.abc import Sequence
 import numpy as np
 
 
-def crossings(polygons: Sequence[np.ndarray], lines: range) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Where edges cross the middles of lines: the line, x, and 1 or −1 where the edge goes on or back, (m,) each."""
+def edges(polygons: Sequence[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
+    """Where the edges of polygons start and end, (m, 2) each."""
     start = np.concatenate([np.zeros((0, 2)), *polygons])
-    end = np.concatenate([np.zeros((0, 2)), *(np.roll(polygon, -1, axis=0) for polygon in polygons)])
-    goes_on = start[:, 1] < end[:, 1]
-    lower, upper = np.where(goes_on[:, None], (start, end), (end, start))
+    return start, np.concatenate([np.zeros((0, 2)), *(np.roll(polygon, -1, axis=0) for polygon in polygons)])
+
+
+def crossings(start: np.ndarray, end: np.ndarray, lines: range) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Where edges cross the middles of lines: the edge, the line, and x, (m,) each."""
+    lower, upper = np.where((start[:, 1] < end[:, 1])[:, None], (start, end), (end, start))
     first, last = (
         np.clip(np.ceil(y - 0.5), lines.start, lines.stop).astype(np.intp) for y in (lower[:, 1], upper[:, 1])
     )
     edge, line = ranges(first, last)
     below, (width, height) = lower[edge], (upper - lower)[edge].T
     x = below[:, 0] + (line + 0.5 - below[:, 1]) * width / height
-    return line, x, np.where(goes_on[edge], 1, -1)
+    return edge, line, x
 
 
 def fill(
@@ -32,16 +35,18 @@ def fill(
 
     odd: those that an odd number of them wind around; seam: pixels by which what is filled reaches farther along x"""
     height, width = picture.shape
-    line, x, turn = crossings(polygons, range(height))
+    start, end = edges(polygons)
+    edge, line, x = crossings(start, end, range(height))
+    turn = np.where(start[:, 1] < end[:, 1], 1, -1)[edge]
     order = np.lexsort((x, line))
     line, x, winding = line[order], x[order], np.cumsum(turn[order])[:-1]
     # What lies between two edges that follow each other on a line.
     inside = (winding % 2 != 0 if odd else winding != 0) & (line[1:] == line[:-1])
     ends = x[:-1][inside], x[1:][inside] + seam
-    start, stop = (np.ceil(np.clip(end - 0.5, 0, width)).astype(int) for end in ends)
-    for y, first, last in zip(line[:-1][inside].tolist(), start.tolist(), stop.tolist(), strict=True):
-        picture[y, first:last] = value
-    return bool((start < stop).any())
+    first, last = (np.ceil(np.clip(x - 0.5, 0, width)).astype(int) for x in ends)
+    for y, a, b in zip(line[:-1][inside].tolist(), first.tolist(), last.tolist(), strict=True):
+        picture[y, a:b] = value
+    return bool((first < last).any())
 
 
 def ranges(first: np.ndarray, last: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

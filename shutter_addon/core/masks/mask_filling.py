@@ -39,8 +39,7 @@ def fill(value: np.ndarray, polygons: list[np.ndarray], solver: str, holes: bool
 
 def _outer_borders(polygons: list[np.ndarray]) -> list[np.ndarray]:
     """The outer borders of all groups of polygons that cross one another or themselves."""
-    start = np.concatenate([np.zeros((0, 2)), *polygons])
-    end = np.concatenate([np.zeros((0, 2)), *(np.roll(p, -1, axis=0) for p in polygons)])
+    start, end = scanlines.edges(polygons)
     first, second, at, other = crossings(start, end)
     if not len(first):
         return []
@@ -147,21 +146,17 @@ def _quad_rows(quads: np.ndarray, width: int, height: int) -> tuple[np.ndarray, 
     others = np.flatnonzero(~convex)
     parts = np.concatenate([quads[convex], quads[others][:, [0, 1, 2, 2]], quads[others][:, [0, 2, 3, 3]]])
     index = np.concatenate([np.flatnonzero(convex), others, others])
-    y = parts[..., 1]
-    first, last = (np.ceil(np.clip(edge * height - 0.5, 0, height)).astype(int) for edge in (y.min(1), y.max(1)))
-    part, row = ranges(first, last)
-    middle = (row + 0.5) / height
-    left, right = np.full(len(row), np.inf), np.full(len(row), -np.inf)
-    for corner in range(4):
-        (ax, ay), (bx, by) = parts[:, corner].T, parts[:, (corner + 1) % 4].T
-        slope = np.divide(bx - ax, by - ay, out=np.zeros_like(ax), where=by != ay)
-        low, high = np.minimum(ay, by)[part], np.maximum(ay, by)[part]
-        x = ax[part] + (middle - ay[part]) * slope[part]
-        met = (low <= middle) & (middle < high)
-        np.minimum(left, x, out=left, where=met)
-        np.maximum(right, x, out=right, where=met)
-    start = np.ceil(np.clip(left * width - 0.5 - _SEAM, 0, width)).astype(int)
-    stop = np.floor(np.clip(right * width + 0.5 + _SEAM, 0, width)).astype(int)
+    start, end = (corners.reshape(-1, 2) * (width, height) for corners in (parts, np.roll(parts, -1, axis=1)))
+    edge, row, x = scanlines.crossings(start, end, range(height))
+    # Each part on each row, from the first to the last place where its edges cross it.
+    place = edge // 4 * height + row
+    order = np.argsort(place, kind="stable")
+    place, x = place[order], x[order]
+    first = np.flatnonzero(np.diff(place, prepend=-1))
+    left, right = (extreme.reduceat(x, first) if len(x) else x for extreme in (np.minimum, np.maximum))
+    part, row = np.divmod(place[first], height)
+    start = np.ceil(np.clip(left - 0.5 - _SEAM, 0, width)).astype(int)
+    stop = np.floor(np.clip(right + 0.5 + _SEAM, 0, width)).astype(int)
     some = stop > start
     return index[part[some]], row[some], start[some], stop[some]
 

@@ -39,7 +39,7 @@ def _covered(strokes: Sequence, width: int, height: int, band: range) -> np.ndar
     """The coverage of the rows of a band."""
     lines, scale = range(band.start * LINES, band.stop * LINES), (width, -height * LINES)
     curves = [np.asarray(stroke, np.float64) * scale + (0, height * LINES) for stroke in strokes if len(stroke) > 2]
-    rows, places, _ = scanlines.crossings(curves, lines)
+    _, rows, places = scanlines.crossings(*scanlines.edges(curves), lines)
     rows -= lines.start
     order = np.lexsort((places, rows))
     rows, places = rows[order], np.clip(places[order], 0, width)

@@ -76,18 +76,17 @@ def baked(effect: Effect, shown: range, contents: Iterable[FileContent | RampCon
 
 def _different(names: list[str]) -> list[str]:
     """The names, those that occur again with a number: regions mean the first."""
-    result = []
+    result: list[str] = []
     for name in names:
-        number = 1
-        while (new := _numbered(name, number)) in result:
-            number += 1
-        result.append(new)
+        result.append(_free(name, result))
     return result
 
 
-def _numbered(name: str, number: int) -> str:
-    end = "" if number == 1 else f" {number}"
-    return name[: limits.MAX_NAME - len(end)] + end
+def _free(name: str, taken: Collection[str]) -> str:
+    """The name; where it is taken, with the first number with which it is not."""
+    ends = itertools.chain([""], (f" {number}" for number in itertools.count(2)))
+    numbered = (name[: limits.MAX_NAME - len(end)] + end for end in ends)
+    return next(each for each in numbered if each not in taken)
 
 
 def _region_names(effect: Effect) -> list[str]:
@@ -97,9 +96,7 @@ def _region_names(effect: Effect) -> list[str]:
     for i, region in enumerate(effect.regions):
         mistaken = region.name == recipe.CAMERA and effect.camera in followed
         if mistaken or any(region is other for other in followed):
-            taken = {recipe.CAMERA, *names[:i], *names[i + 1 :]}
-            numbered = (_numbered(region.name or "Region", number) for number in itertools.count(1))
-            names[i] = next(name for name in numbered if name not in taken)
+            names[i] = _free(region.name or "Region", {recipe.CAMERA, *names[:i], *names[i + 1 :]})
     return names
 
 
