@@ -6,11 +6,17 @@ import os
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
+from . import told
+
 LONGEST = 300  # characters of a sentence, as users see it
 
 
 class UserError(Exception):
     """What a user can mend: one clear sentence, the place first, which can be shown anywhere whatever it quotes."""
+
+    def __init__(self, *arguments: object) -> None:
+        super().__init__(*arguments)
+        told.made(str(self))
 
     def __str__(self) -> str:
         return sentence(super().__str__())

@@ -7,7 +7,10 @@ It tells nobody of strokes and of files on disk: previews look for them when the
 from collections.abc import Callable, Hashable
 from typing import Any, TypeVar
 
+from .memo import Kept
+
 T = TypeVar("T")
+_MOST = 64  # values of an UntilChange
 
 
 class Revision:
@@ -38,22 +41,16 @@ class UntilChange:
 
     For what is drawn: operators, which may follow a change that nobody has told of yet, read anew."""
 
-    _MOST = 64
-
     def __init__(self) -> None:
         self._number = -1
-        self._values: dict[Hashable, tuple[bool, Any]] = {}
+        self._values: Kept[Hashable, tuple[bool, Any]] = Kept()
 
     def get(self, key: Hashable, make: Callable[[], T]) -> T:
         """The value that `make` gives for a key; what it raised, if it did."""
-        if self._number != number() or len(self._values) >= self._MOST:
-            self._number, self._values = number(), {}
-        if key not in self._values:
-            try:
-                self._values[key] = True, make()
-            except Exception as error:
-                self._values[key] = False, error.with_traceback(None)
-        good, value = self._values[key]
+        if self._number != number():
+            self._number = number()
+            self.clear()
+        good, value = self._values.ask(key, lambda: _outcome(make), _MOST)
         if not good:
             raise value.with_traceback(None)  # which would grow with every raise
         return value
@@ -64,4 +61,12 @@ class UntilChange:
         return value if good and self._number == number() else None
 
     def clear(self) -> None:
-        self._values = {}
+        self._values.clear()
+
+
+def _outcome(make: Callable[[], object]) -> tuple[bool, Any]:
+    """Whether a call succeeds, and what it gives, or raises."""
+    try:
+        return True, make()
+    except Exception as error:
+        return False, error.with_traceback(None)

@@ -1,54 +1,83 @@
-"""The last errors and warnings that users were told, for a report of an error: in memory alone, a hundred at most."""
+"""The last errors and warnings that users were told, for a report of an error: in memory alone, a hundred at most.
 
+Sentences quote what is the user's. A report has the source text of the calls that made them instead, which is ours.
+"""
+
+import linecache
 import sys
 import threading
 import time
 import traceback
 from pathlib import Path
+from types import CodeType, FrameType
 from typing import NamedTuple
 
-from .messages import sentence
+from .memo import Kept
 
 MOST = 100  # sentences
 _PACKAGE = Path(__file__).parents[1]
 _CALLS = 8  # of a traceback
+_LEAST = 5  # letters of a sentence; what has fewer stands in others by chance
 _start = time.monotonic()
-_lock = threading.Lock()  # films are rendered on threads of their own
+_lock = threading.RLock()  # films are rendered on threads of their own
 
 
 class Told(NamedTuple):
-    """A sentence as it was shown, names included; `templates.plain` takes these out.
+    """A sentence as it was shown, names included, and the words for it that have none.
 
-    place: of the extension's code that raised it, "": not known; is_plain: it quotes nothing
     seconds: after the start, when it was told last; times: how often that was"""
 
     text: str
-    place: str
-    is_plain: bool
+    words: str
     seconds: float
     times: int
 
 
-_told: dict[tuple[str, str], Told] = {}  # in the order in which they were told last
+_told: Kept[tuple[str, str], Told] = Kept()  # in the order in which they were told last
+_made: Kept[str, tuple[CodeType, int]] = Kept()  # by sentence of an error: the code that made it last, and where
 
 
-def record(text: object) -> None:
-    """Keeps a sentence that a user is told, and where the error that is being handled was raised."""
-    _keep(sentence(text), _place(sys.exception()))
+def made(sentence: str) -> None:
+    """Notes who makes an error of this sentence: the caller of its class."""
+    frame: FrameType | None = sys._getframe(1)
+    while frame and frame.f_code.co_name == "__init__":
+        frame = frame.f_back
+    if frame and len(sentence) >= _LEAST:
+        call = frame.f_code, frame.f_lasti
+        with _lock:
+            _made.pop(sentence, None)
+            _made.ask(sentence, lambda: call, MOST)
 
 
-def shown(text: object) -> None:
+def record(text: object, level: int = 1) -> None:
+    """Keeps a sentence that a user is told. level: which of the callers tells it, where no error of ours has said it"""
+    words = described(text)
+    if not words:
+        frame = sys._getframe(level)
+        words = _source(frame.f_code, frame.f_lasti)
+    _keep(str(text), words)
+
+
+def shown(text: object, level: int = 1) -> None:
     """As `record`, for what is drawn again and again: it counts once."""
-    line = sentence(text)
     with _lock:
-        is_known = any(known == line for known, _ in _told)
+        is_known = any(known == str(text) for known, _ in _told)
     if not is_known:
-        record(line)
+        record(text, level + 1)
 
 
 def exception(error: BaseException) -> None:
     """Keeps an error that nobody expected: its type and calls of the extension's code, not what it says."""
-    _keep(type(error).__name__, _calls(error), is_plain=True)
+    inner_first = reversed(_frames(error)[-_CALLS:])
+    calls = " < ".join(f"{_place(frame.filename, frame.lineno)} {frame.name}" for frame in inner_first)
+    _keep(type(error).__name__, f"{type(error).__name__} [{calls}]")
+
+
+def described(text: object) -> str:
+    """The source text that made the errors which a sentence quotes, the last made first; "": it quotes none."""
+    with _lock:
+        calls = [call for sentence, call in _made.items() if sentence in str(text)]
+    return " < ".join(_source(*call) for call in reversed(calls))
 
 
 def last() -> list[Told]:
@@ -67,30 +96,27 @@ def is_ours(error: BaseException) -> bool:
     return bool(_frames(error))
 
 
-def _keep(text: str, place: str, is_plain: bool = False) -> None:
+def _keep(text: str, words: str) -> None:
     with _lock:
-        known = _told.pop((text, place), None)
+        known = _told.pop((text, words), None)
         times = known.times + 1 if known else 1
-        _told[text, place] = Told(text, place, is_plain, time.monotonic() - _start, times)
-        while len(_told) > MOST:
-            del _told[next(iter(_told))]
+        _told.ask((text, words), lambda: Told(text, words, time.monotonic() - _start, times), MOST)
 
 
-def _place(error: BaseException | None) -> str:
-    frames = _frames(error) if error else []
-    return _in_words(frames[-1]) if frames else ""
+def _source(code: CodeType, at: int) -> str:
+    """The lines of the statement that an instruction belongs to, as one, and where they are."""
+    if not Path(code.co_filename).is_relative_to(_PACKAGE):
+        return "(words that are not the extension's own)"
+    first, end, *_ = list(code.co_positions())[at // 2]
+    lines = linecache.getlines(code.co_filename)[(first or 1) - 1 : end or first]
+    return f"{' '.join(''.join(lines).split())} [{_place(code.co_filename, first)}]"
 
 
-def _calls(error: BaseException) -> str:
-    """The innermost first."""
-    return " < ".join(f"{_in_words(frame)} {frame.name}" for frame in reversed(_frames(error)[-_CALLS:]))
+def _place(file: str, line: int | None) -> str:
+    return f"{Path(file).relative_to(_PACKAGE).as_posix()}:{line}"
 
 
 def _frames(error: BaseException) -> list[traceback.FrameSummary]:
     """Those in files of the extension."""
     frames = traceback.StackSummary.extract(traceback.walk_tb(error.__traceback__), lookup_lines=False)
     return [frame for frame in frames if Path(frame.filename).is_relative_to(_PACKAGE)]
-
-
-def _in_words(frame: traceback.FrameSummary) -> str:
-    return f"{Path(frame.filename).relative_to(_PACKAGE).as_posix()}:{frame.lineno}"

@@ -147,7 +147,7 @@ def _is_registered(group, field: Field) -> None:
 
 
 def test_what_does_not_count_is_not_asked_for_its_keys(whole):
-    """Else an effect would not be known to be the same at all frames (Effect.is_still)."""
+    """Keys are sampled at every frame."""
     from shutter_addon.blender.data import fcurves, snapshot, strips
 
     scene, effect, strip = strips.find_effect(whole.scene)

@@ -56,11 +56,7 @@ def changed(**channels) -> effect.Effect:
     return effect.Effect((effect.Shutter(name="Sharp", bars=Bars(bars)),), regions, options, edge_aware=edge_aware)
 
 
-def test_the_state_of_a_still_effect_is_made_once():
-    still = changed(placement=Constant(np.eye(3)))
-    assert still.at(1) is still.at(3.5)
-    placed = effect.PlacedRamp("linear", effect.Moves())
-    assert (ramped := changed(content=placed)).at(1) is ramped.at(3.5)
+def test_bars_that_are_closed_are_told_with_their_frame():
     closed = changed(bars=Constant(0 * FIRST))
     for frame in (1, 3):
         with pytest.raises(EffectError, match=f"at frame {frame}: all bars are zero"):

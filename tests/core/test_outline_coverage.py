@@ -5,6 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from shutter_addon.core import scanlines
 from shutter_addon.core.model import outlines
 
 SQUARE = [[(0.25, 0.25), (0.75, 0.25), (0.75, 0.75), (0.25, 0.75)]]
@@ -97,13 +98,13 @@ def test_many_points_take_no_more_memory(monkeypatch):
     strokes = [np.random.default_rng(2).random((300, 2)) * 1.4 - 0.2]
     whole = outlines.coverage(strokes, 64, 48)
     # These are what takes the memory.
-    looked, crossings = [], outlines._crossings
+    looked, crossings = [], scanlines.crossings
 
     def counted(*arguments):
         looked.append(crossings(*arguments))
         return looked[-1]
 
-    monkeypatch.setattr(outlines, "_crossings", counted)  # as above
+    monkeypatch.setattr(scanlines, "crossings", counted)
     monkeypatch.setattr(outlines, "_CROSSINGS", 10_000)  # likewise
     assert (outlines.coverage(strokes, 64, 48) == whole).all()
-    assert max(len(rows) for rows, _places in looked) <= 10_000 < sum(len(rows) for rows, _places in looked)
+    assert max(len(rows) for rows, *_ in looked) <= 10_000 < sum(len(rows) for rows, *_ in looked)

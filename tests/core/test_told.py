@@ -1,8 +1,11 @@
+import re
 import threading
 
 import pytest
 
 from shutter_addon.core import threads, told
+from shutter_addon.core.recipes import recipe_file
+from shutter_addon.core.recipes.recipe import RecipeError
 from shutter_addon.media.errors import MediaError
 from shutter_addon.media.files import check_file
 
@@ -36,19 +39,34 @@ def test_what_is_drawn_again_and_again_counts_once():
     assert [each.times for each in told.last()] == [1]
 
 
-def test_a_sentence_is_kept_short():
-    told.record("x" * 10_000)
-    assert len(texts()[0]) == 300
+RAISED = r'raise MediaError\(f"\{path.name\}: no such file in \{.*\}"\) \[media/files\.py:\d+\]'
 
 
-def test_where_it_was_raised(tmp_path):
-    try:
-        check_file(tmp_path / "gone.png")
-    except MediaError as error:
-        told.record(error)
+@pytest.mark.parametrize("told_as", ["{}", "Virtual Shutter: {}", "Datei: {}"])
+def test_an_error_is_kept_as_the_source_text_that_raised_it(tmp_path, told_as):
+    """Whoever tells it, and in whatever words around it."""
+    with pytest.raises(MediaError) as raised:
+        check_file(tmp_path / "Qanarix.png")
+    told.record(told_as.format(raised.value))
     (kept,) = told.last()
-    assert kept.place.startswith("media/files.py:")
-    assert not kept.is_plain
+    assert re.fullmatch(RAISED, kept.words)
+
+
+def test_an_error_that_quotes_another_is_kept_with_it(tmp_path):
+    (tmp_path / "Qanarix.json").write_text('{"version": 1, "window": 4, "shutters": []}')
+    with pytest.raises(RecipeError) as raised:
+        recipe_file.load(tmp_path / "Qanarix.json")
+    told.record(raised.value)
+    (kept,) = told.last()
+    outer, inner = kept.words.split(" < ")
+    assert outer.startswith('raise RecipeError(f"{path}: {error}") from None [core/recipes/recipe_file.py:')
+    assert inner.startswith('raise RecipeError(f"{place}: {message}") [core/recipes/recipe_check.py:')
+
+
+def test_words_of_other_code_are_not_quoted():
+    told.record("Qanarix has said something")
+    told.record(MediaError("Qanarix is gone"))
+    assert {each.words for each in told.last()} == {"(words that are not the extension's own)"}
 
 
 def test_an_error_that_nobody_expected_is_kept_without_what_it_says():
@@ -57,9 +75,7 @@ def test_an_error_that_nobody_expected_is_kept_without_what_it_says():
     assert told.is_ours(raised.value)
     told.exception(raised.value)
     (kept,) = told.last()
-    assert (kept.text, kept.is_plain) == ("TypeError", True)
-    assert kept.place.startswith("media/files.py:")
-    assert kept.place.endswith(" check_file")
+    assert re.fullmatch(r"TypeError \[media/files\.py:\d+ check_file\]", kept.words)
 
 
 def test_errors_of_others_are_not_ours():
@@ -84,5 +100,4 @@ def test_what_a_thread_raises_that_nobody_waits_for(monkeypatch):
     threads.daemon(check_file, lambda: "a name").join()
     assert printed == [TypeError]
     (kept,) = told.last()
-    assert (kept.text, kept.is_plain) == ("TypeError", True)
-    assert "check_file" in kept.place
+    assert re.fullmatch(r"TypeError \[.* check_file < .*\]", kept.words)

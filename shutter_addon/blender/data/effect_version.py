@@ -4,7 +4,7 @@ and its files in the file system. What is baked has the key of what it was made 
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import fields, is_dataclass
 from numbers import Number
 from pathlib import Path
@@ -54,15 +54,13 @@ def key(scene: Scene, effect: PropertyGroup, strip: Strip, frames: range) -> str
     """16 hexadecimal digits; frames: as frames_of. EffectError, MediaError: the effect cannot be shown."""
     start = round(strips.origin(strip))
     taken = snapshot.take(scene, effect, strip, [start + frame for frame in frames])
-    digest = _Digest(start)
     rate = None if taken.timing else scene.render.fps / scene.render.fps_base  # a timing has it
-    parts = taken.effect, taken.timing, taken.source, rate, (frames.start, frames.stop)
-    digest.add((versions.extension(), colour_configuration.name(), *parts))
-    digest.add(_curves(scene, f"{effect.path_from_id()}.", start))
+    parts: list[object] = [versions.extension(), colour_configuration.name(), taken.effect, taken.timing, taken.source]
+    parts += [rate, frames.start, frames.stop, _curves(scene, f"{effect.path_from_id()}.", start)]
     if placed := _curves(scene, f"{strip.path_from_id()}.transform.", start):
         keyed = {path for path, *_ in placed}
-        digest.add([placed, [getattr(strip.transform, name) for name in geometry.TRANSFORM if name not in keyed]])
-    return digest.hexadecimal[:16]
+        parts += [placed, [getattr(strip.transform, name) for name in geometry.TRANSFORM if name not in keyed]]
+    return hashlib.sha256(repr(_told(parts, start)).encode()).hexdigest()[:16]
 
 
 def is_changed(scene: Scene, effect: PropertyGroup, strip: Strip) -> bool:
@@ -107,67 +105,48 @@ def _plain(modifier: bpy_struct) -> list:
     return plain
 
 
-class _Digest:
-    """A hash of plain data; start: the timeline frame that frames count from."""
+def _told(value: Any, start: float) -> object:
+    """Plain data, nested, whose `repr` is equal for equal values; start: the timeline frame that frames count from."""
+    if isinstance(value, np.ndarray):
+        return value.dtype.str, value.shape, value.tobytes()
+    if isinstance(value, Path):
+        return _told([value], start)
+    if is_dataclass(value):
+        return type(value).__name__, _fields(value, start)
+    if isinstance(value, UserError):
+        return "error", str(value)
+    if isinstance(value, Mapping):
+        return sorted((_told(pair, start) for pair in value.items()), key=repr)
+    if not isinstance(value, list | tuple | frozenset | set | range):
+        return value
+    paths = [each for each in value if isinstance(each, Path)]
+    if paths and len(paths) == len(value):
+        digests = zip(paths, versions.digests(paths), strict=True)
+        return [digest or f"missing: {path.name}" for path, digest in digests]
+    told = [_told(each, start) for each in value]
+    return sorted(told, key=repr) if isinstance(value, frozenset | set) else told
 
-    def __init__(self, start: int) -> None:
-        self._hash, self._start = hashlib.sha256(), start
 
-    @property
-    def hexadecimal(self) -> str:
-        return self._hash.hexdigest()
-
-    def _feed(self, *texts: object) -> None:
-        for text in texts:
-            self._hash.update(repr(text).encode() + b"\0")
-
-    def add(self, value: object) -> None:
-        if isinstance(value, np.ndarray):
-            self._feed(value.dtype.str, value.shape)
-            self._hash.update(np.ascontiguousarray(value).tobytes())
-        elif isinstance(value, Path):
-            self._add_all([value])
-        elif is_dataclass(value):
-            self._add_fields(value)
-        elif isinstance(value, Mapping):
-            self._add_all(sorted(value.items(), key=repr))
-        elif isinstance(value, list | tuple | frozenset | set | range):
-            self._add_all(sorted(value, key=repr) if isinstance(value, frozenset | set) else value)
-        elif isinstance(value, UserError):
-            self._feed("error", str(value))
-        else:
-            self._feed(value)
-
-    def _add_all(self, values: Iterable) -> None:
-        values = list(values)
-        self._feed(len(values))
-        if values and all(isinstance(value, Path) for value in values):
-            values = [
-                digest or f"missing: {path.name}" for path, digest in zip(values, versions.digests(values), strict=True)
-            ]
-        for value in values:
-            self.add(value)
-
-    def _add_fields(self, value: Any) -> None:
-        name = type(value).__name__
-        self._feed(name)
-        if name == "Samples" and all(map(_is_number, value.values.values())):
-            # Where they come from is known by their curve; of it Blender gives other floats at other frames.
-            first = next(iter(value.values.values()))
-            self.add(np.round(np.asarray(first, np.float64), 5) + 0.0)
-            return
-        for field in fields(value):
-            if field.name in _LEFT_OUT.get(name, ()):
-                continue
-            content = getattr(value, field.name)
-            if name == "SourceSpec" and field.name == "options":
-                content = {option: each for option, each in content.items() if option != "config"}
-            if name == "MatteFile" and field.name == "files":
-                content = _files(value.path, content)
-            if field.name in _FRAMES.get(name, ()):
-                content = _shifted(content, -self._start)
-            self._feed(field.name)
-            self.add(content)
+def _fields(value: Any, start: float) -> object:
+    """What the fields of a dataclass say of the pictures."""
+    name = type(value).__name__
+    if name == "Samples" and all(map(_is_number, value.values.values())):
+        # Where they come from is known by their curve; of it Blender gives other floats at other frames.
+        first = next(iter(value.values.values()))
+        return _told(np.round(np.asarray(first, np.float64), 5) + 0.0, start)
+    told = []
+    for field in fields(value):
+        if field.name in _LEFT_OUT.get(name, ()):
+            continue
+        content = getattr(value, field.name)
+        if name == "SourceSpec" and field.name == "options":
+            content = {option: each for option, each in content.items() if option != "config"}
+        if name == "MatteFile" and field.name == "files":
+            content = _files(value.path, content)
+        if field.name in _FRAMES.get(name, ()):
+            content = _shifted(content, -start)
+        told.append((field.name, _told(content, start)))
+    return told
 
 
 def _is_number(value: object) -> bool:

@@ -34,13 +34,13 @@ def soon(timer: Callable[[], float | None], seconds: float = 0.0) -> None:
 
 def report_error(operator: Operator, sentence: str) -> None:
     """Reports a sentence that is already translated; Copy Report has it, without what it names."""
-    told.record(sentence)
+    told.record(sentence, level=2)
     operator.report({"ERROR"}, sentence)
 
 
 def report_warning(operator: Operator, sentence: str) -> None:
     """As report_error, of what has been done in part or otherwise."""
-    told.record(sentence)
+    told.record(sentence, level=2)
     operator.report({"WARNING"}, sentence)
 
 

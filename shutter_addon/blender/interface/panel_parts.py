@@ -23,7 +23,7 @@ _MOST_ROWS = 5  # of a list; the rest is scrolled to
 def sentence(layout: UILayout, words: str, icon: str = "NONE", room: float = 1.0, is_quiet: bool = False) -> None:
     """A sentence, already translated, in as many lines as the panel's width takes; room: its share of that width."""
     if icon == "ERROR":
-        told.shown(words)
+        told.shown(words, level=2)
     unit, region = drawing.ui_scale(), bpy.context.region
     width = (
         room * min(region.width if region else 300 * unit, WIDEST * unit)

@@ -8,7 +8,7 @@ from contextlib import closing
 import bpy
 from bpy.types import PropertyGroup, Scene, Strip
 
-from ...core import templates
+from ...core import told
 from ...core.messages import UserError
 from ...media.file_kind import file_kind
 from ..data import annotations, colour_configuration, fcurves, snapshot, source_media, strips
@@ -61,7 +61,7 @@ def _of_effect(scene: Scene, effect: PropertyGroup, strip: Strip) -> Iterator[st
     try:
         snapshot.take(scene, effect, strip, (frame,)).effect.at(frame)
     except UserError as error:
-        yield f"- Cannot be shown at frame {frame}: {templates.plain(str(error))}"
+        yield f"- Cannot be shown at frame {frame}: {told.described(error)}"
 
 
 def _of_strip(strip: Strip) -> Iterator[str]:
@@ -100,7 +100,7 @@ def _of_source(scene: Scene, effect: PropertyGroup, strip: Strip) -> Iterator[st
                 f" {medium.count} frames, read as {medium.dtype}, alpha {medium.alpha}, color space {_standard(space)}"
             )
     except UserError as error:
-        yield f"- Footage: {templates.plain(str(error))}"
+        yield f"- Footage: {told.described(error)}"
 
 
 def _of_region(effect: PropertyGroup, region: PropertyGroup) -> list[str]:

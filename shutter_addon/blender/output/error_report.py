@@ -18,7 +18,7 @@ import bpy
 import gpu
 from bpy.types import Scene
 
-from ...core import templates, told
+from ...core import told
 from ...devices.budget import MEGABYTE, machine_memory
 from ...devices.device import NoDeviceError
 from ..data import preferences, versions
@@ -121,12 +121,9 @@ def without_paths(words: str) -> str:
 
 
 def _sentences() -> list[str]:
-    """The oldest first; where each was raised, when it was told last, and how often."""
+    """The oldest first; when each was told last, and how often."""
     return [
-        f"- {each.seconds:.0f} s: {each.text if each.is_plain else templates.plain(each.text)}"
-        + (f" [{each.place}]" if each.place else "")
-        + (f" × {each.times}" if each.times > 1 else "")
-        for each in told.last()
+        f"- {each.seconds:.0f} s: {each.words}" + (f" × {each.times}" if each.times > 1 else "") for each in told.last()
     ]
 
 

@@ -84,7 +84,7 @@ class VirtualShutterEngine(bpy.types.RenderEngine):
         return self.test_break() or render_job.stopping()
 
     def _say(self, message: str) -> None:
-        told.record(message)
+        told.record(message, level=2)
         if bpy.app.background:
             render_job.say(message)
         else:

@@ -11,7 +11,9 @@ from itertools import pairwise
 
 import numpy as np
 
-from .mask_outlines import crossings, ranges
+from .. import scanlines
+from ..scanlines import ranges
+from .mask_outlines import crossings
 
 # Pixels that are computed at once: what their numbers take stays in a processor's cache.
 _BLOCK = 1 << 14
@@ -27,52 +29,17 @@ def fill(value: np.ndarray, polygons: list[np.ndarray], solver: str, holes: bool
     first cut down to its outer loops.
     """
     if solver == "SWEEP_LINE":
-        loops = [loop for polygon in polygons for loop in (_outer_loops(polygon) if overlap else [polygon])]
-        for group in [loops] if holes else [[loop] for loop in loops]:
-            _fill_together(value, group, lambda winding: winding % 2 != 0)
-        return
-    for group in [polygons] if holes else [[loop] for loop in polygons + _outer_borders(polygons)]:
-        _fill_together(value, group, lambda winding: winding != 0)
-
-
-def _fill_together(value: np.ndarray, polygons: list[np.ndarray], rule: Callable[[np.ndarray], np.ndarray]) -> None:
-    """Sets the pixels to 1 whose winding number is one by the rule."""
-    height, width = value.shape
-    row, left, right, winding = _spans(polygons, height)
-    inside = rule(winding)
-    start = np.ceil(np.clip(left[inside] * width - 0.5, 0, width)).astype(int)
-    stop = np.floor(np.clip(right[inside] * width + 0.5, 0, width)).astype(int)
-    for y, a, b in zip(row[inside].tolist(), start.tolist(), stop.tolist(), strict=True):
-        value[y, a:b] = 1
-
-
-def _spans(polygons: list[np.ndarray], height: int) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Along the middle of each row of pixels, what lies between two edges that follow each other: row, left, right and
-    winding number (n,) each, in order."""
-    none = np.zeros((0, 2))
-    start = np.concatenate([none, *polygons])
-    end = np.concatenate([none, *(np.roll(p, -1, axis=0) for p in polygons)])
-    edge, row, x = _at_rows(start, end, height)
-    order = np.lexsort((x, row))
-    row, x = row[order], x[order]
-    winding = np.cumsum(np.where(end[:, 1] > start[:, 1], 1, -1)[edge[order]])
-    same = row[1:] == row[:-1]
-    return row[:-1][same], x[:-1][same], x[1:][same], winding[:-1][same]
-
-
-def _at_rows(start: np.ndarray, end: np.ndarray, height: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Where edges (n, 2) cross the middles of rows of pixels: index of edge, row, x (m,) each."""
-    lowest, highest = np.minimum(start[:, 1], end[:, 1]), np.maximum(start[:, 1], end[:, 1])
-    first, last = (np.clip(np.ceil(y * height - 0.5), 0, height).astype(int) for y in (lowest, highest))
-    edge, row = ranges(first, last)
-    share = ((row + 0.5) / height - start[edge, 1]) / (end[edge, 1] - start[edge, 1])
-    return edge, row, start[edge, 0] + (end[edge, 0] - start[edge, 0]) * share
+        filled = [loop for polygon in polygons for loop in (_outer_loops(polygon) if overlap else [polygon])]
+    else:
+        filled = polygons if holes else polygons + _outer_borders(polygons)
+    in_pixels = [polygon * value.shape[::-1] for polygon in filled]
+    for group in [in_pixels] if holes else [[polygon] for polygon in in_pixels]:
+        scanlines.fill(value, group, 1, odd=solver == "SWEEP_LINE", seam=_SEAM)
 
 
 def _outer_borders(polygons: list[np.ndarray]) -> list[np.ndarray]:
     """The outer borders of all groups of polygons that cross one another or themselves."""
-    start = np.concatenate([np.zeros((0, 2)), *polygons])
-    end = np.concatenate([np.zeros((0, 2)), *(np.roll(p, -1, axis=0) for p in polygons)])
+    start, end = scanlines.edges(polygons)
     first, second, at, other = crossings(start, end)
     if not len(first):
         return []
@@ -179,21 +146,17 @@ def _quad_rows(quads: np.ndarray, width: int, height: int) -> tuple[np.ndarray, 
     others = np.flatnonzero(~convex)
     parts = np.concatenate([quads[convex], quads[others][:, [0, 1, 2, 2]], quads[others][:, [0, 2, 3, 3]]])
     index = np.concatenate([np.flatnonzero(convex), others, others])
-    y = parts[..., 1]
-    first, last = (np.ceil(np.clip(edge * height - 0.5, 0, height)).astype(int) for edge in (y.min(1), y.max(1)))
-    part, row = ranges(first, last)
-    middle = (row + 0.5) / height
-    left, right = np.full(len(row), np.inf), np.full(len(row), -np.inf)
-    for corner in range(4):
-        (ax, ay), (bx, by) = parts[:, corner].T, parts[:, (corner + 1) % 4].T
-        slope = np.divide(bx - ax, by - ay, out=np.zeros_like(ax), where=by != ay)
-        low, high = np.minimum(ay, by)[part], np.maximum(ay, by)[part]
-        x = ax[part] + (middle - ay[part]) * slope[part]
-        met = (low <= middle) & (middle < high)
-        np.minimum(left, x, out=left, where=met)
-        np.maximum(right, x, out=right, where=met)
-    start = np.ceil(np.clip(left * width - 0.5 - _SEAM, 0, width)).astype(int)
-    stop = np.floor(np.clip(right * width + 0.5 + _SEAM, 0, width)).astype(int)
+    start, end = (corners.reshape(-1, 2) * (width, height) for corners in (parts, np.roll(parts, -1, axis=1)))
+    edge, row, x = scanlines.crossings(start, end, range(height))
+    # Each part on each row, from the first to the last place where its edges cross it.
+    place = edge // 4 * height + row
+    order = np.argsort(place, kind="stable")
+    place, x = place[order], x[order]
+    first = np.flatnonzero(np.diff(place, prepend=-1))
+    left, right = (extreme.reduceat(x, first) if len(x) else x for extreme in (np.minimum, np.maximum))
+    part, row = np.divmod(place[first], height)
+    start = np.ceil(np.clip(left - 0.5 - _SEAM, 0, width)).astype(int)
+    stop = np.floor(np.clip(right + 0.5 + _SEAM, 0, width)).astype(int)
     some = stop > start
     return index[part[some]], row[some], start[some], stop[some]
 

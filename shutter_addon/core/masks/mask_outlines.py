@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..scanlines import ranges
+
 if TYPE_CHECKING:
     from .mask import MaskSpline
 
@@ -219,13 +221,6 @@ def crossings(starts: np.ndarray, ends: np.ndarray) -> tuple[np.ndarray, np.ndar
     shared = (ends[first] == starts[second]).all(1) | (ends[second] == starts[first]).all(1)
     cross = (at >= 0) & (at <= 1) & (other >= 0) & (other <= 1) & ~shared
     return first[cross], second[cross], at[cross], other[cross]
-
-
-def ranges(first: np.ndarray, last: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """All whole numbers from first to before last (n,): the index of the range each is of, and the number."""
-    counts = np.maximum(last - first, 0)
-    index = np.repeat(np.arange(len(counts)), counts)
-    return index, np.arange(len(index)) - np.repeat(np.cumsum(counts) - counts - first, counts)
 
 
 def _normalized(vectors: np.ndarray) -> np.ndarray:

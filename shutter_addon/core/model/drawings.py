@@ -32,11 +32,6 @@ class Drawings:
     placement: Channel | None = None
     origins: tuple[Placement, ...] = ()
 
-    @property
-    def is_still(self) -> bool:
-        """Whether they are known to be the same at every frame."""
-        return len(self.frames) < 2 and (self.placement is None or keyframes.are_still(self.placement))
-
     def at(self, frame: float) -> list[np.ndarray]:
         """Strokes (n, 2) in fractions of the picture. EffectError: a point is nowhere near it (limits.MAX_DISTANCE)."""
         placement = self.placement.at(frame) if self.placement else None

@@ -8,7 +8,6 @@ property is, its field says (fields.py).
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Literal
@@ -19,7 +18,7 @@ from ..messages import EffectError
 from . import combining, keyframes, limits, mattes, motions, outlines, scribbles, shutters
 from .choices import BETWEEN, BLENDS, CHANNELS, COMBINES, CONTEXT, LENGTHS, METHODS, MOTIONS, RAMPS, TIMINGS
 from .drawings import Drawings as Drawings
-from .fields import MISSING, choice, color, fields_of, number, switch, text, whole
+from .fields import MISSING, choice, color, number, switch, text, whole
 from .frame_state import FrameState
 from .keyframes import Bars, Channel
 from .motions import Placement
@@ -40,10 +39,19 @@ class Moves:
     rotation: Channel = field(default=keyframes.Constant(0.0))
     scale: Channel = field(default=keyframes.Constant(1.0))
 
+    @staticmethod
+    def keyed(keys: Sequence[tuple[float, Placement, keyframes.Ease]]) -> Moves:
+        """Those of keys: of each its frame, where something lies there, and the ease of the span that it begins."""
+        if not keys:
+            return Moves()
+        frames, placements, eases = zip(*keys, strict=True)
+        columns = zip(*((placed.location, placed.rotation, placed.scale) for placed in placements), strict=True)
+        return Moves(*(keyframes.Keys(frames, values, eases) for values in columns))
+
     @property
-    def is_still(self) -> bool:
-        """Whether it is known to lie there at every frame."""
-        return keyframes.are_still(self.location, self.rotation, self.scale)
+    def are_keyed(self) -> bool:
+        """Whether it may lie elsewhere at another frame."""
+        return not all(isinstance(each, keyframes.Constant) for each in (self.location, self.rotation, self.scale))
 
     def at(self, frame: float) -> Placement:
         x, y = (float(number) for number in self.location.at(frame))
@@ -108,11 +116,6 @@ class Region(AnyRegion):
     )
     drawings: Drawings
 
-    @property
-    def is_still(self) -> bool:
-        """Whether it is known to be the same at every frame."""
-        return keyframes.are_still(self.drawings, self.kind, self.width, self.moves, self.opacity)
-
     def at(self, frame: float) -> scribbles.Shape:
         moved = self.drawings.moved(frame, self.placement(frame))
         kind, width, opacity = (channel.at(frame) for channel in (self.kind, self.width, self.opacity))
@@ -147,11 +150,6 @@ class MatteRegion(AnyRegion):
         context=CONTEXT,
         recipe="width",
     )
-
-    @property
-    def is_still(self) -> bool:
-        """Whether its matte is known to be the same at every frame."""
-        return keyframes.are_still(self.content, self.opacity, self.feather)
 
     def at(self, frame: float) -> mattes.Matte:
         """The matte at a frame."""
@@ -198,11 +196,6 @@ class DrawnOutlines:
     """Channel of outlines (mattes.Outline) that go straight from one drawing to the next."""
 
     drawings: Drawings
-
-    @property
-    def is_still(self) -> bool:
-        """Whether it is known to be the same at every frame."""
-        return self.drawings.is_still
 
     def at(self, frame: float) -> mattes.Outline:
         return mattes.Outline(outlines.curves(self.drawings.at(frame)))
@@ -256,11 +249,6 @@ class PlacedRamp:
 
     kind: mattes.RampKind
     moves: Moves
-
-    @property
-    def is_still(self) -> bool:
-        """Whether it is known to be the same at every frame."""
-        return self.moves.is_still
 
     def at(self, frame: float) -> mattes.Ramp:
         placed = self.moves.at(frame)
@@ -411,26 +399,8 @@ class Effect:
     inbetween_method: Method = choice("Method", "How in-between frames are made", METHODS, default="quick")
     camera: Camera = STILL_CAMERA
 
-    @cached_property
-    def is_still(self) -> bool:
-        """Whether its state is known to be the same at every frame."""
-        channels = [name for name, each in fields_of(Shutter).items() if each.is_channel]
-        numbers = [getattr(shutter, name) for shutter in self.shutters for name in channels]
-        bars = (shutter.bars for shutter in self.shutters)
-        return keyframes.are_still(self.options, self.edge_aware, *bars, *numbers, *self.regions)
-
     def at(self, frame: float) -> FrameState:
         """The effect at a frame. EffectError: no picture can be made of it."""
-        if self.is_still:
-            with suppress(EffectError):  # it is raised below, and names this frame
-                return self._still
-        return self._state(frame)
-
-    @cached_property
-    def _still(self) -> FrameState:
-        return self._state(0.0)
-
-    def _state(self, frame: float) -> FrameState:
         if (name := self._one_too_many) is not None:
             raise EffectError(_TOO_MANY_POINTS, name=name, most=limits.MAX_POINTS)
         options = replace(self.options.at(frame), edge_aware=float(self.edge_aware.at(frame)))

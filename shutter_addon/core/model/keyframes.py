@@ -64,15 +64,8 @@ class Constant:
 
     value: Any
 
-    is_still = True
-
     def at(self, _frame: float) -> Any:
         return _given(self.value)
-
-
-def are_still(*parts: object) -> bool:
-    """Whether all of them, channels or what is made of channels, are known to be the same at every frame."""
-    return all(getattr(part, "is_still", False) for part in parts)
 
 
 @dataclass(frozen=True)
@@ -139,11 +132,6 @@ class Bars:
     channel: Channel
     keys: tuple[tuple[float, Ease], ...] = ()
     share: Channel | None = None
-
-    @property
-    def is_still(self) -> bool:
-        """Whether they are known to be the same at every frame."""
-        return not self.keys and are_still(self.channel)
 
     def at(self, frame: float, interpolation: str) -> np.ndarray:
         """Between keys by displacement (paper §3.4.1, over time), or by `channel`: where interpolation is "value", and

@@ -26,7 +26,7 @@ def layered(effect: Effect, state: FrameState, clip: Clip, at: Shown) -> FrameSt
     drawn = [(1 + i, region) for i, region in enumerate(regions) if isinstance(region, Region)]
     others = [(0, region) for region in effect.regions if isinstance(region, Region) and region not in regions]
     camera = None
-    if not effect.camera.moves.is_still:
+    if effect.camera.moves.are_keyed:
         turns, shifts = following.moves(following.places_of(effect.camera), clip, at.frame, times)
         camera = Following(frames.start, turns[:, None], shifts[:, None]).of(slice(None))
     return replace(

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from .. import stopping
+from .. import scanlines, stopping
 
 # Lines of each row of pixels on which coverage is exact.
 LINES = 8
@@ -37,7 +37,10 @@ def _bands(height: int, rows: int) -> Iterator[range]:
 
 def _covered(strokes: Sequence, width: int, height: int, band: range) -> np.ndarray:
     """The coverage of the rows of a band."""
-    rows, places = _crossings(strokes, width, height, band)
+    lines, scale = range(band.start * LINES, band.stop * LINES), (width, -height * LINES)
+    curves = [np.asarray(stroke, np.float64) * scale + (0, height * LINES) for stroke in strokes if len(stroke) > 2]
+    _, rows, places = scanlines.crossings(*scanlines.edges(curves), lines)
+    rows -= lines.start
     order = np.lexsort((places, rows))
     rows, places = rows[order], np.clip(places[order], 0, width)
     rank = np.arange(len(rows)) - np.searchsorted(rows, rows)
@@ -90,24 +93,3 @@ def _finer(shape: Sequence, aspect: float, most: float) -> tuple[np.ndarray, np.
 def _apart(points: np.ndarray, point: tuple[float, float], aspect: float) -> np.ndarray:
     """How far points (n, 2) are from one, in parts of the picture's height."""
     return np.hypot(*((points - point) * (aspect, 1)).T)
-
-
-def _crossings(strokes: Sequence, width: int, height: int, band: range) -> tuple[np.ndarray, np.ndarray]:
-    """Where curves cross the lines of a band of rows: which of these, (n,) from its top, and places (n,) in pixels from
-    the left."""
-    lines = band.start * LINES, band.stop * LINES
-    rows, places = [np.zeros(0, np.intp)], [np.zeros(0)]
-    for stroke in strokes:
-        if len(stroke) < 3:
-            continue
-        points = np.asarray(stroke, dtype=np.float64) * (width, -height * LINES) + (0, height * LINES)
-        ends = np.roll(points, -1, axis=0)
-        upper, lower = np.where(points[:, 1:] <= ends[:, 1:], (points, ends), (ends, points))
-        first = np.clip(np.ceil(upper[:, 1] - 0.5), *lines).astype(np.intp)
-        count = np.clip(np.ceil(lower[:, 1] - 0.5), first, lines[1]).astype(np.intp) - first
-        edge = np.repeat(np.arange(len(count)), count)
-        row = np.arange(len(edge)) - np.repeat(np.cumsum(count) - count, count) + first[edge]
-        along = (row + 0.5 - upper[edge, 1]) / (lower[edge, 1] - upper[edge, 1])
-        rows.append(row - lines[0])
-        places.append(upper[edge, 0] + along * (lower[edge, 0] - upper[edge, 0]))
-    return np.concatenate(rows), np.concatenate(places)

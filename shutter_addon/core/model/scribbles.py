@@ -13,6 +13,8 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import ArrayLike
 
+from .. import scanlines
+
 # A line never gets thinner than this radius in pixels: a 5-point diffusion would leak through it.
 _MIN_RADIUS = 0.7072
 # Long segments are cut to this many pixels, so that the box around each stays small.
@@ -123,7 +125,8 @@ def rasterise(shapes: Iterable[Shape], width: int, height: int, *, border: bool 
                 continue
             pixels = np.clip(np.asarray(stroke, dtype=np.float64) * size, -_FARTHEST, _FARTHEST)
             pixels[:, 1] = height - pixels[:, 1]
-            filled = shape.kind == "lasso" and _fill(labels, pixels, shape.shutter + 1)
+            # A hand-drawn lasso crosses itself: even-odd would leave holes in it.
+            filled = shape.kind == "lasso" and scanlines.fill(labels, [pixels], shape.shutter + 1)
             if not filled:
                 _draw(labels, pixels, shape.width * height / 2 if shape.kind == "line" else 0, shape.shutter + 1)
     return labels
@@ -170,25 +173,3 @@ def _draw_segment(labels: np.ndarray, a: np.ndarray, b: np.ndarray, radius: floa
     along = np.clip((x * d[0] + y * d[1]) / max(d @ d, 1e-12), 0, 1)
     near = (x - along * d[0]) ** 2 + (y - along * d[1]) ** 2 <= radius * radius
     box[near] = label
-
-
-def _fill(labels: np.ndarray, points: np.ndarray, label: int) -> bool:
-    """Labels the pixel centres that a closed polygon winds around (nonzero); whether there were any.
-
-    A hand-drawn lasso crosses itself: even-odd would leave holes in it.
-    """
-    height, width = labels.shape
-    first = int(np.clip(np.ceil(points[:, 1].min() - 0.5), 0, height))
-    last = int(np.clip(np.ceil(points[:, 1].max() - 0.5), first, height))
-    # Differences along x of the winding number: each edge adds its direction right of where it crosses a row.
-    winding = np.zeros((last - first, width + 1), dtype=np.int32)
-    for a, b in zip(points, np.roll(points, -1, axis=0), strict=True):
-        direction = 1 if a[1] < b[1] else -1
-        top, bottom = (a, b) if direction == 1 else (b, a)
-        rows = np.arange(max(0, int(np.ceil(top[1] - 0.5))), min(height, int(np.ceil(bottom[1] - 0.5))))
-        if len(rows):
-            x = top[0] + (rows + 0.5 - top[1]) * (bottom[0] - top[0]) / (bottom[1] - top[1])
-            winding[rows - first, np.clip(np.ceil(x - 0.5), 0, width).astype(int)] += direction
-    inside = np.cumsum(winding[:, :-1], axis=1) != 0
-    labels[first:last][inside] = label
-    return bool(inside.any())

@@ -34,6 +34,7 @@ from ..model.effect import (
 from ..model.fields import fields_of
 from ..model.frame_state import Interpolation
 from ..model.keyframes import Bars, Channel, Constant, Ease, Keys, Samples, SourceTime
+from ..model.motions import Placement
 from . import recipe, recipe_file
 
 # Of the largest bar, of fractions of the picture, of degrees; of the larger key's value where that is above 1.
@@ -75,18 +76,17 @@ def baked(effect: Effect, shown: range, contents: Iterable[FileContent | RampCon
 
 def _different(names: list[str]) -> list[str]:
     """The names, those that occur again with a number: regions mean the first."""
-    result = []
+    result: list[str] = []
     for name in names:
-        number = 1
-        while (new := _numbered(name, number)) in result:
-            number += 1
-        result.append(new)
+        result.append(_free(name, result))
     return result
 
 
-def _numbered(name: str, number: int) -> str:
-    end = "" if number == 1 else f" {number}"
-    return name[: limits.MAX_NAME - len(end)] + end
+def _free(name: str, taken: Collection[str]) -> str:
+    """The name; where it is taken, with the first number with which it is not."""
+    ends = itertools.chain([""], (f" {number}" for number in itertools.count(2)))
+    numbered = (name[: limits.MAX_NAME - len(end)] + end for end in ends)
+    return next(each for each in numbered if each not in taken)
 
 
 def _region_names(effect: Effect) -> list[str]:
@@ -96,9 +96,7 @@ def _region_names(effect: Effect) -> list[str]:
     for i, region in enumerate(effect.regions):
         mistaken = region.name == recipe.CAMERA and effect.camera in followed
         if mistaken or any(region is other for other in followed):
-            taken = {recipe.CAMERA, *names[:i], *names[i + 1 :]}
-            numbered = (_numbered(region.name or "Region", number) for number in itertools.count(1))
-            names[i] = next(name for name in numbered if name not in taken)
+            names[i] = _free(region.name or "Region", {recipe.CAMERA, *names[:i], *names[i + 1 :]})
     return names
 
 
@@ -214,14 +212,12 @@ def _region(
 
 def _moves(moving: Subject, words: Mapping[float, Ease], shown: range) -> Moves:
     """Location, rotation and scale with the recipe's keys; words: see _keys."""
-    eased = _move_keys(moving, words, shown)
-    if not eased:
-        return Moves()
-    x, y, degrees, scale = zip(*(_place(moving, frame) for frame, _ in eased), strict=True)
-    locations = tuple((_short(left), _short(up)) for left, up in zip(x, y, strict=True))
-    frames, eases = tuple(_frame(frame, shown) for frame, _ in eased), tuple(ease for _, ease in eased)
-    columns = locations, tuple(map(_short_degrees, degrees)), tuple(map(_short, scale))
-    return Moves(*(Keys(frames, values, eases) for values in columns))
+    keys = []
+    for frame, ease in _move_keys(moving, words, shown):
+        x, y, degrees, scale = _place(moving, frame)
+        placed = Placement((_short(x), _short(y)), _short_degrees(degrees), _short(scale))
+        keys.append((_frame(frame, shown), placed, ease))
+    return Moves.keyed(keys)
 
 
 def _move_keys(moving: Subject, words: Mapping[float, Ease], shown: range) -> _Eased:

@@ -84,10 +84,7 @@ def _moves(
     kept = {frame: old[frame] for frame in keys}
     keys |= {frame: moving.placement(frame) for frame in _cut(old, first - 1, -1) + _cut(old, last + 1, 1)}
     keys |= {frame: placements[frame] if frame in exact else _rounded(placements[frame]) for frame in chosen}
-    frames = tuple(sorted(keys))
-    made = tuple(eases.get(frame, kept.get(frame, "linear")) for frame in frames)
-    columns = [(there.location, there.rotation, there.scale) for there in map(keys.__getitem__, frames)]
-    return Moves(*(Keys(frames, values, made) for values in zip(*columns, strict=True)))
+    return Moves.keyed([(f, keys[f], eases.get(f, kept.get(f, "linear"))) for f in sorted(keys)])
 
 
 def _cut(keys: Mapping[float, Ease], edge: int, step: int) -> list[int]:
