@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from fractions import Fraction
-from functools import partial
 from pathlib import Path
 
 from ..core.frames.frame_source import FrameSource
@@ -16,8 +15,6 @@ from .errors import MediaError
 from .files import check_file
 from .reduced import smaller
 from .sequence import IMAGE_SUFFIXES, SequenceChannel, SequenceSource
-
-Size = tuple[int, int]  # width and height
 
 
 def open_source(
@@ -31,7 +28,6 @@ def open_source(
     alpha: str | None = None,
     deinterlace: bool = False,
     divisor: int = 1,
-    size: Size | None = None,
 ) -> FrameSource:
     """Opens a movie, or the image sequence that starts with the file `path`. MediaError: it cannot be read.
 
@@ -43,12 +39,11 @@ def open_source(
     alpha: an image strip's alpha mode, "straight" or "premultiplied" (default: what Blender assumes); not a movie's
     deinterlace: a movie strip's option of that name
     divisor: how many times smaller than the files' the frames are each way, one of reduced.DIVISORS
-    size: what the frames of an opaque movie are fitted to, width and height, in place of `divisor`
     """
     path = Path(path)
     source: FrameSource
     if _is_movie(path, files):
-        source = _opened_movie(path, stream, deinterlace, divisor, size)
+        source = _opened_movie(path, stream, deinterlace, divisor)
     else:
         source = smaller(SequenceSource(path, files=files, fps=fps, alpha=alpha), divisor)
     try:
@@ -69,16 +64,16 @@ def with_proxy(
     """The source with its frames read from a proxy; the source itself, where there is none that fits.
 
     path, files, colorspace, config: of the proxy, as open_source takes them"""
-    opened = partial(open_source, path, files=files, colorspace=colorspace, config=config)
     try:
         from .proxy import ProxySource, fits
 
-        with opened() as proxy:
-            if not fits(proxy, source):
-                return source
-        return ProxySource(source, opened(size=(source.width, source.height)))
+        proxy = open_source(path, files=files, colorspace=colorspace, config=config)
     except (ImportError, MediaError):  # without PyAV nothing is fitted
         return source
+    if fits(proxy, source):
+        return ProxySource(source, proxy)
+    proxy.close()
+    return source
 
 
 def open_channel(
@@ -99,16 +94,14 @@ def _is_movie(path: Path, files: Sequence[str | Path] | None) -> bool:
     return files is None and path.suffix.lower() not in IMAGE_SUFFIXES
 
 
-def _opened_movie(
-    path: Path, stream: int, deinterlace: bool = False, divisor: int = 1, size: Size | None = None
-) -> FrameSource:
-    """See open_source. Only PyAV's frames are fitted to a size."""
+def _opened_movie(path: Path, stream: int, deinterlace: bool = False, divisor: int = 1) -> FrameSource:
+    """See open_source."""
     if pyav.missing():
         _check_lent(path, stream)
         return smaller(BlenderMovie(path, deinterlace=deinterlace), divisor)
     from .movie import MovieSource
 
-    return MovieSource(path, stream=stream, deinterlace=deinterlace, divisor=divisor, size=size)
+    return MovieSource(path, stream=stream, deinterlace=deinterlace, divisor=divisor)
 
 
 def _check_lent(path: Path, stream: int) -> None:

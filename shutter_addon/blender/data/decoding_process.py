@@ -2,23 +2,19 @@
 
 Blender runs it as a script, no part of the extension there. A question is a line of JSON: `number`, `path` and
 `deinterlace` of a movie, and `wanted`, which is "about", "close", or a frame's index; a file may be open several times,
-by several numbers. An answer is a line of JSON, and as many bytes behind it as its `bytes` says. Before the first comes
-a line that reads as the script's last argument.
+by several numbers. An answer is a line of JSON behind the script's last argument, and as many bytes as its `bytes`
+says.
 """
 
 from __future__ import annotations
 
 import contextlib
-import faulthandler
 import json
 import os
 import sys
 
 import bpy
 import numpy as np
-
-OPENED = 6  # movies that are open at a time, at most
-IDLE = 30  # seconds without an open movie after which it ends
 
 
 class Movie:
@@ -96,71 +92,53 @@ def _has_sound(path: str) -> bool:
         return False
 
 
-class Movies:
-    """Those that are open, the one that was asked for last at the end."""
-
-    def __init__(self) -> None:
-        self.open: dict[int, Movie] = {}
-
-    def get(self, number: int, path: str, deinterlace: bool) -> Movie:
-        """It, opened if it is not."""
-        movie = self.open.pop(number, None) or Movie(path, deinterlace)
-        while len(self.open) >= OPENED:
-            self.close(next(iter(self.open)))
-        self.open[number] = movie
-        return movie
-
-    def close(self, number: int) -> None:
-        """Closes it, if it is open."""
-        if movie := self.open.pop(number, None):
-            movie.close()
-
-
-def _answer(movies: Movies, wanted: str | int, **which) -> tuple[dict, np.ndarray | None]:
-    """The line and the bytes that are an answer. which: what Movies.get takes"""
+def _answer(
+    movies: dict[int, Movie], wanted: str | int, number: int, path: str, deinterlace: bool
+) -> tuple[dict, np.ndarray | None]:
+    """The line and the bytes that are an answer. movies: those that are open, by number"""
     try:
         if wanted == "close":
-            movies.close(which["number"])
+            _close(movies, number)
             return {}, None
-        movie = movies.get(**which)
+        if number not in movies:
+            movies[number] = Movie(path, deinterlace)
         if wanted == "about":
-            return movie.about(), None
-        frame = movie.frame(int(wanted))
+            return movies[number].about(), None
+        frame = movies[number].frame(int(wanted))
         return {"shape": frame.shape, "dtype": frame.dtype.name}, frame
     except (RuntimeError, MemoryError) as error:
-        movies.close(which["number"])
+        _close(movies, number)
         return {"error": " ".join(str(error).split()) or "there is no memory for it"}, None
+
+
+def _close(movies: dict[int, Movie], number: int) -> None:
+    if movie := movies.pop(number, None):
+        movie.close()
 
 
 def main() -> None:
     """Answers until its input ends."""
     # Whatever else Blender prints would be taken for an answer.
     questions, answers = (os.fdopen(os.dup(number), mode) for number, mode in ((0, "rb"), (1, "wb")))
-    null = os.open(os.devnull, os.O_RDWR)
-    os.dup2(null, 1)
+    os.dup2(os.open(os.devnull, os.O_RDWR), 1)
     if sys.platform == "win32":
         import msvcrt
 
         for stream in (questions, answers):
             msvcrt.setmode(stream.fileno(), os.O_BINARY)
     bpy.context.preferences.system.memory_cache_limit = 1  # megabyte: of frames, but for the last one
-    movies = Movies()
-    answers.write(f"\n{sys.argv[-1]}\n".encode())
-    while True:
-        answers.flush()
-        if not movies.open:  # a watch that needs no thread of Python's: it ends the process
-            faulthandler.dump_traceback_later(IDLE, exit=True, file=null)
-        if not (line := questions.readline()):
-            return
-        faulthandler.cancel_dump_traceback_later()
+    movies: dict[int, Movie] = {}
+    answers.write(b"\n")  # Blender may not have ended its line
+    while line := questions.readline():
         question = json.loads(line)
         said, frame = _answer(movies, **question)
         said["bytes"] = 0 if frame is None else frame.nbytes
-        answers.write(json.dumps(said).encode() + b"\n")
+        answers.write(f"{sys.argv[-1]}{json.dumps(said)}\n".encode())
         if frame is not None:
             answers.write(frame.data)
-            answers.flush()
-            next(reversed(movies.open.values())).read_on()
+        answers.flush()
+        if frame is not None:
+            movies[question["number"]].read_on()
 
 
 if __name__ == "__main__":

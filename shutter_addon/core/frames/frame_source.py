@@ -38,7 +38,7 @@ class ShotFinder(Protocol):
 class FrameSource(ABC):
     """The frames of a movie or of an image sequence; close it, or use it in a `with`.
 
-    path: the movie, or the first file of the sequence
+    path: the movie, or the first file of the sequence; files: the movie, or one for each frame of a sequence
     width, height: pixels
     count: frames as Blender's strip counts them (its content_duration)
     fps: frames per second, None for an image sequence
@@ -57,6 +57,7 @@ class FrameSource(ABC):
     """
 
     path: Path
+    files: list[Path]
     width: int
     height: int
     count: int
@@ -73,11 +74,6 @@ class FrameSource(ABC):
     by_blender: bool = False
     windows: int = 1
     is_made: bool = False
-
-    @property
-    def files(self) -> list[Path]:
-        """The files that hold the frames: the movie, or one for each frame of a sequence."""
-        return [self.path]
 
     @abstractmethod
     def read(self, index: int) -> np.ndarray:
