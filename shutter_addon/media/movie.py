@@ -59,6 +59,9 @@ class MovieSource(FrameSource):
         self._reader = FrameReader(self.path, stream)
         try:
             self._probe()
+        except av.error.FFmpegError as error:
+            self.close()
+            raise MediaError(f"{self.path.name}: cannot be read as a movie ({reason(error)})") from error
         except BaseException:
             self.close()
             raise
