@@ -13,6 +13,7 @@ from .channels import CHANNELS, MovieChannel, no_channel
 from .color import in_colorspace
 from .errors import MediaError
 from .files import check_file
+from .proxy import ProxySource, fits
 from .reduced import smaller
 from .sequence import IMAGE_SUFFIXES, SequenceChannel, SequenceSource
 
@@ -65,10 +66,8 @@ def with_proxy(
 
     path, files, colorspace, config: of the proxy, as open_source takes them"""
     try:
-        from .proxy import ProxySource, fits
-
         proxy = open_source(path, files=files, colorspace=colorspace, config=config)
-    except (ImportError, MediaError):  # without PyAV nothing is fitted
+    except MediaError:
         return source
     if fits(proxy, source):
         return ProxySource(source, proxy)

@@ -9,7 +9,6 @@ from contextlib import contextmanager
 from fractions import Fraction
 from functools import lru_cache, partial
 from pathlib import Path
-from stat import S_ISREG
 
 import numpy as np
 from OpenImageIO import ImageInput, ImageSpec, geterror
@@ -17,7 +16,7 @@ from OpenImageIO import ImageInput, ImageSpec, geterror
 from ..core.frames.frame_source import FrameSource
 from .channels import CHANNELS, no_channel
 from .errors import MediaError
-from .files import FOREIGN, check_file, check_index, check_name, check_size
+from .files import FOREIGN, check_file, check_index, check_name, check_size, stamp
 
 # Blender takes these for scene linear, even logarithmic DPX, and every other format for sRGB, even float TIFF.
 LINEAR_SUFFIXES = frozenset({".exr", ".hdr", ".rgbe", ".dpx", ".cin"})
@@ -96,11 +95,12 @@ class SequenceSource(_Sequence):
     ) -> None:
         super().__init__(path, files)
         self.fps = fps
-        with _opened(self.path) as (_image, spec, layer):
+        with _opened(self.path) as (image, spec, layer):
+            self.kind = f"{image.format_name()}, {spec.nchannels} channels of {spec.format}"
             self.width, self.height = spec.width, spec.height
             self.dtype = _dtype(spec)
         self.transfer = "linear" if self.path.suffix.lower() in LINEAR_SUFFIXES else "srgb"
-        has_alpha = len(layer) in ALPHA or any(map(_has_alpha, dict.fromkeys(self.files)))
+        has_alpha = len(layer) in ALPHA or any(_has_alpha(file, stamp(file)) for file in dict.fromkeys(self.files))
         self.alpha = (alpha or self._usual_alpha()) if has_alpha else "opaque"
         self.options = {}
 
@@ -258,21 +258,17 @@ def _listed(folder: Path) -> list[Path]:
         raise MediaError(f"{folder}: cannot be listed ({error.strerror})") from None
 
 
-def _has_alpha(path: Path) -> bool:
-    """Whether that file of a sequence has alpha, as far as it can be read; it is opened only if it changed since."""
-    if path.suffix.lower() in WITHOUT_ALPHA:
+@lru_cache(maxsize=1 << 17)  # a sequence of an hour and a half
+def _has_alpha(path: Path, _stamp: tuple[int, int] | None) -> bool:
+    """Whether that file of a sequence has alpha, as far as it can be read; it is opened anew where its stamp is another
+    one."""
+    if path.suffix.lower() in WITHOUT_ALPHA or not path.is_file():
         return False
     try:
-        status = path.stat()
-        return S_ISREG(status.st_mode) and _had_alpha(path, status.st_size, status.st_mtime_ns)
-    except (OSError, MediaError):  # who needs the frame is told
+        with _opened(path) as (_image, _spec, layer):
+            return len(layer) in ALPHA
+    except MediaError:  # who needs the frame is told
         return False
-
-
-@lru_cache(maxsize=1 << 17)  # a sequence of an hour and a half
-def _had_alpha(path: Path, _size: int, _mtime: int) -> bool:
-    with _opened(path) as (_image, _spec, layer):
-        return len(layer) in ALPHA
 
 
 def _parts(image: ImageInput) -> Iterator[ImageSpec]:
@@ -368,8 +364,8 @@ def _dtype(spec: ImageSpec) -> np.dtype:
 
 def _samples(image: ImageInput, spec: ImageSpec, layer: list[int], path: Path) -> np.ndarray:
     """The layer's samples (height, width, channels)."""
-    kinds = {np.uint8: "uint8", np.uint16: "uint16", np.float16: "half", np.float32: "float"}
-    kind, first, stop = kinds[_dtype(spec).type], min(layer), max(layer) + 1
+    kind = str(spec.format) if str(spec.format) in SAMPLES else "float"
+    first, stop = min(layer), max(layer) + 1
     if image.format_name() != "openexr":  # they hold a pixel's channels together: some take longer than all
         first, stop = 0, max(stop, min(spec.nchannels, 4))
     elif str(spec.channelformat(layer[0])) == "uint":

@@ -22,8 +22,6 @@ class Movie:
 
     def __init__(self, path: str, deinterlace: bool) -> None:
         self._path = path
-        self._ahead: tuple[int, np.ndarray] | None = None
-        self._last, self._onward = -2, False
         self._image = bpy.data.images.load(path)
         self._image.use_deinterlace = deinterlace
         self._image.colorspace_settings.is_data = True  # or it makes light of deep samples
@@ -39,7 +37,7 @@ class Movie:
         """What it says of itself; frames are as many as a strip of it has. RuntimeError: it is no movie."""
         if self._image.source != "MOVIE":
             raise RuntimeError("Blender knows no such movie")
-        frame = self._pixels(0)
+        frame = self.frame(0)
         strips = bpy.context.scene.sequence_editor_create().strips
         strip = strips.new_movie("movie", self._path, 1, 1)
         try:
@@ -55,19 +53,8 @@ class Movie:
             strips.remove(strip)
 
     def frame(self, index: int) -> np.ndarray:
-        """A frame's _pixels, which may have been decoded already."""
-        found = self._ahead[1] if self._ahead and self._ahead[0] == index else self._pixels(index)
-        self._onward, self._last, self._ahead = index == self._last + 1, index, None
-        return found
-
-    def read_on(self) -> None:
-        """Decodes the next frame, if frames are asked for in order."""
-        if self._onward and self._ahead is None:
-            with contextlib.suppress(RuntimeError, MemoryError):
-                self._ahead = self._last + 1, self._pixels(self._last + 1)
-
-    def _pixels(self, index: int) -> np.ndarray:
-        """RGBA (H, W, 4), top row first, uint8 or, of deeper movies, uint16. RuntimeError: it cannot be decoded."""
+        """A frame as RGBA (H, W, 4), top row first, uint8 or, of deeper movies, uint16. RuntimeError: it cannot be
+        decoded."""
         self._look.image_user.frame_current = index + 1
         self._look.evaluate((0, 0, 0))
         width, height = self._image.size
@@ -130,15 +117,12 @@ def main() -> None:
     movies: dict[int, Movie] = {}
     answers.write(b"\n")  # Blender may not have ended its line
     while line := questions.readline():
-        question = json.loads(line)
-        said, frame = _answer(movies, **question)
+        said, frame = _answer(movies, **json.loads(line))
         said["bytes"] = 0 if frame is None else frame.nbytes
         answers.write(f"{sys.argv[-1]}{json.dumps(said)}\n".encode())
         if frame is not None:
             answers.write(frame.data)
         answers.flush()
-        if frame is not None:
-            movies[question["number"]].read_on()
 
 
 if __name__ == "__main__":

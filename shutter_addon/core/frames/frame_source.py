@@ -38,7 +38,9 @@ class ShotFinder(Protocol):
 class FrameSource(ABC):
     """The frames of a movie or of an image sequence; close it, or use it in a `with`.
 
-    path: the movie, or the first file of the sequence; files: the movie, or one for each frame of a sequence
+    path: the movie, or the first file of the sequence
+    kind: what kind of file that is: format, codec and samples, as the libraries call them
+    files: the movie, or one for each frame of a sequence
     width, height: pixels
     count: frames as Blender's strip counts them (its content_duration)
     fps: frames per second, None for an image sequence
@@ -57,6 +59,7 @@ class FrameSource(ABC):
     """
 
     path: Path
+    kind: str
     files: list[Path]
     width: int
     height: int
