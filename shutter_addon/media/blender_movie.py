@@ -23,7 +23,7 @@ class BlenderMovie(FrameSource):
 
     8 bits are equal to the bit; deeper ones are as Blender's floats are."""
 
-    kind, transfer, by_blender = "a movie, read by a second Blender", "srgb", True
+    file_kind, transfer, by_blender = "a movie, read by a second Blender", "srgb", True
 
     def __init__(self, path: str | Path, *, deinterlace: bool = False) -> None:
         self.path = check_file(path)

@@ -70,7 +70,7 @@ class MovieSource(FrameSource):
         file, first = self._reader.first()
         codec = file.stream.codec_context
         profile = f" ({codec.profile})" if codec.profile else ""
-        self.kind = f"{file.container.format.name}, {codec.name}{profile}, {codec.pix_fmt}"
+        self.file_kind = f"{file.container.format.name}, {codec.name}{profile}, {codec.pix_fmt}"
         self.fps = fraction(file.stream.guessed_rate)
         self.count = _count(file.container, file.stream, self.fps)
         if not 0 < self.count < _NO_COUNT:

@@ -96,7 +96,7 @@ class SequenceSource(_Sequence):
         super().__init__(path, files)
         self.fps = fps
         with _opened(self.path) as (image, spec, layer):
-            self.kind = f"{image.format_name()}, {spec.nchannels} channels of {spec.format}"
+            self.file_kind = f"{image.format_name()}, {spec.nchannels} channels of {spec.format}"
             self.width, self.height = spec.width, spec.height
             self.dtype = _dtype(spec)
         self.transfer = "linear" if self.path.suffix.lower() in LINEAR_SUFFIXES else "srgb"

@@ -232,7 +232,7 @@ def test_without_pyav_movies_are_opened_so(coloured):
     with open_source(coloured["bt709.mp4"], divisor=2) as source:
         assert (source.by_blender, source.width, source.height) == (True, 64, 32)
         assert source.read(0).shape == (32, 64, 4)
-        assert source.kind == "a movie, read by a second Blender"
+        assert source.file_kind == "a movie, read by a second Blender"
     with open_channel(coloured["bt709.mp4"], "red") as channel:
         assert channel.read(0).shape == (64, 128, 1)
     for opened in (

@@ -95,7 +95,7 @@ def _of_source(scene: Scene, effect: PropertyGroup, strip: Strip) -> Iterator[st
             space = spec.options["colorspace"]
             rate = f"{float(medium.fps):g} fps" if medium.fps else "no rate"
             yield (
-                f"- Footage: {medium.kind}, {medium.width}×{medium.height}, {rate},"
+                f"- Footage: {medium.file_kind}, {medium.width}×{medium.height}, {rate},"
                 f" {medium.count} frames, read as {medium.dtype}, alpha {medium.alpha}, color space {_standard(space)}"
             )
     except UserError as error:

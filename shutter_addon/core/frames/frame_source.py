@@ -39,7 +39,7 @@ class FrameSource(ABC):
     """The frames of a movie or of an image sequence; close it, or use it in a `with`.
 
     path: the movie, or the first file of the sequence
-    kind: what kind of file that is: format, codec and samples, as the libraries call them
+    file_kind: what kind of file that is: format, codec and samples, as the libraries call them
     files: the movie, or one for each frame of a sequence
     width, height: pixels
     count: frames as Blender's strip counts them (its content_duration)
@@ -59,7 +59,7 @@ class FrameSource(ABC):
     """
 
     path: Path
-    kind: str
+    file_kind: str
     files: list[Path]
     width: int
     height: int
