@@ -395,12 +395,12 @@ def test_a_blender_that_was_killed_is_followed_by_another(movies):
 
 @pytest.mark.skipif(os.name != "posix", reason="processes are stopped by signals there alone")
 def test_a_blender_that_was_stopped_is_followed_by_another(movies, monkeypatch):
-    monkeypatch.setattr(decoding_child, "ANSWERING", 5)
+    monkeypatch.setattr(decoding_child, "ANSWERING", 20)  # in which another one starts, too
     with BlenderMovie(movies["open.mp4"][0]) as source, ThreadPoolExecutor(1) as pool:
         before, stopped = source.read(3), process()
         os.kill(stopped, signal.SIGSTOP)
         try:
-            again = pool.submit(source.read, 3).result(60)
+            again = pool.submit(source.read, 3).result(90)
         finally:
             with suppress(ProcessLookupError):
                 os.kill(stopped, signal.SIGCONT)
