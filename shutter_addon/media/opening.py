@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from fractions import Fraction
 from pathlib import Path
 
 from ..core.frames.frame_source import FrameSource
@@ -22,7 +21,6 @@ def open_source(
     path: str | Path,
     *,
     stream: int = 0,
-    fps: Fraction | None = None,
     files: Sequence[str | Path] | None = None,
     colorspace: str | None = None,
     config: str | Path | None = None,
@@ -33,7 +31,6 @@ def open_source(
     """Opens a movie, or the image sequence that starts with the file `path`. MediaError: it cannot be read.
 
     stream: which of a movie's video streams, from 0
-    fps: frames per second that an image sequence shall report; its files have none
     files: the names of an image strip's files, one per frame, in place of those found beside `path`
     colorspace: the strip's colour space, by Blender's name (default: what Blender assumes for such a file)
     config: path of the OpenColorIO configuration; colour spaces other than sRGB and Linear Rec.709 need it
@@ -46,7 +43,7 @@ def open_source(
     if _is_movie(path, files):
         source = _opened_movie(path, stream, deinterlace, divisor)
     else:
-        source = smaller(SequenceSource(path, files=files, fps=fps, alpha=alpha), divisor)
+        source = smaller(SequenceSource(path, files=files, alpha=alpha), divisor)
     try:
         return source if colorspace is None else in_colorspace(source, colorspace, config)
     except MediaError:

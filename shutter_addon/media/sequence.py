@@ -6,7 +6,6 @@ import itertools
 import re
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
-from fractions import Fraction
 from functools import lru_cache, partial
 from pathlib import Path
 
@@ -44,6 +43,8 @@ class _Sequence(FrameSource):
     the file before it holds. Where more than MISSING in a row are, the sequence ends, and `left_out` says so. With
     `files` (an image strip's list) frame i is files[i].
     """
+
+    fps = None
 
     def __init__(self, path: str | Path, files: Sequence[str | Path] | None) -> None:
         """MediaError: there is no first file, or its folder cannot be listed."""
@@ -86,15 +87,9 @@ class SequenceSource(_Sequence):
     """
 
     def __init__(
-        self,
-        path: str | Path,
-        *,
-        files: Sequence[str | Path] | None = None,
-        fps: Fraction | None = None,
-        alpha: str | None = None,
+        self, path: str | Path, *, files: Sequence[str | Path] | None = None, alpha: str | None = None
     ) -> None:
         super().__init__(path, files)
-        self.fps = fps
         with _opened(self.path) as (image, spec, layer):
             self.file_kind = f"{image.format_name()}, {spec.nchannels} channels of {spec.format}"
             self.width, self.height = spec.width, spec.height
@@ -141,8 +136,6 @@ class SequenceChannel(_Sequence):
     window, since mattes are often cropped to what they cover: what its data window leaves out is 0. Where that is
     larger all around, it is the picture, as in Blender.
     """
-
-    fps = None
 
     def __init__(self, path: str | Path, channel: str, *, files: Sequence[str | Path] | None = None) -> None:
         """channel: one of CHANNELS, or the name of one of the files' own. MediaError: they have none of that name."""
