@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from fractions import Fraction
 from pathlib import Path
@@ -13,6 +14,7 @@ from . import decoding_child
 from .errors import MediaError
 from .files import OTHER, check_file, check_index, check_name, check_size, is_other
 
+_numbers = itertools.count()  # a movie's for the process, which may have the same file open several times
 _FLOAT_ERROR = 2**-23  # relative, of a number that Blender has as a float
 
 
@@ -21,15 +23,16 @@ class BlenderMovie(FrameSource):
 
     8 bits are equal to the bit; deeper ones are as Blender's floats are."""
 
-    transfer, by_blender = "srgb", True
+    file_kind, transfer, by_blender = "a movie, read by a second Blender", "srgb", True
 
     def __init__(self, path: str | Path, *, deinterlace: bool = False) -> None:
         self.path = check_file(path)
+        self.files = [self.path]
         check_name(self.path.absolute())
         self.options = {"stream": 0, "deinterlace": bool(deinterlace)}
-        self._movie = decoding_child.Movie(self.path, bool(deinterlace))
+        self._known = {"number": next(_numbers), "path": str(self.path.absolute()), "deinterlace": bool(deinterlace)}
         try:
-            about = self._movie.about()
+            about, _ = decoding_child.ask(self._known | {"wanted": "about"})
         except MediaError as error:
             raise MediaError(f"{self.path.name}: cannot be read as a movie ({error})") from None
         self.width, self.height = about["size"]
@@ -48,7 +51,7 @@ class BlenderMovie(FrameSource):
         try:
             if is_other(self.path):  # in the place of the file that was there
                 raise MediaError(OTHER)
-            frame = self._movie.frame(index)
+            _, frame = decoding_child.ask(self._known | {"wanted": index})
         except MediaError as error:
             raise MediaError(f"frame {index} of {self.path.name} cannot be decoded: {error}") from None
         if frame is None or frame.shape != (self.height, self.width, 4) or frame.dtype != self.dtype:
@@ -56,7 +59,7 @@ class BlenderMovie(FrameSource):
         return frame
 
     def close(self) -> None:
-        self._movie.close()
+        decoding_child.tell(self._known | {"wanted": "close"})
 
 
 def frame_rate(number: float) -> Fraction:

@@ -127,26 +127,16 @@ def _shared(picture: Signature, down: int, right: int) -> Signature:
 def _differ(before: Signature, after: Signature, least: float, share: float = 1.0) -> bool:
     """Whether brightness changes by that share of what a cut changes, and by no fewer levels than `least`."""
     threshold = max(share * CHANGE * min(max(before.mean(), after.mean()) / GREY, 1.0), least)
-    # Both pictures are rounded first, which moves their mean difference by 1 at most. Most neighbours are far below the
-    # threshold, and need not be.
-    if np.abs(_brightness(before) - _brightness(after)).mean() + 1 < threshold:
-        return False
     return plain_cuts.change(before, after) >= threshold
 
 
-def _brightness(picture: Signature) -> np.ndarray:
-    """The largest colour, which is compared; quicker than by `max` along so short an axis."""
-    return np.maximum(np.maximum(picture[..., 0], picture[..., 1]), picture[..., 2])
-
-
 def _stands_out(before: list[Signature], after: list[Signature]) -> bool:
-    """Whether from before[0] to after[0] more changes than between neighbours; both lists lead away from there."""
-    before, after = before[: WINDOW + 1], after[: WINDOW + 1]
-    # Held pictures stand for those that are not there, and their changes, of zero, must not count in the mean.
-    known = len(before) + len(after) - 2
-    ratio = RATIO * 2 * WINDOW / known if known else RATIO
-    before, after = ([*side, *[side[-1]] * (WINDOW + 1 - len(side))] for side in (before, after))
-    return plain_cuts.stands_out([*before[::-1], *after], WINDOW + 1, ratio, NOISE)
+    """Whether AdaptiveDetector finds that from before[0] to after[0] more changes than between neighbours; both lists
+    lead away from there."""
+    sides = before[: WINDOW + 1], after[: WINDOW + 1]
+    beside = [plain_cuts.change(*pair) for side in sides for pair in pairwise(side)]
+    here = plain_cuts.change(before[0], after[0])
+    return here >= NOISE and here * len(beside) >= RATIO * sum(beside)
 
 
 def _moving(pictures: list[Signature]) -> list[Signature]:

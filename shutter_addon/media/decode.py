@@ -60,26 +60,18 @@ class FrameReader:
     """
 
     def __init__(self, path: Path, number: int = 0) -> None:
-        """number: which of the file's video streams. Raises MediaError if nothing of it can be decoded."""
+        """number: which of the file's video streams"""
         self._path, self._number, self._threads = path, number, "AUTO"
         self._container: InputContainer | None = None
         self._run: _Run | None = None
         self._landmarks = _Landmarks()
-        try:
-            if self._restart().shown is None:
-                raise MediaError(f"{path.name}: no frame of it can be decoded")
-        except av.error.FFmpegError as error:
-            self.close()
-            raise MediaError(f"{path.name}: cannot be read as a movie ({reason(error)})") from error
-        except BaseException:
-            self.close()
-            raise
 
     def first(self) -> tuple[File, av.VideoFrame]:
-        """The open file, and the frame on screen at the time asked for last; at first that is the first. MediaError:
-        none of it can be decoded."""
-        run = self._run or self._restart()
-        return run.file, _known(run).frame
+        """The open file, and its first frame. MediaError: none of it can be decoded."""
+        run = self._restart()
+        if run.shown is None:
+            raise MediaError(f"{self._path.name}: no frame of it can be decoded")
+        return run.file, run.shown.frame
 
     def frame_at(self, time: float, step: float) -> av.VideoFrame:
         """The frame at that time, or the last before the first that is later, or the first one, as in Blender, where

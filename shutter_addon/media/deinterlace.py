@@ -28,15 +28,13 @@ def interpolate_fields(frame: av.VideoFrame) -> av.VideoFrame:
 def blur_rows(picture: np.ndarray, opaque: bool) -> np.ndarray:
     """A copy of the RGBA picture, filtered with (1 2 1)/4 down the columns from the bottom row upwards.
 
-    Whole numbers hand on what rounding leaves over to the next row. Blender leaves out an opaque picture's red."""
+    It hands on what rounding leaves over to the next row. Blender leaves out an opaque picture's red."""
     result = picture.copy()
     rows = result[::-1, :, 1:] if opaque else result[::-1]
-    wide = rows.astype(np.float32 if rows.dtype.kind == "f" else np.int64)
+    wide = rows.astype(np.int64)
     total = np.concatenate([wide[:1], wide[:-1]]) + 2 * wide + np.concatenate([wide[1:], wide[-1:]])
-    if rows.dtype.kind == "f":
-        rows[:] = total / 4
-    else:  # the remainders add up along the column, so one running sum replaces a loop over the rows
-        rows[:] = np.diff((np.cumsum(total, axis=0) + 2) >> 2, axis=0, prepend=0)
+    # The remainders add up along the column, so one running sum replaces a loop over the rows.
+    rows[:] = np.diff((np.cumsum(total, axis=0) + 2) >> 2, axis=0, prepend=0)
     return result
 
 

@@ -48,31 +48,29 @@ class MovieSource(FrameSource):
 
     transfer = "srgb"
 
-    def __init__(
-        self,
-        path: str | Path,
-        *,
-        stream: int = 0,
-        deinterlace: bool = False,
-        divisor: int = 1,
-        size: tuple[int, int] | None = None,
-    ) -> None:
-        """divisor: how many times smaller than the file's the frames are each way (ReducedSource)
-        size: what opaque frames are fitted to, width and height, in place of `divisor`"""
+    def __init__(self, path: str | Path, *, stream: int = 0, deinterlace: bool = False, divisor: int = 1) -> None:
+        """divisor: how many times smaller than the file's the frames are each way (ReducedSource)"""
         self.path = check_file(path)
-        self._deinterlace, self._divisor, self._fitted_to = deinterlace, divisor, size
+        self.files = [self.path]
+        self._deinterlace, self._divisor = deinterlace, divisor
         self.options = {"stream": stream, "deinterlace": bool(deinterlace)}
         self._to_planes, self._to_packed = VideoReformatter(), VideoReformatter()
         self._converting = threading.Lock()  # planes are converted on any thread
         self._reader = FrameReader(self.path, stream)
         try:
             self._probe()
+        except av.error.FFmpegError as error:
+            self.close()
+            raise MediaError(f"{self.path.name}: cannot be read as a movie ({reason(error)})") from error
         except BaseException:
             self.close()
             raise
 
     def _probe(self) -> None:
         file, first = self._reader.first()
+        codec = file.stream.codec_context
+        profile = f" ({codec.profile})" if codec.profile else ""
+        self.file_kind = f"{file.container.format.name}, {codec.name}{profile}, {codec.pix_fmt}"
         self.fps = fraction(file.stream.guessed_rate)
         self.count = _count(file.container, file.stream, self.fps)
         if not 0 < self.count < _NO_COUNT:
@@ -82,7 +80,7 @@ class MovieSource(FrameSource):
         self._tags = tags = self._reader.tags
         self._turns, self._range = tags.turns, ColorRange.JPEG if tags.is_full else ColorRange.MPEG
         filmed = first.width, first.height
-        size = self._fitted_to or tuple(reduced_size(length, self._divisor) for length in filmed)
+        size = reduced_size(first.width, self._divisor), reduced_size(first.height, self._divisor)
         self.width, self.height = size[::-1] if self._turns % 2 else size
         deep = max(component.bits for component in first.format.components) > 8
         self._format, self.dtype = "rgba64le" if deep else "rgba", np.dtype(np.uint16 if deep else np.uint8)

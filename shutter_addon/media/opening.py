@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from fractions import Fraction
-from functools import partial
 from pathlib import Path
 
 from ..core.frames.frame_source import FrameSource
@@ -14,43 +12,38 @@ from .channels import CHANNELS, MovieChannel, no_channel
 from .color import in_colorspace
 from .errors import MediaError
 from .files import check_file
+from .proxy import ProxySource, fits
 from .reduced import smaller
 from .sequence import IMAGE_SUFFIXES, SequenceChannel, SequenceSource
-
-Size = tuple[int, int]  # width and height
 
 
 def open_source(
     path: str | Path,
     *,
     stream: int = 0,
-    fps: Fraction | None = None,
     files: Sequence[str | Path] | None = None,
     colorspace: str | None = None,
     config: str | Path | None = None,
     alpha: str | None = None,
     deinterlace: bool = False,
     divisor: int = 1,
-    size: Size | None = None,
 ) -> FrameSource:
     """Opens a movie, or the image sequence that starts with the file `path`. MediaError: it cannot be read.
 
     stream: which of a movie's video streams, from 0
-    fps: frames per second that an image sequence shall report; its files have none
     files: the names of an image strip's files, one per frame, in place of those found beside `path`
     colorspace: the strip's colour space, by Blender's name (default: what Blender assumes for such a file)
     config: path of the OpenColorIO configuration; colour spaces other than sRGB and Linear Rec.709 need it
     alpha: an image strip's alpha mode, "straight" or "premultiplied" (default: what Blender assumes); not a movie's
     deinterlace: a movie strip's option of that name
     divisor: how many times smaller than the files' the frames are each way, one of reduced.DIVISORS
-    size: what the frames of an opaque movie are fitted to, width and height, in place of `divisor`
     """
     path = Path(path)
     source: FrameSource
     if _is_movie(path, files):
-        source = _opened_movie(path, stream, deinterlace, divisor, size)
+        source = _opened_movie(path, stream, deinterlace, divisor)
     else:
-        source = smaller(SequenceSource(path, files=files, fps=fps, alpha=alpha), divisor)
+        source = smaller(SequenceSource(path, files=files, alpha=alpha), divisor)
     try:
         return source if colorspace is None else in_colorspace(source, colorspace, config)
     except MediaError:
@@ -69,16 +62,14 @@ def with_proxy(
     """The source with its frames read from a proxy; the source itself, where there is none that fits.
 
     path, files, colorspace, config: of the proxy, as open_source takes them"""
-    opened = partial(open_source, path, files=files, colorspace=colorspace, config=config)
     try:
-        from .proxy import ProxySource, fits
-
-        with opened() as proxy:
-            if not fits(proxy, source):
-                return source
-        return ProxySource(source, opened(size=(source.width, source.height)))
-    except (ImportError, MediaError):  # without PyAV nothing is fitted
+        proxy = open_source(path, files=files, colorspace=colorspace, config=config)
+    except MediaError:
         return source
+    if fits(proxy, source):
+        return ProxySource(source, proxy)
+    proxy.close()
+    return source
 
 
 def open_channel(
@@ -99,16 +90,14 @@ def _is_movie(path: Path, files: Sequence[str | Path] | None) -> bool:
     return files is None and path.suffix.lower() not in IMAGE_SUFFIXES
 
 
-def _opened_movie(
-    path: Path, stream: int, deinterlace: bool = False, divisor: int = 1, size: Size | None = None
-) -> FrameSource:
-    """See open_source. Only PyAV's frames are fitted to a size."""
+def _opened_movie(path: Path, stream: int, deinterlace: bool = False, divisor: int = 1) -> FrameSource:
+    """See open_source."""
     if pyav.missing():
         _check_lent(path, stream)
         return smaller(BlenderMovie(path, deinterlace=deinterlace), divisor)
     from .movie import MovieSource
 
-    return MovieSource(path, stream=stream, deinterlace=deinterlace, divisor=divisor, size=size)
+    return MovieSource(path, stream=stream, deinterlace=deinterlace, divisor=divisor)
 
 
 def _check_lent(path: Path, stream: int) -> None:

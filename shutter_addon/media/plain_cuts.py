@@ -4,27 +4,15 @@ OpenCV, which PySceneDetect needs. Pictures are RGB (H, W, 3) in levels, which a
 from __future__ import annotations
 
 from functools import lru_cache
-from itertools import pairwise
 
 import numpy as np
 
-_NOTHING = 1e-5  # a mean change that AdaptiveDetector takes for none
-_MOST = 255.0  # the ratio to that
 _GREY = np.array([9798, 19235, 3735])  # OpenCV's, in 1 / 32768
 
 
 def change(before: np.ndarray, after: np.ndarray) -> float:
     """ContentDetector's score of luma alone: by how many levels the largest colour differs on average."""
     return float(np.abs(_whole(before).max(axis=-1).astype(int) - _whole(after).max(axis=-1)).mean())
-
-
-def stands_out(pictures: list[np.ndarray], index: int, ratio: float, least: float) -> bool:
-    """Whether AdaptiveDetector finds that the change before that picture is so many times that of all others."""
-    changes = [change(*pair) for pair in pairwise(pictures)]
-    here, others = changes[index - 1], changes[: index - 1] + changes[index:]
-    beside = sum(others) / len(others)
-    found = min(here / beside, _MOST) if beside >= _NOTHING else _MOST
-    return here >= least and found >= ratio
 
 
 def unlike(before: np.ndarray, after: np.ndarray, bits: int) -> float:
@@ -46,15 +34,9 @@ def _hash(picture: np.ndarray, bits: int) -> np.ndarray:
 
 
 def _resized(grey: np.ndarray, size: int) -> np.ndarray:
-    """As OpenCV's INTER_AREA makes a square of a picture: by means where it becomes smaller both ways, else by
-    neighbours, in whole numbers."""
-    if min(grey.shape) >= size:
-        down, right = (_means(length, size) for length in grey.shape)
-        return np.rint(down @ grey @ right.T)
-    (top, bottom, down), (left, right, across) = (_neighbours(length, size) for length in grey.shape)
-    rows = (grey[:, left] * (2048 - across) + grey[:, right] * across) >> 4
-    above, below = rows[top] * (2048 - down)[:, None] >> 16, rows[bottom] * down[:, None] >> 16
-    return (above + below + 2) >> 2
+    """A square of a picture, by means, as OpenCV's INTER_AREA makes it but for rounding."""
+    down, right = (_means(length, size) for length in grey.shape)
+    return np.rint(down @ grey @ right.T)
 
 
 @lru_cache(16)
@@ -63,17 +45,6 @@ def _means(length: int, size: int) -> np.ndarray:
     scale = length / size
     edges = np.clip(np.arange(length + 1), *(np.arange(size)[:, None] * scale + end for end in (0, scale)))
     return np.diff(edges) / scale
-
-
-@lru_cache(16)
-def _neighbours(length: int, size: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Which two of so many samples along an axis each of `size` is made of, and which share the second has, in
-    1 / 2048."""
-    scale, places = length / size, np.arange(size)
-    first = (places * scale).astype(int)
-    shares = np.clip(places + 1 - (first + 1) / scale, 0, None) % 1
-    second = np.minimum(first + 1, length - 1)
-    return first, second, np.rint(np.where(second > first, shares, 0) * 2048).astype(int)
 
 
 @lru_cache(2)

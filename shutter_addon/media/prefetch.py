@@ -2,6 +2,7 @@
 
 import threading
 from collections.abc import Iterable
+from concurrent.futures import Future, ThreadPoolExecutor, wait
 
 import numpy as np
 
@@ -26,16 +27,15 @@ class PrefetchSource(SourceWrapper):
         self._fetch = source.decoded if planes else source.read
         self._wanted: list[int] = []  # in the order of decoding
         self._asked: list[int] = []  # by reads that wait
-        self._done: dict[int, np.ndarray | Planes | Exception] = {}
-        self._changed = threading.Condition()
-        self._thread: threading.Thread | None = None
+        self._frames: dict[int, Future[np.ndarray | Planes]] = {}
+        self._changing = threading.Lock()
+        self._pool: ThreadPoolExecutor | None = None
 
     def want(self, indices: Iterable[int]) -> None:
         """Decodes these frames, in this order, and frees all others."""
-        with self._changed:
+        with self._changing:
             self._wanted = list(dict.fromkeys(indices))
-            self._drop()
-            self._wake()
+            self._arrange()
 
     def read(self, index: int) -> np.ndarray:
         """The source's frame, read-only. One that is not decoded yet is decoded next, before all wanted ones.
@@ -49,67 +49,52 @@ class PrefetchSource(SourceWrapper):
     def decoded(self, index: int) -> np.ndarray | Planes:
         """As `read`, but for the conversion."""
         stopping.check()
-        with self._changed:
+        with self._changing:
             self._asked.append(index)
-            self._wake()
-            try:
-                while not self._changed.wait_for(lambda: index in self._done or self._thread is None, _PATIENCE):
-                    stopping.check()
-            finally:
+            self._arrange()
+            frame, pool = self._frames[index], self._pool
+        try:
+            while not wait([frame], _PATIENCE).done:
+                stopping.check()
+        finally:
+            with self._changing:
                 self._asked.remove(index)
-            frame = self._done.get(index)
-            if isinstance(frame, Exception):
-                self._done.pop(index)
-                self._wanted = [i for i in self._wanted if i != index]
-                self._changed.notify_all()  # another read may wait for the same frame
-            self._drop()
-        if frame is None:
+                self._drop()
+        if self._pool is not pool:
             raise MediaError(f"{self._source.path.name}: closed while a frame was read")
-        if isinstance(frame, Exception):
-            raise frame
-        return frame
+        return frame.result()
 
     def close(self) -> None:
         """Ends the thread, closes the file and frees all frames; a later read starts again."""
-        with self._changed:
-            thread, self._thread = self._thread, None
-            self._wanted, self._done = [], {}
-            self._changed.notify_all()
-        if thread is not None:
-            thread.join()
+        with self._changing:
+            pool, self._pool = self._pool, None
+            self._wanted, self._frames = [], {}
+        if pool is not None:
+            pool.shutdown(cancel_futures=True)
         self._source.close()
 
-    def _wake(self) -> None:
-        if self._thread is None:
-            self._thread = threads.daemon(self._decode)
-        self._changed.notify_all()
+    def _arrange(self) -> None:
+        """Has frames decoded in order: those that reads wait for before those that are wanted."""
+        for index, frame in list(self._frames.items()):
+            if index not in self._asked and frame.cancel():
+                del self._frames[index]
+        self._drop()
+        for index in (*self._asked, *self._wanted):
+            if index not in self._frames:
+                self._pool = self._pool or threads.pool(1)
+                self._frames[index] = self._pool.submit(self._frame, index)
 
     def _drop(self) -> None:
-        kept = {*self._wanted, *self._asked}
-        self._done = {index: frame for index, frame in self._done.items() if index in kept}
+        for index in self._frames.keys() - {*self._wanted, *self._asked}:
+            self._frames.pop(index).cancel()
 
-    def _next(self) -> int | None:
-        return next((index for index in (*self._asked, *self._wanted) if index not in self._done), None)
-
-    def _decode(self) -> None:
-        mine = threading.current_thread()
-        while True:
-            with self._changed:
-                self._changed.wait_for(lambda: self._thread is not mine or self._next() is not None)
-                if self._thread is not mine or (index := self._next()) is None:
-                    return
-            frame = self._frame(index)
-            with self._changed:
-                if self._thread is mine:
-                    self._done[index] = frame
-                    self._drop()
-                    self._changed.notify_all()
-
-    def _frame(self, index: int) -> np.ndarray | Planes | Exception:
+    def _frame(self, index: int) -> np.ndarray | Planes:
         try:
             frame = self._fetch(index)
-            if not isinstance(frame, Planes):
-                frame.flags.writeable = False
-            return frame
-        except Exception as error:  # raised to whoever reads the frame
-            return error
+        except Exception:
+            with self._changing:  # whoever reads it later has it decoded again
+                self._wanted = [i for i in self._wanted if i != index]
+            raise
+        if not isinstance(frame, Planes):
+            frame.flags.writeable = False
+        return frame

@@ -2,14 +2,13 @@
 
 from functools import cached_property
 
-import av
 import numpy as np
-from OpenImageIO import FLOAT, ROI, ImageBuf, ImageBufAlgo
 
 from ..core.frames.frame_source import FrameSource
 from ..core.frames.light import to_linear
 from ..core.frames.source_wrapper import SourceWrapper
 from .errors import MediaError
+from .opencv import cv2
 
 STRETCHED = 0.1  # by which share the sides may differ: Blender's movies have even ones
 
@@ -32,7 +31,9 @@ class ProxySource(SourceWrapper):
         except MediaError:
             return self._source.read(index)
         if frame.shape[:2] != (self.height, self.width):
-            frame = _resized(frame, self.width, self.height, self._proxy.path.name)
+            dtype = np.float32 if frame.dtype == np.float16 else frame.dtype  # which OpenCV does not resize
+            size = self.width, self.height
+            frame = cv2.resize(frame.astype(dtype), size, interpolation=cv2.INTER_AREA).astype(frame.dtype)
         if (self._proxy.dtype, self._proxy.transfer) == (self.dtype, self.transfer):
             return frame
         return self._samples[frame if frame.dtype == np.uint8 else frame.view(np.uint16)]
@@ -54,24 +55,13 @@ class ProxySource(SourceWrapper):
         self._source.close()
 
 
-def _resized(frame: np.ndarray, width: int, height: int, name: str) -> np.ndarray:
-    """A frame of bytes or halves at another size. OpenImageIO takes 15 times as long for bytes. MediaError: it has no
-    memory for that."""
-    if frame.dtype == np.uint8:
-        small = av.VideoFrame.from_ndarray(frame, format="rgba")
-        return small.reformat(width=width, height=height, interpolation="BILINEAR").to_ndarray()
-    resized = ImageBufAlgo.resize(ImageBuf(frame.astype(np.float32)), "triangle", roi=ROI(0, width, 0, height))
-    if (pixels := resized.get_pixels(FLOAT)) is None:
-        raise MediaError(f"{name}: cannot be resized ({resized.geterror()})")
-    return pixels.astype(frame.dtype)
-
-
 def fits(proxy: FrameSource, source: FrameSource) -> bool:
     """Whether a proxy may stand for a source: as many frames, not turned, nothing to see through in either, and bytes
-    or halves: what Blender writes of float images, named .jpg, is EXR with sRGB values."""
+    or halves: what Blender writes of float images, named .jpg, is EXR with sRGB values. To resize it takes OpenCV."""
     stretched = proxy.width * source.height / (proxy.height * source.width)
     return (
         proxy.count == source.count
+        and (cv2 is not None or (proxy.width, proxy.height) == (source.width, source.height))
         and abs(stretched - 1) < STRETCHED
         and proxy.alpha == source.alpha == "opaque"
         and (proxy.dtype in (np.uint8, np.float16) or (proxy.dtype, proxy.transfer) == (source.dtype, source.transfer))

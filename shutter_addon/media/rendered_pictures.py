@@ -12,7 +12,6 @@ from ..core.farm import edit_version
 from .files import check_name
 
 _SIGNATURE = b"\x89PNG\r\n\x1a\n"
-_PART = 1 << 20  # bytes that are read at once
 
 
 class RenderedPicture(NamedTuple):
@@ -80,21 +79,15 @@ def _is_sound(path: Path, image: ImageInput) -> bool:
 
 def _is_sound_png(path: Path) -> bool:
     """Whether the file is a PNG whose chunks all match their checksums, to the last one."""
-    with path.open("rb") as file:
-        if file.read(len(_SIGNATURE)) != _SIGNATURE:
+    data, place, name = memoryview(path.read_bytes()), len(_SIGNATURE), b""
+    if data[:place] != _SIGNATURE:
+        return False
+    while name != b"IEND":
+        if len(data) < place + 8:
             return False
-        name = b""
-        while name != b"IEND":
-            head = file.read(8)
-            if len(head) < 8:
-                return False
-            length, name = struct.unpack(">I4s", head)
-            checksum = zlib.crc32(name)
-            while length > 0:
-                part = file.read(min(length, _PART))
-                if not part:
-                    return False
-                checksum, length = zlib.crc32(part, checksum), length - len(part)
-            if file.read(4) != checksum.to_bytes(4):
-                return False
-        return True
+        length, name = struct.unpack_from(">I4s", data, place)
+        end = place + 8 + length
+        if data[end : end + 4] != zlib.crc32(data[place + 4 : end]).to_bytes(4):
+            return False
+        place = end + 4
+    return True

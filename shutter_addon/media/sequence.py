@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-import bisect
 import itertools
 import re
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
-from fractions import Fraction
 from functools import lru_cache, partial
 from pathlib import Path
-from stat import S_ISREG
 
 import numpy as np
 from OpenImageIO import ImageInput, ImageSpec, geterror
@@ -18,7 +15,7 @@ from OpenImageIO import ImageInput, ImageSpec, geterror
 from ..core.frames.frame_source import FrameSource
 from .channels import CHANNELS, no_channel
 from .errors import MediaError
-from .files import FOREIGN, check_file, check_index, check_name, check_size
+from .files import FOREIGN, check_file, check_index, check_name, check_size, stamp
 
 # Blender takes these for scene linear, even logarithmic DPX, and every other format for sRGB, even float TIFF.
 LINEAR_SUFFIXES = frozenset({".exr", ".hdr", ".rgbe", ".dpx", ".cin"})
@@ -39,23 +36,25 @@ _Parts = tuple[str, str, str]  # of a file's stem: what is before a number, its 
 Layer = tuple[ImageSpec, list[int]]  # what describes a part of an image, and the positions of channels in it
 
 
-class ImageFiles:
-    """The files of an image sequence, by frame.
+class _Sequence(FrameSource):
+    """The files of an image sequence, as frames.
 
     Found beside its first file, frame i is the file whose number is i above the first's; where a number is missing,
     the file before it holds. Where more than MISSING in a row are, the sequence ends, and `left_out` says so. With
     `files` (an image strip's list) frame i is files[i].
-
-    path: the first file; files: those there are, in order; count: of frames
     """
 
-    def __init__(self, path: str | Path, files: Sequence[str | Path] | None = None) -> None:
+    fps = None
+
+    def __init__(self, path: str | Path, files: Sequence[str | Path] | None) -> None:
         """MediaError: there is no first file, or its folder cannot be listed."""
         path = Path(path)
-        self.left_out = ""
         if files is None:
             self.path = check_file(path)
-            self._starts, self.files, beyond = _numbered(path)
+            by_frame, beyond = _numbered(path)
+            ends = [*by_frame, max(by_frame) + 1][1:]
+            held = zip(by_frame.items(), ends, strict=True)
+            self.files = [file for (frame, file), end in held for _ in range(frame, end)]
             if beyond:
                 last = self.files[-1].name
                 self.left_out = f"{path.name}: the sequence ends with {last}; too many numbers lie before {beyond.name}"
@@ -64,30 +63,13 @@ class ImageFiles:
             self.files = [folder / file for file in files]
             if not self.files:
                 raise MediaError(f"{path.name}: an image sequence without files")
-            self._starts = [*range(len(self.files))]
             self.path = check_file(self.files[0])
-        self.count = self._starts[-1] + 1
-
-    def __getitem__(self, index: int) -> Path:
-        return self.files[bisect.bisect_right(self._starts, index) - 1]
-
-
-class _Sequence(FrameSource):
-    """What has the files of an image sequence: see ImageFiles."""
-
-    def __init__(self, path: str | Path, files: Sequence[str | Path] | None) -> None:
-        self._files = ImageFiles(path, files)
-        self.path, self.count, self.left_out = self._files.path, self._files.count, self._files.left_out
-
-    @property
-    def files(self) -> list[Path]:
-        """The file of each frame."""
-        return [self._files[index] for index in range(self.count)]
+        self.count = len(self.files)
 
     def _file(self, index: int) -> Path:
         """MediaError: it is missing. IndexError: there is no such frame."""
         check_index(self, index)
-        return check_file(self._files[index])
+        return check_file(self.files[index])
 
     def _check_size(self, path: Path, size: tuple[int, int], window: str = "") -> None:
         """MediaError unless it is the first one's."""
@@ -97,7 +79,7 @@ class _Sequence(FrameSource):
 
 
 class SequenceSource(_Sequence):
-    """Images as frames: see ImageFiles for which file is which frame.
+    """Images as frames: see _Sequence for which file is which frame.
 
     Samples are as stored: straight alpha stays straight, EXIF orientation is left alone, and of an EXR the data window
     is the picture, wherever its display window lies; all as in Blender. All frames must have the first one's size and
@@ -105,20 +87,15 @@ class SequenceSource(_Sequence):
     """
 
     def __init__(
-        self,
-        path: str | Path,
-        *,
-        files: Sequence[str | Path] | None = None,
-        fps: Fraction | None = None,
-        alpha: str | None = None,
+        self, path: str | Path, *, files: Sequence[str | Path] | None = None, alpha: str | None = None
     ) -> None:
         super().__init__(path, files)
-        self.fps = fps
-        with _opened(self.path) as (_image, spec, layer):
+        with _opened(self.path) as (image, spec, layer):
+            self.file_kind = f"{image.format_name()}, {spec.nchannels} channels of {spec.format}"
             self.width, self.height = spec.width, spec.height
             self.dtype = _dtype(spec)
         self.transfer = "linear" if self.path.suffix.lower() in LINEAR_SUFFIXES else "srgb"
-        has_alpha = len(layer) in ALPHA or any(map(_has_alpha, dict.fromkeys(self._files.files)))
+        has_alpha = len(layer) in ALPHA or any(_has_alpha(file, stamp(file)) for file in dict.fromkeys(self.files))
         self.alpha = (alpha or self._usual_alpha()) if has_alpha else "opaque"
         self.options = {}
 
@@ -153,14 +130,12 @@ def expanded(samples: np.ndarray) -> np.ndarray:
 
 
 class SequenceChannel(_Sequence):
-    """One channel of the images of a sequence: see ImageFiles for which file is which frame.
+    """One channel of the images of a sequence: see _Sequence for which file is which frame.
 
     Samples are as stored, of any type. All frames must have the first one's size. An EXR's picture is its display
     window, since mattes are often cropped to what they cover: what its data window leaves out is 0. Where that is
     larger all around, it is the picture, as in Blender.
     """
-
-    fps = None
 
     def __init__(self, path: str | Path, channel: str, *, files: Sequence[str | Path] | None = None) -> None:
         """channel: one of CHANNELS, or the name of one of the files' own. MediaError: they have none of that name."""
@@ -203,12 +178,18 @@ def _in_window(samples: np.ndarray, spec: ImageSpec, window: Window) -> np.ndarr
     return picture
 
 
-def _numbered(path: Path) -> tuple[list[int], list[Path], Path | None]:
-    """(frame numbers from 0, files, the file beyond too wide a gap or None) from that file on: those that differ in the
-    frame number only."""
+def sequence_files(path: Path) -> list[Path]:
+    """The files of the sequence that starts with a file. MediaError: there is no such file, or its folder cannot be
+    listed."""
+    return [*_numbered(check_file(path))[0].values()]
+
+
+def _numbered(path: Path) -> tuple[dict[int, Path], Path | None]:
+    """The files by frame from that file on, which is frame 0: those that differ in the frame number only; and the file
+    beyond too wide a gap, or None."""
     parts, alike = _frame_number(path)
     if parts is None:
-        return [0], [path], None
+        return {0: path}, None
     prefix, first, suffix = parts
     by_frame: dict[int, Path] = {}
     for file in alike:
@@ -218,9 +199,9 @@ def _numbered(path: Path) -> tuple[list[int], list[Path], Path | None]:
             by_frame[number] = file
     numbers = sorted(by_frame)
     gaps = (i for i, (a, b) in enumerate(itertools.pairwise(numbers), 1) if b - a > MISSING + 1 or b >= LONGEST)
-    end = next(gaps, len(numbers))
-    files = [by_frame[number] for number in numbers]
-    return numbers[:end], files[:end], files[end] if end < len(files) else None
+    end = next(gaps, None)
+    beyond = None if end is None else by_frame[numbers[end]]
+    return {number: by_frame[number] for number in numbers[:end]}, beyond
 
 
 def numbered_alike(path: Path) -> list[Path]:
@@ -270,21 +251,17 @@ def _listed(folder: Path) -> list[Path]:
         raise MediaError(f"{folder}: cannot be listed ({error.strerror})") from None
 
 
-def _has_alpha(path: Path) -> bool:
-    """Whether that file of a sequence has alpha, as far as it can be read; it is opened only if it changed since."""
-    if path.suffix.lower() in WITHOUT_ALPHA:
+@lru_cache(maxsize=1 << 17)  # a sequence of an hour and a half
+def _has_alpha(path: Path, _stamp: tuple[int, int] | None) -> bool:
+    """Whether that file of a sequence has alpha, as far as it can be read; it is opened anew where its stamp is another
+    one."""
+    if path.suffix.lower() in WITHOUT_ALPHA or not path.is_file():
         return False
     try:
-        status = path.stat()
-        return S_ISREG(status.st_mode) and _had_alpha(path, status.st_size, status.st_mtime_ns)
-    except (OSError, MediaError):  # who needs the frame is told
+        with _opened(path) as (_image, _spec, layer):
+            return len(layer) in ALPHA
+    except MediaError:  # who needs the frame is told
         return False
-
-
-@lru_cache(maxsize=1 << 17)  # a sequence of an hour and a half
-def _had_alpha(path: Path, _size: int, _mtime: int) -> bool:
-    with _opened(path) as (_image, _spec, layer):
-        return len(layer) in ALPHA
 
 
 def _parts(image: ImageInput) -> Iterator[ImageSpec]:
@@ -380,8 +357,8 @@ def _dtype(spec: ImageSpec) -> np.dtype:
 
 def _samples(image: ImageInput, spec: ImageSpec, layer: list[int], path: Path) -> np.ndarray:
     """The layer's samples (height, width, channels)."""
-    kinds = {np.uint8: "uint8", np.uint16: "uint16", np.float16: "half", np.float32: "float"}
-    kind, first, stop = kinds[_dtype(spec).type], min(layer), max(layer) + 1
+    kind = str(spec.format) if str(spec.format) in SAMPLES else "float"
+    first, stop = min(layer), max(layer) + 1
     if image.format_name() != "openexr":  # they hold a pixel's channels together: some take longer than all
         first, stop = 0, max(stop, min(spec.nchannels, 4))
     elif str(spec.channelformat(layer[0])) == "uint":

@@ -6,7 +6,7 @@ import thread_guard
 def test_a_render_works_on_threads_that_touch_no_data(bpy, edit, render, effect):
     thread_guard.seen.clear()
     render(edit, [1, 2])
-    assert {"media/prefetch.py: PrefetchSource._decode", "compute/renderer.py: Renderer.picture"} <= thread_guard.seen
+    assert {"media/prefetch.py: PrefetchSource._frame", "compute/renderer.py: Renderer.picture"} <= thread_guard.seen
     assert not thread_guard.faults()
 
 

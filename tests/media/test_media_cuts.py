@@ -7,8 +7,7 @@ import numpy as np
 import pytest
 
 from shutter_addon.core.frames.frame_source import FrameSource
-from shutter_addon.media import MediaError, open_source, plain_cuts
-from shutter_addon.media import cuts as media_cuts
+from shutter_addon.media import MediaError, open_source
 from shutter_addon.media.cuts import NEIGHBOURS, ShotSource, is_cut, is_duplicate, signature
 
 ROOT = Path(__file__).parents[2]
@@ -40,28 +39,6 @@ def cuts(*parts, **kind) -> list[int]:
 
 def lit(frames, gain=1.0, more=0.0):
     return np.clip(frames * gain + more, 0, 255).astype(np.uint8)
-
-
-def test_the_quick_look_rules_out_no_cut(monkeypatch):
-    """What it rules out by pictures that are not rounded is none where they are."""
-    monkeypatch.setattr(plain_cuts, "unlike", lambda *_: 1.0)  # the other question: any two pictures are
-    chance = np.random.default_rng(0)
-    rounded = (np.full((18, 32, 3), level, np.float32) for level in (100.49, 126.51))  # by 27 levels, but for rounding
-    pairs = [tuple(rounded)]
-    for _ in range(300):
-        before = (chance.random((18, 32, 3)) * chance.integers(1, 256)).astype(np.float32)
-        change = chance.normal(chance.uniform(-60, 60), chance.uniform(0, 8), before.shape)
-        pairs.append((before, (before + change).clip(0, 255).astype(np.float32)))
-    quick = [media_cuts.may_be_cut(*pair) for pair in pairs]
-    assert quick == [differs(*pair) for pair in pairs]
-    assert quick[0]
-    assert 30 < sum(quick) < 270
-
-
-def differs(before, after) -> bool:
-    """Whether two pictures, rounded, differ as much as at a cut."""
-    threshold = max(media_cuts.CHANGE * min(max(before.mean(), after.mean()) / media_cuts.GREY, 1.0), media_cuts.NOISE)
-    return plain_cuts.change(before, after) >= threshold
 
 
 def test_films_without_cuts_have_none(film, bunny):

@@ -69,7 +69,8 @@ def footage(folder, count=COUNT, *, samples="uint8", suffix=".png", alpha=False)
 
 @pytest.fixture
 def source(tmp_path):
-    with open_source(footage(tmp_path / "shot"), fps=24) as source:
+    with open_source(footage(tmp_path / "shot")) as source:
+        source.fps = 24
         yield source
 
 

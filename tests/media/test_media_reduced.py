@@ -27,17 +27,6 @@ def test_a_movie_becomes_smaller_as_it_is_converted(bunny, divisor):
             assert apart.max() < 12
 
 
-def test_a_movie_is_fitted_as_it_is_converted(bunny):
-    with open_source(bunny, size=(320, 180)) as fitted, open_source(bunny, divisor=4) as small:
-        assert (fitted.width, fitted.height) == (320, 180)
-        assert np.array_equal(fitted.read(3), small.read(3))
-    with open_source(bunny, size=(1920, 1080)) as larger, open_source(bunny) as full:
-        frame = larger.read(3)
-        assert frame.shape == (1080, 1920, 4)
-        apart = np.abs(means(frame, 3) - means(full.read(3), 2))  # of the same squares
-        assert apart.mean() < 1
-
-
 def test_ugly_movies_become_smaller(movies):
     """Turned, interlaced, with alpha, of odd sizes and with frames of other sizes."""
     for name, (path, _numbers) in movies.items():

@@ -39,7 +39,7 @@ def in_time():
 
 @pytest.fixture
 def source(tmp_path):
-    with open_source(footage(tmp_path / "shot"), fps=24) as source:
+    with open_source(footage(tmp_path / "shot")) as source:
         yield source
 
 

@@ -2,14 +2,13 @@
 
 Blender runs it as a script, no part of the extension there. A question is a line of JSON: `number`, `path` and
 `deinterlace` of a movie, and `wanted`, which is "about", "close", or a frame's index; a file may be open several times,
-by several numbers. An answer is a line of JSON, and as many bytes behind it as its `bytes` says. Before the first comes
-a line that reads as the script's last argument.
+by several numbers. An answer is a line of JSON behind the script's last argument, and as many bytes as its `bytes`
+says.
 """
 
 from __future__ import annotations
 
 import contextlib
-import faulthandler
 import json
 import os
 import sys
@@ -17,17 +16,12 @@ import sys
 import bpy
 import numpy as np
 
-OPENED = 6  # movies that are open at a time, at most
-IDLE = 30  # seconds without an open movie after which it ends
-
 
 class Movie:
     """A movie that is open. Its frames are counted from 0."""
 
     def __init__(self, path: str, deinterlace: bool) -> None:
         self._path = path
-        self._ahead: tuple[int, np.ndarray] | None = None
-        self._last, self._onward = -2, False
         self._image = bpy.data.images.load(path)
         self._image.use_deinterlace = deinterlace
         self._image.colorspace_settings.is_data = True  # or it makes light of deep samples
@@ -43,7 +37,7 @@ class Movie:
         """What it says of itself; frames are as many as a strip of it has. RuntimeError: it is no movie."""
         if self._image.source != "MOVIE":
             raise RuntimeError("Blender knows no such movie")
-        frame = self._pixels(0)
+        frame = self.frame(0)
         strips = bpy.context.scene.sequence_editor_create().strips
         strip = strips.new_movie("movie", self._path, 1, 1)
         try:
@@ -59,19 +53,8 @@ class Movie:
             strips.remove(strip)
 
     def frame(self, index: int) -> np.ndarray:
-        """A frame's _pixels, which may have been decoded already."""
-        found = self._ahead[1] if self._ahead and self._ahead[0] == index else self._pixels(index)
-        self._onward, self._last, self._ahead = index == self._last + 1, index, None
-        return found
-
-    def read_on(self) -> None:
-        """Decodes the next frame, if frames are asked for in order."""
-        if self._onward and self._ahead is None:
-            with contextlib.suppress(RuntimeError, MemoryError):
-                self._ahead = self._last + 1, self._pixels(self._last + 1)
-
-    def _pixels(self, index: int) -> np.ndarray:
-        """RGBA (H, W, 4), top row first, uint8 or, of deeper movies, uint16. RuntimeError: it cannot be decoded."""
+        """A frame as RGBA (H, W, 4), top row first, uint8 or, of deeper movies, uint16. RuntimeError: it cannot be
+        decoded."""
         self._look.image_user.frame_current = index + 1
         self._look.evaluate((0, 0, 0))
         width, height = self._image.size
@@ -96,71 +79,50 @@ def _has_sound(path: str) -> bool:
         return False
 
 
-class Movies:
-    """Those that are open, the one that was asked for last at the end."""
-
-    def __init__(self) -> None:
-        self.open: dict[int, Movie] = {}
-
-    def get(self, number: int, path: str, deinterlace: bool) -> Movie:
-        """It, opened if it is not."""
-        movie = self.open.pop(number, None) or Movie(path, deinterlace)
-        while len(self.open) >= OPENED:
-            self.close(next(iter(self.open)))
-        self.open[number] = movie
-        return movie
-
-    def close(self, number: int) -> None:
-        """Closes it, if it is open."""
-        if movie := self.open.pop(number, None):
-            movie.close()
-
-
-def _answer(movies: Movies, wanted: str | int, **which) -> tuple[dict, np.ndarray | None]:
-    """The line and the bytes that are an answer. which: what Movies.get takes"""
+def _answer(
+    movies: dict[int, Movie], wanted: str | int, number: int, path: str, deinterlace: bool
+) -> tuple[dict, np.ndarray | None]:
+    """The line and the bytes that are an answer. movies: those that are open, by number"""
     try:
         if wanted == "close":
-            movies.close(which["number"])
+            _close(movies, number)
             return {}, None
-        movie = movies.get(**which)
+        if number not in movies:
+            movies[number] = Movie(path, deinterlace)
         if wanted == "about":
-            return movie.about(), None
-        frame = movie.frame(int(wanted))
+            return movies[number].about(), None
+        frame = movies[number].frame(int(wanted))
         return {"shape": frame.shape, "dtype": frame.dtype.name}, frame
     except (RuntimeError, MemoryError) as error:
-        movies.close(which["number"])
+        _close(movies, number)
         return {"error": " ".join(str(error).split()) or "there is no memory for it"}, None
+
+
+def _close(movies: dict[int, Movie], number: int) -> None:
+    if movie := movies.pop(number, None):
+        movie.close()
 
 
 def main() -> None:
     """Answers until its input ends."""
     # Whatever else Blender prints would be taken for an answer.
     questions, answers = (os.fdopen(os.dup(number), mode) for number, mode in ((0, "rb"), (1, "wb")))
-    null = os.open(os.devnull, os.O_RDWR)
-    os.dup2(null, 1)
+    os.dup2(os.open(os.devnull, os.O_RDWR), 1)
     if sys.platform == "win32":
         import msvcrt
 
         for stream in (questions, answers):
             msvcrt.setmode(stream.fileno(), os.O_BINARY)
     bpy.context.preferences.system.memory_cache_limit = 1  # megabyte: of frames, but for the last one
-    movies = Movies()
-    answers.write(f"\n{sys.argv[-1]}\n".encode())
-    while True:
-        answers.flush()
-        if not movies.open:  # a watch that needs no thread of Python's: it ends the process
-            faulthandler.dump_traceback_later(IDLE, exit=True, file=null)
-        if not (line := questions.readline()):
-            return
-        faulthandler.cancel_dump_traceback_later()
-        question = json.loads(line)
-        said, frame = _answer(movies, **question)
+    movies: dict[int, Movie] = {}
+    answers.write(b"\n")  # Blender may not have ended its line
+    while line := questions.readline():
+        said, frame = _answer(movies, **json.loads(line))
         said["bytes"] = 0 if frame is None else frame.nbytes
-        answers.write(json.dumps(said).encode() + b"\n")
+        answers.write(f"{sys.argv[-1]}{json.dumps(said)}\n".encode())
         if frame is not None:
             answers.write(frame.data)
-            answers.flush()
-            next(reversed(movies.open.values())).read_on()
+        answers.flush()
 
 
 if __name__ == "__main__":

@@ -15,7 +15,7 @@ from bpy.types import FCurve, PropertyGroup, Scene, Strip, bpy_struct
 
 from ...core.messages import UserError
 from ...media import MediaError
-from ...media.sequence import ImageFiles
+from ...media.sequence import sequence_files
 from . import colour_configuration, fcurves, geometry, snapshot, strips, versions
 
 # Fields that hold timeline frames: they count from the effect strip's origin. In mappings the keys are frames, in
@@ -170,6 +170,6 @@ def _files(path: Path, files: Sequence | None) -> list[Path]:
     if files is not None:
         return [path.parent / file for file in files]
     try:
-        return ImageFiles(path).files
+        return sequence_files(path)
     except MediaError:  # it is a movie, or whoever reads it is told
         return [path]

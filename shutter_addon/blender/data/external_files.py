@@ -9,7 +9,7 @@ import bpy
 from bpy.types import ID, Image, Strip
 
 from ...media import MediaError
-from ...media.sequence import ImageFiles, numbered_alike
+from ...media.sequence import numbered_alike, sequence_files
 
 _MADE = "GENERATED", "VIEWER"  # sources of images that are in no file
 
@@ -45,7 +45,7 @@ def _sequence(item: ID, path: Path) -> list[Path]:
         return [path]
     try:
         # All but clips show files by their own number, those before the named one as well.
-        files = ImageFiles(path).files if isinstance(item, bpy.types.MovieClip) else numbered_alike(path)
+        files = sequence_files(path) if isinstance(item, bpy.types.MovieClip) else numbered_alike(path)
     except MediaError:
         return [path]
     return files or [path]

@@ -22,7 +22,7 @@ from ...media import MediaError
 from ...media.carried_mattes import FOLDER, CarriedFile
 from ...media.files import stamp
 from ...media.matte_files import MatteFile
-from ...media.sequence import ImageFiles
+from ...media.sequence import sequence_files
 from . import inbetween_settings, mask_reading, matte_strips, source_media, strip_timing, strips, validation
 from .external_files import absolute
 from .sampled import Frames
@@ -93,7 +93,7 @@ def image_file(region: PropertyGroup) -> MatteFile:
 def _listed(path: Path, _stamp: tuple) -> list[Path]:
     """The files of an image sequence, listed anew where its folder has changed."""
     try:
-        return ImageFiles(path).files
+        return sequence_files(path)
     except MediaError:  # which whoever reads it is told
         return []
 

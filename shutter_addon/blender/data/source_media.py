@@ -12,6 +12,7 @@ from bpy.app.translations import pgettext_rpt as rpt_
 from bpy.types import Strip
 
 from ...core.frames.frame_source import FrameSource
+from ...core.memo import Kept
 from ...media import MediaError, open_source
 from ...media.files import stamp
 from ...media.opening import with_proxy
@@ -35,8 +36,8 @@ class _Look:
     key: int = 0
 
 
-_specs: dict[tuple, SourceSpec] = {}  # by media_key
-_looks: dict[tuple, _Look] = {}  # by scene and strip, or by image
+_specs: Kept[tuple, SourceSpec] = Kept()  # by media_key
+_looks: Kept[tuple, _Look] = Kept()  # by scene and strip, or by image, and how many files they have
 _resting = False  # while a film is rendered, all its files have been asked before it
 
 
@@ -80,12 +81,7 @@ def between(place: tuple, count: int, path: Callable[[int], Path]) -> int:
     place: what knows it, a strip or an image, as a key; count: of its files; path: gives that of each by its index"""
     if count < 3:
         return 0
-    look = _looks.pop(place, None)
-    if look is None or len(look.known) != count:
-        look = _Look(known=[None] * count, next=0, due=count)
-    _looks[place] = look
-    while len(_looks) > _KEPT:
-        del _looks[next(iter(_looks))]
+    look = _looks.ask((*place, count), lambda: _Look(known=[None] * count, next=0, due=count), _KEPT)
     if not look.due and (_resting or time.monotonic() - look.when < _REST):
         return look.key
     changed = False
@@ -147,11 +143,7 @@ class SourceSpec:
 def spec(strip: Strip, key: tuple | None = None) -> SourceSpec:
     """What a source strip reads; key: its media_key, where that is known. MediaError: it has no files."""
     key = key or media_key(strip)
-    if key not in _specs:
-        while len(_specs) >= _KEPT:
-            del _specs[next(iter(_specs))]
-        _specs[key] = _spec(strip, key)
-    return _specs[key]
+    return _specs.ask(key, lambda: _spec(strip, key), _KEPT)
 
 
 def _spec(strip: Strip, key: tuple) -> SourceSpec:

@@ -10,7 +10,6 @@ from bpy.types import PropertyGroup, Scene, Strip
 
 from ...core import told
 from ...core.messages import UserError
-from ...media.file_kind import file_kind
 from ..data import annotations, colour_configuration, fcurves, snapshot, source_media, strips
 from ..data.validation import word
 
@@ -96,7 +95,7 @@ def _of_source(scene: Scene, effect: PropertyGroup, strip: Strip) -> Iterator[st
             space = spec.options["colorspace"]
             rate = f"{float(medium.fps):g} fps" if medium.fps else "no rate"
             yield (
-                f"- Footage: {file_kind(spec.path, spec.options['stream'])}, {medium.width}×{medium.height}, {rate},"
+                f"- Footage: {medium.file_kind}, {medium.width}×{medium.height}, {rate},"
                 f" {medium.count} frames, read as {medium.dtype}, alpha {medium.alpha}, color space {_standard(space)}"
             )
     except UserError as error:

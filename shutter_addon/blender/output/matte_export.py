@@ -20,7 +20,7 @@ from ...core.model.effect import Effect, FileContent, RampContent
 from ...core.recipes import recipe
 from ...media.image_writing import write_exr, write_grey
 from ...media.matte_values import MatteValues
-from ...media.sequence import ImageFiles
+from ...media.sequence import sequence_files
 from ..data import matte_content, matte_strips, recipe_export, snapshot, source_media, strips, validation
 from ..rendering import effect_source
 
@@ -67,7 +67,7 @@ def _folder(region: PropertyGroup, path: Path, number: int) -> Path | None:
 def _is_one_of_many(region: PropertyGroup) -> bool:
     """Whether a matte is a single picture that a recipe would take for the first of a sequence."""
     path = matte_content.image_path(region)
-    return region.image.source == "FILE" and path.exists() and ImageFiles(path).count > 1
+    return region.image.source == "FILE" and path.exists() and len(sequence_files(path)) > 1
 
 
 def _read(scene: Scene, effect: PropertyGroup, strip: Strip, regions: list) -> Iterator[Path]:

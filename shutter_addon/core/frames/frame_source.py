@@ -39,6 +39,8 @@ class FrameSource(ABC):
     """The frames of a movie or of an image sequence; close it, or use it in a `with`.
 
     path: the movie, or the first file of the sequence
+    file_kind: what kind of file that is: format, codec and samples, as the libraries call them
+    files: the movie, or one for each frame of a sequence
     width, height: pixels
     count: frames as Blender's strip counts them (its content_duration)
     fps: frames per second, None for an image sequence
@@ -57,6 +59,8 @@ class FrameSource(ABC):
     """
 
     path: Path
+    file_kind: str
+    files: list[Path]
     width: int
     height: int
     count: int
@@ -73,11 +77,6 @@ class FrameSource(ABC):
     by_blender: bool = False
     windows: int = 1
     is_made: bool = False
-
-    @property
-    def files(self) -> list[Path]:
-        """The files that hold the frames: the movie, or one for each frame of a sequence."""
-        return [self.path]
 
     @abstractmethod
     def read(self, index: int) -> np.ndarray:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import lru_cache
 
 import numpy as np
 
@@ -81,10 +80,7 @@ class Planes:
         """RGB uint8 (h, w, 3) of the pixels in these rows and columns: those of the frame of `rgba`, and nothing else
         is converted."""
         m, shape = self.matrix, self.luma.shape
-        down, right = (
-            _chroma_places(range(*chosen.indices(length)), length)
-            for chosen, length in zip((rows, columns), shape, strict=True)
-        )
+        down, right = _chroma_places(rows, shape[0]), _chroma_places(columns, shape[1])
         luma = self.luma[rows, columns].astype(np.int32)
         luma *= m.luma << 9
         luma += (1 << 21) - m.offset * m.luma
@@ -101,15 +97,10 @@ class Planes:
         return np.moveaxis(pixels, 1, -1)
 
 
-@lru_cache(8)
-def _chroma_places(chosen: range, length: int) -> np.ndarray | slice:
-    """The samples of chroma that pixels have; a slice, which is quicker, where they lie evenly."""
+def _chroma_places(chosen: slice, length: int) -> np.ndarray:
+    """The samples of chroma that pixels have, of so many along an axis."""
     step = chroma_step(length)
-    places = (np.array(chosen, int) * step + step // 2) >> 16
-    apart = np.diff(places)
-    if len(apart) and apart[0] > 0 and (apart == apart[0]).all():
-        return slice(places[0], places[-1] + 1, apart[0])
-    return places
+    return (np.arange(length)[chosen] * step + step // 2) >> 16
 
 
 def as_rgba(frame: np.ndarray | Planes) -> np.ndarray:

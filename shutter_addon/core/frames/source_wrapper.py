@@ -46,5 +46,5 @@ class SourceWrapper(FrameSource):
         self._source.close()
 
 
-for _name in (*FrameSource.__annotations__, "files"):
+for _name in FrameSource.__annotations__:
     setattr(SourceWrapper, _name, _Forwarded(_name))
