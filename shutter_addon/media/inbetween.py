@@ -25,7 +25,7 @@ from . import cuts, flow
 from .completeness import why_short
 from .errors import MediaError, NotBuiltError
 from .files import check_index
-from .inbetween_cache import InbetweenCache, pair_line, write_picture
+from .inbetween_cache import InbetweenCache, write_picture
 from .inbetween_folders import State
 
 MEMORY = 4 << 30  # bytes of all pairs that are built at the same time, and of the frames that are read ahead
@@ -34,9 +34,7 @@ AHEAD = 640 << 20  # bytes of them for frames that are read ahead; enough to rea
 LAYERS = 26
 _PAUSE = 1.0  # seconds between two looks at what other processes have built
 
-# What makes the frames of a pair: flow.between, or what stands for it.
-Pictures = Iterator[np.ndarray]
-Between = Callable[..., Pictures]
+Pictures = Iterator[np.ndarray]  # the frames of a pair
 
 
 class InbetweenSource(SourceWrapper):
@@ -77,12 +75,12 @@ class InbetweenSource(SourceWrapper):
         return self._cache.read(index) if real is None else self._source.read(real)
 
     def _is_there(self, index: int) -> bool:
-        return self._cache.has(index) or self._real(index) is not None
+        return index in self._cache.listed.frames or self._real(index) is not None
 
     def _real(self, index: int) -> int | None:
         """The source frame that is shown at a frame; None: an in-between frame is."""
         pair, step = divmod(index, self.factor)
-        kind = "same" if step == 0 else self._cache.kinds.get(pair)
+        kind = "same" if step == 0 else self._cache.listed.kinds.get(pair)
         if kind is None:
             return None
         return pair + (kind == "cut" and 2 * step > self.factor)
@@ -95,7 +93,6 @@ def build(
     method: str,
     update: Callable[[int, int], None] = lambda done, total: None,
     cancelled: Callable[[], bool] = lambda: False,
-    between: Between | None = None,
     pairs: Sequence[int] | None = None,
 ) -> State:
     """Builds in-between frames in `folder`. Pictures that are there are checked, and damaged ones are built again.
@@ -103,7 +100,6 @@ def build(
     factor: 2 or more; method: one of flow.METHODS
     update: called with the number of finished pairs and that of all
     cancelled: called often, from several threads; True ends the build, and finished pairs are kept
-    between: makes a pair's frames, in place of flow.between
     pairs: those to build, each by its first source frame, ascending (default: all)
 
     After a build that was killed, the next one goes on where that was. Several processes may build in the same folder,
@@ -114,16 +110,14 @@ def build(
     cache = InbetweenCache(source, folder, factor, method)
     pairs = range(source.count - 1) if pairs is None else pairs
     cache.load()
-    if between is None and not cache.finished().issuperset(pairs):
+    if not cache.listed.pairs.issuperset(pairs):
         flow.check()
-    between = between or flow.between
     cache.prepare()
     done, left = 0, list(pairs)
     with Claims(cache.folder) as claims:
         while left:
-            cache.load()
             others: list[int] = []  # pairs that other processes are building
-            tasks = _tasks(cache, left, claims, others, between, cancelled)
+            tasks = _tasks(cache, left, claims, others, cancelled)
             for finished in _in_parallel(tasks, _workers(source)):
                 done += finished
                 update(done, len(pairs))
@@ -133,14 +127,6 @@ def build(
         claims.clear(map(_claim, pairs))
     cache.confirm()
     return State("ready" if done == len(pairs) else "partial", done, len(pairs))
-
-
-def estimate(source: FrameSource, factor: int) -> int:
-    """About how many bytes the files of all in-between frames of a source will have: the mean of three source frames,
-    written as in-between frames are, times their number. MediaError: these frames cannot be read or written."""
-    samples = {source.count * part // 6 for part in (1, 3, 5)}
-    sizes = list(_sizes(source, map(source.read, samples)))
-    return (source.count - 1) * (factor - 1) * sum(sizes) // len(sizes)
 
 
 class Cost(NamedTuple):
@@ -157,28 +143,21 @@ class Cost(NamedTuple):
         return pairs * (factor - 1) * self.size
 
 
-def cost(source: FrameSource, pair: int, method: str, between: Between | None = None) -> Cost:
+def cost(source: FrameSource, pair: int, method: str) -> Cost:
     """About what in-between frames of a source cost, by two that are made of one pair, and written: several pairs at a
-    time take hardly less each, as one has all processors already. between: as for `build`. MediaError: they cannot be
-    made."""
-    between = between or flow.between
-    when, sizes = [time.perf_counter()], [0]
+    time take hardly less each, as one has all processors already. MediaError: they cannot be made."""
     first, second = source.read(pair), source.read(pair + 1)
-    for size in _sizes(source, islice(between(first, second, 4, method, source.transfer, source.alpha), 2)):
-        when.append(time.perf_counter())
-        sizes.append(size)
-    frame = when[2] - when[1]
-    return Cost(max(when[1] - when[0] - frame, 0.0), frame, sizes[-1])
-
-
-def _sizes(source: FrameSource, pictures: Iterable[np.ndarray]) -> Iterator[int]:
-    """The bytes of each of these pictures, written as a source's in-between frames are. MediaError: it cannot be."""
+    pictures = flow.between(first, second, 4, method, source.transfer, source.alpha)
+    when = [time.perf_counter()]
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder, "picture.png" if source.dtype.kind == "u" else "picture.exr")
-        for picture in pictures:
+        for picture in islice(pictures, 2):
             if not write_picture(path, picture, source.alpha):
                 raise MediaError(f"{folder}: a picture could not be written whole ({why_short(path.parent)})")
-            yield path.stat().st_size
+            when.append(time.perf_counter())
+        size = path.stat().st_size
+    frame = when[2] - when[1]
+    return Cost(max(when[1] - when[0] - frame, 0.0), frame, size)
 
 
 def _tasks(
@@ -186,7 +165,6 @@ def _tasks(
     pairs: list[int],
     claims: Claims,
     others: list[int],
-    between: Between,
     cancelled: Callable[[], bool],
 ) -> Iterator[Callable[[], bool]]:
     """Yields a function for each pair that builds it and returns whether it is finished; adds those to `others` that
@@ -202,13 +180,13 @@ def _tasks(
             is_taken = claims.take(_claim(pair))
         if not is_taken:
             others.append(pair)
-        elif _finished_by_another(cache, pair):
+        elif cache.is_sound(pair):  # by another
             claims.release(_claim(pair))
             yield lambda: True
         else:
             first, second, kind = near.pair(pair)
             source = cache.source
-            made = kind or between(first, second, cache.factor, cache.method, source.transfer, source.alpha)
+            made = kind or flow.between(first, second, cache.factor, cache.method, source.transfer, source.alpha)
             yield partial(_make, cache, claims, pair, made, cancelled)
 
 
@@ -267,22 +245,13 @@ def _claim(pair: int) -> str:
     return f"{pair:08d}"
 
 
-def _finished_by_another(cache: InbetweenCache, pair: int) -> bool:
-    """Whether a pair was finished since the cache was read. Only its pictures are looked for: of a pair without any,
-    the note is made again."""
-    if not cache.picture(cache.steps(pair)[0]).exists():
-        return False
-    cache.load()
-    return cache.is_sound(pair)
-
-
 def _make(
     cache: InbetweenCache, claims: Claims, pair: int, made: str | Pictures, cancelled: Callable[[], bool]
 ) -> bool:
     """Builds a claimed pair: notes its kind, or writes its pictures. Whether it is finished."""
     try:
         if isinstance(made, str):
-            cache.note(pair_line(pair, made))
+            cache.note(pair, made)
             return True
         with suppress(stopping.StoppedError), stopping.once(cancelled):
             for index, picture in zip(cache.steps(pair), made, strict=True):

@@ -1,40 +1,26 @@
 """Folders of in-between frames: how far they are built, how large they are, and what is removed from them."""
 
+from __future__ import annotations
+
 import json
 import os
-from collections.abc import Callable, Iterator
+import re
+from collections.abc import Callable
 from contextlib import suppress
-from functools import partial
+from functools import lru_cache
 from pathlib import Path
 from typing import NamedTuple
 
-from ..core import atomic_write, threads
+from ..core import atomic_write
 from ..core.farm import claims
 from ..core.frames.frame_source import FrameSource
+from . import derived, inbetween_cache
 from .errors import MediaError
 from .folder import Folder
-from .inbetween_cache import (
-    CHECKS,
-    HALF,
-    LARGEST_PICTURE,
-    MAKER,
-    MANIFEST,
-    Checks,
-    InbetweenCache,
-    content_hash,
-    content_of,
-    folder_stamp,
-    identity,
-    manifest_key,
-    read_checks,
-    relative_path,
-)
+from .inbetween_cache import MAKER, MANIFEST, OWN, InbetweenCache, content_of, folder_stamp, relative_path
 
-READERS = 4  # threads that check pictures before they are removed
-
-_KEPT = 64  # folders of which the following is remembered
-_finished: dict[Path, tuple] = {}  # {folder: (stamp, finished pairs)}
-_sizes: dict[Path, tuple] = {}  # {folder: (stamp, bytes)}
+# Where builds of the first version have noted the digests of pictures, in files of these names.
+_CHECKS, _DIGESTS = "checks", re.compile(r"[0-9a-f]{8}\.sha256")
 
 
 class State(NamedTuple):
@@ -55,12 +41,8 @@ def state(source: FrameSource, folder: str | Path, factor: int, method: str) -> 
     While nothing changes it is fast: it asks for the time stamps of the source's files and of the folder alone.
     MediaError: a file of the source is gone."""
     cache, total = InbetweenCache(source, folder, factor, method), source.count - 1
-
-    def finished() -> int:
-        cache.load()
-        return len(cache.finished())
-
-    done = _remembered(_finished, cache.folder, finished)
+    cache.load()
+    done = len(cache.listed.pairs)
     if done or not total:
         return State("ready" if done == total else "partial", done, total)
     wanted = cache.manifest["path"], cache.manifest["settings"]
@@ -69,20 +51,18 @@ def state(source: FrameSource, folder: str | Path, factor: int, method: str) -> 
     return State("stale" if stale else "missing", 0, total)
 
 
-def size(folder: str | Path, source: FrameSource | None = None) -> int:
-    """The bytes that `purge` would free. Pictures that have changed count as well, though it does not remove them.
+def size(folder: str | Path, source: FrameSource) -> int:
+    """The bytes that `purge` would free.
 
     While nothing changes it is fast. MediaError: a file of the source is gone."""
-    folder = Path(folder)
-    return sum(_remembered(_sizes, folder / name, partial(_size, folder / name)) for name in _chosen(folder, source))
+    folders = [Path(folder, name) for name in _chosen(folder, source)]
+    return sum(_size(each, folder_stamp(each)) for each in folders)
 
 
-def purge(
-    folder: str | Path, source: FrameSource | None = None, left: Callable[[Path, int], None] = lambda path, count: None
-) -> int:
-    """Removes in-between frames in `folder`, of one source or of all, stale ones included. Returns the bytes freed.
+def purge(folder: str | Path, source: FrameSource, left: Callable[[Path, int], None] = lambda path, count: None) -> int:
+    """Removes a source's in-between frames in `folder`, stale ones included. Returns the bytes freed. It removes the
+    files that have names of ours, and nothing else.
 
-    It removes nothing else: pictures are read, and removed if they match their digests.
     left: called with each cache's folder that is not empty after that, and the number of entries in it
     MediaError: something cannot be removed, or `folder` is a link."""
     names = _chosen(folder, source)
@@ -97,9 +77,9 @@ def purge(
 
 def forget() -> None:
     """Forgets what is remembered of sources and folders."""
-    _finished.clear()
-    _sizes.clear()
-    content_hash.cache_clear()
+    inbetween_cache.forget()
+    _size.cache_clear()
+    derived.content_hash.cache_clear()
 
 
 def _caches(folder: str | Path) -> list[tuple[str, dict]]:
@@ -119,53 +99,29 @@ def _manifest(cache: Folder) -> dict | None:
     with suppress(ValueError, TypeError, KeyError, AttributeError, RecursionError):
         manifest = json.loads(content_of(cache, MANIFEST) or b"")
         made_of = {key: value for key, value in manifest.items() if key != "path"}
-        named = cache.path.name.endswith(f"-{manifest_key(made_of)}")
+        named = cache.path.name.endswith(f"-{derived.key(made_of)}")
         if named and made_of["maker"] == MAKER and manifest.keys() >= {"path", "source", "settings"}:
             return manifest
     return None
 
 
-def _chosen(folder: str | Path, source: FrameSource | None) -> list[str]:
-    """The names of the caches in `folder`: of one source, stale ones included, or of all."""
-    path, made_of = (None, None) if source is None else (relative_path(source.path, folder), identity(source))
-    return [
-        name
-        for name, manifest in _caches(folder)
-        if source is None or manifest["path"] == path or manifest["source"] == made_of
-    ]
+def _chosen(folder: str | Path, source: FrameSource) -> list[str]:
+    """The names of a source's caches in `folder`, stale ones included."""
+    path, made_of = relative_path(source.path, folder), derived.identity(source)
+    return [name for name, each in _caches(folder) if each["path"] == path or each["source"] == made_of]
 
 
-def _pictures(cache: Folder, checks: Checks) -> list[os.DirEntry]:
-    """The files in a cache's folder with the name of a picture that has a digest."""
-    return [
-        entry
-        for entry in cache.files()
-        if entry.name in checks.digests and entry.stat(follow_symlinks=False).st_size <= LARGEST_PICTURE
-    ]
+def _own(cache: Folder) -> list[os.DirEntry]:
+    """The files in a cache's folder that have names of ours. The manifest is last: without it, what is left would not
+    be recognised as a cache again."""
+    own = [entry for entry in cache.files() if OWN.fullmatch(entry.name) or claims.is_claim(entry.name)]
+    return sorted(own, key=lambda entry: entry.name == MANIFEST)
 
 
-def _other_files(cache: Folder, checks: Checks) -> Iterator[tuple[Folder, str]]:
-    """Our other files in a cache's folder, as (folder, name), in the order in which they are removed. The manifest is
-    last: without it, what is left would not be recognised as a cache again."""
-    yield from ((cache, entry.name) for entry in cache.files() if claims.is_claim(entry.name))
-    for entry in cache.entries():
-        if atomic_write.is_part(entry.name):
-            with suppress(OSError):
-                part = cache.folder(entry.name)
-                yield from ((part, file.name) for file in part.files() if HALF.fullmatch(file.name))
-    if checks.own:
-        folder = cache.folder(CHECKS)
-        yield from ((folder, name) for name in checks.own)
-    yield cache, MANIFEST
-
-
-def _size(folder: Path) -> int:
+@lru_cache(64)
+def _size(folder: Path, _changed: int | None) -> int:
     with suppress(OSError):
-        cache = Folder(folder)
-        checks = read_checks(cache)
-        if not checks.unreadable:
-            pictures = sum(entry.stat(follow_symlinks=False).st_size for entry in _pictures(cache, checks))
-            return pictures + sum((place.path / name).lstat().st_size for place, name in _other_files(cache, checks))
+        return sum(entry.stat(follow_symlinks=False).st_size for entry in _own(Folder(folder)))
     return 0
 
 
@@ -174,17 +130,13 @@ def _remove(top: Folder, name: str, left: Callable[[Path, int], None]) -> int:
         cache = top.folder(name)
         if _manifest(cache) is None:  # another folder than a moment ago
             return 0
-        checks = read_checks(cache)
-        if checks.unreadable:
-            raise checks.unreadable[0]
-        with threads.pool(READERS) as pool:
-            names = [entry.name for entry in _pictures(cache, checks)]
-            freed = sum(pool.map(partial(_remove_picture, cache, checks), names))
-        freed += sum(place.remove(file) for place, file in _other_files(cache, checks))
         for entry in cache.entries():
-            if entry.name == CHECKS or atomic_write.is_part(entry.name):
-                with suppress(OSError):  # it is not empty: others' files are in it
-                    Path(entry.path).rmdir()
+            with suppress(OSError):  # others' files are in it
+                if entry.name == _CHECKS:
+                    cache.remove_part(entry.name, _DIGESTS.fullmatch)
+                elif atomic_write.is_part(entry.name):
+                    cache.remove_part(entry.name, OWN.fullmatch)
+        freed = sum(cache.remove(entry.name) for entry in _own(cache))
         if count := len(cache.entries()):
             left(cache.path, count)
         else:
@@ -192,22 +144,6 @@ def _remove(top: Folder, name: str, left: Callable[[Path, int], None]) -> int:
     except OSError as error:
         raise _irremovable(top.path / name, error) from None
     return freed
-
-
-def _remove_picture(cache: Folder, checks: Checks, name: str) -> int:
-    ours = cache.digest(name, LARGEST_PICTURE) in checks.digests[name]
-    return cache.remove(name) if ours else 0
-
-
-def _remembered(known: dict[Path, tuple], folder: Path, find: Callable[[], int]) -> int:
-    """The result of `find` for a folder, from `known` unless the folder has changed. `known` keeps _KEPT folders."""
-    now = folder_stamp(folder)
-    if known.get(folder, ((),))[0] != now:
-        known.pop(folder, None)
-        while len(known) >= _KEPT:
-            del known[next(iter(known))]
-        known[folder] = now, find()
-    return known[folder][1]
 
 
 def _irremovable(folder: str | Path, error: OSError) -> MediaError:

@@ -64,13 +64,11 @@ def of_source(source: FrameSource, indices: Sequence[int], *, columns: bool = Fa
     first = max((len(indices) - FRAMES) // 2, 0)
     chosen = indices[first : first + FRAMES]
     source.want(chosen)
-    return of_pictures([_small(source, index, columns=columns) for index in chosen])
-
-
-def _small(source: FrameSource, index: int, *, columns: bool) -> np.ndarray:
-    stopping.check()
-    luma = flow.luma(source.read(index), source.transfer, source.alpha)
-    return flow.of_rows(np.ascontiguousarray(luma.T) if columns else luma, ROWS)
+    pictures = []
+    for index in chosen:
+        stopping.check()
+        pictures.append(flow.of_rows(source.read(index), source, ROWS, turned=columns))
+    return of_pictures(pictures)
 
 
 def of_pictures(pictures: Sequence[np.ndarray]) -> Readout:

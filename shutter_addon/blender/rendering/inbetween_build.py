@@ -13,10 +13,11 @@ from bpy.types import PropertyGroup, Scene, Strip
 
 from ...core import threads
 from ...core.frames.frame_source import FrameSource
+from ...core.memo import Kept
 from ...core.messages import EffectError
 from ...core.model.shutters import ShutterError
-from ...media import MediaError, inbetween_folders
-from ...media.inbetween import build, estimate
+from ...media import MediaError, inbetween, inbetween_folders
+from ...media.inbetween import Cost
 from ..data import inbetween_settings, snapshot, source_media, strips
 from . import strobing
 
@@ -36,8 +37,9 @@ class Look(NamedTuple):
     estimate: int | None
 
 
-_media: dict[tuple, tuple] = {}  # by source_media.media_key: the medium, its file not open; bytes for a factor of 2
-_looks: dict[tuple, tuple[float, inbetween_folders.State, int]] = {}  # when it was looked, and what was found
+# By source_media.media_key: the medium, its file not open, and what its in-between frames cost.
+_media: Kept[tuple, tuple[FrameSource, Future[Cost | None]]] = Kept()
+_looks: Kept[tuple, tuple[inbetween_folders.State, int]] = Kept()  # how far a source's are built, and bytes
 
 
 @dataclass
@@ -54,37 +56,35 @@ _builds = _Builds()
 
 def look(scene: Scene, effect: PropertyGroup, strip: Strip) -> Look:
     """How things are, or were a second ago. MediaError, EffectError: there is no source, or no place for frames."""
-    source = strips.source_of(scene, effect, strip)
     settings = inbetween_settings.settings(effect)
-    medium, doubled = _known(spec := source_media.spec(source))
-    key = spec.key, *settings
-    if key not in _looks or time.monotonic() - _looks[key][0] > _FRESH:
-        state, size = inbetween_folders.state(medium, *settings), inbetween_folders.size(settings[0], medium)
-        _looks[key] = time.monotonic(), state, size
-        _trim(_looks)
-    return Look(*_looks[key][1:], doubled.result() * (settings[1] - 1) if doubled.done() else None)
+    spec = source_media.spec(strips.source_of(scene, effect, strip))
+    medium, cost = _known(spec)
+
+    def find() -> tuple[inbetween_folders.State, int]:
+        return inbetween_folders.state(medium, *settings), inbetween_folders.size(settings.folder, medium)
+
+    state, size = _looks.ask((spec.key, *settings, time.monotonic() // _FRESH), find, _KEPT)
+    if not cost.done():
+        return Look(state, size, estimate=None)
+    known = cost.result()
+    return Look(state, size, estimate=int(known.bytes(medium.count - 1, settings.factor)) if known else 0)
 
 
-def _known(spec: source_media.SourceSpec) -> tuple:
-    """A source's medium, and a future of the bytes that its in-between frames take for a factor of 2."""
-    if spec.key not in _media:
+def _known(spec: source_media.SourceSpec) -> tuple[FrameSource, Future[Cost | None]]:
+    """A source's medium, and what its in-between frames will have cost; None: they cannot be made."""
+
+    def find() -> tuple[FrameSource, Future[Cost | None]]:
         medium = spec.open()
         medium.close()
-        _media[spec.key] = medium, threads.start(_estimated, medium)
-    _trim(_media)
-    return _media[spec.key]
+        return medium, threads.start(_cost, medium)
+
+    return _media.ask(spec.key, find, _KEPT)
 
 
-def _trim(known: dict) -> None:
-    """Lets the oldest go."""
-    while len(known) > _KEPT:
-        del known[next(iter(known))]
-
-
-def _estimated(medium: FrameSource) -> int:
+def _cost(medium: FrameSource) -> Cost | None:
     with medium, suppress(MediaError, OSError):  # a build says what is wrong
-        return estimate(medium, 2)
-    return 0
+        return inbetween.cost(medium, max(medium.count // 2 - 1, 0), "quick")
+    return None
 
 
 class Build:
@@ -111,7 +111,9 @@ class Build:
     ) -> inbetween_folders.State:
         wait(before)
         with medium:
-            return build(medium, *self.settings, update=self._update, cancelled=self._stopped.is_set, pairs=pairs)
+            return inbetween.build(
+                medium, *self.settings, update=self._update, cancelled=self._stopped.is_set, pairs=pairs
+            )
 
     def _update(self, done: int, _total: int) -> None:
         self.done = done
@@ -179,7 +181,7 @@ def stop() -> None:
         _builds.running.stop()
         ended()
     wait(_builds.left)
-    wait([doubled for _medium, doubled in _media.values()])
+    wait([cost for _medium, cost in _media.values()])
     _media.clear()
     _looks.clear()
     inbetween_folders.forget()
