@@ -61,7 +61,9 @@ def lasso(count):
     way = [(VELOCITY * (n - count / 2) / WIDTH, 0.0) for n in (0, count)]
     drawings = Drawings("subject", (0.0,), ([shape],), ("linear",), WIDTH / HEIGHT)
     location = Keys((0, count), tuple(way), ("linear", "linear"))
-    return Region(Moves(location), "subject", 0, Constant("lasso"), Constant(0.0), drawings)
+    return Region(
+        moves=Moves(location), name="subject", shutter=0, kind=Constant("lasso"), width=Constant(0.0), drawings=drawings
+    )
 
 
 def tracked(source, regions=(), start=0, camera=STILL_CAMERA, **options):
@@ -194,7 +196,7 @@ ALL = [np.array([(-1, -1), (2, -1), (2, 2), (-1, 2)])]
 
 def everywhere():
     drawings = Drawings("all", (0.0,), (ALL,), ("linear",), WIDTH / HEIGHT)
-    return Region(Moves(), "all", 0, Constant("lasso"), Constant(0.0), drawings)
+    return Region(moves=Moves(), name="all", shutter=0, kind=Constant("lasso"), width=Constant(0.0), drawings=drawings)
 
 
 @pytest.mark.parametrize(
