@@ -105,7 +105,7 @@ def run(folder):
 
 
 def _take(folder, plan, steps):
-    from shutter_addon.media import MediaError, inbetween, inbetween_folders, open_source
+    from shutter_addon.media import MediaError, inbetween, inbetween_cache, open_source
 
     def read(must=False):
         """Every frame is the right one, or there is a sentence."""
@@ -122,12 +122,12 @@ def _take(folder, plan, steps):
                 raise trial.Fault(f"frame {index} is another one")
 
     does = {
-        "state": lambda: inbetween_folders.state(source, place, *SETTINGS),
-        "size": lambda: inbetween_folders.size(place, source),
+        "state": lambda: inbetween_cache.state(source, place, *SETTINGS),
+        "size": lambda: inbetween_cache.size(place, source),
         "cost": lambda: inbetween.cost(source, 0, SETTINGS[1]),
         "read": read,
         "build": lambda: inbetween.build(source, place, *SETTINGS),
-        "remove": lambda: inbetween_folders.purge(place, source),
+        "remove": lambda: inbetween_cache.purge(place, source),
         "whole": lambda: read(must=inbetween.build(source, place, *SETTINGS).name == "ready"),
     }
     place = folder / "cache"

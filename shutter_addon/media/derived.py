@@ -21,6 +21,7 @@ from .files import check_name
 
 WHOLE = 8 << 20  # bytes; files of a source up to this size, such as uncompressed 8-bit HD pictures, are hashed whole
 BLOCKS, BLOCK = 16, 4096  # of a larger file so many blocks, of so many bytes each, are hashed
+_LARGER = 1 << 20  # bytes; a file that is larger than its samples by more holds something else
 
 _SHAPE = (
     *("x", "y", "z", "width", "height", "depth", "full_x", "full_y", "full_width", "full_height"),
@@ -80,15 +81,21 @@ def content_hash(path: Path, size: int, _mtime: int, whole: int) -> bytes:
 
 def is_kept(path: Path) -> bool:
     """Whether a frame's file is there, which is not opened. A link is none."""
+    return _bytes(path) is not None
+
+
+def _bytes(path: Path) -> int | None:
     with suppress(OSError):
-        return stat.S_ISREG(path.lstat().st_mode)
-    return False
+        status = path.lstat()
+        return status.st_size if stat.S_ISREG(status.st_mode) else None
+    return None
 
 
 def opened(path: Path, spec: ImageSpec) -> ImageInput | None:
     """A frame's opened file. None: it is not there, is damaged, or has not exactly the size and samples of `spec`, as
     a file that somebody else has put there may have millions of pixels."""
-    if not is_kept(path):
+    size = _bytes(path)
+    if size is None or size > 2 * spec.image_bytes() + _LARGER:
         return None
     wishes = ImageSpec()
     wishes.attribute("oiio:UnassociatedAlpha", 1)  # no premultiplication on reading

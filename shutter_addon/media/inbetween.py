@@ -9,7 +9,7 @@ import tempfile
 import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, as_completed, wait
-from contextlib import suppress
+from contextlib import closing, suppress
 from functools import partial
 from itertools import islice
 from pathlib import Path
@@ -25,8 +25,8 @@ from . import cuts, flow
 from .completeness import why_short
 from .errors import MediaError, NotBuiltError
 from .files import check_index
-from .inbetween_cache import InbetweenCache, write_picture
-from .inbetween_folders import State
+from .inbetween_cache import InbetweenCache, State, write_picture
+from .prefetch import PrefetchSource
 
 MEMORY = 4 << 30  # bytes of all pairs that are built at the same time, and of the frames that are read ahead
 AHEAD = 640 << 20  # bytes of them for frames that are read ahead; enough to read none of 16 bits in 4K twice
@@ -112,21 +112,34 @@ def build(
     cache.load()
     if not cache.listed.pairs.issuperset(pairs):
         flow.check()
-    cache.prepare()
-    done, left = 0, list(pairs)
+    try:
+        cache.prepare()
+        done = _build(cache, pairs, update, cancelled)
+    except OSError as error:
+        reason = error.strerror or error
+        raise MediaError(f"{cache.folder}: in-between frames cannot be written there ({reason})") from None
+    cache.confirm()
+    return State("ready" if done == len(pairs) else "partial", done, len(pairs))
+
+
+def _build(
+    cache: InbetweenCache, pairs: Sequence[int], update: Callable[[int, int], None], cancelled: Callable[[], bool]
+) -> int:
+    """As `build`; how many pairs are finished."""
+    done, left, source = 0, list(pairs), cache.source
     with Claims(cache.folder) as claims:
         while left:
             others: list[int] = []  # pairs that other processes are building
-            tasks = _tasks(cache, left, claims, others, cancelled)
-            for finished in _in_parallel(tasks, _workers(source)):
-                done += finished
-                update(done, len(pairs))
+            with closing(cuts.ShotSource(PrefetchSource(source))) as shots:
+                tasks = _tasks(cache, shots, left, claims, others, cancelled)
+                for finished in _in_parallel(tasks, _workers(source)):
+                    done += finished
+                    update(done, len(pairs))
             if len(others) == len(left):
                 time.sleep(_PAUSE)
             left = others
         claims.clear(map(_claim, pairs))
-    cache.confirm()
-    return State("ready" if done == len(pairs) else "partial", done, len(pairs))
+    return done
 
 
 class Cost(NamedTuple):
@@ -162,6 +175,7 @@ def cost(source: FrameSource, pair: int, method: str) -> Cost:
 
 def _tasks(
     cache: InbetweenCache,
+    shots: cuts.ShotSource,
     pairs: list[int],
     claims: Claims,
     others: list[int],
@@ -169,75 +183,25 @@ def _tasks(
 ) -> Iterator[Callable[[], bool]]:
     """Yields a function for each pair that builds it and returns whether it is finished; adds those to `others` that
     other processes have claimed. Frames are read here, in the caller's thread; the functions may run in any."""
-    near = _Near(cache.source)
     for pair in pairs:
         if cancelled():
             return
         if cache.is_sound(pair):
             yield lambda: True
             continue
-        with cache.writable():
-            is_taken = claims.take(_claim(pair))
-        if not is_taken:
+        if not claims.take(_claim(pair)):
             others.append(pair)
         elif cache.is_sound(pair):  # by another
             claims.release(_claim(pair))
             yield lambda: True
         else:
-            first, second, kind = near.pair(pair)
-            source = cache.source
-            made = kind or flow.between(first, second, cache.factor, cache.method, source.transfer, source.alpha)
+            # Those behind it decide what it is, and come next.
+            shots.want(range(pair, min(pair + 2 + _ahead(shots), shots.count)))
+            first, second = shots.read(pair), shots.read(pair + 1)
+            kind = "same" if np.array_equal(first, second) else shots.kind(pair)
+            shots.release()
+            made = kind or flow.between(first, second, cache.factor, cache.method, shots.transfer, shots.alpha)
             yield partial(_make, cache, claims, pair, made, cancelled)
-
-
-class _Near:
-    """Reads the frames of pairs, in ascending order, and those around a pair that decide what the pair is.
-
-    The latter are kept for their own pair, as far as AHEAD allows; the rest are read again."""
-
-    def __init__(self, source: FrameSource) -> None:
-        self._source = source
-        self._most = 2 + _ahead(source)
-        self._frames: dict[int, np.ndarray] = {}  # the pair's frames, and those that are kept for their pair
-        self._signatures: dict[int, cuts.Signature] = {}
-
-    def pair(self, index: int) -> tuple[np.ndarray, np.ndarray, str | None]:
-        """Frames `index` and `index` + 1, and their kind: "same" if they are equal or the second repeats the first,
-        "cut" if they are of two shots, else None.
-
-        MediaError: one of them cannot be read, or one around them that decides their kind. A kind is stored for good,
-        so it is not decided without that frame."""
-        self._frames = {i: frame for i, frame in self._frames.items() if i >= index}
-        first, second = (self._frames.setdefault(i, self._frame(i)) for i in (index, index + 1))
-        kind = self._kind(first, second, index)
-        beside = cuts.neighbours(index + 1, self._source.count)
-        del self._frames[index]
-        self._signatures = {i: picture for i, picture in self._signatures.items() if i in beside}
-        return first, second, kind
-
-    def _kind(self, first: np.ndarray, second: np.ndarray, index: int) -> str | None:
-        if np.array_equal(first, second):
-            return "same"
-        here = self._signature(index), self._signature(index + 1)
-        if not (cuts.may_be_cut(*here) or cuts.may_be_duplicate(*here)):
-            return None
-        beside = {i: self._signature(i) for i in cuts.neighbours(index + 1, self._source.count)}
-        sides = cuts.sides(beside, index + 1)
-        if cuts.is_cut(*sides):
-            return "cut"
-        return "same" if cuts.is_duplicate(*sides) else None
-
-    def _frame(self, index: int) -> np.ndarray:
-        frame = self._frames.get(index)
-        return self._source.read(index) if frame is None else frame
-
-    def _signature(self, index: int) -> cuts.Signature:
-        if index not in self._signatures:
-            frame = self._frame(index)
-            if index > min(self._frames) and len(self._frames) < self._most:  # those before the pair are not needed
-                self._frames[index] = frame
-            self._signatures[index] = cuts.signature(frame, self._source.transfer, self._source.alpha)
-        return self._signatures[index]
 
 
 def _claim(pair: int) -> str:

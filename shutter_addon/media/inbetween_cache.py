@@ -1,4 +1,5 @@
-"""The folder of a source's in-between frames: pictures, and a manifest of what they were made of."""
+"""Folders of in-between frames, pictures and a manifest of what they are made of: how far they are built, how large
+they are, and what is removed from them."""
 
 from __future__ import annotations
 
@@ -7,8 +8,8 @@ import json
 import os
 import re
 import time
-from collections.abc import Iterator
-from contextlib import closing, contextmanager, suppress
+from collections.abc import Callable
+from contextlib import closing, suppress
 from functools import lru_cache
 from pathlib import Path
 from typing import NamedTuple
@@ -17,6 +18,7 @@ import numpy as np
 from OpenImageIO import ImageSpec
 
 from ..core import atomic_write
+from ..core.farm import claims
 from ..core.frames.frame_source import FrameSource
 from . import derived
 from .completeness import is_whole_picture, why_short
@@ -33,7 +35,20 @@ SAMPLES = {"uint8": "uint8", "uint16": "uint16", "float16": "half", "float32": "
 
 # The names that we choose: of a frame's picture, and of the empty file of a pair that needs none.
 OWN = re.compile(r"([0-9]{8})\.(png|exr|same|cut)|" + re.escape(MANIFEST))
+# Where builds of the first version have noted the digests of pictures, in files of these names.
+_CHECKS, _DIGESTS = "checks", re.compile(r"[0-9a-f]{8}\.sha256")
 _RECENT = 2e9  # nanoseconds for which a folder that has changed may change again with the same time stamp
+
+
+class State(NamedTuple):
+    """How far in-between frames are built.
+
+    name: "missing", "partial", "ready", or "stale": there are none of the source, but some of what it was before
+    done, total: finished pairs of neighbouring source frames, and all pairs"""
+
+    name: str
+    done: int
+    total: int
 
 
 class Listed(NamedTuple):
@@ -59,7 +74,8 @@ class InbetweenCache:
     The folder may come from a stranger: see `derived`. A picture of the right name, size and samples is taken for what
     its name says, whoever made it.
 
-    A frame's index counts source frames and in-between frames; a pair's is that of its first source frame.
+    A frame's index counts source frames and in-between frames; a pair's is that of its first source frame. What writes
+    may raise OSError.
     """
 
     def __init__(self, source: FrameSource, folder: str | Path, factor: int, method: str) -> None:
@@ -112,43 +128,31 @@ class InbetweenCache:
         return expanded(samples)
 
     def prepare(self) -> None:
-        """Makes the folder and its manifest, and removes half-written files of builds that were killed.
-
-        MediaError: the folder cannot be written to."""
+        """Makes the folder and its manifest, and removes half-written files of builds that were killed."""
         text = (json.dumps(self.manifest, indent=1, sort_keys=True) + "\n").encode()
-        with self.writable():
-            folder = own_folder(self.folder)
-            if content_of(folder, MANIFEST) != text:
-                with atomic_write.writing(self.folder / MANIFEST) as part:
-                    part.write_bytes(text)
-            for part in atomic_write.left_behind(self.folder):
-                with suppress(OSError):  # another user's, or cleared by others meanwhile
-                    folder.remove_part(part.name, OWN.fullmatch)
+        folder = own_folder(self.folder)
+        if content_of(folder, MANIFEST) != text:
+            with atomic_write.writing(self.folder / MANIFEST) as part:
+                part.write_bytes(text)
+        for left in atomic_write.left_behind(self.folder):
+            with suppress(OSError):  # another user's, or cleared by others meanwhile
+                folder.remove_part(left.name, OWN.fullmatch)
 
     def write(self, frame: int, picture: np.ndarray) -> None:
-        """Writes a frame's picture (height, width, 4) whole or not at all. MediaError: it cannot be written."""
+        """Writes a frame's picture (height, width, 4) whole or not at all. MediaError: it cannot be written whole."""
         path = self.picture(frame)
-        with self.writable(), atomic_write.writing(path) as part:
+        with atomic_write.writing(path) as part:
             if not write_picture(part, picture, self.source.alpha):
                 reason = why_short(part.parent)
                 raise MediaError(f"{self.folder}: an in-between frame could not be written whole ({reason})")
         self._written.append(path.name)
 
     def note(self, pair: int, kind: str) -> None:
-        """Notes that a pair needs no pictures; kind: "same" or "cut". MediaError: it cannot be written."""
+        """Notes that a pair needs no pictures; kind: "same" or "cut"."""
         path = self._mark(pair, kind)
-        with self.writable(), atomic_write.writing(path) as part:
+        with atomic_write.writing(path) as part:
             part.touch()
         self._written.append(path.name)
-
-    @contextmanager
-    def writable(self) -> Iterator[None]:
-        """Inside, a MediaError stands for an OSError: the folder cannot be written to."""
-        try:
-            yield
-        except OSError as error:
-            reason = error.strerror or error
-            raise MediaError(f"{self.folder}: in-between frames cannot be written there ({reason})") from None
 
     def confirm(self) -> None:
         """MediaError: the source was written to since this was made. What this build has finished is removed: it may
@@ -244,6 +248,117 @@ def relative_path(path: Path, folder: str | Path) -> str:
         return path.absolute().as_posix()
 
 
+def state(source: FrameSource, folder: str | Path, factor: int, method: str) -> State:
+    """How far a source's in-between frames are built, as the names of their files tell. Only a build or a read opens
+    these files.
+
+    While nothing changes it is fast: it asks for the time stamps of the source's files and of the folder alone.
+    MediaError: a file of the source is gone."""
+    cache, total = InbetweenCache(source, folder, factor, method), source.count - 1
+    cache.load()
+    done = len(cache.listed.pairs)
+    if done or not total:
+        return State("ready" if done == total else "partial", done, total)
+    wanted = cache.manifest["path"], cache.manifest["settings"]
+    others = [manifest for name, manifest in _caches(os.path.realpath(folder)) if name != cache.folder.name]
+    stale = any((manifest["path"], manifest["settings"]) == wanted for manifest in others)
+    return State("stale" if stale else "missing", 0, total)
+
+
+def size(folder: str | Path, source: FrameSource) -> int:
+    """The bytes that `purge` would free.
+
+    While nothing changes it is fast. MediaError: a file of the source is gone."""
+    folders = [Path(folder, name) for name in _chosen(folder, source)]
+    return sum(_size(each, folder_stamp(each)) for each in folders)
+
+
+def purge(folder: str | Path, source: FrameSource, left: Callable[[Path, int], None] = lambda path, count: None) -> int:
+    """Removes a source's in-between frames in `folder`, stale ones included. Returns the bytes freed. It removes the
+    files that have names of ours, and nothing else.
+
+    left: called with each cache's folder that is not empty after that, and the number of entries in it
+    MediaError: something cannot be removed, or `folder` is a link."""
+    names = _chosen(folder, source)
+    try:
+        top = Folder(Path(folder))
+        return sum(_remove(top, name, left) for name in names)
+    except (FileNotFoundError, NotADirectoryError):
+        return 0
+    except OSError as error:
+        raise _irremovable(folder, error) from None
+
+
 def forget() -> None:
-    """Forgets what is remembered of folders."""
+    """Forgets what is remembered of sources and folders."""
     _listing.cache_clear()
+    _size.cache_clear()
+    derived.content_hash.cache_clear()
+
+
+def _caches(folder: str | Path) -> list[tuple[str, dict]]:
+    """(name, manifest) of every cache in `folder`."""
+    caches = []
+    with suppress(OSError):
+        top = Folder(Path(folder))
+        for entry in sorted(top.entries(), key=lambda entry: entry.name):
+            with suppress(OSError):
+                if (manifest := _manifest(top.folder(entry.name))) is not None:
+                    caches.append((entry.name, manifest))
+    return caches
+
+
+def _manifest(cache: Folder) -> dict | None:
+    """A cache's manifest; None if it is not one of ours, or does not match the folder's name."""
+    with suppress(ValueError, TypeError, KeyError, AttributeError, RecursionError):
+        manifest = json.loads(content_of(cache, MANIFEST) or b"")
+        made_of = {key: value for key, value in manifest.items() if key != "path"}
+        named = cache.path.name.endswith(f"-{derived.key(made_of)}")
+        if named and made_of["maker"] == MAKER and manifest.keys() >= {"path", "source", "settings"}:
+            return manifest
+    return None
+
+
+def _chosen(folder: str | Path, source: FrameSource) -> list[str]:
+    """The names of a source's caches in `folder`, stale ones included."""
+    path, made_of = relative_path(source.path, folder), derived.identity(source)
+    return [name for name, each in _caches(folder) if each["path"] == path or each["source"] == made_of]
+
+
+def _own(cache: Folder) -> list[os.DirEntry]:
+    """The files in a cache's folder that have names of ours. The manifest is last: without it, what is left would not
+    be recognised as a cache again."""
+    own = [entry for entry in cache.files() if OWN.fullmatch(entry.name) or claims.is_claim(entry.name)]
+    return sorted(own, key=lambda entry: entry.name == MANIFEST)
+
+
+@lru_cache(64)
+def _size(folder: Path, _changed: int | None) -> int:
+    with suppress(OSError):
+        return sum(entry.stat(follow_symlinks=False).st_size for entry in _own(Folder(folder)))
+    return 0
+
+
+def _remove(top: Folder, name: str, left: Callable[[Path, int], None]) -> int:
+    try:
+        cache = top.folder(name)
+        if _manifest(cache) is None:  # another folder than a moment ago
+            return 0
+        for entry in cache.entries():
+            with suppress(OSError):  # others' files are in it
+                if entry.name == _CHECKS:
+                    cache.remove_part(entry.name, _DIGESTS.fullmatch)
+                elif atomic_write.is_part(entry.name):
+                    cache.remove_part(entry.name, OWN.fullmatch)
+        freed = sum(cache.remove(entry.name) for entry in _own(cache))
+        if count := len(cache.entries()):
+            left(cache.path, count)
+        else:
+            cache.path.rmdir()
+    except OSError as error:
+        raise _irremovable(top.path / name, error) from None
+    return freed
+
+
+def _irremovable(folder: str | Path, error: OSError) -> MediaError:
+    return MediaError(f"{folder}: cannot be removed ({error.strerror or error})")

@@ -64,11 +64,10 @@ def follow_cover(
     def covered(frame: int) -> np.ndarray:
         return cover(frame, footage.size)
 
-    tracking.check_frames(start, frames)
     return _MatteTrack(region, covered, footage, motion, {*frames, *anchors}).both_ways(start, frames, anchors)
 
 
-class _MatteTrack(tracking.Track):
+class _MatteTrack(tracking.Track[Subject]):
     def __init__(
         self,
         region: Subject,

@@ -295,7 +295,7 @@ def test_what_is_known_is_forgotten_with_the_file(bpy, inbetween_build, tmp_path
     bpy.ops.shutter.inbetween_build()
     look(bpy, inbetween_build)
     invalidation.invalidate_changed(bpy.context.scene)
-    assert remembering(tmp_path) >= {"inbetween_folders", "inbetween_build", "inbetween_settings"}
+    assert remembering(tmp_path) >= {"inbetween_cache", "inbetween_build", "inbetween_settings"}
     assert "invalidation" in remembering(scene)
     bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
     assert remembering(tmp_path) == remembering(scene) == set()

@@ -160,14 +160,14 @@ def test_a_slow_strip_shows_in_betweens(film, add, edit, render, same_pixels):
 
 def test_what_is_missing_is_said_and_what_is_built_is_shown(cache, film, add, edit, render, tmp_path, same_pixels):
     from shutter_addon.blender.data import strips
-    from shutter_addon.media import MediaError, inbetween_folders
+    from shutter_addon.media import MediaError, inbetween_cache
 
     first, frames = film
     *_, effect = add(first, COUNT, np.ones(6))
     picture = partial(picture_of, effect.scene, 2)
     picture()
     with open_source(first) as source:
-        inbetween_folders.purge(cache, source)
+        inbetween_cache.purge(cache, source)
     for way in (picture, request(*strips.find_effect(effect.scene), 2).check):
         with pytest.raises(MediaError, match=r"in-between frames of frame 2 are missing"):
             way()
@@ -200,7 +200,7 @@ def test_in_betweens_of_a_file_that_was_replaced_are_not_shown(cache, film, add,
 
 def test_finished_frames_are_dropped_when_in_betweens_come_and_go(cache, film, add, edit):
     from shutter_addon.blender.rendering import invalidation
-    from shutter_addon.media.inbetween_folders import purge
+    from shutter_addon.media.inbetween_cache import purge
 
     first, _ = film
     add(first, COUNT, np.ones(6))

@@ -22,7 +22,7 @@ from footage import picture, save_image, see_through
 from shutter_addon.core import atomic_write
 from shutter_addon.core.farm import claims
 from shutter_addon.core.frames.source_wrapper import SourceWrapper
-from shutter_addon.media import MediaError, flow, inbetween, inbetween_cache, inbetween_folders, open_source
+from shutter_addon.media import MediaError, flow, inbetween, inbetween_cache, open_source
 from shutter_addon.media.folder import Folder
 
 ROOT = Path(__file__).parents[2]
@@ -43,7 +43,7 @@ def build(source, folder, *, between=blend, **more):
 
 
 def state(source, folder):
-    return inbetween_folders.state(source, folder, FACTOR, "quick")
+    return inbetween_cache.state(source, folder, FACTOR, "quick")
 
 
 def opened(source, folder):
@@ -314,8 +314,8 @@ def test_stale_after_a_retouch_that_keeps_the_size(tmp_path, folder):
 
 def test_another_factor_or_reading_is_another_cache(source, folder):
     build(source, folder)
-    assert inbetween_folders.state(source, folder, 8, "quick").name == "missing"
-    assert inbetween_folders.state(source, folder, FACTOR, "good").name == "missing"
+    assert inbetween_cache.state(source, folder, 8, "quick").name == "missing"
+    assert inbetween_cache.state(source, folder, FACTOR, "good").name == "missing"
     source.transfer = "linear"
     assert state(source, folder).name == "stale"
     source.transfer, source.options = "srgb", {"deinterlace": True}
@@ -331,10 +331,10 @@ def test_purge_takes_only_what_was_built(source, folder, tmp_path):
     with open_source(footage(tmp_path / "second", 2)) as second:
         build(second, folder)
         size = sum(path.stat().st_size for path in folder.rglob("*") if path.is_file() and path not in own)
-        freed = inbetween_folders.purge(folder, source)
+        freed = inbetween_cache.purge(folder, source)
         assert state(second, folder).name == "ready"
         assert state(source, folder).name == "missing"
-        freed += inbetween_folders.purge(folder, second)
+        freed += inbetween_cache.purge(folder, second)
     assert freed == size
     assert sorted(path for path in folder.rglob("*") if path.is_file()) == sorted(own)
 
@@ -350,9 +350,9 @@ def test_what_could_not_be_removed_is_found_again(source, folder, monkeypatch):
         with monkeypatch.context() as patch:
             patch.setattr(Folder, "remove", partialmethod(refusing, busy=busy))
             with pytest.raises(MediaError, match=r"cannot be removed \(Permission denied\)"):
-                inbetween_folders.purge(folder, source)
-        assert inbetween_folders.size(folder, source) > 0
-        assert inbetween_folders.purge(folder, source) > 0
+                inbetween_cache.purge(folder, source)
+        assert inbetween_cache.size(folder, source) > 0
+        assert inbetween_cache.purge(folder, source) > 0
         assert not list(folder.iterdir())
         build(source, folder)
 
@@ -516,7 +516,7 @@ def test_killed_anywhere_it_goes_on_to_the_same_files(tmp_path, folder, monkeypa
         assert set(killed) == {-signal.SIGKILL if os.name == "posix" else 1}
         assert 0 < state(source, folder).done < 39
         shutil.copytree(folder, folder.with_name("killed"))
-        inbetween_folders.purge(folder.with_name("killed"), source)
+        inbetween_cache.purge(folder.with_name("killed"), source)
         assert not list(folder.with_name("killed").iterdir())
         monkeypatch.setattr(atomic_write, "LEFT_BEHIND", 0)
         monkeypatch.setattr(claims, "PATIENCE", 0.1)

@@ -16,7 +16,7 @@ import pytest
 from footage import picture, save_image
 from test_media_inbetween import COUNT, FACTOR, blend, build, footage, kept, opened, pictures, state
 
-from shutter_addon.media import MediaError, derived, inbetween_cache, inbetween_folders, open_source
+from shutter_addon.media import MediaError, derived, inbetween_cache, open_source
 
 if os.name != "posix":
     pytest.skip("pipes, sockets and devices by name, alarms: of POSIX systems only", allow_module_level=True)
@@ -78,8 +78,8 @@ def listed(folder):
 
 def purge(folder, source):
     """Bytes freed, and what was left: {name of a folder: count}. Size has to have said so before."""
-    left, said = {}, inbetween_folders.size(folder, source)
-    freed = inbetween_folders.purge(folder, source, left=lambda path, count: left.update({path.name: count}))
+    left, said = {}, inbetween_cache.size(folder, source)
+    freed = inbetween_cache.purge(folder, source, left=lambda path, count: left.update({path.name: count}))
     assert said == freed
     return freed, left
 
@@ -171,9 +171,9 @@ def test_a_folder_that_is_a_link_serves_but_nothing_is_removed_behind_it(source,
     assert state(source, folder).name == "ready"
     assert len(pictures(tmp_path / "disk")) == (COUNT - 1) * (FACTOR - 1)
     before = listed(tmp_path / "disk")
-    assert inbetween_folders.size(folder, source) == 0
+    assert inbetween_cache.size(folder, source) == 0
     with pytest.raises(MediaError, match=r"virtual_shutter_inbetween: cannot be removed \(it is a link"):
-        inbetween_folders.purge(folder, source)
+        inbetween_cache.purge(folder, source)
     assert listed(tmp_path / "disk") == before
     assert purge(tmp_path / "disk", source)[0] > 0
 
@@ -194,7 +194,7 @@ def test_others_files_stay(source, folder, place):
     (place / "00000003.png").mkdir()
     size = sum((place / name).stat().st_size for name in built - {"00000003.png"})
     left = {}
-    freed = inbetween_folders.purge(folder, source, lambda path, count: left.update({path.name: count}))
+    freed = inbetween_cache.purge(folder, source, lambda path, count: left.update({path.name: count}))
     assert size < freed < size + 9999
     assert {path.name for path in place.iterdir()} == {
         *others,
@@ -203,7 +203,7 @@ def test_others_files_stay(source, folder, place):
     assert {path.name for path in (place / "checks").iterdir()} == {"film.sha256", "89ab.sha256"}
     assert (place / f".part-{7:016x}" / "film.png").exists()
     assert left == {place.name: 8}
-    assert inbetween_folders.size(folder, source) == 0
+    assert inbetween_cache.size(folder, source) == 0
 
 
 def test_a_hard_link_goes_by_its_name_alone(source, folder, place, tmp_path):
@@ -296,14 +296,14 @@ def test_whatever_lies_there_is_ignored_or_refused(source, folder, place, kind, 
     else:
         assert expected.items() <= kept(folder).items()
         used(source, folder)
-    inbetween_folders.size(folder, source)
-    assert "cannot be removed" in (refusal(inbetween_folders.purge, folder, source) or "cannot be removed")
+    inbetween_cache.size(folder, source)
+    assert "cannot be removed" in (refusal(inbetween_cache.purge, folder, source) or "cannot be removed")
 
 
 def used(source, folder):
     """Asks for all that there is; pictures are right, or refused."""
     assert state(source, folder).done <= COUNT - 1
-    assert inbetween_folders.size(folder, source) >= 0
+    assert inbetween_cache.size(folder, source) >= 0
     assert inbetween_cache.stamp(folder, FACTOR, "quick", source.path.stem) is not None
     with opened(source, folder) as between:
         for index in range(between.count):
@@ -337,7 +337,7 @@ def test_another_user_s_files_are_ignored_and_stay_findable(source, folder, plac
     mode = path.stat().st_mode
     path.chmod(0)
     used(source, folder)
-    for refused in (refusal(build, source, folder), refusal(inbetween_folders.purge, folder, source)):
+    for refused in (refusal(build, source, folder), refusal(inbetween_cache.purge, folder, source)):
         assert refused is None or "Permission denied" in refused
     path.exists() and path.chmod(mode)
     assert name in ("manifest.json", "00000001.png") or listed(folder).keys() >= before.keys()
@@ -415,10 +415,10 @@ def test_what_is_known_of_folders_is_forgotten(source, tmp_path, monkeypatch):
         return len(looked)
 
     build(source, tmp_path / "cache")
-    for ask in ((state, source, tmp_path / "cache"), (inbetween_folders.size, tmp_path / "cache", source)):
-        inbetween_folders.forget()
+    for ask in ((state, source, tmp_path / "cache"), (inbetween_cache.size, tmp_path / "cache", source)):
+        inbetween_cache.forget()
         assert [looks(*ask) for _ in range(2)] == [1, 0]
-    inbetween_folders.forget()
+    inbetween_cache.forget()
     assert derived.content_hash.cache_info().currsize == 0
 
 
@@ -464,14 +464,14 @@ def check(source, folder, seed):
     frames = [right(source, index) for index in range((source.count - 1) * FACTOR + 1)]
     for _ in range(2):
         state(source, folder)
-        inbetween_folders.size(folder, source)
+        inbetween_cache.size(folder, source)
         with opened(source, folder) as between:
             for index, frame in enumerate(frames):
                 with suppress(MediaError):
                     assert np.array_equal(between.read(index), frame), (seed, index)
         refused = refusal(build, source, folder)
         assert "cannot be written there" in refused if refused else state(source, folder).name == "ready", seed
-    assert "cannot be removed" in (refusal(inbetween_folders.purge, folder, source) or "cannot be removed"), seed
+    assert "cannot be removed" in (refusal(inbetween_cache.purge, folder, source) or "cannot be removed"), seed
 
 
 def test_what_another_version_has_built_is_left_alone(source, folder, monkeypatch):

@@ -16,7 +16,7 @@ from ...core.frames.frame_source import FrameSource
 from ...core.memo import Kept
 from ...core.messages import EffectError
 from ...core.model.shutters import ShutterError
-from ...media import MediaError, inbetween, inbetween_folders
+from ...media import MediaError, inbetween, inbetween_cache
 from ...media.inbetween import Cost
 from ..data import inbetween_settings, snapshot, source_media, strips
 from . import strobing
@@ -32,14 +32,14 @@ class Look(NamedTuple):
     size: bytes that the source's take, of all factors and methods
     estimate: bytes that they will take about; None while that is being found out, 0 if it cannot be"""
 
-    state: inbetween_folders.State
+    state: inbetween_cache.State
     size: int
     estimate: int | None
 
 
 # By source_media.media_key: the medium, its file not open, and what its in-between frames cost.
 _media: Kept[tuple, tuple[FrameSource, Future[Cost | None]]] = Kept()
-_looks: Kept[tuple, tuple[inbetween_folders.State, int]] = Kept()  # how far a source's are built, and bytes
+_looks: Kept[tuple, tuple[inbetween_cache.State, int]] = Kept()  # how far a source's are built, and bytes
 
 
 @dataclass
@@ -60,8 +60,8 @@ def look(scene: Scene, effect: PropertyGroup, strip: Strip) -> Look:
     spec = source_media.spec(strips.source_of(scene, effect, strip))
     medium, cost = _known(spec)
 
-    def find() -> tuple[inbetween_folders.State, int]:
-        return inbetween_folders.state(medium, *settings), inbetween_folders.size(settings.folder, medium)
+    def find() -> tuple[inbetween_cache.State, int]:
+        return inbetween_cache.state(medium, *settings), inbetween_cache.size(settings.folder, medium)
 
     state, size = _looks.ask((spec.key, *settings, time.monotonic() // _FRESH), find, _KEPT)
     if not cost.done():
@@ -91,7 +91,7 @@ class Build:
     """In-between frames of an effect that are being built, by a thread that touches no bpy.
 
     scene: session_uid of the effect's scene; done, total: pairs of neighbouring source frames; settings: what it builds
-    future: how far it came, an inbetween_folders.State; or MediaError"""
+    future: how far it came, an inbetween_cache.State; or MediaError"""
 
     def __init__(self, scene: Scene, effect: PropertyGroup, strip: Strip, factor: int | None = None) -> None:
         """factor: builds what the strip needs with it, in place of all of the source with its own. EffectError,
@@ -106,9 +106,7 @@ class Build:
         self._stopped = threading.Event()
         self.future = threads.start(self._build, _builds.left, medium, pairs)
 
-    def _build(
-        self, before: tuple[Future, ...], medium: FrameSource, pairs: list[int] | None
-    ) -> inbetween_folders.State:
+    def _build(self, before: tuple[Future, ...], medium: FrameSource, pairs: list[int] | None) -> inbetween_cache.State:
         wait(before)
         with medium:
             return inbetween.build(
@@ -118,11 +116,11 @@ class Build:
     def _update(self, done: int, _total: int) -> None:
         self.done = done
 
-    def result(self) -> inbetween_folders.State:
+    def result(self) -> inbetween_cache.State:
         """How far it came, or has come where it was stopped. MediaError: why it could not go on."""
         if self.future.done():
             return self.future.result()
-        return inbetween_folders.State("partial", self.done, self.total)
+        return inbetween_cache.State("partial", self.done, self.total)
 
     def stop(self) -> None:
         """Has it end soon, with the step that is under way; what is finished is kept."""
@@ -167,7 +165,7 @@ def purge(effect: PropertyGroup, source: Strip) -> tuple[int, list[tuple]]:
     wait(_builds.left)
     folder, (medium, _) = inbetween_settings.folder(effect), _known(source_media.spec(source))
     left = []
-    freed = inbetween_folders.purge(folder, medium, lambda *place: left.append(place))
+    freed = inbetween_cache.purge(folder, medium, lambda *place: left.append(place))
     with suppress(OSError):  # other sources' are left there, or it never was
         folder.rmdir()
     _looks.clear()
@@ -184,4 +182,4 @@ def stop() -> None:
     wait([cost for _medium, cost in _media.values()])
     _media.clear()
     _looks.clear()
-    inbetween_folders.forget()
+    inbetween_cache.forget()
