@@ -127,14 +127,13 @@ def _build(
 ) -> int:
     """As `build`; how many pairs are finished."""
     done, left, source = 0, list(pairs), cache.source
-    with Claims(cache.folder) as claims:
+    with Claims(cache.folder) as claims, closing(cuts.ShotSource(PrefetchSource(source))) as shots:
         while left:
             others: list[int] = []  # pairs that other processes are building
-            with closing(cuts.ShotSource(PrefetchSource(source))) as shots:
-                tasks = _tasks(cache, shots, left, claims, others, cancelled)
-                for finished in _in_parallel(tasks, _workers(source)):
-                    done += finished
-                    update(done, len(pairs))
+            tasks = _tasks(cache, shots, left, claims, others, cancelled)
+            for finished in _in_parallel(tasks, _workers(source)):
+                done += finished
+                update(done, len(pairs))
             if len(others) == len(left):
                 time.sleep(_PAUSE)
             left = others
@@ -188,8 +187,7 @@ def _tasks(
             return
         if cache.is_sound(pair):
             yield lambda: True
-            continue
-        if not claims.take(_claim(pair)):
+        elif not claims.take(_claim(pair)):
             others.append(pair)
         elif cache.is_sound(pair):  # by another
             claims.release(_claim(pair))
