@@ -55,7 +55,7 @@ REVIEWED: dict[str, set[str]] = {
     },
     "editing/track_region.py": {"_each", "track.<lambda>"},
     "rendering/device_work.py": {"broken_off"},
-    "rendering/inbetween_build.py": {"Build._build", "Build._update", "Build.stop", "_cost", "running"},
+    "rendering/inbetween_build.py": {"Build._build", "Build._update", "Build.stop", "_estimated", "running"},
     "rendering/outline_carrying.py": {"_Carrying._carry"},
     "rendering/render_job.py": {"where"},
     "rendering/session.py": {"RenderSession._ask", "RenderSession.forget.<lambda>", "_weights"},

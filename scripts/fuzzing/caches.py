@@ -8,7 +8,7 @@ import numpy as np
 from . import hostile, recipes, trial
 
 COUNT, SETTINGS = 4, (2, "quick")
-STEPS = ("state", "size", "cost", "read", "build", "read", "state", "remove", "size")
+STEPS = ("state", "size", "estimate", "read", "build", "read", "state", "remove", "size")
 STRANGERS = ("notes.txt", "99.png", "mine.exr", "123456789.png", "0000000a.same")
 
 
@@ -124,7 +124,7 @@ def _take(folder, plan, steps):
     does = {
         "state": lambda: inbetween_cache.state(source, place, *SETTINGS),
         "size": lambda: inbetween_cache.size(place, source),
-        "cost": lambda: inbetween.cost(source, 0, SETTINGS[1]),
+        "estimate": lambda: inbetween.estimate(source),
         "read": read,
         "build": lambda: inbetween.build(source, place, *SETTINGS),
         "remove": lambda: inbetween_cache.purge(place, source),

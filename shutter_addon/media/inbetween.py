@@ -141,6 +141,22 @@ def _build(
     return done
 
 
+def estimate(source: FrameSource) -> int:
+    """About how many bytes one in-between frame of each pair takes, all together: as three source frames do on average.
+    MediaError: these frames cannot be read or written."""
+    sizes = [_bytes(source, source.read(source.count * part // 6)) for part in (1, 3, 5)]
+    return (source.count - 1) * sum(sizes) // len(sizes)
+
+
+def _bytes(source: FrameSource, picture: np.ndarray) -> int:
+    """Of a picture that is written as a source's in-between frames are. MediaError: it cannot be."""
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder, "picture.png" if source.dtype.kind == "u" else "picture.exr")
+        if not write_picture(path, picture, source.alpha):
+            raise MediaError(f"{folder}: a picture could not be written whole ({why_short(path.parent)})")
+        return path.stat().st_size
+
+
 class Cost(NamedTuple):
     """What in-between frames of a source cost: seconds for each pair and for each of its frames, and bytes of these."""
 
@@ -160,14 +176,10 @@ def cost(source: FrameSource, pair: int, method: str) -> Cost:
     time take hardly less each, as one has all processors already. MediaError: they cannot be made."""
     first, second = source.read(pair), source.read(pair + 1)
     pictures = flow.between(first, second, 4, method, source.transfer, source.alpha)
-    when = [time.perf_counter()]
-    with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder, "picture.png" if source.dtype.kind == "u" else "picture.exr")
-        for picture in islice(pictures, 2):
-            if not write_picture(path, picture, source.alpha):
-                raise MediaError(f"{folder}: a picture could not be written whole ({why_short(path.parent)})")
-            when.append(time.perf_counter())
-        size = path.stat().st_size
+    when, size = [time.perf_counter()], 0
+    for picture in islice(pictures, 2):
+        size = _bytes(source, picture)
+        when.append(time.perf_counter())
     frame = when[2] - when[1]
     return Cost(max(when[1] - when[0] - frame, 0.0), frame, size)
 

@@ -17,7 +17,6 @@ from ...core.memo import Kept
 from ...core.messages import EffectError
 from ...core.model.shutters import ShutterError
 from ...media import MediaError, inbetween, inbetween_cache
-from ...media.inbetween import Cost
 from ..data import inbetween_settings, snapshot, source_media, strips
 from . import strobing
 
@@ -37,8 +36,8 @@ class Look(NamedTuple):
     estimate: int | None
 
 
-# By source_media.media_key: the medium, its file not open, and what its in-between frames cost.
-_media: Kept[tuple, tuple[FrameSource, Future[Cost | None]]] = Kept()
+# By source_media.media_key: the medium, its file not open; bytes for a factor of 2.
+_media: Kept[tuple, tuple[FrameSource, Future[int]]] = Kept()
 _looks: Kept[tuple, tuple[inbetween_cache.State, int]] = Kept()  # how far a source's are built, and bytes
 
 
@@ -58,33 +57,30 @@ def look(scene: Scene, effect: PropertyGroup, strip: Strip) -> Look:
     """How things are, or were a second ago. MediaError, EffectError: there is no source, or no place for frames."""
     settings = inbetween_settings.settings(effect)
     spec = source_media.spec(strips.source_of(scene, effect, strip))
-    medium, cost = _known(spec)
+    medium, doubled = _known(spec)
 
     def find() -> tuple[inbetween_cache.State, int]:
         return inbetween_cache.state(medium, *settings), inbetween_cache.size(settings.folder, medium)
 
     state, size = _looks.ask((spec.key, *settings, time.monotonic() // _FRESH), find, _KEPT)
-    if not cost.done():
-        return Look(state, size, estimate=None)
-    known = cost.result()
-    return Look(state, size, estimate=int(known.bytes(medium.count - 1, settings.factor)) if known else 0)
+    return Look(state, size, doubled.result() * (settings.factor - 1) if doubled.done() else None)
 
 
-def _known(spec: source_media.SourceSpec) -> tuple[FrameSource, Future[Cost | None]]:
-    """A source's medium, and what its in-between frames will have cost; None: they cannot be made."""
+def _known(spec: source_media.SourceSpec) -> tuple[FrameSource, Future[int]]:
+    """A source's medium, and the bytes that its in-between frames take for a factor of 2."""
 
-    def find() -> tuple[FrameSource, Future[Cost | None]]:
+    def find() -> tuple[FrameSource, Future[int]]:
         medium = spec.open()
         medium.close()
-        return medium, threads.start(_cost, medium)
+        return medium, threads.start(_estimated, medium)
 
     return _media.ask(spec.key, find, _KEPT)
 
 
-def _cost(medium: FrameSource) -> Cost | None:
+def _estimated(medium: FrameSource) -> int:
     with medium, suppress(MediaError, OSError):  # a build says what is wrong
-        return inbetween.cost(medium, max(medium.count // 2 - 1, 0), "quick")
-    return None
+        return inbetween.estimate(medium)
+    return 0
 
 
 class Build:
@@ -179,7 +175,7 @@ def stop() -> None:
         _builds.running.stop()
         ended()
     wait(_builds.left)
-    wait([cost for _medium, cost in _media.values()])
+    wait([doubled for _medium, doubled in _media.values()])
     _media.clear()
     _looks.clear()
     inbetween_cache.forget()
