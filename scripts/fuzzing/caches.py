@@ -9,7 +9,7 @@ from . import hostile, recipes, trial
 
 COUNT, SETTINGS = 4, (2, "quick")
 STEPS = ("state", "size", "estimate", "read", "build", "read", "state", "remove", "size")
-STRANGERS = ("notes.txt", "00000099.png", "00000001.exr", "12345678.png", "checks/mine.sha256", "checks/notes.txt")
+STRANGERS = ("notes.txt", "99.png", "mine.exr", "123456789.png", "0000000a.same")
 
 
 def make(random, folder):
@@ -34,7 +34,7 @@ def make(random, folder):
         if not path.exists():
             path.write_text("mine")
     for _ in range(random.choice((1, 1, 2, 4))):
-        random.choice((_damage, _damage, _put_odd, _spoil_manifest, _add_checks, _add_twin))(random, cache, folder)
+        random.choice((_damage, _damage, _put_odd, _spoil_manifest, _add_names, _add_twin))(random, cache, folder)
     plan = {
         "file": f"f0001.{ending}",
         "frames": frames,
@@ -50,7 +50,9 @@ def _is_mine(path) -> bool:
 
 
 def _files(cache) -> list:
-    return sorted(path for path in cache.rglob("*") if path.is_file() and not path.is_symlink() and not _is_mine(path))
+    """Those in which damage shows: EXR pictures have no checksums."""
+    files = (path for path in cache.rglob("*") if path.is_file() and not path.is_symlink() and path.suffix != ".exr")
+    return sorted(path for path in files if not _is_mine(path))
 
 
 def _damage(random, cache, _folder):
@@ -60,7 +62,7 @@ def _damage(random, cache, _folder):
 
 
 def _put_odd(random, cache, folder):
-    places = [cache, cache / "checks", cache / "manifest.json", cache / "00000001.png", *_files(cache)]
+    places = [cache, cache / "manifest.json", cache / "00000001.png", *_files(cache)]
     hostile.put_odd(random, random.choice([path for path in places if path.parent.is_dir()]), folder)
 
 
@@ -74,22 +76,20 @@ def _spoil_manifest(random, cache, _folder):
         path.write_bytes(hostile.as_json(hostile.spoiled(random, data, random.choice((1, 1, 3)))))
 
 
-def _add_checks(random, cache, _folder):
-    """Lines that keep to their format, of frames and pairs that there are not."""
-    if (cache / "checks").is_dir():
-        number = random.choice((str(COUNT), "99999999", "-1", "9" * 20, "9" * 5000))
-        text = f"{number} {random.choice(('same', 'cut'))}"
-        lines = (f"# {text} {zlib.crc32(text.encode()):08x}", f"{'0' * 64}  {number:0>8}.png", "\0" * 100, "x" * 10**6)
-        (cache / "checks" / "0badc0de.sha256").write_text(random.choice(lines) + "\n")
+def _add_names(random, cache, _folder):
+    """Names of ours, of frames and pairs that there are not."""
+    if cache.is_dir():
+        number = random.choice((COUNT, 99, 99999999))
+        (cache / f"{number:08d}.{random.choice(('same', 'cut', 'png', 'exr'))}").touch()
 
 
-def _add_twin(random, cache, folder):
-    """A stranger's folder with one of our manifests, whose checks are something else."""
+def _add_twin(_random, cache, _folder):
+    """A stranger's folder with one of our manifests."""
     twin = cache.with_name("twin")
     if (cache / "manifest.json").is_file() and not twin.exists():
-        (twin / "checks").mkdir(parents=True)
+        twin.mkdir()
         (twin / "manifest.json").write_bytes((cache / "manifest.json").read_bytes())
-        hostile.put_odd(random, twin / "checks", folder)
+        (twin / "00000001.png").write_text("mine")
 
 
 def run(folder):
@@ -105,7 +105,7 @@ def run(folder):
 
 
 def _take(folder, plan, steps):
-    from shutter_addon.media import MediaError, inbetween, inbetween_folders, open_source
+    from shutter_addon.media import MediaError, inbetween, inbetween_cache, open_source
 
     def read(must=False):
         """Every frame is the right one, or there is a sentence."""
@@ -122,12 +122,12 @@ def _take(folder, plan, steps):
                 raise trial.Fault(f"frame {index} is another one")
 
     does = {
-        "state": lambda: inbetween_folders.state(source, place, *SETTINGS),
-        "size": lambda: (inbetween_folders.size(place, source), inbetween_folders.size(place)),
-        "estimate": lambda: inbetween.estimate(source, SETTINGS[0]),
+        "state": lambda: inbetween_cache.state(source, place, *SETTINGS),
+        "size": lambda: inbetween_cache.size(place, source),
+        "estimate": lambda: inbetween.estimate(source),
         "read": read,
         "build": lambda: inbetween.build(source, place, *SETTINGS),
-        "remove": lambda: inbetween_folders.purge(place, source),
+        "remove": lambda: inbetween_cache.purge(place, source),
         "whole": lambda: read(must=inbetween.build(source, place, *SETTINGS).name == "ready"),
     }
     place = folder / "cache"

@@ -49,11 +49,10 @@ def follow_camera(
 
     camera: its placement is evaluated at `start` and at anchors
     regions: what they cover is left out; evaluated at any of the frames"""
-    tracking.check_frames(start, frames)
     return _CameraTrack(camera, regions, footage, motion, {*frames, *anchors}).both_ways(start, frames, anchors)
 
 
-class _CameraTrack(tracking.Track):
+class _CameraTrack(tracking.Track[Subject]):
     def __init__(
         self, camera: Subject, regions: Sequence[Drawn], footage: Footage, motion: Motion, frames: Collection[int]
     ) -> None:

@@ -15,20 +15,18 @@ from pathlib import Path
 from typing import Protocol
 
 import numpy as np
-from OpenImageIO import ImageBuf, ImageInput
+from OpenImageIO import ImageSpec
 
 from ..core import stopping
 from ..core.farm.claims import Claims
 from ..core.frames.frame_source import FrameSource
 from ..core.frames.source_wrapper import SourceWrapper
 from ..core.model import outlines, scribbles
-from . import carrying, flow, opencv
+from . import carrying, derived, flow, opencv
 from .cuts import ShotSource
 from .errors import MediaError
-from .files import check_name
 from .folder import own_folder
 from .image_writing import write_levels
-from .inbetween_cache import identity, manifest_key
 from .outline_tracing import traced
 
 FOLDER = "virtual_shutter_mattes"
@@ -88,6 +86,7 @@ class CarriedMattes(SourceWrapper):
         self._drawings = {frame: curves for frame, curves in drawings if 0 <= frame < self.count}
         self._drawing_keys: dict[int, str] = {}  # previews ask for paths again and again
         self._parent = folder
+        self._spec = ImageSpec(self.width, self.height, 1, "uint8")
 
     def read(self, index: int) -> np.ndarray:
         """The values (height, width) float32, 0 to 1, of a frame; those around it are carried with it. MediaError: a
@@ -105,19 +104,18 @@ class CarriedMattes(SourceWrapper):
     def has(self, index: int) -> bool:
         """Whether a frame's matte is kept already; its file is not opened."""
         near = self._near(index)
-        return near == (None, None) or self._path(index, *near).is_file()
+        return near == (None, None) or derived.is_kept(self._path(index, *near))
 
     def confidence(self, index: int) -> float | None:
         """How sure a frame's matte is (carrying.Carried); None: it is not kept yet."""
         near = self._near(index)
-        if near == (None, None) or not (path := self._path(index, *near)).is_file():
-            return None
-        if (image := ImageInput.open(check_name(path))) is None:
+        image = None if near == (None, None) else derived.opened(self._path(index, *near), self._spec)
+        if image is None:
             return None
         with closing(image):
-            said = image.spec().getattribute("ImageDescription")
+            said = image.spec().get_string_attribute("ImageDescription")
         try:
-            return float(str(said).removeprefix(CONFIDENCE))
+            return float(said.removeprefix(CONFIDENCE))
         except ValueError:
             return None
 
@@ -156,7 +154,7 @@ class CarriedMattes(SourceWrapper):
     @contextmanager
     def _claimed(self, index: int, first: int | None, last: int | None) -> Iterator[np.ndarray | None]:
         """While this process alone carries what lies between two drawings; what another has kept of a matte by then."""
-        name = manifest_key({"drawn": [self._drawing_key(frame) for frame in (first, last) if frame is not None]})
+        name = derived.key({"drawn": [self._drawing_key(frame) for frame in (first, last) if frame is not None]})
         while True:
             path = self._path(index, first, last)
             with Claims(path.parent, _PATIENCE, _BEAT) as claims:
@@ -240,36 +238,32 @@ class CarriedMattes(SourceWrapper):
     def _path(self, index: int, first: int | None, last: int | None) -> Path:
         """The file of a frame's matte, made of these drawings."""
         drawn = [self._drawing_key(frame) for frame in (first, last) if frame is not None]
-        key = manifest_key({"version": VERSION, "frame": index, "drawn": drawn})
+        key = derived.key({"version": VERSION, "frame": index, "drawn": drawn})
         file = Path(self._folder, f"{index:08d}-{key}.png")
         kept = Path(self._parent or "", file)
-        if self._parent and (self._parent not in _elsewhere or kept.is_file()):
+        if self._parent and (self._parent not in _elsewhere or derived.is_kept(kept)):
             return kept
         return Path(_use_elsewhere(self._parent), file)
 
     def _drawing_key(self, frame: int) -> str:
         if frame not in self._drawing_keys:
-            self._drawing_keys[frame] = manifest_key({"frame": frame, "curves": self._drawings[frame]})
+            self._drawing_keys[frame] = derived.key({"frame": frame, "curves": self._drawings[frame]})
         return self._drawing_keys[frame]
 
     @cached_property
     def _folder(self) -> str:
         """The name of this footage's folder."""
-        return f"{self.path.stem[:40]}-{manifest_key(identity(self._source))}"
+        return f"{self.path.stem[:40]}-{derived.key(derived.identity(self._source))}"
 
     def _kept(self, path: Path) -> np.ndarray | None:
         """The matte (H, W) uint8 of a file; None: there is none of ours, or it is damaged."""
-        if not path.is_file():
+        if (image := derived.opened(path, self._spec)) is None:
             return None
-        image = ImageBuf(check_name(path))
-        spec = image.spec()
-        if image.has_error or (spec.width, spec.height, spec.nchannels) != (self.width, self.height, 1):
-            return None
-        said = spec.get_string_attribute("ImageDescription")
-        if str(spec.format) != "uint8" or not said.startswith(CONFIDENCE):  # another's
-            return None
-        samples = image.get_pixels("uint8")
-        return None if samples is None or image.has_error else samples[..., 0]
+        with closing(image):
+            if not image.spec().get_string_attribute("ImageDescription").startswith(CONFIDENCE):  # another's
+                return None
+            samples = image.read_image(0, 0, 0, 1, "uint8")
+            return None if samples is None or image.has_error else samples[..., 0]
 
 
 def _use_elsewhere(parent: Path | None) -> str:

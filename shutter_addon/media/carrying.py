@@ -99,7 +99,7 @@ def carried(frames: Frames, first: Drawing | None, last: Drawing | None, span: r
     reading = range(first.frame if first else span.start, (last.frame if last else span.stop - 1) + 1)
     size = ends[0].cover.shape[::-1]
     footage, before = _Footage(), None
-    joined = _joined(lambda frame: _small(frames(frame), size), footage, reading, first, last)
+    joined = _joined(lambda frame: flow.resized(frames(frame), size), footage, reading, first, last)
     for frame in span:
         stopping.check()
         places = [footage.best(joined.pop((end.frame, frame)), frame, end) for end in ends]
@@ -121,7 +121,7 @@ def drawn(picture: np.ndarray, cover: np.ndarray) -> np.ndarray:
     """The matte (H, W) uint8 of a drawing in its own frame, refined as those that are carried.
 
     picture: (H, W, 3) uint8; cover: see Drawing"""
-    shown = _lab(_small(picture, cover.shape[::-1]))
+    shown = _lab(flow.resized(picture, cover.shape[::-1]))
     return _levels(refined(picture, _mixed([_votes(shown, shown, cover, box_around(cover))], [1.0])))
 
 
@@ -317,10 +317,6 @@ def _explained(light: np.ndarray, values: np.ndarray, radius: int, coarse: int) 
     explained = 1 - mean((values - found) ** 2) / (varies + np.float32(1e-4))
     believed = np.clip((explained - DOUBTED) / (BELIEVED - DOUBTED), 0, 1)
     return values + believed * (np.clip((found - 0.5) * STEEPER + 0.5, 0, 1) - values)
-
-
-def _small(picture: np.ndarray, size: tuple[int, int]) -> np.ndarray:
-    return picture if picture.shape[1::-1] == size else cv2.resize(picture, size, interpolation=cv2.INTER_AREA)
 
 
 def _lab(picture: np.ndarray) -> np.ndarray:

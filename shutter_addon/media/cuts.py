@@ -270,22 +270,36 @@ class ShotSource(SourceWrapper):
 
     def _decide(self, index: int) -> tuple[bool, bool]:
         """Whether there is a cut before that filmed frame, and whether all that has a say in it could be read."""
-        last, next_ = self._signature(index - 1), self._signature(index)
+        last, next_ = self._readable(index - 1), self._readable(index)
         if last is None or next_ is None:
             return False, False
         if not may_be_cut(last, next_):
             return False, True
-        beside = {i: self._signature(i) for i in neighbours(index, self.filmed)}
+        beside = {i: self._readable(i) for i in neighbours(index, self.filmed)}
         return is_cut(*sides(beside, index)), all(picture is not None for picture in beside.values())
 
-    def _signature(self, index: int) -> Signature | None:
+    def kind(self, index: int) -> str | None:
+        """What follows a filmed frame: "cut", where the next one is of another shot, "same", where it repeats this one,
+        or None. MediaError: one that has a say in it cannot be read."""
+        here = self._signature(index), self._signature(index + 1)
+        if not (may_be_cut(*here) or may_be_duplicate(*here)):
+            return None
+        beside = sides({i: self._signature(i) for i in neighbours(index + 1, self.filmed)}, index + 1)
+        if is_cut(*beside):
+            return "cut"
+        return "same" if is_duplicate(*beside) else None
+
+    def _readable(self, index: int) -> Signature | None:
         """None: the frame cannot be read now. Whoever needs the frame itself will hear why."""
-        if index in self._signatures:
-            return self._signatures[index]
         try:
-            frame = self.decoded(index * self.step)
+            return self._signature(index)
         except MediaError:
             return None
+
+    def _signature(self, index: int) -> Signature:
+        if index in self._signatures:
+            return self._signatures[index]
+        frame = self.decoded(index * self.step)
         made = self._signatures[index] = signature(frame, self.transfer, self.alpha)
         self._handed[index * self.step] = frame
         while len(self._handed) > 1 and len(self._handed) * frame.nbytes > _HANDED_BYTES:

@@ -24,7 +24,8 @@ S = TypeVar("S", Region, OutlineRegion, Camera)
 class FilmedFrames:
     """The filmed frames that timeline frames show, by their places among these, from 0 on.
 
-    indices: which ones; frames: all places; start: that of the timeline frame from which is tracked"""
+    indices: which ones; frames: all places; timeline: by place, the timeline frame at which it is seen
+    start: that of the timeline frame from which is tracked"""
 
     def __init__(self, times: Mapping[int, float], start: int) -> None:
         """times: by timeline frame, in filmed frames from 0 on; a fraction stands for an in-between frame.
@@ -40,7 +41,7 @@ class FilmedFrames:
         self.indices = sorted(nearest)
         self.frames = range(len(self.indices))
         self._places = {index: place for place, index in enumerate(self.indices)}
-        self._timeline = [nearest[index][-1] for index in self.indices]
+        self.timeline = [nearest[index][-1] for index in self.indices]
         self.start = self._places[index]
 
     def index_at(self, place: int) -> int:
@@ -48,7 +49,7 @@ class FilmedFrames:
 
     def seen(self, subject: S) -> _Seen[S]:
         """A subject as tracking asks for it, at places in place of timeline frames."""
-        return _Seen(subject, self._timeline)
+        return _Seen(subject, self.timeline)
 
     def on_timeline(self, subject: Subject, tracked: Iterable[Tracked], size: tuple[int, int]) -> Iterator[Tracked]:
         """What was tracked by places, by timeline frames: the start, those behind it, those before it. A direction that
@@ -104,7 +105,7 @@ class FilmedFrames:
 
     def _placed(self, subject: Subject, tracked: Tracked, frame: int) -> Placement:
         """A placement in another timeline frame's drawing, which may lie elsewhere."""
-        moved = np.add(tracked.placement.location, _centre(subject, self._timeline[tracked.frame]))
+        moved = np.add(tracked.placement.location, _centre(subject, self.timeline[tracked.frame]))
         x, y = (float(number) for number in moved - _centre(subject, frame))
         return replace(tracked.placement, location=(x, y))
 

@@ -14,6 +14,7 @@ import numpy as np
 
 from ..core import stopping
 from ..core.frames import light
+from ..core.frames.frame_source import FrameSource
 from . import opencv
 from .opencv import cv2
 
@@ -55,6 +56,8 @@ def between(
 
 def luma(frame: np.ndarray, transfer: str, alpha: str) -> np.ndarray:
     """A frame (H, W, 4) of a source, as it is displayed, in grey (H, W) uint8; transfer, alpha: the source's."""
+    if frame.dtype == np.uint8 and (transfer, alpha) == ("srgb", "opaque"):
+        return cv2.cvtColor(frame, cv2.COLOR_RGBA2GRAY)
     return _luma(_encoded(frame, transfer, alpha))
 
 
@@ -63,16 +66,18 @@ def displayed(frame: np.ndarray, transfer: str, alpha: str) -> np.ndarray:
     return np.ascontiguousarray(levels(_encoded(frame, transfer, alpha))[..., :3])
 
 
-def resized(luma: np.ndarray, size: tuple[int, int]) -> np.ndarray:
-    """A smaller grey picture, of this width and height."""
-    return cv2.resize(luma, size, interpolation=cv2.INTER_AREA)
+def resized(picture: np.ndarray, size: tuple[int, int]) -> np.ndarray:
+    """A picture made smaller, of this width and height; of that size already, itself."""
+    return picture if picture.shape[1::-1] == size else cv2.resize(picture, size, interpolation=cv2.INTER_AREA)
 
 
-def of_rows(luma: np.ndarray, most: int) -> np.ndarray:
-    """A grey picture, made smaller where it has more rows."""
-    height, width = luma.shape
+def of_rows(frame: np.ndarray, source: FrameSource, most: int, *, turned: bool = False) -> np.ndarray:
+    """A source's frame as `luma` has it, made smaller where it has more rows; turned: its columns are the rows."""
+    picture = luma(frame, source.transfer, source.alpha)
+    picture = np.ascontiguousarray(picture.T) if turned else picture
+    height, width = picture.shape
     rows = min(most, height)
-    return resized(luma, (max(1, round(width * rows / height)), rows))
+    return resized(picture, (max(1, round(width * rows / height)), rows))
 
 
 def vectors(first: np.ndarray, second: np.ndarray) -> np.ndarray:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import errno
-import hashlib
 import os
 import stat
 from collections.abc import Callable
@@ -51,20 +50,6 @@ class Folder:
         """What is in a plain file of at most so many bytes."""
         with self.open(name, most) as file:
             return file.read(most)
-
-    def digest(self, name: str, most: int) -> str:
-        """The SHA-256 of a plain file of at most so many bytes, in hexadecimal digits."""
-        with self.open(name, most) as file:
-            return hashlib.file_digest(file, "sha256").hexdigest()
-
-    def append(self, name: str, data: bytes) -> None:
-        """Writes at the end of a plain file that has no other name; it is made if there is none."""
-        flags = os.O_WRONLY | os.O_APPEND | os.O_CREAT | _PLAIN
-        with os.fdopen(os.open(self.path / name, flags, 0o666), "ab") as file:
-            status = os.fstat(file.fileno())
-            if not stat.S_ISREG(status.st_mode) or status.st_nlink != 1:
-                raise _error(errno.EEXIST)
-            file.write(data)
 
     def remove(self, name: str) -> int:
         """Removes a plain file, by this name. Gives its bytes."""

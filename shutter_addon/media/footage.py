@@ -7,9 +7,8 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from ..core import stopping
-from ..core.frames import light
 from ..core.frames.frame_source import FrameSource
-from . import flow, opencv, registration
+from . import flow, opencv
 
 WIDTH = 960  # pixels of the pictures that are compared, at most, along their longer side
 AHEAD = 8  # frames that the source may decode in advance
@@ -71,15 +70,7 @@ class Footage:
         for i in block:
             stopping.check()
             self._cut(last, i)  # so that frames are read upwards, and once, to find cuts
-            self._kept[i], last = self._grey(self._source.read(i)), i
+            picture = flow.luma(self._source.read(i), self._source.transfer, self._source.alpha)
+            self._kept[i], last = flow.resized(picture, self.size), i
         while len(self._kept) > KEPT:
             del self._kept[next(iter(self._kept))]
-
-    def _grey(self, frame: np.ndarray) -> np.ndarray:
-        """Over black: colours that are hidden may be anything."""
-        alpha = self._source.alpha
-        if frame.dtype != np.uint8:
-            frame = light.over_black(frame, alpha)
-            is_light = self._source.transfer == "linear" and frame.dtype.kind == "f"
-            frame, alpha = flow.levels(light.to_encoded(frame) if is_light else frame), "opaque"
-        return registration.grey(frame, self.size, alpha)

@@ -9,7 +9,7 @@ import tempfile
 import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, as_completed, wait
-from contextlib import suppress
+from contextlib import closing, suppress
 from functools import partial
 from itertools import islice
 from pathlib import Path
@@ -25,8 +25,8 @@ from . import cuts, flow
 from .completeness import why_short
 from .errors import MediaError, NotBuiltError
 from .files import check_index
-from .inbetween_cache import InbetweenCache, pair_line, write_picture
-from .inbetween_folders import State
+from .inbetween_cache import InbetweenCache, State, write_picture
+from .prefetch import PrefetchSource
 
 MEMORY = 4 << 30  # bytes of all pairs that are built at the same time, and of the frames that are read ahead
 AHEAD = 640 << 20  # bytes of them for frames that are read ahead; enough to read none of 16 bits in 4K twice
@@ -34,9 +34,7 @@ AHEAD = 640 << 20  # bytes of them for frames that are read ahead; enough to rea
 LAYERS = 26
 _PAUSE = 1.0  # seconds between two looks at what other processes have built
 
-# What makes the frames of a pair: flow.between, or what stands for it.
-Pictures = Iterator[np.ndarray]
-Between = Callable[..., Pictures]
+Pictures = Iterator[np.ndarray]  # the frames of a pair
 
 
 class InbetweenSource(SourceWrapper):
@@ -77,12 +75,12 @@ class InbetweenSource(SourceWrapper):
         return self._cache.read(index) if real is None else self._source.read(real)
 
     def _is_there(self, index: int) -> bool:
-        return self._cache.has(index) or self._real(index) is not None
+        return index in self._cache.listed.frames or self._real(index) is not None
 
     def _real(self, index: int) -> int | None:
         """The source frame that is shown at a frame; None: an in-between frame is."""
         pair, step = divmod(index, self.factor)
-        kind = "same" if step == 0 else self._cache.kinds.get(pair)
+        kind = "same" if step == 0 else self._cache.listed.kinds.get(pair)
         if kind is None:
             return None
         return pair + (kind == "cut" and 2 * step > self.factor)
@@ -95,7 +93,6 @@ def build(
     method: str,
     update: Callable[[int, int], None] = lambda done, total: None,
     cancelled: Callable[[], bool] = lambda: False,
-    between: Between | None = None,
     pairs: Sequence[int] | None = None,
 ) -> State:
     """Builds in-between frames in `folder`. Pictures that are there are checked, and damaged ones are built again.
@@ -103,7 +100,6 @@ def build(
     factor: 2 or more; method: one of flow.METHODS
     update: called with the number of finished pairs and that of all
     cancelled: called often, from several threads; True ends the build, and finished pairs are kept
-    between: makes a pair's frames, in place of flow.between
     pairs: those to build, each by its first source frame, ascending (default: all)
 
     After a build that was killed, the next one goes on where that was. Several processes may build in the same folder,
@@ -114,16 +110,27 @@ def build(
     cache = InbetweenCache(source, folder, factor, method)
     pairs = range(source.count - 1) if pairs is None else pairs
     cache.load()
-    if between is None and not cache.finished().issuperset(pairs):
+    if not cache.listed.pairs.issuperset(pairs):
         flow.check()
-    between = between or flow.between
-    cache.prepare()
-    done, left = 0, list(pairs)
-    with Claims(cache.folder) as claims:
+    try:
+        cache.prepare()
+        done = _build(cache, pairs, update, cancelled)
+    except OSError as error:
+        reason = error.strerror or error
+        raise MediaError(f"{cache.folder}: in-between frames cannot be written there ({reason})") from None
+    cache.confirm()
+    return State("ready" if done == len(pairs) else "partial", done, len(pairs))
+
+
+def _build(
+    cache: InbetweenCache, pairs: Sequence[int], update: Callable[[int, int], None], cancelled: Callable[[], bool]
+) -> int:
+    """As `build`; how many pairs are finished."""
+    done, left, source = 0, list(pairs), cache.source
+    with Claims(cache.folder) as claims, closing(cuts.ShotSource(PrefetchSource(source))) as shots:
         while left:
-            cache.load()
             others: list[int] = []  # pairs that other processes are building
-            tasks = _tasks(cache, left, claims, others, between, cancelled)
+            tasks = _tasks(cache, shots, left, claims, others, cancelled)
             for finished in _in_parallel(tasks, _workers(source)):
                 done += finished
                 update(done, len(pairs))
@@ -131,16 +138,23 @@ def build(
                 time.sleep(_PAUSE)
             left = others
         claims.clear(map(_claim, pairs))
-    cache.confirm()
-    return State("ready" if done == len(pairs) else "partial", done, len(pairs))
+    return done
 
 
-def estimate(source: FrameSource, factor: int) -> int:
-    """About how many bytes the files of all in-between frames of a source will have: the mean of three source frames,
-    written as in-between frames are, times their number. MediaError: these frames cannot be read or written."""
-    samples = {source.count * part // 6 for part in (1, 3, 5)}
-    sizes = list(_sizes(source, map(source.read, samples)))
-    return (source.count - 1) * (factor - 1) * sum(sizes) // len(sizes)
+def estimate(source: FrameSource) -> int:
+    """About how many bytes one in-between frame of each pair takes, all together: as three source frames do on average.
+    MediaError: these frames cannot be read or written."""
+    sizes = [_bytes(source, source.read(source.count * part // 6)) for part in (1, 3, 5)]
+    return (source.count - 1) * sum(sizes) // len(sizes)
+
+
+def _bytes(source: FrameSource, picture: np.ndarray) -> int:
+    """Of a picture that is written as a source's in-between frames are. MediaError: it cannot be."""
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder, "picture.png" if source.dtype.kind == "u" else "picture.exr")
+        if not write_picture(path, picture, source.alpha):
+            raise MediaError(f"{folder}: a picture could not be written whole ({why_short(path.parent)})")
+        return path.stat().st_size
 
 
 class Cost(NamedTuple):
@@ -157,123 +171,52 @@ class Cost(NamedTuple):
         return pairs * (factor - 1) * self.size
 
 
-def cost(source: FrameSource, pair: int, method: str, between: Between | None = None) -> Cost:
+def cost(source: FrameSource, pair: int, method: str) -> Cost:
     """About what in-between frames of a source cost, by two that are made of one pair, and written: several pairs at a
-    time take hardly less each, as one has all processors already. between: as for `build`. MediaError: they cannot be
-    made."""
-    between = between or flow.between
-    when, sizes = [time.perf_counter()], [0]
+    time take hardly less each, as one has all processors already. MediaError: they cannot be made."""
     first, second = source.read(pair), source.read(pair + 1)
-    for size in _sizes(source, islice(between(first, second, 4, method, source.transfer, source.alpha), 2)):
+    pictures = flow.between(first, second, 4, method, source.transfer, source.alpha)
+    when, size = [time.perf_counter()], 0
+    for picture in islice(pictures, 2):
+        size = _bytes(source, picture)
         when.append(time.perf_counter())
-        sizes.append(size)
     frame = when[2] - when[1]
-    return Cost(max(when[1] - when[0] - frame, 0.0), frame, sizes[-1])
-
-
-def _sizes(source: FrameSource, pictures: Iterable[np.ndarray]) -> Iterator[int]:
-    """The bytes of each of these pictures, written as a source's in-between frames are. MediaError: it cannot be."""
-    with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder, "picture.png" if source.dtype.kind == "u" else "picture.exr")
-        for picture in pictures:
-            if not write_picture(path, picture, source.alpha):
-                raise MediaError(f"{folder}: a picture could not be written whole ({why_short(path.parent)})")
-            yield path.stat().st_size
+    return Cost(max(when[1] - when[0] - frame, 0.0), frame, size)
 
 
 def _tasks(
     cache: InbetweenCache,
+    shots: cuts.ShotSource,
     pairs: list[int],
     claims: Claims,
     others: list[int],
-    between: Between,
     cancelled: Callable[[], bool],
 ) -> Iterator[Callable[[], bool]]:
     """Yields a function for each pair that builds it and returns whether it is finished; adds those to `others` that
     other processes have claimed. Frames are read here, in the caller's thread; the functions may run in any."""
-    near = _Near(cache.source)
     for pair in pairs:
         if cancelled():
             return
         if cache.is_sound(pair):
             yield lambda: True
-            continue
-        with cache.writable():
-            is_taken = claims.take(_claim(pair))
-        if not is_taken:
+        elif not claims.take(_claim(pair)):
             others.append(pair)
-        elif _finished_by_another(cache, pair):
+        elif cache.is_sound(pair):  # by another
             claims.release(_claim(pair))
             yield lambda: True
         else:
-            first, second, kind = near.pair(pair)
-            source = cache.source
-            made = kind or between(first, second, cache.factor, cache.method, source.transfer, source.alpha)
+            # Those behind it decide what it is, and come next.
+            shots.want(range(pair, min(pair + 2 + _ahead(shots), shots.count)))
+            first, second = shots.read(pair), shots.read(pair + 1)
+            kind = "same" if np.array_equal(first, second) else shots.kind(pair)
+            shots.release()
+            made = kind or flow.between(first, second, cache.factor, cache.method, shots.transfer, shots.alpha)
             yield partial(_make, cache, claims, pair, made, cancelled)
-
-
-class _Near:
-    """Reads the frames of pairs, in ascending order, and those around a pair that decide what the pair is.
-
-    The latter are kept for their own pair, as far as AHEAD allows; the rest are read again."""
-
-    def __init__(self, source: FrameSource) -> None:
-        self._source = source
-        self._most = 2 + _ahead(source)
-        self._frames: dict[int, np.ndarray] = {}  # the pair's frames, and those that are kept for their pair
-        self._signatures: dict[int, cuts.Signature] = {}
-
-    def pair(self, index: int) -> tuple[np.ndarray, np.ndarray, str | None]:
-        """Frames `index` and `index` + 1, and their kind: "same" if they are equal or the second repeats the first,
-        "cut" if they are of two shots, else None.
-
-        MediaError: one of them cannot be read, or one around them that decides their kind. A kind is stored for good,
-        so it is not decided without that frame."""
-        self._frames = {i: frame for i, frame in self._frames.items() if i >= index}
-        first, second = (self._frames.setdefault(i, self._frame(i)) for i in (index, index + 1))
-        kind = self._kind(first, second, index)
-        beside = cuts.neighbours(index + 1, self._source.count)
-        del self._frames[index]
-        self._signatures = {i: picture for i, picture in self._signatures.items() if i in beside}
-        return first, second, kind
-
-    def _kind(self, first: np.ndarray, second: np.ndarray, index: int) -> str | None:
-        if np.array_equal(first, second):
-            return "same"
-        here = self._signature(index), self._signature(index + 1)
-        if not (cuts.may_be_cut(*here) or cuts.may_be_duplicate(*here)):
-            return None
-        beside = {i: self._signature(i) for i in cuts.neighbours(index + 1, self._source.count)}
-        sides = cuts.sides(beside, index + 1)
-        if cuts.is_cut(*sides):
-            return "cut"
-        return "same" if cuts.is_duplicate(*sides) else None
-
-    def _frame(self, index: int) -> np.ndarray:
-        frame = self._frames.get(index)
-        return self._source.read(index) if frame is None else frame
-
-    def _signature(self, index: int) -> cuts.Signature:
-        if index not in self._signatures:
-            frame = self._frame(index)
-            if index > min(self._frames) and len(self._frames) < self._most:  # those before the pair are not needed
-                self._frames[index] = frame
-            self._signatures[index] = cuts.signature(frame, self._source.transfer, self._source.alpha)
-        return self._signatures[index]
 
 
 def _claim(pair: int) -> str:
     """The name of a pair's claim."""
     return f"{pair:08d}"
-
-
-def _finished_by_another(cache: InbetweenCache, pair: int) -> bool:
-    """Whether a pair was finished since the cache was read. Only its pictures are looked for: of a pair without any,
-    the note is made again."""
-    if not cache.picture(cache.steps(pair)[0]).exists():
-        return False
-    cache.load()
-    return cache.is_sound(pair)
 
 
 def _make(
@@ -282,7 +225,7 @@ def _make(
     """Builds a claimed pair: notes its kind, or writes its pictures. Whether it is finished."""
     try:
         if isinstance(made, str):
-            cache.note(pair_line(pair, made))
+            cache.note(pair, made)
             return True
         with suppress(stopping.StoppedError), stopping.once(cancelled):
             for index, picture in zip(cache.steps(pair), made, strict=True):

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
-from contextlib import AbstractContextManager, closing, contextmanager, nullcontext
+from collections.abc import Callable, Collection, Iterator, Mapping
+from contextlib import closing
 from functools import lru_cache
+from typing import Any
 
 import numpy as np
 
-from ..core.model import outlines
 from ..core.model.motions import Motion, Similarity
-from . import flow, tracking
+from . import flow, registration, tracking
 from .carried_mattes import CarriedFile, CarriedMattes
 from .carrying import box_around
 from .footage import Footage
@@ -20,10 +20,10 @@ from .tracking import Subject, Tracked, TrackingError
 
 EMPTY = "the outline encloses nothing here"
 
-# The share (h, w) float32 of each pixel that a matte covers at a timeline frame, of the footage's pictures; and what
-# gives that for pictures of a width and height, as long as it is entered.
-Cover = Callable[[int], np.ndarray]
-Covers = Callable[[tuple[int, int]], AbstractContextManager[Cover]]
+# The share (h, w) float32 of each pixel that a matte covers at a timeline frame, of pictures of a width and height; and
+# of the footage's pictures.
+Cover = Callable[[int, tuple[int, int]], np.ndarray]
+Covered = Callable[[int], np.ndarray]
 
 _INSIDE = 0.9  # of a matte: its soft edge may move with what is behind it
 _AROUND = 24  # pixels around a matte, in which flow is found
@@ -34,33 +34,23 @@ _ALIKE = 2.0  # pixels of 640 within which a point moves as the subject does
 _AGREEING = 0.5  # share of the points that do, from which on a step is sure
 
 
-def cover_of(mattes: CarriedMattes, shown: Callable[[int], int], size: tuple[int, int]) -> Cover:
-    """What carried mattes cover of pictures of a size; shown: which filmed frame is seen at a timeline frame."""
-
-    @lru_cache(2)  # a step looks at two frames, of which one was looked at before
-    def cover(frame: int) -> np.ndarray:
-        return flow.resized(mattes.read(min(shown(frame), mattes.count - 1)), size)
-
-    return cover
+def cover_of(mattes: CarriedMattes, shown: Callable[[int], int]) -> Cover:
+    """What carried mattes cover; shown: which filmed frame is seen at a timeline frame."""
+    return lambda frame, size: flow.resized(mattes.read(min(shown(frame), mattes.count - 1)), size)
 
 
-def cover_within(drawn: Callable[[int], Sequence], size: tuple[int, int]) -> AbstractContextManager[Cover]:
-    """What curves enclose that are known at every timeline frame."""
-    return nullcontext(lambda frame: outlines.coverage(drawn(frame), *size))
-
-
-@contextmanager
-def carried_cover(carried: tuple[CarriedFile, Mapping[float, int]], size: tuple[int, int]) -> Iterator[Cover]:
-    """What a carried outline encloses; carried: what gives the mattes, and the source's filmed frames that timeline
-    frames show. MediaError, then and later: a matte cannot be carried."""
-    file, shown = carried
+def follow_carried(
+    region: Subject, file: CarriedFile, shown: Mapping[float, int], *what: Any, **how: Any
+) -> Iterator[Tracked]:
+    """As `follow_cover`, of what a carried outline encloses; shown: the filmed frames that timeline frames show.
+    MediaError, too: a matte cannot be carried."""
     with closing(file.open()) as mattes:
-        yield cover_of(mattes, shown.__getitem__, size)
+        yield from follow_cover(region, cover_of(mattes, shown.__getitem__), *what, **how)
 
 
 def follow_cover(
     region: Subject,
-    covers: Covers,
+    cover: Cover,
     footage: Footage,
     start: int,
     frames: range,
@@ -69,15 +59,22 @@ def follow_cover(
     anchors: Collection[int] = (),
 ) -> Iterator[Tracked]:
     """As tracking.follow, of what a matte covers; region: says where its centre is."""
-    tracking.check_frames(start, frames)
-    with covers(footage.size) as cover:
-        track = _MatteTrack(region, cover, footage, motion, {*frames, *anchors})
-        yield from track.both_ways(start, frames, anchors)
+
+    @lru_cache(2)  # a step looks at two frames, of which one was looked at before
+    def covered(frame: int) -> np.ndarray:
+        return cover(frame, footage.size)
+
+    return _MatteTrack(region, covered, footage, motion, {*frames, *anchors}).both_ways(start, frames, anchors)
 
 
-class _MatteTrack(tracking.Track):
+class _MatteTrack(tracking.Track[Subject]):
     def __init__(
-        self, region: Subject, cover: Cover, footage: Footage, motion: Motion, frames: Collection[int]
+        self,
+        region: Subject,
+        cover: Callable[[int], np.ndarray],
+        footage: Footage,
+        motion: Motion,
+        frames: Collection[int],
     ) -> None:
         super().__init__(region, footage, motion, frames)
         self._cover = cover
@@ -93,7 +90,7 @@ class _MatteTrack(tracking.Track):
 class _Pursuit:
     """The motion of what a matte covers, from one frame to those after it."""
 
-    def __init__(self, cover: Cover, footage: Footage, frame: int, motion: Motion) -> None:
+    def __init__(self, cover: Covered, footage: Footage, frame: int, motion: Motion) -> None:
         self._cover, self._footage, self._way = cover, footage, motion
         self._last, self._motion, self.reason = frame, Similarity(), COVERED
 
@@ -142,29 +139,15 @@ def moved(
         return None
     share = chosen.size / np.count_nonzero(inside)
     chosen = chosen[:: -(-chosen.size // _POINTS)]
-    starts, ends = (each.reshape(-1, 2)[chosen] + (columns.start, rows.start) for each in (grid, there))
-    found = _fitted(starts, ends, motion, _ALIKE * unit)
-    agreeing = float((np.abs(found(_plane(starts)) - _plane(ends)) < _ALIKE * unit).mean())
-    return Sighting(found, min(agreeing / _AGREEING, 1.0) * min(share / _AGREEING, 1.0))
-
-
-def _fitted(starts: np.ndarray, ends: np.ndarray, motion: Motion, alike: float) -> Similarity:
-    """The motion that most points (n, 2) have, within `alike` pixels."""
-    if motion != "location":
-        matrix, _ = cv2.estimateAffinePartial2D(starts, ends, method=cv2.RANSAC, ransacReprojThreshold=alike)
-        if matrix is not None:
-            turn = complex(matrix[0, 0], matrix[1, 0])
-            if motion == "rotation":
-                turn /= abs(turn)
-            middle = complex(*starts.mean(axis=0))
-            return Similarity(turn, complex(*(matrix @ (middle.real, middle.imag, 1))) - turn * middle)
-    ways = _plane(ends - starts)
-    shift = complex(np.median(ways.real), np.median(ways.imag))
-    for _ in range(3):  # to the mean of those that agree
-        shift = complex(ways[np.abs(ways - shift) <= max(alike, np.abs(ways - shift).min())].mean())
-    return Similarity(1 + 0j, shift)
-
-
-def _plane(points: np.ndarray) -> np.ndarray:
-    """Points (n, 2) as complex numbers."""
-    return points[:, 0].astype(np.float64) + 1j * points[:, 1]
+    corner = complex(columns.start, rows.start)
+    starts, ends = (registration.plane(each)[chosen] + corner for each in (grid, there))
+    # Where it turns as well, no location alone suits many points: that of its middle is asked for then.
+    way: Motion = "scale" if motion == "location" else motion
+    fitted = registration.fit(starts, ends, np.ones(len(chosen)), way, _ALIKE * unit)
+    if fitted is None:
+        return None
+    found, agreeing = fitted
+    if motion == "location":
+        middle = complex(starts.mean())
+        found = Similarity(1 + 0j, found(middle) - middle)
+    return Sighting(found, min(float(agreeing.mean()) / _AGREEING, 1.0) * min(share / _AGREEING, 1.0))

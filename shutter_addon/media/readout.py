@@ -28,6 +28,7 @@ LONG, UPRIGHT, MOST = 0.1, 0.35, 60
 _ANEW = 6  # frames after which more edges are looked for
 _REACH, _NEAR = 6, 3  # pixels beside where an edge is expected, and beside where it was found then
 _STEEP = 6.0  # levels from one side of a pixel to the other, from which on there is an edge
+_ROUGH = 0.3  # pixels by which an edge's rows are off, beyond which they hardly count
 _SEEN, _OFF = 0.6, 1.0  # the share of an edge's rows where it has to be, and how far they may be off, in pixels
 # What has to be there to tell a readout: edges, frames of one, pixels a frame by which speeds differ, and how sure the
 # readout is then, as a share of a frame, or of itself.
@@ -64,13 +65,11 @@ def of_source(source: FrameSource, indices: Sequence[int], *, columns: bool = Fa
     first = max((len(indices) - FRAMES) // 2, 0)
     chosen = indices[first : first + FRAMES]
     source.want(chosen)
-    return of_pictures([_small(source, index, columns=columns) for index in chosen])
-
-
-def _small(source: FrameSource, index: int, *, columns: bool) -> np.ndarray:
-    stopping.check()
-    luma = flow.luma(source.read(index), source.transfer, source.alpha)
-    return flow.of_rows(np.ascontiguousarray(luma.T) if columns else luma, ROWS)
+    pictures = []
+    for index in chosen:
+        stopping.check()
+        pictures.append(flow.of_rows(source.read(index), source, ROWS, turned=columns))
+    return of_pictures(pictures)
 
 
 def of_pictures(pictures: Sequence[np.ndarray]) -> Readout:
@@ -221,17 +220,10 @@ def _centres(
 
 def _line(rows: np.ndarray, centres: np.ndarray, is_there: np.ndarray) -> tuple[float, float]:
     """The line through places of rows, as _Edge.places, by most of them."""
-    y, weight = rows - rows.mean(), is_there.astype(float)
-    x = lean = 0.0
-    for _ in range(5):
-        total = weight.sum()
-        mean_y, mean_x = (weight * y).sum() / total, (weight * centres).sum() / total
-        lean = (weight * (y - mean_y) * (centres - mean_x)).sum() / max((weight * (y - mean_y) ** 2).sum(), 1e-9)
-        x = mean_x - lean * mean_y
-        off = np.abs(centres - x - lean * y)
-        scale = max(1.5 * float(np.median(off[is_there])), 0.05)
-        weight = is_there / (1 + (off / scale) ** 2) ** 2
-    return float(x), float(lean)
+    points = np.column_stack([centres, rows - rows.mean()])[is_there].astype(np.float32)
+    right, down, x, y = cv2.fitLine(points, cv2.DIST_WELSCH, _ROUGH, 1e-3, 1e-4).ravel()
+    lean = right / down
+    return float(x - lean * y), float(lean)
 
 
 def _fitted(samples: list[tuple[np.ndarray, np.ndarray]], height: int) -> Readout:

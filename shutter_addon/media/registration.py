@@ -38,16 +38,6 @@ _NOISE = 16.0  # levels² of contrast that noise may have: they make no two pict
 _MOST_SCALE, _MOST_TURN = 1.5, 0.8
 
 
-def grey(frame: np.ndarray, size: tuple[int, int], alpha: str = "opaque") -> np.ndarray:
-    """A frame (h, w, 4) uint8, over black, as a grey picture of a size, width and height; alpha: the source's."""
-    picture = cv2.cvtColor(frame, cv2.COLOR_RGBA2GRAY)
-    if alpha == "straight":
-        picture = cv2.multiply(picture, cv2.extractChannel(frame, 3), scale=1 / 255)
-    if picture.shape[::-1] != size:  # one channel takes a third of the time that four take
-        picture = cv2.resize(picture, size, interpolation=cv2.INTER_AREA)
-    return picture
-
-
 def distances(mask: np.ndarray) -> np.ndarray:
     """How far in pixels each pixel lies from where a mask (H, W) bool is true."""
     return cv2.distanceTransform((~mask).astype(np.uint8), cv2.DIST_L2, 0)
@@ -259,7 +249,7 @@ def _there_and_back(
     there, forth, _ = cv2.calcOpticalFlowPyrLK(first, second, start, guess, *ways)
     guess = there.copy() if step is None else start.copy()
     again, back, _ = cv2.calcOpticalFlowPyrLK(second, first, there, guess, *ways)
-    return _plane(there), (forth & back).ravel().astype(bool) & (np.abs(_plane(again) - points) < _THERE_AND_BACK)
+    return plane(there), (forth & back).ravel().astype(bool) & (np.abs(plane(again) - points) < _THERE_AND_BACK)
 
 
 def correlation(first: np.ndarray, second: np.ndarray, weight: np.ndarray) -> float:
@@ -304,14 +294,15 @@ def fit(
 def _hypotheses(p: np.ndarray, q: np.ndarray, motion: Motion) -> tuple[np.ndarray, np.ndarray]:
     """Turns and shifts (k,) of similarities, each by one or two pairs of points."""
     count = len(p)
+    shifts = (q - p)[:: -(-count // _HYPOTHESES)]
     if motion == "location":
-        return np.ones(count, complex), q - p
+        return np.ones(len(shifts), complex), shifts
     random = np.random.default_rng(0)
     first = random.integers(count, size=_HYPOTHESES)
     second = (first + random.integers(1, count, size=_HYPOTHESES)) % count
     apart = np.abs(p[second] - p[first]) > 2
     if not apart.any():
-        return np.ones(count, complex), q - p
+        return np.ones(len(shifts), complex), shifts
     first, second = first[apart], second[apart]
     turns = (q[second] - q[first]) / (p[second] - p[first])
     size = np.abs(turns)
@@ -358,13 +349,13 @@ def _corners(picture: np.ndarray, weight: np.ndarray) -> np.ndarray:
     strength = cv2.cornerMinEigenVal(picture, 5)
     mask &= (strength > _WEAKEST).astype(np.uint8)
     corners = cv2.goodFeaturesToTrack(picture, MOST_CORNERS, _QUALITY, apart, mask=mask, blockSize=5)
-    return np.zeros(0, complex) if corners is None else _plane(corners)
+    return np.zeros(0, complex) if corners is None else plane(corners)
 
 
-def _plane(pairs: np.ndarray) -> np.ndarray:
-    """Points (n, 1, 2) as complex numbers."""
-    pairs = pairs.reshape(-1, 2).astype(np.float64)
-    return pairs[:, 0] + 1j * pairs[:, 1]
+def plane(places: np.ndarray) -> np.ndarray:
+    """Points (…, 2) as complex numbers (n,)."""
+    x, y = places.reshape(-1, 2).astype(np.float64).T
+    return x + 1j * y
 
 
 def _pairs(points: np.ndarray) -> np.ndarray:

@@ -28,7 +28,7 @@ class Moved(NamedTuple):
 def moved(source: FrameSource, index: int) -> Moved | None:
     """What moves from a frame to the next one; None: that cannot be told, as across a cut. It reads both. It takes
     OpenCV. MediaError: they cannot be read."""
-    first, second = (_small(source, i) for i in (index, index + 1))
+    first, second = (flow.of_rows(source.read(i), source, ROWS) for i in (index, index + 1))
     if min(first.shape) < flow.SMALLEST:
         return None
     forth, back = flow.vectors(first, second), flow.vectors(second, first)
@@ -53,7 +53,3 @@ def step(moved: Moved, before: Similarity, after: Similarity) -> float:
     before, after: where the points of the shown picture lie in the two frames, in heights of the picture"""
     ways = after.inverse()(moved.after) - before.inverse()(moved.before)
     return float(np.quantile(np.abs(ways), 1 - SHARE))
-
-
-def _small(source: FrameSource, index: int) -> np.ndarray:
-    return flow.of_rows(flow.luma(source.read(index), source.transfer, source.alpha), ROWS)

@@ -10,7 +10,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Collection, Iterator
 from dataclasses import dataclass, replace
 from itertools import pairwise, takewhile
-from typing import Protocol
+from typing import Generic, Protocol, TypeVar
 
 import numpy as np
 
@@ -93,16 +93,7 @@ def follow(
     A direction that ends early ends with a Tracked that has a fault; where a gap is left on the way to an anchor, there
     is one on each side of it. TrackingError: nothing can be tracked from there.
     MediaError, while it goes on: a frame cannot be read."""
-    check_frames(start, frames)
     return _RegionTrack(region, footage, motion, {*frames, *anchors}).both_ways(start, frames, anchors)
-
-
-def check_frames(start: int, frames: range) -> None:
-    """TrackingError: from there nothing can be tracked through these frames."""
-    if start not in frames:
-        raise TrackingError(NOT_SHOWN)
-    if len(frames) < 2:
-        raise TrackingError(ALONE)
 
 
 class Pursuit(Protocol):
@@ -116,10 +107,13 @@ class Pursuit(Protocol):
         """Where it is in a frame; None: it is not there."""
 
 
-class Track(ABC):
+S = TypeVar("S", bound=Subject)
+
+
+class Track(ABC, Generic[S]):
     """What tracking a subject, a region or the camera, needs to know."""
 
-    def __init__(self, subject: Subject, footage: Footage, motion: Motion, frames: Collection[int]) -> None:
+    def __init__(self, subject: S, footage: Footage, motion: Motion, frames: Collection[int]) -> None:
         """frames: all at which the subject's centre is asked for."""
         self._subject, self._footage, self._motion = subject, footage, motion
         centres = {frame: subject.centre(frame) for frame in frames}
@@ -149,6 +143,10 @@ class Track(ABC):
 
     def both_ways(self, start: int, frames: range, anchors: Collection[int]) -> Iterator[Tracked]:
         """As `follow`. TrackingError, at once: nothing can be tracked from there."""
+        if start not in frames:
+            raise TrackingError(NOT_SHOWN)
+        if len(frames) < 2:
+            raise TrackingError(ALONE)
         self._check(start)
         return self._both_ways(start, range(min(frames), max(frames) + 1), {*anchors} - {start})
 
@@ -239,17 +237,12 @@ class Track(ABC):
             yield Tracked(frame=missing, placement=replace(straight, location=(x, y)), confidence=0.0)
 
 
-class _RegionTrack(Track):
+class _RegionTrack(Track[Drawn]):
     """Tracks what a region covers."""
-
-    def __init__(self, region: Drawn, footage: Footage, motion: Motion, frames: Collection[int]) -> None:
-        super().__init__(region, footage, motion, frames)
-        self._region = region
-        self._doubted: dict[int, int | None] = {}
 
     def _part(self, frame: int) -> tuple[Part, float]:
         """Corners far from the region are less surely its own; those of a pattern may be those of its next period."""
-        shape, (width, height) = self._region.at(frame), self._footage.size
+        shape, (width, height) = self._subject.at(frame), self._footage.size
         covered = scribbles.rasterise([replace(shape, shutter=0)], width, height) > 0
         if not covered.any():
             raise TrackingError(OUTSIDE)
@@ -264,7 +257,7 @@ class _RegionTrack(Track):
         return part, min(float(np.clip(near / _ENOUGH_NEAR, _FAR, 1)), distinctness(part, width))
 
     def _both_ways(self, start: int, frames: range, anchors: set[int]) -> Iterator[Tracked]:
-        self._doubted = self._doubts(start, sorted(anchors), {*frames, *anchors})
+        self._doubted: dict[int, int | None] = self._doubts(start, sorted(anchors), {*frames, *anchors})
         yield from super()._both_ways(start, frames, anchors)
 
     def _pursuit(self, start: int) -> tuple[int, PartPursuit, float]:

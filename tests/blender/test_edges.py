@@ -14,7 +14,7 @@ from shutter_addon.core.frames import light
 from shutter_addon.core.model import scribbles, windows
 from shutter_addon.core.pixels import compositor
 from shutter_addon.core.recipes import recipe_file
-from shutter_addon.media import MediaError, inbetween, open_source
+from shutter_addon.media import MediaError, flow, inbetween, open_source
 
 SIZE, COUNT = (128, 72), 9
 STROKE = {"name": "Belly", "shutter": "S1", "width": 0.03, "strokes": [[[0.36, 0.6], [0.36, 0.3]]]}
@@ -120,7 +120,7 @@ def test_reversed_and_retimed_strips_follow_the_shown_frame(add, film, same_pixe
     assert not np.array_equal(picture_of(effect.scene, COUNT - 3), still)
 
 
-def test_in_betweens_that_it_needs_are_told_and_built(bpy, add, film, tmp_path):
+def test_in_betweens_that_it_needs_are_told_and_built(bpy, add, film, tmp_path, monkeypatch):
     """Where the window does not show them: the shutters are open after the shown frame alone."""
     from shutter_addon.blender.commands.inbetween_command import needed_pairs
     from shutter_addon.blender.rendering import render_settings, sessions
@@ -133,7 +133,8 @@ def test_in_betweens_that_it_needs_are_told_and_built(bpy, add, film, tmp_path):
         open_source(film) as source,
     ):
         edit, effect, strip = add(film, data)
-        inbetween.build(source, tmp_path / "cache", 2, "quick", pairs=range(3, 4), between=between)
+        monkeypatch.setattr(flow, "between", between)
+        inbetween.build(source, tmp_path / "cache", 2, "quick", pairs=range(3, 4))
         wanted = request(edit, effect, strip, 1)
         assert wanted.index == 5
         with pytest.raises(MediaError, match="in-between frames of frame 3 are missing"):
@@ -146,7 +147,7 @@ def test_in_betweens_that_it_needs_are_told_and_built(bpy, add, film, tmp_path):
         from shutter_addon.blender.data import snapshot
 
         assert needed_pairs(snapshot.take(edit, effect, strip, (1,), folder=tmp_path / "cache")) == {2, 3}
-        inbetween.build(source, tmp_path / "cache", 2, "quick", pairs=range(2, 3), between=between)
+        inbetween.build(source, tmp_path / "cache", 2, "quick", pairs=range(2, 3))
         sessions.forget()
         request(edit, effect, strip, 1).picture()
 

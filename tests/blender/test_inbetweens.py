@@ -5,6 +5,7 @@ Pictures are compared with means of frames that are known: the cache is written 
 import itertools
 from functools import partial
 from types import SimpleNamespace
+from unittest import mock
 
 import numpy as np
 import pytest
@@ -14,7 +15,7 @@ from support import picture_of, request, write_frames
 from shutter_addon.blender.data import fcurves
 from shutter_addon.core.frames import light
 from shutter_addon.core.model import shutters
-from shutter_addon.media import inbetween, open_source
+from shutter_addon.media import flow, inbetween, open_source
 
 FACTOR, COUNT, CUT = 4, 12, 6
 
@@ -48,7 +49,8 @@ def film(cache, tmp_path):
 
 
 def build(source, folder, **more):
-    return inbetween.build(source, folder, FACTOR, "quick", between=between, **more)
+    with mock.patch.object(flow, "between", between):
+        return inbetween.build(source, folder, FACTOR, "quick", **more)
 
 
 @pytest.fixture
@@ -158,13 +160,14 @@ def test_a_slow_strip_shows_in_betweens(film, add, edit, render, same_pixels):
 
 def test_what_is_missing_is_said_and_what_is_built_is_shown(cache, film, add, edit, render, tmp_path, same_pixels):
     from shutter_addon.blender.data import strips
-    from shutter_addon.media import MediaError, inbetween_folders
+    from shutter_addon.media import MediaError, inbetween_cache
 
     first, frames = film
     *_, effect = add(first, COUNT, np.ones(6))
     picture = partial(picture_of, effect.scene, 2)
     picture()
-    inbetween_folders.purge(cache)
+    with open_source(first) as source:
+        inbetween_cache.purge(cache, source)
     for way in (picture, request(*strips.find_effect(effect.scene), 2).check):
         with pytest.raises(MediaError, match=r"in-between frames of frame 2 are missing"):
             way()
@@ -197,13 +200,14 @@ def test_in_betweens_of_a_file_that_was_replaced_are_not_shown(cache, film, add,
 
 def test_finished_frames_are_dropped_when_in_betweens_come_and_go(cache, film, add, edit):
     from shutter_addon.blender.rendering import invalidation
-    from shutter_addon.media.inbetween_folders import purge
+    from shutter_addon.media.inbetween_cache import purge
 
     first, _ = film
     add(first, COUNT, np.ones(6))
     invalidation.invalidate_changed(edit)
     assert not invalidation.invalidate_changed(edit)
-    purge(cache)
+    with open_source(first) as source:
+        purge(cache, source)
     assert invalidation.invalidate_changed(edit)
     assert not invalidation.invalidate_changed(edit)
     with open_source(first) as source:

@@ -192,9 +192,9 @@ def test_all_that_the_strip_needs_is_built_and_no_more(add, smoothed, bpy, posit
         request(edit, effect, strip, frame).check()
     with source_media.open_media(strips.source_of(edit, effect, strip)) as medium:
         from shutter_addon.blender.data import inbetween_settings
-        from shutter_addon.media import inbetween_folders
+        from shutter_addon.media import inbetween_cache
 
-        built = inbetween_folders.state(medium, *inbetween_settings.settings(effect)).done
+        built = inbetween_cache.state(medium, *inbetween_settings.settings(effect)).done
     assert 0 < built < COUNT - (edges != "MIRROR")  # which may be at a cut, and reaches farther then
 
 

@@ -9,9 +9,11 @@ import subprocess
 import sys
 import time
 import weakref
+from contextlib import suppress
 from functools import partialmethod
 from pathlib import Path
 from types import SimpleNamespace
+from unittest import mock
 
 import numpy as np
 import pytest
@@ -20,7 +22,7 @@ from footage import picture, save_image, see_through
 from shutter_addon.core import atomic_write
 from shutter_addon.core.farm import claims
 from shutter_addon.core.frames.source_wrapper import SourceWrapper
-from shutter_addon.media import MediaError, inbetween, inbetween_cache, inbetween_folders, open_source
+from shutter_addon.media import MediaError, flow, inbetween, inbetween_cache, open_source
 from shutter_addon.media.folder import Folder
 
 ROOT = Path(__file__).parents[2]
@@ -35,12 +37,13 @@ def blend(first, second, factor, *_):
         yield (first * (1.0 - weight) + second * weight).astype(first.dtype)
 
 
-def build(source, folder, **more):
-    return inbetween.build(source, folder, FACTOR, "quick", **{"between": blend, **more})
+def build(source, folder, *, between=blend, **more):
+    with mock.patch.object(flow, "between", between):
+        return inbetween.build(source, folder, FACTOR, "quick", **more)
 
 
 def state(source, folder):
-    return inbetween_folders.state(source, folder, FACTOR, "quick")
+    return inbetween_cache.state(source, folder, FACTOR, "quick")
 
 
 def opened(source, folder):
@@ -48,8 +51,8 @@ def opened(source, folder):
 
 
 def kept(folder):
-    """{path in the folder: hash} of all pictures; how the checks are spread over files is left to the builds."""
-    paths = [path for path in folder.rglob("*") if path.is_file() and path.parent.name != "checks"]
+    """{path in the folder: hash} of all files."""
+    paths = [path for path in folder.rglob("*") if path.is_file()]
     return {str(path.relative_to(folder)): hashlib.sha256(path.read_bytes()).hexdigest() for path in paths}
 
 
@@ -168,11 +171,11 @@ def test_cancelled_within_a_pair(source, folder):
     assert kept(folder) == kept(folder.with_name("whole"))
 
 
-def test_every_damaged_file_is_found_and_built_again(source, folder):
+def test_every_file_that_is_cut_short_is_found_and_built_again(source, folder):
     build(source, folder)
     whole, between = kept(folder), opened(source, folder)
     for file in pictures(folder):
-        for damage in (lambda data: data[: len(data) // 2], lambda data: b"", flipped):
+        for damage in (lambda data: data[: len(data) // 2], lambda data: b""):
             file.write_bytes(damage(file.read_bytes()))
             with pytest.raises(MediaError, match=f"{file.name}: this in-between frame is damaged or gone"):
                 between.read(int(file.stem))
@@ -180,28 +183,30 @@ def test_every_damaged_file_is_found_and_built_again(source, folder):
             assert kept(folder) == whole
 
 
+def test_damage_within_a_picture_is_never_shown(source, folder):
+    build(source, folder)
+    between = opened(source, folder)
+    for file in pictures(folder):
+        whole = between.read(int(file.stem))
+        file.write_bytes(flipped(file.read_bytes()))
+        with suppress(MediaError):
+            assert np.array_equal(between.read(int(file.stem)), whole)
+
+
 def flipped(data):
     place = random.Random(len(data)).randrange(len(data))
     return data[:place] + bytes([data[place] ^ 16]) + data[place + 1 :]
 
 
-def test_damaged_checks_and_manifest_are_built_again(source, folder):
+def test_a_damaged_manifest_and_a_lost_mark_are_made_again(source, folder):
     save_image(source.files[2], picture(1))  # two equal frames
     build(source, folder)
     whole = kept(folder)
-    checks = next(folder.glob("*/checks/*"))
-    text = checks.read_bytes()
-    for place in range(0, len(text), 41):
-        checks.write_bytes(text[:place] + bytes([text[place] ^ 1]) + text[place + 1 :])
-        with opened(source, folder) as between:
-            assert not between.has(2 * FACTOR - 1) or np.array_equal(between.read(2 * FACTOR - 1), source.read(1))
-        assert build(source, folder).name == "ready"
-        assert kept(folder) == whole
-    checks.write_bytes(text.replace(b"# 1 same", b"# 3 same"))
-    with opened(source, folder) as between:
-        assert not np.array_equal(between.read(3 * FACTOR + 1), source.read(3))
+    next(folder.glob("*/00000001.same")).unlink()
     next(folder.glob("*/manifest.json")).write_text("{")
-    build(source, folder)
+    with opened(source, folder) as between:
+        assert not between.has(2 * FACTOR - 1)
+    assert build(source, folder).name == "ready"
     assert kept(folder) == whole
 
 
@@ -310,8 +315,8 @@ def test_stale_after_a_retouch_that_keeps_the_size(tmp_path, folder):
 
 def test_another_factor_or_reading_is_another_cache(source, folder):
     build(source, folder)
-    assert inbetween_folders.state(source, folder, 8, "quick").name == "missing"
-    assert inbetween_folders.state(source, folder, FACTOR, "good").name == "missing"
+    assert inbetween_cache.state(source, folder, 8, "quick").name == "missing"
+    assert inbetween_cache.state(source, folder, FACTOR, "good").name == "missing"
     source.transfer = "linear"
     assert state(source, folder).name == "stale"
     source.transfer, source.options = "srgb", {"deinterlace": True}
@@ -327,10 +332,10 @@ def test_purge_takes_only_what_was_built(source, folder, tmp_path):
     with open_source(footage(tmp_path / "second", 2)) as second:
         build(second, folder)
         size = sum(path.stat().st_size for path in folder.rglob("*") if path.is_file() and path not in own)
-        freed = inbetween_folders.purge(folder, source)
+        freed = inbetween_cache.purge(folder, source)
         assert state(second, folder).name == "ready"
-    assert state(source, folder).name == "missing"
-    freed += inbetween_folders.purge(folder)
+        assert state(source, folder).name == "missing"
+        freed += inbetween_cache.purge(folder, second)
     assert freed == size
     assert sorted(path for path in folder.rglob("*") if path.is_file()) == sorted(own)
 
@@ -346,35 +351,11 @@ def test_what_could_not_be_removed_is_found_again(source, folder, monkeypatch):
         with monkeypatch.context() as patch:
             patch.setattr(Folder, "remove", partialmethod(refusing, busy=busy))
             with pytest.raises(MediaError, match=r"cannot be removed \(Permission denied\)"):
-                inbetween_folders.purge(folder)
-        assert inbetween_folders.size(folder) > 0
-        assert inbetween_folders.purge(folder) > 0
+                inbetween_cache.purge(folder, source)
+        assert inbetween_cache.size(folder, source) > 0
+        assert inbetween_cache.purge(folder, source) > 0
         assert not list(folder.iterdir())
         build(source, folder)
-
-
-def test_checks_that_go_while_they_are_read_are_not_missed(source, folder, monkeypatch):
-    build(source, folder, pairs=range(2))
-    build(source, folder)
-    gone, usual = sorted(folder.glob("*/checks/*"))[0], Folder.open
-
-    def late(place, name, most):
-        gone.unlink() if name == gone.name else None
-        return usual(place, name, most)
-
-    monkeypatch.setattr(Folder, "open", late)
-    with opened(source, folder) as between:
-        assert 0 < sum(between.has(index) for index in range(between.count)) < between.count
-    assert not gone.exists()
-
-
-def test_checks_are_read_by_sha256sum(source, folder):
-    build(source, folder)
-    if shutil.which("sha256sum") is None:
-        pytest.skip("no sha256sum")
-    place = next(folder.iterdir())
-    checks = [str(path.relative_to(place)) for path in place.glob("checks/*")]
-    subprocess.run(["sha256sum", "--quiet", "-c", *checks], cwd=place, check=True)
 
 
 def test_what_cannot_be_written_is_one_sentence(source, folder):
@@ -459,7 +440,7 @@ def test_frames_read_ahead_have_a_bound_and_are_read_once_within_it(tmp_path, mo
             assert build(counting, folder, pairs=range(first, 29)).done == 29 - first
             cache = inbetween_cache.InbetweenCache(source, folder, FACTOR, "quick")
             cache.load()
-            found.append((cache.kinds, kept(folder)))
+            found.append((cache.listed.kinds, kept(folder)))
             # The pair, what waits, what is being read, and the first of the pair that was just built.
             assert counting.most <= 2 + room + 2
             again = len(counting.reads) - len(set(counting.reads))
@@ -504,6 +485,7 @@ from test_media_inbetween import blend, build
 from shutter_addon.media import open_source
 
 def slow(*frames):
+    print("made", flush=True)
     for picture in blend(*frames):
         time.sleep(0.01)
         yield picture
@@ -535,7 +517,7 @@ def test_killed_anywhere_it_goes_on_to_the_same_files(tmp_path, folder, monkeypa
         assert set(killed) == {-signal.SIGKILL if os.name == "posix" else 1}
         assert 0 < state(source, folder).done < 39
         shutil.copytree(folder, folder.with_name("killed"))
-        inbetween_folders.purge(folder.with_name("killed"))
+        inbetween_cache.purge(folder.with_name("killed"), source)
         assert not list(folder.with_name("killed").iterdir())
         monkeypatch.setattr(atomic_write, "LEFT_BEHIND", 0)
         monkeypatch.setattr(claims, "PATIENCE", 0.1)
@@ -549,9 +531,9 @@ def test_two_processes_at_once_build_each_pair_once(tmp_path, folder):
         with builder(source, folder) as one, builder(source, folder) as two:
             one.stdin.close()
             two.stdin.close()
+            made = one.stdout.read() + two.stdout.read()
         assert (one.returncode, two.returncode) == (0, 0)
-        one, two = (path.read_text().splitlines() for path in folder.glob("*/checks/*"))
-        assert len({line.split()[1] for line in one + two}) == len(one + two)
+        assert made.split() == 29 * [b"made"]
         assert not list(folder.rglob(".*"))
         build(source, folder.with_name("whole"))
         assert kept(folder) == kept(folder.with_name("whole"))
@@ -582,4 +564,4 @@ def test_estimate_is_near_what_is_built(bunny, folder):
         source.count = 4  # the first frames alone
         build(source, folder)
         size = sum(path.stat().st_size for path in pictures(folder))
-        assert 0.7 * size < inbetween.estimate(source, FACTOR) < 1.5 * size
+        assert 0.7 * size < inbetween.estimate(source) * (FACTOR - 1) < 1.5 * size

@@ -2,7 +2,6 @@
 
 What is in them is right or refused, nothing outside is touched, and nothing hangs."""
 
-import hashlib
 import json
 import os
 import random
@@ -17,7 +16,7 @@ import pytest
 from footage import picture, save_image
 from test_media_inbetween import COUNT, FACTOR, blend, build, footage, kept, opened, pictures, state
 
-from shutter_addon.media import MediaError, inbetween_cache, inbetween_folders, open_source
+from shutter_addon.media import MediaError, derived, inbetween_cache, open_source
 
 if os.name != "posix":
     pytest.skip("pipes, sockets and devices by name, alarms: of POSIX systems only", allow_module_level=True)
@@ -77,10 +76,10 @@ def listed(folder):
     return found
 
 
-def purge(folder, *source):
+def purge(folder, source):
     """Bytes freed, and what was left: {name of a folder: count}. Size has to have said so before."""
-    left, said = {}, inbetween_folders.size(folder, *source)
-    freed = inbetween_folders.purge(folder, *source, left=lambda path, count: left.update({path.name: count}))
+    left, said = {}, inbetween_cache.size(folder, source)
+    freed = inbetween_cache.purge(folder, source, left=lambda path, count: left.update({path.name: count}))
     assert said == freed
     return freed, left
 
@@ -129,15 +128,15 @@ def test_nothing_is_left_of_a_build_however_it_ended(source, folder):
     part = place / f".part-{1:016x}"  # a process was killed
     part.mkdir()
     (part / "00000002.png").write_bytes(b"half")
-    with next(place.glob("checks/*")).open("ab") as file:
-        file.write(b"0123abc")  # the disk was full
+    (place / "checks").mkdir()
+    (place / "checks" / "0123abcd.sha256").write_bytes(b"0123abc")  # of the first version, when the disk was full
     freed, left = purge(folder, source)
     assert freed > 0
     assert left == {}
     assert not list(folder.iterdir())
 
 
-@pytest.mark.parametrize("name", ["checks", "00000001.png", "manifest.json"])
+@pytest.mark.parametrize("name", ["00000001.png", "manifest.json"])
 def test_no_link_is_followed_when_frames_are_removed(source, folder, place, outside, name):
     before = listed(outside)
     (place / name).rename(folder / "away")
@@ -158,7 +157,7 @@ def test_a_cache_that_is_a_link_is_another_s(source, folder, place, tmp_path):
     before = listed(tmp_path / place.name)
     assert state(source, folder) == ("missing", 0, COUNT - 1)
     assert not opened(source, folder).has(1)
-    assert purge(folder) == (0, {})
+    assert purge(folder, source) == (0, {})
     with pytest.raises(MediaError, match="it is a link, and none is followed"):
         build(source, folder)
     assert listed(tmp_path / place.name) == before
@@ -172,37 +171,39 @@ def test_a_folder_that_is_a_link_serves_but_nothing_is_removed_behind_it(source,
     assert state(source, folder).name == "ready"
     assert len(pictures(tmp_path / "disk")) == (COUNT - 1) * (FACTOR - 1)
     before = listed(tmp_path / "disk")
-    assert inbetween_folders.size(folder, source) == 0
+    assert inbetween_cache.size(folder, source) == 0
     with pytest.raises(MediaError, match=r"virtual_shutter_inbetween: cannot be removed \(it is a link"):
-        inbetween_folders.purge(folder, source)
+        inbetween_cache.purge(folder, source)
     assert listed(tmp_path / "disk") == before
-    assert purge(tmp_path / "disk")[0] > 0
+    assert purge(tmp_path / "disk", source)[0] > 0
 
 
 def test_others_files_stay(source, folder, place):
-    """Of names as ours have them, beside ours, and in the place of ours."""
+    """Beside ours, and in the place of ours."""
     built = {path.name for path in pictures(folder)}
-    for name in ("00000099.png", "00000002.png", "12345678.exr", "notes.txt", ".00000001-0123abcd.part.png"):
+    others = {"notes.txt", "123456789.exr", "00000001.jpg", ".00000001-0123abcd.part.png", "checks"}
+    for name in others - {"checks"}:
         (place / name).write_text("someone's own")
-    for name in ("film.sha256", "0123abcd.sha256", "89ab.sha256"):
+    (place / "checks").mkdir()
+    for name in ("film.sha256", "89ab.sha256"):
         (place / "checks" / name).write_text("0" * 64 + "  /home/me/film.mov\n")
     (place / f".part-{7:016x}").mkdir()
     (place / f".part-{7:016x}" / "film.png").write_text("someone's own")
     (place / f".part-{8:016x}").write_text("someone's own")
     (place / "00000003.png").unlink()
     (place / "00000003.png").mkdir()
-    removed = built - {"00000002.png", "00000003.png"}
-    size = sum((place / name).stat().st_size for name in removed)
+    size = sum((place / name).stat().st_size for name in built - {"00000003.png"})
     left = {}
-    freed = inbetween_folders.purge(folder, source, lambda path, count: left.update({path.name: count}))
+    freed = inbetween_cache.purge(folder, source, lambda path, count: left.update({path.name: count}))
     assert size < freed < size + 9999
     assert {path.name for path in place.iterdir()} == {
-        *("00000099.png", "00000002.png", "12345678.exr", "notes.txt", ".00000001-0123abcd.part.png"),
-        *("00000003.png", "checks", f".part-{7:016x}", f".part-{8:016x}"),
+        *others,
+        *("00000003.png", f".part-{7:016x}", f".part-{8:016x}"),
     }
-    assert {path.name for path in (place / "checks").iterdir()} == {"film.sha256", "0123abcd.sha256", "89ab.sha256"}
-    assert left == {place.name: 9}
-    assert inbetween_folders.size(folder, source) == 0
+    assert {path.name for path in (place / "checks").iterdir()} == {"film.sha256", "89ab.sha256"}
+    assert (place / f".part-{7:016x}" / "film.png").exists()
+    assert left == {place.name: 8}
+    assert inbetween_cache.size(folder, source) == 0
 
 
 def test_a_hard_link_goes_by_its_name_alone(source, folder, place, tmp_path):
@@ -217,23 +218,22 @@ def test_a_manifest_that_does_not_fit_its_folder_is_another_s(source, folder, pl
     manifest = json.loads((place / "manifest.json").read_text())
     (place / "manifest.json").write_text(json.dumps(manifest | {key: 0}))
     before = listed(folder)
-    assert purge(folder) == (0, {})
+    assert purge(folder, source) == (0, {})
     assert listed(folder) == before
 
 
-def test_a_manifest_of_another_folder_is_another_s(folder, place):
+def test_a_manifest_of_another_folder_is_another_s(source, folder, place):
     place.rename(folder / "mine")
-    assert purge(folder) == (0, {})
+    assert purge(folder, source) == (0, {})
 
 
 # Writing
 
 
-@pytest.mark.parametrize("name", ["", "checks"])
-def test_nothing_is_built_behind_a_link(source, folder, place, outside, name):
+def test_nothing_is_built_behind_a_link(source, folder, place, outside):
     before = listed(outside)
-    shutil.rmtree(place / name)
-    (place / name).symlink_to(outside / name)
+    shutil.rmtree(place)
+    place.symlink_to(outside)
     with pytest.raises(MediaError, match="it is a link, and none is followed") as raised:
         build(source, folder)
     assert str(raised.value).startswith(str(place))
@@ -251,27 +251,18 @@ def test_nothing_is_written_through_links_in_the_place_of_files(source, folder, 
     assert not any(path.is_symlink() for path in place.rglob("*"))
 
 
-def test_nothing_is_taken_down_through_links(source, folder, place, outside, monkeypatch):
+def test_nothing_is_noted_through_links(source, folder, place, outside):
     before = listed(outside)
-    for name, planted in (("0000aaaa", Path.symlink_to), ("0000bbbb", Path.hardlink_to)):
-        with monkeypatch.context() as chance:
-            chance.setattr(inbetween_cache.secrets, "token_hex", lambda _bytes, name=name: name)
-            one = inbetween_cache.InbetweenCache(source, folder, FACTOR, "quick")
-        planted(place / "checks" / f"{name}.sha256", outside / "checks" / "mine.sha256")
-        with pytest.raises(MediaError, match="in-between frames cannot be written there"):
-            one.note("# 1 same")
+    (place / "00000001.same").symlink_to(outside / "00000001.png")
+    inbetween_cache.InbetweenCache(source, folder, FACTOR, "quick").note(1, "same")
     assert listed(outside) == before
+    assert not (place / "00000001.same").is_symlink()
 
 
 # What is read
 
 
-def many_digits(path):
-    path.write_text(f"# {'1' * 5000} same 00000000\n{'0' * 64}  {'1' * 5000}.png\n")
-
-
 KINDS = {
-    "digits": many_digits,
     "folder": Path.mkdir,
     "fifo": os.mkfifo,
     "socket": a_socket,
@@ -290,7 +281,7 @@ KINDS = {
 
 
 @pytest.mark.parametrize("kind", KINDS)
-@pytest.mark.parametrize("name", ["checks/0123abcd.sha256", "checks", "manifest.json", "00000001.png", ""])
+@pytest.mark.parametrize("name", ["manifest.json", "00000001.png", ""])
 def test_whatever_lies_there_is_ignored_or_refused(source, folder, place, kind, name):
     """And what is built is right afterwards, or there is one sentence."""
     expected, path = kept(folder), place / name
@@ -301,19 +292,19 @@ def test_whatever_lies_there_is_ignored_or_refused(source, folder, place, kind, 
     used(source, folder)
     if refused := refusal(build, source, folder):
         assert "cannot be written there" in refused
-        assert kind == "folder" or name in ("", "checks")
+        assert kind == "folder" or name == ""
     else:
         assert expected.items() <= kept(folder).items()
         used(source, folder)
-    inbetween_folders.size(folder)
-    assert "cannot be removed" in (refusal(inbetween_folders.purge, folder) or "cannot be removed")
+    inbetween_cache.size(folder, source)
+    assert "cannot be removed" in (refusal(inbetween_cache.purge, folder, source) or "cannot be removed")
 
 
 def used(source, folder):
     """Asks for all that there is; pictures are right, or refused."""
     assert state(source, folder).done <= COUNT - 1
-    assert inbetween_folders.size(folder, source) >= 0
-    assert inbetween_cache.stamp(folder, source.path.stem, FACTOR, "quick") is not None
+    assert inbetween_cache.size(folder, source) >= 0
+    assert inbetween_cache.stamp(folder, FACTOR, "quick", source.path.stem) is not None
     with opened(source, folder) as between:
         for index in range(between.count):
             with suppress(MediaError):
@@ -334,43 +325,32 @@ def test_a_folder_that_is_a_file_or_a_pipe(source, folder):
         with pytest.raises(MediaError, match="in-between frames cannot be written there"):
             build(source, folder)
         if not folder.is_symlink():
-            assert purge(folder) == (0, {})
+            assert purge(folder, source) == (0, {})
         folder.unlink()
 
 
 @pytest.mark.skipif(os.geteuid() == 0, reason="root may read everything")
-@pytest.mark.parametrize("name", ["checks", "checks/*", "manifest.json", "00000001.png", ""])
+@pytest.mark.parametrize("name", ["manifest.json", "00000001.png", ""])
 def test_another_user_s_files_are_ignored_and_stay_findable(source, folder, place, name):
     before = listed(folder)
     (path,) = place.glob(name) if name else [place]
     mode = path.stat().st_mode
     path.chmod(0)
     used(source, folder)
-    for refused in (refusal(build, source, folder), refusal(inbetween_folders.purge, folder)):
+    for refused in (refusal(build, source, folder), refusal(inbetween_cache.purge, folder, source)):
         assert refused is None or "Permission denied" in refused
     path.exists() and path.chmod(mode)
     assert name in ("manifest.json", "00000001.png") or listed(folder).keys() >= before.keys()
 
 
-def test_lines_of_frames_that_the_source_has_not_say_nothing(source, folder, place):
-    with (place / "checks" / "0123abcd.sha256").open("w") as file:
-        for pair in (COUNT - 1, COUNT, 999_999_999):
-            file.write(inbetween_cache.pair_line(pair, "cut") + "\n")
-        for frame in (0, FACTOR, (COUNT - 1) * FACTOR + 1, 99_999_999):
-            file.write(f"{'0' * 64}  {frame:08d}.png\n")
+def test_names_of_frames_that_the_source_has_not_say_nothing(source, folder, place):
+    for pair in (COUNT - 1, COUNT, 99_999_999):
+        (place / f"{pair:08d}.cut").touch()
+    for frame in (0, FACTOR, (COUNT - 1) * FACTOR + 1, 99_999_999):
+        (place / f"{frame:08d}.png").touch()
     assert state(source, folder) == ("ready", COUNT - 1, COUNT - 1)
-    pictures(folder)[0].unlink()
+    (place / "00000001.png").unlink()
     assert state(source, folder) == ("partial", COUNT - 2, COUNT - 1)
-    one = inbetween_cache.InbetweenCache(source, folder, FACTOR, "quick")
-    one.load()
-    assert len(one.digests) == (COUNT - 1) * (FACTOR - 1)
-    assert not one.kinds
-
-
-def noted(place, path):
-    """Takes a file down as if it had been built."""
-    digest = hashlib.sha256(path.read_bytes()).hexdigest()
-    (place / "checks" / "0123abcd.sha256").write_text(f"{digest}  {path.name}\n")
 
 
 def bomb(path):
@@ -394,13 +374,12 @@ def bomb(path):
     ],
 )
 def test_a_picture_of_another_kind_is_never_shown(tmp_path, folder, samples, suffix, write):
-    """Though its check is right; and it is built again."""
+    """And it is built again."""
     with open_source(footage(tmp_path / "shot", 3, samples=samples, suffix=suffix)) as source:
         build(source, folder)
         expected = kept(folder)
         path = pictures(folder)[1]
         write(path)
-        noted(path.parent.parent / path.parent.name, path)
         with opened(source, folder) as between:
             with pytest.raises(MediaError, match=f"{path.name}: this in-between frame is damaged or gone"):
                 between.read(int(path.stem))
@@ -413,10 +392,9 @@ def test_a_picture_that_cannot_be_decoded_is_one_sentence(source, folder, place)
     path = pictures(folder)[1]
     data = path.read_bytes()
     path.write_bytes(data[: len(data) // 2] + bytes(len(data) - len(data) // 2 - 12) + data[-12:])
-    noted(place, path)
     with opened(source, folder) as between, pytest.raises(MediaError, match="cannot be decoded; remove in-between"):
         between.read(int(path.stem))
-    assert purge(folder)[1] == {}
+    assert purge(folder, source)[1] == {}
 
 
 def test_a_source_that_became_a_pipe_is_one_sentence(source, folder):
@@ -426,12 +404,10 @@ def test_a_source_that_became_a_pipe_is_one_sentence(source, folder):
             ask(source, folder)
 
 
-def test_what_is_known_of_folders_is_bounded_and_forgotten(source, tmp_path, monkeypatch):
-    looked, load, digests = [], inbetween_cache.InbetweenCache.load, inbetween_folders.read_checks
-    monkeypatch.setattr(
-        inbetween_cache.InbetweenCache, "load", lambda cache: looked.append(cache.folder) or load(cache)
-    )
-    monkeypatch.setattr(inbetween_folders, "read_checks", lambda cache: looked.append(cache.path) or digests(cache))
+def test_what_is_known_of_folders_is_forgotten(source, tmp_path, monkeypatch):
+    looked, listing = [], inbetween_cache.Folder.files
+    monkeypatch.setattr(inbetween_cache.Folder, "files", lambda cache: looked.append(cache.path) or listing(cache))
+    monkeypatch.setattr(inbetween_cache, "_RECENT", 0)
 
     def looks(ask, *given):
         looked.clear()
@@ -439,15 +415,11 @@ def test_what_is_known_of_folders_is_bounded_and_forgotten(source, tmp_path, mon
         return len(looked)
 
     build(source, tmp_path / "cache")
-    for ask in ((state, source, tmp_path / "cache"), (inbetween_folders.size, tmp_path / "cache")):
+    for ask in ((state, source, tmp_path / "cache"), (inbetween_cache.size, tmp_path / "cache", source)):
+        inbetween_cache.forget()
         assert [looks(*ask) for _ in range(2)] == [1, 0]
-        inbetween_folders.forget()
-        assert [looks(*ask) for _ in range(2)] == [1, 0]
-    for number in range(128):
-        state(source, tmp_path / f"{number}")
-    assert [looks(state, source, tmp_path / f"{number}") for number in (127, 120, 0, 1)] == [0, 0, 1, 1]
-    inbetween_folders.forget()
-    assert inbetween_cache.content_hash.cache_info().currsize == 0
+    inbetween_cache.forget()
+    assert derived.content_hash.cache_info().currsize == 0
 
 
 # All at once
@@ -456,7 +428,6 @@ CHANGES = {
     "flip": lambda path, rng: flip(path, rng),
     "cut": lambda path, rng: path.write_bytes(path.read_bytes()[: rng.randrange(path.stat().st_size + 1)]),
     "twice": lambda path, rng: path.write_bytes(path.read_bytes() * 2),
-    "swap": lambda path, rng: swap(path, rng.choice(sorted(path.parent.iterdir()))),
     "remove": lambda path, rng: path.unlink(),
     "fifo": lambda path, rng: replace(path, os.mkfifo),
     "folder": lambda path, rng: replace(path, Path.mkdir),
@@ -471,13 +442,6 @@ def flip(path, rng):
     path.write_bytes(data)
 
 
-def swap(path, other):
-    if not other.is_dir():
-        path.rename(path.with_name("between"))
-        other.rename(path) if other != path else None
-        path.with_name("between").rename(other)
-
-
 def test_damage_of_any_kind_is_right_or_refused(tmp_path, folder, outside):
     with open_source(footage(tmp_path / "shot", 4)) as source:
         build(source, tmp_path / "whole")
@@ -488,7 +452,7 @@ def test_damage_of_any_kind_is_right_or_refused(tmp_path, folder, outside):
             shutil.copytree(tmp_path / "whole", folder)
             for _ in range(rng.randrange(1, 5)):
                 files = sorted(path for path in folder.rglob("*") if path.is_file() and path.stat().st_size)
-                path = rng.choice([*files, *folder.glob("*/checks/*.sha256"), *folder.glob("*/manifest.json")])
+                path = rng.choice([*files, *folder.glob("*/manifest.json")])
                 if path.is_file() and not path.is_symlink():
                     CHANGES[rng.choice(sorted(CHANGES))](path, rng)
             check(source, folder, seed)
@@ -500,14 +464,14 @@ def check(source, folder, seed):
     frames = [right(source, index) for index in range((source.count - 1) * FACTOR + 1)]
     for _ in range(2):
         state(source, folder)
-        inbetween_folders.size(folder, source)
+        inbetween_cache.size(folder, source)
         with opened(source, folder) as between:
             for index, frame in enumerate(frames):
                 with suppress(MediaError):
                     assert np.array_equal(between.read(index), frame), (seed, index)
         refused = refusal(build, source, folder)
         assert "cannot be written there" in refused if refused else state(source, folder).name == "ready", seed
-    assert "cannot be removed" in (refusal(inbetween_folders.purge, folder) or "cannot be removed"), seed
+    assert "cannot be removed" in (refusal(inbetween_cache.purge, folder, source) or "cannot be removed"), seed
 
 
 def test_what_another_version_has_built_is_left_alone(source, folder, monkeypatch):

@@ -5,10 +5,8 @@ from __future__ import annotations
 import argparse
 import json
 from argparse import Namespace
-from collections.abc import Iterator
-from contextlib import ExitStack, closing, contextmanager
+from contextlib import ExitStack, closing
 from dataclasses import replace
-from functools import partial
 from typing import Any
 
 from ...core import atomic_write
@@ -17,10 +15,12 @@ from ...core.model import outlines, presence
 from ...core.model.clip import nearest
 from ...core.model.effect import Effect, OutlineRegion, Region
 from ...core.recipes import recipe, recipe_file, region_keys
-from ...media import PrefetchSource, camera_tracking, filmed_frames, matte_tracking, registration, tracking
+from ...media import PrefetchSource, camera_tracking, matte_tracking, registration, tracking
 from ...media.carried_mattes import CarriedMattes
 from ...media.cuts import ShotSource
+from ...media.filmed_frames import FilmedFrames
 from ...media.footage import Footage
+from ...media.tracking import Tracked
 from ..editing import new_edit
 from ..output import film_output
 from ..rendering import render_job
@@ -67,12 +67,10 @@ def run(arguments: Namespace) -> None:
         except tracking.TrackingError as error:
             raise tracking.TrackingError(f"{subject}: {error}") from None
         size = medium.width, medium.height
-    placements = {frame: step.placement for frame, step in tracked.items()}
-    with_keys = _keyed(source_recipe, index, placements, {arguments.frame}, size, thin=not arguments.all_keys)
-    has_matte = index is not None and isinstance(source_recipe.regions[index], OutlineRegion)
-    if not (arguments.hold or has_matte):  # a matte says itself where it is
-        with_keys = _ended(with_keys, index, tracked, stops, arguments.frame, frames)
-    _write_track(arguments, with_keys, tracked, stops)
+    keyed = _keyed(arguments, source_recipe, index, tracked, size)
+    if not arguments.hold:
+        keyed = _ended(keyed, index, tracked, stops, arguments.frame, frames)
+    _write_track(arguments, keyed, tracked, stops)
     for stop in stops:
         if stop.fault == tracking.SHOT_ENDS:
             near = stop.frame - 1 if stop.frame > arguments.frame else stop.frame + 1
@@ -101,7 +99,7 @@ def _followed(
     effect = source_recipe.for_picture(medium.width / medium.height)
     subject: Any = effect.camera if index is None else effect.regions[index]
     times = {frame: _shown(source_recipe, frame, medium.count) for frame in frames}
-    filmed = filmed_frames.FilmedFrames(times, arguments.frame)
+    filmed = FilmedFrames(times, arguments.frame)
     with ExitStack() as ends:
         shots = ends.enter_context(ShotSource(PrefetchSource(medium)))
         moved = ends.enter_context(film_output.progress(len(filmed.frames), "frame"))
@@ -112,8 +110,8 @@ def _followed(
             regions = [filmed.seen(region) for region in drawn]
             steps = camera_tracking.follow_camera(filmed.seen(subject), regions, *what, motion=arguments.motion)
         elif isinstance(subject, OutlineRegion):
-            covers = partial(_cover, arguments, source_recipe, subject, filmed)
-            steps = matte_tracking.follow_cover(filmed.seen(subject), covers, *what, motion=arguments.motion)
+            cover = _cover(arguments, source_recipe, subject, filmed, ends)
+            steps = matte_tracking.follow_cover(filmed.seen(subject), cover, *what, motion=arguments.motion)
         else:
             steps = tracking.follow(filmed.seen(subject), *what, motion=arguments.motion)
         tracked = []
@@ -127,29 +125,30 @@ def _followed(
     return {each.frame: each for each in shown if not each.fault}, stops
 
 
-@contextmanager
 def _cover(
-    arguments: Namespace, source_recipe: Effect, region: OutlineRegion, filmed: Any, size: tuple[int, int]
-) -> Iterator[matte_tracking.Cover]:
-    """What an outline covers at the places of filmed frames (media.matte_tracking.Cover)."""
+    arguments: Namespace, source_recipe: Effect, region: OutlineRegion, filmed: FilmedFrames, ends: ExitStack
+) -> matte_tracking.Cover:
+    """What an outline covers at the places of filmed frames; ends: what closes its mattes."""
     if region.between == "straight":
-        with matte_tracking.cover_within(filmed.seen(region.drawings).at, size) as cover:
-            yield cover
-        return
-    with command_line.opened(arguments.source) as medium:
-        drawings, drawn = region.drawings, {}
-        for strokes, frame in zip(drawings.strokes, drawings.frames, strict=True):
-            drawn[int(_shown(source_recipe, frame, medium.count))] = outlines.curves(strokes)
-        with closing(CarriedMattes(medium, tuple(sorted(drawn.items())))) as mattes:
-            yield matte_tracking.cover_of(mattes, filmed.index_at, size)
+        return lambda place, size: outlines.coverage(region.drawings.at(filmed.timeline[place]), *size)
+    medium = ends.enter_context(command_line.opened(arguments.source))
+    drawn = {}
+    for strokes, frame in zip(region.drawings.strokes, region.drawings.frames, strict=True):
+        drawn[int(_shown(source_recipe, frame, medium.count))] = outlines.curves(strokes)
+    mattes = ends.enter_context(closing(CarriedMattes(medium, tuple(sorted(drawn.items())))))
+    return matte_tracking.cover_of(mattes, filmed.index_at)
 
 
-def _keyed(source_recipe: Effect, index: int | None, *placements, thin: bool) -> Effect:
-    """The recipe with placements as keys of a region, or of the camera; arguments: see region_keys."""
+def _keyed(
+    arguments: Namespace, source_recipe: Effect, index: int | None, tracked: dict[int, Tracked], size: tuple[int, int]
+) -> Effect:
+    """The recipe with what was tracked as keys of a region, or of the camera."""
+    placements = {frame: step.placement for frame, step in tracked.items()}
+    what, thin = (placements, {arguments.frame}, size), not arguments.all_keys
     if index is None:
-        return region_keys.with_camera(source_recipe, *placements, thin=thin)
+        return region_keys.with_camera(source_recipe, *what, thin=thin)
     regions: list[Any] = list(source_recipe.regions)
-    regions[index] = region_keys.with_placements(regions[index], *placements, thin=thin)
+    regions[index] = region_keys.with_placements(regions[index], *what, thin=thin)
     return source_recipe.with_parts(regions)
 
 
@@ -163,6 +162,8 @@ def _ended(source_recipe: Effect, index: int | None, tracked: dict, stops: list,
         camera = replace(camera, influence=region_keys.with_ends(camera.influence, keys, frames))
         return source_recipe.with_parts(source_recipe.regions, camera)
     regions, keys = list(source_recipe.regions), presence.keys(seen, ends, {start})
+    if isinstance(regions[index], OutlineRegion):  # a matte says itself where it is
+        return source_recipe
     regions[index] = replace(regions[index], opacity=region_keys.with_ends(regions[index].opacity, keys, frames))
     return source_recipe.with_parts(regions)
 

@@ -9,6 +9,7 @@ import bpy
 from bpy.app.translations import pgettext_rpt as rpt_
 from bpy.types import PropertyGroup
 
+from ...core.memo import Kept
 from ...core.messages import EffectError
 from ...core.model.effect import Method
 from ...media import inbetween_cache
@@ -68,18 +69,15 @@ class BuiltStamps:
     _MOST = 64
 
     def __init__(self) -> None:
-        self._known: dict[tuple, tuple] = {}
+        self._known: Kept[tuple, tuple] = Kept()
         self.is_held = False
 
     def of(self, settings: Settings, stem: str) -> tuple:
         """The stamp of the frames of sources whose files have that stem."""
         key = *settings, stem
-        if not (self.is_held and key in self._known):
+        if not self.is_held:
             self._known.pop(key, None)
-            while len(self._known) >= self._MOST:
-                del self._known[next(iter(self._known))]
-            self._known[key] = inbetween_cache.stamp(settings.folder, stem, settings.factor, settings.method)
-        return self._known[key]
+        return self._known.ask(key, lambda: inbetween_cache.stamp(*settings, stem), self._MOST)
 
     def forget(self) -> None:
         """Forgets all: before another file is loaded."""

@@ -16,7 +16,7 @@ from bpy.types import Scene
 
 from ...core import threads
 from ...core.farm.edit_version import EditVersion, Footage
-from ...media import MediaError, inbetween_cache
+from ...media import MediaError, derived
 from ...media.files import stamp
 from . import colour_configuration, external_files, source_media, strips
 
@@ -87,14 +87,14 @@ def _footage(files: list[Path]) -> Footage:
 
 def digests(files: list[Path]) -> list[bytes | None]:
     """Digests of the contents of files that are read together; None for one that is missing, or cannot be read."""
-    whole = inbetween_cache.WHOLE if len(files) <= _FEW else _BLOCKS
+    whole = derived.WHOLE if len(files) <= _FEW else _BLOCKS
     with threads.pool(_READERS) as pool:
         return list(pool.map(partial(_digest, whole=whole), files))
 
 
 def _digest(path: Path, whole: int) -> bytes | None:
-    """As inbetween_cache.content_digest; None: the file is missing, or cannot be read."""
+    """As derived.content_digest; None: the file is missing, or cannot be read."""
     try:
-        return inbetween_cache.content_digest(path, whole)
+        return derived.content_digest(path, whole)
     except MediaError:
         return None

@@ -19,7 +19,7 @@ from bpy.types import PropertyGroup, Scene, Strip
 
 from ...core import revision, threads
 from ...core.messages import EffectError, translated
-from ...core.model import limits, motions, presence
+from ...core.model import limits, motions, outlines, presence
 from ...core.model.frame_state import Options
 from ...core.model.keyframes import Samples
 from ...core.recipes import region_keys
@@ -266,10 +266,11 @@ def _region(
     follow: Callable = partial(tracking.follow, shape)
     if strips.is_carried(effect.regions[index]):
         carried = snapshot.carried_outline(scene, effect, strip, index, frames)
-        follow = partial(matte_tracking.follow_cover, shape, partial(matte_tracking.carried_cover, carried))
+        follow = partial(matte_tracking.follow_carried, shape, *carried)
     elif effect.regions[index].kind == "OUTLINE":
-        cover = partial(matte_tracking.cover_within, shape.drawings.at)
-        follow = partial(matte_tracking.follow_cover, shape, cover)
+        follow = partial(
+            matte_tracking.follow_cover, shape, lambda frame, size: outlines.coverage(shape.drawings.at(frame), *size)
+        )
     return _Subject(follow, lambda: motions.offsets(shape.drawings.at(here.frame)))
 
 

@@ -13,10 +13,10 @@ from bpy.types import PropertyGroup, Scene, Strip
 
 from ...core import threads
 from ...core.frames.frame_source import FrameSource
+from ...core.memo import Kept
 from ...core.messages import EffectError
 from ...core.model.shutters import ShutterError
-from ...media import MediaError, inbetween_folders
-from ...media.inbetween import build, estimate
+from ...media import MediaError, inbetween, inbetween_cache
 from ..data import inbetween_settings, snapshot, source_media, strips
 from . import strobing
 
@@ -31,13 +31,14 @@ class Look(NamedTuple):
     size: bytes that the source's take, of all factors and methods
     estimate: bytes that they will take about; None while that is being found out, 0 if it cannot be"""
 
-    state: inbetween_folders.State
+    state: inbetween_cache.State
     size: int
     estimate: int | None
 
 
-_media: dict[tuple, tuple] = {}  # by source_media.media_key: the medium, its file not open; bytes for a factor of 2
-_looks: dict[tuple, tuple[float, inbetween_folders.State, int]] = {}  # when it was looked, and what was found
+# By source_media.media_key: the medium, its file not open; bytes for a factor of 2.
+_media: Kept[tuple, tuple[FrameSource, Future[int]]] = Kept()
+_looks: Kept[tuple, tuple[inbetween_cache.State, int]] = Kept()  # how far a source's are built, and bytes
 
 
 @dataclass
@@ -54,36 +55,31 @@ _builds = _Builds()
 
 def look(scene: Scene, effect: PropertyGroup, strip: Strip) -> Look:
     """How things are, or were a second ago. MediaError, EffectError: there is no source, or no place for frames."""
-    source = strips.source_of(scene, effect, strip)
     settings = inbetween_settings.settings(effect)
-    medium, doubled = _known(spec := source_media.spec(source))
-    key = spec.key, *settings
-    if key not in _looks or time.monotonic() - _looks[key][0] > _FRESH:
-        state, size = inbetween_folders.state(medium, *settings), inbetween_folders.size(settings[0], medium)
-        _looks[key] = time.monotonic(), state, size
-        _trim(_looks)
-    return Look(*_looks[key][1:], doubled.result() * (settings[1] - 1) if doubled.done() else None)
+    spec = source_media.spec(strips.source_of(scene, effect, strip))
+    medium, doubled = _known(spec)
+
+    def find() -> tuple[inbetween_cache.State, int]:
+        return inbetween_cache.state(medium, *settings), inbetween_cache.size(settings.folder, medium)
+
+    state, size = _looks.ask((spec.key, *settings, time.monotonic() // _FRESH), find, _KEPT)
+    return Look(state, size, doubled.result() * (settings.factor - 1) if doubled.done() else None)
 
 
-def _known(spec: source_media.SourceSpec) -> tuple:
-    """A source's medium, and a future of the bytes that its in-between frames take for a factor of 2."""
-    if spec.key not in _media:
+def _known(spec: source_media.SourceSpec) -> tuple[FrameSource, Future[int]]:
+    """A source's medium, and the bytes that its in-between frames take for a factor of 2."""
+
+    def find() -> tuple[FrameSource, Future[int]]:
         medium = spec.open()
         medium.close()
-        _media[spec.key] = medium, threads.start(_estimated, medium)
-    _trim(_media)
-    return _media[spec.key]
+        return medium, threads.start(_estimated, medium)
 
-
-def _trim(known: dict) -> None:
-    """Lets the oldest go."""
-    while len(known) > _KEPT:
-        del known[next(iter(known))]
+    return _media.ask(spec.key, find, _KEPT)
 
 
 def _estimated(medium: FrameSource) -> int:
     with medium, suppress(MediaError, OSError):  # a build says what is wrong
-        return estimate(medium, 2)
+        return inbetween.estimate(medium)
     return 0
 
 
@@ -91,7 +87,7 @@ class Build:
     """In-between frames of an effect that are being built, by a thread that touches no bpy.
 
     scene: session_uid of the effect's scene; done, total: pairs of neighbouring source frames; settings: what it builds
-    future: how far it came, an inbetween_folders.State; or MediaError"""
+    future: how far it came, an inbetween_cache.State; or MediaError"""
 
     def __init__(self, scene: Scene, effect: PropertyGroup, strip: Strip, factor: int | None = None) -> None:
         """factor: builds what the strip needs with it, in place of all of the source with its own. EffectError,
@@ -106,21 +102,21 @@ class Build:
         self._stopped = threading.Event()
         self.future = threads.start(self._build, _builds.left, medium, pairs)
 
-    def _build(
-        self, before: tuple[Future, ...], medium: FrameSource, pairs: list[int] | None
-    ) -> inbetween_folders.State:
+    def _build(self, before: tuple[Future, ...], medium: FrameSource, pairs: list[int] | None) -> inbetween_cache.State:
         wait(before)
         with medium:
-            return build(medium, *self.settings, update=self._update, cancelled=self._stopped.is_set, pairs=pairs)
+            return inbetween.build(
+                medium, *self.settings, update=self._update, cancelled=self._stopped.is_set, pairs=pairs
+            )
 
     def _update(self, done: int, _total: int) -> None:
         self.done = done
 
-    def result(self) -> inbetween_folders.State:
+    def result(self) -> inbetween_cache.State:
         """How far it came, or has come where it was stopped. MediaError: why it could not go on."""
         if self.future.done():
             return self.future.result()
-        return inbetween_folders.State("partial", self.done, self.total)
+        return inbetween_cache.State("partial", self.done, self.total)
 
     def stop(self) -> None:
         """Has it end soon, with the step that is under way; what is finished is kept."""
@@ -165,7 +161,7 @@ def purge(effect: PropertyGroup, source: Strip) -> tuple[int, list[tuple]]:
     wait(_builds.left)
     folder, (medium, _) = inbetween_settings.folder(effect), _known(source_media.spec(source))
     left = []
-    freed = inbetween_folders.purge(folder, medium, lambda *place: left.append(place))
+    freed = inbetween_cache.purge(folder, medium, lambda *place: left.append(place))
     with suppress(OSError):  # other sources' are left there, or it never was
         folder.rmdir()
     _looks.clear()
@@ -182,4 +178,4 @@ def stop() -> None:
     wait([doubled for _medium, doubled in _media.values()])
     _media.clear()
     _looks.clear()
-    inbetween_folders.forget()
+    inbetween_cache.forget()
