@@ -53,7 +53,6 @@ class FrameSource(ABC):
     from_proxy: whether frames are read from a proxy, as far as it has them
     by_blender: whether a second Blender decodes them, for want of PyAV
     windows: how many windows of a picture read it, which have to have room beside one another
-    is_made: whether frames are made, quickly, of others that are kept
     """
 
     path: Path
@@ -72,7 +71,6 @@ class FrameSource(ABC):
     from_proxy: bool = False
     by_blender: bool = False
     windows: int = 1
-    is_made: bool = False
 
     @property
     def files(self) -> list[Path]:
@@ -101,10 +99,6 @@ class FrameSource(ABC):
     def check(self, index: int) -> None:
         """MediaError: the frame does not exist (see `has`)."""
         return  # all do
-
-    def keep(self, count: int) -> None:
-        """Has a source that keeps frames keep so many, at least."""
-        return  # most keep none
 
     def close(self) -> None:
         """Closes the file; a later read opens it again."""
