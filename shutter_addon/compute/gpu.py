@@ -127,15 +127,9 @@ class GPUCompositor:
     """request.Compositor on a Device."""
 
     def __init__(self, device: Device) -> None:
-        self.name = device.name
-        self.device = device
+        self.device, self.name, self.takes_planes = device, device.name, device.takes_planes
         self._textures = NamedTextures(device)
         self._displaying = Displaying(device)
-
-    @property
-    def takes_planes(self) -> bool:
-        """Whether frames that are planes are quickest to send."""
-        return self.device.takes_planes
 
     def current(self) -> AbstractContextManager:
         return self.device.current()

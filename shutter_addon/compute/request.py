@@ -3,7 +3,7 @@ with NumPy."""
 
 from __future__ import annotations
 
-from collections.abc import Collection, Hashable, Sequence
+from collections.abc import Hashable, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from typing import Any, NamedTuple, Protocol, TypeAlias
@@ -11,13 +11,13 @@ from typing import Any, NamedTuple, Protocol, TypeAlias
 import numpy as np
 
 from ..core.frames.frame_source import FrameSource
-from ..core.model.frame_state import FrameState, Options
+from ..core.model.frame_state import FrameState
 from ..core.model.mattes import Matte
 from ..core.pixels.shown_levels import Display
 from .memory_needs import Kind, Needs
 
 # What a compositor has on its device, which nothing else looks into: of a picture or of coefficients, on a GPU a
-# Texture, with NumPy an array.
+# Texture, with NumPy an array; of the frames that are exposed, a window.Window or a cpu.HostWindow.
 Handle: TypeAlias = Any
 
 
@@ -78,18 +78,6 @@ class Behind(NamedTuple):
     plate: np.ndarray | None = None
 
 
-class Window(Protocol):
-    """The source frames around the shown one; see compute.window."""
-
-    is_open: bool
-    sends: bool
-
-    @property
-    def held(self) -> Collection[int]: ...
-    def load(self, positions: np.ndarray, options: Options, shot: range) -> None: ...
-    def release(self) -> None: ...
-
-
 class Stages(Protocol):
     """What a renderer has for itself. What a method gives is valid until its next call."""
 
@@ -128,9 +116,7 @@ class Compositor(Protocol):
     takes_planes: whether frames that are planes (core.frames.planes) are quickest to send"""
 
     name: str
-
-    @property
-    def takes_planes(self) -> bool: ...
+    takes_planes: bool
 
     def current(self) -> AbstractContextManager:
         """A context manager: all other methods are called inside it, on any one thread (Device.current)."""
@@ -140,8 +126,8 @@ class Compositor(Protocol):
 
     def window(
         self, source: FrameSource, capacity: int, moved: bool = False, shutters: int = 4, summed: bool = True
-    ) -> Any:
-        """A Window of `capacity` frames; moved: pictures of it have FrameState.following; shutters: of these pictures;
+    ) -> Handle:
+        """A window of `capacity` frames; moved: pictures of it have FrameState.following; shutters: of these pictures;
         summed: all of them average."""
 
     def stages(self) -> Stages: ...
@@ -167,7 +153,7 @@ class Compositor(Protocol):
     def shown(self, drawn: Handle, display: Display) -> np.ndarray:
         """The levels (H, W, 4) uint8 of an opaque scene-linear picture of `draw`, top row first."""
 
-    def draw(self, window: Any, request: Request, coefficients: Coefficients) -> Handle:
+    def draw(self, window: Handle, request: Request, coefficients: Coefficients) -> Handle:
         """The picture, premultiplied; window: has loaded all frames that some shutter exposes."""
 
     def release(self) -> None: ...

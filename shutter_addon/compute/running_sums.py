@@ -52,23 +52,14 @@ def accumulation(decode: int, sent: str, back: bool, tiled: bool, cover: int = 0
     """The pass that makes a layer of sums from its neighbour: with the frame between the two added, or subtracted.
 
     decode: of `decoding`
-    sent: as what the frame was sent, "colours", "numbers" (Device.send) or "planes"; "before": it is taken as the
+    sent: as what the frame was sent, "COLOURS", "NUMBERS" (Device.send) or "PLANES"; "AGAIN": it is taken as the
     difference of two layers that hold it already
     back: it is subtracted
     tiled: the sums are stored in tiles
     cover: of WeightedSums
     """
-    return read_pass(
-        "accumulate",
-        DECODE=decode,
-        AGAIN=int(sent == "before"),
-        BACK=int(back),
-        TILED=int(tiled),
-        NUMBERS=int(sent == "numbers"),
-        PLANES=int(sent == "planes"),
-        COVER=cover,
-        STORED=STORED_SUMS[cover],
-    )
+    macros = {"DECODE": decode, "BACK": int(back), "TILED": int(tiled), "COVER": cover, sent: 1}
+    return read_pass("accumulate", STORED=STORED_SUMS[cover], **macros)
 
 
 def _in_fours(plane: np.ndarray) -> np.ndarray:
@@ -165,7 +156,7 @@ class Sums(Window):
             given |= arguments | {"whole": float(self.whole)}
             images = given.pop("images", images)
         else:
-            sent = "before"
+            sent = "AGAIN"
             given |= {"before": same % self.layers, "after": (same + 1) % self.layers}
         decode = decoding(self.source.transfer, light)
         program = accumulation(decode, sent, next_ < known, self.tiled, self.cover)
@@ -186,10 +177,10 @@ class Sums(Window):
         """Sends a source frame: as what (`accumulation`), and the arguments of the pass that adds it."""
         frame = self.source.decoded(index) if self.device.takes_planes else self.source.read(index)
         if isinstance(frame, Planes):
-            return "planes", self._send_planes(frame)
+            return "PLANES", self._send_planes(frame)
         own = self._own("frame", "rgba8")
         sent = self.device.send(own, frame)
-        return "colours" if sent is own else "numbers", {"textures": {"frame": sent}}
+        return "COLOURS" if sent is own else "NUMBERS", {"textures": {"frame": sent}}
 
     def _send_planes(self, frame: Planes) -> Given:
         luma = self._extra.filled("luma", [_in_fours(frame.luma)], "r32ui")

@@ -10,7 +10,7 @@ import numpy as np
 from ..core.model.mattes import Matte
 from ..devices.device import Device, Texture
 from ..devices.named_textures import NamedTextures
-from ..devices.passes import Pass, read_pass
+from ..devices.passes import read_pass
 from .diffusion import follows_edges
 from .diffusion_gpu import Diffusion
 from .edge_diffusion_gpu import EdgeDiffusion
@@ -21,24 +21,6 @@ MOST_MATTES = 8
 # Pixels along a side of the blocks whose least share is looked at.
 BLOCK = 16
 LEAST = read_pass("layer", "LEAST")
-
-
-def blend_pass(count: int, adds: bool) -> Pass:
-    """Lays so many mattes; adds: any by the blend "add"."""
-    return read_pass("matte_blend", COUNT=count, ADDS=int(adds), MOST=MOST_MATTES)
-
-
-def laying_pass(begins: bool, ends: bool, opaque: bool, plain: bool, plate: bool, levels: bool) -> Pass:
-    """Lays a layer over a picture, or over what lies behind all; see shaders/layer.glsl."""
-    return read_pass(
-        "layer",
-        BEGINS=int(begins),
-        ENDS=int(ends),
-        OPAQUE=int(opaque),
-        PLAIN=int(plain and begins),
-        PLATE=int(plate and begins),
-        LEVELS=int(levels and ends),
-    )
 
 
 class Stages:
@@ -100,8 +82,9 @@ class Stages:
                     self._device.write(values, np.ascontiguousarray(array[..., None]), layer)
                     self._held[layer] = key
             over = self._textures.of(ends[0], (width, height, beneath.size[2]), "rgba32f")
+            adds = any(matte.blend == "add" for matte, _ in some)
             self._device.run(
-                blend_pass(len(some), any(matte.blend == "add" for matte, _ in some)),
+                read_pass("matte_blend", COUNT=len(some), ADDS=int(adds), MOST=MOST_MATTES),
                 over.size,
                 images={"under": beneath, "values": values, "over": over},
                 blocks={"table": table},
@@ -129,13 +112,14 @@ class Stages:
             ends = k == len(layers) - 1
             name = ("levels" if levels else "picture") if ends else f"part {k % 2}"
             picture = self._textures.of(name, (width, height, 1), "rgba8" if levels and ends else "rgba32f")
-            program = laying_pass(
-                begins=not k,
-                ends=ends,
-                opaque=layer.color is layer.share,
-                plain=behind.plain is not None,
-                plate=plate is not None,
-                levels=levels,
+            program = read_pass(
+                "layer",
+                BEGINS=int(not k),
+                ENDS=int(ends),
+                OPAQUE=int(layer.color is layer.share),
+                PLAIN=int(not k and behind.plain is not None),
+                PLATE=int(not k and plate is not None),
+                LEVELS=int(levels and ends),
             )
             textures = {"share": layer.share, "clear": behind.exposed.share, "plain": behind.plain, "plate": plate}
             images = {"under": under, "exposed": layer.color, "picture": picture}

@@ -82,20 +82,21 @@ def _layers():
         yield _of_sums(4, 2, cover == 1, tiled, light)
         for way in _WAYS:
             yield composition(way, 3, light, EDGES=2, SUMS=1, TILED=tiled)
-        for sent in ("colours", "planes", "before"):
+        for sent in ("COLOURS", "PLANES", "AGAIN"):
             yield running_sums.accumulation(1, sent, cover == 1, cover == 2, cover)
     for ends, opaque in itertools.product((True, False), repeat=2):
-        yield stages.laying_pass(True, ends, opaque, plain=not opaque, plate=ends, levels=ends)
-        yield stages.laying_pass(False, ends, opaque, plain=False, plate=False, levels=opaque)
+        macros = {"ENDS": int(ends), "OPAQUE": int(opaque)}
+        yield read_pass("layer", BEGINS=1, PLAIN=int(not opaque), PLATE=int(ends), LEVELS=int(ends), **macros)
+        yield read_pass("layer", LEVELS=int(opaque and ends), **macros)
 
 
 def _filling():
-    for tiled, sent in itertools.product((True, False), ("colours", "numbers", "planes", "before")):
+    for tiled, sent in itertools.product((True, False), ("COLOURS", "NUMBERS", "PLANES", "AGAIN")):
         yield running_sums.accumulation(1, sent, tiled, tiled)
     yield window.packing(1, True)
     yield window.packing(2, False)
     for adds in (False, True):
-        yield stages.blend_pass(2, adds)
+        yield read_pass("matte_blend", COUNT=2, ADDS=int(adds), MOST=stages.MOST_MATTES)
         yield read_pass("mix", BEGINS=int(adds))
 
 
