@@ -235,7 +235,7 @@ class LayerCase:
 
     def draw(self, index: int, coefficients: Coefficients):
         """The picture of frame `index`, of loaded windows."""
-        whole = Coefficients(self._compositor.upload(np.ones((1, 1, 1))), max(self._source.width, self._source.height))
+        whole = Coefficients(self._laying.upload(np.ones((1, 1, 1))), max(self._source.width, self._source.height))
         behind = self._compositor.draw(self.windows[0], Request(index, self._state), coefficients)
         own = self._compositor.draw(self.windows[1], Request(index, self._own), whole)
         exposures = Exposure(behind, behind), Exposure(own, own)

@@ -36,7 +36,7 @@ from .displaying import Displaying
 from .request import Coefficients, Handle, Request
 from .running_sums import Sums, open_window
 from .stages import Stages
-from .tables import moved_tables, padded, table
+from .tables import moved_tables, table
 from .window import BLOCK, PackedFrames, WholeFrames, Window
 
 
@@ -113,11 +113,6 @@ def _in_window(state: FrameState, chosen: tuple[int, ...]) -> FrameState:
     return replace(part, following=Following(following.first, still, 0 * still))
 
 
-def in_fours(values: np.ndarray) -> np.ndarray:
-    """Coefficients (N, h, w) as layers (⌈N/4⌉, h, w, 4) float32 of a texture."""
-    return np.moveaxis(padded(np.moveaxis(values, 0, -1)), 2, 0).astype(np.float32)
-
-
 def _bits(coefficients: Coefficients) -> int:
     """How far a pixel's place is shifted for that of its coefficients."""
     return (coefficients.block - 1).bit_length()
@@ -147,9 +142,6 @@ class GPUCompositor:
 
     def needs(self, source: FrameSource, kind: memory_needs.Kind) -> memory_needs.Needs:
         return memory_needs.of_windows(self.device, source, kind)
-
-    def upload(self, values: np.ndarray) -> Texture:
-        return self._textures.filled("coefficients", in_fours(values))
 
     def labels(self, values: np.ndarray) -> Texture:
         """Labels (H, W) uint16 as a texture r32ui. Valid until the next call."""

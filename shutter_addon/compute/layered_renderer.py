@@ -120,7 +120,7 @@ class LayeredRenderer:
         self.recent.windows = self._crowd * with_layers(self._source, len(parts), moves)
         windows = {name: self._window(name, part, len(request.state.bars)) for name, part in parts.items()}
         self._load(windows, positions, request, shot)
-        whole = Coefficients(self._compositor.upload(np.ones((1, 1, 1))), max(self._source.width, self._source.height))
+        whole = Coefficients(self._stages.upload(np.ones((1, 1, 1))), max(self._source.width, self._source.height))
         drawn = {
             name: self._compositor.draw(
                 windows[name], replace(part, levels=False), whole if name[0] >= 0 else coefficients

@@ -166,7 +166,7 @@ class Renderer:
             return self.drawn_coefficients(request)
         values = self.coefficients_with_layers(request)
         with self.compositor.current():
-            return Coefficients(self.compositor.upload(values), 1)
+            return Coefficients(self._stages.upload(values), 1)
 
     def drawn_labels(self, request: Request) -> tuple[Handle, int]:
         """Labels of the first layer on the device, a GPU: (texture array r32ui, block), top row first, each texel for
@@ -310,7 +310,7 @@ class Renderer:
 
     def _constant(self, values: np.ndarray) -> Coefficients:
         """Coefficients (N,) of the whole picture."""
-        return Coefficients(self.compositor.upload(values[:, None, None]), self._everywhere)
+        return Coefficients(self._stages.upload(values[:, None, None]), self._everywhere)
 
     def _with_mattes(self, request: Request, labels: list[LabelLayer]) -> Handle:
         """Coefficients on the device, with the mattes laid over what the scribbles give. They are laid again only if

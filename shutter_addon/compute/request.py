@@ -92,6 +92,9 @@ class Stages(Protocol):
     ) -> Handle:
         """Coefficients as compute.diffusion.diffuse has them; warm: they may start from the last ones."""
 
+    def upload(self, values: np.ndarray) -> Handle:
+        """Coefficients (N, h, w), or (N, 1, 1) of the whole picture. Valid until the next call."""
+
     def add(self, mixed: Handle | None, added: Handle, share: float, size: tuple[int, int]) -> Handle:
         """A sum (h, w) of shares of coefficients with one more; mixed: what was returned last, None: it begins."""
 
@@ -134,9 +137,6 @@ class Compositor(Protocol):
 
     def needs(self, source: FrameSource, kind: Kind) -> Needs:
         """What the windows of a picture need of memory."""
-
-    def upload(self, values: np.ndarray) -> Handle:
-        """Coefficients (N, h, w), or (N, 1, 1) of the whole picture. Valid until the next call."""
 
     def labels(self, values: np.ndarray) -> Handle:
         """Labels (H, W) uint16, on a GPU a texture r32ui. Valid until the next call."""

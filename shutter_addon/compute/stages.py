@@ -15,12 +15,18 @@ from .diffusion import follows_edges
 from .diffusion_gpu import Diffusion
 from .edge_diffusion_gpu import EdgeDiffusion
 from .request import Behind, Exposure
+from .tables import padded
 
 # Mattes that one pass lays, whose values are on the device at once.
 MOST_MATTES = 8
 # Pixels along a side of the blocks whose least share is looked at.
 BLOCK = 16
 LEAST = read_pass("layer", "LEAST")
+
+
+def _in_fours(values: np.ndarray) -> np.ndarray:
+    """Coefficients (N, h, w) as layers (⌈N/4⌉, h, w, 4) float32 of a texture."""
+    return np.moveaxis(padded(np.moveaxis(values, 0, -1)), 2, 0).astype(np.float32)
 
 
 class Stages:
@@ -48,6 +54,10 @@ class Stages:
             return self._edged.solve(labels, count, guide, strength)
         self._edged.release()
         return self._plain.solve(labels, count, warm=warm)
+
+    def upload(self, values: np.ndarray) -> Texture:
+        """See request.Stages."""
+        return self._textures.filled("uploaded", _in_fours(values))
 
     def add(self, mixed: Texture | None, added: Texture, share: float, size: tuple[int, int]) -> Texture:
         """See request.Stages."""
