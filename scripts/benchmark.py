@@ -51,8 +51,7 @@ from shutter_addon.compute import (
 )
 from shutter_addon.compute.gpu import GPUCompositor
 from shutter_addon.compute.layer_frames import WeightedFrames
-from shutter_addon.compute.laying import Behind, Exposure
-from shutter_addon.compute.request import Coefficients, Request
+from shutter_addon.compute.request import Behind, Coefficients, Exposure, Request
 from shutter_addon.compute.tables import table as table_of
 from shutter_addon.compute.window import Frames
 from shutter_addon.core.frames import light
@@ -220,7 +219,7 @@ class LayerCase:
 
     def __init__(self, compositor, source, state: FrameState, shutter: int):
         self._compositor, self._source, self._state = compositor, source, state
-        self._own, self._laying = state.alone(shutter), compositor.laying()
+        self._own, self._laying = state.alone(shutter), compositor.stages()
         window, shutters = state.options.window, len(state.bars)
         behind = WeightedFrames(source, lambda index: 1 - self.matte(index), rest=True)
         self.windows = [
@@ -236,7 +235,7 @@ class LayerCase:
 
     def draw(self, index: int, coefficients: Coefficients):
         """The picture of frame `index`, of loaded windows."""
-        whole = Coefficients(self._compositor.constant(np.ones(1)), max(self._source.width, self._source.height))
+        whole = Coefficients(self._laying.upload(np.ones((1, 1, 1))), max(self._source.width, self._source.height))
         behind = self._compositor.draw(self.windows[0], Request(index, self._state), coefficients)
         own = self._compositor.draw(self.windows[1], Request(index, self._own), whole)
         exposures = Exposure(behind, behind), Exposure(own, own)
@@ -298,10 +297,10 @@ class Case:
         width, height = -(-self.source.width // block), -(-self.source.height // block)
         self.labels = scribbles.rasterise(self.state.shapes, width, height)
         self.moved = np.roll(self.labels, max(1, width // 640), axis=(0, 1))  # three pixels of 1920
-        self.solver = self.compositor.solver()
+        self.solver = self.compositor.stages()
         self.handle = self.solver.solve(self.labels, count)
-        self.edge_solver = self.compositor.solver()
-        self.matting, self.layers = self.compositor.matting(), None
+        self.edge_solver = self.compositor.stages()
+        self.matting, self.layers = self.compositor.stages(), None
 
     @cached_property
     def layer(self) -> LayerCase:
@@ -333,18 +332,18 @@ class Case:
         if method in ("ours", "follow", "layer", *COMBINED):
             self.drawn = self._drawn(method)
             return
-        self.drawn, block = self.window.picture, self.state.options.aggregate if method == "paper" else 1
+        self.drawn, block = self.window.picture(), self.state.options.aggregate if method == "paper" else 1
         program = _appendix_a(self.state, self.shared) if method == "paper" else _average(self.state)
-        for top, height, frames in self.frames.bands():
-            extent = (-(-self.source.width // block), -(-height // block))
+        for part, frames in self.frames.stored():
+            extent = (-(-self.source.width // block), -(-part.height // block))
             textures = {"frames": frames, "coefficients": self.handle, "sums": self.sums}
             self.device.run(
                 program,
                 extent,
                 textures=textures,
-                images={"picture": self.window.picture},
-                size=(self.source.width, height),
-                top=top,
+                images={"picture": self.drawn},
+                size=(self.source.width, part.height),
+                top=part.top,
                 height=self.source.height,
                 first_layer=self.index % self.frames.layers,
             )
@@ -405,7 +404,7 @@ class Case:
     def matte_blend(self, method: str = "ours") -> None:
         """Lays what was read last, whose values are on the device then."""
         self.layers = self.layers or self.mattes.read("matte", self.state.options.aggregate)
-        self.laid = self.matting.lay(self.handle, *self.layers)
+        self.laid = self.matting.blend(self.handle, *self.layers)
 
     def must_move(self, name: str, method: str) -> int | None:
         """Bytes that a pass must move: all it has to read or write, once each. None: what counts is computing."""
@@ -475,7 +474,7 @@ class Case:
 
     def _diffusion_error(self) -> float:
         """Of what was solved last."""
-        count, exact = len(self.state.bars), self.compositor.solver()
+        count, exact = len(self.state.bars), self.compositor.stages()
         usual = diffusion_gpu.CYCLES, diffusion_gpu.WHOLE
         try:
             diffusion_gpu.CYCLES, diffusion_gpu.WHOLE = 12, max(self.labels.shape)

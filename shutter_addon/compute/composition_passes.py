@@ -50,7 +50,6 @@ class LightFormat:
 
     def defines(self) -> dict[str, int | str]:
         """The macros of include/compose.glsl that say so."""
-        mode = MODES[self.combine.mode]
         raw = {"rgba8": 0, "rgba16": 1}.get(self.kind, 2)
         return {
             "DECODE": self.decode,
@@ -59,89 +58,20 @@ class LightFormat:
             "LEVELS": int(self.levels),
             "COVER": self.cover,
             "STORED": STORED_SUMS[self.cover],
-            "COMBINE": mode,
+            "COMBINE": MODES[self.combine.mode],
             "BY_LUMINANCE": int(self.combine.by_luminance),
             "OPAQUE": int(self.opaque),
             "THRESHOLD": int(self.combine.threshold is not None),
-            "LEVELS_OF": (2 if self.premultiplied else raw) if mode == MODES["median"] else 0,
+            "LEVELS_OF": 2 if self.premultiplied else raw,
         }
 
 
-def composition(way: str, groups: int, stored: str, edges: int, light: LightFormat) -> Pass:
-    """The pass compose_<way> for a way of `way_of` other than "sums".
-
-    groups: of four shutters
-    stored: what the window holds: "frames", "sums", or sums in "tiles"
-    edges: a number of EDGES
-    """
-    return read_pass(
-        f"compose_{way}",
-        MOVED=0,
-        VALUE=int(way == "value"),
-        PACKED=0,
-        CONTINUED=0,
-        UNFINISHED=0,
-        QUADS=lines_of(way, light.combine) // 4,
-        GROUPS=groups,
-        SUMS=int(stored != "frames"),
-        TILED=int(stored == "tiles"),
-        EDGES=edges,
-        **light.defines(),
-    )
-
-
-def composition_of_sums(rows: float, groups: int, back: bool, tiled: bool, light: LightFormat) -> Pass:
-    """The pass compose_sums for `rows` pieces. back: the source plays in reverse; groups: as for `composition`."""
-    return read_pass(
-        "compose_sums",
-        ROWS=rows,
-        GROUPS=groups,
-        TABLE=(1 + rows) * (2 * groups + 1),
-        BACK=int(back),
-        TILED=int(tiled),
-        **light.defines(),
-    )
-
-
-def composition_of_moved(
-    way: str,
-    light: LightFormat,
-    *,
-    quads: int,
-    shutters: int,
-    mixed: int,
-    packed: bool,
-    shortened: bool,
-    sharp: bool,
-    continued: bool = False,
-    unfinished: bool = False,
-) -> Pass:
-    """The pass of a way, "frames", "search" or "value", where shutters follow something.
-
-    quads: of pixels that an invocation composes
-    shutters: their number; mixed: motions that are mixed for a pixel
-    packed: whether the window holds PackedFrames; shortened: whether frames are left out
-    sharp: how frames are resampled (core.pixels.compositor.seen)
-    continued, unfinished: whether passes over other frames come before, and after"""
-    return read_pass(
-        f"compose_{way}",
-        MOVED=1,
-        VALUE=int(way == "value"),
-        PACKED=int(packed),
-        CONTINUED=int(continued),
-        UNFINISHED=int(unfinished),
-        QUADS=quads,
-        GROUPS=-(-shutters // 4),
-        SHUTTERS=shutters,
-        MIXED=mixed,
-        SUMS=0,
-        TILED=0,
-        EDGES=EDGES["shorten"] if shortened else 0,
-        SHARP=int(sharp),
-        SQUARED=int(not light.encoded),
-        SEVERAL=int(continued or unfinished),
-        **light.defines(),
-    )
+def composition(way: str, groups: int, light: LightFormat, **macros: int) -> Pass:
+    """The pass compose_<way>, for `groups` of four shutters. macros: others of shaders/include/compose.glsl and
+    moved.glsl, or of compose_sums, as far as they are not 0."""
+    given: dict[str, int | str] = {"GROUPS": groups, "VALUE": int(way == "value"), **light.defines()}
+    given["QUADS"] = lines_of(way, light.combine) // 4
+    return read_pass(f"compose_{way}", **(given | macros))
 
 
 def lines_of(way: str, combine: Combine = AVERAGE) -> int:

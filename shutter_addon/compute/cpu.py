@@ -14,81 +14,16 @@ from ..core.model import mattes, windows
 from ..core.model.frame_state import Options
 from ..core.pixels import compositor, layering
 from ..core.pixels.shown_levels import Display
+from . import memory_needs
 from .diffusion import diffuse
 from .layer_frames import LARGEST, linear
-from .laying import Behind, Exposure
-from .request import Coefficients, Request
+from .request import Behind, Coefficients, Exposure, Request
 
 # A tile's rows and columns, a multiple of every block: its arrays stay in the processor's cache.
 TILE = 64
 
 Tile = tuple[slice, slice]
 Moves = tuple[np.ndarray, np.ndarray]
-
-
-class _Stage:
-    """What has nothing on a device."""
-
-    def release(self) -> None:
-        """There is nothing to free."""
-
-
-class Solver(_Stage):
-    """compute.diffusion, with the methods of compute.gpu.Solver. It ignores `warm`."""
-
-    gave_up = False
-
-    def solve(
-        self,
-        labels: np.ndarray,
-        count: int,
-        guide: np.ndarray | None = None,
-        strength: float = 0.0,
-        *,
-        warm: bool = False,
-    ) -> np.ndarray:
-        return diffuse(labels, count, guide, strength)
-
-
-class Matting(_Stage):
-    """core.model.mattes, with the methods of compute.matting.Matting."""
-
-    def lay(
-        self, beneath: np.ndarray, shown: tuple[mattes.Matte, ...], layers: Sequence[tuple[Hashable, np.ndarray]]
-    ) -> np.ndarray:
-        return mattes.blended(beneath, shown, [values for _, values in layers])
-
-
-class Mixing(_Stage):
-    """Shares of coefficients, with the methods of compute.mixing.Mixing."""
-
-    def add(self, mixed: np.ndarray | None, added: np.ndarray, share: float, size: tuple[int, int]) -> np.ndarray:
-        part = np.broadcast_to(added * np.float32(share), (len(added), *size))
-        return part if mixed is None else mixed + part
-
-
-class Laying(_Stage):
-    """core.pixels.layering, with the methods of compute.laying.Laying."""
-
-    def shares(self, exposed: Exposure) -> np.ndarray:
-        return exposed.share[..., 3]
-
-    least = shares
-
-    def around(self, exposed: Exposure) -> np.ndarray:
-        return layering.with_plate(exposed.color, exposed.share[..., 3], None)
-
-    def plate(self, picture: np.ndarray) -> np.ndarray:
-        return picture
-
-    def lay(self, behind: Behind, layers: Sequence[Exposure], levels: bool) -> np.ndarray:
-        color, share = behind.exposed
-        picture = layering.with_plate(color, share[..., 3], behind.plate)
-        if behind.plain is not None:
-            picture = np.where((share[..., 3] > layering.UNCOVERED)[..., None], behind.plain, picture)
-        for layer in layers:
-            picture = layering.laid_over(picture, layer.color, layer.share[..., 3])
-        return CPUCompositor().over_black(picture) if levels else picture
 
 
 class HostWindow:
@@ -168,29 +103,30 @@ def _of_tile(coefficients: Coefficients, tile: Tile) -> np.ndarray:
     return c / c.sum(axis=0)
 
 
-class CPUCompositor(_Stage):
-    """Composes with NumPy; the same methods as GPUCompositor."""
+class CPUCompositor:
+    """request.Compositor with NumPy, and its request.Stages: there is nothing to keep from one to the next."""
 
     name = "NumPy"
     takes_planes = False
-    solver, matting, mixing, laying = Solver, Matting, Mixing, Laying
 
-    def current(self) -> AbstractContextManager[CPUCompositor]:
+    def current(self) -> AbstractContextManager:
         return nullcontext(self)
 
     freeing = current
 
     def window(self, source: FrameSource, *_size: object) -> HostWindow:
-        """See GPUCompositor.window."""
         return HostWindow(source)
 
-    def constant(self, values: np.ndarray) -> np.ndarray:
-        return np.asarray(values, dtype=np.float32)[:, None, None]
+    def stages(self) -> CPUCompositor:
+        return self
 
-    def uploaded(self, values: np.ndarray) -> np.ndarray:
+    def needs(self, source: FrameSource, kind: memory_needs.Kind) -> memory_needs.Needs:
+        return memory_needs.with_numpy(source, kind)
+
+    def upload(self, values: np.ndarray) -> np.ndarray:
         return values
 
-    labels = uploaded
+    labels = upload
 
     def coefficients(self, handle: np.ndarray, count: int) -> np.ndarray:
         return handle[:count]
@@ -199,17 +135,47 @@ class CPUCompositor(_Stage):
         return drawn
 
     def over_black(self, drawn: np.ndarray) -> np.ndarray:
-        """A scene-linear picture of `draw` as Renderer.picture has it of levels."""
         levels = np.full(drawn.shape, 255, np.uint8)
         levels[..., :3] = 255 * light.to_encoded(np.nan_to_num(drawn[..., :3]).clip(0, 1)) + np.float32(0.5)
         return levels
 
     def shown(self, drawn: np.ndarray, display: Display) -> np.ndarray:
-        """As GPUCompositor.shown."""
         levels = np.full(drawn.shape, 255, np.uint8)
         noise = display.noise(drawn.shape[1], drawn.shape[0])[::-1]
         levels[..., :3] = display.levels(drawn[..., :3], noise)
         return levels
+
+    def solve(
+        self,
+        labels: np.ndarray,
+        count: int,
+        guide: np.ndarray | None = None,
+        strength: float = 0.0,
+        *,
+        warm: bool = False,
+    ) -> np.ndarray:
+        return diffuse(labels, count, guide, strength)
+
+    def add(self, mixed: np.ndarray | None, added: np.ndarray, share: float, size: tuple[int, int]) -> np.ndarray:
+        part = np.broadcast_to(added * np.float32(share), (len(added), *size))
+        return part if mixed is None else mixed + part
+
+    def blend(
+        self, beneath: np.ndarray, shown: tuple[mattes.Matte, ...], layers: Sequence[tuple[Hashable, np.ndarray]]
+    ) -> np.ndarray:
+        return mattes.blended(beneath, shown, [values for _, values in layers])
+
+    def least_share(self, exposed: Exposure) -> float:
+        return exposed.share[..., 3].min()
+
+    def lay(self, behind: Behind, layers: Sequence[Exposure], levels: bool) -> np.ndarray:
+        color, share = behind.exposed
+        picture = layering.with_plate(color, share[..., 3], behind.plate)
+        if behind.plain is not None:
+            picture = np.where((share[..., 3] > layering.UNCOVERED)[..., None], behind.plain, picture)
+        for layer in layers:
+            picture = layering.laid_over(picture, layer.color, layer.share[..., 3])
+        return self.over_black(picture) if levels else picture
 
     def draw(self, window: HostWindow, request: Request, coefficients: Coefficients) -> np.ndarray:
         """The picture (H, W, 4), top row first: float32, or levels in uint8; arguments as for GPUCompositor.draw."""
@@ -225,3 +191,6 @@ class CPUCompositor(_Stage):
             made = compositor.compose(state, frames, indices >= 0, c, moved, sharp)
             picture[tile] = made.clip(-LARGEST, LARGEST)
         return self.over_black(picture) if request.levels else picture
+
+    def release(self) -> None:
+        """There is nothing to free."""

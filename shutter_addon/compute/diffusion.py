@@ -1,12 +1,10 @@
 """Diffusion with NumPy: coefficients for every pixel from the scribbles (paper §3.4.2), which spread freely within what
 the picture shows as one, and hardly across its edges.
 
-The harmonic function with the scribbles as fixed values and free (Neumann) edges, by multigrid. Coarse cells lie on the
-even cells of the finer grid, and coarse operators are Galerkin products PᵀAP (nine points). The prolongation P follows
-the operator: what a cell takes of the coarse cells around it goes by how it is tied to them (Dendy's black box
-multigrid, 1982). A grid knows little of what lies between edges that are finer than its cells. So one grid is solved by
-conjugate gradients, each iteration a cycle over it and the coarser ones: that whose cells are the guide's, or the grid
-after the pixels where these are pixels. On the grids before it conductances are smooth.
+The harmonic function with the scribbles as fixed values and free (Neumann) edges, by conjugate gradients, each
+iteration a cycle over grids. Coarse cells lie on the even cells of the finer grid, and coarse operators are Galerkin
+products PᵀAP (nine points). The prolongation P follows the operator: what a cell takes of the coarse cells around it
+goes by how it is tied to them (Dendy's black box multigrid, 1982). It is slow: devices have compute.diffusion_gpu.
 """
 
 from __future__ import annotations
@@ -16,27 +14,20 @@ from collections.abc import Iterable
 import numpy as np
 
 from ..core import stopping
-from ..core.pixels.conductances import cell_side, conductances
+from ..core.pixels.conductances import conductances
 
-# Cycles at most, and the iterations of conjugate gradients in each: frames of films at 640 × 360 take four cycles,
-# specks of single pixels some forty.
-CYCLES = (4,) * 48
-# Cycles end where those to come would change no coefficient by as much. Largest error × 255 over 40 pictures of specks
-# and noise, on a GPU, for 1/512, 1/1024: 2.1, 0.65; by eight cycles, whatever they change: 27.
-ENOUGH = 1 / 1024
+# Iterations at most.
+ITERATIONS = 200
+# They end where a cycle would change no coefficient by as much.
+ENOUGH = 1 / 65536
 # Gauss-Seidel sweeps over a grid before its correction by coarser ones, and again after it.
 SWEEPS = 2
-# So many grids after that of the conjugate gradients are visited twice for each visit of the one before.
-TWICE = 2
 # A cell of which more than this share of the diagonal is no tie to free cells does not follow them fully.
 GROUNDED = 1e-3
 # Coefficients below this are none: regions that one shutter encloses get exactly that one.
 NOTHING = 1 / 4096
 # Cells (y, x) of 2 × 2 in the order of a sweep: red-black where only four neighbours count.
 COLOURS = ((0, 0), (1, 1), (0, 1), (1, 0))
-# As if a guide without edges had cells of so many pixels: the fastest.
-_PLAIN_SIDE = 8
-
 Ties = dict[tuple[int, int], np.ndarray]  # arrays (H, W) by offset (dy, dx)
 
 
@@ -54,12 +45,10 @@ def diffuse(labels: np.ndarray, count: int, guide: np.ndarray | None = None, str
         return coefficients
     height, width = labels.shape
     across, down = np.ones((height, width - 1), np.float32), np.ones((height - 1, width), np.float32)
-    side = _PLAIN_SIDE
     if guide is not None and strength > 0:
-        side = cell_side(guide.shape[:2], labels.shape)
         across, down = (ties.astype(np.float32) for ties in conductances(guide, strength, labels.shape))
     *solved, last = drawn  # the last one has what the others leave
-    coefficients[solved] = _solved(labels, np.array(solved), across, down, first_solved(side))
+    coefficients[solved] = _solved(labels, np.array(solved), across, down)
     coefficients[last] = 1 - coefficients.sum(axis=0)
     coefficients[coefficients < NOTHING] = 0
     coefficients /= coefficients.sum(axis=0)
@@ -71,32 +60,25 @@ def follows_edges(labels: np.ndarray, guide: np.ndarray | None, strength: float)
     return guide is not None and strength > 0 and 0 < int(np.count_nonzero(labels)) < labels.size
 
 
-def is_enough(change: float, before: float) -> bool:
-    """Whether cycles can end, by how much the last one and the one before it have changed coefficients at most; 0 where
-    there was none. Changes are taken to go on shrinking as they did: there are pictures where they hardly do."""
-    return change == 0 or (change < before and change**2 < ENOUGH * (before - change))
-
-
-def first_solved(side: int) -> int:
-    """The grid that conjugate gradients solve, where the guide's cells are so many pixels wide."""
-    return max(1, side.bit_length() - 1)
-
-
-def _solved(labels: np.ndarray, shutters: np.ndarray, across: np.ndarray, down: np.ndarray, solved: int) -> np.ndarray:
+def _solved(labels: np.ndarray, shutters: np.ndarray, across: np.ndarray, down: np.ndarray) -> np.ndarray:
     """The harmonic functions (N, H, W) of some shutters, not yet clipped.
 
-    across, down: conductances to the right neighbours and to those below
-    solved: which grid conjugate gradients solve, if there are so many"""
+    across, down: conductances to the right neighbours and to those below"""
     grids = [_finest(labels == 0, across, down)]
     while grids[-1].shape != (1, 1):
         grids.append(_coarser(grids[-1]))
-    solved = min(solved, len(grids) - 1)
     solution = (labels == shutters[:, None, None] + 1).astype(np.float32)
-    for iterations in CYCLES:
-        correction = _cycle(grids, _unbalanced(solution, across, down) * grids[0].live, solved, iterations)
-        solution += correction
-        if np.abs(correction).max() < ENOUGH:
+    live, direction, before = grids[0].live, np.zeros_like(solution), np.zeros((len(solution), 1, 1), np.float32)
+    for _ in range(ITERATIONS):
+        residual = _unbalanced(solution, across, down) * live
+        guess = _cycle(grids, residual)
+        if np.abs(guess).max() < ENOUGH:
             break
+        power = _dot(residual, guess)
+        direction = guess + _ratio(power, before) * direction
+        answer = _unbalanced(direction, across, down) * live
+        solution += _ratio(power, -_dot(direction, answer)) * direction
+        before = power
     return solution
 
 
@@ -196,42 +178,15 @@ def _unbalanced(values: np.ndarray, across: np.ndarray, down: np.ndarray) -> np.
     return flow
 
 
-def _cycle(grids: list[_Grid], right: np.ndarray, solved: int, iterations: int, twice: int = 0) -> np.ndarray:
-    """An approximate solution (N, H, W), by a cycle over these grids.
-
-    solved: which of them conjugate gradients solve in so many iterations; none if it is 0 or less
-    twice: how many of the grids after the first are visited twice
-    """
+def _cycle(grids: list[_Grid], right: np.ndarray) -> np.ndarray:
+    """An approximate solution (N, H, W), by a cycle over these grids."""
     grid, *below = grids
     values = np.zeros_like(right)
     _smooth(grid, values, right, COLOURS * SWEEPS)
-    if not below:
-        return values
-    coarse = _restricted(grid, _missing(grid, values, right))
-    if solved == 1:
-        correction = _conjugate_gradients(below, coarse, iterations)
-    else:
-        correction = _cycle(below, coarse, solved - 1, iterations, twice - 1)
-        if twice > 0 and len(below) > 1:
-            correction += _cycle(below, _missing(below[0], correction, coarse), 0, 0, twice - 1)
-    values += _prolonged(grid, correction)
-    _smooth(grid, values, right, COLOURS[::-1] * SWEEPS)
+    if below:
+        values += _prolonged(grid, _cycle(below, _restricted(grid, _missing(grid, values, right))))
+        _smooth(grid, values, right, COLOURS[::-1] * SWEEPS)
     return values
-
-
-def _conjugate_gradients(grids: list[_Grid], right: np.ndarray, iterations: int) -> np.ndarray:
-    solution, residual, direction = np.zeros_like(right), right, np.zeros_like(right)
-    before = np.zeros((len(right), 1, 1), np.float32)
-    for _ in range(iterations):
-        guess = _cycle(grids, residual, 0, 0, TWICE)
-        power = _dot(residual, guess)
-        direction = guess + _ratio(power, before) * direction
-        answer = -_missing(grids[0], direction, 0.0)
-        step = _ratio(power, _dot(direction, answer))
-        solution = solution + step * direction
-        residual = residual - step * answer
-        before = power
-    return solution
 
 
 def _dot(one: np.ndarray, other: np.ndarray) -> np.ndarray:

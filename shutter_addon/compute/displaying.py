@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..core.memo import Memo
 from ..core.pixels.shown_levels import Display
 from ..devices.device import Device, Texture
 from ..devices.named_textures import NamedTextures
@@ -33,17 +34,16 @@ class Displaying:
     def __init__(self, device: Device) -> None:
         self._device = device
         self._textures = NamedTextures(device)
-        self._written: dict[str, tuple[Display, Texture]] = {}  # by name: what is of which display
-        self._slope = 0.0
+        self._sent: Memo[tuple[dict[str, Texture], float]] = Memo()  # of a display
 
     def levels(self, picture: Texture, display: Display) -> np.ndarray:
         """The levels (H, W, 4) uint8 of an opaque picture of GPUCompositor.draw, top row first."""
         width, height, _ = picture.size
         noise, levels = display.noise(width, height), self._textures.of("levels", (width, height, 1), "rgba8")
         images = {"picture": picture, "levels": levels}
-        images["grain"] = self._sent("grain", display, noise[..., None], "r32f")
-        images["curve"] = self._sent("curve", display, None, "rgba32f")
-        self._device.run(SHOW, (width, height), images=images, size=(width, height), slope=self._slope)
+        own, slope = self._sent.get((display, width, height), lambda: self._send(display, noise))
+        images |= own
+        self._device.run(SHOW, (width, height), images=images, size=(width, height), slope=slope)
         made = self._device.read(levels)[0]
         whole = made.view("<u4")  # the alpha lies in its highest bits
         unsure = np.flatnonzero(whole < 1 << 24)
@@ -73,23 +73,16 @@ class Displaying:
             found.append(self._device.read(picked)[0].reshape(-1, 4)[: len(part), :3])
         return np.concatenate(found)
 
-    def _sent(self, name: str, display: Display, values: np.ndarray | None, kind: str) -> Texture:
-        """The noise or the curve of a display, which is sent once."""
-        width, height = (_PIECES, 1) if values is None else values.shape[1::-1]
-        texture = self._textures.of(name, (width, height, 1), kind)
-        if self._written.get(name) != (display, texture):
-            if values is None:
-                values = _curve(display)
-                # Below, OpenColorIO's slope, which is no 12.92.
-                self._slope = 255 * float(display.transfer(np.array([2.0**_LOWEST], np.float32))[0]) / 2.0**_LOWEST
-            self._device.write(texture, np.ascontiguousarray(values))
-            self._written[name] = display, texture
-        return texture
+    def _send(self, display: Display, noise: np.ndarray) -> tuple[dict[str, Texture], float]:
+        """The textures of the noise and the curve; and OpenColorIO's slope below that, which is no 12.92."""
+        slope = 255 * float(display.transfer(np.array([2.0**_LOWEST], np.float32))[0]) / 2.0**_LOWEST
+        grain = self._textures.filled("grain", [noise], "r32f")
+        return {"grain": grain, "curve": self._textures.filled("curve", [_curve(display)])}, slope
 
     def release(self) -> None:
         """Frees what it has on the device, inside Device.freeing."""
         self._textures.release()
-        self._written.clear()
+        self._sent.clear()
 
 
 def _curve(display: Display) -> np.ndarray:

@@ -54,17 +54,19 @@ class LayerColors:
 
     def frames(self, layer: int) -> FrameSource:
         """A source of frames with the colours of a layer, or with −1 of what lies behind all layers."""
-        if self.changes(layer) == (False, None):
-            return self._source
-        if layer < 0:
-            return LayerFrames(self._source, self._changed_behind)
-        return LayerFrames(self._source, lambda frame: self._separated(frame, layer)[0])
+        if layer < 0 and self._uncovers:
+            return LayerFrames(self._source, lambda frame: self._uncovered(frame)[0])
+        if self._separates:
+            return LayerFrames(self._source, lambda frame: self._separated(frame, layer)[int(layer < 0)])
+        return self._source
 
     def weights(self, layer: int) -> Callable[[int], np.ndarray]:
         """What gives how much of a layer, or of what lies behind all, a frame shows."""
-        if layer < 0:
-            return lambda frame: self._behind(frame)[1]
-        return lambda frame: self._mattes.one(self.layers, frame, layer)
+        if layer >= 0:
+            return lambda frame: self._mattes.one(self.layers, frame, layer)
+        if self._uncovers:
+            return lambda frame: self._uncovered(frame)[1]
+        return lambda frame: self._mattes.behind(self.layers, frame)
 
     @property
     def _separates(self) -> bool:
@@ -93,23 +95,14 @@ class LayerColors:
     def _decoded(self, frame: int) -> np.ndarray:
         return as_rgba(self._source.decoded(frame))
 
-    def _changed_behind(self, frame: int) -> np.ndarray:
-        picture, _ = self._behind(frame)
-        if picture is None:
-            raise ValueError("the frame is as it was read")
-        return picture
-
-    def _behind(self, frame: int) -> tuple[np.ndarray | None, np.ndarray]:
+    def _uncovered(self, frame: int) -> tuple[np.ndarray, np.ndarray]:
         return self._memo(frame, "behind", lambda: self._uncover(frame))
 
-    def _uncover(self, frame: int) -> tuple[np.ndarray | None, np.ndarray]:
-        """What lies behind layers; None: the frame as it is. What they cover is taken from other frames where the
+    def _uncover(self, frame: int) -> tuple[np.ndarray, np.ndarray]:
+        """What lies behind layers, and how much of it counts. What they cover is taken from other frames where the
         camera's motion is known: of what it pans over, the frames that show it are no mean of all."""
-        picture = self._separated(frame, -1)[1] if self._separates else None
+        picture = self._separated(frame, -1)[1] if self._separates else self._decoded(frame)
         seen = self._mattes.behind(self.layers, frame)
-        if not self._uncovers:
-            return picture, seen
-        picture = self._decoded(frame) if picture is None else picture
         plate, kinds = self._plate(frame, seen < layering.UNCOVERED)
         colors, share = plates.uncovered(linear(picture, self._source)[..., :3], seen, plate, kinds)
         return with_colors(picture, colors, kinds == plates.TAKEN, self._source), share

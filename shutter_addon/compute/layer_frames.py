@@ -38,9 +38,6 @@ class RecentFrames(SourceWrapper):
     def want(self, indices: Iterable[int]) -> None:
         """Who reads through this says nothing of what comes next: the renderer does."""
 
-    def keep(self, count: int) -> None:
-        self.most = max(self.most, count)
-
     def clear(self) -> None:
         """Forgets all frames."""
         self._kept.clear()
@@ -70,7 +67,6 @@ class WeightedFrames(SourceWrapper):
     """
 
     alpha, transfer = "premultiplied", "linear"
-    is_made = True  # of frames that are kept (RecentFrames)
 
     def __init__(
         self,

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
@@ -17,11 +18,8 @@ from . import plates
 from .layer_colors import TOGETHER, LayerColors
 from .layer_frames import RecentFrames, WeightedFrames, with_layers
 from .layer_mattes import LayerMattes
-from .laying import Behind, Exposure
-from .request import Coefficients, Compositor, Handle, Request
+from .request import Behind, Coefficients, Compositor, Exposure, Handle, Request, Stages
 
-# How often windows are made smaller that have freed one another.
-_TRIES = 4
 # How much of what lies behind layers has to be seen for a plate to be looked for.
 _SEEN = 1 / 1024
 
@@ -37,18 +35,18 @@ class LayeredRenderer:
     def __init__(
         self,
         compositor: Compositor,
+        stages: Stages,
         source: FrameSource,
         noted: Callable[[FrameSource], FrameSource],
         mattes: MatteReader | None,
         solve: Callable[[FrameSource, FrameState, int], np.ndarray],
     ) -> None:
-        self._compositor, self._source = compositor, source
+        self._compositor, self._stages, self._source = compositor, stages, source
         self.recent = RecentFrames(source)
         self._noted = noted(self.recent)
         size = source.width, source.height
         self.mattes = LayerMattes(size, lambda state, frame: solve(self.recent, state, frame), mattes)
         self._colors = LayerColors(self._noted, self.recent, self.mattes)
-        self._laying = compositor.laying()
         self._layers: Layers | None = None
         self._windows: dict[tuple, Handle] = {}
         self._loaded: dict[int, tuple] = {}  # by source frame in the windows: Layers.key_at
@@ -97,18 +95,15 @@ class LayeredRenderer:
         self._forget_changed(layers, parts)
         self._layers = layers
 
-        def composed() -> Handle:
-            return self._composed(request, parts, coefficients, positions, shot, plain)
-
-        for _ in range(_TRIES):
-            try:
-                return composed()
-            except ValueError:
-                if all(window.is_open for window in self._windows.values()):
-                    raise
-            # They were freed to make room for one another: smaller ones, or frames that are sent, have room.
-            self.release_windows()
-            self._crowd *= 2
+        composed = partial(self._composed, request, parts, coefficients, positions, shot, plain)
+        try:
+            return composed()
+        except ValueError:
+            if all(window.is_open for window in self._windows.values()):
+                raise
+        # They were freed to make room for one another. Frames that are sent have room.
+        self.release_windows()
+        self._crowd = 1 << 16
         return composed()
 
     def _composed(
@@ -125,7 +120,7 @@ class LayeredRenderer:
         self.recent.windows = self._crowd * with_layers(self._source, len(parts), moves)
         windows = {name: self._window(name, part, len(request.state.bars)) for name, part in parts.items()}
         self._load(windows, positions, request, shot)
-        whole = Coefficients(self._compositor.constant(np.ones(1)), max(self._source.width, self._source.height))
+        whole = Coefficients(self._stages.upload(np.ones((1, 1, 1))), max(self._source.width, self._source.height))
         drawn = {
             name: self._compositor.draw(
                 windows[name], replace(part, levels=False), whole if name[0] >= 0 else coefficients
@@ -138,7 +133,7 @@ class LayeredRenderer:
         self._exposed = exposed
         plate = self._plate(request, exposed, shot, lambda: self._gain(parts[-1, False].state, coefficients))
         bottom = Behind(exposed[0], None if same else plain(), plate)
-        return self._laying.lay(bottom, exposed[1:], request.levels)
+        return self._stages.lay(bottom, exposed[1:], request.levels)
 
     def _parts(self, request: Request, behind: Request) -> dict[tuple[int, bool], Request]:
         """What is composed, by layer, −1 for what lies behind, and whether it is of the weights alone."""
@@ -197,7 +192,9 @@ class LayeredRenderer:
                 return True
         return False
 
-    def _plate(self, request: Request, exposed: list[Exposure], shot: range, gain: Callable[[], np.ndarray]) -> Handle:
+    def _plate(
+        self, request: Request, exposed: list[Exposure], shot: range, gain: Callable[[], np.ndarray]
+    ) -> np.ndarray | None:
         """See Behind.plate; gain: gives how bright (H, W) its pixels are."""
         layers, (bottom, *_) = request.state.layers, exposed
         self._kinds = None
@@ -214,22 +211,27 @@ class LayeredRenderer:
         )
         picture[..., :3] *= gain()[..., None]
         if (self._kinds == plates.FILLED).any():
-            around, is_open = self._laying.around(bottom), self._kinds == plates.OPEN
+            shares, is_open = self._shares(bottom), self._kinds == plates.OPEN
+            around = layering.with_plate(self._compositor.read(bottom.color), shares, None)
             # Of what a layer hides altogether, there is nothing to go on from.
-            known = np.where(is_open, self._laying.shares(bottom) >= layering.CLEAR, self._kinds == plates.TAKEN)
+            known = np.where(is_open, shares >= layering.CLEAR, self._kinds == plates.TAKEN)
             picture = plates.filled(np.where(is_open[..., None], around, picture), known)
         if self._source.alpha == "opaque":
             picture[..., 3] = 1  # even if nothing is known
-        return self._laying.plate(picture)
+        return picture
 
     def _lacks(self, exposed: list[Exposure], least: float) -> np.ndarray | None:
         """Where (H, W) less than that of what lies behind is exposed, and it is seen; None: nowhere."""
         bottom, *own = exposed
-        if (self._laying.least(bottom) >= least).all():
+        if self._stages.least_share(bottom) >= least:
             return None
-        holes = self._laying.shares(bottom) < least
-        holes &= layering.behind([self._laying.shares(layer) for layer in own]) > _SEEN
+        holes = self._shares(bottom) < least
+        holes &= layering.behind([self._shares(layer) for layer in own]) > _SEEN
         return holes if holes.any() else None
+
+    def _shares(self, exposed: Exposure) -> np.ndarray:
+        """The shares (H, W) of an exposure."""
+        return self._compositor.read(exposed.share)[..., 3]
 
     def _gain(self, state: FrameState, coefficients: Coefficients) -> np.ndarray:
         """The brightness (H, W) or (1, 1) of what lies behind."""
@@ -252,7 +254,6 @@ class LayeredRenderer:
     def release(self) -> None:
         """Frees what it has on the device, and what it keeps of frames."""
         self.release_windows()
-        self._laying.release()
         self.recent.clear()
 
     def close(self) -> None:

@@ -52,24 +52,19 @@ class _CountingDevice(Device):
     def _free(self, own: object) -> None:
         pass
 
-    def write(self, *_texture: object, **_how: object) -> None:
-        pass
-
     def read(self, texture: Texture) -> np.ndarray:
         return np.empty(0)
 
 
-def of_window(device: Device, source: FrameSource, kind: Kind) -> Needs:
+def of_windows(device: Device, source: FrameSource, kind: Kind) -> Needs:
     """What windows on a GPU need, with all that is made beside them. NoDeviceError: not even a picture has room on the
     device."""
     counting = _CountingDevice(device)
     asked = kind.window, kind.moved, kind.shutters, kind.summed
     windows = [open_window(counting, frames, *asked) for frames in _read(source, kind)]
     gpu = min(counting.most + beside(source, kind.shutters), counting.budget.limit)
-    sizes = {window: kind.window * frame_bytes(window.source) for window in windows if window.sends}
-    anew = [size for window, size in sizes.items() if window.anew]  # one after the other, of frames that are kept
-    host = sum(sizes.values()) - sum(anew) + (max(anew) + kind.window * frame_bytes(source) if anew else 0)
-    return Needs(gpu, host, bool(sizes))
+    sizes = [kind.window * frame_bytes(window.source) for window in windows if window.sends]
+    return Needs(gpu, sum(sizes), bool(sizes))
 
 
 def _read(source: FrameSource, kind: Kind) -> list[FrameSource]:
@@ -90,7 +85,7 @@ def _no_weight(_frame: int) -> np.ndarray:
     raise NotImplementedError("nothing is read")
 
 
-def of_numpy_window(source: FrameSource, kind: Kind) -> Needs:
+def with_numpy(source: FrameSource, kind: Kind) -> Needs:
     """What windows need with NumPy."""
     frames = [source, *(read for read in _read(source, kind) if isinstance(read, WeightedFrames))]
     return Needs(0, sum(kind.window * frame_bytes(read) for read in frames), False)

@@ -51,19 +51,18 @@ class Renderer:
     """Pictures of one source. It keeps the window's frames, and the last result of each stage.
 
     mattes: what reads the mattes of its pictures; None: they have none
-    shortages: what was slow in the last picture, as the device has no room: "window", every picture sends the frames;
-    "diffusion", NumPy diffuses
+    is_short: whether the last picture was slow: the device has no room for its window, and all frames are sent
     """
 
     def __init__(self, compositor: Compositor, source: FrameSource, mattes: MatteReader | None = None) -> None:
         self.compositor, self.source, self._mattes = compositor, source, mattes
-        self._solver, self._matting, self._mixing = compositor.solver(), compositor.matting(), compositor.mixing()
+        self._stages = compositor.stages()
         self._guides = guide.Guides(source)
         self._layered: LayeredRenderer | None = None
         self._scribbles: Renderer | None = None  # of layers
         self._window: Handle = None
         self._kind: tuple[int, bool, int, bool] | None = None
-        self.shortages: set[str] = set()
+        self.is_short = False
         self._kept_labels: Memo[list[LabelLayer]] = Memo()
         self._kept_diffusion: Memo[Handle] = Memo()
         self._kept_mattes: Memo[Handle] = Memo()
@@ -120,6 +119,7 @@ class Renderer:
         if self._layered is None:
             self._layered = LayeredRenderer(
                 self.compositor,
+                self._stages,
                 self.source,
                 lambda source: guide.NotedSource(source, self._guides),
                 self._mattes and self._mattes.another(),
@@ -137,21 +137,16 @@ class Renderer:
         """Coefficients (N, h, w) float32 of `picture`, for each pixel, or for each block of Options.aggregate pixels a
         side."""
         self._want(request)  # the picture will read them as well
-        labels, count = self.labels(request), len(request.state.bars)
+        count, (width, height) = len(request.state.bars), grid(self.source, request.state)
+        drawn = self.drawn_coefficients(request)
         with self.compositor.current():
-            if (sole := _sole(request, labels)) is not None:
-                values = np.eye(count, dtype=np.float32)[sole]
-                return np.broadcast_to(values[:, None, None], (count, *labels[0].labels.shape))
-            return self.compositor.coefficients(self._with_mattes(request, labels), count)
+            return np.broadcast_to(self.compositor.coefficients(drawn.handle, count), (count, height, width))
 
     def drawn_coefficients(self, request: Request) -> Coefficients:
         """Coefficients on the device, of all shutters. They are valid until the next call of any method."""
         labels = self.labels(request)
         with self.compositor.current():
-            if (sole := _sole(request, labels)) is not None:
-                constant = self.compositor.constant(np.eye(len(request.state.bars))[sole])
-                return Coefficients(constant, self._everywhere)
-            return Coefficients(self._with_mattes(request, labels), request.state.options.aggregate)
+            return self._coefficients(request, labels, len(request.state.bars))
 
     def coefficients_with_layers(self, request: Request) -> np.ndarray:
         """As `coefficients`, of each pixel (N, H, W); where layers are, of their shutters."""
@@ -171,14 +166,13 @@ class Renderer:
             return self.drawn_coefficients(request)
         values = self.coefficients_with_layers(request)
         with self.compositor.current():
-            return Coefficients(self.compositor.uploaded(values), 1)
+            return Coefficients(self._stages.upload(values), 1)
 
     def drawn_labels(self, request: Request) -> tuple[Handle, int]:
         """Labels of the first layer on the device, a GPU: (texture array r32ui, block), top row first, each texel for
         block × block pixels. They are valid until the next call of any method."""
         with self.compositor.current():
-            labels = self.compositor.labels(self.labels(request)[0].labels)
-            return labels, request.state.options.aggregate
+            return self.compositor.labels(self.labels(request)[0].labels), request.state.options.aggregate
 
     def drawn_holes(self, request: Request) -> tuple[Handle, int]:
         """The picture's holes on the device, a GPU, like drawn_labels; 0 where there is none."""
@@ -282,7 +276,7 @@ class Renderer:
         exposing = self._exposing(request, labels)
         shot = self.shot(exposing)
         window.load(window_frames.positions(exposing, shot), exposing.state.options, shot)
-        self._note_shortage("window", window.sends)
+        self.is_short = window.sends
         return window
 
     def _kind_for(self, request: Request) -> tuple[int, bool, int, bool]:
@@ -307,11 +301,16 @@ class Renderer:
         elif self._is_guided(request):  # else it is perhaps a still frame between two pictures that are
             self._guides.keep(window_frames.guided_later(request, self._beside(request)))
 
-    def _coefficients(self, request: Request, labels: list[LabelLayer]) -> Coefficients:
-        """What the composition takes: a single 1 where one shutter holds everywhere."""
-        if _sole(request, labels) is not None:
-            return Coefficients(self.compositor.constant(np.ones(1)), self._everywhere)
+    def _coefficients(self, request: Request, labels: list[LabelLayer], count: int = 1) -> Coefficients:
+        """What the composition takes; count: the shutters, of which it takes a single one where that holds
+        everywhere."""
+        if (sole := _sole(request, labels)) is not None:
+            return self._constant(np.eye(count)[sole if count > 1 else 0])
         return Coefficients(self._with_mattes(request, labels), request.state.options.aggregate)
+
+    def _constant(self, values: np.ndarray) -> Coefficients:
+        """Coefficients (N,) of the whole picture."""
+        return Coefficients(self._stages.upload(values[:, None, None]), self._everywhere)
 
     def _with_mattes(self, request: Request, labels: list[LabelLayer]) -> Handle:
         """Coefficients on the device, with the mattes laid over what the scribbles give. They are laid again only if
@@ -324,9 +323,9 @@ class Renderer:
         if sole is None:
             beneath, below = self._diffused(request, labels), self._kept_diffusion.made
         else:
-            beneath, below = self.compositor.constant(np.eye(count)[sole]), None
+            beneath, below = self._constant(np.eye(count)[sole]).handle, None
         key = state.mattes, [key for key, _ in values], count, sole, below
-        return self._kept_mattes.get(key, lambda: self._matting.lay(beneath, state.mattes, values))
+        return self._kept_mattes.get(key, lambda: self._stages.blend(beneath, state.mattes, values))
 
     def _diffused(self, request: Request, labels: list[LabelLayer]) -> Handle:
         """Coefficients on the device. They are solved for only if labels or what guides them changed since the last
@@ -337,9 +336,7 @@ class Renderer:
         def solve() -> Handle:
             self._keep_guides(request)
             guided = (self._guides.guide(frames, options.aggregate), options.edge_aware) if frames else ()
-            mixed = self._solved_layers(labels, count, guided, request.quick)
-            self._note_shortage("diffusion", self._solver.gave_up)
-            return mixed
+            return self._solved_layers(labels, count, guided, request.quick)
 
         key = count, frames and (frames, options.edge_aware), [layer.key for layer in labels]
         return self._kept_diffusion.get(key, solve, quick=request.quick)
@@ -348,15 +345,15 @@ class Renderer:
         """The coefficients of all layers, solved for one after the other and added up. A solution that another layer
         has begun from would depend on that one."""
         if len(layers) == 1:
-            return self._solver.solve(layers[0].labels, count, *guided, warm=quick)
+            return self._stages.solve(layers[0].labels, count, *guided, warm=quick)
         mixed: Handle = None
         solved: Handle
         for layer in layers:
             if layer.sole is None:
-                solved = self._solver.solve(layer.labels, count, *guided)
+                solved = self._stages.solve(layer.labels, count, *guided)
             else:
-                solved = self.compositor.constant(np.eye(count)[layer.sole])
-            mixed = self._mixing.add(mixed, solved, layer.share, layer.labels.shape)
+                solved = self._constant(np.eye(count)[layer.sole]).handle
+            mixed = self._stages.add(mixed, solved, layer.share, layer.labels.shape)
         return mixed
 
     def release_window(self) -> None:
@@ -374,19 +371,14 @@ class Renderer:
         if self._window is not None:
             self._window.release()
             self._window = None
-            self._note_shortage("window", False)
+            self.is_short = False
             self._kept_picture.clear()
-
-    def _note_shortage(self, what: str, is_short: bool) -> None:
-        (self.shortages.add if is_short else self.shortages.discard)(what)
 
     def release(self) -> None:
         """Frees what the renderer has on the device. The next picture makes it again."""
         with self.compositor.freeing():
             self.release_window()
-            self._solver.release()
-            self._matting.release()
-            self._mixing.release()
+            self._stages.release()
             for part in (self._layered, self._scribbles):
                 if part is not None:
                     part.release()

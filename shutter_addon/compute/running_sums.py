@@ -14,11 +14,10 @@ from ..core.model import windows
 from ..core.model.frame_state import Light, Options
 from ..core.stopping import kept
 from ..devices import llvmpipe
-from ..devices.device import TEXEL_BYTES, Device, Given, NoDeviceError, Texture
-from ..devices.named_textures import NamedTextures
+from ..devices.device import Device, Given, NoDeviceError, Texture
 from ..devices.passes import Pass, read_pass
 from .layer_frames import WeightedFrames
-from .window import BLOCK, Frames, PackedFrames, WholeFrames, Window, decoding, summable
+from .window import BLOCK, Frames, PackedFrames, Part, WholeFrames, Window, decoding, summable
 
 # A tile of running sums in pixels (across, down), as in shaders/include/sums.glsl.
 TILE = 8, BLOCK
@@ -45,13 +44,6 @@ def stores_rows(device: Device) -> bool:
     return llvmpipe.is_llvmpipe(device.name)
 
 
-def _in_tiles(width: int, height: int, layers: int) -> tuple[int, int, int]:
-    """The size of a texture for so many layers of pixels stored tile by tile: a row of texels has all layers of a tile,
-    a layer of texels a row of tiles."""
-    across, down = TILE
-    return across * down * layers, -(-width // across), -(-height // down)
-
-
 # What running sums are stored as, by COVER of shaders/include/sums.glsl.
 STORED_SUMS = ("rgba16ui", "rgba32ui", "rgba32ui")
 
@@ -60,23 +52,14 @@ def accumulation(decode: int, sent: str, back: bool, tiled: bool, cover: int = 0
     """The pass that makes a layer of sums from its neighbour: with the frame between the two added, or subtracted.
 
     decode: of `decoding`
-    sent: as what the frame was sent, "colours", "numbers" (Device.send) or "planes"; "before": it is taken as the
+    sent: as what the frame was sent, "COLOURS", "NUMBERS" (Device.send) or "PLANES"; "AGAIN": it is taken as the
     difference of two layers that hold it already
     back: it is subtracted
     tiled: the sums are stored in tiles
     cover: of WeightedSums
     """
-    return read_pass(
-        "accumulate",
-        DECODE=decode,
-        AGAIN=int(sent == "before"),
-        BACK=int(back),
-        TILED=int(tiled),
-        NUMBERS=int(sent == "numbers"),
-        PLANES=int(sent == "planes"),
-        COVER=cover,
-        STORED=STORED_SUMS[cover],
-    )
+    macros = {"DECODE": decode, "BACK": int(back), "TILED": int(tiled), "COVER": cover, sent: 1}
+    return read_pass("accumulate", STORED=STORED_SUMS[cover], **macros)
 
 
 def _in_fours(plane: np.ndarray) -> np.ndarray:
@@ -100,10 +83,7 @@ class Sums(Window):
 
     whole: what white is in a field
     tiled: whether pixels are stored tile by tile, in TILE
-    cover: COVER of the shaders: 0, these are no layer's
     """
-
-    cover = 0
 
     def __init__(self, device: Device, source: FrameSource, capacity: int, shutters: int = 1) -> None:
         self.layers = capacity + 1
@@ -112,16 +92,12 @@ class Sums(Window):
         self._light: Light | None = None
         # White is the largest 2ⁿ − 1 for which the sum of a whole window fits into 21 bits, and n is 16 at most.
         self.whole = (1 << min(16, 21 - (capacity - 1).bit_length())) - 1
+        self.kind = STORED_SUMS[self.cover]
         # A workgroup reads all layers of its pixels. In tiles, they are one run of memory.
-        texels, _, tiles = _in_tiles(source.width, source.height, self.layers)
-        self.tiled = stores_rows(device) and texels <= device.max_size and tiles <= device.max_layers
-        self._sent = NamedTextures(device)
-        self._sent_as: tuple[str, ...] = ()  # their names
+        across, down = TILE
+        fits = across * down * self.layers <= device.max_size and -(-source.height // down) <= device.max_layers
+        self.tiled = stores_rows(device) and fits
         super().__init__(device, source, capacity, shutters)
-
-    def _allocate(self) -> None:
-        self._allocate_bands(STORED_SUMS[self.cover], TEXEL_BYTES[STORED_SUMS[self.cover]])
-        self._sent_to("frame")
 
     @property
     def held(self) -> Collection[int]:
@@ -180,46 +156,38 @@ class Sums(Window):
             given |= arguments | {"whole": float(self.whole)}
             images = given.pop("images", images)
         else:
-            sent = "before"
+            sent = "AGAIN"
             given |= {"before": same % self.layers, "after": (same + 1) % self.layers}
         decode = decoding(self.source.transfer, light)
         program = accumulation(decode, sent, next_ < known, self.tiled, self.cover)
-        for top, height, sums in self.bands():
-            size = self.source.width, height
-            self.device.run(program, size, images=images | {"sums": sums}, size=size, top=top, **given)
+        for part, sums in self.stored():
+            size = self.source.width, part.height
+            self.device.run(program, size, images=images | {"sums": sums}, size=size, top=part.top, **given)
         self._frames[min(known, next_)] = frame
         kept()
 
-    def _size(self, height: int) -> tuple[int, int, int]:
-        return _in_tiles(self.source.width, height, self.layers) if self.tiled else super()._size(height)
-
-    def _sent_to(self, *names: str) -> dict[str, Texture]:
-        """The textures that a frame is sent to: "frame", or "luma" and "chroma". The others go."""
-        if names != self._sent_as:
-            self._sent.release()
-            self._sent_as = names
-        width, height = self.source.width, self.source.height
-        sizes = {"frame": ((width, height, 1), "rgba8"), "luma": ((-(-width // 4), height, 1), "r32ui")}
-        sizes["chroma"] = (-(-width // 8), -(-height // 2), 2), "r32ui"
-        return {name: self._sent.of(name, *sizes[name]) for name in names}
+    def _size(self, part: Part) -> tuple[int, int, int]:
+        if not self.tiled:
+            return super()._size(part)
+        # A row of texels has all layers of a tile, a layer of texels a row of tiles.
+        across, down = TILE
+        return across * down * self.layers, -(-self.source.width // across), -(-part.height // down)
 
     def _send(self, index: int) -> tuple[str, Given]:
         """Sends a source frame: as what (`accumulation`), and the arguments of the pass that adds it."""
         frame = self.source.decoded(index) if self.device.takes_planes else self.source.read(index)
         if isinstance(frame, Planes):
-            return "planes", self._send_planes(frame)
-        own = self._sent_to("frame")["frame"]
+            return "PLANES", self._send_planes(frame)
+        own = self._own("frame", "rgba8")
         sent = self.device.send(own, frame)
-        return "colours" if sent is own else "numbers", {"textures": {"frame": sent}}
+        return "COLOURS" if sent is own else "NUMBERS", {"textures": {"frame": sent}}
 
     def _send_planes(self, frame: Planes) -> Given:
-        sent = self._sent_to("luma", "chroma")
-        self.device.write(sent["luma"], _in_fours(frame.luma))
-        for layer, plane in enumerate(frame.chroma):
-            self.device.write(sent["chroma"], _in_fours(plane), layer)
+        luma = self._extra.filled("luma", [_in_fours(frame.luma)], "r32ui")
+        chroma = self._extra.filled("chroma", [_in_fours(plane) for plane in frame.chroma], "r32ui")
         matrix = frame.matrix
         return {
-            "images": sent,
+            "images": {"luma": luma, "chroma": chroma},
             "chroma_step": (chroma_step(self.source.width), chroma_step(self.source.height)),
             "luma_of": (matrix.offset, matrix.luma),
             "red_of": matrix.red_of_cr,
@@ -230,7 +198,6 @@ class Sums(Window):
     def release(self) -> None:
         self._frames, self._light = {}, None
         super().release()
-        self._sent.release()
 
 
 class WeightedSums(Sums):
@@ -242,17 +209,8 @@ class WeightedSums(Sums):
         self.cover, self._weight = 2 if source.rest else 1, source.weight
         super().__init__(device, source.base, capacity, shutters)
 
-    def _allocate(self) -> None:
-        super()._allocate()
-        self._weights()
-
-    def _weights(self) -> Texture:
-        """The texture that a frame's weights are sent to."""
-        return self._extra.of("weights", (self.source.width, self.source.height, 1), "r32f")
-
     def _send(self, index: int) -> tuple[str, Given]:
-        weights = self._weights()
-        self.device.write(weights, np.ascontiguousarray(self._weight(index)[..., None]))
+        weights = self._extra.filled("weights", [self._weight(index)], "r32f")
         sent, given = super()._send(index)
         given["textures"] = given.get("textures", {}) | {"weights": weights}
         return sent, given

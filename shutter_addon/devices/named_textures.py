@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
+import numpy as np
+
 from .device import Device, Texture
 
 
@@ -19,6 +23,14 @@ class NamedTextures:
             if texture is not None:
                 self._kept.pop(name).release()  # before there may be no room for the new one
             texture = self._kept[name] = self.device.texture(*size, kind)
+        return texture
+
+    def filled(self, name: str, layers: Sequence[np.ndarray] | np.ndarray, kind: str = "rgba32f") -> Texture:
+        """The texture of a name, with these layers (height, width[, components]) in the format's type."""
+        height, width = layers[0].shape[:2]
+        texture = self.of(name, (width, height, len(layers)), kind)
+        for number, layer in enumerate(layers):
+            self.device.write(texture, np.ascontiguousarray(layer), number)
         return texture
 
     def release(self) -> None:

@@ -2,8 +2,8 @@
 
 A file is GLSL that declares what each of its steps binds, between `#ifdef STEP` and `#endif` where it has several. That
 is read here: Blender's `gpu` module has to be told what is declared, and moderngl where it is bound. So #include and
-conditions are resolved here: of steps, and of macros whose values Python gives. A condition is NAME, !NAME,
-NAME == number or defined(STEP), or several of these joined by && and ||.
+conditions are resolved here: of steps, and of macros whose values Python gives, 0 where it gives none. A condition is
+NAME, !NAME, NAME == number or defined(STEP), or several of these joined by && and ||.
 """
 
 from __future__ import annotations
@@ -146,10 +146,9 @@ def _holds(condition: str, macros: Mapping[str, int | str]) -> bool:
 
 
 def _is(term: str, macros: Mapping[str, int | str]) -> bool:
-    """KeyError: Python gives no value for the macro."""
     name, _, number = term.removeprefix("!").partition(" == ")
     if name.startswith("defined("):
         found = name[8:-1] in macros
     else:
-        found = macros[name] == int(number) if number else macros[name] != 0
+        found = macros.get(name, 0) == int(number) if number else macros.get(name, 0) != 0
     return found != term.startswith("!")

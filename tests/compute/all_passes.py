@@ -10,26 +10,19 @@ from shutter_addon.compute import (
     diffusion_gpu,
     displaying,
     edge_diffusion_gpu,
-    laying,
-    matting,
-    mixing,
     running_sums,
+    stages,
     window,
 )
-from shutter_addon.compute.composition_passes import (
-    LightFormat,
-    composition,
-    composition_of_moved,
-    composition_of_sums,
-)
+from shutter_addon.compute.composition_passes import LightFormat, composition
 from shutter_addon.core.model.combining import Combine
-from shutter_addon.devices.passes import Pass
+from shutter_addon.devices.passes import Pass, read_pass
 
 _WAYS = ("frames", "search", "value")
 
 
 def _declared():
-    for module in (diffusion_gpu, displaying, edge_diffusion_gpu, composition_passes, laying):
+    for module in (diffusion_gpu, displaying, edge_diffusion_gpu, composition_passes, stages):
         yield from (value for value in vars(module).values() if isinstance(value, Pass))
     for ties in ("LABELS", "LINKS", "STENCIL"):
         yield from diffusion_gpu.operators(ties).values()
@@ -39,23 +32,30 @@ def _composing():
     def light(levels, encoded=False, premultiplied=True):
         return LightFormat(1, premultiplied, encoded, levels)
 
-    def moved(quads, packed, at=(False, False), **others):
-        given = {"shutters": 3, "mixed": 3, "shortened": packed, "sharp": True} | others
-        return {"quads": quads, "packed": packed, "continued": at[0], "unfinished": at[1], **given}
-
     for way, edges in itertools.product(("pieces", *_WAYS), (1, 2)):
-        yield composition(way, 3, "frames", edges, light(edges == 2))
-    for way, stored in itertools.product(_WAYS, ("sums", "tiles")):
-        yield composition(way, 3, stored, 2, light(stored == "sums"))
+        yield composition(way, 3, light(edges == 2), EDGES=edges)
+    for way, tiled in itertools.product(_WAYS, (0, 1)):
+        yield composition(way, 3, light(not tiled), EDGES=2, SUMS=1, TILED=tiled)
     for rows, groups, back, tiled in ((1, 1, False, True), (4, 2, True, False), (32, 4, True, True)):
-        yield composition_of_sums(rows, groups, back, tiled, light(back, encoded=True))
+        yield _of_sums(rows, groups, back, tiled, light(back, encoded=True))
     for way, packed in itertools.product(_WAYS, (True, False)):
         for at in ((True, False), (False, True)):
-            yield composition_of_moved(way, light(True, premultiplied=False), **moved(1, packed, at))
-        others = {"shutters": 5, "mixed": 1, "shortened": False, "sharp": False}
-        yield composition_of_moved(
-            way, light(packed, encoded=True), **moved(1 if way == "search" else 4, packed, **others)
-        )
+            yield _moved(way, light(True, premultiplied=False), 1, packed, at, EDGES=2 * packed)
+        others = {"SHUTTERS": 5, "MIXED": 1, "GROUPS": 2, "SHARP": 0, "SQUARED": 0}
+        quads = 1 if way == "search" else 4
+        yield _moved(way, light(packed, encoded=True), quads, packed, **others)
+
+
+def _of_sums(rows, groups, back, tiled, light):
+    macros = {"ROWS": rows, "TABLE": (1 + rows) * (2 * groups + 1), "BACK": int(back), "TILED": int(tiled)}
+    return composition("sums", groups, light, **macros)
+
+
+def _moved(way, light, quads, packed, at=(False, False), **others):
+    macros = {"MOVED": 1, "QUADS": quads, "PACKED": int(packed), "SHUTTERS": 3, "MIXED": 3, "SHARP": 1, "SQUARED": 1}
+    macros |= {"CONTINUED": int(at[0]), "UNFINISHED": int(at[1]), "SEVERAL": int(any(at))}
+    groups = others.pop("GROUPS", 1)
+    return composition(way, groups, light, **(macros | others))
 
 
 def _combining():
@@ -64,41 +64,40 @@ def _combining():
         combine = Combine.of(mode, **(has_threshold or {}))
         for edges, kind in ((1, "rgba8"), (2, "rgba16f")):
             light = LightFormat(1, kind != "rgba8", edges == 2, edges == 1, combine=combine, kind=kind)
-            yield composition(way, 3, "frames", edges, light)
+            yield composition(way, 3, light, EDGES=edges)
         if mode != "median":
             for quads, packed, at in ((4, True, (False, False)), (1, False, (True, False)), (1, False, (False, True))):
-                moved = {"shutters": 3, "mixed": 3, "packed": packed, "shortened": True, "sharp": True}
-                moved |= {"continued": at[0], "unfinished": at[1]}
                 for each in (way, "value"):
                     own = quads if each != "search" else 1
                     light = LightFormat(1, False, False, at == (False, False), combine=combine)
-                    yield composition_of_moved(each, light, quads=own, **moved)
+                    yield _moved(each, light, own, packed, at, EDGES=2)
     yield composition_passes.selection(2, 9)
     for begins, levels in ((True, False), (False, False), (False, True)):
         yield composition_passes.way_sum(begins, levels)
 
 
 def _layers():
-    for cover, stored in ((1, "sums"), (2, "tiles")):
+    for cover, tiled in ((1, 0), (2, 1)):
         light = LightFormat(0, False, True, cover == 2, cover)
-        yield composition_of_sums(4, 2, cover == 1, cover == 2, light)
+        yield _of_sums(4, 2, cover == 1, tiled, light)
         for way in _WAYS:
-            yield composition(way, 3, stored, 2, light)
-        for sent in ("colours", "planes", "before"):
+            yield composition(way, 3, light, EDGES=2, SUMS=1, TILED=tiled)
+        for sent in ("COLOURS", "PLANES", "AGAIN"):
             yield running_sums.accumulation(1, sent, cover == 1, cover == 2, cover)
     for ends, opaque in itertools.product((True, False), repeat=2):
-        yield laying.laying_pass(True, ends, opaque, plain=not opaque, plate=ends, levels=ends)
-        yield laying.laying_pass(False, ends, opaque, plain=False, plate=False, levels=opaque)
+        macros = {"ENDS": int(ends), "OPAQUE": int(opaque)}
+        yield read_pass("layer", BEGINS=1, PLAIN=int(not opaque), PLATE=int(ends), LEVELS=int(ends), **macros)
+        yield read_pass("layer", LEVELS=int(opaque and ends), **macros)
 
 
 def _filling():
-    for tiled, sent in itertools.product((True, False), ("colours", "numbers", "planes", "before")):
+    for tiled, sent in itertools.product((True, False), ("COLOURS", "NUMBERS", "PLANES", "AGAIN")):
         yield running_sums.accumulation(1, sent, tiled, tiled)
     yield window.packing(1, True)
     yield window.packing(2, False)
     for adds in (False, True):
-        yield matting.blend_pass(2, adds)
-        yield mixing.mix_pass(adds)
+        yield read_pass("matte_blend", COUNT=2, ADDS=int(adds), MOST=stages.MOST_MATTES)
+        yield read_pass("mix", BEGINS=int(adds))
 
 
 def _unpacking():

@@ -449,7 +449,7 @@ def test_what_is_needed_is_what_is_read(device):
 def test_no_new_solve_when_nothing_moved(device, monkeypatch):
     rng = np.random.default_rng(13)
     solves = []
-    solver = type(device.solver())
+    solver = type(device.stages())
     solve = solver.solve
     monkeypatch.setattr(solver, "solve", lambda self, *a, **k: solves.append(1) or solve(self, *a, **k))
     renderer, moment = Renderer(device, footage(rng)), state(rng)

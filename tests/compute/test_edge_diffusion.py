@@ -8,7 +8,8 @@ import exact_diffusion
 import numpy as np
 import pytest
 
-from shutter_addon.compute import cpu, diffusion, gpu
+from shutter_addon.compute import diffusion, stages
+from shutter_addon.compute.cpu import CPUCompositor
 from shutter_addon.core.model.scribbles import Shape, rasterise
 
 LEVEL = 1 / 255
@@ -229,7 +230,7 @@ def on_blender(blender_device):
 
 
 def solving(device):
-    solver = gpu.Solver(device)
+    solver = stages.Stages(device)
 
     def solve(labels, count, *how, **options):
         with device.current():
@@ -243,7 +244,7 @@ def solving(device):
 
 @pytest.fixture(scope="module", params=["numpy", "moderngl", "blender"])
 def solve(request):
-    return cpu.Solver().solve if request.param == "numpy" else request.getfixturevalue(f"on_{request.param}")
+    return CPUCompositor().solve if request.param == "numpy" else request.getfixturevalue(f"on_{request.param}")
 
 
 @pytest.mark.parametrize("scene", SCENES)
@@ -340,15 +341,15 @@ def test_a_stroke_stays_within_its_object():
     """What the equations are for: a disc of another colour than the ground, with a line inside."""
     y, x = np.mgrid[:HEIGHT, :WIDTH]
     disc = (x - 48) ** 2 + (y - 32) ** 2 < 22**2
-    got = cpu.Solver().solve(one_stroke(), 2, grey(0.4 + 0.2 * disc), 1.0)[1] > 0.5
+    got = CPUCompositor().solve(one_stroke(), 2, grey(0.4 + 0.2 * disc), 1.0)[1] > 0.5
     assert (got & disc).sum() / (got | disc).sum() > 0.97
-    plain = cpu.Solver().solve(one_stroke(), 2)[1] > 0.5
+    plain = CPUCompositor().solve(one_stroke(), 2)[1] > 0.5
     assert (plain & disc).sum() / (plain | disc).sum() < 0.5
 
 
-def test_fewer_cycles_are_too_few(monkeypatch, exact):
+def test_fewer_iterations_are_too_few(monkeypatch, exact):
     """The scenes are hard enough to tell."""
-    monkeypatch.setattr(diffusion, "CYCLES", (4, 4))
+    monkeypatch.setattr(diffusion, "ITERATIONS", 2)
     scenes = ("people", "narrow maze", "checks, 3", "a band")
-    errors = [abs(cpu.Solver().solve(*SCENES[scene], 1.0) - exact(scene, 1.0)).max() for scene in scenes]
+    errors = [abs(CPUCompositor().solve(*SCENES[scene], 1.0) - exact(scene, 1.0)).max() for scene in scenes]
     assert max(errors) > LEVEL

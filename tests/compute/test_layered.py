@@ -2,13 +2,12 @@
 
 import dataclasses
 import itertools
-import tracemalloc
 
 import numpy as np
 import pytest
 from test_composition import LEVEL, ROUNDED, Footage, device, footage, state  # noqa: F401 – a fixture
 
-from shutter_addon.compute import layer_colors, layer_frames, layer_mattes, memory_needs, running_sums
+from shutter_addon.compute import layer_colors, layer_frames, layer_mattes, running_sums
 from shutter_addon.compute.gpu import GPUCompositor
 from shutter_addon.compute.renderer import Renderer, open_compositor, open_gl
 from shutter_addon.compute.request import Request
@@ -500,37 +499,6 @@ def test_windows_have_room_beside_one_another_or_frames_are_sent(kilobytes, foll
     renderer.close()
     roomy.close()
     compositor.release()
-
-
-@pytest.mark.parametrize("follows", [False, True])
-def test_many_layers_take_no_more_of_the_host_than_one(follows, monkeypatch):
-    """Where their windows would take more there than the device may, each makes its frames when it is composed: the
-    picture has the same bits. What is said to be needed is what is taken, whatever else is kept of frames."""
-    limit, count, window = 200 << 10, 8, 12
-    rng = np.random.default_rng(15)
-    source, moment = footage(rng, COUNT, SIZE), drawn_state(rng, window=window)
-    if follows:
-        shifts = (np.arange(COUNT) - SHOWN + 0j)[:, None] * [1, 0, 0]
-        moment = dataclasses.replace(moment, following=Following(0, np.ones((COUNT, 3), complex), shifts))
-    moment, _ = with_layers(moment, *(discs(speed=k / 4) for k in range(count)))
-    moment = dataclasses.replace(moment, layers=dataclasses.replace(moment.layers, shutters=(0, 1) * (count // 2)))
-    needs, held, pictures = [], [], []
-    for is_made in (False, True):
-        monkeypatch.setattr(layer_frames.WeightedFrames, "is_made", is_made)
-        compositor = GPUCompositor(open_gl(Budget(limit)))
-        renderer = Renderer(compositor, source, MatteValues(*SIZE))
-        tracemalloc.start()
-        pictures.append(renderer.picture(Request(SHOWN, moment)))
-        held.append(tracemalloc.get_traced_memory()[1])
-        tracemalloc.stop()
-        needs.append(memory_needs.of_window(compositor.device, source, memory_needs.Kind(window, follows, 3, count)))
-        renderer.close()
-        compositor.release()
-    assert np.array_equal(*pictures)
-    assert all(need.sends and need.gpu <= limit for need in needs)
-    saved = needs[0].host - needs[1].host
-    assert saved > 6 * window * 8 * SIZE[0] * SIZE[1]
-    assert held[0] - held[1] > 0.8 * saved, (held, needs)
 
 
 def _no_room(*_):

@@ -7,7 +7,7 @@ import pytest
 from test_composition import LEVEL, SHAPES, Footage, check, device, footage, state  # noqa: F401
 from test_moved import following
 
-from shutter_addon.compute import matting
+from shutter_addon.compute import stages
 from shutter_addon.compute.renderer import Renderer
 from shutter_addon.compute.request import Request
 from shutter_addon.core.model.mattes import Matte
@@ -85,7 +85,7 @@ def check_mattes(device, source, moment, index=2, direction=1):  # noqa: F811
 
 
 @pytest.mark.parametrize("interpolation", ["displacement", "value"])
-@pytest.mark.parametrize("count", [1, 3, matting.MOST + 3])
+@pytest.mark.parametrize("count", [1, 3, stages.MOST_MATTES + 3])
 def test_over_scribbles(device, interpolation, count):  # noqa: F811
     rng = np.random.default_rng(42)
     moment = state(rng, interpolation=interpolation)

@@ -21,8 +21,7 @@ WINDOW, SHUTTERS = 6, 3
 
 def source(dtype, alpha):
     shape = {"width": 70, "height": 50, "count": 20, "dtype": np.dtype(dtype)}
-    read_by = {"windows": 1, "is_made": False, "keep": None}
-    return SimpleNamespace(**shape, **read_by, alpha=alpha, transfer="srgb", shots=None)
+    return SimpleNamespace(**shape, windows=1, alpha=alpha, transfer="srgb", shots=None)
 
 
 @pytest.fixture(scope="module")
@@ -44,7 +43,7 @@ def test_on_a_gpu(device, dtype, alpha, moved, summed):
         taken = device.budget.used
         window.release()
     kind = memory_needs.Kind(WINDOW, moved, SHUTTERS, summed=summed)
-    needs = memory_needs.of_window(device, source(dtype, alpha), kind)
+    needs = memory_needs.of_windows(device, source(dtype, alpha), kind)
     assert needs == (taken + beside(source(dtype, alpha), SHUTTERS), 0, False)
 
 
@@ -61,13 +60,13 @@ def test_of_layers_on_a_gpu(dtype, alpha):
         taken = roomy.budget.used
         for window in windows:
             window.release()
-    needs = memory_needs.of_window(roomy, pictures, memory_needs.Kind(WINDOW, False, SHUTTERS, 2))
+    needs = memory_needs.of_windows(roomy, pictures, memory_needs.Kind(WINDOW, False, SHUTTERS, 2))
     roomy.release()
     assert needs == (taken + beside(pictures, SHUTTERS), 0, False)
 
 
 def test_without_room_the_frames_stay_on_the_host(device):
-    needs = memory_needs.of_window(device, source(np.float32, "opaque"), memory_needs.Kind(250, False, SHUTTERS))
+    needs = memory_needs.of_windows(device, source(np.float32, "opaque"), memory_needs.Kind(250, False, SHUTTERS))
     assert needs.sends
     assert needs.host == 250 * 70 * 50 * 16
     assert needs.gpu <= device.budget.limit
@@ -85,13 +84,13 @@ def test_with_numpy(dtype, alpha):
     finally:
         tracemalloc.stop()
     taken = sum(trace.size for trace in arrays.traces)
-    assert memory_needs.of_numpy_window(pictures, memory_needs.Kind(WINDOW, False, SHUTTERS)) == (0, taken, False)
+    assert memory_needs.with_numpy(pictures, memory_needs.Kind(WINDOW, False, SHUTTERS)) == (0, taken, False)
 
 
 def test_of_layers_with_numpy():
     """The frames as they are, and what each of two layers and what lies behind them makes of these."""
     pictures = source(np.float32, "opaque")
-    needs = memory_needs.of_numpy_window(pictures, memory_needs.Kind(WINDOW, False, SHUTTERS, layers=2))
+    needs = memory_needs.with_numpy(pictures, memory_needs.Kind(WINDOW, False, SHUTTERS, layers=2))
     assert needs == (0, 4 * WINDOW * memory_needs.frame_bytes(pictures), False)
 
 
@@ -102,7 +101,7 @@ def test_of_layers_without_room_for_all_of_them(dtype):
     for limit in range(500_000, 3_000_000, 250_000):
         device = open_gl(Budget(limit))
         kind = memory_needs.Kind(WINDOW, False, SHUTTERS, layers=4)
-        needs = memory_needs.of_window(device, pictures, kind)
+        needs = memory_needs.of_windows(device, pictures, kind)
         with device.current():
             frames = memory_needs._read(pictures, kind)  # which those are does not matter here
             windows = [open_window(device, read, WINDOW, False, SHUTTERS) for read in frames]

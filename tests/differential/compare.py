@@ -184,9 +184,22 @@ def lent_picture(device, rendering, asked, nudge: int | None = None) -> np.ndarr
 
     random = None if nudge is None else np.random.default_rng(nudge)
 
-    class Solver(cpu.Solver):
+    class Window(cpu.HostWindow):
+        def seen(self, *given):
+            frames, moved = super().seen(*given)
+            if random is not None:
+                frames = [nudged_light(frame, asked, self.source, random) for frame in frames]
+            return frames, moved
+
+    class Lent(cpu.CPUCompositor):
         def __init__(self):
-            self._own = device.solver()
+            self._own = device.stages()
+
+        def window(self, source, *_size):
+            return Window(source)
+
+        def stages(self):
+            return Lent()
 
         def solve(self, labels, count, *guide, **_how):
             with device.current():
@@ -198,20 +211,6 @@ def lent_picture(device, rendering, asked, nudge: int | None = None) -> np.ndarr
         def release(self):
             with device.freeing():
                 self._own.release()
-
-    class Window(cpu.HostWindow):
-        def seen(self, *given):
-            frames, moved = super().seen(*given)
-            if random is not None:
-                frames = [nudged_light(frame, asked, self.source, random) for frame in frames]
-            return frames, moved
-
-    class Lent(cpu.CPUCompositor):
-        def solver(self):
-            return Solver()
-
-        def window(self, source, *_size):
-            return Window(source)
 
     with rendering(Lent()) as renderer:
         return renderer.picture(asked)

@@ -197,7 +197,11 @@ FAULTS = {
     "nothing followed": (following, "followed", lambda effect, state, *_: state),
     "a dull filter": (compositor, "seen", lambda frame, places, sharp: seen(frame, places, sharp=False)),
     "trails of no length": (trails, "with_length", lambda bars, *_: (bars, len(bars))),
-    "edges passed over": (cpu.Solver, "solve", lambda solver, labels, count, *_, warm: solve(solver, labels, count)),
+    "edges passed over": (
+        cpu.CPUCompositor,
+        "solve",
+        lambda solver, labels, count, *_, warm: solve(solver, labels, count),
+    ),
     "mattes in another order": (mattes, "blended", lambda c, shown, values: blended(c, shown[::-1], values[::-1])),
     "hard mattes": (matte_values, "feathered", lambda values, width: values),
     "outlines of hard edges": (mattes, "coverage", lambda *given: np.round(coverage(*given))),
@@ -214,7 +218,7 @@ FAULTS = {
     "nothing slides": (windows, "slid", lambda state, *_, **__: state),
     "not normalised": (windows, "source_frames", lambda options, places, shot: places.clip(0, shot.stop - 1)),
 }
-eased, source_frames, solve = keyframes.eased, windows.source_frames, cpu.Solver.solve
+eased, source_frames, solve = keyframes.eased, windows.source_frames, cpu.CPUCompositor.solve
 blended, ramp_values, coverage = mattes.blended, mattes.Ramp.values, mattes.coverage
 rasterise, seen = scribbles.rasterise, compositor.seen
 

@@ -14,10 +14,8 @@ import bpy
 from bpy.types import PropertyGroup, Scene, Strip
 
 from ...compute import decoding_ahead, memory_needs
-from ...compute.cpu import CPUCompositor
-from ...compute.gpu import GPUCompositor
 from ...compute.renderer import Renderer
-from ...compute.request import Request
+from ...compute.request import Compositor, Request
 from ...core.farm.chunks import LEAST, chunk_size
 from ...core.frames import frame_ranges
 from ...core.frames.frame_source import FrameSource
@@ -33,8 +31,6 @@ from ..rendering.render_context import RenderContext
 from ..rendering.render_settings import RenderSettings
 from ..rendering.session import RenderSession
 from . import output_space
-
-Compositor = CPUCompositor | GPUCompositor
 
 
 @dataclass
@@ -250,13 +246,8 @@ def _notes(
 
 def _needs(source: FrameSource, requests: dict[float, Request], compositor: Compositor) -> memory_needs.Needs:
     """The most that one of the windows needs, decoded frames included."""
-    device, most = getattr(compositor, "device", None), memory_needs.Needs(0, 0, False)
-    for kind in {_kind(request.state) for request in requests.values()}:
-        if device is None:
-            needs = memory_needs.of_numpy_window(source, kind)
-        else:
-            needs = memory_needs.of_window(device, source, kind)
-        most = max(most, needs)
+    kinds = {_kind(request.state) for request in requests.values()}
+    most = max(compositor.needs(source, kind) for kind in kinds)
     window = max(request.state.options.window for request in requests.values())
     return most._replace(host=most.host + decoding_ahead.decoded_bytes(source, window))
 

@@ -96,22 +96,16 @@ def unread(snapshot: Snapshot, request: Request) -> Iterator[str]:
 
 
 def _slow(renderer: Renderer, request: Request) -> list[str]:
-    if not renderer.shortages:
+    if not renderer.is_short:
         return []
     source = renderer.source
     words = {"width": source.width, "height": source.height, "frames": request.state.options.window}
     words["limit"] = render_settings.memory().limit // MEGABYTE
-    sentences = {
-        "window": rpt_(
-            "the {limit} MB that may be taken of the GPU are too few for {frames} frames of {width}×{height}: all are"
-            " sent for every picture, which is slow"
-        ),
-        "diffusion": rpt_(
-            "the {limit} MB that may be taken of the GPU are too few to diffuse {width}×{height}: NumPy does it, which"
-            " is slow"
-        ),
-    }
-    return [sentences[name].format(**words) for name in sorted(renderer.shortages)]
+    sentence = rpt_(
+        "the {limit} MB that may be taken of the GPU are too few for {frames} frames of {width}×{height}: all are"
+        " sent for every picture, which is slow"
+    )
+    return [sentence.format(**words)]
 
 
 def resized(picture: np.ndarray, width: int, height: int, divisor: int = 1) -> np.ndarray:

@@ -55,7 +55,6 @@ class FrameSource(ABC):
     from_proxy: whether frames are read from a proxy, as far as it has them
     by_blender: whether a second Blender decodes them, for want of PyAV
     windows: how many windows of a picture read it, which have to have room beside one another
-    is_made: whether frames are made, quickly, of others that are kept
     """
 
     path: Path
@@ -76,7 +75,6 @@ class FrameSource(ABC):
     from_proxy: bool = False
     by_blender: bool = False
     windows: int = 1
-    is_made: bool = False
 
     @abstractmethod
     def read(self, index: int) -> np.ndarray:
@@ -100,10 +98,6 @@ class FrameSource(ABC):
     def check(self, index: int) -> None:
         """MediaError: the frame does not exist (see `has`)."""
         return  # all do
-
-    def keep(self, count: int) -> None:
-        """Has a source that keeps frames keep so many, at least."""
-        return  # most keep none
 
     def close(self) -> None:
         """Closes the file; a later read opens it again."""

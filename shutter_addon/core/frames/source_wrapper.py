@@ -39,9 +39,6 @@ class SourceWrapper(FrameSource):
     def check(self, index: int) -> None:
         self._source.check(index)
 
-    def keep(self, count: int) -> None:
-        self._source.keep(count)
-
     def close(self) -> None:
         self._source.close()
 

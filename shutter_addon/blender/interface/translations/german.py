@@ -75,12 +75,6 @@ MESSAGES = {
     " {width}×{height}: für jedes Bild werden alle neu gesendet, und das ist langsam",
     (
         "*",
-        "the {limit} MB that may be taken of the GPU are too few to diffuse {width}×{height}: NumPy does it, which is"
-        " slow",
-    ): "die {limit} MB, die von der GPU genommen werden dürfen, reichen für die Diffusion auf {width}×{height} nicht:"
-    " NumPy rechnet sie, und das ist langsam",
-    (
-        "*",
         "a second Blender decodes movies, which is slow: install the zip that is made for your system",
     ): "ein zweites Blender dekodiert Filme, und das ist langsam: installieren Sie die Zip-Datei für Ihr System",
     (

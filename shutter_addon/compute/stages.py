@@ -1,0 +1,145 @@
+"""The stages of a picture on a device, beside its composition: coefficients are diffused, added up, and covered by
+mattes; layers are laid over what lies behind them."""
+
+from __future__ import annotations
+
+from collections.abc import Hashable, Sequence
+
+import numpy as np
+
+from ..core.model.mattes import Matte
+from ..devices.device import Device, Texture
+from ..devices.named_textures import NamedTextures
+from ..devices.passes import read_pass
+from .diffusion import follows_edges
+from .diffusion_gpu import Diffusion
+from .edge_diffusion_gpu import EdgeDiffusion
+from .request import Behind, Exposure
+from .tables import padded
+
+# Mattes that one pass lays, whose values are on the device at once.
+MOST_MATTES = 8
+# Pixels along a side of the blocks whose least share is looked at.
+BLOCK = 16
+LEAST = read_pass("layer", "LEAST")
+
+
+def _in_fours(values: np.ndarray) -> np.ndarray:
+    """Coefficients (N, h, w) as layers (⌈N/4⌉, h, w, 4) float32 of a texture."""
+    return np.moveaxis(padded(np.moveaxis(values, 0, -1)), 2, 0).astype(np.float32)
+
+
+class Stages:
+    """request.Stages on a Device."""
+
+    def __init__(self, device: Device) -> None:
+        self._device = device
+        self._textures = NamedTextures(device)
+        self._plain, self._edged = Diffusion(device), EdgeDiffusion(device)
+        self._mattes: Texture | None = None
+        self._held: dict[int, Hashable] = {}  # by layer of that: the key of the values in it
+
+    def solve(
+        self,
+        labels: np.ndarray,
+        count: int,
+        guide: np.ndarray | None = None,
+        strength: float = 0.0,
+        *,
+        warm: bool = False,
+    ) -> Texture:
+        """See request.Stages. What the other kind of diffusion has on the device is freed."""
+        if guide is not None and follows_edges(labels, guide, strength):
+            self._plain.release()
+            return self._edged.solve(labels, count, guide, strength)
+        self._edged.release()
+        return self._plain.solve(labels, count, warm=warm)
+
+    def upload(self, values: np.ndarray) -> Texture:
+        """See request.Stages."""
+        return self._textures.filled("uploaded", _in_fours(values))
+
+    def add(self, mixed: Texture | None, added: Texture, share: float, size: tuple[int, int]) -> Texture:
+        """See request.Stages."""
+        height, width = size
+        result = self._textures.of("sum", (width, height, added.size[2]), "rgba32f")
+        self._device.run(
+            read_pass("mix", BEGINS=int(mixed is None)),
+            result.size,
+            images={"added": added, "mixed": result},
+            size=(width, height),
+            given=added.size[:2],
+            share=share,
+        )
+        return result
+
+    def blend(
+        self, beneath: Texture, mattes: tuple[Matte, ...], layers: Sequence[tuple[Hashable, np.ndarray]]
+    ) -> Texture:
+        """See request.Stages. Values that it was given last stay on the device."""
+        height, width = layers[0][1].shape
+        values = self._textures.of("mattes", (width, height, min(len(mattes), MOST_MATTES)), "r32f")
+        if values is not self._mattes:
+            self._mattes, self._held = values, {}
+        ends = ["even", "odd"]
+        laid = list(zip(mattes, layers, strict=True))
+        for start in range(0, len(laid), MOST_MATTES):
+            some = laid[start : start + MOST_MATTES]
+            table = np.zeros((MOST_MATTES, 4), np.float32)
+            for layer, (matte, (key, array)) in enumerate(some):
+                table[layer, :3] = matte.shutter, matte.blend == "add", matte.opacity
+                if self._held.get(layer) != key:
+                    self._device.write(values, np.ascontiguousarray(array[..., None]), layer)
+                    self._held[layer] = key
+            over = self._textures.of(ends[0], (width, height, beneath.size[2]), "rgba32f")
+            adds = any(matte.blend == "add" for matte, _ in some)
+            self._device.run(
+                read_pass("matte_blend", COUNT=len(some), ADDS=int(adds), MOST=MOST_MATTES),
+                over.size,
+                images={"under": beneath, "values": values, "over": over},
+                blocks={"table": table},
+                size=(width, height),
+                beneath=beneath.size[:2],
+            )
+            beneath, ends = over, ends[::-1]
+        return beneath
+
+    def least_share(self, exposed: Exposure) -> float:
+        """See request.Stages: the least of each block is found on the device."""
+        width, height, _ = exposed.share.size
+        least = self._textures.of("least", (-(-width // BLOCK), -(-height // BLOCK), 1), "r32f")
+        images = {"clear": exposed.share, "least": least}
+        self._device.run(LEAST, least.size[:2], images=images, size=(width, height))
+        return self._device.read(least).min()
+
+    def lay(self, behind: Behind, layers: Sequence[Exposure], levels: bool) -> Texture:
+        """See request.Stages."""
+        under, plate = behind.exposed.color, None
+        size = width, height = under.size[:2]
+        if behind.plate is not None:
+            plate = self._textures.filled("plate", [behind.plate[::-1].astype(np.float32, copy=False)])
+        for k, layer in enumerate(layers):
+            ends = k == len(layers) - 1
+            name = ("levels" if levels else "picture") if ends else f"part {k % 2}"
+            picture = self._textures.of(name, (width, height, 1), "rgba8" if levels and ends else "rgba32f")
+            program = read_pass(
+                "layer",
+                BEGINS=int(not k),
+                ENDS=int(ends),
+                OPAQUE=int(layer.color is layer.share),
+                PLAIN=int(not k and behind.plain is not None),
+                PLATE=int(not k and plate is not None),
+                LEVELS=int(levels and ends),
+            )
+            textures = {"share": layer.share, "clear": behind.exposed.share, "plain": behind.plain, "plate": plate}
+            images = {"under": under, "exposed": layer.color, "picture": picture}
+            self._device.run(program, size, textures=textures, images=images, size=size, height=height)
+            under = picture
+        return under
+
+    def release(self) -> None:
+        """Frees what is on the device, inside Device.freeing."""
+        self._plain.release()
+        self._edged.release()
+        self._textures.release()
+        self._mattes = None
