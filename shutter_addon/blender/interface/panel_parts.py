@@ -4,6 +4,7 @@ from collections.abc import Sequence
 
 import bpy
 from bpy.app.translations import contexts
+from bpy.app.translations import pgettext_iface as iface_
 from bpy.app.translations import pgettext_n as n_
 from bpy.types import Context, PropertyGroup, Scene, Strip, UILayout
 
@@ -97,6 +98,11 @@ def _draw_operator(layout: UILayout, name: str, icon: str = "NONE", prop: str = 
 def draw_properties(layout: UILayout, owner: bpy.types.bpy_struct, *names: str) -> None:
     for name in names:
         layout.prop(owner, name)
+
+
+def draw_progress(layout: UILayout, done: int, total: int) -> None:
+    text = iface_("{done} of {total}").format(done=done, total=total)
+    layout.progress(factor=done / max(total, 1), text=text, translate=False)
 
 
 class WithEffect(Mixin):

@@ -16,8 +16,7 @@ from ..rendering import inbetween_build, strobing
 from . import icons, inbetween_operators
 from .bake_operators import Bake
 from .note_buttons import Button
-from .operator_bases import Mixin, own_classes
-from .option_panels import Inbetween, Options
+from .operator_bases import Mixin
 from .panel_parts import (
     WIDEST,
     WithEffect,
@@ -294,6 +293,23 @@ class _Move(WithEffect):
             draw_tracking(layout, None)
 
 
+class _Options(WithEffect):
+    bl_label = "Options"
+
+    def draw_effect(self, layout: UILayout, _scene: Scene, effect: PropertyGroup, _strip: Strip) -> None:
+        names = "position", "interpolation", "light", "exposure", "edges", "stop_at_cuts", "aggregate", "border"
+        draw_properties(layout, effect, *names)
+        column = layout.column()
+        column.active = any(region.is_layer for region in effect.regions)
+        draw_properties(column, effect, "decontaminate", "plate_reach")
+        layout.prop(effect, "use_source_time")
+        column = layout.column()
+        column.active = effect.use_source_time
+        column.prop(effect, "source_time")
+        if effect.use_source_time and effect.inbetween == "1":
+            sentence(column, iface_("No in-between frames: the nearest source frame is shown"), "INFO")
+
+
 class _Report(Mixin):
     """The last of the tab, whether there is an effect or not."""
 
@@ -335,8 +351,8 @@ _PANELS = {
     "_exposure": (_Exposure, ""),
     "_move": (_Move, "_exposure"),
     "_camera": (Camera, ""),
-    "_options": (Options, ""),
-    "_inbetween": (Inbetween, ""),
+    "_options": (_Options, ""),
+    "_inbetween": (inbetween_operators.Inbetween, ""),
     "_bake": (Bake, ""),
     "_report": (_Report, ""),
 }
@@ -349,40 +365,7 @@ def _panels(start: str, place: type) -> list[type]:
     ]
 
 
-def _add_entry(self, _context: Context) -> None:
-    self.layout.separator()
-    self.layout.operator("shutter.add_effect", text="Shutter")
-
-
-def _strip_entry(self, context: Context) -> None:
-    strip = selection.active_strip(context)
-    if strip is None or not (strip.type in strips.SOURCES or selection.active(context)):
-        return
-    self.layout.separator()
-    if strip.type in strips.SOURCES:
-        self.layout.operator("shutter.draw", text="Draw Shutter", icon="GREASEPENCIL")
-        self.layout.operator("shutter.add_effect")
-    draw_operators(self.layout, ("effect_copy", "COPYDOWN"), ("effect_paste", "PASTEDOWN"))
-
-
-MENUS = {
-    "SEQUENCER_MT_add_effect": _add_entry,
-    "SEQUENCER_MT_strip": _strip_entry,
-    "SEQUENCER_MT_context_menu": _strip_entry,
-}
-
 classes = (
-    *own_classes(globals()),
     *_panels("STRIP_PT_shutter", _InProperties),
     *_panels("SEQUENCER_PT_shutter", _InSidebar),
 )
-
-
-def register() -> None:
-    for menu, entry in MENUS.items():
-        getattr(bpy.types, menu).append(entry)
-
-
-def unregister() -> None:
-    for menu, entry in MENUS.items():
-        getattr(bpy.types, menu).remove(entry)
