@@ -53,7 +53,7 @@ def test_no_message_misses_its_translation():
             assert not (name in SHOWN and ast.Constant in given), f"{path.name}:{call.lineno}"
 
 
-# What these return is shown as it is, and what others return that are named as the last, or are in needs.py.
+# What these return is shown as it is, and what others do that begin with `_why_` or are in needs.py.
 TELLING = {"refusal", "why_no_effect", "why_full"}
 
 

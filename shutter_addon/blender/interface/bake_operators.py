@@ -12,7 +12,7 @@ from ..data import main_thread, selection, strips
 from ..editing import baked_strips
 from ..output import bake_job, baked_film, film_output
 from .operator_bases import Named, operator, redraw
-from .panel_parts import WithEffect, draw_progress, sentence
+from .panel_parts import draw_progress, sentence
 
 TICK = 0.5  # seconds from one look at the job to the next
 STILL = 1.0  # seconds without a change after which it is asked whether a film is stale
@@ -131,25 +131,22 @@ def forget() -> None:
     _failures.clear()
 
 
-class Bake(WithEffect):
-    bl_label = "Bake"
-
-    def draw_effect(self, layout: UILayout, scene: Scene, effect: PropertyGroup, strip: Strip) -> None:
-        job = next((job for job in _running if job.effect == effect.identity), None)
-        if job is not None:
-            row = layout.row(align=True)
-            draw_progress(row, job.done(), len(job.film.frames))
-            row.operator("shutter.bake_stop", text="", icon="X")
-            return
-        if failure := _failures.get(effect.identity):
-            sentence(layout, failure, "ERROR")
-        identity = strip.virtual_shutter_bake.identity
-        if identity:
-            _draw_state(layout, scene, effect, strip)
+def draw_panel(layout: UILayout, scene: Scene, effect: PropertyGroup, strip: Strip) -> None:
+    job = next((job for job in _running if job.effect == effect.identity), None)
+    if job is not None:
         row = layout.row(align=True)
-        row.operator_menu_enum("shutter.bake", "file_format", text="Bake Again" if identity else "Bake to Strip")
-        if identity:
-            layout.operator("shutter.unbake")
+        draw_progress(row, job.done(), len(job.film.frames))
+        row.operator("shutter.bake_stop", text="", icon="X")
+        return
+    if failure := _failures.get(effect.identity):
+        sentence(layout, failure, "ERROR")
+    identity = strip.virtual_shutter_bake.identity
+    if identity:
+        _draw_state(layout, scene, effect, strip)
+    row = layout.row(align=True)
+    row.operator_menu_enum("shutter.bake", "file_format", text="Bake Again" if identity else "Bake to Strip")
+    if identity:
+        layout.operator("shutter.unbake")
 
 
 def _draw_state(layout: UILayout, scene: Scene, effect: PropertyGroup, strip: Strip) -> None:

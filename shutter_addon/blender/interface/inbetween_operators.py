@@ -17,7 +17,7 @@ from ..rendering import inbetween_build, strobing
 from ..rendering.effect_source import FAULTS
 from .note_buttons import Button
 from .operator_bases import Beside, OfEffect, redraw, report_warning, show_status
-from .panel_parts import WithEffect, draw_progress, draw_properties, sentence
+from .panel_parts import draw_progress, draw_properties, sentence
 
 TICK = 0.25  # seconds
 
@@ -193,30 +193,27 @@ class SHUTTER_OT_inbetween_purge(OfEffect, Operator):
             report_warning(self, messages.sentence(sentence.format(folder=place, count=count)))
 
 
-class Inbetween(WithEffect):
-    bl_label = "In-Between Frames"
-
-    def draw_effect(self, layout: UILayout, scene: Scene, effect: PropertyGroup, strip: Strip) -> None:
-        build = inbetween_build.running()
-        if build is not None and build.scene != effect.scene.session_uid:
-            build = None  # of another effect
-        column = layout.column()
-        column.enabled = build is None
-        column.prop(effect, "inbetween", text="Factor")
-        column = column.column()
-        is_on = effect.inbetween != "1"
-        column.active = is_on
-        draw_properties(column, effect, "inbetween_method", "inbetween_place")
-        if build is not None:
-            draw_progress(layout, build.done, build.total)
-        elif is_on:
-            try:
-                _draw_look(layout, inbetween_build.look(scene, effect, strip))
-            except FAULTS as error:
-                sentence(layout, str(error), "ERROR")
-        row = layout.row(align=True)
-        row.operator("shutter.inbetween_build", text="Build")
-        row.operator("shutter.inbetween_purge", text="Remove")
+def draw_panel(layout: UILayout, scene: Scene, effect: PropertyGroup, strip: Strip) -> None:
+    build = inbetween_build.running()
+    if build is not None and build.scene != effect.scene.session_uid:
+        build = None  # of another effect
+    column = layout.column()
+    column.enabled = build is None
+    column.prop(effect, "inbetween", text="Factor")
+    column = column.column()
+    is_on = effect.inbetween != "1"
+    column.active = is_on
+    draw_properties(column, effect, "inbetween_method", "inbetween_place")
+    if build is not None:
+        draw_progress(layout, build.done, build.total)
+    elif is_on:
+        try:
+            _draw_look(layout, inbetween_build.look(scene, effect, strip))
+        except FAULTS as error:
+            sentence(layout, str(error), "ERROR")
+    row = layout.row(align=True)
+    row.operator("shutter.inbetween_build", text="Build")
+    row.operator("shutter.inbetween_purge", text="Remove")
 
 
 # How a state of in-between frames is called, and its icon.

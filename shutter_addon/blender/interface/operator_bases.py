@@ -178,8 +178,9 @@ class Beside(Named):
 
     def modal(self, context: Context, event: Event) -> set[str]:
         is_stopped = event.type == "ESC" and event.value == "PRESS"
+        is_over = is_stopped or self._timer not in _timers
         try:
-            is_over = is_stopped or (event.type == "TIMER" and not self.goes_on(context))
+            is_over = is_over or (event.type == "TIMER" and not self.goes_on(context))
         except Exception:  # Blender ends the operator then, and asks for no `cancel`
             self.leave(context)
             raise

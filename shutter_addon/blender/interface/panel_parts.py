@@ -1,6 +1,6 @@
 """What panels are made of: sentences, lists, and when there is an effect to show."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import bpy
 from bpy.app.translations import contexts
@@ -13,6 +13,8 @@ from ...core.model.fields import fields_of
 from ..data import selection
 from . import drawing
 from .operator_bases import Mixin
+
+Draws = Callable[[UILayout, Scene, PropertyGroup, Strip], None]  # what a panel shows of an effect
 
 # Units of the interface beside a sentence in a panel: margins and the tabs of a sidebar; its icon.
 _MARGIN, _ICON = 64, 20
@@ -105,24 +107,19 @@ def draw_progress(layout: UILayout, done: int, total: int) -> None:
     layout.progress(factor=done / max(total, 1), text=text, translate=False)
 
 
-class WithEffect(Mixin):
-    """A panel of the effect, closed at first."""
+def of_effect(label: str, draws: Draws, shows: Callable[[PropertyGroup], bool] | None = None, **look: object) -> type:
+    """Makes a panel of the effect, closed at first.
 
-    bl_options = {"DEFAULT_CLOSED"}
+    shows: whether there is anything to show of an effect; look: what else the class has for Blender"""
 
-    @classmethod
-    def poll(cls, context: Context) -> bool:
-        active = selection.active(context) if super().poll(context) else None
-        return active is not None and cls.shows(active[1])
+    class Drawn(Mixin):
+        @classmethod
+        def poll(cls, context: Context) -> bool:
+            active = selection.active(context) if super().poll(context) else None
+            return active is not None and (shows is None or shows(active[1]))
 
-    @classmethod
-    def shows(cls, effect: PropertyGroup) -> bool:
-        """Whether there is anything to show of an effect."""
-        return True
+        def draw(self, context: Context) -> None:
+            self.layout.use_property_split = True
+            draws(self.layout, *selection.active(context))
 
-    def draw(self, context: Context) -> None:
-        self.layout.use_property_split = True
-        self.draw_effect(self.layout, *selection.active(context))
-
-    def draw_effect(self, layout: UILayout, scene: Scene, effect: PropertyGroup, strip: Strip) -> None:
-        raise NotImplementedError
+    return type("Drawn", (Drawn,), {"bl_label": label, "bl_options": {"DEFAULT_CLOSED"}} | look)
