@@ -1,8 +1,7 @@
 """Operators that make regions of mattes, ramps and time maps; that repair what a rolling shutter has skewed, and find
 how long its readout is."""
 
-from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack
 from pathlib import Path
 
 import bpy
@@ -10,7 +9,7 @@ from bpy.app.translations import contexts
 from bpy.app.translations import pgettext_iface as iface_
 from bpy.app.translations import pgettext_rpt as rpt_
 from bpy.props import BoolProperty, EnumProperty, FloatProperty, StringProperty
-from bpy.types import Context, Mask, Operator, PropertyGroup, Window
+from bpy.types import Context, Mask, Operator, PropertyGroup
 from bpy_extras.io_utils import ImportHelper
 
 from ...core.messages import EffectError, UserError
@@ -207,18 +206,6 @@ class SHUTTER_OT_rolling_shutter(OfEffect, Operator):
         rolling_shutter.repair(self.edit, effect, self.effect_strip, share, self.side)
 
 
-@contextmanager
-def _waiting(window: Window | None) -> Iterator[None]:
-    """Inside, the pointer shows that it takes some seconds."""
-    if window is not None:
-        window.cursor_modal_set("WAIT")
-    try:
-        yield
-    finally:
-        if window is not None:
-            window.cursor_modal_restore()
-
-
 _READS = EnumProperty(
     name="Reads",
     description="What the sensor reads one after the other",
@@ -230,7 +217,10 @@ _READS = EnumProperty(
 @operator("Find Readout", _why_no_repair, reads=_READS)
 def find_readout(self: Operator, context: Context, effect: PropertyGroup) -> None:
     """Find how long the sensor reads out, by lines that lean as they move around the current frame, and repair that"""
-    with _waiting(context.window):
+    with ExitStack() as after:
+        if (window := context.window) is not None:
+            window.cursor_modal_set("WAIT")
+            after.callback(window.cursor_modal_restore)
         found, side = rolling_shutter.find(
             self.edit, effect, self.effect_strip, "TOP" if self.reads == "ROWS" else "LEFT"
         )

@@ -1,5 +1,8 @@
 """Operators: what the user can do, as thin calls of plain functions."""
 
+from collections.abc import Callable
+from functools import partial
+
 import bpy
 from bpy.app.translations import contexts
 from bpy.app.translations import pgettext_iface as iface_
@@ -148,20 +151,20 @@ def shutter_remove(_self: Operator, _context: Context, effect: PropertyGroup) ->
 _DIRECTION = EnumProperty(name="Direction", items=(("UP", "Up", ""), ("DOWN", "Down", "")), options={"SKIP_SAVE"})
 
 
-def _target(direction: str, places: list[int], index: int) -> int:
-    """The place after or before `index` in a list, among the places that it shows."""
+def _move(places: list[int], index: int, direction: str, move: Callable[[int, int], None]) -> set[str] | None:
+    """Moves an item to the place after or before it in a list, among the places that it shows."""
     step = places.index(index) + (1 if direction == "DOWN" else -1)
-    return places[min(max(step, 0), len(places) - 1)]
+    if not 0 <= step < len(places):
+        return {"CANCELLED"}
+    move(index, places[step])
+    return None
 
 
 @operator("Move Shutter", needs.a_shutter, direction=_DIRECTION)
 def shutter_move(self: Operator, _context: Context, effect: PropertyGroup) -> set[str] | None:
     """Move the active shutter in the list (the first one is the default, which holds where nothing is scribbled)"""
-    index = effect.active_shutter
-    if (to := _target(self.direction, list(range(len(effect.shutters))), index)) == index:
-        return {"CANCELLED"}
-    shutter_edits.move_shutter(effect, index, to)
-    return None
+    places = list(range(len(effect.shutters)))
+    return _move(places, effect.active_shutter, self.direction, partial(shutter_edits.move_shutter, effect))
 
 
 @kept
@@ -351,12 +354,9 @@ def region_remove(_self: Operator, _context: Context, effect: PropertyGroup) -> 
 @operator("Move Region", needs.a_region, direction=_DIRECTION)
 def region_move(self: Operator, _context: Context, effect: PropertyGroup) -> set[str] | None:
     """Move the active region in the list (later ones lie over earlier ones)"""
-    index, name = effect.active_region, selection.active_shutter(effect).name
-    listed = [i for i, region in enumerate(effect.regions) if region.shutter == name]
-    if (to := _target(self.direction, listed, index)) == index:
-        return {"CANCELLED"}
-    region_edits.move_region(effect, index, to)
-    return None
+    name = selection.active_shutter(effect).name
+    places = [i for i, region in enumerate(effect.regions) if region.shutter == name]
+    return _move(places, effect.active_region, self.direction, partial(region_edits.move_region, effect))
 
 
 @operator("Insert Region Keyframes", needs.a_region)
