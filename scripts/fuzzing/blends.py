@@ -243,11 +243,12 @@ def _to_its_end(task, *arguments) -> None:
 
 def _draw(bpy, _folder):
     """What panels and lists do when they are drawn."""
+    from shutter_addon import blender
     from shutter_addon.blender.data import selection, validation
     from shutter_addon.blender.editing import bar_edits
     from shutter_addon.blender.interface import panels
 
-    for panel in panels.classes:
+    for panel in blender.classes_of(panels):
         if issubclass(panel, bpy.types.Panel) and panel.poll(bpy.context):
             functions = {name: each for name, each in inspect.getmembers(panel) if inspect.isfunction(each)}
             type("Drawn", (), {**functions, "layout": _Layout()})().draw(bpy.context)

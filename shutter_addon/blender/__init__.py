@@ -1,10 +1,11 @@
 """Everything that touches bpy: properties, engine, strips, commands."""
 
 from importlib import import_module
+from types import ModuleType
 
 import bpy
 
-# Blender gets the `classes` of each, and loses its `TIMERS`; all else that it gets, `register` and `unregister` know.
+# Blender gets the classes of each (classes_of); all else that it gets, `register` and `unregister` know.
 _MODULES = (
     "data.main_thread",
     "interface.translations",
@@ -19,22 +20,17 @@ _MODULES = (
     "interface.inbetween_operators",
     "interface.track_operators",
     "interface.matte_operators",
-    "interface.readout_operators",
     "interface.outline_operators",
-    "interface.outline_points",
     "interface.copy_operators",
     "interface.bake_operators",
     "interface.full_quality",
-    "interface.numeric_operators",
     "interface.panels",
     "interface.menus",
     "interface.note_buttons",
-    "interface.newer_files",
     "interface.gizmo_groups",
     "interface.bar_editor",
     "interface.region_gizmo",
     "interface.outline_gizmo",
-    "interface.split_gizmo",
     "interface.probe_gizmo",
     "handlers",
 )
@@ -42,10 +38,17 @@ _modules = [import_module(f".{name}", __package__) for name in _MODULES]
 _commands: list = []
 
 
+def classes_of(module: ModuleType) -> tuple[type, ...]:
+    """Those of a module that Blender gets: its own with Blender's kind of names, and what it calls `classes`."""
+    own = [each for each in vars(module).values() if getattr(each, "__module__", "") == module.__name__]
+    named = [each for each in own if isinstance(each, type) and each.__name__.startswith("SHUTTER_")]
+    return (*named, *getattr(module, "classes", ()))
+
+
 def register() -> None:
     """Registers everything with Blender, the command included."""
     for module in _modules:
-        for cls in getattr(module, "classes", ()):
+        for cls in classes_of(module):
             bpy.utils.register_class(cls)
         if hasattr(module, "register"):
             module.register()
@@ -58,9 +61,7 @@ def unregister() -> None:
     for module in reversed(_modules):
         if hasattr(module, "unregister"):
             module.unregister()
-        for timer in filter(bpy.app.timers.is_registered, getattr(module, "TIMERS", ())):
-            bpy.app.timers.unregister(timer)
-        for cls in reversed(getattr(module, "classes", ())):
+        for cls in reversed(classes_of(module)):
             bpy.utils.unregister_class(cls)
 
 

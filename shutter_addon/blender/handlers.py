@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import inspect
 import sys
+from collections.abc import Iterable
 from functools import partial
 from types import TracebackType
 
@@ -13,9 +14,10 @@ from bpy.app.handlers import persistent
 from bpy.types import Depsgraph, Scene
 
 from ..core import revision, told
-from .data import data_format, inbetween_settings, preview_areas, source_media, strips, versions
+from ..core.messages import sentence, signed
+from .data import data_format, inbetween_settings, main_thread, preview_areas, source_media, strips, versions
 from .editing import migrations, reconcile, shown_annotations, track_region, undelete
-from .interface import bake_operators, inbetween_operators, newer_files, sharp_frame
+from .interface import bake_operators, inbetween_operators, operator_bases, sharp_frame
 from .output import edit_feed
 from .rendering import invalidation, job_snapshots, render_job, sessions
 from .rendering.render_job import Where
@@ -24,6 +26,7 @@ from .rendering.render_job import Where
 def _before_load(*_) -> None:
     edit_feed.end()
     sharp_frame.forget()
+    operator_bases.end_all()
     inbetween_operators.stop()
     bake_operators.forget()
     track_region.data_replaced()
@@ -41,12 +44,30 @@ def _after_load(*_) -> None:
         migrations.migrate()
         reconcile.tidy()
     shown_annotations.follow()
-    newer_files.tell(bpy.data.scenes)
+    tell_newer(bpy.data.scenes)
 
 
 def _after_import(imported: bpy.types.BlendImportContext, *_) -> None:
     items = [item for item in imported.import_items if item.id_type == "SCENE"]
-    newer_files.tell(item.id for item in items if item.id is not None)  # a name that was asked for may not be there
+    tell_newer(item.id for item in items if item.id is not None)  # a name that was asked for may not be there
+
+
+def tell_newer(scenes: Iterable[Scene]) -> None:
+    """Says once, of the first scene that holds what only a newer version of the extension knows, that it does: in the
+    window, or on stderr where there is none."""
+    if (words := data_format.note(scenes)) is None:
+        return
+    told.record(words)
+    if bpy.app.background:
+        print(signed(words), file=sys.stderr)
+    else:  # while a file is loaded, its windows are not there yet
+        main_thread.soon(partial(_show, sentence(words)))
+
+
+def _show(words: str) -> None:
+    if windows := bpy.context.window_manager.windows:
+        with bpy.context.temp_override(window=windows[0]):
+            operator_bases.popup(bpy.context, words, title="Virtual Shutter", icon="INFO")
 
 
 def _before_save(*_) -> None:
@@ -66,7 +87,7 @@ def _update(scene: Scene | None = None, depsgraph: Depsgraph | None = None) -> N
     # Blender itself draws previews again for most of what changes, but not for a mask. And it may crash where one is
     # drawn while a render ends.
     if depsgraph is not None and depsgraph.id_type_updated("MASK") and not render_job.runs():
-        preview_areas.redraw(bpy.context)
+        preview_areas.redraw()
 
 
 def _before_undo(*_) -> None:
@@ -175,16 +196,15 @@ def register() -> None:
         _hooks.append(sys.excepthook)
         sys.excepthook = _uncaught
     # Those that the sequencer keeps from before lack the effects; while this registers, Blender's data cannot be had.
-    bpy.app.timers.register(_drop_frames)
+    main_thread.later(_drop_frames)
 
 
 def unregister() -> None:
     for name, function in HANDLERS.items():
         getattr(bpy.app.handlers, name).remove(function)
-    if bpy.app.timers.is_registered(_drop_frames):
-        bpy.app.timers.unregister(_drop_frames)
     if sys.excepthook is _uncaught:  # else somebody who came after us calls it still
         sys.excepthook = _hooks.pop()
+    operator_bases.end_all()
     edit_feed.end()
     sessions.forget()
     source_media.forget()

@@ -49,7 +49,7 @@ def of_sources() -> set:
 
 def _classes():
     modules = blender._modules  # what it registers: there is no other list
-    return [cls for module in modules for cls in getattr(module, "classes", ())]
+    return [cls for module in modules for cls in blender.classes_of(module)]
 
 
 def _of_class(cls):

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from support import recipe, sequencer
 
+from shutter_addon import blender
 from shutter_addon.blender.data import annotations, consistency, selection
 from shutter_addon.blender.editing import bar_edits, region_edits
 from shutter_addon.core.model import limits
@@ -449,7 +450,7 @@ def test_what_cannot_be_used_says_why(bpy, operators, edit, effect, tmp_path, si
     situation(bpy, edit, effect, tmp_path)
     usual, others = SITUATIONS[situation]
     with bpy.context.temp_override(window=bpy.data.window_managers[0].windows[0]):
-        for cls in operators.classes:
+        for cls in blender.classes_of(operators):
             name = cls.bl_idname.removeprefix("shutter.")
             operator = getattr(bpy.ops.shutter, name)
             sentence = others.get(name, usual)

@@ -471,6 +471,7 @@ class Layout:
 
 def show(bpy, edit):
     """Calls what Blender calls where an effect is shown: handlers, polls, panels, gizmos."""
+    from shutter_addon import blender
     from shutter_addon.blender.data import preview_areas, selection
     from shutter_addon.blender.editing import reconcile
     from shutter_addon.blender.interface import (
@@ -478,8 +479,8 @@ def show(bpy, edit):
         inbetween_operators,
         operators,
         panels,
+        probe_gizmo,
         region_gizmo,
-        split_gizmo,
     )
     from shutter_addon.blender.rendering import invalidation
 
@@ -493,11 +494,12 @@ def show(bpy, edit):
             preview_areas.shown(context)
             bar_editor.bar_under(context, 30, 30)
             region_gizmo.place(context)
-            for cls in (*operators.classes, *inbetween_operators.classes, *bar_editor.classes, *region_gizmo.classes):
-                if hasattr(cls, "poll"):
-                    cls.poll(context)
-            split_gizmo.SHUTTER_GGT_split.poll(context)
-            for cls in panels.classes:
+            for module in (operators, inbetween_operators, bar_editor, region_gizmo):
+                for cls in blender.classes_of(module):
+                    if hasattr(cls, "poll"):
+                        cls.poll(context)
+            probe_gizmo.SHUTTER_GGT_split.poll(context)
+            for cls in blender.classes_of(panels):
                 if issubclass(cls, bpy.types.Panel) and cls.poll(context):
                     functions = {name: each for name, each in inspect.getmembers(cls) if inspect.isfunction(each)}
                     type("Drawn", (), {**functions, "layout": Layout()})().draw(context)

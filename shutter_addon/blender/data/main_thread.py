@@ -18,7 +18,7 @@ def soon(function: Callable[[], None]) -> None:
     _calls.put(function)
 
 
-def _call() -> float:
+def call_waiting() -> float:
     """A timer, which is there as long as the extension is."""
     for _ in range(_calls.qsize()):
         try:
@@ -28,9 +28,26 @@ def _call() -> float:
     return _TICK
 
 
-TIMERS = (_call,)
+_timers: set[Callable[[], float | None]] = set()  # that Blender may have still once the extension is disabled
 
 
-def register():
+def later(timer: Callable[[], float | None], seconds: float = 0.0, *, persistent: bool = False) -> None:
+    """Has Blender call a timer, unless it is going to; for the main thread."""
+    _timers.add(timer)
+    if not bpy.app.timers.is_registered(timer):
+        bpy.app.timers.register(timer, first_interval=seconds, persistent=persistent)
+
+
+def drop(*timers: Callable[[], float | None]) -> None:
+    """Has Blender call timers no more."""
+    for timer in filter(bpy.app.timers.is_registered, timers):
+        bpy.app.timers.unregister(timer)
+
+
+def register() -> None:
     if not bpy.app.background:
-        bpy.app.timers.register(_call, first_interval=_TICK, persistent=True)
+        later(call_waiting, _TICK, persistent=True)
+
+
+def unregister() -> None:
+    drop(*_timers)

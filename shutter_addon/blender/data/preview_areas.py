@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Iterator
+from contextlib import AbstractContextManager
 from dataclasses import dataclass
 
 import bpy
@@ -49,10 +50,15 @@ def previews(context: Context) -> Iterator[tuple[bpy.types.Window, Area]]:
                 yield window, area
 
 
-def redraw(context: Context) -> None:
-    """Draws all previews again."""
-    for _window, area in previews(context):
+def redraw(_owner: object = None, _context: Context | None = None) -> None:
+    """Draws all previews again; Blender calls it with two arguments after a change of a property."""
+    for _window, area in previews(bpy.context):
         area.tag_redraw()  # of the area alone, Blender's picture and ours
+
+
+def within(window: bpy.types.Window, area: Area) -> AbstractContextManager:
+    """A context in which Blender's operators work in the preview of a sequencer's area."""
+    return bpy.context.temp_override(window=window, area=area, region=preview_region(area))
 
 
 def preview_region(area: Area) -> bpy.types.Region:

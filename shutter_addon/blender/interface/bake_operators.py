@@ -8,11 +8,11 @@ from bpy.types import Context, Operator, PropertyGroup, Scene, Strip, UILayout
 
 from ...core import messages, revision
 from ...core.messages import EffectError, UserError
-from ..data import selection, strips
+from ..data import main_thread, selection, strips
 from ..editing import baked_strips
 from ..output import bake_job, baked_film, film_output
-from .operator_bases import Named, OfEffect, own_classes, redraw
-from .panel_parts import WithEffect, sentence
+from .operator_bases import Named, operator, redraw
+from .panel_parts import draw_progress, sentence
 
 TICK = 0.5  # seconds from one look at the job to the next
 STILL = 1.0  # seconds without a change after which it is asked whether a film is stale
@@ -31,32 +31,27 @@ def _is_baking() -> bool:
     return bool(_running or _stopped)
 
 
-class SHUTTER_OT_bake(OfEffect, Operator):
+def _why_baking(_effect: PropertyGroup) -> str | None:
+    return rpt_("An effect is being baked") if _is_baking() else None
+
+
+@operator("Bake to Strip", _why_baking, file_format=EnumProperty(name="Format", items=FORMATS))
+def bake(self: Operator, _context: Context, effect: PropertyGroup) -> set[str] | None:
     """Render the effect beside Blender, and put the film above it as a strip. Frames that are finished are kept"""
-
-    bl_label = "Bake to Strip"
-
-    file_format: EnumProperty(name="Format", items=FORMATS)
-
-    @classmethod
-    def why_not(cls, effect: PropertyGroup) -> str | None:
-        return rpt_("An effect is being baked") if _is_baking() else None
-
-    def change(self, _context: Context, effect: PropertyGroup) -> set[str] | None:
-        _failures.pop(effect.identity, None)
-        baked_strips.check(self.edit, self.effect_strip)
-        film = baked_film.film_of(self.edit, effect, self.effect_strip, self.file_format)
-        try:
-            if bpy.app.background:
-                baked_film.render(self.edit, effect, self.effect_strip, film, lambda _done: None)
-            if film.is_finished():
-                baked_strips.lay(self.edit, self.effect_strip, film)
-                return None
-            _running.append(bake_job.start(self.edit, effect, self.effect_strip, film))
-        except (film_output.OutputError, OSError) as error:
-            raise UserError(film_output.in_words(error, film.place)) from None
-        bpy.app.timers.register(_look, first_interval=TICK)
-        return {"CANCELLED"}  # nothing has changed yet that could be undone
+    _failures.pop(effect.identity, None)
+    baked_strips.check(self.edit, self.effect_strip)
+    film = baked_film.film_of(self.edit, effect, self.effect_strip, self.file_format)
+    try:
+        if bpy.app.background:
+            baked_film.render(self.edit, effect, self.effect_strip, film, lambda _done: None)
+        if film.is_finished():
+            baked_strips.lay(self.edit, self.effect_strip, film)
+            return None
+        _running.append(bake_job.start(self.edit, effect, self.effect_strip, film))
+    except (film_output.OutputError, OSError) as error:
+        raise UserError(film_output.in_words(error, film.place)) from None
+    main_thread.later(_look, TICK)
+    return {"CANCELLED"}  # nothing has changed yet that could be undone
 
 
 class SHUTTER_OT_bake_stop(Named, Operator):
@@ -74,20 +69,15 @@ class SHUTTER_OT_bake_stop(Named, Operator):
         return {"FINISHED"}
 
 
-class SHUTTER_OT_unbake(OfEffect, Operator):
+def _why_not_baked(_effect: PropertyGroup) -> str | None:
+    is_baked = bool(selection.active(bpy.context)[2].virtual_shutter_bake.identity)
+    return None if is_baked else rpt_("The effect is not baked")
+
+
+@operator("Unbake", _why_not_baked)
+def unbake(self: Operator, _context: Context, _effect: PropertyGroup) -> None:
     """Remove the baked strip, and show the effect again. The baked files stay"""
-
-    bl_label = "Unbake"
-
-    @classmethod
-    def refusal(cls, context: Context) -> str | None:
-        if sentence := super().refusal(context):
-            return sentence
-        is_baked = bool(selection.active(context)[2].virtual_shutter_bake.identity)
-        return None if is_baked else rpt_("The effect is not baked")
-
-    def change(self, _context: Context, _effect: PropertyGroup) -> None:
-        baked_strips.unbake(self.edit, self.effect_strip)
+    baked_strips.unbake(self.edit, self.effect_strip)
 
 
 def _look() -> float | None:
@@ -124,7 +114,7 @@ def _lay(job: bake_job.BakeJob) -> str | None:
     except (EffectError, RuntimeError) as error:
         return messages.sentence(error)
     with bpy.context.temp_override(window=bpy.context.window_manager.windows[0]):
-        bpy.ops.ed.undo_push(message=SHUTTER_OT_bake.bl_label)
+        bpy.ops.ed.undo_push(message=bake.bl_label)
     return None
 
 
@@ -141,36 +131,29 @@ def forget() -> None:
     _failures.clear()
 
 
-class Bake(WithEffect):
-    bl_label = "Bake"
-
-    def draw_effect(self, layout: UILayout, scene: Scene, effect: PropertyGroup, strip: Strip) -> None:
-        job = next((job for job in _running if job.effect == effect.identity), None)
-        if job is not None:
-            done, total = job.done(), len(job.film.frames)
-            row = layout.row(align=True)
-            progress = iface_("{done} of {total}").format(done=done, total=total)
-            row.progress(factor=done / total, text=progress, translate=False)
-            row.operator("shutter.bake_stop", text="", icon="X")
-            return
-        if failure := _failures.get(effect.identity):
-            sentence(layout, failure, "ERROR")
-        identity = strip.virtual_shutter_bake.identity
-        if identity:
-            _draw_state(layout, scene, effect, strip)
+def draw_panel(layout: UILayout, scene: Scene, effect: PropertyGroup, strip: Strip) -> None:
+    job = next((job for job in _running if job.effect == effect.identity), None)
+    if job is not None:
         row = layout.row(align=True)
-        row.operator_menu_enum("shutter.bake", "file_format", text="Bake Again" if identity else "Bake to Strip")
-        if identity:
-            layout.operator("shutter.unbake")
+        draw_progress(row, job.done(), len(job.film.frames))
+        row.operator("shutter.bake_stop", text="", icon="X")
+        return
+    if failure := _failures.get(effect.identity):
+        sentence(layout, failure, "ERROR")
+    identity = strip.virtual_shutter_bake.identity
+    if identity:
+        _draw_state(layout, scene, effect, strip)
+    row = layout.row(align=True)
+    row.operator_menu_enum("shutter.bake", "file_format", text="Bake Again" if identity else "Bake to Strip")
+    if identity:
+        layout.operator("shutter.unbake")
 
 
 def _draw_state(layout: UILayout, scene: Scene, effect: PropertyGroup, strip: Strip) -> None:
     if not baked_strips.baked_of(scene, strip):
         sentence(layout, iface_("The baked strip was deleted"), "ERROR")
     elif (is_stale := baked_strips.known_stale(scene, effect, strip)) is None:
-        if not bpy.app.timers.is_registered(_ask_whether_stale):  # beside drawing: it reads all of the effect
-            _asked[:] = [revision.number()]
-            bpy.app.timers.register(_ask_whether_stale, first_interval=STILL)
+        main_thread.later(_ask_whether_stale, STILL)  # beside drawing: it reads all of the effect
     elif is_stale:
         sentence(layout, iface_("The effect has changed since it was baked"), "ERROR")
     else:
@@ -186,10 +169,6 @@ def _ask_whether_stale() -> float | None:
         baked_strips.is_stale(*active)
         redraw(bpy.context)
     return None
-
-
-classes = own_classes(globals())
-TIMERS = _look, _ask_whether_stale
 
 
 def unregister() -> None:

@@ -14,7 +14,6 @@ from ..data import consistency, selection
 from ..editing import bar_edits, track_region
 from . import drawing
 from .gizmo_groups import TWEAK, Dragged, WithKeys
-from .operator_bases import own_classes
 
 _MARGIN, _HEIGHT, _BAR = 16, 96, 16  # in units of the interface
 _PAD, _HEADER = 8, 18
@@ -225,6 +224,3 @@ class SHUTTER_GGT_bars(WithKeys, GizmoGroup):
     def poll(cls, context: Context) -> bool:
         seen = selection.in_picture(context)
         return seen is not None and selection.active_shutter(seen[1]) is not None and seen[0].is_editable
-
-
-classes = own_classes(globals())

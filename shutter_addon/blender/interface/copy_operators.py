@@ -16,31 +16,24 @@ from ..data import data_format, recipe_import, selection
 from ..editing import add_effect, undelete
 from ..output import error_report, matte_export
 from .matte_operators import strip_items
-from .operator_bases import Named, OfEffect, chosen_file, own_classes, report_error, report_warning
+from .operator_bases import Named, OfEffect, chosen_file, operator, report_error, report_warning
 from .operators import MakesEffect
 
+_STRIP = EnumProperty(name="Strip", items=strip_items, translation_context=contexts.no_translation)
 
-class SHUTTER_OT_source(OfEffect, Operator):
+
+@operator("Choose Source", strip=_STRIP)
+def source(self: Operator, _context: Context, effect: PropertyGroup) -> None:
     """Give the effect another clip: the movie, image or clip strip whose frames it exposes"""
-
-    bl_label = "Choose Source"
-
-    strip: EnumProperty(name="Strip", items=strip_items, translation_context=contexts.no_translation)
-
-    def change(self, _context: Context, effect: PropertyGroup) -> None:
-        add_effect.choose_source(effect, self.effect_strip, self.edit.sequence_editor.strips_all[self.strip])
+    add_effect.choose_source(effect, self.effect_strip, self.edit.sequence_editor.strips_all[self.strip])
 
 
-class SHUTTER_OT_effect_copy(OfEffect, Operator):
+@operator("Copy Effect", options={"REGISTER"})
+def effect_copy(self: Operator, _context: Context, effect: PropertyGroup) -> None:
     """Copy the shutters, regions, keyframes and options of the effect, for other strips and scenes of this file"""
-
-    bl_label = "Copy Effect"
-    bl_options = {"REGISTER"}
-
-    def change(self, _context: Context, effect: PropertyGroup) -> None:
-        undelete.copy(effect, self.effect_strip)
-        if data_format.is_newer(self.edit):
-            report_warning(self, rpt_("Copied, without what a newer version of Virtual Shutter has added"))
+    undelete.copy(effect, self.effect_strip)
+    if data_format.is_newer(self.edit):
+        report_warning(self, rpt_("Copied, without what a newer version of Virtual Shutter has added"))
 
 
 class SHUTTER_OT_effect_paste(MakesEffect, OfEffect, Operator):
@@ -101,6 +94,3 @@ class SHUTTER_OT_copy_report(Named, Operator):
         context.window_manager.clipboard = error_report.text(selection.scene_of(context))
         self.report({"INFO"}, rpt_("Report copied: paste it into your message, and read it before you send it"))
         return {"FINISHED"}
-
-
-classes = own_classes(globals())

@@ -64,7 +64,11 @@ def rectangles(boxes: Sequence[Box] | np.ndarray, colors: ArrayLike) -> None:
     corners = np.stack([left, bottom, right, bottom, right, top, left, top], axis=1).reshape(-1, 2)
     first = 4 * np.arange(len(left), dtype=np.int32)[:, None]
     triangles = (first + np.array([0, 1, 2, 0, 2, 3], dtype=np.int32)).reshape(-1, 3)
-    _draw("TRIS", corners, np.repeat(np.asarray(colors, dtype=np.float32), 4, axis=0), triangles)
+    content = {"pos": corners, "color": np.repeat(np.asarray(colors, dtype=np.float32), 4, axis=0)}
+    shader = gpu.shader.from_builtin("SMOOTH_COLOR")
+    gpu.state.blend_set("ALPHA")
+    batch_for_shader(shader, "TRIS", content, indices=triangles).draw(shader)
+    gpu.state.blend_set("NONE")
 
 
 def bars(box: Box, shares: np.ndarray, color: Sequence[float]) -> list[Box]:
@@ -140,10 +144,3 @@ def text_width(words: str, size: float = SIZE) -> float:
     """How wide `text` draws words, in pixels."""
     blf.size(0, size * ui_scale())
     return blf.dimensions(0, words)[0]
-
-
-def _draw(kind: str, corners: np.ndarray, colors: ArrayLike, indices: np.ndarray) -> None:
-    shader = gpu.shader.from_builtin("SMOOTH_COLOR")
-    gpu.state.blend_set("ALPHA")
-    batch_for_shader(shader, kind, {"pos": corners, "color": colors}, indices=indices).draw(shader)
-    gpu.state.blend_set("NONE")

@@ -1,21 +1,20 @@
 """One look at the shown frame as it will be rendered: composed in full, exactly, and a pixel of the picture to one of
 the screen. It ends with a second click, with the frame, and with a change of the effect; then the view is as before."""
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import bpy
 from bpy.app.translations import pgettext_rpt as rpt_
 from bpy.types import Area, Context, Operator, Region, Window
 
-from ..data import preview_areas
+from ..data import main_thread, preview_areas
 from ..rendering import previews
-from .operator_bases import Named, own_classes
+from .operator_bases import Named
 
 _TICK = 0.1  # seconds between two looks at whether it has ended
 
 
-@dataclass
-class _View:
+class _View(NamedTuple):
     """How a preview was before; area: its address; rows, centre: see _view_of."""
 
     area: int
@@ -54,7 +53,7 @@ def _shown(context: Context) -> tuple[Window, Area, preview_areas.Shown] | None:
     """Window and area of the preview that is looked at, the context's own or another, and what it shows; or None."""
     areas = sorted(preview_areas.previews(context), key=lambda pair: pair[1] != context.area)
     for window, area in areas:
-        with context.temp_override(window=window, area=area, region=preview_areas.preview_region(area)):
+        with preview_areas.within(window, area):
             if (shown := preview_areas.shown(bpy.context)) is not None:
                 return window, area, shown
     return None
@@ -63,30 +62,28 @@ def _shown(context: Context) -> tuple[Window, Area, preview_areas.Shown] | None:
 def _begin(window: Window, area: Area) -> None:
     global _before
     space, region = area.spaces.active, preview_areas.preview_region(area)
-    rows, centre = _view_of(region)
-    size, proxies = space.proxy_render_size, space.use_proxies
-    _before = _View(area=area.as_pointer(), size=size, proxies=proxies, rows=rows, centre=centre)
+    _before = _View(area.as_pointer(), space.proxy_render_size, space.use_proxies, *_view_of(region))
     space.proxy_render_size, space.use_proxies = "SCENE", False
     _zoom(window, area, region.height)
-    bpy.app.timers.register(_end_when_over, first_interval=_TICK)
-    preview_areas.redraw(bpy.context)
+    main_thread.later(_end_when_over, _TICK)
+    preview_areas.redraw()
 
 
 def _end_when_over() -> float | None:
-    if _before is None:
-        return None
-    if previews.looking.whole is None:
-        _end()
-        return None
-    return _TICK
+    if _before is not None and previews.looking.whole is not None:
+        return _TICK
+    _end()
+    return None
 
 
 def _end() -> None:
     """Has the view as before: what of it the user has not changed since."""
     global _before
-    before, _before = _before, None
+    if (before := _before) is None:
+        return
+    _before = None
     for window, area in list(preview_areas.previews(bpy.context)):
-        if before is None or area.as_pointer() != before.area:
+        if area.as_pointer() != before.area:
             continue
         space, region = area.spaces.active, preview_areas.preview_region(area)
         if (space.proxy_render_size, space.use_proxies) == ("SCENE", False):
@@ -94,7 +91,7 @@ def _end() -> None:
         if abs(_view_of(region)[0] - region.height) < 1:
             _zoom(window, area, before.rows)
             _centre(window, area, before.centre)
-    preview_areas.redraw(bpy.context)
+    preview_areas.redraw()
 
 
 def _view_of(region: Region) -> tuple[float, tuple[float, float]]:
@@ -106,17 +103,16 @@ def _view_of(region: Region) -> tuple[float, tuple[float, float]]:
 
 
 def _zoom(window: Window, area: Area, rows: float) -> None:
-    region = preview_areas.preview_region(area)
-    with bpy.context.temp_override(window=window, area=area, region=region):
+    with preview_areas.within(window, area):
         # The operator shows the height divided by the ratio, and a half, rounded up.
-        bpy.ops.sequencer.view_zoom_ratio(ratio=region.height / (rows - 0.6))
+        bpy.ops.sequencer.view_zoom_ratio(ratio=bpy.context.region.height / (rows - 0.6))
 
 
 def _centre(window: Window, area: Area, centre: tuple[float, float]) -> None:
     region = preview_areas.preview_region(area)
     rows, now = _view_of(region)
     x, y = ((wanted - here) * region.height / rows for wanted, here in zip(centre, now, strict=True))
-    with bpy.context.temp_override(window=window, area=area, region=region):
+    with preview_areas.within(window, area):
         bpy.ops.view2d.pan(deltax=round(x), deltay=round(y))
 
 
@@ -124,10 +120,6 @@ def forget() -> None:
     """Ends it, and leaves the view as it is."""
     global _before
     _before = previews.looking.whole = None
-
-
-classes = own_classes(globals())
-TIMERS = (_end_when_over,)
 
 
 def unregister() -> None:

@@ -1,11 +1,14 @@
 """What gizmos in previews and their groups share; and the groups' keymaps, which Blender leaves behind."""
 
+from typing import NamedTuple
+
 import bpy
 import numpy as np
 from bpy.types import Context, Gizmo, KeyConfig, KeyMap, PropertyGroup, Region, Strip
+from numpy.typing import ArrayLike
 
 from ...core.model.scribbles import mapped
-from ..data import annotations, geometry
+from ..data import annotations, geometry, preview_areas
 from .operator_bases import Mixin
 
 TWEAK = ("gizmogroup.gizmo_tweak", "LEFTMOUSE", "PRESS", {"any": True})
@@ -27,6 +30,16 @@ class InPreview(Mixin):
     bl_region_type = "PREVIEW"
     bl_options = {"PERSISTENT"}
     gizmo: type[Gizmo]
+
+    @classmethod
+    def poll(cls, context: Context) -> bool:
+        """By default, where the live preview shows an effect, and as it is set."""
+        live = context.window_manager.virtual_shutter
+        return live.live and cls.is_wanted(live) and preview_areas.shown(context) is not None
+
+    @classmethod
+    def is_wanted(cls, _live: PropertyGroup) -> bool:
+        return True
 
     def setup(self, _context: Context) -> None:
         self.gizmos.new(self.gizmo.__name__)
@@ -50,14 +63,27 @@ class WithKeys(InPreview):
         return keymap
 
 
-def to_region(effect: PropertyGroup, strip: Strip, region: Region) -> np.ndarray:
-    """Matrix from fractions of an effect's picture to pixels of a preview's region."""
-    return geometry.picture_to_region(strip, annotations.picture_size(effect), region)
+class View(NamedTuple):
+    """How an effect's picture lies in a preview's region.
+
+    matrix: from fractions of the picture to the region's pixels; aspect: the picture's width over its height"""
+
+    matrix: np.ndarray
+    aspect: float
+
+    def on_region(self, points: ArrayLike) -> np.ndarray:
+        """Points (n, 2) of the picture, in pixels of the region."""
+        return mapped(self.matrix, np.asarray(points, np.float64))
+
+    def on_picture(self, x: float, y: float) -> np.ndarray:
+        """A point of the region, in fractions of the picture."""
+        return mapped(np.linalg.inv(self.matrix), np.array([(x, y)], np.float64))[0]
 
 
-def on_picture(matrix: np.ndarray, x: float, y: float) -> np.ndarray:
-    """A point of a region, in fractions of the picture; matrix: as to_region."""
-    return mapped(np.linalg.inv(matrix), np.array([(x, y)], np.float64))[0]
+def view(effect: PropertyGroup, strip: Strip, region: Region) -> View:
+    """The view of an effect's picture in a preview's region."""
+    width, height = size = annotations.picture_size(effect)
+    return View(geometry.picture_to_region(strip, size, region), width / height)
 
 
 def unregister() -> None:

@@ -2,6 +2,7 @@
 
 import bpy.utils.previews
 import numpy as np
+from bpy.utils.previews import ImagePreviewCollection
 
 from ...core.model import presets
 from ...core.pixels import patterns
@@ -9,22 +10,17 @@ from ...core.pixels import patterns
 _SIZE, _WINDOW = 32, 8
 _UNITS = 16  # of the interface, along each side of an icon
 _LIGHT = (0.8, 0.8, 0.8)
-_collections: dict = {}  # of Blender's icons, by name
+_icons: list[ImagePreviewCollection] = []  # of Blender's: one while the extension is registered
 
 
-def of(preset: str) -> int:
+def of(name: str) -> int:
     """The icon of a preset; 0, which is none, in the background."""
-    return _icon("presets", preset)
+    return _icons[0][name].icon_id if _icons and name in _icons[0] else 0
 
 
 def of_pattern(index: int) -> int:
     """The icon of the pattern that the shutter at an index of the list has; 0, which is none, in the background."""
-    return _icon("patterns", str(index % patterns.COUNT))
-
-
-def _icon(collection: str, name: str) -> int:
-    icons = _collections.get(collection, {})
-    return icons[name].icon_id if name in icons else 0
+    return of(str(index % patterns.COUNT))
 
 
 def _drawn(bars: np.ndarray) -> np.ndarray:
@@ -46,18 +42,14 @@ def _painted(index: int) -> np.ndarray:
 
 
 def register() -> None:
-    _make("presets", {name: _drawn(presets.bars(name, _WINDOW)) for name in presets.PRESETS})
-    _make("patterns", {str(index): _painted(index) for index in range(patterns.COUNT)})
-
-
-def _make(collection: str, pictures: dict) -> None:
-    icons = _collections[collection] = bpy.utils.previews.new()
+    _icons.append(bpy.utils.previews.new())
+    pictures = {name: _drawn(presets.bars(name, _WINDOW)) for name in presets.PRESETS}
+    pictures |= {str(index): _painted(index) for index in range(patterns.COUNT)}
     for name, picture in pictures.items():
-        icon = icons.new(name)
+        icon = _icons[0].new(name)
         icon.icon_size = icon.image_size = (_SIZE, _SIZE)
         icon.icon_pixels_float = icon.image_pixels_float = picture.ravel()
 
 
 def unregister() -> None:
-    while _collections:
-        bpy.utils.previews.remove(_collections.popitem()[1])
+    bpy.utils.previews.remove(_icons.pop())

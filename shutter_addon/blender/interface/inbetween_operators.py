@@ -1,4 +1,4 @@
-"""Operators that build and remove in-between frames."""
+"""Operators that build and remove in-between frames, and their panel."""
 
 from concurrent.futures import wait
 
@@ -7,48 +7,25 @@ from bpy.app.translations import pgettext_iface as iface_
 from bpy.app.translations import pgettext_n as n_
 from bpy.app.translations import pgettext_rpt as rpt_
 from bpy.props import EnumProperty
-from bpy.types import Context, Event, Operator, PropertyGroup
+from bpy.types import Context, Event, Operator, PropertyGroup, Scene, Strip, UILayout
 
 from ...core import messages
 from ...core.messages import EffectError
 from ...core.model.choices import INBETWEENS
-from ..data import inbetween_settings, selection, strips
+from ..data import inbetween_settings, main_thread, selection, strips
 from ..rendering import inbetween_build, strobing
+from ..rendering.effect_source import FAULTS
 from .note_buttons import Button
-from .operator_bases import UNDOABLE, OfEffect, is_escape, own_classes, redraw, report_warning
+from .operator_bases import Beside, OfEffect, redraw, report_warning, show_status
+from .panel_parts import draw_progress, draw_properties, sentence
 
 TICK = 0.25  # seconds
-_RUNS = n_("In-between frames are being built; Esc stops that")
-
-_timer = None
 
 
 def stop() -> None:
-    """As inbetween_build.stop, and the status bar is Blender's again; and nothing is measured any more."""
+    """As inbetween_build.stop; and nothing is measured any more."""
     inbetween_build.stop()
     strobing.forget()
-    _show_end()
-
-
-def _show_start(context: Context) -> None:
-    global _timer
-    if not bpy.app.background:
-        _timer = context.window_manager.event_timer_add(TICK, window=context.window)
-    redraw_panels()
-
-
-def _show_end() -> None:
-    global _timer
-    if _timer is not None:  # Blender crashes where a text is taken from the status bar while it quits
-        _say(None)
-        bpy.context.window_manager.event_timer_remove(_timer)
-        _timer = None
-
-
-def _say(sentence: str | None) -> None:
-    """In the status bar, of whichever workspace; None: what Blender says."""
-    for workspace in bpy.data.workspaces:
-        workspace.status_text_set(sentence)
 
 
 def redraw_panels() -> None:
@@ -90,69 +67,62 @@ def smoothing(exposure: strobing.Strobing) -> Button | None:
     return Button("shutter.smooth_streaks", label, {"factor": str(exposure.factor)}) if exposure.factor else None
 
 
-class _OfInbetweens(OfEffect):
-    """Works on files, which are not undone."""
-
-    bl_options = {"REGISTER"}
-
-    @classmethod
-    def why_not(cls, effect: PropertyGroup) -> str | None:
-        if inbetween_build.running() is not None:
-            return rpt_(_RUNS)
-        try:
-            inbetween_settings.settings(effect)
-        except EffectError as error:
-            return str(error)
-        return None
+def _why_busy(_effect: PropertyGroup) -> str | None:
+    is_busy = inbetween_build.running() is not None
+    return rpt_("In-between frames are being built; Esc stops that") if is_busy else None
 
 
-class _Building(_OfInbetweens):
+def _why_no_factor(effect: PropertyGroup) -> str | None:
+    return rpt_("Choose a factor first") if effect.inbetween == "1" else None
+
+
+def _why_no_settings(effect: PropertyGroup) -> str | None:
+    try:
+        inbetween_settings.settings(effect)
+    except EffectError as error:
+        return str(error)
+    return None
+
+
+class _Building(Beside, OfEffect):
     """Builds, and shows how far it is."""
+
+    tick = TICK
 
     def wanted(self) -> int | None:
         """Factor of what the strip needs; None: all of the source's, of the effect's own."""
         return None
 
-    def invoke(self, context: Context, _event: Event) -> set[str]:
-        return self.tried(self._begin, context, bpy.app.background)
-
-    def execute(self, context: Context) -> set[str]:
-        return self.tried(self._begin, context, True)
-
-    def _begin(self, context: Context, waits: bool) -> set[str]:
+    def begin(self, context: Context, waits: bool) -> set[str] | None:
         scene, effect, strip = selection.active(context)
         self._build = inbetween_build.start(scene, effect, strip, self.wanted())
-        _show_start(context)
+        redraw_panels()
         if waits:
             wait([self._build.future])
-            return self._finish(context)
-        context.window_manager.modal_handler_add(self)
-        return {"RUNNING_MODAL"}
+            return self.end(context, False)
+        return self.go_on(context)
 
-    def modal(self, context: Context, event: Event) -> set[str]:
-        if inbetween_build.running() is not self._build:  # a file was loaded
-            return {"CANCELLED"}
-        if is_escape(event):
+    def goes_on(self, _context: Context) -> bool:
+        if inbetween_build.running() is not self._build or self._build.future.done():
+            return False
+        if all(scene.session_uid != self._build.scene for scene in bpy.data.scenes):  # the effect was deleted
             self._build.stop()
-            return self.tried(self._finish, context)
-        if event.type == "TIMER":
-            if self._build.future.done():
-                return self.tried(self._finish, context)
-            if all(scene.session_uid != self._build.scene for scene in bpy.data.scenes):  # the effect was deleted
-                self._build.stop()
-            sentence = rpt_("Building in-between frames: {done} of {total}, Esc to stop")
-            _say(sentence.format(done=self._build.done, total=self._build.total))
-            redraw_panels()
-        return {"PASS_THROUGH"}
+        sentence = rpt_("Building in-between frames: {done} of {total}, Esc to stop")
+        show_status(sentence.format(done=self._build.done, total=self._build.total))
+        redraw_panels()
+        return True
 
-    def cancel(self, _context: Context) -> None:
-        """Its window was closed."""
+    def cancel(self, context: Context) -> None:
+        super().cancel(context)
         if inbetween_build.running() is self._build:
             stop()
 
-    def _finish(self, context: Context) -> set[str]:
+    def end(self, context: Context, is_stopped: bool) -> set[str] | None:
+        if inbetween_build.running() is not self._build:  # a file was loaded
+            return {"CANCELLED"}
+        if is_stopped:
+            self._build.stop()
         inbetween_build.ended()
-        _show_end()
         redraw(context)
         state = self._build.result()
         if state.name == "ready":
@@ -162,38 +132,31 @@ class _Building(_OfInbetweens):
         report_warning(self, sentence.format(done=state.done, total=state.total))
         return {"CANCELLED"}
 
-    def built(self) -> set[str]:
+    def built(self) -> set[str] | None:
         """Called once all is built."""
-        return {"FINISHED"}
+        return None
 
 
 class SHUTTER_OT_inbetween_build(_Building, Operator):
     """Build the in-between frames that are missing, as files that are kept (Esc stops, and keeps what is built)"""
 
     bl_label = "Build In-Between Frames"
-
-    @classmethod
-    def why_not(cls, effect: PropertyGroup) -> str | None:
-        return rpt_("Choose a factor first") if effect.inbetween == "1" else super().why_not(effect)
+    bl_options = {"REGISTER"}  # files are not undone
+    needs = _why_no_factor, _why_busy, _why_no_settings
 
 
 class SHUTTER_OT_smooth_streaks(_Building, Operator):
     """Build the in-between frames that smooth streaks take, and use them (Esc stops, and keeps what is built)"""
 
     bl_label = "Smooth Streaks"
-    bl_options = UNDOABLE
+    needs = (_why_busy,)  # what else is wrong is reported: where it is clicked, nothing is greyed out
 
     factor: EnumProperty(name="Factor", items=INBETWEENS[1:])
-
-    @classmethod
-    def why_not(cls, effect: PropertyGroup) -> str | None:
-        # What else is wrong is reported: where it is clicked, nothing is greyed out.
-        return rpt_(_RUNS) if inbetween_build.running() is not None else None
 
     def wanted(self) -> int | None:
         return int(self.factor)
 
-    def built(self) -> set[str]:
+    def built(self) -> set[str] | None:
         """The factor is set now, so that the picture never lacks frames, and nothing is left of a build that was
         stopped."""
         effects = (effect for scene in bpy.data.scenes for effect in scene.virtual_shutter.effects)
@@ -201,13 +164,15 @@ class SHUTTER_OT_smooth_streaks(_Building, Operator):
         if effect is None:
             return {"CANCELLED"}
         effect.inbetween = self.factor
-        return {"FINISHED"}
+        return None
 
 
-class SHUTTER_OT_inbetween_purge(_OfInbetweens, Operator):
+class SHUTTER_OT_inbetween_purge(OfEffect, Operator):
     """Remove the files of all in-between frames of the effect's source, of every factor and method"""
 
     bl_label = "Remove In-Between Frames"
+    bl_options = {"REGISTER"}
+    needs = _why_busy, _why_no_settings
 
     def invoke(self, context: Context, event: Event) -> set[str]:
         return context.window_manager.invoke_confirm(
@@ -228,8 +193,52 @@ class SHUTTER_OT_inbetween_purge(_OfInbetweens, Operator):
             report_warning(self, messages.sentence(sentence.format(folder=place, count=count)))
 
 
-classes = own_classes(globals())
-TIMERS = (redraw_panels,)
+def draw_panel(layout: UILayout, scene: Scene, effect: PropertyGroup, strip: Strip) -> None:
+    build = inbetween_build.running()
+    if build is not None and build.scene != effect.scene.session_uid:
+        build = None  # of another effect
+    column = layout.column()
+    column.enabled = build is None
+    column.prop(effect, "inbetween", text="Factor")
+    column = column.column()
+    is_on = effect.inbetween != "1"
+    column.active = is_on
+    draw_properties(column, effect, "inbetween_method", "inbetween_place")
+    if build is not None:
+        draw_progress(layout, build.done, build.total)
+    elif is_on:
+        try:
+            _draw_look(layout, inbetween_build.look(scene, effect, strip))
+        except FAULTS as error:
+            sentence(layout, str(error), "ERROR")
+    row = layout.row(align=True)
+    row.operator("shutter.inbetween_build", text="Build")
+    row.operator("shutter.inbetween_purge", text="Remove")
+
+
+# How a state of in-between frames is called, and its icon.
+_STATES = {
+    "missing": (n_("Missing"), "ERROR"),
+    "partial": (n_("Partial: {done} of {total}"), "ERROR"),
+    "stale": (n_("Stale: the source has changed"), "ERROR"),
+    "ready": (n_("Ready"), "CHECKMARK"),
+}
+
+
+def _draw_look(layout: UILayout, look: inbetween_build.Look) -> None:
+    words, icon = _STATES[look.state.name]
+    words = iface_(words).format(done=look.state.done, total=look.state.total)
+    column = layout.column(align=True)
+    sentence(column, words, icon)
+    if look.size:
+        size = size_in_words(look.size)
+        column.label(text=iface_("{size} on disk").format(size=size), icon="DISK_DRIVE", translate=False)
+    if look.state.name != "ready":
+        if look.estimate:
+            size = size_in_words(look.estimate)
+            column.label(text=iface_("About {size} when built").format(size=size), icon="BLANK1", translate=False)
+        elif look.estimate is None:
+            main_thread.later(redraw_panels, TICK)
 
 
 def unregister() -> None:

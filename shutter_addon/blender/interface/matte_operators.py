@@ -1,27 +1,33 @@
-"""Operators that make regions of mattes, ramps and time maps."""
+"""Operators that make regions of mattes, ramps and time maps; that repair what a rolling shutter has skewed, and find
+how long its readout is."""
 
+from contextlib import ExitStack
 from pathlib import Path
 
 import bpy
 from bpy.app.translations import contexts
+from bpy.app.translations import pgettext_iface as iface_
 from bpy.app.translations import pgettext_rpt as rpt_
-from bpy.props import BoolProperty, EnumProperty, StringProperty
+from bpy.props import BoolProperty, EnumProperty, FloatProperty, StringProperty
 from bpy.types import Context, Mask, Operator, PropertyGroup
 from bpy_extras.io_utils import ImportHelper
 
-from ...core.messages import UserError
-from ...core.model.choices import RAMPS
+from ...core.messages import EffectError, UserError
+from ...core.model.choices import CONTEXT, RAMPS, READOUT_UNITS, READS, SIDES
 from ...core.model.limits import MAX_CHANNEL
 from ..data import matte_strips, recipe_import, selection, strips
-from ..editing import outline_masks, region_edits, time_map
+from ..editing import collection_edits, outline_masks, region_edits, rolling_shutter
+from ..editing import time_map as time_maps
 from ..output import matte_export
-from .operator_bases import Adds, OfRegion, chosen_file, kept, own_classes
+from . import needs
+from .operator_bases import OfEffect, chosen_file, kept, operator
 
 
-class SHUTTER_OT_matte_add(Adds, ImportHelper, Operator):
+class SHUTTER_OT_matte_add(OfEffect, ImportHelper, Operator):
     """Make a movie, an image sequence or a picture the matte of the active shutter"""
 
     bl_label = "Matte from File"
+    needs = (needs.room_for_a_region,)
 
     channel_name: StringProperty(
         name="Channel Name",
@@ -48,16 +54,14 @@ def strip_items(context: Context) -> list[tuple]:
     return [(strip.name, strip.name, "") for strip in all_strips if strip.type in strips.SOURCES]
 
 
-class SHUTTER_OT_matte_strip(Adds, Operator):
+_STRIP = EnumProperty(name="Strip", items=strip_items, translation_context=contexts.no_translation)
+
+
+@operator("Matte from Strip", needs.room_for_a_region, strip=_STRIP)
+def matte_strip(self: Operator, _context: Context, effect: PropertyGroup) -> None:
     """Make a movie, image or clip strip of the edit the matte of the active shutter, muted or not"""
-
-    bl_label = "Matte from Strip"
-
-    strip: EnumProperty(name="Strip", items=strip_items, translation_context=contexts.no_translation)
-
-    def change(self, _context: Context, effect: PropertyGroup) -> None:
-        region = region_edits.add_region(effect, selection.active_shutter(effect), "MATTE", self.strip, matte="STRIP")
-        matte_strips.choose_strip(region, self.strip)
+    region = region_edits.add_region(effect, selection.active_shutter(effect), "MATTE", self.strip, matte="STRIP")
+    matte_strips.choose_strip(region, self.strip)
 
 
 @kept
@@ -65,46 +69,42 @@ def _masks(_context: Context) -> list[tuple]:
     return [(mask.name_full, mask.name_full, "") for mask in bpy.data.masks]
 
 
-class _OfMask(Adds):
-    """Adds a region that a mask makes."""
-
-    mask: EnumProperty(name="Mask", items=_masks, translation_context=contexts.no_translation)
-
-    @classmethod
-    def why_not(cls, effect: PropertyGroup) -> str | None:
-        if sentence := super().why_not(effect):
-            return sentence
-        return None if bpy.data.masks else rpt_("There is no mask: draw one in the Mask mode of an image or clip")
-
-    def chosen(self) -> Mask:
-        return next(mask for mask in bpy.data.masks if mask.name_full == self.mask)
+def _chosen(name: str) -> Mask:
+    return next(mask for mask in bpy.data.masks if mask.name_full == name)
 
 
-class SHUTTER_OT_matte_mask(_OfMask, Operator):
+def _why_no_mask(_effect: PropertyGroup) -> str | None:
+    return None if bpy.data.masks else rpt_("There is no mask: draw one in the Mask mode of an image or clip")
+
+
+_MASK = EnumProperty(name="Mask", items=_masks, translation_context=contexts.no_translation)
+
+
+@operator("Matte from Mask", needs.room_for_a_region, _why_no_mask, mask=_MASK)
+def matte_mask(self: Operator, _context: Context, effect: PropertyGroup) -> None:
     """Make a mask the matte of the active shutter"""
-
-    bl_label = "Matte from Mask"
-
-    def change(self, _context: Context, effect: PropertyGroup) -> None:
-        mask = self.chosen()
-        region_edits.add_region(effect, selection.active_shutter(effect), "MATTE", mask.name, matte="MASK", mask=mask)
+    mask = _chosen(self.mask)
+    region_edits.add_region(effect, selection.active_shutter(effect), "MATTE", mask.name, matte="MASK", mask=mask)
 
 
-class SHUTTER_OT_outline_from_mask(_OfMask, Operator):
+@operator("Outline from Mask", needs.room_for_a_region, _why_no_mask, mask=_MASK)
+def outline_from_mask(self: Operator, _context: Context, effect: PropertyGroup) -> None:
     """Make an outline of the active shutter that is drawn at each key of a mask"""
-
-    bl_label = "Outline from Mask"
-
-    def change(self, _context: Context, effect: PropertyGroup) -> None:
-        shutter = selection.active_shutter(effect)
-        outline_masks.from_mask(self.edit, effect, self.effect_strip, shutter, self.chosen())
+    shutter = selection.active_shutter(effect)
+    outline_masks.from_mask(self.edit, effect, self.effect_strip, shutter, _chosen(self.mask))
 
 
-class SHUTTER_OT_matte_export(OfRegion, ImportHelper, Operator):
+def _why_not_laid(effect: PropertyGroup) -> str | None:
+    is_laid = selection.active_region(effect).kind in strips.LAID
+    return None if is_laid else rpt_("The region is no matte, ramp or outline")
+
+
+class SHUTTER_OT_matte_export(OfEffect, ImportHelper, Operator):
     """Write what the active matte or outline shows at each frame of its strip as pictures, for any other program"""
 
     bl_label = "Export Matte"
     bl_options = {"REGISTER"}
+    needs = needs.a_region, _why_not_laid
 
     directory: StringProperty(name="Folder", subtype="DIR_PATH", options={"SKIP_SAVE"})
     format: EnumProperty(
@@ -113,13 +113,6 @@ class SHUTTER_OT_matte_export(OfRegion, ImportHelper, Operator):
         items=(("PNG", "PNG", "Grey, 16 bits"), ("EXR", "OpenEXR", "Float, in the channel Y")),
     )
     filter_folder: BoolProperty(default=True, options={"HIDDEN", "SKIP_SAVE"})
-
-    @classmethod
-    def why_not(cls, effect: PropertyGroup) -> str | None:
-        if sentence := super().why_not(effect):
-            return sentence
-        is_laid = selection.active_region(effect).kind in strips.LAID
-        return None if is_laid else rpt_("The region is no matte, ramp or outline")
 
     def change(self, _context: Context, effect: PropertyGroup) -> None:
         folder = Path(bpy.path.abspath(self.directory or str(Path(self.filepath).parent)))
@@ -131,28 +124,108 @@ class SHUTTER_OT_matte_export(OfRegion, ImportHelper, Operator):
         self.report({"INFO"}, rpt_('Saved {count} pictures in "{folder}"').format(count=count, folder=folder))
 
 
-class SHUTTER_OT_ramp_add(Adds, Operator):
+_RAMP = EnumProperty(name="Ramp", description="How the ramp runs", items=RAMPS)
+
+
+@operator("Ramp", needs.room_for_a_region, ramp=_RAMP)
+def ramp_add(self: Operator, _context: Context, effect: PropertyGroup) -> None:
     """Make a ramp across the picture the matte of the active shutter"""
-
-    bl_label = "Ramp"
-
-    ramp: EnumProperty(name="Ramp", description="How the ramp runs", items=RAMPS)
-
-    def change(self, _context: Context, effect: PropertyGroup) -> None:
-        region_edits.add_region(effect, selection.active_shutter(effect), "RAMP", ramp=self.ramp)
+    region_edits.add_region(effect, selection.active_shutter(effect), "RAMP", ramp=self.ramp)
 
 
-class SHUTTER_OT_time_map(Adds, Operator):
+def _why_no_time_map(effect: PropertyGroup) -> str | None:
+    return collection_edits.why_full(effect, regions=1, shutters=2)
+
+
+@operator("Time Map", needs.a_shutter, _why_no_time_map, ramp=_RAMP)
+def time_map(self: Operator, _context: Context, effect: PropertyGroup) -> None:
     """Show every pixel at its own moment: a ramp from the first of the frames to the last (slit-scan)"""
+    time_maps.add(effect, self.ramp)
 
-    bl_label = "Time Map"
 
-    ramp: EnumProperty(name="Ramp", description="How the ramp runs", items=RAMPS)
+def _why_no_repair(effect: PropertyGroup) -> str | None:
+    try:
+        has_repair = rolling_shutter.of(effect) is not None
+    except EffectError as error:
+        return str(error)
+    return None if has_repair else collection_edits.why_full(effect, regions=1, shutters=2)
 
-    more = {"regions": 1, "shutters": 2}
+
+class SHUTTER_OT_rolling_shutter(OfEffect, Operator):
+    """Show every row as it was when the middle one was filmed: straight, where a rolling shutter has skewed it"""
+
+    bl_label = "Rolling Shutter Repair"
+    needs = (_why_no_repair,)
+
+    side: EnumProperty(
+        name="Read First",
+        description="Side of the filmed picture that the sensor reads first",
+        items=SIDES,
+        translation_context=CONTEXT,
+    )
+    unit: EnumProperty(
+        name="Unit",
+        description="What the readout is counted in",
+        items=READOUT_UNITS,
+        translation_context=CONTEXT,
+        options={"SKIP_SAVE"},
+    )
+    readout: FloatProperty(
+        name="Readout",
+        description="Time from the first row to the last, of that from a filmed frame to the next",
+        subtype="PERCENTAGE",
+        default=50.0,
+        min=1.0,
+        max=100.0,
+        options={"SKIP_SAVE"},
+    )
+    milliseconds: FloatProperty(
+        name="Readout",
+        description="Time from the first row to the last, in milliseconds",
+        default=15.0,
+        min=0.1,
+        max=1000.0,
+        soft_max=40.0,
+        options={"SKIP_SAVE"},
+    )
+
+    def draw(self, _context: Context) -> None:
+        layout = self.layout
+        layout.use_property_split = True
+        layout.prop(self, "side")
+        layout.prop(self, "unit")
+        layout.prop(self, "readout" if self.unit == "PERCENT" else "milliseconds")
 
     def change(self, _context: Context, effect: PropertyGroup) -> None:
-        time_map.add(effect, self.ramp)
+        known = rolling_shutter.of(effect)
+        if known is not None and not self.properties.is_property_set("readout"):
+            self.readout = 100 * known.readout  # from the menu, another side keeps it
+        share = self.readout / 100
+        if self.unit == "MILLISECONDS":
+            share = rolling_shutter.share_of(self.edit, effect, self.effect_strip, self.milliseconds)
+        rolling_shutter.repair(self.edit, effect, self.effect_strip, share, self.side)
 
 
-classes = own_classes(globals())
+_READS = EnumProperty(
+    name="Reads",
+    description="What the sensor reads one after the other",
+    items=READS,
+    translation_context=CONTEXT,
+)
+
+
+@operator("Find Readout", _why_no_repair, reads=_READS)
+def find_readout(self: Operator, context: Context, effect: PropertyGroup) -> None:
+    """Find how long the sensor reads out, by lines that lean as they move around the current frame, and repair that"""
+    with ExitStack() as after:
+        if (window := context.window) is not None:
+            window.cursor_modal_set("WAIT")
+            after.callback(window.cursor_modal_restore)
+        found, side = rolling_shutter.find(
+            self.edit, effect, self.effect_strip, "TOP" if self.reads == "ROWS" else "LEFT"
+        )
+    rolling_shutter.repair(self.edit, effect, self.effect_strip, min(abs(found.share), 1.0), side)
+    name = next(name for word, name, _ in SIDES if word == side)
+    percent = round(100 * abs(found.share))
+    sentence = rpt_("Readout of {percent} % of a frame, read first: {side}")
+    self.report({"INFO"}, sentence.format(percent=percent, side=iface_(name, CONTEXT)))

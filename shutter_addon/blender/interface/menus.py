@@ -1,9 +1,10 @@
-"""The menu Strip ▸ Shutter: every operator, so that Blender's search finds it, and keys reach it."""
+"""The menu Strip ▸ Shutter: every operator, so that Blender's search finds it, and keys reach it; and what
+Blender's own menus have of ours."""
 
 import bpy
 from bpy.types import Context, Menu
 
-from .operator_bases import own_classes
+from ..data import selection, strips
 from .panel_parts import draw_moves, draw_operators
 
 
@@ -100,17 +101,42 @@ class SHUTTER_MT_of_preview(Menu):
         layout.operator("shutter.probe_pixel")
 
 
+def _add_entry(self, _context: Context) -> None:
+    self.layout.separator()
+    self.layout.operator("shutter.add_effect", text="Shutter")
+
+
+def _strip_entry(self, context: Context) -> None:
+    strip = selection.active_strip(context)
+    if strip is None or not (strip.type in strips.SOURCES or selection.active(context)):
+        return
+    self.layout.separator()
+    if strip.type in strips.SOURCES:
+        self.layout.operator("shutter.draw", text="Draw Shutter", icon="GREASEPENCIL")
+        self.layout.operator("shutter.add_effect")
+    draw_operators(self.layout, ("effect_copy", "COPYDOWN"), ("effect_paste", "PASTEDOWN"))
+
+
 def _entry(self, _context: Context) -> None:
     self.layout.separator()
     self.layout.menu(SHUTTER_MT_strip.__name__)
 
 
-classes = (*own_classes(globals()), *(_menu(end, *what) for end, what in _GROUPS.items()))
+_ENTRIES = (
+    ("SEQUENCER_MT_add_effect", _add_entry),
+    ("SEQUENCER_MT_strip", _strip_entry),
+    ("SEQUENCER_MT_context_menu", _strip_entry),
+    ("SEQUENCER_MT_strip", _entry),
+)
+
+classes = tuple(_menu(end, *what) for end, what in _GROUPS.items())
 
 
 def register() -> None:
-    bpy.types.SEQUENCER_MT_strip.append(_entry)
+    for menu, entry in _ENTRIES:
+        getattr(bpy.types, menu).append(entry)
 
 
 def unregister() -> None:
-    bpy.types.SEQUENCER_MT_strip.remove(_entry)
+    for menu, entry in _ENTRIES:
+        getattr(bpy.types, menu).remove(entry)

@@ -4,10 +4,8 @@ from dataclasses import dataclass, field
 
 from bpy.types import Context, Gizmo, GizmoGroup, Region
 
-from ..data import preview_areas
 from . import drawing
 from .gizmo_groups import InPreview
-from .operator_bases import own_classes
 
 HEIGHT = 19  # in units of the interface
 _PAD = 8
@@ -71,10 +69,6 @@ class SHUTTER_GT_note_button(Gizmo):
 class SHUTTER_GGT_note_buttons(InPreview, GizmoGroup):
     bl_label = "Buttons of Notes"
 
-    @classmethod
-    def poll(cls, context: Context) -> bool:
-        return context.window_manager.virtual_shutter.live and preview_areas.shown(context) is not None
-
     def setup(self, _context: Context) -> None:
         for operator in OPERATORS:
             gizmo = self.gizmos.new(SHUTTER_GT_note_button.__name__)
@@ -86,9 +80,6 @@ class SHUTTER_GGT_note_buttons(InPreview, GizmoGroup):
             placed = _placed(context, gizmo.operator)
             for name, value in (placed[1].values if placed else {}).items():
                 setattr(gizmo.target_set_operator(gizmo.operator), name, value)
-
-
-classes = own_classes(globals())
 
 
 def unregister() -> None:

@@ -4,18 +4,18 @@ from collections.abc import Callable, Iterable
 
 import bpy
 from bpy.app.translations import pgettext_rpt as rpt_
-from bpy.props import EnumProperty
 from bpy.types import Context, Event, Operator, PropertyGroup
 
 from ...core import told
 from ...core.messages import UserError
 from ...core.recipes import recipe
-from ..data import selection, strips
-from ..editing import collection_edits
+from ..data import selection
 from ..rendering.effect_source import FAULTS
 
 Mixin: Operator = object  # for what is mixed into Blender's classes: mypy takes it to have what these have
 UNDOABLE = {"REGISTER", "UNDO"}
+Need = Callable[[PropertyGroup], str | None]  # why an effect does not do, in the user's language; None: it does
+Change = Callable[[Operator, Context, PropertyGroup], set[str] | None]  # changes an effect; None: it has been done
 
 
 def redraw(context: Context) -> None:
@@ -24,12 +24,6 @@ def redraw(context: Context) -> None:
         for area in window.screen.areas:
             if area.type in {"SEQUENCE_EDITOR", "PROPERTIES", "DOPESHEET_EDITOR", "GRAPH_EDITOR"}:
                 area.tag_redraw()
-
-
-def soon(timer: Callable[[], float | None], seconds: float = 0.0) -> None:
-    """Has Blender call a timer, unless it is going to."""
-    if not bpy.app.timers.is_registered(timer):
-        bpy.app.timers.register(timer, first_interval=seconds)
 
 
 def report_error(operator: Operator, sentence: str) -> None:
@@ -48,16 +42,6 @@ def popup(context: Context, words: str, **looks: str) -> None:
     """Says a sentence that is already translated beside the pointer."""
     show = context.window_manager.popup_menu
     show(lambda menu, _context: menu.layout.label(text=words, translate=False), **looks)
-
-
-def is_escape(event: Event) -> bool:
-    return event.type == "ESC" and event.value == "PRESS"
-
-
-def own_classes(module: dict[str, object]) -> tuple:
-    """The classes of a module that Blender gets, in their order; module: its globals."""
-    own = [each for name, each in module.items() if name.startswith("SHUTTER_")]
-    return tuple(each for each in own if getattr(each, "__module__", "") == module["__name__"])
 
 
 def kept(items: Callable[[Context], Iterable[tuple]]) -> Callable[[object, Context], list[tuple]]:
@@ -102,10 +86,12 @@ class Named(Mixin):
 class OfEffect(Named):
     """Works on the effect that is seen, or where none is, on that of the active strip.
 
+    needs: each may say why an effect that can be changed does not do; the first reason counts
     edit, effect_strip: the scene and the strip of the effect, while it is changed"""
 
     bl_options = UNDOABLE
     only_seen = False  # it does something in the picture
+    needs: tuple[Need, ...] = ()
 
     @classmethod
     def refusal(cls, context: Context) -> str | None:
@@ -116,12 +102,7 @@ class OfEffect(Named):
             return rpt_("The edit is linked from another file")
         if cls.only_seen and selection.in_picture(context) is None:
             return selection.why_unseen(scene, strip)
-        return cls.why_not(effect)
-
-    @classmethod
-    def why_not(cls, effect: PropertyGroup) -> str | None:
-        """As `refusal`, of an effect that can be changed."""
-        return None
+        return next(filter(None, (need(effect) for need in cls.needs)), None)
 
     def execute(self, context: Context) -> set[str]:
         self.edit, effect, self.effect_strip = selection.active(context)
@@ -130,66 +111,103 @@ class OfEffect(Named):
         return result
 
 
-class OfShutter(OfEffect):
-    """Works on the active shutter."""
+def operator(
+    label: str,
+    *needs: Need,
+    options: set[str] = UNDOABLE,
+    only_seen: bool = False,
+    **properties: object,
+) -> Callable[[Change], type[Operator]]:
+    """Makes an operator of a function that changes an effect, with its name and docstring; the rest as OfEffect has
+    it."""
 
-    @classmethod
-    def why_not(cls, effect: PropertyGroup) -> str | None:
-        return None if selection.active_shutter(effect) is not None else rpt_("The effect has no shutter: add one")
+    def made(change: Change) -> type[Operator]:
+        content = {
+            "__doc__": change.__doc__,
+            "__module__": change.__module__,
+            "__annotations__": properties,
+            "bl_label": label,
+            "bl_options": options,
+            "only_seen": only_seen,
+            "needs": needs,
+            "change": change,
+        }
+        return type(f"SHUTTER_OT_{change.__name__}", (OfEffect, Operator), content)
 
-
-class OfRegion(OfEffect):
-    """Works on the active region."""
-
-    @classmethod
-    def why_not(cls, effect: PropertyGroup) -> str | None:
-        return None if selection.active_region(effect) is not None else rpt_("The shutter has no region: draw one")
-
-
-class OfStrokes(OfRegion):
-    """Works on the active region, which is one of strokes."""
-
-    @classmethod
-    def why_not(cls, effect: PropertyGroup) -> str | None:
-        if sentence := super().why_not(effect):
-            return sentence
-        if selection.active_region(effect).kind in strips.MATTES:
-            return rpt_("The region is a matte or a ramp, and has no strokes")
-        return None
-
-
-class Adds(OfShutter):
-    """Adds to what the active shutter has. more: how many "shutters" and "regions" it takes room for."""
-
-    more: dict[str, int] = {"regions": 1}
-
-    @classmethod
-    def why_not(cls, effect: PropertyGroup) -> str | None:
-        return super().why_not(effect) or collection_edits.why_full(effect, **cls.more)
+    return made
 
 
 class Beside(Named):
-    """Goes on beside Blender, which calls its `modal` at least with every tick of a timer."""
+    """Goes on beside Blender, step by step; or at once, in the background and for scripts.
 
-    def go_on(self, context: Context, seconds: float) -> set[str]:
-        """seconds: from tick to tick"""
-        self._timer = context.window_manager.event_timer_add(seconds, window=context.window)
+    tick: seconds from step to step; blocks: whether Blender waits meanwhile"""
+
+    tick = 0.1
+    blocks = False
+
+    def begin(self, context: Context, waits: bool) -> set[str] | None:
+        """Does all of it, or goes on; waits: whether it has to do all."""
+        raise NotImplementedError
+
+    def goes_on(self, context: Context) -> bool:
+        """Does a step; whether there are more."""
+        raise NotImplementedError
+
+    def end(self, context: Context, is_stopped: bool) -> set[str] | None:
+        """What is done once all steps are, or once Esc has stopped them."""
+        raise NotImplementedError
+
+    def leave(self, context: Context) -> None:
+        """Lets go of what steps need."""
+        if self._timer in _timers:
+            _timers.remove(self._timer)
+            context.window_manager.event_timer_remove(self._timer)
+            show_status(None)
+
+    def invoke(self, context: Context, _event: Event) -> set[str]:
+        return self.tried(self.begin, context, bpy.app.background)
+
+    def execute(self, context: Context) -> set[str]:
+        return self.tried(self.begin, context, True)
+
+    def go_on(self, context: Context) -> set[str]:
+        self._timer = context.window_manager.event_timer_add(self.tick, window=context.window)
+        _timers.append(self._timer)
         context.window_manager.modal_handler_add(self)
         return {"RUNNING_MODAL"}
 
+    def modal(self, context: Context, event: Event) -> set[str]:
+        is_stopped = event.type == "ESC" and event.value == "PRESS"
+        is_over = is_stopped or self._timer not in _timers
+        try:
+            is_over = is_over or (event.type == "TIMER" and not self.goes_on(context))
+        except Exception:  # Blender ends the operator then, and asks for no `cancel`
+            self.leave(context)
+            raise
+        if not is_over:
+            return {"RUNNING_MODAL"} if self.blocks else {"PASS_THROUGH"}
+        self.leave(context)
+        return self.tried(self.end, context, is_stopped)
+
     def cancel(self, context: Context) -> None:
-        """It has ended, or its window was closed."""
-        context.window_manager.event_timer_remove(self._timer)
-        context.workspace.status_text_set(None)
+        """Its window was closed."""
+        self.leave(context)
 
 
-class Move:
-    direction: EnumProperty(name="Direction", items=(("UP", "Up", ""), ("DOWN", "Down", "")), options={"SKIP_SAVE"})
+_timers: list = []  # of what goes on
 
-    def target(self, places: list[int], index: int) -> int:
-        """The place after or before `index` in the list, among the places that it shows."""
-        step = places.index(index) + (1 if self.direction == "DOWN" else -1)
-        return places[min(max(step, 0), len(places) - 1)]
+
+def show_status(words: str | None) -> None:
+    """Says it in the status bar, of whichever workspace; None: what Blender says."""
+    for workspace in bpy.data.workspaces:
+        workspace.status_text_set(words)
+
+
+def end_all() -> None:
+    """Ends what goes on, before another file is loaded."""
+    while _timers:  # Blender crashes where a text is taken from the status bar while it quits
+        bpy.context.window_manager.event_timer_remove(_timers.pop())
+        show_status(None)
 
 
 def chosen_file(operator: Operator) -> str:

@@ -1,5 +1,8 @@
 """Operators: what the user can do, as thin calls of plain functions."""
 
+from collections.abc import Callable
+from functools import partial
+
 import bpy
 from bpy.app.translations import contexts
 from bpy.app.translations import pgettext_iface as iface_
@@ -10,34 +13,19 @@ from bpy.types import Annotation, Context, Event, Operator, PropertyGroup
 from ...core.messages import EffectError
 from ...core.model import presets
 from ...core.model.choices import CONTEXT, DRAWN
-from ..data import annotations, consistency, preview_areas, selection, strips
+from ..data import annotations, consistency, main_thread, preview_areas, selection, strips
 from ..editing import (
     add_effect,
     bar_edits,
     collection_edits,
     drawn_places,
-    match_source,
     region_edits,
     shown_annotations,
     shutter_edits,
 )
-from . import icons, sharp_frame
-from .operator_bases import (
-    UNDOABLE,
-    Adds,
-    Mixin,
-    Move,
-    Named,
-    OfEffect,
-    OfRegion,
-    OfShutter,
-    OfStrokes,
-    kept,
-    own_classes,
-    redraw,
-    report_warning,
-    soon,
-)
+from ..editing import match_source as matching
+from . import icons, needs, sharp_frame
+from .operator_bases import UNDOABLE, Mixin, Named, OfEffect, kept, operator, redraw, report_warning
 
 
 class SHUTTER_OT_add_effect(Named, Operator):
@@ -88,36 +76,30 @@ class MakesEffect(Mixin):
         return super().execute(context)
 
 
-class SHUTTER_OT_match_source(OfEffect, Operator):
+def _why_alike(effect: PropertyGroup) -> str | None:
+    if (shown := matching.shown(effect)) is None:
+        return rpt_("The Shutter strip has no source any more")
+    return None if shown.differences else rpt_("The Shutter strip is like its source")
+
+
+@operator("Match Source", _why_alike)
+def match_source(self: Operator, _context: Context, effect: PropertyGroup) -> None:
     """Give the Shutter strip transform, crop, flip, color and range of its source (scribbles stay on the picture)"""
-
-    bl_label = "Match Source"
-
-    @classmethod
-    def why_not(cls, effect: PropertyGroup) -> str | None:
-        if (shown := match_source.shown(effect)) is None:
-            return rpt_("The Shutter strip has no source any more")
-        return None if shown.differences else rpt_("The Shutter strip is like its source")
-
-    def change(self, _context: Context, effect: PropertyGroup) -> None:
-        if (neighbor := match_source.match(effect)) is not None:
-            sentence = rpt_('"{neighbor}" is in the way: "{strip}" has not the whole range of its source')
-            report_warning(self, sentence.format(neighbor=neighbor.name, strip=self.effect_strip.name))
+    if (neighbor := matching.match(effect)) is not None:
+        sentence = rpt_('"{neighbor}" is in the way: "{strip}" has not the whole range of its source')
+        report_warning(self, sentence.format(neighbor=neighbor.name, strip=self.effect_strip.name))
 
 
-class SHUTTER_OT_copy_modifiers(OfEffect, Operator):
+def _why_no_modifiers(effect: PropertyGroup) -> str | None:
+    if (shown := matching.shown(effect)) is not None and shown.lacks_modifiers:
+        return None
+    return rpt_("The Shutter strip has the modifiers of its source")
+
+
+@operator("Copy Modifiers", _why_no_modifiers)
+def copy_modifiers(_self: Operator, _context: Context, effect: PropertyGroup) -> None:
     """Copy the modifiers of the source to the Shutter strip, which shows the source's file as it is"""
-
-    bl_label = "Copy Modifiers"
-
-    @classmethod
-    def why_not(cls, effect: PropertyGroup) -> str | None:
-        if (shown := match_source.shown(effect)) is not None and shown.lacks_modifiers:
-            return None
-        return rpt_("The Shutter strip has the modifiers of its source")
-
-    def change(self, _context: Context, effect: PropertyGroup) -> None:
-        match_source.copy_modifiers(effect)
+    matching.copy_modifiers(effect)
 
 
 def show_panel(context: Context) -> None:
@@ -126,7 +108,7 @@ def show_panel(context: Context) -> None:
         area.spaces.active.show_region_ui = True
     # A sidebar has tabs once it has been drawn, which a slow window does late, and one without room never.
     _waits[:] = [0.1] * 30
-    soon(_choose_tab, 0.1)
+    main_thread.later(_choose_tab, 0.1)
 
 
 _waits: list[float] = []
@@ -144,57 +126,45 @@ def _choose_tab() -> float | None:
     return None
 
 
-class SHUTTER_OT_shutter_add(OfEffect, Operator):
+@operator("Add Shutter", needs.room_for_a_shutter)
+def shutter_add(_self: Operator, _context: Context, effect: PropertyGroup) -> None:
     """Add a shutter that is fully open"""
-
-    bl_label = "Add Shutter"
-
-    @classmethod
-    def why_not(cls, effect: PropertyGroup) -> str | None:
-        return collection_edits.why_full(effect, shutters=1)
-
-    def change(self, _context: Context, effect: PropertyGroup) -> None:
-        shutter_edits.add_shutter(effect)
+    shutter_edits.add_shutter(effect)
 
 
-class SHUTTER_OT_shutter_duplicate(Adds, Operator):
+@operator("Duplicate Shutter", needs.a_shutter, needs.room_for_a_shutter)
+def shutter_duplicate(_self: Operator, _context: Context, effect: PropertyGroup) -> None:
     """Add a copy of the active shutter, keyframes included"""
-
-    bl_label = "Duplicate Shutter"
-
-    more = {"shutters": 1}
-
-    def change(self, _context: Context, effect: PropertyGroup) -> None:
-        shutter_edits.duplicate_shutter(effect, effect.active_shutter)
+    shutter_edits.duplicate_shutter(effect, effect.active_shutter)
 
 
-class SHUTTER_OT_shutter_remove(OfShutter, Operator):
+def _why_last(effect: PropertyGroup) -> str | None:
+    return rpt_("The last shutter of an effect cannot be removed") if len(effect.shutters) == 1 else None
+
+
+@operator("Remove Shutter", _why_last, needs.a_shutter)
+def shutter_remove(_self: Operator, _context: Context, effect: PropertyGroup) -> None:
     """Remove the active shutter and its regions"""
-
-    bl_label = "Remove Shutter"
-
-    @classmethod
-    def why_not(cls, effect: PropertyGroup) -> str | None:
-        if len(effect.shutters) == 1:
-            return rpt_("The last shutter of an effect cannot be removed")
-        return super().why_not(effect)
-
-    def change(self, _context: Context, effect: PropertyGroup) -> None:
-        shutter_edits.remove_shutter(effect, effect.active_shutter)
+    shutter_edits.remove_shutter(effect, effect.active_shutter)
 
 
-class SHUTTER_OT_shutter_move(Move, OfShutter, Operator):
+_DIRECTION = EnumProperty(name="Direction", items=(("UP", "Up", ""), ("DOWN", "Down", "")), options={"SKIP_SAVE"})
+
+
+def _move(places: list[int], index: int, direction: str, move: Callable[[int, int], None]) -> set[str] | None:
+    """Moves an item to the place after or before it in a list, among the places that it shows."""
+    step = places.index(index) + (1 if direction == "DOWN" else -1)
+    if not 0 <= step < len(places):
+        return {"CANCELLED"}
+    move(index, places[step])
+    return None
+
+
+@operator("Move Shutter", needs.a_shutter, direction=_DIRECTION)
+def shutter_move(self: Operator, _context: Context, effect: PropertyGroup) -> set[str] | None:
     """Move the active shutter in the list (the first one is the default, which holds where nothing is scribbled)"""
-
-    bl_label = "Move Shutter"
-
-    def change(self, _context: Context, effect: PropertyGroup) -> set[str] | None:
-        index = effect.active_shutter
-        to = self.target(list(range(len(effect.shutters))), index)
-        if to == index:
-            return {"CANCELLED"}
-        shutter_edits.move_shutter(effect, index, to)
-        return None
+    places = list(range(len(effect.shutters)))
+    return _move(places, effect.active_shutter, self.direction, partial(shutter_edits.move_shutter, effect))
 
 
 @kept
@@ -206,42 +176,35 @@ def _presets(_context: Context) -> list[tuple]:
     ]
 
 
-class SHUTTER_OT_preset(OfShutter, Operator):
+_PRESET = EnumProperty(name="Preset", items=_presets, translation_context=CONTEXT)
+
+
+@operator("Apply Shutter Preset", needs.a_shutter, preset=_PRESET)
+def preset(self: Operator, context: Context, effect: PropertyGroup) -> None:
     """Give the active shutter the bars of a preset"""
-
-    bl_label = "Apply Shutter Preset"
-
-    preset: EnumProperty(name="Preset", items=_presets, translation_context=CONTEXT)
-
-    def change(self, context: Context, effect: PropertyGroup) -> None:
-        shutter_edits.apply_preset(effect, effect.active_shutter, self.preset, bar_edits.auto_key(context))
+    shutter_edits.apply_preset(effect, effect.active_shutter, self.preset, bar_edits.auto_key(context))
 
 
-class SHUTTER_OT_bars_key(OfShutter, Operator):
+@operator("Insert Bar Keyframes", needs.a_shutter)
+def bars_key(_self: Operator, _context: Context, effect: PropertyGroup) -> None:
     """Insert keyframes for all bars of the active shutter at the current frame"""
-
-    bl_label = "Insert Bar Keyframes"
-
-    def change(self, _context: Context, effect: PropertyGroup) -> None:
-        bar_edits.key_bars(effect, effect.active_shutter)
+    bar_edits.key_bars(effect, effect.active_shutter)
 
 
-class SHUTTER_OT_bars_unkey(OfShutter, Operator):
+@operator("Delete Bar Keyframes", needs.a_shutter)
+def bars_unkey(self: Operator, _context: Context, effect: PropertyGroup) -> set[str] | None:
     """Delete the keyframes of all bars of the active shutter at the current frame"""
-
-    bl_label = "Delete Bar Keyframes"
-
-    def change(self, _context: Context, effect: PropertyGroup) -> set[str] | None:
-        if not bar_edits.unkey_bars(effect, effect.active_shutter):
-            report_warning(self, rpt_("No bar has a keyframe at the current frame"))
-            return {"CANCELLED"}
-        return None
+    if not bar_edits.unkey_bars(effect, effect.active_shutter):
+        report_warning(self, rpt_("No bar has a keyframe at the current frame"))
+        return {"CANCELLED"}
+    return None
 
 
-class SHUTTER_OT_bar_set(OfShutter, Operator):
+class SHUTTER_OT_bar_set(OfEffect, Operator):
     """Set the weight of a bar as a number"""
 
     bl_label = "Set Bar Weight"
+    needs = (needs.a_shutter,)
 
     bar: IntProperty(name="Bar", description="Number of the bar, from 1", default=1, min=1)
     weight: FloatProperty(name="Weight", description="How much the bar's frame contributes", min=0.0, soft_max=1.0)
@@ -278,11 +241,16 @@ class SHUTTER_OT_bar_set(OfShutter, Operator):
         bar_edits.paint(effect, effect.active_shutter, weights, bar_edits.auto_key(context))
 
 
-class SHUTTER_OT_draw(MakesEffect, OfShutter, Operator):
+def _why_no_room(effect: PropertyGroup) -> str | None:
+    return collection_edits.why_full(effect, regions=1 if selection.active_region(effect) is None else 0)
+
+
+class SHUTTER_OT_draw(MakesEffect, OfEffect, Operator):
     """Draw on the sharp frame where the active shutter holds (at another frame, this redraws the active region)"""
 
     bl_label = "Draw"
     only_seen = True
+    needs = needs.a_shutter, _why_no_room
 
     # Blender would use again what a button was pressed with before.
     new: BoolProperty(
@@ -298,11 +266,6 @@ class SHUTTER_OT_draw(MakesEffect, OfShutter, Operator):
         options={"SKIP_SAVE"},
     )
 
-    @classmethod
-    def why_not(cls, effect: PropertyGroup) -> str | None:
-        new_ones = 1 if selection.active_region(effect) is None else 0
-        return super().why_not(effect) or collection_edits.why_full(effect, regions=new_ones)
-
     def change(self, context: Context, effect: PropertyGroup) -> None:
         region = selection.active_region(effect)
         if self.new or region is None or region.kind in strips.MATTES:
@@ -315,16 +278,12 @@ class SHUTTER_OT_draw(MakesEffect, OfShutter, Operator):
         sharp_frame.show(context)
 
 
-class SHUTTER_OT_erase(OfStrokes, Operator):
+@operator("Erase", needs.strokes, only_seen=True)
+def erase(self: Operator, context: Context, effect: PropertyGroup) -> None:
     """Erase strokes of the active region in the preview"""
-
-    bl_label = "Erase"
-    only_seen = True
-
-    def change(self, context: Context, effect: PropertyGroup) -> None:
-        drawn_places.begin(effect, self.effect_strip, effect.active_region, erases=True)
-        if not drawing_tool(context, effect, selection.active_region(effect), "builtin.annotate_eraser"):
-            self.report({"INFO"}, "Open a sequencer with a preview to erase")
+    drawn_places.begin(effect, self.effect_strip, effect.active_region, erases=True)
+    if not drawing_tool(context, effect, selection.active_region(effect), "builtin.annotate_eraser"):
+        self.report({"INFO"}, "Open a sequencer with a preview to erase")
 
 
 def drawing_tool(context: Context, effect: PropertyGroup, region: PropertyGroup, tool: str) -> bool:
@@ -332,9 +291,14 @@ def drawing_tool(context: Context, effect: PropertyGroup, region: PropertyGroup,
     if annotations.layer_of(effect, region) is None:
         region_edits.new_layer(effect, region)
     consistency.aim_pen(effect)
+    _show_annotation(context, effect)
+    return sharp_frame.take_up(context, tool)
+
+
+def _show_annotation(context: Context, effect: PropertyGroup) -> None:
+    """Has every preview show the effect's annotation."""
     for _window, area in preview_areas.previews(context):
         shown_annotations.give(area.spaces.active, effect.scene.annotation)
-    return sharp_frame.take_up(context, tool)
 
 
 @kept
@@ -349,28 +313,21 @@ def annotation_of(context: Context) -> Annotation | None:
     return next((area.spaces.active.annotation for _window, area in preview_areas.previews(context)), None)
 
 
-class SHUTTER_OT_region_take(Adds, Operator):
+def _why_no_layer(effect: PropertyGroup) -> str | None:
+    has_some = region_edits.free_layers(effect, annotation_of(bpy.context))
+    return None if has_some else rpt_("The preview shows no annotation layer that is not a region yet")
+
+
+_LAYER = EnumProperty(name="Layer", items=_layers, translation_context=contexts.no_translation)
+
+
+@operator("Add Region from Annotation Layer", needs.room_for_a_region, _why_no_layer, only_seen=True, layer=_LAYER)
+def region_take(self: Operator, context: Context, effect: PropertyGroup) -> None:
     """Make an annotation layer of the preview a region of the active shutter"""
-
-    bl_label = "Add Region from Annotation Layer"
-    only_seen = True
-
-    layer: EnumProperty(name="Layer", items=_layers, translation_context=contexts.no_translation)
-
-    @classmethod
-    def refusal(cls, context: Context) -> str | None:
-        if sentence := super().refusal(context):
-            return sentence
-        if not region_edits.free_layers(selection.active(context)[1], annotation_of(context)):
-            return rpt_("The preview shows no annotation layer that is not a region yet")
-        return None
-
-    def change(self, context: Context, effect: PropertyGroup) -> None:
-        free = region_edits.free_layers(effect, annotation_of(context))
-        layer = next(layer for layer in free if layer.info == self.layer)
-        region_edits.take_layer(effect, selection.active_shutter(effect), layer)
-        for _window, area in preview_areas.previews(context):
-            shown_annotations.give(area.spaces.active, effect.scene.annotation)
+    free = region_edits.free_layers(effect, annotation_of(context))
+    layer = next(layer for layer in free if layer.info == self.layer)
+    region_edits.take_layer(effect, selection.active_shutter(effect), layer)
+    _show_annotation(context, effect)
 
 
 @kept
@@ -379,48 +336,30 @@ def _shutters(context: Context) -> list[tuple]:
     return [(str(i), shutter.name, "") for i, shutter in enumerate(active[1].shutters)] if active else []
 
 
-class SHUTTER_OT_region_assign(OfRegion, Operator):
+_SHUTTER = EnumProperty(name="Shutter", items=_shutters, translation_context=contexts.no_translation)
+
+
+@operator("Assign Region to Shutter", needs.a_region, shutter=_SHUTTER)
+def region_assign(self: Operator, _context: Context, effect: PropertyGroup) -> None:
     """Assign the active region to another shutter"""
-
-    bl_label = "Assign Region to Shutter"
-
-    shutter: EnumProperty(name="Shutter", items=_shutters, translation_context=contexts.no_translation)
-
-    def change(self, _context: Context, effect: PropertyGroup) -> None:
-        region_edits.assign_region(effect, effect.active_region, effect.shutters[int(self.shutter)])
+    region_edits.assign_region(effect, effect.active_region, effect.shutters[int(self.shutter)])
 
 
-class SHUTTER_OT_region_remove(OfRegion, Operator):
+@operator("Remove Region", needs.a_region)
+def region_remove(_self: Operator, _context: Context, effect: PropertyGroup) -> None:
     """Remove the active region and its strokes"""
-
-    bl_label = "Remove Region"
-
-    def change(self, _context: Context, effect: PropertyGroup) -> None:
-        region_edits.remove_region(effect, effect.active_region)
+    region_edits.remove_region(effect, effect.active_region)
 
 
-class SHUTTER_OT_region_move(Move, OfRegion, Operator):
+@operator("Move Region", needs.a_region, direction=_DIRECTION)
+def region_move(self: Operator, _context: Context, effect: PropertyGroup) -> set[str] | None:
     """Move the active region in the list (later ones lie over earlier ones)"""
-
-    bl_label = "Move Region"
-
-    def change(self, _context: Context, effect: PropertyGroup) -> set[str] | None:
-        index, name = effect.active_region, selection.active_shutter(effect).name
-        listed = [i for i, region in enumerate(effect.regions) if region.shutter == name]
-        if (to := self.target(listed, index)) == index:
-            return {"CANCELLED"}
-        region_edits.move_region(effect, index, to)
-        return None
+    name = selection.active_shutter(effect).name
+    places = [i for i, region in enumerate(effect.regions) if region.shutter == name]
+    return _move(places, effect.active_region, self.direction, partial(region_edits.move_region, effect))
 
 
-class SHUTTER_OT_region_key(OfRegion, Operator):
+@operator("Insert Region Keyframes", needs.a_region)
+def region_key(_self: Operator, _context: Context, effect: PropertyGroup) -> None:
     """Insert keyframes for location, rotation and scale of the active region at the current frame"""
-
-    bl_label = "Insert Region Keyframes"
-
-    def change(self, _context: Context, effect: PropertyGroup) -> None:
-        region_edits.key_region(effect, effect.active_region)
-
-
-classes = own_classes(globals())
-TIMERS = (_choose_tab,)
+    region_edits.key_region(effect, effect.active_region)

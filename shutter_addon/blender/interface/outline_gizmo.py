@@ -8,12 +8,10 @@ from bpy.types import Context, Event, Gizmo, GizmoGroup, PropertyGroup, Strip
 
 from ...core.messages import UserError
 from ...core.model import outlines
-from ...core.model.scribbles import mapped
-from ..data import annotations, selection
+from ..data import selection
 from ..editing import outline_drawings, track_region
 from . import drawing, region_gizmo
-from .gizmo_groups import Dragged, WithKeys, on_picture, to_region
-from .operator_bases import own_classes
+from .gizmo_groups import Dragged, View, WithKeys, view
 
 _CARRIED = (0.2, 0.9, 1.0, 0.9)
 _NEAR = 6  # units of the interface, within which the pointer is at a curve
@@ -29,19 +27,17 @@ class SHUTTER_GT_outline(Dragged, Gizmo):
             return
         if not (curves := _curves(context)):
             return
-        _scene, effect, strip = selection.in_picture(context)
-        matrix = to_region(effect, strip, context.region)
+        seen = _view(context)
         for points in self.mended() if self.is_modal else curves:
             width = 2 if self.is_highlight or self.is_modal else 1
-            drawing.lines(mapped(matrix, np.array(points)), _CARRIED, closed=True, width=width)
+            drawing.lines(seen.on_region(points), _CARRIED, closed=True, width=width)
 
     def test_select(self, context: Context, location: tuple[int, int]) -> int:
-        curves = _curves(context)
-        if not curves:
+        if not (curves := _curves(context)):
             return -1
-        _scene, effect, strip = selection.in_picture(context)
-        point, height = _on_picture(context, effect, strip, location)
-        _index, apart = outlines.nearest(curves, point, _aspect(effect))
+        seen = _view(context)
+        _index, apart = outlines.nearest(curves, _point(seen, location), seen.aspect)
+        height = float(np.hypot(*seen.matrix[:2, 1]))  # of the picture, in pixels of the region
         return 0 if apart * height <= drawing.ui_scale() * _NEAR else -1
 
     def invoke(self, context: Context, event: Event) -> set[str]:
@@ -50,8 +46,9 @@ class SHUTTER_GT_outline(Dragged, Gizmo):
         scene, effect, strip = selection.in_picture(context)
         self.target, self.frame = track_region.Target.of(effect, effect.active_region), scene.frame_current
         self.strip, self.curves, self.by, self.reach = strip.name, curves, (0.0, 0.0), _REACH
-        self.aspect = _aspect(effect)
-        self.grabbed, _height = _on_picture(context, effect, strip, (event.mouse_region_x, event.mouse_region_y))
+        seen = _view(context)
+        self.aspect = seen.aspect
+        self.grabbed = _point(seen, (event.mouse_region_x, event.mouse_region_y))
         self.pulled, _apart = outlines.nearest(curves, self.grabbed, self.aspect)
         return {"RUNNING_MODAL"}
 
@@ -63,7 +60,8 @@ class SHUTTER_GT_outline(Dragged, Gizmo):
             return {"RUNNING_MODAL"}
         if event.type in {"WHEELUPMOUSE", "WHEELDOWNMOUSE"}:
             self.reach *= _MORE if event.type == "WHEELUPMOUSE" else 1 / _MORE
-        point, _height = _on_picture(context, effect, strip, (event.mouse_region_x, event.mouse_region_y))
+        seen = view(effect, strip, context.region)
+        point = _point(seen, (event.mouse_region_x, event.mouse_region_y))
         self.by = tuple(np.subtract(point, self.grabbed))
         context.area.tag_redraw()
         return {"RUNNING_MODAL"}
@@ -81,6 +79,17 @@ class SHUTTER_GT_outline(Dragged, Gizmo):
         return effect.id_data.sequence_editor.strips_all.get(self.strip)
 
 
+def _view(context: Context) -> View:
+    _scene, effect, strip = selection.in_picture(context)
+    return view(effect, strip, context.region)
+
+
+def _point(seen: View, location: tuple[int, int]) -> tuple[float, float]:
+    """A point of the preview's region in fractions of the picture."""
+    x, y = seen.on_picture(*location)
+    return float(x), float(y)
+
+
 def _curves(context: Context) -> outlines.Curves:
     """The active outline's at the current frame, where it is seen."""
     if (seen := selection.in_picture(context)) is None:  # while it plays, it may just have gone
@@ -92,20 +101,6 @@ def _curves(context: Context) -> outlines.Curves:
         return ()
 
 
-def _aspect(effect: PropertyGroup) -> float:
-    width, height = annotations.picture_size(effect)
-    return width / height
-
-
-def _on_picture(
-    context: Context, effect: PropertyGroup, strip: Strip, location: tuple[int, int]
-) -> tuple[tuple[float, float], float]:
-    """A point of the preview's region in fractions of the picture, and how many of the region's pixels that is high."""
-    matrix = to_region(effect, strip, context.region)
-    x, y = on_picture(matrix, *location)
-    return (float(x), float(y)), float(np.hypot(*matrix[:2, 1]))
-
-
 class SHUTTER_GGT_outline(WithKeys, GizmoGroup):
     bl_label = "Shutter Outline"
     gizmo = SHUTTER_GT_outline
@@ -115,6 +110,3 @@ class SHUTTER_GGT_outline(WithKeys, GizmoGroup):
         if not region_gizmo.SHUTTER_GGT_region.poll(context):
             return False
         return selection.active_region(selection.in_picture(context)[1]).kind == "OUTLINE"
-
-
-classes = own_classes(globals())

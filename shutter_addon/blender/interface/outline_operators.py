@@ -1,50 +1,44 @@
-"""Operators of outlines: carried now, drawn where that is needed most, and made of what is carried."""
+"""Operators of outlines: carried now, drawn where that is needed most, made of what is carried; and drawn point by
+point: between two of them a curve goes along the picture's edges."""
 
 from contextlib import closing
 
 import bpy
+import numpy as np
 from bpy.app.translations import pgettext_rpt as rpt_
 from bpy.props import IntProperty
-from bpy.types import Context, Event, Operator, PropertyGroup
+from bpy.types import Context, Event, Operator, PropertyGroup, Scene, Strip
 
 from ...core.messages import UserError
-from ..data import selection, strips
+from ...media import outlining
+from ..data import preview_areas, selection, strips
 from ..editing import outline_drawings, outline_masks, track_region
 from ..rendering import outline_carrying
-from .operator_bases import UNDOABLE, Beside, OfRegion, OfStrokes, is_escape, own_classes, redraw, report_warning
+from . import drawing, needs, sharp_frame
+from .gizmo_groups import View, view
+from .operator_bases import UNDOABLE, Beside, OfEffect, operator, redraw, report_warning, show_status
 from .preview import show_carried
 
-_TICK = 0.1  # seconds from one look at what is carried to the next
+_COLOR = (0.2, 0.9, 1.0, 0.9)
+_STRIDE = 12  # units of the interface from point to point, as the pointer is dragged
+_CLOSES = 8  # units of the interface around the first point, within which a click closes the curve
+_KEYS = {"ESC", "RIGHTMOUSE", "RET", "NUMPAD_ENTER", "BACK_SPACE"}
+_ARROWS = {"LEFT_ARROW": (-1, 0), "RIGHT_ARROW": (1, 0), "DOWN_ARROW": (0, -1), "UP_ARROW": (0, 1)}
+_STEP, _FINE = 10, 1  # units of the interface that an arrow key moves the pointer by, and with Shift
 
 
-class OfOutline(OfRegion):
-    """Works on the active region, which is an outline."""
-
-    only_seen = True
-
-    @classmethod
-    def why_not(cls, effect: PropertyGroup) -> str | None:
-        if sentence := super().why_not(effect):
-            return sentence
-        return None if selection.active_region(effect).kind == "OUTLINE" else rpt_("The region is no outline")
-
-
-class _Carries(Beside, OfOutline):
+class _Carries(Beside, OfEffect):
     """Carries the active outline through its strip, beside Blender, and then does something with it."""
 
     bl_options = {"REGISTER"}
+    only_seen = True
+    needs = (needs.an_outline,)
 
     def carried(self, context: Context) -> set[str] | None:
         """Called once all is carried. One of FAULTS: what comes then cannot be done."""
         return None
 
-    def execute(self, context: Context) -> set[str]:
-        return self.tried(self._begin, context, True)
-
-    def invoke(self, context: Context, _event: Event) -> set[str]:
-        return self.tried(self._begin, context, bpy.app.background)
-
-    def _begin(self, context: Context, waits: bool) -> set[str] | None:
+    def begin(self, context: Context, waits: bool) -> set[str] | None:
         scene, effect, strip = selection.active(context)
         self._target = track_region.Target.of(effect, effect.active_region)
         if not strips.is_carried(selection.active_region(effect)):
@@ -59,22 +53,20 @@ class _Carries(Beside, OfOutline):
             return self.carried(context)
         self._file = file
         outline_carrying.carry(file, frames, show_carried)
-        return self.go_on(context, _TICK)
+        return self.go_on(context)
 
-    def modal(self, context: Context, event: Event) -> set[str]:
-        progress = outline_carrying.progress()
-        is_stopped = self._target.effect() is None or is_escape(event)
-        if is_stopped:
+    def goes_on(self, _context: Context) -> bool:
+        if self._target.effect() is None or (progress := outline_carrying.progress()) is None:
+            return False
+        sentence = rpt_("Tracking the outline: {done} of {total} frames, Esc to stop")
+        show_status(sentence.format(done=progress[0], total=progress[1]))
+        return True
+
+    def end(self, context: Context, is_stopped: bool) -> set[str] | None:
+        if is_stopped or self._target.effect() is None:
             outline_carrying.stop()
             show_carried()
-        elif progress is not None:
-            sentence = rpt_("Tracking the outline: {done} of {total} frames, Esc to stop")
-            context.workspace.status_text_set(sentence.format(done=progress[0], total=progress[1]))
-            return {"PASS_THROUGH"}
-        self.cancel(context)
-        return {"CANCELLED"} if is_stopped else self.tried(self._end, context)
-
-    def _end(self, context: Context) -> set[str] | None:
+            return {"CANCELLED"}
         if (failure := outline_carrying.failure(self._file)) is not None:
             raise UserError(failure)
         return self.carried(context)
@@ -123,40 +115,185 @@ class SHUTTER_OT_outline_mask(_Carries, Operator):
         self.report({"INFO"}, rpt_('Made the mask "{mask}"').format(mask=mask.name))
 
 
-class SHUTTER_OT_outline_draw(OfOutline, Operator):
+@operator("Insert Outline Drawing", needs.an_outline, only_seen=True)
+def outline_draw(self: Operator, _context: Context, effect: PropertyGroup) -> set[str] | None:
     """Make the outline that is tracked to the current frame a drawing of its own, to be mended"""
-
-    bl_label = "Insert Outline Drawing"
-
-    def change(self, _context: Context, effect: PropertyGroup) -> set[str] | None:
-        scene, strip, index = self.edit, self.effect_strip, effect.active_region
-        curves = outline_drawings.curves_now(scene, effect, strip, index)
-        if not curves:
-            report_warning(self, rpt_("The outline encloses nothing at the current frame"))
-            return {"CANCELLED"}
-        outline_drawings.draw(effect, strip, effect.regions[index], curves, scene.frame_current)
-        return None
+    scene, strip, index = self.edit, self.effect_strip, effect.active_region
+    curves = outline_drawings.curves_now(scene, effect, strip, index)
+    if not curves:
+        report_warning(self, rpt_("The outline encloses nothing at the current frame"))
+        return {"CANCELLED"}
+    outline_drawings.draw(effect, strip, effect.regions[index], curves, scene.frame_current)
+    return None
 
 
-class SHUTTER_OT_outline_it(OfStrokes, Operator):
+_FRAME = IntProperty(
+    name="Frame",
+    description="Timeline frame of the strokes; without one, the current frame",
+    options={"SKIP_SAVE"},
+)
+
+
+@operator("Find Outline", needs.strokes, only_seen=True, frame=_FRAME)
+def outline_it(self: Operator, _context: Context, effect: PropertyGroup) -> set[str] | None:
     """Make the active region an outline of the subject that its strokes run over, or go around, at this frame"""
+    if self.properties.is_property_set("frame"):
+        self.edit.frame_set(self.frame)
+    if not outline_drawings.outline_it(self.edit, effect, self.effect_strip, effect.active_region):
+        report_warning(self, rpt_("No subject is told from what is around it"))
+        return {"CANCELLED"}
+    return None
 
-    bl_label = "Find Outline"
+
+class SHUTTER_OT_outline_points(OfEffect, Operator):
+    """Draw a curve of the active outline point by point, along the picture's edges (Ctrl for straight lines)"""
+
+    bl_label = "Draw by Points"
     only_seen = True
+    needs = (needs.an_outline,)
 
-    frame: IntProperty(
-        name="Frame",
-        description="Timeline frame of the strokes; without one, the current frame",
-        options={"SKIP_SAVE"},
-    )
-
-    def change(self, _context: Context, effect: PropertyGroup) -> set[str] | None:
-        if self.properties.is_property_set("frame"):
-            self.edit.frame_set(self.frame)
-        if not outline_drawings.outline_it(self.edit, effect, self.effect_strip, effect.active_region):
-            report_warning(self, rpt_("No subject is told from what is around it"))
+    def invoke(self, context: Context, _event: Event) -> set[str]:
+        scene, effect, strip = selection.active(context)
+        areas = [area for window, area in preview_areas.previews(context) if window == context.window]
+        if not areas:
+            report_warning(self, rpt_("Open a sequencer with a preview to draw"))
             return {"CANCELLED"}
-        return None
+        self._area = context.area if context.area in areas else areas[0]
+        if self.tried(self._read, scene, effect, strip) == {"CANCELLED"}:
+            return {"CANCELLED"}
+        self._target, self._frame = track_region.Target.of(effect, effect.active_region), scene.frame_current
+        self._strip, self._next, self._is_down = strip.name, np.zeros((0, 2)), False
+        self._ways: list[np.ndarray] = []
+        sharp_frame.show(context)
+        self._drawn = bpy.types.SpaceSequenceEditor.draw_handler_add(self._draw, (), "PREVIEW", "POST_PIXEL")
+        sentence = rpt_(
+            "Click points around the subject (arrow keys, Space), Ctrl: straight, Backspace: one less, "
+            "Return: close, Esc: nothing"
+        )
+        show_status(sentence)
+        context.window_manager.modal_handler_add(self)
+        return {"RUNNING_MODAL"}
 
+    def _read(self, scene: Scene, effect: PropertyGroup, strip: Strip) -> None:
+        self._picture = outline_drawings.picture_now(scene, effect, strip)
+        outlining.along_edges(self._picture, np.zeros(2), np.zeros(2))  # that it can, before anything is drawn
 
-classes = own_classes(globals())
+    def execute(self, _context: Context) -> set[str]:
+        report_warning(self, rpt_("Open a sequencer with a preview to draw"))  # it is drawn in a window alone
+        return {"CANCELLED"}
+
+    def modal(self, context: Context, event: Event) -> set[str]:
+        there, has_preview = self._there(), self._area.type == "SEQUENCE_EDITOR"
+        has_preview = has_preview and self._area.spaces.active.view_type != "SEQUENCER"
+        if there is None or there[0].frame_current != self._frame or not has_preview:
+            return self._ended(context, {"CANCELLED"})
+        if event.type == "LEFTMOUSE" and event.value == "RELEASE":
+            self._is_down = False
+        if event.type in _ARROWS and event.value == "PRESS":
+            return self._stepped(context, event)
+        if event.type in {"MOUSEMOVE", "LEFTMOUSE", "SPACE"} and self._is_over(event):
+            return self._pointed(context, event)
+        return self._key(context, event) if event.type in _KEYS else {"PASS_THROUGH"}
+
+    def _pointed(self, context: Context, event: Event) -> set[str]:
+        """A click or the space bar adds a point; dragging adds one after the other."""
+        point = self._on_picture(event)
+        if event.type in {"LEFTMOUSE", "SPACE"} and event.value in {"PRESS", "DOUBLE_CLICK"}:
+            if len(self._ways) > 2 and self._apart(point, self._ways[0][0]) <= _CLOSES * drawing.ui_scale():
+                return self._closed(context)
+            self._is_down = event.type == "LEFTMOUSE"
+            self._ways.append(self._way(point, event.ctrl))
+        elif self._is_down and self._apart(point, self._ways[-1][-1]) >= _STRIDE * drawing.ui_scale():
+            self._ways.append(self._way(point, event.ctrl))
+        self._next = self._way(point, event.ctrl) if self._ways else np.zeros((0, 2))
+        self._area.tag_redraw()
+        return {"RUNNING_MODAL"}
+
+    def _stepped(self, context: Context, event: Event) -> set[str]:
+        """An arrow key moves the pointer, from elsewhere to the preview's middle first."""
+        region = preview_areas.preview_region(self._area)
+        x, y = region.x + region.width // 2, region.y + region.height // 2
+        if self._is_over(event):
+            step = round((_FINE if event.shift else _STEP) * drawing.ui_scale())
+            x, y = (
+                place + step * way
+                for place, way in zip((event.mouse_x, event.mouse_y), _ARROWS[event.type], strict=True)
+            )
+        context.window.cursor_warp(x, y)
+        return {"RUNNING_MODAL"}
+
+    def _key(self, context: Context, event: Event) -> set[str]:
+        if event.value == "PRESS":
+            if event.type in {"ESC", "RIGHTMOUSE"}:
+                return self._ended(context, {"CANCELLED"})
+            if event.type in {"RET", "NUMPAD_ENTER"}:
+                return self._closed(context)
+            if event.type == "BACK_SPACE" and self._ways:
+                self._ways.pop()
+                self._next = np.zeros((0, 2))
+                self._area.tag_redraw()
+        return {"RUNNING_MODAL"}
+
+    def _closed(self, context: Context) -> set[str]:
+        """The curve becomes one of the drawing at this frame."""
+        if len(self._ways) < 3:
+            report_warning(self, rpt_("A curve has three points at least"))
+            return {"RUNNING_MODAL"}
+        _scene, effect, strip = self._there()
+        region = effect.regions[self._target.index]
+        # The first click is at no edge; the way from it begins at the one beside it.
+        first = self._ways[1][0]
+        curve = np.concatenate([*self._ways[1:], self._way(first, False)])
+        steps = np.hypot(*np.diff(curve, axis=0, append=curve[:1]).T)
+        return self._ended(
+            context,
+            self.tried(outline_drawings.add, effect, strip, region, curve[steps > 0], self._frame),
+        )
+
+    def _ended(self, context: Context, result: set[str]) -> set[str]:
+        self.cancel(context)
+        redraw(context)
+        return result
+
+    def cancel(self, context: Context) -> None:
+        """It has ended, or its window was closed."""
+        bpy.types.SpaceSequenceEditor.draw_handler_remove(self._drawn, "PREVIEW")
+        show_status(None)
+        sharp_frame.give_back(context)
+
+    def _there(self):
+        """Scene, effect and strip as Blender has them now; None: they are gone."""
+        effect = self._target.effect()
+        strip = effect and effect.id_data.sequence_editor.strips_all.get(self._strip)
+        return (effect.id_data, effect, strip) if effect is not None and strip is not None else None
+
+    def _way(self, point: np.ndarray, is_straight: bool) -> np.ndarray:
+        """From the last point to another one; the first is on its own."""
+        if not self._ways:
+            return point[None]
+        last = self._ways[-1][-1]
+        return np.stack([last, point]) if is_straight else outlining.along_edges(self._picture, last, point)
+
+    def _is_over(self, event: Event) -> bool:
+        region = preview_areas.preview_region(self._area)
+        x, y = event.mouse_x - region.x, event.mouse_y - region.y
+        return 0 <= x < region.width and 0 <= y < region.height
+
+    def _view(self) -> View:
+        _scene, effect, strip = self._there()
+        return view(effect, strip, preview_areas.preview_region(self._area))
+
+    def _on_picture(self, event: Event) -> np.ndarray:
+        """Where the pointer is, in fractions of the picture."""
+        region = preview_areas.preview_region(self._area)
+        return self._view().on_picture(event.mouse_x - region.x, event.mouse_y - region.y)
+
+    def _apart(self, *points: np.ndarray) -> float:
+        """How far two points are from each other, in pixels of the region."""
+        return float(np.hypot(*np.diff(self._view().on_region(points), axis=0)[0]))
+
+    def _draw(self) -> None:
+        if bpy.context.area != self._area or self._there() is None or not self._ways:
+            return
+        curve = np.concatenate([*self._ways, self._next])
+        drawing.lines(self._view().on_region(curve), _COLOR, width=2)

@@ -1,9 +1,10 @@
 """What panels are made of: sentences, lists, and when there is an effect to show."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import bpy
 from bpy.app.translations import contexts
+from bpy.app.translations import pgettext_iface as iface_
 from bpy.app.translations import pgettext_n as n_
 from bpy.types import Context, PropertyGroup, Scene, Strip, UILayout
 
@@ -12,6 +13,8 @@ from ...core.model.fields import fields_of
 from ..data import selection
 from . import drawing
 from .operator_bases import Mixin
+
+Draws = Callable[[UILayout, Scene, PropertyGroup, Strip], None]  # what a panel shows of an effect
 
 # Units of the interface beside a sentence in a panel: margins and the tabs of a sidebar; its icon.
 _MARGIN, _ICON = 64, 20
@@ -99,24 +102,24 @@ def draw_properties(layout: UILayout, owner: bpy.types.bpy_struct, *names: str) 
         layout.prop(owner, name)
 
 
-class WithEffect(Mixin):
-    """A panel of the effect, closed at first."""
+def draw_progress(layout: UILayout, done: int, total: int) -> None:
+    text = iface_("{done} of {total}").format(done=done, total=total)
+    layout.progress(factor=done / max(total, 1), text=text, translate=False)
 
-    bl_options = {"DEFAULT_CLOSED"}
 
-    @classmethod
-    def poll(cls, context: Context) -> bool:
-        active = selection.active(context) if super().poll(context) else None
-        return active is not None and cls.shows(active[1])
+def of_effect(label: str, draws: Draws, shows: Callable[[PropertyGroup], bool] | None = None, **look: object) -> type:
+    """Makes a panel of the effect, closed at first.
 
-    @classmethod
-    def shows(cls, effect: PropertyGroup) -> bool:
-        """Whether there is anything to show of an effect."""
-        return True
+    shows: whether there is anything to show of an effect; look: what else the class has for Blender"""
 
-    def draw(self, context: Context) -> None:
-        self.layout.use_property_split = True
-        self.draw_effect(self.layout, *selection.active(context))
+    class Drawn(Mixin):
+        @classmethod
+        def poll(cls, context: Context) -> bool:
+            active = selection.active(context) if super().poll(context) else None
+            return active is not None and (shows is None or shows(active[1]))
 
-    def draw_effect(self, layout: UILayout, scene: Scene, effect: PropertyGroup, strip: Strip) -> None:
-        raise NotImplementedError
+        def draw(self, context: Context) -> None:
+            self.layout.use_property_split = True
+            draws(self.layout, *selection.active(context))
+
+    return type("Drawn", (Drawn,), {"bl_label": label, "bl_options": {"DEFAULT_CLOSED"}} | look)

@@ -13,22 +13,19 @@ from ...core.model.effect import Shutter
 from ..data import annotations, consistency, data_format, selection, strips
 from ..editing import bar_edits, match_source
 from ..rendering import inbetween_build, strobing
-from . import icons, inbetween_operators
-from .bake_operators import Bake
+from . import bake_operators, icons, inbetween_operators, region_panels
 from .note_buttons import Button
-from .operator_bases import Mixin, own_classes
-from .option_panels import Inbetween, Options
+from .operator_bases import Mixin
 from .panel_parts import (
     WIDEST,
-    WithEffect,
     draw_fields,
     draw_list,
     draw_moves,
     draw_operators,
     draw_properties,
+    of_effect,
     sentence,
 )
-from .region_panels import Camera, Follow, Regions, Track, Transform, draw_tracked, draw_tracking, tracking_icon
 
 
 class SHUTTER_UL_shutters(UIList):
@@ -136,38 +133,34 @@ class _Shutters(Mixin):
         row = layout.row(align=True)
         draw_operators(row, ("draw", "GREASEPENCIL"), ("erase",))
         row.menu("SHUTTER_MT_regions", text="", icon="DOWNARROW_HLT")
-        draw_tracking(layout, effect.active_region)
+        region_panels.draw_tracking(layout, effect.active_region)
         draw_operators(layout.row(align=True), ("sharp_subject",), ("panning_shot",), ("clean_trail",))
 
 
-class _Exposure(WithEffect):
+def _draw_header(self: Panel, context: Context) -> None:
+    if (shutter := selection.active_shutter(selection.active(context)[1])) is not None:
+        words = iface_('Exposure of "{shutter}"').format(shutter=shutter.name)
+        self.layout.label(text=words, translate=False)
+
+
+def _draw_exposure(layout: UILayout, scene: Scene, effect: PropertyGroup, strip: Strip) -> None:
     """What the active shutter makes of the frames."""
-
-    bl_label = ""
-    bl_options = set()
-
-    def draw_header(self, context: Context) -> None:
-        if (shutter := selection.active_shutter(selection.active(context)[1])) is not None:
-            words = iface_('Exposure of "{shutter}"').format(shutter=shutter.name)
-            self.layout.label(text=words, translate=False)
-
-    def draw_effect(self, layout: UILayout, scene: Scene, effect: PropertyGroup, strip: Strip) -> None:
-        if (shutter := selection.active_shutter(effect)) is None:
-            return
-        row = layout.row(align=True)
-        preset = consistency.preset_of(effect, effect.active_shutter)
-        label = iface_(presets.PRESETS[preset][0], CONTEXT) if preset else None
-        row.menu("SHUTTER_MT_presets", text=label, icon="PRESET", translate=False)
-        row.operator("shutter.bars_key", text="", icon="KEY_HLT")
-        row.operator("shutter.bars_unkey", text="", icon="KEY_DEHLT")
-        layout.prop(effect, "window")
-        layout.prop(shutter, "length")
-        if shutter.length == "MOTION" and shutter.follow != "NOTHING":
-            layout.prop(shutter, "trail")
-        _draw_combine(layout, shutter)
-        draw_fields(layout, shutter, Shutter)
-        layout.operator("shutter.tripod", icon="CON_CAMERASOLVER")
-        _draw_bars(layout, scene, effect, strip)
+    if (shutter := selection.active_shutter(effect)) is None:
+        return
+    row = layout.row(align=True)
+    preset = consistency.preset_of(effect, effect.active_shutter)
+    label = iface_(presets.PRESETS[preset][0], CONTEXT) if preset else None
+    row.menu("SHUTTER_MT_presets", text=label, icon="PRESET", translate=False)
+    row.operator("shutter.bars_key", text="", icon="KEY_HLT")
+    row.operator("shutter.bars_unkey", text="", icon="KEY_DEHLT")
+    layout.prop(effect, "window")
+    layout.prop(shutter, "length")
+    if shutter.length == "MOTION" and shutter.follow != "NOTHING":
+        layout.prop(shutter, "trail")
+    _draw_combine(layout, shutter)
+    draw_fields(layout, shutter, Shutter)
+    layout.operator("shutter.tripod", icon="CON_CAMERASOLVER")
+    _draw_bars(layout, scene, effect, strip)
 
 
 def _draw_combine(layout: UILayout, shutter: PropertyGroup) -> None:
@@ -210,7 +203,9 @@ def _draw_live(layout: UILayout, context: Context) -> None:
     view.prop(live, "probe", text="", icon="EYEDROPPER")
     notes = row.row(align=True)
     effect = selection.active(context)[1]
-    found = {tracking_icon(effect, index) for index in _tracked(effect)} | {"INFO" for _note in _notes(context)}
+    found = {region_panels.tracking_icon(effect, index) for index in _tracked(effect)} | {
+        "INFO" for _note in _notes(context)
+    }
     notes.enabled = bool(found - {None})
     notes.alert = "ERROR" in found
     notes.popover("SHUTTER_PT_notes", text="", icon="ERROR" if notes.alert else "INFO")
@@ -274,24 +269,33 @@ class SHUTTER_PT_notes(Panel):
                 for name, value in button.values.items():
                     setattr(drawn, name, value)
         for index in _tracked(effect):
-            draw_tracked(layout, effect, index)
+            region_panels.draw_tracked(layout, effect, index)
 
 
-class _Move(WithEffect):
-    """What the exposure moves with."""
+def _draw_move(layout: UILayout, _scene: Scene, effect: PropertyGroup, _strip: Strip) -> None:
+    if (shutter := selection.active_shutter(effect)) is None:
+        return
+    layout.prop(shutter, "follow")
+    if shutter.follow == "REGION":
+        layout.prop_search(shutter, "follow_region", effect, "regions", text="Region")
+    if shutter.follow != "NOTHING":
+        draw_properties(layout, shutter, "follow_motion", "follow_smooth")
+    if shutter.follow == "CAMERA":
+        region_panels.draw_tracking(layout, None)
 
-    bl_label = "Exposure Moves With"
 
-    def draw_effect(self, layout: UILayout, _scene: Scene, effect: PropertyGroup, _strip: Strip) -> None:
-        if (shutter := selection.active_shutter(effect)) is None:
-            return
-        layout.prop(shutter, "follow")
-        if shutter.follow == "REGION":
-            layout.prop_search(shutter, "follow_region", effect, "regions", text="Region")
-        if shutter.follow != "NOTHING":
-            draw_properties(layout, shutter, "follow_motion", "follow_smooth")
-        if shutter.follow == "CAMERA":
-            draw_tracking(layout, None)
+def _draw_options(layout: UILayout, _scene: Scene, effect: PropertyGroup, _strip: Strip) -> None:
+    names = "position", "interpolation", "light", "exposure", "edges", "stop_at_cuts", "aggregate", "border"
+    draw_properties(layout, effect, *names)
+    column = layout.column()
+    column.active = any(region.is_layer for region in effect.regions)
+    draw_properties(column, effect, "decontaminate", "plate_reach")
+    layout.prop(effect, "use_source_time")
+    column = layout.column()
+    column.active = effect.use_source_time
+    column.prop(effect, "source_time")
+    if effect.use_source_time and effect.inbetween == "1":
+        sentence(column, iface_("No in-between frames: the nearest source frame is shown"), "INFO")
 
 
 class _Report(Mixin):
@@ -328,16 +332,19 @@ class _InSidebar:
 # By the end of its name, what each panel draws, and in which other one it lies.
 _PANELS = {
     "": (_Shutters, None),
-    "_regions": (Regions, ""),
-    "_transform": (Transform, "_regions"),
-    "_track": (Track, "_regions"),
-    "_follow": (Follow, "_regions"),
-    "_exposure": (_Exposure, ""),
-    "_move": (_Move, "_exposure"),
-    "_camera": (Camera, ""),
-    "_options": (Options, ""),
-    "_inbetween": (Inbetween, ""),
-    "_bake": (Bake, ""),
+    "_regions": (of_effect("Regions", region_panels.draw_regions, bl_options=set()), ""),
+    "_transform": (of_effect("Transform", region_panels.draw_transform, region_panels.has_region), "_regions"),
+    "_track": (
+        of_effect("Track", region_panels.draw_track, region_panels.has_strokes, bl_translation_context=CONTEXT),
+        "_regions",
+    ),
+    "_follow": (of_effect("Follow Track", region_panels.draw_follow, region_panels.has_region), "_regions"),
+    "_exposure": (of_effect("", _draw_exposure, bl_options=set(), draw_header=_draw_header), ""),
+    "_move": (of_effect("Exposure Moves With", _draw_move), "_exposure"),
+    "_camera": (of_effect("Camera", region_panels.draw_camera, region_panels.has_camera), ""),
+    "_options": (of_effect("Options", _draw_options), ""),
+    "_inbetween": (of_effect("In-Between Frames", inbetween_operators.draw_panel), ""),
+    "_bake": (of_effect("Bake", bake_operators.draw_panel), ""),
     "_report": (_Report, ""),
 }
 
@@ -349,40 +356,7 @@ def _panels(start: str, place: type) -> list[type]:
     ]
 
 
-def _add_entry(self, _context: Context) -> None:
-    self.layout.separator()
-    self.layout.operator("shutter.add_effect", text="Shutter")
-
-
-def _strip_entry(self, context: Context) -> None:
-    strip = selection.active_strip(context)
-    if strip is None or not (strip.type in strips.SOURCES or selection.active(context)):
-        return
-    self.layout.separator()
-    if strip.type in strips.SOURCES:
-        self.layout.operator("shutter.draw", text="Draw Shutter", icon="GREASEPENCIL")
-        self.layout.operator("shutter.add_effect")
-    draw_operators(self.layout, ("effect_copy", "COPYDOWN"), ("effect_paste", "PASTEDOWN"))
-
-
-MENUS = {
-    "SEQUENCER_MT_add_effect": _add_entry,
-    "SEQUENCER_MT_strip": _strip_entry,
-    "SEQUENCER_MT_context_menu": _strip_entry,
-}
-
 classes = (
-    *own_classes(globals()),
     *_panels("STRIP_PT_shutter", _InProperties),
     *_panels("SEQUENCER_PT_shutter", _InSidebar),
 )
-
-
-def register() -> None:
-    for menu, entry in MENUS.items():
-        getattr(bpy.types, menu).append(entry)
-
-
-def unregister() -> None:
-    for menu, entry in MENUS.items():
-        getattr(bpy.types, menu).remove(entry)

@@ -20,7 +20,7 @@ from ...core.model.frame_state import FrameState
 from ...devices.device import Texture
 from ...media import MediaError
 from ...media.errors import NotBuiltError
-from ..data import annotations, preview_areas, selection, strips
+from ..data import annotations, main_thread, preview_areas, selection, strips
 from ..data.preview_areas import Shown
 from ..data.snapshot import Snapshot
 from ..devices import blender_gpu
@@ -39,7 +39,6 @@ from ..rendering import (
 from ..rendering.previews import Decision, Drawing
 from . import drawing, inbetween_operators, note_buttons, preview_quad, sharp_frame
 from .note_buttons import Button
-from .operator_bases import soon
 from .preview_quad import Quad
 
 VIEWS = (
@@ -57,25 +56,16 @@ VIEWS = (
 )
 
 
-def redraw(_settings: PropertyGroup | None, _context: Context) -> None:
-    """Draws all previews again: for what is called at changes of properties."""
-    preview_areas.redraw(bpy.context)
-
-
-def _view_chosen(settings: PropertyGroup, context: Context) -> None:
+def _view_chosen(_settings: PropertyGroup, context: Context) -> None:
     sharp_frame.give_back(context)
-    redraw(settings, context)
-
-
-def _redraw_once() -> None:
-    redraw(None, bpy.context)
+    preview_areas.redraw()
 
 
 def _redraw_when_still() -> float | None:
     """Blender does not draw again where the playhead is let go, or tracking ends."""
     if previews.is_going(bpy.context):
         return _SOON
-    _redraw_once()
+    preview_areas.redraw()
     return None
 
 
@@ -109,19 +99,19 @@ class ShutterPreview(PropertyGroup):
         default=0.5,
         min=0.0,
         max=1.0,
-        update=redraw,
+        update=preview_areas.redraw,
     )
     probe: BoolProperty(
         name="Probe",
         description="Show the shutter of the pixel that the pointer was over last, and how much of each it gets",
-        update=redraw,
+        update=preview_areas.redraw,
     )
     probe_at: FloatVectorProperty(
         name="Probe Position",
         description="The pixel that is probed, in fractions of the picture from its lower left corner",
         size=2,
         default=(-1.0, -1.0),
-        update=redraw,
+        update=preview_areas.redraw,
     )
 
 
@@ -137,11 +127,11 @@ def _draw() -> None:
     # Blender tells nobody of strokes that are drawn or erased, but it draws the preview again.
     scene = selection.scene_of(context)
     if scene is not None and scene.library is None and invalidation.invalidate_changed(scene):
-        soon(_redraw_once)  # what is tagged while it is drawn is not drawn again
+        main_thread.later(preview_areas.redraw)  # what is tagged while it is drawn is not drawn again
     sharp_frame.follow_pen()
     space = context.space_data
     if shown_annotations.is_laid_wrong(space) or shown_annotations.is_other(space, selection.seen(scene)):
-        soon(shown_annotations.follow)  # nothing may be changed while it is drawn
+        main_thread.later(shown_annotations.follow)  # nothing may be changed while it is drawn
     if sharp_frame.is_shown(space):
         _show_sharp(context, preview_areas.shown(context, space.display_channel))
     # A stroke that is being drawn would lie below our picture: Blender's own shows the same.
@@ -151,14 +141,13 @@ def _draw() -> None:
     if not context.window_manager.virtual_shutter.live:
         return
     say = _Notes(context.region)
-    shown = preview_areas.shown(context)
-    if shown is None:
-        previews.looking.whole = None
-        previews.was_drawn()
-        _tell_unseen(context, say)
-        return
     with drawing.pixel_space(context.region):
-        _show(context, shown, decision, say)
+        if (shown := preview_areas.shown(context)) is not None:
+            _show(context, shown, decision, say)
+        else:
+            previews.looking.whole = None
+            previews.was_drawn()
+            _tell_unseen(context, say)
         say.draw()
 
 
@@ -167,7 +156,7 @@ def _show(context: Context, shown: Shown, decision: Decision | None, say: "_Note
     try:
         wanted = previews.for_drawing(context, shown, decision)
         if previews.is_going(context):
-            soon(_redraw_when_still, _SOON)
+            main_thread.later(_redraw_when_still, _SOON)
         quad = Quad(context.region, shown.strip, annotations.picture_size(shown.effect))
         try:
             if wanted.decision.is_late:
@@ -177,7 +166,7 @@ def _show(context: Context, shown: Shown, decision: Decision | None, say: "_Note
         except stopping.StoppedError:
             say(rpt_("Composing…"))
             _show_strokes(context, quad, shown, wanted.decision.snapshot)
-            soon(_redraw_once)
+            main_thread.later(preview_areas.redraw)
     except effect_source.FAULTS as error:
         previews.was_drawn()
         _tell_fault(error, say)
@@ -189,8 +178,6 @@ def _tell_unseen(context: Context, say: "_Notes") -> None:
     if active is None or selection.seen(active[0]) or not context.space_data.show_overlays:
         return
     say(selection.why_unseen(active[0], active[2]))
-    with drawing.pixel_space(context.region):
-        say.draw()
 
 
 def _show_picture(context: Context, quad: Quad, shown: Shown, wanted: Drawing, say: "_Notes") -> None:
@@ -263,17 +250,16 @@ def _tell_strobing(looked: strobing.Looked, place: int, say: "_Notes") -> None:
     if looked.known is not None and inbetween_build.running() is None:
         say(inbetween_operators.strobing_in_words(looked.known), inbetween_operators.smoothing(looked.known), place)
     if looked.is_new:
-        soon(inbetween_operators.redraw_panels)  # which may have been drawn before
+        main_thread.later(inbetween_operators.redraw_panels)  # which may have been drawn before
     if looked.is_busy:
-        if bpy.app.timers.is_registered(_measure):
-            bpy.app.timers.unregister(_measure)
-        bpy.app.timers.register(_measure, first_interval=_STILL)  # once a frame stays
+        main_thread.drop(_measure)
+        main_thread.later(_measure, _STILL)  # once a frame stays
 
 
 def _measure() -> float | None:
     """Has measured what tells of strobing, a little at a time."""
     if strobing.advance():
-        redraw(None, bpy.context)
+        preview_areas.redraw()
     return inbetween_operators.TICK if strobing.is_busy() else None
 
 
@@ -315,7 +301,7 @@ def show_carried() -> None:
     for scene in strips.local_scenes():
         if scene.virtual_shutter.effects:
             strips.invalidate(scene)
-    preview_areas.redraw(bpy.context)
+    preview_areas.redraw()
 
 
 def _tell_fault(error: Exception, say: "_Notes") -> None:
@@ -416,7 +402,6 @@ class _Notes:
 
 
 classes = (ShutterPreview,)
-TIMERS = _redraw_once, _redraw_when_still, shown_annotations.follow, _measure
 _handler = None
 
 

@@ -1,4 +1,5 @@
-"""The probe: a pixel's shutter as bars, and its coefficients as shares, beside it in the preview."""
+"""The probe: a pixel's shutter as bars, and its coefficients as shares, beside it in the preview; and the handle of the
+split view."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -6,17 +7,20 @@ from dataclasses import dataclass
 import bpy
 import numpy as np
 from bpy.app.translations import pgettext_iface as iface_
-from bpy.types import Context, Gizmo, GizmoGroup, PropertyGroup, Region, Strip
+from bpy.app.translations import pgettext_rpt as rpt_
+from bpy.props import IntProperty
+from bpy.types import Context, Event, Gizmo, GizmoGroup, Operator, PropertyGroup, Region, Strip
 
 from ...compute import plates
-from ...core.model.scribbles import mapped
-from ..data import annotations, geometry, preview_areas
+from ...core.messages import EffectError
+from ..data import annotations, geometry, preview_areas, selection
 from ..rendering import effect_source, previews, probe, render_context
 from . import drawing
-from .gizmo_groups import InPreview, on_picture, to_region
-from .operator_bases import own_classes
+from .gizmo_groups import Dragged, InPreview, View, view
+from .operator_bases import OfEffect
 
 _WIDTH, _HEIGHT, _LINE, _PAD, _APART = 180, 64, 17, 8, 14  # in units of the interface
+_REACH = 8  # of the pointer to the split's handle, in units of the interface
 _MARK = (1.0, 1.0, 1.0, 0.9)
 
 
@@ -46,10 +50,12 @@ def layout(point: Sequence[float], size: tuple[int, int], count: int, unit: floa
     return Layout((left, top - height, left + width, top), bars, lines)
 
 
-def _to_region(context: Context, shown: preview_areas.Shown) -> np.ndarray | None:
-    """Matrix from fractions of the shown picture to the region's pixels; None: nothing is seen of it."""
-    matrix = to_region(shown.effect, shown.strip, context.region)
-    return matrix if geometry.is_invertible(matrix) else None
+def _view(context: Context) -> View | None:
+    """The view of the shown picture; None: nothing is seen of it."""
+    if (shown := preview_areas.shown(context)) is None:
+        return None
+    seen = view(shown.effect, shown.strip, context.region)
+    return seen if geometry.is_invertible(seen.matrix) else None
 
 
 def _is_cropped(strip: Strip, size: tuple[int, int], point: Sequence[float]) -> bool:
@@ -62,7 +68,7 @@ class SHUTTER_GT_probe(Gizmo):
 
     def draw(self, context: Context) -> None:
         shown, at = preview_areas.shown(context), tuple(context.window_manager.virtual_shutter.probe_at)
-        if shown is None or (matrix := _to_region(context, shown)) is None:
+        if shown is None or (seen := _view(context)) is None:
             return
         if _is_cropped(shown.strip, annotations.picture_size(shown.effect), at):
             return
@@ -73,15 +79,14 @@ class SHUTTER_GT_probe(Gizmo):
         except effect_source.FAULTS:  # which the live preview tells
             return
         if probed is not None:
-            point = mapped(matrix, np.array([at]))[0]
+            (point,) = seen.on_region([at])
             _draw(context.region, point, shown.effect.shutters, probed, _of_layers(shown, probed))
 
     def test_select(self, context: Context, location: tuple[int, int]) -> int:
         """Blender asks whenever the pointer moves: nothing else tells of it without taking events from others."""
-        shown = preview_areas.shown(context)
-        if shown is not None and (matrix := _to_region(context, shown)) is not None:
+        if (seen := _view(context)) is not None:
             x, y = location
-            context.window_manager.virtual_shutter.probe_at = on_picture(matrix, x + 0.5, y + 0.5)
+            context.window_manager.virtual_shutter.probe_at = seen.on_picture(x + 0.5, y + 0.5)
         return -1
 
 
@@ -124,11 +129,89 @@ class SHUTTER_GGT_probe(InPreview, GizmoGroup):
     gizmo = SHUTTER_GT_probe
 
     @classmethod
-    def poll(cls, context: Context) -> bool:
-        settings = context.window_manager.virtual_shutter
-        if not (settings.live and settings.probe) or bpy.app.is_job_running("RENDER"):
-            return False
-        return preview_areas.shown(context) is not None
+    def is_wanted(cls, live: PropertyGroup) -> bool:
+        return live.probe and not bpy.app.is_job_running("RENDER")
 
 
-classes = own_classes(globals())
+class SHUTTER_OT_probe_pixel(OfEffect, Operator):
+    """Probe a pixel that is named by its numbers, and not the one under the pointer"""
+
+    bl_label = "Probe Pixel"
+    bl_options = {"REGISTER"}
+    only_seen = True
+
+    column: IntProperty(name="Column", description="Number of the pixel from the left, from 1", default=1, min=1)
+    row: IntProperty(name="Row", description="Number of the pixel from below, from 1", default=1, min=1)
+
+    def invoke(self, context: Context, _event: Event) -> set[str]:
+        size = annotations.picture_size(selection.active(context)[1])
+        at = context.window_manager.virtual_shutter.probe_at
+        inside = all(0 <= place < 1 for place in at)
+        self.column, self.row = (
+            int(place * n) + 1 for place, n in zip(at if inside else (0.5, 0.5), size, strict=True)
+        )
+        return context.window_manager.invoke_props_dialog(self)
+
+    def draw(self, _context: Context) -> None:
+        self.layout.activate_init = True
+        self.layout.prop(self, "column")
+        self.layout.prop(self, "row")
+
+    def change(self, context: Context, effect: PropertyGroup) -> None:
+        width, height = annotations.picture_size(effect)
+        if self.column > width or self.row > height:
+            sentence = rpt_("The picture has {width} × {height} pixels")
+            raise EffectError(sentence.format(width=width, height=height))
+        live = context.window_manager.virtual_shutter
+        live.live = live.probe = True
+        live.probe_at = (self.column - 0.5) / width, (self.row - 0.5) / height
+        preview_areas.redraw()
+
+
+def _line(context: Context) -> np.ndarray | None:
+    """Where the split is, in pixels of the region (2, 2); None: nothing is seen of it."""
+    at = context.window_manager.virtual_shutter.split
+    return None if (seen := _view(context)) is None else seen.on_region([(at, 0.0), (at, 1.0)])
+
+
+class SHUTTER_GT_split(Dragged, Gizmo):
+    def draw(self, context: Context) -> None:
+        if (line := _line(context)) is None:
+            return
+        x, y = line.mean(axis=0)
+        half = drawing.ui_scale() * _REACH / 2
+        drawing.lines(line, _MARK, width=2 if self.is_highlight else 1)
+        drawing.rectangles([(x - half, y - 3 * half, x + half, y + 3 * half)], [_MARK])
+
+    def test_select(self, context: Context, location: tuple[int, int]) -> int:
+        if (line := _line(context)) is None:
+            return -1
+        first, second = line
+        along = (second - first) / max(np.hypot(*(second - first)), 1e-6)
+        offset = np.array(location) - first
+        apart, place = abs(along[0] * offset[1] - along[1] * offset[0]), along @ offset
+        near = apart <= drawing.ui_scale() * _REACH and 0 <= place <= np.hypot(*(second - first))
+        return 0 if near else -1
+
+    def invoke(self, context: Context, _event: Event) -> set[str]:
+        self.before = context.window_manager.virtual_shutter.split
+        return {"RUNNING_MODAL"}
+
+    def modal(self, context: Context, event: Event, _tweak: set[str]) -> set[str]:
+        if (seen := _view(context)) is not None:
+            x, _y = seen.on_picture(event.mouse_region_x, event.mouse_region_y)
+            context.window_manager.virtual_shutter.split = x
+        return {"RUNNING_MODAL"}
+
+    def exit(self, context: Context, cancel: bool) -> None:
+        if cancel:
+            context.window_manager.virtual_shutter.split = self.before
+
+
+class SHUTTER_GGT_split(InPreview, GizmoGroup):
+    bl_label = "Split View"
+    gizmo = SHUTTER_GT_split
+
+    @classmethod
+    def is_wanted(cls, live: PropertyGroup) -> bool:
+        return live.view == "SPLIT"

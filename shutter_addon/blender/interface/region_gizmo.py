@@ -1,23 +1,26 @@
-"""Where the active region lies, and handles to move, turn and scale it in the sequencer's preview."""
+"""Where the active region lies, and handles to move, turn and scale it in the sequencer's preview; and the same by
+numbers."""
 
-from dataclasses import dataclass
+import math
+from typing import NamedTuple
 
 import bpy
 import numpy as np
 from bpy.app.translations import contexts
 from bpy.app.translations import pgettext_iface as iface_
-from bpy.types import Context, Event, Gizmo, GizmoGroup, PropertyGroup, Scene, Strip
+from bpy.props import FloatProperty, FloatVectorProperty
+from bpy.types import Context, Event, Gizmo, GizmoGroup, Operator, PropertyGroup, Scene, Strip
 
 from ...core import revision
 from ...core.messages import EffectError
 from ...core.model import scribbles
-from ...core.model.scribbles import mapped
-from ..data import annotations, selection, snapshot, validation
+from ...core.model.limits import MAX_DEGREES, MAX_DISTANCE, MAX_SCALE
+from ..data import selection, snapshot, validation
 from ..editing import bar_edits, drawn_places, region_edits, track_region
 from ..editing.motion_keys import MotionKeys
-from . import drawing
-from .gizmo_groups import TWEAK, Dragged, WithKeys, on_picture, to_region
-from .operator_bases import own_classes, popup
+from . import drawing, needs
+from .gizmo_groups import TWEAK, Dragged, View, WithKeys, view
+from .operator_bases import OfEffect, popup
 
 _RADIUS = 7  # of a handle, in units of the interface
 _NEAREST = 0.03  # of the corner's handle to the centre's, in parts of the picture
@@ -25,17 +28,14 @@ _MARK = (1.0, 1.0, 1.0, 0.9)
 _RAMP = np.array([(0.25, 0.5), (0.75, 0.5)])  # what handles of a ramp are about, in fractions of the picture
 
 
-@dataclass(frozen=True)
-class Place:
+class Place(NamedTuple):
     """Where a region's handles are at the current frame, in pixels of the preview's region.
 
-    centre: the handle that moves; corner: the one that turns and scales. to_region: the matrix from fractions of the
-    picture, whose width over its height is aspect."""
+    centre: the handle that moves; corner: the one that turns and scales"""
 
     centre: np.ndarray
     corner: np.ndarray
-    to_region: np.ndarray
-    aspect: float
+    view: View
 
 
 _strokes = revision.UntilChange()
@@ -65,7 +65,7 @@ def place(context: Context) -> Place | None:
         return None
     if not strokes:
         return None
-    width, height = annotations.picture_size(effect)
+    seen_as = view(effect, strip, context.region)
     points = np.concatenate(strokes)
     low, high = points.min(axis=0), points.max(axis=0)
     middle = (low + high) / 2
@@ -76,11 +76,10 @@ def place(context: Context) -> Place | None:
         region.location,
         np.degrees(region.rotation),
         region.scale,
-        width / height,
+        seen_as.aspect,
     )
-    matrix = to_region(effect, strip, context.region)
-    centre, corner = mapped(matrix, np.stack([middle + np.array(region.location), moved]))
-    return Place(centre=centre, corner=corner, to_region=matrix, aspect=width / height)
+    centre, corner = seen_as.on_region([middle + np.array(region.location), moved])
+    return Place(centre, corner, seen_as)
 
 
 def outline(context: Context, where: Place) -> list[np.ndarray]:
@@ -89,8 +88,8 @@ def outline(context: Context, where: Place) -> list[np.ndarray]:
     scene, effect, strip = selection.active(context)
     region = selection.active_region(effect)
     numbers = region.location, np.degrees(region.rotation), region.scale
-    moved = scribbles.transform(_strokes_now(scene, effect, strip), *numbers, where.aspect)
-    return [mapped(where.to_region, points) for points in moved]
+    moved = scribbles.transform(_strokes_now(scene, effect, strip), *numbers, where.view.aspect)
+    return [where.view.on_region(points) for points in moved]
 
 
 class SHUTTER_GT_region(Dragged, Gizmo):
@@ -144,9 +143,9 @@ class SHUTTER_GT_region(Dragged, Gizmo):
         return {"RUNNING_MODAL"}
 
     def _move(self, region: PropertyGroup, point: np.ndarray, snap: bool) -> None:
-        moved = on_picture(self.where.to_region, *point) - on_picture(self.where.to_region, *self.grabbed)
+        moved = self.where.view.on_picture(*point) - self.where.view.on_picture(*self.grabbed)
         if snap:  # along one axis
-            moved[np.abs(moved * (self.where.aspect, 1)).argmin()] = 0
+            moved[np.abs(moved * (self.where.view.aspect, 1)).argmin()] = 0
         region.location = np.array(self.before[0]) + moved
 
     def _turn(self, region: PropertyGroup, point: np.ndarray, snap: bool) -> None:
@@ -206,4 +205,48 @@ class SHUTTER_GGT_region(WithKeys, GizmoGroup):
             self.gizmos.new(SHUTTER_GT_region.__name__).turns = turns
 
 
-classes = own_classes(globals())
+class SHUTTER_OT_region_transform(OfEffect, Operator):
+    """Move, turn and scale the active region by numbers, as its handles in the preview do"""
+
+    bl_label = "Transform Region"
+    needs = (needs.a_region,)
+
+    location: FloatVectorProperty(
+        name="Location",
+        description="Distance from where the region was drawn, as a fraction of the picture",
+        subtype="XYZ",
+        size=2,
+        min=-MAX_DISTANCE,
+        max=MAX_DISTANCE,
+        step=1,
+    )
+    rotation: FloatProperty(
+        name="Rotation",
+        description="Rotation about the region's center",
+        subtype="ANGLE",
+        min=-math.radians(MAX_DEGREES),
+        max=math.radians(MAX_DEGREES),
+    )
+    scale: FloatProperty(
+        name="Scale", description="Scale about the region's center", default=1.0, min=-MAX_SCALE, max=MAX_SCALE
+    )
+
+    def invoke(self, context: Context, _event: Event) -> set[str]:
+        region = selection.active_region(selection.active(context)[1])
+        self.location, self.rotation, self.scale = region.location, region.rotation, region.scale
+        return context.window_manager.invoke_props_dialog(self)
+
+    def draw(self, _context: Context) -> None:
+        layout = self.layout
+        layout.activate_init = True  # Blender heeds it neither with a property split nor for a vector
+        layout.prop(self, "location", index=0, text="Location X")
+        layout.prop(self, "location", index=1, text="Location Y")
+        layout.prop(self, "rotation")
+        layout.prop(self, "scale")
+
+    def change(self, context: Context, effect: PropertyGroup) -> None:
+        index, region = effect.active_region, selection.active_region(effect)
+        drawn_places.hold(effect, index)
+        region.location, region.rotation, region.scale = self.location, self.rotation, self.scale
+        if wants_keys(context, effect, index):
+            region_edits.key_region(effect, index)

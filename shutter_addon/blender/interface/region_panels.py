@@ -6,54 +6,49 @@ from bpy.app.translations import pgettext_iface as iface_
 from bpy.types import MovieTracking, PropertyGroup, Scene, Strip, UILayout
 
 from ...core.messages import EffectError
-from ...core.model.choices import CONTEXT
 from ...media.pursuit import SURE
 from ..data import matte_look, selection, strips, validation
 from ..editing import follow_track, outline_drawings, track_region
 from . import track_operators
-from .panel_parts import WithEffect, draw_list, draw_properties, sentence
+from .panel_parts import draw_list, draw_properties, sentence
 
 _PLACEMENT = "location", "rotation", "scale"
 _TRACKING = "motion", "track_until", "track_all_keys", "track_ends"
 _OF_KIND = {"LINE": "width", "OUTLINE": "between", "RAMP": "ramp"}  # the property that each kind adds
 
 
-class Regions(WithEffect):
-    bl_label = "Regions"
-    bl_options = set()
-
-    def draw_effect(self, layout: UILayout, scene: Scene, effect: PropertyGroup, strip: Strip) -> None:
-        layout.use_property_split = False
-        shutter = selection.active_shutter(effect)
-        own = [region for region in effect.regions if shutter and region.shutter == shutter.name]
-        draw_list(layout, effect, "region", own)
-        region = selection.active_region(effect)
-        if region is not None:
-            row = layout.row(align=True)
-            row.operator_menu_enum("shutter.region_assign", "shutter", text=region.shutter, translate=False)
-            row.prop(region, "kind", text="")
-            if region.kind in _OF_KIND:
-                row.prop(region, _OF_KIND[region.kind], text=None if region.kind == "LINE" else "")
-        layout.use_property_split = True
-        if region is None or region.kind not in strips.LAID:
-            layout.prop(effect, "edge_aware")
-        if region is None:
-            return
-        if region.kind == "MATTE":
-            _draw_matte(layout, matte_look.look(scene, effect, strip, region), region)
-        if region.kind not in strips.LAID:
-            layout.prop(region, "opacity")
-        if region.kind not in strips.MATTES:
-            row = layout.row(align=True)
-            row.operator("shutter.outline_it")
-            row.operator("shutter.outline_needed")
-            row.menu("SHUTTER_MT_of_outline", text="", icon="DOWNARROW_HLT")
-        if region.kind in strips.LAID:
-            _draw_blend(layout, region)
-        try:
-            validation.check_region(region)
-        except EffectError as error:
-            sentence(layout, str(error), "ERROR")
+def draw_regions(layout: UILayout, scene: Scene, effect: PropertyGroup, strip: Strip) -> None:
+    layout.use_property_split = False
+    shutter = selection.active_shutter(effect)
+    own = [region for region in effect.regions if shutter and region.shutter == shutter.name]
+    draw_list(layout, effect, "region", own)
+    region = selection.active_region(effect)
+    if region is not None:
+        row = layout.row(align=True)
+        row.operator_menu_enum("shutter.region_assign", "shutter", text=region.shutter, translate=False)
+        row.prop(region, "kind", text="")
+        if region.kind in _OF_KIND:
+            row.prop(region, _OF_KIND[region.kind], text=None if region.kind == "LINE" else "")
+    layout.use_property_split = True
+    if region is None or region.kind not in strips.LAID:
+        layout.prop(effect, "edge_aware")
+    if region is None:
+        return
+    if region.kind == "MATTE":
+        _draw_matte(layout, matte_look.look(scene, effect, strip, region), region)
+    if region.kind not in strips.LAID:
+        layout.prop(region, "opacity")
+    if region.kind not in strips.MATTES:
+        row = layout.row(align=True)
+        row.operator("shutter.outline_it")
+        row.operator("shutter.outline_needed")
+        row.menu("SHUTTER_MT_of_outline", text="", icon="DOWNARROW_HLT")
+    if region.kind in strips.LAID:
+        _draw_blend(layout, region)
+    try:
+        validation.check_region(region)
+    except EffectError as error:
+        sentence(layout, str(error), "ERROR")
 
 
 def _draw_matte(layout: UILayout, look: matte_look.Look, region: PropertyGroup) -> None:
@@ -143,49 +138,37 @@ def _draw_camera_gaps(layout: UILayout, effect: PropertyGroup) -> None:
         sentence(layout, text.format(first=gap.first, last=gap.last), "INFO")
 
 
-class _WithRegion(WithEffect):
-    """A panel of the active region."""
-
-    @classmethod
-    def shows(cls, effect: PropertyGroup) -> bool:
-        return selection.active_region(effect) is not None
-
-    def draw_effect(self, layout: UILayout, _scene: Scene, effect: PropertyGroup, _strip: Strip) -> None:
-        self.draw_region(layout, selection.active_region(effect))
+def has_region(effect: PropertyGroup) -> bool:
+    return selection.active_region(effect) is not None
 
 
-class Transform(_WithRegion):
-    bl_label = "Transform"
-
-    def draw_region(self, layout: UILayout, region: PropertyGroup) -> None:
-        draw_properties(layout.column(align=True), region, *_PLACEMENT)
-        layout.operator("shutter.region_key", text="Insert Keyframes", icon="KEY_HLT")
+def has_strokes(effect: PropertyGroup) -> bool:
+    return has_region(effect) and selection.active_region(effect).kind not in strips.MATTES
 
 
-class Track(_WithRegion):
-    bl_label = "Track"
-    bl_translation_context = CONTEXT
-
-    @classmethod
-    def shows(cls, effect: PropertyGroup) -> bool:
-        return super().shows(effect) and selection.active_region(effect).kind not in strips.MATTES
-
-    def draw_region(self, layout: UILayout, region: PropertyGroup) -> None:
-        draw_properties(layout, region, *_TRACKING)
+def has_camera(effect: PropertyGroup) -> bool:
+    return any(shutter.follow == "CAMERA" for shutter in effect.shutters)
 
 
-class Follow(_WithRegion):
-    bl_label = "Follow Track"
+def draw_transform(layout: UILayout, _scene: Scene, effect: PropertyGroup, _strip: Strip) -> None:
+    draw_properties(layout.column(align=True), selection.active_region(effect), *_PLACEMENT)
+    layout.operator("shutter.region_key", text="Insert Keyframes", icon="KEY_HLT")
 
-    def draw_region(self, layout: UILayout, region: PropertyGroup) -> None:
-        draw_properties(layout, region, "follow_clip", "follow_kind")
-        if region.follow_clip is not None:
-            _draw_tracks(layout, region, region.follow_clip.tracking)
-        if follow_track.is_changed(region):
-            sentence(layout, iface_("The track has changed"), "ERROR")
-        row = layout.row(align=True)
-        row.operator("shutter.follow", icon="TRACKER")
-        row.operator("shutter.follow_update", text="Update", icon="FILE_REFRESH")
+
+def draw_track(layout: UILayout, _scene: Scene, effect: PropertyGroup, _strip: Strip) -> None:
+    draw_properties(layout, selection.active_region(effect), *_TRACKING)
+
+
+def draw_follow(layout: UILayout, _scene: Scene, effect: PropertyGroup, _strip: Strip) -> None:
+    region = selection.active_region(effect)
+    draw_properties(layout, region, "follow_clip", "follow_kind")
+    if region.follow_clip is not None:
+        _draw_tracks(layout, region, region.follow_clip.tracking)
+    if follow_track.is_changed(region):
+        sentence(layout, iface_("The track has changed"), "ERROR")
+    row = layout.row(align=True)
+    row.operator("shutter.follow", icon="TRACKER")
+    row.operator("shutter.follow_update", text="Update", icon="FILE_REFRESH")
 
 
 def _draw_tracks(layout: UILayout, region: PropertyGroup, tracking: MovieTracking) -> None:
@@ -197,16 +180,8 @@ def _draw_tracks(layout: UILayout, region: PropertyGroup, tracking: MovieTrackin
         layout.prop_search(region, "follow_track", holder, kind)
 
 
-class Camera(WithEffect):
+def draw_camera(layout: UILayout, _scene: Scene, effect: PropertyGroup, _strip: Strip) -> None:
     """Its numbers, and how they are found; the shutter that follows it has the buttons that track it."""
-
-    bl_label = "Camera"
-
-    @classmethod
-    def shows(cls, effect: PropertyGroup) -> bool:
-        return any(shutter.follow == "CAMERA" for shutter in effect.shutters)
-
-    def draw_effect(self, layout: UILayout, _scene: Scene, effect: PropertyGroup, _strip: Strip) -> None:
-        draw_properties(layout.column(align=True), effect.camera, *_PLACEMENT)
-        draw_properties(layout, effect.camera, "influence", *_TRACKING, "follow_clip")
-        layout.operator("shutter.follow_stabilization", icon="TRACKER")
+    draw_properties(layout.column(align=True), effect.camera, *_PLACEMENT)
+    draw_properties(layout, effect.camera, "influence", *_TRACKING, "follow_clip")
+    layout.operator("shutter.follow_stabilization", icon="TRACKER")

@@ -9,9 +9,8 @@ from dataclasses import dataclass
 import bpy
 from bpy.types import Context, SpaceSequenceEditor
 
-from ..data import preview_areas, selection, strips
+from ..data import main_thread, preview_areas, selection, strips
 from ..rendering.previews import pen_is_down
-from .operator_bases import soon
 
 _TOOLS = "builtin.annotate"  # how the tools' names begin
 
@@ -40,7 +39,7 @@ def take_up(context: Context, tool: str) -> bool:
 def _choose(context: Context, tool: str) -> bool:
     areas = list(preview_areas.previews(context))
     for window, area in areas:
-        with context.temp_override(window=window, area=area, region=preview_areas.preview_region(area)):
+        with preview_areas.within(window, area):
             bpy.ops.wm.tool_set_by_id(name=tool, space_type="SEQUENCE_EDITOR")
         area.tag_redraw()  # or handles would come with the pointer alone
     return bool(areas)
@@ -78,9 +77,9 @@ def follow_pen() -> None:
     """For what draws a preview, which may change nothing: what the pen asks for comes right after."""
     was_down, _pen.is_down = _pen.is_down, pen_is_down()
     if _pen.is_down and not _pen.channel:
-        soon(_show)
+        main_thread.later(_show)
     elif was_down and not _pen.is_down:
-        soon(_lay_down)
+        main_thread.later(_lay_down)
 
 
 def is_shown(space: SpaceSequenceEditor) -> bool:
@@ -109,7 +108,6 @@ def _lay_down() -> None:
 
 
 _OWNER = object()  # of what Blender tells of tools
-TIMERS = (_show, _lay_down)
 
 
 def listen() -> None:

@@ -4,27 +4,17 @@ those that make layers of regions, a panning shot, or a tripod."""
 import math
 import time
 
-import bpy
 from bpy.app.translations import pgettext_rpt as rpt_
 from bpy.props import EnumProperty, IntProperty
-from bpy.types import Context, Event, Operator, PropertyGroup, Scene, Strip
+from bpy.types import Context, Operator, PropertyGroup, Scene, Strip
 
 from ...core.model.choices import CONTEXT
 from ..data import selection, validation
-from ..editing import bar_edits, follow_stabilization, follow_track, layer_presets, track_region
+from ..editing import bar_edits, follow_track, layer_presets, track_region
+from ..editing import follow_stabilization as stabilization
 from ..rendering.effect_source import FAULTS
-from .operator_bases import (
-    Beside,
-    Mixin,
-    OfEffect,
-    OfRegion,
-    OfShutter,
-    OfStrokes,
-    is_escape,
-    own_classes,
-    redraw,
-    report_warning,
-)
+from . import needs
+from .operator_bases import Beside, OfEffect, operator, redraw, report_warning, show_status
 
 # Seconds of work from one look at the window to the next, at least and at most, and between two looks at its thread.
 _TICK, _MOST, _PATIENCE = 0.05, 0.1, 0.02
@@ -47,16 +37,14 @@ _DIRECTION = EnumProperty(
 )
 
 
-def _index(operator: Operator, effect: PropertyGroup) -> int | None:
-    """What an operator works on, as for selection.moving: the active region, or the camera."""
-    return effect.active_region if isinstance(operator, OfRegion) else None
-
-
 class _Tracks(Beside):
     """Tracks the active region, or the camera, from the current frame in a `direction` of DIRECTIONS."""
 
     bl_options = {"UNDO"}
     only_seen = True
+    tick = _TICK
+    blocks = True
+    is_camera = False
 
     def is_ready(self, scene: Scene, effect: PropertyGroup, strip: Strip) -> bool:
         """Whether nothing has to be tracked. EffectError: what comes after tracking cannot be done."""
@@ -65,17 +53,11 @@ class _Tracks(Beside):
     def ended(self, context: Context) -> None:
         """Called once all is tracked, and not after Esc. EffectError: what comes after tracking cannot be done."""
 
-    def invoke(self, context: Context, _event: Event) -> set[str]:
-        return self.tried(self._run, context, math.inf if bpy.app.background else _TICK)
-
-    def execute(self, context: Context) -> set[str]:
-        return self.tried(self._run, context, math.inf)
-
-    def _run(self, context: Context, seconds: float) -> set[str]:
+    def begin(self, context: Context, waits: bool) -> set[str] | None:
         """Tracks for a while, and then whenever Blender has time."""
         scene, effect, strip = selection.active(context)
-        index = _index(self, effect)
-        moving, patience = selection.moving(effect, index), None if math.isinf(seconds) else _PATIENCE
+        index = None if self.is_camera else effect.active_region
+        moving = selection.moving(effect, index)
         self._target, self._start = track_region.Target.of(effect, index), scene.frame_current
         self._done: set[int] = set()
         if self.is_ready(scene, effect, strip):
@@ -83,50 +65,45 @@ class _Tracks(Beside):
         self._frames = track_region.frames_to_track(scene, strip, self.direction, moving.track_until)
         motion, all_keys = validation.word(moving, "motion"), moving.track_all_keys
         self._frame = self._start
+        patience = None if waits else _PATIENCE
         self._steps = track_region.track(
             scene, effect, strip, index, self._frames, motion, all_keys=all_keys, patience=patience
         )
-        if not self._go_on(seconds):
+        if not self._track(math.inf if waits else _TICK):
             return self._finish(context)
         context.window_manager.progress_begin(0, len(self._frames))
         self._show(context)
-        return self.go_on(context, _TICK)
+        return self.go_on(context)
 
-    def modal(self, context: Context, event: Event) -> set[str]:
+    def goes_on(self, context: Context) -> bool:
         if self._target.effect() is None:  # undone or removed in another window, or another file was loaded
-            self.cancel(context)
+            return False
+        # What it takes to draw a frame, tracking takes as well, unless Esc would have to wait.
+        goes_on = self._track(min(max(_TICK, time.perf_counter() - self._shown), _MOST))
+        self._show(context)
+        return goes_on
+
+    def end(self, context: Context, is_stopped: bool) -> set[str] | None:
+        if self._target.effect() is None:
             return {"CANCELLED"}
-        is_stopped = is_ended = is_escape(event)
-        if event.type == "TIMER":
-            # What it takes to draw a frame, tracking takes as well, unless Esc would have to wait.
-            try:
-                is_ended = not self._go_on(min(max(_TICK, time.perf_counter() - self._shown), _MOST))
-            except Exception:  # Blender ends the operator then, and asks for no `cancel`
-                self.cancel(context)
-                raise
-            self._show(context)
-        if not is_ended:
-            return {"RUNNING_MODAL"}
-        self.cancel(context)
         if self.direction == "BOTH":
             self._go_to(self._start)
         return self._finish(context, is_stopped)
 
-    def _finish(self, context: Context, is_stopped: bool = False) -> set[str]:
+    def _finish(self, context: Context, is_stopped: bool = False) -> set[str] | None:
         self._tell()
         has_ended = not is_stopped and self._target.effect() is not None
         if has_ended and self.tried(self.ended, context) == {"CANCELLED"} and not self._done:
             return {"CANCELLED"}
         redraw(context)
-        return {"FINISHED"}  # what was tracked can be undone
+        return None  # what was tracked can be undone
 
-    def cancel(self, context: Context) -> None:
-        """It has ended, or its window was closed."""
+    def leave(self, context: Context) -> None:
         self._steps.close()
         context.window_manager.progress_end()
-        super().cancel(context)
+        super().leave(context)
 
-    def _go_on(self, seconds: float) -> bool:
+    def _track(self, seconds: float) -> bool:
         """Tracks for a while; whether there is more to track. One of FAULTS: there is nothing to track at all."""
         end = time.perf_counter() + seconds
         try:
@@ -151,7 +128,7 @@ class _Tracks(Beside):
         done, total = len(self._done), len(self._frames) - 1
         context.window_manager.progress_update(done)
         sentence = rpt_("Tracking: {done} of {total} frames, Esc to stop")
-        context.workspace.status_text_set(sentence.format(done=done, total=total))
+        show_status(sentence.format(done=done, total=total))
         redraw(context)
         self._shown = time.perf_counter()
 
@@ -175,10 +152,11 @@ class _Tracks(Beside):
                     self.report({"INFO"}, words)
 
 
-class SHUTTER_OT_track(_Tracks, OfStrokes, Operator):
+class SHUTTER_OT_track(_Tracks, OfEffect, Operator):
     """Key the active region by what it covers here, up to your own keys (Esc stops and keeps the tracked frames)"""
 
     bl_label = "Track Region"
+    needs = (needs.strokes,)
 
     direction: _DIRECTION
 
@@ -187,15 +165,16 @@ class SHUTTER_OT_track_camera(_Tracks, OfEffect, Operator):
     """Key the camera by what the regions leave free, up to your own keys (Esc stops and keeps the tracked frames)"""
 
     bl_label = "Track Camera"
+    is_camera = True
 
     direction: _DIRECTION
 
 
-class SHUTTER_OT_panning_shot(_Tracks, OfStrokes, Operator):
+class SHUTTER_OT_panning_shot(_Tracks, OfEffect, Operator):
     """Keep the active region sharp while all else streaks past it (tracks the region unless it has keys)"""
 
     bl_label = "Panning Shot"
-
+    needs = (needs.strokes,)
     direction = "BOTH"
 
     def is_ready(self, scene: Scene, effect: PropertyGroup, strip: Strip) -> bool:
@@ -205,11 +184,12 @@ class SHUTTER_OT_panning_shot(_Tracks, OfStrokes, Operator):
         layer_presets.panning_shot(self._target.effect(), self._target.index, bar_edits.auto_key(context))
 
 
-class SHUTTER_OT_tripod(_Tracks, OfShutter, Operator):
+class SHUTTER_OT_tripod(_Tracks, OfEffect, Operator):
     """Expose for long as if the camera had stood still (tracks the camera unless it has keys)"""
 
     bl_label = "Stabilize Exposure"
-
+    needs = (needs.a_shutter,)
+    is_camera = True
     direction = "BOTH"
 
     def is_ready(self, _edit: Scene, effect: PropertyGroup, _strip: Strip) -> bool:
@@ -219,99 +199,74 @@ class SHUTTER_OT_tripod(_Tracks, OfShutter, Operator):
         layer_presets.tripod(self._target.effect(), bar_edits.auto_key(context))
 
 
-class _Looks(Mixin):
-    """Goes to a frame at which tracking of what has an `index` is not sure."""
-
-    bl_options = {"REGISTER"}
-
-    frame: IntProperty(
-        name="Frame",
-        description="Timeline frame; without one, the worst of the next that are unsure",
-        options={"SKIP_SAVE"},
-    )
-
-    def change(self, _context: Context, effect: PropertyGroup) -> set[str] | None:
-        frame: int | None = self.frame
-        if not self.properties.is_property_set("frame"):
-            frame = track_region.next_unsure(effect, _index(self, effect), self.edit.frame_current)
-        if frame is None:
-            self.report({"INFO"}, "No other stretch of unsure frames lies ahead")
-            return {"CANCELLED"}
-        self.edit.frame_set(frame)
-        return None
+_FRAME = IntProperty(
+    name="Frame",
+    description="Timeline frame; without one, the worst of the next that are unsure",
+    options={"SKIP_SAVE"},
+)
 
 
-class SHUTTER_OT_track_look(_Looks, OfRegion, Operator):
+def _look(looking: Operator, effect: PropertyGroup, index: int | None) -> set[str] | None:
+    """Goes to a frame at which tracking of what has an `index` (selection.moving) is not sure."""
+    frame: int | None = looking.frame
+    if not looking.properties.is_property_set("frame"):
+        frame = track_region.next_unsure(effect, index, looking.edit.frame_current)
+    if frame is None:
+        looking.report({"INFO"}, "No other stretch of unsure frames lies ahead")
+        return {"CANCELLED"}
+    looking.edit.frame_set(frame)
+    return None
+
+
+@operator("Next Unsure Frame", needs.a_region, options={"REGISTER"}, frame=_FRAME)
+def track_look(self: Operator, _context: Context, effect: PropertyGroup) -> set[str] | None:
     """Go to a frame that tracking is not sure of"""
+    return _look(self, effect, effect.active_region)
 
-    bl_label = "Next Unsure Frame"
 
-
-class SHUTTER_OT_track_camera_look(_Looks, OfEffect, Operator):
+@operator("Next Unsure Camera Frame", options={"REGISTER"}, frame=_FRAME)
+def track_camera_look(self: Operator, _context: Context, effect: PropertyGroup) -> set[str] | None:
     """Go to a frame that tracking of the camera is not sure of"""
+    return _look(self, effect, None)
 
-    bl_label = "Next Unsure Camera Frame"
+
+def _why_no_clip(effect: PropertyGroup) -> str | None:
+    return None if selection.active_region(effect).follow_clip is not None else rpt_("Choose a clip first")
 
 
-class SHUTTER_OT_follow(OfStrokes, Operator):
+@operator("Follow Track", needs.strokes, _why_no_clip)
+def follow(self: Operator, _context: Context, effect: PropertyGroup) -> None:
     """Key the active region by a track of a movie clip, from where the region is at this frame"""
-
-    bl_label = "Follow Track"
-
-    @classmethod
-    def why_not(cls, effect: PropertyGroup) -> str | None:
-        if sentence := super().why_not(effect):
-            return sentence
-        return None if selection.active_region(effect).follow_clip is not None else rpt_("Choose a clip first")
-
-    def change(self, _context: Context, effect: PropertyGroup) -> None:
-        follow_track.follow(self.edit, effect, self.effect_strip, effect.active_region)
+    follow_track.follow(self.edit, effect, self.effect_strip, effect.active_region)
 
 
-class SHUTTER_OT_follow_update(OfStrokes, Operator):
+def _why_no_track(effect: PropertyGroup) -> str | None:
+    return None if selection.active_region(effect).follow_stamp else rpt_("The region follows no track yet")
+
+
+@operator("Update Followed Track", needs.strokes, _why_no_track)
+def follow_update(self: Operator, _context: Context, effect: PropertyGroup) -> None:
     """Key the active region anew by what it follows, after the track has changed"""
-
-    bl_label = "Update Followed Track"
-
-    @classmethod
-    def why_not(cls, effect: PropertyGroup) -> str | None:
-        if sentence := super().why_not(effect):
-            return sentence
-        return None if selection.active_region(effect).follow_stamp else rpt_("The region follows no track yet")
-
-    def change(self, _context: Context, effect: PropertyGroup) -> None:
-        follow_track.update(self.edit, effect, self.effect_strip, effect.active_region)
+    follow_track.update(self.edit, effect, self.effect_strip, effect.active_region)
 
 
-class SHUTTER_OT_follow_stabilization(OfEffect, Operator):
+def _why_no_camera_clip(effect: PropertyGroup) -> str | None:
+    return None if effect.camera.follow_clip is not None else rpt_("Choose a clip first")
+
+
+@operator("Follow Stabilization", _why_no_camera_clip)
+def follow_stabilization(self: Operator, _context: Context, effect: PropertyGroup) -> None:
     """Key the camera by the 2D stabilization of a movie clip, from where the camera is at this frame"""
-
-    bl_label = "Follow Stabilization"
-
-    @classmethod
-    def why_not(cls, effect: PropertyGroup) -> str | None:
-        return None if effect.camera.follow_clip is not None else rpt_("Choose a clip first")
-
-    def change(self, _context: Context, effect: PropertyGroup) -> None:
-        follow_stabilization.follow(self.edit, effect, self.effect_strip)
+    stabilization.follow(self.edit, effect, self.effect_strip)
 
 
-class SHUTTER_OT_sharp_subject(OfRegion, Operator):
+@operator("Sharp Subject", needs.a_region)
+def sharp_subject(_self: Operator, context: Context, effect: PropertyGroup) -> None:
     """Keep the active region sharp before all else, which is exposed for long and without it"""
-
-    bl_label = "Sharp Subject"
-
-    def change(self, context: Context, effect: PropertyGroup) -> None:
-        layer_presets.sharp_subject(effect, effect.active_region, bar_edits.auto_key(context))
+    layer_presets.sharp_subject(effect, effect.active_region, bar_edits.auto_key(context))
 
 
-class SHUTTER_OT_clean_trail(OfRegion, Operator):
+@operator("Trail", needs.a_region)
+def clean_trail(_self: Operator, context: Context, effect: PropertyGroup) -> None:
     """Have the active region leave a trail before all else, which stays sharp"""
-
-    bl_label = "Trail"
-
-    def change(self, context: Context, effect: PropertyGroup) -> None:
-        layer_presets.clean_trail(effect, effect.active_region, bar_edits.auto_key(context))
-
-
-classes = own_classes(globals())
+    layer_presets.clean_trail(effect, effect.active_region, bar_edits.auto_key(context))
