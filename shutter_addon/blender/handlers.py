@@ -14,7 +14,7 @@ from bpy.types import Depsgraph, Scene
 
 from ..core import revision, told
 from .data import data_format, inbetween_settings, preview_areas, source_media, strips, versions
-from .editing import migrations, reconcile, shown_annotations, track_region, undelete
+from .editing import reconcile, shown_annotations, track_region, undelete
 from .interface import bake_operators, inbetween_operators, newer_files, sharp_frame
 from .output import edit_feed
 from .rendering import invalidation, job_snapshots, render_job, sessions
@@ -38,7 +38,7 @@ def _after_load(*_) -> None:
     sharp_frame.listen()
     sessions.drop_removed()  # what a render job took up while the file was loaded
     if not data_format.is_file_newer():
-        migrations.migrate()
+        data_format.migrate()
         reconcile.tidy()
     shown_annotations.follow()
     newer_files.tell(bpy.data.scenes)
