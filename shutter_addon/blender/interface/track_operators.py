@@ -11,7 +11,7 @@ from bpy.types import Context, Event, Operator, PropertyGroup, Scene, Strip
 
 from ...core.model.choices import CONTEXT
 from ..data import selection, validation
-from ..editing import bar_edits, follow_stabilization, follow_track, layer_presets, track_region
+from ..editing import bar_edits, follow_track, layer_presets, track_region
 from ..rendering.effect_source import FAULTS
 from .operator_bases import (
     Beside,
@@ -293,7 +293,7 @@ class SHUTTER_OT_follow_stabilization(OfEffect, Operator):
         return None if effect.camera.follow_clip is not None else rpt_("Choose a clip first")
 
     def change(self, _context: Context, effect: PropertyGroup) -> None:
-        follow_stabilization.follow(self.edit, effect, self.effect_strip)
+        follow_track.follow_stabilization(self.edit, effect, self.effect_strip)
 
 
 class SHUTTER_OT_sharp_subject(OfRegion, Operator):
