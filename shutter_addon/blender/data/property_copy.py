@@ -13,8 +13,8 @@ def copy_properties(old: PropertyGroup, new: PropertyGroup) -> None:
     """Gives a new property group all that is stored in another one, also what a newer version has stored there; IDs
     stay shared. It calls no update functions: what depends on each other is copied as it is."""
     there, copied = old.bl_system_properties_get(do_create=True), new.bl_system_properties_get(do_create=True)
-    for name in there.keys():
-        copied[name] = there[name]
+    for name, value in there.items():
+        copied[name] = value
 
 
 def is_group(struct: bpy_struct, name: str) -> bool:

@@ -7,12 +7,11 @@ What could only be wrong follows by itself (reconcile.follow_sources).
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from typing import NamedTuple
 
 import bpy
-import mathutils
 import numpy as np
 from bpy.app.translations import pgettext_n as n_
 from bpy.types import AnnotationFrame, FCurve, PropertyGroup, Scene, Strip, StripModifier
@@ -21,15 +20,9 @@ from ...core import revision
 from ...core.model.scribbles import mapped
 from ..data import fcurves, geometry, strips
 from ..data.annotations import layer_of, picture_size
+from ..data.property_copy import for_a_while
 from . import add_effect
 
-# What a strip looks like: what it is called, and the names of the strip's properties and groups.
-_LOOK = {
-    n_("transform"): ("transform",),
-    n_("crop"): ("crop",),
-    n_("flip"): ("use_flip_x", "use_flip_y"),
-    n_("color"): ("color_multiply", "color_saturation", "multiply_alpha"),
-}
 _RANGE = n_("range")
 _shown = revision.UntilChange()
 
@@ -66,7 +59,7 @@ def differences(effect: PropertyGroup) -> list[str]:
     """What match would change, in words to be translated."""
     strip, source = strip_and_source(effect)
     look, wanted = _looks(strip), _looks(source)
-    words = [word for word in _LOOK if look[word] != wanted[word]]
+    words = [word for word in add_effect.LOOK if look[word] != wanted[word]]
     if _goal(effect, strip, source)[:2] != (strip.left_handle, strip.right_handle):
         words.append(_RANGE)
     return words
@@ -77,11 +70,7 @@ def match(effect: PropertyGroup) -> Strip | None:
     the way of the whole range, or None."""
     scene, (strip, source) = effect.id_data, strip_and_source(effect)
     with scribbles_kept(effect, strip):
-        add_effect.copy_look(source, strip)
-        for name in (name for names in _LOOK.values() for name in names):
-            old, new = f"{source.path_from_id()}.{name}", f"{strip.path_from_id()}.{name}"
-            fcurves.remove_curves(scene, new)
-            fcurves.copy_curves(scene, old, scene, new)
+        add_effect.copy_look(source, strip, keys=True)
     left, right, neighbor = _goal(effect, strip, source)
     _slip(scene, strip, source, left, right)
     strip.right_handle = max(strip.right_handle, right)  # or the left one could not pass it
@@ -94,18 +83,15 @@ def _looks(strip: Strip) -> dict[str, str]:
     path = f"{strip.path_from_id()}."
     curves = [curve for curve in fcurves.curves_under(strip.id_data, path) if not curve.mute]
     return {
-        word: repr([(_plain(getattr(strip, name)), _keyed(curves, path + name)) for name in names])
-        for word, names in _LOOK.items()
+        word: repr([(_values(strip, name), _keyed(curves, path + name)) for name in names])
+        for word, names in add_effect.LOOK.items()
     }
 
 
-def _plain(value: object) -> object:
-    if value == strips.IN_CODE_VALUES:
-        return 1.0
-    if isinstance(value, bpy.types.bpy_struct):
-        names = [prop.identifier for prop in value.bl_rna.properties if not prop.is_readonly]
-        return [_plain(getattr(value, name)) for name in names]
-    return tuple(value) if isinstance(value, bpy.types.bpy_prop_array | mathutils.Vector) else value
+def _values(strip: Strip, name: str) -> list:
+    values = [getattr(owner, prop) for owner, prop in add_effect.settings(strip, name)]
+    values = [1.0 if value == strips.IN_CODE_VALUES else value for value in values]
+    return [tuple(value) if isinstance(value, Iterable) else value for value in values]
 
 
 def _keyed(curves: list[FCurve], path: str) -> list:
@@ -216,10 +202,9 @@ def append_modifiers(scene: Scene, source: Strip, part: Strip, chosen: list[Stri
     if not source.modifiers:
         return
     count = len(part.modifiers)
-    active, scene.sequence_editor.active_strip = scene.sequence_editor.active_strip, source
-    with add_effect.selecting(scene, [part]):  # and all modifiers of the active strip
+    active = scene.sequence_editor, "active_strip", source
+    with for_a_while([active]), add_effect.selecting(scene, [part]):  # and all modifiers of the active strip
         bpy.ops.sequencer.strip_modifier_copy(type="APPEND")
-    scene.sequence_editor.active_strip = active
     for old, new in list(zip(source.modifiers, part.modifiers[count:], strict=True)):
         if chosen is None or old in chosen:
             fcurves.copy_curves(scene, f"{old.path_from_id()}.", scene, f"{new.path_from_id()}.")

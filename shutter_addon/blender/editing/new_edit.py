@@ -62,15 +62,11 @@ def length(medium: FrameSource, source_recipe: Effect) -> int:
 
 
 def _add_source(editor: SequenceEditor, path: Path, medium: FrameSource) -> Strip:
-    name = path.name
-    if medium.fps is not None:
-        if medium.has_audio:
-            editor.strips.new_sound(f"{name} Sound", str(path), 1, 1)
-        return editor.strips.new_movie(name, str(path), 2, 1)
-    strip = editor.strips.new_image(name, str(medium.files[0]), 2, 1)
-    for file in medium.files[1:]:
-        strip.elements.append(file.name)
-    return strip
+    is_movie = medium.fps is not None
+    if is_movie and medium.has_audio:
+        editor.strips.new_sound(f"{path.name} Sound", str(path), 1, 1)
+    files = [str(path)] if is_movie else [str(file) for file in medium.files]
+    return add_effect.new_footage(editor.strips, path.name, files, 2, 1, is_movie)
 
 
 def paths_relative(scene: Scene, folder: Path) -> AbstractContextManager[None]:
