@@ -127,12 +127,9 @@ def unbake(scene: Scene, strip: Strip) -> None:
     for baked in baked_of(scene, strip):
         (baked.parent_meta() or scene.sequence_editor).strips.remove(baked)
     for part in parts:
-        bake = part.virtual_shutter_bake
-        _move(part.parent_meta() or scene.sequence_editor, part, bake.channel)
+        _move(part.parent_meta() or scene.sequence_editor, part, part.virtual_shutter_bake.channel)
         part.mute = False
-        for prop in bake.bl_rna.properties:
-            if not prop.is_readonly:
-                bake.property_unset(prop.identifier)
+        part.property_unset("virtual_shutter_bake")
 
 
 def is_stale(scene: Scene, effect: PropertyGroup, strip: Strip) -> bool:

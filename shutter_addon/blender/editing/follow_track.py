@@ -13,7 +13,6 @@ import math
 from bisect import bisect_left, bisect_right
 from collections.abc import Callable
 from functools import partial
-from pathlib import Path
 
 import bpy
 import numpy as np
@@ -27,7 +26,7 @@ from ...core.model.effect import Camera, Region
 from ...core.model.motions import Placement, Similarity
 from ...core.model.stabilization import Settings, Stabilization, Track, laid
 from ...media import registration
-from ..data import annotations, fcurves, selection, snapshot, source_media, strips, validation
+from ..data import annotations, external_files, fcurves, selection, snapshot, source_media, strips, validation
 from ..rendering import effect_source
 from . import motion_keys
 from .motion_keys import MotionKeys
@@ -197,14 +196,11 @@ def _points_at(tracks: list, time: float, size: tuple[int, int]) -> Points:
 
 def _check_footage(source: Strip, clip: MovieClip) -> None:
     """EffectError: a clip begins with another file than a strip does. MediaError: the strip has no files."""
-    first = _file(source.clip) if source.type == "MOVIECLIP" and source.clip else source_media.spec(source).path
-    if first.resolve() != _file(clip).resolve():
+    own = source.clip if source.type == "MOVIECLIP" else None
+    first = external_files.absolute(own, own.filepath) if own else source_media.spec(source).path
+    if first.resolve() != external_files.absolute(clip, clip.filepath).resolve():
         sentence = rpt_('clip "{clip}" does not begin with the same file as strip "{strip}"')
         raise EffectError(sentence.format(clip=clip.name, strip=source.name))
-
-
-def _file(clip: MovieClip) -> Path:
-    return Path(bpy.path.abspath(clip.filepath, library=clip.library))
 
 
 def _first_frame(source: Strip, clip: MovieClip) -> int:

@@ -18,8 +18,8 @@ from bpy.types import AnnotationFrame, FCurve, PropertyGroup, Scene, Strip, Stri
 
 from ...core import revision
 from ...core.model.scribbles import mapped
-from ..data import fcurves, geometry, strips
-from ..data.annotations import layer_of, picture_size
+from ..data import fcurves, sampled, strips
+from ..data.annotations import layer_of
 from ..data.property_copy import for_a_while
 from . import add_effect
 
@@ -145,30 +145,25 @@ def scribbles_kept(effect: PropertyGroup, strip: Strip) -> Iterator[None]:
     put_back(effect, strip, before)
 
 
-def places(effect: PropertyGroup, strip: Strip) -> list[np.ndarray]:
-    """Where the picture of an effect lies on the image, at each of its drawings."""
-    return [_place(effect, strip, drawing.frame_number) for drawing in _drawings(effect)]
+def places(effect: PropertyGroup, strip: Strip) -> list[np.ndarray | None]:
+    """What takes the image to the picture of an effect, at each of its drawings; None: it is too small to be seen, or
+    nowhere."""
+    frames = [drawing.frame_number for drawing in _drawings(effect)]
+    placement = sampled.placement(fcurves.Curves(effect.id_data), effect, strip, frames)
+    found = [sampled.tried(placement.at, frame) for frame in frames]
+    return [place if isinstance(place, np.ndarray) else None for place in found]
 
 
-def put_back(effect: PropertyGroup, strip: Strip, before: list[np.ndarray]) -> None:
+def put_back(effect: PropertyGroup, strip: Strip, before: list[np.ndarray | None]) -> None:
     """Puts an effect's drawings where they lie on its picture; before: the places at which they do."""
-    for drawing, old in zip(_drawings(effect), before, strict=True):
-        new = _place(effect, strip, drawing.frame_number)
-        if geometry.is_invertible(old) and geometry.is_invertible(new) and not np.array_equal(old, new):
-            _move(drawing, new @ np.linalg.inv(old))
+    for drawing, old, new in zip(_drawings(effect), before, places(effect, strip), strict=True):
+        if old is not None and new is not None and not np.array_equal(old, new):
+            _move(drawing, np.linalg.inv(new) @ old)
 
 
 def _drawings(effect: PropertyGroup) -> list[AnnotationFrame]:
     layers = {region.layer: layer_of(effect, region) for region in effect.regions}
     return [drawing for layer in layers.values() if layer for drawing in layer.frames]
-
-
-def _place(effect: PropertyGroup, strip: Strip, frame: int) -> np.ndarray:
-    """Where an effect's picture lies on the image at a frame, as geometry.picture_to_image has it."""
-    path = f"{strip.path_from_id()}.transform."
-    curves = [curve for curve in fcurves.curves_under(effect.id_data, path) if not (curve.mute or curve.is_empty)]
-    moved = {curve.data_path.removeprefix(path): curve.evaluate(frame) for curve in curves}
-    return geometry.picture_to_image(strip, picture_size(effect), **moved)
 
 
 def _move(drawing: AnnotationFrame, change: np.ndarray) -> None:

@@ -108,9 +108,8 @@ def _find_scenes(scenes: list[Scene]) -> None:
     known = {scene.virtual_shutter.identity: scene for scene in reversed(_oldest_first(_effect_scenes()))}
     for scene in scenes:
         for effect in scene.virtual_shutter.effects:
-            is_lost = effect.scene is None or effect.scene.virtual_shutter.identity != effect.identity
-            if is_lost and effect.identity in known:
-                effect.scene = known[effect.identity]
+            if effect.scene is None or effect.scene.virtual_shutter.identity != effect.identity:
+                _give(effect, "scene", known.get(effect.identity, effect.scene))
         for strip in strips.all_strips(scene):
             found = known.get(strip.virtual_shutter_effect) if strip.type == "SCENE" else None
             if found not in (None, scene) and strip.scene in (None, scene):

@@ -13,7 +13,6 @@ from typing import Any
 
 import bpy
 import numpy as np
-from bpy.app.translations import pgettext_n as n_
 from bpy.app.translations import pgettext_rpt as rpt_
 from bpy.types import PropertyGroup, Scene, Strip
 
@@ -32,22 +31,6 @@ from ..data.sampled import placement_now
 from ..rendering import effect_source
 from . import motion_keys
 from .motion_keys import MotionKeys
-
-# Sentences of media/tracking.py and media/camera_tracking.py, which are looked up where they are shown.
-FAULTS = (
-    n_("the shot ends here"),
-    n_("the subject is covered, or looks too different"),
-    n_("the subject has left the picture"),
-    n_("there are too few corners to follow"),
-    n_("the outline encloses nothing here"),
-    n_("the region has no strokes to follow"),
-    n_("the region lies outside the picture"),
-    n_("there is no other frame to track"),
-    n_("the frame lies outside what can be tracked"),
-    n_("what the regions leave of the picture has too few corners to follow"),
-    n_("the picture is too unlike those before"),
-    n_("the picture is too unlike those before, and it goes on from here"),
-)
 
 _replaced = revision.Revision()  # Blender's data, by undo or by another file
 
