@@ -111,8 +111,10 @@ def track(
     here, known = Tracked(frame=start, placement=placement_now(moving), confidence=1.0), sorted({*frames, *anchors})
     shape, follow = _subject(scene, effect, strip, index, known, here)
     tracked, stops = {start: here}, []
-    goals = [frames[0], *(frame for frame in anchors if frame in frames), frames[-1]]
-    reach = max(goal for goal in goals if goal <= start), min(goal for goal in goals if goal >= start)
+    reach = (
+        max((a for a in anchors if frames[0] <= a < start), default=frames[0]),
+        min((a for a in anchors if start < a <= frames[-1]), default=frames[-1]),
+    )
     shown, target = snapshot.take(scene, effect, strip, known), Target.of(effect, index)
     del scene, effect, strip, keys, moving  # which may not outlive the first step
     with effect_source.open_source(shown) as source:
