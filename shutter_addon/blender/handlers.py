@@ -16,7 +16,7 @@ from bpy.types import Depsgraph, Scene
 from ..core import revision, told
 from ..core.messages import sentence, signed
 from .data import data_format, inbetween_settings, main_thread, preview_areas, source_media, strips, versions
-from .editing import migrations, reconcile, shown_annotations, track_region, undelete
+from .editing import reconcile, shown_annotations, track_region, undelete
 from .interface import bake_operators, inbetween_operators, operator_bases, sharp_frame
 from .output import edit_feed
 from .rendering import invalidation, job_snapshots, render_job, sessions
@@ -41,7 +41,7 @@ def _after_load(*_) -> None:
     sharp_frame.listen()
     sessions.drop_removed()  # what a render job took up while the file was loaded
     if not data_format.is_file_newer():
-        migrations.migrate()
+        data_format.migrate()
         reconcile.tidy()
     shown_annotations.follow()
     tell_newer(bpy.data.scenes)

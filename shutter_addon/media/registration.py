@@ -285,7 +285,7 @@ def fit(
         close = off < tolerance
         if close.sum() < FEWEST[motion]:
             return None
-        fitted = _least_squares(p[close], q[close], (w * (1 - (off / tolerance) ** 2))[close], motion)
+        fitted = least_squares(p[close], q[close], (w * (1 - (off / tolerance) ** 2))[close], motion)
     agreeing = np.zeros(len(source), bool)
     agreeing[usable[np.abs(fitted(p) - q) < tolerance]] = True
     return (fitted, agreeing) if agreeing.sum() >= FEWEST[motion] else None
@@ -313,7 +313,7 @@ def _hypotheses(p: np.ndarray, q: np.ndarray, motion: Motion) -> tuple[np.ndarra
     return turns, (q[first] + q[second] - turns * (p[first] + p[second])) / 2
 
 
-def _least_squares(p: np.ndarray, q: np.ndarray, weights: np.ndarray, motion: Motion) -> Similarity:
+def least_squares(p: np.ndarray, q: np.ndarray, weights: np.ndarray, motion: Motion) -> Similarity:
     """The best similarity between points, by complex regression."""
     total = weights.sum()
     middle, target = (weights * p).sum() / total, (weights * q).sum() / total

@@ -11,6 +11,7 @@ from _bl_i18n_utils import bl_extract_messages, settings
 from shutter_addon import blender
 from shutter_addon.core.model import presets, shutters
 from shutter_addon.core.model.choices import CONTEXT
+from shutter_addon.media import camera_tracking, matte_tracking, pursuit, readout, tracking
 
 SOURCES = sorted(Path(blender.__file__).parent.rglob("*.py"))
 
@@ -32,6 +33,14 @@ def of_presets() -> set:
 def of_core() -> set:
     """Sentences of core that data/snapshot.py passes on in the user's language."""
     return {("*", _fault(bars)) for bars in ([0], [-1], [math.inf], [1e7], [1e-7])}
+
+
+def of_media() -> set:
+    """Sentences of media that say why nothing can be tracked or found, which editing passes on in the user's
+    language."""
+    modules = tracking, camera_tracking, pursuit, matte_tracking, readout
+    named = [each for module in modules for each in vars(module).items()]
+    return {("*", words) for name, words in named if name.isupper() and isinstance(words, str)}
 
 
 def _fault(bars) -> str:

@@ -10,7 +10,7 @@ from support import request, write_frames
 from shutter_addon.blender.data import annotations, consistency, fcurves, selection, snapshot, strips, validation
 from shutter_addon.blender.editing import (
     add_effect,
-    follow_stabilization,
+    follow_track,
     motion_keys,
     region_edits,
     shutter_edits,
@@ -334,7 +334,7 @@ def test_it_lays_the_picture_as_blender_does(bpy, edit, render, clip, kind):
     strip.stabilize2d = True
     shown = render(edit, [2, 5, 8, COUNT], "8")
     for frame, picture_there in shown.items():
-        laid = follow_stabilization.unstabilized(clip, SIZE)(frame).inverse()
+        laid = follow_track.unstabilized(clip, SIZE)(frame).inverse()
         expected = cv2.warpAffine(picture(frame - 1), registration.matrix(laid), SIZE).astype(float)
         inside = cv2.warpAffine(np.ones((HEIGHT, WIDTH), np.uint8), registration.matrix(laid), SIZE)
         inside = cv2.erode(inside, np.ones((5, 5), np.uint8), borderValue=0) > 0
@@ -351,7 +351,7 @@ def test_the_camera_follows_a_clips_stabilization(bpy, edit, effect, clip):
     bpy.context.view_layer.update()
     bpy.ops.ed.undo_push(message="before")
     assert call(bpy, "follow_stabilization") == {"FINISHED"}
-    laid = follow_stabilization.unstabilized(bpy.data.movieclips[0], SIZE)
+    laid = follow_track.unstabilized(bpy.data.movieclips[0], SIZE)
     assert apart(placements(bpy), {frame: laid(frame - 10) for frame in TRUTH}, 16) < 0.3
     assert {kind for *_, kind in keys(bpy)[0]} == {"GENERATED", "KEYFRAME"}
     bpy.ops.ed.undo()
@@ -367,4 +367,4 @@ def test_a_clip_that_is_not_stabilized_is_refused(bpy, edit, effect, clip):
     refuses(bpy, "follow_stabilization", "the current frame is outside of the Shutter strip")
     effect.camera.follow_clip = None
     with pytest.raises(validation.EffectError, match="Choose a clip first"):
-        follow_stabilization.follow(*active(bpy))
+        follow_track.follow_stabilization(*active(bpy))

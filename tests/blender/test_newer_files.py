@@ -12,7 +12,7 @@ from support import picture_of, recipe, sequencer
 
 from shutter_addon.blender import command
 from shutter_addon.blender.data import data_format, preferences, property_copy
-from shutter_addon.blender.editing import migrations, reconcile, undelete
+from shutter_addon.blender.editing import reconcile, undelete
 from shutter_addon.core.messages import EffectError
 from shutter_addon.core.recipes import recipe_file
 from shutter_addon.core.recipes.recipe import RecipeError
@@ -157,7 +157,7 @@ def test_an_older_file_is_migrated_once(bpy, edit, effect, tmp_path, monkeypatch
 
     number = data_format.FORMAT + 1
     monkeypatch.setattr(data_format, "FORMAT", number)
-    monkeypatch.setattr(migrations, "MIGRATIONS", (*migrations.MIGRATIONS, (number, mark)))
+    monkeypatch.setattr(data_format, "MIGRATIONS", (*data_format.MIGRATIONS, (number, mark)))
     for _ in range(2):
         bpy.ops.wm.open_mainfile(filepath=path)
         group = bpy.context.scene.virtual_shutter
@@ -183,7 +183,7 @@ def test_what_is_made_of_older_effects_is_older(bpy, edit, effect):
     data_format.stamp_saved("9")
     assert [len(scene.virtual_shutter.effects) for scene in (copied, other, empty)] == [1, 1, 1]
     assert [scene.virtual_shutter.format for scene in (edit, copied, other, empty)] == [0, 0, 0, 0]
-    data_format.stamp_migrated()
+    data_format.migrate()
     assert {scene.virtual_shutter.format for scene in (edit, copied, other, empty)} == {data_format.FORMAT}
 
 

@@ -480,15 +480,6 @@ def test_forward_from_a_covered_frame_is_never_surely_wrong(bpy, edit, tmp_path)
     assert not sure
 
 
-def test_every_sentence_of_the_tracker_can_be_translated():
-    from shutter_addon.media import camera_tracking, matte_tracking, pursuit, tracking
-
-    named = [each for module in (tracking, camera_tracking, pursuit, matte_tracking) for each in vars(module).items()]
-    said = {words for name, words in named if name.isupper() and isinstance(words, str)}
-    assert len(said) > 5
-    assert said == set(track_region.FAULTS)
-
-
 def test_the_next_unsure_frame(bpy, region):
     _edit, effect, _strip = active(bpy)
     confidence = {11: 1.0, 12: 0.9, 13: 0.4, 14: 0.2, 15: 0.3, 16: 0.6, 17: 0.0}

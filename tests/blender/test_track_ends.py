@@ -137,7 +137,7 @@ def test_recipes_keep_it(bpy, between_cuts):
     edit, effect, strip = active(bpy)
     effect.camera.influence = 0.25
     found = recipe_file.parse(recipe_file.dump(recipe_export.recipe_of(edit, effect, strip)))
-    assert found.camera_influence == 0.25
+    assert found.camera.influence.at(1) == 0.25
     before = opacity(bpy, range(11, 47))
     assert [found.for_picture(1.5).regions[0].opacity.at(frame) for frame in range(1, 37)] == before
     recipe_import.apply(edit, effect, strip, found)

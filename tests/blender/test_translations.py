@@ -19,7 +19,8 @@ def german(bpy):
 def test_everything_that_is_said_has_a_german_text_and_nothing_else_has(bpy, german):
     import messages
 
-    said = messages.of_classes() | messages.of_presets() | messages.of_sources() | messages.of_core()
+    shown = messages.of_classes() | messages.of_presets() | messages.of_sources()
+    said = shown | messages.of_core() | messages.of_media()
     said = {message for message in said if message[0] != bpy.app.translations.contexts.no_translation}
     assert said - german.keys() == set(), "not translated"
     assert german.keys() - said == set(), "no longer said"

@@ -3,15 +3,18 @@
 A file of a newer format opens: what is not known here stays as it is stored, unseen, and nothing is tidied by itself.
 """
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 
 from bpy.app.translations import pgettext_rpt as rpt_
 
 from . import strips
 
 # Raise it with the first change after a release that older versions would not understand: a property, an item of an
-# enum, another meaning. What then becomes of older files is in editing/migrations.py.
+# enum, another meaning.
 FORMAT = 1
+# What then becomes of older files: by the format that each leads to, in order; the first version's was 1. They are run
+# as a file is loaded of which anything is older, and may find newer scenes beside: what needs no change stays as it is.
+MIGRATIONS: tuple[tuple[int, Callable[[], None]], ...] = ()
 
 
 def of_file() -> int:
@@ -40,8 +43,13 @@ def new_effect(scene, number: int):
     return group.effects.add()
 
 
-def stamp_migrated() -> None:
-    """Notes in all scenes with effects that they are of this format now."""
+def migrate() -> None:
+    """Brings the file that was loaded to this format, and notes that in all scenes with effects: not as it is saved,
+    as autosave tells nobody."""
+    stored = of_file()
+    for number, change in MIGRATIONS:
+        if stored < number:
+            change()
     for scene in _holding():
         if scene.virtual_shutter.format != FORMAT:
             scene.virtual_shutter.format = FORMAT

@@ -10,25 +10,11 @@ from bpy.types import PropertyGroup, bpy_struct
 
 
 def copy_properties(old: PropertyGroup, new: PropertyGroup) -> None:
-    """Copies a property group with all that is in it; IDs stay shared."""
-    for prop in old.bl_rna.properties:
-        name = prop.identifier
-        if prop.type == "COLLECTION":
-            getattr(new, name).clear()
-            for item in getattr(old, name):
-                copy_properties(item, getattr(new, name).add())
-        elif is_group(old, name):
-            copy_properties(getattr(old, name), getattr(new, name))
-        elif not (prop.is_readonly or prop.is_skip_save):  # what is not saved only shows another one
-            store(new, name, stored(old, name))
-    _copy_unknown(old, new)
-
-
-def _copy_unknown(old: PropertyGroup, new: PropertyGroup) -> None:
-    """Copies what a newer version has stored in a property group, of which Blender knows the values alone."""
-    there = old.bl_system_properties_get() or {}
-    for name in set(there.keys()).difference(old.bl_rna.properties.keys()):
-        new.bl_system_properties_get(do_create=True)[name] = there[name]
+    """Gives a new property group all that is stored in another one, also what a newer version has stored there; IDs
+    stay shared. It calls no update functions: what depends on each other is copied as it is."""
+    there, copied = old.bl_system_properties_get(do_create=True), new.bl_system_properties_get(do_create=True)
+    for name, value in there.items():
+        copied[name] = value
 
 
 def is_group(struct: bpy_struct, name: str) -> bool:

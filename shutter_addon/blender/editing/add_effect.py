@@ -2,33 +2,39 @@
 
 from __future__ import annotations
 
+import os
 import uuid
 from collections.abc import Iterator
 from contextlib import contextmanager
 
 import bpy
 from bpy.app.translations import pgettext_data as data_
-from bpy.types import PropertyGroup, Scene, Strip
+from bpy.app.translations import pgettext_n as n_
+from bpy.types import PropertyGroup, Scene, Strip, StripsTopLevel, bpy_struct
 
 from ...core.frames.frame_source import FrameSource
 from ...core.model.limits import MAX_FRAME
 from ...media import color
-from ..data import data_format, seen_alone, source_media
+from ..data import data_format, fcurves, seen_alone, source_media
 from ..data.annotations import new_annotation
+from ..data.property_copy import for_a_while
 from ..data.strips import ENGINE, Shown, effect_of, nearest_source, origin, overlap, shown_effects
 
 _COLOR = "COLOR_06"
-_LOOK = ("use_flip_x", "use_flip_y", "color_multiply", "color_saturation", "multiply_alpha")
+# What a strip looks like: what it is called, and the names of the strip's properties and groups.
+LOOK = {
+    n_("transform"): ("transform",),
+    n_("crop"): ("crop",),
+    n_("flip"): ("use_flip_x", "use_flip_y"),
+    n_("color"): ("color_multiply", "color_saturation", "multiply_alpha"),
+}
 
 
 def add_effect(scene: Scene, source: Strip) -> tuple[Strip, PropertyGroup]:
     """Puts a new effect on a movie, image or clip strip: its strip above the source, same range, transform and crop.
 
     Returns strip and effect; the effect has no shutter yet. MediaError: the source cannot be read."""
-    medium = source_media.open_media(source)
-    medium.close()
-    if not source.virtual_shutter_source:
-        source.virtual_shutter_source = uuid.uuid4().hex
+    medium = _take(source)
     name = data_("Shutter {source}").format(source=source.name)
     effect_scene = new_effect_scene(scene, uuid.uuid4().hex, name, (medium.width, medium.height))
     level = (source.parent_meta() or scene.sequence_editor).strips
@@ -38,7 +44,6 @@ def add_effect(scene: Scene, source: Strip) -> tuple[Strip, PropertyGroup]:
     strip.left_handle, strip.right_handle = source.left_handle, source.right_handle
     strip.blend_type = source.blend_type
     copy_look(source, strip)
-    _mute(source, medium)
     config = source_media.spec(source).options["config"]
     keeps = color.keeps(scene.sequencer_colorspace_settings.name, config)
     if not keeps and medium.alpha == "opaque" and seen_alone.hides(scene, strip):
@@ -55,10 +60,8 @@ def add_effect(scene: Scene, source: Strip) -> tuple[Strip, PropertyGroup]:
 
 def choose_source(effect: PropertyGroup, strip: Strip, source: Strip) -> None:
     """Has an effect show another movie, image or clip strip. MediaError: it cannot be read."""
-    medium, scene = source_media.open_media(source), effect.id_data
-    medium.close()
-    _mute(source, medium)
-    source.virtual_shutter_source = effect.source = source.virtual_shutter_source or uuid.uuid4().hex
+    _take(source)
+    scene, effect.source = effect.id_data, source.virtual_shutter_source
     if nearest_source(scene, effect, strip) != source:  # but a copy or another part of it
         own_source(source, shown_effects(scene))
         effect.source = source.virtual_shutter_source
@@ -72,10 +75,16 @@ def own_source(source: Strip, shown: list[Shown]) -> None:
         effect.source = source.virtual_shutter_source
 
 
-def _mute(source: Strip, medium: FrameSource) -> None:
-    """Through a transparent picture the plain source would show. An opaque one stays: mute the effect to see it."""
+def _take(source: Strip) -> FrameSource:
+    """Gives a strip an identity as a source, unless it has one; its medium, which is closed. Through a transparent
+    picture the plain source would show; an opaque one stays: mute the effect to see it. MediaError: it cannot be
+    read."""
+    medium = source_media.open_media(source)
+    medium.close()
+    source.virtual_shutter_source = source.virtual_shutter_source or uuid.uuid4().hex
     if medium.alpha != "opaque" and not source.mute:
         source.mute = source.virtual_shutter_muted = True
+    return medium
 
 
 def connect(scene: Scene, connected: list[Strip]) -> None:
@@ -87,24 +96,38 @@ def connect(scene: Scene, connected: list[Strip]) -> None:
 @contextmanager
 def selecting(scene: Scene, chosen: list[Strip]) -> Iterator[None]:
     """For what Blender has an operator only, which takes the selection: these strips are it meanwhile."""
-    before = [(strip, strip.select) for strip in scene.sequence_editor.strips_all]
-    for strip, _is_selected in before:
-        strip.select = strip in chosen
-    with bpy.context.temp_override(sequencer_scene=scene):
+    selected = ((strip, "select", strip in chosen) for strip in scene.sequence_editor.strips_all)
+    with for_a_while(selected), bpy.context.temp_override(sequencer_scene=scene):
         yield
-    for strip, is_selected in before:
-        strip.select = is_selected
 
 
-def copy_look(source: Strip, strip: Strip) -> None:
-    """Transform, crop, flip and colour of the source strip."""
-    for group in ("transform", "crop"):
-        old, new = getattr(source, group), getattr(strip, group)
-        for prop in old.bl_rna.properties:
-            if not prop.is_readonly:
-                setattr(new, prop.identifier, getattr(old, prop.identifier))
-    for name in _LOOK:
-        setattr(strip, name, getattr(source, name))
+def copy_look(source: Strip, strip: Strip, *, keys: bool = False) -> None:
+    """Transform, crop, flip and colour of the source strip; keys: theirs as well, in place of the strip's own."""
+    for name in (name for names in LOOK.values() for name in names):
+        for (old, prop), (new, _prop) in zip(settings(source, name), settings(strip, name), strict=True):
+            setattr(new, prop, getattr(old, prop))
+        if keys:
+            path = f"{strip.path_from_id()}.{name}"
+            fcurves.remove_curves(strip.id_data, path)
+            fcurves.copy_curves(source.id_data, f"{source.path_from_id()}.{name}", strip.id_data, path)
+
+
+def settings(strip: Strip, name: str) -> list[tuple[bpy_struct, str]]:
+    """Owner and name of a strip's property, or of all that are in a group of it."""
+    group = getattr(strip, name)
+    if not isinstance(group, bpy_struct):
+        return [(strip, name)]
+    return [(group, prop.identifier) for prop in group.bl_rna.properties if not prop.is_readonly]
+
+
+def new_footage(level: StripsTopLevel, name: str, files: list[str], channel: int, start: int, is_movie: bool) -> Strip:
+    """A new strip of a movie, or of an image sequence."""
+    if is_movie:
+        return level.new_movie(name, files[0], channel, start)
+    strip = level.new_image(name, files[0], channel, start)
+    for file in files[1:]:
+        strip.elements.append(os.path.basename(file))
+    return strip
 
 
 def new_effect_scene(scene: Scene, identity: str, name: str, size: tuple[int, int]) -> Scene:

@@ -12,7 +12,7 @@ from pathlib import Path
 import bpy
 from bpy.app.translations import pgettext_data as data_
 from bpy.app.translations import pgettext_rpt as rpt_
-from bpy.types import MetaStrip, PropertyGroup, Scene, SequenceEditor, Strip, StripsTopLevel
+from bpy.types import MetaStrip, PropertyGroup, Scene, SequenceEditor, Strip
 
 from ...core.messages import EffectError
 from ...core.revision import UntilChange
@@ -21,7 +21,6 @@ from ..output.baked_film import Film
 from . import add_effect, match_source
 
 _LOOK = ("blend_type", "blend_alpha")
-_CURVES = "transform.", "crop.", "blend_alpha", "color_multiply", "color_saturation"
 _states = UntilChange()
 
 
@@ -40,7 +39,9 @@ def lay(scene: Scene, strip: Strip, film: Film) -> Strip:
     older = [baked for baked in baked_of(scene, strip) if strips.overlap(baked, strip)]
     home = strip.virtual_shutter_bake.channel if older else strip.channel
     name, start = data_("{strip} Baked").format(strip=strip.name), round(strips.origin(strip)) + film.frames.start
-    baked = _new_strip(owner.strips, name, film, _channel(scene, strip), start)
+    is_movie = film.kind == "MOVIE"
+    files = [_relative(path) for path in ([film.place] if is_movie else film.pictures)]
+    baked = add_effect.new_footage(owner.strips, name, files, _channel(scene, strip), start, is_movie)
     baked.left_handle, baked.right_handle = strip.left_handle, strip.right_handle
     if older:
         channel = older[0].channel
@@ -53,12 +54,13 @@ def lay(scene: Scene, strip: Strip, film: Film) -> Strip:
         _move(owner, strip, _channel(scene, strip))
         _move(owner, baked, home)
         _move(owner, strip, spare)
-    add_effect.copy_look(strip, baked)
+    add_effect.copy_look(strip, baked, keys=True)
     if baked.color_multiply == strips.IN_CODE_VALUES:  # a film is mixed so by itself
         baked.color_multiply = 1
     for look in _LOOK:
         setattr(baked, look, getattr(strip, look))
-    _copy_curves(scene, strip, baked)
+    alpha = [f"{each.path_from_id()}.blend_alpha" for each in (strip, baked)]
+    fcurves.copy_curves(scene, alpha[0], scene, alpha[1])
     match_source.append_modifiers(scene, strip, baked)
     strip.mute = True
     _note(strip, baked, film, home)
@@ -87,27 +89,11 @@ def _move(owner: SequenceEditor | MetaStrip, strip: Strip, channel: int) -> None
         strip.channel = channel
 
 
-def _new_strip(level: StripsTopLevel, name: str, film: Film, channel: int, start: int) -> Strip:
-    if film.kind == "MOVIE":
-        return level.new_movie(name, _relative(film.place), channel, start)
-    first, *others = film.pictures
-    baked = level.new_image(name, _relative(first), channel, start)
-    for picture in others:
-        baked.elements.append(picture.name)
-    return baked
-
-
 def _relative(path: Path) -> str:
     """As the edit names a file, so that both may be moved together."""
     with suppress(ValueError):  # another drive
         return bpy.path.relpath(str(path))
     return str(path)
-
-
-def _copy_curves(scene: Scene, strip: Strip, baked: Strip) -> None:
-    old, new = strip.path_from_id(), baked.path_from_id()
-    for end in _CURVES:
-        fcurves.copy_curves(scene, f"{old}.{end}", scene, f"{new}.{end}")
 
 
 def _note(strip: Strip, baked: Strip, film: Film, channel: int) -> None:
@@ -141,12 +127,9 @@ def unbake(scene: Scene, strip: Strip) -> None:
     for baked in baked_of(scene, strip):
         (baked.parent_meta() or scene.sequence_editor).strips.remove(baked)
     for part in parts:
-        bake = part.virtual_shutter_bake
-        _move(part.parent_meta() or scene.sequence_editor, part, bake.channel)
+        _move(part.parent_meta() or scene.sequence_editor, part, part.virtual_shutter_bake.channel)
         part.mute = False
-        for prop in bake.bl_rna.properties:
-            if not prop.is_readonly:
-                bake.property_unset(prop.identifier)
+        part.property_unset("virtual_shutter_bake")
 
 
 def is_stale(scene: Scene, effect: PropertyGroup, strip: Strip) -> bool:

@@ -1,6 +1,7 @@
 """A shutter's bars: painted, keyed, and as they are at the current frame."""
 
 from collections.abc import Sequence
+from contextlib import suppress
 from typing import NamedTuple
 
 import bpy
@@ -91,16 +92,11 @@ def _paths(effect: PropertyGroup, index: int) -> list[str]:
 def unkey_bars(effect: PropertyGroup, index: int) -> bool:
     """Deletes the keys of a shutter's bars at the current frame; whether there were any."""
     scene = effect.id_data
-    curves = fcurves.Curves(scene)
-    deleted = [_deleted(scene, path) for path in _paths(effect, index) if curves.find(path)]
-    return any(deleted)
-
-
-def _deleted(scene: Scene, path: str) -> bool:
-    try:
-        return scene.keyframe_delete(path, frame=scene.frame_current)
-    except RuntimeError:  # no key at this frame
-        return False
+    curves, is_deleted = fcurves.Curves(scene), False
+    for path in filter(curves.find, _paths(effect, index)):
+        with suppress(RuntimeError):  # no key at this frame
+            is_deleted |= scene.keyframe_delete(path, frame=scene.frame_current)
+    return is_deleted
 
 
 class BarsShown(NamedTuple):
@@ -116,14 +112,8 @@ _shown = revision.UntilChange()
 
 def shown(effect: PropertyGroup, index: int) -> BarsShown:
     """What bars_now and key_state say, for what is drawn: worked out once until something changes."""
-    scene = effect.id_data
-    key = effect.scene.session_uid, index, scene.frame_float
-
-    def read() -> BarsShown:
-        states = key_state(effect, index)
-        return BarsShown(_bars_now(effect, index, states), states)
-
-    return _shown.get(key, read)
+    key = effect.scene.session_uid, index, effect.id_data.frame_float
+    return _shown.get(key, lambda: _read(effect, index))
 
 
 def key_state(effect: PropertyGroup, index: int) -> list[str]:
@@ -148,10 +138,11 @@ def bars_now(effect: PropertyGroup, index: int) -> np.ndarray:
 
     Bars that were changed since, and not keyed yet, count as they stand. EffectError: the picture cannot be made.
     """
-    return _bars_now(effect, index, key_state(effect, index))
+    return _read(effect, index).bars
 
 
-def _bars_now(effect: PropertyGroup, index: int, states: list[str]) -> np.ndarray:
+def _read(effect: PropertyGroup, index: int) -> BarsShown:
+    scene, states = effect.id_data, key_state(effect, index)
     if "changed" in states:
-        return bars(effect.shutters[index])
-    return snapshot.bars_at(effect.id_data, effect, index, effect.id_data.frame_float)
+        return BarsShown(bars(effect.shutters[index]), states)
+    return BarsShown(snapshot.bars_at(scene, effect, index, scene.frame_float), states)

@@ -2,11 +2,17 @@
 
 Markers lie at frames of the clip, 1 is its first, in fractions of its picture. A region is moved as they are, from
 where it is at one frame of the timeline, and from the editor's other keys; it gets keys as tracking makes them.
+
+And the camera, that follows the 2D stabilization of a clip: what that takes back, shutters can follow. Blender's Python
+does not tell how it lays the picture; core/model/stabilization.py computes that from the clip's tracks and settings, as
+Blender does.
 """
 
 import hashlib
+import math
 from bisect import bisect_left, bisect_right
-from pathlib import Path
+from collections.abc import Callable
+from functools import partial
 
 import bpy
 import numpy as np
@@ -18,12 +24,14 @@ from ...core.messages import EffectError, translated
 from ...core.model import motions
 from ...core.model.effect import Camera, Region
 from ...core.model.motions import Placement, Similarity
-from ..data import annotations, snapshot, source_media, strips, validation
+from ...core.model.stabilization import Settings, Stabilization, Track, laid
+from ...media import registration
+from ..data import annotations, external_files, fcurves, selection, snapshot, source_media, strips, validation
 from ..rendering import effect_source
 from . import motion_keys
 from .motion_keys import MotionKeys
 
-Moves = dict[int, dict[int, Similarity]]  # by two frames, the motion of the picture from the one to the other
+Motions = dict[int, Similarity]  # of the picture, by the frame to which it moves
 Points = dict[str, complex]  # where markers are in the picture, in pixels as motions.Similarity counts them
 
 
@@ -53,17 +61,26 @@ def _keys(effect: PropertyGroup, index: int) -> MotionKeys:
 
 
 def _key(scene: Scene, effect: PropertyGroup, strip: Strip, index: int, points: dict[int, Points]) -> None:
-    region, start, size = effect.regions[index], _start(effect, index), annotations.picture_size(effect)
-    keys = _keys(effect, index)
-    known = sorted({start, *(frame for frame in keys.edited(range(min(points), max(points) + 1)) if frame in points)})
+    region, start = effect.regions[index], _start(effect, index)
     shape = snapshot.region_at(scene, effect, strip, index, points)
-    placements = followed(shape, sorted(points), {frame: _motions(points, frame) for frame in known}, start, size)
-    kept = motions.thinned(placements, motions.offsets(shape.drawings.at(start)), size, known)
-    frames = range(min(placements), max(placements) + 1)
-    confidence = {frame: float(frame in placements) for frame in frames}
-    keys.write({frame: placements[frame] for frame in kept}, confidence)
+    carry(_keys(effect, index), shape, start, sorted(points), partial(_motions, points))
     region.follow_stamp = stamp(region)
-    region.stops.clear()
+
+
+def carry(
+    keys: MotionKeys, shape: Region | Camera, start: int, frames: list[int], motions_from: Callable[[int], Motions]
+) -> None:
+    """Keys a region or the camera as the picture moves, from where it is at the frame `start` and at the editor's other
+    keys; no stop of tracking is known of it any more.
+
+    frames: those at which motions are known, ascending; motions_from: by one of these, from there to the others"""
+    known = {start, *(frame for frame in keys.edited(range(frames[0], frames[-1] + 1)) if frame in frames)}
+    moves = {frame: motions_from(frame) for frame in known}
+    placements = followed(shape, frames, moves, start, annotations.picture_size(keys.effect))
+    kept = keys.needed(shape, start, placements, known)
+    between = range(min(placements), max(placements) + 1)
+    keys.write({frame: placements[frame] for frame in kept}, {frame: float(frame in placements) for frame in between})
+    selection.moving(keys.effect, keys.index).stops.clear()
 
 
 def is_changed(region: PropertyGroup) -> bool:
@@ -179,14 +196,11 @@ def _points_at(tracks: list, time: float, size: tuple[int, int]) -> Points:
 
 def _check_footage(source: Strip, clip: MovieClip) -> None:
     """EffectError: a clip begins with another file than a strip does. MediaError: the strip has no files."""
-    first = _file(source.clip) if source.type == "MOVIECLIP" and source.clip else source_media.spec(source).path
-    if first.resolve() != _file(clip).resolve():
+    own = source.clip if source.type == "MOVIECLIP" else None
+    first = external_files.absolute(own, own.filepath) if own else source_media.spec(source).path
+    if first.resolve() != external_files.absolute(clip, clip.filepath).resolve():
         sentence = rpt_('clip "{clip}" does not begin with the same file as strip "{strip}"')
         raise EffectError(sentence.format(clip=clip.name, strip=source.name))
-
-
-def _file(clip: MovieClip) -> Path:
-    return Path(bpy.path.abspath(clip.filepath, library=clip.library))
 
 
 def _first_frame(source: Strip, clip: MovieClip) -> int:
@@ -206,7 +220,7 @@ def _place_at(frames: np.ndarray, places: np.ndarray, time: float) -> np.ndarray
 
 
 def followed(
-    subject: Region | Camera, frames: list[int], moves: Moves, start: int, size: tuple[int, int]
+    subject: Region | Camera, frames: list[int], moves: dict[int, Motions], start: int, size: tuple[int, int]
 ) -> dict[int, Placement]:
     """By frame the placement of a region or the camera, carried from the frames at which that is known.
 
@@ -242,7 +256,7 @@ def _ways(frames: list[int], start: int) -> tuple[list[int], list[int]]:
     return [frame for frame in frames if frame > start], [frame for frame in reversed(frames) if frame < start]
 
 
-def _motions(points: dict[int, Points], origin: int) -> dict[int, Similarity]:
+def _motions(points: dict[int, Points], origin: int) -> Motions:
     """By frame the motion from the points of one frame; where too few of these are left, by way of the frame before."""
     by_frame = {origin: Similarity()}
     enough = min(2, len(points[origin]))
@@ -252,17 +266,97 @@ def _motions(points: dict[int, Points], origin: int) -> dict[int, Similarity]:
             for base in (origin, before):
                 shared = sorted(points[base].keys() & points[frame].keys())
                 if len(shared) >= enough:
-                    ends = ([points[end][name] for name in shared] for end in (base, frame))
-                    by_frame[frame] = _similarity(*ends).after(by_frame[base])
+                    there, here = (np.array([points[end][name] for name in shared]) for end in (base, frame))
+                    motion = registration.least_squares(there, here, np.ones(len(shared)), "scale")
+                    by_frame[frame] = motion.after(by_frame[base])
                     before = frame
                     break
     return by_frame
 
 
-def _similarity(before: list[complex], after: list[complex]) -> Similarity:
-    """The motion that takes points to others with the least squared error; a single one is shifted alone."""
-    first, second = np.array(before), np.array(after)
-    apart = first - first.mean()
-    spread = np.vdot(apart, apart).real
-    turn = complex(np.vdot(apart, second - second.mean()) / spread) if spread else 1 + 0j
-    return Similarity(turn, complex(second.mean() - turn * first.mean()))
+def follow_stabilization(scene: Scene, effect: PropertyGroup, strip: Strip) -> None:
+    """Keys the camera by the stabilization of its clip, from where it is now, at the current frame. EffectError,
+    MediaError: there is nothing to follow, and nothing has changed."""
+    camera, start, size = effect.camera, scene.frame_current, annotations.picture_size(effect)
+    validation.check_placement(camera)
+    motion_keys.check_curves(effect, None)
+    if camera.follow_clip is None:
+        raise EffectError(rpt_("Choose a clip first"))
+    times = clip_times(scene, effect, strip, camera.follow_clip)
+    if start not in times:
+        raise EffectError(rpt_("the current frame is outside of the Shutter strip"))
+    shifted = unstabilized(camera.follow_clip, size)
+    seen = {frame: shifted(time) for frame, time in times.items()}
+    keys = MotionKeys(effect, None, _stabilized_motion(camera.follow_clip.tracking.stabilization))
+    keys.begin(start)
+
+    def motions_from(origin: int) -> Motions:
+        return {frame: there.after(seen[origin].inverse()) for frame, there in seen.items()}
+
+    carry(keys, snapshot.camera_at(scene, effect, times), start, sorted(times), motions_from)
+
+
+def _stabilized_motion(settings: bpy.types.MovieTrackingStabilization) -> str:
+    if not settings.use_stabilize_rotation:
+        return "LOCATION"
+    return "SCALE" if settings.use_stabilize_scale else "ROTATION"
+
+
+def unstabilized(clip: MovieClip, size: tuple[int, int]) -> Callable[[float], Similarity]:
+    """The motion of the picture from where stabilization lays it to where the clip has it, at a time in the clip's
+    frames. EffectError: the clip is not stabilized."""
+    settings = clip.tracking.stabilization
+    stabilization = _stabilization(clip, size[0] / size[1])
+    if not settings.use_2d_stabilization or not stabilization.frames:
+        raise EffectError(rpt_('clip "{clip}" has no 2D stabilization').format(clip=clip.name))
+    value = _values(clip)
+
+    def at(frame: int) -> Similarity:
+        x, y = (value(settings, "target_position", frame, axis) for axis in (0, 1))
+        taken = {name: value(settings, f"influence_{name}", frame) for name in ("location", "rotation", "scale")}
+        target = complex(x * size[0] / size[1], y)
+        angle, scale = value(settings, "target_rotation", frame), value(settings, "target_scale", frame)
+        wanted = Settings(**taken, target=target, target_angle=angle, target_scale=scale)
+        measured = stabilization.at(frame)
+        assert measured is not None  # as there are frames
+        return _in_pixels(laid(measured, wanted), size).inverse()
+
+    def between(time: float) -> Similarity:
+        first, second, share = at(math.floor(time)), at(math.ceil(time)), time - math.floor(time)
+        turn = (1 - share) * first.turn + share * second.turn
+        return Similarity(turn, (1 - share) * first.shift + share * second.shift)
+
+    return between
+
+
+def _stabilization(clip: MovieClip, aspect: float) -> Stabilization:
+    settings, value, tracks = clip.tracking.stabilization, _values(clip), []
+    used = [{track.name for track in each} for each in (settings.tracks, settings.rotation_tracks)]
+    for track in clip.tracking.objects[0].tracks:
+        frames, places = markers_of(track)
+        markers = dict(zip(frames.tolist(), (places * (aspect, 1) @ (1, 1j)).tolist(), strict=True))
+        location, turn = (track.name in names for names in used)
+        if location or turn:
+            weight = partial(value, track, "weight_stab")
+            tracks.append(Track(markers=markers, weight=weight, location=location, turn=turn))
+    turned = settings.use_stabilize_rotation
+    return Stabilization(tracks, settings.anchor_frame, turned=turned, scaled=turned and settings.use_stabilize_scale)
+
+
+def _values(clip: MovieClip) -> Callable:
+    """What a number of a clip is at one of its frames."""
+    curves = fcurves.Curves(clip)
+
+    def at(owner: bpy.types.bpy_struct, name: str, frame: int, axis: int | None = None) -> float:
+        curve = curves.find(f"{owner.path_from_id()}.{name}", axis or 0)
+        if curve is not None:
+            return curve.evaluate(frame + clip.frame_start - 1)
+        return getattr(owner, name) if axis is None else getattr(owner, name)[axis]
+
+    return at
+
+
+def _in_pixels(motion: Similarity, size: tuple[int, int]) -> Similarity:
+    """A motion in heights of the picture, y up, as one in pixels, y down."""
+    turn, origin = motion.turn.conjugate(), motions.pixel((0, 0), size)
+    return Similarity(turn, origin - turn * origin + size[1] * motion.shift.conjugate())

@@ -7,29 +7,22 @@ What could only be wrong follows by itself (reconcile.follow_sources).
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from typing import NamedTuple
 
 import bpy
-import mathutils
 import numpy as np
 from bpy.app.translations import pgettext_n as n_
 from bpy.types import AnnotationFrame, FCurve, PropertyGroup, Scene, Strip, StripModifier
 
 from ...core import revision
 from ...core.model.scribbles import mapped
-from ..data import fcurves, geometry, strips
-from ..data.annotations import layer_of, picture_size
+from ..data import fcurves, sampled, strips
+from ..data.annotations import layer_of
+from ..data.property_copy import for_a_while
 from . import add_effect
 
-# What a strip looks like: what it is called, and the names of the strip's properties and groups.
-_LOOK = {
-    n_("transform"): ("transform",),
-    n_("crop"): ("crop",),
-    n_("flip"): ("use_flip_x", "use_flip_y"),
-    n_("color"): ("color_multiply", "color_saturation", "multiply_alpha"),
-}
 _RANGE = n_("range")
 _shown = revision.UntilChange()
 
@@ -66,7 +59,7 @@ def differences(effect: PropertyGroup) -> list[str]:
     """What match would change, in words to be translated."""
     strip, source = strip_and_source(effect)
     look, wanted = _looks(strip), _looks(source)
-    words = [word for word in _LOOK if look[word] != wanted[word]]
+    words = [word for word in add_effect.LOOK if look[word] != wanted[word]]
     if _goal(effect, strip, source)[:2] != (strip.left_handle, strip.right_handle):
         words.append(_RANGE)
     return words
@@ -77,11 +70,7 @@ def match(effect: PropertyGroup) -> Strip | None:
     the way of the whole range, or None."""
     scene, (strip, source) = effect.id_data, strip_and_source(effect)
     with scribbles_kept(effect, strip):
-        add_effect.copy_look(source, strip)
-        for name in (name for names in _LOOK.values() for name in names):
-            old, new = f"{source.path_from_id()}.{name}", f"{strip.path_from_id()}.{name}"
-            fcurves.remove_curves(scene, new)
-            fcurves.copy_curves(scene, old, scene, new)
+        add_effect.copy_look(source, strip, keys=True)
     left, right, neighbor = _goal(effect, strip, source)
     _slip(scene, strip, source, left, right)
     strip.right_handle = max(strip.right_handle, right)  # or the left one could not pass it
@@ -94,18 +83,15 @@ def _looks(strip: Strip) -> dict[str, str]:
     path = f"{strip.path_from_id()}."
     curves = [curve for curve in fcurves.curves_under(strip.id_data, path) if not curve.mute]
     return {
-        word: repr([(_plain(getattr(strip, name)), _keyed(curves, path + name)) for name in names])
-        for word, names in _LOOK.items()
+        word: repr([(_values(strip, name), _keyed(curves, path + name)) for name in names])
+        for word, names in add_effect.LOOK.items()
     }
 
 
-def _plain(value: object) -> object:
-    if value == strips.IN_CODE_VALUES:
-        return 1.0
-    if isinstance(value, bpy.types.bpy_struct):
-        names = [prop.identifier for prop in value.bl_rna.properties if not prop.is_readonly]
-        return [_plain(getattr(value, name)) for name in names]
-    return tuple(value) if isinstance(value, bpy.types.bpy_prop_array | mathutils.Vector) else value
+def _values(strip: Strip, name: str) -> list:
+    values = [getattr(owner, prop) for owner, prop in add_effect.settings(strip, name)]
+    values = [1.0 if value == strips.IN_CODE_VALUES else value for value in values]
+    return [tuple(value) if isinstance(value, Iterable) else value for value in values]
 
 
 def _keyed(curves: list[FCurve], path: str) -> list:
@@ -159,30 +145,25 @@ def scribbles_kept(effect: PropertyGroup, strip: Strip) -> Iterator[None]:
     put_back(effect, strip, before)
 
 
-def places(effect: PropertyGroup, strip: Strip) -> list[np.ndarray]:
-    """Where the picture of an effect lies on the image, at each of its drawings."""
-    return [_place(effect, strip, drawing.frame_number) for drawing in _drawings(effect)]
+def places(effect: PropertyGroup, strip: Strip) -> list[np.ndarray | None]:
+    """What takes the image to the picture of an effect, at each of its drawings; None: it is too small to be seen, or
+    nowhere."""
+    frames = [drawing.frame_number for drawing in _drawings(effect)]
+    placement = sampled.placement(fcurves.Curves(effect.id_data), effect, strip, frames)
+    found = [sampled.tried(placement.at, frame) for frame in frames]
+    return [place if isinstance(place, np.ndarray) else None for place in found]
 
 
-def put_back(effect: PropertyGroup, strip: Strip, before: list[np.ndarray]) -> None:
+def put_back(effect: PropertyGroup, strip: Strip, before: list[np.ndarray | None]) -> None:
     """Puts an effect's drawings where they lie on its picture; before: the places at which they do."""
-    for drawing, old in zip(_drawings(effect), before, strict=True):
-        new = _place(effect, strip, drawing.frame_number)
-        if geometry.is_invertible(old) and geometry.is_invertible(new) and not np.array_equal(old, new):
-            _move(drawing, new @ np.linalg.inv(old))
+    for drawing, old, new in zip(_drawings(effect), before, places(effect, strip), strict=True):
+        if old is not None and new is not None and not np.array_equal(old, new):
+            _move(drawing, np.linalg.inv(new) @ old)
 
 
 def _drawings(effect: PropertyGroup) -> list[AnnotationFrame]:
     layers = {region.layer: layer_of(effect, region) for region in effect.regions}
     return [drawing for layer in layers.values() if layer for drawing in layer.frames]
-
-
-def _place(effect: PropertyGroup, strip: Strip, frame: int) -> np.ndarray:
-    """Where an effect's picture lies on the image at a frame, as geometry.picture_to_image has it."""
-    path = f"{strip.path_from_id()}.transform."
-    curves = [curve for curve in fcurves.curves_under(effect.id_data, path) if not (curve.mute or curve.is_empty)]
-    moved = {curve.data_path.removeprefix(path): curve.evaluate(frame) for curve in curves}
-    return geometry.picture_to_image(strip, picture_size(effect), **moved)
 
 
 def _move(drawing: AnnotationFrame, change: np.ndarray) -> None:
@@ -216,10 +197,9 @@ def append_modifiers(scene: Scene, source: Strip, part: Strip, chosen: list[Stri
     if not source.modifiers:
         return
     count = len(part.modifiers)
-    active, scene.sequence_editor.active_strip = scene.sequence_editor.active_strip, source
-    with add_effect.selecting(scene, [part]):  # and all modifiers of the active strip
+    active = scene.sequence_editor, "active_strip", source
+    with for_a_while([active]), add_effect.selecting(scene, [part]):  # and all modifiers of the active strip
         bpy.ops.sequencer.strip_modifier_copy(type="APPEND")
-    scene.sequence_editor.active_strip = active
     for old, new in list(zip(source.modifiers, part.modifiers[count:], strict=True)):
         if chosen is None or old in chosen:
             fcurves.copy_curves(scene, f"{old.path_from_id()}.", scene, f"{new.path_from_id()}.")

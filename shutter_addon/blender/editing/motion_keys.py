@@ -8,9 +8,8 @@ A key that the editor sets bends the frames around it, as keys do, until trackin
 tracked again are where tracking had left them.
 """
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from itertools import pairwise
 
 import bpy
 import numpy as np
@@ -19,10 +18,13 @@ from bpy.app.translations import pgettext_n as n_
 from bpy.app.translations import pgettext_rpt as rpt_
 from bpy.types import PropertyGroup, Scene
 
+from ...core.frames import frame_ranges
 from ...core.messages import EffectError
-from ...core.model import presence
-from ...core.model.motions import Placement
-from ..data import fcurves, selection, validation
+from ...core.model import motions, presence
+from ...core.model.effect import Camera, Region
+from ...core.model.motions import Placement, Placements
+from ...core.recipes import region_keys
+from ..data import annotations, fcurves, selection, validation
 
 MADE = "GENERATED"
 _MADE = bpy.types.Keyframe.bl_rna.properties["type"].enum_items[MADE].value
@@ -60,14 +62,12 @@ class MotionKeys:
         curve = self._curve("location")
         return curve is not None and bool(_read(curve)[1].any())
 
-    def are_several(self) -> bool:
-        """Whether a channel of the motion has keys at more than one frame: with one alone the region stands still."""
-        return any(len(curve.keyframe_points) > 1 for curve in self._curves(_COUNTS[self.motion]))
-
     def reach(self, frame: int) -> bool:
-        """Whether there are keys of a motion, and tracking, if any of them come from it, has come through a frame."""
+        """Whether there are keys of a motion, and tracking, if any of them come from it, has come through a frame. With
+        a single one the region stands still."""
         tracked = self.confidence()[0]
-        return self.are_several() and (not len(tracked) or frame in tracked)
+        are_several = any(len(curve.keyframe_points) > 1 for curve in self._curves(_COUNTS[self.motion]))
+        return are_several and (not len(tracked) or frame in tracked)
 
     def channels(self) -> list[str]:
         """The channels that the motion has, and those that have keys already."""
@@ -96,7 +96,7 @@ class MotionKeys:
         were, have no confidence at all: it is 0.
 
         confidence: 0 to 1 by frame"""
-        for first, last in runs(confidence):
+        for first, last in frame_ranges.runs(confidence):
             self.hold(first, last)
         for k, (name, component) in enumerate(_COMPONENTS):
             is_keyed = k < _COUNTS[self.motion]
@@ -107,6 +107,14 @@ class MotionKeys:
         between = dict.fromkeys(set(range(min(confidence), max(confidence))) - known, 0.0)
         every = between | {frame: 100 * share for frame, share in confidence.items()}
         _replace(self._curve("confidence", new=True), every, every)
+
+    def needed(self, shape: Region | Camera, start: int, placements: Placements, kept: Collection[int]) -> list[int]:
+        """The frames whose keys say the motion, within a pixel for a region, as it is drawn at the frame `start`; kept:
+        those that stay in any case."""
+        size = annotations.picture_size(self.effect)
+        if isinstance(shape, Camera):
+            return motions.thinned(placements, region_keys.CORNERS, size, kept, region_keys.STEADY)
+        return motions.thinned(placements, motions.offsets(shape.drawings.at(start)), size, kept)
 
     def confidence(self) -> tuple[np.ndarray, np.ndarray]:
         """The frames (n,) that have a confidence, ascending, and what it is, 0 to 1."""
@@ -166,15 +174,13 @@ def insert(
     index: int | None,
     channels: Sequence[str] = CHANNELS,
     *,
-    keep_tracked: bool = False,
     begins: bool = False,
 ) -> None:
     """Keys channels of a region or of the camera at the scene's current frame; where tracking has made a key, it is the
     editor's from now on, and sure. EffectError: as check_curves says.
 
-    keep_tracked: whether the keys keep what was tracked there, for the next MotionKeys.hold
     begins: whether tracking begins there, so that they are read there; of a timeline that is stretched, others lie
-    where Blender's own do, and are read elsewhere"""
+    where Blender's own do, and are read elsewhere. Those keep what was tracked there, for the next MotionKeys.hold"""
     check_curves(effect, index)
     scene, moving = effect.id_data, selection.moving(effect, index)
     path, pace, frame = moving.path_from_id(), fcurves.stretched(scene), scene.frame_current
@@ -187,19 +193,11 @@ def insert(
         tracked += [NOTHING_KEPT] * len(_COMPONENTS)
         for curve, value in zip(_curves(scene, f"{path}.{name}"), tracked, strict=False):
             for key in _keys_at(curve, frame):
-                key.type, key.back = "KEYFRAME", value if keep_tracked else NOTHING_KEPT
+                key.type, key.back = "KEYFRAME", NOTHING_KEPT if begins else value
     for curve in _curves(scene, f"{path}.confidence"):
         for key in _keys_at(curve, frame):
             key.back = key.co[1] = 100
         curve.update()
-
-
-def runs(frames: Iterable[int]) -> list[tuple[int, int]]:
-    """The first and the last of each stretch of frames without a gap, ascending."""
-    ordered = sorted(frames)
-    ends = [i for i, (frame, after) in enumerate(pairwise(ordered)) if after != frame + 1]
-    firsts, lasts = [0, *(i + 1 for i in ends)], [*ends, len(ordered) - 1]
-    return [(ordered[first], ordered[last]) for first, last in zip(firsts, lasts, strict=True)]
 
 
 def _curves(scene: Scene, path: str) -> list[fcurves.Timed]:
@@ -220,18 +218,15 @@ def _tracked_value(curve: fcurves.Timed, frame: float) -> float:
 
 
 def _as_tracked(curve: fcurves.Timed, edited: tuple[int, int], frames: list[float]) -> dict[float, float]:
-    """The values of an F-curve at frames without a key, with what tracking said of two frames that the editor may have
-    keyed since; it is forgotten after this."""
-    moved = []
-    for key in (key for frame in set(edited) for key in _keys_at(curve, frame)):
+    """The values of an F-curve at frames without a key, straight between its keys, with what tracking said of two
+    frames that the editor may have keyed since; it is forgotten after this."""
+    points = curve.points()
+    for i in np.flatnonzero(np.isin(points[:, 0], edited)).tolist():
+        key = curve.keyframe_points[i]
         if key.type != MADE and key.back != NOTHING_KEPT:
-            moved.append((key, key.co[1], key.interpolation))
-            key.co_ui[1], key.back, key.interpolation = key.back, NOTHING_KEPT, "LINEAR"
-    keyed = curve.points()[:, 0]
-    values = {frame: curve.evaluate(frame) for frame in frames if not curve.is_empty and frame not in keyed}
-    for key, value, ease in moved:
-        key.co_ui[1], key.interpolation = value, ease
-    return values
+            points[i, 1], key.back = key.back, NOTHING_KEPT
+    without = [frame for frame in frames if len(points) and frame not in points[:, 0]]
+    return dict(zip(without, np.interp(without, *points.T).tolist(), strict=True)) if without else {}
 
 
 def _values(placement: Placement) -> tuple[float, ...]:

@@ -6,7 +6,7 @@ from contextlib import AbstractContextManager, suppress
 from pathlib import Path
 
 import bpy
-from bpy.types import Scene, SequenceEditor, Strip
+from bpy.types import Scene, Strip
 
 from ...core.frames.frame_source import FrameSource
 from ...core.model.effect import Effect
@@ -50,7 +50,11 @@ def make_source(path: Path, medium: FrameSource) -> Strip:
     # Of a file that is gone Blender would make a picture of the size that its element has: none where Python has added
     # it, but what lay in memory there.
     editor.show_missing_media = False
-    return _add_source(editor, path, medium)
+    is_movie = medium.fps is not None
+    if is_movie and medium.has_audio:
+        editor.strips.new_sound(f"{path.name} Sound", str(path), 1, 1)
+    files = [str(path)] if is_movie else [str(file) for file in medium.files]
+    return add_effect.new_footage(editor.strips, path.name, files, 2, 1, is_movie)
 
 
 def length(medium: FrameSource, source_recipe: Effect) -> int:
@@ -59,18 +63,6 @@ def length(medium: FrameSource, source_recipe: Effect) -> int:
     time = source_recipe.time
     keys = [math.ceil(frame) for frame, _ in time.keys] if isinstance(time, SourceTime) else []
     return min(max([medium.count, *keys]), MAX_FRAME)
-
-
-def _add_source(editor: SequenceEditor, path: Path, medium: FrameSource) -> Strip:
-    name = path.name
-    if medium.fps is not None:
-        if medium.has_audio:
-            editor.strips.new_sound(f"{name} Sound", str(path), 1, 1)
-        return editor.strips.new_movie(name, str(path), 2, 1)
-    strip = editor.strips.new_image(name, str(medium.files[0]), 2, 1)
-    for file in medium.files[1:]:
-        strip.elements.append(file.name)
-    return strip
 
 
 def paths_relative(scene: Scene, folder: Path) -> AbstractContextManager[None]:

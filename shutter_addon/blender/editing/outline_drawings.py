@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 from bpy.app.translations import pgettext_rpt as rpt_
-from bpy.types import AnnotationFrame, PropertyGroup, Scene, Strip
+from bpy.types import PropertyGroup, Scene, Strip
 
 from ...core import revision
 from ...core.messages import EffectError
@@ -23,6 +23,7 @@ from ..data.annotations import layer_of
 from ..rendering import effect_source
 from . import region_edits
 
+Strokes = outlines.Curves | list[np.ndarray]  # (n, 2) in fractions of the picture
 SURE = 0.75  # confidence from which on no drawing is needed: an overlap of nine tenths, as a rule
 
 
@@ -60,41 +61,28 @@ def shown_curves(scene: Scene, effect: PropertyGroup, strip: Strip, index: int) 
     return _shown.get(key, lambda: curves_now(scene, effect, strip, index))
 
 
-def carried() -> None:
-    """Mattes have been carried, of which Blender does not tell."""
-    _shown.clear()
-
-
-def draw(effect: PropertyGroup, strip: Strip, region: PropertyGroup, curves: outlines.Curves, frame: int) -> None:
-    """Makes curves the drawing of a region at a timeline frame, in place of one that is there. EffectError: the strip
-    is scaled to nothing."""
-    layer = layer_of(effect, region) or region_edits.new_layer(effect, region)
-    to_image = _to_image(effect, strip)
-    for drawing in [drawing for drawing in layer.frames if drawing.frame_number == frame]:
-        layer.frames.remove(drawing)
-    _add(layer.frames.new(frame), to_image, curves)
-
-
 def add(effect: PropertyGroup, strip: Strip, region: PropertyGroup, curve: np.ndarray, frame: int) -> None:
     """Adds a curve (n, 2), in fractions of the picture, to the drawing of a region at a timeline frame. EffectError: as
     draw."""
-    layer = layer_of(effect, region) or region_edits.new_layer(effect, region)
-    to_image = _to_image(effect, strip)
-    there = [drawing for drawing in layer.frames if drawing.frame_number == frame]
-    _add(there[0] if there else layer.frames.new(frame), to_image, [curve])
+    draw(effect, strip, region, [curve], frame, adds=True)
 
 
-def _to_image(effect: PropertyGroup, strip: Strip) -> np.ndarray:
+def draw(
+    effect: PropertyGroup, strip: Strip, region: PropertyGroup, curves: Strokes, frame: int, *, adds: bool = False
+) -> None:
+    """Makes curves the drawing of a region at a timeline frame; in place of one that is there, unless it adds to it.
+    EffectError: the strip is scaled to nothing."""
     to_image = geometry.picture_to_image(strip, annotations.picture_size(effect))
     if not geometry.is_invertible(to_image):
         raise EffectError(rpt_('strip "{strip}" is scaled to nothing').format(strip=strip.name))
-    return to_image
-
-
-def _add(drawing: AnnotationFrame, to_image: np.ndarray, curves: outlines.Curves | list[np.ndarray]) -> None:
-    revision.changed()  # Blender tells of no strokes
+    layer = layer_of(effect, region) or region_edits.new_layer(effect, region)
+    there = [drawing for drawing in layer.frames if drawing.frame_number == frame]
+    while there and not adds:
+        layer.frames.remove(there.pop())
+    drawing = there[0] if there else layer.frames.new(frame)
     for points in curves:
         annotations.add_stroke(drawing, mapped(to_image, np.asarray(points)))
+    revision.changed()  # Blender tells of no strokes
 
 
 def picture_now(scene: Scene, effect: PropertyGroup, strip: Strip) -> np.ndarray:

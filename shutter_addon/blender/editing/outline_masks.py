@@ -13,6 +13,7 @@ from ...core.model import outline_chains, outlines
 from ...core.model.keyframes import Ease
 from ...media.outline_tracing import traced
 from ..data import annotations, fcurves, mask_reading, snapshot, strips
+from ..data.property_copy import for_a_while
 from . import outline_drawings, region_edits
 
 
@@ -105,8 +106,7 @@ def _place(spline: MaskSpline, points: np.ndarray) -> None:
 def _insert_keys(context: Context, mask: Mask, chains: list[outline_chains.Chain], size: tuple[int, int]) -> None:
     """Blender gives shape keys to selected layers, at its current frame."""
     edited = context.window.scene
-    current = edited.frame_current
-    try:
+    with for_a_while([(edited, "frame_current", edited.frame_current)]):
         for frame in sorted({frame for chain in chains for frame in chain.frames}):
             edited.frame_current = frame + 1
             context.window.view_layer.update()  # or the operator would, and put the points where the last key has them
@@ -120,8 +120,6 @@ def _insert_keys(context: Context, mask: Mask, chains: list[outline_chains.Chain
             bpy.ops.mask.shape_key_insert()
         for layer in mask.layers:
             layer.hide = False
-    finally:
-        edited.frame_current = current
 
 
 @contextmanager
@@ -132,18 +130,12 @@ def _mask_editor(context: Context, mask: Mask) -> Iterator[None]:
     if window is None:
         raise EffectError(rpt_("A mask is written in a window of Blender, and there is none"))
     area = context.area or window.screen.areas[0]
-    before = area.ui_type
-    area.ui_type = "IMAGE_EDITOR"
-    space = area.spaces.active
-    shown = space.mode, space.mask
-    try:
-        space.mode, space.mask = "MASK", mask
-        region = next(region for region in area.regions if region.type == "WINDOW")
-        with context.temp_override(window=window, area=area, region=region):
-            yield
-    finally:
-        space.mode, space.mask = shown
-        area.ui_type = before
+    with for_a_while([(area, "ui_type", "IMAGE_EDITOR")]):
+        space = area.spaces.active
+        with for_a_while([(space, "mode", "MASK"), (space, "mask", mask)]):
+            region = next(region for region in area.regions if region.type == "WINDOW")
+            with context.temp_override(window=window, area=area, region=region):
+                yield
 
 
 def _drawn_frames(scene: Scene, effect: PropertyGroup, strip: Strip, mask: Mask) -> dict[int, int]:

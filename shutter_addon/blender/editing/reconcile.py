@@ -108,9 +108,8 @@ def _find_scenes(scenes: list[Scene]) -> None:
     known = {scene.virtual_shutter.identity: scene for scene in reversed(_oldest_first(_effect_scenes()))}
     for scene in scenes:
         for effect in scene.virtual_shutter.effects:
-            is_lost = effect.scene is None or effect.scene.virtual_shutter.identity != effect.identity
-            if is_lost and effect.identity in known:
-                effect.scene = known[effect.identity]
+            if effect.scene is None or effect.scene.virtual_shutter.identity != effect.identity:
+                _give(effect, "scene", known.get(effect.identity, effect.scene))
         for strip in strips.all_strips(scene):
             found = known.get(strip.virtual_shutter_effect) if strip.type == "SCENE" else None
             if found not in (None, scene) and strip.scene in (None, scene):
@@ -138,13 +137,9 @@ def _bring_back(scenes: list[Scene]) -> None:
     lost = [strip for scene in scenes for strip in strips.own_strips(scene) if strip.scene is None]
     if lost:
         _remove_left()  # of their scenes, which somebody removed
-    found: dict[str, Scene | None] = {}
     for strip in lost:
-        identity = strip.virtual_shutter_effect
-        if identity not in found:
-            found[identity] = undelete.restore(strip.id_data, identity)
-        if found[identity] is not None:
-            strip.scene = found[identity]
+        if strip.scene is None and undelete.restore(strip.id_data, strip.virtual_shutter_effect):
+            _find_scenes(scenes)  # others have the same
 
 
 def _oldest_first(scenes: list[Scene]) -> list[Scene]:
@@ -154,21 +149,13 @@ def _oldest_first(scenes: list[Scene]) -> list[Scene]:
 
 
 def _separate(scenes: list[Scene]) -> None:
-    """A copied edit gets keys and effect scenes of its own: Blender lets both share actions and what strips show."""
+    """A copied edit gets keys of its own: Blender lets both share their action."""
     taken = set()
-    for scene in [scene for scene in scenes if scene.virtual_shutter.effects]:
-        animation, effects = scene.animation_data, scene.virtual_shutter.effects
+    for animation in [scene.animation_data for scene in scenes if scene.virtual_shutter.effects]:
         if animation and animation.action:
             if (animation.action, animation.action_slot_handle) in taken:
                 animation.action = animation.action.copy()
             taken.add((animation.action, animation.action_slot_handle))
-        for effect in effects:
-            if effect.scene in taken:
-                same = [strip for strip in strips.effect_strips(scene) if strip.scene == effect.scene]
-                effect.scene = effect.scene.copy()
-                for strip in same:
-                    strip.scene = effect.scene
-        taken.update(effect.scene for effect in effects if effect.scene)
 
 
 def _adopt(scenes: list[Scene]) -> None:
@@ -281,27 +268,27 @@ def _follow_strips(shown: list[strips.Shown]) -> None:
         start = strips.origin(strip)
         if not abs(effect.start) <= 2 * MAX_FRAME:  # no frame: its keys are where they are
             effect.start = start
-        _move_drawings(effect)
+        _move_drawings(effect, start)
         if start != effect.start:
             _renew_action(strip.id_data)
             fcurves.move_curves(strip.id_data, effect.path_from_id() + ".", start - effect.start)
             effect.start = start
-            _move_drawings(effect)
 
 
-def _move_drawings(effect: PropertyGroup) -> None:
-    """Drawings follow the effect's start, by that which the annotation says they are for: undo may bring the effect's
-    back and leave the annotation, which a handler moved, as it is."""
+def _move_drawings(effect: PropertyGroup, start: float) -> None:
+    """Drawings go along to where an effect starts now, from that which the annotation says they are for: undo may bring
+    the effect's back and leave the annotation, which a handler moved, as it is."""
     annotation = effect.scene.annotation
     if annotation is None or annotation.library is not None:
         return
-    frames = effect.start - annotation.virtual_shutter_start
-    if not (annotation.is_property_set("virtual_shutter_start") and abs(frames) <= 4 * MAX_FRAME):  # or it is no frame
-        annotation.virtual_shutter_start = effect.start
-    elif frames:
+    before = annotation.virtual_shutter_start
+    is_known = annotation.is_property_set("virtual_shutter_start") and abs(start - before) <= 4 * MAX_FRAME
+    if not is_known:
+        before = effect.start
+    if not is_known or before != start:
         for drawing in [drawing for layer in annotation.layers for drawing in layer.frames]:
-            drawing.frame_number += round(frames)
-        annotation.virtual_shutter_start = effect.start
+            drawing.frame_number += round(start - before)
+        annotation.virtual_shutter_start = start
 
 
 def _part_sources(shown: list[strips.Shown]) -> None:

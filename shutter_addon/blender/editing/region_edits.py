@@ -114,4 +114,4 @@ def free_layers(effect: PropertyGroup, annotation: Annotation | None) -> list:
 
 def key_region(effect: PropertyGroup, index: int) -> None:
     """Keys where the editor has put a region at the current frame. EffectError: it cannot be keyed."""
-    motion_keys.insert(effect, index, keep_tracked=True)
+    motion_keys.insert(effect, index)

@@ -12,7 +12,6 @@ from typing import NamedTuple
 
 import numpy as np
 from bpy.app.translations import pgettext_data as data_
-from bpy.app.translations import pgettext_n as n_
 from bpy.app.translations import pgettext_rpt as rpt_
 from bpy.types import PropertyGroup, Scene, Strip
 
@@ -34,14 +33,6 @@ LEAST = 0.02  # of a frame: a readout that is shorter, and found, is none
 # How the ramp is turned, in degrees, so that what is read first is at its end, which is shown from later.
 _TURNS = {"TOP": 90, "BOTTOM": -90, "LEFT": 180, "RIGHT": 0}
 _OPPOSITE = {"TOP": "BOTTOM", "BOTTOM": "TOP", "LEFT": "RIGHT", "RIGHT": "LEFT"}
-
-# Sentences of media/readout.py, which are looked up where they are shown.
-FAULTS = (
-    n_("there are too few frames"),
-    n_("too few straight lines go across the picture"),
-    n_("lines move too little, or always alike"),
-    n_("lines do not lean as one readout would have them"),
-)
 
 
 class Repair(NamedTuple):

@@ -72,7 +72,7 @@ def duplicate_shutter(effect: PropertyGroup, index: int) -> PropertyGroup:
     scene, path, color = effect.id_data, f"{effect.path_from_id()}.shutters", _free_color(effect)
     last, new = len(effect.shutters), effect.shutters.add()
     property_copy.copy_properties(effect.shutters[index], new)
-    new.color = color
+    new.name, new.color = new.name, color  # a name that is taken gets a number as it is set
     fcurves.copy_curves(scene, f"{path}[{index}].", scene, f"{path}[{last}].")
     move_shutter(effect, last, index + 1)
     effect.active_shutter = index + 1

@@ -9,44 +9,28 @@ from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
 from contextlib import closing
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import Any, NamedTuple
+from typing import Any
 
 import bpy
 import numpy as np
-from bpy.app.translations import pgettext_n as n_
 from bpy.app.translations import pgettext_rpt as rpt_
 from bpy.types import PropertyGroup, Scene, Strip
 
 from ...core import revision, threads
+from ...core.frames import frame_ranges
 from ...core.messages import EffectError, translated
-from ...core.model import limits, motions, outlines, presence
+from ...core.model import limits, outlines, presence
+from ...core.model.effect import Camera, Region
 from ...core.model.frame_state import Options
 from ...core.model.keyframes import Samples
-from ...core.recipes import region_keys
 from ...media import camera_tracking, matte_tracking, pursuit, tracking
 from ...media.footage import Footage
 from ...media.tracking import Tracked
-from ..data import annotations, inbetween_settings, selection, snapshot, strips, validation
+from ..data import inbetween_settings, selection, snapshot, strips, validation
 from ..data.sampled import placement_now
 from ..rendering import effect_source
 from . import motion_keys
 from .motion_keys import MotionKeys
-
-# Sentences of media/tracking.py and media/camera_tracking.py, which are looked up where they are shown.
-FAULTS = (
-    n_("the shot ends here"),
-    n_("the subject is covered, or looks too different"),
-    n_("the subject has left the picture"),
-    n_("there are too few corners to follow"),
-    n_("the outline encloses nothing here"),
-    n_("the region has no strokes to follow"),
-    n_("the region lies outside the picture"),
-    n_("there is no other frame to track"),
-    n_("the frame lies outside what can be tracked"),
-    n_("what the regions leave of the picture has too few corners to follow"),
-    n_("the picture is too unlike those before"),
-    n_("the picture is too unlike those before, and it goes on from here"),
-)
 
 _replaced = revision.Revision()  # Blender's data, by undo or by another file
 
@@ -72,26 +56,15 @@ class Target:
 
     def effect(self) -> PropertyGroup | None:
         """The effect, or None: it is gone, has another region there, lies elsewhere, or something was undone."""
-        for scene in bpy.data.scenes:
-            for effect in scene.virtual_shutter.effects:
-                if effect.scene and effect.scene.session_uid == self.scene:
-                    is_there = self.index is None or self.index < len(effect.regions)
-                    return effect if is_there and self._known(effect, self.index) == self.known else None
-        return None
+        effects = (effect for scene in bpy.data.scenes for effect in scene.virtual_shutter.effects if effect.scene)
+        effect = next((effect for effect in effects if effect.scene.session_uid == self.scene), None)
+        is_there = effect is not None and (self.index is None or self.index < len(effect.regions))
+        return effect if is_there and self._known(effect, self.index) == self.known else None
 
     @staticmethod
     def _known(effect: PropertyGroup, index: int | None) -> tuple:
         layer = None if index is None else effect.regions[index].layer
         return _replaced.number, effect.id_data.session_uid, effect.start, layer
-
-
-class _Subject(NamedTuple):
-    """follow: as tracking.follow behind its region; points: (n, 2) that tell how far thinned keys are off, from its
-    centre on; tolerance: how far they may be, in pixels of the source"""
-
-    follow: Callable
-    points: Callable[[], np.ndarray]
-    tolerance: float = 1.0
 
 
 def frames_to_track(scene: Scene, strip: Strip, direction: str, until: int = 0) -> range:
@@ -136,10 +109,7 @@ def track(
     # Those beyond the frames that are tracked tell how the subject looks as well.
     anchors = [frame for frame in keys.edited(range(strip.left_handle, strip.right_handle)) if frame != start]
     here, known = Tracked(frame=start, placement=placement_now(moving), confidence=1.0), sorted({*frames, *anchors})
-    if index is None:
-        subject = _camera(scene, effect, strip, known, here)
-    else:
-        subject = _region(scene, effect, strip, index, known, here)
+    shape, follow = _subject(scene, effect, strip, index, known, here)
     tracked, stops = {start: here}, []
     reach = (
         max((a for a in anchors if frames[0] <= a < start), default=frames[0]),
@@ -151,8 +121,8 @@ def track(
         try:
             clip = effect_source.clip_of(shown, source)
             footage = Footage(source, lambda frame: clip.shown(frame).source_frame)
-            follow = partial(subject.follow, footage, start, frames, motion=motion.lower(), anchors=anchors)
-            for step in _followed(follow, patience):
+            found = partial(follow, footage, start, frames, motion=motion.lower(), anchors=anchors)
+            for step in _followed(found, patience):
                 if step is None:
                     yield None
                 elif step.fault:
@@ -170,8 +140,9 @@ def track(
         finally:
             if len(tracked) > 1 and (effect := target.effect()) is not None:
                 keys = MotionKeys(effect, index, motion)
-                ends = {frame for run in motion_keys.runs(tracked) for frame in run}
-                kept = tracked if all_keys else _thinned(effect, subject, tracked, {start, *anchors, *ends})
+                ends = {frame for run in frame_ranges.runs(tracked) for frame in run}
+                placements = {frame: each.placement for frame, each in tracked.items()}
+                kept = tracked if all_keys else keys.needed(shape, start, placements, {start, *anchors, *ends})
                 _write(keys, [tracked[frame] for frame in kept], tracked.values())
                 _mark(effect, index, tracked, stops, reach)
                 key_ends(effect, index)
@@ -259,28 +230,27 @@ def lost(effect: PropertyGroup, index: int | None) -> tuple[int, str] | None:
     return frame, words.format(frame=frame)
 
 
-def _region(
-    scene: Scene, effect: PropertyGroup, strip: Strip, index: int, frames: Sequence[int], here: Tracked
-) -> _Subject:
+def _subject(
+    scene: Scene, effect: PropertyGroup, strip: Strip, index: int | None, frames: Sequence[int], here: Tracked
+) -> tuple[Region | Camera, Callable]:
+    """A region or the camera as plain data, and what follows it: a function as tracking.follow behind its region."""
+    if index is None:
+        camera = _standing(snapshot.camera_at(scene, effect, frames), here)
+        drawn = [i for i, region in enumerate(effect.regions) if region.kind not in strips.MATTES]
+        left_out = [snapshot.region_at(scene, effect, strip, i, frames) for i in drawn]
+        return camera, partial(camera_tracking.follow_camera, camera, left_out)
     shape = _standing(snapshot.region_at(scene, effect, strip, index, frames), here)
-    follow: Callable = partial(tracking.follow, shape)
     if strips.is_carried(effect.regions[index]):
         carried = snapshot.carried_outline(scene, effect, strip, index, frames)
-        follow = partial(matte_tracking.follow_carried, shape, *carried)
-    elif effect.regions[index].kind == "OUTLINE":
-        follow = partial(
-            matte_tracking.follow_cover, shape, lambda frame, size: outlines.coverage(shape.drawings.at(frame), *size)
-        )
-    return _Subject(follow, lambda: motions.offsets(shape.drawings.at(here.frame)))
+        return shape, partial(matte_tracking.follow_carried, shape, *carried)
+    if effect.regions[index].kind == "OUTLINE":
+        cover = partial(_enclosed, shape)
+        return shape, partial(matte_tracking.follow_cover, shape, cover)
+    return shape, partial(tracking.follow, shape)
 
 
-def _camera(scene: Scene, effect: PropertyGroup, strip: Strip, frames: Sequence[int], here: Tracked) -> _Subject:
-    """The camera, and all regions, which are left out."""
-    camera = _standing(snapshot.camera_at(scene, effect, frames), here)
-    drawn = [i for i, region in enumerate(effect.regions) if region.kind not in strips.MATTES]
-    regions = [snapshot.region_at(scene, effect, strip, i, frames) for i in drawn]
-    follow = partial(camera_tracking.follow_camera, camera, regions)
-    return _Subject(follow, lambda: region_keys.CORNERS, region_keys.STEADY)
+def _enclosed(region: Region, frame: int, size: tuple[int, int]) -> np.ndarray:
+    return outlines.coverage(region.drawings.at(frame), *size)
 
 
 def _standing(moving: Any, here: Tracked) -> Any:
@@ -306,11 +276,6 @@ def _followed(follow: Callable, patience: float | None) -> Iterator[Tracked | No
 
 def _each(follow: Callable[[], Iterator[Tracked]]) -> Iterator[Tracked]:
     yield from follow()
-
-
-def _thinned(effect: PropertyGroup, subject: _Subject, tracked: dict[int, Tracked], kept: set[int]) -> list[int]:
-    placements, size = {frame: each.placement for frame, each in tracked.items()}, annotations.picture_size(effect)
-    return motions.thinned(placements, subject.points(), size, kept, subject.tolerance)
 
 
 def _write(keys: MotionKeys, kept: Iterable[Tracked], tracked: Iterable[Tracked]) -> None:

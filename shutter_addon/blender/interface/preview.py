@@ -24,7 +24,7 @@ from ..data import annotations, main_thread, preview_areas, selection, strips
 from ..data.preview_areas import Shown
 from ..data.snapshot import Snapshot
 from ..devices import blender_gpu
-from ..editing import outline_drawings, shown_annotations
+from ..editing import shown_annotations
 from ..rendering import (
     effect_source,
     inbetween_build,
@@ -296,7 +296,6 @@ def _tell_carrying(say: "_Notes") -> None:
 
 def show_carried() -> None:
     """Previews are made anew, with what was carried."""
-    outline_drawings.carried()
     sessions.WINDOW.keep(set())
     for scene in strips.local_scenes():
         if scene.virtual_shutter.effects:

@@ -11,7 +11,6 @@ from bpy.types import Context, Operator, PropertyGroup, Scene, Strip
 from ...core.model.choices import CONTEXT
 from ..data import selection, validation
 from ..editing import bar_edits, follow_track, layer_presets, track_region
-from ..editing import follow_stabilization as stabilization
 from ..rendering.effect_source import FAULTS
 from . import needs
 from .operator_bases import Beside, OfEffect, operator, redraw, report_warning, show_status
@@ -257,7 +256,7 @@ def _why_no_camera_clip(effect: PropertyGroup) -> str | None:
 @operator("Follow Stabilization", _why_no_camera_clip)
 def follow_stabilization(self: Operator, _context: Context, effect: PropertyGroup) -> None:
     """Key the camera by the 2D stabilization of a movie clip, from where the camera is at this frame"""
-    stabilization.follow(self.edit, effect, self.effect_strip)
+    follow_track.follow_stabilization(self.edit, effect, self.effect_strip)
 
 
 @operator("Sharp Subject", needs.a_region)
