@@ -15,7 +15,7 @@ import numpy as np
 from bpy.app.translations import pgettext_iface as iface_
 from bpy.app.translations import pgettext_n as n_
 from bpy.app.translations import pgettext_rpt as rpt_
-from bpy.types import FCurve, Property, PropertyGroup
+from bpy.types import Property, PropertyGroup
 
 from ...core.messages import EffectError
 from ...core.model.effect import MatteRegion, Region
@@ -55,13 +55,6 @@ def number(group: PropertyGroup, name: str, value: float | None = None) -> Any:
     raise EffectError(
         sentence.format(place=place(group), property=_called(prop), value=f"{show(value):.7g}", low=low, high=high)
     )
-
-
-def curved(group: PropertyGroup, name: str, curve: FCurve, frame: float) -> float:
-    """A number that an F-curve gives, in the property's range, where Blender keeps it. EffectError: it is none."""
-    prop = group.bl_rna.properties[name]
-    # In this order "not a number" stays what it is.
-    return number(group, name, min(max(curve.evaluate(frame), prop.hard_min), prop.hard_max))
 
 
 def check(items: Sequence[PropertyGroup], name: str, numbers: np.ndarray) -> None:
