@@ -88,11 +88,6 @@ def unread(snapshot: Snapshot, request: Request) -> Iterator[str]:
             " blend mode of the Shutter strip to Replace"
         )
         yield sentence.format(space=snapshot.blended)
-    if any(getattr(content, "is_current", False) for content in contents):
-        yield rpt_(
-            "The shape keys of masks cannot be read in this version of Blender: mattes may have them as at another"
-            " frame"
-        )
 
 
 def _slow(renderer: Renderer, request: Request) -> list[str]:
