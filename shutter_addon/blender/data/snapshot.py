@@ -180,10 +180,8 @@ def strokes_at(scene: Scene, effect: PropertyGroup, strip: Strip, index: int, fr
 def region_at(scene: Scene, effect: PropertyGroup, strip: Strip, index: int, frames: Frames) -> Any:
     """A region as plain data, by its kind a Region or a MatteRegion, its channels sampled at timeline frames; an
     outline is the Region that its curves would be as a lasso. What is wrong at one frame is told at that frame."""
-    if effect.regions[index].kind == "OUTLINE":
-        path = f"{effect.path_from_id()}.regions[{index}]"
-        return _region(_Sampling.of(Curves(scene), effect, strip, frames), path, effect.regions[index], 0)
-    return _any_region(_Sampling.of(Curves(scene), effect, strip, frames), index, 0)
+    read_region = _region if effect.regions[index].kind == "OUTLINE" else _any_region
+    return read_region(_Sampling.of(Curves(scene), effect, strip, frames), index, 0)
 
 
 def matte_content_at(
@@ -203,7 +201,7 @@ def carried_outline(
     if validation.word(region, "between") == "STRAIGHT":
         raise EffectError(rpt_("{place}: a linear outline is not tracked").format(place=validation.place(region)))
     sampling = _Sampling.of(Curves(scene), effect, strip, frames)
-    return _carried(sampling, _drawings(sampling, index)), _source_frames(sampling)
+    return _carried(sampling, _drawings(sampling, index)), source_frames(scene, effect, strip, frames)
 
 
 def drawn_outline(scene: Scene, effect: PropertyGroup, strip: Strip, index: int) -> dict[int, outlines.Curves]:
@@ -216,7 +214,9 @@ def drawn_outline(scene: Scene, effect: PropertyGroup, strip: Strip, index: int)
 def source_frames(scene: Scene, effect: PropertyGroup, strip: Strip, frames: Frames) -> dict[float, int]:
     """Which of the source's filmed frames an effect strip shows, by timeline frame. EffectError, MediaError: nobody
     knows."""
-    return _source_frames(_Sampling.of(Curves(scene), effect, strip, frames))
+    time = _Sampling.of(Curves(scene), effect, strip, frames).time
+    shown = matte_content.shown_frame(scene, effect, strip, time)
+    return {frame: int(shown(frame)) for frame in frames}
 
 
 def last_shown(scene: Scene, effect: PropertyGroup, strip: Strip) -> float:
@@ -366,7 +366,7 @@ def _any_region(sampling: _Sampling, index: int, shutter: int) -> model.Region |
     effect, curves, frames = sampling.effect, sampling.curves, sampling.frames
     region, path = effect.regions[index], f"{effect.path_from_id()}.regions[{index}]"
     if region.kind not in strips.LAID:
-        return _region(sampling, path, region, shutter)
+        return _region(sampling, index, shutter)
     moves = sampled.moves(curves, region, path, frames)
     kind: type[model.MatteRegion] = model.MatteRegion
     drawn: dict = {}
@@ -407,23 +407,18 @@ def _by_source_frame(sampling: _Sampling, drawings: model.Drawings) -> dict[int,
     return {int(shown(frame)): outlines.curves(placed.drawing(i, frame)) for i, frame in enumerate(numbers)}
 
 
-def _source_frames(sampling: _Sampling) -> dict[float, int]:
-    """See source_frames."""
-    shown = matte_content.shown_frame(sampling.effect.id_data, sampling.effect, sampling.strip, sampling.time)
-    return {frame: int(shown(frame)) for frame in sampling.frames}
-
-
 def _drawings(sampling: _Sampling, index: int) -> model.Drawings:
     effect, path = sampling.effect, f"{sampling.effect.path_from_id()}.regions[{index}]"
     return sampled.drawings(sampling.curves, path, effect, effect.regions[index], sampling.placement, None)
 
 
-def _region(sampling: _Sampling, path: str, region: PropertyGroup, shutter: int) -> model.Region:
-    curves, frames = sampling.curves, sampling.frames
+def _region(sampling: _Sampling, index: int, shutter: int) -> model.Region:
+    effect, curves, frames = sampling.effect, sampling.curves, sampling.frames
+    region, path = effect.regions[index], f"{effect.path_from_id()}.regions[{index}]"
     return model.Region(
         shutter=shutter,
         kind=keyframes.Constant(sampled.tried(_word_of_kind, region)),
-        drawings=sampled.drawings(curves, path, sampling.effect, region, sampling.placement, frames),
+        drawings=sampled.drawings(curves, path, effect, region, sampling.placement, frames),
         moves=sampled.moves(curves, region, path, frames),
         **sampled.sampled_fields(curves, region, path, model.Region, frames),
     )

@@ -59,9 +59,8 @@ def number(group: PropertyGroup, name: str, value: float | None = None) -> Any:
 
 def check(items: Sequence[PropertyGroup], name: str, numbers: np.ndarray) -> None:
     """EffectError: one of the numbers (n,) of as many items of a collection is outside of the property's range."""
-    prop = items[0].bl_rna.properties[name]
-    for i in np.flatnonzero(~((numbers >= prop.hard_min) & (numbers <= prop.hard_max))):
-        number(items[int(i)], name, float(numbers[i]))
+    for item, value in zip(items, numbers.tolist(), strict=True):
+        number(item, name, value)
 
 
 def check_region(region: PropertyGroup) -> None:
