@@ -677,7 +677,7 @@ def test_a_changed_mask_drops_finished_frames(bpy, edit, matte, triangle):
     layer = triangle.layers[0]
     point = layer.splines[0].points[0]
     clip = bpy.data.movieclips.load(str(matte))
-    track = clip.tracking.tracks.new(name="T", frame=1)
+    clip.tracking.tracks.new(name="T", frame=1)
 
     def parented():
         parent = point.parent
@@ -686,9 +686,6 @@ def test_a_changed_mask_drops_finished_frames(bpy, edit, matte, triangle):
     def keyed():
         layer.keyframe_insert("alpha", frame=1)
 
-    def tracked():
-        track.markers.insert_frame(9).co = 0.5, 0.6
-
     changes = {
         "point": lambda: setattr(point, "co", (0.1, 0.3)),
         "feather": lambda: setattr(point, "weight", 0.1),
@@ -696,7 +693,6 @@ def test_a_changed_mask_drops_finished_frames(bpy, edit, matte, triangle):
         "layer": lambda: setattr(layer, "invert", True),
         "opacity": keyed,
         "parent": parented,
-        "marker": tracked,
         "removed": lambda: bpy.data.masks.remove(triangle),
     }
     invalidation.invalidate_changed(edit)

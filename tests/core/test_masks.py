@@ -308,12 +308,3 @@ def test_aligned_handles_are_in_line_and_keep_their_lengths(selected):
     assert np.linalg.norm(left, axis=1) == pytest.approx(np.linalg.norm(points[:, 0] - points[:, 1], axis=1))
     kept = 0 if selected else 2
     assert np.array_equal(made[:, kept], points[:, kept])
-
-
-def test_a_homography_moves_a_plane_as_a_camera_sees_it():
-    camera = np.array([(1.1, 0.2, 0.05), (-0.1, 0.9, 0.1), (0.2, -0.15, 1)])
-    corners = np.array([(0.1, 0.1), (0.9, 0.2), (0.8, 0.9), (0.2, 0.7)])
-    seen = mask_handles.homography(corners, mask_handles.moved(corners, camera))
-    points = np.random.default_rng(3).random((4, 3, 2))
-    assert mask_handles.moved(points, seen) == pytest.approx(mask_handles.moved(points, camera))
-    assert np.array_equal(mask_handles.homography(np.zeros((4, 2)), corners), np.eye(3))

@@ -12,6 +12,7 @@ from bpy.types import Annotation, AnnotationFrame, PropertyGroup, Scene, Strip
 
 from ...core.messages import EffectError
 from . import geometry
+from .fcurves import numbers
 
 # Pixels of a strip's side on the image, below which nobody sees where its scribbles are.
 _SMALLEST = 4
@@ -36,11 +37,7 @@ def image_to_picture(strip: Strip, size: tuple[int, int], **moved: float) -> np.
 
 def strokes_of(drawing: AnnotationFrame) -> list[np.ndarray]:
     """The strokes (n, 2) float64 of an annotation's frame, in the sequencer's image space; empty ones left out."""
-    strokes = []
-    for stroke in drawing.strokes:
-        flat = np.empty(len(stroke.points) * 3, dtype=np.float32)
-        stroke.points.foreach_get("co", flat)
-        strokes.append(flat.reshape(-1, 3)[:, :2].astype(np.float64))
+    strokes = [numbers(stroke.points, "co", size=3)[:, :2].astype(np.float64) for stroke in drawing.strokes]
     return [points for points in strokes if len(points)]
 
 

@@ -12,6 +12,7 @@ from ...core.messages import EffectError
 from ...core.model import limits, presets, shutters
 from . import fcurves, inbetween_settings, strips, validation
 from .annotations import layer_of
+from .fcurves import numbers
 from .selection import active_region, active_shutter
 
 
@@ -82,9 +83,7 @@ def forget_followed(effect: PropertyGroup, name: str) -> None:
 
 def bars(shutter: PropertyGroup) -> np.ndarray:
     """A shutter's bars as they stand, float64 (L,)."""
-    weights = np.empty(len(shutter.bars), dtype=np.float32)
-    shutter.bars.foreach_get("weight", weights)
-    return weights.astype(np.float64)
+    return numbers(shutter.bars, "weight").astype(np.float64)
 
 
 def fit_bars(effect: PropertyGroup) -> None:
@@ -155,7 +154,7 @@ def _change_bars(effect: PropertyGroup, index: int, change: Callable[[np.ndarray
     """Gives a shutter other bars, and as many, at all its keys: those that `change` makes of the old ones."""
     shutter = effect.shutters[index]
     scene, path = effect.id_data, f"{effect.path_from_id()}.shutters[{index}].bars"
-    curves = fcurves.Curves(scene, as_stored=True)
+    curves = fcurves.Curves(scene)
     old = bars(shutter)
     keyed = {k: curve for k in range(len(old)) if (curve := curves.find(f"{path}[{k}].weight"))}
     words = curves.keys(list(keyed.values()))
@@ -166,7 +165,7 @@ def _change_bars(effect: PropertyGroup, index: int, change: Callable[[np.ndarray
         shutter.bars.add().weight = weight
         if keys:
             new = [(frame, bar[k], ease) for frame, bar, ease in keys]
-            fcurves.set_keys(scene, f"{path}[{k}].weight", 0, new, as_stored=True)
+            fcurves.set_keys(scene, f"{path}[{k}].weight", 0, new)
 
 
 def _bars_keyed(old: np.ndarray, keyed: dict[int, FCurve], frame: float) -> np.ndarray:

@@ -1,47 +1,48 @@
-"""The version of an effect: a key that is the same as long as its pictures are, wherever its strips lie on the timeline
-and its files in the file system. What is baked has the key of what it was made of."""
+"""What an effect's pictures depend on: one list for previews, which drop finished frames where it changes, and for
+bakes, whose version is a key of it that is the same wherever the strips lie on the timeline and their files on disk."""
 
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Mapping, Sequence
-from dataclasses import fields, is_dataclass
-from numbers import Number
-from pathlib import Path
-from typing import Any
+from collections.abc import Callable, Hashable, Iterable, Iterator
+from dataclasses import replace
 
 import numpy as np
-from bpy.types import FCurve, PropertyGroup, Scene, Strip, bpy_struct
+from bpy.types import FCurve, Mask, PropertyGroup, Scene, Strip, bpy_struct
 
-from ...core.messages import UserError
+from ...core import revision
+from ...core.frames.retiming import StripTiming
+from ...core.messages import EffectError, UserError
+from ...core.model import effect as model
+from ...core.model.fields import fields_of
+from ...core.model.frame_state import Options
 from ...media import MediaError
-from ...media.sequence import sequence_files
-from . import colour_configuration, fcurves, geometry, snapshot, strips, versions
+from . import (
+    colour_configuration,
+    external_files,
+    fcurves,
+    geometry,
+    mask_reading,
+    matte_content,
+    matte_strips,
+    snapshot,
+    source_media,
+    strip_timing,
+    strips,
+    versions,
+)
+from .annotations import layer_of, picture_size
+from .fcurves import numbers
 
-# Fields that hold timeline frames: they count from the effect strip's origin. In mappings the keys are frames, in
-# sequences of pairs the first of each.
-_FRAMES = {
-    "Samples": {"values", "keys"},
-    "Keys": {"frames"},
-    "Bars": {"keys"},
-    "Drawings": {"frames"},
-    "FileFrames": {"first"},
-    "StripTiming": {"content_start", "content_end"},
-}
-# Fields that say nothing of the pictures: names, where a strip was cut, when a file was written.
-_LEFT_OUT = {
-    "StripTiming": {"name", "left_handle", "is_known"},
-    "SourceSpec": {"key"},
-    "MatteFile": {"stamp"},
-    "CarriedFile": {"folder"},
-    "Options": {"slid"},
-    "Shutter": {"name", "color"},
-    "Region": {"name"},
-    "MatteRegion": {"name"},
-    "OutlineRegion": {"name"},
-    "Drawings": {"name"},
-}
-_POINTS = ("co", "handle_left", "handle_right")
+# What stands for the files of a strip, or of a region whose matte is an image.
+Files = Callable[[Strip | PropertyGroup], Hashable]
+
+_Curve = tuple[str, int, FCurve]  # with its path and index
+
+_masks = revision.UntilChange()  # by mask: what it shows at its start
+_MOVES = "location", "rotation", "scale"
+# Keyframe.interpolation as a number: constant, linear, bezier, then the others.
+_BEZIER = 2
 
 
 def frames_of(strip: Strip) -> range:
@@ -53,14 +54,18 @@ def frames_of(strip: Strip) -> range:
 def key(scene: Scene, effect: PropertyGroup, strip: Strip, frames: range) -> str:
     """16 hexadecimal digits; frames: as frames_of. EffectError, MediaError: the effect cannot be shown."""
     start = round(strips.origin(strip))
-    taken = snapshot.take(scene, effect, strip, [start + frame for frame in frames])
-    rate = None if taken.timing else scene.render.fps / scene.render.fps_base  # a timing has it
-    parts: list[object] = [versions.extension(), colour_configuration.name(), taken.effect, taken.timing, taken.source]
-    parts += [rate, frames.start, frames.stop, _curves(scene, f"{effect.path_from_id()}.", start)]
-    if placed := _curves(scene, f"{strip.path_from_id()}.transform.", start):
-        keyed = {path for path, *_ in placed}
-        parts += [placed, [getattr(strip.transform, name) for name in geometry.TRANSFORM if name not in keyed]]
-    return hashlib.sha256(repr(_told(parts, start)).encode()).hexdigest()[:16]
+    snapshot.check_counts(effect)
+    source = strips.source_of(scene, effect, strip)
+    rate = scene.render.fps / scene.render.fps_base
+    digest = hashlib.sha256()
+    for part in (
+        (versions.extension(), colour_configuration.name(), rate, frames, picture_size(effect)),
+        (None if effect.use_source_time else timing(source, start), _contents(source)),
+        *_settings(effect),
+        *parts(scene, effect, strip, _contents, start),
+    ):
+        digest.update(repr(part).encode() + b"\0")
+    return digest.hexdigest()[:16]
 
 
 def is_changed(scene: Scene, effect: PropertyGroup, strip: Strip) -> bool:
@@ -74,23 +79,88 @@ def is_changed(scene: Scene, effect: PropertyGroup, strip: Strip) -> bool:
         return True
 
 
-def _curves(scene: Scene, path: str, start: int) -> list[tuple]:
-    """The F-curves below a path, as plain data."""
-    found = fcurves.curves_under(scene, path)
-    return sorted(((curve.data_path.removeprefix(path), *_curve(curve, start)) for curve in found), key=lambda c: c[:2])
+def parts(
+    scene: Scene, effect: PropertyGroup, strip: Strip, files: Files, start: int | None = None
+) -> Iterator[Hashable]:
+    """All that an effect's pictures depend on, but for its source and for properties with an update callback.
+
+    The values of keyed properties do not count: they change with every frame that plays. start: the timeline frame that
+    frames count from, so that the parts are the same wherever the strips lie; None: that counts as well"""
+    names = [shutter.name for shutter in effect.shutters]
+    yield tuple(len(shutter.bars) for shutter in effect.shutters)
+    for region in effect.regions:
+        yield names.index(region.shutter) if region.shutter in names else None
+        yield from _strokes(effect, region, start)
+        if region.kind == "MATTE":
+            yield from _matte(region, files, start)
+    yield fcurves.stretched(scene)
+    found = [(curve.data_path, curve.array_index, curve) for curve in fcurves.curves_under(scene, "")]
+    yield from _curves(_below(effect.path_from_id() + ".", found), start)
+    placed = _below(f"{strip.path_from_id()}.transform.", found)
+    yield from _curves(placed, start)
+    keyed = {name for name, _index, _curve in placed}
+    # As words: "not a number" is never the same again.
+    yield repr([getattr(strip.transform, name) for name in geometry.TRANSFORM if name not in keyed])
+    yield repr(tuple(strip.transform.origin)), strip.use_flip_x, strip.use_flip_y  # scribbles lie mirrored with it
 
 
-def _curve(curve: FCurve, start: int) -> tuple:
-    """An F-curve, its frames from `start` on; these are rounded, as floats of other frames are others."""
-    points = np.empty((len(_POINTS), len(curve.keyframe_points), 2), np.float32)
-    for name, values in zip(_POINTS, points, strict=True):
-        flat = np.empty(values.size, np.float32)
-        curve.keyframe_points.foreach_get(name, flat)
-        values[:] = flat.reshape(values.shape)
-    points[..., 0] = np.round(points[..., 0] - start, 2) + 0.0
-    kinds = tuple((p.interpolation, p.easing, p.amplitude, p.back, p.period) for p in curve.keyframe_points)
-    changes = tuple((each.type, each.mute, repr(_plain(each))) for each in curve.modifiers)
-    return curve.array_index, curve.mute, curve.extrapolation, points, kinds, changes
+def _settings(effect: PropertyGroup) -> Iterator[Hashable]:
+    """The properties of an effect that are not keyed, but for names and colors."""
+    path, followed = effect.path_from_id(), [region.name for region in effect.regions]
+    keyed = {curve.data_path for curve in fcurves.curves_under(effect.id_data, path + ".")}
+
+    def values(group: PropertyGroup, place: str, *names: str) -> Iterator[Hashable]:
+        for name in names:
+            if f"{path}{place}.{name}" not in keyed:
+                value = getattr(group, name)
+                yield name, value if isinstance(value, str | float | int) else tuple(value)
+
+    yield from values(effect, "", *_told(model.Effect, Options), "use_source_time", "source_time")
+    yield from values(effect.camera, ".camera", *_told(model.Camera), *_MOVES)
+    for i, shutter in enumerate(effect.shutters):
+        yield from values(shutter, f".shutters[{i}]", *_told(model.Shutter), "follow")
+        is_followed = shutter.follow == "REGION" and shutter.follow_region in followed
+        yield followed.index(shutter.follow_region) if is_followed else None
+        for k, bar in enumerate(shutter.bars):
+            yield from values(bar, f".shutters[{i}].bars[{k}]", "weight")
+    told = _told(model.Region, model.OutlineRegion, model.FileContent, model.RampContent)
+    for i, region in enumerate(effect.regions):
+        yield from values(region, f".regions[{i}]", *told, "kind", "matte", "channel_name", *_MOVES)
+        yield tuple((noted.frame, tuple(noted.location), noted.rotation, noted.scale) for noted in region.drawn)
+
+
+def _told(*kinds: type) -> list[str]:
+    """The properties that the fields of the model's classes define, but for names and colors."""
+    fields = fields_of(*kinds).values()
+    return [field.blender for field in fields if field.choices or not isinstance(field.default, str | tuple)]
+
+
+def _below(path: str, curves: Iterable[_Curve]) -> list[_Curve]:
+    """Those of F-curves whose path begins so, the rest of it, in an order that does not change."""
+    found = [(name.removeprefix(path), index, curve) for name, index, curve in curves if name.startswith(path)]
+    return sorted(found, key=lambda each: each[:2])
+
+
+def _curves(curves: Iterable[_Curve], start: int | None) -> Iterator[Hashable]:
+    for path, index, curve in curves:
+        yield path, index, curve.mute, curve.extrapolation
+        yield from _curve(curve, start)
+
+
+def _curve(curve: FCurve, start: int | None) -> Iterator[Hashable]:
+    points = curve.keyframe_points
+    for name in ("handle_left", "co", "handle_right"):
+        places = numbers(points, name, size=2)
+        if start is not None:  # floats of other frames are others
+            places[:, 0] = np.round(places[:, 0] - start, 2) + 0.0
+        yield places.tobytes()
+    interpolations = numbers(points, "interpolation", np.int32)
+    yield interpolations.tobytes()
+    if max(interpolations.tolist(), default=0) > _BEZIER:  # one of those that have parameters
+        yield numbers(points, "easing", np.int32).tobytes()
+        yield tuple(numbers(points, name).tobytes() for name in ("back", "amplitude", "period"))
+    for modifier in curve.modifiers:
+        yield repr(_plain(modifier))
 
 
 def _plain(modifier: bpy_struct) -> list:
@@ -100,76 +170,57 @@ def _plain(modifier: bpy_struct) -> list:
         value = getattr(modifier, prop.identifier)
         if prop.type == "COLLECTION":
             plain += [_plain(item) for item in value]
-        elif prop.type in ("INT", "FLOAT", "BOOLEAN", "ENUM"):
+        elif prop.type != "POINTER":
             plain.append((prop.identifier, tuple(value) if getattr(prop, "is_array", False) else value))
     return plain
 
 
-def _told(value: Any, start: float) -> object:
-    """Plain data, nested, whose `repr` is equal for equal values; start: the timeline frame that frames count from."""
-    if isinstance(value, np.ndarray):
-        return value.dtype.str, value.shape, value.tobytes()
-    if isinstance(value, Path):
-        return _told([value], start)
-    if is_dataclass(value):
-        return type(value).__name__, _fields(value, start)
-    if isinstance(value, UserError):
-        return "error", str(value)
-    if isinstance(value, Mapping):
-        return sorted((_told(pair, start) for pair in value.items()), key=repr)
-    if not isinstance(value, list | tuple | frozenset | set | range):
-        return value
-    paths = [each for each in value if isinstance(each, Path)]
-    if paths and len(paths) == len(value):
-        digests = zip(paths, versions.digests(paths), strict=True)
-        return [digest or f"missing: {path.name}" for path, digest in digests]
-    told = [_told(each, start) for each in value]
-    return sorted(told, key=repr) if isinstance(value, frozenset | set) else told
+def _strokes(effect: PropertyGroup, region: PropertyGroup, start: int | None) -> Iterator[Hashable]:
+    layer = layer_of(effect, region)
+    for drawing in layer.frames if layer else ():
+        yield drawing.frame_number - (start or 0)
+        for stroke in drawing.strokes:
+            yield numbers(stroke.points, "co", size=3).tobytes()
 
 
-def _fields(value: Any, start: float) -> object:
-    """What the fields of a dataclass say of the pictures."""
-    name = type(value).__name__
-    if name == "Samples" and all(map(_is_number, value.values.values())):
-        # Where they come from is known by their curve; of it Blender gives other floats at other frames.
-        first = next(iter(value.values.values()))
-        return _told(np.round(np.asarray(first, np.float64), 5) + 0.0, start)
-    told = []
-    for field in fields(value):
-        if field.name in _LEFT_OUT.get(name, ()):
-            continue
-        content = getattr(value, field.name)
-        if name == "SourceSpec" and field.name == "options":
-            content = {option: each for option, each in content.items() if option != "config"}
-        if name == "MatteFile" and field.name == "files":
-            content = _files(value.path, content)
-        if field.name in _FRAMES.get(name, ()):
-            content = _shifted(content, -start)
-        told.append((field.name, _told(content, start)))
-    return told
-
-
-def _is_number(value: object) -> bool:
-    """Whether it is a number, or several."""
-    if isinstance(value, tuple | list):
-        return all(map(_is_number, value))
-    return isinstance(value, Number | np.ndarray)
-
-
-def _shifted(value: Any, by: float) -> Any:
-    """Frames, moved: a number, numbers, pairs that begin with one, or a mapping from numbers."""
-    if isinstance(value, Mapping):
-        return {_shifted(frame, by): each for frame, each in value.items()}
-    if isinstance(value, list | tuple):
-        return tuple((each[0] + by, *each[1:]) if isinstance(each, tuple) else each + by for each in value)
-    return value if value is None else float(value + by)
-
-
-def _files(path: Path, files: Sequence | None) -> list[Path]:
-    """The files of a matte; files: as it names them."""
-    if files is not None:
-        return [path.parent / file for file in files]
+def _matte(region: PropertyGroup, files: Files, start: int | None) -> Iterator[Hashable]:
+    """What a matte shows, but for properties of the region."""
     try:
-        return sequence_files(path)
-    except MediaError:  # it is a movie, or whoever reads it is told
-        return [path]
+        if region.matte == "IMAGE":
+            yield files(region)
+        for part in matte_strips.strips_of(region) if region.matte == "STRIP" else ():
+            yield part.left_handle - (start or 0), part.right_handle - (start or 0)
+            yield timing(part, start or 0)
+            yield files(part)
+        if region.matte == "MASK" and region.mask is not None:
+            yield from _mask(region.mask)
+    except (MediaError, EffectError) as error:
+        yield str(error)
+
+
+def _mask(mask: Mask) -> Iterator[Hashable]:
+    # Blender tells of these; many points take long to read.
+    yield mask.frame_start, _masks.get(mask.session_uid, lambda: repr(mask_reading.mask_at(mask, mask.frame_start)))
+    yield from mask_reading.motion(mask)
+    yield from _curves([(c.data_path, c.array_index, c) for c in fcurves.curves_under(mask, "")], None)
+
+
+def timing(strip: Strip, start: int = 0) -> StripTiming:
+    """How a movie, image or clip strip lies on the timeline, whatever it is called and wherever it was cut."""
+    lies = strip_timing.timing_of(strip)
+    begins, ends = lies.content_start - start, lies.content_end - start
+    return replace(lies, name="", left_handle=0, content_start=begins, content_end=ends)
+
+
+def _contents(owner: Strip | PropertyGroup) -> Hashable:
+    """How the files of a strip, or of a region's matte, are read, and digests of what is in them. EffectError,
+    MediaError: it has none."""
+    if isinstance(owner, Strip):
+        spec = source_media.spec(owner)
+        read = repr(sorted(item for item in spec.options.items() if item[0] != "config"))
+        found = list(spec.files or [spec.path])
+    else:
+        matte_content.image_path(owner)
+        read, found = matte_content.channel(owner), external_files.every(owner.image)
+    digests = zip(found, versions.digests(found), strict=True)
+    return read, tuple(digest or f"missing: {path.name}" for path, digest in digests)

@@ -10,6 +10,7 @@ from typing import Any
 
 import bpy
 import numpy as np
+from bpy.types import bpy_prop_collection
 from bpy_extras import anim_utils
 
 from ...core.model.keyframes import Ease
@@ -50,12 +51,10 @@ class Timed:
 
 
 class Curves:
-    """The F-curves of a scene, found by path; each is looked through once.
+    """The F-curves of a scene, found by path; each is looked through once."""
 
-    as_stored: frames are those of the keys, not the timeline's"""
-
-    def __init__(self, scene, *, as_stored: bool = False):
-        self._scene, self._pace = scene, 1.0 if as_stored else stretched(scene)
+    def __init__(self, scene):
+        self._scene, self._pace = scene, stretched(scene)
         found = (c for c in curves_under(scene, "") if not (c.mute or c.is_empty))
         self._curves = {(c.data_path, c.array_index): c if self._pace == 1 else Timed(c, scene) for c in found}
         self._frames: dict = {}  # by curve: the frames (n,) of its keys
@@ -99,23 +98,29 @@ class Curves:
 
     def _component(self, owner, path: str, name: str, index: int, frame: float, value: float):
         curve = self.find(f"{path}.{name}", index)
-        if curve is None:
-            return validation.number(owner, name, value)
-        return validation.curved(owner, name, curve, frame)
+        if curve is not None:
+            prop = owner.bl_rna.properties[name]
+            # In this order "not a number" stays what it is.
+            value = min(max(curve.evaluate(frame), prop.hard_min), prop.hard_max)
+        return validation.number(owner, name, value)
+
+
+def numbers(items: bpy_prop_collection, name: str, kind: type = np.float32, size: int = 1) -> np.ndarray:
+    """A property of all items of a collection: (n,), or (n, size) of a vector; of an enum, its numbers."""
+    values: np.ndarray = np.empty(len(items) * size, kind)
+    items.foreach_get(name, values)
+    return values if size == 1 else values.reshape(-1, size)
 
 
 def points_of(curve) -> np.ndarray:
     """Frames and values (n, 2) of an F-curve's keys."""
-    points = np.empty(2 * len(curve.keyframe_points), np.float32)
-    curve.keyframe_points.foreach_get("co", points)
-    return points.reshape(-1, 2)
+    return numbers(curve.keyframe_points, "co", size=2)
 
 
 def _eases(curve) -> list[Ease]:
     """The recipe's words for the eases of an F-curve's keys: those that it does not know are "bezier"."""
-    numbers = np.empty(len(curve.keyframe_points), np.int32)
-    curve.keyframe_points.foreach_get("interpolation", numbers)
-    return [_EASES.get(number, "bezier") for number in numbers.tolist()]
+    eases = numbers(curve.keyframe_points, "interpolation", np.int32)
+    return [_EASES.get(number, "bezier") for number in eases.tolist()]
 
 
 def key_frames(curves) -> list[float]:
@@ -137,11 +142,9 @@ def progress(curve, first: float, last: float, frame: float) -> float:
     return min(max((curve.evaluate(frame) - first) / (last - first), 0.0), 1.0)
 
 
-def set_keys(
-    scene, path: str, index: int, keys: Sequence[tuple[float, float, Ease]], group: str = "", *, as_stored: bool = False
-) -> None:
-    """Replaces a property's F-curve by keys (frame, value, ease of the span that follows). as_stored: see Curves"""
-    pace = 1.0 if as_stored else stretched(scene)
+def set_keys(scene, path: str, index: int, keys: Sequence[tuple[float, float, Ease]], group: str = "") -> None:
+    """Replaces a property's F-curve by keys (frame, value, ease of the span that follows)."""
+    pace = stretched(scene)
     keys = [(frame * pace, value, ease) for frame, value, ease in keys]
     points = new_curve(scene, path, index, group).keyframe_points
     points.add(len(keys))
@@ -194,9 +197,7 @@ def move_curves(scene, path: str, frames: float) -> None:
     frames *= stretched(scene)
     for curve in curves_under(scene, path):
         for point in curve.keyframe_points:
-            point.co[0] += frames
-            point.handle_left[0] += frames
-            point.handle_right[0] += frames
+            point.co_ui[0] += frames  # and its handles
         curve.update()
 
 
@@ -228,8 +229,5 @@ def reindex(scene, path: str, places: dict[int, int | None]) -> None:
 
 def curves_under(scene, path: str) -> list:
     """The scene's F-curves whose path starts with `path`."""
-    animation = scene.animation_data
-    if not (animation and animation.action and animation.action_slot):
-        return []
-    bag = anim_utils.action_get_channelbag_for_slot(animation.action, animation.action_slot)
+    bag = anim_utils.animdata_get_channelbag_for_assigned_slot(scene.animation_data)
     return [curve for curve in bag.fcurves if curve.data_path.startswith(path)] if bag else []

@@ -12,7 +12,6 @@ import bpy
 from bpy.app.translations import pgettext_rpt as rpt_
 from bpy.types import PropertyGroup, Scene, Strip
 
-from ...core.masks.mask import MaskShape
 from ...core.messages import EffectError
 from ...core.model import keyframes, mattes, outlines
 from ...core.model.clip import Clip
@@ -25,7 +24,7 @@ from ...media.matte_files import MatteFile
 from ...media.sequence import sequence_files
 from . import inbetween_settings, mask_reading, matte_strips, source_media, strip_timing, strips, validation
 from .external_files import absolute
-from .sampled import Frames
+from .sampled import Frames, over
 
 
 def content(
@@ -106,13 +105,9 @@ def _mask_shapes(
     if mask is None:
         raise EffectError(rpt_("{place}: it has no mask").format(place=validation.place(region)))
     if not mask_reading.moves(mask):
-        return keyframes.Constant(_tried(mask_reading.mask_at, mask, mask.frame_start))
+        return over(None, lambda _frame: mask_reading.mask_at(mask, mask.frame_start))
     filmed = shown_frame(effect.id_data, effect, strip, time)
-
-    def shape(frame: float) -> MaskShape:
-        return mask_reading.mask_at(mask, mask.frame_start + filmed(frame))
-
-    return keyframes.Samples({frame: _tried(shape, frame) for frame in frames})
+    return over(frames, lambda frame: mask_reading.mask_at(mask, mask.frame_start + filmed(frame)))
 
 
 def shown_frame(scene: Scene, effect: PropertyGroup, strip: Strip, time: Channel | None) -> Callable[[float], float]:
@@ -132,14 +127,6 @@ def _movie(spec: source_media.SourceSpec) -> tuple[int, Fraction | None]:
     MediaError: it cannot be read."""
     with closing(spec.open()) as movie:
         return movie.count, movie.fps
-
-
-def _tried(function: Callable, *arguments) -> object:
-    """The result, or the EffectError in its place, which is raised where the value is asked for."""
-    try:
-        return function(*arguments)
-    except EffectError as error:
-        return error
 
 
 def _strip_frames(strip: Strip, region: PropertyGroup, frames: Frames) -> Channel:

@@ -30,7 +30,7 @@ def recipe_of(scene, effect, strip, contents: Sequence = ()) -> Effect:
         sentence = rpt_('strip "{strip}" is too small to find its scribbles')
         raise EffectError(sentence.format(strip=strip.name))
     with translated(rpt_):
-        plain = snapshot.read(scene, effect, strip, sorted({*shown, *_keyed(scene, effect)}), thorough=True)
+        plain = snapshot.read(scene, effect, strip, sorted({*shown, *_keyed(scene, effect)}))
         plain = replace(plain, inbetween_method=inbetween_settings.method(effect))
         return baking.baked(plain, shown, contents)
 

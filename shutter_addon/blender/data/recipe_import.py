@@ -15,7 +15,7 @@ from ...core.messages import EffectError
 from ...core.model import effect as model
 from ...core.model import keyframes, limits
 from ...core.model.choices import CHANNELS
-from ...core.model.fields import Field, fields_of
+from ...core.model.fields import fields_of
 from ...core.model.scribbles import mapped
 from ...media import MediaError
 from ...media.files import check_name
@@ -55,16 +55,12 @@ def apply(scene, effect, strip, source: model.Effect, folder: Path = Path()) -> 
 
 def _set_fields(scene, owner, path: str, part: Any, first: float, **curve) -> None:
     """What fields define of a part of an effect, and its keys."""
-    for name, each in _fields(part):
+    for name, each in fields_of(type(part)).items():
         value = getattr(part, name)
         if each.is_channel:
             _set_channel(scene, owner, path, each.blender, value, first, **curve)
         else:
             setattr(owner, each.blender, str(value).upper() if each.choices else value)
-
-
-def _fields(part: Any) -> Iterable[tuple[str, Field]]:
-    return fields_of(type(part)).items()
 
 
 def _set_channel(scene, owner, path: str, name: str, channel: keyframes.Channel, first: float, **curve) -> None:
@@ -133,7 +129,9 @@ def _check_keys(source: model.Effect, first: float) -> None:
 def _keyed(source: model.Effect) -> list[keyframes.Keys]:
     """All channels of an effect that have keys."""
     parts: tuple = source, source.camera, *source.shutters, *source.regions
-    channels = [getattr(part, name) for part in parts for name, each in _fields(part) if each.is_channel]
+    channels = [
+        getattr(part, name) for part in parts for name, each in fields_of(type(part)).items() if each.is_channel
+    ]
     channels += [part.moves.location for part in (source.camera, *source.regions)]
     channels += [shutter.bars.channel for shutter in source.shutters]
     channels += [source.time.numbers] if isinstance(source.time, keyframes.SourceTime) else []

@@ -15,7 +15,6 @@ from . import annotations, geometry, strips, validation
 from .fcurves import Curves
 
 Frames = Collection[float]  # of the timeline
-Keys = tuple[tuple[float, keyframes.Ease], ...]  # frames and eases of keys
 
 
 def tried(function: Callable, *arguments: object) -> Any:
@@ -38,9 +37,16 @@ def channel(
         keyed = curves.of(owner, path, name)
     except EffectError as error:
         return keyframes.Constant(error)
-    if not keyed:
+    return over(frames if keyed else None, at, curves.keys(keyed))
+
+
+def over(
+    frames: Frames | None, at: Callable[[float], object], keys: tuple[tuple[float, keyframes.Ease], ...] = ()
+) -> keyframes.Channel:
+    """What a function gives, sampled at frames; None: it gives the same at all of them."""
+    if frames is None:
         return keyframes.Constant(tried(at, 0.0))
-    return keyframes.Samples({frame: tried(at, frame) for frame in frames}, curves.keys(keyed))
+    return keyframes.Samples({frame: tried(at, frame) for frame in frames}, keys)
 
 
 def sampled_fields(
@@ -134,9 +140,7 @@ def placement(curves: Curves, effect: PropertyGroup, strip: Strip, frames: Frame
         moved = {name: curve.evaluate(frame) for name, curve in keyed.items() if not isinstance(curve, EffectError)}
         return annotations.image_to_picture(strip, size, **moved)
 
-    if not keyed:
-        return keyframes.Constant(tried(at, 0.0))
-    return keyframes.Samples({frame: tried(at, frame) for frame in frames})
+    return over(frames if keyed else None, at)
 
 
 class _Evaluated:
@@ -150,11 +154,9 @@ def source_time(curves: Curves, path: str, effect: PropertyGroup, frames: Frames
     def value(frame: float) -> float:
         return curves.value(effect, path, "source_time", frame)
 
-    keyed = tried(curves.of, effect, path, "source_time")
-    if isinstance(keyed, EffectError):
-        return keyframes.Constant(keyed)
+    try:
+        keyed = curves.of(effect, path, "source_time")
+    except EffectError as error:
+        return keyframes.Constant(error)
     keys = curves.keys(keyed)
-    time = keyframes.SourceTime(_Evaluated(value), keys)
-    if not keyed:
-        return keyframes.Constant(tried(time.at, 0.0))
-    return keyframes.Samples({frame: tried(time.at, frame) for frame in frames}, keys)
+    return over(frames if keyed else None, keyframes.SourceTime(_Evaluated(value), keys).at, keys)

@@ -7,10 +7,10 @@ Blender itself. Drivers, NLA strips and further layers of an action do not count
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from bpy.app.translations import pgettext_n as n_
@@ -25,8 +25,8 @@ from ...core.model.fields import fields_of
 from ...core.model.frame_state import Options
 from ...media.carried_mattes import CarriedFile
 from . import inbetween_settings, matte_content, sampled, source_media, strips, validation
-from .fcurves import Curves, Timed, leading, progress
-from .sampled import Frames, Keys
+from .fcurves import Curves, leading, progress
+from .sampled import Frames
 from .strip_timing import timing_of
 
 # Sentences of core/model/effect.py, which are looked up where they are passed on.
@@ -65,37 +65,22 @@ class Snapshot:
         return self.origin + scene_frame
 
 
-class SourceFiles(NamedTuple):
-    """What a source strip reads (source_media.media_key), and the stamp of the in-between frames made of it."""
-
-    key: tuple
-    built: tuple
-
-
-def source_files(effect: PropertyGroup, source: Strip, folder: Path | None = None) -> SourceFiles:
-    """Looks at the files of an effect's source strip. folder: where in-between frames lie, in place of the effect's
-    own. EffectError: they lie nowhere. MediaError: there are no files."""
+def source_files(effect: PropertyGroup, source: Strip, folder: Path | None = None) -> tuple[tuple, tuple]:
+    """What an effect's source strip reads (source_media.media_key), and the stamp of the in-between frames made of it.
+    folder: where these lie, in place of the effect's own. EffectError: they lie nowhere. MediaError: there are no
+    files."""
     key, built = source_media.media_key(source), ()
     if inbetween_settings.factor(effect) > 1:
         settings = inbetween_settings.settings(effect, folder)
         built = inbetween_settings.built.of(settings, source_media.stem(source))
-    return SourceFiles(key, built)
+    return key, built
 
 
-def take(
-    scene: Scene,
-    effect: PropertyGroup,
-    strip: Strip,
-    frames: Frames,
-    *,
-    folder: Path | None = None,
-    files: dict[str, SourceFiles] | None = None,
-) -> Snapshot:
-    """The snapshot of an effect strip at timeline frames; folder: see source_files; files: what that
-    returned, by source strip.
-    EffectError, MediaError: there is no source, or no picture at any frame."""
+def take(scene: Scene, effect: PropertyGroup, strip: Strip, frames: Frames, *, folder: Path | None = None) -> Snapshot:
+    """The snapshot of an effect strip at timeline frames; folder: see source_files. EffectError, MediaError: there is
+    no source, or no picture at any frame."""
     source = strips.source_of(scene, effect, strip)
-    stamps = (files or {}).get(source.name) or source_files(effect, source, folder)
+    key, built = source_files(effect, source, folder)
     return Snapshot(
         scene=effect.scene.session_uid,
         origin=strips.timeline_frame(strip, 0),
@@ -103,19 +88,17 @@ def take(
         film=(scene.frame_step, scene.frame_end),
         frames=frozenset(frames),
         effect=read(scene, effect, strip, frames),
-        source=source_media.spec(source, stamps.key),
+        source=source_media.spec(source, key),
         timing=None if effect.use_source_time else timing_of(source),
         inbetween=inbetween_settings.settings(effect, folder) if inbetween_settings.factor(effect) > 1 else None,
-        built=stamps.built,
+        built=built,
         blended="" if strip.blend_type == "REPLACE" or source.mute else scene.sequencer_colorspace_settings.name,
     )
 
 
-def read(scene: Scene, effect: PropertyGroup, strip: Strip, frames: Frames, *, thorough: bool = False) -> model.Effect:
+def read(scene: Scene, effect: PropertyGroup, strip: Strip, frames: Frames) -> model.Effect:
     """An effect, its channels sampled at timeline frames; strip: the effect strip that shows it. EffectError: it has no
-    shutter, or more of anything than an effect has. What is wrong at one frame is told at that frame.
-
-    thorough: bars are sampled both ways at every frame, displaced or not"""
+    shutter, or more of anything than an effect has. What is wrong at one frame is told at that frame."""
     check_counts(effect)
     curves, path = Curves(scene), effect.path_from_id()
     options = _options(curves, path, effect, frames)
@@ -134,10 +117,10 @@ def read(scene: Scene, effect: PropertyGroup, strip: Strip, frames: Frames, *, t
         if region.shutter in names
     )
     camera = _camera(curves, effect, around)
-    unused = ("inbetween_method",) if effect.inbetween == "1" and not thorough else ()
+    unused = ("inbetween_method",) if effect.inbetween == "1" else ()
     return model.Effect(
         shutters=tuple(
-            replace(_shutter(curves, effect, i, options, frames, thorough), follow=_followed(shutter, regions, camera))
+            replace(_shutter(curves, effect, i, options, frames), follow=_followed(shutter, regions, camera))
             for i, shutter in enumerate(effect.shutters)
         ),
         regions=regions,
@@ -181,7 +164,7 @@ def bars_at(scene: Scene, effect: PropertyGroup, index: int, frame: float) -> np
     not as many as the window is long, or one cannot be."""
     curves, frames = Curves(scene), (frame,)
     options = _options(curves, effect.path_from_id(), effect, frames)
-    shutter = _shutter(curves, effect, index, options, frames, thorough=False)
+    shutter = _shutter(curves, effect, index, options, frames)
     return shutter.bars.at(frame, options.at(frame).interpolation)
 
 
@@ -197,10 +180,8 @@ def strokes_at(scene: Scene, effect: PropertyGroup, strip: Strip, index: int, fr
 def region_at(scene: Scene, effect: PropertyGroup, strip: Strip, index: int, frames: Frames) -> Any:
     """A region as plain data, by its kind a Region or a MatteRegion, its channels sampled at timeline frames; an
     outline is the Region that its curves would be as a lasso. What is wrong at one frame is told at that frame."""
-    if effect.regions[index].kind == "OUTLINE":
-        path = f"{effect.path_from_id()}.regions[{index}]"
-        return _region(_Sampling.of(Curves(scene), effect, strip, frames), path, effect.regions[index], 0)
-    return _any_region(_Sampling.of(Curves(scene), effect, strip, frames), index, 0)
+    read_region = _region if effect.regions[index].kind == "OUTLINE" else _any_region
+    return read_region(_Sampling.of(Curves(scene), effect, strip, frames), index, 0)
 
 
 def matte_content_at(
@@ -220,7 +201,7 @@ def carried_outline(
     if validation.word(region, "between") == "STRAIGHT":
         raise EffectError(rpt_("{place}: a linear outline is not tracked").format(place=validation.place(region)))
     sampling = _Sampling.of(Curves(scene), effect, strip, frames)
-    return _carried(sampling, _drawings(sampling, index)), _source_frames(sampling)
+    return _carried(sampling, _drawings(sampling, index)), source_frames(scene, effect, strip, frames)
 
 
 def drawn_outline(scene: Scene, effect: PropertyGroup, strip: Strip, index: int) -> dict[int, outlines.Curves]:
@@ -233,7 +214,9 @@ def drawn_outline(scene: Scene, effect: PropertyGroup, strip: Strip, index: int)
 def source_frames(scene: Scene, effect: PropertyGroup, strip: Strip, frames: Frames) -> dict[float, int]:
     """Which of the source's filmed frames an effect strip shows, by timeline frame. EffectError, MediaError: nobody
     knows."""
-    return _source_frames(_Sampling.of(Curves(scene), effect, strip, frames))
+    time = _Sampling.of(Curves(scene), effect, strip, frames).time
+    shown = matte_content.shown_frame(scene, effect, strip, time)
+    return {frame: int(shown(frame)) for frame in frames}
 
 
 def last_shown(scene: Scene, effect: PropertyGroup, strip: Strip) -> float:
@@ -265,30 +248,26 @@ def check_counts(effect: PropertyGroup) -> None:
 
 
 def _options(curves: Curves, path: str, effect: PropertyGroup, frames: Frames) -> keyframes.Channel:
-    keyed = [name for name, field in fields_of(Options).items() if field.keyed]
-    option_curves = {name: sampled.tried(curves.find, f"{path}.{name}") for name in keyed}
-    if error := next((error for error in option_curves.values() if isinstance(error, EffectError)), None):
+    """EffectErrors in it: an option that no effect can have."""
+    fields = fields_of(Options).items()
+    try:
+        keyed = {name: curves.find(f"{path}.{name}") for name, field in fields if field.keyed}
+    except EffectError as error:
         return keyframes.Constant(error)
-    if not any(option_curves.values()):
-        return keyframes.Constant(sampled.tried(_options_at, effect, option_curves, 0.0))
-    return keyframes.Samples({frame: sampled.tried(_options_at, effect, option_curves, frame) for frame in frames})
 
+    def at(frame: float) -> Options:
+        numbers = {name: curve.evaluate(frame) for name, curve in keyed.items() if curve is not None}
+        return Options(**{name: sampled.value(effect, field, numbers.get(name)) for name, field in fields})
 
-def _options_at(effect: PropertyGroup, curves: dict[str, Timed | FCurve | None], frame: float) -> Options:
-    """The effect's options at a frame; curves: F-curves or None by name. EffectError: one that no effect can have."""
-    values = {}
-    for name, field in fields_of(Options).items():
-        curve = curves.get(name)
-        values[name] = sampled.value(effect, field, None if curve is None else curve.evaluate(frame))
-    return Options(**values)
+    return sampled.over(frames if any(keyed.values()) else None, at)
 
 
 def _shutter(
-    curves: Curves, effect: PropertyGroup, index: int, options: keyframes.Channel, frames: Frames, thorough: bool
+    curves: Curves, effect: PropertyGroup, index: int, options: keyframes.Channel, frames: Frames
 ) -> model.Shutter:
     """A shutter, but for what it follows."""
     path, shutter = f"{effect.path_from_id()}.shutters[{index}]", effect.shutters[index]
-    bars = sampled.tried(_bars, curves, path, shutter, options, frames, thorough)
+    bars = sampled.tried(_bars, curves, path, shutter, options, frames)
     if isinstance(bars, EffectError):
         bars = keyframes.Bars(keyframes.Constant(bars))
     unused = [] if shutter.use_threshold else ["threshold", "softness"]
@@ -298,56 +277,50 @@ def _shutter(
 
 
 def _bars(
-    curves: Curves, path: str, shutter: PropertyGroup, options: keyframes.Channel, frames: Frames, thorough: bool
+    curves: Curves, path: str, shutter: PropertyGroup, options: keyframes.Channel, frames: Frames
 ) -> keyframes.Bars:
     """EffectError: they are not as many as the window is long."""
-    stored = np.array([bar.weight for bar in shutter.bars])
+    stored = [bar.weight for bar in shutter.bars]
     keyed = {i: curve for i in range(len(stored)) if (curve := curves.find(f"{path}.bars[{i}].weight"))}
-    chosen = {frame: state for frame in frames if isinstance(state := sampled.tried(options.at, frame), Options)}
-    for window in {state.window for state in chosen.values()}:
+    chosen = (sampled.tried(options.at, frame) for frame in frames)
+    for window in {state.window for state in chosen if isinstance(state, Options)}:
         check_bar_count(shutter, window)
-
-    def at(frame: float) -> np.ndarray:
-        bars = stored.copy()
-        # No bar is below 0, a curve may be. In this order "not a number" stays what it is.
-        bars[list(keyed)] = [min(max(curve.evaluate(frame), 0.0), limits.MAX_BAR) for curve in keyed.values()]
-        validation.check(shutter.bars, "weight", bars)
-        return bars
-
-    ways: dict[float, str] = {frame: state.interpolation for frame, state in chosen.items()}
-    if thorough:  # whatever the options are there
-        ways = dict.fromkeys(frames, "displacement") | ways
     if not keyed:
-        return keyframes.Bars(keyframes.Constant(sampled.tried(at, 0.0) if len(stored) else stored))
+        return keyframes.Bars(keyframes.Constant(_bars_over(shutter, stored, keyed, [0.0])[0.0]))
     keys = curves.keys(list(keyed.values()))
+    ways = _ways(list(keyed.values()), [frame for frame, _ease in keys], frames) if keys else {}
+    needed = {*frames, *(end for ends, _share in ways.values() for end in ends)}
+    values = keyframes.Samples(_bars_over(shutter, stored, keyed, sorted(needed)))
     if not keys:  # curves of samples or of modifiers alone
-        return keyframes.Bars(keyframes.Samples({frame: sampled.tried(at, frame) for frame in frames}))
-    return _keyed_bars(keys, list(keyed.values()), at, ways, thorough)
+        return keyframes.Bars(values)
+    return keyframes.Bars(values, keys, keyframes.Samples({frame: share for frame, (_ends, share) in ways.items()}))
 
 
-def _keyed_bars(keys: Keys, curves: list, at: Callable, frames: dict[float, str], thorough: bool) -> keyframes.Bars:
-    """Bars sampled where they are needed: at keys; between them the way that the curve has gone which changes most, or
-    the bars, where they are not displaced. frames: by frame the interpolation."""
-    numbers, values, shares, leaders = [frame for frame, _ in keys], {}, {}, {}
+def _bars_over(
+    shutter: PropertyGroup, stored: list[float], keyed: dict[int, FCurve], frames: list[float]
+) -> dict[float, np.ndarray | UserError]:
+    """The bars (L,) at frames; keyed: F-curves by the bar's index."""
+    rows = np.tile(np.array(stored), (len(frames), 1))
+    for i, curve in keyed.items():
+        # No bar is below 0, a curve may be; "not a number" stays what it is.
+        rows[:, i] = np.clip([curve.evaluate(frame) for frame in frames], 0.0, limits.MAX_BAR)
+    usable = ((rows >= 0) & (rows <= limits.MAX_BAR)).all(axis=1)
+    return {
+        frame: row if good else sampled.tried(validation.check, shutter.bars, "weight", row)
+        for frame, row, good in zip(frames, rows, usable, strict=True)
+    }
 
-    def sample(frame: float) -> np.ndarray | UserError:
-        if frame not in values:
-            values[frame] = sampled.tried(at, frame)
-        return values[frame]
 
-    for frame, interpolation in frames.items():
-        before, after, _ = keyframes.span(numbers, frame)
-        ends = [sample(numbers[index]) for index in (before, after)]
-        if before == after:
-            continue
-        displaced = interpolation != "value" and all(isinstance(bars, np.ndarray) and bars.any() for bars in ends)
-        if thorough or not displaced:
-            sample(frame)
-        if thorough or displaced:
-            if before not in leaders:
-                leaders[before] = leading(curves, numbers[before], numbers[after])
-            shares[frame] = progress(*leaders[before], frame)
-    return keyframes.Bars(keyframes.Samples(values), keys, keyframes.Samples(shares))
+def _ways(curves: list, keys: list[float], frames: Frames) -> dict[float, tuple[tuple[float, float], float]]:
+    """Of frames, the keys before and after each, and how far the curve has gone between them that changes most."""
+    ways, leaders = {}, {}
+    for frame in frames:
+        before, after, _share = keyframes.span(keys, frame)
+        ends = keys[before], keys[after]
+        if ends not in leaders:
+            leaders[ends] = leading(curves, *ends)
+        ways[frame] = ends, progress(*leaders[ends], frame)
+    return ways
 
 
 def check_bar_count(shutter: PropertyGroup, window: int) -> None:
@@ -393,7 +366,7 @@ def _any_region(sampling: _Sampling, index: int, shutter: int) -> model.Region |
     effect, curves, frames = sampling.effect, sampling.curves, sampling.frames
     region, path = effect.regions[index], f"{effect.path_from_id()}.regions[{index}]"
     if region.kind not in strips.LAID:
-        return _region(sampling, path, region, shutter)
+        return _region(sampling, index, shutter)
     moves = sampled.moves(curves, region, path, frames)
     kind: type[model.MatteRegion] = model.MatteRegion
     drawn: dict = {}
@@ -434,23 +407,18 @@ def _by_source_frame(sampling: _Sampling, drawings: model.Drawings) -> dict[int,
     return {int(shown(frame)): outlines.curves(placed.drawing(i, frame)) for i, frame in enumerate(numbers)}
 
 
-def _source_frames(sampling: _Sampling) -> dict[float, int]:
-    """See source_frames."""
-    shown = matte_content.shown_frame(sampling.effect.id_data, sampling.effect, sampling.strip, sampling.time)
-    return {frame: int(shown(frame)) for frame in sampling.frames}
-
-
 def _drawings(sampling: _Sampling, index: int) -> model.Drawings:
     effect, path = sampling.effect, f"{sampling.effect.path_from_id()}.regions[{index}]"
     return sampled.drawings(sampling.curves, path, effect, effect.regions[index], sampling.placement, None)
 
 
-def _region(sampling: _Sampling, path: str, region: PropertyGroup, shutter: int) -> model.Region:
-    curves, frames = sampling.curves, sampling.frames
+def _region(sampling: _Sampling, index: int, shutter: int) -> model.Region:
+    effect, curves, frames = sampling.effect, sampling.curves, sampling.frames
+    region, path = effect.regions[index], f"{effect.path_from_id()}.regions[{index}]"
     return model.Region(
         shutter=shutter,
         kind=keyframes.Constant(sampled.tried(_word_of_kind, region)),
-        drawings=sampled.drawings(curves, path, sampling.effect, region, sampling.placement, frames),
+        drawings=sampled.drawings(curves, path, effect, region, sampling.placement, frames),
         moves=sampled.moves(curves, region, path, frames),
         **sampled.sampled_fields(curves, region, path, model.Region, frames),
     )

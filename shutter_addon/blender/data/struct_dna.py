@@ -19,8 +19,8 @@ import bpy
 import numpy as np
 
 _POINTER = 8  # bytes
-_NUMBERS = {"short": "i2", "int": "i4", "float": "f4", "double": "f8"}
-_FIELD = re.compile(r"(\w+) (\**)(\w+)((?:\[\d+\])*)")  # float *corners[4][2]
+_NUMBERS = {"int": "i4", "float": "f4", "double": "f8"}
+_FIELD = re.compile(r"(\w+) (\**)(\w+)(?:\[(\d+)\])?")  # char name[64]
 
 
 class LayoutError(Exception):
@@ -32,7 +32,7 @@ def record(name: str, *fields: str) -> np.dtype:
     """The type of a record of Blender's memory with some of its fields, under their names: numbers, addresses
     (uintp), text (bytes) and lists ("first" and "last"). LayoutError: it is another one in this Blender.
 
-    fields: as Blender declares them, `float corners[4][2]`"""
+    fields: as Blender declares them, `char name[64]`"""
     size, places = described().get(name, (0, {}))
     parts = [match for field in fields if (match := _FIELD.fullmatch(field)) and field in places]
     if len(parts) < len(fields):
@@ -62,13 +62,12 @@ def text(field: bytes) -> bytes:
     return field.partition(b"\0")[0]
 
 
-def _format(kind: str, stars: str, dimensions: str) -> object:
-    shape = tuple(map(int, re.findall(r"\d+", dimensions)))
+def _format(kind: str, stars: str, length: str) -> object:
     if stars:
-        return np.uintp, shape
-    if kind == "char":
-        return f"S{math.prod(shape)}"
-    return (record(kind, "void *first", "void *last") if kind == "ListBase" else _NUMBERS[kind]), shape
+        return np.uintp
+    if kind == "ListBase":
+        return record(kind, "void *first", "void *last")
+    return f"S{length}" if kind == "char" else _NUMBERS[kind]
 
 
 @cache

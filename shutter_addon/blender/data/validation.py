@@ -15,7 +15,7 @@ import numpy as np
 from bpy.app.translations import pgettext_iface as iface_
 from bpy.app.translations import pgettext_n as n_
 from bpy.app.translations import pgettext_rpt as rpt_
-from bpy.types import FCurve, Property, PropertyGroup
+from bpy.types import Property, PropertyGroup
 
 from ...core.messages import EffectError
 from ...core.model.effect import MatteRegion, Region
@@ -57,18 +57,10 @@ def number(group: PropertyGroup, name: str, value: float | None = None) -> Any:
     )
 
 
-def curved(group: PropertyGroup, name: str, curve: FCurve, frame: float) -> float:
-    """A number that an F-curve gives, in the property's range, where Blender keeps it. EffectError: it is none."""
-    prop = group.bl_rna.properties[name]
-    # In this order "not a number" stays what it is.
-    return number(group, name, min(max(curve.evaluate(frame), prop.hard_min), prop.hard_max))
-
-
 def check(items: Sequence[PropertyGroup], name: str, numbers: np.ndarray) -> None:
     """EffectError: one of the numbers (n,) of as many items of a collection is outside of the property's range."""
-    prop = items[0].bl_rna.properties[name]
-    for i in np.flatnonzero(~((numbers >= prop.hard_min) & (numbers <= prop.hard_max))):
-        number(items[int(i)], name, float(numbers[i]))
+    for item, value in zip(items, numbers.tolist(), strict=True):
+        number(item, name, value)
 
 
 def check_region(region: PropertyGroup) -> None:

@@ -71,8 +71,7 @@ def shortages(renderer: Renderer, snapshot: Snapshot, request: Request) -> list[
 
 
 def unread(snapshot: Snapshot, request: Request) -> Iterator[str]:
-    """Sentences about what cannot be had of Blender for a picture: how strips are retimed, the shapes of masks, and
-    colours."""
+    """Sentences about what cannot be had of Blender for a picture: how strips are retimed, and colours."""
     layers = request.state.layers.mattes if request.state.layers else ()
     contents = [matte.content for matte in chain(request.state.mattes, *layers) if matte is not None]
     for timing in (snapshot.timing, *(getattr(content, "timing", None) for content in contents)):
@@ -88,11 +87,6 @@ def unread(snapshot: Snapshot, request: Request) -> Iterator[str]:
             " blend mode of the Shutter strip to Replace"
         )
         yield sentence.format(space=snapshot.blended)
-    if any(getattr(content, "is_current", False) for content in contents):
-        yield rpt_(
-            "The shape keys of masks cannot be read in this version of Blender: mattes may have them as at another"
-            " frame"
-        )
 
 
 def _slow(renderer: Renderer, request: Request) -> list[str]:

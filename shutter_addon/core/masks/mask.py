@@ -37,15 +37,13 @@ _BLENDS: dict[str, Callable[[np.ndarray, np.ndarray], np.ndarray]] = {
 
 @dataclass(frozen=True)
 class MaskSpline:
-    """A spline whose parents and handles are evaluated; numbers in mask space, tuples so that it can be a key.
+    """A spline whose handles are evaluated; numbers in mask space, tuples so that it can be a key.
 
     points: of each its left handle, itself and its right handle ((x, y), (x, y), (x, y))
     weights: the width of the feather at each point
     feathers: for each point, the feather points ((u, factor), …) of the segment that follows it, u ascending; the
     factors multiply the points' weights
     collapse: whether loops of the feather's outline are taken out
-    longest: the length of its longest segment before its parents moved it, by which all are cut into straight ones; 0:
-    as it lies
     """
 
     points: tuple[tuple[tuple[float, float], ...], ...]
@@ -56,7 +54,6 @@ class MaskSpline:
     offset_mode: str = "EVEN"  # EVEN | SMOOTH
     weight_interpolation: str = "EASE"  # EASE | LINEAR
     collapse: bool = False
-    longest: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -75,12 +72,9 @@ class MaskLayer:
 
 @dataclass(frozen=True)
 class MaskShape:
-    """A mask as it stands at one frame: the layers that are rendered, from the lowest up.
-
-    is_current: whether it may be that of the frame at which Blender was when it was read, in place of the wanted one"""
+    """A mask as it stands at one frame: the layers that are rendered, from the lowest up."""
 
     layers: tuple[MaskLayer, ...]
-    is_current: bool = False
 
     def values(self, width: int, height: int) -> np.ndarray:
         """What it covers of a picture: (height, width) float32, 0 to 1, the top row first."""

@@ -1,4 +1,4 @@
-"""Handles of a mask's splines, as Blender makes them follow the points; and how a tracked plane moves points."""
+"""Handles of a mask's splines, as Blender makes them follow the points."""
 
 from __future__ import annotations
 
@@ -59,21 +59,3 @@ def _aligned(points: np.ndarray, types: np.ndarray, selected: np.ndarray) -> np.
 
 def _lengths(vectors: np.ndarray) -> np.ndarray:
     return np.linalg.norm(vectors, axis=1, keepdims=True)
-
-
-def homography(start: np.ndarray, end: np.ndarray) -> np.ndarray:
-    """The matrix (3, 3) that moves four points (4, 2) to four others; that of no motion where there is none."""
-    rows = []
-    for (x, y), (u, v) in zip(start, end, strict=True):
-        rows += [(x, y, 1, 0, 0, 0, -u * x, -u * y), (0, 0, 0, x, y, 1, -v * x, -v * y)]
-    try:
-        numbers = np.linalg.solve(np.array(rows), np.ravel(end))
-    except np.linalg.LinAlgError:
-        return np.eye(3)
-    return np.append(numbers, 1.0).reshape(3, 3)
-
-
-def moved(points: np.ndarray, matrix: np.ndarray) -> np.ndarray:
-    """Points (…, 2) moved by a matrix (3, 3)."""
-    homogeneous = np.concatenate([points, np.ones_like(points[..., :1])], axis=-1) @ matrix.T
-    return homogeneous[..., :2] / homogeneous[..., 2:]

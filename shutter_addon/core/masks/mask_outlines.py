@@ -47,7 +47,7 @@ def outlines(spline: MaskSpline, width: int, height: int) -> tuple[np.ndarray, n
     return edge, feather
 
 
-def longest_segment(points: np.ndarray, cyclic: bool) -> float:
+def _longest_segment(points: np.ndarray, cyclic: bool) -> float:
     """Of the segments of a spline (n, 3, 2), the length of the longest, along its handles."""
     following = np.roll(points, -1, axis=0)
     hull = np.stack([points[:, 1], points[:, 2], following[:, 0], following[:, 1]], axis=1)
@@ -57,7 +57,7 @@ def longest_segment(points: np.ndarray, cyclic: bool) -> float:
 
 def _steps(spline: MaskSpline, points: np.ndarray, weights: np.ndarray, larger: int) -> int:
     """Points that a segment is cut into: one in four pixels of the longest segment, more where its feather changes."""
-    longest = (spline.longest or longest_segment(points, spline.cyclic)) * larger
+    longest = _longest_segment(points, spline.cyclic) * larger
     steepest = 0.0
     for weight, feather in zip(weights, spline.feathers, strict=True):
         u, factor = np.array([(0.0, weight), *feather]).T

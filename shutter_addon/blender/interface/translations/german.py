@@ -163,15 +163,15 @@ MESSAGES = {
     ): "Maske „{mask}“: ein Punkt, eine weiche Kante oder eine Deckkraft ist keine brauchbare Zahl",
     (
         "*",
-        'mask "{mask}": the parents of its points cannot be read in this version of Blender, but a film of its Mask'
-        " strip can be the matte",
-    ): "Maske „{mask}“: die Eltern ihrer Punkte sind in dieser Version von Blender nicht lesbar, aber ein Film ihres"
-    " Maskenstreifens kann die Matte sein",
+        'mask "{mask}": parents of its points are not followed, but a film of its Mask strip can be the matte',
+    ): "Maske „{mask}“: den Eltern ihrer Punkte wird nicht gefolgt, aber ein Film ihres Maskenstreifens kann die Matte"
+    " sein",
     (
         "*",
-        "The shape keys of masks cannot be read in this version of Blender: mattes may have them as at another frame",
-    ): "Die Formschlüssel von Masken sind in dieser Version von Blender nicht lesbar: Matten haben sie womöglich"
-    " wie bei einem anderen Bild",
+        'mask "{mask}": its shape keys cannot be read in this version of Blender, but a film of its Mask strip can'
+        " be the matte",
+    ): "Maske „{mask}“: ihre Formschlüssel sind in dieser Version von Blender nicht lesbar, aber ein Film ihres"
+    " Maskenstreifens kann die Matte sein",
     (
         "*",
         'strip "{strip}": its retiming keys cannot be read in this version of Blender, so it is shown at an even speed;'
