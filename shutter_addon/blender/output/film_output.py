@@ -94,6 +94,18 @@ def check_folder(path: Path, file_format: str | None) -> None:
         raise OutputError(f"{path}: neither a folder nor one of {', '.join(MOVIES)}")
 
 
+def check_writable(folder: Path) -> None:
+    """OutputError: nothing can be written to a folder, or where it is to be made."""
+    place = next(path for path in (folder, *folder.parents) if path.exists())
+    if not place.is_dir():
+        raise OutputError(f"{place}: is a file, and no folder")
+    try:
+        with atomic_write.part_folder(place):  # what permissions and mounts promise is not always so
+            pass
+    except OSError as error:
+        raise OutputError(f"{place}: {error.strerror or error}") from None
+
+
 def spare(written: Iterable[Path], read: Collection[Path]) -> None:
     """OutputError: a file that would be written is one that is read, whatever link leads to it, or is written twice."""
     taken: dict[object, Path] = {os.path.realpath(path): path for path in read}
