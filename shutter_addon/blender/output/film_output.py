@@ -20,7 +20,7 @@ from ...media.completeness import is_whole_movie, is_whole_picture, whole_pictur
 from ..data import strips
 from ..data.property_copy import for_a_while
 from ..rendering import render_job
-from . import movie_feed
+from . import edit_feed
 
 INTERRUPTED = 130
 Move = Callable[[Path, Path], object]  # moves a picture to its place
@@ -207,7 +207,7 @@ def film(scene: Scene, output: Path) -> None:
     OutputError: it cannot be rendered or written; finished pictures stay, and of a movie what was finished, under a
     name of its own. InterruptedRenderError: the same, by Ctrl-C or a farm's TERM."""
     prepare(output.parent if is_movie(output) else output)
-    feed = movie_feed.feeding(scene) if is_movie(output) and strips.effect_strips(scene) else nullcontext()
+    feed = edit_feed.feeding() if is_movie(output) and strips.effect_strips(scene) else nullcontext()
     with progress(scene.frame_end - scene.frame_start + 1, "frame") as moved, _without_sources(scene), feed:
         write(scene, output, moved)
 

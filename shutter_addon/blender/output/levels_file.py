@@ -13,22 +13,10 @@ import bpy
 import numpy as np
 
 from ...core import atomic_write
-from ..data import strips
 
 # Rows of a tile of the file; its columns are a multiple of 16. A TIFF without tiles takes twice the time: Blender reads
 # rows upwards, for which OpenImageIO then allocates 64 MB for each picture.
 _ROWS, _COLUMNS = 64, 16
-
-
-def strip_above(editor: bpy.types.SequenceEditor, path: Path, first: int, stop: int) -> bpy.types.ImageStrip:
-    """A strip of that file which covers all others from one timeline frame to another. ValueError: there is no channel
-    above them."""
-    channel = max((strip.channel for strip in editor.strips), default=0) + 1
-    if channel > strips.CHANNELS:
-        raise ValueError
-    strip = editor.strips.new_image(path.name, str(path), channel, first)
-    strip.right_handle, strip.blend_type = stop, "REPLACE"
-    return strip
 
 
 @contextmanager

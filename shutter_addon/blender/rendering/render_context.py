@@ -1,4 +1,4 @@
-"""For whom pictures are made: built once at each door (the engine, what is drawn, a command, the movie feed), and
+"""For whom pictures are made: built once at each door (the engine, what is drawn, a command, the feed of a film), and
 passed down."""
 
 from __future__ import annotations
