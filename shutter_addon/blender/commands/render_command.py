@@ -172,19 +172,8 @@ def _save_whole(scene: Scene, path: Path) -> None:
                 bpy.ops.wm.save_as_mainfile(filepath=str(part), compress=True, copy=True, relative_remap=False)
         except RuntimeError as error:
             raise film_output.OutputError(f"{path}: {film_output.message(error)}") from None
-        if not _is_whole(part, scene.name):
+        if not is_whole_blend(part):
             raise film_output.OutputError(f"{path}: could not be saved whole; {why_short(folder)}")
         if path.is_file() and bpy.context.preferences.filepaths.save_version:
             path.replace(f"{path}1")  # as Blender itself keeps what stood there
         part.replace(path)
-
-
-def _is_whole(path: Path, scene: str) -> bool:
-    """Whether a .blend file was written to its end, and Blender finds the scene in it."""
-    if not is_whole_blend(path):
-        return False
-    try:
-        with bpy.data.libraries.load(str(path)) as (data_from, _):
-            return scene in data_from.scenes
-    except OSError:
-        return False
