@@ -11,7 +11,7 @@ from bpy.types import Context, Gizmo, GizmoGroup, PropertyGroup, Region, Strip
 from ...compute import plates
 from ...core.model.scribbles import mapped
 from ..data import annotations, geometry, preview_areas
-from ..rendering import effect_source, previews, probe, render_context
+from ..rendering import effect_source, previews, probe, sessions
 from . import drawing
 from .gizmo_groups import InPreview, on_picture, to_region
 from .operator_bases import own_classes
@@ -67,7 +67,7 @@ class SHUTTER_GT_probe(Gizmo):
         if _is_cropped(shown.strip, annotations.picture_size(shown.effect), at):
             return
         try:
-            render = render_context.of_drawing()
+            render = sessions.of_drawing()
             request = previews.request_of(context, shown)
             probed = probe.at(render.renderer(request), request, at)
         except effect_source.FAULTS:  # which the live preview tells

@@ -28,7 +28,7 @@ from ...media.completeness import is_whole_movie, is_whole_picture
 from ...media.errors import MediaError
 from ...media.folder import Folder, own_folder
 from ..data import colour_configuration, effect_version, snapshot, source_media, strips
-from ..rendering import pictures, render_context, render_settings
+from ..rendering import pictures, render_settings, sessions
 from . import film_output
 
 FOLDER = "virtual_shutter_baked"  # beside the .blend file
@@ -144,7 +144,7 @@ def render(scene: Scene, effect: PropertyGroup, strip: Strip, film: Film, told: 
 
 
 def _picture(taken: snapshot.Snapshot, frame: int, levels: bool, stopped: Callable[[], bool]) -> np.ndarray:
-    context = render_context.of_render(stopped=stopped, levels=levels)
+    context = sessions.of_render(stopped=stopped, levels=levels)
     picture = pictures.picture(context, taken, frame)
     context.session.begin_next(taken, frame, context)
     return picture

@@ -29,9 +29,7 @@ from ...media.carried_mattes import CarriedMattes
 from ...media.files import check_file
 from ..data import effect_version, requirements, selection, snapshot, source_media, strip_timing, strips
 from ..rendering import effect_source, job_snapshots, pictures
-from ..rendering.render_context import RenderContext
-from ..rendering.render_settings import RenderSettings
-from ..rendering.session import RenderSession
+from ..rendering.session import RenderContext, RenderSession
 
 Compositor = CPUCompositor | GPUCompositor
 
@@ -127,7 +125,7 @@ def _effect(session: RenderSession, shown: tuple, compositor: Compositor, find_c
 
 def _requests(session: RenderSession, taken: snapshot.Snapshot, check: EffectCheck) -> dict[float, Request]:
     """What each frame asks for, where it can be shown; faults of others are noted, each at the first of its frames."""
-    requests, context = {}, RenderContext(session=session, settings=RenderSettings())
+    requests, context = {}, RenderContext(session)
     faults: dict[str, list[str]] = {}
     for frame in sorted(taken.frames):
         try:

@@ -22,7 +22,7 @@ from ...core.pixels.shown_levels import Display
 from ...media import display_transfer
 from ..data import colour_configuration, seen_alone, strips
 from ..data.property_copy import for_a_while
-from ..rendering import job_snapshots, pictures, render_context, render_job
+from ..rendering import job_snapshots, pictures, render_job, sessions
 from ..rendering.effect_source import FULL, in_words
 from ..rendering.render_job import Where
 from . import levels_file
@@ -111,7 +111,7 @@ def _feed(film: _Film, scene: Scene, seen: seen_alone.Alone) -> bool:
         snapshot, frame = job_snapshots.of(strip.scene, int(shown))
         transfer = display_transfer.blended if seen.is_blended else display_transfer.shown
         display = None if _data.is_own else Display(scene.render.dither_intensity, transfer)
-        context = render_context.of_render(render_job.say, render_job.stopping, levels=_data.is_own, display=display)
+        context = sessions.of_render(render_job.say, render_job.stopping, levels=_data.is_own, display=display)
         source = context.renderer(context.request(snapshot, frame, FULL)).source
         size = scene.render.resolution_x, scene.render.resolution_y
         is_known = _data.is_own or source.alpha == "opaque"  # over black, what shines through is known

@@ -253,17 +253,6 @@ def prepare(folder: Path) -> None:
     atomic_write.clear_up(folder)
 
 
-@contextmanager
-def whole(path: Path | None) -> Iterator[Path | None]:
-    """What to write in place of a file, so that it is there whole or not at all; None for none."""
-    if path is None:
-        yield None
-        return
-    prepare(path.parent)
-    with atomic_write.writing(path) as part:
-        yield part
-
-
 def _finish(part: Path, output: Path, count: int) -> None:
     if not is_whole_movie(part, count):
         raise OutputError(f"{output}: could not be written whole ({why_short(part.parent)})")
