@@ -55,7 +55,8 @@ def _told(part: Callable[[], Iterable[str]]) -> list[str]:
 def _versions() -> Iterator[str]:
     app = bpy.app
     yield f"- Virtual Shutter: {versions.extension()}, {_zip()}"
-    yield f"- Blender: {app.version_string}, build {_decoded(app.build_branch)} {_decoded(app.build_hash)}"
+    branch = app.build_branch.decode("utf-8", "replace")
+    yield f"- Blender: {app.version_string}, build {branch} {app.build_hash.decode()}"
     yield f"- System: {platform.platform()}; {'no window' if app.background else 'with a window'}"
     yield f"- Python: {platform.python_version()}"
     yield f"- Packages: {', '.join(f'{name} {_version(module)}' for name, module in PACKAGES.items())}"
@@ -114,7 +115,3 @@ def _sentences() -> list[str]:
         + (f" × {each.times}" if each.times > 1 else "")
         for each in told.last()
     ]
-
-
-def _decoded(words: bytes) -> str:
-    return words.decode("utf-8", "replace")

@@ -216,7 +216,7 @@ def write(scene: Scene, output: Path, moved: Callable[[], None], move: Move = Pa
     """Renders the frames of any edit to a movie, or to the pictures that its settings say in a prepared folder. Blender
     writes into a folder beside the output, and what is finished moves out of it.
 
-    moved: called after each frame; move: moves a picture to its place, or raises an error
+    moved: called after each frame; move: moves a picture to its place. Both may raise what ends the render
     OutputError, InterruptedRenderError: see `film`."""
     kept = scene.render.filepath
     faults: list[str] = []
@@ -281,16 +281,16 @@ def message(error: RuntimeError) -> str:
 
 @contextmanager
 def _moved(part: Path, output: Path, scene: Scene, update: Callable[[], None], move: Move) -> Iterator[dict[str, Path]]:
-    """Moves each finished picture from `part` to `output`, and calls both. Gives the pictures that are missing so
-    far, by name; none of a movie's."""
+    """Moves each finished picture from `part` to `output`, and calls both, which may raise. Gives the pictures that are
+    missing so far, by name; none of a movie's."""
     frames = range(scene.frame_start, scene.frame_end + 1)
     settings = scene.render.image_settings
     ending = next((name for name, kind in FORMATS.items() if settings.file_format == kind.blender), "")
     missing = {path.name: path for path in pictures_of(output, ending, frames)} if ending else {}
 
     def moved(*_) -> None:
-        update()
         try:
+            update()
             os.utime(part)  # a movie's encoder may not write for long: nobody shall take it for left behind
             for name in [path.name for path in part.iterdir() if path.name in missing]:
                 if not is_whole_picture(part / name):
