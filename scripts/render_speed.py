@@ -38,7 +38,7 @@ import sys
 import tempfile
 import threading
 import time
-from contextlib import ExitStack, contextmanager, nullcontext, suppress
+from contextlib import ExitStack, contextmanager, suppress
 from functools import cache
 from pathlib import Path
 
@@ -51,7 +51,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 from shutter_addon import blender
 from shutter_addon.blender.data import snapshot, strips
 from shutter_addon.blender.editing import new_edit
-from shutter_addon.blender.output import edit_feed, film_output, movie_feed
+from shutter_addon.blender.output import edit_feed, film_output
 from shutter_addon.blender.rendering import sessions
 from shutter_addon.blender.rendering.engine import VirtualShutterEngine
 from shutter_addon.compute.cpu import CPUCompositor
@@ -137,7 +137,7 @@ class ProcessorTime:
         with ExitStack() as kept:
             kept.enter_context(self._timed(GLDevice, "run", "_passes"))
             kept.enter_context(self._timed(GLDevice, "texture", "_passes"))
-            kept.enter_context(self._timed(movie_feed, "_fill", "_engine"))  # what a frame costs has no other name
+            kept.enter_context(self._timed(edit_feed, "_feed", "_engine"))  # what a frame costs has no other name
             kept.enter_context(self._timed(VirtualShutterEngine, "render", "_engine"))
             yield
 
@@ -263,14 +263,14 @@ def engine_of(way: str, footage: Path):
         yield
         return
     # Another engine would make it another strip, and the effect would go with it.
-    kept, feeding, begin = VirtualShutterEngine.render, movie_feed.feeding, edit_feed.begin
+    kept, begin = VirtualShutterEngine.render, edit_feed.begin
     with open_source(footage) as medium, PrefetchSource(LinearSource(medium)) as source:
         VirtualShutterEngine.render = lambda engine, depsgraph: echo(engine, source, depsgraph)
-        movie_feed.feeding, edit_feed.begin = nullcontext, lambda _scene: None
+        edit_feed.begin = lambda _scene: None
         try:
             yield
         finally:
-            VirtualShutterEngine.render, movie_feed.feeding, edit_feed.begin = kept, feeding, begin
+            VirtualShutterEngine.render, edit_feed.begin = kept, begin
 
 
 def tmix_command(edit, footage: Path, window: int, film: Path) -> list[str]:

@@ -106,18 +106,18 @@ def source_time(edit, effect, frame):
 
 def picture_of(scene, scene_frame, say=print, stopped=lambda: False):
     """The picture of an effect scene, as the engine gives it to Blender."""
-    from shutter_addon.blender.rendering import job_snapshots, pictures, render_context
+    from shutter_addon.blender.rendering import job_snapshots, pictures, sessions
 
-    return pictures.picture(render_context.of_engine(say, stopped), *job_snapshots.of(scene, scene_frame))
+    return pictures.picture(sessions.of_engine(say, stopped), *job_snapshots.of(scene, scene_frame))
 
 
 def request(edit, effect, strip, frame):
     """What is asked of the session for the picture at a timeline frame, and what it gives."""
     from shutter_addon.blender.data import snapshot
-    from shutter_addon.blender.rendering import render_context, render_settings
+    from shutter_addon.blender.rendering import render_settings, sessions
 
     folder = render_settings.settings().inbetween
-    context = render_context.of_drawing()
+    context = sessions.of_drawing()
     return Asked(context, context.request(snapshot.take(edit, effect, strip, (frame,), folder=folder), frame))
 
 

@@ -98,8 +98,7 @@ def test_what_a_job_takes_away_meanwhile_is_not_missed(film, monkeypatch, look):
     the look at what is known and its removal, which is where this one does: at one of the looks."""
     from shutter_addon.blender.data import snapshot
     from shutter_addon.blender.rendering import session
-    from shutter_addon.blender.rendering.render_context import RenderContext
-    from shutter_addon.blender.rendering.render_settings import RenderSettings
+    from shutter_addon.blender.rendering.session import RenderContext
     from shutter_addon.compute.renderer import Renderer
 
     edit, _source, effect, strip = film
@@ -125,7 +124,7 @@ def test_what_a_job_takes_away_meanwhile_is_not_missed(film, monkeypatch, look):
 
     taken = snapshot.take(edit, effect, strip, (1, 2, 3))
     for frame in (1, 2):
-        found.begin_next(taken, frame, RenderContext(found, RenderSettings()))
+        found.begin_next(taken, frame, RenderContext(found))
     found.keep(Kept())
     assert next(looks) == 4
     assert is_closed.wait(30)
@@ -144,7 +143,7 @@ def held_up(session, until):
 
 def test_who_is_stopped_waits_neither_for_a_device_nor_for_others_to_be_closed(film):
     """Though the session's thread waits, as for a window that does not answer."""
-    from shutter_addon.blender.rendering import effect_source, job_snapshots, render_context, sessions
+    from shutter_addon.blender.rendering import effect_source, job_snapshots, sessions
 
     scene, answer, half = film[2].scene, threading.Event(), effect_source.Detail(2)
     waits = held_up(sessions.OFFSCREEN, answer)
@@ -153,7 +152,7 @@ def test_who_is_stopped_waits_neither_for_a_device_nor_for_others_to_be_closed(f
         picture_of(scene, 1, stopped=lambda: next(stops, True))
     assert waits.is_alive()
     answer.set()
-    context = render_context.of_render()
+    context = sessions.of_render()
     first = context.request(*job_snapshots.of(scene, 1), effect_source.FULL)
     answer.clear()
     waits = held_up(sessions.OFFSCREEN, answer)
@@ -168,13 +167,12 @@ def test_who_asks_for_room_keeps_what_it_uses(film, monkeypatch):
     """The other one may ask it in turn, while it waits for that."""
     from shutter_addon.blender.devices import available
     from shutter_addon.blender.rendering import effect_source, job_snapshots, session
-    from shutter_addon.blender.rendering.render_context import RenderContext
-    from shutter_addon.blender.rendering.render_settings import RenderSettings
+    from shutter_addon.blender.rendering.session import RenderContext
 
     asks, opened = [], available.OPEN["cpu"]
     monkeypatch.setitem(available.OPEN, "cpu", lambda memory, ask: asks.append(ask) or opened(memory, ask))
     found = session.RenderSession(lambda: ("cpu", None), lambda: found.free())
-    context = RenderContext(found, RenderSettings())
+    context = RenderContext(found)
     request = context.request(*job_snapshots.of(film[2].scene, 1), effect_source.FULL)
     found.picture(request)
     renderer = found.renderer(request.source)

@@ -77,8 +77,6 @@ def test_a_sound_edit(noise, check, tmp_path):
         }
     ]
     assert report["extension"] == {"here": versions.extension(), "saved": versions.extension()}
-    assert 64 * 48 * 4 * 2 < report["disk"]["frame"] < 64 * 48 * 4 * 2 * 1.25
-    assert report["disk"]["all"] == FRAMES * report["disk"]["frame"]
     assert report["device"]
     assert report["chunk"] == FRAMES
     assert job_file.read(tmp_path / "out").key == report["key"]
@@ -254,7 +252,7 @@ def test_mattes(noise, check, tmp_path, plant, sentence):
 
 
 def test_outlines(noise, check, tmp_path, monkeypatch):
-    """Whose mattes are not carried yet: nothing is carried for this, their number is told, and room is asked for."""
+    """Whose mattes are not carried yet: nothing is carried for this, and their number is told."""
     from shutter_addon.blender.data import recipe_import
     from shutter_addon.media import carrying
 
@@ -268,10 +266,6 @@ def test_outlines(noise, check, tmp_path, monkeypatch):
     code, sentences, report = check()
     assert (code, sentences) == (0, [])
     assert f"{FRAMES} mattes of outlines are not tracked yet" in " ".join(report["notes"])
-    monkeypatch.setattr("shutter_addon.blender.output.output_space.free", lambda _folder: 10)
-    code, sentences, _report = check()
-    assert code == 2
-    assert "mattes of outlines may take" in sentences[0]
 
 
 def test_a_mask_and_a_strip_that_are_gone(noise, check, tmp_path):
@@ -402,48 +396,13 @@ def test_a_newer_extension_and_blender(noise, check, bpy, tmp_path, monkeypatch)
     assert found[1].startswith(f"the edit was saved by Blender {major}.{minor + 1}, this machine has {major}.{minor}")
 
 
-def test_output(noise, check, tmp_path, monkeypatch):
+def test_output(noise, check, tmp_path):
     (tmp_path / "file").write_bytes(b"")
     assert check("--output", tmp_path / "file" / "out")[1] == [f"{tmp_path / 'file'}: is a file, and no folder"]
-    frame = check()[2]["disk"]["frame"]
-    usage = shutil.disk_usage(tmp_path)
-    monkeypatch.setattr(shutil, "disk_usage", lambda _path: usage._replace(free=frame * FRAMES - 1))
-    _, found, _ = check("--output", tmp_path / "out")
-    assert found == [f"{tmp_path / 'out'}: 8 frames may take 230.8 kB, 230.7 kB are free"]
-    assert not (tmp_path / "out").exists()
     edit = now()[0]
     edit.render.resolution_x = 65
     edit.render.image_settings.media_type = "VIDEO"
     assert "a movie has even sizes, not 65×48" in check()[1][0]
-
-
-def test_pictures_take_no_more_than_is_told(noise, check, tmp_path):
-    """Those of noise, in all channels."""
-    from shutter_addon.blender import command
-
-    edit = now()[0]
-    edit.render.image_settings.color_mode = "RGBA"
-    edit.render.image_settings.compression = 0
-    for file_format in ("png", "exr"):
-        options = "--output", tmp_path / file_format, "--format", file_format
-        most = check(*options, "--frames", "1")[2]["disk"]["frame"]
-        arguments = "render", tmp_path / "edit.blend", *options, "--frames", "1"
-        assert command.main([str(argument) for argument in arguments]) == 0
-        assert (tmp_path / file_format / f"0001.{file_format}").stat().st_size <= most
-
-
-def test_room_for_in_between_frames(noise, check, tmp_path, monkeypatch):
-    """They lie beside the edit, and share its disk with the frames."""
-    now()[1].inbetween = "2"
-    report = check("--inbetweens-later")[2]
-    assert report["disk"]["inbetweens"] > (FRAMES - 1) * 64 * 48 * 4
-    usage = shutil.disk_usage(tmp_path)
-    free = report["disk"]["all"] + report["disk"]["inbetweens"]
-    monkeypatch.setattr(shutil, "disk_usage", lambda _path: usage._replace(free=free))
-    assert check("--inbetweens-later", "--output", tmp_path / "out")[1] == []
-    monkeypatch.setattr(shutil, "disk_usage", lambda _path: usage._replace(free=free - 1))
-    (fault,) = check("--inbetweens-later", "--output", tmp_path / "out", "--movie", tmp_path / "film.mp4")[1]
-    assert fault.startswith(f"{tmp_path / 'out'}: 8 frames and in-between frames may take ")
 
 
 def test_a_folder_of_in_between_frames_that_cannot_be_written_to(noise, check, tmp_path):

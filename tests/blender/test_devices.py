@@ -79,12 +79,12 @@ def test_the_preference_chooses(effect, preferred):
     """From the next render on, if the command asks for nothing else."""
     from shutter_addon.blender.data import preferences
     from shutter_addon.blender.devices import available
-    from shutter_addon.blender.rendering import job_snapshots, render_context, render_settings, sessions
+    from shutter_addon.blender.rendering import job_snapshots, render_settings, sessions
 
     def composed_by():
         sessions.settle()
         picture_of(effect.scene, 1)
-        context = render_context.of_render()
+        context = sessions.of_render()
         return type(context.renderer(context.request(*job_snapshots.of(effect.scene, 1))).compositor)
 
     for wanted, found in (("CPU", CPUCompositor), ("AUTO", GPUCompositor), ("OPENGL", GPUCompositor)):

@@ -131,7 +131,7 @@ def test_a_single_frame_that_fails_is_not_written(bpy, film, tmp_path):
     assert not (tmp_path / "still.png").exists()
 
 
-@pytest.mark.parametrize("name", ["pictures.resized", "pictures.picture", "render_context.of_engine"])
+@pytest.mark.parametrize("name", ["pictures.resized", "pictures.picture", "sessions.of_engine"])
 @pytest.mark.parametrize("fault", [MemoryError(), KeyboardInterrupt(), ValueError("odd")])
 def test_no_fault_gives_a_plain_frame(bpy, film, tmp_path, capfd, monkeypatch, name, fault):
     from shutter_addon.blender import rendering

@@ -42,7 +42,7 @@ RECIPES = {
 def test_it_is_what_the_session_asks_for(bpy, edit, tmp_path, name):
     from shutter_addon.blender.data import recipe_import, snapshot
     from shutter_addon.blender.editing import add_effect
-    from shutter_addon.blender.rendering import render_context, sessions
+    from shutter_addon.blender.rendering import sessions
 
     found = recipe_file.parse(json.dumps(RECIPES[name]))
     clip = Clip(width=WIDTH, height=HEIGHT, count=COUNT).stepped(found.options.at(1).step)
@@ -56,7 +56,7 @@ def test_it_is_what_the_session_asks_for(bpy, edit, tmp_path, name):
     recipe_import.apply(edit, effect, strip, found)
     for frame, ours in made.items():
         taken = snapshot.take(edit, effect, strip, (frame,), folder=tmp_path)
-        asked = render_context.of_drawing().request(taken, frame)
+        asked = sessions.of_drawing().request(taken, frame)
         assert (ours.index, ours.direction) == (asked.index, asked.direction)
         assert ours.state.key == asked.state.key
     sessions.forget()

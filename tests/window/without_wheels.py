@@ -71,7 +71,7 @@ def story():
     add_effect()
     yield 1.0
     shot("preview")
-    contexts, said = part("rendering.render_context"), []
+    contexts, said = part("rendering.sessions"), []
     of_engine = contexts.of_engine
     contexts.of_engine = lambda say, stopped: of_engine(lambda words: (said.append(words), say(words)), stopped)
     edit.frame_set(3)

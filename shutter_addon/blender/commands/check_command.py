@@ -10,7 +10,7 @@ import shlex
 import subprocess
 import sys
 from argparse import Namespace
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import bpy
@@ -25,9 +25,8 @@ from ...devices.budget import machine_memory
 from ...devices.device import NoDeviceError
 from ..data import missing_media, versions
 from ..devices import available
-from ..output import edit_check, error_report, film_join, film_output, output_space, shared_frames
+from ..output import edit_check, error_report, film_join, film_output, shared_frames
 from ..output.edit_check import EffectCheck
-from ..output.output_space import Need, in_units
 from ..rendering import render_job, render_settings
 from . import command_line
 from .command_line import place
@@ -94,9 +93,10 @@ def _report(arguments: Namespace, scene: Scene, frames: range, version: EditVers
     faults += missing_media.sound_faults(scene, frames)
     memory = _memory(checks, limit)
     if (most := machine_memory()) and memory["host"] > most:
-        words = f"{in_units(memory['host'])} of memory, the machine has {in_units(most)}"
+        words = f"{_in_units(memory['host'])} of memory, the machine has {_in_units(most)}"
         faults.append(f"a frame needs {words}")
-    disk = _disk(arguments, scene, frames, checks, faults)
+    for folder in dict.fromkeys(_written_folders(arguments, checks)):
+        faults += _fault(film_output.check_writable, folder)
     report = {
         "edit": str(arguments.edit),
         "key": version.key,
@@ -108,7 +108,6 @@ def _report(arguments: Namespace, scene: Scene, frames: range, version: EditVers
         "effects": [_effect(each) for each in checks],
         "build": build,
         "memory": memory,
-        "disk": disk,
         "chunk": min(len(frames), max([each.chunk for each in checks], default=chunks.LEAST)),
         "notes": notes,
         "faults": faults,
@@ -190,28 +189,16 @@ def _memory(checks: list[EffectCheck], limit: int | None) -> dict:
     return {"gpu": min(gpu, limit or gpu), "gpu_limit": limit, "host": host}
 
 
-def _disk(arguments: Namespace, scene: Scene, frames: range, checks: list[EffectCheck], faults: list[str]) -> dict:
-    """Bytes that the frames and the in-between frames that are missing take at most, as noise does, which is not
-    compressed: no frame is rendered for this. Those that are there already are not counted."""
-    file_format, needs = arguments.format or "png", []
-    frame = output_space.picture(*film_output.size(scene), film_output.FORMATS[file_format].bits // 8)
-    if output := arguments.output:
-        left = sum(not path.exists() for path in film_output.pictures_of(output, file_format, frames))
-        needs.append(Need(output, left * frame, f"{left} frames"))
+def _written_folders(arguments: Namespace, checks: list[EffectCheck]) -> Iterator[Path]:
+    """The folders that the job will write to."""
+    if arguments.output:
+        yield arguments.output
     if arguments.movie:
-        needs.append(Need(arguments.movie.parent, 0, "the movie"))
-    needs += [Need(each.folder, each.bytes, "in-between frames") for each in checks if each.folder and each.missing]
-    for each in checks:
-        size = each.size[0] * each.size[1]
-        needs += [Need(folder, size * count, "mattes of outlines") for folder, count in each.mattes.items() if count]
-    faults += output_space.faults(needs)
-    return {
-        "format": file_format,
-        "frame": frame,
-        "all": len(frames) * frame,
-        "inbetweens": sum(each.bytes for each in checks),
-        "free": output_space.free(output) if output else None,
-    }
+        yield arguments.movie.parent
+    for check in checks:
+        if check.folder and check.missing:
+            yield check.folder
+        yield from (folder for folder, count in check.mattes.items() if count)
 
 
 def _effect(check: EffectCheck) -> dict:
@@ -240,7 +227,7 @@ def _builds(file: Path, scene: Scene, frames: range, checks: list[EffectCheck]) 
 
 def _lines(report: dict) -> list[str]:
     """The report for people."""
-    memory, disk = report["memory"], report["disk"]
+    memory = report["memory"]
     lines = [
         f"Edit: {report['edit']}, version {report['key']}",
         "Frames: {} to {}, {}×{}".format(*report["frames"], *report["size"]),
@@ -258,14 +245,17 @@ def _lines(report: dict) -> list[str]:
     lines.append(f"Device: {report['device'] or 'none'}")
     if is_known := all(effect["source"] for effect in report["effects"]):
         limit = memory["gpu_limit"]
-        gpu = f"{in_units(memory['gpu'])} of the {in_units(limit)} that may be taken of the GPU, " if limit else ""
-        lines.append(f"Memory: {gpu}{in_units(memory['host'])} for decoded frames")
-    most = f"at most {in_units(disk['frame'])} a frame as {disk['format']}, {in_units(disk['all'])} in all"
-    most += f", in-between frames at most {in_units(disk['inbetweens'])}" if disk["inbetweens"] else ""
-    most += f", {in_units(disk['free'])} are free" if disk["free"] is not None else ""
-    lines.append(f"Disk: {most}")
+        gpu = f"{_in_units(memory['gpu'])} of the {_in_units(limit)} that may be taken of the GPU, " if limit else ""
+        lines.append(f"Memory: {gpu}{_in_units(memory['host'])} for decoded frames")
     lines += [f"Chunk size: {report['chunk']} frames"] if is_known else []
     return lines + [f"Note: {note}" for note in report["notes"]]
+
+
+def _in_units(count: int) -> str:
+    """Bytes for people."""
+    sizes = {"GB": 1 << 30, "MB": 1 << 20, "kB": 1 << 10}
+    unit = next((unit for unit, size in sizes.items() if count >= size), "kB")
+    return f"{count / sizes[unit]:.1f} {unit}"
 
 
 def _saved_by(name: str, version: dict) -> str:

@@ -15,7 +15,7 @@ from ...media import inbetween
 from ..data import inbetween_settings, requirements, snapshot, source_media
 from ..editing import new_edit, saved_edit
 from ..output import film_output
-from ..rendering import job_snapshots, render_context, render_settings
+from ..rendering import job_snapshots, render_settings, sessions
 from . import command_line
 from .command_line import place
 
@@ -83,7 +83,7 @@ def build_lacking(film: Scene) -> None:
 def needed_pairs(shown: snapshot.Snapshot) -> set[int]:
     """The pairs of neighbouring source frames whose in-betweens are needed to show an effect strip at the snapshot's
     frames, each by its first. It reads what it must to find cuts. One of FAULTS: they cannot be shown."""
-    context = render_context.of_render()
+    context = sessions.of_render()
     pairs: set[int] = set()
     for frame in sorted(shown.frames):
         request = context.request(shown, frame)

@@ -159,32 +159,14 @@ def _save(scene: Scene, path: Path) -> None:
     saved whole; what stood there stays."""
     try:
         film_output.prepare(path.parent)
-        _save_whole(scene, path)
-    except OSError as error:
-        raise film_output.OutputError(f"{path}: {error.strerror or error}") from None
-
-
-def _save_whole(scene: Scene, path: Path) -> None:
-    with atomic_write.part_folder(path.parent) as folder:
-        part = folder / "edit.blend"
-        try:
+        with atomic_write.writing(path) as part:
             with film_output.quiet(), new_edit.paths_relative(scene, path.parent):
                 bpy.ops.wm.save_as_mainfile(filepath=str(part), compress=True, copy=True, relative_remap=False)
-        except RuntimeError as error:
-            raise film_output.OutputError(f"{path}: {film_output.message(error)}") from None
-        if not _is_whole(part, scene.name):
-            raise film_output.OutputError(f"{path}: could not be saved whole; {why_short(folder)}")
-        if path.is_file() and bpy.context.preferences.filepaths.save_version:
-            path.replace(f"{path}1")  # as Blender itself keeps what stood there
-        part.replace(path)
-
-
-def _is_whole(path: Path, scene: str) -> bool:
-    """Whether a .blend file was written to its end, and Blender finds the scene in it."""
-    if not is_whole_blend(path):
-        return False
-    try:
-        with bpy.data.libraries.load(str(path)) as (data_from, _):
-            return scene in data_from.scenes
-    except OSError:
-        return False
+            if not is_whole_blend(part):
+                raise film_output.OutputError(f"{path}: could not be saved whole; {why_short(part.parent)}")
+            if path.is_file() and bpy.context.preferences.filepaths.save_version:
+                path.replace(f"{path}1")  # as Blender itself keeps what stood there
+    except RuntimeError as error:
+        raise film_output.OutputError(f"{path}: {film_output.message(error)}") from None
+    except OSError as error:
+        raise film_output.OutputError(f"{path}: {error.strerror or error}") from None

@@ -14,7 +14,7 @@ from ...core.model import shutters
 from ...core.model.choices import COMBINES
 from ..data import fcurves, snapshot
 from ..data.consistency import bars
-from ..rendering import effect_source, invalidation, render_context
+from ..rendering import effect_source, invalidation, sessions
 
 
 def summary(weights: np.ndarray, combine: str = "AVERAGE") -> str:
@@ -41,7 +41,7 @@ def open_for(scene: Scene, effect: PropertyGroup, strip: Strip, index: int) -> s
     if not (has_length and is_shown):
         return None
     try:
-        state = render_context.of_drawing().request(invalidation.current(scene, effect, strip, frame), frame).state
+        state = sessions.of_drawing().request(invalidation.current(scene, effect, strip, frame), frame).state
     except effect_source.FAULTS:  # which the live preview tells
         return None
     words = iface_("Open for {frames} of {window} frames here")

@@ -87,8 +87,6 @@ def _look() -> float | None:
     job = _running[0]
     redraw(bpy.context)
     if not job.is_over():
-        if job.done():
-            job.drop_copy()
         return TICK
     windows = bpy.context.window_manager.windows
     if bpy.app.is_job_running("RENDER") or any(window.modal_operators for window in windows):

@@ -14,7 +14,7 @@ from bpy.types import Context, Event, Gizmo, GizmoGroup, Operator, PropertyGroup
 from ...compute import plates
 from ...core.messages import EffectError
 from ..data import annotations, geometry, preview_areas, selection
-from ..rendering import effect_source, previews, probe, render_context
+from ..rendering import effect_source, previews, probe, sessions
 from . import drawing
 from .gizmo_groups import Dragged, InPreview, View, view
 from .operator_bases import OfEffect
@@ -73,7 +73,7 @@ class SHUTTER_GT_probe(Gizmo):
         if _is_cropped(shown.strip, annotations.picture_size(shown.effect), at):
             return
         try:
-            render = render_context.of_drawing()
+            render = sessions.of_drawing()
             request = previews.request_of(context, shown)
             probed = probe.at(render.renderer(request), request, at)
         except effect_source.FAULTS:  # which the live preview tells

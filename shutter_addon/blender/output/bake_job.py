@@ -33,7 +33,8 @@ class BakeJob:
     """A bake that runs.
 
     scene: session_uid of the edit's; effect: identity of the effect, strip: name of its strip
-    copy: of the edit; log: part folder beside the film with what the process says, and the name of the copy"""
+    copy: of the edit, which the process removes once it has read it
+    log: part folder beside the film with what the process says, and the name of the copy"""
 
     scene: int
     effect: str
@@ -66,13 +67,9 @@ class BakeJob:
         """Stops it, if it runs, and removes what it needed alone. Frames that are finished stay."""
         if not self.is_over():
             self.process.terminate()
-        self.drop_copy()
-        shutil.rmtree(self.log, ignore_errors=True)
-
-    def drop_copy(self) -> None:
-        """Removes the copy of the edit, once it has been read."""
         with suppress(OSError):  # Windows keeps what is open
             self.copy.unlink(missing_ok=True)
+        shutil.rmtree(self.log, ignore_errors=True)
 
 
 def start(scene: Scene, effect: PropertyGroup, strip: Strip, film: Film) -> BakeJob:

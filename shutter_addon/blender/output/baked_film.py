@@ -28,13 +28,14 @@ from ...media.completeness import is_whole_movie, is_whole_picture
 from ...media.errors import MediaError
 from ...media.folder import Folder, own_folder
 from ..data import colour_configuration, effect_version, snapshot, source_media, strips
-from ..rendering import pictures, render_context, render_settings
+from ..rendering import pictures, render_settings, sessions
 from . import film_output
 
 FOLDER = "virtual_shutter_baked"  # beside the .blend file
 Kind = Literal["MOVIE", "OPEN_EXR"]
 KINDS: dict[str, Kind] = {"movie": "MOVIE", "exr": "OPEN_EXR"}  # as the command calls them
 _CHANNELS = ["R", "G", "B", "A"]
+Picture = Callable[[int], np.ndarray]  # that of a frame
 
 
 @dataclass(frozen=True)
@@ -125,16 +126,19 @@ def render(scene: Scene, effect: PropertyGroup, strip: Strip, film: Film, told: 
     taken = snapshot.take(
         scene, effect, strip, [start + frame for frame in film.frames], folder=render_settings.settings().inbetween
     )
-    size = film_output.size(effect.scene)
     with film_output.stoppable() as stopped:
 
-        def shown(frames: range) -> Iterator[np.ndarray]:
-            for frame in frames:
-                yield _picture(taken, start + frame, film.kind == "MOVIE", lambda: bool(stopped))
+        def picture(frame: int) -> np.ndarray:
+            context = sessions.of_render(stopped=lambda: bool(stopped), levels=film.kind == "MOVIE")
+            made = pictures.picture(context, taken, start + frame)
+            context.session.begin_next(taken, start + frame, context)
+            return made
 
         try:
-            make = _make_movie if film.kind == "MOVIE" else _make_pictures
-            make(film, shown, size, frame_rate(scene.render.fps / scene.render.fps_base), told)
+            if film.kind == "MOVIE":
+                _make_movie(film, picture, frame_rate(scene.render.fps / scene.render.fps_base), told)
+            else:
+                _make_pictures(film, picture, film_output.size(effect.scene), told)
         except StoppedError:
             raise film_output.InterruptedRenderError(f"{film.place}: stopped") from None
         except (MediaError, OSError):
@@ -143,33 +147,26 @@ def render(scene: Scene, effect: PropertyGroup, strip: Strip, film: Film, told: 
             told(len(film.frames))
 
 
-def _picture(taken: snapshot.Snapshot, frame: int, levels: bool, stopped: Callable[[], bool]) -> np.ndarray:
-    context = render_context.of_render(stopped=stopped, levels=levels)
-    picture = pictures.picture(context, taken, frame)
-    context.session.begin_next(taken, frame, context)
-    return picture
-
-
-def _make_pictures(film: Film, shown: Callable, size: tuple[int, int], _fps: Fraction, told: Callable) -> None:
+def _make_pictures(film: Film, picture: Picture, size: tuple[int, int], told: Callable[[int], object]) -> None:
     _prepare(film.place)
     note = edit_version.note(film.version)
     for number, (path, frame) in enumerate(zip(film.pictures, film.frames, strict=True), start=1):
         there = rendered_pictures.read(path, film.version)
         if there is None or there.size != size:
-            picture = pictures.resized(next(shown(range(frame, frame + 1))), *size)
-            channels = 3 if (picture[..., 3] == 1).all() else 4
-            image_writing.write_exr(path, picture[..., :channels], _CHANNELS[:channels], note)
+            made = pictures.resized(picture(frame), *size)
+            channels = 3 if (made[..., 3] == 1).all() else 4
+            image_writing.write_exr(path, made[..., :channels], _CHANNELS[:channels], note)
         told(number)
 
 
-def _make_movie(film: Film, shown: Callable, _size: tuple[int, int], fps: Fraction, told: Callable) -> None:
+def _make_movie(film: Film, picture: Picture, fps: Fraction, told: Callable[[int], object]) -> None:
     done = 0
     for path, frames in film.parts:
         if path.is_file() and is_whole_movie(path, len(frames)):
             told(done + len(frames))
         else:
             _prepare(path.parent)
-            film_parts.write_part(path, _counted(shown(frames), done, told), fps)
+            film_parts.write_part(path, _counted(map(picture, frames), done, told), fps)
         done += len(frames)
     if not film.is_finished():  # by another process, say
         film_parts.join([path for path, _frames in film.parts], film.place, fps)

@@ -27,10 +27,7 @@ from ...media.carried_mattes import CarriedMattes
 from ...media.files import check_file
 from ..data import effect_version, requirements, selection, snapshot, source_media, strip_timing, strips
 from ..rendering import effect_source, job_snapshots, pictures
-from ..rendering.render_context import RenderContext
-from ..rendering.render_settings import RenderSettings
-from ..rendering.session import RenderSession
-from . import output_space
+from ..rendering.session import RenderContext, RenderSession
 
 
 @dataclass
@@ -42,7 +39,7 @@ class EffectCheck:
     factor: of its in-between frames, 1: none; pairs: how many pairs of source frames the frames need in-betweens of
     missing: those of them that are not built, each by its first source frame, from 1 on
     lacking: the timeline frames that need these
-    folder: of its in-between frames, None: it has none; bytes: what those that are missing take at most
+    folder: of its in-between frames, None: it has none
     mattes: how many mattes of outlines are to be carried first, by the folder that they are kept in
     needs: memory for a frame, None: its frames cannot be asked for
     faults, notes: sentences; notes are of what can be rendered, but otherwise than one may think"""
@@ -59,7 +56,6 @@ class EffectCheck:
     missing: set[int] = field(default_factory=set)
     lacking: set[int] = field(default_factory=set)
     folder: Path | None = None
-    bytes: int = 0
     mattes: dict[Path, int] = field(default_factory=dict)
     needs: memory_needs.Needs | None = None
     faults: list[str] = field(default_factory=list)
@@ -125,7 +121,7 @@ def _effect(session: RenderSession, shown: tuple, compositor: Compositor, find_c
 
 def _requests(session: RenderSession, taken: snapshot.Snapshot, check: EffectCheck) -> dict[float, Request]:
     """What each frame asks for, where it can be shown; faults of others are noted, each at the first of its frames."""
-    requests, context = {}, RenderContext(session=session, settings=RenderSettings())
+    requests, context = {}, RenderContext(session)
     faults: dict[str, list[str]] = {}
     for frame in sorted(taken.frames):
         try:
@@ -181,7 +177,6 @@ def _look_at_frames(check: EffectCheck, renderer: Renderer, requests: dict[float
     check.pairs = len({index // source.step for index in between})
     gone = {index for index in between if not source.has(index)}
     check.missing = {index // source.step + 1 for index in gone}
-    check.bytes = len(gone) * output_space.picture(*check.size, source.dtype.itemsize)
     check.lacking = {math.floor(frame) for frame in lacking if needed[frame] & gone}
     if gone and not find_cuts and any(request.state.options.stop_at_cuts for request in requests.values()):
         check.notes.append("in-between frames are counted as if there were no cuts, beyond which none are needed")

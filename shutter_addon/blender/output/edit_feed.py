@@ -5,11 +5,14 @@ blends them over footage that nobody sees: several times the work that it has wi
 shows a file of the very levels that Blender would make (core.pixels.shown_levels), from a film's second frame on: a
 picture by itself keeps its floats, as a script may save it as others than the edit's settings say. The edit is as it
 was once the render ends, or a file is saved or loaded meanwhile: from then on the engine renders.
+
+A movie that the command makes of footage and a recipe is known to be such an edit (`feeding`). Its levels are made by
+the GPU alone, and those where rounding decides may be others than Blender's.
 """
 
 from __future__ import annotations
 
-from contextlib import ExitStack
+from contextlib import AbstractContextManager, ExitStack
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -17,12 +20,13 @@ from bpy.types import Scene
 
 from ...core.pixels.shown_levels import Display
 from ...media import display_transfer
-from ..data import seen_alone, strips
-from ..rendering import job_snapshots, pictures, render_context, render_job
+from ..data import colour_configuration, seen_alone, strips
+from ..data.property_copy import for_a_while
+from ..rendering import job_snapshots, pictures, render_job, sessions
 from ..rendering.effect_source import FULL, in_words
 from ..rendering.render_job import Where
 from . import levels_file
-from .levels_file import LevelsFile, strip_above
+from .levels_file import LevelsFile
 
 
 @dataclass
@@ -44,38 +48,59 @@ class _Film:
     has_begun: bool = False
 
 
-_films: list[_Film] = []  # one, while it renders
+@dataclass
+class _Feed:
+    """film: that renders; is_own: whether renders are movies of new_edit.make_edit"""
+
+    film: _Film | None = None
+    is_own: bool = False
+
+
+_data = _Feed()
+
+
+def feeding() -> AbstractContextManager[None]:
+    """Inside, renders are movies of edits of new_edit.make_edit, from their first frame on."""
+    return for_a_while([(_data, "is_own", True)])
 
 
 def begin(scene: Scene) -> None:
     """The render of an edit begins, on the main thread."""
     end()
     if render_job.where() is Where.BACKGROUND and scene.sequence_editor is not None:
-        _films.append(_Film(scene.session_uid))
+        _data.film = _Film(scene.session_uid)
 
 
 def end() -> None:
     """Puts the edit back."""
-    while _films:
-        _films.pop().changed.close()
+    film, _data.film = _data.film, None
+    if film is not None:
+        film.changed.close()
 
 
 def before_frame(scene: Scene) -> None:
     """Prepares the edit for its current frame."""
-    if not _films or _films[0].scene != scene.session_uid:
+    film = _data.film
+    if film is None or film.scene != scene.session_uid:
         return
-    film = _films[0]
-    if not film.has_begun:  # a picture by itself may be saved as floats afterwards
+    if not (film.has_begun or _data.is_own):  # a picture by itself may be saved as floats afterwards
         film.has_begun = True
         return
-    if film.makes_levels is None or render_job.scripts_act():
-        film.makes_levels = seen_alone.makes_levels(scene)
-    can_feed = film.makes_levels and not film.has_failed
-    seen = seen_alone.alone(scene, scene.frame_current, film.strip) if can_feed else None
+    seen = None if film.has_failed else _seen(film, scene)
     is_fed = seen is not None and _feed(film, scene, seen)
     shown = film.strip and scene.sequence_editor.strips_all.get(film.strip)
     if shown and shown.mute == is_fed:  # each change costs
         shown.mute = not is_fed
+
+
+def _seen(film: _Film, scene: Scene) -> seen_alone.Alone | None:
+    """The effect that is all that is seen at the current frame, where Blender makes known levels of it."""
+    if _data.is_own:
+        is_known = not colour_configuration.name()
+        return seen_alone.Alone(strips.effect_strips(scene)[0], is_blended=False) if is_known else None
+    if film.makes_levels is None or render_job.scripts_act():
+        film.makes_levels = seen_alone.makes_levels(scene)
+    return seen_alone.alone(scene, scene.frame_current, film.strip) if film.makes_levels else None
 
 
 def _feed(film: _Film, scene: Scene, seen: seen_alone.Alone) -> bool:
@@ -85,11 +110,12 @@ def _feed(film: _Film, scene: Scene, seen: seen_alone.Alone) -> bool:
         shown = scene.frame_current - strips.origin(strip) + strip.scene.frame_start
         snapshot, frame = job_snapshots.of(strip.scene, int(shown))
         transfer = display_transfer.blended if seen.is_blended else display_transfer.shown
-        display = Display(scene.render.dither_intensity, transfer)
-        context = render_context.of_render(render_job.say, render_job.stopping, display=display)
+        display = None if _data.is_own else Display(scene.render.dither_intensity, transfer)
+        context = sessions.of_render(render_job.say, render_job.stopping, levels=_data.is_own, display=display)
         source = context.renderer(context.request(snapshot, frame, FULL)).source
         size = scene.render.resolution_x, scene.render.resolution_y
-        if source.alpha != "opaque" or (source.width, source.height) != size:
+        is_known = _data.is_own or source.alpha == "opaque"  # over black, what shines through is known
+        if not is_known or (source.width, source.height) != size:
             return False
         levels = pictures.picture(context, snapshot, frame)
         _file(film, scene).write(levels)
@@ -104,7 +130,8 @@ def _feed(film: _Film, scene: Scene, seen: seen_alone.Alone) -> bool:
 
 
 def _file(film: _Film, scene: Scene) -> LevelsFile:
-    """The file of the film, with a strip that shows it. OSError: it cannot be written."""
+    """The file of the film, with a strip that shows it. OSError: it cannot be written. ValueError: there is no channel
+    for the strip."""
     if film.file is None:
         film.file = film.changed.enter_context(levels_file.temporary(scene))
         film.strip = _add_strip(film, scene, film.file.path)
@@ -115,7 +142,11 @@ def _add_strip(film: _Film, scene: Scene, path: Path) -> str:
     editor, uid = scene.sequence_editor, scene.session_uid
     active, kept = editor.active_strip, (editor.use_cache_raw, editor.use_cache_final)
     first, last = min(scene.frame_start, scene.frame_current), max(scene.frame_end, scene.frame_current)
-    strip = strip_above(editor, path, first, last + 1)
+    channel = max((strip.channel for strip in editor.strips), default=0) + 1
+    if channel > strips.CHANNELS:
+        raise ValueError
+    strip = editor.strips.new_image(path.name, str(path), channel, first)
+    strip.right_handle, strip.blend_type = last + 1, "REPLACE"
     # Blender would keep the file's first picture, and every frame of the film.
     editor.active_strip, editor.use_cache_raw, editor.use_cache_final = active, False, False
     name = strip.name

@@ -7,12 +7,9 @@ import importlib
 import os
 import platform
 import re
-import subprocess
-import sys
 import tomllib
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import suppress
-from pathlib import Path
 
 import bpy
 import gpu
@@ -58,7 +55,8 @@ def _told(part: Callable[[], Iterable[str]]) -> list[str]:
 def _versions() -> Iterator[str]:
     app = bpy.app
     yield f"- Virtual Shutter: {versions.extension()}, {_zip()}"
-    yield f"- Blender: {app.version_string}, build {_decoded(app.build_branch)} {_decoded(app.build_hash)}"
+    branch = app.build_branch.decode("utf-8", "replace")
+    yield f"- Blender: {app.version_string}, build {branch} {app.build_hash.decode()}"
     yield f"- System: {platform.platform()}; {'no window' if app.background else 'with a window'}"
     yield f"- Python: {platform.python_version()}"
     yield f"- Packages: {', '.join(f'{name} {_version(module)}' for name, module in PACKAGES.items())}"
@@ -99,19 +97,8 @@ def _device() -> Iterator[str]:
     most, memory = render_settings.memory().limit // MEGABYTE, machine_memory()
     yield f"- GPU memory: {most} MB may be taken, {preferences.gpu_memory() or 'nothing'} is set in the preferences"
     in_all = "unknown" if memory is None else f"{memory / (1 << 30):.1f} GB"
-    yield f"- Processor: {_processor()}, {os.cpu_count()} logical cores; memory: {in_all}"
-
-
-def _processor() -> str:
-    """The processor's name, as far as the system tells."""
-    with suppress(OSError, subprocess.SubprocessError, StopIteration):
-        if sys.platform == "linux":
-            lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
-            return next(line for line in lines if line.startswith("model name")).partition(":")[2].strip()
-        if sys.platform == "darwin":
-            asked = ["sysctl", "-n", "machdep.cpu.brand_string"]
-            return subprocess.run(asked, capture_output=True, text=True, check=True, timeout=5).stdout.strip()
-    return platform.processor() or platform.machine()
+    processor = platform.processor() or platform.machine()
+    yield f"- Processor: {processor}, {os.cpu_count()} logical cores; memory: {in_all}"
 
 
 def without_paths(words: str) -> str:
@@ -125,7 +112,3 @@ def _sentences() -> list[str]:
     return [
         f"- {each.seconds:.0f} s: {each.words}" + (f" × {each.times}" if each.times > 1 else "") for each in told.last()
     ]
-
-
-def _decoded(words: bytes) -> str:
-    return words.decode("utf-8", "replace")

@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import re
 import tempfile
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager, nullcontext
+from collections.abc import Callable
+from contextlib import nullcontext
 from pathlib import Path
 
-import bpy
 import numpy as np
 from bpy.types import ImageFormatSettings, Scene
 
@@ -83,28 +82,16 @@ def join(
     _lay_over(scene, paths, first)
     _set_output(scene, output, size)
     film_output.prepare(output.parent)
-    with progress(len(paths), "frame") as moved, _ended_by_gaps(scene, paths):
-        film_output.write(scene, output, moved)
+    left = iter(paths[1:])
+    with progress(len(paths), "frame") as moved:
 
+        def rendered() -> None:
+            """Ends the film before a frame whose picture is gone by then: Blender would show a colour in its place."""
+            moved()
+            if (path := next(left, None)) and not path.is_file():
+                raise OutputError(f"{path}: no such file")
 
-@contextmanager
-def _ended_by_gaps(scene: Scene, paths: list[Path]) -> Iterator[None]:
-    """Inside, the film ends before a frame whose picture is gone by then: Blender would show a colour in its place."""
-
-    def look(rendered: Scene, *_) -> None:
-        if not render_job.is_film(rendered):
-            return
-        path = _picture_at(rendered.frame_current, scene, paths)
-        if not path.is_file():
-            render_job.fail(f"{path}: no such file")
-            render_job.cancel()
-
-    with render_job.calling(bpy.app.handlers.render_pre, look):
-        yield
-
-
-def _picture_at(frame: int, scene: Scene, paths: list[Path]) -> Path:
-    return paths[(frame - scene.frame_start) // scene.frame_step]
+        film_output.write(scene, output, rendered)
 
 
 def _pictures(folder: Path, frames: range) -> list[Path]:
@@ -219,7 +206,7 @@ def _lay_over(scene: Scene, paths: list[Path], first: RenderedPicture) -> None:
         raise OutputError("the edit has strips in the uppermost channel, where the frames are to lie; move them down")
     editor.channels[channel].mute = False
     space = _keep_colours(scene, paths[0].suffix, first)
-    shown = [_picture_at(frame, scene, paths) for frame in range(scene.frame_start, scene.frame_end + 1)]
+    shown = [path for path in paths for _ in range(scene.frame_step)][: scene.frame_end + 1 - scene.frame_start]
     for start in range(0, len(shown), AT_ONCE):
         part = shown[start : start + AT_ONCE]
         strip = editor.strips.new_image(part[0].name, str(part[0]), channel, scene.frame_start + start)

@@ -20,7 +20,7 @@ from ...media.completeness import is_whole_movie, is_whole_picture, whole_pictur
 from ..data import strips
 from ..data.property_copy import for_a_while
 from ..rendering import render_job
-from . import movie_feed
+from . import edit_feed
 
 INTERRUPTED = 130
 Move = Callable[[Path, Path], object]  # moves a picture to its place
@@ -92,6 +92,18 @@ def check_folder(path: Path, file_format: str | None) -> None:
     """OutputError: it looks like a file of another kind, and no format says that it is a folder of pictures."""
     if path.suffix.strip(".") and not path.is_dir() and file_format is None:
         raise OutputError(f"{path}: neither a folder nor one of {', '.join(MOVIES)}")
+
+
+def check_writable(folder: Path) -> None:
+    """OutputError: nothing can be written to a folder, or where it is to be made."""
+    place = next(path for path in (folder, *folder.parents) if path.exists())
+    if not place.is_dir():
+        raise OutputError(f"{place}: is a file, and no folder")
+    try:
+        with atomic_write.part_folder(place):  # what permissions and mounts promise is not always so
+            pass
+    except OSError as error:
+        raise OutputError(f"{place}: {error.strerror or error}") from None
 
 
 def spare(written: Iterable[Path], read: Collection[Path]) -> None:
@@ -195,7 +207,7 @@ def film(scene: Scene, output: Path) -> None:
     OutputError: it cannot be rendered or written; finished pictures stay, and of a movie what was finished, under a
     name of its own. InterruptedRenderError: the same, by Ctrl-C or a farm's TERM."""
     prepare(output.parent if is_movie(output) else output)
-    feed = movie_feed.feeding(scene) if is_movie(output) and strips.effect_strips(scene) else nullcontext()
+    feed = edit_feed.feeding() if is_movie(output) and strips.effect_strips(scene) else nullcontext()
     with progress(scene.frame_end - scene.frame_start + 1, "frame") as moved, _without_sources(scene), feed:
         write(scene, output, moved)
 
@@ -204,7 +216,7 @@ def write(scene: Scene, output: Path, moved: Callable[[], None], move: Move = Pa
     """Renders the frames of any edit to a movie, or to the pictures that its settings say in a prepared folder. Blender
     writes into a folder beside the output, and what is finished moves out of it.
 
-    moved: called after each frame; move: moves a picture to its place, or raises an error
+    moved: called after each frame; move: moves a picture to its place. Both may raise what ends the render
     OutputError, InterruptedRenderError: see `film`."""
     kept = scene.render.filepath
     faults: list[str] = []
@@ -241,17 +253,6 @@ def prepare(folder: Path) -> None:
     atomic_write.clear_up(folder)
 
 
-@contextmanager
-def whole(path: Path | None) -> Iterator[Path | None]:
-    """What to write in place of a file, so that it is there whole or not at all; None for none."""
-    if path is None:
-        yield None
-        return
-    prepare(path.parent)
-    with atomic_write.writing(path) as part:
-        yield part
-
-
 def _finish(part: Path, output: Path, count: int) -> None:
     if not is_whole_movie(part, count):
         raise OutputError(f"{output}: could not be written whole ({why_short(part.parent)})")
@@ -280,16 +281,16 @@ def message(error: RuntimeError) -> str:
 
 @contextmanager
 def _moved(part: Path, output: Path, scene: Scene, update: Callable[[], None], move: Move) -> Iterator[dict[str, Path]]:
-    """Moves each finished picture from `part` to `output`, and calls both. Gives the pictures that are missing so
-    far, by name; none of a movie's."""
+    """Moves each finished picture from `part` to `output`, and calls both, which may raise. Gives the pictures that are
+    missing so far, by name; none of a movie's."""
     frames = range(scene.frame_start, scene.frame_end + 1)
     settings = scene.render.image_settings
     ending = next((name for name, kind in FORMATS.items() if settings.file_format == kind.blender), "")
     missing = {path.name: path for path in pictures_of(output, ending, frames)} if ending else {}
 
     def moved(*_) -> None:
-        update()
         try:
+            update()
             os.utime(part)  # a movie's encoder may not write for long: nobody shall take it for left behind
             for name in [path.name for path in part.iterdir() if path.name in missing]:
                 if not is_whole_picture(part / name):

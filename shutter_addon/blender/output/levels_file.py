@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import struct
 import tempfile
 from collections.abc import Iterator
 from contextlib import closing, contextmanager
@@ -11,30 +10,18 @@ from pathlib import Path
 
 import bpy
 import numpy as np
+import OpenImageIO
 
 from ...core import atomic_write
-from ..data import strips
 
 # Rows of a tile of the file; its columns are a multiple of 16. A TIFF without tiles takes twice the time: Blender reads
 # rows upwards, for which OpenImageIO then allocates 64 MB for each picture.
 _ROWS, _COLUMNS = 64, 16
 
 
-def strip_above(editor: bpy.types.SequenceEditor, path: Path, first: int, stop: int) -> bpy.types.ImageStrip:
-    """A strip of that file which covers all others from one timeline frame to another. ValueError: there is no channel
-    above them."""
-    channel = max((strip.channel for strip in editor.strips), default=0) + 1
-    if channel > strips.CHANNELS:
-        raise ValueError
-    strip = editor.strips.new_image(path.name, str(path), channel, first)
-    strip.right_handle, strip.blend_type = stop, "REPLACE"
-    return strip
-
-
 @contextmanager
 def temporary(scene: bpy.types.Scene) -> Iterator[LevelsFile]:
-    """A file for the pictures of a scene. OSError, struct.error (beyond the 4 GB of a TIFF): there is no room for
-    it."""
+    """A file for the pictures of a scene. OSError: there is no room for it."""
     atomic_write.clear_up(place := Path(tempfile.gettempdir()))
     with atomic_write.part_folder(place) as folder:
         file = LevelsFile(folder / "picture.tif", scene.render.resolution_x, scene.render.resolution_y)
@@ -47,10 +34,18 @@ class LevelsFile:
 
     def __init__(self, path: Path, width: int, height: int) -> None:
         """OSError: it cannot be written. After this there is room for all that is written to it."""
-        self.path = path
-        self._padding, tiles = -width % _COLUMNS, -(-height // _ROWS)
-        self._head = _tiff_head(width, height, width + self._padding, tiles)
-        path.write_bytes(self._head + bytes(4 * (width + self._padding) * _ROWS * tiles))
+        self.path, self._padding = path, -width % _COLUMNS
+        columns = width + self._padding
+        spec = OpenImageIO.ImageSpec(width, height, 4, "uint8")
+        spec.tile_width, spec.tile_height = columns, _ROWS
+        spec.attribute("compression", "none")
+        spec.attribute("oiio:UnassociatedAlpha", 1)
+        white = np.full((height, width, 4), 255, np.uint8)
+        file = OpenImageIO.ImageOutput.create(str(path))
+        if not (file and file.open(str(path), spec) and file.write_image(white) and file.close()):
+            raise OSError(f"{path}: cannot be written")
+        # The tiles are one below the other, and nothing lies between.
+        self._start = path.read_bytes().index(b"\xff" * (4 * width))
         self._file = path.open("r+b", buffering=0)
 
     def write(self, levels: np.ndarray) -> None:
@@ -58,29 +53,9 @@ class LevelsFile:
         a picture of one colour."""
         if self._padding:
             levels = np.pad(levels, ((0, 0), (0, self._padding), (0, 0)))
-        self._file.seek(len(self._head))
+        self._file.seek(self._start)
         self._file.write(levels)
         os.utime(self.path)
 
     def close(self) -> None:
         self._file.close()
-
-
-def _tiff_head(width: int, height: int, columns: int, tiles: int) -> bytes:
-    """All of a little-endian TIFF before its pixels: so many tiles, so many columns wide, one below the other."""
-    short, long, count, size = 3, 4, 11, 4 * columns * _ROWS
-    depths = 8 + 2 + 12 * count + 4  # behind the header of 8 bytes, the number of fields, the fields, and their end
-    places = depths + 8
-    pixels = places + 8 * tiles if tiles > 1 else places
-    starts, sizes = [pixels + tile * size for tile in range(tiles)], [size] * tiles
-    table = struct.pack(f"<{2 * tiles}I", *starts, *sizes) if tiles > 1 else b""
-    fields = [
-        *((256, long, 1, width), (257, long, 1, height)),
-        *((258, short, 4, depths), (259, short, 1, 1), (262, short, 1, 2)),  # bits of samples, not compressed, RGB
-        *((277, short, 1, 4), (322, long, 1, columns), (323, long, 1, _ROWS)),  # channels, columns, rows
-        (324, long, tiles, places if table else pixels),  # where the tiles are
-        (325, long, tiles, places + 4 * tiles if table else size),  # their bytes
-        (338, short, 1, 2),  # straight alpha
-    ]
-    packed = b"".join(struct.pack("<HHII", *field) for field in fields) + bytes(4) + struct.pack("<4H", 8, 8, 8, 8)
-    return struct.pack("<2sHIH", b"II", 42, 8, count) + packed + table

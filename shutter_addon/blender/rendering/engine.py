@@ -11,7 +11,7 @@ from ...core import told
 from ...core.messages import signed
 from ...core.stopping import StoppedError
 from ..data.strips import ENGINE
-from . import effect_source, invalidation, job_snapshots, pictures, previews, render_context, render_job
+from . import effect_source, invalidation, job_snapshots, pictures, previews, render_job, sessions
 from .render_job import Where
 
 
@@ -50,7 +50,7 @@ class VirtualShutterEngine(bpy.types.RenderEngine):
         last = job_snapshots.pictures.get(scene.session_uid) if render_job.where() is Where.JOB else None
         if last is not None and last.shape == (height, width, 4):
             self._show(last)  # in the render's window, which would be empty until this one is made
-        context = render_context.of_engine(self._say, stopped or self._stopped)
+        context = sessions.of_engine(self._say, stopped or self._stopped)
         try:
             picture = pictures.picture(context, shown, frame, detail)
         except StoppedError:

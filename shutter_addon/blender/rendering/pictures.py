@@ -21,7 +21,7 @@ from ..data import consistency
 from ..data.snapshot import Snapshot
 from . import render_settings
 from .effect_source import FULL, Detail
-from .render_context import RenderContext
+from .session import RenderContext
 
 SLOW_DECODING = n_("a second Blender decodes movies, which is slow: install the zip that is made for your system")
 
@@ -36,7 +36,7 @@ def picture(context: RenderContext, snapshot: Snapshot, frame: float, detail: De
         raise StoppedError
     session, request = context.session, context.request(snapshot, frame, detail)
     renderer = context.renderer(request)  # meanwhile the window may close it: it would be opened again
-    if (weights := context.settings.weights) is not None:
+    if (weights := render_settings.settings().weights) is not None:
         place = weights / f"{round(frame - snapshot.first + 1):04d}.exr"
         _write_weights(place, snapshot, frame, session.weights(request, context.stopped))
     if renderer.source.by_blender:

@@ -23,8 +23,8 @@ from ...media.reduced import DIVISORS
 from ..data import annotations, preview_areas, selection, strips
 from ..data.preview_areas import Look, Shown
 from ..data.snapshot import Snapshot
-from . import effect_source, invalidation, render_context, render_job
-from .render_context import RenderContext
+from . import effect_source, invalidation, render_job, sessions
+from .session import RenderContext
 
 # Operators that read the sequencer's pictures, from the window.
 _READERS = {"RENDER_OT_opengl", "SEQUENCER_OT_sample"}
@@ -169,7 +169,7 @@ def for_drawing(context: Context, shown: Shown, decision: Decision | None) -> Dr
         left = 1.0
     # Else the engine has composed it, and it lies there in its place among the other strips.
     draws_result = has_result and left < 1 and (decision.is_drawn or not _is_rendered(shown))
-    renderer = render_context.of_drawing().renderer(request)
+    renderer = sessions.of_drawing().renderer(request)
     return Drawing(
         decision=decision,
         request=request,
@@ -192,7 +192,7 @@ def _look(context: Context, shown: Shown) -> Look:
 
 
 def _decide(context: Context, shown: Shown, look: Look, snapshot: Snapshot) -> Decision:
-    render = render_context.of_drawing()
+    render = sessions.of_drawing()
     request = _requested(context, render, shown, snapshot, look)
     return Decision(snapshot, request, _is_drawn(context, shown, look, render.renderer(request).source))
 
@@ -247,7 +247,7 @@ def _drafted(context: Context, shown: Shown, request: Request) -> Request:
     is_result = context.window_manager.virtual_shutter.view in RESULTS and _is_rendered(shown)
     if looking.whole is not None or (is_result and not is_going(context)):
         return request
-    return draft(request, render_context.of_drawing().renderer(request).source)
+    return draft(request, sessions.of_drawing().renderer(request).source)
 
 
 def draft(request: Request, source: FrameSource) -> Request:

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from contextlib import contextmanager
-from contextvars import ContextVar
+from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from pathlib import Path
 
 from ...devices.budget import MEGABYTE, Budget
 from ..data import preferences
+from ..data.property_copy import for_a_while
 from ..devices import available
 
 
@@ -28,23 +27,25 @@ class RenderSettings:
     gpu_memory: int | None = None
 
 
-_settings: ContextVar[RenderSettings] = ContextVar("settings", default=RenderSettings())  # noqa: B039
-_budget: tuple[int, Budget] | None = None  # with the megabytes that it was made for
+@dataclass
+class _Data:
+    """settings: of the command that runs; budget: with the megabytes that it was made for"""
+
+    settings: RenderSettings = RenderSettings()
+    budget: tuple[int, Budget] | None = None
 
 
-@contextmanager
-def using(settings: RenderSettings) -> Iterator[None]:
-    """Inside, on this thread, renders have these settings."""
-    token = _settings.set(settings)
-    try:
-        yield
-    finally:
-        _settings.reset(token)
+_data = _Data()
+
+
+def using(settings: RenderSettings) -> AbstractContextManager[None]:
+    """Inside, renders have these settings: in a command, beside which nothing else renders."""
+    return for_a_while([(_data, "settings", settings)])
 
 
 def settings() -> RenderSettings:
-    """Those of the render that runs on this thread; of a job of the window none are set."""
-    return _settings.get()
+    """Those of the command that runs; of the window none are set."""
+    return _data.settings
 
 
 def wanted() -> str:
@@ -61,18 +62,16 @@ def _wanted_memory() -> int:
 def memory() -> Budget:
     """What the textures of both sessions may take together: it is one GPU, which OpenGL knows best, where it may be
     asked; else the first device tells."""
-    global _budget
-    if _budget is None:
+    if _data.budget is None:
         megabytes = _wanted_memory()
         asks = not megabytes and wanted() in ("auto", "gpu", "opengl")
-        _budget = megabytes, Budget(megabytes * MEGABYTE or (available.opengl().memory if asks else None))
-    return _budget[1]
+        _data.budget = megabytes, Budget(megabytes * MEGABYTE or (available.opengl().memory if asks else None))
+    return _data.budget[1]
 
 
 def forget_memory_if_changed() -> bool:
     """Whether another limit is wanted than the one that `memory` gave; the next call gives that."""
-    global _budget
-    if _budget is None or _budget[0] == _wanted_memory():
+    if _data.budget is None or _data.budget[0] == _wanted_memory():
         return False
-    _budget = None
+    _data.budget = None
     return True

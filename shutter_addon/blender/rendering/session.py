@@ -6,7 +6,8 @@ import threading
 from collections.abc import Callable, Iterable
 from concurrent.futures import Executor, Future
 from contextlib import suppress
-from typing import TYPE_CHECKING, Any
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from bpy.app.translations import pgettext_rpt as rpt_
@@ -17,6 +18,7 @@ from ...core import threads
 from ...core.messages import translated
 from ...core.model.state_at import state_at
 from ...core.pixels.matte_grid import block_means
+from ...core.pixels.shown_levels import Display
 from ...core.stopping import never
 from ...devices.device import NoDeviceError
 from ...media.matte_values import Late, MatteValues
@@ -26,11 +28,33 @@ from . import render_settings
 from .device_work import T, Work, broken_off, result_of
 from .effect_source import FAULTS, FULL, Detail, SourceKey, clip_of
 
-if TYPE_CHECKING:
-    from .render_context import RenderContext
-
 # Renderers whose frames are kept: more effects than these in one frame decode their windows again for every frame.
 _KEPT = 4
+
+
+@dataclass(frozen=True)
+class RenderContext:
+    """For whom pictures are made, whatever they show.
+
+    session: whose device makes them
+    say: called with a sentence when the device is a lesser one, or something cannot be done
+    stopped: whether they are not wanted any longer
+    levels: they are of 8-bit display code values (Request.levels)
+    display: what shows them, whose levels are wanted (Request.display)"""
+
+    session: RenderSession
+    say: Callable[[str], None] = print
+    stopped: Callable[[], bool] = never
+    levels: bool = False
+    display: Display | None = None
+
+    def request(self, snapshot: Snapshot, frame: float, detail: Detail | None = None) -> Request:
+        """See RenderSession.request."""
+        return self.session.request(snapshot, frame, self, detail)
+
+    def renderer(self, request: Request) -> Renderer:
+        """See RenderSession.renderer."""
+        return self.session.renderer(request.source, self.say, self.stopped)
 
 
 class RenderSession:

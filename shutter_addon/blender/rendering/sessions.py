@@ -1,13 +1,19 @@
-"""The sessions that there are: the window's, that of renders, and that of renders for which the window waits."""
+"""The sessions that there are: the window's, that of renders, and that of renders for which the window waits. Whoever
+wants pictures (the engine, what is drawn, a command, the feed of a film) gets a RenderContext here once, and passes it
+down."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import bpy
 
+from ...core.pixels.shown_levels import Display
+from ...core.stopping import never
 from ..devices import available, gpu_relay
 from . import outline_carrying, render_job, render_settings
 from .render_job import Where
-from .session import RenderSession
+from .session import RenderContext, RenderSession
 
 _ANSWER = 5.0  # seconds that a job waits for the window to free memory
 
@@ -34,7 +40,28 @@ WAITED_FOR = RenderSession(lambda: available.choose(render_settings.wanted(), wi
 SESSIONS = OFFSCREEN, WINDOW, WAITED_FOR
 
 
-def of_render() -> RenderSession:
+def of_drawing() -> RenderContext:
+    """For what is drawn on the main thread; without a window, what draws there is a script."""
+    return RenderContext(WINDOW) if render_job.where() is Where.WINDOW else of_render()
+
+
+def of_engine(say: Callable[[str], None], stopped: Callable[[], bool]) -> RenderContext:
+    """For the engine: a preview where Blender draws, else a render."""
+    return of_render(say, stopped) if render_job.ends_films() else RenderContext(WINDOW, say, stopped)
+
+
+def of_render(
+    say: Callable[[str], None] = print,
+    stopped: Callable[[], bool] = never,
+    *,
+    levels: bool = False,
+    display: Display | None = None,
+) -> RenderContext:
+    """For a render: on a device apart from the window's, which need not be current. NoDeviceError: there is none."""
+    return RenderContext(_of_render(), say, stopped, levels=levels, display=display)
+
+
+def _of_render() -> RenderSession:
     """That of the render which runs on this thread."""
     if render_job.where() is not Where.WAITED_FOR:
         return OFFSCREEN
