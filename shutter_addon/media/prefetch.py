@@ -2,7 +2,7 @@
 
 import threading
 from collections.abc import Iterable
-from concurrent.futures import Future, ThreadPoolExecutor, wait
+from concurrent.futures import Executor, Future, wait
 
 import numpy as np
 
@@ -29,7 +29,7 @@ class PrefetchSource(SourceWrapper):
         self._asked: list[int] = []  # by reads that wait
         self._frames: dict[int, Future[np.ndarray | Planes]] = {}
         self._changing = threading.Lock()
-        self._pool: ThreadPoolExecutor | None = None
+        self._pool: Executor | None = None
 
     def want(self, indices: Iterable[int]) -> None:
         """Decodes these frames, in this order, and frees all others."""
