@@ -289,17 +289,18 @@ def test_a_folder_that_is_a_link_is_one_sentence_when_it_is_to_be_emptied(bpy, i
 @pytest.mark.usefixtures("effect")
 def test_what_is_known_is_forgotten_with_the_file(bpy, inbetween_build, tmp_path):
     from shutter_addon.blender.rendering import invalidation
-    from shutter_addon.media import derived
+    from shutter_addon.media import derived, inbetween_cache
 
     scene = bpy.context.scene.virtual_shutter.effects[0].scene.session_uid
     bpy.ops.shutter.inbetween_build()
     look(bpy, inbetween_build)
     invalidation.invalidate_changed(bpy.context.scene)
-    assert remembering(tmp_path) >= {"inbetween_cache", "inbetween_build", "inbetween_settings"}
+    assert remembering(tmp_path) >= {"inbetween_build", "inbetween_settings"}
     assert "invalidation" in remembering(scene)
     bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
     assert remembering(tmp_path) == remembering(scene) == set()
-    assert derived.content_hash.cache_info().currsize == 0
+    remembered = derived.content_hash, inbetween_cache._listing, inbetween_cache._size  # of sources and folders
+    assert [each.cache_info().currsize for each in remembered] == [0, 0, 0]
 
 
 def test_footage_that_is_gone_is_one_sentence(bpy, effect, tmp_path):

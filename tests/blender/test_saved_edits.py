@@ -416,8 +416,7 @@ def test_in_betweens_of_an_edits_frames_are_built_and_shared(bpy, edit, noise, r
     refused(run("render", saved, "--output", out, "--frames", "3:4"), "in-between frames", "are missing")
     assert run("inbetween", saved, "--frames", "3:4")[0] == 0
     (cache,) = (tmp_path / "virtual_shutter_inbetween").iterdir()
-    built = {line.split()[1] for path in (cache / "checks").iterdir() for line in path.read_text().splitlines()}
-    assert built
+    assert [path for path in cache.iterdir() if path.name != "manifest.json"]
     assert run("render", saved, "--output", out, "--frames", "3:4") == (0, "")
     assert run("render", saved, "--output", out, "--frames", "9")[0] == 2
     assert run("inbetween", saved) == (0, "")

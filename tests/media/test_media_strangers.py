@@ -407,7 +407,7 @@ def test_a_source_that_became_a_pipe_is_one_sentence(source, folder):
 def test_what_is_known_of_folders_is_forgotten(source, tmp_path, monkeypatch):
     looked, listing = [], inbetween_cache.Folder.files
     monkeypatch.setattr(inbetween_cache.Folder, "files", lambda cache: looked.append(cache.path) or listing(cache))
-    monkeypatch.setattr(inbetween_cache, "_RECENT", 0)
+    monkeypatch.setattr(inbetween_cache, "_RECENT", 0)  # as if the folder were some seconds old
 
     def looks(ask, *given):
         looked.clear()
