@@ -239,7 +239,7 @@ class LayerCase:
         behind = self._compositor.draw(self.windows[0], Request(index, self._state), coefficients)
         own = self._compositor.draw(self.windows[1], Request(index, self._own), whole)
         exposures = Exposure(behind, behind), Exposure(own, own)
-        self._laying.least(exposures[0])
+        self._laying.least_share(exposures[0])
         return self._laying.lay(Behind(exposures[0]), exposures[1:], False)
 
     def expected(self, frames, y, x, coefficients: np.ndarray) -> np.ndarray:
@@ -495,8 +495,7 @@ class Case:
         """Of what was solved last, along edges."""
         count = len(self.state.bars)
         got = self.compositor.coefficients(self.edges, count).copy()
-        many = mock.patch.multiple(edge_diffusion_gpu, LAST_CYCLES=(4,) * 8, CYCLES=(4,) * 16)
-        with many, mock.patch.multiple(diffusion, CYCLES=(4,) * 16, ENOUGH=0):
+        with mock.patch.multiple(edge_diffusion_gpu, LAST_CYCLES=(4,) * 8, CYCLES=(4,) * 16, ENOUGH=0):
             self.diffuse("edges")
         return float(np.abs(self.compositor.coefficients(self.edges, count) - got).max() * 255)
 
@@ -562,7 +561,7 @@ class HostCase(Case):
         return None
 
     def _diffusion_error(self) -> float:
-        with mock.patch.multiple(diffusion, CYCLES=(4,) * 12, ENOUGH=0):
+        with mock.patch.multiple(diffusion, ITERATIONS=30, ENOUGH=0):
             expected = self.solver.solve(self.labels, len(self.state.bars))
         return float(np.abs(self.handle - expected).max() * 255)
 
