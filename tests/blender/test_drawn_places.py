@@ -130,9 +130,9 @@ def test_a_recipe_keeps_its_meaning(bpy, region):
     move(bpy, 1, Placement())
     move(bpy, 11, MOVES["all"])
     pen(bpy, 11, SECOND)
-    exported = recipe_export.recipe_of(*selection.active(bpy.context))
-    key = next(key for key in exported.regions[0].keys if key.frame == 11)
-    placed = scribbles.transform(key.strokes, key.location, key.rotation, key.scale, 640 / 360)
+    exported = recipe_export.recipe_of(*selection.active(bpy.context)).regions[0]
+    strokes, there = exported.drawings.strokes[exported.drawings.frames.index(11)], exported.placement(11)
+    placed = scribbles.transform(strokes, there.location, there.rotation, there.scale, 640 / 360)
     assert same([points * (640, 360) - (320, 180) for points in placed], SECOND)
 
 
