@@ -16,6 +16,7 @@ from itertools import pairwise
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from ..model import keyframes, limits
 from ..model.effect import (
@@ -42,6 +43,7 @@ TOLERANCE = 1e-4
 
 # Frames of keys, each with the ease of the span that it begins.
 _Eased = Sequence[tuple[float, Ease]]
+_Fits = Callable[[float, float, float, float], bool]
 
 
 def baked(effect: Effect, shown: range, contents: Iterable[FileContent | RampContent] = ()) -> Effect:
@@ -176,16 +178,25 @@ def _time(time: Channel, shown: range) -> SourceTime:
 def _number_keys(at: Callable[[float], float], channel: Channel, shown: range) -> Keys:
     """The keys of a number; at: its values, channel: where it was sampled."""
 
-    def fits(first: float, second: float, frame: float, share: float) -> bool:
-        ends = np.array([at(first), at(second)])
-        apart = abs((1 - share) * ends[0] + share * ends[1] - at(frame))
-        return bool(apart <= max(TOLERANCE, 2e-6 * np.abs(ends).max()))  # of large numbers: float32 has no more digits
-
+    # Of large numbers, float32 has no more digits.
+    fits = _straight(lambda frame: np.array(at(frame)), lambda largest: max(TOLERANCE, 2e-6 * float(largest)))
     keys: _Eased = [(shown.start, "linear")]
     if isinstance(channel, Samples):
         frames = [frame for frame, _ in channel.keys]
         keys = _keys(fits, lambda frame, held: fits(held, held, frame, 0), channel.keys, frames, {}, shown)
     return _keyed(keys, lambda frame: _short(at(frame)), shown)
+
+
+def _straight(at: Callable[[float], np.ndarray], allowed: Callable[[np.ndarray], ArrayLike]) -> _Fits:
+    """What tells whether numbers are straight in between (see _keys). allowed: how far they may be off, by the largest
+    at the ends"""
+
+    def fits(first: float, second: float, frame: float, share: float) -> bool:
+        ends = np.array([at(first), at(second)])
+        apart = np.abs((1 - share) * ends[0] + share * ends[1] - at(frame))
+        return bool(np.all(apart <= allowed(np.abs(ends).max(axis=0))))
+
+    return fits
 
 
 def _region(
@@ -236,10 +247,7 @@ def _move_keys(moving: Subject, words: Mapping[float, Ease], shown: range) -> _E
     if not frames and tuple(place(shown.start)) != (0, 0, 0, 1):
         frames = {shown.start}
 
-    def fits(first: float, second: float, frame: float, share: float) -> bool:
-        ends = np.array([place(first), place(second)])
-        apart = np.abs((1 - share) * ends[0] + share * ends[1] - place(frame))
-        return bool(np.all(apart <= TOLERANCE * np.maximum(1, np.abs(ends).max(axis=0))))
+    fits = _straight(place, lambda largest: TOLERANCE * np.maximum(1, largest))
 
     def still(frame: float, held: float) -> bool:
         return fits(held, held, frame, 0)
@@ -263,7 +271,7 @@ def _drawings(region: Region | OutlineRegion, frame: float) -> dict[float, list[
 
 
 def _keys(
-    fits: Callable[[float, float, float, float], bool],
+    fits: _Fits,
     still: Callable[[float, float], bool],
     keys: Collection[tuple[float, Ease]],
     frames: Sequence[float],

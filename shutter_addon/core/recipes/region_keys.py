@@ -29,11 +29,10 @@ def with_placements(
     exact: those frames among them whose keys are kept in any case, and as they are given
     size: of the picture; thin: no more keys than the motion needs within a pixel"""
     drawings = replace(region.drawings, aspect=size[0] / size[1])
-    keyed = _frames(region)
+    keyed = _eases(region)
     # A drawing at no key is there from the first on.
     drawn = [frame for frame in drawings.frames if frame in keyed]
-    eases = dict(zip(keyed, _eases(region), strict=True)) if len(drawings.frames) > 1 else {}
-    eases = {frame: ease for frame, ease in eases.items() if frame in drawn}
+    eases = {frame: keyed[frame] for frame in drawn if len(drawings.frames) > 1}
     chosen = sorted(placements)
     if thin:
         # behind a drawing with an ease of its own the motion is to go straight
@@ -58,15 +57,10 @@ def with_camera(
     return source.with_parts(source.regions, camera)
 
 
-def _frames(moving: Subject) -> tuple[float, ...]:
-    """The frames of its keys."""
+def _eases(moving: Subject) -> dict[float, Ease]:
+    """The eases of its keys, by their frames."""
     location = moving.moves.location
-    return location.frames if isinstance(location, Keys) else ()
-
-
-def _eases(moving: Subject) -> tuple[Ease, ...]:
-    location = moving.moves.location
-    return location.eases if isinstance(location, Keys) else ()
+    return dict(zip(location.frames, location.eases, strict=True)) if isinstance(location, Keys) else {}
 
 
 def _moves(
@@ -79,7 +73,7 @@ def _moves(
     """Keys with the chosen placements, in place of those from the first placement to the last; what moves still does so
     at whole frames beyond. eases: by frame, those that drawings have."""
     first, last = min(placements), max(placements)
-    old = dict(zip(_frames(moving), _eases(moving), strict=True))
+    old = _eases(moving)
     keys: dict[float, Placement] = {frame: moving.placement(frame) for frame in old if not first <= frame <= last}
     kept = {frame: old[frame] for frame in keys}
     keys |= {frame: moving.placement(frame) for frame in _cut(old, first - 1, -1) + _cut(old, last + 1, 1)}
