@@ -16,7 +16,8 @@ from bpy.types import Depsgraph, Scene
 from ..core import revision, told
 from ..core.messages import sentence, signed
 from .data import data_format, inbetween_settings, main_thread, preview_areas, source_media, strips, versions
-from .editing import reconcile, shown_annotations, track_region, undelete
+from .editing import reconcile as reconciling
+from .editing import shown_annotations, track_region, undelete
 from .interface import bake_operators, inbetween_operators, operator_bases, sharp_frame
 from .output import edit_feed
 from .rendering import invalidation, job_snapshots, render_job, sessions
@@ -34,7 +35,7 @@ def _before_load(*_) -> None:
     invalidation.forget()
     inbetween_settings.built.forget()
     source_media.forget()
-    reconcile.forget()
+    reconciling.forget()
 
 
 def _after_load(*_) -> None:
@@ -42,7 +43,7 @@ def _after_load(*_) -> None:
     sessions.drop_removed()  # what a render job took up while the file was loaded
     if not data_format.is_file_newer():
         data_format.migrate()
-        reconcile.tidy()
+        reconciling.tidy()
     shown_annotations.follow()
     tell_newer(bpy.data.scenes)
 
@@ -72,7 +73,7 @@ def _show(words: str) -> None:
 
 def _before_save(*_) -> None:
     edit_feed.end()
-    reconcile.update()  # a script may have removed strips, since Blender last told
+    reconciling.update()  # a script may have removed strips, since Blender last told
     sharp_frame.give_back(bpy.context)
     if not data_format.is_file_newer():
         data_format.stamp_saved(versions.extension())
@@ -83,7 +84,7 @@ def _update(scene: Scene | None = None, depsgraph: Depsgraph | None = None) -> N
     if (film := render_job.film()) is not None and bpy.app.is_job_running("RENDER"):
         job_snapshots.look(film)
     if not render_job.cancelling():
-        reconcile.update(scene)
+        reconciling.update(scene)
     # Blender itself draws previews again for most of what changes, but not for a mask. And it may crash where one is
     # drawn while a render ends.
     if depsgraph is not None and depsgraph.id_type_updated("MASK") and not render_job.runs():
@@ -96,7 +97,7 @@ def _before_undo(*_) -> None:
 
 def _after_undo(*_) -> None:
     revision.changed()
-    reconcile.find_lost()
+    reconciling.find_lost()
     track_region.data_replaced()
     _drop_frames()
     sessions.drop_removed()
@@ -127,7 +128,7 @@ def _prepare(film: int, in_job: bool) -> bool:
     source_media.rest(render_job.runs())
     if not data_format.is_file_newer():
         # In a window the last update has seen to it, but for views, of which Blender tells nobody.
-        reconcile.follow_sources(reconcile.tidy() if bpy.app.background else reconcile.gather())
+        reconciling.follow_sources(reconciling.tidy() if bpy.app.background else reconciling.gather())
     for scene in bpy.data.scenes:
         invalidation.invalidate_changed(scene)
     if in_job:
@@ -208,5 +209,5 @@ def unregister() -> None:
     edit_feed.end()
     sessions.forget()
     source_media.forget()
-    reconcile.forget()
+    reconciling.forget()
     undelete.forget()
