@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from itertools import pairwise
 from typing import Any
 
@@ -10,9 +11,7 @@ from ..model import limits, shutters
 from ..model.fields import Field, fields_of
 from ..model.frame_state import Options
 from .recipe import CAMERA, RecipeError
-from .recipe_types import shown
 from .records import (
-    MODELS,
     Keyable,
     MatteRecord,
     MoveKey,
@@ -24,6 +23,20 @@ from .records import (
 )
 
 _COMBINED = "lightest", "darkest"
+
+
+def shown(value: Any) -> str:
+    """A value as JSON, or its first 40 characters; of large ones the rest is not looked at."""
+    text = ""
+    for part in json.JSONEncoder(ensure_ascii=False).iterencode(value):
+        text += part
+        if len(text) > 40:
+            break
+    return cut(text)
+
+
+def cut(text: str) -> str:
+    return text if len(text) <= 40 else text[:37] + "…"
 
 
 def _plain(number: float) -> str:
@@ -38,8 +51,7 @@ def _require(condition: object, place: str, message: str) -> None:
 def _require_within(value: float, most: float, place: str, least: float | None = None) -> None:
     """least: −most, where it is not given."""
     least = -most if least is None else least
-    if not least <= value <= most:  # asked so often that its words are made where it is not
-        raise RecipeError(f"{place}: {_plain(value)} is not {_plain(least)} to {_plain(most)}")
+    _require(least <= value <= most, place, f"{_plain(value)} is not {_plain(least)} to {_plain(most)}")
 
 
 def check(recipe: Any) -> None:
@@ -135,7 +147,8 @@ def _check_follow(follow: str | None, regions: list, place: str) -> None:
 
 
 def _check_region(region: Any, place: str) -> None:
-    _check_fields(MODELS[type(region)], region, f"{place}.")
+    kinds = {RegionRecord: model.Region, OutlineRecord: model.OutlineRegion}
+    _check_fields(kinds.get(type(region), model.MatteRegion), region, f"{place}.")
     _check_moves(region.keys, f"{place}.keys")
     if isinstance(region, MatteRecord):
         _check_fields(model.FileContent, region, f"{place}.")
@@ -172,7 +185,8 @@ def _check_strokes(strokes: list[Stroke], place: str) -> None:
         _require(stroke, f"{place}[{j}]", "empty: a stroke has at least one point")
         for n, point in enumerate(stroke):
             for axis, value in enumerate(point):
-                _require_within(value, limits.MAX_DISTANCE, f"{place}[{j}][{n}][{axis}]")
+                if not -limits.MAX_DISTANCE <= value <= limits.MAX_DISTANCE:
+                    _require_within(value, limits.MAX_DISTANCE, f"{place}[{j}][{n}][{axis}]")
 
 
 def _most_points(region: Any) -> int:
@@ -206,6 +220,5 @@ def _check_keys(keys: list, place: str) -> None:
     for k, key in enumerate(keys):
         _require_within(key.frame, limits.MAX_FRAME, f"{place}[{k}].frame")
     for k, (first, second) in enumerate(pairwise(keys)):
-        if not first.frame < second.frame:
-            follows = f"{_plain(second.frame)} does not follow {_plain(first.frame)}"
-            raise RecipeError(f"{place}[{k + 1}].frame: {follows}")
+        follows = f"{_plain(second.frame)} does not follow {_plain(first.frame)}"
+        _require(first.frame < second.frame, f"{place}[{k + 1}].frame", follows)

@@ -3,19 +3,26 @@
 from __future__ import annotations
 
 import json
+import math
 import re
+from collections import Counter
+from collections.abc import Callable
 from dataclasses import fields, is_dataclass
+from functools import cache, partial
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any, Literal, get_args, get_origin
 
 from .. import atomic_write
 from ..model import effect as model
 from ..model import limits
 from ..model.fields import fields_of
 from ..model.frame_state import Options
-from . import recipe_check, recipe_types, records
+from . import recipe_check, records
 from .recipe import RecipeError
-from .recipe_types import shown
+from .recipe_check import cut, shown
+
+if TYPE_CHECKING:
+    from cattrs import Converter
 
 # Longer numbers are read as floats, which need no time for it; a whole number that counts anything is far shorter.
 _MAX_DIGITS = 300
@@ -54,7 +61,7 @@ def parse(text: str) -> model.Effect:
     """Read the recipe in a JSON text. RecipeError: one sentence that names the place, as `shutters[1].bars: …`."""
     _check_size(text)
     try:
-        data = json.loads(text.removeprefix("\ufeff"), object_pairs_hook=recipe_types.Object, parse_int=_whole)
+        data = json.loads(text.removeprefix("\ufeff"), object_pairs_hook=_object, parse_int=_whole)
     except json.JSONDecodeError as error:
         raise RecipeError(f"line {error.lineno}, column {error.colno}: not JSON ({error.msg})") from None
     except RecursionError:
@@ -62,10 +69,11 @@ def parse(text: str) -> model.Effect:
     if isinstance(data, dict) and type(version := data.get("version")) is int and version > records.VERSION:
         newer = f"version: {shown(version)} is of a newer version of Virtual Shutter, this one reads {records.VERSION}"
         raise RecipeError(newer)
+    converter = _converter()
     try:
-        recipe = recipe_types.reader(records.RecipeRecord)(data)
-    except recipe_types.FaultError as fault:
-        raise RecipeError(f"{fault.place.lstrip('.') or 'recipe'}: {fault}") from None
+        recipe: Any = converter.structure(data, records.RecipeRecord)
+    except Exception as error:
+        raise RecipeError(_first_fault(error)) from None
     recipe_check.check(recipe)
     return records.effect_of(recipe)
 
@@ -107,5 +115,166 @@ def _said(value: Any) -> Any:
     return [_said(each) for each in value] if isinstance(value, list | tuple) else value
 
 
+class _Doubled(dict):
+    """An object of JSON that has a field twice, its name in `field`: which one is meant, nobody knows."""
+
+    field: str
+
+
+def _object(pairs: list) -> dict:
+    fields = dict(pairs)
+    if len(fields) == len(pairs):
+        return fields
+    doubled = _Doubled(fields)
+    doubled.field = Counter(name for name, _ in pairs).most_common(1)[0][0]
+    return doubled
+
+
 def _whole(digits: str) -> int | float:
     return int(digits) if len(digits) <= _MAX_DIGITS else float(digits)
+
+
+def _number(value: Any, _kind: Any) -> float:
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        raise ValueError(f"{shown(value)} is not a number")
+    if not math.isfinite(value):
+        raise ValueError(f"{value} is not a finite number")
+    return float(value)
+
+
+def _number_or_keys(converter: Converter, value: Any, kind: Any) -> float | list[records.ValueKey] | None:
+    if value is None and kind != records.Keyable:
+        return None
+    if isinstance(value, list):
+        return converter.structure(value, list[records.ValueKey])
+    try:
+        return _number(value, kind)
+    except ValueError as error:
+        raise ValueError(f"{error}, nor a list of keys") from None
+
+
+def _exactly(wanted: type, name: str) -> Callable[[Any, Any], Any]:
+    def structure(value: Any, _kind: Any) -> Any:
+        if type(value) is not wanted:
+            raise ValueError(f"{shown(value)} is not {name}")
+        return value
+
+    return structure
+
+
+def _choice(value: Any, kind: Any) -> Any:
+    allowed = get_args(kind)
+    if not any(type(value) is type(option) and value == option for option in allowed):
+        raise ValueError(f"{shown(value)} is none of {', '.join(map(str, allowed))}")
+    return value
+
+
+def _tuple(kind: Any, converter: Converter) -> Callable[[Any, Any], Any]:
+    inner = get_args(kind)
+
+    def structure(value: Any, _kind: Any) -> Any:
+        if not isinstance(value, list):
+            raise ValueError(f"{shown(value)} is not a list")
+        if len(value) != len(inner):
+            raise ValueError(f"{len(value)} values, not {len(inner)}")
+        return tuple(converter.structure(v, t) for v, t in zip(value, inner, strict=True))
+
+    return structure
+
+
+def _list(kind: Any, converter: Converter) -> Callable[[Any, Any], Any]:
+    (inner,) = get_args(kind)
+    structure_item = converter.get_structure_hook(inner)
+
+    def structure(value: Any, _kind: Any) -> Any:
+        if not isinstance(value, list):
+            raise ValueError(f"{shown(value)} is not a list")
+        return [item(value, index) for index in range(len(value))]
+
+    def item(value: list, index: int) -> Any:
+        try:
+            return structure_item(value[index], inner)
+        except Exception as error:  # the first one is enough; cattrs' own lists gather millions
+            from cattrs.errors import IterableValidationError, IterableValidationNote
+
+            error.add_note(IterableValidationNote(f"index {index}", index, inner))
+            raise IterableValidationError("in a list", [error], kind) from None
+
+    return structure
+
+
+def _dataclass(kind: Any, converter: Converter) -> Callable[[Any, Any], Any]:
+    from cattrs.gen import make_dict_structure_fn
+
+    structure_fields = make_dict_structure_fn(kind, converter, _cattrs_forbid_extra_keys=True)
+
+    def structure(value: Any, kind: Any) -> Any:
+        if not isinstance(value, dict):
+            raise ValueError(f"{shown(value)} is not an object")
+        if isinstance(value, _Doubled):
+            raise ValueError(f"field {shown(value.field)} stands there twice")
+        return structure_fields(value, kind)
+
+    return structure
+
+
+def _one_region(converter: Converter, value: Any, _kind: Any) -> Any:
+    """Which of the kinds of regions it is, its field `kind` says."""
+    word = value.get("kind", "line") if isinstance(value, dict) else "line"
+    if isinstance(word, str) and word in records.KINDS:
+        return converter.structure(value, records.KINDS[word])
+    from cattrs.errors import AttributeValidationNote, ClassValidationError
+
+    error = ValueError(f"{shown(word)} is none of {', '.join(records.KINDS)}")
+    error.add_note(AttributeValidationNote("in a region", "kind", str))
+    raise ClassValidationError("in a region", [error], records.RegionRecord)
+
+
+def _made_of(origin: Any) -> Callable[[Any], bool]:
+    return lambda kind: get_origin(kind) is origin
+
+
+@cache
+def _converter() -> Converter:
+    """RecipeError: cattrs is missing. Blender brings it; a Linux distribution's Blender may not, and effects render
+    without it."""
+    try:
+        import cattrs
+    except ImportError as error:
+        raise RecipeError(
+            f"recipes need the Python package cattrs ({error}); install it for Blender's Python"
+        ) from None
+    converter = cattrs.Converter()
+    converter.register_structure_hook(float, _number)
+    converter.register_structure_hook(int, _exactly(int, "a whole number"))
+    converter.register_structure_hook(str, _exactly(str, "a text"))
+    converter.register_structure_hook(bool, _exactly(bool, "true or false"))
+    converter.register_structure_hook_func(_made_of(Literal), _choice)
+    converter.register_structure_hook_func(
+        lambda kind: kind in (records.Keyable, records.Keyable | None), partial(_number_or_keys, converter)
+    )
+    converter.register_structure_hook_func(
+        lambda kind: kind is records.AnyRegionRecord, partial(_one_region, converter)
+    )
+    converter.register_structure_hook_factory(_made_of(tuple), _tuple)
+    converter.register_structure_hook_factory(_made_of(list), _list)
+    converter.register_structure_hook_factory(is_dataclass, _dataclass)
+    return converter
+
+
+def _first_fault(error: Exception) -> str:
+    """`place: what is wrong`, of the first fault."""
+    import cattrs
+    from cattrs.errors import ForbiddenExtraKeysError
+
+    def described(error: BaseException, kind: Any) -> str:
+        if isinstance(error, KeyError):
+            return "missing"
+        if isinstance(error, ForbiddenExtraKeysError):
+            names = sorted(error.extra_fields)
+            more = f" and {len(names) - 3} more" if len(names) > 3 else ""
+            return f"unknown field {', '.join(map(cut, names[:3]))}{more}"
+        return str(error)
+
+    message, _, place = cattrs.transform_error(error, "$", described)[0].rpartition(" @ $")
+    return f"{place.lstrip('.') or 'recipe'}: {message}"

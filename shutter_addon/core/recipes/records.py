@@ -1,4 +1,4 @@
-"""What a recipe's JSON holds, as records (recipe_types.py); and the effects that these mean.
+"""What a recipe's JSON holds, as records for cattrs; and the effects that these mean.
 
 A record has what the model's fields say, and what is special: bars, strokes and keys. Frames are timeline frames, 1 is
 the strip's first. Points are fractions of the picture, y up.
@@ -17,7 +17,6 @@ from ..model import keyframes, mattes
 from ..model.fields import MISSING, Field, fields_of
 from ..model.frame_state import Options
 from ..model.keyframes import Channel, Constant, Ease, Keys
-from ..model.motions import Placement
 from .recipe import CAMERA
 
 VERSION = 1  # the newest one that is read
@@ -121,7 +120,7 @@ KINDS = {
     "matte": MatteRecord,
     "ramp": RampRecord,
 }
-MODELS = {
+_MODELS = {
     RegionRecord: model.Region,
     OutlineRecord: model.OutlineRegion,
     MatteRecord: model.MatteRegion,
@@ -130,9 +129,7 @@ MODELS = {
 
 
 class AnyRegionRecord:
-    """A region of a recipe: by its field `kind`, one of KINDS, the first where it says none."""
-
-    KINDS = KINDS
+    """A region of a recipe: by its field `kind`, one of KINDS."""
 
 
 RecipeRecord: Any = _record(
@@ -199,13 +196,15 @@ def _shutter(record: Any, follow: model.Subject | None) -> model.Shutter:
     return model.Shutter(bars=exposed, follow=follow, **values)
 
 
-def _moves(keys: list[MoveKey]) -> model.Moves:
-    placed = [(key.frame, Placement(key.location, key.rotation, key.scale), key.ease) for key in keys]
-    return model.Moves.keyed(placed)
+def _moves(keys: list) -> model.Moves:
+    if not keys:
+        return model.Moves()
+    frames, eases, *numbers = _columns(keys, "frame", "ease", "location", "rotation", "scale")
+    return model.Moves(*(Keys(frames, values, eases) for values in numbers))
 
 
 def _region(record: Any, shutter: int) -> model.Region | model.MatteRegion:
-    kind: Any = MODELS[type(record)]
+    kind: Any = _MODELS.get(type(record), model.MatteRegion)
     values: dict[str, Any] = _values(kind, record) | {"shutter": shutter, "moves": _moves(record.keys)}
     if isinstance(record, RegionRecord | OutlineRecord):
         values["drawings"] = _drawings(record)
