@@ -212,7 +212,7 @@ def test_help_says_where_a_relative_folder_lies():
 def test_the_version_is_the_same_everywhere():
     version = tomllib.loads((ROOT / "blender_manifest.toml").read_text())["version"]
     assert tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["version"] == version
-    assert re.search(r"^## (\S+)", (ROOT / "CHANGELOG.md").read_text(), re.MULTILINE)[1] == version
+    assert re.search(r"^## (\d\S*)", (ROOT / "CHANGELOG.md").read_text(), re.MULTILINE)[1] == version
     for page in ("README.md", "docs/farms.md"):
         assert set(re.findall(r"virtual_shutter-([\d.]+)-", (ROOT / page).read_text())) == {version}
 

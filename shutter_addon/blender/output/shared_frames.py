@@ -112,8 +112,9 @@ def _render_missing(
                     del missing[frame]
             else:
                 if not waits:
-                    words = f"waiting for {frame_ranges.in_words(list(missing))}, which other workers have claimed"
-                    render_job.say(f"{folder}: {words}")
+                    awaited = frame_ranges.in_words(list(missing))
+                    words = f"{folder}: waiting for {awaited}, which other workers have claimed"
+                    render_job.say(words)
                 waits = True
                 time.sleep(_PAUSE)
         claims.clear(map(_name, pictures.values()))
