@@ -359,7 +359,7 @@ FOUND_BY_RENDER = {
     "other extension": (_change_job("extension", "0.0.9"), ["is of version 0.0.9 of the extension, this machine has"]),
     "other Blender": (_change_job("blender", "5.1.0"), ["is of Blender 5.1.0, this machine has"]),
     "job file damaged": (lambda node: _cut(node.pictures / JOB), [JOB, "is damaged; check the edit again"]),
-    "in-between damaged": (lambda node: _flip(_inbetween(node)), ["in-between frame is damaged or gone"]),
+    "in-between damaged": (lambda node: _flip(_inbetween(node)), ["in-between frame cannot be decoded"]),
     "in-between missing": (lambda node: _inbetween(node).unlink(), ["in-between frames of frame 1", "are missing"]),
     "edit cut off": (lambda node: _cut(node.edit), ["edit.blend"]),
     "no edit": (lambda node: node.edit.write_bytes(b"BLENDER"), ["edit.blend"]),
