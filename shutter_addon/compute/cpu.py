@@ -124,9 +124,10 @@ class CPUCompositor:
         return memory_needs.with_numpy(source, kind)
 
     def upload(self, values: np.ndarray) -> np.ndarray:
-        return values
+        return values.astype(np.float32, copy=False)
 
-    labels = upload
+    def labels(self, values: np.ndarray) -> np.ndarray:
+        return values
 
     def coefficients(self, handle: np.ndarray, count: int) -> np.ndarray:
         return handle[:count]

@@ -96,14 +96,15 @@ class LayeredRenderer:
         self._layers = layers
 
         composed = partial(self._composed, request, parts, coefficients, positions, shot, plain)
-        try:
-            return composed()
-        except ValueError:
-            if all(window.is_open for window in self._windows.values()):
-                raise
-        # They were freed to make room for one another. Frames that are sent have room.
-        self.release_windows()
-        self._crowd = 1 << 16
+        for crowd in (2, 8, 1 << 16):
+            try:
+                return composed()
+            except ValueError:
+                if all(window.is_open for window in self._windows.values()):
+                    raise
+            # They were freed to make room for one another: smaller ones, or frames that are sent, have room.
+            self.release_windows()
+            self._crowd = max(self._crowd, crowd)
         return composed()
 
     def _composed(

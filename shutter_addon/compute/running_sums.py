@@ -85,6 +85,8 @@ class Sums(Window):
     tiled: whether pixels are stored tile by tile, in TILE
     """
 
+    _loading: tuple[tuple[str, str], ...] = (("frame", "rgba8"),)
+
     def __init__(self, device: Device, source: FrameSource, capacity: int, shutters: int = 1) -> None:
         self.layers = capacity + 1
         self.start = self.stop = 0
@@ -204,6 +206,8 @@ class WeightedSums(Sums):
     """A window of running sums of opaque 8-bit frames that are weighted pixel by pixel, as layers are exposed
     (core.pixels.layering), and of their weights, in textures rgba32ui: four fields of 32 bits. Where the weights are 1,
     its pictures have the bits of Sums."""
+
+    _loading = (*Sums._loading, ("weights", "r32f"))
 
     def __init__(self, device: Device, source: WeightedFrames, capacity: int, shutters: int = 1) -> None:
         self.cover, self._weight = 2 if source.rest else 1, source.weight

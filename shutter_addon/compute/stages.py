@@ -57,7 +57,8 @@ class Stages:
 
     def upload(self, values: np.ndarray) -> Texture:
         """See request.Stages."""
-        return self._textures.filled("uploaded", _in_fours(values))
+        name = "constant" if values.shape[1:] == (1, 1) else "uploaded"
+        return self._textures.filled(name, _in_fours(values))
 
     def add(self, mixed: Texture | None, added: Texture, share: float, size: tuple[int, int]) -> Texture:
         """See request.Stages."""

@@ -67,6 +67,7 @@ class Window:
     kind: str
     cover = 0
     is_open = sends = False
+    _loading: tuple[tuple[str, str], ...] = ()  # textures that frames are loaded by, and their kinds
 
     def __init__(self, device: Device, source: FrameSource, capacity: int, shutters: int) -> None:
         self.device, self.source, self.capacity, self.shutters = device, source, capacity, shutters
@@ -93,6 +94,8 @@ class Window:
         for part in self.parts:
             self._textures.append(self.device.texture(*self._size(part), self.kind))
         self.picture()
+        for name, kind in self._loading:
+            self._own(name, kind)
 
     def _divided(self, most: int) -> list[Part]:
         """Bands of rows, of all layers, of so many bytes at most, but for those of a few rows. Each has a multiple of
@@ -247,6 +250,7 @@ class PackedFrames(WholeFrames):
     """A window of whole opaque 8-bit frames, in the light that is summed and quick to read (shaders/pack.glsl)."""
 
     _light: Light = "linear"
+    _loading = (("sent", "rgba8"),)
 
     def _kind(self, source: FrameSource) -> str:
         return "rgba16ui"

@@ -43,7 +43,10 @@ class Kept(dict[K, T]):
 
     def ask(self, key: K, make: Callable[[], T], most: int) -> T:
         """The value of a key: the kept one, or what `make` gives, which is kept beside most − 1 others."""
-        value = self.pop(key) if key in self else make()
+        try:
+            value = self.pop(key)
+        except KeyError:
+            value = make()
         self[key] = value
         while len(self) > most:
             del self[next(iter(self))]

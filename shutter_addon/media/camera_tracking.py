@@ -52,7 +52,7 @@ def follow_camera(
     return _CameraTrack(camera, regions, footage, motion, {*frames, *anchors}).both_ways(start, frames, anchors)
 
 
-class _CameraTrack(tracking.Track[Subject]):
+class _CameraTrack(tracking.Track):
     def __init__(
         self, camera: Subject, regions: Sequence[Drawn], footage: Footage, motion: Motion, frames: Collection[int]
     ) -> None:

@@ -15,7 +15,8 @@ from ..core import threads
 from .errors import MediaError
 
 ANSWER = "Virtual Shutter decodes"  # what an answer's line begins with: a Blender prints what it likes before
-ANSWERING = 120  # seconds after which a process that does not answer is killed: no frame takes as long
+STARTING = 60  # seconds after which a process that has not begun to answer is killed
+ANSWERING = 120  # seconds after which one that does not answer any more is: no frame takes as long
 ENDING = 5  # seconds after which one that does not end is
 _PIPE = 1 << 20  # bytes, where a pipe's size can be chosen: of 64 KB, a frame takes twice as long
 
@@ -33,7 +34,13 @@ def lend(command: list[str] | None) -> None:
     without the answer that somebody may be waiting for, if that takes long."""
     global _command
     _command = command
-    _end()  # whoever waits for an answer is told so by its pipe
+    if _asking.acquire(timeout=ENDING):
+        try:
+            _end()
+        finally:
+            _asking.release()
+    elif (process := _process) is not None:
+        process.kill()  # whoever waits is told so by its pipe, and ends it
 
 
 def is_lent() -> bool:
@@ -59,11 +66,18 @@ def tell(wanted: dict) -> None:
 
 def _answer(wanted: dict) -> tuple[dict, np.ndarray | None] | None:
     """None: the process has ended, or was ended as it did not answer."""
+    is_new = _process is None
     try:
-        return threads.start(_asked, _process or _started(), json.dumps(wanted).encode() + b"\n").result(ANSWERING)
+        asked = threads.start(_asked, _process or _started(), json.dumps(wanted).encode() + b"\n")
+        return asked.result(STARTING if is_new else ANSWERING)
     except MediaError:
         raise
-    except (_EndedError, OSError, ValueError):  # of which TimeoutError is one: it was stopped, say
+    except TimeoutError:  # it was stopped, say
+        _end()
+        if is_new:
+            raise MediaError(f"the Blender that decodes it is not ready after {STARTING} seconds") from None
+        return None
+    except (_EndedError, OSError, ValueError):
         _end()
         return None
     except BaseException:  # an interrupt, say: what is still to come would be taken for the next answer

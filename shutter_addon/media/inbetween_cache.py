@@ -159,8 +159,8 @@ class InbetweenCache:
         be of what the source has become."""
         if derived.identity(self.source) == self.manifest["source"]:
             return
-        with suppress(OSError):
-            for name in self._written:
+        for name in self._written:
+            with suppress(OSError):
                 Folder(self.folder).remove(name)
         raise MediaError(f"{self.source.path}: was written to while in-between frames were built; build them again")
 
@@ -175,7 +175,7 @@ class InbetweenCache:
         return is_whole_picture(path)
 
 
-@lru_cache(64)
+@lru_cache(8)
 def _listing(folder: Path, _changed: int | None, factor: int, suffix: str, pairs: int) -> Listed:
     """What is listed in a folder of a source of so many pairs."""
     frames, kinds = set(), {}

@@ -67,7 +67,7 @@ def follow_cover(
     return _MatteTrack(region, covered, footage, motion, {*frames, *anchors}).both_ways(start, frames, anchors)
 
 
-class _MatteTrack(tracking.Track[Subject]):
+class _MatteTrack(tracking.Track):
     def __init__(
         self,
         region: Subject,

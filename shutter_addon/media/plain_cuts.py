@@ -1,5 +1,6 @@
-"""What PySceneDetect's detectors say of pictures, computed by NumPy alone: the same sums of the same samples, without
-OpenCV, which PySceneDetect needs. Pictures are RGB (H, W, 3) in levels, which are rounded."""
+"""What PySceneDetect's detectors say of pictures, by NumPy alone, without OpenCV, which PySceneDetect needs. The sums
+are the same but for pictures of fewer rows than HashDetector has bits. Pictures are RGB (H, W, 3) in levels, which are
+rounded."""
 
 from __future__ import annotations
 

@@ -2,7 +2,6 @@
 
 import threading
 from collections.abc import Iterable
-from concurrent.futures import Executor, Future, wait
 
 import numpy as np
 
@@ -27,15 +26,16 @@ class PrefetchSource(SourceWrapper):
         self._fetch = source.decoded if planes else source.read
         self._wanted: list[int] = []  # in the order of decoding
         self._asked: list[int] = []  # by reads that wait
-        self._frames: dict[int, Future[np.ndarray | Planes]] = {}
-        self._changing = threading.Lock()
-        self._pool: Executor | None = None
+        self._done: dict[int, np.ndarray | Planes | Exception] = {}
+        self._changed = threading.Condition()
+        self._thread: threading.Thread | None = None
 
     def want(self, indices: Iterable[int]) -> None:
         """Decodes these frames, in this order, and frees all others."""
-        with self._changing:
+        with self._changed:
             self._wanted = list(dict.fromkeys(indices))
-            self._arrange()
+            self._drop()
+            self._wake()
 
     def read(self, index: int) -> np.ndarray:
         """The source's frame, read-only. One that is not decoded yet is decoded next, before all wanted ones.
@@ -49,52 +49,67 @@ class PrefetchSource(SourceWrapper):
     def decoded(self, index: int) -> np.ndarray | Planes:
         """As `read`, but for the conversion."""
         stopping.check()
-        with self._changing:
+        with self._changed:
             self._asked.append(index)
-            self._arrange()
-            frame, pool = self._frames[index], self._pool
-        try:
-            while not wait([frame], _PATIENCE).done:
-                stopping.check()
-        finally:
-            with self._changing:
+            self._wake()
+            try:
+                while not self._changed.wait_for(lambda: index in self._done or self._thread is None, _PATIENCE):
+                    stopping.check()
+            finally:
                 self._asked.remove(index)
-                self._drop()
-        if self._pool is not pool:
+            frame = self._done.get(index)
+            if isinstance(frame, Exception):
+                self._done.pop(index)
+                self._wanted = [i for i in self._wanted if i != index]
+                self._changed.notify_all()  # another read may wait for the same frame
+            self._drop()
+        if frame is None:
             raise MediaError(f"{self._source.path.name}: closed while a frame was read")
-        return frame.result()
+        if isinstance(frame, Exception):
+            raise frame
+        return frame
 
     def close(self) -> None:
         """Ends the thread, closes the file and frees all frames; a later read starts again."""
-        with self._changing:
-            pool, self._pool = self._pool, None
-            self._wanted, self._frames = [], {}
-        if pool is not None:
-            pool.shutdown(cancel_futures=True)
+        with self._changed:
+            thread, self._thread = self._thread, None
+            self._wanted, self._done = [], {}
+            self._changed.notify_all()
+        if thread is not None:
+            thread.join()
         self._source.close()
 
-    def _arrange(self) -> None:
-        """Has frames decoded in order: those that reads wait for before those that are wanted."""
-        for index, frame in list(self._frames.items()):
-            if index not in self._asked and frame.cancel():
-                del self._frames[index]
-        self._drop()
-        for index in (*self._asked, *self._wanted):
-            if index not in self._frames:
-                self._pool = self._pool or threads.pool(1)
-                self._frames[index] = self._pool.submit(self._frame, index)
+    def _wake(self) -> None:
+        if self._thread is None:
+            self._thread = threads.daemon(self._decode)
+        self._changed.notify_all()
 
     def _drop(self) -> None:
-        for index in self._frames.keys() - {*self._wanted, *self._asked}:
-            self._frames.pop(index).cancel()
+        kept = {*self._wanted, *self._asked}
+        self._done = {index: frame for index, frame in self._done.items() if index in kept}
 
-    def _frame(self, index: int) -> np.ndarray | Planes:
+    def _next(self) -> int | None:
+        return next((index for index in (*self._asked, *self._wanted) if index not in self._done), None)
+
+    def _decode(self) -> None:
+        mine = threading.current_thread()
+        while True:
+            with self._changed:
+                self._changed.wait_for(lambda: self._thread is not mine or self._next() is not None)
+                if self._thread is not mine or (index := self._next()) is None:
+                    return
+            frame = self._frame(index)
+            with self._changed:
+                if self._thread is mine:
+                    self._done[index] = frame
+                    self._drop()
+                    self._changed.notify_all()
+
+    def _frame(self, index: int) -> np.ndarray | Planes | Exception:
         try:
             frame = self._fetch(index)
-        except Exception:
-            with self._changing:  # whoever reads it later has it decoded again
-                self._wanted = [i for i in self._wanted if i != index]
-            raise
-        if not isinstance(frame, Planes):
-            frame.flags.writeable = False
-        return frame
+            if not isinstance(frame, Planes):
+                frame.flags.writeable = False
+            return frame
+        except Exception as error:  # raised to whoever reads the frame
+            return error

@@ -33,7 +33,8 @@ class ProxySource(SourceWrapper):
         if frame.shape[:2] != (self.height, self.width):
             dtype = np.float32 if frame.dtype == np.float16 else frame.dtype  # which OpenCV does not resize
             size = self.width, self.height
-            frame = cv2.resize(frame.astype(dtype), size, interpolation=cv2.INTER_AREA).astype(frame.dtype)
+            fitted = cv2.resize(frame.astype(dtype, copy=False), size, interpolation=cv2.INTER_AREA)
+            frame = fitted.astype(frame.dtype, copy=False)
         if (self._proxy.dtype, self._proxy.transfer) == (self.dtype, self.transfer):
             return frame
         return self._samples[frame if frame.dtype == np.uint8 else frame.view(np.uint16)]

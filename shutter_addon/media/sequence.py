@@ -95,7 +95,7 @@ class SequenceSource(_Sequence):
             self.width, self.height = spec.width, spec.height
             self.dtype = _dtype(spec)
         self.transfer = "linear" if self.path.suffix.lower() in LINEAR_SUFFIXES else "srgb"
-        has_alpha = len(layer) in ALPHA or any(_has_alpha(file, stamp(file)) for file in dict.fromkeys(self.files))
+        has_alpha = len(layer) in ALPHA or any(map(_has_alpha, dict.fromkeys(self.files)))
         self.alpha = (alpha or self._usual_alpha()) if has_alpha else "opaque"
         self.options = {}
 
@@ -251,17 +251,20 @@ def _listed(folder: Path) -> list[Path]:
         raise MediaError(f"{folder}: cannot be listed ({error.strerror})") from None
 
 
-@lru_cache(maxsize=1 << 17)  # a sequence of an hour and a half
-def _has_alpha(path: Path, _stamp: tuple[int, int] | None) -> bool:
-    """Whether that file of a sequence has alpha, as far as it can be read; it is opened anew where its stamp is another
-    one."""
-    if path.suffix.lower() in WITHOUT_ALPHA or not path.is_file():
+def _has_alpha(path: Path) -> bool:
+    """Whether that file of a sequence has alpha, as far as it can be read; it is opened only if it changed since."""
+    if path.suffix.lower() in WITHOUT_ALPHA:
         return False
     try:
-        with _opened(path) as (_image, _spec, layer):
-            return len(layer) in ALPHA
-    except MediaError:  # who needs the frame is told
+        return path.is_file() and _had_alpha(path, stamp(path))
+    except (OSError, MediaError):  # who needs the frame is told
         return False
+
+
+@lru_cache(maxsize=1 << 17)  # a sequence of an hour and a half
+def _had_alpha(path: Path, _stamp: tuple[int, int] | None) -> bool:
+    with _opened(path) as (_image, _spec, layer):
+        return len(layer) in ALPHA
 
 
 def _parts(image: ImageInput) -> Iterator[ImageSpec]:

@@ -10,7 +10,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Collection, Iterator
 from dataclasses import dataclass, replace
 from itertools import pairwise, takewhile
-from typing import Generic, Protocol, TypeVar
+from typing import Protocol
 
 import numpy as np
 
@@ -107,13 +107,10 @@ class Pursuit(Protocol):
         """Where it is in a frame; None: it is not there."""
 
 
-S = TypeVar("S", bound=Subject)
-
-
-class Track(ABC, Generic[S]):
+class Track(ABC):
     """What tracking a subject, a region or the camera, needs to know."""
 
-    def __init__(self, subject: S, footage: Footage, motion: Motion, frames: Collection[int]) -> None:
+    def __init__(self, subject: Subject, footage: Footage, motion: Motion, frames: Collection[int]) -> None:
         """frames: all at which the subject's centre is asked for."""
         self._subject, self._footage, self._motion = subject, footage, motion
         centres = {frame: subject.centre(frame) for frame in frames}
@@ -237,8 +234,10 @@ class Track(ABC, Generic[S]):
             yield Tracked(frame=missing, placement=replace(straight, location=(x, y)), confidence=0.0)
 
 
-class _RegionTrack(Track[Drawn]):
+class _RegionTrack(Track):
     """Tracks what a region covers."""
+
+    _subject: Drawn
 
     def _part(self, frame: int) -> tuple[Part, float]:
         """Corners far from the region are less surely its own; those of a pattern may be those of its next period."""

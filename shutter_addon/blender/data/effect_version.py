@@ -98,7 +98,7 @@ def parts(
     yield from _curves(_below(effect.path_from_id() + ".", found), start)
     placed = _below(f"{strip.path_from_id()}.transform.", found)
     yield from _curves(placed, start)
-    keyed = {name for name, _index, _curve in placed}
+    keyed = {name for name, _index, curve in placed if _drives(curve)}
     # As words: "not a number" is never the same again.
     yield repr([getattr(strip.transform, name) for name in geometry.TRANSFORM if name not in keyed])
     yield repr(tuple(strip.transform.origin)), strip.use_flip_x, strip.use_flip_y  # scribbles lie mirrored with it
@@ -107,13 +107,14 @@ def parts(
 def _settings(effect: PropertyGroup) -> Iterator[Hashable]:
     """The properties of an effect that are not keyed, but for names and colors."""
     path, followed = effect.path_from_id(), [region.name for region in effect.regions]
-    keyed = {curve.data_path for curve in fcurves.curves_under(effect.id_data, path + ".")}
+    curves = filter(_drives, fcurves.curves_under(effect.id_data, path + "."))
+    keyed = {(curve.data_path, curve.array_index) for curve in curves}
 
     def values(group: PropertyGroup, place: str, *names: str) -> Iterator[Hashable]:
         for name in names:
-            if f"{path}{place}.{name}" not in keyed:
-                value = getattr(group, name)
-                yield name, value if isinstance(value, str | float | int) else tuple(value)
+            value, where = getattr(group, name), f"{path}{place}.{name}"
+            numbers = (value,) if isinstance(value, str | float | int) else tuple(value)
+            yield name, tuple(number for i, number in enumerate(numbers) if (where, i) not in keyed)
 
     yield from values(effect, "", *_told(model.Effect, Options), "use_source_time", "source_time")
     yield from values(effect.camera, ".camera", *_told(model.Camera), *_MOVES)
@@ -127,6 +128,11 @@ def _settings(effect: PropertyGroup) -> Iterator[Hashable]:
     for i, region in enumerate(effect.regions):
         yield from values(region, f".regions[{i}]", *told, "kind", "matte", "channel_name", *_MOVES)
         yield tuple((noted.frame, tuple(noted.location), noted.rotation, noted.scale) for noted in region.drawn)
+
+
+def _drives(curve: FCurve) -> bool:
+    """Whether it has any say in its property."""
+    return not (curve.mute or curve.is_empty)
 
 
 def _told(*kinds: type) -> list[str]:

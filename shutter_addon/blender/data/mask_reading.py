@@ -9,6 +9,7 @@ from __future__ import annotations
 from bisect import bisect_right
 from collections.abc import Iterator
 from itertools import chain
+from typing import NamedTuple
 
 import bpy
 import numpy as np
@@ -32,7 +33,18 @@ _LAYER = "MaskLayer", "char name[64]", "ListBase splines", "ListBase splines_sha
 _LINKS = "MaskLayerShape *next", "MaskLayerShape *prev"
 _SHAPE = "MaskLayerShape", *_LINKS, "float *data", "int tot_vert", "int frame"
 
-Shape = tuple[int, np.ndarray]  # a shape key: its frame, and the numbers (n, 8) float32 of its points
+
+class Shape(NamedTuple):
+    """A shape key: its frame, how many points it has, and where their numbers lie."""
+
+    frame: int
+    points: int
+    address: int
+
+    def numbers(self) -> np.ndarray:
+        """(points, 8) float32."""
+        size = self.points * _SHAPE_NUMBERS * np.dtype(np.float32).itemsize
+        return np.frombuffer(memory(self.address, size), np.float32).reshape(-1, _SHAPE_NUMBERS)
 
 
 def mask_at(mask: bpy.types.Mask, frame: float) -> MaskShape:
@@ -46,20 +58,20 @@ def mask_at(mask: bpy.types.Mask, frame: float) -> MaskShape:
 def motion(mask: bpy.types.Mask) -> Iterator[tuple]:
     """What lets a mask differ from frame to frame, F-curves apart: its shape keys. EffectError: they cannot be read."""
     for layer in mask.layers:
-        for frame, points in _shapes(mask, layer):
-            yield frame, points.tobytes()
+        for shape in _shapes(mask, layer):
+            yield shape.frame, shape.numbers().tobytes()
 
 
 def key_frames(mask: bpy.types.Mask) -> list[float]:
     """The frames of a mask at which something is said of it: shape keys, and keys of its F-curves. EffectError: they
     cannot be read."""
-    keyed = {float(frame) for frame, _points in motion(mask)}
+    keyed = {float(shape.frame) for layer in mask.layers for shape in _shapes(mask, layer)}
     return sorted(keyed.union(fcurves.key_frames(fcurves.curves_under(mask, ""))))
 
 
 def moves(mask: bpy.types.Mask) -> bool:
     """Whether a mask may differ from frame to frame. EffectError: nobody knows."""
-    return bool(fcurves.curves_under(mask, "")) or next(motion(mask), None) is not None
+    return bool(fcurves.curves_under(mask, "")) or any(_shapes(mask, layer) for layer in mask.layers)
 
 
 def _layer_at(mask: bpy.types.Mask, layer: bpy.types.MaskLayer, frame: float) -> MaskLayer:
@@ -128,13 +140,13 @@ def _keyed_points(layer: bpy.types.MaskLayer, shapes: list[Shape], frame: float)
     last; None where it has none that fit."""
     if not shapes:
         return None
-    place = bisect_right([at for at, _points in shapes], frame)
-    (before, first), (after, last) = shapes[max(place - 1, 0)], shapes[min(place, len(shapes) - 1)]
+    place = bisect_right([shape.frame for shape in shapes], frame)
+    before, after = shapes[max(place - 1, 0)], shapes[min(place, len(shapes) - 1)]
     count = sum(len(spline.points) for spline in layer.splines)
-    if len(first) != count or len(last) != count:
+    if (before.points, after.points) != (count, count):
         return None
-    first, last = first.astype(np.float64), last.astype(np.float64)
-    share = (frame - before) / max(after - before, 1) if frame > before else 0.0
+    first, last = before.numbers().astype(np.float64), after.numbers().astype(np.float64)
+    share = (frame - before.frame) / max(after.frame - before.frame, 1) if frame > before.frame else 0.0
     return first + (last - first) * share
 
 
@@ -161,11 +173,10 @@ def _shapes_in_memory(layer: bpy.types.MaskLayer) -> list[Shape]:
     (address, last), before = raw["splines_shapes"].tolist(), 0
     while address:
         following, previous, data, points, frame = read(kind, address).tolist()
-        ascends = not shapes or shapes[-1][0] < frame
+        ascends = not shapes or shapes[-1].frame < frame
         if previous != before or points < 0 or not data or not ascends:
             raise LayoutError("MaskLayerShape")
-        stored = memory(data, points * _SHAPE_NUMBERS * np.dtype(np.float32).itemsize)
-        shapes.append((frame, np.frombuffer(stored, np.float32).reshape(-1, _SHAPE_NUMBERS)))
+        shapes.append(Shape(frame, points, data))
         before, address = address, following
     if last != before:
         raise LayoutError("MaskLayerShape")

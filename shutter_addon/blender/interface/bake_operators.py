@@ -151,6 +151,8 @@ def _draw_state(layout: UILayout, scene: Scene, effect: PropertyGroup, strip: St
     if not baked_strips.baked_of(scene, strip):
         sentence(layout, iface_("The baked strip was deleted"), "ERROR")
     elif (is_stale := baked_strips.known_stale(scene, effect, strip)) is None:
+        if not bpy.app.timers.is_registered(_ask_whether_stale):
+            _asked[:] = [revision.number()]
         main_thread.later(_ask_whether_stale, STILL)  # beside drawing: it reads all of the effect
     elif is_stale:
         sentence(layout, iface_("The effect has changed since it was baked"), "ERROR")
