@@ -22,7 +22,7 @@ REVIEWED: dict[str, set[str]] = {
     "commands/inbetween_command.py": {"_build.<lambda>"},
     "data/source_media.py": {"SourceSpec.open"},
     "data/versions.py": {"_digest"},
-    "data/main_thread.py": {"soon"},
+    "devices/main_thread.py": {"soon"},
     "devices/available.py": {"<lambda>", "_tried"},
     "devices/blender_gpu.py": {
         "BlenderDevice.__init__",

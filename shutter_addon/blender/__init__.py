@@ -7,7 +7,7 @@ import bpy
 
 # Blender gets the classes of each (classes_of); all else that it gets, `register` and `unregister` know.
 _MODULES = (
-    "data.main_thread",
+    "devices.main_thread",
     "interface.translations",
     "data.preferences",
     "data.properties",

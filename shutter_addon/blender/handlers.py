@@ -15,7 +15,8 @@ from bpy.types import Depsgraph, Scene
 
 from ..core import revision, told
 from ..core.messages import sentence, signed
-from .data import data_format, inbetween_settings, main_thread, preview_areas, source_media, strips, versions
+from .data import data_format, inbetween_settings, preview_areas, source_media, strips, versions
+from .devices import main_thread
 from .editing import reconcile as reconciling
 from .editing import shown_annotations, track_region, undelete
 from .interface import bake_operators, inbetween_operators, operator_bases, sharp_frame

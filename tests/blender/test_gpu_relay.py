@@ -24,8 +24,7 @@ def clock(monkeypatch):
 
 def test_a_call_that_is_made_before_anyone_looks(bpy, monkeypatch, clock):
     """The main thread, waiting in `serve`, takes it as soon as it is there: it must look for the next all the same."""
-    from shutter_addon.blender.data import main_thread
-    from shutter_addon.blender.devices import gpu_relay
+    from shutter_addon.blender.devices import gpu_relay, main_thread
 
     looking, made = [], []
     monkeypatch.setattr(main_thread, "soon", lambda function: function())

@@ -7,7 +7,8 @@ from support import Like
 
 from shutter_addon import blender
 from shutter_addon.blender import handlers
-from shutter_addon.blender.data import data_format, main_thread
+from shutter_addon.blender.data import data_format
+from shutter_addon.blender.devices import main_thread
 from shutter_addon.core import told
 
 

@@ -151,7 +151,7 @@ def disabled(before):
 def calls_wait():
     """What other threads ask of the main one while the extension is disabled is done once it is enabled again."""
     made = []
-    part("data.main_thread").soon(lambda: made.append("asked"))
+    part("devices.main_thread").soon(lambda: made.append("asked"))
     addon_utils.disable(traces.NAME)
     yield 0.3
     assert not made

@@ -21,7 +21,7 @@ import gpu
 
 from ...devices.device import Device
 from ...devices.passes import Pass
-from ..data import main_thread
+from . import main_thread
 from .blender_gpu import BlenderDevice, has_context
 
 T = TypeVar("T")

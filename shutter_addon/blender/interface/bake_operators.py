@@ -8,7 +8,8 @@ from bpy.types import Context, Operator, PropertyGroup, Scene, Strip, UILayout
 
 from ...core import messages, revision
 from ...core.messages import EffectError, UserError
-from ..data import main_thread, selection, strips
+from ..data import selection, strips
+from ..devices import main_thread
 from ..editing import baked_strips
 from ..output import bake_job, baked_film, film_output
 from .operator_bases import Named, operator, redraw

@@ -7,7 +7,8 @@ import bpy
 from bpy.app.translations import pgettext_rpt as rpt_
 from bpy.types import Area, Context, Operator, Region, Window
 
-from ..data import main_thread, preview_areas
+from ..data import preview_areas
+from ..devices import main_thread
 from ..rendering import previews
 from .operator_bases import Named
 

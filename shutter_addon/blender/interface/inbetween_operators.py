@@ -12,7 +12,8 @@ from bpy.types import Context, Event, Operator, PropertyGroup, Scene, Strip, UIL
 from ...core import messages
 from ...core.messages import EffectError
 from ...core.model.choices import INBETWEENS
-from ..data import inbetween_settings, main_thread, selection, strips
+from ..data import inbetween_settings, selection, strips
+from ..devices import main_thread
 from ..rendering import inbetween_build, strobing
 from ..rendering.effect_source import FAULTS
 from .note_buttons import Button

@@ -13,7 +13,8 @@ from bpy.types import Annotation, Context, Event, Operator, PropertyGroup
 from ...core.messages import EffectError
 from ...core.model import presets
 from ...core.model.choices import CONTEXT, DRAWN
-from ..data import annotations, consistency, main_thread, preview_areas, selection, strips
+from ..data import annotations, consistency, preview_areas, selection, strips
+from ..devices import main_thread
 from ..editing import (
     add_effect,
     bar_edits,

@@ -20,10 +20,10 @@ from ...core.model.frame_state import FrameState
 from ...devices.device import Texture
 from ...media import MediaError
 from ...media.errors import NotBuiltError
-from ..data import annotations, main_thread, preview_areas, selection, strips
+from ..data import annotations, preview_areas, selection, strips
 from ..data.preview_areas import Shown
 from ..data.snapshot import Snapshot
-from ..devices import blender_gpu
+from ..devices import blender_gpu, main_thread
 from ..editing import shown_annotations
 from ..rendering import (
     effect_source,

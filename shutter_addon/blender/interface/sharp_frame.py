@@ -9,7 +9,8 @@ from dataclasses import dataclass
 import bpy
 from bpy.types import Context, SpaceSequenceEditor
 
-from ..data import main_thread, preview_areas, selection, strips
+from ..data import preview_areas, selection, strips
+from ..devices import main_thread
 from ..rendering.previews import pen_is_down
 
 _TOOLS = "builtin.annotate"  # how the tools' names begin

@@ -16,6 +16,7 @@ from ...core.messages import EffectError
 from ...media import MediaError
 from ..data import effect_version, matte_content, snapshot, source_media, strips
 from ..data.snapshot import Snapshot
+from ..devices import main_thread
 from . import render_settings
 
 _signatures: dict[int, int] = {}  # by effect scene
@@ -63,8 +64,7 @@ def keep_until_drawn(scene: int) -> None:
     draws. Nobody else may get that: Blender shares what it keeps with renders, scopes and the colour picker. So the
     draw handler drops it."""
     _lesser.add(scene)
-    if not bpy.app.timers.is_registered(drop_lesser):
-        bpy.app.timers.register(drop_lesser)  # should the handler not be called
+    main_thread.later(drop_lesser)  # should the handler not be called
 
 
 def drop_lesser() -> None:

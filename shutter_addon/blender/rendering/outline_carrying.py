@@ -14,6 +14,7 @@ import bpy
 from ...core import stopping, threads
 from ...media.carried_mattes import CarriedFile
 from ..data import preview_areas
+from ..devices import main_thread
 from .effect_source import in_words
 
 TICK = 0.25  # seconds from one look at the thread to the next
@@ -77,8 +78,7 @@ def carry(file: CarriedFile, frames: list[int], arrived: Callable[[], None]) -> 
     stop()
     _failed.pop(file, None)
     _running.append(_Carrying(file=file, frames=frames, arrived=arrived))
-    if not bpy.app.timers.is_registered(_look):
-        bpy.app.timers.register(_look, first_interval=TICK)
+    main_thread.later(_look, TICK)
 
 
 def failure(file: CarriedFile) -> str | None:

@@ -24,9 +24,9 @@ from bpy.types import Scene
 
 from ...core import told
 from ...core.messages import sentence, signed
-from ..data import main_thread
 from ..data.property_copy import for_a_while
 from ..data.strips import ENGINE
+from ..devices import main_thread
 
 T = TypeVar("T")
 BAD_INPUT = 2
