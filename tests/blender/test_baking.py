@@ -398,6 +398,20 @@ def test_keys_that_moved_along_are_no_change_and_others_are(bpy, film, change):
     assert states(scene, strip) == [True]
 
 
+@pytest.mark.parametrize("keyed", ["one axis", "muted"])
+def test_a_value_that_no_curve_drives_is_a_change(bpy, film, keyed):
+    """Another component of what is keyed, and what a muted curve leaves alone."""
+    scene, effect, strip = film()
+    region = effect.regions[0]
+    region.keyframe_insert("location", index=0, frame=1)
+    if keyed == "muted":
+        scene.animation_data.action.layers[0].strips[0].channelbags[0].fcurves[0].mute = True
+    bake(bpy)
+    assert states(scene, strip) == [False]
+    region.location[0 if keyed == "muted" else 1] += 0.25
+    assert states(scene, strip) == [True]
+
+
 def test_check_tells_of_a_stale_film_that_is_shown(bpy, film):
     scene, effect, strip = film()
     baked = bake(bpy)

@@ -260,6 +260,7 @@ def ugly_movies(folder):
         "libx265",
         options={"x265-params": "open-gop=1:keyint=12:bframes=3:pools=none:frame-threads=1:log-level=none"},
     )
+    encode("fields.mkv", "libx264", options={"x264-params": "tff=1:bframes=0"})  # interlaced
     encode("refresh.mp4", "libx264", options={"x264-params": "intra-refresh=1:keyint=12:bframes=0"})
     encode("mpeg4.avi", "mpeg4", [0, *plain[:-1]], options={"bf": "2", "g": "12"})  # time stamps from 1 on, start 0
     encode("mpeg4.mp4", "mpeg4", options={"bf": "2", "g": "12"})
