@@ -17,7 +17,6 @@ _MODULES = (
     "interface.sharp_frame",
     "interface.preview",
     "interface.operators",
-    "interface.inbetween_operators",
     "interface.track_operators",
     "interface.matte_operators",
     "interface.outline_operators",

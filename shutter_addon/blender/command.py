@@ -16,8 +16,8 @@ from .output import film_output
 from .rendering import render_job
 
 BAD_INPUT = 2
-PLACES = ("output", "save", "cache", "json", "source", "edit")  # where a fault may be that says not where
-COMMANDS = "render", "inbetween", "track", "bake", "check", "join"
+PLACES = ("output", "save", "json", "source", "edit")  # where a fault may be that says not where
+COMMANDS = "render", "track", "bake", "check", "join"
 
 
 def main(argv: list[str]) -> int:

@@ -15,13 +15,13 @@ from bpy.types import Depsgraph, Scene
 
 from ..core import revision, told
 from ..core.messages import sentence, signed
-from .data import data_format, inbetween_settings, preview_areas, source_media, strips, versions
+from .data import data_format, preview_areas, source_media, strips, versions
 from .devices import main_thread
 from .editing import reconcile as reconciling
 from .editing import shown_annotations, track_region, undelete
-from .interface import bake_operators, inbetween_operators, operator_bases, sharp_frame
+from .interface import bake_operators, operator_bases, sharp_frame
 from .output import edit_feed
-from .rendering import invalidation, job_snapshots, render_job, sessions
+from .rendering import invalidation, job_snapshots, render_job, sessions, strobing
 from .rendering.render_job import Where
 
 
@@ -29,12 +29,11 @@ def _before_load(*_) -> None:
     edit_feed.end()
     sharp_frame.forget()
     operator_bases.end_all()
-    inbetween_operators.stop()
+    strobing.forget()
     bake_operators.forget()
     track_region.data_replaced()
     sessions.forget()
     invalidation.forget()
-    inbetween_settings.built.forget()
     source_media.forget()
     reconciling.forget()
 

@@ -7,7 +7,7 @@ methodology for optical flow"). Along what has arrived, both frames are looked u
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from functools import cache, lru_cache, partial
 
 import numpy as np
@@ -21,37 +21,36 @@ from .opencv import cv2
 STEP = 2  # pixels between the vectors that are carried; all pixels gain nothing and take four times as long
 SMALLEST = 16  # pixels; OpenCV's flows need about as many, smaller pictures are cross-faded
 HALF_MAX = 65504  # the largest value of a half float, which infinite samples count as
-ALIKE = 8  # levels of 255 by which the ends of a vector may differ before another flow is believed more
+UNLIKE = 24  # levels of 255 by which the ends of a vector may differ that carries something
+SHARED = 0.5  # of all vectors, in both directions, have to
 
 
 def check() -> None:
-    """MediaError: OpenCV is missing, or has no contributed modules."""
-    opencv.check("in-between frames need", "optflow")
+    """MediaError: OpenCV is missing."""
+    opencv.check("moments between frames need")
 
 
-def between(
-    first: np.ndarray,
-    second: np.ndarray,
-    factor: int,
-    method: str = "quick",
-    transfer: str = "srgb",
-    alpha: str = "opaque",
-) -> Iterator[np.ndarray]:
-    """The frames at the times 1/factor … (factor-1)/factor between two frames, one by one: a function of the two alone,
-    the same bits whatever the number of cores.
+class Between:
+    """What lies between two frames, at any time: a function of the two alone, the same bits whatever the number of
+    cores."""
 
-    first, second: arrays (height, width, 4) of a FrameSource's dtype; no cut may lie between them
-    method: of METHODS
-    transfer, alpha: how samples are encoded, as FrameSource says; the new frames are encoded alike
+    def __init__(self, first: np.ndarray, second: np.ndarray, transfer: str = "srgb", alpha: str = "opaque") -> None:
+        """first, second: arrays (height, width, 4) of a FrameSource's dtype
+        transfer, alpha: how samples are encoded, as FrameSource says; the new frames are encoded alike"""
+        self._frames, self._transfer, self._alpha = (first, second), transfer, alpha
+        self._paths: _Paths | None = None
+        if np.array_equal(first, second):
+            return
+        self._ends = [_encoded(frame, transfer, alpha) for frame in (first, second)]
+        paths = _Paths([_luma(end) for end in self._ends], FLOW)
+        self._paths = paths if paths.meet else None
 
-    What only one of the frames shows is taken from it, all else is mixed in linear light.
-    Raises what `check` raises at the first frame."""
-    check()
-    ends = [_encoded(frame, transfer, alpha) for frame in (first, second)]
-    luma = [_luma(end) for end in ends]
-    paths = [_Paths(luma, flow) for flow in METHODS[method]]
-    for t in (k / factor for k in range(1, factor)):
-        yield _decoded(_mixed(ends, [path.at(t) for path in paths], t), first.dtype, transfer, alpha)
+    def at(self, t: float) -> np.ndarray:
+        """The frame (height, width, 4) at a time in 0 … 1. What only one of the two shows is taken from it, all else is
+        mixed in linear light; of two frames that have nothing in common it is the nearer one."""
+        if self._paths is None:
+            return self._frames[t > 0.5]
+        return _decoded(_mixed(self._ends, self._paths.at(t), t), self._frames[0].dtype, self._transfer, self._alpha)
 
 
 def luma(frame: np.ndarray, transfer: str, alpha: str) -> np.ndarray:
@@ -106,20 +105,9 @@ def _dis(first: np.ndarray, second: np.ndarray, finest: int, stride: int, smooth
     return dis.calc(*wide, None)[:height, :width]
 
 
-def _deep(first: np.ndarray, second: np.ndarray) -> np.ndarray:
-    """Likewise, at half size: at full size it takes four times as long and is no better."""
-    half = [cv2.resize(luma, None, fx=0.5, fy=0.5, interpolation=cv2.INTER_AREA) for luma in (first, second)]
-    vectors = cv2.optflow.createOptFlow_DeepFlow().calc(*half, None)
-    return 2 * cv2.resize(vectors, first.shape[::-1], interpolation=cv2.INTER_LINEAR)
-
-
 # From a picture (H, W) uint8 to another: vectors (H, W, 2).
 Flow = Callable[[np.ndarray, np.ndarray], np.ndarray]
-# The flows of a method. What several say is weighed pixel by pixel.
-METHODS: dict[str, tuple[Flow, ...]] = {
-    "quick": (partial(_dis, finest=1, stride=3),),
-    "good": (partial(_dis, finest=0, stride=4), _deep),
-}
+FLOW: Flow = partial(_dis, finest=1, stride=3)
 
 
 class _Paths:
@@ -128,6 +116,11 @@ class _Paths:
     def __init__(self, luma: list[np.ndarray], flow: Flow) -> None:
         self._shape = luma[0].shape
         self._sides = [_carriers(a, b, flow) for a, b in (luma, luma[::-1])]
+
+    @property
+    def meet(self) -> bool:
+        """Whether the pictures have anything in common: enough vectors have ends that look alike."""
+        return min(float((costs <= UNLIKE).mean()) for _places, _vectors, costs in self._sides) >= SHARED
 
     def at(self, t: float) -> tuple[np.ndarray, np.ndarray]:
         """At a time in 0 … 1, for each pixel: the vector (H, W, 2) from the first picture to the second that passes
@@ -187,29 +180,16 @@ def _filled(vectors: np.ndarray, known: np.ndarray) -> np.ndarray:
     return np.where(known[..., None], vectors, cv2.resize(coarse, known.shape[::-1], interpolation=cv2.INTER_LINEAR))
 
 
-def _mixed(ends: list[np.ndarray], paths: list[tuple[np.ndarray, np.ndarray]], t: float) -> np.ndarray:
-    """Linear light (H, W, 3 or 4) at time t: both frames looked up along each flow's paths."""
-    total = weights = np.zeros((), np.float32)
-    for vectors, shown in paths:
-        stopping.check()
-        here = grid(*vectors.shape[:2])
-        seen = look(ends[0], here - np.float32(t) * vectors), look(ends[1], here + np.float32(1 - t) * vectors)
-        late: np.ndarray = np.float32(t) * shown[..., 1]
-        late = (late / (late + np.float32(1 - t) * shown[..., 0]))[..., None]
-        first, second = map(_light, seen)
-        frame = first + late * (second - first)
-        if len(paths) == 1:
-            return frame
-        weight = np.exp(_difference(*seen) / -ALIKE)[..., None] + np.float32(1e-6)
-        total, weights = total + weight * frame, weights + weight
-    return total / weights
-
-
-def _difference(picture: np.ndarray, other: np.ndarray) -> np.ndarray:
-    """How much two pictures differ around each pixel, (H, W) in levels of 255."""
-    level = 255 / np.iinfo(picture.dtype).max if picture.dtype.kind == "u" else 255
-    each = cv2.absdiff(picture, other)[..., :3].mean(axis=2, dtype=np.float32)
-    return cv2.blur(each, (9, 9)) * np.float32(level)
+def _mixed(ends: list[np.ndarray], path: tuple[np.ndarray, np.ndarray], t: float) -> np.ndarray:
+    """Linear light (H, W, 3 or 4) at time t: both frames looked up along the paths."""
+    stopping.check()
+    vectors, shown = path
+    here = grid(*vectors.shape[:2])
+    seen = look(ends[0], here - np.float32(t) * vectors), look(ends[1], here + np.float32(1 - t) * vectors)
+    late: np.ndarray = np.float32(t) * shown[..., 1]
+    late = (late / (late + np.float32(1 - t) * shown[..., 0]))[..., None]
+    first, second = map(_light, seen)
+    return first + late * (second - first)
 
 
 def look(picture: np.ndarray, places: np.ndarray, how: int | None = None) -> np.ndarray:

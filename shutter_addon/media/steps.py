@@ -15,6 +15,9 @@ ROWS = 270  # of the pictures that are compared
 # The share of the picture that moves at least so far, of all whose motion is known: what is smaller is not looked at.
 SHARE = 0.01
 _THERE_AND_BACK = 0.2, 0.5  # of a vector, and pixels beside that, by which the way back may miss where it started
+# Copies that lie so far apart, in heights of the picture, look like a streak: 3 pixels of 1080; at 4, lines show in
+# sharp lettering. Edges of footage are some 2 pixels wide, however small it is.
+_SMOOTH, _SMOOTH_PIXELS = 3 / 1080, 2.0
 _KNOWN = 0.25  # of the picture whose motion has to be known: across a cut, that of little is
 
 
@@ -53,3 +56,8 @@ def step(moved: Moved, before: Similarity, after: Similarity) -> float:
     before, after: where the points of the shown picture lie in the two frames, in heights of the picture"""
     ways = after.inverse()(moved.after) - before.inverse()(moved.before)
     return float(np.quantile(np.abs(ways), 1 - SHARE))
+
+
+def smooth(height: int) -> float:
+    """Up to how many pixels from frame to frame a streak looks smooth, in a picture of that height."""
+    return max(_SMOOTH * height, _SMOOTH_PIXELS)

@@ -4,10 +4,7 @@ from __future__ import annotations
 
 import argparse
 import json
-import os
 import re
-import shlex
-import subprocess
 import sys
 from argparse import Namespace
 from collections.abc import Callable, Iterator
@@ -19,7 +16,6 @@ from bpy.types import Scene
 from ...core import told
 from ...core.farm import chunks, job_file
 from ...core.farm.edit_version import EditVersion
-from ...core.frames import frame_ranges
 from ...core.messages import UserError
 from ...devices.budget import machine_memory
 from ...devices.device import NoDeviceError
@@ -45,9 +41,6 @@ def add(commands: argparse._SubParsersAction) -> None:
         type=place,
         metavar="FILE",
         help=f"what the frames will be joined to ({', '.join(film_output.MOVIES)})",
-    )
-    option(
-        "--inbetweens-later", action="store_true", help="in-between frames may be missing: they are built after this"
     )
     command_line.add_device(parser)
     printed = parser.add_mutually_exclusive_group()
@@ -79,14 +72,10 @@ def _report(arguments: Namespace, scene: Scene, frames: range, version: EditVers
     """What is found, as JSON has it (docs/command.md)."""
     faults = [*_version_faults(scene), *_setting_faults(arguments, scene, frames)]
     notes: list[str] = []
-    device, checks, limit = _on_device(scene, frames, faults, notes, find_cuts=not arguments.inbetweens_later)
-    build = _builds(arguments.edit, scene, frames, checks)
+    device, checks, limit = _on_device(scene, frames, faults, notes)
     for check in checks:
         faults += [f'"{check.name}": {fault}' for fault in check.faults]
         notes += [f'"{check.name}": {note}' for note in check.notes]
-        if check.missing and not arguments.inbetweens_later:
-            words = f"in-between frames of source {frame_ranges.in_words(check.missing)} are missing"
-            faults.append(f'"{check.name}": {words}; build them: {build}')
     faults += edit_check.left_out(scene, frames)
     notes += edit_check.stale_films(scene, frames)
     faults += missing_media.faults(scene, frames, sources=False)  # of these the effects' own say more
@@ -106,7 +95,6 @@ def _report(arguments: Namespace, scene: Scene, frames: range, version: EditVers
         "blender": {"here": version.blender, "saved": _file_version()},
         "device": device,
         "effects": [_effect(each) for each in checks],
-        "build": build,
         "memory": memory,
         "chunk": min(len(frames), max([each.chunk for each in checks], default=chunks.LEAST)),
         "notes": notes,
@@ -162,7 +150,7 @@ def _fault(check: Callable, *arguments) -> list[str]:
 
 
 def _on_device(
-    scene: Scene, frames: range, faults: list[str], notes: list[str], *, find_cuts: bool
+    scene: Scene, frames: range, faults: list[str], notes: list[str]
 ) -> tuple[str | None, list[EffectCheck], int | None]:
     """The name of the device that will render, what is found of the effects (edit_check.effects), and the bytes that
     textures may take of a GPU; without a device, which is a fault, nothing of the effects."""
@@ -175,7 +163,7 @@ def _on_device(
     notes += [lesser] if lesser else []
     try:
         limit = compositor.device.budget.limit if hasattr(compositor, "device") else None
-        return compositor.name, edit_check.effects(scene, frames, compositor, find_cuts=find_cuts), limit
+        return compositor.name, edit_check.effects(scene, frames, compositor), limit
     finally:
         compositor.release()
 
@@ -196,8 +184,6 @@ def _written_folders(arguments: Namespace, checks: list[EffectCheck]) -> Iterato
     if arguments.movie:
         yield arguments.movie.parent
     for check in checks:
-        if check.folder and check.missing:
-            yield check.folder
         yield from (folder for folder, count in check.mattes.items() if count)
 
 
@@ -208,21 +194,8 @@ def _effect(check: EffectCheck) -> dict:
         "size": list(check.size),
         "window": check.window,
         "shutters": check.shutters,
-        "inbetween": check.factor,
-        "pairs": check.pairs,
-        "missing": [list(run) for run in frame_ranges.runs(check.missing)],
+        "inbetween": check.steps,
     }
-
-
-def _builds(file: Path, scene: Scene, frames: range, checks: list[EffectCheck]) -> str | None:
-    """The command that builds the in-between frames that are missing; None: none is."""
-    if not any(each.missing for each in checks):
-        return None
-    # Of a scene in this one all are built, whatever frames are asked for.
-    lacking = set().union(*(each.lacking for each in checks if each.scene == scene)) or frames
-    program = "python -m shutter_addon" if bpy.app.module else "blender -c shutter"
-    quoted = subprocess.list2cmdline([file]) if os.name == "nt" else shlex.quote(str(file))
-    return f"{program} inbetween {quoted} --frames {min(lacking)}:{max(lacking)}"
 
 
 def _lines(report: dict) -> list[str]:
@@ -239,8 +212,7 @@ def _lines(report: dict) -> list[str]:
             effect["source"] or "no footage", *effect["size"], effect["window"], effect["shutters"]
         )
         if effect["inbetween"] > 1:
-            gone = sum(last - first + 1 for first, last in effect["missing"])
-            words += f"; in-between frames ×{effect['inbetween']}: {effect['pairs'] - gone} of {effect['pairs']} pairs"
+            words += f", {effect['inbetween']} moments each"
         lines.append(f"Effect {effect['strip']}: {words}")
     lines.append(f"Device: {report['device'] or 'none'}")
     if is_known := all(effect["source"] for effect in report["effects"]):

@@ -20,14 +20,12 @@ from ...core.model.frame_state import Options
 from ...media import open_source
 from ...media.files import stamp
 from ...media.sequence import by_number
-from ..data import inbetween_settings
 from ..devices import available
 from ..editing import saved_edit
 from ..output import film_output
 from ..rendering import render_job, render_settings
 
-FACTORS = fields_of(Options)["step"].words  # 1: none
-METHODS = tuple(inbetween_settings.METHODS.values())
+SMOOTH = tuple(map(str, fields_of(Options)["step"].words))  # 1: off
 
 
 def place(text: str) -> Path:

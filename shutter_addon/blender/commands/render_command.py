@@ -13,15 +13,16 @@ from bpy.types import Scene
 from ...core import atomic_write
 from ...core.farm import job_file
 from ...core.model.effect import Effect
+from ...core.model.keyframes import Constant
 from ...core.recipes import recipe, recipe_file
 from ...media.completeness import is_whole_blend, why_short
 from ...media.matte_files import MatteFile
-from ..data import inbetween_settings, missing_media, preferences, versions
+from ..data import missing_media, preferences, versions
 from ..devices import available
 from ..editing import new_edit, saved_edit
 from ..output import film_output, shared_frames
 from ..rendering import render_settings
-from . import command_line, inbetween_command
+from . import command_line
 from .command_line import place
 
 
@@ -37,17 +38,7 @@ def add(commands: argparse._SubParsersAction) -> None:
     command_line.add_device(parser)
     option("--weights", type=place, metavar="DIR", help="also write the mattes of the shutters, as float EXR")
     option("--save", type=place, metavar="FILE.blend", help="keep the edit")
-    option(
-        "--inbetween", type=int, choices=command_line.FACTORS, help="in-between frames, in place of the recipe's factor"
-    )
-    option("--inbetween-method", choices=command_line.METHODS, help="in place of the recipe's")
-    option(
-        "--cache",
-        type=place,
-        metavar="DIR",
-        help="where in-between frames lie"
-        f' (default: "{inbetween_settings.FOLDER}" beside the output, or beside FILE.blend)',
-    )
+    option("--inbetween", choices=command_line.SMOOTH, help="moments for a filmed frame, in place of the recipe's")
     parser.set_defaults(run=run)
 
 
@@ -60,7 +51,7 @@ def run(arguments: Namespace) -> None:
 
 def _render_edit(arguments: Namespace) -> None:
     """Renders a saved edit as it is."""
-    names = "recipe", "weights", "save", "inbetween", "inbetween_method", "cache"
+    names = "recipe", "weights", "save", "inbetween"
     command_line.refuse(arguments, names, "is for a source and a recipe; a saved edit is rendered as it is")
     output, file_format = arguments.output, arguments.format or "png"
     if output is None:
@@ -104,11 +95,8 @@ def _render_source(arguments: Namespace) -> None:
         film_output.set_output(scene, output, file_format, alpha=medium.alpha != "opaque")
     if arguments.save:
         _save(scene, arguments.save)
-    folder = _cache(arguments) if source_recipe.options.at(1).step > 1 else None
     weights = arguments.weights if output else None
-    with render_settings.using(render_settings.RenderSettings(arguments.device, weights, folder, arguments.gpu_memory)):
-        if folder:
-            inbetween_command.build_lacking(scene)
+    with render_settings.using(render_settings.RenderSettings(arguments.device, weights, arguments.gpu_memory)):
         if output and arguments.weights:
             film_output.prepare(arguments.weights)
         if output:
@@ -142,16 +130,12 @@ def _mattes(source_recipe: Effect, folder: Path) -> list[Path]:
 
 
 def _recipe(arguments: Namespace) -> Effect:
-    """The recipe, with the in-between frames that were asked for."""
-    source_recipe = recipe_file.load(arguments.recipe)
-    if arguments.inbetween is not None:
-        source_recipe = recipe.with_inbetween(source_recipe, arguments.inbetween)
-    return replace(source_recipe, inbetween_method=arguments.inbetween_method or source_recipe.inbetween_method)
-
-
-def _cache(arguments: Namespace) -> Path:
-    """The folder of in-between frames: where a saved edit will look for them, if it is to be saved."""
-    return arguments.cache or (arguments.save or arguments.output).parent / inbetween_settings.FOLDER
+    """The recipe, as smooth as was asked for."""
+    found = recipe_file.load(arguments.recipe)
+    if arguments.inbetween is None:
+        return found
+    step = int(arguments.inbetween) if arguments.inbetween.isdigit() else arguments.inbetween
+    return replace(found, options=Constant(replace(found.options.at(1), step=step)))
 
 
 def _save(scene: Scene, path: Path) -> None:

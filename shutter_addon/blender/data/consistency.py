@@ -5,12 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable, Container
 
 import numpy as np
-from bpy.app.translations import pgettext_rpt as rpt_
 from bpy.types import Context, FCurve, PropertyGroup
 
-from ...core.messages import EffectError
 from ...core.model import limits, presets, shutters
-from . import fcurves, inbetween_settings, strips, validation
+from . import fcurves, strips, validation
 from .annotations import layer_of
 from .fcurves import numbers
 from .selection import active_region, active_shutter
@@ -90,39 +88,19 @@ def fit_bars(effect: PropertyGroup) -> None:
     """After a change of the window's length or its position: shutters that keep to a preset have its bars again, all
     others, their keys as well, keep their shape and share of light."""
     for index, shutter in enumerate(effect.shutters):
-        is_made = _made_again(effect, index, effect.window, effect.bars_per_frame)
+        is_made = _made_again(effect, index)
         if not is_made and len(shutter.bars) not in (0, effect.window):
             _change_bars(effect, index, lambda old: shutters.resample(old, effect.window))
 
 
-def fit_factor(effect: PropertyGroup) -> None:
-    """After a change of the factor of in-between frames: the bars, keyed ones as well, stand for the same times, or are
-    a preset's again.
-
-    EffectError: it would take too many bars; the factor is put back, and nothing has changed. Or a value that no effect
-    can have is in the way."""
-    factor, position = inbetween_settings.factor(effect), validation.word(effect, "position").lower()
-    if str(effect.bars_per_frame) not in effect.bl_rna.properties["inbetween"].enum_items:
-        effect.bars_per_frame = factor  # what the bars stood for is not known
-    if factor == effect.bars_per_frame:
-        return
-
-    def multiplied(old: np.ndarray) -> np.ndarray:
-        return shutters.multiplied(old, effect.bars_per_frame, factor, position)
-
-    try:
-        window = len(multiplied(np.ones(effect.window)))
-    except shutters.ShutterError:
-        effect.inbetween = str(effect.bars_per_frame)
-        count = effect.window * factor // effect.bars_per_frame
-        sentence = rpt_("{factor}× in-between frames take {count} bars; a shutter has {most} at most")
-        raise EffectError(sentence.format(factor=factor, count=count, most=shutters.MAX_WINDOW)) from None
-    # Presets would be open beyond a window that ends within a source frame.
-    is_whole = window * effect.bars_per_frame == effect.window * factor
+def count_filmed(effect: PropertyGroup) -> None:
+    """Has an effect of format 1, whose bars counted moments between filmed frames, count filmed frames. EffectError: a
+    value that no effect can have is in the way."""
+    steps, position = int(effect.inbetween), validation.word(effect, "position").lower()
+    window = -(-effect.window // steps)
     for index in range(len(effect.shutters)):
-        if not (is_whole and _made_again(effect, index, window, factor)):
-            _change_bars(effect, index, multiplied)
-    effect.bars_per_frame, effect.window = factor, window
+        _change_bars(effect, index, lambda old: shutters.filmed(old, steps, position))
+    effect.window = window
 
 
 def preset_of(effect: PropertyGroup, index: int) -> str:
@@ -131,21 +109,20 @@ def preset_of(effect: PropertyGroup, index: int) -> str:
     shutter, weights = effect.shutters[index], bars(effect.shutters[index])
     if shutter.preset not in presets.PRESETS or not weights.size:
         return ""
-    position, step = shutter.preset_position.lower(), max(effect.bars_per_frame, 1)
-    made = presets.bars(shutter.preset, len(weights), position, step).astype(np.float32)
+    made = presets.bars(shutter.preset, len(weights), shutter.preset_position.lower()).astype(np.float32)
     path = f"{effect.path_from_id()}.shutters[{index}].bars["
     is_kept = np.array_equal(weights, made) and not fcurves.curves_under(effect.id_data, path)
     return shutter.preset if is_kept else ""
 
 
-def _made_again(effect: PropertyGroup, index: int, window: int, step: int) -> bool:
-    """Gives a shutter that keeps to a preset its bars for a window, with `step` of them for a filmed frame; any other
-    one forgets which it was given. Whether it keeps to one."""
+def _made_again(effect: PropertyGroup, index: int) -> bool:
+    """Gives a shutter that keeps to a preset its bars for the window; any other one forgets which it was given. Whether
+    it keeps to one."""
     shutter = effect.shutters[index]
     shutter.preset = preset_of(effect, index)
     if shutter.preset:
         shutter.preset_position = effect.position
-        made = presets.bars(shutter.preset, window, effect.position.lower(), max(step, 1))
+        made = presets.bars(shutter.preset, effect.window, effect.position.lower())
         _change_bars(effect, index, lambda _old: made)
     return bool(shutter.preset)
 

@@ -7,14 +7,23 @@ from collections.abc import Callable, Iterable
 
 from bpy.app.translations import pgettext_rpt as rpt_
 
-from . import strips
+from . import consistency, strips
+
+
+def _count_filmed() -> None:
+    """Format 2: bars count filmed frames, not the moments between them as well."""
+    for scene in _holding():
+        for effect in scene.virtual_shutter.effects if scene.virtual_shutter.format < 2 else ():
+            if effect.inbetween != "1":
+                consistency.count_filmed(effect)
+
 
 # Raise it with the first change after a release that older versions would not understand: a property, an item of an
 # enum, another meaning.
-FORMAT = 1
+FORMAT = 2
 # What then becomes of older files: by the format that each leads to, in order; the first version's was 1. They are run
 # as a file is loaded of which anything is older, and may find newer scenes beside: what needs no change stays as it is.
-MIGRATIONS: tuple[tuple[int, Callable[[], None]], ...] = ()
+MIGRATIONS: tuple[tuple[int, Callable[[], None]], ...] = ((2, _count_filmed),)
 
 
 def of_file() -> int:

@@ -22,9 +22,11 @@ from ...media.carried_mattes import FOLDER, CarriedFile
 from ...media.files import stamp
 from ...media.matte_files import MatteFile
 from ...media.sequence import sequence_files
-from . import inbetween_settings, mask_reading, matte_strips, source_media, strip_timing, strips, validation
+from . import mask_reading, matte_strips, source_media, strip_timing, strips, validation
 from .external_files import absolute
 from .sampled import Frames, over
+
+_MOMENTS = 16  # of a filmed frame, that masks are read at
 
 
 def content(
@@ -117,7 +119,7 @@ def shown_frame(scene: Scene, effect: PropertyGroup, strip: Strip, time: Channel
     spec, timing = source_media.spec(source), time or strip_timing.timing_of(source)
     filmed, fps = (len(spec.files), None) if spec.files else _movie(spec)
     size = 0, 0  # nothing of it is in pixels
-    clip = Clip(*size, filmed, fps=fps, timing=timing).stepped(inbetween_settings.factor(effect))
+    clip = Clip(*size, filmed, fps=fps, timing=timing).stepped(_MOMENTS if effect.inbetween != "1" else 1)
     return lambda frame: clip.shown(frame).source_frame / clip.step
 
 

@@ -56,6 +56,16 @@ def redraw(_owner: object = None, _context: Context | None = None) -> None:
         area.tag_redraw()  # of the area alone, Blender's picture and ours
 
 
+def redraw_panels() -> None:
+    """Draws panels again, and no preview; a timer as well."""
+    kinds = {"SEQUENCE_EDITOR": "UI", "PROPERTIES": "WINDOW"}
+    for window in bpy.context.window_manager.windows:
+        for area in window.screen.areas:
+            for region in area.regions:
+                if region.type == kinds.get(area.type):
+                    region.tag_redraw()
+
+
 def within(window: bpy.types.Window, area: Area) -> AbstractContextManager:
     """A context in which Blender's operators work in the preview of a sequencer's area."""
     return bpy.context.temp_override(window=window, area=area, region=preview_region(area))

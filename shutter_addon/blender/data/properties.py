@@ -21,7 +21,7 @@ from bpy.types import Context, PropertyGroup
 from ...core import revision, told
 from ...core.messages import EffectError
 from ...core.model import effect as model
-from ...core.model.choices import FOLLOWS, PLACES, UNKEYED
+from ...core.model.choices import FOLLOWS, UNKEYED
 from ...core.model.frame_state import Options
 from ...core.model.limits import MAX_BAR, MAX_FRAME
 from . import consistency, selection
@@ -42,10 +42,6 @@ def _recolored(shutter: PropertyGroup, _context: Context) -> None:
 
 def _window_changed(effect: PropertyGroup, context: Context) -> None:
     _fit(consistency.fit_bars, effect, context)
-
-
-def _multiplied(effect: PropertyGroup, context: Context) -> None:
-    _fit(consistency.fit_factor, effect, context)
 
 
 def _fit(change: Callable[[PropertyGroup], None], effect: PropertyGroup, context: Context) -> None:
@@ -105,7 +101,6 @@ class Shutter(PropertyGroup):
     Options,
     window={"update": _window_changed},
     position={"update": _window_changed},
-    inbetween={"update": _multiplied},
 )
 class _Settings:
     """All of an effect but its shutters and regions. Copies get these first, and bars that fit them after that."""
@@ -117,13 +112,6 @@ class _Settings:
     source: StringProperty(name="Source", description="Identity of the source strip")
     start: FloatProperty(name="Start", description="Timeline frame where the effect's content starts", options=UNKEYED)
     camera: PointerProperty(name="Camera", description="How what the camera sees moves", type=ShutterCamera)
-    bars_per_frame: IntProperty(
-        name="Bars per Frame",
-        description="How many bars stand for a source frame",
-        default=1,
-        options={"HIDDEN"},
-    )
-    inbetween_place: choice("Place", "Where in-between frames lie", PLACES)
     use_source_time: BoolProperty(
         name="Custom Time",
         description="Show the source at the time that is set here, in place of the strip's own timing",

@@ -1,7 +1,6 @@
 """The recipe of an effect: the inverse of recipe_import.apply."""
 
 from collections.abc import Sequence
-from dataclasses import replace
 
 from bpy.app.translations import pgettext_rpt as rpt_
 
@@ -9,7 +8,7 @@ from ...core.messages import EffectError, translated
 from ...core.model import limits
 from ...core.model.effect import Effect
 from ...core.recipes import baking
-from . import annotations, fcurves, inbetween_settings, snapshot, strips, validation
+from . import annotations, fcurves, snapshot, strips, validation
 
 
 def recipe_of(scene, effect, strip, contents: Sequence = ()) -> Effect:
@@ -31,7 +30,6 @@ def recipe_of(scene, effect, strip, contents: Sequence = ()) -> Effect:
         raise EffectError(sentence.format(strip=strip.name))
     with translated(rpt_):
         plain = snapshot.read(scene, effect, strip, sorted({*shown, *_keyed(scene, effect)}))
-        plain = replace(plain, inbetween_method=inbetween_settings.method(effect))
         return baking.baked(plain, shown, contents)
 
 

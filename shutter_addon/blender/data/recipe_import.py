@@ -36,7 +36,6 @@ def apply(scene, effect, strip, source: model.Effect, folder: Path = Path()) -> 
     images = {content: matte_image(folder / content.path, content.channel) for content in files}
     clear(scene, effect)
     path, options = effect.path_from_id(), source.options.at(1)
-    effect.bars_per_frame = options.step  # before the factor, which else would change the window
     _set_fields(scene, effect, path, options, first)
     _set_fields(scene, effect, path, source, first, group=effect.name)
     effect.use_source_time = source.time is not None

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -24,7 +23,7 @@ from ...core.model import following, keyframes, limits, mattes, outlines
 from ...core.model.fields import fields_of
 from ...core.model.frame_state import Options
 from ...media.carried_mattes import CarriedFile
-from . import inbetween_settings, matte_content, sampled, source_media, strips, validation
+from . import matte_content, sampled, source_media, strips, validation
 from .fcurves import Curves, leading, progress
 from .sampled import Frames
 from .strip_timing import timing_of
@@ -44,7 +43,6 @@ class Snapshot:
     scene: session_uid of the effect's scene, whose frame 0 is shown at the timeline frame `origin`
     effect: its channels are sampled at `frames`
     source: what is read, and `timing`, when; None: the effect's own source time says that
-    inbetween: its in-between frames, None: it has none; built: the stamp of those there are
     blended: the sequencer's colour space, in which Blender lays the strip over others; "": it does not
     first: the strip's first timeline frame; film: from frame to frame of the scene's film, and its last frame"""
 
@@ -56,8 +54,6 @@ class Snapshot:
     effect: model.Effect
     source: source_media.SourceSpec
     timing: StripTiming | None
-    inbetween: inbetween_settings.Settings | None
-    built: tuple
     blended: str
 
     def timeline_frame(self, scene_frame: float) -> float:
@@ -65,22 +61,10 @@ class Snapshot:
         return self.origin + scene_frame
 
 
-def source_files(effect: PropertyGroup, source: Strip, folder: Path | None = None) -> tuple[tuple, tuple]:
-    """What an effect's source strip reads (source_media.media_key), and the stamp of the in-between frames made of it.
-    folder: where these lie, in place of the effect's own. EffectError: they lie nowhere. MediaError: there are no
-    files."""
-    key, built = source_media.media_key(source), ()
-    if inbetween_settings.factor(effect) > 1:
-        settings = inbetween_settings.settings(effect, folder)
-        built = inbetween_settings.built.of(settings, source_media.stem(source))
-    return key, built
-
-
-def take(scene: Scene, effect: PropertyGroup, strip: Strip, frames: Frames, *, folder: Path | None = None) -> Snapshot:
-    """The snapshot of an effect strip at timeline frames; folder: see source_files. EffectError, MediaError: there is
-    no source, or no picture at any frame."""
+def take(scene: Scene, effect: PropertyGroup, strip: Strip, frames: Frames) -> Snapshot:
+    """The snapshot of an effect strip at timeline frames. EffectError, MediaError: there is no source, or no picture at
+    any frame."""
     source = strips.source_of(scene, effect, strip)
-    key, built = source_files(effect, source, folder)
     return Snapshot(
         scene=effect.scene.session_uid,
         origin=strips.timeline_frame(strip, 0),
@@ -88,10 +72,8 @@ def take(scene: Scene, effect: PropertyGroup, strip: Strip, frames: Frames, *, f
         film=(scene.frame_step, scene.frame_end),
         frames=frozenset(frames),
         effect=read(scene, effect, strip, frames),
-        source=source_media.spec(source, key),
+        source=source_media.spec(source),
         timing=None if effect.use_source_time else timing_of(source),
-        inbetween=inbetween_settings.settings(effect, folder) if inbetween_settings.factor(effect) > 1 else None,
-        built=built,
         blended="" if strip.blend_type == "REPLACE" or source.mute else scene.sequencer_colorspace_settings.name,
     )
 
@@ -117,7 +99,6 @@ def read(scene: Scene, effect: PropertyGroup, strip: Strip, frames: Frames) -> m
         if region.shutter in names
     )
     camera = _camera(curves, effect, around)
-    unused = ("inbetween_method",) if effect.inbetween == "1" else ()
     return model.Effect(
         shutters=tuple(
             replace(_shutter(curves, effect, i, options, frames), follow=_followed(shutter, regions, camera))
@@ -127,7 +108,7 @@ def read(scene: Scene, effect: PropertyGroup, strip: Strip, frames: Frames) -> m
         options=options,
         time=sampling.time,
         camera=camera,
-        **sampled.sampled_fields(curves, effect, path, model.Effect, around if layers else frames, unused),
+        **sampled.sampled_fields(curves, effect, path, model.Effect, around if layers else frames),
     )
 
 

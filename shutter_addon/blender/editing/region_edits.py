@@ -29,7 +29,7 @@ def first_drawn(effect: PropertyGroup, shutter: PropertyGroup, kind: str) -> Pro
     """Appends a region for strokes, as add_region does; the active one of that shutter becomes it while it has none.
     The first of an effect, of a shutter that is sharp, follows edges, unless the editor has said how much: a subject is
     meant, and no spot of it."""
-    is_sharp = np.count_nonzero(bars(shutter)) <= effect.bars_per_frame
+    is_sharp = np.count_nonzero(bars(shutter)) <= 1
     is_scribble = kind not in strips.LAID
     if is_scribble and is_sharp and not effect.regions and not effect.is_property_set("edge_aware"):
         effect.edge_aware = 1.0

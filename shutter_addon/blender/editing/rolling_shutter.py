@@ -2,9 +2,9 @@
 from another one in turn, so that all of them show what was there when the middle row was read.
 
 A row that is read a part y of the readout after the first one is shown y - 1/2 of the readout earlier. Two shutters are
-open for a single frame each, as long before the shown one as behind it, and a ramp across the whole picture goes from
-the one to the other. By displacement its pixels' moments lie evenly in between. The ramp is larger than the picture, so
-that both moments are whole in-between frames, and what lies between two of these is of both its neighbours alone.
+open for a single frame each, the one before the shown one and the one behind it, and a ramp across the whole picture
+goes from the one to the other. By displacement its pixels' moments lie evenly in between. The ramp is larger than the
+picture, as a readout is shorter than two frames.
 """
 
 import math
@@ -16,19 +16,17 @@ from bpy.app.translations import pgettext_rpt as rpt_
 from bpy.types import PropertyGroup, Scene, Strip
 
 from ...core.messages import EffectError
-from ...core.model import shutters
 from ...core.model.frame_state import Options
 from ...media import flow, readout
 from ...media.cuts import ShotSource
-from ..data import inbetween_settings, sampled, snapshot, source_media, strips, validation
+from ..data import sampled, snapshot, source_media, strips, validation
 from ..data.consistency import bars
 from ..data.fcurves import Curves
 from ..data.strip_timing import timing_of
 from . import bar_edits, collection_edits, time_map
 
-# In-between frames where there are none: the first of these that there is room for.
-FACTORS = 8, 4, 2
-FILMED = 3  # frames of the window, at least: the shown one and those beside it
+SMOOTH = "8"  # of effects that were not smooth
+FRAMES = 3  # of the window, at least: the shown one and those beside it
 LEAST = 0.02  # of a frame: a readout that is shorter, and found, is none
 # How the ramp is turned, in degrees, so that what is read first is at its end, which is shown from later.
 _TURNS = {"TOP": 90, "BOTTOM": -90, "LEFT": 180, "RIGHT": 0}
@@ -46,8 +44,7 @@ class Repair(NamedTuple):
 
 def of(effect: PropertyGroup) -> Repair | None:
     """The repair that an effect has, however its shutters and its ramp are called; None: it has none."""
-    step = inbetween_settings.factor(effect)
-    if step == 1 or not effect.shutters:
+    if effect.inbetween == "1" or not effect.shutters:
         return None
     default = _moment(effect.shutters[0])
     for index, region in enumerate(effect.regions):
@@ -57,9 +54,8 @@ def of(effect: PropertyGroup) -> Repair | None:
         turn = round(math.degrees(region.rotation)) % 360
         side = next((side for side, turned in _TURNS.items() if turned % 360 == turn), None)
         span = _moment(effect.shutters[place]) - default
-        middle, near = default + span / 2, _shown(effect)
-        if side and 0 < abs(span) <= 2 * step and min(abs(middle - shown) for shown in near) < 0.6:
-            return Repair(index, abs(span) / step / abs(region.scale or 1), side)
+        if side and 0 < abs(span) <= 2 and abs(default + span / 2 - _shown(effect)) < 0.6:
+            return Repair(index, abs(span) / abs(region.scale or 1), side)
     return None
 
 
@@ -69,35 +65,32 @@ def _moment(shutter: PropertyGroup) -> float:
     return float((weights * np.arange(len(weights))).sum() / weights.sum()) if weights.any() else math.nan
 
 
-def _shown(effect: PropertyGroup) -> tuple[int, int]:
-    """The bar of the shown frame, where the source runs forward, and where it runs backward."""
-    step = inbetween_settings.factor(effect)
-    options = Options(validation.number(effect, "window"), position="center", step=step)
-    return options.before, options.before + step - 1
+def _shown(effect: PropertyGroup) -> int:
+    """The bar of the shown frame."""
+    return Options(validation.number(effect, "window"), position="center").before
 
 
 def repair(scene: Scene, effect: PropertyGroup, strip: Strip, share: float, side: str) -> None:
     """Repairs the readout of an effect's source, or changes the repair that it has.
 
     share: as Repair.readout, 0 to 1; side: likewise
-    EffectError: there is no room for it. MediaError: the footage cannot be read, or its in-between frames cannot be
-    built. Nothing has changed then."""
+    EffectError: there is no room for it. MediaError: the footage cannot be read, or OpenCV is missing. Nothing has
+    changed then."""
     backward = _is_backward(scene, effect, strip)
     known = of(effect)
     if known is None and (sentence := collection_edits.why_full(effect, regions=1, shutters=2)):
         raise EffectError(sentence)
-    if inbetween_settings.factor(effect) == 1:  # what is built already is there without OpenCV
-        flow.check()
-    _make_room(effect)
+    flow.check()
+    effect.window = max(validation.number(effect, "window"), FRAMES)
     effect.position, effect.interpolation = "CENTER", "DISPLACEMENT"
-    step, shown = inbetween_settings.factor(effect), _shown(effect)[backward]
-    half = share * step / 2
-    reach = max(math.ceil(half), 1)
+    if effect.inbetween == "1":
+        effect.inbetween = SMOOTH
+    shown = _shown(effect)
     region = _begin(effect) if known is None else effect.regions[known.region]
-    region.rotation, region.scale = math.radians(_TURNS[side]), reach / half
+    region.rotation, region.scale = math.radians(_TURNS[side]), 2 / share
     region.location, region.opacity, region.invert, region.blend = (0, 0), 1.0, False, "OVER"
     earlier, later = effect.shutters[0], effect.shutters[region.shutter]
-    for shutter, to in ((earlier, -reach), (later, reach)):
+    for shutter, to in ((earlier, -1), (later, 1)):
         shutter.follow, shutter.length, shutter.combine = "NOTHING", "FRAMES", "AVERAGE"
         place = shown - to if backward else shown + to
         bar_edits.paint(effect, effect.shutters.find(shutter.name), np.eye(effect.window)[place])
@@ -112,21 +105,6 @@ def _is_backward(scene: Scene, effect: PropertyGroup, strip: Strip) -> bool:
         time = sampled.source_time(Curves(scene), effect.path_from_id(), effect, (frame,))
         return bool(time.at(frame)[1])
     return bool(timing_of(strips.source_of(scene, effect, strip)).use_reverse_frames)
-
-
-def _make_room(effect: PropertyGroup) -> None:
-    """Has the effect show in-between frames, if it has none, and the filmed frames on both sides of the shown one."""
-    step, window = inbetween_settings.factor(effect), validation.number(effect, "window")
-    filmed = max(-(-window // step), FILMED)
-    if step == 1:
-        factor = next((factor for factor in FACTORS if filmed * factor <= shutters.MAX_WINDOW), None)
-        if factor is None:
-            sentence = rpt_("in-between frames of {count} frames are too many: set Frames to {most} or fewer")
-            raise EffectError(sentence.format(count=filmed, most=shutters.MAX_WINDOW // FACTORS[-1]))
-    if window < FILMED * step:
-        effect.window = FILMED * step
-    if step == 1:
-        effect.inbetween = str(factor)
 
 
 def _begin(effect: PropertyGroup) -> PropertyGroup:

@@ -56,7 +56,7 @@ def apply_preset(effect: PropertyGroup, index: int, preset: str, key: bool = Fal
     frame. EffectError: the window has no length, and nothing has changed."""
     shutter, window = effect.shutters[index], validation.number(effect, "window")
     shutter.preset, shutter.preset_position = preset, effect.position
-    weights = presets.bars(preset, window, effect.position.lower(), max(effect.bars_per_frame, 1))
+    weights = presets.bars(preset, window, effect.position.lower())
     bar_edits.paint(effect, index, weights, key)
 
 

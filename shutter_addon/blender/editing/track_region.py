@@ -26,7 +26,7 @@ from ...core.model.keyframes import Samples
 from ...media import camera_tracking, matte_tracking, pursuit, tracking
 from ...media.footage import Footage
 from ...media.tracking import Tracked
-from ..data import inbetween_settings, selection, snapshot, strips, validation
+from ..data import selection, snapshot, strips, validation
 from ..data.sampled import placement_now
 from ..rendering import effect_source
 from . import motion_keys
@@ -193,7 +193,7 @@ def key_ends(effect: PropertyGroup, index: int | None) -> None:
 def _reach(effect: PropertyGroup) -> int:
     """The frames over which the camera's influence fades: so no exposure reaches one whose motion nobody knows."""
     window, position = validation.number(effect, "window"), validation.word(effect, "position").lower()
-    return max(Options(window=window, position=position, step=inbetween_settings.factor(effect)).reach, presence.FADE)
+    return max(Options(window=window, position=position).reach, presence.FADE)
 
 
 def confidence_at(effect: PropertyGroup, index: int | None, frame: float) -> float | None:

@@ -70,7 +70,7 @@ _GROUPS: dict[str, tuple] = {
     "footage": (
         "Footage",
         [("source", "NONE", "strip"), ("match_source",), ("copy_modifiers",)],
-        [("smooth_streaks", "NONE", "factor"), ("inbetween_build",), ("inbetween_purge",)],
+        [("smooth_streaks",)],
     ),
     "bake": ("Bake", [("bake",), ("bake_stop",), ("unbake",)]),
 }

@@ -1,7 +1,9 @@
 """Buttons at the ends of the preview's notes, each of which calls an operator."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
+from bpy.app.translations import pgettext_iface as iface_
+from bpy.app.translations import pgettext_rpt as rpt_
 from bpy.types import Context, Gizmo, GizmoGroup, Region
 
 from . import drawing
@@ -14,11 +16,20 @@ OPERATORS = "shutter.full_quality", "shutter.smooth_streaks"
 
 @dataclass(frozen=True)
 class Button:
-    """operator: in previews one of OPERATORS; label: in panels, empty for the operator's; values: of its properties"""
+    """operator: in previews one of OPERATORS; label: in panels, empty for the operator's"""
 
     operator: str
     label: str
-    values: dict = field(default_factory=dict)
+
+
+def strobing_in_words(step: float) -> str:
+    """That an exposure has too few frames. step: pixels from one to the next"""
+    return rpt_("Too few frames: steps of {pixels} pixels").format(pixels=f"{step:.0f}")
+
+
+def smoothing() -> Button:
+    """What helps against that."""
+    return Button("shutter.smooth_streaks", iface_("Smooth"))
 
 
 places: dict[tuple[int, str], tuple[drawing.Box, Button]] = {}  # by region and operator
@@ -74,12 +85,6 @@ class SHUTTER_GGT_note_buttons(InPreview, GizmoGroup):
             gizmo = self.gizmos.new(SHUTTER_GT_note_button.__name__)
             gizmo.operator = operator
             gizmo.target_set_operator(operator)
-
-    def draw_prepare(self, context: Context) -> None:
-        for gizmo in self.gizmos:
-            placed = _placed(context, gizmo.operator)
-            for name, value in (placed[1].values if placed else {}).items():
-                setattr(gizmo.target_set_operator(gizmo.operator), name, value)
 
 
 def unregister() -> None:

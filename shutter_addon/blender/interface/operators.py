@@ -103,6 +103,16 @@ def copy_modifiers(_self: Operator, _context: Context, effect: PropertyGroup) ->
     matching.copy_modifiers(effect)
 
 
+def _why_smooth(effect: PropertyGroup) -> str | None:
+    return None if effect.inbetween == "1" else rpt_("The exposures are smooth")
+
+
+@operator("Smooth Streaks", _why_smooth)
+def smooth_streaks(_self: Operator, _context: Context, effect: PropertyGroup) -> None:
+    """Expose moments between filmed frames as well, as many as the footage needs"""
+    effect.inbetween = "AUTO"
+
+
 def show_panel(context: Context) -> None:
     """Opens the sidebar's Shutter tab beside the picture: in the Properties editor it is below all other panels."""
     for _window, area in preview_areas.previews(context):

@@ -12,8 +12,8 @@ from ...core.model.choices import CONTEXT
 from ...core.model.effect import Shutter
 from ..data import annotations, consistency, data_format, selection, strips
 from ..editing import bar_edits, match_source
-from ..rendering import inbetween_build, strobing
-from . import bake_operators, icons, inbetween_operators, region_panels
+from ..rendering import strobing
+from . import bake_operators, icons, note_buttons, region_panels
 from .note_buttons import Button
 from .operator_bases import Mixin
 from .panel_parts import (
@@ -154,6 +154,7 @@ def _draw_exposure(layout: UILayout, scene: Scene, effect: PropertyGroup, strip:
     row.operator("shutter.bars_key", text="", icon="KEY_HLT")
     row.operator("shutter.bars_unkey", text="", icon="KEY_DEHLT")
     layout.prop(effect, "window")
+    layout.prop(effect, "inbetween")
     layout.prop(shutter, "length")
     if shutter.length == "MOTION" and shutter.follow != "NOTHING":
         layout.prop(shutter, "trail")
@@ -235,8 +236,8 @@ def _notes(context: Context) -> Iterator[tuple[str, Button | None]]:
         if shown.has_effects:
             words = iface_("Effect strips on the source do not reach the effect: make the Shutter strip their input")
             yield words, None
-    if (exposure := strobing.last(effect)) is not None and inbetween_build.running() is None:
-        yield inbetween_operators.strobing_in_words(exposure), inbetween_operators.smoothing(exposure)
+    if (step := strobing.last(effect)) is not None:
+        yield note_buttons.strobing_in_words(step), note_buttons.smoothing()
 
 
 def _tracked(effect: PropertyGroup) -> list[int | None]:
@@ -265,9 +266,7 @@ class SHUTTER_PT_notes(Panel):
             sentence(column, words, "INFO")
             if button is not None:
                 text = {"text": button.label, "translate": False} if button.label else {}
-                drawn = column.operator(button.operator, **text)
-                for name, value in button.values.items():
-                    setattr(drawn, name, value)
+                column.operator(button.operator, **text)
         for index in _tracked(effect):
             region_panels.draw_tracked(layout, effect, index)
 
@@ -295,7 +294,7 @@ def _draw_options(layout: UILayout, _scene: Scene, effect: PropertyGroup, _strip
     column.active = effect.use_source_time
     column.prop(effect, "source_time")
     if effect.use_source_time and effect.inbetween == "1":
-        sentence(column, iface_("No in-between frames: the nearest source frame is shown"), "INFO")
+        sentence(column, iface_("Smooth is off: the nearest source frame is shown"), "INFO")
 
 
 class _Report(Mixin):
@@ -343,7 +342,6 @@ _PANELS = {
     "_move": (of_effect("Exposure Moves With", _draw_move), "_exposure"),
     "_camera": (of_effect("Camera", region_panels.draw_camera, region_panels.has_camera), ""),
     "_options": (of_effect("Options", _draw_options), ""),
-    "_inbetween": (of_effect("In-Between Frames", inbetween_operators.draw_panel), ""),
     "_bake": (of_effect("Bake", bake_operators.draw_panel), ""),
     "_report": (_Report, ""),
 }

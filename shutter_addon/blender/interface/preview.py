@@ -19,7 +19,6 @@ from ...core.model.choices import CONTEXT
 from ...core.model.frame_state import FrameState
 from ...devices.device import Texture
 from ...media import MediaError
-from ...media.errors import NotBuiltError
 from ..data import annotations, preview_areas, selection, strips
 from ..data.preview_areas import Shown
 from ..data.snapshot import Snapshot
@@ -27,7 +26,6 @@ from ..devices import blender_gpu, main_thread
 from ..editing import shown_annotations
 from ..rendering import (
     effect_source,
-    inbetween_build,
     invalidation,
     outline_carrying,
     pictures,
@@ -37,7 +35,7 @@ from ..rendering import (
     strobing,
 )
 from ..rendering.previews import Decision, Drawing
-from . import drawing, inbetween_operators, note_buttons, preview_quad, sharp_frame
+from . import drawing, note_buttons, preview_quad, sharp_frame
 from .note_buttons import Button
 from .preview_quad import Quad
 
@@ -72,6 +70,7 @@ def _redraw_when_still() -> float | None:
 _HOLES = (1.0, 0.55, 0.0), (0.75, 0.2, 0.9)  # the colours of compute.plates.TAKEN and FILLED
 Colors = Sequence[Sequence[float]]  # display code values
 _NAVIGATION = 56  # units at the right of a preview, where Blender's own buttons lie
+_TICK = 0.25  # seconds
 _STILL = 0.4  # seconds after which a frame that is shown stays
 _SOON = 0.1  # seconds
 
@@ -215,7 +214,7 @@ def _show_picture(context: Context, quad: Quad, shown: Shown, wanted: Drawing, s
     # What it measures would take from what runs.
     if context.space_data.show_overlays and is_still and not previews.may_be_late():
         decision = wanted.decision
-        looked = strobing.look(shown.effect, shown.strip, decision.snapshot, renderer, decision.request)
+        looked = strobing.look(shown.effect, decision.snapshot, renderer, decision.request)
         _tell_strobing(looked, after_detail, say)
 
 
@@ -247,10 +246,10 @@ def _tell_detail(wanted: Drawing, size: tuple[int, int], is_still: bool, say: "_
 
 def _tell_strobing(looked: strobing.Looked, place: int, say: "_Notes") -> None:
     """Says, in that place among what is said, that the exposure has too few frames, and gives the way to more."""
-    if looked.known is not None and inbetween_build.running() is None:
-        say(inbetween_operators.strobing_in_words(looked.known), inbetween_operators.smoothing(looked.known), place)
+    if looked.known is not None:
+        say(note_buttons.strobing_in_words(looked.known), note_buttons.smoothing(), place)
     if looked.is_new:
-        main_thread.later(inbetween_operators.redraw_panels)  # which may have been drawn before
+        main_thread.later(preview_areas.redraw_panels)  # which may have been drawn before
     if looked.is_busy:
         main_thread.drop(_measure)
         main_thread.later(_measure, _STILL)  # once a frame stays
@@ -260,7 +259,7 @@ def _measure() -> float | None:
     """Has measured what tells of strobing, a little at a time."""
     if strobing.advance():
         preview_areas.redraw()
-    return inbetween_operators.TICK if strobing.is_busy() else None
+    return _TICK if strobing.is_busy() else None
 
 
 def _show_sharp(context: Context, shown: Shown | None) -> None:
@@ -306,11 +305,7 @@ def show_carried() -> None:
 def _tell_fault(error: Exception, say: "_Notes") -> None:
     """Says why there is no picture."""
     told.shown(error)
-    if isinstance(error, NotBuiltError) and inbetween_build.running() is None:
-        button = Button("shutter.smooth_streaks", iface_("Build"), {"factor": str(error.factor)})
-        say(rpt_("In-between frames are missing"), button)
-    else:
-        say(rpt_("Shutter: {fault}").format(fault=error))
+    say(rpt_("Shutter: {fault}").format(fault=error))
 
 
 def _show_strokes(context: Context, quad: Quad, shown: Shown, snapshot: Snapshot) -> None:

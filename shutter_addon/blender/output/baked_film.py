@@ -28,7 +28,7 @@ from ...media.completeness import is_whole_movie, is_whole_picture
 from ...media.errors import MediaError
 from ...media.folder import Folder, own_folder
 from ..data import colour_configuration, effect_version, snapshot, source_media, strips
-from ..rendering import pictures, render_settings, sessions
+from ..rendering import pictures, sessions
 from . import film_output
 
 FOLDER = "virtual_shutter_baked"  # beside the .blend file
@@ -123,9 +123,7 @@ def render(scene: Scene, effect: PropertyGroup, strip: Strip, film: Film, told: 
         told(len(film.frames))
         return
     start = round(strips.origin(strip))
-    taken = snapshot.take(
-        scene, effect, strip, [start + frame for frame in film.frames], folder=render_settings.settings().inbetween
-    )
+    taken = snapshot.take(scene, effect, strip, [start + frame for frame in film.frames])
     with film_output.stoppable() as stopped:
 
         def picture(frame: int) -> np.ndarray:

@@ -6,7 +6,7 @@ import math
 import os
 import re
 from collections.abc import Iterator
-from contextlib import closing, suppress
+from contextlib import closing
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -36,10 +36,7 @@ class EffectCheck:
 
     scene: that its strip is in; name: of that strip; source: the footage's first file, "": it cannot be read
     size: of its pictures, width and height in pixels; window: frames of the longest; shutters: how many
-    factor: of its in-between frames, 1: none; pairs: how many pairs of source frames the frames need in-betweens of
-    missing: those of them that are not built, each by its first source frame, from 1 on
-    lacking: the timeline frames that need these
-    folder: of its in-between frames, None: it has none
+    steps: moments for a filmed frame, 1: it is not smooth
     mattes: how many mattes of outlines are to be carried first, by the folder that they are kept in
     needs: memory for a frame, None: its frames cannot be asked for
     faults, notes: sentences; notes are of what can be rendered, but otherwise than one may think"""
@@ -51,11 +48,7 @@ class EffectCheck:
     source: str = ""
     size: tuple[int, int] = (0, 0)
     window: int = 0
-    factor: int = 1
-    pairs: int = 0
-    missing: set[int] = field(default_factory=set)
-    lacking: set[int] = field(default_factory=set)
-    folder: Path | None = None
+    steps: int = 1
     mattes: dict[Path, int] = field(default_factory=dict)
     needs: memory_needs.Needs | None = None
     faults: list[str] = field(default_factory=list)
@@ -63,20 +56,18 @@ class EffectCheck:
 
     @property
     def chunk(self) -> int:
-        return chunk_size(self.window, self.factor) if self.window else LEAST
+        return chunk_size(self.window, self.steps) if self.window else LEAST
 
 
-def effects(scene: Scene, frames: range, compositor: Compositor, *, find_cuts: bool) -> list[EffectCheck]:
+def effects(scene: Scene, frames: range, compositor: Compositor) -> list[EffectCheck]:
     """Looks at the effects that the scene's frames show, those of scenes in it included.
 
     compositor: of the device that will render. Files are opened, and of each the first and the last frame that is
-    needed are read.
-    find_cuts: which in-between frames are needed depends on cuts, so that more is read where some are missing: of a
-    film without any, all of it. Otherwise they are counted as if there were no cuts."""
+    needed are read."""
     # It asks no device, which would have to wait for its first picture: states and windows are known without.
     session = RenderSession(lambda: ("cpu", None), lambda: None)
     try:
-        return [_effect(session, shown, compositor, find_cuts) for shown in _shown_effects(scene, frames)]
+        return [_effect(session, shown, compositor) for shown in _shown_effects(scene, frames)]
     finally:
         session.forget()
 
@@ -94,7 +85,7 @@ def _shown_effects(film: Scene, frames: range) -> Iterator[tuple]:
             yield scene, effect, parts[0], shown
 
 
-def _effect(session: RenderSession, shown: tuple, compositor: Compositor, find_cuts: bool) -> EffectCheck:
+def _effect(session: RenderSession, shown: tuple, compositor: Compositor) -> EffectCheck:
     """shown: of _shown_effects"""
     scene, effect, strip, frames = shown
     check = EffectCheck(scene=scene, name=strip.name, frames=frames, shutters=len(effect.shutters))
@@ -102,7 +93,6 @@ def _effect(session: RenderSession, shown: tuple, compositor: Compositor, find_c
         return check
     try:
         taken = snapshot.take(scene, effect, strip, frames)
-        check.folder = taken.inbetween.folder if taken.inbetween else None
         requests = _requests(session, taken, check)
     except effect_source.FAULTS as error:
         check.faults.append(str(error))
@@ -111,8 +101,8 @@ def _effect(session: RenderSession, shown: tuple, compositor: Compositor, find_c
         renderer = session.renderer(next(iter(requests.values())).source)
         source = renderer.source
         check.window = max(request.state.options.window for request in requests.values())
-        check.factor = source.step
-        _look_at_frames(check, renderer, requests, find_cuts)
+        check.steps = source.step
+        _look_at_frames(check, renderer, requests)
         _look_at_mattes(check, source, requests)
         check.needs = _needs(source, requests, compositor)
         check.notes += _notes(check, taken, requests, renderer.source)
@@ -158,28 +148,13 @@ def _look_at_footage(check: EffectCheck, effect: PropertyGroup, strip: Strip) ->
     return True
 
 
-def _look_at_frames(check: EffectCheck, renderer: Renderer, requests: dict[float, Request], find_cuts: bool) -> None:
-    """Whether the frames that windows need are there: files of image sequences, in-between frames, and of a movie the
-    first and the last one."""
+def _look_at_frames(check: EffectCheck, renderer: Renderer, requests: dict[float, Request]) -> None:
+    """Whether the frames that windows need are there: files of image sequences, and of a movie the first and the last
+    one."""
     source = renderer.source
-    needed = {frame: renderer.needed(request) for frame, request in requests.items()}
-    filmed = {index // source.step for indices in needed.values() for index in indices if index % source.step == 0}
-    check.faults += _unreadable(source, filmed, source.step)
-    if source.step == 1:
-        return
-    lacking = [frame for frame, indices in needed.items() if not all(map(source.has, indices))]
-    for frame in lacking if find_cuts else ():  # beyond a cut none is needed
-        with suppress(UserError):  # a file that cannot be read has been told
-            needed[frame] = renderer.needed(requests[frame], known=False)
-            if source.shots is not None:
-                source.shots.release()
-    between = {index for indices in needed.values() for index in indices if index % source.step}
-    check.pairs = len({index // source.step for index in between})
-    gone = {index for index in between if not source.has(index)}
-    check.missing = {index // source.step + 1 for index in gone}
-    check.lacking = {math.floor(frame) for frame in lacking if needed[frame] & gone}
-    if gone and not find_cuts and any(request.state.options.stop_at_cuts for request in requests.values()):
-        check.notes.append("in-between frames are counted as if there were no cuts, beyond which none are needed")
+    needed: set[int] = set().union(*map(renderer.needed, requests.values()))
+    ends = {end for index in needed for end in (index // source.step, -(-index // source.step))}
+    check.faults += _unreadable(source, ends, source.step)
 
 
 def _unreadable(source: FrameSource, indices: set[int], step: int = 1) -> list[str]:

@@ -1,4 +1,4 @@
-"""What a renderer reads for an effect: its source, in-between frames included, in some detail."""
+"""What a renderer reads for an effect: its source, with the moments between its frames, in some detail."""
 
 from __future__ import annotations
 
@@ -7,15 +7,14 @@ from dataclasses import dataclass
 
 from ...core import told
 from ...core.frames.frame_source import FrameSource
+from ...core.memo import Kept
 from ...core.messages import EffectError, of_file
 from ...core.model.clip import Clip
 from ...devices.device import NoDeviceError
 from ...media import MediaError
 from ...media.cuts import ShotSource
-from ...media.inbetween import InbetweenSource
 from ...media.prefetch import PrefetchSource
-from ...media.reduced import smaller
-from ..data import inbetween_settings
+from ...media.smooth import SmoothSource, steps_for
 from ..data.snapshot import Snapshot
 from ..data.source_media import SourceSpec
 from ..data.strip_proxies import Proxy
@@ -41,11 +40,16 @@ class Detail:
     """In how much detail a preview is composed.
 
     divisor: how many times smaller than the source's the picture is each way (media.open_source)
-    proxy: what frames are read from, where it fits; in-between frames and those beside them have none"""
+    proxy: what frames are read from, where it fits
+    smooth: whether moments between frames are exposed as well"""
 
     divisor: int = 1
     proxy: Proxy | None = None
+    smooth: bool = True
 
+
+_steps: Kept[tuple, int] = Kept()  # moments that effects have for a filmed frame, by what they are found of
+_KEPT = 64
 
 FULL = Detail()  # what renders are composed in
 
@@ -54,36 +58,36 @@ FULL = Detail()  # what renders are composed in
 class SourceKey:
     """What a renderer reads, in plain data: equal where it reads the same frames for the same effect.
 
-    scene: session_uid of the effect's scene; spec, inbetween, built: Snapshot's source, inbetween and built"""
+    scene: session_uid of the effect's scene; spec: Snapshot's source
+    smooth, window: as Options has them of the effect: step and window"""
 
     scene: int
     spec: SourceSpec
-    inbetween: inbetween_settings.Settings | None
-    built: tuple
+    smooth: int | str
+    window: int
     detail: Detail = FULL
 
     @staticmethod
     def of(snapshot: Snapshot, detail: Detail = FULL) -> SourceKey:
-        return SourceKey(
-            scene=snapshot.scene,
-            spec=snapshot.source,
-            inbetween=snapshot.inbetween,
-            built=snapshot.built,
-            detail=detail,
-        )
+        options = snapshot.effect.options.at(min(snapshot.frames))  # neither has keys
+        smooth = options.step if detail.smooth else 1
+        window = options.window if smooth != 1 else 0
+        return SourceKey(scene=snapshot.scene, spec=snapshot.source, smooth=smooth, window=window, detail=detail)
 
     def open(self, *, planes: bool = False) -> ShotSource:
         """The source; planes: see PrefetchSource. EffectError, MediaError: there is none."""
-        divisor = self.detail.divisor
-        if self.inbetween is None:
-            return ShotSource(PrefetchSource(self.spec.open(divisor, self.detail.proxy), planes=planes))
-        medium = self.spec.open()
+        medium = self.spec.open(self.detail.divisor, self.detail.proxy)
+        if self.smooth == 1:
+            return ShotSource(PrefetchSource(medium, planes=planes))
         try:
-            source = InbetweenSource(medium, *self.inbetween)
-            return ShotSource(PrefetchSource(smaller(source, divisor)), self.inbetween.factor)
+            steps = _steps.ask((self.spec.key, self.smooth, self.window), lambda: self._steps(medium), _KEPT)
+            return ShotSource(PrefetchSource(SmoothSource(medium, steps) if steps > 1 else medium), steps)
         except FAULTS:
             medium.close()
             raise
+
+    def _steps(self, medium: FrameSource) -> int:
+        return steps_for(medium, self.smooth, self.window)
 
 
 def open_source(snapshot: Snapshot) -> ShotSource:

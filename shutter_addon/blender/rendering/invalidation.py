@@ -17,7 +17,6 @@ from ...media import MediaError
 from ..data import effect_version, matte_content, snapshot, source_media, strips
 from ..data.snapshot import Snapshot
 from ..devices import main_thread
-from . import render_settings
 
 _signatures: dict[int, int] = {}  # by effect scene
 _current = revision.UntilChange()
@@ -30,7 +29,7 @@ def current(scene: Scene, effect: PropertyGroup, strip: Strip, frame: float) -> 
     EffectError, MediaError: as snapshot.take."""
 
     def take() -> Snapshot:
-        return snapshot.take(scene, effect, strip, (frame,), folder=render_settings.settings().inbetween)
+        return snapshot.take(scene, effect, strip, (frame,))
 
     return _current.get((effect.scene.session_uid, strip.name, frame), take)
 
@@ -111,7 +110,7 @@ def _signature(scene: Scene, effect: PropertyGroup, strip: Strip) -> Iterator[Ha
         yield effect_version.timing(source), source.left_handle
         yield source_media.reading(source)
         try:
-            yield snapshot.source_files(effect, source, render_settings.settings().inbetween)
+            yield source_media.media_key(source)
         except (MediaError, EffectError) as error:
             yield str(error)  # a file that was missing may be there again
 

@@ -21,7 +21,7 @@ from ...core.messages import EffectError
 from ...core.stopping import StoppedError
 from ..data import requirements, snapshot, strips
 from ..data.snapshot import Snapshot
-from . import effect_source, invalidation, render_job, render_settings, sessions
+from . import effect_source, invalidation, render_job, sessions
 from .render_job import Where
 
 # Of the job that runs, by effect scene: of each part of a cut strip its timeline frames and its snapshot.
@@ -111,7 +111,7 @@ def _of_film(scene: Scene, effect: PropertyGroup, strip: Strip, frame: float) ->
     if is_again:
         parts = [part for part in strips.effect_strips(scene) if part.scene == effect.scene]
         frames |= asked_frames(scene, parts, scene.session_uid == render_job.film())
-    taken = snapshot.take(scene, effect, strip, frames, folder=render_settings.settings().inbetween)
+    taken = snapshot.take(scene, effect, strip, frames)
     if render_job.runs():
         _films[key] = taken if is_again else None
     return taken

@@ -30,8 +30,7 @@ from .session import RenderContext
 _READERS = {"RENDER_OT_opengl", "SEQUENCER_OT_sample"}
 # Operators by which one picture comes after another, as where it plays: drafts, so that a key need not wait.
 _TRACKING = {"SHUTTER_OT_track", "SHUTTER_OT_track_camera", "SHUTTER_OT_panning_shot", "SHUTTER_OT_tripod"}
-_BUILDING = {"SHUTTER_OT_inbetween_build", "SHUTTER_OT_smooth_streaks"}
-_GOING = {"ANIM_OT_change_frame"} | _TRACKING | _BUILDING
+_GOING = {"ANIM_OT_change_frame"} | _TRACKING
 _PEN = "GPENCIL_OT_annotate"
 _MOMENT = 0.3  # seconds
 _SLICE = 0.15  # seconds
@@ -139,7 +138,7 @@ def for_engine(context: Context, effect_scene: Scene) -> Asked | None:
         is_told = context.window_manager.virtual_shutter.live and not decision.is_drawn
         stopped = _time_up(context, decision.request.key) if is_told else None
         return Asked(snapshot, frame, decision.request.source.detail, decision.is_drawn, stopped)
-    detail = effect_source.FULL if look is None or looking.whole is not None else _detail(look)
+    detail = effect_source.FULL if look is None or looking.whole is not None else _detail(context, look)
     return Asked(snapshot, frame, detail, False)
 
 
@@ -215,16 +214,17 @@ def _requested(context: Context, render: RenderContext, shown: Shown, snapshot: 
             whole.key = request.key[1:]
             return request
     looking.whole = None
-    return render.request(snapshot, frame, _detail(look))
+    return render.request(snapshot, frame, _detail(context, look))
 
 
-def _detail(look: Look) -> effect_source.Detail:
+def _detail(context: Context, look: Look) -> effect_source.Detail:
     """What a picture is composed in for the previews of its scene: smaller by the power of two, of reduced.DIVISORS,
-    that is nearest to the largest of them, and from the proxy that Blender reads for that one."""
+    that is nearest to the largest of them, and from the proxy that Blender reads for that one. What plays is not
+    smooth: it would wait for optical flow."""
     if (scale := look.scale) is None:
         return effect_source.FULL
     divisor = min(DIVISORS, key=lambda number: abs(math.log2(max(scale, 1e-3) * number)))
-    return effect_source.Detail(divisor, look.proxy)
+    return effect_source.Detail(divisor, look.proxy, smooth=not is_going(context))
 
 
 def _is_drawn(context: Context, shown: Shown, look: Look, source: FrameSource) -> bool:

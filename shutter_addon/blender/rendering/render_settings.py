@@ -18,12 +18,10 @@ class RenderSettings:
 
     device: one of available.CHOICES, in place of the user's preference
     weights: folder for the coefficients of every picture, as EXR files
-    inbetween: folder of in-between frames, in place of the effects' own
     gpu_memory: megabytes of the GPU that textures may take, in place of the user's preference; 0: as budget.allowed"""
 
     device: str | None = None
     weights: Path | None = None
-    inbetween: Path | None = None
     gpu_memory: int | None = None
 
 

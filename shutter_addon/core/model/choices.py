@@ -49,24 +49,13 @@ AGGREGATES = (
 )
 
 
-INBETWEENS = (
-    ("1", "Off", "The source's own frames alone"),
-    ("2", "2×", "One frame between two of the source"),
-    ("4", "4×", "Three frames between two of the source"),
-    ("8", "8×", "Seven frames between two of the source"),
-    ("16", "16×", "Fifteen frames between two of the source"),
-)
-
-
-METHODS = (
-    ("QUICK", "Quick", "Optical flow by DIS"),
-    ("GOOD", "Good", "Optical flow that takes longer, and is better"),
-)
-
-
-PLACES = (
-    ("FILE", "Beside the File", "A folder beside the .blend file"),
-    ("USER", "Extension", "The extension's own folder"),
+SMOOTH = (
+    ("1", "Off", "Expose filmed frames alone"),
+    ("AUTO", "Automatic", "As many moments as the fastest motion in the footage needs, 16 at most"),
+    ("2", "2×", "2 moments from a filmed frame to the next"),
+    ("4", "4×", "4 moments from a filmed frame to the next"),
+    ("8", "8×", "8 moments from a filmed frame to the next"),
+    ("16", "16×", "16 moments from a filmed frame to the next"),
 )
 
 

@@ -16,7 +16,7 @@ import numpy as np
 
 from ..messages import EffectError
 from . import combining, keyframes, limits, mattes, motions, outlines, scribbles, shutters
-from .choices import BETWEEN, BLENDS, CHANNELS, COMBINES, CONTEXT, LENGTHS, METHODS, MOTIONS, RAMPS, TIMINGS
+from .choices import BETWEEN, BLENDS, CHANNELS, COMBINES, CONTEXT, LENGTHS, MOTIONS, RAMPS, TIMINGS
 from .drawings import Drawings as Drawings
 from .fields import MISSING, choice, color, number, switch, text, whole
 from .frame_state import FrameState
@@ -24,7 +24,6 @@ from .keyframes import Bars, Channel
 from .motions import Placement
 
 Length = Literal["frames", "timeline", "motion"]
-Method = Literal["quick", "good"]
 _CLOSED = 'shutter "{name}" at frame {frame}: {fault}'
 _TOO_MANY_POINTS = 'region "{name}": more than {most} points with those before it'
 
@@ -396,7 +395,6 @@ class Effect:
         default=0.0,
         subtype="FACTOR",
     )
-    inbetween_method: Method = choice("Method", "How in-between frames are made", METHODS, default="quick")
     camera: Camera = STILL_CAMERA
 
     def at(self, frame: float) -> FrameState:

@@ -57,8 +57,8 @@ class Field:
 
     @property
     def words(self) -> tuple[Any, ...]:
-        """Its choices as the model has them: texts, or whole numbers."""
-        return tuple(type(self.default)(word.lower()) for word, *_ in self.choices)
+        """Its choices as the model has them: texts, and whole numbers."""
+        return tuple(int(word) if word.isdigit() else word.lower() for word, *_ in self.choices)
 
 
 MISSING = dataclasses.MISSING

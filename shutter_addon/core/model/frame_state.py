@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from . import limits, scribbles, shutters
-from .choices import AGGREGATES, CONTEXT, EDGES, EXPOSURES, INBETWEENS, INTERPOLATIONS, LIGHTS, POSITIONS
+from .choices import AGGREGATES, CONTEXT, EDGES, EXPOSURES, INTERPOLATIONS, LIGHTS, POSITIONS, SMOOTH
 from .combining import AVERAGE, Combine
 from .fields import MISSING, choice, switch, whole
 from .mattes import Matte
@@ -27,9 +27,9 @@ Position = Literal["start", "center", "end"]
 class Options:
     """How a window of frames becomes a picture.
 
-    window: L, its length in frames, in-between frames included
+    window: L, its length in filmed frames; in a FrameState that of its bars, `step` of them for each filmed frame
     edge_aware: 0 to 1, how much coefficients stop at the edges of the shown frame (core.pixels.conductances)
-    step: frames for each filmed one: 1, or the factor of in-between frames
+    step: moments from a filmed frame to the next; "auto": as the footage needs, which only an effect's options have
     slid: how many frames later the window lies than its position says (core.model.windows.slid)
     """
 
@@ -99,10 +99,10 @@ class Options:
         keyed=True,
     )
     step: int = choice(
-        "In-Between Frames",
-        "Frames between those of the source, by optical flow: bars count them all, "
-        "and a still frame becomes as many equal bars",
-        INBETWEENS,
+        "Smooth",
+        "Expose moments between filmed frames as well, which optical flow finds: light counts between two frames "
+        "whose bars are both open",
+        SMOOTH,
         default=1,
         blender="inbetween",
         recipe="inbetween",

@@ -81,16 +81,9 @@ PRESETS: dict[str, tuple[str, str, Callable[[int], np.ndarray]]] = {
 }
 
 
-# Of whole filmed frames, in-between frames included. All others count every frame of the window.
-_FILMED = {"STILL", "TWO_CUTS", "CUTS", "STUTTER"}
-
-
-def bars(name: str, window: int, position: str = "start", step: int = 1) -> np.ndarray:
-    """Bars (L,) of the preset `name`; position, step: as frame_state.Options has them. KeyError: no such preset."""
+def bars(name: str, window: int, position: str = "start") -> np.ndarray:
+    """Bars (L,) of the preset `name`; position: as frame_state.Options has it. KeyError: no such preset."""
     _label, _description, make = PRESETS[name]
-    if name not in _FILMED:
+    if name != "STILL":
         return make(window)
-    filmed = -(-window // step)
-    shown = {"center": (filmed - 1) // 2, "end": filmed - 1}.get(position, 0)
-    weights = np.repeat(still(filmed, shown) if name == "STILL" else make(filmed), step)
-    return weights[-window:] if position == "end" else weights[:window]
+    return still(window, {"center": (window - 1) // 2, "end": window - 1}.get(position, 0))

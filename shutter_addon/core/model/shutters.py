@@ -184,18 +184,55 @@ def spanning(bars: ArrayLike, start: float, end: float) -> np.ndarray:
     return np.diff(np.maximum.accumulate(total))  # by rounding alone would it fall
 
 
-def multiplied(bars: ArrayLike, old: int, new: int, position: str = "start") -> np.ndarray:
-    """Bars of the same shutter, in time, where each source frame has `new` frames in place of `old`, both powers of 2.
+def smoothed(bars: ArrayLike, steps: int, *, backward: bool = False) -> np.ndarray:
+    """Spread bars (L,) over the moments between filmed frames.
 
-    A window that ends within a source frame gets closed bars up to that frame's end; where `position` is "end" it is
-    the first frame that lacks some, otherwise the last. ShutterError: it would have more than 256 bars."""
+    Where two neighbouring bars are open, light between their frames counts: each spreads its weight evenly over the
+    half intervals towards its open neighbours. A bar without any stays the filmed frame itself.
+
+    Args:
+        steps: moments from a filmed frame to the next, 1 or an even number
+        backward: whether the source plays in reverse, so that a bar's frame is the last of its moments
+
+    Returns:
+        Weights (L · steps,) of the same sum. Moment k · steps is filmed frame k, backward k · steps + steps − 1.
+    """
     bars = np.asarray(bars, dtype=np.float64)
-    window = -(-len(bars) * new // old)
-    if window > MAX_WINDOW:
-        raise ShutterError(f"a shutter has 1 to {MAX_WINDOW} bars, not {window}")
-    lacking = max(window * old // new - len(bars), 0)
+    if steps == 1:
+        return bars
+    if backward:
+        return smoothed(bars[::-1], steps)[::-1]
+    is_open = bars > 0
+    after = is_open & np.append(is_open[1:], False)
+    before = np.append(False, after[:-1])
+    sides = before.astype(int) + after
+    share = bars / np.maximum(sides, 1)
+    half = np.ones(steps // 2 + 1)
+    half[[0, -1]] = 0.5  # the frame, and the middle of the interval, lie half in this half interval
+    half /= half.sum()
+    frames = np.arange(len(bars)) * steps
+    moments = np.zeros(len(bars) * steps)
+    moments[frames] = np.where(sides == 0, bars, share * sides * half[0])
+    for step, part in enumerate(half[1:], 1):
+        moments[frames[after] + step] += share[after] * part
+        moments[frames[before] - step] += share[before] * part
+    return moments
+
+
+def held(bars: ArrayLike, steps: int) -> np.ndarray:
+    """Spread each bar evenly over its frame's `steps` moments: (L · steps,), of the same sum."""
+    return np.repeat(np.asarray(bars, dtype=np.float64) / steps, steps)
+
+
+def filmed(moments: ArrayLike, steps: int, position: str) -> np.ndarray:
+    """Bars of filmed frames, by those that counted `steps` moments in each (recipes of version 1).
+
+    A window that ended within a filmed frame gets all of it; where `position` is "end" it is the first frame that
+    lacked some, otherwise the last. The largest bar keeps its weight."""
+    moments = np.asarray(moments, dtype=np.float64)
+    lacking = -len(moments) % steps
     before = lacking if position == "end" else 0
-    return resample(np.pad(bars, (before, lacking - before)), window)
+    return np.pad(moments, (before, lacking - before)).reshape(-1, steps).mean(axis=1)
 
 
 def open_angle(bars: ArrayLike) -> float:

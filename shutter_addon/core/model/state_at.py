@@ -5,7 +5,9 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import NamedTuple
 
-from . import following, layers, timeline_exposure, windows
+import numpy as np
+
+from . import following, layers, shutters, timeline_exposure, windows
 from .clip import Clip
 from .effect import Effect
 from .frame_state import FrameState
@@ -27,9 +29,23 @@ def state_at(effect: Effect, clip: Clip, frame: float) -> Moment:
     EffectError: no picture can be made of it."""
     if effect.time is not None:
         clip = replace(clip, timing=effect.time)
-    state, at = effect.at(frame), clip.shown(frame)
+    at = clip.shown(frame)
+    state = _in_moments(effect, effect.at(frame), clip.step, at.direction)
     state = timeline_exposure.exposed(effect, state, clip, at)
     has_trails = any(shutter.has_trail for shutter in effect.shutters)
     state = windows.slid(state, at.source_frame, at.direction, range(clip.count), whole=has_trails)
     state = following.followed(effect, state, clip, at)
     return Moment(at.source_frame, layers.layered(effect, state, clip, at), at.direction)
+
+
+def _in_moments(effect: Effect, state: FrameState, steps: int, direction: int) -> FrameState:
+    """The state whose bars are of the moments that a clip has, `steps` for each filmed frame. Bars that say the shape
+    of an exposure of another length stay that shape, and are moved to its moments later."""
+    bars = [
+        shutters.held(row, steps)
+        if shutter.length == "timeline" or shutter.has_trail
+        else shutters.smoothed(row, steps, backward=direction < 0)
+        for shutter, row in zip(effect.shutters, state.bars, strict=True)
+    ]
+    options = replace(state.options, window=state.options.window * steps, step=steps)
+    return replace(state, bars=np.stack(bars), options=options)

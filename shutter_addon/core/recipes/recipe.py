@@ -10,12 +10,8 @@ from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 
-import numpy as np
-
 from ..messages import UserError, sentence
-from ..model import shutters
 from ..model.effect import Effect, FileContent, MatteRegion, Region
-from ..model.keyframes import Bars, Channel, Constant, Keys
 
 
 class RecipeError(UserError, ValueError):
@@ -27,33 +23,6 @@ class RecipeError(UserError, ValueError):
 
 # What a shutter follows that moves with the camera.
 CAMERA = "camera"
-
-
-def with_inbetween(source: Effect, factor: int) -> Effect:
-    """The same effect over another number of in-between frames: its bars stand for the same times.
-
-    RecipeError: they would be too many."""
-    options = source.options.at(1)
-
-    def changed(bars: np.ndarray) -> np.ndarray:
-        return shutters.multiplied(bars, options.step, factor, options.position)
-
-    def multiplied(channel: Channel) -> Channel:
-        if isinstance(channel, Keys):
-            return replace(channel, values=tuple(map(changed, channel.values)))
-        return Constant(changed(channel.at(1)))
-
-    window = options.window * factor
-    try:
-        bars = [Bars(multiplied(shutter.bars.channel), shutter.bars.keys) for shutter in source.shutters]
-    except shutters.ShutterError:
-        count = window // options.step
-        raise RecipeError(
-            f"window: {count} bars for {factor}× in-between frames, the most are {shutters.MAX_WINDOW}"
-        ) from None
-    made = tuple(replace(shutter, bars=each) for shutter, each in zip(source.shutters, bars, strict=True))
-    options = replace(options, window=-(-window // options.step), step=factor)
-    return replace(source, shutters=made, options=Constant(options))
 
 
 def contents(source: Effect) -> list[FileContent]:

@@ -6,7 +6,8 @@ the strip's first. Points are fractions of the picture, y up.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, make_dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, field, make_dataclass, replace
 from functools import partial
 from typing import Any, Literal
 
@@ -17,9 +18,10 @@ from ..model import keyframes, mattes
 from ..model.fields import MISSING, Field, fields_of
 from ..model.frame_state import Options
 from ..model.keyframes import Channel, Constant, Ease, Keys
+from ..model.shutters import filmed
 from .recipe import CAMERA
 
-VERSION = 1  # the newest one that is read
+VERSION = 2  # the newest one that is read; in the first, bars counted moments between filmed frames
 Point = tuple[float, float]
 Stroke = list[Point]
 
@@ -135,7 +137,7 @@ class AnyRegionRecord:
 RecipeRecord: Any = _record(
     "RecipeRecord",
     (Options, model.Effect, model.Camera),
-    version=(Literal[1], MISSING),
+    version=(Literal[1, 2], MISSING),
     shutters=(list[ShutterRecord], MISSING),
     regions=(list[AnyRegionRecord], []),
     time=(list[ValueKey], []),
@@ -145,6 +147,8 @@ RecipeRecord: Any = _record(
 
 def effect_of(recipe: Any) -> model.Effect:
     """The effect of a recipe that was checked, for no picture in particular yet (Effect.for_picture)."""
+    options = Options(**_values(Options, recipe))
+    steps = int(options.step) if recipe.version == 1 and options.step != "auto" else 1
     order = {shutter.name: index for index, shutter in enumerate(recipe.shutters)}
     regions = tuple(_region(region, order[region.shutter]) for region in recipe.regions)
     camera = model.Camera(moves=_moves(recipe.camera), **_values(model.Camera, recipe))
@@ -154,9 +158,12 @@ def effect_of(recipe: Any) -> model.Effect:
     if recipe.time:
         time = keyframes.SourceTime(_channel(recipe.time), tuple((key.frame, key.ease) for key in recipe.time))
     return model.Effect(
-        shutters=tuple(_shutter(shutter, followed[shutter.follow]) for shutter in recipe.shutters),
+        shutters=tuple(
+            _shutter(shutter, followed[shutter.follow], partial(filmed, steps=steps, position=options.position))
+            for shutter in recipe.shutters
+        ),
         regions=regions,
-        options=Constant(Options(**_values(Options, recipe))),
+        options=Constant(replace(options, window=-(-options.window // steps))),
         time=time,
         camera=camera,
         **_values(model.Effect, recipe),
@@ -178,7 +185,8 @@ def _columns(keys: list, *names: str) -> list[tuple]:
     return [tuple(getattr(key, name) for key in keys) for name in names]
 
 
-def _shutter(record: Any, follow: model.Subject | None) -> model.Shutter:
+def _shutter(record: Any, follow: model.Subject | None, filmed: Callable[[list[float]], np.ndarray]) -> model.Shutter:
+    """filmed: gives bars of filmed frames by those of a recipe"""
     values = _values(model.Shutter, record)
     values["length"] = "frames" if record.length == "bars" else record.length
     if record.trail is not None:
@@ -189,10 +197,10 @@ def _shutter(record: Any, follow: model.Subject | None) -> model.Shutter:
         del values["softness"]  # it says nothing
     if record.keys:
         frames, bars, eases = _columns(record.keys, "frame", "bars", "ease")
-        made = tuple(np.asarray(each, float) for each in bars)
+        made = tuple(map(filmed, bars))
         exposed = keyframes.Bars(Keys(frames, made, eases), tuple(zip(frames, eases, strict=True)))
     else:
-        exposed = keyframes.Bars(Constant(np.asarray(record.bars, float)))
+        exposed = keyframes.Bars(Constant(filmed(record.bars)))
     return model.Shutter(bars=exposed, follow=follow, **values)
 
 
