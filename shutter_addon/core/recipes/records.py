@@ -148,7 +148,7 @@ RecipeRecord: Any = _record(
 def effect_of(recipe: Any) -> model.Effect:
     """The effect of a recipe that was checked, for no picture in particular yet (Effect.for_picture)."""
     options = Options(**_values(Options, recipe))
-    steps = int(options.step) if recipe.version == 1 and options.step != "auto" else 1
+    steps = int(options.step) if recipe.version == 1 else 1
     order = {shutter.name: index for index, shutter in enumerate(recipe.shutters)}
     regions = tuple(_region(region, order[region.shutter]) for region in recipe.regions)
     camera = model.Camera(moves=_moves(recipe.camera), **_values(model.Camera, recipe))
