@@ -66,7 +66,7 @@ def value(owner: PropertyGroup, field: Field, number: float | None = None) -> An
     """What a field without a channel is, as the model has it; number: which an F-curve gives it. EffectError: it is
     none of its choices, or outside of its range."""
     if field.choices:
-        return type(field.default)(validation.word(owner, field.blender, number).lower())
+        return field.word(validation.word(owner, field.blender, number))
     if isinstance(field.default, bool) and number is not None:
         return number >= 0.5
     if isinstance(field.default, bool | str):

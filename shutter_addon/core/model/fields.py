@@ -58,7 +58,12 @@ class Field:
     @property
     def words(self) -> tuple[Any, ...]:
         """Its choices as the model has them: texts, and whole numbers."""
-        return tuple(int(word) if word.isdigit() else word.lower() for word, *_ in self.choices)
+        return tuple(self.word(word) for word, *_ in self.choices)
+
+    @staticmethod
+    def word(choice: str) -> int | str:
+        """A choice as the model has it."""
+        return int(choice) if choice.isdigit() else choice.lower()
 
 
 MISSING = dataclasses.MISSING
