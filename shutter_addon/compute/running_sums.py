@@ -97,6 +97,8 @@ class Sums(Window):
         # White is the largest 2ⁿ − 1 for which the sum of a whole window fits into 21 bits, and n is 16 at most.
         self.whole = (1 << min(16, 21 - (capacity - 1).bit_length())) - 1
         self.kind = STORED_SUMS[self.cover]
+        if source.step > 1:
+            self._loading = (*self._loading, ("filmed 0", "rgba8"), ("filmed 1", "rgba8"))
         # A workgroup reads all layers of its pixels. In tiles, they are one run of memory.
         across, down = TILE
         fits = across * down * self.layers <= device.max_size and -(-source.height // down) <= device.max_layers
