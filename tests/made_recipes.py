@@ -7,7 +7,7 @@ from shutter_addon.core.recipes import recipe_file, records
 
 def made(window, shutters, regions=(), **more):
     """The effect of a recipe with these shutters and regions, as JSON has them."""
-    data = {"version": 1, "window": window, "shutters": list(shutters), "regions": list(regions)}
+    data = {"version": 2, "window": window, "shutters": list(shutters), "regions": list(regions)}
     return recipe_file.parse(json.dumps(data | more))
 
 

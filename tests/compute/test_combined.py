@@ -111,7 +111,7 @@ def test_the_middle_of_what_is_left_out_is_that_of_an_average(device, combines, 
 
 @pytest.mark.parametrize("follows", [False, True])
 def test_the_shown_frame_may_be_left_out(device, follows):
-    """Played in reverse, a filmed frame begins with its last in-between frame, which the clip's end does not have."""
+    """Played in reverse, a filmed frame begins with its last moment, which the clip's end does not have."""
     rng = np.random.default_rng(6)
     moment = combining(rng, MODES["threshold"], shapes=(), edges="shorten", step=4)
     if follows:

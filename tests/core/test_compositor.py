@@ -96,7 +96,7 @@ def test_what_is_longer_than_the_shot_covers_it_and_holds_its_end():
 
 
 def test_the_last_filmed_frame_lasts_as_long_as_others():
-    """So that what is sharp stays so where there are in-between frames."""
+    """In moments as well, so that what lies at its end stays there."""
     still = sliding([[0, 0, 0, 0, 1, 1, 1, 1, 0, 0, 0, 0], [1] * 12], step=4)
     found = exposed(windows.slid(still, 36, 1, range(37)), 36, 1, range(37))
     assert found == [{36: 4}, {**dict.fromkeys(range(28, 36), 1), 36: 4}]

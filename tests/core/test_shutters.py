@@ -6,7 +6,8 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from shutter_addon.core.model import shutters
+from shutter_addon.core.model import shutters, windows
+from shutter_addon.core.model.frame_state import Options
 
 BAR = st.one_of(st.just(0.0), st.floats(1e-3, 1.0))
 
@@ -214,3 +215,91 @@ def test_a_disc_has_its_angle(window, degrees):
 
 def test_a_closed_shutter_has_no_angle():
     assert shutters.open_angle([0.0, 0.0]) == 0
+
+
+STEPS = st.sampled_from([1, 2, 4, 8, 16])
+
+
+def overlap(first, second):
+    """How long two spans of time are open together."""
+    return max(min(first[1], second[1]) - max(first[0], second[0]), 0.0)
+
+
+def light(lit, steps):
+    """{moment: weight}, by {filmed frame: bar}. A bar is spread evenly over the half intervals from its frame to those
+    beside it that are open; a moment gets what lies nearer to it than to any other."""
+    found = {}
+    for frame, bar in lit.items():
+        spans = [(min(end, frame), max(end, frame)) for end in (frame - 0.5, frame + 0.5) if lit.get(2 * end - frame)]
+        if steps == 1 or not spans:
+            found[frame * steps] = found.get(frame * steps, 0) + bar
+            continue
+        for moment in range((frame - 1) * steps, (frame + 1) * steps + 1):
+            own = (moment - 0.5) / steps, (moment + 0.5) / steps
+            part = sum(overlap(own, span) for span in spans) / (0.5 * len(spans))
+            found[moment] = found.get(moment, 0) + bar * part
+    return {moment: weight for moment, weight in found.items() if weight}
+
+
+def exposed(weights, steps, index=10, direction=1):
+    """{moment: weight} of a window's weights, around a filmed frame."""
+    positions = windows.positions(Options(len(weights), step=steps), index * steps, direction)
+    return {int(at): weight for at, weight in zip(positions, weights, strict=True) if weight}
+
+
+@given(bars_lists(most=1), STEPS, st.sampled_from([1, -1]))
+def test_a_bar_is_spread_towards_its_open_neighbours(bars, steps, direction):
+    found = shutters.smoothed(bars[0], steps, backward=direction < 0)
+    assert found.shape == (len(bars[0]) * steps,)
+    assert found.sum() == pytest.approx(bars[0].sum())
+    wanted = light({10 + direction * k: bar for k, bar in enumerate(bars[0]) if bar}, steps)
+    there = exposed(found, steps, direction=direction)
+    assert there.keys() == wanted.keys()
+    assert there == pytest.approx(wanted)
+
+
+@given(bars_lists(most=1))
+def test_in_one_step_bars_are_what_they_are(bars):
+    assert shutters.smoothed(bars[0], 1).tolist() == bars[0].tolist()
+    assert shutters.smoothed(bars[0], 1, backward=True).tolist() == bars[0].tolist()
+    assert shutters.held(bars[0], 1).tolist() == bars[0].tolist()
+    assert shutters.filmed(bars[0], 1, "end").tolist() == bars[0].tolist()
+
+
+def test_what_is_sharp_stays_so_and_a_box_is_one_streak():
+    assert exposed(shutters.smoothed([0, 0, 3, 0], 8), 8) == {96: 3}
+    assert exposed(shutters.smoothed([0, 0, 3, 0], 8, backward=True), 8, direction=-1) == {64: 3}
+    assert exposed(shutters.smoothed([1, 0, 1, 0], 4), 4) == {40: 1, 48: 1}
+    box = exposed(shutters.smoothed([1, 1, 1], 4), 4)
+    assert sorted(box) == list(range(40, 49))  # from its first frame to its last
+    assert [box[at] for at in range(40, 49)] == pytest.approx([1 / 4, 1 / 2, 3 / 8, *[1 / 4] * 3, 3 / 8, 1 / 2, 1 / 4])
+
+
+@given(bars_lists(most=1), STEPS)
+def test_what_is_held_lasts_from_its_frame_to_the_next(bars, steps):
+    found = shutters.held(bars[0], steps)
+    assert len(found) == len(bars[0]) * steps
+    for k, bar in enumerate(bars[0]):
+        assert found[k * steps : (k + 1) * steps] == pytest.approx(np.full(steps, bar / steps))
+
+
+@pytest.mark.parametrize("direction", [1, -1])
+@pytest.mark.parametrize("position", ["start", "center", "end"])
+@given(bars_lists(most=1), STEPS)
+def test_bars_of_moments_become_those_of_filmed_frames(position, direction, bars, steps):
+    """Each filmed frame keeps its light, wherever a window of moments began and ended around the shown one."""
+
+    def of_frames(weights, step):
+        positions = windows.positions(Options(len(weights), position, step=step), 100 * step, direction)
+        frames = np.zeros(200)
+        np.add.at(frames, positions // step, weights)
+        return frames
+
+    found = shutters.filmed(bars[0], steps, position)
+    assert len(found) == -(-len(bars[0]) // steps)
+    assert of_frames(found, 1) * steps == pytest.approx(of_frames(bars[0], steps))
+
+
+@given(bars_lists(most=1), STEPS, st.sampled_from(["start", "center", "end"]))
+def test_a_whole_frame_of_equal_bars_is_one_of_them(bars, steps, position):
+    assert shutters.filmed(np.repeat(bars[0], steps), steps, position) == pytest.approx(bars[0])

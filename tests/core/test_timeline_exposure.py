@@ -34,7 +34,7 @@ def test_as_it_was_filmed_and_slower_it_is_the_shown_frame():
         assert length == pytest.approx(speed)
 
 
-def test_in_between_frames_have_their_part():
+def test_moments_between_frames_have_their_part():
     """Half the speed is two of four; a quarter more speed than filmed goes into the next frame."""
     np.testing.assert_allclose(exposed(OPEN, 2, step=4)[0], [4, 4, 0, 0, 0, 0, 0, 0])
     np.testing.assert_allclose(exposed(OPEN, 5, step=4)[0], [1.6] * 5 + [0, 0, 0])
@@ -72,7 +72,7 @@ def test_speed_that_changes_within_a_frame_counts():
 
 @pytest.mark.parametrize("position", ["start", "center", "end"])
 def test_a_freeze_is_the_shown_frame(position):
-    """Of in-between frames as well, forward and backward."""
+    """Of moments as well, forward and backward."""
     for direction, place in ((1, 0), (-1, 3)):
         options = Options(8, position=position, step=4)
         bars, length = exposed(OPEN, 0, direction, position=position, step=4)

@@ -207,11 +207,12 @@ def test_a_reversed_source():
     assert backward.bars[0] == pytest.approx(forward.bars[0, ::-1])
 
 
-def test_in_between_frames_count_as_the_parts_of_one():
+def test_moments_count_as_the_parts_of_a_frame():
     plain, _ = followed(accelerating(0.2), 40)
-    source = with_options(accelerating(0.2, bars=(1.0,) * 4 * WINDOW), step=4)
-    state = state_at(source.for_picture(1.6), replace(SOURCE, count=4 * SOURCE.count, step=4), 40).state
+    state = state_at(accelerating(0.2).for_picture(1.6), SOURCE.stepped(4), 40).state
+    assert len(state.bars[0]) == 4 * WINDOW
     assert open_frames(state.bars[0]) == pytest.approx(4 * open_frames(plain.bars[0]), rel=0.03)
+    assert state.bars[0].sum() == pytest.approx(plain.bars[0].sum())
 
 
 def test_frames_change_no_bit():

@@ -200,7 +200,7 @@ def test_what_a_lost_frame_hid_is_found_when_it_is_back(film, lost):
 
 
 def test_frames_that_nobody_reads_are_let_go(film):
-    """A look through a whole film, as for what its in-between frames lack, keeps those around the last window."""
+    """A look through a whole film, as for its shots, keeps those around the last window."""
     for step in (1, 8):
         shots = ShotSource(Frames(film.repeat(step, 0)[: 131 * step + 1]), step)
         for index in range(shots.count):
