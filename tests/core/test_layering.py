@@ -22,7 +22,7 @@ SOURCE = Clip(width=64, height=36, count=60)
 
 def effect(*regions, **more):
     shutters = [{"name": f"S{i}", "bars": bars} for i, bars in enumerate(([1, 1, 1, 1], [1, 0, 0, 0]))]
-    data = {"version": 1, "window": 4, "shutters": shutters, "regions": list(regions), "plate_reach": 2} | more
+    data = {"version": 2, "window": 4, "shutters": shutters, "regions": list(regions), "plate_reach": 2} | more
     return recipe_file.parse(json.dumps(data)).for_picture(SOURCE.width / SOURCE.height)
 
 

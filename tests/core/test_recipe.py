@@ -15,7 +15,7 @@ from shutter_addon.core.model.motions import Placement
 from shutter_addon.core.recipes import recipe, recipe_file
 
 EXAMPLE = {
-    "version": 1,
+    "version": 2,
     "window": 8,
     "position": "start",
     "interpolation": "displacement",
@@ -87,7 +87,7 @@ def test_the_contracts_example():
 
 
 def test_defaults():
-    small = recipe_file.parse('{"version": 1, "window": 2, "shutters": [{"name": "A", "bars": [1, 1]}]}')
+    small = recipe_file.parse('{"version": 2, "window": 2, "shutters": [{"name": "A", "bars": [1, 1]}]}')
     assert small.options.at(1) == Options(2)
     assert small.options.at(1).aggregate == 1
     assert small.regions == ()
@@ -113,8 +113,13 @@ def broken(change):
         (lambda d: d.pop("window"), "window: missing"),
         (lambda d: d.update(foo=1), "recipe: unknown field foo"),
         (lambda d: d["regions"][0].update(bar=1), r"regions[0]: unknown field bar"),
-        (lambda d: d.update(version=2), "version: 2 is of a newer version of Virtual Shutter, this one reads 1"),
-        (lambda d: d.update(version=True), "version: true is none of 1"),
+        (lambda d: d.update(version=3), "version: 3 is of a newer version of Virtual Shutter, this one reads 2"),
+        (lambda d: d.update(version=0), "version: 0 is none of 1, 2"),
+        (lambda d: d.update(version=True), "version: true is none of 1, 2"),
+        (lambda d: d.update(version=1, inbetween="auto"), 'inbetween: recipes have "auto" from version 2 on'),
+        (lambda d: d.update(inbetween=3), "inbetween: 3 is none of 1, auto, 2, 4, 8, 16"),
+        (lambda d: d.update(inbetween="2"), 'inbetween: "2" is none of 1, auto, 2'),
+        (lambda d: d.update(inbetween_method="good"), "recipe: unknown field inbetween_method"),
         (lambda d: d.update(window=0), "window: 0 is not 1 to 256"),
         (lambda d: d.update(window=257), "window: 257 is not 1 to 256"),
         (lambda d: d.update(window=8.0), "window: 8.0 is not a whole number"),
@@ -267,7 +272,7 @@ def is_a_sentence(text):
 
 
 DEEP = 100_000
-ONE = '{"version": 1, "window": 1, "shutters": [{"name": "A", "bars": [1]}], '
+ONE = '{"version": 2, "window": 1, "shutters": [{"name": "A", "bars": [1]}], '
 
 
 def test_what_is_followed_comes_back():
@@ -290,19 +295,19 @@ def test_what_is_followed_comes_back():
     [
         ("", "line 1, column 1: not JSON"),
         ("{", "line 1, column 2: not JSON"),
-        ('{"version": 1,\n "window": }', "line 2, column 12: not JSON"),
+        ('{"version": 2,\n "window": }', "line 2, column 12: not JSON"),
         ("[]", "recipe: [] is not an object"),
         ("null", "recipe: null is not an object"),
         ("3", "recipe: 3 is not an object"),
         ('"a"', 'recipe: "a" is not an object'),
         ("[" * DEEP, "recipe: lists or objects within one another, too many"),
         ('{"a":' * DEEP, "recipe: lists or objects within one another, too many"),
-        ('{"version": 1, "window": ' + "9" * 5000 + "}", "window: Infinity is not a whole number"),
+        ('{"version": 2, "window": ' + "9" * 5000 + "}", "window: Infinity is not a whole number"),
         (
             ONE + '"regions": [{"shutter": "A", "width": -' + "9" * 5000 + "}]}",
             "regions[0].width: -inf is not a finite number",
         ),
-        ('{"version": 1, "window": 1, "window": 2}', 'recipe: field "window" stands there twice'),
+        ('{"version": 2, "window": 1, "window": 2}', 'recipe: field "window" stands there twice'),
         (ONE + '"time": [{"frame": 1, "value": 1, "frame": 2}]}', 'time[0]: field "frame" stands there twice'),
     ],
     ids=lambda value: value[:20],
@@ -317,13 +322,13 @@ def test_no_recipe_at_all(text, sentence):
 def test_lists_that_are_read_but_too_deep_to_be_shown():
     deep = "[" * 900 + "]" * 900  # the reader and the writer of JSON may go to different depths
     with pytest.raises(recipe.RecipeError, match=r"^shutters\[0\]: \[\[\["):
-        recipe_file.parse('{"version": 1, "window": 1, "shutters": [' + deep + "]}")
+        recipe_file.parse('{"version": 2, "window": 1, "shutters": [' + deep + "]}")
 
 
 def test_at_the_ends_of_all_ranges():
     far = {"location": [-1000, 1000], "rotation": -360_000, "scale": -1000}
     ends = {
-        "version": 1,
+        "version": 2,
         "window": 2,
         "shutters": [{"name": "é" * 63, "bars": [1e6, 1e6]}, {"name": "", "bars": [1e-6, 0]}],
         "regions": [
@@ -502,66 +507,75 @@ def test_position():
     assert [Options(5, position=p).before for p in ("start", "center", "end")] == [0, 2, 4]
 
 
+# Recipes of version 1, whose bars counted the moments between filmed frames
+
+
+def first(window, shutters, **more):
+    """The effect of a recipe of version 1."""
+    return recipe_file.parse(json.dumps({"version": 1, "window": window, "shutters": shutters} | more))
+
+
 @pytest.mark.parametrize("direction", [1, -1])
 @pytest.mark.parametrize("position", ["start", "center", "end"])
-@pytest.mark.parametrize(("window", "old", "new"), [(8, 1, 8), (8, 1, 4), (5, 1, 2), (1, 1, 16), (12, 8, 1), (6, 4, 2)])
-def test_bars_are_open_at_the_same_times_at_another_factor(window, old, new, position, direction):
-    """Shown is the filmed frame 10, and the light of each bar is spread over the time of its frame."""
+@pytest.mark.parametrize("factor", [1, 2, 4, 8, 16])
+@pytest.mark.parametrize("window", [1, 3, 5, 8, 12, 48, 256])
+def test_each_filmed_frame_keeps_its_light(window, factor, position, direction):
+    """Shown is the filmed frame 100: of the bars that lay within each, the mean is its own now."""
     bars = np.random.default_rng(1).random(window)
-    source = made(window, [{"name": "A", "bars": bars.tolist()}], inbetween=old, position=position)
-    more = recipe.with_inbetween(source, new)
-    fine = 16
+    found = first(window, [{"name": "A", "bars": bars.tolist()}], inbetween=factor, position=position)
+    options = found.options.at(1)
+    assert (options.window, options.step) == (-(-window // factor), factor)
 
-    def light(found):
-        """Of each sixteenth of a filmed frame, from frame -20 to frame 40; of as many as the coarser has together."""
-        options = found.options.at(1)
-        positions = windows.positions(options, 10 * options.step, direction) + 20 * options.step
-        spread = np.zeros(60 * options.step)
-        spread[positions] = found.bars_at(0, 1) / options.step
-        each = np.repeat(spread * options.step / fine, fine // options.step)
-        return each.reshape(-1, fine // min(old, new)).sum(axis=1)
+    def of_frames(weights, options):
+        frames = np.zeros(400)
+        places = windows.positions(options, 100 * options.step, direction) // options.step
+        np.add.at(frames, places, weights)
+        return frames
 
-    np.testing.assert_allclose(light(more), light(source), atol=1e-12)
-
-
-@pytest.mark.parametrize("position", ["start", "center", "end"])
-def test_a_still_frame_stays_where_it_is(position):
-    """In reverse as well: of the filmed frame's time the last part comes first."""
-    for direction in (1, -1):
-        options = Options(64, position=position, step=8)
-        positions = windows.positions(options, 80, direction)[options.before : options.before + 8]
-        assert sorted(positions) == list(range(80, 88))
+    before = of_frames(bars, Options(window, position, step=factor))
+    now = of_frames(found.bars_at(0, 1), Options(options.window, position))
+    np.testing.assert_allclose(now * factor, before, atol=1e-12)
 
 
-def test_another_factor_of_in_betweens_keeps_times():
-    source = recipe_file.parse(
-        json.dumps(
-            {
-                "version": 1,
-                "window": 3,
-                "inbetween": 2,
-                "position": "end",
-                "shutters": [
-                    {"name": "A", "bars": [0, 1, 2]},
-                    {"name": "B", "keys": [{"frame": 2, "bars": [1, 0, 1]}, {"frame": 5, "bars": [0, 0, 1]}]},
-                ],
-            }
-        )
-    )
-    more = recipe.with_inbetween(source, 4)
-    assert (more.options.at(1).window, more.options.at(1).step) == (6, 4)
-    assert more.bars_at(0, 1).tolist() == [0, 0, 1, 1, 2, 2]
-    assert [more.bars_at(1, frame).tolist() for frame in (2, 5)] == [[1, 1, 0, 0, 1, 1], [0, 0, 0, 0, 1, 1]]
-    assert is_same(recipe.with_inbetween(more, 2), source)
-    less = recipe.with_inbetween(source, 1)  # a frame and a half, which ends with the shown one
-    assert less.bars_at(0, 1).tolist() == [0, 1.5]
-    with pytest.raises(recipe.RecipeError, match="window: 384 bars for 256× in-between frames"):
-        recipe.with_inbetween(source, 256)
+def test_a_first_recipe_comes_back_as_a_second():
+    keys = [{"frame": 2, "bars": [1, 0, 1]}, {"frame": 5, "bars": [0, 0, 1], "ease": "constant"}]
+    shutters = [{"name": "A", "bars": [0, 1, 2]}, {"name": "B", "keys": keys}]
+    found = first(3, shutters, inbetween=2, position="end")
+    assert found.bars_at(0, 1).tolist() == [0, 1.5]  # a frame and a half, which ends with the shown one
+    assert [found.bars_at(1, frame).tolist() for frame in (2, 5)] == [[0.5, 0.5], [0, 0.5]]
+    told = json.loads(recipe_file.dump(found))
+    assert {name: told[name] for name in ("version", "window", "inbetween")} == {
+        "version": 2,
+        "window": 2,
+        "inbetween": 2,
+    }
+    assert comes_back(found)
+
+
+@pytest.mark.parametrize("method", ["quick", "good"])
+def test_how_frames_were_made_says_nothing_any_more(method):
+    shutters = [{"name": "A", "bars": [1, 1]}]
+    found = first(2, shutters, inbetween=2, inbetween_method=method)
+    assert is_same(found, first(2, shutters, inbetween=2))
+    assert "method" not in recipe_file.dump(found)
+
+
+def test_a_still_frame_that_counted_its_moments_is_one_bar():
+    bars = [0, 0, 0, 0, 1, 1, 1, 1, 0, 0, 0, 0]
+    assert first(12, [{"name": "A", "bars": bars}], inbetween=4).bars_at(0, 1).tolist() == [0, 1, 0]
+
+
+@pytest.mark.parametrize("smooth", [1, 2, 4, 8, 16, "auto"])
+def test_a_second_recipe_counts_filmed_frames(smooth):
+    found = made(3, [{"name": "A", "bars": [0, 1, 2]}], inbetween=smooth)
+    assert (found.options.at(1).window, found.options.at(1).step) == (3, smooth)
+    assert found.bars_at(0, 1).tolist() == [0, 1, 2]
+    assert comes_back(found)
 
 
 def test_time_between_its_keys():
     keys = [{"frame": 1, "value": 5}, {"frame": 5, "value": 9, "ease": "constant"}, {"frame": 9, "value": 1}]
-    source = {"version": 1, "window": 1, "shutters": [{"name": "A", "bars": [1]}]}
+    source = {"version": 2, "window": 1, "shutters": [{"name": "A", "bars": [1]}]}
     assert recipe_file.parse(json.dumps(source)).time is None
     found = recipe_file.parse(json.dumps(source | {"time": keys}))
     assert [found.time.at(frame)[0] for frame in (-3, 2, 5, 8.9, 9, 40)] == [5, 6, 9, 9, 1, 1]
@@ -569,7 +583,7 @@ def test_time_between_its_keys():
 
 
 def test_edge_aware_between_its_keys():
-    source = {"version": 1, "window": 1, "shutters": [{"name": "A", "bars": [1]}]}
+    source = {"version": 2, "window": 1, "shutters": [{"name": "A", "bars": [1]}]}
 
     def strengths(value, *frames):
         found = recipe_file.parse(json.dumps(source | {"edge_aware": value}))
@@ -588,6 +602,6 @@ def test_what_is_drawn_comes_in_the_order_of_its_regions():
     outline = {"shutter": "S1", "kind": "outline", "between": "straight", "strokes": strokes}
     regions = [outline, {"shutter": "S0", "strokes": strokes}, outline | {"shutter": "S0"}]
     shutters = [{"name": f"S{i}", "bars": [1]} for i in range(2)]
-    content = recipe_file.parse(json.dumps({"version": 1, "window": 1, "shutters": shutters, "regions": regions}))
+    content = recipe_file.parse(json.dumps({"version": 2, "window": 1, "shutters": shutters, "regions": regions}))
     drawn = content.for_picture(1.5).drawn_at(1)
     assert [(shape.shutter, shape.kind) for shape in drawn] == [(1, "lasso"), (0, "line"), (0, "lasso")]

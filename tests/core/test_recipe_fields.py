@@ -12,7 +12,7 @@ from shutter_addon.core.recipes import recipe, recipe_file
 
 STROKES = [[[0.1, 0.1], [0.5, 0.1], [0.5, 0.5]]]
 BASE = {
-    "version": 1,
+    "version": 2,
     "window": 2,
     "shutters": [
         {"name": "A", "bars": [1, 1]},
