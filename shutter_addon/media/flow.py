@@ -20,7 +20,9 @@ from .opencv import cv2
 
 SMALLEST = 16  # pixels; OpenCV's flows need about as many, smaller pictures are cross-faded
 HALF_MAX = 65504  # the largest value of a half float, which infinite samples count as
-UNLIKE = 24  # levels of 255 by which the ends of a vector may differ that carries something
+# Levels of 255 by which the ends of a vector may differ that carries something, in pictures that are GREY on average or
+# brighter; in darker ones in proportion, but for noise.
+UNLIKE, GREY, NOISE = 24.0, 90.0, 4.0
 AROUND = 3  # vectors, over which it is averaged how surely a frame shows something
 SHARED = 0.5  # of all vectors, in both directions, have to
 
@@ -113,12 +115,14 @@ class _Paths:
 
     def __init__(self, luma: list[np.ndarray]) -> None:
         self._shape = luma[0].shape
+        brightness = max(float(each.mean()) for each in luma)
+        self._unlike = max(UNLIKE * min(brightness / GREY, 1.0), NOISE)
         self._sides = [_carriers(a, b) for a, b in (luma, luma[::-1])]
 
     @property
     def meet(self) -> bool:
         """Whether the pictures have anything in common: enough vectors have ends that look alike."""
-        return min(float((costs <= UNLIKE).mean()) for _places, _vectors, costs in self._sides) >= SHARED
+        return min(float((costs <= self._unlike).mean()) for _places, _vectors, costs in self._sides) >= SHARED
 
     def at(self, t: float) -> np.ndarray:
         """Moment.vectors at a time in 0 … 1."""

@@ -4,9 +4,9 @@ import hashlib
 import subprocess
 import sys
 import tracemalloc
-import types
 from pathlib import Path
 
+import cv2
 import numpy as np
 import pytest
 
@@ -14,7 +14,6 @@ from shutter_addon.core.frames import light
 from shutter_addon.media import MediaError, flow, open_source, opencv
 
 HEIGHT, WIDTH = 96, 160
-METHODS = tuple(flow.METHODS)
 
 
 def noise(seed, height=HEIGHT, width=WIDTH):
@@ -37,6 +36,12 @@ def pan(x, dtype=np.uint8):
     return frame(noise(1, HEIGHT, WIDTH + 64)[:, x : x + WIDTH], dtype)
 
 
+def between(first, second, factor, transfer="srgb", alpha="opaque"):
+    """The frames at the times 1/factor … (factor-1)/factor."""
+    found = flow.Between(first, second, transfer, alpha)
+    return [found.at(k / factor) for k in range(1, factor)]
+
+
 def off(picture, other):
     """The mean difference inside the picture, in levels of 255."""
     top = np.iinfo(picture.dtype).max if picture.dtype.kind == "u" else 1
@@ -44,10 +49,9 @@ def off(picture, other):
     return np.abs(picture[inside].astype(float) - other[inside].astype(float)).mean() * 255 / top
 
 
-@pytest.mark.parametrize("method", METHODS)
 @pytest.mark.parametrize("dtype", [np.uint8, np.uint16, np.float16, np.float32])
-def test_what_moves_is_where_it_is_at_each_time(method, dtype):
-    made = list(flow.between(pan(0, dtype), pan(8, dtype), 4, method))
+def test_what_moves_is_where_it_is_at_each_time(dtype):
+    made = between(pan(0, dtype), pan(8, dtype), 4)
     assert [picture.dtype for picture in made] == [dtype] * 3
     for k, picture in enumerate(made, start=1):
         assert picture.shape == (HEIGHT, WIDTH, 4)
@@ -55,22 +59,67 @@ def test_what_moves_is_where_it_is_at_each_time(method, dtype):
         assert off(picture, pan(2 * k - 2, dtype)) > 4  # the time before
 
 
-@pytest.mark.parametrize("method", METHODS)
 @pytest.mark.parametrize("size", [(96, 160), (61, 47), (17, 200), (9, 9), (1, 1)])
 @pytest.mark.parametrize("dtype", [np.uint8, np.uint16])
-def test_between_equal_frames_nothing_changes(method, size, dtype):
+def test_between_equal_frames_nothing_changes(size, dtype):
     samples = np.random.default_rng(3).integers(0, np.iinfo(dtype).max, (*size, 4), dtype, endpoint=True)
     samples[..., 3] = np.iinfo(dtype).max
-    for picture in flow.between(samples, samples, 2, method):
+    for picture in between(samples, samples, 2):
         np.testing.assert_array_equal(picture, samples)
 
 
-def test_frames_are_mixed_in_linear_light():
-    black, white = (np.full((32, 32, 4), (v, v, v, 255), np.uint8) for v in (0, 255))
-    (grey,) = flow.between(black, white, 2)
-    assert abs(int(grey[16, 16, 0]) - 188) <= 1
-    for k, picture in enumerate(flow.between(black, white, 4), start=1):
-        assert abs(light.to_linear(picture[16, 16, 0] / 255) - k / 4) < 0.005
+@pytest.mark.parametrize("size", [32, 9, 1])  # of which flow is found, and which are too small for it
+def test_frames_are_mixed_in_linear_light(size):
+    dark, bright = (np.full((size, size, 4), (v, v, v, 1), np.float32) for v in (0.5, 0.58))
+    ends = light.to_linear(np.array([0.5, 0.58]))
+    for k, picture in enumerate(between(dark, bright, 4), start=1):
+        wanted = light.to_encoded(np.interp(k / 4, [0, 1], ends))
+        assert np.abs(picture[..., :3] - wanted).max() < 1e-4
+        assert abs(wanted - 0.5 - k / 4 * 0.08) > 1e-3  # what a mean of encoded values is
+
+
+def blocks(seed, size=(HEIGHT, WIDTH)):
+    """A picture (H, W, 3) of blocks in any colours, 0 to 1."""
+    coarse = np.random.default_rng(seed).random((size[0] // 4 + 1, size[1] // 4 + 1, 3))
+    return np.kron(coarse, np.ones((4, 4, 1)))[: size[0], : size[1]]
+
+
+@pytest.mark.parametrize("dtype", [np.uint8, np.uint16, np.float16, np.float32])
+@pytest.mark.parametrize("alpha", ["opaque", "premultiplied"])
+@pytest.mark.parametrize("size", [(96, 160), (9, 9)])
+def test_of_frames_that_have_nothing_in_common_it_is_the_nearer(size, alpha, dtype):
+    """As at a cut: the frame's own bits. In the middle it is the first, as shots have it."""
+    first, second = (frame(blocks(seed, size), dtype) for seed in (1, 2))
+    found = flow.Between(first, second, alpha=alpha)
+    for t in (0.01, 0.25, 0.5):
+        np.testing.assert_array_equal(found.at(t), first)
+    for t in (0.5 + 1 / 16, 0.75, 0.99):
+        np.testing.assert_array_equal(found.at(t), second)
+
+
+@pytest.mark.parametrize("brightness", [1, 0.3, 0.15])
+def test_a_cut_is_none_the_less_in_the_dark(bunny, brightness):
+    """From one film to another; and what moves in each of them lies between its frames."""
+    films = []
+    for path in (bunny, bunny.with_name("pedestrians.avi")):
+        with open_source(path) as film:
+            shown = [cv2.resize(film.read(i), (320, 180), interpolation=cv2.INTER_AREA) for i in (40, 41)]
+        films.append([(each * [brightness, brightness, brightness, 1]).astype(np.uint8) for each in shown])
+    found = flow.Between(films[0][0], films[1][0])
+    np.testing.assert_array_equal(found.at(0.25), films[0][0])
+    np.testing.assert_array_equal(found.at(0.75), films[1][0])
+    for first, second in films:
+        made = flow.Between(first, second).at(0.5)
+        assert not np.array_equal(made, first)
+        assert not np.array_equal(made, second)
+
+
+def test_what_fills_less_than_half_of_the_picture_may_be_new():
+    """Someone who steps in is no cut: all else is where it is at that time."""
+    first, second = pan(0), pan(8)
+    second[30:, 90:, :3] = frame(noise(9, HEIGHT - 30, WIDTH - 90))[..., :3]
+    made = flow.Between(first, second).at(0.75)
+    assert np.abs(made[:, :80].astype(float) - pan(6)[:, :80]).mean() < 1.5
 
 
 @pytest.mark.parametrize("alpha", ["straight", "premultiplied"])
@@ -85,7 +134,7 @@ def test_alpha_and_transfer_stay_as_they_are(alpha, transfer):
         rgb = np.roll(red, x, axis=1) * (cover if alpha == "premultiplied" else 1)
         return np.dstack([rgb, cover]).astype(np.float32)
 
-    (made,) = flow.between(disc(70), disc(78), 2, transfer=transfer, alpha=alpha)
+    (made,) = between(disc(70), disc(78), 2, transfer=transfer, alpha=alpha)
     expected = disc(74)
     assert np.abs(made[..., 3] - expected[..., 3]).mean() < 0.01
     shown, wanted = (p[..., :3] * (p[..., 3:] if alpha == "straight" else 1) for p in (made, expected))
@@ -93,8 +142,7 @@ def test_alpha_and_transfer_stay_as_they_are(alpha, transfer):
     assert made[:20, :, 3].max() < 1e-3
 
 
-@pytest.mark.parametrize("method", METHODS)
-def test_what_moves_over_ground_leaves_no_ghosts(method):
+def test_what_moves_over_ground_leaves_no_ghosts():
     ground, thing = (np.kron(noise(seed, 96, 160), np.ones((2, 2, 1))) for seed in (7, 8))
 
     def at(x):
@@ -103,7 +151,7 @@ def test_what_moves_over_ground_leaves_no_ghosts(method):
         return frame(rgb)
 
     first, second = at(80), at(96)
-    made = list(flow.between(first, second, 4, method))
+    made = between(first, second, 4)
     for k, picture in enumerate(made, start=1):
         assert off(picture, at(80 + 4 * k)) < 0.7
     mixed = (light.to_linear(first / 255) + light.to_linear(second / 255)) / 2
@@ -111,11 +159,10 @@ def test_what_moves_over_ground_leaves_no_ghosts(method):
     assert off(made[1], at(88)) < off(mixed, at(88)) / 3
 
 
-@pytest.mark.parametrize("method", METHODS)
-def test_what_leaves_or_enters_the_picture_comes_from_the_frame_that_shows_it(method):
+def test_what_leaves_or_enters_the_picture_comes_from_the_frame_that_shows_it():
     wide = np.kron(noise(1), np.ones((2, 2, 1)))
     first, middle, second = (frame(wide[:, x : x + 256]) for x in (0, 8, 16))
-    (made,) = flow.between(first, second, 2, method)
+    (made,) = between(first, second, 2)
     for side in (np.s_[12:-12, :8], np.s_[12:-12, -8:]):
         assert np.abs(made[side].astype(float) - middle[side]).mean() < 5  # 7 where both are mixed
 
@@ -127,7 +174,7 @@ def test_dropped_frames_of_a_film_come_closer_than_a_blend(bunny):
     with open_source(bunny) as film:
         for index in (30, 60):
             first, dropped, second = (film.read(index + step) for step in (-1, 0, 1))
-            (made,) = flow.between(first, second, 2)
+            (made,) = between(first, second, 2)
             mixed = (light.to_linear(first / 255) + light.to_linear(second / 255)) / 2
             mixed = np.rint(255 * light.to_encoded(mixed))
             assert psnr(made, dropped) > psnr(mixed, dropped) + 1
@@ -137,40 +184,44 @@ def test_dropped_frames_of_a_film_come_closer_than_a_blend(bunny):
 def test_odd_values_stay_local(value):
     samples = pan(0, np.float32)
     samples[10, 10, :3] = value
-    (made,) = flow.between(samples, samples, 2, transfer="linear")
+    (made,) = between(samples, samples, 2, transfer="linear")
     np.testing.assert_allclose(made[24:, 24:], samples[24:, 24:], atol=1e-4)
 
 
 @pytest.mark.filterwarnings("error")
-@pytest.mark.parametrize("method", METHODS)
 @pytest.mark.parametrize("dtype", [np.float16, np.float32])
 @pytest.mark.parametrize("transfer", ["srgb", "linear"])
 @pytest.mark.parametrize("alpha", ["opaque", "straight", "premultiplied"])
-def test_what_is_not_finite_becomes_finite(method, dtype, transfer, alpha):
+def test_what_is_not_finite_becomes_finite(dtype, transfer, alpha):
     first, second = pan(0, dtype), pan(8, dtype)
     first[40, 60, 0], first[50, 70] = np.inf, np.nan
     second[40, 60, 1], second[50, 70, 2] = np.inf, -np.inf
-    for made in flow.between(first, second, 3, method, transfer, alpha):
+    for made in between(first, second, 3, transfer, alpha):
         assert np.isfinite(made).all()
 
 
-def test_frames_are_made_one_by_one(monkeypatch):
-    looked, remap = [], flow.cv2.remap
-    monkeypatch.setattr(flow.cv2, "remap", lambda *given, **options: looked.append(1) or remap(*given, **options))
-    frames = flow.between(pan(0), pan(8), 4)
-    assert looked == []
-    first, second, third = (len(looked) for _ in frames)
-    assert third - second == second - first > 0
+def test_flow_is_found_once_for_all_times(monkeypatch):
+    found, own = [], flow.FLOW
+    monkeypatch.setattr(flow, "FLOW", lambda *pictures: found.append(1) or own(*pictures))
+    pair = flow.Between(pan(0), pan(8))
+    assert len(found) == 2  # there, and back
+    pictures = [pair.at(k / 8) for k in range(1, 8)]
+    assert len(found) == 2
+    flow.Between(pan(0), pan(0)).at(0.5)
+    assert len(found) == 2
+    again = flow.Between(pan(0), pan(8))
+    for k in (5, 1, 7):  # a time depends on no other
+        np.testing.assert_array_equal(again.at(k / 8), pictures[k - 1])
 
 
-def digest(threads, method):
+def digest(threads):
     code = f"""
 import sys, hashlib
 sys.path.insert(0, "tests/media")
 import cv2
 cv2.setNumThreads({threads})
-from test_media_flow import pan, flow
-made = flow.between(pan(0), pan(8), 4, {method!r})
+from test_media_flow import between, pan
+made = between(pan(0), pan(8), 4)
 print(hashlib.sha256(b"".join(p.tobytes() for p in made)).hexdigest())
 """
     root = Path(__file__).parents[2]
@@ -178,27 +229,22 @@ print(hashlib.sha256(b"".join(p.tobytes() for p in made)).hexdigest())
     return done.stdout.strip()
 
 
-@pytest.mark.parametrize("method", METHODS)
-def test_the_same_bits_whatever_the_number_of_threads(method):
-    made = flow.between(pan(0), pan(8), 4, method)
+def test_the_same_bits_whatever_the_number_of_threads():
+    made = between(pan(0), pan(8), 4)
     here = hashlib.sha256(b"".join(picture.tobytes() for picture in made)).hexdigest()
-    assert digest(1, method) == digest(7, method) == here
-
-
-def test_one_frame_after_the_other_has_none_between():
-    assert list(flow.between(pan(0), pan(8), 1)) == []
+    assert digest(1) == digest(7) == here
 
 
 def test_without_opencv_it_is_one_sentence(monkeypatch):
-    for found in (None, types.ModuleType("cv2")):  # none, and one without the contributed modules
-        monkeypatch.setattr(opencv, "cv2", found)
-        with pytest.raises(MediaError, match="need the Python package opencv-contrib-python-headless"):
-            next(flow.between(pan(0), pan(8), 2))
+    monkeypatch.setattr(opencv, "cv2", None)
+    with pytest.raises(MediaError, match="^moments between frames need the Python package opencv-contrib-python-headl"):
+        flow.check()
 
 
 def test_what_is_kept_of_pictures_of_other_sizes_is_let_go():
     def make(width):
-        list(flow.between(*(frame(noise(seed, 32, width), np.uint8) for seed in (1, 2)), 2))
+        first = frame(noise(1, 32, width))
+        assert not np.array_equal(flow.Between(first, first + np.uint8(8)).at(0.25), first)
 
     make(31)  # and what is kept of all pictures
     tracemalloc.start()

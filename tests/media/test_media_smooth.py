@@ -1,0 +1,259 @@
+"""Moments between the frames of footage: those that were filmed stay what they are, and all others lie between."""
+
+import gc
+import weakref
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from test_media_flow import blocks, frame, off, pan
+from test_media_steps import Film, shift
+
+from shutter_addon.core.frames.frame_source import FrameSource
+from shutter_addon.core.frames.planes import as_rgba
+from shutter_addon.core.model.shutters import MAX_WINDOW
+from shutter_addon.media import MediaError, PrefetchSource, flow, open_source, opencv, smooth
+from shutter_addon.media.cuts import ShotSource
+from shutter_addon.media.smooth import SmoothSource, steps_for
+
+SPEED = 8  # pixels from a frame to the next
+
+
+class Panned(FrameSource):
+    """Pictures that move to the left, from a cut on other ones; it notes which were read, and which of them live."""
+
+    transfer, alpha, options, fps = "srgb", "opaque", {"colour": "sRGB"}, 25
+
+    def __init__(self, count=8, cut=None, dtype=np.uint8):
+        self.count, self.cut, self.dtype, self.lost = count, cut, np.dtype(dtype), None
+        self.height, self.width, _ = pan(0).shape
+        self.asked, self._given, self.most = [], [], 0
+
+    def read(self, index):
+        if index == self.lost:
+            raise MediaError(f"frame {index} is lost")
+        self.asked.append(index)
+        made = self.picture(index)
+        self._given.append(weakref.ref(made))
+        self.most = max(self.most, self.living)
+        return made
+
+    @property
+    def living(self):
+        return sum(each() is not None for each in self._given)
+
+    def picture(self, index):
+        if self.cut is not None and index >= self.cut:
+            return frame(np.roll(blocks(5), -SPEED * index, axis=1), self.dtype)
+        return pan(SPEED * index, self.dtype)
+
+
+@pytest.mark.parametrize("dtype", [np.uint8, np.uint16, np.float16])
+@pytest.mark.parametrize("step", [2, 4, 16])
+def test_what_was_filmed_has_the_footage_s_bits(step, dtype):
+    film = Panned(dtype=dtype)
+    source = SmoothSource(film, step)
+    assert (source.count, source.step, source.fps) == (7 * step + 1, step, 25 * step)
+    assert source.options == {"colour": "sRGB", "inbetween": step}
+    assert (source.width, source.transfer, film.step) == (film.width, "srgb", 1)
+    for index in (3, 0, 7, 1):
+        for read in (source.read, source.decoded, SmoothSource(film, step).decoded):
+            np.testing.assert_array_equal(read(index * step), film.picture(index))
+
+
+@pytest.mark.parametrize("step", [2, 4, 8])
+def test_moments_lie_between_in_even_steps(step):
+    source = SmoothSource(Panned(3), step)
+    for index in range(source.count):
+        made, x = source.read(index), index * SPEED // step
+        assert made.dtype == np.uint8
+        assert off(made, pan(x)) < 1
+        others = [abs(x - SPEED // step), x + SPEED // step]
+        assert off(made, pan(x)) < min(off(made, pan(other)) for other in others) / 2
+
+
+def test_at_a_cut_moments_are_the_nearer_frame():
+    """The middle one is the first's, as a source that knows its shots has it."""
+    film = Panned(6, cut=3)
+    source = SmoothSource(film, 4)
+    for moment, shown in ((9, 2), (10, 2), (11, 3)):
+        np.testing.assert_array_equal(source.read(moment), film.picture(shown))
+    assert not np.array_equal(source.read(7), film.picture(2))
+    assert not np.array_equal(source.read(13), film.picture(3))
+
+
+def test_between_equal_frames_is_that_frame(monkeypatch):
+    film = Panned(2)
+    film.picture = lambda _index: pan(5)
+    monkeypatch.setattr(flow, "FLOW", None)  # none is needed
+    for moment in range(9):
+        np.testing.assert_array_equal(SmoothSource(film, 8).read(moment), pan(5))
+
+
+@pytest.mark.parametrize("kind", [{}, {"cut": 4}, {"dtype": np.float16}])
+def test_the_order_of_reading_changes_no_bit(kind):
+    first = SmoothSource(Panned(**kind), 4)
+    wanted = [first.read(moment) for moment in range(first.count)]
+    for order in (range(first.count)[::-1], np.random.default_rng(2).permutation(first.count).tolist() * 2):
+        source = SmoothSource(Panned(**kind), 4)
+        for moment in order:
+            np.testing.assert_array_equal(source.read(moment), wanted[moment])
+    ahead = PrefetchSource(SmoothSource(Panned(**kind), 4))
+    try:
+        for moment in (9, 2, 20):
+            ahead.want(range(moment, moment + 6))
+            for each in range(moment, moment + 6):
+                np.testing.assert_array_equal(ahead.read(each), wanted[each])
+    finally:
+        ahead.close()
+
+
+def test_memory_has_a_bound_and_film_is_decoded_once():
+    film = Panned(30)
+    film.picture = lambda index: pan(2 * index)
+    source = SmoothSource(film, 4)
+    for moment in range(source.count):
+        source.read(moment)
+    assert film.asked == list(range(30))
+    for moment in np.random.default_rng(0).permutation(source.count):
+        source.read(int(moment))
+    assert film.most <= smooth._FRAMES + 2 * 2 + 1  # those of two pairs, and the one that is being read
+    source.close()
+    gc.collect()
+    assert film.living == 0
+    assert off(source.read(2), pan(1)) < 1  # a later read begins anew
+
+
+def test_without_moments_nothing_is_looked_for(monkeypatch):
+    monkeypatch.setattr(flow, "Between", None)
+    film = Panned()
+    source = SmoothSource(film, 8)
+    for index in range(8):
+        np.testing.assert_array_equal(source.read(8 * index), film.picture(index))
+
+
+def test_flow_of_a_pair_is_found_once(monkeypatch):
+    found, own = [], flow.Between
+    monkeypatch.setattr(flow, "Between", lambda *given: found.append(1) or own(*given))
+    source = SmoothSource(Panned(4), 8)
+    for moment in range(source.count):
+        source.read(moment)
+    assert len(found) == 3
+
+
+def test_a_lost_frame_is_one_sentence_until_it_is_back():
+    film = Panned()
+    film.lost = 3
+    source = SmoothSource(film, 4)
+    for moment in (9, 12, 14):
+        with pytest.raises(MediaError, match="frame 3 is lost"):
+            source.read(moment)
+    assert off(source.read(6), pan(12)) < 1
+    film.lost = None
+    assert off(source.read(14), pan(28)) < 1
+
+
+@pytest.mark.parametrize("index", [-1, 29])
+def test_beyond_its_ends_is_nothing(index):
+    with pytest.raises(IndexError):
+        SmoothSource(Panned(), 4).read(index)
+
+
+def test_a_film_of_one_frame():
+    source = SmoothSource(Panned(1), 16)
+    assert source.count == 1
+    np.testing.assert_array_equal(source.read(0), pan(0))
+
+
+def test_of_a_movie_filmed_frames_come_as_they_were_decoded(bunny):
+    with open_source(bunny) as movie, ShotSource(PrefetchSource(SmoothSource(movie, 4), planes=True), 4) as source:
+        assert source.count == 4 * (movie.count - 1) + 1
+        smooth_source = SmoothSource(movie, 4)
+        assert type(smooth_source.decoded(20)) is type(movie.decoded(5)) is not np.ndarray
+        for index in (20, 24):
+            np.testing.assert_array_equal(as_rgba(smooth_source.decoded(index)), movie.read(index // 4))
+            np.testing.assert_array_equal(source.read(index), movie.read(index // 4))
+        moment = smooth_source.read(22)
+        np.testing.assert_array_equal(source.read(22), moment)
+        assert isinstance(smooth_source.decoded(20), np.ndarray)  # which is there already
+        np.testing.assert_array_equal(smooth_source.decoded(20), movie.read(5))
+
+
+# How many moments there are
+
+
+def speeding(x, count=9, size=(480, 270), **more):
+    """A film that moves by so many pixels from frame to frame."""
+    film = Film(shift(x), size, **more)
+    film.count, (film.width, film.height) = count, size
+    return film
+
+
+@pytest.mark.parametrize("window", [1, 8, 16, 17, 32, 33, 64, 65, 128, 129, 256])
+@pytest.mark.parametrize("asked", [1, 2, 4, 8, 16])
+def test_as_many_as_are_asked_for_if_a_window_has_room(asked, window):
+    """It reads no frame for that."""
+    found = steps_for(SimpleNamespace(count=9), asked, window)
+    assert found <= asked
+    assert found * window <= MAX_WINDOW
+    assert found == asked or 2 * found * window > MAX_WINDOW
+
+
+def test_a_longer_window_has_none():
+    assert steps_for(SimpleNamespace(count=9), 16, MAX_WINDOW + 40) == 1
+
+
+@pytest.mark.parametrize(("x", "wanted"), [(0, 1), (1.5, 1), (3, 2), (7, 4), (14, 8), (25, 16), (40, 16)])
+def test_as_many_as_the_fastest_motion_needs(x, wanted):
+    """In a picture of 270 rows, copies may be two pixels apart."""
+    assert steps_for(speeding(x), "auto", 8) == wanted
+
+
+def test_in_a_large_picture_copies_may_be_farther_apart():
+    """Three pixels of 1080: 12 pixels take 4 steps, which is 8 in a small one."""
+    assert steps_for(speeding(11, size=(1920, 1080)), "auto", 8) == 4
+    assert steps_for(speeding(11), "auto", 8) == 8
+
+
+@pytest.mark.parametrize(("window", "wanted"), [(16, 16), (20, 8), (60, 4), (128, 2), (200, 1)])
+def test_a_window_bounds_what_is_needed(window, wanted):
+    assert steps_for(speeding(40), "auto", window) == wanted
+
+
+@pytest.mark.parametrize("fast", [0, 999])
+def test_few_pairs_tell_the_first_and_the_last_among_them(fast):
+    film, asked = speeding(0, count=1001), []
+    film.matrix = lambda k: [[1, 0, -160 + 7 * (k > fast)], [0, 1, -160]]  # a single step
+    own = film.read
+    film.read = lambda index: asked.append(index) or own(index)
+    assert steps_for(film, "auto", 8) == 4
+    assert len(asked) <= 2 * smooth._PAIRS
+    assert (min(asked), max(asked)) == (0, 1000)
+
+
+def test_what_cannot_be_read_or_told_does_not_count():
+    film = speeding(7, count=3)
+    own = film.read
+
+    def lost(index):
+        if index == 0:
+            raise MediaError("frame 0 is lost")
+        return own(index)
+
+    film.read = lost
+    assert steps_for(film, "auto", 8) == 4
+    film.read = lambda index: frame(blocks(index, (270, 480)))  # cuts alone
+    assert steps_for(film, "auto", 8) == 1
+
+
+def test_one_frame_has_none():
+    assert steps_for(speeding(7, count=1), "auto", 8) == 1
+
+
+def test_without_opencv(monkeypatch):
+    """Automatic is none then; what was asked for is refused in one sentence."""
+    monkeypatch.setattr(opencv, "cv2", None)
+    assert steps_for(speeding(7), "auto", 8) == 1
+    assert steps_for(speeding(7), 4, 8) == 4
+    with pytest.raises(MediaError, match="^moments between frames need the Python package opencv"):
+        SmoothSource(Panned(), 4)
