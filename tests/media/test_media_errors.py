@@ -15,7 +15,6 @@ from footage import COUNT, cut_file, damage_frame, make_movie, number, picture, 
 
 from shutter_addon.media import MediaError, open_source
 from shutter_addon.media.image_writing import write_exr
-from shutter_addon.media.inbetween_cache import write_picture
 from shutter_addon.media.sequence import IMAGE_SUFFIXES
 
 
@@ -357,8 +356,6 @@ def test_names_that_are_not_utf8(tmp_path):
             assert text.endswith("its path is not UTF-8; rename the file, or the folder that is not")
     with pytest.raises(MediaError, match="its path is not UTF-8"):
         write_exr(folder / "a.exr", np.zeros((4, 4, 1), np.float32), ["Y"])
-    with pytest.raises(MediaError, match="its path is not UTF-8"):
-        write_picture(folder / "a.png", picture(5), "opaque")
 
 
 @pytest.mark.parametrize("suffix", ["jpg", "tif", "exr", "dpx"])

@@ -237,7 +237,7 @@ def test_the_same_bits_whatever_the_number_of_threads():
 
 def test_without_opencv_it_is_one_sentence(monkeypatch):
     monkeypatch.setattr(opencv, "cv2", None)
-    with pytest.raises(MediaError, match="^moments between frames need the Python package opencv-contrib-python-headl"):
+    with pytest.raises(MediaError, match=r"^moments between frames need the Python package opencv-contrib-python"):
         flow.check()
 
 

@@ -255,5 +255,5 @@ def test_without_opencv(monkeypatch):
     monkeypatch.setattr(opencv, "cv2", None)
     assert steps_for(speeding(7), "auto", 8) == 1
     assert steps_for(speeding(7), 4, 8) == 4
-    with pytest.raises(MediaError, match="^moments between frames need the Python package opencv"):
+    with pytest.raises(MediaError, match=r"^moments between frames need the Python package opencv"):
         SmoothSource(Panned(), 4)

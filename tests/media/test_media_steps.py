@@ -89,3 +89,9 @@ def test_nothing_is_told_across_a_cut():
 def test_a_picture_of_few_pixels_tells_nothing():
     film = Film(shift(1), size=(20, 8))
     assert steps.moved(film, 0) is None
+
+
+@pytest.mark.parametrize(("height", "most"), [(90, 2), (720, 2), (1080, 3), (2160, 6)])
+def test_a_streak_is_smooth_whose_copies_are_near(height, most):
+    """Three pixels of 1080, but two of any picture: edges are as wide."""
+    assert steps.smooth(height) == pytest.approx(most)

@@ -17,11 +17,11 @@ import numpy as np
 import pytest
 from footage import COUNT, cut_file, damage_frame, make_movie, number, picture, save_image
 
-from shutter_addon.media import MediaError, decoding_child, inbetween, open_source, opencv, pyav
+from shutter_addon.media import MediaError, decoding_child, open_source, pyav
 from shutter_addon.media.blender_movie import BlenderMovie, frame_rate
 from shutter_addon.media.channels import MovieChannel
-from shutter_addon.media.inbetween import InbetweenSource
 from shutter_addon.media.opening import open_channel
+from shutter_addon.media.smooth import SmoothSource
 
 ROOT = Path(__file__).parents[2]
 FOLDER = ROOT / "shutter_addon" / "blender" / "data"
@@ -369,19 +369,12 @@ def test_an_answer_that_nobody_waited_for_is_not_the_next_one(movies, tmp_path):
         signal.signal(signal.SIGUSR1, before)
 
 
-def test_in_between_frames_that_are_built_already_are_used(coloured, tmp_path, monkeypatch):
-    """Without PyAV and OpenCV, and what is not built is refused, before anything is written."""
+def test_moments_between_its_frames_are_those_of_pyav(coloured):
     path = coloured["bt709.mp4"]
-    with open_source(path) as by_pyav:
-        inbetween.build(by_pyav, tmp_path, 2, "quick")
-        built = InbetweenSource(by_pyav, tmp_path, 2, "quick").read(1)
-    monkeypatch.setattr(opencv, "cv2", None)
-    with BlenderMovie(path) as source:
-        assert inbetween.build(source, tmp_path, 2, "quick").name == "ready"
-        assert np.array_equal(InbetweenSource(source, tmp_path, 2, "quick").read(1), built)
-        with pytest.raises(MediaError, match=r"^in-between frames need the Python package opencv"):
-            inbetween.build(source, tmp_path / "none", 2, "quick")
-    assert not (tmp_path / "none").exists()
+    with open_source(path) as by_pyav, BlenderMovie(path) as source:
+        assert source.by_blender
+        for index in range(5):
+            assert np.array_equal(SmoothSource(source, 2).read(index), SmoothSource(by_pyav, 2).read(index))
 
 
 @linux
