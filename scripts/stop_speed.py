@@ -1,8 +1,8 @@
 """How long Blender takes to be free again after Esc, measured in its own window by real key presses.
 
     blender --factory-startup --python scripts/stop_speed.py -- FOOTAGE.mp4 OUT.json \\
-        [--presses 20] [--jobs render,play,scrub,track,build] [--window 16] [--device auto] [--packages DIR] \\
-        [--whole]
+        [--presses 20] [--jobs render,play,scrub,track] [--window 16] [--device auto] [--smooth 1] \\
+        [--packages DIR] [--whole]
 
 xdotool presses Esc at some moment of each job, from a process of its own: Blender need not have time for it. What
 counts is the time from that press until the job has ended and a timer ticks again; `idle` is the time until what works
@@ -14,9 +14,10 @@ clicked while a picture is composed, with a sharp subject. What counts is the ti
 the preview shows that, as a picture or with a note.
 
 render: Render Animation as a job; play: the preview plays; scrub: the playhead is dragged to and fro; track: the
-strokes' region is tracked; build: in-between frames are built.
+strokes' region is tracked.
 
 Any Blender 5.2 with the extension enabled, started with a window and `--python` this file, will do.
+--smooth: moments for a filmed frame, or auto.
 --packages: a folder with OpenCV, where Blender has none.
 --whole: still pictures are composed to their end before Blender looks at its keys.
 """
@@ -38,7 +39,7 @@ from pathlib import Path
 import bpy
 import gpu
 
-JOBS = "render", "play", "scrub", "track", "build"
+JOBS = "render", "play", "scrub", "track"
 PATIENCE = 60.0
 
 
@@ -50,7 +51,7 @@ def arguments():
     parser.add_argument("--jobs", default=",".join(JOBS))
     parser.add_argument("--window", type=int, default=16)
     parser.add_argument("--device", default="auto")
-    parser.add_argument("--method", default="quick", choices=("quick", "good"))
+    parser.add_argument("--smooth", default="1", choices=("1", "auto", "2", "4", "8", "16"))
     parser.add_argument("--zoom", default="fit", choices=("fit", "full"))
     parser.add_argument("--packages")
     parser.add_argument("--whole", action="store_true")
@@ -119,7 +120,7 @@ def make_edit():
     edit.frame_end = source.right_handle - 1
     edit.sequence_editor.active_strip = source
     add_effect(edit, source)
-    bpy.ops.wm.save_as_mainfile(filepath=str(FOLDER / "edit.blend"))  # in-between frames lie beside it
+    bpy.ops.wm.save_as_mainfile(filepath=str(FOLDER / "edit.blend"))
     with within("PREVIEW"):
         bpy.ops.sequencer.view_all_preview()
         if OPTIONS.zoom == "full":
@@ -139,8 +140,9 @@ def add_effect(edit, source):
         for name, stroke in strokes.items()
     ]
     data = {
-        "version": 1,
+        "version": 2,
         "window": OPTIONS.window,
+        "inbetween": OPTIONS.smooth if OPTIONS.smooth == "auto" else int(OPTIONS.smooth),
         "border": True,
         "edge_aware": 1,
         "shutters": [{"name": n, "bars": presets.bars(p, OPTIONS.window).tolist()} for n, p in bars.items()],
@@ -148,7 +150,6 @@ def add_effect(edit, source):
     }
     part("blender.data.recipe_import").apply(edit, effect, strip, recipe_file.parse(json.dumps(data)))
     effect.active_shutter = 1
-    effect.inbetween_method, effect.inbetween_place = OPTIONS.method.upper(), "FILE"
 
 
 def operators():
@@ -192,13 +193,6 @@ def track():
     with within("PREVIEW"):
         bpy.ops.shutter.track("INVOKE_DEFAULT", direction="FORWARD")
     return lambda: "SHUTTER_OT_track" in operators()
-
-
-def build():
-    effect_now().inbetween = "4"
-    with within("PREVIEW"):
-        bpy.ops.shutter.inbetween_build("INVOKE_DEFAULT")
-    return lambda: part("blender.rendering.inbetween_build").running() is not None
 
 
 # Jobs of the mouse: each gives places on the screen, of which the first is pressed and the last let go at, and what
@@ -333,9 +327,6 @@ def undone(job):
     if job is track:
         with within("SEQUENCER"):
             bpy.ops.ed.undo()
-    if job is build:
-        effect_now().inbetween = "1"
-        shutil.rmtree(part("blender.data.inbetween_settings").folder(effect_now()), ignore_errors=True)
     shutil.rmtree(FOLDER / "frames", ignore_errors=True)
 
 

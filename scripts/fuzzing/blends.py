@@ -46,7 +46,7 @@ def make(random, folder):
             owner = random.choice([*OURS, *OURS, *OURS, *BLENDERS])
             values = [hostile.number(random), random.choice(TEXTS), random.randrange(-3, 9)]
             changes.append([owner, random.getrandbits(32), values])
-    data = recipes.plausible(random, 16) | {"inbetween": random.choice((1, 1, 1, 4))}
+    data = recipes.plausible(random, 16) | {"inbetween": random.choice((1, 1, 1, 4, "auto"))}
     plan = {"recipe": data, "changes": changes, "reload": random.random() < 0.3, "frame": random.choice((1, 5, 30, 90))}
     (folder / "plan.json").write_text(json.dumps(plan))
 

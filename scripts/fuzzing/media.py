@@ -127,7 +127,8 @@ def _render(folder, path):
     shutters = [{"name": "A", "bars": [1, 1, 0]}, {"name": "B", "bars": [0, 0, 1]}]
     regions = [{"shutter": "B", "strokes": [[[0.1, 0.1], [0.6, 0.7]]]}]
     recipe = folder / "out" / "recipe.json"
-    recipe.write_text(json.dumps({"version": 1, "window": 3, "shutters": shutters, "regions": regions}))
+    said = {"version": 2, "window": 3, "inbetween": 2, "shutters": shutters, "regions": regions}
+    recipe.write_text(json.dumps(said))
     for output in ("a", "b"):
         recipes.command(None, "render", path, "--recipe", recipe, "--output", folder / "out" / output)
     if not _is_movie(path):

@@ -3,6 +3,7 @@ wrong; rendered, and composed by both devices."""
 
 import json
 import sys
+from dataclasses import replace
 
 import numpy as np
 
@@ -137,6 +138,7 @@ def compose(found, plan: dict, folder):
     keys = [frame for channel in channels if isinstance(channel, Keys) for frame in channel.frames]
     for frame in (1, 2.5, *keys[:2]):
         moment = found.for_picture(SIZE[0] / SIZE[1], file).at(frame)
+        moment = replace(moment, options=replace(moment.options, step=1))  # footage of filmed frames alone
         renderers = [Renderer(device, source, values) for device in devices.values()]
         first, second = (renderer.coefficients(Request(3, moment)).astype(float) for renderer in renderers)
         if not (apart := np.abs(first - second).max()) <= 1 / 255:
