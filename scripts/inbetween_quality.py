@@ -1,4 +1,4 @@
-"""How close in-between frames come to frames that were left out, beside other ways, measured in one run.
+"""How close moments between frames come to frames that were left out, beside other ways, measured in one run.
 
     python scripts/inbetween_quality.py [--films A.mp4,B.avi] [--frames 121] [--scenes A,B] [--parts films,scenes,speed]
                                         [--table FILE] [--json FILE] [--picture FILE]
@@ -8,9 +8,9 @@ scenes: of footage of the gallery, rendered at 240 fps, every eighth frame is ke
     shutter over four of the kept frames is compared with the same over all 32.
 speed: frames per second and peak memory at 1920×1080, between frames of the first film, eight to one.
 
-Ways: "quick" and "good" are shutter_addon.media.flow's, "blend" mixes both neighbours in linear light, "repeat" shows
-the earlier one, "minterpolate" is `ffmpeg -vf minterpolate=mi_mode=mci`, taken from PATH. Its frames are matched by
-those that it was given and returns. Footage that is not there yet is rendered, which needs Blender as a library (bpy).
+Ways: "flow" is shutter_addon.media.flow's, "blend" mixes both neighbours in linear light, "repeat" shows the earlier
+one, "minterpolate" is `ffmpeg -vf minterpolate=mi_mode=mci`, taken from PATH. Its frames are matched by those that it
+was given and returns. Footage that is not there yet is rendered, which needs Blender as a library (bpy).
 Peak memory is read from /proc, hence on Linux alone.
 """
 
@@ -55,12 +55,10 @@ def codes(picture: np.ndarray) -> np.ndarray:
     return np.rint(255 * light.to_encoded(np.clip(picture, 0, 1))).astype(np.uint8)
 
 
-def by_flow(method):
-    def rebuilt(kept, factor):
-        opaque = [np.dstack([frame, np.full(frame.shape[:2], 255, np.uint8)]) for frame in kept]
-        return [[new[..., :3] for new in flow.between(*pair, factor, method)] for pair in pairwise(opaque)]
-
-    return rebuilt
+def by_flow(kept, factor):
+    opaque = [np.dstack([frame, np.full(frame.shape[:2], 255, np.uint8)]) for frame in kept]
+    pairs = (flow.Between(*pair) for pair in pairwise(opaque))  # of which one is kept
+    return [[pair.at(k / factor)[..., :3] for k in range(1, factor)] for pair in pairs]
 
 
 def blend(kept, factor):
@@ -84,8 +82,7 @@ def minterpolate(kept, factor):
     return [list(made[i * factor + 1 : (i + 1) * factor]) for i in range(len(kept) - 1)]
 
 
-WAYS = {"quick": by_flow("quick"), "good": by_flow("good"), "blend": blend, "repeat": repeat}
-WAYS["minterpolate"] = minterpolate
+WAYS = {"flow": by_flow, "blend": blend, "repeat": repeat, "minterpolate": minterpolate}
 
 
 def through_ffmpeg(kept, factor):
@@ -172,7 +169,7 @@ def scene(name, args) -> list[dict]:
     rows, rebuilt = compare(name, truth, FACTOR)
     kept = truth[::FACTOR]
     exposed = [exposure(truth[:-1])]
-    for way in ("30 fps", "quick", "good", "blend"):
+    for way in ("30 fps", "flow", "blend"):
         frames = kept[:-1]
         if way != "30 fps":
             frames = [frame for first, rest in zip(kept, rebuilt[way], strict=False) for frame in (first, *rest)]
@@ -182,7 +179,7 @@ def scene(name, args) -> list[dict]:
         print("| {footage}, box | {box} | {psnr:.2f} | | {ssim:.4f} | | |".format(**rows[-1]), flush=True)
         exposed.append(picture)
     if args.picture and name == args.scenes[0]:
-        few, many = f"{BOX} frames at 30 fps", f"30 fps, {FACTOR}x in-betweens"
+        few, many = f"{BOX} frames at 30 fps", f"30 fps, {FACTOR}x moments"
         save(args.picture, [(exposed[1], few), (exposed[2], many), (exposed[0], "240 fps")])
     return rows
 
@@ -210,7 +207,7 @@ def save(path, labelled) -> None:
 
 def speed(args) -> list[dict]:
     """In processes of their own, which tell their peak memory; by turns."""
-    ways = ("quick", "good", "minterpolate")
+    ways = ("flow", "minterpolate")
     results = {way: [] for way in ways}
     spawn = multiprocessing.get_context("spawn")
     for _ in range(args.rounds):
@@ -234,7 +231,7 @@ def one_speed(way, film, gaps):
         made, seconds, peak = through_ffmpeg(kept, FACTOR)
         return len(made) * (FACTOR - 1) / FACTOR / seconds, peak
     start = time.perf_counter()
-    # One gap at a time, as they are built: no more than that is kept.
+    # One gap at a time, as they are read: no more than two are kept.
     count = sum(len(WAYS[way](list(pair), FACTOR)[0]) for pair in pairwise(kept))
     seconds = time.perf_counter() - start
     return count / seconds, peak_memory(os.getpid())

@@ -5,7 +5,7 @@
 Cycles films a flat scene through a camera that shakes from side to side, up to 8 pixels a frame, with its rolling
 shutter on, each row for the 50th part of the shutter's time; and the same with all rows at once. The first is repaired
 in Blender, by the operator's own function, with the readout that Cycles has. The edit goes to `shutter render` as a
-recipe, with in-between frames at 8×, and three of its frames are compared with those of the second.
+recipe, with eight moments for a filmed frame, and three of its frames are compared with those of the second.
 
 Printed are the PSNR of 8-bit sRGB with these, of the footage and of the repair; how far a red pole's middle is from
 straight, in any of its rows, in pixels; and the readout that *Find Readout* finds.
@@ -90,7 +90,7 @@ def repaired(first: Path, share: float, folder: Path) -> list[np.ndarray]:
     rolling_shutter.repair(edit, effect, strip, share, "TOP")
     recipe_file.save(matte_export.recipe_for(edit, effect, strip, folder / "recipe.json"), folder / "recipe.json")
     command = [sys.executable, "-m", "shutter_addon", "render", str(first), "--recipe", str(folder / "recipe.json")]
-    command += ["--output", str(folder / "made"), "--format", "exr", "--cache", str(folder / "inbetween")]
+    command += ["--output", str(folder / "made"), "--format", "exr"]
     for frame in SHOWN:
         done = subprocess.run([*command, "--frames", str(frame + 1)], cwd=ROOT, capture_output=True, text=True)
         if done.returncode:

@@ -82,7 +82,7 @@ def regions() -> dict:
         {"name": "ramp", "shutter": "Keyed", "kind": "ramp", "ramp": "radial", "opacity": 0.4, "keys": _MOVES},
     ]
     return {
-        "version": 1,
+        "version": 2,
         "window": 4,
         "position": "center",
         "edge_aware": _values(0.2, 0.8),
@@ -105,7 +105,7 @@ def combined() -> dict:
         {"name": "bright", "shutter": "Shades", "kind": "ramp", "ramp": "luminance", "opacity": 0.5},
     ]
     return {
-        "version": 1,
+        "version": 2,
         "window": 6,
         "position": "end",
         "interpolation": "value",
@@ -128,10 +128,9 @@ def _carried() -> dict:
     outline = {"name": "carried", "shutter": "Long", "kind": "outline", "strokes": [_SQUARE]}
     shutters = [{"name": "Long", "bars": [1, 1, 1, 1]}, {"name": "Sharp", "bars": [1, 0, 0, 0]}]
     return {
-        "version": 1,
+        "version": 2,
         "window": 4,
         "inbetween": 2,
-        "inbetween_method": "good",
         "shutters": shutters,
         "regions": [outline],
     }
@@ -227,4 +226,4 @@ def _add_other_regions(scene: Any, effect: Any, footage: Path) -> None:
     effect.shutters[1].preset, effect.shutters[1].preset_position = "STILL", "START"
     effect.source_time, effect.active_shutter, effect.active_region = 7.5, 1, 2
     effect.camera.stops.add().frame = 4
-    effect.name, effect.inbetween_place = "Carried", "USER"
+    effect.name = "Carried"

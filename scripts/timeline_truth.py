@@ -8,8 +8,8 @@ shutter of 180° whose length is the timeline's: through the sequencer, by `shut
 exposure, motion blur with a shutter of 0.5, of the same scene whose clock runs as fast as the footage does.
 
 Where both begin: *Position: Start* has the exposure begin with the shown frame, which is a moment, as Cycles' does with
-the shutter at START. Four frames of eight are open at full speed, which are four copies and no streak: with in-between
-frames at 8× they are 32. The rows "no in-betweens" are without, "bars" with *Exposure Length: Frames*.
+the shutter at START. Four frames of eight are open at full speed, which are four copies and no streak: *Smooth* at 8×
+makes 32 moments of them. The rows "not smooth" are without, "bars" with *Exposure Length: Frames*.
 
 A white rod runs over black along the bottom, 4 pixels a frame of 320. The light of its streak has a second moment, of
 which the length of an evenly lit one comes, once the still rod's is taken off. Printed are SSIM (Wang et al. 2004) of
@@ -70,14 +70,13 @@ def render(scene, file: Path, frame: int, samples: int, shutter: float = 0.0) ->
     return file
 
 
-def recipe(case: str, *, timeline: bool = True, inbetween: int = 8) -> dict:
+def recipe(case: str, *, timeline: bool = True, smooth: int = 8) -> dict:
     """The recipe: time as it is keyed twice a frame of the timeline."""
-    window = WINDOW * inbetween
-    shutter = {"name": "180°", "bars": [1.0] * (window // 2) + [0.0] * (window // 2)}
+    shutter = {"name": "180°", "bars": [1.0] * (WINDOW // 2) + [0.0] * (WINDOW // 2)}
     keys = [{"frame": 1 + at / 2, "value": 1 + position(case, at / 2)} for at in range(2 * TIMELINE + 1)]
     shutters = [shutter | ({"length": "timeline"} if timeline else {})]
-    said = {"version": 1, "window": window, "shutters": shutters, "regions": [], "time": keys}
-    return said | {"inbetween": inbetween, "inbetween_method": "good", "stop_at_cuts": False}
+    said = {"version": 2, "window": WINDOW, "shutters": shutters, "regions": [], "time": keys}
+    return said | {"inbetween": smooth, "stop_at_cuts": False}
 
 
 def exposed(first: Path, said: dict, frames: list[int], folder: Path) -> list[np.ndarray]:
@@ -85,7 +84,7 @@ def exposed(first: Path, said: dict, frames: list[int], folder: Path) -> list[np
     folder.mkdir()
     (folder / "recipe.json").write_text(json.dumps(said), encoding="utf-8")
     command = [sys.executable, "-m", "shutter_addon", "render", str(first), "--recipe", str(folder / "recipe.json")]
-    command += ["--output", str(folder), "--format", "exr", "--cache", str(first.parent / "inbetween")]
+    command += ["--output", str(folder), "--format", "exr"]
     for frame in frames:
         done = subprocess.run([*command, "--frames", str(frame + 1)], cwd=ROOT, capture_output=True, text=True)
         if done.returncode:
@@ -113,7 +112,7 @@ def measure(args, folder: Path) -> tuple[list[dict], np.ndarray]:
     for index in range(count):
         render(scene, folder / f"{index + 1:04d}.exr", index, max(args.samples // 8, 16))
     still = read(folder / "0002.exr")
-    ways = {"timeline": {}, "no in-betweens": {"inbetween": 1}, "bars": {"timeline": False}}
+    ways = {"timeline": {}, "not smooth": {"smooth": 1}, "bars": {"timeline": False}}
     rows, strips = [], []
     for case, clock in CASES.items():
         scene = filmed(args.size, clock)

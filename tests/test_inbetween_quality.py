@@ -1,4 +1,4 @@
-"""What the comparison of in-between frames says when it cannot be made."""
+"""What the comparison of moments between frames says when it cannot be made."""
 
 import subprocess
 import sys
