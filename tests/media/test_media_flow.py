@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from shutter_addon.core.frames import light
+from shutter_addon.core.frames.planes import as_rgba
 from shutter_addon.media import MediaError, flow, open_source, opencv
 
 HEIGHT, WIDTH = 96, 160
@@ -36,10 +37,15 @@ def pan(x, dtype=np.uint8):
     return frame(noise(1, HEIGHT, WIDTH + 64)[:, x : x + WIDTH], dtype)
 
 
-def between(first, second, factor, transfer="srgb", alpha="opaque"):
-    """The frames at the times 1/factor … (factor-1)/factor."""
+def at(pair, number, steps):
+    """One of the moments of a pair."""
+    return as_rgba(pair.moment(0, number, steps))
+
+
+def between(first, second, steps, transfer="srgb", alpha="opaque"):
+    """The frames at the times 1/steps … (steps-1)/steps."""
     found = flow.Between(first, second, transfer, alpha)
-    return [found.at(k / factor) for k in range(1, factor)]
+    return [at(found, k, steps) for k in range(1, steps)]
 
 
 def off(picture, other):
@@ -91,10 +97,10 @@ def test_of_frames_that_have_nothing_in_common_it_is_the_nearer(size, alpha, dty
     """As at a cut: the frame's own bits. In the middle it is the first, as shots have it."""
     first, second = (frame(blocks(seed, size), dtype) for seed in (1, 2))
     found = flow.Between(first, second, alpha=alpha)
-    for t in (0.01, 0.25, 0.5):
-        np.testing.assert_array_equal(found.at(t), first)
-    for t in (0.5 + 1 / 16, 0.75, 0.99):
-        np.testing.assert_array_equal(found.at(t), second)
+    for number in (1, 4, 8):
+        np.testing.assert_array_equal(at(found, number, 16), first)
+    for number in (9, 12, 15):
+        np.testing.assert_array_equal(at(found, number, 16), second)
 
 
 @pytest.mark.parametrize("brightness", [1, 0.3, 0.15])
@@ -106,10 +112,10 @@ def test_a_cut_is_none_the_less_in_the_dark(bunny, brightness):
             shown = [cv2.resize(film.read(i), (320, 180), interpolation=cv2.INTER_AREA) for i in (40, 41)]
         films.append([(each * [brightness, brightness, brightness, 1]).astype(np.uint8) for each in shown])
     found = flow.Between(films[0][0], films[1][0])
-    np.testing.assert_array_equal(found.at(0.25), films[0][0])
-    np.testing.assert_array_equal(found.at(0.75), films[1][0])
+    np.testing.assert_array_equal(at(found, 1, 4), films[0][0])
+    np.testing.assert_array_equal(at(found, 3, 4), films[1][0])
     for first, second in films:
-        made = flow.Between(first, second).at(0.5)
+        made = at(flow.Between(first, second), 1, 2)
         assert not np.array_equal(made, first)
         assert not np.array_equal(made, second)
 
@@ -118,7 +124,7 @@ def test_what_fills_less_than_half_of_the_picture_may_be_new():
     """Someone who steps in is no cut: all else is where it is at that time."""
     first, second = pan(0), pan(8)
     second[30:, 90:, :3] = frame(noise(9, HEIGHT - 30, WIDTH - 90))[..., :3]
-    made = flow.Between(first, second).at(0.75)
+    made = at(flow.Between(first, second), 3, 4)
     assert np.abs(made[:, :80].astype(float) - pan(6)[:, :80]).mean() < 1.5
 
 
@@ -196,22 +202,22 @@ def test_what_is_not_finite_becomes_finite(dtype, transfer, alpha):
     first, second = pan(0, dtype), pan(8, dtype)
     first[40, 60, 0], first[50, 70] = np.inf, np.nan
     second[40, 60, 1], second[50, 70, 2] = np.inf, -np.inf
-    for made in between(first, second, 3, transfer, alpha):
+    for made in between(first, second, 4, transfer, alpha):
         assert np.isfinite(made).all()
 
 
 def test_flow_is_found_once_for_all_times(monkeypatch):
-    found, own = [], flow.FLOW
-    monkeypatch.setattr(flow, "FLOW", lambda *pictures: found.append(1) or own(*pictures))
+    found, own = [], flow._dis
+    monkeypatch.setattr(flow, "_dis", lambda *given, **more: found.append(1) or own(*given, **more))
     pair = flow.Between(pan(0), pan(8))
     assert len(found) == 2  # there, and back
-    pictures = [pair.at(k / 8) for k in range(1, 8)]
+    pictures = [at(pair, k, 8) for k in range(1, 8)]
     assert len(found) == 2
-    flow.Between(pan(0), pan(0)).at(0.5)
+    at(flow.Between(pan(0), pan(0)), 1, 2)
     assert len(found) == 2
     again = flow.Between(pan(0), pan(8))
     for k in (5, 1, 7):  # a time depends on no other
-        np.testing.assert_array_equal(again.at(k / 8), pictures[k - 1])
+        np.testing.assert_array_equal(at(again, k, 8), pictures[k - 1])
 
 
 def digest(threads):
@@ -244,7 +250,7 @@ def test_without_opencv_it_is_one_sentence(monkeypatch):
 def test_what_is_kept_of_pictures_of_other_sizes_is_let_go():
     def make(width):
         first = frame(noise(1, 32, width))
-        assert not np.array_equal(flow.Between(first, first + np.uint8(8)).at(0.25), first)
+        assert not np.array_equal(at(flow.Between(first, first + np.uint8(8)), 1, 4), first)
 
     make(31)  # and what is kept of all pictures
     tracemalloc.start()
@@ -255,3 +261,24 @@ def test_what_is_kept_of_pictures_of_other_sizes_is_let_go():
     finally:
         tracemalloc.stop()
     assert sum(trace.size for trace in arrays.traces) <= 32 * 39 * 2 * 4  # one place for each pixel
+
+
+def test_a_moment_of_a_time_is_the_same_of_any_number_of_steps():
+    pair = flow.Between(pan(0), pan(8))
+    for number, steps in ((1, 2), (1, 4), (3, 4), (5, 8)):
+        np.testing.assert_array_equal(at(pair, number, steps), at(pair, 16 // steps * number, 16))
+
+
+@pytest.mark.parametrize(("move", "dtype"), [((8, 0), np.uint8), ((-6, 3), np.uint16), ((5, -4), np.float32)])
+def test_vectors_say_where_all_goes(move, dtype):
+    """For every fourth pixel, in 1/32 of one; and both frames surely show what stays in the picture."""
+    wide = noise(3, HEIGHT + 32, WIDTH + 32)
+    first, second = (frame(wide[16 - y :, 16 - x :][:HEIGHT, :WIDTH], dtype) for x, y in ((0, 0), move))
+    moment = flow.Between(first, second).moment(7, 1, 2)
+    assert moment.vectors.shape == (HEIGHT // 4, WIDTH // 4, 4)
+    assert moment.vectors.dtype == np.uint16
+    assert (moment.pair, moment.number, moment.steps) == (7, 1, 2)
+    assert all(map(np.array_equal, moment.ends, (first, second)))
+    inside = moment.vectors[6:-6, 6:-6].astype(float)
+    np.testing.assert_allclose(np.median((inside[..., :2] - 32768) / 32, axis=(0, 1)), move, atol=0.15)
+    assert np.median(inside[..., 2:], axis=(0, 1)).tolist() == [255, 255]

@@ -58,7 +58,7 @@ def test_what_was_filmed_has_the_footage_s_bits(step, dtype):
     assert (source.width, source.transfer, film.step) == (film.width, "srgb", 1)
     for index in (3, 0, 7, 1):
         for read in (source.read, source.decoded, SmoothSource(film, step).decoded):
-            np.testing.assert_array_equal(read(index * step), film.picture(index))
+            np.testing.assert_array_equal(as_rgba(read(index * step)), film.picture(index))
 
 
 @pytest.mark.parametrize("step", [2, 4, 8])
@@ -85,7 +85,7 @@ def test_at_a_cut_moments_are_the_nearer_frame():
 def test_between_equal_frames_is_that_frame(monkeypatch):
     film = Panned(2)
     film.picture = lambda _index: pan(5)
-    monkeypatch.setattr(flow, "FLOW", None)  # none is needed
+    monkeypatch.setattr(flow, "_dis", None)  # no flow is needed
     for moment in range(9):
         np.testing.assert_array_equal(SmoothSource(film, 8).read(moment), pan(5))
 
@@ -165,18 +165,27 @@ def test_a_film_of_one_frame():
     np.testing.assert_array_equal(source.read(0), pan(0))
 
 
-def test_of_a_movie_filmed_frames_come_as_they_were_decoded(bunny):
+def test_moments_come_with_the_frames_around_them():
+    """Which are sent once for all of a pair, and of which a device makes the moment."""
+    film = Panned()
+    source = SmoothSource(film, 4)
+    moments = [source.decoded(index) for index in (9, 10, 11)]
+    assert [(each.pair, each.number, each.steps) for each in moments] == [(2, 1, 4), (2, 2, 4), (2, 3, 4)]
+    for each, index in zip(moments, (9, 10, 11), strict=True):
+        np.testing.assert_array_equal(each.rgba(), source.read(index))
+        for end, frame_ in zip(each.ends, moments[0].ends, strict=True):
+            assert end is frame_
+
+
+def test_of_a_movie(bunny):
+    """Through all that a renderer reads it by."""
     with open_source(bunny) as movie, ShotSource(PrefetchSource(SmoothSource(movie, 4), planes=True), 4) as source:
         assert source.count == 4 * (movie.count - 1) + 1
-        smooth_source = SmoothSource(movie, 4)
-        assert type(smooth_source.decoded(20)) is type(movie.decoded(5)) is not np.ndarray
+        alone = SmoothSource(movie, 4)
+        for index in (20, 22, 24):
+            np.testing.assert_array_equal(source.read(index), alone.read(index))
         for index in (20, 24):
-            np.testing.assert_array_equal(as_rgba(smooth_source.decoded(index)), movie.read(index // 4))
             np.testing.assert_array_equal(source.read(index), movie.read(index // 4))
-        moment = smooth_source.read(22)
-        np.testing.assert_array_equal(source.read(22), moment)
-        assert isinstance(smooth_source.decoded(20), np.ndarray)  # which is there already
-        np.testing.assert_array_equal(smooth_source.decoded(20), movie.read(5))
 
 
 # How many moments there are
