@@ -23,7 +23,6 @@ HALF_MAX = 65504  # the largest value of a half float, which infinite samples co
 # Levels of 255 by which the ends of a vector may differ that carries something, in pictures that are GREY on average or
 # brighter; in darker ones in proportion, but for noise.
 UNLIKE, GREY, NOISE = 24.0, 90.0, 4.0
-AROUND = 3  # vectors, over which it is averaged how surely a frame shows something
 SHARED = 0.5  # of all vectors, in both directions, have to
 
 
@@ -133,8 +132,7 @@ class _Paths:
         arrived = np.dstack([cost, other]) < np.inf
         vectors = _filled(vectors.astype(np.float32), arrived.any(axis=2))
         stored = np.rint(UNIT * vectors).clip(-ZERO, ZERO - 1) + ZERO
-        shown = cv2.blur(255 * arrived.astype(np.float32), (AROUND, AROUND))
-        return np.dstack([stored, np.rint(shown)]).astype(np.uint16)
+        return np.dstack([stored, 255 * arrived]).astype(np.uint16)
 
     def _carry(
         self, places: np.ndarray, vectors: np.ndarray, costs: np.ndarray, t: float
