@@ -38,6 +38,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 from quality import similarity
 
 from shutter_addon.core.frames import light
+from shutter_addon.core.frames.planes import as_rgba
 from shutter_addon.media import MediaError, flow, open_source
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -58,7 +59,7 @@ def codes(picture: np.ndarray) -> np.ndarray:
 def by_flow(kept, factor):
     opaque = [np.dstack([frame, np.full(frame.shape[:2], 255, np.uint8)]) for frame in kept]
     pairs = (flow.Between(*pair) for pair in pairwise(opaque))  # of which one is kept
-    return [[pair.at(k / factor)[..., :3] for k in range(1, factor)] for pair in pairs]
+    return [[as_rgba(pair.moment(0, k, factor))[..., :3] for k in range(1, factor)] for pair in pairs]
 
 
 def blend(kept, factor):

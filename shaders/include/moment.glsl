@@ -7,11 +7,11 @@
 // What the vectors say of a pixel, 16 times as large.
 ivec4 spread_at(ivec2 pixel) {
   ivec2 last = textureSize(vectors, 0).xy - 1, place = pixel / APART, part = pixel - place * APART;
-  ivec2 next = min(place + 1, last);
+  ivec2 beside = min(place + 1, last);
   ivec4 above = ivec4(texelFetch(vectors, ivec3(place, 0), 0)) * (APART - part.x) +
-                ivec4(texelFetch(vectors, ivec3(next.x, place.y, 0), 0)) * part.x;
-  ivec4 below = ivec4(texelFetch(vectors, ivec3(place.x, next.y, 0), 0)) * (APART - part.x) +
-                ivec4(texelFetch(vectors, ivec3(next, 0), 0)) * part.x;
+                ivec4(texelFetch(vectors, ivec3(beside.x, place.y, 0), 0)) * part.x;
+  ivec4 below = ivec4(texelFetch(vectors, ivec3(place.x, beside.y, 0), 0)) * (APART - part.x) +
+                ivec4(texelFetch(vectors, ivec3(beside, 0), 0)) * part.x;
   return above * (APART - part.y) + below * part.y;
 }
 
