@@ -23,11 +23,11 @@ vec4 cubic_weights(float x) {
   return vec4(before, here, after, 1.0 - before - here - after);
 }
 
-vec3 row_at(sampler2DArray frame, ivec4 columns, int row, vec4 weights) {
-  return texelFetch(frame, ivec3(columns.x, row, 0), 0).rgb * weights.x +
-         texelFetch(frame, ivec3(columns.y, row, 0), 0).rgb * weights.y +
-         texelFetch(frame, ivec3(columns.z, row, 0), 0).rgb * weights.z +
-         texelFetch(frame, ivec3(columns.w, row, 0), 0).rgb * weights.w;
+vec3 row_at(sampler2DArray frame, ivec4 columns, int row, vec4 shares) {
+  return texelFetch(frame, ivec3(columns.x, row, 0), 0).rgb * shares.x +
+         texelFetch(frame, ivec3(columns.y, row, 0), 0).rgb * shares.y +
+         texelFetch(frame, ivec3(columns.z, row, 0), 0).rgb * shares.z +
+         texelFetch(frame, ivec3(columns.w, row, 0), 0).rgb * shares.w;
 }
 
 // A frame at a place in 1 / UNIT of a pixel, in levels of 8 bits.
