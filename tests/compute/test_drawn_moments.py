@@ -1,0 +1,146 @@
+"""Moments between filmed frames, which devices make of the two frames and their vectors, beside the reference."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+from test_composition import LEVEL, ROUNDED, Footage, device, few_pieces, state  # noqa: F401
+
+from shutter_addon.compute import running_sums
+from shutter_addon.compute.renderer import Renderer
+from shutter_addon.compute.request import Request
+from shutter_addon.core.frames import light
+from shutter_addon.core.model import shutters, windows
+from shutter_addon.core.model.frame_state import FrameState, Options
+from shutter_addon.core.pixels import compositor
+from shutter_addon.media.smooth import SmoothSource
+
+STEPS = 4
+
+
+def film(rng, count=6, size=(53, 38), dtype=np.uint8):
+    """Soft blocks that move, each picture with some that stand still, and a cut before the last."""
+    blocks = rng.integers(0, 256, (2, size[1] // 6 + 4, size[0] // 6 + 8, 3)).repeat(6, 1).repeat(6, 2)
+    for axis in (1, 2):
+        blocks = sum(np.roll(blocks, k, axis) for k in range(-2, 3)) / 5
+    frames = np.empty((count, size[1], size[0], 4))
+    for k, frame in enumerate(frames):
+        wide = blocks[int(k == count - 1)]
+        frame[..., :3] = wide[2 : 2 + size[1], 3 * k : 3 * k + size[0]]
+        frame[2:8, 4:14, :3] = wide[:6, :10]
+    frames[..., 3] = 255
+    most = np.iinfo(dtype).max if np.dtype(dtype).kind == "u" else 1
+    found = Footage((frames / 255 * most).round(0 if most > 1 else 6).astype(dtype))
+    found.fps, found.options = None, {}
+    return found
+
+
+def compared(device, source, moment, index, direction=1):  # noqa: F811
+    """A device's picture, and the reference's of the same frames and moments as they are read."""
+    renderer = Renderer(device, source)
+    asked = Request(index, moment, direction)
+    picture, mix = renderer.picture(asked), renderer.coefficients(asked).astype(float)
+    renderer.release_window()
+    frames = np.stack([source.read(k) for k in range(source.count)])
+    moment = windows.slid(moment, index, direction, range(source.count))
+    indices = windows.indices(moment.options, index, range(source.count), direction)
+    seen = Footage(frames).linear()[np.maximum(indices, 0)]
+    return picture, compositor.compose(moment, seen, indices >= 0, mix / mix.sum(axis=0))
+
+
+def check(device, source, moment, index, direction=1):  # noqa: F811
+    picture, expected = compared(device, source, moment, index, direction)
+    difference = np.abs(light.to_encoded(picture.astype(np.float64)) - light.to_encoded(expected))
+    assert difference.max() <= LEVEL
+    return picture
+
+
+def smooth(moment, steps=STEPS, direction=1):
+    """The state of filmed frames, in moments."""
+    bars = np.stack([shutters.smoothed(row, steps, backward=direction < 0) for row in moment.bars])
+    return dataclasses.replace(
+        moment, bars=bars, options=dataclasses.replace(moment.options, window=len(bars[0]), step=steps)
+    )
+
+
+@pytest.mark.parametrize("steps", [2, 4, 16])
+@pytest.mark.parametrize("size", [(53, 38), (64, 40), (17, 9)])  # which vectors divide or do not; too few for any
+def test_a_moment_alone(device, size, steps):  # noqa: F811
+    """Of each moment, the picture is what `read` gives."""
+    source = SmoothSource(film(np.random.default_rng(1), size=size), steps)
+    for index in (1, steps // 2, steps + 1, 3 * steps - 1, 5 * steps - 1, source.count - 1):
+        alone = FrameState(Options(1, step=steps), np.ones((1, 1)))
+        picture = Renderer(device, source).picture(Request(index, alone))
+        wanted = Footage(source.read(index)[None]).linear()[0]
+        apart = np.abs(light.to_encoded(picture.astype(np.float64)) - light.to_encoded(wanted))
+        assert apart.max() <= 1.1 * LEVEL
+        assert (apart > ROUNDED * LEVEL).mean() < 0.01  # where a level is rounded the other way
+
+
+@pytest.mark.parametrize("light_", ["linear", "encoded"])
+@pytest.mark.parametrize("direction", [1, -1])
+@pytest.mark.parametrize("edges", ["hold", "mirror", "shorten", "slide"])
+def test_smooth_bars(device, edges, direction, light_):  # noqa: F811
+    rng = np.random.default_rng(2)
+    source = SmoothSource(film(rng), STEPS)
+    moment = smooth(few_pieces(rng, 4, edges=edges, light=light_, position="center"), direction=direction)
+    for index in (0, 2 * STEPS, 2 * STEPS + 1, source.count - 1):
+        check(device, source, moment, index, direction)
+
+
+@pytest.mark.parametrize("interpolation", ["displacement", "value"])
+def test_bars_of_many_pieces(device, interpolation):  # noqa: F811
+    rng = np.random.default_rng(3)
+    source = SmoothSource(film(rng), STEPS)
+    check(device, source, smooth(state(rng, 5, interpolation=interpolation)), STEPS)
+
+
+@pytest.mark.parametrize("dtype", [np.uint16, np.float16, np.float32])
+def test_samples_of_other_types(device, dtype):  # noqa: F811
+    """Which are sent as they are read."""
+    rng = np.random.default_rng(4)
+    source = SmoothSource(film(rng, dtype=dtype), STEPS)
+    check(device, source, smooth(few_pieces(rng, 4)), STEPS)
+
+
+def test_what_is_sharp_has_the_filmed_frames_bits(device):  # noqa: F811
+    """At any number of moments."""
+    rng = np.random.default_rng(5)
+    plain = film(rng)
+    still = FrameState(Options(3), np.array([[1.0, 0, 0]]))
+    wanted = Renderer(device, plain).picture(Request(2, still)).copy()
+    for steps in (2, 8, 16):
+        source = SmoothSource(plain, steps)
+        picture = Renderer(device, source).picture(Request(2 * steps, smooth(still, steps)))
+        np.testing.assert_array_equal(picture, wanted)
+
+
+def test_a_window_that_slides_is_one_that_was_just_opened(device):  # noqa: F811
+    """Onwards, back and far away: whatever is left on the device of other pairs of frames."""
+    rng = np.random.default_rng(6)
+    source = SmoothSource(film(rng), STEPS)
+    moment, kept = smooth(few_pieces(rng, 3)), Renderer(device, source)
+    for index in (0, 4, 5, 8, 4, 3, 16, 0):
+        own = Renderer(device, SmoothSource(film(np.random.default_rng(6)), STEPS))
+        asked = Request(index, moment)
+        np.testing.assert_array_equal(kept.picture(asked), own.picture(asked))
+        own.release_window()
+
+
+def test_filmed_frames_of_a_pair_are_sent_once(gpu_device, monkeypatch):
+    """With the vectors of each moment, a sixteenth of a picture."""
+    from shutter_addon.compute.gpu import GPUCompositor
+
+    sent, own = [], running_sums.Sums._filmed
+
+    def noted(sums, number, frame):
+        before = dict(sums._sent)
+        texture = own(sums, number, frame)
+        sent.extend([number] if sums._sent != before else [])
+        return texture
+
+    monkeypatch.setattr(running_sums.Sums, "_filmed", noted)
+    source = SmoothSource(film(np.random.default_rng(7)), 8)
+    moment = smooth(FrameState(Options(4), np.ones((1, 4))), 8)
+    Renderer(GPUCompositor(gpu_device), source).picture(Request(0, moment))
+    assert sent == [0, 1, 2, 3]
