@@ -11,6 +11,7 @@ from test_shutters import light
 from shutter_addon.core.model import presets, windows
 from shutter_addon.core.model.clip import Clip
 from shutter_addon.core.model.state_at import state_at
+from shutter_addon.core.pixels import combined
 
 CLIP = Clip(width=160, height=100, count=40)
 STEPS = [1, 2, 4, 8, 16]
@@ -86,3 +87,22 @@ def test_each_shutter_has_as_much_light_as_its_bars(steps):
     _index, found = state(bars, steps)
     assert found.bars.sum(axis=1) == pytest.approx([4, 3, 8])
     assert found.options.window == 4 * steps
+
+
+@pytest.mark.parametrize("direction", [1, -1])
+@pytest.mark.parametrize("steps", STEPS)
+@pytest.mark.parametrize("mode", ["lightest", "darkest"])
+def test_trails_of_light_are_as_bright_as_their_lights(mode, steps, direction):
+    """A moment counts as much as the frame that it is nearest to, halfway as the mean of both."""
+    bars = [1, 1, 0, 4, 2, 0, 4]
+    index, found = state([{"bars": bars, "combine": mode}], steps, direction=direction)
+    counts = combined.counts(found.combines[0], found.bars, np.ones(1), "displacement")
+    at = windows.positions(found.options, index, direction)
+    near = [19 * steps + direction * k * steps for k in range(len(bars))]
+    wanted = {}
+    for place in at:
+        beside = [k for k, frame in enumerate(near) if abs(frame - place) <= steps / 2]
+        between = [k for k, frame in enumerate(near) if abs(frame - place) < steps]
+        is_open = all(bars[k] for k in between) and (len(between) == 2 or place in near)
+        wanted[int(place)] = np.mean([bars[k] for k in beside]) / 4 if is_open else 0.0
+    assert dict(zip(map(int, at), counts, strict=True)) == pytest.approx(wanted)

@@ -266,6 +266,16 @@ def test_in_one_step_bars_are_what_they_are(bars):
     assert shutters.filmed(bars[0], 1, "end").tolist() == bars[0].tolist()
 
 
+@given(bars_lists(most=1), STEPS, st.booleans())
+def test_a_level_streak_has_the_same_light(bars, steps, backward):
+    """Open where the other is; and filmed frames stand to one another as their bars."""
+    found = shutters.smoothed(bars[0], steps, backward=backward, level=True)
+    assert found.sum() == pytest.approx(bars[0].sum())
+    assert ((found > 0) == (shutters.smoothed(bars[0], steps, backward=backward) > 0)).all()
+    frames = found[steps - 1 :: steps] if backward else found[::steps]
+    assert frames / frames.max() == pytest.approx(bars[0] / bars[0].max())
+
+
 def test_what_is_sharp_stays_so_and_a_box_is_one_streak():
     assert exposed(shutters.smoothed([0, 0, 3, 0], 8), 8) == {96: 3}
     assert exposed(shutters.smoothed([0, 0, 3, 0], 8, backward=True), 8, direction=-1) == {64: 3}

@@ -184,7 +184,7 @@ def spanning(bars: ArrayLike, start: float, end: float) -> np.ndarray:
     return np.diff(np.maximum.accumulate(total))  # by rounding alone would it fall
 
 
-def smoothed(bars: ArrayLike, steps: int, *, backward: bool = False) -> np.ndarray:
+def smoothed(bars: ArrayLike, steps: int, *, backward: bool = False, level: bool = False) -> np.ndarray:
     """Spread bars (L,) over the moments between filmed frames.
 
     Where two neighbouring bars are open, light between their frames counts: each spreads its weight evenly over the
@@ -193,6 +193,7 @@ def smoothed(bars: ArrayLike, steps: int, *, backward: bool = False) -> np.ndarr
     Args:
         steps: moments from a filmed frame to the next, 1 or an even number
         backward: whether the source plays in reverse, so that a bar's frame is the last of its moments
+        level: moments are as high beside one another as their bars, for who takes the lightest of all
 
     Returns:
         Weights (L · steps,) of the same sum. Moment k · steps is filmed frame k, backward k · steps + steps − 1.
@@ -201,22 +202,22 @@ def smoothed(bars: ArrayLike, steps: int, *, backward: bool = False) -> np.ndarr
     if steps == 1:
         return bars
     if backward:
-        return smoothed(bars[::-1], steps)[::-1]
+        return smoothed(bars[::-1], steps, level=level)[::-1]
     is_open = bars > 0
     after = is_open & np.append(is_open[1:], False)
     before = np.append(False, after[:-1])
     sides = before.astype(int) + after
-    share = bars / np.maximum(sides, 1)
+    share = bars if level else bars / np.maximum(sides, 1)
     half = np.ones(steps // 2 + 1)
     half[[0, -1]] = 0.5  # the frame, and the middle of the interval, lie half in this half interval
-    half /= half.sum()
+    half /= 1 if level else half.sum()
     frames = np.arange(len(bars)) * steps
     moments = np.zeros(len(bars) * steps)
-    moments[frames] = np.where(sides == 0, bars, share * sides * half[0])
+    moments[frames] = bars if level else np.where(sides == 0, bars, share * sides * half[0])
     for step, part in enumerate(half[1:], 1):
         moments[frames[after] + step] += share[after] * part
         moments[frames[before] - step] += share[before] * part
-    return moments
+    return moments * (bars.sum() / moments.sum()) if level else moments
 
 
 def held(bars: ArrayLike, steps: int) -> np.ndarray:

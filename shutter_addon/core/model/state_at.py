@@ -44,7 +44,7 @@ def _in_moments(effect: Effect, state: FrameState, steps: int, direction: int) -
     bars = [
         shutters.held(row, steps)
         if shutter.length == "timeline" or shutter.has_trail
-        else shutters.smoothed(row, steps, backward=direction < 0)
+        else shutters.smoothed(row, steps, backward=direction < 0, level=shutter.combine in ("lightest", "darkest"))
         for shutter, row in zip(effect.shutters, state.bars, strict=True)
     ]
     options = replace(state.options, window=state.options.window * steps, step=steps)
