@@ -119,6 +119,35 @@ def make(seed: int, mixed: bool = False) -> Case:
     return Case(seed, json.dumps(recipe, indent=1), frame, kind, stored, int(rng.integers(count)), direction, mattes)
 
 
+def make_smooth(seed: int) -> Case:
+    """The case of a seed whose frames are moments, of which some were filmed. Its recipe has nothing that goes by time
+    or by place: of these, this is no reference."""
+    case, rng = make(seed), np.random.default_rng([seed, 8])
+    recipe = json.loads(case.recipe)
+    for name in ("time", "camera", "edge_aware", "plate_reach", "decontaminate"):
+        recipe.pop(name, None)
+    recipe["regions"] = [region for region in recipe["regions"] if region["kind"] in ("line", "lasso", "outline")]
+    for each in (*recipe["shutters"], *recipe["regions"]):
+        for name in ("follow", "trail", "layer", "combine", "by_luminance", "threshold", "softness"):
+            each.pop(name, None)
+    recipe["inbetween"] = int(choose(rng, 2, 4, 8)) if recipe["window"] <= 11 else 2
+    add_combining(rng, recipe, len(case.stored), mixed=True)
+    direction = -1 if rng.random() < 0.4 else 1
+    if any("threshold" in shutter for shutter in recipe["shutters"]):
+        direction = 1  # in reverse it is the window's first moment that is shown whatever counts
+    last = (len(case.stored) - 1) // recipe["inbetween"] * recipe["inbetween"]  # the last filmed frame
+    return Case(
+        seed,
+        json.dumps(recipe, indent=1),
+        case.frame,
+        case.kind,
+        case.stored[: last + 1],
+        min(case.index, last),
+        direction,
+        mattes={},
+    )
+
+
 # Recipes
 
 
@@ -218,7 +247,7 @@ def add_combining(rng, recipe: dict, count: int, mixed: bool) -> None:
 
 def add_others(rng, recipe: dict, count: int) -> None:
     """What the reference knows nothing of: how motion is followed, lengths on the timeline, opacities of scribbles,
-    equal names, in-between frames, colours of edges."""
+    equal names, moments between frames, colours of edges."""
 
     def share():
         return choose(rng, 1, 0, round(rng.random(), 3), random_numbers(rng, count, 1))
@@ -275,7 +304,7 @@ def random_recipe(rng, count: int) -> dict:
     names = ["Default", "B", "ü", "D d", "E", "F"][: choose(rng, 1, 2, 2, 3, 3, 4, 5, 6)]
     scale = choose(rng, 1, 1, 0.01, 50)
     recipe = {
-        "version": 1,
+        "version": 2,
         "window": window,
         "position": choose(rng, "start", "center", "end"),
         "interpolation": choose(rng, "displacement", "displacement", "value"),

@@ -74,11 +74,13 @@ def check(case: Case, devices: dict, folder: Path) -> dict:
     """How far each device is off, as {device: (picture, coefficients)}. DifferenceError: too far; what differs is left
     in the folder."""
     from shutter_addon.compute.renderer import Renderer
+    from shutter_addon.core.frames.source_wrapper import SourceWrapper
     from shutter_addon.media import open_source
     from shutter_addon.media.matte_values import MatteValues
 
     recipe, found = json.loads(case.recipe), {}
-    with tempfile.TemporaryDirectory() as files, open_source(write(case, Path(files))) as source:
+    with tempfile.TemporaryDirectory() as files, SourceWrapper(open_source(write(case, Path(files)))) as source:
+        source.step = recipe.get("inbetween", 1)
         footage, asked = case.footage(samples_of(case, source)), asked_of(case, source, Path(files))
         index, direction = shown(recipe, case.frame, source.count) if "time" in recipe else (case.index, case.direction)
         if (index, direction) != (asked.index, asked.direction):
@@ -100,7 +102,8 @@ def check(case: Case, devices: dict, folder: Path) -> dict:
 
 
 def is_referable(case: Case) -> bool:
-    """Whether the reference knows all that the recipe has: it has no in-between frames, and no estimate of colours."""
+    """Whether the reference knows all that the recipe has: it has no moments between frames, of which the reference
+    knows the weights alone, and no estimate of colours."""
     recipe = json.loads(case.recipe)
     return recipe.get("inbetween", 1) == 1 and not ("plate_reach" in recipe and recipe["decontaminate"])
 

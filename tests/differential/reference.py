@@ -7,6 +7,8 @@ pictures.
 
 What neither the paper nor the manual says is taken from the product; these are decisions, not results:
 - a line is never thinner than √2 pixels; so is the outline of a lasso that encloses no pixel's centre;
+- halfway between two filmed frames, the lightest and the darkest count the mean of both bars; in reverse a window's
+  first moments are those behind its first filmed frame;
 - with `aggregate` scribbles are drawn into the grid of blocks as if it was the picture;
 - what is mirrored shows the clip's first and last frame once;
 - of a shutter that "shorten" leaves nothing of, the frame is shown that is nearest to the middle of its exposure, and
@@ -59,6 +61,7 @@ DEFAULTS = {
     "aggregate": 1,
     "border": False,
     "plate_reach": 48,
+    "inbetween": 1,
 }
 LEAST_RADIUS = 0.7072
 NOTHING = 1e-6  # less of an exposure than this is nothing
@@ -593,11 +596,18 @@ def cubic(t):
 
 def positions(recipe, index, direction, count):
     """Which source frames the window's frames are, were the clip endless."""
-    length = recipe["window"]
+    length, steps = recipe["window"], option(recipe, "inbetween")
     before = {"start": 0, "center": (length - 1) // 2, "end": length - 1}[option(recipe, "position")]
-    places = [index + direction * (k - before) for k in range(length)]
-    by = into(places, count) if option(recipe, "edges") == "slide" else 0
+    first = index - direction * before * steps + (steps - 1 if direction < 0 else 0)
+    places = [first + direction * k for k in range(length * steps)]
+    by = into(places, lasting(recipe, count)) if option(recipe, "edges") == "slide" else 0
     return [place + by for place in places]
+
+
+def lasting(recipe, count):
+    """How many moments a clip has whose last filmed frame lasts as long as others."""
+    steps = option(recipe, "inbetween")
+    return -(-count // steps) * steps
 
 
 def into(places, count):
@@ -615,7 +625,7 @@ def slid(recipe, bars, places, there, count):
     moved = np.zeros_like(bars)
     for own, found in zip(bars, moved, strict=True):
         first, *_, last = [k for k in range(len(own)) if own[k] > 1e-9 * own.sum()] * 2  # rounding leaves some
-        by = into([places[first], places[last]], count)
+        by = into([places[first], places[last]], lasting(recipe, count))
         for k in range(first, last + 1):
             found[there.index(places[k] + by)] = own[k]
     return moved
@@ -848,6 +858,9 @@ def opened(recipe, frame, index, direction, count, aspect):
     """The bars (N, L) of all shutters as they are open, and the turns and shifts (2, N, L), or None, of `motions`."""
     shutters = recipe["shutters"]
     bars = np.array([bars_at(shutter, frame, option(recipe, "interpolation")) for shutter in shutters])
+    if (steps := option(recipe, "inbetween")) > 1:
+        ways = [shutter.get("combine", "average") for shutter in shutters]
+        bars = np.array([in_moments(own, steps, direction, way) for own, way in zip(bars, ways, strict=True)])
     for i, shutter in enumerate(shutters):
         if shutter.get("length") == "timeline":
             bars[i] = on_timeline(recipe, bars[i], frame, index, direction, count)
@@ -863,6 +876,32 @@ def opened(recipe, frame, index, direction, count, aspect):
         if shutter.get("follow") == "camera" and share < 1:
             bars[i] = influenced(bars[i], share, shown_time)
     return slid(recipe, bars, where, where, count), moves
+
+
+def in_moments(bars, steps, direction, way):
+    """What each moment has of the bars of filmed frames: of its own time, a step long, as much as lies in the half
+    intervals between frames whose bars are open, over which these are spread; or of what is lightest or darkest as much
+    as the frames count that are nearest."""
+    length, found = len(bars), np.zeros(len(bars) * steps)
+    frames = np.arange(length) * steps + (steps - 1 if direction < 0 else 0)
+    alone = [not any(0 <= j < length and bars[j] > 0 for j in (k - 1, k + 1)) for k in range(length)]
+    for moment in range(length * steps):
+        for k, frame in enumerate(frames):
+            for j in (k - 1, k + 1):
+                if not (0 <= j < length and bars[k] > 0 and bars[j] > 0):
+                    continue
+                half = sorted((frame, (frame + frames[j]) / 2))
+                if way in ("lightest", "darkest"):
+                    is_half = moment == (frame + frames[j]) / 2
+                    found[moment] = found[moment] + bars[k] / 2 if is_half else found[moment]
+                    found[moment] = bars[k] if half[0] <= moment <= half[1] and not is_half else found[moment]
+                    continue
+                share = sum(0 <= n < length and bars[n] > 0 for n in (k - 1, k + 1))
+                part = overlap(moment - 0.5, moment + 0.5, *half) / (steps / 2)
+                found[moment] += bars[k] * part / share
+            if alone[k] and moment == frame:
+                found[moment] += bars[k]
+    return found * (bars.sum() / found.sum())
 
 
 def on_timeline(recipe, bars, frame, index, direction, count):

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from cases import KINDS, make
+from cases import KINDS, make, make_smooth
 from compare import PICTURE, DifferenceError, can_be_a_film, check, check_films, check_mixed, open_devices, within
 from reference import DEFAULTS, layers_at, picture, shown
 
@@ -49,11 +49,11 @@ def blenders_devices():
     gc.collect()
 
 
-def differences(seeds, devices, folder, mixed=False) -> list[str]:
+def differences(seeds, devices, folder, mixed=False, of=make) -> list[str]:
     errors = []
     for seed in seeds:
         try:
-            (check_mixed if mixed else check)(make(seed, mixed), devices, folder)
+            (check_mixed if mixed else check)(make(seed, mixed) if mixed else of(seed), devices, folder)
         except DifferenceError as error:
             errors.append(str(error))
     return errors
@@ -62,6 +62,13 @@ def differences(seeds, devices, folder, mixed=False) -> list[str]:
 @pytest.mark.parametrize("first", SEEDS[::BATCH])
 def test_pictures_and_coefficients(devices, first, tmp_path):
     errors = differences(range(first, first + BATCH), devices, tmp_path)
+    assert not errors, "\n".join(errors)
+
+
+@pytest.mark.parametrize("first", SEEDS[::BATCH])
+def test_pictures_of_moments(devices, first, tmp_path):
+    """Bars count filmed frames, and what lies between two that are open counts as well."""
+    errors = differences(range(first, first + BATCH), devices, tmp_path, of=make_smooth)
     assert not errors, "\n".join(errors)
 
 
@@ -255,6 +262,24 @@ def test_planted_faults_are_found(monkeypatch, fault, tmp_path):
         names = sorted(path.name for path in place.iterdir())
         assert names == ["difference-x64.png", "made.exr", "recipe.json", "right.exr"]
         assert again.endswith(f"tests/differential/compare.py {place.name.partition('-')[0]} --ways cpu")
+
+
+SMOOTH_FAULTS = {
+    "bars that last until the next frame": lambda bars, steps, **_: shutters.held(bars, steps),
+    "frames alone": lambda bars, steps, backward=False, **_: np.insert(
+        np.zeros((len(bars), steps - 1)), (steps - 1) * backward, bars, axis=1
+    ).ravel(),
+    "nothing in reverse": lambda bars, steps, level=False, **_: smoothed(bars, steps, level=level),
+    "trails of half the light": lambda bars, steps, backward=False, **_: smoothed(bars, steps, backward=backward),
+}
+smoothed = shutters.smoothed
+
+
+@pytest.mark.parametrize("fault", SMOOTH_FAULTS)
+def test_planted_faults_of_moments_are_found(monkeypatch, fault, tmp_path):
+    monkeypatch.setattr(shutters, "smoothed", SMOOTH_FAULTS[fault])
+    errors = differences(range(40), open_devices(["cpu"]), tmp_path, of=make_smooth)
+    assert any("/255 off" in error for error in errors)
 
 
 MIXED_FAULTS = {
