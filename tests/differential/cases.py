@@ -52,7 +52,8 @@ class Case:
     """A recipe (JSON), the timeline frame to be shown, and footage: arrays (count, H, W, 4) as they are stored.
 
     mattes: those that the recipe reads, by path, as the footage
-    index, direction: the source frame where the recipe has no time keys, and whether the source runs backward."""
+    index, direction: the source frame where the recipe has no time keys, and whether the source runs backward
+    again: what compare.py has to be told beside the seed to make the case"""
 
     seed: int
     recipe: str
@@ -62,6 +63,7 @@ class Case:
     index: int
     direction: int
     mattes: dict[str, np.ndarray]
+    again: str = ""
 
     def footage(self, stored=None) -> Footage:
         """As the reference has it."""
@@ -116,7 +118,10 @@ def make(seed: int, mixed: bool = False) -> Case:
     direction = -1 if rng.random() < 0.25 else 1
     if mixed and kind.samples.startswith("uint") and rng.random() < 0.3:
         stored[int(rng.integers(count)) :, ..., :3] //= 8  # a cut
-    return Case(seed, json.dumps(recipe, indent=1), frame, kind, stored, int(rng.integers(count)), direction, mattes)
+    again = " --mixed" if mixed else ""
+    return Case(
+        seed, json.dumps(recipe, indent=1), frame, kind, stored, int(rng.integers(count)), direction, mattes, again
+    )
 
 
 def make_smooth(seed: int) -> Case:
@@ -145,6 +150,7 @@ def make_smooth(seed: int) -> Case:
         min(case.index, last),
         direction,
         mattes={},
+        again=" --smooth",
     )
 
 

@@ -1,6 +1,7 @@
 """Compares the product with the reference, one random case after the other:
 
-    .venv/bin/python tests/differential/compare.py SEED … [--ways cpu,gpu,blender,film] [--mixed] [--output DIR]
+    .venv/bin/python tests/differential/compare.py SEED … [--ways cpu,gpu,blender,film]
+        [--mixed | --smooth] [--output DIR]
 
 A picture may be 0.5/255 off, coefficients 1/255. How far a picture is off is the most of any channel of any pixel: in
 scene-linear light, or in the codes that a viewer sees (sRGB), whichever is more, both premultiplied; light above 1 in
@@ -8,7 +9,8 @@ proportion. Coefficients are judged by themselves, against exact ones. For pictu
 their tolerance alone moves a picture by more than its own, where shutters that are far apart in time meet in noise.
 
 --mixed: recipes that have every field with every other. What the reference knows nothing of is compared with NumPy's
-picture, see check_mixed. A seed may be a range: 1000:2000.
+picture, see check_mixed. --smooth: frames that are moments, of which some were filmed; films have none. A seed may be a
+range: 1000:2000.
 """
 
 import argparse
@@ -23,7 +25,7 @@ from functools import partial
 from pathlib import Path
 
 import numpy as np
-from cases import Case, make, write, write_image
+from cases import Case, make, make_smooth, write, write_image
 from OpenImageIO import ImageBuf
 from reference import (
     coefficients,
@@ -422,7 +424,7 @@ def within(tolerance: float, apart, case: Case, what: str, folder: Path, made, r
     raise DifferenceError(
         f"{told(case)}: {what} {255 * most:.3g}/255 off at row {y}, column {x}, channel {channel}: "
         f"{made[y, x, channel]:.6g} instead of {right[y, x, channel]:.6g}; pictures in {place}\n    "
-        f".venv/bin/python {Path(__file__).relative_to(ROOT)} {case.seed} --ways {what.partition('-')[0]}"
+        f".venv/bin/python {Path(__file__).relative_to(ROOT)} {case.seed} --ways {what.partition('-')[0]}{case.again}"
     )
 
 
@@ -438,7 +440,9 @@ def seeds_of(text: str) -> range:
 def main() -> int:
     parser = argparse.ArgumentParser(description="Compares pictures and coefficients of random recipes.")
     parser.add_argument("seeds", type=seeds_of, nargs="+", metavar="SEED")
-    parser.add_argument("--mixed", action="store_true", help="recipes that have every field with every other")
+    kinds = parser.add_mutually_exclusive_group()
+    kinds.add_argument("--mixed", action="store_true", help="recipes that have every field with every other")
+    kinds.add_argument("--smooth", action="store_true", help="frames that are moments, of which some were filmed")
     parser.add_argument("--ways", default="cpu,gpu", help="of cpu, gpu, blender, film (default: cpu,gpu)")
     parser.add_argument(
         "--output", type=Path, default=ROOT / "out" / "differential", metavar="DIR", help="for pictures"
@@ -446,10 +450,11 @@ def main() -> int:
     arguments = parser.parse_args()
     ways = arguments.ways.split(",")
     devices, failed = open_devices([way for way in ways if way != "film"]), False
-    for case in (make(seed, arguments.mixed) for seeds in arguments.seeds for seed in seeds):
+    made = make_smooth if arguments.smooth else partial(make, mixed=arguments.mixed)
+    for case in (made(seed) for seeds in arguments.seeds for seed in seeds):
         try:
             found = (check_mixed if arguments.mixed else check)(case, devices, arguments.output)
-            if "film" in ways and can_be_a_film(case):
+            if "film" in ways and not arguments.smooth and can_be_a_film(case):
                 films, errors = check_films([case], arguments.output)
                 found["film"] = films.get(case.seed)
                 for error in errors:
