@@ -226,8 +226,9 @@ def test_opencv_works_without_its_openssl(opencv, bunny, tmp_path):
 import sys; sys.path.insert(0, {str(tmp_path)!r})
 import socket, cv2, numpy
 assert cv2.__file__.startswith({str(tmp_path)!r})
-noise = numpy.random.default_rng(0).random((64, 64), numpy.float32)
-print(cv2.optflow.createOptFlow_DeepFlow().calc(noise, noise, None).shape)
+assert cv2.ximgproc  # of the contributed modules
+noise = numpy.random.default_rng(0).integers(0, 256, (64, 64), numpy.uint8)
+print(cv2.DISOpticalFlow_create().calc(noise, noise, None).shape)
 print(cv2.VideoCapture({str(bunny)!r}, cv2.CAP_FFMPEG).read()[1].shape)
 with socket.create_server(("127.0.0.1", 0)) as server:
     for scheme in ("https", "rtmps", "tls"):

@@ -102,6 +102,18 @@ def test_the_last_filmed_frame_lasts_as_long_as_others():
     assert found == [{36: 4}, {**dict.fromkeys(range(28, 36), 1), 36: 4}]
 
 
+@pytest.mark.parametrize("direction", [1, -1])
+def test_what_is_smooth_slides_by_whole_filmed_frames(direction):
+    """So that what is sharp is a filmed frame wherever it slides to, and a streak begins and ends with one."""
+    bars = [[0, 0, 0, 1, 0], [0, 0, 1, 1, 1]]
+    smooth = [shutters.smoothed(row, 4, backward=direction < 0) for row in bars]
+    index, shot = (36, range(20, 37)) if direction > 0 else (20, range(20, 40))
+    found = exposed(windows.slid(sliding(smooth, step=4), index, direction, shot), index, direction, shot)
+    assert found[0] == {index: 1}  # which lay behind the shot's end
+    assert (min(found[1]), max(found[1])) == ((28, 36) if direction > 0 else (20, 28))
+    assert sum(found[1].values()) == pytest.approx(3)
+
+
 @settings(max_examples=200, deadline=None)
 @given(
     st.integers(1, 9).flatmap(

@@ -622,9 +622,10 @@ def slid(recipe, bars, places, there, count):
     """Each shutter's bars, moved into the clip by itself. places: of the window; there: of that which has moved"""
     if option(recipe, "edges") != "slide":
         return bars
-    moved = np.zeros_like(bars)
+    moved, steps = np.zeros_like(bars), option(recipe, "inbetween")
     for own, found in zip(bars, moved, strict=True):
         first, *_, last = [k for k in range(len(own)) if own[k] > 1e-9 * own.sum()] * 2  # rounding leaves some
+        first, last = first // steps * steps, last // steps * steps + steps - 1  # of whole filmed frames
         by = into([places[first], places[last]], lasting(recipe, count))
         for k in range(first, last + 1):
             found[there.index(places[k] + by)] = own[k]

@@ -66,12 +66,11 @@ def parse(text: str) -> model.Effect:
         raise RecipeError(f"line {error.lineno}, column {error.colno}: not JSON ({error.msg})") from None
     except RecursionError:
         raise RecipeError("recipe: lists or objects within one another, too many") from None
-    if isinstance(data, dict) and type(version := data.get("version")) is int:
-        if version > records.VERSION:
-            newer = f"{shown(version)} is of a newer version of Virtual Shutter, this one reads {records.VERSION}"
-            raise RecipeError(f"version: {newer}")
-        if version == 1:
-            data.pop("inbetween_method", None)  # there is one way by now
+    if isinstance(data, dict) and type(version := data.get("version")) is int and version > records.VERSION:
+        newer = f"version: {shown(version)} is of a newer version of Virtual Shutter, this one reads {records.VERSION}"
+        raise RecipeError(newer)
+    if isinstance(data, dict) and data.get("version") == 1:
+        data.pop("inbetween_method", None)  # there is one way by now
     converter = _converter()
     try:
         recipe: Any = converter.structure(data, records.RecipeRecord)
