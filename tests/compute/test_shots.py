@@ -5,13 +5,14 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from test_composition import Footage, check, few_pieces, state
+from test_composition import SHAPES, Footage, check, few_pieces, state
 
 from shutter_addon.compute.renderer import Renderer, open_compositor
 from shutter_addon.compute.request import Request
-from shutter_addon.core.model import presets
+from shutter_addon.core.model import presets, shutters
 from shutter_addon.core.model.frame_state import FrameState, Options
 from shutter_addon.media.cuts import NEIGHBOURS, ShotSource
+from shutter_addon.media.smooth import SmoothSource
 
 LENGTHS = 7, 6, 9
 ENDS = np.cumsum((0, *LENGTHS))
@@ -134,7 +135,7 @@ BETWEEN = [0, 27, 51, 85]  # the middle one of a cut's pair of filmed frames, as
 
 
 def with_between(dtype=np.uint8) -> Footage:
-    """The film with random frames between its own."""
+    """The film with random moments between its frames."""
     filmed = film(dtype).frames
     rng = np.random.default_rng(48)
     noise = rng.random((len(filmed) * STEP - STEP + 1, *filmed.shape[1:]))
@@ -147,7 +148,7 @@ def with_between(dtype=np.uint8) -> Footage:
 @pytest.mark.parametrize("edges", ["hold", "mirror", "shorten", "slide"])
 @pytest.mark.parametrize("position", ["start", "center", "end"])
 @pytest.mark.parametrize("dtype", [np.uint8, np.float32])
-def test_in_betweens_are_of_the_shot_of_the_nearer_filmed_frame(device, edges, position, dtype):
+def test_moments_are_of_the_shot_of_the_nearer_filmed_frame(device, edges, position, dtype):
     rng = np.random.default_rng(49)
     for first, stop in pairwise(BETWEEN):
         for index, direction in ((first, 1), (first + 9, -1), (stop - 1, 1)):
@@ -200,3 +201,27 @@ def test_a_frame_that_cannot_be_read_is_missed_only_where_it_is_shown(device):
     renderer.picture(Request(2, last))
     with pytest.raises(MediaError, match="broken"):
         renderer.picture(Request(1, last))
+
+
+@pytest.mark.parametrize("brightness", [1.0, 0.25])
+@pytest.mark.parametrize("edges", ["hold", "mirror", "shorten", "slide"])
+def test_moments_show_nothing_of_the_next_shot(device, edges, brightness):
+    """Whatever that is: a smooth exposure ends with the last filmed frame of its own."""
+
+    def source(seed):
+        found = film()
+        found.fps, found.options = None, {}
+        texture = np.random.default_rng(seed).integers(0, 256, (7, 11, 3)).repeat(4, 0).repeat(4, 1)[:23, :37]
+        found.frames[ENDS[1] : ENDS[2], ..., :3] = [np.roll(texture, k, axis=1) for k in range(LENGTHS[1])]
+        found.frames[..., :3] = found.frames[..., :3] * brightness
+        return ShotSource(SmoothSource(found, STEP), STEP)
+
+    bars = np.stack([shutters.smoothed(bars, STEP) for bars in ([1, 1, 1, 1], [0, 1, 2, 0])])
+    moment = FrameState(Options(4 * STEP, edges=edges, step=STEP), bars, SHAPES[:1])
+    for index in (4 * STEP, 5 * STEP, 6 * STEP):
+        first, second = (Renderer(device, source(seed)) for seed in (1, 2))
+        picture = first.picture(Request(index, moment)).copy()
+        first.release_window()
+        np.testing.assert_array_equal(second.picture(Request(index, moment)), picture)
+        assert first.source.around(index, 0, 40).stop == BETWEEN[1]
+        second.release_window()
