@@ -2,6 +2,7 @@
 
 import gc
 import weakref
+from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
@@ -23,6 +24,7 @@ class Panned(FrameSource):
     """Pictures that move to the left, from a cut on other ones; it notes which were read, and which of them live."""
 
     transfer, alpha, options, fps = "srgb", "opaque", {"colour": "sRGB"}, 25
+    path = Path("pan.mov")
 
     def __init__(self, count=8, cut=None, dtype=np.uint8):
         self.count, self.cut, self.dtype, self.lost = count, cut, np.dtype(dtype), None
@@ -155,7 +157,7 @@ def test_a_lost_frame_is_one_sentence_until_it_is_back():
 
 @pytest.mark.parametrize("index", [-1, 29])
 def test_beyond_its_ends_is_nothing(index):
-    with pytest.raises(IndexError):
+    with pytest.raises(IndexError, match=r"pan\.mov: it has frames 0 to 28"):
         SmoothSource(Panned(), 4).read(index)
 
 
