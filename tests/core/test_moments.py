@@ -69,6 +69,18 @@ def test_bars_are_interpolated_before_they_are_spread():
     assert exposed([{"keys": keys}], 8) == pytest.approx({19 * 8 + 8: 1})
 
 
+@pytest.mark.parametrize("last", [10, 11, 12, 13])
+def test_what_rounding_leaves_beside_a_sharp_frame_makes_it_no_streak(last):
+    """Of a still frame that is keyed from one end of the window to the other, wherever it is a filmed one."""
+    bars = np.eye(last)[[0, last - 1]].tolist()
+    keys = [{"frame": 5, "bars": bars[0]}, {"frame": 5 + 3 * (last - 1), "bars": bars[1]}]
+    for at in range(last):
+        _index, found = state([{"keys": keys}], 8, frame=5 + 3 * at)
+        wanted = np.zeros(8 * last)
+        wanted[8 * at] = 1
+        assert found.bars[0] == pytest.approx(wanted, abs=1e-9)
+
+
 @pytest.mark.parametrize("steps", STEPS)
 @pytest.mark.parametrize("direction", [1, -1])
 def test_on_the_timeline_a_shape_has_the_same_time(steps, direction):

@@ -276,6 +276,12 @@ def test_a_level_streak_has_the_same_light(bars, steps, backward):
     assert frames / frames.max() == pytest.approx(bars[0] / bars[0].max())
 
 
+def test_what_rounding_leaves_opens_no_bar():
+    for level in (False, True):
+        moments = shutters.smoothed([1e-12, 1.0, 0.0, 1e-13], 8, level=level)
+        assert moments == pytest.approx(np.eye(32)[8], abs=1e-9)
+
+
 def test_what_is_sharp_stays_so_and_a_box_is_one_streak():
     assert exposed(shutters.smoothed([0, 0, 3, 0], 8), 8) == {96: 3}
     assert exposed(shutters.smoothed([0, 0, 3, 0], 8, backward=True), 8, direction=-1) == {64: 3}

@@ -884,6 +884,7 @@ def in_moments(bars, steps, direction, way):
     intervals between frames whose bars are open, over which these are spread; or of what is lightest or darkest as much
     as the frames count that are nearest."""
     length, found = len(bars), np.zeros(len(bars) * steps)
+    bars = np.where(bars > 1e-9 * bars.sum(), bars, 0)  # rounding leaves some
     frames = np.arange(length) * steps + (steps - 1 if direction < 0 else 0)
     alone = [not any(0 <= j < length and bars[j] > 0 for j in (k - 1, k + 1)) for k in range(length)]
     for moment in range(length * steps):

@@ -18,6 +18,8 @@ MAX_WINDOW = 256
 
 # Levels of z closer than this are one: float rounding of equal sums, far below any visible weight.
 _SAME = 1e-12
+# Of an exposure: rounding may leave as much in a bar that is closed.
+_CLOSED = 1e-9
 
 
 class ShutterError(ValueError):
@@ -203,7 +205,7 @@ def smoothed(bars: ArrayLike, steps: int, *, backward: bool = False, level: bool
         return bars
     if backward:
         return smoothed(bars[::-1], steps, level=level)[::-1]
-    is_open = bars > 0
+    is_open = bars > _CLOSED * bars.sum()
     after = is_open & np.append(is_open[1:], False)
     before = np.append(False, after[:-1])
     sides = before.astype(int) + after
