@@ -21,8 +21,7 @@ layout(r32ui) uniform readonly uimage2DArray luma, chroma;  // a software render
 uniform ivec2 chroma_step, luma_of, green_of;
 uniform int red_of, blue_of;
 #  elif MOMENT
-uniform sampler2DArray first_frame, second_frame;
-uniform usampler2DArray vectors;
+uniform sampler2DArray first_frame, second_frame, vectors;
 uniform ivec3 moment;
 #  else
 uniform sampler2DArray frame;

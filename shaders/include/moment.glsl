@@ -4,14 +4,16 @@
 #define UNIT 32  // of a coordinate, in a pixel
 #define ZERO 32768
 
+ivec4 stored_at(int x, int y) {
+  return ivec4(texelFetch(vectors, ivec3(x, y, 0), 0) * 65535.0 + 0.5);
+}
+
 // What the vectors say of a pixel, 16 times as large.
 ivec4 spread_at(ivec2 pixel) {
   ivec2 last = textureSize(vectors, 0).xy - 1, place = pixel / APART, part = pixel - place * APART;
   ivec2 beside = min(place + 1, last);
-  ivec4 above = ivec4(texelFetch(vectors, ivec3(place, 0), 0)) * (APART - part.x) +
-                ivec4(texelFetch(vectors, ivec3(beside.x, place.y, 0), 0)) * part.x;
-  ivec4 below = ivec4(texelFetch(vectors, ivec3(place.x, beside.y, 0), 0)) * (APART - part.x) +
-                ivec4(texelFetch(vectors, ivec3(beside, 0), 0)) * part.x;
+  ivec4 above = stored_at(place.x, place.y) * (APART - part.x) + stored_at(beside.x, place.y) * part.x;
+  ivec4 below = stored_at(place.x, beside.y) * (APART - part.x) + stored_at(beside.x, beside.y) * part.x;
   return above * (APART - part.y) + below * part.y;
 }
 

@@ -206,7 +206,7 @@ class Sums(Window):
 
     def _send_moment(self, moment: Moment) -> Given:
         first, second = (self._filmed(moment.pair + k, end) for k, end in enumerate(moment.ends))
-        vectors = self._extra.filled("vectors", [moment.vectors], "rgba16ui")
+        vectors = self._extra.filled("vectors", [moment.vectors], "rgba16")
         shift = (STEP**2 * moment.steps).bit_length() - 1
         return {
             "textures": {"first_frame": first, "second_frame": second, "vectors": vectors},
