@@ -34,11 +34,11 @@ vec3 row_at(sampler2DArray frame, ivec4 columns, int row, vec4 shares) {
 
 // A frame at a place in 1 / UNIT of a pixel, in levels of 8 bits.
 vec3 looked_up(sampler2DArray frame, ivec2 place) {
-  ivec2 last = textureSize(frame, 0).xy - 1, whole = place >> 5, part = place & (UNIT - 1);
+  ivec2 last = textureSize(frame, 0).xy - 1, corner = place >> 5, part = place & (UNIT - 1);
   if (part == ivec2(0)) {
-    return texelFetch(frame, ivec3(clamp(whole, ivec2(0), last), 0), 0).rgb;
+    return texelFetch(frame, ivec3(clamp(corner, ivec2(0), last), 0), 0).rgb;
   }
-  ivec4 columns = clamp(whole.x + ivec4(-1, 0, 1, 2), 0, last.x), rows = clamp(whole.y + ivec4(-1, 0, 1, 2), 0, last.y);
+  ivec4 columns = clamp(corner.x + ivec4(-1, 0, 1, 2), 0, last.x), rows = clamp(corner.y + ivec4(-1, 0, 1, 2), 0, last.y);
   vec4 across = cubic_weights(float(part.x) / float(UNIT)), down = cubic_weights(float(part.y) / float(UNIT));
   vec3 color = row_at(frame, columns, rows.x, across) * down.x + row_at(frame, columns, rows.y, across) * down.y +
                row_at(frame, columns, rows.z, across) * down.z + row_at(frame, columns, rows.w, across) * down.w;
