@@ -146,7 +146,7 @@ def test_recipes_have_all_that_a_recipe_may_have():
     values |= {"ease": 4, "redrawn": 2, "kind": 5, "shutters": 6, "time": 2, "direction": 2, "footage": len(KINDS)}
     values |= {"ramp": 4, "blend": 2, "timing": 2, "channel": 4}
     values |= {"combine": 3, "by_luminance": 1, "threshold": 2}
-    values |= {"follow": 2, "trail": 2, "edge_aware": 3, "layer": 2, "plate_reach": 4}
+    values |= {"follow": 2, "trail": 2, "edge_aware": 3, "layer": 2, "plate_reach": 4, "inbetween": 1}
     assert Counter(name for name, _ in seen) == values
     assert min(seen.values()) >= 5
     assert seen["layer", True] >= 0.4 * len(SEEDS)
