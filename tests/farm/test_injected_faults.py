@@ -29,7 +29,7 @@ WIDTH, HEIGHT = 128, 72
 JOB = "virtual_shutter_job.json"
 OLD = b"the film of last night"
 RECIPE = {
-    "version": 1,
+    "version": 2,
     "window": 8,
     "inbetween": 2,
     "shutters": [{"name": "Long", "bars": [1] * 8}, {"name": "Sharp", "bars": [1] + [0] * 7}],

@@ -69,6 +69,8 @@ def parse(text: str) -> model.Effect:
     if isinstance(data, dict) and type(version := data.get("version")) is int and version > records.VERSION:
         newer = f"version: {shown(version)} is of a newer version of Virtual Shutter, this one reads {records.VERSION}"
         raise RecipeError(newer)
+    if isinstance(data, dict) and data.get("version") == 1:
+        data.pop("inbetween_method", None)  # there is one way by now
     converter = _converter()
     try:
         recipe: Any = converter.structure(data, records.RecipeRecord)
