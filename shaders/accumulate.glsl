@@ -1,6 +1,7 @@
 // Adds a frame to the running sums, or takes it away: from the layer `known` to the layer `next`.
 // The frame: the one that was sent, in the light that is summed, `whole` for white,
 // with COVER weighted, its colours with NUMBERS in one of 0 to 2²⁴ − 1, R + 256 G + 65536 B;
+// with MOMENT one between two frames that were sent (include/moment.glsl);
 // with PLANES by the whole numbers of libswscale (core/frames/planes.py) from samples of luma and chroma;
 // or with AGAIN one that the sums hold already, between the layers `before` and `after`.
 layout(local_size_x = 8, local_size_y = 16) in;  // a tile
@@ -19,12 +20,19 @@ uniform sampler2DArray weights;
 layout(r32ui) uniform readonly uimage2DArray luma, chroma;  // a software renderer's texelFetch takes longer
 uniform ivec2 chroma_step, luma_of, green_of;
 uniform int red_of, blue_of;
+#  elif MOMENT
+uniform sampler2DArray first_frame, second_frame;
+uniform usampler2DArray vectors;
+uniform ivec3 moment;
 #  else
 uniform sampler2DArray frame;
 #  endif
 #endif
 #include "light.glsl"
 #include "sums.glsl"
+#if MOMENT
+#  include "moment.glsl"
+#endif
 
 #if PLANES
 // A texel has four samples, side by side.
@@ -54,6 +62,8 @@ void main() {
 #else
 #  if PLANES
   vec3 color = color_at(pixel + ivec2(0, top));
+#  elif MOMENT
+  vec3 color = moment_at(pixel + ivec2(0, top));
 #  else
   vec4 sent = texelFetch(frame, ivec3(pixel + ivec2(0, top), 0), 0);
 #    if NUMBERS

@@ -15,7 +15,7 @@ import numpy as np
 
 from ..core.frames import light
 from ..core.frames.frame_source import FrameSource
-from ..core.frames.planes import Planes, as_rgba
+from ..core.frames.planes import Decoded, as_rgba
 from ..core.frames.source_wrapper import SourceWrapper
 from ..core.memo import Memo
 from ..core.messages import UserError
@@ -122,7 +122,7 @@ class NotedSource(SourceWrapper):
         self._guides.note(index, frame)
         return frame
 
-    def decoded(self, index: int) -> np.ndarray | Planes:
+    def decoded(self, index: int) -> Decoded:
         # As it is decoded in any case: colours that are sent as such may differ by rounding.
         frame = self._source.decoded(index)
         if self._guides.wants(index):

@@ -9,7 +9,7 @@ import numpy as np
 
 from ..core.frames import light
 from ..core.frames.frame_source import FrameSource
-from ..core.frames.planes import Planes
+from ..core.frames.planes import Decoded
 from ..core.frames.source_wrapper import SourceWrapper
 from ..core.memo import Kept
 from .window import summable
@@ -32,7 +32,7 @@ class RecentFrames(SourceWrapper):
     def read(self, index: int) -> np.ndarray:
         return self._kept.ask(("read", index), lambda: self._source.read(index), self.most)
 
-    def decoded(self, index: int) -> np.ndarray | Planes:
+    def decoded(self, index: int) -> Decoded:
         return self._kept.ask(("decoded", index), lambda: self._source.decoded(index), self.most)
 
     def want(self, indices: Iterable[int]) -> None:

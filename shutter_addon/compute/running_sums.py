@@ -9,6 +9,7 @@ from contextlib import suppress
 import numpy as np
 
 from ..core.frames.frame_source import FrameSource
+from ..core.frames.moments import STEP, Moment
 from ..core.frames.planes import Planes, chroma_step
 from ..core.model import windows
 from ..core.model.frame_state import Light, Options
@@ -52,8 +53,8 @@ def accumulation(decode: int, sent: str, back: bool, tiled: bool, cover: int = 0
     """The pass that makes a layer of sums from its neighbour: with the frame between the two added, or subtracted.
 
     decode: of `decoding`
-    sent: as what the frame was sent, "COLOURS", "NUMBERS" (Device.send) or "PLANES"; "AGAIN": it is taken as the
-    difference of two layers that hold it already
+    sent: as what the frame was sent, "COLOURS", "NUMBERS" (Device.send), "PLANES" or "MOMENT"; "AGAIN": it is taken as
+    the difference of two layers that hold it already
     back: it is subtracted
     tiled: the sums are stored in tiles
     cover: of WeightedSums
@@ -92,9 +93,12 @@ class Sums(Window):
         self.start = self.stop = 0
         self._frames: dict[int, int] = {}  # position: source frame
         self._light: Light | None = None
+        self._sent: dict[int, int] = {}  # by texture of `_filmed`: the number of the frame in it
         # White is the largest 2ⁿ − 1 for which the sum of a whole window fits into 21 bits, and n is 16 at most.
         self.whole = (1 << min(16, 21 - (capacity - 1).bit_length())) - 1
         self.kind = STORED_SUMS[self.cover]
+        if source.step > 1:
+            self._loading = (*self._loading, ("filmed 0", "rgba8"), ("filmed 1", "rgba8"))
         # A workgroup reads all layers of its pixels. In tiles, they are one run of memory.
         across, down = TILE
         fits = across * down * self.layers <= device.max_size and -(-source.height // down) <= device.max_layers
@@ -177,9 +181,12 @@ class Sums(Window):
 
     def _send(self, index: int) -> tuple[str, Given]:
         """Sends a source frame: as what (`accumulation`), and the arguments of the pass that adds it."""
-        frame = self.source.decoded(index) if self.device.takes_planes else self.source.read(index)
+        is_moment = index % self.source.step > 0
+        frame = self.source.decoded(index) if self.device.takes_planes or is_moment else self.source.read(index)
         if isinstance(frame, Planes):
             return "PLANES", self._send_planes(frame)
+        if isinstance(frame, Moment):
+            return "MOMENT", self._send_moment(frame)
         own = self._own("frame", "rgba8")
         sent = self.device.send(own, frame)
         return "COLOURS" if sent is own else "NUMBERS", {"textures": {"frame": sent}}
@@ -197,8 +204,25 @@ class Sums(Window):
             "blue_of": matrix.blue_of_cb,
         }
 
+    def _send_moment(self, moment: Moment) -> Given:
+        first, second = (self._filmed(moment.pair + k, end) for k, end in enumerate(moment.ends))
+        vectors = self._extra.filled("vectors", [moment.vectors], "rgba16ui")
+        shift = (STEP**2 * moment.steps).bit_length() - 1
+        return {
+            "textures": {"first_frame": first, "second_frame": second, "vectors": vectors},
+            "moment": (moment.number, moment.steps, shift),
+        }
+
+    def _filmed(self, number: int, frame: np.ndarray) -> Texture:
+        """A filmed frame on the device: those of a pair stay for all its moments."""
+        texture = self._own(f"filmed {number % 2}", "rgba8")
+        if self._sent.get(number % 2) != number:
+            self.device.write(texture, frame, opaque=True)
+            self._sent[number % 2] = number
+        return texture
+
     def release(self) -> None:
-        self._frames, self._light = {}, None
+        self._frames, self._light, self._sent = {}, None, {}
         super().release()
 
 

@@ -11,7 +11,8 @@ import numpy as np
 
 from ..core.frames import light
 from ..core.frames.frame_source import FrameSource
-from ..core.frames.planes import Planes, as_rgba
+from ..core.frames.moments import Moment
+from ..core.frames.planes import Decoded, Planes, as_rgba
 from ..core.frames.source_wrapper import SourceWrapper
 from . import plain_cuts
 from .errors import MediaError
@@ -194,7 +195,7 @@ class ShotSource(SourceWrapper):
         self.filmed = (source.count - 1) // step + 1  # how many frames are
         self._cuts: dict[int, bool] = {}  # by filmed frame: whether there is a cut before it
         self._signatures: dict[int, Signature] = {}  # likewise
-        self._handed: dict[int, np.ndarray | Planes] = {}
+        self._handed: dict[int, Decoded] = {}
 
     @property  # an attribute would keep its frames until Python looks for cycles
     def shots(self) -> ShotSource:  # type: ignore[override]  # nobody sets a source's shots
@@ -204,7 +205,7 @@ class ShotSource(SourceWrapper):
         """The frame as the source gives it."""
         return as_rgba(self.decoded(index))
 
-    def decoded(self, index: int) -> np.ndarray | Planes:
+    def decoded(self, index: int) -> Decoded:
         """The frame as the source has it decoded."""
         frame = self._handed.pop(index, None)
         return self._source.decoded(index) if frame is None else frame
@@ -300,6 +301,7 @@ class ShotSource(SourceWrapper):
         if index in self._signatures:
             return self._signatures[index]
         frame = self.decoded(index * self.step)
+        assert not isinstance(frame, Moment)  # that index is a filmed frame's
         made = self._signatures[index] = signature(frame, self.transfer, self.alpha)
         self._handed[index * self.step] = frame
         while len(self._handed) > 1 and len(self._handed) * frame.nbytes > _HANDED_BYTES:

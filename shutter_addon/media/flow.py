@@ -7,7 +7,6 @@ methodology for optical flow"). Along what has arrived, both frames are looked u
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from functools import cache, lru_cache, partial
 
 import numpy as np
@@ -15,13 +14,14 @@ import numpy as np
 from ..core import stopping
 from ..core.frames import light
 from ..core.frames.frame_source import FrameSource
+from ..core.frames.moments import STEP, UNIT, ZERO, Moment
 from . import opencv
 from .opencv import cv2
 
-STEP = 2  # pixels between the vectors that are carried; all pixels gain nothing and take four times as long
 SMALLEST = 16  # pixels; OpenCV's flows need about as many, smaller pictures are cross-faded
 HALF_MAX = 65504  # the largest value of a half float, which infinite samples count as
 UNLIKE = 24  # levels of 255 by which the ends of a vector may differ that carries something
+AROUND = 3  # vectors, over which it is averaged how surely a frame shows something
 SHARED = 0.5  # of all vectors, in both directions, have to
 
 
@@ -31,26 +31,29 @@ def check() -> None:
 
 
 class Between:
-    """What lies between two frames, at any time: a function of the two alone, the same bits whatever the number of
-    cores."""
+    """What lies between two frames: a function of the two alone, the same bits whatever the number of cores."""
 
     def __init__(self, first: np.ndarray, second: np.ndarray, transfer: str = "srgb", alpha: str = "opaque") -> None:
         """first, second: arrays (height, width, 4) of a FrameSource's dtype
         transfer, alpha: how samples are encoded, as FrameSource says; the new frames are encoded alike"""
-        self._frames, self._transfer, self._alpha = (first, second), transfer, alpha
+        self.ends, self._transfer, self._alpha = (first, second), transfer, alpha
         self._paths: _Paths | None = None
-        if np.array_equal(first, second):
-            return
-        self._ends = [_encoded(frame, transfer, alpha) for frame in (first, second)]
-        paths = _Paths([_luma(end) for end in self._ends], FLOW)
-        self._paths = paths if paths.meet else None
+        if not np.array_equal(first, second):
+            self._encoded = [_encoded(frame, transfer, alpha) for frame in (first, second)]
+            paths = _Paths([_luma(end) for end in self._encoded])
+            self._paths = paths if paths.meet else None
 
-    def at(self, t: float) -> np.ndarray:
-        """The frame (height, width, 4) at a time in 0 … 1. What only one of the two shows is taken from it, all else is
-        mixed in linear light; of two frames that have nothing in common it is the nearer one."""
+    def moment(self, pair: int, number: int, steps: int) -> np.ndarray | Moment:
+        """One of `steps` moments, a power of two. What only one of the two frames shows is taken from it, all else is
+        mixed in linear light; of two frames that have nothing in common it is the nearer one. pair: Moment's."""
         if self._paths is None:
-            return self._frames[t > 0.5]
-        return _decoded(_mixed(self._ends, self._paths.at(t), t), self._frames[0].dtype, self._transfer, self._alpha)
+            return self.ends[2 * number > steps]
+        vectors = self._paths.at(number / steps)
+        return Moment(pair, self.ends, number, steps, vectors, partial(self._rgba, vectors, number, steps))
+
+    def _rgba(self, vectors: np.ndarray, number: int, steps: int) -> np.ndarray:
+        frame = _mixed(self._encoded, vectors, number, steps)
+        return _decoded(frame, self.ends[0].dtype, self._transfer, self._alpha)
 
 
 def luma(frame: np.ndarray, transfer: str, alpha: str) -> np.ndarray:
@@ -105,35 +108,29 @@ def _dis(first: np.ndarray, second: np.ndarray, finest: int, stride: int, smooth
     return dis.calc(*wide, None)[:height, :width]
 
 
-# From a picture (H, W) uint8 to another: vectors (H, W, 2).
-Flow = Callable[[np.ndarray, np.ndarray], np.ndarray]
-FLOW: Flow = partial(_dis, finest=1, stride=3)
-
-
 class _Paths:
     """Where the pixels of two pictures go from one to the other."""
 
-    def __init__(self, luma: list[np.ndarray], flow: Flow) -> None:
+    def __init__(self, luma: list[np.ndarray]) -> None:
         self._shape = luma[0].shape
-        self._sides = [_carriers(a, b, flow) for a, b in (luma, luma[::-1])]
+        self._sides = [_carriers(a, b) for a, b in (luma, luma[::-1])]
 
     @property
     def meet(self) -> bool:
         """Whether the pictures have anything in common: enough vectors have ends that look alike."""
         return min(float((costs <= UNLIKE).mean()) for _places, _vectors, costs in self._sides) >= SHARED
 
-    def at(self, t: float) -> tuple[np.ndarray, np.ndarray]:
-        """At a time in 0 … 1, for each pixel: the vector (H, W, 2) from the first picture to the second that passes
-        there, and how surely the first and the second show what it carries (H, W, 2), 0 to 1."""
+    def at(self, t: float) -> np.ndarray:
+        """Moment.vectors at a time in 0 … 1."""
         (forth, cost), (back, other) = (
             self._carry(*side, t=s) for side, s in zip(self._sides, (t, 1 - t), strict=True)
         )
         vectors = np.where((cost <= other)[..., None], forth, -back)
         arrived = np.dstack([cost, other]) < np.inf
         vectors = _filled(vectors.astype(np.float32), arrived.any(axis=2))
-        shown = cv2.blur(arrived.astype(np.float32), (5, 5)) + np.float32(0.05)
-        fine = grid(*self._shape) / STEP
-        return look(vectors, fine, cv2.INTER_LINEAR), look(shown, fine, cv2.INTER_LINEAR)
+        stored = np.rint(UNIT * vectors).clip(-ZERO, ZERO - 1) + ZERO
+        shown = cv2.blur(255 * arrived.astype(np.float32), (AROUND, AROUND))
+        return np.dstack([stored, np.rint(shown)]).astype(np.uint16)
 
     def _carry(
         self, places: np.ndarray, vectors: np.ndarray, costs: np.ndarray, t: float
@@ -154,12 +151,12 @@ class _Paths:
         return np.concatenate([vectors, nowhere])[chosen], np.concatenate([costs, infinite])[chosen]
 
 
-def _carriers(first: np.ndarray, second: np.ndarray, flow: Flow) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _carriers(first: np.ndarray, second: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Places (n, 2) on every STEPth pixel, vectors (n, 2) and costs (n,), the dearest first: how much, in levels, the
     two ends differ."""
     stopping.check()
     places = grid(*first.shape)
-    vectors = np.zeros_like(places) if min(first.shape) < SMALLEST else flow(first, second)
+    vectors = np.zeros_like(places) if min(first.shape) < SMALLEST else _dis(first, second, finest=1, stride=3)
     vectors = np.nan_to_num(vectors, posinf=0, neginf=0)  # of pictures without any structure
     cost = cv2.blur(cv2.absdiff(first, look(second, places + vectors, cv2.INTER_LINEAR)).astype(np.float32), (5, 5))
     cost = cost[::STEP, ::STEP].ravel()
@@ -180,16 +177,47 @@ def _filled(vectors: np.ndarray, known: np.ndarray) -> np.ndarray:
     return np.where(known[..., None], vectors, cv2.resize(coarse, known.shape[::-1], interpolation=cv2.INTER_LINEAR))
 
 
-def _mixed(ends: list[np.ndarray], path: tuple[np.ndarray, np.ndarray], t: float) -> np.ndarray:
-    """Linear light (H, W, 3 or 4) at time t: both frames looked up along the paths."""
+def _mixed(ends: list[np.ndarray], vectors: np.ndarray, number: int, steps: int) -> np.ndarray:
+    """Linear light (H, W, 3 or 4) of a moment: both frames looked up along the paths. Places are whole numbers of
+    1 / UNIT, so that all devices look up the same ones (shaders/include/moment.glsl)."""
     stopping.check()
-    vectors, shown = path
-    here = grid(*vectors.shape[:2])
-    seen = look(ends[0], here - np.float32(t) * vectors), look(ends[1], here + np.float32(1 - t) * vectors)
-    late: np.ndarray = np.float32(t) * shown[..., 1]
-    late = (late / (late + np.float32(1 - t) * shown[..., 0]))[..., None]
+    height, width = ends[0].shape[:2]
+    spread = _spread(vectors, height, width)
+    paths = spread[..., :2] - (ZERO * STEP**2)
+    here = UNIT * np.dstack(np.meshgrid(np.arange(width, dtype=np.int32), np.arange(height, dtype=np.int32)))
+    shift = (STEP**2 * steps).bit_length() - 1
+    half = 1 << (shift - 1)
+    seen = [
+        _cubic(ends[0], here - ((number * paths + half) >> shift)),
+        _cubic(ends[1], here + (((steps - number) * paths + half) >> shift)),
+    ]
+    shown = spread[..., 2:] * np.float32(1 / (255 * STEP**2)) + np.float32(0.05)
+    late: np.ndarray = np.float32(number) * shown[..., 1]
+    late = (late / (late + np.float32(steps - number) * shown[..., 0]))[..., None]
     first, second = map(_light, seen)
     return first + late * (second - first)
+
+
+def _spread(values: np.ndarray, height: int, width: int) -> np.ndarray:
+    """Values (h, w, C) of every STEPth pixel for all pixels, STEP² times as large: int32 (H, W, C)."""
+    spread = values.astype(np.int32)
+    for axis, length in ((0, height), (1, width)):
+        next_ = np.roll(spread, -1, axis=axis)
+        last = [slice(None)] * 3
+        last[axis] = slice(-1, None)
+        next_[tuple(last)] = spread[tuple(last)]
+        parts = [(STEP - k) * spread + k * next_ for k in range(STEP)]
+        shape = list(spread.shape)
+        shape[axis] *= STEP
+        spread = np.stack(parts, axis=axis + 1).reshape(shape).take(range(length), axis=axis)
+    return spread
+
+
+def _cubic(picture: np.ndarray, places: np.ndarray) -> np.ndarray:
+    """The picture (H, W, C) at places (H, W, 2) in 1 / UNIT of a pixel; its edge goes on beyond it."""
+    whole, part = (places >> 5).astype(np.int16), (places & (UNIT - 1)).astype(np.uint16)
+    fraction = part[..., 1] << 5 | part[..., 0]  # of OpenCV's table of weights
+    return cv2.remap(picture, whole, fraction, cv2.INTER_CUBIC, borderMode=cv2.BORDER_REPLICATE)
 
 
 def look(picture: np.ndarray, places: np.ndarray, how: int | None = None) -> np.ndarray:

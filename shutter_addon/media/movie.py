@@ -20,7 +20,7 @@ from av.video.reformatter import ColorRange, Interpolation, VideoReformatter
 from av.video.stream import VideoStream
 
 from ..core.frames.frame_source import FrameSource
-from ..core.frames.planes import Matrix, Planes, matrix
+from ..core.frames.planes import Decoded, Matrix, Planes, matrix
 from .decode import FrameReader, fraction, reason
 from .deinterlace import blur_rows, has_fields, interpolate_fields, samples_of
 from .errors import MediaError
@@ -99,7 +99,7 @@ class MovieSource(FrameSource):
         with self._named(index):
             return self._pixels(frame)
 
-    def decoded(self, index: int) -> np.ndarray | Planes:
+    def decoded(self, index: int) -> Decoded:
         """As `read`, or the frame's planes, where they are 8-bit 4:2:0 and as large as the frame, and BT.601 or 709.
 
         They are those of the decoder's own memory. What they become is what libswscale makes of them, by SCALER."""

@@ -7,7 +7,7 @@ import numpy as np
 
 from ..core import stopping, threads
 from ..core.frames.frame_source import FrameSource
-from ..core.frames.planes import Planes, as_rgba
+from ..core.frames.planes import Decoded, as_rgba
 from ..core.frames.source_wrapper import SourceWrapper
 from .errors import MediaError
 
@@ -26,7 +26,7 @@ class PrefetchSource(SourceWrapper):
         self._fetch = source.decoded if planes else source.read
         self._wanted: list[int] = []  # in the order of decoding
         self._asked: list[int] = []  # by reads that wait
-        self._done: dict[int, np.ndarray | Planes | Exception] = {}
+        self._done: dict[int, Decoded | Exception] = {}
         self._changed = threading.Condition()
         self._thread: threading.Thread | None = None
 
@@ -46,7 +46,7 @@ class PrefetchSource(SourceWrapper):
         picture.flags.writeable = False
         return picture
 
-    def decoded(self, index: int) -> np.ndarray | Planes:
+    def decoded(self, index: int) -> Decoded:
         """As `read`, but for the conversion."""
         stopping.check()
         with self._changed:
@@ -105,10 +105,10 @@ class PrefetchSource(SourceWrapper):
                     self._drop()
                     self._changed.notify_all()
 
-    def _frame(self, index: int) -> np.ndarray | Planes | Exception:
+    def _frame(self, index: int) -> Decoded | Exception:
         try:
             frame = self._fetch(index)
-            if not isinstance(frame, Planes):
+            if isinstance(frame, np.ndarray):
                 frame.flags.writeable = False
             return frame
         except Exception as error:  # raised to whoever reads the frame

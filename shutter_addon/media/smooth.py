@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..core.frames.frame_source import FrameSource
-from ..core.frames.planes import Planes
+from ..core.frames.planes import Decoded, as_rgba
 from ..core.frames.source_wrapper import SourceWrapper
 from ..core.memo import Kept
 from ..core.model.motions import Similarity
@@ -41,16 +41,15 @@ class SmoothSource(SourceWrapper):
 
     def read(self, index: int) -> np.ndarray:
         """The frame or the moment (height, width, 4). MediaError: as the source's `read`."""
-        check_index(self, index)
-        pair, moment = divmod(index, self.step)
-        if moment == 0:
-            return self._frame(pair)
-        return self._pairs.ask(pair, lambda: self._between(pair), 2).at(moment / self.step)
+        return as_rgba(self.decoded(index))
 
-    def decoded(self, index: int) -> np.ndarray | Planes:
-        """The frame as it is quickest to get. MediaError: as the source's `read`."""
-        pair, moment = divmod(index, self.step)
-        return self.read(index) if moment or pair in self._frames else self._source.decoded(pair)
+    def decoded(self, index: int) -> Decoded:
+        """The frame, or the moment with the two frames around it. MediaError: as the source's `read`."""
+        check_index(self, index)
+        pair, number = divmod(index, self.step)
+        if number == 0:
+            return self._frame(pair)
+        return self._pairs.ask(pair, lambda: self._between(pair), 2).moment(pair, number, self.step)
 
     def _frame(self, index: int) -> np.ndarray:
         return self._frames.ask(index, lambda: self._source.read(index), _FRAMES)

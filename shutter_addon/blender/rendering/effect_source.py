@@ -81,7 +81,9 @@ class SourceKey:
             return ShotSource(PrefetchSource(medium, planes=planes))
         try:
             steps = _steps.ask((self.spec.key, self.smooth, self.window), lambda: self._steps(medium), _KEPT)
-            return ShotSource(PrefetchSource(SmoothSource(medium, steps) if steps > 1 else medium), steps)
+            if steps == 1:
+                return ShotSource(PrefetchSource(medium, planes=planes))
+            return ShotSource(PrefetchSource(SmoothSource(medium, steps), planes=True), steps)
         except FAULTS:
             medium.close()
             raise

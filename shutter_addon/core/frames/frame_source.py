@@ -10,7 +10,7 @@ from typing import Protocol, Self
 
 import numpy as np
 
-from .planes import Planes
+from .planes import Decoded
 
 
 class ShotFinder(Protocol):
@@ -82,7 +82,7 @@ class FrameSource(ABC):
 
         MediaError: the frame cannot be decoded. IndexError: it is outside 0 … count-1."""
 
-    def decoded(self, index: int) -> np.ndarray | Planes:
+    def decoded(self, index: int) -> Decoded:
         """The frame as it is quickest to get, raising what `read` raises: its planes, where it has some and nothing but
         their conversion is between the two, else as `read` gives it."""
         return self.read(index)

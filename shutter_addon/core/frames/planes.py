@@ -4,8 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import TypeAlias
 
 import numpy as np
+
+from .moments import Moment
 
 # Of the matrices, by the numbers of ITU-T H.273: red of Cr, blue of Cb, green of Cb and of Cr, which is taken away; in
 # libswscale's units of 1/65536 for samples of limited range. Where a file names none, it is BT.601.
@@ -103,6 +106,9 @@ def _chroma_places(chosen: slice, length: int) -> np.ndarray:
     return (np.arange(length)[chosen] * step + step // 2) >> 16
 
 
-def as_rgba(frame: np.ndarray | Planes) -> np.ndarray:
+Decoded: TypeAlias = np.ndarray | Planes | Moment  # what FrameSource.decoded gives
+
+
+def as_rgba(frame: Decoded) -> np.ndarray:
     """A frame of FrameSource.decoded as its `read` gives it."""
-    return frame.rgba() if isinstance(frame, Planes) else frame
+    return frame if isinstance(frame, np.ndarray) else frame.rgba()

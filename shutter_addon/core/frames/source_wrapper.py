@@ -5,7 +5,7 @@ from collections.abc import Iterable
 import numpy as np
 
 from .frame_source import FrameSource
-from .planes import Planes
+from .planes import Decoded
 
 
 class _Forwarded:
@@ -27,7 +27,7 @@ class SourceWrapper(FrameSource):
     def read(self, index: int) -> np.ndarray:
         return self._source.read(index)
 
-    def decoded(self, index: int) -> np.ndarray | Planes:
+    def decoded(self, index: int) -> Decoded:
         return self.read(index)  # which may give other frames than the source
 
     def want(self, indices: Iterable[int]) -> None:

@@ -58,7 +58,7 @@ def check(recipe: Any) -> None:
     """Check a record of a recipe. RecipeError: it is none that an effect can have."""
     for kind in (Options, model.Effect, model.Camera):
         _check_fields(kind, recipe, "")
-    _require(recipe.version > 1 or recipe.inbetween != "auto", "inbetween", "recipes have \"auto\" from version 2 on")
+    _require(recipe.version > 1 or recipe.inbetween != "auto", "inbetween", 'recipes have "auto" from version 2 on')
     _require(recipe.shutters, "shutters", "there is none; the first is the default")
     _check_count(recipe.shutters, limits.MAX_SHUTTERS, "shutters")
     _check_count(recipe.regions, limits.MAX_REGIONS, "regions")
