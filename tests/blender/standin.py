@@ -9,17 +9,17 @@ APART = 50  # levels by which frames differ on average that have nothing in comm
 
 
 class Between:
-    """Moments that no blend or flow would give, and that follow from the two frames and the time alone. Those of frames
-    that have nothing in common are the nearer one, as flow's are."""
+    """In place of flow.Between: moments that no blend or flow would give, and that follow from the two frames and the
+    time alone. Those of frames that have nothing in common are the nearer one, as flow's are."""
 
     def __init__(self, first, second, *_):
         self._ends = first, second
         self._is_cut = np.abs(first.astype(float) - second).mean() > APART
 
-    def at(self, time):
+    def moment(self, _pair, number, steps):
         if self._is_cut:
-            return self._ends[time > 0.5]
-        seeds = (*(int(end.sum()) for end in self._ends), round(time * 16))
+            return self._ends[2 * number > steps]
+        seeds = (*(int(end.sum()) for end in self._ends), number * 16 // steps)
         frame = np.random.default_rng(seeds).integers(0, 256, self._ends[0].shape, dtype=np.uint8)
         frame[..., 3] = 255
         return frame
@@ -28,9 +28,9 @@ class Between:
 def moments(frames, steps):
     """All moments ((n - 1) * steps + 1, H, W, 4) of filmed frames (n, H, W, 4) uint8."""
     found = []
-    for first, second in pairwise(frames):
+    for pair, (first, second) in enumerate(pairwise(frames)):
         between = Between(first, second)
-        found += [first, *(between.at(step / steps) for step in range(1, steps))]
+        found += [first, *(between.moment(pair, number, steps) for number in range(1, steps))]
     return np.stack([*found, frames[-1]])
 
 
