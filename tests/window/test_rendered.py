@@ -92,20 +92,6 @@ def test_films_on_blenders_own_gpu(tmp_path):
             assert apart.max() <= 1, (folder, name)
 
 
-def test_in_between_frames_are_built_and_removed(tmp_path):
-    seen, console = tell("inbetween_story.py", "opengl", linked(tmp_path))
-    states = [(entry["shown"], entry["state"]) for entry in seen if "shown" in entry]
-    assert states == [
-        ("missing", "missing"),
-        ("partial", "partial"),
-        ("ready", "ready"),
-        ("stale", "stale"),
-        ("again", "ready"),
-        ("removed", "missing"),
-    ]
-    assert "Traceback" not in console
-
-
 def test_renders_that_end_early(tmp_path):
     """A picture that fails ends the job, as Esc does: the movie is finished up to there, and a menu says why."""
     seen, console = tell("failing.py", "opengl", linked(tmp_path))
