@@ -39,6 +39,7 @@ def edited(bpy, edit, tmp_path):
             source.elements.append(f"f{number:04d}.png")
         strip, effect = add_effect.add_effect(edit, source)
         shutter_edits.start(effect)
+        effect.inbetween = "1"
         selection.choose(edit, strip)
         edit.frame_set(8)
         return strip, effect

@@ -36,7 +36,7 @@ def add(bpy, edit, tmp_path):
             source.elements.append(f"f{number:04d}.png")
         edit.render.resolution_x, edit.render.resolution_y = WIDTH, HEIGHT
         strip, effect = add_effect.add_effect(edit, source)
-        effect.window = len(bars[0])
+        effect.inbetween, effect.window = "1", len(bars[0])
         for i, each in enumerate(bars):
             shutter_edits.add_shutter(effect, f"S{i}")
             bar_edits.paint(effect, i, each)
