@@ -48,7 +48,7 @@ def slid(state: FrameState, index: int, direction: int, shot: range, *, whole: b
     def way(start: int, stop: int) -> int:
         return sorted((0, low - start, high + 1 - stop))[1]
 
-    spans = [shutters.open_span(bars > _CLOSED * bars.sum()) for bars in state.bars]
+    spans = [_filmed(shutters.open_span(bars > _CLOSED * bars.sum()), options) for bars in state.bars]
     if options.edges != "slide" or not (whole or any(way(*span) for span in spans)):
         return state
     moved, by = np.zeros_like(state.bars), way(0, options.window)
@@ -56,6 +56,12 @@ def slid(state: FrameState, index: int, direction: int, shot: range, *, whole: b
         place = start + way(start, stop) - by
         new[place : place + stop - start] = bars[start:stop]
     return replace(state, bars=moved, options=replace(options, slid=options.slid + by))
+
+
+def _filmed(span: tuple[int, int], options: Options) -> tuple[int, int]:
+    """A span of the window's frames with all of the filmed ones that it is in: bars move by whole ones."""
+    start, stop = span
+    return start - start % options.step, min(stop + -stop % options.step, options.window)
 
 
 def source_frames(options: Options, positions: np.ndarray, shot: range) -> np.ndarray:
