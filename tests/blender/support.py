@@ -141,6 +141,21 @@ class Asked:
         self.renderer.check(self.request)
 
 
+def packages(folder, blenders_python):
+    """A folder, for PYTHONPATH, of what smooth effects need besides what the Blender of a distribution has."""
+    import cv2
+    import pytest
+
+    here = f"{sys.version_info.major}.{sys.version_info.minor}"
+    if blenders_python != here:
+        pytest.skip(f"OTHER PYTHON: this one's packages are for {here}, Blender's is {blenders_python}")
+    folder.mkdir()
+    site = Path(cv2.__file__).parents[1]
+    for name in ("cv2", *(each.name for each in site.glob("opencv*.libs"))):
+        (folder / name).symlink_to(site / name)
+    return folder
+
+
 @contextmanager
 def small_disk(folder, size):
     """A folder on a disk of that many bytes."""

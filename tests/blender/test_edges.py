@@ -128,7 +128,7 @@ def test_moments_that_are_shown_guide_it(bpy, add, film):
     wanted = request(edit, effect, strip, 1)
     assert wanted.index == 5
     moment = wanted.state
-    labels = scribbles.rasterise(moment.shapes, SIZE[1], SIZE[0], border=True)
+    labels = scribbles.rasterise(moment.shapes, *SIZE, border=True)
     seen = Guides(wanted.renderer.source).guide(guiding(5, 2, range(wanted.renderer.source.count)), 1)
     expected = exact_diffusion.solve(labels, 2, seen, 1.0)
     assert np.abs(wanted.coefficients() - expected).max() <= 1 / 255

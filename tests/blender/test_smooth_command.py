@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from standin import moments, spread
-from support import read_picture, recipe, write_frames
+from support import packages, read_picture, recipe, write_frames
 
 from shutter_addon.core.frames import light
 from shutter_addon.media import open_source
@@ -123,12 +123,13 @@ def test_a_recipe_of_the_first_version(run, film, tmp_path, same_pixels, more):
     same_pixels(read_picture(tmp_path / "out" / "0002.png"), shown(frames, window(2, bars), spread(bars, STEPS)), 1)
 
 
-def test_a_saved_edit_in_blender(command, film, tmp_path, blender):
+def test_a_saved_edit_in_blender(command, film, tmp_path, blender, blenders_python, monkeypatch):
     """With real flow: as the library renders it, and nothing lies beside it."""
     first, _ = film
     data = recipe(3, np.ones(3), inbetween=STEPS)
     command(first, "--save", tmp_path / "edit" / "e.blend", "--output", tmp_path / "out", recipe=data)
     assert [path.name for path in (tmp_path / "edit").iterdir()] == ["e.blend"]
+    monkeypatch.setenv("PYTHONPATH", str(packages(tmp_path / "packages", blenders_python)))
     done = blender(tmp_path / "edit" / "e.blend", "-o", f"{tmp_path}/again/", "-a")
     assert done.returncode == 0, done.stderr
     for frame in range(1, COUNT + 1):
