@@ -99,13 +99,13 @@ def test_scribbles_follow_a_keyed_transform(found):
 
 
 def test_what_is_drawn_is_read_once_until_something_changes(bpy, found, monkeypatch):
-    from shutter_addon.blender.data import snapshot
+    from shutter_addon.blender.data import snapshot, source_media
     from shutter_addon.blender.rendering import invalidation
 
     edit, effect, strip = found
-    asked, take, look = [], snapshot.take, snapshot.source_files
+    asked, take, look = [], snapshot.take, source_media.media_key
     monkeypatch.setattr(snapshot, "take", lambda *a, **k: asked.append("take") or take(*a, **k))
-    monkeypatch.setattr(snapshot, "source_files", lambda *a: asked.append("files") or look(*a))
+    monkeypatch.setattr(source_media, "media_key", lambda *a: asked.append("files") or look(*a))
     invalidation.invalidate_changed(edit)
 
     def drawn():
