@@ -19,7 +19,6 @@ _DATA = (bpy.types.bpy_struct, bpy.types.bpy_prop_collection, bpy.types.bpy_prop
 _MODULES = "bpy", "_bpy", "gpu", "bl_math", "mathutils"
 # By files below blender/: what runs on our threads, and touches no bpy data.
 REVIEWED: dict[str, set[str]] = {
-    "commands/inbetween_command.py": {"_build.<lambda>"},
     "data/source_media.py": {"SourceSpec.open"},
     "data/versions.py": {"_digest"},
     "devices/main_thread.py": {"soon"},
@@ -55,12 +54,11 @@ REVIEWED: dict[str, set[str]] = {
     },
     "editing/track_region.py": {"_each", "track.<lambda>"},
     "rendering/device_work.py": {"broken_off"},
-    "rendering/inbetween_build.py": {"Build._build", "Build._update", "Build.stop", "_estimated", "running"},
     "rendering/outline_carrying.py": {"_Carrying._carry"},
     "rendering/render_job.py": {"where"},
     "rendering/session.py": {"RenderSession._ask", "RenderSession.forget.<lambda>", "_weights"},
     "rendering/sessions.py": {"_ask_window"},
-    "rendering/strobing.py": {"_measure_cost", "_measure_motion"},
+    "rendering/strobing.py": {"_measure_motion"},
 }
 
 seen: set[str] = set()  # functions that were called on our threads

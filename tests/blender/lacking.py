@@ -16,7 +16,7 @@ folder, name = Path(sys.argv[-2]), sys.argv[-1]
 ops, edit = bpy.ops.shutter, bpy.context.scene
 TRACKING = "tracking needs the Python package opencv-contrib-python-headless; install the zip"
 OUTLINE = "the Python package opencv-contrib-python-headless; install the zip"
-INBETWEEN = "in-between frames need the Python package"
+MOMENTS = "moments between frames need the Python package"
 BAKE = "the Python package av is missing, which movies need: bake to OpenEXR"
 # Operators by the kind of region that they work on, their options, and what they say.
 LACKING = [
@@ -25,9 +25,8 @@ LACKING = [
     ("line", "tripod", {}, TRACKING),
     ("line", "panning_shot", {}, TRACKING),
     ("line", "find_readout", {}, f"the readout is found by {OUTLINE}"),
-    ("line", "rolling_shutter", {}, INBETWEEN),
+    ("line", "rolling_shutter", {}, MOMENTS),
     ("line", "outline_it", {}, f"outlines are proposed by {OUTLINE}"),
-    ("line", "smooth_streaks", {"factor": "4"}, INBETWEEN),
     ("line", "bake", {"file_format": "MOVIE"}, BAKE),
     ("outline", "track", {}, TRACKING),
     ("outline", "outline_carry", {}, f"outlines are tracked by {OUTLINE}"),
@@ -51,7 +50,7 @@ def prepared(kind):
     region = {"name": "R", "shutter": "Sharp", "kind": kind, **KINDS[kind]}
     shutters = [{"name": "Long", "bars": [1, 1, 1, 1]}, {"name": "Sharp", "bars": [1, 0, 0, 0]}]
     path = folder / "lacking.json"
-    path.write_text(json.dumps({"version": 1, "window": 4, "shutters": shutters, "regions": [region]}))
+    path.write_text(json.dumps({"version": 2, "window": 4, "shutters": shutters, "regions": [region]}))
     assert ops.recipe_import(filepath=str(path)) == {"FINISHED"}
     edit.virtual_shutter.effects[0].active_shutter = 1
     edit.virtual_shutter.effects[0].active_region = 0

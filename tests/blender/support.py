@@ -49,7 +49,7 @@ def recipe(window, *shutters, regions=(), **options):
         else:
             entry["bars"] = [float(b) for b in bars]
         entries.append(entry)
-    return {"version": 1, "window": window, "shutters": entries, "regions": list(regions), **options}
+    return {"version": 2, "window": window, "shutters": entries, "regions": list(regions), **options}
 
 
 def noise_film(edit, frames, folder):
@@ -114,11 +114,10 @@ def picture_of(scene, scene_frame, say=print, stopped=lambda: False):
 def request(edit, effect, strip, frame):
     """What is asked of the session for the picture at a timeline frame, and what it gives."""
     from shutter_addon.blender.data import snapshot
-    from shutter_addon.blender.rendering import render_settings, sessions
+    from shutter_addon.blender.rendering import sessions
 
-    folder = render_settings.settings().inbetween
     context = sessions.of_drawing()
-    return Asked(context, context.request(snapshot.take(edit, effect, strip, (frame,), folder=folder), frame))
+    return Asked(context, context.request(snapshot.take(edit, effect, strip, (frame,)), frame))
 
 
 class Asked:
@@ -140,6 +139,21 @@ class Asked:
 
     def check(self):
         self.renderer.check(self.request)
+
+
+def packages(folder, blenders_python):
+    """A folder, for PYTHONPATH, of what smooth effects need besides what the Blender of a distribution has."""
+    import cv2
+    import pytest
+
+    here = f"{sys.version_info.major}.{sys.version_info.minor}"
+    if blenders_python != here:
+        pytest.skip(f"OTHER PYTHON: this one's packages are for {here}, Blender's is {blenders_python}")
+    folder.mkdir()
+    site = Path(cv2.__file__).parents[1]
+    for name in ("cv2", *(each.name for each in site.glob("opencv*.libs"))):
+        (folder / name).symlink_to(site / name)
+    return folder
 
 
 @contextmanager

@@ -57,7 +57,7 @@ def test_no_medium(command, tmp_path, name, content, words):
 
 
 @pytest.mark.skipif(os.name != "posix", reason="names are bytes on POSIX systems only")
-@pytest.mark.parametrize("option", ["source", "--output", "--save", "--weights", "--cache", "--recipe"])
+@pytest.mark.parametrize("option", ["source", "--output", "--save", "--weights", "--recipe"])
 def test_names_that_are_not_utf8(command, frames, tmp_path, option):
     odd = tmp_path / os.fsdecode(b"caf\xe9")
     odd.mkdir()

@@ -210,23 +210,6 @@ def test_what_is_known_of_effects_goes_with_them(edit, effect):
     assert remembering(scene) == set()
 
 
-def test_stamps_of_in_between_frames_are_bounded(effect, tmp_path, monkeypatch):
-    from shutter_addon.blender.data import inbetween_settings, snapshot, strips
-
-    effect.inbetween = "4"
-    source = strips.source_of(effect.id_data, effect, strips.effect_strips(effect.id_data)[0])
-    cache, asked = inbetween_settings.inbetween_cache, []
-    stamp = cache.stamp
-    monkeypatch.setattr(cache, "stamp", lambda folder, *given: asked.append(folder.name) or stamp(folder, *given))
-    inbetween_settings.built.is_held = True  # of what is known nothing is asked
-    try:
-        for number in (*range(128), 127, 100, 0):
-            snapshot.source_files(effect, source, tmp_path / f"{number}")
-    finally:
-        inbetween_settings.built.is_held = False
-    assert asked == [f"{number}" for number in (*range(128), 0)]
-
-
 def test_a_file_replaced_in_the_middle_is_rendered(bpy, edit, effect, render, images):
     """In place, as Blender writes over its own renders: the folder tells nothing of it."""
     before = render(edit, [FRAME])[FRAME]

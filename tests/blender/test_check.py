@@ -72,8 +72,6 @@ def test_a_sound_edit(noise, check, tmp_path):
             "window": WINDOW,
             "shutters": 2,
             "inbetween": 1,
-            "pairs": 0,
-            "missing": [],
         }
     ]
     assert report["extension"] == {"here": versions.extension(), "saved": versions.extension()}
@@ -276,40 +274,60 @@ def test_a_mask_and_a_strip_that_are_gone(noise, check, tmp_path):
     assert "it has no matte strip" in check()[1][0]
 
 
-def test_in_between_frames(noise, check, tmp_path):
-    """The command that is told builds what is missing, and no more is asked for."""
+@pytest.mark.parametrize("smooth", ["2", "8"])
+def test_a_smooth_effect(noise, check, bpy, tmp_path, capsys, smooth):
+    """It needs nothing that is not there; exposures are told in filmed frames, and chunks stay as long as they were."""
     from shutter_addon.blender import command
 
-    now()[1].inbetween = "2"
-    _, found, report = check()
-    assert report["effects"][0]["pairs"] == FRAMES - 1
-    assert report["effects"][0]["missing"] == [[1, FRAMES - 1]]
-    path = tmp_path / "edit.blend"
-    assert report["build"] == f"python -m shutter_addon inbetween {path} --frames 1:7"
-    assert found == [f'"Shutter": in-between frames of source frames 1 to 7 are missing; build them: {report["build"]}']
-    assert check("--frames", "1")[2]["effects"][0]["missing"] == [[1, 4]]
-    code, sentences, report = check("--inbetweens-later")
-    assert (code, sentences, report["effects"][0]["missing"]) == (0, [], [[1, FRAMES - 1]])
-    assert command.main(["inbetween", str(path), "--frames", "1:2"]) == 0
-    scene = now()[0]
-    scene.frame_start, scene.frame_end = 1, FRAMES  # the command has set others
-    assert check("--frames", "1:2")[1] == []
-    assert check()[2]["effects"][0]["missing"] == [[6, 7]]
-
-
-def test_the_command_that_is_told_may_be_pasted(noise, check, bpy, tmp_path, capsys):
-    import shlex
-
-    from shutter_addon.blender import command
-
-    now()[1].inbetween = "2"
-    path = tmp_path / 'an "edit" of $HOME.blend'
-    bpy.ops.wm.save_as_mainfile(filepath=str(path), copy=True)
+    plain = check()[2]
+    now()[1].inbetween = smooth
+    code, sentences, report = check()
+    assert (code, sentences) == (0, [])
+    (effect,) = report["effects"]
+    assert (effect["window"], effect["inbetween"]) == (WINDOW, int(smooth))
+    assert report["chunk"] == plain["chunk"]
+    assert report["key"] != plain["key"]
+    assert "build" not in report
     capsys.readouterr()
-    assert command.main(["check", str(path), "--frames", "1"]) == 2
-    told = capsys.readouterr().err.strip()
-    build = shlex.split(told[told.index("build them: ") :].removeprefix("build them: "))
-    assert build == ["python", "-m", "shutter_addon", "inbetween", str(path), "--frames", "1:1"]
+    assert command.main(["check", str(tmp_path / "edit.blend")]) == 0
+    assert f"exposures of {WINDOW} frames, 2 shutters, {smooth} moments each" in capsys.readouterr().out
+
+
+def test_a_long_smooth_exposure_has_long_chunks(edit, check, tmp_path):
+    """Those of filmed frames: a neighbour decodes one in ten."""
+    frames = np.random.default_rng(2).integers(0, 256, (90, 16, 16, 3), dtype=np.uint8)
+    noise_film(edit, frames, tmp_path)
+    now()[1].window = 9
+    chunk = check()[2]["chunk"]
+    assert chunk == 9 * (9 - 1)
+    now()[1].inbetween = "4"
+    assert check()[2]["chunk"] == chunk
+
+
+def test_automatic_tells_how_smooth_it_is(edit, check, tmp_path):
+    """By the footage, which stands still here."""
+    noise_film(edit, np.full((FRAMES, 48, 64, 3), 90, np.uint8), tmp_path)
+    now()[1].inbetween = "AUTO"
+    assert check()[2]["effects"][0]["inbetween"] == 1
+
+
+def test_a_frame_that_a_moment_needs_is_missing(noise, check, tmp_path):
+    """The second of its pair, which no bar is open for by itself: time stands between the two."""
+    _edit, effect, _strip = now()
+    effect.use_source_time, effect.source_time = True, 3.5
+    for shutter in effect.shutters:
+        for bar in list(shutter.bars)[1:]:
+            bar.weight = 0
+        shutter.bars[0].weight = 1
+    effect.inbetween = "2"
+    assert check("--frames", "1")[1] == []
+    (fault,) = check("--frames", "1", change=lambda: (tmp_path / "in" / "f0004.png").unlink())[1]
+    assert "f0004.png" in fault
+
+
+@pytest.mark.parametrize("option", [["--inbetweens-later"]])
+def test_options_of_the_first_version_are_gone(noise, check, option):
+    assert check(*option)[0] == 2
 
 
 def test_a_fault_of_the_system_that_names_no_file(noise, check, monkeypatch, tmp_path):
@@ -320,25 +338,6 @@ def test_a_fault_of_the_system_that_names_no_file(noise, check, monkeypatch, tmp
 
     monkeypatch.setattr(versions, "of_edit", no_more)
     assert check()[1] == [f"{tmp_path / 'edit.blend'}: Too many open files"]
-
-
-def test_beyond_a_cut_no_in_between_frame_is_needed(edit, check, tmp_path):
-    """As the build sees it, too."""
-    from shutter_addon.blender.commands.inbetween_command import needed_pairs
-    from shutter_addon.blender.data import snapshot
-
-    rng = np.random.default_rng(3)
-    shots = [rng.integers(0, 256, (6, 8, 3), dtype=np.uint8).repeat(8, 0).repeat(8, 1) for _ in range(2)]
-    noise_film(edit, np.stack([np.roll(shots[k // 6], k, axis=1) for k in range(12)]), tmp_path)
-    now()[1].inbetween = "2"
-    report = check("--frames", "4:6")[2]
-    assert report["effects"][0]["missing"] == [[4, 6]]
-    assert report["build"].endswith("--frames 4:6")
-    assert report["notes"] == []
-    assert needed_pairs(snapshot.take(*now(), range(4, 7))) == {3, 4, 5}
-    later = check("--frames", "4:6", "--inbetweens-later")[2]  # no cuts are looked for
-    assert later["effects"][0]["missing"] == [[4, 9]]
-    assert "as if there were no cuts" in later["notes"][0]
 
 
 def test_plain_strips(noise, check, tmp_path):
@@ -403,13 +402,6 @@ def test_output(noise, check, tmp_path):
     edit.render.resolution_x = 65
     edit.render.image_settings.media_type = "VIDEO"
     assert "a movie has even sizes, not 65×48" in check()[1][0]
-
-
-def test_a_folder_of_in_between_frames_that_cannot_be_written_to(noise, check, tmp_path):
-    now()[1].inbetween = "2"
-    (tmp_path / "virtual_shutter_inbetween").write_bytes(b"")
-    (fault,) = check("--inbetweens-later")[1]
-    assert fault == f"{tmp_path / 'virtual_shutter_inbetween'}: is a file, and no folder"
 
 
 @pytest.mark.parametrize(

@@ -1,4 +1,4 @@
-"""Follow Edges in Blender: renders against the float64 reference, keys, chunks, and in-between frames that it needs."""
+"""Follow Edges in Blender: renders against the float64 reference, keys, chunks, and moments between frames."""
 
 import json
 
@@ -6,7 +6,6 @@ import cv2
 import exact_diffusion
 import numpy as np
 import pytest
-from standin import between
 from support import picture_of, read_picture, recipe, request, state, write_frames
 
 from shutter_addon.compute.guide import Guides, guiding
@@ -14,7 +13,7 @@ from shutter_addon.core.frames import light
 from shutter_addon.core.model import scribbles, windows
 from shutter_addon.core.pixels import compositor
 from shutter_addon.core.recipes import recipe_file
-from shutter_addon.media import MediaError, flow, inbetween, open_source
+from shutter_addon.media import open_source
 
 SIZE, COUNT = (128, 72), 9
 STROKE = {"name": "Belly", "shutter": "S1", "width": 0.03, "strokes": [[[0.36, 0.6], [0.36, 0.3]]]}
@@ -120,36 +119,21 @@ def test_reversed_and_retimed_strips_follow_the_shown_frame(add, film, same_pixe
     assert not np.array_equal(picture_of(effect.scene, COUNT - 3), still)
 
 
-def test_in_betweens_that_it_needs_are_told_and_built(bpy, add, film, tmp_path, monkeypatch):
-    """Where the window does not show them: the shutters are open after the shown frame alone."""
-    from shutter_addon.blender.commands.inbetween_command import needed_pairs
-    from shutter_addon.blender.rendering import render_settings, sessions
-
+def test_moments_that_are_shown_guide_it(bpy, add, film):
+    """Where the window does not show them: the shutters are open after the shown moment alone."""
     data = effect_recipe(inbetween=2, time=[{"frame": 1, "value": 3.5}], edge_aware=1)
     for shutter, bars in zip(data["shutters"], ([0, 1, 0], [0, 0, 0.5]), strict=True):
         shutter["bars"] = bars
-    with (
-        render_settings.using(render_settings.RenderSettings(inbetween=tmp_path / "cache")),
-        open_source(film) as source,
-    ):
-        edit, effect, strip = add(film, data)
-        monkeypatch.setattr(flow, "between", between)
-        inbetween.build(source, tmp_path / "cache", 2, "quick", pairs=range(3, 4))
-        wanted = request(edit, effect, strip, 1)
-        assert wanted.index == 5
-        with pytest.raises(MediaError, match="in-between frames of frame 3 are missing"):
-            wanted.check()
-        with pytest.raises(MediaError, match="in-between frames of frame 3 are missing"):
-            wanted.picture()
-        effect.edge_aware = 0
-        request(edit, effect, strip, 1).check()
-        effect.edge_aware = 1
-        from shutter_addon.blender.data import snapshot
-
-        assert needed_pairs(snapshot.take(edit, effect, strip, (1,), folder=tmp_path / "cache")) == {2, 3}
-        inbetween.build(source, tmp_path / "cache", 2, "quick", pairs=range(2, 3))
-        sessions.forget()
-        request(edit, effect, strip, 1).picture()
+    edit, effect, strip = add(film, data)
+    wanted = request(edit, effect, strip, 1)
+    assert wanted.index == 5
+    moment = wanted.state
+    labels = scribbles.rasterise(moment.shapes, *SIZE, border=True)
+    seen = Guides(wanted.renderer.source).guide(guiding(5, 2, range(wanted.renderer.source.count)), 1)
+    expected = exact_diffusion.solve(labels, 2, seen, 1.0)
+    assert np.abs(wanted.coefficients() - expected).max() <= 1 / 255
+    effect.use_source_time = False
+    assert np.abs(request(edit, effect, strip, 4).coefficients() - expected).max() > 0.01
 
 
 def test_a_draft_has_larger_blocks_where_edges_are_followed(add, film, monkeypatch):

@@ -25,7 +25,7 @@ def stroke(count):
 
 def keyed_recipe(window=8):
     return {
-        "version": 1,
+        "version": 2,
         "window": window,
         "position": "center",
         "light": "encoded",
@@ -131,7 +131,7 @@ def test_applying_another_recipe_leaves_nothing_of_the_first(bpy, edit, effect_o
     effect_on(keyed_recipe())
     effect = edit.virtual_shutter.effects[0]
     strip = next(s for s in edit.sequence_editor.strips if s.type == "SCENE")
-    plain = recipe_file.parse('{"version": 1, "window": 2, "shutters": [{"name": "A", "bars": [1, 0]}]}')
+    plain = recipe_file.parse('{"version": 2, "window": 2, "shutters": [{"name": "A", "bars": [1, 0]}]}')
     recipe_import.apply(edit, effect, strip, plain)
     check(state(edit, effect, strip, 40), plain.for_picture(40 / 24).at(10))
     from bpy_extras import anim_utils

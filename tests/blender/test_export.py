@@ -91,7 +91,7 @@ def valid_recipes(draw, longest=6):
     window = draw(st.integers(1, longest))
     names = draw(st.lists(text, min_size=1, max_size=3, unique=True))
     return records.RecipeRecord(
-        version=1,
+        version=2,
         window=window,
         shutters=[draw(shutters(name, window)) for name in names],
         regions=draw(st.lists(regions(names), max_size=3)),
@@ -230,7 +230,7 @@ def test_numbers_that_float32_cannot_hold(effect_on, weight, degrees, width):
     """The nearest that it can; and from then on the same."""
     region = {"shutter": "A", "width": width, "strokes": [[[0.1, 0.2]]], "keys": [{"frame": 1, "rotation": degrees}]}
     shutter = {"name": "A", "bars": [weight]}
-    apply(effect_on, {"version": 1, "window": 1, "shutters": [shutter], "regions": [region]})
+    apply(effect_on, {"version": 2, "window": 1, "shutters": [shutter], "regions": [region]})
     found = export(effect_on)
     assert np.float32(found.shutters[0].bars[0]) == np.float32(weight)
     assert np.float32(found.regions[0].width) == np.float32(width)
@@ -240,7 +240,7 @@ def test_numbers_that_float32_cannot_hold(effect_on, weight, degrees, width):
 
 
 BASE = {
-    "version": 1,
+    "version": 2,
     "window": 4,
     "inbetween": 2,
     "edge_aware": [{"frame": 4, "value": 0.25, "ease": "bezier"}, {"frame": 24, "value": 1}],
@@ -427,7 +427,7 @@ def test_a_source_time_that_stands_still_keeps_its_direction(effect_on, ease):
 
 
 def test_a_source_time_without_keys_holds_a_frame(effect_on):
-    plain = {"version": 1, "window": 1, "shutters": [{"name": "A", "bars": [1]}]}
+    plain = {"version": 2, "window": 1, "shutters": [{"name": "A", "bars": [1]}]}
     apply(effect_on, plain)
     effect_on[1].use_source_time, effect_on[1].source_time = True, 3.5
     assert export(effect_on).time == [records.ValueKey(1, 3.5)]
@@ -511,7 +511,7 @@ def test_keys_that_cannot_lie_there_leave_the_effect_as_it_was(effect_on, part, 
 
     apply(effect_on, BASE)
     before = export(effect_on)
-    data = {"version": 1, "window": 1, "shutters": [{"name": "A", "bars": [1]}]}
+    data = {"version": 2, "window": 1, "shutters": [{"name": "A", "bars": [1]}]}
     if part == "time":
         data["time"] = [{"frame": frame, "value": 1} for frame in keys]
     elif part == "shutters":
@@ -532,7 +532,7 @@ def test_what_a_recipe_may_hold_at_most(effect_on):
     moves = [{"frame": first, **far}, {"frame": last, "strokes": [[[-900, 900]] * 90]}]
     region = {"shutter": "0", "name": "é" * 63, "width": 1000, "strokes": [[[-900, 900]] * 95]}
     data = {
-        "version": 1,
+        "version": 2,
         "window": 256,
         "shutters": [{"name": str(i), "keys": keys} for i in range(32)],
         "regions": [region | {"keys": moves if i < 20 else []} for i in range(1000)],
@@ -549,7 +549,7 @@ def test_a_key_at_every_frame_is_soon_written(effect_on):
     frames = range(1, 4001)
     ramp = [{"frame": frame, "value": frame % 7 + 1} for frame in frames]
     keys = [{"frame": frame, "bars": [1, frame % 3, 0]} for frame in frames]
-    apply(effect_on, {"version": 1, "window": 3, "shutters": [{"name": "A", "keys": keys}], "time": ramp})
+    apply(effect_on, {"version": 2, "window": 3, "shutters": [{"name": "A", "keys": keys}], "time": ramp})
     found = export(effect_on)
     assert (len(found.time), len(found.shutters[0].keys)) == (4000, 4000)
 

@@ -33,10 +33,10 @@ def _region(read: model.Effect, index: int):
 
 @pytest.fixture
 def whole(bpy, effect, tmp_path):
-    """An effect in which every property counts, with in-between frames only where they are asked for."""
+    """An effect in which every property counts."""
     from shutter_addon.blender.editing import region_edits
 
-    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "edit.blend"))  # in-between frames lie beside it
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "edit.blend"))
     shutter = effect.shutters[1]
     shutter.follow, shutter.length, shutter.combine, shutter.use_threshold = "CAMERA", "MOTION", "LIGHTEST", True
     region_edits.add_region(effect, shutter, "LINE", "line")
@@ -75,8 +75,6 @@ def test_a_field_counts_everywhere(whole, kind, name):
 
     field, (group_of, model_of) = fields_of(kind)[name], KINDS[kind]
     scene, effect, strip = strips.find_effect(whole.scene)
-    if name == "inbetween_method":
-        effect.inbetween = "2"
     group, other = group_of(effect), _other(field)
 
     def seen(frame: int = FIRST):

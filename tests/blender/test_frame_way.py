@@ -12,7 +12,7 @@ sys.path.append(str(ROOT / "scripts"))  # at the end: gallery is a package, and 
 frame_way = importlib.import_module("frame_way")
 
 RECIPE = {
-    "version": 1,
+    "version": 2,
     "window": 8,
     "border": True,
     "shutters": [{"name": "Long", "bars": [1] * 8}, {"name": "Sharp", "bars": [1] + [0] * 7}],

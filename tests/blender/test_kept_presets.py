@@ -1,4 +1,4 @@
-"""A shutter keeps to its preset while Frames, Position and in-between frames change, until its bars are edited."""
+"""A shutter keeps to its preset while Frames, Position and Smooth change, until its bars are edited."""
 
 import itertools
 
@@ -23,7 +23,7 @@ def opened(effect, index=1):
 
 
 def made(name, effect):
-    weights = presets.bars(name, effect.window, effect.position.lower(), int(effect.inbetween))
+    weights = presets.bars(name, effect.window, effect.position.lower())
     return pytest.approx(weights, abs=1e-7)
 
 
@@ -36,23 +36,22 @@ def test_it_is_what_the_preset_makes_however_it_came_there(effect, name, positio
         assert bars(effect) == made(name, effect)
     effect.position = position
     assert bars(effect) == made(name, effect)
-    for factor, window in itertools.product("248", (32, 1, 2, 10)):
-        effect.inbetween = factor
+    for smooth, window in itertools.product(("2", "8", "AUTO"), (32, 1, 2, 10)):
+        effect.inbetween = smooth
         effect.window = window
         assert bars(effect) == made(name, effect)
         assert consistency.preset_of(effect, 1) == name
 
 
-@pytest.mark.parametrize("factor", ["1", "2", "4", "8", "16"])
-def test_the_still_frame_is_the_shown_one(effect, factor):
+@pytest.mark.parametrize("smooth", ["1", "2", "16", "AUTO"])
+def test_the_still_frame_is_the_shown_one(effect, smooth):
     """Whatever changes, in whatever order."""
-    rng = np.random.default_rng(int(factor))
-    effect.inbetween = factor
+    rng = np.random.default_rng(len(smooth))
+    effect.inbetween = smooth
     for _ in range(40):
         effect.window = int(rng.choice(WINDOWS))
         effect.position = rng.choice(["START", "CENTER", "END"])
-        options = Options(effect.window, effect.position.lower(), step=int(factor))
-        assert opened(effect) == list(range(options.before, min(options.before + int(factor), effect.window)))
+        assert opened(effect) == [Options(effect.window, effect.position.lower()).before]
 
 
 def test_shutters_of_one_frame_stay_so(bpy, effect):
@@ -156,12 +155,3 @@ def test_where_the_position_is_keyed_it_is_that_of_the_frame(edit, effect):
     assert opened(effect) == [0], "keys change no bars"
     effect.window = 24
     assert opened(effect) == [23]
-
-
-def test_a_window_that_ends_within_a_frame_is_open_for_the_same_time(effect):
-    effect.inbetween = "8"
-    effect.window = 12
-    effect.inbetween = "1"
-    assert bars(effect, 0).tolist() == [1, 0.5]
-    assert bars(effect).tolist() == [1, 0]
-    assert [consistency.preset_of(effect, i) for i in range(2)] == ["", "STILL"]

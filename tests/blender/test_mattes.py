@@ -739,8 +739,8 @@ def test_a_sequence_is_one_image_however_often_it_is_imported(bpy, shown, matte)
 
 
 def test_between_filmed_frames_a_matte_is_that_of_the_one_before(bpy, tmp_path, footage, matte):
-    """At half the speed, with an in-between frame for each filmed one; an exposure is a filmed frame later."""
-    content = recipe(4, [1, 0, 0, 0], [0, 0, 1, 0], regions=[region(matte)], inbetween=2, **OPTIONS)
+    """At half the speed, with two moments for a filmed frame; an exposure is a filmed frame later."""
+    content = recipe(2, [1, 0], [0, 1], regions=[region(matte)], inbetween=2, **OPTIONS)
     content["time"] = [{"frame": 1, "value": 1}, {"frame": 21, "value": 11}]
     (tmp_path / "r.json").write_text(json.dumps(content))
     where = "--recipe", str(tmp_path / "r.json"), "--output", str(tmp_path / "out")

@@ -373,7 +373,7 @@ NO_SHUTTER = "The effect has no shutter: add one"
 NO_REGION = "The shutter has no region: draw one"
 NO_LAYER = "The preview shows no annotation layer that is not a region yet"
 LINKED = "The edit is linked from another file"
-ANY_EFFECT = ("shutter_add", "recipe_import", "recipe_export")  # need nothing in it
+ANY_EFFECT = ("smooth_streaks", "shutter_add", "recipe_import", "recipe_export")  # need nothing in it
 ALIKE = {
     "match_source": "The Shutter strip is like its source",
     "copy_modifiers": "The Shutter strip has the modifiers of its source",

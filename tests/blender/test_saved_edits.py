@@ -409,21 +409,19 @@ def test_an_edit_without_an_effect_renders(bpy, edit, run, save, tmp_path):
     assert np.abs(read_picture(tmp_path / "out" / "0002.png")[0, 0, :3] - [127.5, 63.75, 31.875]).max() <= 0.5
 
 
-def test_in_betweens_of_an_edits_frames_are_built_and_shared(bpy, edit, noise, run, save, tmp_path):
-    _source, effect, _strip = noise_film(edit, noise, tmp_path)
-    effect.inbetween = "2"
-    saved, out = save(), tmp_path / "out"
-    refused(run("render", saved, "--output", out, "--frames", "3:4"), "in-between frames", "are missing")
-    assert run("inbetween", saved, "--frames", "3:4")[0] == 0
-    (cache,) = (tmp_path / "virtual_shutter_inbetween").iterdir()
-    assert [path for path in cache.iterdir() if path.name != "manifest.json"]
-    assert run("render", saved, "--output", out, "--frames", "3:4") == (0, "")
-    assert run("render", saved, "--output", out, "--frames", "9")[0] == 2
-    assert run("inbetween", saved) == (0, "")
-    assert run("render", saved, "--output", out, "--resume") == (0, "")
-    assert len(bits(out)) == COUNT
-    refused(run("inbetween", saved, "--factor", "2"), "--factor")
-    refused(run("inbetween", tmp_path / "in" / "f0001.png"), "--factor is missing")
+def test_chunks_of_a_smooth_edit_are_the_whole(bpy, edit, run, save, tmp_path):
+    """Bit for bit, wherever they begin; beside the edit nothing is written."""
+    noise = np.random.default_rng(4).integers(0, 256, (6, 10, 3), dtype=np.uint8).repeat(4, 0).repeat(4, 1)
+    _source, effect, _strip = noise_film(edit, np.stack([np.roll(noise, k, axis=1) for k in range(COUNT)]), tmp_path)
+    effect.inbetween = "4"
+    saved = save()
+    before = {path.name for path in tmp_path.iterdir()}
+    assert run("render", saved, "--output", tmp_path / "whole") == (0, "")
+    for chunk in ("9:14", "1:3", "4:8"):
+        assert run("render", saved, "--output", tmp_path / "parts", "--frames", chunk) == (0, "")
+    assert bits(tmp_path / "parts") == bits(tmp_path / "whole")
+    assert len(bits(tmp_path / "whole")) == COUNT
+    assert {path.name for path in tmp_path.iterdir()} == before | {"whole", "parts"}
 
 
 def test_what_cannot_be_done_is_one_sentence(bpy, saved, run, save, tmp_path):
@@ -433,7 +431,7 @@ def test_what_cannot_be_done_is_one_sentence(bpy, saved, run, save, tmp_path):
         ((saved, "--output", tmp_path / "film.mp4"), "film.mp4", "folder of pictures"),
         ((saved, *out, "--recipe", tmp_path / "r.json"), "--recipe"),
         ((saved, *out, "--weights", tmp_path / "w"), "--weights"),
-        ((saved, *out, "--inbetween-method", "quick"), "--inbetween-method"),
+        ((saved, *out, "--inbetween", "4"), "--inbetween"),
         ((saved, *out, "--frames", "3:15"), "3:15", "the edit's frames 1:14"),
         ((saved, *out, "--frames", "3:"), "3:"),
         ((tmp_path / "none.blend", *out), "none.blend", "no such file"),

@@ -99,13 +99,13 @@ def test_scribbles_follow_a_keyed_transform(found):
 
 
 def test_what_is_drawn_is_read_once_until_something_changes(bpy, found, monkeypatch):
-    from shutter_addon.blender.data import snapshot
+    from shutter_addon.blender.data import snapshot, source_media
     from shutter_addon.blender.rendering import invalidation
 
     edit, effect, strip = found
-    asked, take, look = [], snapshot.take, snapshot.source_files
+    asked, take, look = [], snapshot.take, source_media.media_key
     monkeypatch.setattr(snapshot, "take", lambda *a, **k: asked.append("take") or take(*a, **k))
-    monkeypatch.setattr(snapshot, "source_files", lambda *a: asked.append("files") or look(*a))
+    monkeypatch.setattr(source_media, "media_key", lambda *a: asked.append("files") or look(*a))
     invalidation.invalidate_changed(edit)
 
     def drawn():
@@ -146,19 +146,18 @@ def test_a_part_of_a_cut_source_is_read_as_itself(bpy, found):
         assert snapshot.take(edit, effect, part, (part.left_handle,)).source == taken.source
 
 
-def test_another_factor_is_another_source_though_nothing_is_built(found, tmp_path):
+def test_another_smoothness_is_another_source(found):
     from support import request
 
-    from shutter_addon.blender.rendering import render_settings
-
     edit, effect, strip = found
-    with render_settings.using(render_settings.RenderSettings("cpu", inbetween=tmp_path / "none")):
-        sources = []
-        for factor, method in (("1", "QUICK"), ("4", "QUICK"), ("4", "GOOD"), ("1", "GOOD")):
-            effect.inbetween, effect.inbetween_method = factor, method
-            sources.append(request(edit, effect, strip, 3).renderer.source)
-            assert sources[-1].step == int(factor)
+    sources = []
+    for smooth in "1", "4", "8", "1":
+        effect.inbetween = smooth
+        sources.append(request(edit, effect, strip, 3).renderer.source)
+        assert sources[-1].step == int(smooth)
     assert len(set(map(id, sources))) == 4
+    effect.position = "END"  # as all that does not say what is read
+    assert request(edit, effect, strip, 3).renderer.source is sources[-1]
 
 
 def test_keys_follow_time_stretching(found):

@@ -34,7 +34,7 @@ RECIPES = {
     "layers before a camera that pans": effect_of(MOVED | {"layer": True}, camera=CAMERA, plate_reach=4),
     "the timeline's length": with_shutter(effect_of(MOVED), length="timeline"),
     "source time": effect_of(MOVED, time=[{"frame": 1, "value": 9}, {"frame": 17, "value": 1}]),
-    "in-between frames": effect_of(MOVED, inbetween=2),
+    "smooth": effect_of(MOVED, inbetween=2),
 }
 
 
@@ -55,7 +55,7 @@ def test_it_is_what_the_session_asks_for(bpy, edit, tmp_path, name):
     strip, effect = add_effect.add_effect(edit, source)
     recipe_import.apply(edit, effect, strip, found)
     for frame, ours in made.items():
-        taken = snapshot.take(edit, effect, strip, (frame,), folder=tmp_path)
+        taken = snapshot.take(edit, effect, strip, (frame,))
         asked = sessions.of_drawing().request(taken, frame)
         assert (ours.index, ours.direction) == (asked.index, asked.direction)
         assert ours.state.key == asked.state.key

@@ -1,16 +1,14 @@
-"""Exposures with too few frames: said for footage that moves by known pixels a frame, and mended by in-between frames.
-
-In-between frames are random ones in place of flow's, which takes long."""
+"""Exposures with too few frames: said for footage that moves by known pixels a frame, and mended by Smooth Streaks."""
 
 import time
+from pathlib import Path
 
 import cv2
 import numpy as np
 import pytest
-from standin import between
 from support import request, write_frames
 
-from shutter_addon.media import flow
+from shutter_addon.media import steps
 
 WIDTH, HEIGHT, COUNT = 320, 180, 12  # at this height, 2 pixels look smooth
 
@@ -38,7 +36,7 @@ def add(bpy, edit, tmp_path):
             source.elements.append(f"f{number:04d}.png")
         edit.render.resolution_x, edit.render.resolution_y = WIDTH, HEIGHT
         strip, effect = add_effect.add_effect(edit, source)
-        effect.window = len(bars[0])
+        effect.inbetween, effect.window = "1", len(bars[0])
         for i, each in enumerate(bars):
             shutter_edits.add_shutter(effect, f"S{i}")
             bar_edits.paint(effect, i, each)
@@ -66,7 +64,7 @@ def looked(edit, effect, strip):
     for _ in range(4):
         frame = edit.frame_current
         taken = snapshot.take(edit, effect, strip, (frame,))
-        found = strobing.look(effect, strip, taken, *asked(edit, effect, strip, frame)).known
+        found = strobing.look(effect, taken, *asked(edit, effect, strip, frame)).known
         if not strobing.is_busy():
             return found
         until = time.monotonic() + 60
@@ -76,17 +74,10 @@ def looked(edit, effect, strip):
     raise AssertionError("it is never done")
 
 
-@pytest.mark.parametrize(("pixels", "factor"), [(0, None), (1, None), (3, 2), (5, 4), (7, 4), (12, 8), (20, 16)])
-def test_the_least_factor_whose_steps_look_smooth(add, pixels, factor):
-    edit, effect, strip = add(pixels, np.ones(8))
-    found = looked(edit, effect, strip)
-    if factor is None:
-        assert found is None
-        return
-    assert found.step == pytest.approx(pixels, abs=0.3)
-    assert found.factor == factor
-    assert found.seconds > 0
-    assert found.size > 0
+@pytest.mark.parametrize(("pixels", "is_told"), [(0, False), (1, False), (3, True), (7, True), (20, True)])
+def test_steps_that_look_like_steps_are_told(add, pixels, is_told):
+    found = looked(*add(pixels, np.ones(8)))
+    assert found == (pytest.approx(pixels, abs=0.3) if is_told else None)
 
 
 @pytest.mark.parametrize("bars", [[1, 0, 0, 0], [1, 0, 1, 0], [0, 0, 1, 0]])
@@ -98,13 +89,13 @@ def test_shutters_that_are_not_seen_do_not_count(add):
     edit, effect, strip = add(12, [1, 0, 0, 0], np.ones(4), border=True)
     assert looked(edit, effect, strip) is None
     effect.shutters.move(1, 0)
-    assert looked(edit, effect, strip).factor == 8
+    assert looked(edit, effect, strip) == pytest.approx(12, abs=0.3)
 
 
 def test_what_is_followed_has_no_steps(add):
     """The camera's keys move as the footage does."""
     edit, effect, strip = add(12, np.ones(4))
-    assert looked(edit, effect, strip).factor == 8
+    assert looked(edit, effect, strip) == pytest.approx(12, abs=0.3)
     for frame in (1, COUNT):
         effect.camera.location = (-12 * (frame - 1) / WIDTH, 0)
         effect.camera.keyframe_insert("location", frame=frame)
@@ -117,22 +108,17 @@ def test_what_is_followed_has_no_steps(add):
     assert looked(edit, effect, strip) is None
 
 
-def test_no_more_bars_than_there_is_room_for(add):
-    edit, effect, strip = add(12, np.ones(100))
-    assert looked(edit, effect, strip).factor == 2
-    effect.window = 200
-    found = looked(edit, effect, strip)
-    assert (found.factor, found.seconds) == (None, None)
+@pytest.mark.parametrize("smooth", ["2", "4", "AUTO"])
+def test_where_smooth_is_on_nothing_is_said(add, smooth):
+    """And nothing is measured."""
+    from shutter_addon.blender.rendering import strobing
 
-
-def test_in_between_frames_make_steps_smaller(add):
     edit, effect, strip = add(12, np.ones(4))
-    effect.inbetween = "4"
-    found = looked(edit, effect, strip)
-    assert found.step == pytest.approx(3, abs=0.2)
-    assert found.factor == 8
-    effect.inbetween = "8"
+    effect.inbetween = smooth
     assert looked(edit, effect, strip) is None
+    assert not strobing._moved
+    effect.inbetween = "1"
+    assert looked(edit, effect, strip) == pytest.approx(12, abs=0.3)
 
 
 def test_without_opencv_nothing_is_said(add, monkeypatch):
@@ -147,7 +133,6 @@ def test_without_opencv_nothing_is_said(add, monkeypatch):
 
 def test_drawing_never_waits_and_measures_once(add, monkeypatch):
     from shutter_addon.blender.rendering import strobing
-    from shutter_addon.media import steps
 
     edit, effect, strip = add(12, np.ones(4))
     measured, moved = [], steps.moved
@@ -155,103 +140,57 @@ def test_drawing_never_waits_and_measures_once(add, monkeypatch):
     from shutter_addon.blender.data import snapshot
 
     taken = snapshot.take(edit, effect, strip, (4,))
-    assert strobing.look(effect, strip, taken, *asked(edit, effect, strip, 4)).known is None
+    assert strobing.look(effect, taken, *asked(edit, effect, strip, 4)).known is None
     assert not measured
     for frame in (4, 5, 6, 4):
         edit.frame_set(frame)
         looked(edit, effect, strip)
     assert len(measured) == len(set(measured)) <= COUNT
-    assert strobing.last(effect).factor == 8
+    assert strobing.last(effect) == pytest.approx(12, abs=0.3)
     edit.frame_set(7)
     assert strobing.last(effect) is None
+
+
+def test_what_is_known_is_forgotten_with_the_file(add, bpy):
+    from shutter_addon.blender.rendering import strobing
+
+    looked(*add(12, np.ones(4)))
+    assert strobing._moved
+    bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
+    assert not strobing._moved
+    assert not strobing._last_looks
 
 
 # The button
 
 
-@pytest.fixture
-def smoothed(bpy, monkeypatch):
-    monkeypatch.setattr(flow, "between", between)
+def test_smooth_streaks_has_as_many_moments_as_it_takes(add, bpy):
+    """By one click, and back by one undo; the bars stay, and nothing is written."""
+    from shutter_addon.blender.data import consistency, selection
 
-    def press(factor):
-        return bpy.ops.shutter.smooth_streaks("EXEC_DEFAULT", factor=str(factor))
-
-    return press
-
-
-@pytest.mark.parametrize("position", ["START", "CENTER", "END"])
-@pytest.mark.parametrize("edges", ["HOLD", "MIRROR", "SHORTEN", "SLIDE"])
-def test_all_that_the_strip_needs_is_built_and_no_more(add, smoothed, bpy, position, edges):
-    from shutter_addon.blender.data import source_media, strips
-
-    edit, effect, strip = add(3, [1, 1, 0, 0], position=position, edges=edges)
-    strip.left_handle, strip.right_handle = 4, 7
-    assert smoothed(4) == {"FINISHED"}
-    assert (effect.inbetween, effect.window) == ("4", 16)
-    for frame in range(4, 7):
-        request(edit, effect, strip, frame).check()
-    with source_media.open_media(strips.source_of(edit, effect, strip)) as medium:
-        from shutter_addon.blender.data import inbetween_settings
-        from shutter_addon.media import inbetween_cache
-
-        built = inbetween_cache.state(medium, *inbetween_settings.settings(effect)).done
-    assert 0 < built < COUNT - (edges != "MIRROR")  # which may be at a cut, and reaches farther then
+    edit, effect, strip = add(12, np.ones(4))
+    folder = sorted(path.name for path in Path(bpy.data.filepath).parent.rglob("*"))
+    bpy.ops.ed.undo_push(message="before")
+    assert bpy.ops.shutter.smooth_streaks("EXEC_DEFAULT", True) == {"FINISHED"}
+    assert (effect.inbetween, effect.window) == ("AUTO", 4)
+    assert consistency.bars(effect.shutters[0]).tolist() == [1] * 4
+    assert asked(edit, effect, strip, 4)[0].source.step == 8
+    assert looked(edit, effect, strip) is None
+    assert sorted(path.name for path in Path(bpy.data.filepath).parent.rglob("*")) == folder
+    bpy.ops.ed.undo()
+    assert selection.active(bpy.context)[1].inbetween == "1"
 
 
-@pytest.mark.parametrize("way", ["reversed", "slow", "source time"])
-def test_whatever_the_strip_shows(add, smoothed, way):
-    from shutter_addon.blender.data import strips
-
-    edit, effect, strip = add(3, [1, 1, 1, 0])
-    source = strips.source_of(edit, effect, strip)
-    if way == "reversed":
-        source.use_reverse_frames = True
-    elif way == "slow":
-        source.retiming_keys.add(timeline_frame=1)
-        source.retiming_keys.add(timeline_frame=source.right_handle)
-        source.retiming_keys[-1].timeline_frame = 1 + 3 * COUNT
-        strip.right_handle = 25
-    else:
-        effect.use_source_time = True
-        for frame, time in ((1, 9.0), (12, 2.5)):
-            effect.source_time = time
-            effect.keyframe_insert("source_time", frame=frame)
-    assert smoothed(8) == {"FINISHED"}
-    for frame in range(strip.left_handle, strip.right_handle):
-        request(edit, effect, strip, frame).check()
-
-
-def test_a_build_that_fails_changes_nothing(add, smoothed, tmp_path):
+@pytest.mark.parametrize("smooth", ["2", "16", "AUTO"])
+def test_what_is_smooth_is_not_made_so(add, bpy, smooth):
     _edit, effect, _strip = add(3, np.ones(4))
-    (tmp_path / "film" / "f0006.png").write_bytes(b"")
-    with pytest.raises(RuntimeError, match="f0006"):
-        smoothed(4)
-    assert (effect.inbetween, effect.window) == ("1", 4)
+    assert bpy.ops.shutter.smooth_streaks.poll()
+    effect.inbetween = smooth
+    assert not bpy.ops.shutter.smooth_streaks.poll()
+    with pytest.raises(RuntimeError, match="The exposures are smooth"):
+        bpy.ops.shutter.smooth_streaks("EXEC_DEFAULT", True)
+    assert effect.inbetween == smooth
 
 
-def test_more_bars_than_a_shutter_has_are_refused(add, smoothed):
-    _edit, effect, _strip = add(3, np.ones(100))
-    with pytest.raises(RuntimeError, match="not 800"):
-        smoothed(8)
-    assert (effect.inbetween, effect.window) == ("1", 100)
-
-
-def test_the_estimate_is_near_what_is_built(add, smoothed, monkeypatch):
-    from shutter_addon.blender.data import snapshot
-    from shutter_addon.blender.rendering import strobing
-    from shutter_addon.media import inbetween
-
-    edit, effect, strip = add(3, np.ones(4))
-    strip.left_handle, strip.right_handle = 3, 6
-    taken = snapshot.take(edit, effect, strip, range(3, 6))
-    with taken.source.open() as medium:
-        needed = strobing.pairs(taken, medium, 4)
-    assert needed == [2, 3, 4, 5, 6, 7]
-    monkeypatch.setattr(inbetween, "cost", lambda *_: inbetween.Cost(pair=1.0, frame=0.0, size=1.0))
-    assert looked(edit, effect, strip).seconds == len(needed)
-
-
-def test_what_looks_smooth(bpy):
-    from shutter_addon.blender.rendering import strobing
-
-    assert [strobing.smooth(height) for height in (1080, 2160, 480)] == [3, 6, 2]
+def test_what_looks_smooth():
+    assert [steps.smooth(height) for height in (1080, 2160, 480)] == [3, 6, 2]

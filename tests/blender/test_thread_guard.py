@@ -11,15 +11,15 @@ def test_a_render_works_on_threads_that_touch_no_data(bpy, edit, render, effect)
 
 
 def test_data_on_a_thread_are_found(bpy, effect):
-    from shutter_addon.blender.data import inbetween_settings, selection
+    from shutter_addon.blender.data import selection
     from shutter_addon.core import threads
 
-    inbetween_settings.factor(effect)
+    selection.active_shutter(effect)
     assert not thread_guard.faults()
-    threads.start(inbetween_settings.factor, effect).result()
+    threads.start(selection.active_shutter, effect).result()
     found = thread_guard.faults()
-    assert "blender/data/inbetween_settings.py: factor runs on a thread" in found
-    assert any("factor has effect" in fault for fault in found)
+    assert "blender/data/selection.py: active_shutter runs on a thread" in found
+    assert any("active_shutter has effect" in fault for fault in found)
     threads.start(selection.active, bpy.context).exception()
     assert any("has context" in fault for fault in thread_guard.faults())
 

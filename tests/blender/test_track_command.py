@@ -135,8 +135,8 @@ def test_what_a_keyed_time_shows_is_tracked(track, film, tmp_path):
 @pytest.mark.parametrize("start", [1, 20, 31])
 @pytest.mark.parametrize("subject", ["region", "camera"])
 def test_between_filmed_frames_it_goes_straight(track, film, tmp_path, subject, start):
-    """From frame to frame by a quarter of a filmed one's time, as in-between frames do; from one of these as well. The
-    region is redrawn meanwhile."""
+    """From frame to frame by a quarter of a filmed one's time, as moments do; from one of these as well. The region is
+    redrawn meanwhile."""
     moved = [[[0.45, 0.5], [0.75, 0.5]], [[0.6, 0.35], [0.6, 0.65]]]
     given = plain(keys=[{"frame": 1}, {"frame": 30, "strokes": moved}])
     given |= {"inbetween": 4, "time": [{"frame": 1, "value": 1}, {"frame": 45, "value": 12}]}
@@ -152,6 +152,17 @@ def test_between_filmed_frames_it_goes_straight(track, film, tmp_path, subject, 
         places[frame] = np.add(moving.placement(frame).location, moving.centre(frame))
     for frame, place in places.items():
         assert place - places[start] == pytest.approx(expected(frame / 4, start / 4), abs=0.3 / WIDTH), frame
+
+
+def test_as_many_moments_as_the_footage_needs_are_tracked(track, film, tmp_path):
+    """It moves by 3.2 pixels: two moments look smooth."""
+    found = {}
+    for smooth in ("auto", 2, 1):
+        given = plain() | {"inbetween": smooth, "time": [{"frame": 1, "value": 1}, {"frame": 45, "value": 12}]}
+        options = "--region", "cross", "--frame", 1, "--all-keys", "--output", tmp_path / "t.json"
+        assert track(film, *options, recipe=given) == (0, "")
+        found[smooth] = keys(tmp_path / "t.json")
+    assert found["auto"] == found[2] != found[1]
 
 
 def test_what_is_shown_twice_is_tracked_once(track, film, tmp_path):

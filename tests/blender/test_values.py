@@ -134,7 +134,7 @@ IMPOSSIBLE = {
     "position": (lambda e: raw(e, "position", 77), 'effect "Shutter": Position is none of its choices'),
     "light": (lambda e: raw(e, "light", -1), 'effect "Shutter": Light is none'),
     "aggregate": (lambda e: raw(e, "aggregate", 9), 'effect "Shutter": Matte Resolution is none'),
-    "inbetween": (lambda e: raw(e, "inbetween", 9), 'effect "Shutter": In-Between Frames is none'),
+    "inbetween": (lambda e: raw(e, "inbetween", 9), 'effect "Shutter": Smooth is none'),
     "keyed position": (lambda e: key(e, "position", (1, -1)), 'effect "Shutter": Position is none'),
     "keyed light": (lambda e: key(e, "light", (1, NAN)), 'effect "Shutter": Light is none'),
     "kind": (lambda e: raw(e.regions[0], "kind", 5), 'region "Face": Type is none'),
@@ -476,7 +476,6 @@ def show(bpy, edit):
     from shutter_addon.blender.editing import reconcile
     from shutter_addon.blender.interface import (
         bar_editor,
-        inbetween_operators,
         operators,
         panels,
         probe_gizmo,
@@ -494,7 +493,7 @@ def show(bpy, edit):
             preview_areas.shown(context)
             bar_editor.bar_under(context, 30, 30)
             region_gizmo.place(context)
-            for module in (operators, inbetween_operators, bar_editor, region_gizmo):
+            for module in (operators, bar_editor, region_gizmo):
                 for cls in blender.classes_of(module):
                     if hasattr(cls, "poll"):
                         cls.poll(context)

@@ -15,7 +15,7 @@ def single(bunny, tmp_path_factory):
     footage, recipe = job.folder / "footage.mp4", job.folder / "recipe.json"
     shrink(bunny, footage)
     recipe.write_text(json.dumps(RECIPE))
-    shutter("render", footage, "--recipe", recipe, "--save", job.edit)  # builds the in-betweens, too
+    shutter("render", footage, "--recipe", recipe, "--save", job.edit)
     shutter("render", job.edit, "--output", job.pictures)
     shutter("join", job.pictures, "--edit", job.edit, "--output", job.movie)
     return job

@@ -1,4 +1,4 @@
-"""The demo's edit, small, shorter, and with in-betweens; and what a farm makes of it."""
+"""The demo's edit, small, shorter, and smooth; and what a farm makes of it."""
 
 import json
 import subprocess
@@ -12,7 +12,7 @@ ROOT = Path(__file__).parents[2]
 FARM = ROOT / "farm"
 FRAMES = 32
 SIZE = 160, 90
-RECIPE = json.loads((ROOT / "assets" / "bunny.json").read_text()) | {"inbetween": 2}
+RECIPE = json.loads((ROOT / "assets" / "bunny.json").read_text()) | {"version": 2, "inbetween": 2}
 
 
 @dataclass

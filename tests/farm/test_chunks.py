@@ -8,7 +8,6 @@ CHUNKS = 8
 
 
 def test_chunks_in_random_order_give_the_bits_of_one_process(job, single):
-    shutter("inbetween", job.edit)
     length = FRAMES // CHUNKS
     for first in random.Random(1).sample(range(1, FRAMES, length), CHUNKS):
         chunk = f"{first}:{first + length - 1}"

@@ -29,7 +29,7 @@ WIDTH, HEIGHT = 128, 72
 JOB = "virtual_shutter_job.json"
 OLD = b"the film of last night"
 RECIPE = {
-    "version": 1,
+    "version": 2,
     "window": 8,
     "inbetween": 2,
     "shutters": [{"name": "Long", "bars": [1] * 8}, {"name": "Sharp", "bars": [1] + [0] * 7}],
@@ -58,10 +58,6 @@ class Node(Job):
     """A machine's view of a job. Its pictures and its film lie elsewhere."""
 
     @property
-    def inbetween(self):
-        return self.folder / "virtual_shutter_inbetween"
-
-    @property
     def pictures(self):
         return self.folder.parent / "pictures"
 
@@ -70,10 +66,7 @@ class Node(Job):
         return self.folder.parent / "films" / "film.mp4"
 
     def look(self):
-        return "check", self.edit, "--output", self.pictures, "--inbetweens-later", "--resume", "--movie", self.movie
-
-    def build(self):
-        return "inbetween", self.edit
+        return "check", self.edit, "--output", self.pictures, "--resume", "--movie", self.movie
 
     def render(self, frames=f"1:{FRAMES}"):
         return "render", self.edit, "--output", self.pictures, "--frames", frames, "--resume", "--device", "cpu"
@@ -83,7 +76,7 @@ class Node(Job):
 
     def steps(self):
         """The commands of a whole submission, in their order."""
-        return [self.look(), self.build(), *map(self.render, CHUNKS), self.join()]
+        return [self.look(), *map(self.render, CHUNKS), self.join()]
 
 
 def _started(arguments, before=()):
@@ -185,7 +178,7 @@ def worker():
 
 @pytest.fixture
 def node(whole, tmp_path):
-    """A node that has all that the job needs, in-betweens too, and a film of last night; nothing is rendered."""
+    """A node that has all that the job needs, and a film of last night; nothing is rendered."""
     node = Node(tmp_path / "Knoten Süd 1" / "node")
     shutil.copytree(whole.folder, node.folder)
     node.movie.parent.mkdir()
@@ -237,7 +230,6 @@ def _put(node, whole, frames=range(1, FRAMES + 1)):
 # The command, what it writes, and how many files that are in the end.
 KILLED = {
     "frames": (Node.render, lambda node: list(node.pictures.glob("*.png")), FRAMES),
-    "in-betweens": (Node.build, lambda node: list(node.inbetween.glob("*/*.png")), FRAMES - 1),
     "join": (Node.join, lambda node: list(node.movie.parent.glob(".part-*/*")), 2),
 }
 
@@ -246,8 +238,6 @@ KILLED = {
 def test_a_killed_worker(whole, node, submit, step):
     command, written, count = KILLED[step]
     _put(node, whole, range(1, FRAMES + 1) if step == "join" else ())
-    if step == "in-betweens":
-        shutil.rmtree(node.inbetween)
     process = _started(command(node))
     _wait_for(lambda: written(node), process)
     process.kill()
@@ -272,7 +262,6 @@ def test_a_worker_that_is_asked_to_leave(whole, node, submit):
 
 FULL = {
     "frames": (Node.render, lambda node: node.pictures, 96 << 10),
-    "in-betweens": (Node.build, lambda node: node.inbetween, 96 << 10),
     "join": (Node.join, lambda node: node.movie.parent, 24 << 10),
 }
 
@@ -283,8 +272,6 @@ def test_a_full_disk(whole, node, submit, step):
     command, place, size = FULL[step]
     if step == "join":
         _put(node, whole)
-    elif step == "in-betweens":
-        shutil.rmtree(node.inbetween)
     with small_disk(place(node), size) as disk:
         node.movie.write_bytes(OLD)
         _refused(_run(*command(node)), place(node), "no space left")
@@ -313,9 +300,9 @@ def test_a_read_only_output(whole, node, submit, command, place):
 
 @pytest.mark.skipif(os.geteuid() != 0, reason="only root mounts")
 def test_a_read_only_edit_with_all_that_it_needs(whole, node, submit):
-    """Footage, edit and in-betweens lie on a drive that a node may only read."""
+    """Footage and edit lie on a drive that a node may only read."""
     before = _seeing_read_only(node.folder)
-    for step in (node.look(), node.build(), node.render("3:4")):
+    for step in (node.look(), node.render("3:4")):
         assert _run(*step, before=before) == (0, "")
     submit(node)
 
@@ -333,10 +320,6 @@ def _flip(path):
 
 def _cut(path):
     path.write_bytes(path.read_bytes()[: path.stat().st_size // 2])
-
-
-def _inbetween(node):
-    return min(node.inbetween.glob("*/0000003*.png"))
 
 
 def _change_job(name, value):
@@ -359,8 +342,6 @@ FOUND_BY_RENDER = {
     "other extension": (_change_job("extension", "0.0.9"), ["is of version 0.0.9 of the extension, this machine has"]),
     "other Blender": (_change_job("blender", "5.1.0"), ["is of Blender 5.1.0, this machine has"]),
     "job file damaged": (lambda node: _cut(node.pictures / JOB), [JOB, "is damaged; check the edit again"]),
-    "in-between damaged": (lambda node: _flip(_inbetween(node)), ["in-between frame cannot be decoded"]),
-    "in-between missing": (lambda node: _inbetween(node).unlink(), ["in-between frames of frame 1", "are missing"]),
     "edit cut off": (lambda node: _cut(node.edit), ["edit.blend"]),
     "no edit": (lambda node: node.edit.write_bytes(b"BLENDER"), ["edit.blend"]),
 }
@@ -419,7 +400,7 @@ def test_a_fault_among_finished_frames(whole, node, worker, submit, fault):
 
 @pytest.mark.parametrize("frames", ["20:30", "0", "9:3", "all", ""])
 def test_frames_that_the_edit_has_not(node, worker, frames):
-    for command in (node.look(), node.build(), node.render(), node.join()):
+    for command in (node.look(), node.render(), node.join()):
         _refused(worker(*command, "--frames", frames), "--frames: ")
     assert not list(node.folder.parent.glob("pictures/*.png"))
     assert node.movie.read_bytes() == OLD

@@ -72,9 +72,7 @@ def told():
 
 
 def seen(name):
-    yield from driver.until(
-        lambda: (found := strobing_story.note()) and found.seconds, "the note says what it takes", 30
-    )
+    yield from driver.until(strobing_story.note, "the note says that there are too few frames", 30)
     found = yield from buttons()
     sidebar, unit = story.sidebar(), bpy.context.preferences.system.ui_scale
     if LAST in found:

@@ -39,7 +39,7 @@ def effect_added():
         assert bpy.ops.shutter.add_effect("EXEC_DEFAULT") == {"FINISHED"}
     line = [[0.45, 0.2], [0.5, 0.8]]
     recipe = {
-        "version": 1,
+        "version": 2,
         "window": 8,
         "border": True,
         "shutters": [{"name": "Long", "bars": [1] * 8}, {"name": "Sharp", "bars": [1] + [0] * 7}],

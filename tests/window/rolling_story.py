@@ -1,5 +1,5 @@
-"""A pole that a rolling shutter has skewed: Find Readout and Rolling Shutter Repair from the menu, the in-between
-frames by the note's button, and undo. Run inside Blender, by test_window.py."""
+"""A pole that a rolling shutter has skewed: Find Readout and Rolling Shutter Repair from the menu, and undo. Run inside
+Blender, by test_window.py."""
 
 # ruff: noqa: E402 (Blender finds the helpers once it knows their folder)
 import os
@@ -11,7 +11,6 @@ sys.path.append(os.environ["SHUTTER_PACKAGES"])
 
 import bpy
 import driver
-import full_quality_story as look
 import numpy as np
 import story
 from support import write_frames
@@ -23,7 +22,6 @@ ADJUSTED = 30
 COUNT, SIZE, READOUT = 16, (360, 640), 0.6
 SHOWN = 10  # the pole is fastest here
 FILM = driver.OUT / "film"
-BUTTON = "shutter.smooth_streaks"
 
 
 def frame(number):
@@ -44,16 +42,13 @@ def opened():
     first = write_frames(FILM, [frame(number) for number in range(COUNT)])
     yield from story.pictures_added(first, SIZE)
     story.edit().frame_set(SHOWN)
+    story.effect().inbetween = "1"
     for bar in story.effect().shutters[0].bars[1:]:  # a still frame
         bar.weight = 0.0
     bpy.ops.ed.undo_push(message="Start")
     with driver.override("PREVIEW"):
         bpy.ops.sequencer.view_all_preview()
     yield 1.0
-
-
-def label():
-    return look.label(BUTTON)
 
 
 def readout():
@@ -68,17 +63,8 @@ def shown(name):
     driver.move(region, region.width / 2, region.height + 12)
     yield 1.0
     yield from driver.shot_when_shown(name)
-    facts = {"label": label(), "readout": readout(), "factor": story.effect().inbetween}
+    facts = {"readout": readout(), "smooth": story.effect().inbetween}
     driver.saw(step=name, crop=story.crop(), regions=len(story.effect().regions), **facts)
-
-
-def built():
-    yield from driver.until(label, "the note says that frames are missing", 20)
-    yield from shown("2_missing")
-    driver.move(story.preview(), *look.button(BUTTON))
-    yield 0.5
-    driver.xdotool("click", 1)
-    yield from driver.until(lambda: label() is None, "the in-between frames are built", 90)
 
 
 def adjusted():
@@ -105,20 +91,19 @@ def told():
     yield from shown("1_skewed")
     yield from story.chosen_beside_draw(FIND)
     yield from driver.until(readout, "the menu finds the readout", 60)
-    yield from built()
-    yield from shown("3_found")
+    yield from shown("2_found")
     yield from story.chosen_beside_draw(REPAIR, MENU)
     yield 1.0
-    yield from shown("4_again")
+    yield from shown("3_again")
     yield from adjusted()
-    yield from shown("5_adjusted")
-    for times in (1, 2, 3):  # the second repair, the in-between frames, the first repair
+    yield from shown("4_adjusted")
+    for times in (1, 2):  # the second repair, the first repair
         driver.move(story.preview(), 300, 300)
         driver.key("ctrl+z")
         yield 1.5
         driver.saw(undone=times, readout=readout())
     yield from driver.until(lambda: not readout(), "it is undone")
-    yield from shown("6_undone")
+    yield from shown("5_undone")
 
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-"""Footage with too few frames for its exposure: the note in the preview, its button, which builds in-between frames and
+"""Footage with too few frames for its exposure: the note in the preview, its button, which makes the streak smooth and
 has the note go, and undo. Run inside Blender, by test_window.py."""
 
 # ruff: noqa: E402 (Blender finds the helpers once it knows their folder)
@@ -37,6 +37,7 @@ def opened():
     first = write_frames(FILM, [frame(number) for number in range(COUNT)])
     yield from story.pictures_added(first, SIZE)
     story.edit().frame_set(3)
+    story.effect().inbetween = "1"
     bpy.ops.ed.undo_push(message="Start")
     with driver.override("PREVIEW"):
         bpy.ops.sequencer.view_all_preview()
@@ -48,7 +49,7 @@ def label():
 
 
 def note():
-    """What is known of the exposure."""
+    """How far it goes from one frame of the exposure to the next, in pixels."""
     strobing = sys.modules["bl_ext.user_default.virtual_shutter.shutter_addon.blender.rendering.strobing"]
     return strobing.last(story.effect())
 
@@ -58,7 +59,7 @@ def shown(name):
     driver.move(region, region.width / 2, region.height + 12)
     yield 1.0
     yield from driver.shot_when_shown(name)
-    driver.saw(step=name, crop=story.crop(), label=label(), factor=story.effect().inbetween, bars=bar_counts())
+    driver.saw(step=name, crop=story.crop(), label=label(), smooth=story.effect().inbetween, bars=bar_counts())
 
 
 def bar_counts():
@@ -75,10 +76,10 @@ def clicked():
 
 def told():
     yield from opened()
-    yield from driver.until(lambda: note() and note().seconds, "the note says what it takes", 30)
+    yield from driver.until(note, "the note says it", 30)
     yield from shown("1_steps")
     yield from clicked()
-    yield from driver.until(lambda: story.effect().inbetween != "1", "the in-between frames are used", 60)
+    yield from driver.until(lambda: story.effect().inbetween != "1", "the exposure is smooth")
     yield from driver.until(lambda: label() is None, "the note goes", 20)
     yield from shown("2_smooth")
     driver.move(story.preview(), 300, 300)

@@ -16,7 +16,7 @@ def test_an_effect_is_baked_and_brought_back(backend, tmp_path):
     line = {"shutter": "Sharp", "kind": "line", "width": 0.03, "strokes": [[[0.462, 0.65], [0.468, 0.565]]]}
     shutters = [{"name": "Long", "bars": [1] * 16}, {"name": "Sharp", "bars": [0] * 8 + [1] + [0] * 7}]
     recipe = tmp_path / "recipe.json"
-    recipe.write_text(json.dumps({"version": 1, "window": 16, "border": True, "shutters": shutters, "regions": [line]}))
+    recipe.write_text(json.dumps({"version": 2, "window": 16, "border": True, "shutters": shutters, "regions": [line]}))
     footage = shutil.copy(ROOT / "assets" / "walkers.mp4", tmp_path)
     seen, console = tell("bake_story.py", backend, linked(tmp_path), footage=footage, recipe=recipe)
     assert "Traceback" not in console

@@ -31,7 +31,7 @@ def footage(tmp_path_factory):
         OpenImageIO.ImageBuf(frame).write(str(folder / "frames" / f"{number + 1:04d}.png"))
     line = {"name": "Line", "shutter": "Sharp", "strokes": [[[0.2, 0.2], [0.6, 0.9]]], "width": 0.1}
     shutters = [{"name": "Long", "bars": [1] * 6}, {"name": "Sharp", "bars": [0, 0, 1, 0, 0, 0]}]
-    recipe = {"version": 1, "window": 6, "border": True, "shutters": shutters, "regions": [line]}
+    recipe = {"version": 2, "window": 6, "border": True, "shutters": shutters, "regions": [line]}
     (folder / "recipe.json").write_text(json.dumps(recipe))
     command = (sys.executable, "-m", "shutter_addon", "render", folder / "frames" / "0001.png")
     options = ("--recipe", folder / "recipe.json", "--output", folder / "expected", "--device", "opengl")

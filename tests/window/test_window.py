@@ -4,7 +4,7 @@ import cv2
 import numpy as np
 import pytest
 from screens import TOLERANCE, assert_alike, crop, pixels
-from telling import ROOT, backends, linked, needs_window, packages, tell
+from telling import ROOT, backends, linked, needs_window, packages, tell, write_film
 
 from shutter_addon.media import open_source
 
@@ -230,36 +230,71 @@ def test_one_look_at_full_quality(backend, tmp_path):
 
 @pytest.mark.parametrize("backend", backends("opengl"))
 def test_too_few_frames_for_a_streak(backend, tmp_path):
-    """Said in the preview, with a button that builds what the strip needs, by which the steps go; undone and redone."""
+    """Said in the preview, with a button that makes it smooth, by which the steps go and the bars stay; undone and
+    redone."""
     given = {"packages": packages(tmp_path / "packages")}
     seen, console = tell("strobing_story.py", backend, linked(tmp_path), **given)
     assert "Traceback" not in console
     steps = {entry["step"]: entry for entry in seen if "step" in entry}
-    found = {name: (entry["factor"], entry["bars"], entry["label"] is None) for name, entry in steps.items()}
-    stepped, smooth = ("1", [8, 8], False), ("4", [32, 32], True)
+    found = {name: (entry["smooth"], entry["bars"], entry["label"]) for name, entry in steps.items()}
+    stepped, smooth = ("1", [8, 8], "Smooth"), ("AUTO", [8, 8], None)
     assert found == {"1_steps": stepped, "2_smooth": smooth, "3_undone": stepped, "4_redone": smooth}
-    for name in ("1_steps", "3_undone"):
-        assert steps[name]["label"] == "4× In-Between Frames", name
     before, after = (crop(tmp_path, steps[name])[120:280] for name in ("1_steps", "2_smooth"))  # the picture alone
     assert detail(after) < 0.8 * detail(before)
 
 
+def fast_film(path):
+    """For smooth_story.py: 24 frames of lines that go 12 pixels at a time, behind a square that stands still."""
+    random = np.random.default_rng(4)
+    texture = cv2.resize(random.integers(0, 256, (45, 128, 3), dtype=np.uint8), (1024, 360)) // 4
+    for line in range(20, texture.shape[1], 70):
+        texture[:, line : line + 3] = 255
+    square = cv2.resize(random.integers(120, 256, (20, 20, 3), dtype=np.uint8), (160, 160))
+    frames = [texture[:, 12 * number : 12 * number + 640].copy() for number in range(24)]
+    for frame in frames:
+        frame[180:340, 240:400] = square
+    return write_film(path, frames, 10)
+
+
+@pytest.mark.parametrize("backend", backends("opengl"))
+def test_a_streak_is_smooth_without_a_further_click(backend, tmp_path):
+    """A clip is dropped, Draw Shutter, one stroke: what moves streaks without steps, and what the stroke is on is as
+    sharp as the clip."""
+    (tmp_path / "clip").mkdir()
+    footage = fast_film(tmp_path / "clip" / "lines.mp4")
+    given = {"footage": footage, "packages": packages(tmp_path / "packages")}
+    seen, console = tell("smooth_story.py", backend, linked(tmp_path), **given)
+    assert "Traceback" not in console
+    facts = {name: entry[name] for entry in seen for name in entry}
+    assert facts["clicks"][-1][0] == "the stroke is drawn"
+    assert facts["smooth"] == "AUTO"
+    steps = {entry["step"]: entry for entry in seen if "step" in entry}
+    plain, smooth = (crop(tmp_path, steps[name])[120:200] for name in ("3_plain", "2_smooth"))  # above the square
+    assert detail(smooth) < 0.5 * detail(plain)
+    final = pixels(tmp_path / "final.png")
+    with open_source(footage) as source:
+        filmed = source.read(facts["frame"])[..., :3].astype(float)
+    assert np.abs(final[220:300, 280:360] - filmed[220:300, 280:360]).max() <= 6
+    streak, row = final[60:140, 100:540], filmed[60:140, 100:540]
+    assert detail(streak) < 0.25 * detail(row)
+    assert np.abs(np.diff(streak.mean(axis=(0, 2)), 2)).max() < 4, "copies of lines lie side by side"
+
+
 @pytest.mark.parametrize("backend", backends("vulkan"))
 def test_a_rolling_shutter_is_repaired(backend, tmp_path):
-    """Found from the menu, the in-between frames by the note's button: the pole stands upright. Undone, it leans."""
+    """Found from the menu: the pole stands upright, without a further click. Undone, it leans."""
     given = {"packages": packages(tmp_path / "packages")}
     seen, console = tell("rolling_story.py", backend, linked(tmp_path), **given)
     assert "Traceback" not in console
     steps = {entry["step"]: entry for entry in seen if "step" in entry}
-    assert [(entry["factor"], entry["regions"]) for entry in steps.values()] == [("1", 0), *[("8", 1)] * 4, ("1", 0)]
-    for name in ("2_missing", "3_found", "4_again"):
+    assert [(entry["smooth"], entry["regions"]) for entry in steps.values()] == [("1", 0), *[("8", 1)] * 3, ("1", 0)]
+    for name in ("2_found", "3_again"):
         assert steps[name]["readout"] == pytest.approx(60, abs=2), name
-    assert steps["2_missing"]["label"] == "Build"
-    leans = {name: lean(crop(tmp_path, steps[name])) for name in steps if name != "2_missing"}
-    assert steps["5_adjusted"]["readout"] == 30
-    assert min(leans["1_skewed"], leans["6_undone"]) > 6
-    assert max(leans["3_found"], leans["4_again"]) < 1
-    assert leans["5_adjusted"] == pytest.approx(leans["1_skewed"] / 2, abs=1)
+    leans = {name: lean(crop(tmp_path, steps[name])) for name in steps}
+    assert steps["4_adjusted"]["readout"] == 30
+    assert min(leans["1_skewed"], leans["5_undone"]) > 6
+    assert max(leans["2_found"], leans["3_again"]) < 1
+    assert leans["4_adjusted"] == pytest.approx(leans["1_skewed"] / 2, abs=1)
 
 
 def lean(picture):

@@ -20,6 +20,7 @@ from ...media.carried_mattes import CarriedMattes
 from ...media.cuts import ShotSource
 from ...media.filmed_frames import FilmedFrames
 from ...media.footage import Footage
+from ...media.smooth import steps_for
 from ...media.tracking import Tracked
 from ..editing import new_edit
 from ..output import film_output
@@ -98,7 +99,8 @@ def _followed(
     TrackingError: at once."""
     effect = source_recipe.for_picture(medium.width / medium.height)
     subject: Any = effect.camera if index is None else effect.regions[index]
-    times = {frame: _shown(source_recipe, frame, medium.count) for frame in frames}
+    step = _steps(source_recipe, medium)
+    times = {frame: _shown(source_recipe, frame, medium.count, step) for frame in frames}
     filmed = FilmedFrames(times, arguments.frame)
     with ExitStack() as ends:
         shots = ends.enter_context(ShotSource(PrefetchSource(medium)))
@@ -132,9 +134,9 @@ def _cover(
     if region.between == "straight":
         return lambda place, size: outlines.coverage(region.drawings.at(filmed.timeline[place]), *size)
     medium = ends.enter_context(command_line.opened(arguments.source))
-    drawn = {}
+    drawn, step = {}, _steps(source_recipe, medium)
     for strokes, frame in zip(region.drawings.strokes, region.drawings.frames, strict=True):
-        drawn[int(_shown(source_recipe, frame, medium.count))] = outlines.curves(strokes)
+        drawn[int(_shown(source_recipe, frame, medium.count, step))] = outlines.curves(strokes)
     mattes = ends.enter_context(closing(CarriedMattes(medium, tuple(sorted(drawn.items())))))
     return matte_tracking.cover_of(mattes, filmed.index_at)
 
@@ -168,11 +170,16 @@ def _ended(source_recipe: Effect, index: int | None, tracked: dict, stops: list,
     return source_recipe.with_parts(regions)
 
 
-def _shown(source_recipe: Effect, frame: float, count: int) -> float:
-    """Which of a source's frames, from 0 on, a recipe shows at a timeline frame; a fraction: an in-between one."""
-    factor = source_recipe.options.at(1).step
+def _steps(source_recipe: Effect, medium: FrameSource) -> int:
+    """How many moments a recipe has from a filmed frame to the next."""
+    options = source_recipe.options.at(1)
+    return steps_for(medium, options.step, options.window)
+
+
+def _shown(source_recipe: Effect, frame: float, count: int, step: int) -> float:
+    """Which of a source's frames, from 0 on, a recipe shows at a timeline frame; a fraction: a moment between two."""
     filmed = (source_recipe.time.at(frame)[0] if source_recipe.time else frame) - 1
-    return nearest(filmed, factor, (count - 1) * factor + 1) / factor
+    return nearest(filmed, step, (count - 1) * step + 1) / step
 
 
 def _write_track(arguments: Namespace, result: Effect, tracked: dict, stops: list) -> None:

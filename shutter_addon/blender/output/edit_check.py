@@ -35,7 +35,8 @@ class EffectCheck:
     """What was found of an effect, of the frames that its strips show.
 
     scene: that its strip is in; name: of that strip; source: the footage's first file, "": it cannot be read
-    size: of its pictures, width and height in pixels; window: frames of the longest; shutters: how many
+    size: of its pictures, width and height in pixels; window: filmed frames of the longest
+    shutters: how many
     steps: moments for a filmed frame, 1: it is not smooth
     mattes: how many mattes of outlines are to be carried first, by the folder that they are kept in
     needs: memory for a frame, None: its frames cannot be asked for
@@ -56,7 +57,7 @@ class EffectCheck:
 
     @property
     def chunk(self) -> int:
-        return chunk_size(self.window, self.steps) if self.window else LEAST
+        return chunk_size(self.window * self.steps, self.steps) if self.window else LEAST
 
 
 def effects(scene: Scene, frames: range, compositor: Compositor) -> list[EffectCheck]:
@@ -100,8 +101,8 @@ def _effect(session: RenderSession, shown: tuple, compositor: Compositor) -> Eff
     if requests:
         renderer = session.renderer(next(iter(requests.values())).source)
         source = renderer.source
-        check.window = max(request.state.options.window for request in requests.values())
         check.steps = source.step
+        check.window = max(request.state.options.window for request in requests.values()) // source.step
         _look_at_frames(check, renderer, requests)
         _look_at_mattes(check, source, requests)
         check.needs = _needs(source, requests, compositor)

@@ -1,0 +1,510 @@
+"""Smooth effects: what their windows show, which moments there are, and what stays as it is when Smooth changes.
+
+Pictures are compared with sums of moments that are known: random ones in place of flow's (standin.py)."""
+
+import itertools
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from standin import Between, moments, spread
+from support import picture_of, recipe, request, state, write_frames
+
+from shutter_addon.blender.data import fcurves
+from shutter_addon.core.frames import light
+from shutter_addon.media import flow, open_source, smooth
+
+STEPS, COUNT, CUT = 4, 12, 6
+LAST = (CUT - 1) * STEPS  # the first shot's last filmed frame, and the moments that are nearest to it:
+END = LAST + STEPS // 2
+
+
+def cut_film():
+    """Two shots (n, 24, 40, 3), each a texture that moves by a pixel a frame."""
+    rng = np.random.default_rng(7)
+    shots = [rng.integers(0, 256, (6, 10, 3), dtype=np.uint8).repeat(4, 0).repeat(4, 1) for _ in range(2)]
+    return np.stack([np.roll(shots[k >= CUT], k, axis=1) for k in range(COUNT)])
+
+
+@pytest.fixture
+def filmed(tmp_path):
+    """A cut film: the first file."""
+    return write_frames(tmp_path / "film", cut_film())
+
+
+@pytest.fixture
+def film(filmed, monkeypatch):
+    """The same with moments that are known: the first file, and all in linear light (count, H, W, 3)."""
+    monkeypatch.setattr(flow, "Between", Between)
+    with open_source(filmed) as source:
+        every = moments(np.stack([source.read(k) for k in range(COUNT)]), STEPS)
+    return filmed, light.to_linear(every[..., :3] / 255)
+
+
+@pytest.fixture
+def add(bpy, edit):
+    """Puts a smooth effect on an image strip of files from frame 1 on; bars: of its shutter."""
+    from shutter_addon.blender.editing import add_effect, bar_edits, shutter_edits
+    from shutter_addon.blender.rendering import sessions
+
+    def added(first, count, bars, smooth=str(STEPS), **options):
+        source = edit.sequence_editor.strips.new_image("film", str(first), 1, 1)
+        for number in range(2, count + 1):
+            source.elements.append(f"f{number:04d}.png")
+        strip, effect = add_effect.add_effect(edit, source)
+        edit.render.resolution_x, edit.render.resolution_y = (
+            effect.scene.render.resolution_x,
+            effect.scene.render.resolution_y,
+        )
+        effect.inbetween = smooth
+        effect.window = len(bars)
+        shutter_edits.add_shutter(effect, "S")
+        bar_edits.paint(effect, 0, bars)
+        for name, value in options.items():
+            setattr(effect, name, value)
+        return source, strip, effect
+
+    yield added
+    sessions.forget()
+
+
+def shown(frames, indices, bars):
+    """The picture of a window of these moments, in 8-bit levels."""
+    weights = spread(bars, STEPS)
+    weighed = np.tensordot(weights / weights.sum(), frames[list(indices)], 1)
+    return light.to_encoded(weighed) * 255
+
+
+def around(start, bars):
+    return np.arange(start, start + len(bars) * STEPS)
+
+
+@pytest.mark.parametrize("bars", [[1, 1], [1, 1, 1], [0.25, 1, 0.5], [1, 0, 1], [1, 1, 0, 0.5, 0.5], [0, 1, 0]])
+def test_light_counts_between_bars_that_are_both_open(film, add, edit, render, same_pixels, bars):
+    first, frames = film
+    add(first, COUNT, bars, stop_at_cuts=False)
+    for frame, picture in render(edit, (1, 3)).items():
+        start = (frame - 1) * STEPS
+        same_pixels(picture[..., :3], shown(frames, around(start, bars), bars), 1)
+
+
+def test_a_window_stops_in_the_middle_of_a_cut_pair(film, add, edit, render, same_pixels):
+    """Whose moments are copies of the nearer frame; hold repeats the last of the shot."""
+    first, frames = film
+    bars = np.ones(3)
+    _source, _strip, effect = add(first, COUNT, bars)
+    for frame, picture in render(edit, (4, 5, 6, 7)).items():
+        window = around((frame - 1) * STEPS, bars)
+        window = np.minimum(window, END) if frame <= CUT else window
+        same_pixels(picture[..., :3], shown(frames, window, bars), 1)
+    effect.position = "END"
+    window = np.maximum(around((CUT - 2) * STEPS, bars), END + 1)
+    same_pixels(render(edit, (7,))[7][..., :3], shown(frames, window, bars), 1)
+    effect.stop_at_cuts, effect.position = False, "START"
+    same_pixels(render(edit, (6,))[6][..., :3], shown(frames, around(LAST, bars), bars), 1)
+
+
+def test_at_a_cut_it_slides_by_filmed_frames(film, add, edit, render, same_pixels):
+    first, frames = film
+    bars = np.ones(3)
+    add(first, COUNT, bars, edges="SLIDE")
+    for frame, picture in render(edit, (3, 5, 6)).items():
+        start = min((frame - 1) * STEPS, LAST - (len(bars) - 1) * STEPS)
+        window = np.minimum(around(start, bars), END)
+        same_pixels(picture[..., :3], shown(frames, window, bars), 1)
+
+
+def test_an_exposure_that_follows_takes_the_motion_between(film, add, edit, render, same_pixels):
+    """By four pixels a filmed frame, so that moments are seen at whole pixels; those beyond the cut are not."""
+    first, frames = film
+    bars = np.ones(2)
+    _source, _strip, effect = add(first, COUNT, bars)
+    effect.shutters[0].follow = "CAMERA"
+    for frame in (1, COUNT):
+        effect.camera.location = (STEPS * frame / 40, 0)
+        edit.keyframe_insert(effect.camera.path_from_id("location"), frame=frame)
+    for curve in fcurves.curves_under(edit, effect.camera.path_from_id("location")):
+        for key in curve.keyframe_points:
+            key.interpolation = "LINEAR"
+    start = STEPS
+    window = around(start, bars)
+    moved = np.stack([np.roll(frames[k], start - k, axis=1) for k in window])
+    expected = shown(moved, range(len(window)), bars)
+    same_pixels(render(edit, (2,))[2][:, :-6, :3], expected[:, :-6], 1)
+
+
+def test_reversed_frames(film, add, edit, render, same_pixels):
+    """The filmed frame that is shown comes first, and then those before it."""
+    first, frames = film
+    bars = np.array([1.0, 1.0, 0.5])
+    source, *_ = add(first, COUNT, bars)
+    source.use_reverse_frames = True
+    frame = 2
+    at = (COUNT - frame) * STEPS
+    weighed = np.zeros_like(frames[0])
+    for place, weight in enumerate(spread(bars, STEPS)):
+        weighed += weight * frames[at - place]
+    same_pixels(render(edit, (frame,))[frame][..., :3], light.to_encoded(weighed / bars.sum()) * 255, 1)
+
+
+def test_a_slow_strip_shows_moments(film, add, edit, render, same_pixels):
+    first, frames = film
+    source, strip, effect = add(first, COUNT, [1.0])
+    source.retiming_keys.add(timeline_frame=1)
+    source.retiming_keys.add(timeline_frame=source.right_handle)
+    source.retiming_keys[-1].timeline_frame = 1 + 4 * COUNT
+    strip.right_handle = source.right_handle
+    found = {frame: request(edit, effect, strip, frame).index for frame in range(1, 30)}
+    assert len(set(found.values())) > 20
+    for frame, picture in render(edit, (3, 8)).items():
+        same_pixels(picture[..., :3], light.to_encoded(frames[found[frame]]) * 255, 1)
+        assert abs(found[frame] - (frame - 1)) <= 1
+
+
+def test_a_file_that_was_replaced_is_shown(film, add, edit, monkeypatch):
+    """With the moments beside it."""
+    from shutter_addon.blender.data import source_media
+    from shutter_addon.blender.rendering import invalidation
+
+    seconds = itertools.count(1e6, 10)  # so that all files are looked at each time
+    monkeypatch.setattr(source_media, "time", SimpleNamespace(monotonic=lambda: next(seconds)))
+    first, _ = film
+    *_, effect = add(first, COUNT, np.ones(2))
+    before = picture_of(effect.scene, 2)
+    invalidation.invalidate_changed(edit)
+    (first.parent / "f0003.png").write_bytes((first.parent / "f0009.png").read_bytes())
+    assert invalidation.invalidate_changed(edit)
+    assert not np.allclose(picture_of(effect.scene, 2), before)
+
+
+# Still frames
+
+
+@pytest.mark.parametrize("position", ["START", "CENTER", "END"])
+def test_a_still_frame_is_the_filmed_one_bit_for_bit(filmed, add, edit, render, position):
+    """As the preset makes it, at every smoothness, before a shutter that streaks."""
+    from shutter_addon.blender.editing import shutter_edits
+
+    *_, effect = add(filmed, COUNT, np.ones(4), "1", position=position)
+    shutter_edits.apply_preset(effect, 0, "STILL")
+    frames = 1, 5, 6, 7, 12
+    plain = {frame: picture_of(effect.scene, frame) for frame in frames}
+    film = cut_film()
+    for steps in ("1", "2", "4", "8", "16", "AUTO"):
+        effect.inbetween = steps
+        for frame, picture in render(edit, frames).items():
+            assert np.array_equal(picture[..., :3], film[frame - 1]), (steps, frame)
+            # In float, sums of more moments are rounded otherwise.
+            assert np.abs(picture_of(effect.scene, frame) - plain[frame]).max() < 1e-4, (steps, frame)
+
+
+@pytest.mark.parametrize("way", ["reversed", "custom time"])
+def test_it_is_so_however_the_source_runs(filmed, add, way):
+    from shutter_addon.blender.editing import shutter_edits
+
+    source, _strip, effect = add(filmed, COUNT, np.ones(4), "1")
+    shutter_edits.apply_preset(effect, 0, "STILL")
+    if way == "reversed":
+        source.use_reverse_frames = True
+    else:
+        effect.use_source_time, effect.source_time = True, 3.0
+    plain = picture_of(effect.scene, 4)
+    for steps in ("2", "8"):
+        effect.inbetween = steps
+        assert np.array_equal(picture_of(effect.scene, 4), plain), steps
+
+
+# Bars
+
+
+@pytest.mark.parametrize("smooth", ["2", "4", "8", "16", "AUTO"])
+def test_bars_stay_as_they_are(effect, smooth):
+    """Keyed ones as well, and their number; those of presets are the presets'."""
+    from shutter_addon.blender.data import consistency, snapshot
+    from shutter_addon.blender.editing import bar_edits
+
+    rng = np.random.default_rng(3)
+    bar_edits.set_bars(effect.shutters[0], rng.random(8))
+    bar_edits.key_bars(effect, 0)
+    effect.id_data.frame_set(9)
+    bar_edits.set_bars(effect.shutters[0], rng.random(8))
+    bar_edits.key_bars(effect, 0)
+
+    def seen():
+        keyed = [snapshot.bars_at(effect.id_data, effect, 0, frame).tolist() for frame in (1, 5, 9)]
+        return effect.window, keyed, consistency.bars(effect.shutters[1]).tolist(), consistency.preset_of(effect, 1)
+
+    before = seen()
+    assert before[3] == "STILL"
+    effect.inbetween = smooth
+    assert seen() == before
+    effect.window = 5
+    assert len(effect.shutters[0].bars) == 5, "they are counted in filmed frames"
+    effect.inbetween = "1"
+    assert effect.window == 5
+
+
+def test_a_copy_of_an_effect_is_as_smooth(effect, edit):
+    from shutter_addon.blender.data import property_copy
+
+    effect.inbetween = "AUTO"
+    path = effect.path_from_id()
+    copy = edit.virtual_shutter.effects.add()
+    effect = edit.path_resolve(path)
+    property_copy.copy_properties(effect, copy)
+    assert (copy.inbetween, copy.window) == ("AUTO", 8)
+    assert [len(shutter.bars) for shutter in copy.shutters] == [8, 8]
+
+
+def test_a_shape_is_spread_over_its_own_time(film, add, edit):
+    """Bars that are the shape of a frame of the timeline, which are no frames."""
+    first, _ = film
+    _source, strip, effect = add(first, COUNT, [1, 1, 0, 0], stop_at_cuts=False)
+    effect.shutters[0].length = "TIMELINE"
+    (bars,) = request(edit, effect, strip, 3).state.bars
+    # The first half of one filmed frame, which is two of its four moments.
+    assert np.flatnonzero(bars > 1e-9).tolist() == [0, 1]
+    assert bars[0] == pytest.approx(bars[1])
+
+
+# How many moments there are
+
+
+def moving(folder, pixels, count=6, size=(320, 180)):
+    """A film of a texture that moves to the left: its first file."""
+    import cv2
+
+    noise = np.random.default_rng(2).integers(0, 256, (60, 160, 3), dtype=np.uint8)
+    texture = cv2.resize(noise, None, fx=4, fy=4, interpolation=cv2.INTER_CUBIC)
+    width, height = size
+    frames = [texture[20 : 20 + height, 8 + k * pixels : 8 + k * pixels + width] for k in range(count)]
+    return write_frames(folder, np.stack(frames))
+
+
+@pytest.mark.parametrize(("pixels", "steps"), [(0, 1), (1, 1), (3, 2), (5, 4), (7, 4), (12, 8), (20, 16)])
+def test_automatic_takes_as_many_as_the_fastest_motion_needs(add, edit, tmp_path, pixels, steps):
+    """At this height, two pixels look smooth."""
+    _source, strip, effect = add(moving(tmp_path / "film", pixels), 6, np.ones(4), "AUTO")
+    found = request(edit, effect, strip, 2)
+    assert found.renderer.source.step == steps
+    assert found.state.bars.shape == (1, 4 * steps)
+    assert found.state.bars.sum() == pytest.approx(4)
+
+
+@pytest.mark.parametrize(
+    ("smooth", "window", "steps"),
+    [("16", 16, 16), ("16", 17, 8), ("8", 64, 4), ("4", 200, 1), ("AUTO", 100, 2), ("AUTO", 256, 1), ("2", 128, 2)],
+)
+def test_no_more_than_there_is_room_for(add, edit, tmp_path, smooth, window, steps):
+    _source, strip, effect = add(moving(tmp_path / "film", 12), 6, np.ones(window), smooth)
+    assert request(edit, effect, strip, 2).renderer.source.step == steps
+    assert (effect.inbetween, effect.window) == (smooth, window)
+
+
+def test_without_opencv_automatic_is_off_and_a_number_is_refused(add, edit, tmp_path, monkeypatch):
+    from shutter_addon.blender.rendering import effect_source
+    from shutter_addon.media import MediaError, opencv
+
+    first = moving(tmp_path / "film", 12)
+    _source, strip, effect = add(first, 6, np.ones(4), "AUTO")
+    monkeypatch.setattr(opencv, "cv2", None)
+    monkeypatch.setattr(effect_source, "_steps", type(effect_source._steps)())  # found in a process of its own
+    assert request(edit, effect, strip, 2).renderer.source.step == 1
+    effect.inbetween = "4"
+    with pytest.raises(MediaError, match="moments between frames need the Python package"):
+        request(edit, effect, strip, 2)
+
+
+def test_motion_is_measured_once(add, edit, tmp_path, monkeypatch):
+    """Whatever else changes; another file is another film."""
+    asked, steps_for = [], smooth.steps_for
+    from shutter_addon.blender.rendering import effect_source, sessions
+
+    monkeypatch.setattr(effect_source, "steps_for", lambda *given: asked.append(given[1:]) or steps_for(*given))
+    _source, strip, effect = add(moving(tmp_path / "film", 5), 6, np.ones(4), "AUTO")
+    for position in ("START", "CENTER", "END"):
+        effect.position = position
+        request(edit, effect, strip, 2)
+        sessions.forget()
+    assert asked == [("auto", 4)]
+
+
+# Previews
+
+
+def test_a_preview_is_plain_while_it_plays_and_smooth_when_it_stands(film, add, edit, bpy, monkeypatch, same_pixels):
+    """It never waits for flow, and nobody has to click."""
+    from shutter_addon.blender.data import preview_areas, snapshot
+    from shutter_addon.blender.rendering import previews, sessions
+
+    first, frames = film
+    bars = np.ones(3)
+    _source, strip, effect = add(first, COUNT, bars)
+    made = []
+    monkeypatch.setattr(flow, "Between", lambda *given: made.append(given) or Between(*given))
+    look = preview_areas.Look(scale=1.0, proxy=None, is_plain=True)
+    drawing = sessions.of_drawing()
+    taken = snapshot.take(edit, effect, strip, (2,))
+    plain = light.to_encoded(frames[[4, 8, 12]].mean(axis=0)) * 255
+    for is_playing in (True, False, True):
+        monkeypatch.setattr(previews, "_is_playing", lambda _context, is_playing=is_playing: is_playing)
+        made.clear()
+        asked = drawing.request(taken, 2, previews._detail(bpy.context, look))
+        picture = light.to_encoded(drawing.session.picture(asked)[..., :3]) * 255
+        assert bool(made) != is_playing
+        same_pixels(picture, plain if is_playing else shown(frames, around(4, bars), bars), 1)
+
+
+def test_a_dragged_playhead_waits_for_no_flow(bpy, monkeypatch):
+    from shutter_addon.blender.data import preview_areas
+    from shutter_addon.blender.rendering import previews, render_job
+
+    look = preview_areas.Look(scale=0.5, proxy=None, is_plain=True)
+    assert previews._detail(bpy.context, look).smooth
+    monkeypatch.setattr(render_job, "operators_running", lambda: {"ANIM_OT_change_frame"})
+    assert not previews._detail(bpy.context, look).smooth
+    monkeypatch.setattr(previews.looking, "late_until", 0.0)
+
+
+def test_nothing_is_written(film, add, edit, bpy, tmp_path):
+    first, _ = film
+    add(first, COUNT, np.ones(3))
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "edit.blend"))
+    before = sorted(path for path in tmp_path.rglob("*"))
+    picture_of(bpy.context.scene.virtual_shutter.effects[0].scene, 2)
+    assert sorted(path for path in tmp_path.rglob("*")) == before
+
+
+# Files of format 1
+
+
+def test_files_of_format_1_have_numbers_for_the_items(effect):
+    """These are stored, and no words."""
+    items = effect.bl_rna.properties["inbetween"].enum_items
+    assert [items[word].value for word in ("1", "2", "4", "8", "16")] == [0, 1, 2, 3, 4]
+
+
+def counted(bars, steps, position):
+    """Bars of filmed frames by those of moments: the mean of each frame's, closed ones beyond the window."""
+    bars = list(bars)
+    while len(bars) % steps:
+        bars = [0, *bars] if position == "END" else [*bars, 0]
+    return [sum(bars[k : k + steps]) / steps for k in range(0, len(bars), steps)]
+
+
+@pytest.fixture
+def older(bpy, effect, tmp_path):
+    """Has an effect be one of a file of format 1, whose bars count moments; opens that file."""
+    from shutter_addon.blender.editing import bar_edits
+
+    def opened(steps, position, window, keyed=False):
+        scene = effect.id_data
+        effect.position, effect.window = position, window
+        rng = np.random.default_rng(5)
+        bars = [rng.random(window) for _ in range(3)]
+        bar_edits.set_bars(effect.shutters[0], bars[0])
+        bar_edits.set_bars(effect.shutters[1], bars[1])
+        if keyed:
+            for frame, weights in ((1, bars[0]), (9, bars[2])):
+                scene.frame_set(frame)
+                bar_edits.set_bars(effect.shutters[0], weights)
+                bar_edits.key_bars(effect, 0)
+        effect.inbetween = str(steps)
+        scene.virtual_shutter.format = 1
+        bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "older.blend"))
+        bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "older.blend"))
+        return bpy.context.scene, bars
+
+    return opened
+
+
+@pytest.mark.parametrize("position", ["START", "CENTER", "END"])
+@pytest.mark.parametrize(("steps", "window"), [(2, 8), (4, 8), (8, 12), (16, 33), (4, 1)])
+def test_bars_of_format_1_count_filmed_frames_now(older, steps, window, position):
+    from shutter_addon.blender.data import consistency
+
+    scene, bars = older(steps, position, window)
+    effect = scene.virtual_shutter.effects[0]
+    assert scene.virtual_shutter.format == 2
+    assert (effect.inbetween, effect.window) == (str(steps), -(-window // steps))
+    for shutter, given in zip(effect.shutters, bars[:2], strict=True):
+        assert consistency.bars(shutter) == pytest.approx(counted(given, steps, position), abs=1e-6)
+
+
+def test_keyed_bars_of_format_1_do(older):
+    from shutter_addon.blender.data import snapshot
+
+    scene, bars = older(4, "START", 10, keyed=True)
+    effect = scene.virtual_shutter.effects[0]
+    for frame, given in ((1, bars[0]), (9, bars[2])):
+        assert snapshot.bars_at(scene, effect, 0, frame) == pytest.approx(counted(given, 4, "START"), abs=1e-6)
+    paths = {curve.data_path.rpartition("bars[")[2] for curve in fcurves.curves_under(scene, effect.path_from_id())}
+    assert paths == {f"{bar}].weight" for bar in range(3)}
+
+
+def test_what_had_no_frames_in_between_stays(older):
+    from shutter_addon.blender.data import consistency
+
+    scene, bars = older(1, "START", 8)
+    effect = scene.virtual_shutter.effects[0]
+    assert (scene.virtual_shutter.format, effect.inbetween, effect.window) == (2, "1", 8)
+    assert consistency.bars(effect.shutters[0]) == pytest.approx(bars[0], abs=1e-6)
+
+
+def test_files_of_format_2_stay(bpy, effect, tmp_path):
+    from shutter_addon.blender.data import consistency
+
+    effect.inbetween = "4"
+    before = [consistency.bars(shutter).tolist() for shutter in effect.shutters]
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "now.blend"))
+    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "now.blend"))
+    effect = bpy.context.scene.virtual_shutter.effects[0]
+    assert (effect.inbetween, effect.window) == ("4", 8)
+    assert [consistency.bars(shutter).tolist() for shutter in effect.shutters] == before
+
+
+def test_a_still_frame_of_format_1_is_one(bpy, effect, tmp_path):
+    """It was as many equal bars as there were moments."""
+    from shutter_addon.blender.data import consistency
+    from shutter_addon.blender.editing import bar_edits
+
+    effect.window = 32
+    bar_edits.set_bars(effect.shutters[1], [1] * 8 + [0] * 24)
+    effect.inbetween = "8"
+    effect.id_data.virtual_shutter.format = 1
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "older.blend"))
+    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "older.blend"))
+    effect = bpy.context.scene.virtual_shutter.effects[0]
+    assert consistency.bars(effect.shutters[1]).tolist() == [1, 0, 0, 0]
+    assert consistency.preset_of(effect, 1) == "STILL"
+    strip = next(s for s in bpy.context.scene.sequence_editor.strips if s.type == "SCENE")
+    assert np.count_nonzero(state(bpy.context.scene, effect, strip, 3).bars[1]) == 1
+
+
+def test_an_edit_and_a_recipe_of_the_first_versions_are_read_alike(older):
+    from made_recipes import made
+
+    from shutter_addon.blender.data import consistency
+
+    scene, bars = older(4, "END", 10)
+    effect = scene.virtual_shutter.effects[0]
+    stored = [[float(np.float32(bar)) for bar in row] for row in bars[:2]]
+    parts = [{"name": name, "bars": row} for name, row in zip("AB", stored, strict=True)]
+    read = made(10, parts, inbetween=4, position="end", version=1)
+    assert read.options.at(1).window == effect.window
+    for shutter, mine in zip(read.shutters, effect.shutters, strict=True):
+        assert consistency.bars(mine) == pytest.approx(shutter.bars.channel.at(1), abs=1e-6)
+
+
+def test_a_recipe_says_it(bpy, effect, edit):
+    import json
+
+    from shutter_addon.blender.data import recipe_export, recipe_import, strips
+    from shutter_addon.core.recipes import recipe_file
+
+    _scene, _effect, strip = strips.find_effect(effect.scene)
+    for steps in ("auto", 8, 1):
+        data = recipe(4, [1, 1, 1, 1], [1, 0, 0, 0], inbetween=steps)
+        recipe_import.apply(edit, effect, strip, recipe_file.parse(json.dumps(data)))
+        assert (effect.inbetween, effect.window) == (str(steps).upper(), 4)
+        assert json.loads(recipe_file.dump(recipe_export.recipe_of(edit, effect, strip)))["inbetween"] == steps

@@ -1,0 +1,177 @@
+"""The command over moments between frames, end to end."""
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from standin import moments, spread
+from support import packages, read_picture, recipe, write_frames
+
+from shutter_addon.core.frames import light
+from shutter_addon.media import open_source
+
+ROOT = Path(__file__).parents[2]
+STEPS, COUNT, CUT = 4, 10, 6
+
+
+@pytest.fixture(scope="module")
+def film(tmp_path_factory):
+    """Two shots: the first file, and all moments in linear light (count, H, W, 3)."""
+    rng = np.random.default_rng(8)
+    shots = [rng.integers(0, 256, (6, 10, 3), dtype=np.uint8).repeat(4, 0).repeat(4, 1) for _ in range(2)]
+    first = write_frames(
+        tmp_path_factory.mktemp("film"), np.stack([np.roll(shots[k >= CUT], k, axis=1) for k in range(COUNT)])
+    )
+    with open_source(first) as source:
+        every = moments(np.stack([source.read(k) for k in range(COUNT)]), STEPS)
+    return first, light.to_linear(every[..., :3] / 255)
+
+
+@pytest.fixture
+def run(tmp_path):
+    def run(command, source, *arguments, check=True, **given):
+        arguments = [command, source, *arguments]
+        if given:
+            (tmp_path / "recipe.json").write_text(json.dumps(given["recipe"]))
+            arguments += ["--recipe", tmp_path / "recipe.json"]
+        done = subprocess.run(
+            [sys.executable, str(ROOT / "tests" / "blender" / "standin.py"), *map(str, arguments)],
+            env=os.environ | {"PYTHONPATH": str(ROOT)},
+            capture_output=True,
+            text=True,
+            check=False,
+        )
+        assert not check or done.returncode == 0, done.stderr
+        return done
+
+    return run
+
+
+def shown(frames, indices, weights):
+    weights = np.asarray(weights) / np.sum(weights)
+    return light.to_encoded(np.tensordot(weights, frames[list(indices)], 1)) * 255
+
+
+def window(frame, bars):
+    """The moments of a window at a frame, which end with the shot."""
+    places = np.arange((frame - 1) * STEPS, (frame - 1 + len(bars)) * STEPS)
+    return np.minimum(places, (CUT - 1) * STEPS + STEPS // 2 if frame <= CUT else (COUNT - 1) * STEPS)
+
+
+def test_an_option_in_place_of_the_recipes(run, film, tmp_path, same_pixels):
+    """The recipe's bars stay what they are. Beside the output nothing is written."""
+    first, frames = film
+    bars = [1, 0.5, 1]
+    run("render", first, "--output", tmp_path / "out", "--frames", "2:3", "--inbetween", STEPS, recipe=recipe(3, bars))
+    for frame in (2, 3):
+        expected = shown(frames, window(frame, bars), spread(bars, STEPS))
+        same_pixels(read_picture(tmp_path / "out" / f"{frame:04d}.png"), expected, 1)
+    assert {path.name for path in tmp_path.iterdir()} == {"out", "recipe.json"}
+    run("render", first, "--output", tmp_path / "off", "--frames", 2, "--inbetween", 1, recipe=recipe(3, bars))
+    same_pixels(read_picture(tmp_path / "off" / "0002.png"), shown(frames, (4, 8, 12), bars), 1)
+
+
+def test_chunks_are_the_whole(run, film, tmp_path):
+    """Bit for bit; the window stops in the middle of the cut's pair."""
+    first, frames = film
+    bars = np.ones(2)
+    data = recipe(2, bars, inbetween=STEPS)
+    run("render", first, "--output", tmp_path / "whole", recipe=data)
+    for chunk in ("7:10", "1:2", "3:6"):
+        run("render", first, "--output", tmp_path / "parts", "--frames", chunk, recipe=data)
+    for frame in range(1, COUNT + 1):
+        whole, part = (read_picture(tmp_path / way / f"{frame:04d}.png") for way in ("whole", "parts"))
+        assert np.array_equal(whole, part)
+        assert np.abs(whole - shown(frames, window(frame, bars), spread(bars, STEPS))).max() <= 1
+
+
+def test_source_time_ramps(run, film, tmp_path, same_pixels):
+    """A fourth of the speed, then backward; the film ends with the last key. A still frame is the moment there."""
+    first, frames = film
+    time = [{"frame": 1, "value": 2}, {"frame": 9, "value": 4}, {"frame": 17, "value": 2}]
+    bars = [1, 1]
+    run(
+        "render", first, "--output", tmp_path / "out", "--frames", "1:17",
+        recipe=recipe(2, bars, inbetween=STEPS, time=time),
+    )  # fmt: skip
+    for frame, start, way in ((1, 4, 1), (2, 5, 1), (6, 9, 1), (12, 9, -1), (16, 5, -1)):
+        places = start + way * np.arange(len(bars) * STEPS)
+        expected = shown(frames, places, spread(bars, STEPS))
+        same_pixels(read_picture(tmp_path / "out" / f"{frame:04d}.png"), expected, 1)
+    run(
+        "render", first, "--output", tmp_path / "still", "--frames", "1:8",
+        recipe=recipe(2, [1, 0], inbetween=STEPS, time=time),
+    )  # fmt: skip
+    for frame in range(1, 9):
+        same_pixels(read_picture(tmp_path / "still" / f"{frame:04d}.png"), shown(frames, [frame + 3], [1]), 1)
+    run("render", first, "--output", tmp_path / "nearest", "--frames", "4:8", recipe=recipe(1, [1], time=time))
+    for frame, source in ((4, 2), (5, 2), (7, 3), (8, 3)):  # 2.75, 3, 3.5 and 3.75, the first is 1
+        same_pixels(read_picture(tmp_path / "nearest" / f"{frame:04d}.png"), shown(frames, [4 * source], [1]), 1)
+
+
+@pytest.mark.parametrize("more", [{}, {"inbetween_method": "good"}])
+def test_a_recipe_of_the_first_version(run, film, tmp_path, same_pixels, more):
+    """Its bars count moments, and it says a method; what is shown is within the frames that it showed."""
+    first, frames = film
+    data = recipe(8, [1, 1, 1, 1, 0.5, 0.5, 0.5, 0.5], inbetween=STEPS, **more) | {"version": 1}
+    run("render", first, "--output", tmp_path / "out", "--frames", 2, recipe=data)
+    bars = [1, 0.5]
+    same_pixels(read_picture(tmp_path / "out" / "0002.png"), shown(frames, window(2, bars), spread(bars, STEPS)), 1)
+
+
+def test_a_saved_edit_in_blender(command, film, tmp_path, blender, blenders_python, monkeypatch):
+    """With real flow: as the library renders it, and nothing lies beside it."""
+    first, _ = film
+    data = recipe(3, np.ones(3), inbetween=STEPS)
+    command(first, "--save", tmp_path / "edit" / "e.blend", "--output", tmp_path / "out", recipe=data)
+    assert [path.name for path in (tmp_path / "edit").iterdir()] == ["e.blend"]
+    monkeypatch.setenv("PYTHONPATH", str(packages(tmp_path / "packages", blenders_python)))
+    done = blender(tmp_path / "edit" / "e.blend", "-o", f"{tmp_path}/again/", "-a")
+    assert done.returncode == 0, done.stderr
+    for frame in range(1, COUNT + 1):
+        found, expected = (read_picture(tmp_path / way / f"{frame:04d}.png") for way in ("again", "out"))
+        assert np.abs(found[..., :3] - expected[..., :3]).max() <= 1, frame
+
+
+def test_automatic_is_as_smooth_as_the_footage_needs(command, tmp_path):
+    """With real flow: bit for bit what the number gives that it is."""
+    noise = np.random.default_rng(1).integers(0, 256, (40, 60, 3), dtype=np.uint8).repeat(6, 0).repeat(6, 1)
+    frames = np.stack([noise[:180, 3 * k : 3 * k + 320] for k in range(5)])  # by 3 pixels, where 2 look smooth
+    first = write_frames(tmp_path / "film", frames)
+    for smooth in ("auto", "2", "1"):
+        data = recipe(3, np.ones(3))
+        command(first, "--output", tmp_path / smooth, "--frames", 2, "--inbetween", smooth, recipe=data)
+    auto, two, off = (read_picture(tmp_path / smooth / "0002.png") for smooth in ("auto", "2", "1"))
+    assert np.array_equal(auto, two)
+    assert not np.array_equal(auto, off)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "data", "sentence"),
+    [
+        (["--inbetween", 3], recipe(2, [1, 1]), "invalid choice: '3'"),
+        (["--cache", "x"], recipe(2, [1, 1]), "unrecognized arguments: --cache"),
+        (["--inbetween-method", "quick"], recipe(2, [1, 1]), "unrecognized arguments: --inbetween-method"),
+        ([], recipe(2, [1, 1], inbetween=3), "inbetween: 3 is none of "),
+        ([], recipe(2, [1, 1], inbetween="AUTO"), "inbetween: "),
+        ([], recipe(2, [1, 1], inbetween="auto") | {"version": 1}, 'recipes have "auto" from version 2 on'),
+        ([], recipe(2, [1, 1], inbetween_method="quick"), "unknown field inbetween_method"),
+        ([], recipe(2, [1, 1], time=[{"frame": 2, "value": 1}] * 2), "time[1].frame: 2 does not follow 2"),
+    ],
+)
+def test_bad_input_is_one_sentence(run, film, tmp_path, arguments, data, sentence):
+    done = run("render", film[0], "--output", tmp_path / "out", *arguments, recipe=data, check=False)
+    assert done.returncode == 2
+    assert sentence in done.stderr
+    assert "Traceback" not in done.stderr
+    assert not list(tmp_path.glob("out/*"))
+
+
+def test_there_is_no_build(run, film):
+    done = run("inbetween", film[0], check=False)
+    assert done.returncode == 2
+    assert "Traceback" not in done.stderr
