@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-sys.path.insert(0, str(Path(__file__).parents[1] / "scripts"))
+sys.path.append(str(Path(__file__).parents[1] / "scripts"))  # at the end: gallery is a package, and a script there
 
 from farm_plan import SMOOTH, Parts, effect_recipe, parts_table, plan, plans_table, served, used
 
