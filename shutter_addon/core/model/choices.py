@@ -49,13 +49,14 @@ AGGREGATES = (
 )
 
 
+# Files keep the number of an item: the first five are those of format 1.
 SMOOTH = (
     ("1", "Off", "Expose filmed frames alone"),
-    ("AUTO", "Automatic", "As many moments as the fastest motion in the footage needs, 16 at most"),
     ("2", "2×", "2 moments from a filmed frame to the next"),
     ("4", "4×", "4 moments from a filmed frame to the next"),
     ("8", "8×", "8 moments from a filmed frame to the next"),
     ("16", "16×", "16 moments from a filmed frame to the next"),
+    ("AUTO", "Automatic", "As many moments as the fastest motion in the footage needs, 16 at most"),
 )
 
 
