@@ -1,7 +1,7 @@
 """Rolling Shutter Repair: a camera that is turned quickly has houses lean, which stand upright again.
 
-The recipe is what Rolling Shutter Repair makes at 60 % with in-between frames at 16×. The truth is a camera that reads
-all rows at once.
+The recipe is what Rolling Shutter Repair makes at 60 % with *Smooth* at 16×. The truth is a camera that reads all rows
+at once.
 """
 
 from __future__ import annotations

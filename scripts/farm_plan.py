@@ -3,10 +3,9 @@
     python scripts/farm_plan.py FOOTAGE [--hours 2] [--exposure 16] [--nodes 1,10,1000] [--cores 16] [--json PARTS]
     python scripts/farm_plan.py --parts PARTS [--nodes 1,10,1000] [--cores 16] [--network 10]
 
-Needs Blender as a library (bpy), and Linux. The command is run on FOOTAGE as on a node: in-betweens of a few pairs of
-frames, and chunks of two lengths, whose difference is the time of a picture, and whose rest is what every chunk pays
-anew: the start, and the frames of its window that lie behind its last picture. Three shutters, scribbled; an exposure
-of 16 source frames, which at factor 8 are 128 of the window.
+Needs Blender as a library (bpy), and Linux. The command is run on FOOTAGE as on a node: chunks of two lengths, whose
+difference is the time of a picture, and whose rest is what every chunk pays anew: the start, and the frames of its
+window that lie behind its last picture. Three shutters, scribbled; an exposure of 16 frames, with Smooth off and at 8×.
 
 Times are processor times, which other work on the machine lengthens less than waits. Much of a picture's is one
 thread's, so that no process keeps many cores busy: a node has a worker for each of its cores, and the join, which is
@@ -30,31 +29,29 @@ from shutter_addon.core.farm import chunks
 from shutter_addon.core.model import presets
 from shutter_addon.media import open_source
 
-LENGTHS = {1: (1, 13), 8: (1, 4)}  # pictures of the chunks that are measured, by factor
+SMOOTH = 1, 8  # off, and eight moments for a frame
+LENGTHS = 1, 13  # pictures of the chunks that are measured
 FIRST = 9  # their first timeline frame
 
 
 @dataclass(frozen=True)
 class Parts:
-    """What was measured at a factor of in-between frames. Times in seconds of a core, sizes in bytes.
+    """What was measured. Times in seconds of a core, sizes in bytes.
 
-    window: frames that a shutter exposes, in-between frames included
+    smooth: moments from a filmed frame to the next; window: filmed frames that a shutter exposes
     once: what a chunk pays whatever its length; picture: one more of its pictures; picture_thread: its longest thread
-    pair: the in-between frames of a pair of source frames
     join: a picture of the film; join_thread: its longest thread
-    memory: of a process that renders; source, between, output: a frame's file"""
+    memory: of a process that renders; source, output: a frame's file"""
 
-    factor: int
+    smooth: int
     window: int
     once: float
     picture: float
     picture_thread: float
-    pair: float
     join: float
     join_thread: float
     memory: float
     source: float
-    between: float
     output: float
 
     def chunk(self, pictures: int) -> float:
@@ -62,9 +59,7 @@ class Parts:
 
     def read(self, pictures: int) -> float:
         """Bytes that a chunk reads."""
-        frames = chunks.decoded(pictures, self.window, self.factor)
-        filmed = frames / self.factor
-        return filmed * self.source + (frames - filmed) * self.between
+        return chunks.decoded(pictures, self.window) * self.source
 
 
 @dataclass(frozen=True)
@@ -81,7 +76,7 @@ class Plan:
     """What a film costs on so many nodes.
 
     chunk: pictures of one; work: core-hours of all
-    hours: until in-betweens and pictures are done; join: hours of the join, were it as fast as its longest thread
+    hours: until the pictures are done; join: hours of the join, were it as fast as its longest thread
     anew: share of the pictures' core-hours that goes into what chunks pay anew; storage: bytes that are kept
     traffic: bytes that are read and written until the pictures are done; joined: those that the join reads"""
 
@@ -101,60 +96,48 @@ def plan(parts: Parts, pictures: int, nodes: int, cores: int, longest: int) -> P
     rounds = math.ceil(pictures / (longest * workers))
     chunk = math.ceil(pictures / (rounds * workers))
     count = math.ceil(pictures / chunk)
-    rendered, built = count * parts.once + pictures * parts.picture, pictures * parts.pair
-    betweens = pictures * (parts.factor - 1) * parts.between
-    written = betweens + pictures * parts.output
-    # What windows read, and what in-betweens are made of.
-    read = count * parts.read(chunk) + (pictures * parts.source if parts.factor > 1 else 0)
+    rendered, written = count * parts.once + pictures * parts.picture, pictures * parts.output
     return Plan(
         chunk=chunk,
-        work=(rendered + built + pictures * parts.join) / 3600,
-        hours=rounds * (parts.chunk(chunk) + chunk * parts.pair) / 3600,
+        work=(rendered + pictures * parts.join) / 3600,
+        hours=rounds * parts.chunk(chunk) / 3600,
         join=pictures * parts.join_thread / 3600,
         anew=count * parts.once / rendered,
         storage=written + pictures * parts.source,
-        traffic=written + read,
+        traffic=written + count * parts.read(chunk),
         # It compares all checksums before Blender reads the first picture: no machine's memory has them by then.
         joined=2 * pictures * parts.output,
     )
 
 
-def measured(footage: Path, factor: int, exposure: int, folder: Path) -> Parts:
+def measured(footage: Path, smooth: int, window: int, folder: Path) -> Parts:
     """Runs the command. subprocess.CalledProcessError: it failed."""
-    window, cache, recipe = exposure * factor, folder / "inbetween", folder / f"{factor}.json"
-    recipe.write_text(json.dumps(effect_recipe(window, factor)))
-    short, long = LENGTHS[factor]
-    pairs = long + exposure
-    pair = 0.0
-    if factor > 1:
-        frames = f"{FIRST}:{FIRST + pairs - 1}"
-        pair = used("inbetween", footage, "--factor", factor, "--cache", cache, "--frames", frames).total / pairs
-    edit, outputs = folder / f"{factor}.blend", {length: folder / f"{factor}-{length}" for length in (short, long)}
+    recipe, edit = folder / f"{smooth}.json", folder / f"{smooth}.blend"
+    recipe.write_text(json.dumps(effect_recipe(window, smooth)))
+    short, long = LENGTHS
+    outputs = {length: folder / f"{smooth}-{length}" for length in LENGTHS}
     rendered = {
         length: used(
-            *("render", footage, "--recipe", recipe, "--output", output, "--cache", cache),
-            *("--save", edit),
+            *("render", footage, "--recipe", recipe, "--output", output, "--save", edit),
             *("--frames", f"{FIRST}:{FIRST + length - 1}"),
         )
         for length, output in outputs.items()
     }
     join = "join", outputs[long], "--edit", edit, "--output", folder / "film.mp4"
-    joined = {length: used(*join, "--frames", f"{FIRST}:{FIRST + length - 1}") for length in (short, long)}
+    joined = {length: used(*join, "--frames", f"{FIRST}:{FIRST + length - 1}") for length in LENGTHS}
     picture, film = per_picture(rendered), per_picture(joined)
     with open_source(footage) as medium:
         source = sum(path.stat().st_size for path in medium.files) / medium.count
     return Parts(
-        factor=factor,
+        smooth=smooth,
         window=window,
         once=rendered[short].total - short * picture.total,
         picture=picture.total,
         picture_thread=picture.thread,
-        pair=pair,
         join=film.total,
         join_thread=film.thread,
         memory=rendered[long].memory,
         source=source,
-        between=mean_size(cache.rglob("*.png")),
         output=mean_size(outputs[long].glob("*.png")),
     )
 
@@ -171,14 +154,14 @@ def mean_size(paths) -> float:
     return sum(sizes) / max(1, len(sizes))
 
 
-def effect_recipe(window: int, factor: int) -> dict:
+def effect_recipe(window: int, smooth: int) -> dict:
     """Three shutters on two lines and the border."""
     bars = {"Long": "ANGLE_360", "Sharp": "STILL", "Twice": "TWO_CUTS"}
     lines = {"Sharp": [[0.3, 0.2], [0.5, 0.8]], "Twice": [[0.7, 0.2], [0.7, 0.8]]}
     return {
-        "version": 1,
+        "version": 2,
         "window": window,
-        "inbetween": factor,
+        "inbetween": smooth,
         "border": True,
         "shutters": [{"name": name, "bars": presets.bars(preset, window).tolist()} for name, preset in bars.items()],
         "regions": [{"shutter": n, "kind": "line", "width": 0.02, "strokes": [points]} for n, points in lines.items()],
@@ -214,33 +197,42 @@ def thread_times(pid: int) -> dict[str, float]:
 def parts_table(found: list[Parts]) -> str:
     """Markdown. In brackets: of it, what the longest thread takes."""
     lines = [
-        "| factor | window | chunk, anew | picture | in-betweens | join | memory | source | in-between | picture |",
-        "|---|---|---|---|---|---|---|---|---|---|",
+        "| Smooth | window | chunk, anew | picture | join | memory | source | picture |",
+        "|---|---|---|---|---|---|---|---|",
     ]
     for each in found:
         picture = f"{each.picture:.1f} s ({each.picture_thread:.1f} s)"
         join = f"{each.join:.1f} s ({each.join_thread:.1f} s)"
-        times = f"{each.once:.1f} s | {picture} | {f'{each.pair:.1f} s' if each.pair else ''} | {join}"
-        sizes = " | ".join(f"{size / 1e6:.1f} MB" if size else "" for size in (each.source, each.between, each.output))
-        lines.append(f"| {each.factor} | {each.window} | {times} | {each.memory / 1e9:.1f} GB | {sizes} |")
+        times, sizes = f"{each.once:.1f} s | {picture} | {join}", f"{in_mb(each.source)} | {in_mb(each.output)}"
+        lines.append(f"| {name(each)} | {each.window} | {times} | {each.memory / 1e9:.1f} GB | {sizes} |")
     return "\n".join(lines)
 
 
 def plans_table(found: list[Parts], pictures: int, nodes: list[int], cores: int, network: float) -> str:
     """Markdown. The network's column is what the traffic takes alone; network: of the storage, in Gbit/s."""
     lines = [
-        "| factor | nodes | chunk | core-hours | anew | pictures | network | join | network | storage | traffic |",
+        "| Smooth | nodes | chunk | core-hours | anew | pictures | network | join | network | storage | traffic |",
         "|---|---|---|---|---|---|---|---|---|---|---|",
     ]
     for parts in found:
         for count in nodes:
-            each = plan(parts, pictures, count, cores, chunks.chunk_size(parts.window, parts.factor))
+            each = plan(parts, pictures, count, cores, chunks.chunk_size(parts.window))
             loads = [span(load / speed(network) / 3600) for load in (each.traffic, each.joined)]
             times = f"{span(each.hours)} | {loads[0]} | {span(each.join)} | {loads[1]}"
             size = f"{each.storage / 1e12:.1f} TB | {(each.traffic + each.joined) / 1e12:.1f} TB"
             work = f"{each.work:,.0f} | {each.anew:.1%}"
-            lines.append(f"| {parts.factor} | {count:,} | {each.chunk} | {work} | {times} | {size} |")
+            lines.append(f"| {name(parts)} | {count:,} | {each.chunk} | {work} | {times} | {size} |")
     return "\n".join(lines)
+
+
+def name(parts: Parts) -> str:
+    """What the panel calls so many moments."""
+    return f"{parts.smooth}×" if parts.smooth > 1 else "off"
+
+
+def in_mb(size: float) -> str:
+    """In words, of a size in bytes."""
+    return f"{size / 1e6:.1f} MB"
 
 
 def speed(network: float) -> float:
@@ -249,8 +241,8 @@ def speed(network: float) -> float:
 
 
 def served(parts: Parts, pictures: int, cores: int, network: float) -> float:
-    """How many nodes the storage serves before they wait for it, while they work on in-betweens and pictures."""
-    one = plan(parts, pictures, 1, cores, chunks.chunk_size(parts.window, parts.factor))
+    """How many nodes the storage serves before they wait for it, while they work on pictures."""
+    one = plan(parts, pictures, 1, cores, chunks.chunk_size(parts.window))
     return speed(network) * one.hours * 3600 / one.traffic
 
 
@@ -274,8 +266,8 @@ def main(arguments=None) -> int:
     parser.add_argument("--parts", type=Path, help="what was measured before, in place of the footage")
     parser.add_argument("--hours", type=float, default=2, help="of film")
     parser.add_argument("--rate", type=float, default=24, help="frames a second")
-    parser.add_argument("--exposure", type=int, default=16, help="source frames")
-    parser.add_argument("--factors", type=numbers, default=[1, 8])
+    parser.add_argument("--exposure", type=int, default=16, help="filmed frames")
+    parser.add_argument("--smooth", type=numbers, default=SMOOTH, help="moments for a filmed frame")
     parser.add_argument("--nodes", type=numbers, default=[1, 10, 1000])
     parser.add_argument("--cores", type=int, default=16, help="of a node")
     parser.add_argument("--network", type=float, default=10, help="of the storage, in Gbit/s")
@@ -287,7 +279,7 @@ def main(arguments=None) -> int:
         found = [Parts(**each) for each in json.loads(options.parts.read_text())]
     else:
         with tempfile.TemporaryDirectory() as folder:
-            found = [measured(options.footage, factor, options.exposure, Path(folder)) for factor in options.factors]
+            found = [measured(options.footage, smooth, options.exposure, Path(folder)) for smooth in options.smooth]
     if options.json:
         options.json.write_text(json.dumps([asdict(each) for each in found], indent=1) + "\n")
     print(parts_table(found), end="\n\n")
@@ -295,8 +287,8 @@ def main(arguments=None) -> int:
     print(plans_table(found, pictures, options.nodes, options.cores, options.network))
     for each in found:
         nodes = served(each, pictures, options.cores, options.network)
-        print(f"factor {each.factor}: most of it is paid anew below {dominated(each):.1f} pictures a chunk")
-        print(f"factor {each.factor}: the storage serves {nodes:.1f} nodes")
+        print(f"Smooth {name(each)}: most of it is paid anew below {dominated(each):.1f} pictures a chunk")
+        print(f"Smooth {name(each)}: the storage serves {nodes:.1f} nodes")
     return 0
 
 

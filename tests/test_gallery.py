@@ -10,11 +10,14 @@ import numpy as np
 import pytest
 from OpenImageIO import ImageBuf
 
-from gallery import NAMES, bunny, time_map
+from gallery import NAMES, bunny, rolling_repair, time_map
 from gallery.item import HERE, ROOT, Shot
 from shutter_addon.compute.renderer import Renderer, open_compositor
 from shutter_addon.compute.request import Request
 from shutter_addon.core.frames import light
+from shutter_addon.core.model.clip import Clip
+from shutter_addon.core.model.shutters import displace
+from shutter_addon.core.model.state_at import state_at
 from shutter_addon.core.recipes import recipe_file
 from shutter_addon.media import open_source
 from shutter_addon.media.matte_values import MatteValues
@@ -62,6 +65,18 @@ def test_help_says_where_a_relative_folder_lies():
 def test_recipes_load(path):
     assert path.stem.split("-")[0] in NAMES
     assert recipe_file.load(path).shutters
+
+
+def test_the_repair_shows_rows_of_as_much_time_as_the_camera_reads():
+    """From half a readout before the shown frame, in steps of a moment, to as long behind it."""
+    effect = recipe_file.load(HERE / "rolling_repair.json").for_picture(16 / 9, lambda _region: None)
+    steps = effect.options.at(1).step
+    moment = state_at(effect, Clip(16, 9, rolling_repair.COUNT).stepped(steps), rolling_repair.FRAME)
+    rows = np.linspace(-0.5, 0.5, 5) / effect.regions[0].moves.scale.at(1)
+    shares = displace(moment.state.bars, np.stack([0.5 - rows, 0.5 + rows], axis=-1))
+    times = shares @ np.arange(shares.shape[1]) - moment.state.options.before
+    assert times / steps == pytest.approx(rolling_repair.READOUT * np.linspace(-0.5, 0.5, 5), abs=1e-6)
+    assert (shares > 0).sum(axis=1).max() == 2
 
 
 def test_an_item_from_end_to_end(tmp_path, monkeypatch):

@@ -38,17 +38,17 @@ def lines(path):
 def test_steps_follow_each_other_and_bear_the_edits_name(submit, tmp_path):
     done = submit("--partition=render")
     assert (done.returncode, done.stderr) == (0, "")
-    assert done.stdout == "jobs: check 101, in-betweens 102, frames 103, join 104\n"
+    assert done.stdout == "jobs: check 101, frames 102, join 103\n"
     found = lines(tmp_path / "submitted")
-    assert len(found) == 4
-    for number, (step, line) in enumerate(zip(("check", "inbetweens", "frames", "join"), found, strict=True)):
+    assert len(found) == 3
+    for number, (step, line) in enumerate(zip(("check", "frames", "join"), found, strict=True)):
         assert f"--job-name=shot 7-{step} " in line
         assert " --partition=render " in line
         assert (f" --dependency=afterok:{100 + number} " in line) == (number > 0)
     assert not lines(tmp_path / "cancelled")
 
 
-@pytest.mark.parametrize(("refused", "cancelled"), [("1", []), ("2", ["101"]), ("4", ["101 102 103"])])
+@pytest.mark.parametrize(("refused", "cancelled"), [("1", []), ("2", ["101"]), ("3", ["101 102"])])
 def test_a_refused_step_takes_those_before_it_away(submit, tmp_path, refused, cancelled):
     done = submit(refused=refused)
     assert done.returncode == 7
@@ -58,9 +58,9 @@ def test_a_refused_step_takes_those_before_it_away(submit, tmp_path, refused, ca
 
 
 def test_a_clusters_name_is_no_part_of_a_jobs_number(submit, tmp_path):
-    done = submit("--clusters=big", refused="4", cluster=";big")
+    done = submit("--clusters=big", refused="3", cluster=";big")
     assert done.returncode == 7
     found = lines(tmp_path / "submitted")
     assert " --dependency=afterok:101 " in found[1]
-    assert " --dependency=afterok:103 " in found[3]
-    assert lines(tmp_path / "cancelled") == ["--quiet --clusters=big 101 102 103"]
+    assert " --dependency=afterok:102 " in found[2]
+    assert lines(tmp_path / "cancelled") == ["--quiet --clusters=big 101 102"]
