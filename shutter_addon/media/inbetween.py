@@ -29,7 +29,7 @@ from .inbetween_cache import InbetweenCache, State, write_picture
 from .prefetch import PrefetchSource
 
 MEMORY = 4 << 30  # bytes of all pairs that are built at the same time, and of the frames that are read ahead
-AHEAD = 640 << 20  # bytes of them for frames that are read ahead; enough to read none of 16 bits in 4K twice
+AHEAD = 640 << 20  # bytes of frames that are read ahead, held twice at most; enough to read none of 16 bits in 4K twice
 # Memory for building a pair, in RGBA frames of float32. Measured: 9 to 17 for "quick", 15 to 24.3 for "good".
 LAYERS = 26
 _PAUSE = 1.0  # seconds between two looks at what other processes have built
@@ -254,7 +254,7 @@ def _workers(source: FrameSource) -> int:
     """How many pairs to build at the same time: one per processor, as far as MEMORY allows."""
     pair = source.width * source.height * 16 * LAYERS
     processors = getattr(os, "process_cpu_count", os.cpu_count)() or 1
-    return max(1, min(processors, (MEMORY - _ahead(source) * _size(source)) // pair))
+    return max(1, min(processors, (MEMORY - 2 * _ahead(source) * _size(source)) // pair))
 
 
 def _ahead(source: FrameSource) -> int:

@@ -82,7 +82,7 @@ def test_a_device_makes_the_bits_of_libswscale(gl, tmp_path, monkeypatch, size, 
             try:
                 window.load(np.arange(3), Options(window=3, light=light), range(source.count))
                 assert ("r32ui" in kinds) == planar  # of luma and chroma
-                sums = np.concatenate([gl.read(texture).ravel() for texture in window.textures])
+                sums = np.concatenate([gl.read(texture).ravel() for _part, texture in window.stored()])
                 found.append(sums.copy())
             finally:
                 window.release()
