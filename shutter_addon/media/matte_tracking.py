@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import closing
 from functools import lru_cache
 from typing import Any
 
 import numpy as np
 
+from ..core.model import outlines
 from ..core.model.motions import Motion, Similarity
 from . import flow, registration, tracking
 from .carried_mattes import CarriedFile, CarriedMattes
@@ -37,6 +38,11 @@ _AGREEING = 0.5  # share of the points that do, from which on a step is sure
 def cover_of(mattes: CarriedMattes, shown: Callable[[int], int]) -> Cover:
     """What carried mattes cover; shown: which filmed frame is seen at a timeline frame."""
     return lambda frame, size: flow.resized(mattes.read(min(shown(frame), mattes.count - 1)), size)
+
+
+def cover_within(drawn: Callable[[int], Sequence]) -> Cover:
+    """What curves enclose that are known at every timeline frame."""
+    return lambda frame, size: outlines.coverage(drawn(frame), *size)
 
 
 def follow_carried(

@@ -268,11 +268,11 @@ def test_a_blender_that_does_not_answer_is_one_sentence(coloured, command, reaso
 SILENT = [sys.executable, "-c", "import time; time.sleep(600)"]
 
 
-def test_a_blender_that_never_answers_is_killed_and_one_sentence(coloured, monkeypatch):
-    monkeypatch.setattr(decoding_child, "ANSWERING", 0.3)
+def test_a_blender_that_is_never_ready_is_killed_and_one_sentence(coloured, monkeypatch):
+    monkeypatch.setattr(decoding_child, "STARTING", 0.3)
     monkeypatch.setattr(decoding_child, "ENDING", 0.1)
     decoding_child.lend(SILENT)
-    with pytest.raises(MediaError, match=r"\(the Blender that decodes it has ended\)$"):
+    with pytest.raises(MediaError, match=r"\(the Blender that decodes it is not ready after 0\.3 seconds\)$"):
         BlenderMovie(coloured["bt709.mp4"])
     assert decoding_child._process is None  # nobody else is told whether one runs
 

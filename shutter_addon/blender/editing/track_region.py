@@ -19,7 +19,7 @@ from bpy.types import PropertyGroup, Scene, Strip
 from ...core import revision, threads
 from ...core.frames import frame_ranges
 from ...core.messages import EffectError, translated
-from ...core.model import limits, outlines, presence
+from ...core.model import limits, presence
 from ...core.model.effect import Camera, Region
 from ...core.model.frame_state import Options
 from ...core.model.keyframes import Samples
@@ -244,13 +244,8 @@ def _subject(
         carried = snapshot.carried_outline(scene, effect, strip, index, frames)
         return shape, partial(matte_tracking.follow_carried, shape, *carried)
     if effect.regions[index].kind == "OUTLINE":
-        cover = partial(_enclosed, shape)
-        return shape, partial(matte_tracking.follow_cover, shape, cover)
+        return shape, partial(matte_tracking.follow_cover, shape, matte_tracking.cover_within(shape.drawings.at))
     return shape, partial(tracking.follow, shape)
-
-
-def _enclosed(region: Region, frame: int, size: tuple[int, int]) -> np.ndarray:
-    return outlines.coverage(region.drawings.at(frame), *size)
 
 
 def _standing(moving: Any, here: Tracked) -> Any:
