@@ -479,13 +479,13 @@ def test_a_pair_takes_no_more_memory_than_is_reckoned():
 
 
 BUILDER = """
-import sys, time
+import os, sys, time
 sys.path.insert(0, "tests/media")
 from test_media_inbetween import blend, build
 from shutter_addon.media import open_source
 
 def slow(*frames):
-    print("made", flush=True)
+    os.write(1, b"made ")  # at once: print writes the end of a line apart, and threads come between
     for picture in blend(*frames):
         time.sleep(0.01)
         yield picture
