@@ -17,6 +17,7 @@ from ..model import keyframes, mattes
 from ..model.fields import MISSING, Field, fields_of
 from ..model.frame_state import Options
 from ..model.keyframes import Channel, Constant, Ease, Keys
+from ..model.motions import Placement
 from .recipe import CAMERA
 
 VERSION = 1  # the newest one that is read
@@ -197,10 +198,8 @@ def _shutter(record: Any, follow: model.Subject | None) -> model.Shutter:
 
 
 def _moves(keys: list) -> model.Moves:
-    if not keys:
-        return model.Moves()
-    frames, eases, *numbers = _columns(keys, "frame", "ease", "location", "rotation", "scale")
-    return model.Moves(*(Keys(frames, values, eases) for values in numbers))
+    placed = [(key.frame, Placement(key.location, key.rotation, key.scale), key.ease) for key in keys]
+    return model.Moves.keyed(placed)
 
 
 def _region(record: Any, shutter: int) -> model.Region | model.MatteRegion:
