@@ -14,7 +14,7 @@ from bpy.app.handlers import persistent
 from bpy.types import Depsgraph, Scene
 
 from ..core import revision, told
-from ..core.messages import sentence, signed
+from ..core.messages import sentence
 from .data import data_format, preview_areas, source_media, strips, versions
 from .devices import main_thread
 from .editing import reconcile as reconciling
@@ -60,7 +60,7 @@ def tell_newer(scenes: Iterable[Scene]) -> None:
         return
     told.record(words)
     if bpy.app.background:
-        print(signed(words), file=sys.stderr)
+        render_job.say(words)
     else:  # while a file is loaded, its windows are not there yet
         main_thread.soon(partial(_show, sentence(words)))
 

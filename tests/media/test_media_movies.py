@@ -15,7 +15,7 @@ from shutter_addon.media import open_source
 UGLY = (
     "b_frames.mp4 open.mkv open.mp4 open.ts hevc.mp4 refresh.mp4 mpeg4.avi mpeg4.mp4 mpeg2.mpg mpeg2.ts "
     "vp9.webm ntsc.mov film.mp4 variable.mkv variable.mp4 sound.mkv animation.gif edit_list.mp4 late.mp4 "
-    "late.mkv no_key_first.ts no_index.avi stamped.mkv set_back.mkv pairs.mkv"
+    "late.mkv fields.mkv no_key_first.ts no_index.avi stamped.mkv set_back.mkv pairs.mkv"
 )
 NAMES = UGLY.split()
 ROOT = Path(__file__).parents[2]

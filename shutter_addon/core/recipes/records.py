@@ -18,6 +18,7 @@ from ..model import keyframes, mattes
 from ..model.fields import MISSING, Field, fields_of
 from ..model.frame_state import Options
 from ..model.keyframes import Channel, Constant, Ease, Keys
+from ..model.motions import Placement
 from ..model.shutters import filmed
 from .recipe import CAMERA
 
@@ -205,10 +206,8 @@ def _shutter(record: Any, follow: model.Subject | None, filmed: Callable[[list[f
 
 
 def _moves(keys: list) -> model.Moves:
-    if not keys:
-        return model.Moves()
-    frames, eases, *numbers = _columns(keys, "frame", "ease", "location", "rotation", "scale")
-    return model.Moves(*(Keys(frames, values, eases) for values in numbers))
+    placed = [(key.frame, Placement(key.location, key.rotation, key.scale), key.ease) for key in keys]
+    return model.Moves.keyed(placed)
 
 
 def _region(record: Any, shutter: int) -> model.Region | model.MatteRegion:
