@@ -110,15 +110,15 @@ def _followed(
         if index is None:
             drawn = [region for region in effect.regions if isinstance(region, Region)]
             regions = [filmed.seen(region) for region in drawn]
-            steps = camera_tracking.follow_camera(filmed.seen(subject), regions, *what, motion=arguments.motion)
+            found = camera_tracking.follow_camera(filmed.seen(subject), regions, *what, motion=arguments.motion)
         elif isinstance(subject, OutlineRegion):
             cover = _cover(arguments, source_recipe, subject, filmed, ends)
-            steps = matte_tracking.follow_cover(filmed.seen(subject), cover, *what, motion=arguments.motion)
+            found = matte_tracking.follow_cover(filmed.seen(subject), cover, *what, motion=arguments.motion)
         else:
-            steps = tracking.follow(filmed.seen(subject), *what, motion=arguments.motion)
+            found = tracking.follow(filmed.seen(subject), *what, motion=arguments.motion)
         tracked = []
-        for step in steps:
-            tracked.append(step)
+        for each in found:
+            tracked.append(each)
             moved()
     shown = list(filmed.on_timeline(subject, tracked, footage.size))
     stops = [each for each in shown if each.fault]
