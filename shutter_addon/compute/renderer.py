@@ -197,12 +197,6 @@ class Renderer:
             return request
         return window_frames.slid(request, self.shot(request, known=known))
 
-    def needed(self, request: Request, *, known: bool = True) -> set[int]:
-        """The source frames at window_frames.positions, and those that guide the diffusion. known: as for `shot`."""
-        request = self.slid(request, known=known)
-        shot = self.shot(request, known=known)
-        return window_frames.exposed_frames(request, shot).union(self._guiding(request, shot))
-
     def missing(self, request: Request) -> set[int]:
         """The source frames that `draw` would read: needed ones that are not loaded, and those in which it looks for
         cuts."""
@@ -232,12 +226,6 @@ class Renderer:
         None: what lies behind its layers was exposed everywhere."""
         with self.compositor.current():
             return self._layered.holes if self._layered else None
-
-    def check(self, request: Request) -> None:
-        """MediaError: an in-between frame that the picture needs is missing. No frame is read."""
-        if self.source.step > 1:
-            for index in sorted(self.needed(request)):
-                self.source.check(index)
 
     def _want(self, request: Request) -> list[int]:
         """See decoding_ahead.want."""
