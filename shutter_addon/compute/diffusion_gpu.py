@@ -21,8 +21,7 @@ from typing import Any
 
 import numpy as np
 
-from ..devices.device import Device, Given, Texture
-from ..devices.named_textures import NamedTextures
+from ..devices.device import Device, Given, NamedTextures, Texture
 from ..devices.passes import Pass, read_pass
 from .diffusion import NOTHING
 

@@ -19,8 +19,7 @@ from footage import COUNT, cut_file, damage_frame, make_movie, number, picture, 
 
 from shutter_addon.media import MediaError, decoding_child, open_source, pyav
 from shutter_addon.media.blender_movie import BlenderMovie, frame_rate
-from shutter_addon.media.channels import MovieChannel
-from shutter_addon.media.opening import open_channel
+from shutter_addon.media.opening import MovieChannel, open_channel
 from shutter_addon.media.smooth import SmoothSource
 
 ROOT = Path(__file__).parents[2]

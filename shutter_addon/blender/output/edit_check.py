@@ -13,7 +13,7 @@ from pathlib import Path
 import bpy
 from bpy.types import PropertyGroup, Scene, Strip
 
-from ...compute import decoding_ahead, memory_needs
+from ...compute import memory_needs, window_frames
 from ...compute.renderer import Renderer
 from ...compute.request import Compositor, Request
 from ...core.farm.chunks import LEAST, chunk_size
@@ -153,7 +153,7 @@ def _look_at_frames(check: EffectCheck, renderer: Renderer, requests: dict[float
     """Whether the frames that windows need are there: files of image sequences, and of a movie the first and the last
     one."""
     source = renderer.source
-    needed: set[int] = set().union(*map(renderer.needed, requests.values()))
+    needed: set[int] = set().union(*map(renderer.missing, requests.values()))
     ends = {end for index in needed for end in (index // source.step, -(-index // source.step))}
     check.faults += _unreadable(source, ends, source.step)
 
@@ -220,7 +220,7 @@ def _needs(source: FrameSource, requests: dict[float, Request], compositor: Comp
     kinds = {_kind(request.state) for request in requests.values()}
     most = max(compositor.needs(source, kind) for kind in kinds)
     window = max(request.state.options.window for request in requests.values())
-    return most._replace(host=most.host + decoding_ahead.decoded_bytes(source, window))
+    return most._replace(host=most.host + window_frames.decoded_bytes(source, window))
 
 
 def _kind(state: FrameState) -> memory_needs.Kind:
