@@ -9,8 +9,8 @@ import numpy as np
 
 from ..core.frames.frame_source import FrameSource
 from ..core.frames.source_wrapper import SourceWrapper
-from . import decoding_child, pyav
-from .blender_movie import BlenderMovie
+from . import pyav
+from .blender_movie import BlenderMovie, is_lent
 from .color import in_colorspace
 from .errors import MediaError
 from .files import check_file
@@ -103,10 +103,10 @@ def _opened_movie(path: Path, stream: int, deinterlace: bool = False, divisor: i
 
 def _check_lent(path: Path, stream: int) -> None:
     """MediaError: without PyAV (a package without wheels, or one for another system) that movie cannot be read."""
-    if decoding_child.is_lent() and stream == 0:
+    if is_lent() and stream == 0:
         return
     check_file(path)
-    what = f"video stream {stream} of a movie needs" if decoding_child.is_lent() else "movies need"
+    what = f"video stream {stream} of a movie needs" if is_lent() else "movies need"
     raise MediaError(
         f"{path.name}: {what} the Python package PyAV ({pyav.missing()}); "
         "install the zip of Virtual Shutter that is made for your system, or use an image sequence"
