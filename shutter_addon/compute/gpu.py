@@ -1,7 +1,5 @@
 """Compositing on a device: one compute pass per picture and band of rows, over the window's frames or running sums."""
 
-from __future__ import annotations
-
 from contextlib import AbstractContextManager
 from dataclasses import replace
 from typing import Any

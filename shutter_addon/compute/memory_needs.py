@@ -1,7 +1,5 @@
 """What a window takes of memory, worked out without taking it."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

@@ -11,8 +11,6 @@ So no layer leaves its ghost beside it. The sums are made in the light of Option
 light. Where Σ qₖ hₖ is less than CLEAR, too little of B was seen: a plate takes the place of what lacks.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np
