@@ -21,7 +21,6 @@ _MODULES = "bpy", "_bpy", "gpu", "bl_math", "mathutils"
 REVIEWED: dict[str, set[str]] = {
     "data/source_media.py": {"SourceSpec.open"},
     "data/versions.py": {"_digest"},
-    "devices/main_thread.py": {"soon"},
     "devices/available.py": {"<lambda>", "_tried"},
     "devices/blender_gpu.py": {
         "BlenderDevice.__init__",
@@ -38,7 +37,7 @@ REVIEWED: dict[str, set[str]] = {
         "_packed",
         "unpacking",
     },
-    "devices/gpu_relay.py": {
+    "devices/main_thread.py": {
         "RelayedDevice.__init__",
         "RelayedDevice._dispatch",
         "RelayedDevice._free",
@@ -51,6 +50,7 @@ REVIEWED: dict[str, set[str]] = {
         "_called",
         "_keep_looking",
         "ask",
+        "soon",
     },
     "editing/track_region.py": {"_each", "track.<lambda>"},
     "rendering/device_work.py": {"broken_off"},

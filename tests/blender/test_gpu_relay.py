@@ -9,7 +9,7 @@ import pytest
 @pytest.fixture
 def clock(monkeypatch):
     """A clock that stands still: `now` may be set forward, and `meanwhile` is called at the next look at the time."""
-    from shutter_addon.blender.devices import gpu_relay
+    from shutter_addon.blender.devices import main_thread
 
     def look():
         meanwhile, clock.meanwhile = clock.meanwhile, None
@@ -18,18 +18,18 @@ def clock(monkeypatch):
         return clock.now
 
     clock = SimpleNamespace(now=1000.0, meanwhile=None)
-    monkeypatch.setattr(gpu_relay, "time", SimpleNamespace(monotonic=look))
+    monkeypatch.setattr(main_thread, "time", SimpleNamespace(monotonic=look))
     return clock
 
 
 @pytest.fixture
 def relay(bpy, monkeypatch, clock):
     """As where Blender's GPU is current."""
-    from shutter_addon.blender.devices import gpu_relay
+    from shutter_addon.blender.devices import main_thread
 
-    monkeypatch.setattr(gpu_relay, "has_context", lambda: True)
-    monkeypatch.setattr(gpu_relay, "gpu", Mock())
-    return gpu_relay
+    monkeypatch.setattr(main_thread, "has_context", lambda: True)
+    monkeypatch.setattr(main_thread, "gpu", Mock())
+    return main_thread
 
 
 def test_the_main_thread_looks_for_calls_until_there_are_none_for_a_while(relay, clock):

@@ -29,7 +29,7 @@ class Passes:
 
     def __init__(self):
         self.all, self.whole, self.begun = 0, [], None
-        devices = [part("blender.devices.gpu_relay").RelayedDevice]
+        devices = [part("blender.devices.main_thread").RelayedDevice]
         if not os.environ.get("SHUTTER_HIDDEN"):
             devices.append(part("devices.gl").GLDevice)
         for device in devices:

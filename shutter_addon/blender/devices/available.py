@@ -15,7 +15,7 @@ from ...compute.request import Compositor
 from ...core import threads
 from ...devices.device import NoDeviceError
 from .blender_gpu import BlenderDevice, opens_in_background
-from .gpu_relay import RelayedDevice
+from .main_thread import RelayedDevice
 
 CHOICES = ("auto", "gpu", "opengl", "blender", "cpu")  # gpu: opengl, or else blender
 # Given a Budget and `ask_others`, as Device.

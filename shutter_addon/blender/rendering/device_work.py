@@ -10,7 +10,7 @@ from typing import Any, NamedTuple, TypeVar
 
 from ...core import stopping
 from ...core.stopping import StoppedError
-from ..devices import gpu_relay
+from ..devices import main_thread
 from ..devices.blender_gpu import require_context
 from .render_job import Where, where
 
@@ -45,7 +45,7 @@ def result_of(future: Future[T], relayed: bool, stopped: Callable[[], bool]) -> 
     Blender's GPU is not current."""
     is_window = where() is Where.WINDOW
     while not wait([future], 0 if is_window else _PATIENCE).done:
-        if is_window and not gpu_relay.serve() and relayed:
+        if is_window and not main_thread.serve() and relayed:
             require_context()
         if stopped():
             raise StoppedError

@@ -10,7 +10,7 @@ import bpy
 
 from ...core.pixels.shown_levels import Display
 from ...core.stopping import never
-from ..devices import available, gpu_relay
+from ..devices import available, main_thread
 from . import outline_carrying, render_job, render_settings
 from .render_job import Where
 from .session import RenderContext, RenderSession
@@ -21,7 +21,7 @@ _ANSWER = 5.0  # seconds that a job waits for the window to free memory
 def _ask_window() -> None:
     """Has the window free what it shows, for a job: it is not drawn meanwhile, and makes it again."""
     if render_job.where() is Where.JOB:
-        gpu_relay.ask(WINDOW.free, _ANSWER)
+        main_thread.ask(WINDOW.free, _ANSWER)
 
 
 def _ask_offscreen() -> None:
