@@ -13,7 +13,6 @@ from ..core.model.mattes import MatteReader
 from ..core.model.windows import source_frames
 from ..core.pixels import layering
 from . import plates
-from .layer_colors import TOGETHER, LayerColors
 from .layer_frames import LayerMattes, RecentFrames, WeightedFrames, with_layers
 from .request import Behind, Coefficients, Compositor, Exposure, Handle, Request, Stages
 
@@ -43,7 +42,7 @@ class LayeredRenderer:
         self._noted = noted(self.recent)
         size = source.width, source.height
         self.mattes = LayerMattes(size, lambda state, frame: solve(self.recent, state, frame), mattes)
-        self._colors = LayerColors(self._noted, self.recent, self.mattes)
+        self._colors = plates.LayerColors(self._noted, self.recent, self.mattes)
         self._layers: Layers | None = None
         self._windows: dict[tuple, Handle] = {}
         self._loaded: dict[int, tuple] = {}  # by source frame in the windows: Layers.key_at
@@ -162,7 +161,7 @@ class LayeredRenderer:
         """Loads all windows. Where many frames lack, they are loaded a few at a time: each is read once for all."""
         options, ordered = request.state.options, np.sort(positions)
         lacking = set(source_frames(options, ordered, shot).tolist()).difference(self.held)
-        step = TOGETHER if len(lacking) > 1 else len(ordered)
+        step = plates.TOGETHER if len(lacking) > 1 else len(ordered)
         for end in range(step, len(ordered) + step, step):
             for window in windows.values():
                 window.load(ordered[:end], options, shot)

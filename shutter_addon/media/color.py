@@ -1,4 +1,9 @@
-"""A source in any colour space that Blender knows."""
+"""A source in any colour space that Blender knows; and the code values that light is shown as by its sequencer, to the
+bit: sRGB, view transform Standard.
+
+OpenColorIO, which Blender asks as well, raises to powers by polynomials of some 15 bits. So its own rounding counts, as
+often as Blender asks it.
+"""
 
 from functools import cache
 from pathlib import Path
@@ -12,6 +17,8 @@ from ..core.frames.source_wrapper import SourceWrapper
 from .errors import MediaError
 
 SCENE_LINEAR = "Linear Rec.709"  # of Blender's own configuration
+# A configuration would be read anew for every picture, which takes milliseconds; files of transforms are kept.
+_ENCODE, _DECODE = (str(Path(__file__).with_name(f"srgb_{name}.clf")) for name in ("encode", "decode"))
 TRANSFERS = {"sRGB": "srgb", SCENE_LINEAR: "linear", "Non-Color": "linear"}
 
 
@@ -68,3 +75,25 @@ class ColorSource(SourceWrapper):
         if linear.has_error or converted is None:
             raise MediaError(f"{self._source.path.name}: no conversion from {self._name} ({linear.geterror()})")
         return converted
+
+
+def shown(light: np.ndarray) -> np.ndarray:
+    """The code values of light float32 of any shape, as the display has it. RuntimeError: this OpenImageIO cannot make
+    them."""
+    return _transformed(light, (_ENCODE,))
+
+
+def blended(light: np.ndarray) -> np.ndarray:
+    """As `shown`, of light that was blended over something: to the sequencer's colours, and back, first."""
+    return _transformed(light, (_ENCODE, _DECODE, _ENCODE))
+
+
+def _transformed(light: np.ndarray, paths: tuple[str, ...]) -> np.ndarray:
+    samples = np.zeros(-(-light.size // 3) * 3, np.float32)
+    samples[: light.size] = light.ravel()
+    buffer = ImageBuf(samples.reshape(1, -1, 3))
+    for path in paths:
+        buffer = ImageBufAlgo.ociofiletransform(buffer, path, unpremult=False)
+        if buffer.has_error:
+            raise RuntimeError(buffer.geterror())
+    return np.asarray(buffer.get_pixels(FLOAT)).ravel()[: light.size].reshape(light.shape)

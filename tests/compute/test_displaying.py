@@ -6,9 +6,9 @@ import pytest
 from shutter_addon.compute.cpu import CPUCompositor
 from shutter_addon.compute.displaying import Displaying
 from shutter_addon.core.pixels.shown_levels import Display, rounded
-from shutter_addon.media import display_transfer
+from shutter_addon.media import color
 
-TRANSFERS = {"shown": display_transfer.shown, "blended": display_transfer.blended}
+TRANSFERS = {"shown": color.shown, "blended": color.blended}
 
 
 def pictures():
@@ -63,8 +63,8 @@ def test_the_display_is_asked_about_few_pixels(gpu_device):
 
 
 def test_noise_is_a_triangle_about_nothing():
-    noise = Display(1.0, display_transfer.shown).noise(640, 480)
+    noise = Display(1.0, color.shown).noise(640, 480)
     assert abs(noise.mean()) < 1e-5
     assert 0.0032 < noise.max() <= 0.0033
     assert noise.std() == pytest.approx(0.0033 * 6**-0.5, rel=0.02)
-    assert not Display(0.0, display_transfer.shown).noise(8, 8).any()
+    assert not Display(0.0, color.shown).noise(8, 8).any()

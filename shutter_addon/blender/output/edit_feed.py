@@ -19,7 +19,7 @@ from pathlib import Path
 from bpy.types import Scene
 
 from ...core.pixels.shown_levels import Display
-from ...media import display_transfer
+from ...media import color
 from ..data import colour_configuration, seen_alone, strips
 from ..data.property_copy import for_a_while
 from ..rendering import job_snapshots, pictures, render_job, sessions
@@ -109,7 +109,7 @@ def _feed(film: _Film, scene: Scene, seen: seen_alone.Alone) -> bool:
     try:
         shown = scene.frame_current - strips.origin(strip) + strip.scene.frame_start
         snapshot, frame = job_snapshots.of(strip.scene, int(shown))
-        transfer = display_transfer.blended if seen.is_blended else display_transfer.shown
+        transfer = color.blended if seen.is_blended else color.shown
         display = None if _data.is_own else Display(scene.render.dither_intensity, transfer)
         context = sessions.of_render(render_job.say, render_job.stopping, levels=_data.is_own, display=display)
         source = context.renderer(context.request(snapshot, frame, FULL)).source
