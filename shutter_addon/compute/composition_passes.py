@@ -9,7 +9,7 @@ import numpy as np
 from ..core.model import shutters
 from ..core.model.combining import AVERAGE, Combine
 from ..core.model.frame_state import FrameState, Options
-from ..devices.llvmpipe import MOST_ITERATIONS
+from ..devices.llvmpipe import MOST_ITERATIONS, frames_iterations
 from ..devices.passes import Pass, read_pass
 from .running_sums import STORED_SUMS, Sums
 from .window import BLOCK, Window
@@ -110,26 +110,6 @@ def way_of(
     if not isinstance(window, Sums) and 3 * rows < 2 * frames:
         return "pieces"
     return "frames" if frames_iterations(values, span) <= MOST_ITERATIONS else "search"
-
-
-def frames_iterations(values: np.ndarray, span: tuple[int, int]) -> int:
-    """An upper bound of the loop iterations of an invocation of compose_frames, for any coefficients.
-
-    For each frame it goes through the pieces that may have begun and have not all ended. So each piece counts once for
-    every frame from that in which it may begin to that in which it and all before it have ended."""
-    groups = values.shape[1] // 2
-    start, end, apart = values[1:, :groups], values[1:, groups:-1], values[1:, -1, 1]
-    until = np.maximum.accumulate(end.max(axis=(1, 2)) + apart)
-    from_ = start.max(axis=(1, 2)) - 2 * apart  # the earliest start of a shutter, and once more the difference
-    frames = np.clip(np.ceil(until), *span) - np.clip(np.floor(from_), *span) + 1
-    return int(frames.sum()) + len(start) + span[1] - span[0]
-
-
-def median_iterations(rows: int, frames: int, kind: str) -> int:
-    """As frames_iterations, of compose_search for a median (include/combine.glsl), with `rows` pieces, of frames in
-    textures of a kind."""
-    scans = 5 if kind == "rgba8" else 10
-    return scans * frames * (1 + 4 * (1 + rows.bit_length()))
 
 
 def moved_way(

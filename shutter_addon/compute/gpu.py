@@ -11,7 +11,7 @@ from ..core.model.combining import AVERAGE, Combine
 from ..core.model.frame_state import Following, FrameState
 from ..core.pixels.shown_levels import Display
 from ..devices.device import Device, Given, NamedTextures, Texture
-from ..devices.llvmpipe import MOST_ITERATIONS
+from ..devices.llvmpipe import MOST_ITERATIONS, median_iterations
 from ..devices.passes import Pass
 from . import cpu, memory_needs, window_frames
 from .composition_passes import (
@@ -22,7 +22,6 @@ from .composition_passes import (
     composition,
     filled_rows,
     lines_of,
-    median_iterations,
     moved_tables,
     moved_way,
     selection,
