@@ -10,7 +10,7 @@ from typing import Any, TypeVar
 from .memo import Kept
 
 T = TypeVar("T")
-_MOST = 64  # values of an UntilChange
+_MOST = 128  # values of until_change
 
 
 class Revision:
@@ -23,7 +23,16 @@ class Revision:
         self.number += 1
 
 
-_data = Revision()
+class _Data(Revision):
+    """kept: values of until_change, each with whether it could be made; at: the number at which they were made"""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.kept: Kept[Hashable, tuple[bool, Any]] = Kept()
+        self.at = 0
+
+
+_data = _Data()
 
 
 def number() -> int:
@@ -36,32 +45,26 @@ def changed() -> None:
     _data.changed()
 
 
-class UntilChange:
-    """Values by key, each made once until something changes; a few at most.
+def until_change(what: str, key: Hashable, make: Callable[[], T]) -> T:
+    """The value that `make` gives for something and a key, made once until something changes; what it raised, if it
+    did. The values that were asked for last are kept.
 
     For what is drawn: operators, which may follow a change that nobody has told of yet, read anew."""
+    if _data.at != (start := number()):
+        _data.at = start
+        _data.kept.clear()
+    good, value = _data.kept.ask((what, key), lambda: _outcome(make), _MOST)
+    if number() != start:  # meanwhile
+        _data.at = -1
+    if not good:
+        raise value.with_traceback(None)  # which would grow with every raise
+    return value
 
-    def __init__(self) -> None:
-        self._number = -1
-        self._values: Kept[Hashable, tuple[bool, Any]] = Kept()
 
-    def get(self, key: Hashable, make: Callable[[], T]) -> T:
-        """The value that `make` gives for a key; what it raised, if it did."""
-        if self._number != number():
-            self._number = number()
-            self.clear()
-        good, value = self._values.ask(key, lambda: _outcome(make), _MOST)
-        if not good:
-            raise value.with_traceback(None)  # which would grow with every raise
-        return value
-
-    def known(self, key: Hashable) -> Any:
-        """The value of a key that has been made since something changed; None: none has, or it could not be."""
-        good, value = self._values.get(key, (False, None))
-        return value if good and self._number == number() else None
-
-    def clear(self) -> None:
-        self._values.clear()
+def known(what: str, key: Hashable) -> Any:
+    """The value of until_change that has been made since something changed; None: none has, or it could not be."""
+    good, value = _data.kept.get((what, key), (False, None))
+    return value if good and _data.at == number() else None
 
 
 def _outcome(make: Callable[[], object]) -> tuple[bool, Any]:

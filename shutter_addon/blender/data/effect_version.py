@@ -39,7 +39,6 @@ Files = Callable[[Strip | PropertyGroup], Hashable]
 
 _Curve = tuple[str, int, FCurve]  # with its path and index
 
-_masks = revision.UntilChange()  # by mask: what it shows at its start
 _MOVES = "location", "rotation", "scale"
 # Keyframe.interpolation as a number: constant, linear, bezier, then the others.
 _BEZIER = 2
@@ -206,7 +205,9 @@ def _matte(region: PropertyGroup, files: Files, start: int | None) -> Iterator[H
 
 def _mask(mask: Mask) -> Iterator[Hashable]:
     # Blender tells of these; many points take long to read.
-    yield mask.frame_start, _masks.get(mask.session_uid, lambda: repr(mask_reading.mask_at(mask, mask.frame_start)))
+    key = mask.session_uid
+    yield mask.frame_start
+    yield revision.until_change("mask", key, lambda: repr(mask_reading.mask_at(mask, mask.frame_start)))
     yield from mask_reading.motion(mask)
     yield from _curves([(c.data_path, c.array_index, c) for c in fcurves.curves_under(mask, "")], None)
 

@@ -17,8 +17,6 @@ from ...core.model.mattes import FileFrames
 from ...media.matte_files import MatteFile
 from . import matte_strips, snapshot
 
-_looks = revision.UntilChange()
-
 
 class Look(NamedTuple):
     """text: of the medium, "" where there is none to tell of; fault: why it cannot be shown; note: that its last frame
@@ -32,7 +30,8 @@ class Look(NamedTuple):
 def look(scene: Scene, effect: PropertyGroup, strip: Strip, region: PropertyGroup) -> Look:
     """The look at a region that is a matte, taken once until something changes."""
     index = list(effect.regions).index(region)
-    return _looks.get((effect.scene.session_uid, index, strip.name), lambda: _look(scene, effect, strip, index))
+    key = effect.scene.session_uid, index, strip.name
+    return revision.until_change("matte", key, lambda: _look(scene, effect, strip, index))
 
 
 def _look(scene: Scene, effect: PropertyGroup, strip: Strip, index: int) -> Look:

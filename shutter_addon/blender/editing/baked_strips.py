@@ -14,14 +14,13 @@ from bpy.app.translations import pgettext_data as data_
 from bpy.app.translations import pgettext_rpt as rpt_
 from bpy.types import MetaStrip, PropertyGroup, Scene, SequenceEditor, Strip
 
+from ...core import revision
 from ...core.messages import EffectError
-from ...core.revision import UntilChange
 from ..data import effect_version, fcurves, selection, strips
 from ..output.baked_film import Film
 from . import add_effect, match_source
 
 _LOOK = ("blend_type", "blend_alpha")
-_states = UntilChange()
 
 
 def check(scene: Scene, strip: Strip) -> None:
@@ -135,12 +134,13 @@ def unbake(scene: Scene, strip: Strip) -> None:
 def is_stale(scene: Scene, effect: PropertyGroup, strip: Strip) -> bool:
     """Whether an effect has changed since its strip was baked: its pictures would be others. True as well where it has
     none any more."""
-    return _states.get(_place(scene, effect, strip), lambda: effect_version.is_changed(scene, effect, strip))
+    place = _place(scene, effect, strip)
+    return revision.until_change("bake", place, lambda: effect_version.is_changed(scene, effect, strip))
 
 
 def known_stale(scene: Scene, effect: PropertyGroup, strip: Strip) -> bool | None:
     """As is_stale, where that has been asked since something changed; None: it has not."""
-    return _states.known(_place(scene, effect, strip))
+    return revision.known("bake", _place(scene, effect, strip))
 
 
 def _place(scene: Scene, effect: PropertyGroup, strip: Strip) -> tuple:

@@ -107,13 +107,10 @@ class BarsShown(NamedTuple):
     states: list[str]
 
 
-_shown = revision.UntilChange()
-
-
 def shown(effect: PropertyGroup, index: int) -> BarsShown:
     """What bars_now and key_state say, for what is drawn: worked out once until something changes."""
     key = effect.scene.session_uid, index, effect.id_data.frame_float
-    return _shown.get(key, lambda: _read(effect, index))
+    return revision.until_change("bars", key, lambda: _read(effect, index))
 
 
 def key_state(effect: PropertyGroup, index: int) -> list[str]:

@@ -88,10 +88,7 @@ def is_changed(region: PropertyGroup) -> bool:
     if not region.follow_stamp:
         return False
     key = region.id_data.session_uid, region.path_from_id()
-    return region.follow_stamp != _stamps.get(key, lambda: stamp(region))
-
-
-_stamps = revision.UntilChange()
+    return region.follow_stamp != revision.until_change("track", key, lambda: stamp(region))
 
 
 def stamp(region: PropertyGroup) -> str:

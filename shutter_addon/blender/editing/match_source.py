@@ -24,7 +24,6 @@ from ..data.property_copy import for_a_while
 from . import add_effect
 
 _RANGE = n_("range")
-_shown = revision.UntilChange()
 
 
 def strip_and_source(effect: PropertyGroup) -> list[Strip]:
@@ -45,7 +44,7 @@ class Shown(NamedTuple):
 
 def shown(effect: PropertyGroup) -> Shown | None:
     """For what is drawn: worked out once until something changes. None: it has no source."""
-    return _shown.get(effect.scene.session_uid, lambda: _compare(effect))
+    return revision.until_change("source", effect.scene.session_uid, lambda: _compare(effect))
 
 
 def _compare(effect: PropertyGroup) -> Shown | None:

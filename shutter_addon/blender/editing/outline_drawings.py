@@ -36,9 +36,6 @@ class Needed(NamedTuple):
     confidence: float
 
 
-_shown = revision.UntilChange()
-
-
 def curves_now(scene: Scene, effect: PropertyGroup, strip: Strip, index: int) -> outlines.Curves:
     """The curves of an outline at the current frame, in fractions of the picture: drawn, carried, or straight where
     nothing is carried yet. EffectError, MediaError: there are none."""
@@ -58,7 +55,7 @@ def _opened(file: CarriedFile) -> CarriedMattes:
 def shown_curves(scene: Scene, effect: PropertyGroup, strip: Strip, index: int) -> outlines.Curves:
     """As curves_now, read once until something changes: for what is drawn."""
     key = effect.scene.session_uid, strip.name, index, scene.frame_current
-    return _shown.get(key, lambda: curves_now(scene, effect, strip, index))
+    return revision.until_change("outline", key, lambda: curves_now(scene, effect, strip, index))
 
 
 def add(effect: PropertyGroup, strip: Strip, region: PropertyGroup, curve: np.ndarray, frame: int) -> None:

@@ -38,9 +38,6 @@ class Place(NamedTuple):
     view: View
 
 
-_strokes = revision.UntilChange()
-
-
 def _strokes_now(scene: Scene, effect: PropertyGroup, strip: Strip) -> list[np.ndarray]:
     """The active region's strokes, or the line of a ramp, not moved yet: read once until something changes."""
     index, frame = effect.active_region, scene.frame_float
@@ -48,7 +45,7 @@ def _strokes_now(scene: Scene, effect: PropertyGroup, strip: Strip) -> list[np.n
     if region.kind == "RAMP":
         return [_RAMP] if region.ramp != "LUMINANCE" else []
     key = effect.scene.session_uid, strip.name, index, frame
-    return _strokes.get(key, lambda: snapshot.strokes_at(scene, effect, strip, index, frame))
+    return revision.until_change("strokes", key, lambda: snapshot.strokes_at(scene, effect, strip, index, frame))
 
 
 def place(context: Context) -> Place | None:

@@ -19,7 +19,6 @@ from ..data.snapshot import Snapshot
 from ..devices import main_thread
 
 _signatures: dict[int, int] = {}  # by effect scene
-_current = revision.UntilChange()
 _spoilt: set[int] = set()  # session_uids of scenes of whose frames the sequencer may keep one that failed
 _lesser: set[int] = set()  # likewise, one that is less than the full picture, for a preview
 
@@ -31,13 +30,12 @@ def current(scene: Scene, effect: PropertyGroup, strip: Strip, frame: float) -> 
     def take() -> Snapshot:
         return snapshot.take(scene, effect, strip, (frame,))
 
-    return _current.get((effect.scene.session_uid, strip.name, frame), take)
+    return revision.until_change("snapshot", (effect.scene.session_uid, strip.name, frame), take)
 
 
 def forget() -> None:
     """Forgets what the effects of a file were, before another one is loaded."""
     _signatures.clear()
-    _current.clear()
     revision.changed()
 
 
