@@ -12,7 +12,7 @@ MEMBERS = {name for name in {*FrameSource.__annotations__, *vars(FrameSource)} i
 
 
 def test_a_wrapper_forwards_every_member():
-    assert {"path", "files", "shots", "read", "want", "has", "check", "close"} <= MEMBERS
+    assert {"path", "files", "shots", "read", "want", "close"} <= MEMBERS
     assert vars(SourceWrapper).keys() >= MEMBERS
 
 
