@@ -4,11 +4,11 @@ copy that Blender's sequencer has made of the footage."""
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import DTypeLike
 
 from ..core.frames.frame_source import FrameSource
 from ..core.frames.light import to_linear
 from ..core.frames.source_wrapper import SourceWrapper
+from ..core.pixels.matte_grid import block_sums
 from .errors import MediaError
 from .opencv import cv2
 
@@ -44,32 +44,18 @@ def reduced(frame: np.ndarray, divisor: int, alpha: str) -> np.ndarray:
     pixel goes on. alpha: a FrameSource's; straight colours count by their cover."""
     if divisor == 1:
         return frame
-    down, right = (-length % divisor for length in frame.shape[:2])
-    if down or right:
-        frame = np.pad(frame, ((0, down), (0, right), (0, 0)), mode="edge")
     whole = frame.dtype.kind == "u"
     if alpha == "straight":
         colours = frame.astype(np.float32)
         colours[..., :3] *= colours[..., 3:]
-        means = _sums(colours, divisor, np.float32) / divisor**2
+        means = block_sums(colours, divisor, np.float32) / divisor**2
         np.divide(means[..., :3], means[..., 3:], out=means[..., :3], where=means[..., 3:] > 0)
     elif whole:
-        sums = _sums(frame, divisor, np.uint16 if frame.dtype == np.uint8 else np.uint32)
+        sums = block_sums(frame, divisor, np.uint16 if frame.dtype == np.uint8 else np.uint32)
         return ((sums + sums.dtype.type(divisor**2 // 2)) // sums.dtype.type(divisor**2)).astype(frame.dtype)
     else:
-        means = _sums(frame, divisor, np.float32) / divisor**2
+        means = block_sums(frame, divisor, np.float32) / divisor**2
     return (np.rint(means) if whole else means).astype(frame.dtype)
-
-
-def _sums(frame: np.ndarray, divisor: int, dtype: DTypeLike) -> np.ndarray:
-    """The sums over squares of a frame whose sides they divide."""
-    height, width, channels = frame.shape
-    squares = frame.reshape(height // divisor, divisor, width // divisor, divisor, channels)
-    sums = np.zeros((height // divisor, width // divisor, channels), dtype)
-    for row in range(divisor):
-        for column in range(divisor):
-            sums += squares[:, row, :, column]
-    return sums
 
 
 class ProxySource(SourceWrapper):

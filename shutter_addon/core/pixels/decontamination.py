@@ -47,7 +47,7 @@ def _surroundings(own: np.ndarray, behind: np.ndarray, matte: np.ndarray, radius
     """The means (h, w, C) around each pixel of colours, weighted by a matte (h, w, 1), and of others, by its rest."""
     cell = max(radius // _CELLS, 1)
     weighted = np.concatenate([own * matte, behind * (1 - matte), matte, 1 - matte], axis=-1)
-    sums = _box_sums(block_sums(weighted, cell, beyond="constant"), radius // cell)
+    sums = _box_sums(block_sums(weighted, cell, np.float32, beyond="constant"), radius // cell)
     count = own.shape[-1]
     totals = np.maximum(sums[..., 2 * count :], 1e-6)
     means = sums[..., :count] / totals[..., :1], sums[..., count : 2 * count] / totals[..., 1:]

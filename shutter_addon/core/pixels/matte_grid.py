@@ -53,16 +53,21 @@ def block_means(values: np.ndarray, block: int) -> np.ndarray:
 
 
 def block_sums(
-    picture: np.ndarray, size: int, dtype: DTypeLike | None = None, *, beyond: Literal["edge", "constant"] = "edge"
+    picture: np.ndarray, size: int, dtype: DTypeLike, *, beyond: Literal["edge", "constant"] = "edge"
 ) -> np.ndarray:
     """Sums (⌈h/size⌉, ⌈w/size⌉, C) over blocks of a picture's pixels (h, w, C).
 
     beyond: what comes after its last pixels, as numpy.pad has it: these again, or "constant", nothing"""
-    height, width, channels = picture.shape
-    if height % size or width % size:
-        picture = np.pad(picture, [(0, -height % size), (0, -width % size), (0, 0)], beyond)
-    rows = picture.reshape(len(picture) // size, size, -1).sum(axis=1, dtype=dtype)
-    return rows.reshape(len(rows), -1, size, channels).sum(axis=2)
+    down, right = (-length % size for length in picture.shape[:2])
+    if down or right:
+        picture = np.pad(picture, [(0, down), (0, right), (0, 0)], beyond)
+    rows = picture[::size].astype(dtype)
+    for row in range(1, size):
+        rows += picture[row::size]
+    total = rows[:, ::size].copy()
+    for column in range(1, size):
+        total += rows[:, column::size]
+    return total
 
 
 def _resampled(values: np.ndarray, down: Taps, across: Taps) -> np.ndarray:
