@@ -24,8 +24,8 @@ ANSWERING = 120  # seconds after which one that does not answer any more is: no 
 ENDING = 5  # seconds after which one that does not end is
 _PIPE = 1 << 20  # bytes, where a pipe's size can be chosen: of 64 KB, a frame takes twice as long
 
-_command: list[str] | None = None
-_process: subprocess.Popen[bytes] | None = None
+_command: list[str] | None = None  # what starts the process, which all movies share
+_process: subprocess.Popen[bytes] | None = None  # that runs
 _asking = threading.Lock()  # one question at a time, from any thread
 _numbers = itertools.count()  # a movie's for the process, which may have the same file open several times
 _FLOAT_ERROR = 2**-23  # relative, of a number that Blender has as a float

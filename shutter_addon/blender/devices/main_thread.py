@@ -31,7 +31,7 @@ _MOMENT = 0.01  # seconds that the passes take for which it waits at once
 _AHEAD = 4  # passes that wait for the main thread at most: they are run, too, where the picture is not wanted any more
 _REST = 1.0  # seconds without a call, after which the main thread looks for none
 _TICK = 0.02  # seconds from one look at the queue to the next
-_calls: queue.SimpleQueue[Callable[[], object]] = queue.SimpleQueue()
+_calls: queue.SimpleQueue[Callable[[], object]] = queue.SimpleQueue()  # of any thread, for the timer
 
 
 def soon(function: Callable[[], object]) -> None:

@@ -25,7 +25,7 @@ class _View(NamedTuple):
     centre: tuple[float, float]
 
 
-_before: _View | None = None
+_before: _View | None = None  # Full Quality ends by itself, and then brings that back
 
 
 class SHUTTER_OT_full_quality(Named, Operator):

@@ -32,7 +32,7 @@ def smoothing() -> Button:
     return Button("shutter.smooth_streaks", iface_("Smooth"))
 
 
-places: dict[tuple[int, str], tuple[drawing.Box, Button]] = {}  # by region and operator
+places: dict[tuple[int, str], tuple[drawing.Box, Button]] = {}  # by region and operator: a handler puts them there
 
 
 def clear(region: Region) -> None:

@@ -59,7 +59,7 @@ class Quad:
             gpu.state.scissor_test_set(False)  # as it is where Blender has handlers draw
 
 
-_shaders: dict = {}
+_shaders: dict = {}  # by step: to compile one takes long
 
 
 def shader_of(name: str) -> GPUShader:

@@ -26,7 +26,7 @@ class _Pen:
     is_down: bool = False
 
 
-_pen = _Pen()
+_pen = _Pen()  # Blender draws with it, and tells of no stroke
 
 
 def take_up(context: Context, tool: str) -> bool:
