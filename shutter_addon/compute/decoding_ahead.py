@@ -25,7 +25,7 @@ def want(source: FrameSource, index: int, direction: int, missing: Callable[[int
 
 def _in_order(source: FrameSource, lacking: list[set[int]]) -> list[int]:
     most = decoded_ahead(source)
-    # One that is not built yet would be remembered as a fault, and may come before it is needed.
+    # One that is not made yet would be remembered as a fault, and may come before it is needed.
     wanted = dict.fromkeys(i for frames in lacking for i in sorted(frames) if source.has(i))
     return list(wanted)[:most]
 

@@ -234,7 +234,7 @@ class Renderer:
             return self._layered.holes if self._layered else None
 
     def check(self, request: Request) -> None:
-        """MediaError: an in-between frame that the picture needs is missing. No frame is read."""
+        """MediaError: a frame or moment that the picture needs does not exist. No frame is read."""
         if self.source.step > 1:
             for index in sorted(self.needed(request)):
                 self.source.check(index)

@@ -1,6 +1,6 @@
 """Tracking through filmed frames, each of them once and in their order, whichever a strip shows and how often.
 
-Where it shows in-between frames, what is tracked goes straight from filmed frame to filmed frame, as it does in these.
+Where a strip shows a moment between two of them, what is tracked goes straight from one to the other.
 No bpy.
 """
 
@@ -28,7 +28,7 @@ class FilmedFrames:
     start: that of the timeline frame from which is tracked"""
 
     def __init__(self, times: Mapping[int, float], start: int) -> None:
-        """times: by timeline frame, in filmed frames from 0 on; a fraction stands for an in-between frame.
+        """times: by timeline frame, in filmed frames from 0 on; a fraction is a moment between two of them.
         start: one of the timeline frames"""
         self._times, self._begin = times, start
         nearest: dict[int, tuple] = {}
@@ -61,7 +61,7 @@ class FilmedFrames:
             else:
                 known[each.frame] = each
         first, centre = subject.placement(self._begin), _centre(subject, self._begin)
-        # where the frame is an in-between one, a filmed one beside it was tracked from as if it were that
+        # where the frame is a moment between two, a filmed one beside it was tracked from as if it were that
         origin = (self._between(subject, self._begin, known) or known[self.start]).placement
         yield Tracked(frame=self._begin, placement=first, confidence=1.0)
         for rest in (range(self._begin + 1, max(self._times) + 1), range(self._begin - 1, min(self._times) - 1, -1)):

@@ -108,12 +108,12 @@ def test_what_is_followed_has_no_steps(add):
     assert looked(edit, effect, strip) is None
 
 
-@pytest.mark.parametrize("smooth", ["2", "4", "AUTO"])
-def test_where_smooth_is_on_nothing_is_said(add, smooth):
-    """And nothing is measured."""
+@pytest.mark.parametrize(("smooth", "window"), [("2", 4), ("4", 4), ("AUTO", 4), ("AUTO", 130)])
+def test_where_smooth_is_on_nothing_is_said(add, smooth, window):
+    """And nothing is measured. 130 frames leave no room for moments."""
     from shutter_addon.blender.rendering import strobing
 
-    edit, effect, strip = add(12, np.ones(4))
+    edit, effect, strip = add(12, np.ones(window))
     effect.inbetween = smooth
     assert looked(edit, effect, strip) is None
     assert not strobing._moved

@@ -177,7 +177,7 @@ def _points(scene: Scene, effect: PropertyGroup, strip: Strip, index: int, start
 
 
 def clip_times(scene: Scene, effect: PropertyGroup, strip: Strip, clip: MovieClip) -> dict[int, float]:
-    """By timeline frame of the strip what it shows, in the clip's frames: in-between frames lie between two of them.
+    """By timeline frame of the strip what it shows, in the clip's frames; moments lie between two of them.
     EffectError, MediaError: the strip does not show the clip's footage."""
     frames = range(strip.left_handle, strip.right_handle)
     source = strips.source_of(scene, effect, strip)

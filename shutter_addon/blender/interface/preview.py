@@ -323,7 +323,7 @@ def _show_strokes(context: Context, quad: Quad, shown: Shown, snapshot: Snapshot
 
 def _show_source(quad: Quad, shown: Shown, renderer: Renderer, request: Request, right: float) -> None:
     """The source's own frame, from the left edge on: that of a shutter that is open for it alone."""
-    options = replace(request.state.options, step=1)  # no in-between frames come first in reverse
+    options = replace(request.state.options, step=1)  # no moments come first in reverse
     still = np.zeros((1, options.window))
     still[0, options.before] = 1
     # The shown frame lies where it is for all that move. Without a motion, other frames would have to be read for it.

@@ -307,8 +307,8 @@ def is_tracking() -> bool:
 
 
 def may_be_late() -> bool:
-    """Whether the playhead is dragged, something is tracked or in-between frames are built, or was a moment ago: keys
-    count for more than pictures."""
+    """Whether the playhead is dragged, or something is tracked, or was a moment ago: keys count for more than
+    pictures."""
     if _GOING & render_job.operators_running():
         looking.late_until = time.monotonic() + _MOMENT
     return time.monotonic() < looking.late_until

@@ -7,11 +7,11 @@ LEAST = 24
 
 
 def decoded(frames: int, window: int, step: int = 1) -> int:
-    """How many frames of a source, in-between frames included, a chunk of so many timeline frames decodes: those of its
+    """How many frames of a source, moments between them included, a chunk of so many timeline frames reads: those of its
     first picture's window, and `step` more for each later picture.
 
-    window: frames that a shutter can expose, in-between frames included; step: how many frames the source moves on from
-    one timeline frame to the next, which is the factor of its in-between frames unless it is retimed"""
+    window: frames that a shutter can expose, moments included; step: how many of these the source moves on from one
+    timeline frame to the next, which is how many a filmed frame has unless it is retimed"""
     return (frames - 1) * step + window
 
 

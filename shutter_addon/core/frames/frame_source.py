@@ -92,7 +92,7 @@ class FrameSource(ABC):
         return  # or it need not
 
     def has(self, index: int) -> bool:
-        """Whether the frame exists; in-between frames may not be built yet. It is not decoded."""
+        """Whether the frame exists; mattes of outlines may not be made yet. It is not decoded."""
         return True
 
     def check(self, index: int) -> None:

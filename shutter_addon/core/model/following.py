@@ -2,7 +2,7 @@
 
 Keys of regions and of the camera are on timeline frames, a window has frames of the source. What a source frame shows
 is where the keys have it at the timeline frame that shows it: of several the one nearest to the shown frame; between
-two timeline frames for a source frame that is passed over there, or for an in-between frame. Between timeline frames
+two timeline frames for a source frame that is passed over there, or for a moment between two. Between timeline frames
 motion is straight.
 """
 
