@@ -5,7 +5,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from support import recipe, remembering, request, write_frames
+from support import image_strip, recipe, remembering, request, write_frames
 
 from shutter_addon.core.recipes import recipe_file
 
@@ -28,9 +28,7 @@ def effect(bpy, edit, images):
     from shutter_addon.blender.editing import add_effect
 
     edit.render.resolution_x = edit.render.resolution_y = 32
-    source = edit.sequence_editor.strips.new_image("images", str(images), 1, 1)
-    for file in sorted(images.parent.iterdir())[1:]:
-        source.elements.append(file.name)
+    source = image_strip(edit, images)
     strip, effect = add_effect.add_effect(edit, source)
     recipe_import.apply(edit, effect, strip, recipe_file.parse(json.dumps(KEYED)))
     bpy.context.view_layer.update()

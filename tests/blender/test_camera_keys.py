@@ -5,7 +5,7 @@ import math
 import cv2
 import numpy as np
 import pytest
-from support import request, write_frames
+from support import image_strip, request, write_frames
 
 from shutter_addon.blender.data import annotations, consistency, fcurves, selection, snapshot, strips, validation
 from shutter_addon.blender.editing import (
@@ -63,9 +63,7 @@ def effect(edit, frames):
 
 def new_source(edit, first):
     edit.render.resolution_x, edit.render.resolution_y = SIZE
-    source = edit.sequence_editor.strips.new_image("images", str(first), 1, 11)
-    for path in sorted(first.parent.iterdir())[1:]:
-        source.elements.append(path.name)
+    source = image_strip(edit, first, 11)
     return source
 
 

@@ -6,7 +6,7 @@ import cv2
 import exact_diffusion
 import numpy as np
 import pytest
-from support import picture_of, read_picture, recipe, request, state, write_frames
+from support import image_strip, picture_of, read_picture, recipe, request, state, write_frames
 
 from shutter_addon.compute.guide import Guides, guiding
 from shutter_addon.core.frames import light
@@ -82,9 +82,7 @@ def add(bpy, edit):
     from shutter_addon.blender.editing import add_effect
 
     def added(first, data):
-        source = edit.sequence_editor.strips.new_image("film", str(first), 1, 1)
-        for number in range(2, COUNT + 1):
-            source.elements.append(f"f{number:04d}.png")
+        source = image_strip(edit, first, 1, 1, "film")
         strip, effect = add_effect.add_effect(edit, source)
         edit.render.resolution_x, edit.render.resolution_y = SIZE
         recipe_import.apply(edit, effect, strip, recipe_file.parse(json.dumps(data)))

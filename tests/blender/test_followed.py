@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from support import read_picture, recipe, request, write_frames
+from support import image_strip, read_picture, recipe, request, write_frames
 
 from shutter_addon.core.frames import light
 from shutter_addon.core.model.clip import Clip
@@ -54,9 +54,7 @@ def shown(bpy, edit, tmp_path):
 
     def show(data, velocity, frame, change=lambda source: None, film=codes):
         first = write_frames(tmp_path / "in", [film(index, velocity) for index in range(COUNT)])
-        source = edit.sequence_editor.strips.new_image("images", str(first), 1, 1)
-        for i in range(2, COUNT + 1):
-            source.elements.append(f"f{i:04d}.png")
+        source = image_strip(edit, first)
         change(source)
         strip, effect = add_effect.add_effect(edit, source)
         recipe_import.apply(edit, effect, strip, recipe_file.parse(json.dumps(data)))

@@ -4,7 +4,7 @@ import json
 
 import numpy as np
 import pytest
-from support import picture_of, recipe, remembering, sequencer, state, write_frames
+from support import image_strip, picture_of, recipe, remembering, sequencer, state, write_frames
 
 from shutter_addon.core.recipes import recipe_file
 
@@ -14,11 +14,7 @@ REMEMBER = "reconcile", "invalidation"  # what modules know of an effect's annot
 KEYED = recipe(4, {1: [1, 0, 0, 0], 9: [0, 0, 0, 1]}, [1, 1, 1, 1], regions=[MOVED])
 
 
-@pytest.fixture(autouse=True)
-def _no_exception(capfd):
-    """Blender prints what a handler raises, and goes on."""
-    yield
-    assert "Traceback" not in capfd.readouterr().err
+pytestmark = pytest.mark.usefixtures("no_exception")
 
 
 @pytest.fixture
@@ -37,9 +33,7 @@ def add(edit, images):
     edit.render.resolution_x = edit.render.resolution_y = 32
 
     def add(start=1, data=KEYED):
-        source = edit.sequence_editor.strips.new_image("images", str(images), 1, start)
-        for file in sorted(images.parent.iterdir())[1:]:
-            source.elements.append(file.name)
+        source = image_strip(edit, images, start)
         strip, effect = add_effect.add_effect(edit, source)
         recipe_import.apply(edit, effect, strip, recipe_file.parse(json.dumps(data)))
         return strip

@@ -8,7 +8,7 @@ import shutil
 import av
 import numpy as np
 import pytest
-from support import read_picture, recipe, request, sequencer, write_frames
+from support import image_strip, read_picture, recipe, request, sequencer, write_frames
 
 from shutter_addon.core.frames import light
 from shutter_addon.core.recipes import recipe_file, records
@@ -56,9 +56,7 @@ def shown(bpy, edit, footage):
     from shutter_addon.blender.rendering import sessions
 
     def show(content, change=lambda source: None):
-        source = edit.sequence_editor.strips.new_image("images", str(footage), 1, 1)
-        for i in range(2, COUNT + 1):
-            source.elements.append(f"f{i:04d}.png")
+        source = image_strip(edit, footage)
         change(source)
         strip, effect = add_effect.add_effect(edit, source)
         recipe_import.apply(edit, effect, strip, recipe_file.parse(json.dumps(content)))

@@ -5,7 +5,7 @@ import json
 import numpy as np
 import pytest
 from OpenImageIO import ImageBuf
-from support import recipe, request, write_frames
+from support import image_strip, recipe, request, write_frames
 
 from shutter_addon.core.frames import light
 from shutter_addon.core.model import outlines
@@ -50,9 +50,7 @@ def edited(bpy, edit, footage):
     from shutter_addon.blender.rendering import sessions
 
     def make(*regions, change=lambda source: None):
-        source = edit.sequence_editor.strips.new_image("images", str(footage), 1, 1)
-        for i in range(2, COUNT + 1):
-            source.elements.append(f"f{i:04d}.png")
+        source = image_strip(edit, footage)
         change(source)
         strip, effect = add_effect.add_effect(edit, source)
         content = recipe(2, [1, 0], [0, 1], regions=regions, **OPTIONS)

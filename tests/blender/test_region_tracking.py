@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from support import write_frames
+from support import image_strip, write_frames
 
 from shutter_addon.blender.data import annotations, fcurves, selection, strips, validation
 from shutter_addon.blender.editing import add_effect, bar_edits, follow_track, region_edits, shutter_edits, track_region
@@ -64,9 +64,7 @@ def region(bpy, edit, frames):
 
 def new_source(edit, first):
     edit.render.resolution_x, edit.render.resolution_y = SIZE.tolist()
-    source = edit.sequence_editor.strips.new_image("images", str(first), 1, 11)
-    for path in sorted(first.parent.iterdir())[1:]:
-        source.elements.append(path.name)
+    source = image_strip(edit, first, 11)
     return source
 
 

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from support import read_picture, recipe, write_frames
+from support import image_strip, read_picture, recipe, write_frames
 
 from shutter_addon.core.recipes import recipe_file
 from shutter_addon.media.completeness import whole_pictures
@@ -26,9 +26,7 @@ def film(bpy, edit, tmp_path):
     sessions.forget()
     frames = np.random.default_rng(0).integers(0, 256, (6, 32, 32, 3), dtype=np.uint8)
     first = write_frames(tmp_path / "in", frames)
-    source = edit.sequence_editor.strips.new_image("images", str(first), 1, 1)
-    for i in range(2, 7):
-        source.elements.append(f"f{i:04d}.png")
+    source = image_strip(edit, first)
     strip, effect = add_effect.add_effect(edit, source)
     recipe_import.apply(edit, effect, strip, recipe_file.parse(json.dumps(recipe(2, [0, 1]))))
     edit.render.resolution_x = edit.render.resolution_y = 32
@@ -89,9 +87,7 @@ def test_two_effects_of_a_frame_fail(bpy, film, tmp_path, capfd):
     from shutter_addon.blender.data import recipe_import
     from shutter_addon.blender.editing import add_effect
 
-    source = film.sequence_editor.strips.new_image("more", str(tmp_path / "in" / "f0001.png"), 5, 1)
-    for i in range(2, 7):
-        source.elements.append(f"f{i:04d}.png")
+    source = image_strip(film, tmp_path / "in" / "f0001.png", 1, 5, "more")
     strip, effect = add_effect.add_effect(film, source)
     recipe_import.apply(film, effect, strip, recipe_file.parse(json.dumps(recipe(2, [0, 1]))))
     strip.blend_type = "ALPHA_OVER"

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from support import request, write_frames
+from support import image_strip, request, write_frames
 
 from shutter_addon.blender.data import consistency, selection
 from shutter_addon.core.model import limits, windows
@@ -34,9 +34,7 @@ def edited(bpy, edit, tmp_path):
 
     def make(share=0.0, turned=False):
         pictures = [picture.swapaxes(0, 1) if turned else picture for picture in frames(share)]
-        source = edit.sequence_editor.strips.new_image("images", str(write_frames(tmp_path / "in", pictures)), 1, 1)
-        for number in range(2, COUNT + 1):
-            source.elements.append(f"f{number:04d}.png")
+        source = image_strip(edit, write_frames(tmp_path / "in", pictures))
         strip, effect = add_effect.add_effect(edit, source)
         shutter_edits.start(effect)
         effect.inbetween = "1"

@@ -8,7 +8,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from standin import Between, moments, spread
-from support import picture_of, recipe, request, state, write_frames
+from support import image_strip, picture_of, recipe, request, state, write_frames
 
 from shutter_addon.blender.data import fcurves
 from shutter_addon.core.frames import light
@@ -47,10 +47,8 @@ def add(bpy, edit):
     from shutter_addon.blender.editing import add_effect, bar_edits, shutter_edits
     from shutter_addon.blender.rendering import sessions
 
-    def added(first, count, bars, smooth=str(STEPS), **options):
-        source = edit.sequence_editor.strips.new_image("film", str(first), 1, 1)
-        for number in range(2, count + 1):
-            source.elements.append(f"f{number:04d}.png")
+    def added(first, bars, smooth=str(STEPS), **options):
+        source = image_strip(edit, first, 1, 1, "film")
         strip, effect = add_effect.add_effect(edit, source)
         edit.render.resolution_x, edit.render.resolution_y = (
             effect.scene.render.resolution_x,
@@ -82,7 +80,7 @@ def around(start, bars):
 @pytest.mark.parametrize("bars", [[1, 1], [1, 1, 1], [0.25, 1, 0.5], [1, 0, 1], [1, 1, 0, 0.5, 0.5], [0, 1, 0]])
 def test_light_counts_between_bars_that_are_both_open(film, add, edit, render, same_pixels, bars):
     first, frames = film
-    add(first, COUNT, bars, stop_at_cuts=False)
+    add(first, bars, stop_at_cuts=False)
     for frame, picture in render(edit, (1, 3)).items():
         start = (frame - 1) * STEPS
         same_pixels(picture[..., :3], shown(frames, around(start, bars), bars), 1)
@@ -92,7 +90,7 @@ def test_a_window_stops_in_the_middle_of_a_cut_pair(film, add, edit, render, sam
     """Whose moments are copies of the nearer frame; hold repeats the last of the shot."""
     first, frames = film
     bars = np.ones(3)
-    _source, _strip, effect = add(first, COUNT, bars)
+    _source, _strip, effect = add(first, bars)
     for frame, picture in render(edit, (4, 5, 6, 7)).items():
         window = around((frame - 1) * STEPS, bars)
         window = np.minimum(window, END) if frame <= CUT else window
@@ -107,7 +105,7 @@ def test_a_window_stops_in_the_middle_of_a_cut_pair(film, add, edit, render, sam
 def test_at_a_cut_it_slides_by_filmed_frames(film, add, edit, render, same_pixels):
     first, frames = film
     bars = np.ones(3)
-    add(first, COUNT, bars, edges="SLIDE")
+    add(first, bars, edges="SLIDE")
     for frame, picture in render(edit, (3, 5, 6)).items():
         start = min((frame - 1) * STEPS, LAST - (len(bars) - 1) * STEPS)
         window = np.minimum(around(start, bars), END)
@@ -118,7 +116,7 @@ def test_an_exposure_that_follows_takes_the_motion_between(film, add, edit, rend
     """By four pixels a filmed frame, so that moments are seen at whole pixels; those beyond the cut are not."""
     first, frames = film
     bars = np.ones(2)
-    _source, _strip, effect = add(first, COUNT, bars)
+    _source, _strip, effect = add(first, bars)
     effect.shutters[0].follow = "CAMERA"
     for frame in (1, COUNT):
         effect.camera.location = (STEPS * frame / 40, 0)
@@ -137,7 +135,7 @@ def test_reversed_frames(film, add, edit, render, same_pixels):
     """The filmed frame that is shown comes first, and then those before it."""
     first, frames = film
     bars = np.array([1.0, 1.0, 0.5])
-    source, *_ = add(first, COUNT, bars)
+    source, *_ = add(first, bars)
     source.use_reverse_frames = True
     frame = 2
     at = (COUNT - frame) * STEPS
@@ -149,7 +147,7 @@ def test_reversed_frames(film, add, edit, render, same_pixels):
 
 def test_a_slow_strip_shows_moments(film, add, edit, render, same_pixels):
     first, frames = film
-    source, strip, effect = add(first, COUNT, [1.0])
+    source, strip, effect = add(first, [1.0])
     source.retiming_keys.add(timeline_frame=1)
     source.retiming_keys.add(timeline_frame=source.right_handle)
     source.retiming_keys[-1].timeline_frame = 1 + 4 * COUNT
@@ -169,7 +167,7 @@ def test_a_file_that_was_replaced_is_shown(film, add, edit, monkeypatch):
     seconds = itertools.count(1e6, 10)  # so that all files are looked at each time
     monkeypatch.setattr(source_media, "time", SimpleNamespace(monotonic=lambda: next(seconds)))
     first, _ = film
-    *_, effect = add(first, COUNT, np.ones(2))
+    *_, effect = add(first, np.ones(2))
     before = picture_of(effect.scene, 2)
     invalidation.invalidate_changed(edit)
     (first.parent / "f0003.png").write_bytes((first.parent / "f0009.png").read_bytes())
@@ -185,7 +183,7 @@ def test_a_still_frame_is_the_filmed_one_bit_for_bit(filmed, add, edit, render, 
     """As the preset makes it, at every smoothness, before a shutter that streaks."""
     from shutter_addon.blender.editing import shutter_edits
 
-    *_, effect = add(filmed, COUNT, np.ones(4), "1", position=position)
+    *_, effect = add(filmed, np.ones(4), "1", position=position)
     shutter_edits.apply_preset(effect, 0, "STILL")
     frames = 1, 5, 6, 7, 12
     plain = {frame: picture_of(effect.scene, frame) for frame in frames}
@@ -202,7 +200,7 @@ def test_a_still_frame_is_the_filmed_one_bit_for_bit(filmed, add, edit, render, 
 def test_it_is_so_however_the_source_runs(filmed, add, way):
     from shutter_addon.blender.editing import shutter_edits
 
-    source, _strip, effect = add(filmed, COUNT, np.ones(4), "1")
+    source, _strip, effect = add(filmed, np.ones(4), "1")
     shutter_edits.apply_preset(effect, 0, "STILL")
     if way == "reversed":
         source.use_reverse_frames = True
@@ -259,7 +257,7 @@ def test_a_copy_of_an_effect_is_as_smooth(effect, edit):
 def test_a_shape_is_spread_over_its_own_time(film, add, edit):
     """Bars that are the shape of a frame of the timeline, which are no frames."""
     first, _ = film
-    _source, strip, effect = add(first, COUNT, [1, 1, 0, 0], stop_at_cuts=False)
+    _source, strip, effect = add(first, [1, 1, 0, 0], stop_at_cuts=False)
     effect.shutters[0].length = "TIMELINE"
     (bars,) = request(edit, effect, strip, 3).state.bars
     # The first half of one filmed frame, which is two of its four moments.
@@ -284,7 +282,7 @@ def moving(folder, pixels, count=6, size=(320, 180)):
 @pytest.mark.parametrize(("pixels", "steps"), [(0, 1), (1, 1), (3, 2), (5, 4), (7, 4), (12, 8), (20, 16)])
 def test_automatic_takes_as_many_as_the_fastest_motion_needs(add, edit, tmp_path, pixels, steps):
     """At this height, two pixels look smooth."""
-    _source, strip, effect = add(moving(tmp_path / "film", pixels), 6, np.ones(4), "AUTO")
+    _source, strip, effect = add(moving(tmp_path / "film", pixels), np.ones(4), "AUTO")
     found = request(edit, effect, strip, 2)
     assert found.renderer.source.step == steps
     assert found.state.bars.shape == (1, 4 * steps)
@@ -296,7 +294,7 @@ def test_automatic_takes_as_many_as_the_fastest_motion_needs(add, edit, tmp_path
     [("16", 16, 16), ("16", 17, 8), ("8", 64, 4), ("4", 200, 1), ("AUTO", 100, 2), ("AUTO", 256, 1), ("2", 128, 2)],
 )
 def test_no_more_than_there_is_room_for(add, edit, tmp_path, smooth, window, steps):
-    _source, strip, effect = add(moving(tmp_path / "film", 12), 6, np.ones(window), smooth)
+    _source, strip, effect = add(moving(tmp_path / "film", 12), np.ones(window), smooth)
     assert request(edit, effect, strip, 2).renderer.source.step == steps
     assert (effect.inbetween, effect.window) == (smooth, window)
 
@@ -306,7 +304,7 @@ def test_without_opencv_automatic_is_off_and_a_number_is_refused(add, edit, tmp_
     from shutter_addon.media import MediaError, opencv
 
     first = moving(tmp_path / "film", 12)
-    _source, strip, effect = add(first, 6, np.ones(4), "AUTO")
+    _source, strip, effect = add(first, np.ones(4), "AUTO")
     monkeypatch.setattr(opencv, "cv2", None)
     monkeypatch.setattr(effect_source, "_steps", type(effect_source._steps)())  # found in a process of its own
     assert request(edit, effect, strip, 2).renderer.source.step == 1
@@ -321,7 +319,7 @@ def test_motion_is_measured_once(add, edit, tmp_path, monkeypatch):
     from shutter_addon.blender.rendering import effect_source, sessions
 
     monkeypatch.setattr(effect_source, "steps_for", lambda *given: asked.append(given[1:]) or steps_for(*given))
-    _source, strip, effect = add(moving(tmp_path / "film", 5), 6, np.ones(4), "AUTO")
+    _source, strip, effect = add(moving(tmp_path / "film", 5), np.ones(4), "AUTO")
     for position in ("START", "CENTER", "END"):
         effect.position = position
         request(edit, effect, strip, 2)
@@ -339,7 +337,7 @@ def test_a_preview_is_plain_while_it_plays_and_smooth_when_it_stands(film, add, 
 
     first, frames = film
     bars = np.ones(3)
-    _source, strip, effect = add(first, COUNT, bars)
+    _source, strip, effect = add(first, bars)
     made = []
     monkeypatch.setattr(flow, "Between", lambda *given: made.append(given) or Between(*given))
     look = preview_areas.Look(scale=1.0, proxy=None, is_plain=True)
@@ -368,7 +366,7 @@ def test_a_dragged_playhead_waits_for_no_flow(bpy, monkeypatch):
 
 def test_nothing_is_written(film, add, edit, bpy, tmp_path):
     first, _ = film
-    add(first, COUNT, np.ones(3))
+    add(first, np.ones(3))
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "edit.blend"))
     before = sorted(path for path in tmp_path.rglob("*"))
     picture_of(bpy.context.scene.virtual_shutter.effects[0].scene, 2)

@@ -4,7 +4,7 @@ import pickle
 
 import numpy as np
 import pytest
-from support import sequencer, state, write_frames
+from support import image_strip, sequencer, state, write_frames
 
 FRAMES = range(1, 25)
 
@@ -17,9 +17,7 @@ def found(bpy, edit, tmp_path):
 
     frames = np.random.default_rng(0).integers(0, 256, (24, 24, 40, 3), dtype=np.uint8)
     first = write_frames(tmp_path / "in", frames)
-    source = edit.sequence_editor.strips.new_image("images", str(first), 1, 1)
-    for file in sorted(first.parent.iterdir())[1:]:
-        source.elements.append(file.name)
+    source = image_strip(edit, first)
     strip, effect = add_effect.add_effect(edit, source)
     effect.window = 4
     shutter_edits.start(effect)

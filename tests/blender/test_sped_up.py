@@ -4,7 +4,7 @@ import json
 
 import numpy as np
 import pytest
-from support import recipe, request, write_frames
+from support import image_strip, recipe, request, write_frames
 
 from shutter_addon.core.frames import light
 from shutter_addon.core.recipes import recipe_file
@@ -31,9 +31,7 @@ def edited(bpy, edit, tmp_path):
 
     def make(change=lambda source: None, **options):
         first = write_frames(tmp_path / "in", [frame(i) for i in range(COUNT)])
-        source = edit.sequence_editor.strips.new_image("images", str(first), 1, 1)
-        for i in range(2, COUNT + 1):
-            source.elements.append(f"f{i:04d}.png")
+        source = image_strip(edit, first)
         change(source)
         strip, effect = add_effect.add_effect(edit, source)
         said = recipe(WINDOW, [1] * (WINDOW // 2) + [0] * (WINDOW // 2), **options)

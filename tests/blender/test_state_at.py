@@ -4,7 +4,7 @@ import json
 
 import numpy as np
 import pytest
-from support import recipe, write_frames
+from support import image_strip, recipe, write_frames
 
 from shutter_addon.compute.request import Request
 from shutter_addon.core.model.clip import Clip
@@ -49,9 +49,7 @@ def test_it_is_what_the_session_asks_for(bpy, edit, tmp_path, name):
     made = {frame: Request(*state_at(found.for_picture(WIDTH / HEIGHT), clip, frame)) for frame in (1, 8, COUNT)}
 
     first = write_frames(tmp_path / "in", np.zeros((COUNT, HEIGHT, WIDTH, 3), np.uint8))
-    source = edit.sequence_editor.strips.new_image("images", str(first), 1, 1)
-    for number in range(2, COUNT + 1):
-        source.elements.append(f"f{number:04d}.png")
+    source = image_strip(edit, first)
     strip, effect = add_effect.add_effect(edit, source)
     recipe_import.apply(edit, effect, strip, found)
     for frame, ours in made.items():

@@ -5,7 +5,7 @@ import ctypes
 import av
 import numpy as np
 import pytest
-from support import noise_film, picture_of, recipe, sequencer, write_frames
+from support import image_strip, noise_film, picture_of, recipe, sequencer, write_frames
 
 LEVELS = 1
 SELECTED = 1 << 4  # SEQ_KEY_SELECTED in a retiming key's flag, behind a double: Python cannot select one
@@ -69,9 +69,7 @@ def new_movie(edit, path, start=1, channel=1):
 
 
 def new_images(edit, first, start=1, channel=1):
-    strip = edit.sequence_editor.strips.new_image("images", str(first), channel, start)
-    for file in sorted(first.parent.iterdir())[1:]:
-        strip.elements.append(file.name)
+    strip = image_strip(edit, first, start, channel)
     return strip
 
 

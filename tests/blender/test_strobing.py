@@ -6,7 +6,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
-from support import request, write_frames
+from support import image_strip, request, write_frames
 
 from shutter_addon.media import steps
 
@@ -31,9 +31,7 @@ def add(bpy, edit, tmp_path):
 
     def added(pixels, *bars, **options):
         first = write_frames(tmp_path / "film", film(pixels))
-        source = edit.sequence_editor.strips.new_image("film", str(first), 1, 1)
-        for number in range(2, COUNT + 1):
-            source.elements.append(f"f{number:04d}.png")
+        source = image_strip(edit, first, 1, 1, "film")
         edit.render.resolution_x, edit.render.resolution_y = WIDTH, HEIGHT
         strip, effect = add_effect.add_effect(edit, source)
         effect.inbetween, effect.window = "1", len(bars[0])

@@ -5,7 +5,7 @@ import time
 
 import numpy as np
 import pytest
-from support import Like, picture_of, write_frames
+from support import Like, image_strip, picture_of, write_frames
 
 
 def keys_of(pairs):
@@ -38,9 +38,7 @@ def test_what_cannot_be_read_is_shown_at_an_even_speed(bpy, edit, tmp_path, monk
     from shutter_addon.compute.cpu import CPUCompositor
 
     first = write_frames(tmp_path / "in", np.zeros((20, 8, 8, 3), dtype=np.uint8))
-    source = edit.sequence_editor.strips.new_image("images", str(first), 1, 1)
-    for file in sorted(first.parent.iterdir())[1:]:
-        source.elements.append(file.name)
+    source = image_strip(edit, first)
     source.right_handle = 21
     for frame in (1, 11)[: keys - 1]:
         source.retiming_keys.add(timeline_frame=frame)

@@ -11,18 +11,14 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 import pytest
-from support import picture_of, sequencer, state, write_frames
+from support import image_strip, picture_of, sequencer, state, write_frames
 
 from shutter_addon.core.model.limits import MAX_REGIONS, MAX_SHUTTERS
 
 NAN, INF = math.nan, math.inf
 
 
-@pytest.fixture(autouse=True)
-def _no_exception(capfd):
-    """Blender prints what a handler raises, and goes on."""
-    yield
-    assert "Traceback" not in capfd.readouterr().err
+pytestmark = pytest.mark.usefixtures("no_exception")
 
 
 @pytest.fixture
@@ -34,9 +30,7 @@ def effect(bpy, edit, tmp_path):
 
     frames = np.random.default_rng(0).integers(0, 256, (12, 24, 40, 3), dtype=np.uint8)
     first = write_frames(tmp_path / "in", frames)
-    source = edit.sequence_editor.strips.new_image("images", str(first), 1, 1)
-    for file in sorted(first.parent.iterdir())[1:]:
-        source.elements.append(file.name)
+    source = image_strip(edit, first)
     strip, effect = add_effect.add_effect(edit, source)
     effect.window = 4
     shutter_edits.start(effect)
