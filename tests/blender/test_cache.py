@@ -7,6 +7,10 @@ import numpy as np
 import pytest
 from support import image_strip, recipe, remembering, request, write_frames
 
+from shutter_addon.blender import handlers
+from shutter_addon.blender.data import fcurves, recipe_import, source_media, strips
+from shutter_addon.blender.editing import add_effect, reconcile
+from shutter_addon.blender.rendering import invalidation, session
 from shutter_addon.core.recipes import recipe_file
 
 REGION = {"name": "Face", "shutter": "S1", "kind": "lasso", "strokes": [[[0.1, 0.1], [0.9, 0.1], [0.5, 0.9]]]}
@@ -24,9 +28,6 @@ def images(tmp_path):
 @pytest.fixture
 def effect(bpy, edit, images):
     """An effect on an image strip, with keyed bars and a region that moves."""
-    from shutter_addon.blender.data import recipe_import
-    from shutter_addon.blender.editing import add_effect
-
     edit.render.resolution_x = edit.render.resolution_y = 32
     source = image_strip(edit, images)
     strip, effect = add_effect.add_effect(edit, source)
@@ -36,8 +37,6 @@ def effect(bpy, edit, images):
 
 
 def curve(edit, name):
-    from shutter_addon.blender.data import fcurves
-
     return next(c for c in fcurves.curves_under(edit, "virtual_shutter") if c.data_path.endswith(name))
 
 
@@ -183,8 +182,6 @@ def test_undo_and_redo_are_rendered(bpy, edit, effect, render, change):
 
 def test_the_cache_is_on(bpy, edit, effect, render):
     """What the other tests rest on: without the handlers, a frame would be the old one."""
-    from shutter_addon.blender import handlers
-
     before = render(edit, [FRAME])[FRAME]
     handlers.unregister()
     try:
@@ -196,9 +193,6 @@ def test_the_cache_is_on(bpy, edit, effect, render):
 
 
 def test_what_is_known_of_effects_goes_with_them(edit, effect):
-    from shutter_addon.blender.editing import reconcile
-    from shutter_addon.blender.rendering import invalidation
-
     scene = effect.scene.session_uid
     invalidation.invalidate_changed(edit)
     assert "invalidation" in remembering(scene)
@@ -224,8 +218,6 @@ def test_a_file_replaced_in_the_middle_is_rendered(bpy, edit, effect, render, im
 @pytest.fixture
 def clock(monkeypatch):
     """A clock that stands still: a function that sets it forward."""
-    from shutter_addon.blender.data import source_media
-
     now = [1000.0]
     monkeypatch.setattr(source_media, "time", SimpleNamespace(monotonic=lambda: now[0]))
 
@@ -238,8 +230,6 @@ def clock(monkeypatch):
 @pytest.fixture
 def asked(monkeypatch):
     """The files of which it was asked whether they are the same."""
-    from shutter_addon.blender.data import source_media
-
     asked, stamp = [], source_media.stamp
     monkeypatch.setattr(source_media, "stamp", lambda path: asked.append(path) or stamp(path))
     return asked
@@ -257,9 +247,6 @@ def long(edit, effect, images):
 @pytest.mark.usefixtures("long")
 def test_replaced_files_of_a_long_sequence_are_noticed_little_by_little(edit, images, clock, asked):
     """Each look asks few of its files, and all of them are asked in turn."""
-    from shutter_addon.blender.data import source_media
-    from shutter_addon.blender.rendering import invalidation
-
     invalidation.invalidate_changed(edit)
     for _ in range(10):
         asked.clear()
@@ -276,9 +263,6 @@ def test_replaced_files_of_a_long_sequence_are_noticed_little_by_little(edit, im
 
 @pytest.mark.usefixtures("clock", "long")
 def test_a_redraw_asks_the_ends_of_a_sequence_alone(edit, effect, asked):
-    from shutter_addon.blender.data import strips
-    from shutter_addon.blender.rendering import invalidation
-
     (strip,) = strips.effect_strips(edit)
     invalidation.invalidate_changed(edit)
     for frame in (FRAME, FRAME + 1):
@@ -290,9 +274,6 @@ def test_a_redraw_asks_the_ends_of_a_sequence_alone(edit, effect, asked):
 
 def test_a_film_asks_all_files_before_it_and_then_the_ends_alone(bpy, edit, render, long, clock, asked, monkeypatch):
     """However long a picture takes."""
-    from shutter_addon.blender.data import source_media
-    from shutter_addon.blender.rendering import session
-
     begin, counts = session.RenderSession.begin_next, []
 
     def begin_next(*arguments):
@@ -316,8 +297,6 @@ def test_a_film_asks_all_files_before_it_and_then_the_ends_alone(bpy, edit, rend
 
 @pytest.mark.usefixtures("effect", "clock")
 def test_what_is_known_of_files_is_bounded(edit, asked):
-    from shutter_addon.blender.data import source_media
-
     source = edit.sequence_editor.strips["images"]
 
     def asks(number):

@@ -8,6 +8,7 @@ import pytest
 from support import image_strip, request, write_frames
 
 from shutter_addon.blender.data import annotations, consistency, fcurves, selection, snapshot, strips, validation
+from shutter_addon.blender.data.property_copy import copy_properties
 from shutter_addon.blender.editing import (
     add_effect,
     follow_track,
@@ -270,8 +271,6 @@ def test_a_button_goes_to_the_frames_that_need_a_look(bpy, edit, effect):
 
 
 def test_a_copy_of_the_effect_has_the_cameras_keys_and_stops(bpy, edit, effect):
-    from shutter_addon.blender.data.property_copy import copy_properties
-
     effect.camera.location, effect.camera.track_all_keys = (0.25, 0), True
     effect.camera.stops.add().frame = 7
     new = edit.virtual_shutter.effects.add()

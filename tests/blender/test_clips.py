@@ -8,6 +8,9 @@ import OpenImageIO
 import pytest
 from support import picture_of, recipe, sequencer, write_frames
 
+from shutter_addon.blender.data import recipe_import
+from shutter_addon.blender.editing import add_effect, shutter_edits
+from shutter_addon.blender.rendering import effect_source
 from shutter_addon.core.recipes import recipe_file
 
 RNG = np.random.default_rng(0)
@@ -61,9 +64,6 @@ def clip_strip(bpy, edit):
 
 
 def check(edit, render, source, frames, depth="8", levels=1):
-    from shutter_addon.blender.data import recipe_import
-    from shutter_addon.blender.editing import add_effect
-
     plain = render(edit, frames, depth)
     strip, effect = add_effect.add_effect(edit, source)
     recipe_import.apply(edit, effect, strip, recipe_file.parse(json.dumps(recipe(4, [1, 0, 0, 0]))))
@@ -137,9 +137,6 @@ def test_colour_spaces(edit, render, tmp_path, clip_strip, movie, space):
 
 
 def test_what_is_not_supported_is_said(edit, clip_strip, movie):
-    from shutter_addon.blender.editing import add_effect, shutter_edits
-    from shutter_addon.blender.rendering import effect_source
-
     source = clip_strip(movie)
     strip, effect = add_effect.add_effect(edit, source)
     shutter_edits.start(effect)

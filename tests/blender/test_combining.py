@@ -6,6 +6,9 @@ import numpy as np
 import pytest
 from support import image_strip, recipe, request, write_frames
 
+from shutter_addon.blender.data import recipe_import
+from shutter_addon.blender.editing import add_effect
+from shutter_addon.blender.rendering import sessions
 from shutter_addon.core.frames import light
 from shutter_addon.core.recipes import recipe_file
 from shutter_addon.core.recipes.recipe import RecipeError
@@ -29,9 +32,6 @@ def frame(index):
 @pytest.fixture
 def edited(bpy, edit, tmp_path):
     """Makes an effect of a recipe of one shutter: its strip and the effect."""
-    from shutter_addon.blender.data import recipe_import
-    from shutter_addon.blender.editing import add_effect
-    from shutter_addon.blender.rendering import sessions
 
     def make(*regions, bars=(1,) * WINDOW, **shutter):
         first = write_frames(tmp_path / "in", [frame(i) for i in range(COUNT)])

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 from support import recipe, sequencer, write_frames
 
-from shutter_addon.blender.data import annotations, data_format, fcurves, geometry, selection, strips
-from shutter_addon.blender.editing import match_source, undelete
+from shutter_addon.blender.data import annotations, data_format, fcurves, geometry, recipe_import, selection, strips
+from shutter_addon.blender.editing import add_effect, match_source, undelete
 from shutter_addon.core.model.scribbles import mapped
 from shutter_addon.core.recipes import recipe_file
 
@@ -77,8 +77,6 @@ def clip(edit, tmp_path):
 @pytest.fixture
 def add(bpy, edit, clip):
     """A clip with a keyed effect; its strip."""
-    from shutter_addon.blender.data import recipe_import
-    from shutter_addon.blender.editing import add_effect
 
     def made(start=1, data=KEYED):
         strip, effect = add_effect.add_effect(edit, clip(start))

@@ -8,6 +8,9 @@ import numpy as np
 import pytest
 from support import image_strip, picture_of, read_picture, recipe, request, state, write_frames
 
+from shutter_addon.blender.data import recipe_import
+from shutter_addon.blender.editing import add_effect
+from shutter_addon.blender.rendering import invalidation, previews
 from shutter_addon.compute.guide import Guides, guiding
 from shutter_addon.core.frames import light
 from shutter_addon.core.model import scribbles, windows
@@ -78,8 +81,6 @@ def test_chunks_are_the_whole(command, film, tmp_path):
 @pytest.fixture
 def add(bpy, edit):
     """Puts an effect of a recipe on the film; gives edit, effect and strip."""
-    from shutter_addon.blender.data import recipe_import
-    from shutter_addon.blender.editing import add_effect
 
     def added(first, data):
         source = image_strip(edit, first, 1, 1, "film")
@@ -92,8 +93,6 @@ def add(bpy, edit):
 
 
 def test_keys_are_blenders_and_change_what_is_shown(bpy, add, film):
-    from shutter_addon.blender.rendering import invalidation
-
     edit, effect, strip = add(film, effect_recipe())
     for frame, value in ((2, 0.0), (6, 1.0)):
         effect.edge_aware = value
@@ -136,8 +135,6 @@ def test_moments_that_are_shown_guide_it(bpy, add, film):
 
 def test_a_draft_has_larger_blocks_where_edges_are_followed(add, film, monkeypatch):
     """Coefficients of a draft are those of the blocks; films and what has no edges to follow are never drafts."""
-    from shutter_addon.blender.rendering import previews
-
     monkeypatch.setattr(previews, "DRAFT_ROWS", SIZE[1] // 3)
     edit, effect, strip = add(film, effect_recipe(edge_aware=1))
     exact = request(edit, effect, strip, 3)

@@ -7,6 +7,9 @@ import numpy as np
 import pytest
 from support import image_strip, read_picture, recipe, request, write_frames
 
+from shutter_addon.blender.data import recipe_import, snapshot
+from shutter_addon.blender.editing import add_effect, bar_edits, region_edits
+from shutter_addon.blender.rendering import sessions
 from shutter_addon.core.frames import light
 from shutter_addon.core.model.clip import Clip
 from shutter_addon.core.model.state_at import state_at
@@ -48,9 +51,6 @@ def following(keys, follow="car", **options):
 def shown(bpy, edit, tmp_path):
     """Gives the picture of an effect at a timeline frame, and the recipe's, for footage of a velocity; change: what
     happens to the source strip first."""
-    from shutter_addon.blender.data import recipe_import
-    from shutter_addon.blender.editing import add_effect
-    from shutter_addon.blender.rendering import sessions
 
     def show(data, velocity, frame, change=lambda source: None, film=codes):
         first = write_frames(tmp_path / "in", [film(index, velocity) for index in range(COUNT)])
@@ -126,8 +126,6 @@ def test_the_exposure_ends_at_a_cut(shown, position):
 
 def test_the_camera_and_nothing_left_behind(shown):
     """What the camera sees is followed by its keys, and a recipe without them puts them back."""
-    from shutter_addon.blender.data import recipe_import
-
     velocity = 2, -1
     camera = [{"frame": frame, "location": place(frame - 1, velocity)} for frame in (1, COUNT)]
     edit, effect, strip, found = shown(following({}, "camera", camera=camera), velocity, 9)
@@ -147,9 +145,6 @@ def test_a_region_called_as_new_ones_are_is_followed(shown):
 
 
 def test_a_region_that_is_renamed_or_removed(shown):
-    from shutter_addon.blender.data import snapshot
-    from shutter_addon.blender.editing import region_edits
-
     velocity = 2, -1
     edit, effect, strip, _ = shown(following({frame: place(frame, velocity) for frame in (0, COUNT)}), velocity, 9)
     effect.regions[0].name = "truck"
@@ -166,8 +161,6 @@ def test_a_region_that_is_renamed_or_removed(shown):
 
 def test_the_trails_length_is_keyed(shown):
     """Bars in Blender are those of the recipe; of what is not keyed, too, and of what has no length."""
-    from shutter_addon.blender.editing import bar_edits
-
     velocity, keys = (3, 0), {frame: place((frame - 1) ** 2 / COUNT, (3, 0)) for frame in range(1, COUNT + 1)}
     data = following(keys, position="center")
     shutter = data["shutters"][0]

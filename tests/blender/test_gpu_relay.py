@@ -5,11 +5,12 @@ from unittest.mock import Mock
 
 import pytest
 
+from shutter_addon.blender.devices import gpu_relay, main_thread
+
 
 @pytest.fixture
 def clock(monkeypatch):
     """A clock that stands still: `now` may be set forward, and `meanwhile` is called at the next look at the time."""
-    from shutter_addon.blender.devices import gpu_relay
 
     def look():
         meanwhile, clock.meanwhile = clock.meanwhile, None
@@ -24,8 +25,6 @@ def clock(monkeypatch):
 
 def test_a_call_that_is_made_before_anyone_looks(bpy, monkeypatch, clock):
     """The main thread, waiting in `serve`, takes it as soon as it is there: it must look for the next all the same."""
-    from shutter_addon.blender.devices import gpu_relay, main_thread
-
     looking, made = [], []
     monkeypatch.setattr(main_thread, "soon", lambda function: function())
     monkeypatch.setattr(gpu_relay, "has_context", lambda: True)

@@ -6,6 +6,9 @@ import numpy as np
 import pytest
 from support import image_strip, picture_of, recipe, remembering, sequencer, state, write_frames
 
+from shutter_addon.blender import handlers
+from shutter_addon.blender.data import fcurves, recipe_import
+from shutter_addon.blender.editing import add_effect, undelete
 from shutter_addon.core.recipes import recipe_file
 
 REGION = {"name": "Face", "shutter": "S1", "kind": "lasso", "strokes": [[[0.1, 0.1], [0.9, 0.1], [0.5, 0.9]]]}
@@ -27,9 +30,6 @@ def images(tmp_path):
 @pytest.fixture
 def add(edit, images):
     """Puts an image strip with an effect at a frame of the edit."""
-    from shutter_addon.blender.data import recipe_import
-    from shutter_addon.blender.editing import add_effect
-
     edit.render.resolution_x = edit.render.resolution_y = 32
 
     def add(start=1, data=KEYED):
@@ -57,8 +57,6 @@ def census(bpy):
 
 
 def curves(edit):
-    from shutter_addon.blender.data import fcurves
-
     return {
         (curve.data_path, curve.array_index): [tuple(key.co) for key in curve.keyframe_points]
         for curve in fcurves.curves_under(edit, "")
@@ -105,8 +103,6 @@ def test_a_source_that_was_muted_shows_again(bpy, edit, add):
 
 
 def test_a_source_that_the_user_muted_stays_so(bpy, edit, images):
-    from shutter_addon.blender.editing import add_effect
-
     source = edit.sequence_editor.strips.new_image("images", str(images), 1, 1)
     source.mute = True
     strip, _ = add_effect.add_effect(edit, source)
@@ -142,8 +138,6 @@ def test_a_scene_that_the_window_shows_stays(bpy, edit, add):
 @pytest.mark.parametrize("late", [True, False])
 def test_undo_brings_an_effect_back_and_redo_removes_it_again(bpy, edit, add, render, late):
     """late: in a window, the handler comes after the undo push."""
-    from shutter_addon.blender import handlers
-
     add(1), add(101, recipe(4, {101: [0, 1, 0, 0], 111: [0, 0, 1, 0]}))
     before = render(edit, [5, 105])
     known, everything = curves(edit), census(bpy)
@@ -187,8 +181,6 @@ def _copy(edit):
 @pytest.mark.parametrize("change", [_delete, _move, _copy])
 def test_undo_takes_back_what_handlers_did_after_the_step_before(bpy, edit, add, change):
     """Blender's undo keeps data that is equal in both steps as it is now: keys and drawings that a handler changed."""
-    from shutter_addon.blender import handlers
-
     add(1), add(101, recipe(4, {101: [0, 1, 0, 0], 111: [0, 0, 1, 0]}))
     update(bpy)
     known = curves(edit), drawings(edit), [effect.start for effect in edit.virtual_shutter.effects]
@@ -240,8 +232,6 @@ def test_scenes_and_keys_are_found_again_that_undo_loses(bpy, edit, add, tmp_pat
 
 def test_a_renamed_drawing_stays_its_regions_when_steps_are_undone(bpy, edit, add):
     """Blender comes to handlers after the undo push: the step of the rename has the region's old name for it."""
-    from shutter_addon.blender import handlers
-
     add(1)
     update(bpy)
     layer = edit.virtual_shutter.effects[0].scene.annotation.layers[0]
@@ -372,8 +362,6 @@ def test_linked_scenes_stay(bpy, edit, add, tmp_path):
 
 
 def test_effect_and_source_are_connected_as_the_source_was(edit, add, images):
-    from shutter_addon.blender.editing import add_effect
-
     source = edit.sequence_editor.strips.new_image("images", str(images), 1, 1)
     friend = edit.sequence_editor.strips.new_image("friend", str(images), 2, 1)
     add_effect.connect(edit, [source, friend])
@@ -467,8 +455,6 @@ def test_nothing_is_remembered_of_what_is_gone(bpy, edit, add):
 
 
 def test_only_the_last_effects_that_were_removed_are_kept(edit, add):
-    from shutter_addon.blender.editing import undelete
-
     scene, effect = add().scene, edit.virtual_shutter.effects[0]
     for number in (*range(64), 0, *range(64, 127)):
         scene.virtual_shutter.identity = f"identity {number}"
@@ -480,9 +466,6 @@ def test_only_the_last_effects_that_were_removed_are_kept(edit, add):
 
 
 def test_the_extension_leaves_nothing_kept(bpy, edit, add):
-    from shutter_addon.blender import handlers
-    from shutter_addon.blender.editing import undelete
-
     scene = add().scene
     undelete.keep(edit.virtual_shutter.effects[0])
     update(bpy)

@@ -9,6 +9,9 @@ import numpy as np
 import pytest
 from support import Like, write_frames
 
+from shutter_addon.blender.data import mask_reading, struct_dna
+from shutter_addon.core.messages import EffectError
+
 AVERAGE = 0.5  # what a picture may differ by, in 8-bit levels: Blender cuts off fractions
 ASTRAY = 0.001  # share of pixels that may differ by more than 8 levels
 FRAMES = 1, 11, 21, 31, 41
@@ -25,7 +28,6 @@ def mask(bpy, edit):
 @pytest.fixture
 def assert_as_the_strip(bpy, edit, render):
     """Compares a mask with what its strip shows at frames; read from another frame, so that nothing stands there."""
-    from shutter_addon.blender.data import mask_reading
 
     def compare(mask, frames, size=(161, 90)):
         edit.render.resolution_x, edit.render.resolution_y = size
@@ -218,8 +220,6 @@ def test_a_linked_mask(bpy, mask, assert_as_the_strip, mask_editor, clip, edit, 
 
 
 def test_reading_leaves_the_mask_as_it_is(moving):
-    from shutter_addon.blender.data import mask_reading
-
     mask, layer = moving, moving.layers["L"]
     spline = layer.splines[0]
     stood = [tuple(point.co) for point in spline.points]
@@ -236,7 +236,6 @@ def test_reading_leaves_the_mask_as_it_is(moving):
 @pytest.fixture
 def other_blender(monkeypatch):
     """Makes the description of one of Blender's records that of another version: a field renamed, all moved."""
-    from shutter_addon.blender.data import struct_dna
 
     def described(record, name="", new="", moved=0):
         parsed = struct_dna.parsed
@@ -273,8 +272,6 @@ def moving(bpy, edit, mask, mask_editor, clip):
 
 
 def first_x(mask, frame):
-    from shutter_addon.blender.data import mask_reading
-
     return mask_reading.mask_at(mask, frame).layers[0].splines[0].points[0][1][0]
 
 
@@ -288,8 +285,6 @@ def first_x(mask, frame):
     ],
 )
 def test_shape_keys_in_another_blender_are_refused(moving, other_blender, change):
-    from shutter_addon.blender.data import mask_reading
-
     assert first_x(moving, 5) == pytest.approx(0.1)
     assert mask_reading.moves(moving)
     other_blender(*change)
@@ -297,9 +292,6 @@ def test_shape_keys_in_another_blender_are_refused(moving, other_blender, change
 
 
 def assert_unreadable(mask):
-    from shutter_addon.blender.data import mask_reading
-    from shutter_addon.core.messages import EffectError
-
     for read in (mask_reading.moves, mask_reading.key_frames, lambda mask: mask_reading.mask_at(mask, 5)):
         with pytest.raises(EffectError, match='mask "M": its shape keys cannot be read in this version of Blender'):
             read(mask)
@@ -307,8 +299,6 @@ def assert_unreadable(mask):
 
 def test_a_blender_that_tells_nothing_is_asked_once(moving, other_blender, monkeypatch):
     """What it tells is written to a file, and masks are read at every frame."""
-    from shutter_addon.blender.data import struct_dna
-
     asked = []
 
     def none(blend):
@@ -335,8 +325,6 @@ def test_a_layer_that_is_not_what_the_api_says(moving):
 
 def test_what_lies_elsewhere_in_another_blender_is_read_there(moving, other_blender):
     """As if a new field of eight bytes came first in the records of layers."""
-    from shutter_addon.blender.data import struct_dna
-
     other_blender("MaskLayer", moved=8)
     size = struct_dna.record("MaskLayer", "char name[64]").itemsize
     layer = moving.layers[0]
@@ -348,9 +336,6 @@ def test_what_lies_elsewhere_in_another_blender_is_read_there(moving, other_blen
 
 
 def test_parents_are_refused(bpy, mask, mask_editor, clip, edit):
-    from shutter_addon.blender.data import mask_reading
-    from shutter_addon.core.messages import EffectError
-
     clip = clip(40, 30)
     spline = draw(mask.layers.new(name="L"), blob(random.Random(2), 5))
     clip.tracking.tracks.active = clip.tracking.tracks.new(name="T", frame=1)
@@ -364,9 +349,6 @@ def test_parents_are_refused(bpy, mask, mask_editor, clip, edit):
 
 @pytest.mark.parametrize("value", [float("nan"), float("inf"), 1e20])
 def test_numbers_that_are_none_are_refused(bpy, mask, value):
-    from shutter_addon.blender.data import mask_reading
-    from shutter_addon.core.messages import EffectError
-
     layer = mask.layers.new(name="L")
     spline = draw(layer, blob(random.Random(2), 5))
     spline.points[2].co = (value, 0.5)

@@ -7,8 +7,10 @@ import numpy as np
 import pytest
 from support import recipe, sequencer
 
-from shutter_addon.blender.data import annotations, fcurves, geometry, selection
-from shutter_addon.blender.editing import match_source, reconcile
+from shutter_addon.blender import handlers
+from shutter_addon.blender.data import annotations, fcurves, geometry, recipe_import, selection
+from shutter_addon.blender.editing import add_effect, match_source, reconcile, shutter_edits
+from shutter_addon.blender.rendering import render_job
 from shutter_addon.core.model.scribbles import mapped
 from shutter_addon.core.recipes import recipe_file
 
@@ -55,9 +57,6 @@ def make_movie(path, width, height, count=40):
 @pytest.fixture
 def made(bpy, edit, movie):
     """A movie strip from frame 1 to 40 with a still effect, or that of a recipe; effect strip and source."""
-    from shutter_addon.blender.data import recipe_import
-    from shutter_addon.blender.editing import add_effect
-
     edit.render.resolution_x, edit.render.resolution_y = 48, 48
     edit.frame_start, edit.frame_end = -100, 300
 
@@ -371,8 +370,6 @@ def test_undo_takes_size_and_scribbles_along(bpy, edit, made, large_movie):
 
 
 def test_a_render_without_a_window_follows_a_file_that_was_replaced(edit, made, render, large_movie):
-    from shutter_addon.blender import handlers
-
     strip, source = made()
     updates = handlers.bpy.app.handlers.depsgraph_update_post
     updates.remove(handlers.HANDLERS["depsgraph_update_post"])
@@ -384,8 +381,6 @@ def test_a_render_without_a_window_follows_a_file_that_was_replaced(edit, made, 
 
 
 def test_a_film_keeps_its_size(bpy, edit, made, large_movie, monkeypatch):
-    from shutter_addon.blender.rendering import render_job
-
     _strip, source = made()
     monkeypatch.setattr(render_job, "runs", lambda: True)
     source.filepath = str(large_movie)
@@ -423,8 +418,6 @@ def test_another_rate_of_the_edit(bpy, edit, made, shown):
 
 def test_another_rate_of_the_edit_where_the_source_keeps_its_speed(bpy, edit, movie, shown):
     """Blender makes the source longer."""
-    from shutter_addon.blender.editing import add_effect, shutter_edits
-
     edit.render.resolution_x = edit.render.resolution_y = 48
     with sequencer(bpy):
         bpy.ops.sequencer.movie_strip_add(

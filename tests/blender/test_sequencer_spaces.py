@@ -6,6 +6,9 @@ import numpy as np
 import pytest
 from support import recipe, write_frames
 
+from shutter_addon.blender.data import recipe_import
+from shutter_addon.blender.editing import add_effect
+from shutter_addon.blender.rendering import pictures
 from shutter_addon.core.recipes import recipe_file
 
 LEVELS = 1
@@ -20,9 +23,6 @@ def spaces(edit):
 @pytest.fixture
 def made(edit, tmp_path):
     """Makes an effect on a picture of all colours in steps of 17 levels: its strip."""
-    from shutter_addon.blender.data import recipe_import
-    from shutter_addon.blender.editing import add_effect
-
     cube = np.stack(np.meshgrid(*[np.arange(0, 256, 17, dtype=np.uint8)] * 3), axis=-1).reshape(1, 64, 64, 3)
     first = write_frames(tmp_path / "in", cube)
     edit.render.resolution_x = edit.render.resolution_y = 64
@@ -63,8 +63,6 @@ def test_an_effect_that_is_added_keeps_all_colours(edit, render, spaces, made):
 
 def test_colours_that_blender_changes_are_told(edit, render, spaces, made, capfd, monkeypatch):
     """A strip that is laid over others loses some in a few spaces, an effect as any other."""
-    from shutter_addon.blender.rendering import pictures
-
     strip = made()
     assert strip.blend_type == "ALPHA_OVER"
     for space in spaces:

@@ -10,9 +10,22 @@ import pytest
 from standin import Between, moments, spread
 from support import image_strip, picture_of, recipe, request, state, write_frames
 
-from shutter_addon.blender.data import fcurves
+from shutter_addon.blender.data import (
+    consistency,
+    fcurves,
+    preview_areas,
+    property_copy,
+    recipe_export,
+    recipe_import,
+    snapshot,
+    source_media,
+    strips,
+)
+from shutter_addon.blender.editing import add_effect, bar_edits, shutter_edits
+from shutter_addon.blender.rendering import effect_source, invalidation, previews, render_job, sessions
 from shutter_addon.core.frames import light
-from shutter_addon.media import flow, open_source, smooth
+from shutter_addon.core.recipes import recipe_file
+from shutter_addon.media import MediaError, flow, open_source, opencv, smooth
 
 STEPS, COUNT, CUT = 4, 12, 6
 LAST = (CUT - 1) * STEPS  # the first shot's last filmed frame, and the moments that are nearest to it:
@@ -44,8 +57,6 @@ def film(filmed, monkeypatch):
 @pytest.fixture
 def add(bpy, edit):
     """Puts a smooth effect on an image strip of files from frame 1 on; bars: of its shutter."""
-    from shutter_addon.blender.editing import add_effect, bar_edits, shutter_edits
-    from shutter_addon.blender.rendering import sessions
 
     def added(first, bars, smooth=str(STEPS), **options):
         source = image_strip(edit, first, 1, 1, "film")
@@ -161,9 +172,6 @@ def test_a_slow_strip_shows_moments(film, add, edit, render, same_pixels):
 
 def test_a_file_that_was_replaced_is_shown(film, add, edit, monkeypatch):
     """With the moments beside it."""
-    from shutter_addon.blender.data import source_media
-    from shutter_addon.blender.rendering import invalidation
-
     seconds = itertools.count(1e6, 10)  # so that all files are looked at each time
     monkeypatch.setattr(source_media, "time", SimpleNamespace(monotonic=lambda: next(seconds)))
     first, _ = film
@@ -181,8 +189,6 @@ def test_a_file_that_was_replaced_is_shown(film, add, edit, monkeypatch):
 @pytest.mark.parametrize("position", ["START", "CENTER", "END"])
 def test_a_still_frame_is_the_filmed_one_bit_for_bit(filmed, add, edit, render, position):
     """As the preset makes it, at every smoothness, before a shutter that streaks."""
-    from shutter_addon.blender.editing import shutter_edits
-
     *_, effect = add(filmed, np.ones(4), "1", position=position)
     shutter_edits.apply_preset(effect, 0, "STILL")
     frames = 1, 5, 6, 7, 12
@@ -198,8 +204,6 @@ def test_a_still_frame_is_the_filmed_one_bit_for_bit(filmed, add, edit, render, 
 
 @pytest.mark.parametrize("way", ["reversed", "custom time"])
 def test_it_is_so_however_the_source_runs(filmed, add, way):
-    from shutter_addon.blender.editing import shutter_edits
-
     source, _strip, effect = add(filmed, np.ones(4), "1")
     shutter_edits.apply_preset(effect, 0, "STILL")
     if way == "reversed":
@@ -218,9 +222,6 @@ def test_it_is_so_however_the_source_runs(filmed, add, way):
 @pytest.mark.parametrize("smooth", ["2", "4", "8", "16", "AUTO"])
 def test_bars_stay_as_they_are(effect, smooth):
     """Keyed ones as well, and their number; those of presets are the presets'."""
-    from shutter_addon.blender.data import consistency, snapshot
-    from shutter_addon.blender.editing import bar_edits
-
     rng = np.random.default_rng(3)
     bar_edits.set_bars(effect.shutters[0], rng.random(8))
     bar_edits.key_bars(effect, 0)
@@ -243,8 +244,6 @@ def test_bars_stay_as_they_are(effect, smooth):
 
 
 def test_a_copy_of_an_effect_is_as_smooth(effect, edit):
-    from shutter_addon.blender.data import property_copy
-
     effect.inbetween = "AUTO"
     path = effect.path_from_id()
     copy = edit.virtual_shutter.effects.add()
@@ -300,9 +299,6 @@ def test_no_more_than_there_is_room_for(add, edit, tmp_path, smooth, window, ste
 
 
 def test_without_opencv_automatic_is_off_and_a_number_is_refused(add, edit, tmp_path, monkeypatch):
-    from shutter_addon.blender.rendering import effect_source
-    from shutter_addon.media import MediaError, opencv
-
     first = moving(tmp_path / "film", 12)
     _source, strip, effect = add(first, np.ones(4), "AUTO")
     monkeypatch.setattr(opencv, "cv2", None)
@@ -316,8 +312,6 @@ def test_without_opencv_automatic_is_off_and_a_number_is_refused(add, edit, tmp_
 def test_motion_is_measured_once(add, edit, tmp_path, monkeypatch):
     """Whatever else changes; another file is another film."""
     asked, steps_for = [], smooth.steps_for
-    from shutter_addon.blender.rendering import effect_source, sessions
-
     monkeypatch.setattr(effect_source, "steps_for", lambda *given: asked.append(given[1:]) or steps_for(*given))
     _source, strip, effect = add(moving(tmp_path / "film", 5), np.ones(4), "AUTO")
     for position in ("START", "CENTER", "END"):
@@ -332,9 +326,6 @@ def test_motion_is_measured_once(add, edit, tmp_path, monkeypatch):
 
 def test_a_preview_is_plain_while_it_plays_and_smooth_when_it_stands(film, add, edit, bpy, monkeypatch, same_pixels):
     """It never waits for flow, and nobody has to click."""
-    from shutter_addon.blender.data import preview_areas, snapshot
-    from shutter_addon.blender.rendering import previews, sessions
-
     first, frames = film
     bars = np.ones(3)
     _source, strip, effect = add(first, bars)
@@ -354,9 +345,6 @@ def test_a_preview_is_plain_while_it_plays_and_smooth_when_it_stands(film, add, 
 
 
 def test_a_dragged_playhead_waits_for_no_flow(bpy, monkeypatch):
-    from shutter_addon.blender.data import preview_areas
-    from shutter_addon.blender.rendering import previews, render_job
-
     look = preview_areas.Look(scale=0.5, proxy=None, is_plain=True)
     assert previews._detail(bpy.context, look).smooth
     monkeypatch.setattr(render_job, "operators_running", lambda: {"ANIM_OT_change_frame"})
@@ -393,7 +381,6 @@ def counted(bars, steps, position):
 @pytest.fixture
 def older(bpy, effect, tmp_path):
     """Has an effect be one of a file of format 1, whose bars count moments; opens that file."""
-    from shutter_addon.blender.editing import bar_edits
 
     def opened(steps, position, window, keyed=False):
         scene = effect.id_data
@@ -419,8 +406,6 @@ def older(bpy, effect, tmp_path):
 @pytest.mark.parametrize("position", ["START", "CENTER", "END"])
 @pytest.mark.parametrize(("steps", "window"), [(2, 8), (4, 8), (8, 12), (16, 33), (4, 1)])
 def test_bars_of_format_1_count_filmed_frames_now(older, steps, window, position):
-    from shutter_addon.blender.data import consistency
-
     scene, bars = older(steps, position, window)
     effect = scene.virtual_shutter.effects[0]
     assert scene.virtual_shutter.format == 2
@@ -430,8 +415,6 @@ def test_bars_of_format_1_count_filmed_frames_now(older, steps, window, position
 
 
 def test_keyed_bars_of_format_1_do(older):
-    from shutter_addon.blender.data import snapshot
-
     scene, bars = older(4, "START", 10, keyed=True)
     effect = scene.virtual_shutter.effects[0]
     for frame, given in ((1, bars[0]), (9, bars[2])):
@@ -441,8 +424,6 @@ def test_keyed_bars_of_format_1_do(older):
 
 
 def test_what_had_no_frames_in_between_stays(older):
-    from shutter_addon.blender.data import consistency
-
     scene, bars = older(1, "START", 8)
     effect = scene.virtual_shutter.effects[0]
     assert (scene.virtual_shutter.format, effect.inbetween, effect.window) == (2, "1", 8)
@@ -450,8 +431,6 @@ def test_what_had_no_frames_in_between_stays(older):
 
 
 def test_files_of_format_2_stay(bpy, effect, tmp_path):
-    from shutter_addon.blender.data import consistency
-
     effect.inbetween = "4"
     before = [consistency.bars(shutter).tolist() for shutter in effect.shutters]
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "now.blend"))
@@ -463,9 +442,6 @@ def test_files_of_format_2_stay(bpy, effect, tmp_path):
 
 def test_a_still_frame_of_format_1_is_one(bpy, effect, tmp_path):
     """It was as many equal bars as there were moments."""
-    from shutter_addon.blender.data import consistency
-    from shutter_addon.blender.editing import bar_edits
-
     effect.window = 32
     bar_edits.set_bars(effect.shutters[1], [1] * 8 + [0] * 24)
     effect.inbetween = "8"
@@ -482,8 +458,6 @@ def test_a_still_frame_of_format_1_is_one(bpy, effect, tmp_path):
 def test_an_edit_and_a_recipe_of_the_first_versions_are_read_alike(older):
     from made_recipes import made
 
-    from shutter_addon.blender.data import consistency
-
     scene, bars = older(4, "END", 10)
     effect = scene.virtual_shutter.effects[0]
     stored = [[float(np.float32(bar)) for bar in row] for row in bars[:2]]
@@ -496,9 +470,6 @@ def test_an_edit_and_a_recipe_of_the_first_versions_are_read_alike(older):
 
 def test_a_recipe_says_it(bpy, effect, edit):
     import json
-
-    from shutter_addon.blender.data import recipe_export, recipe_import, strips
-    from shutter_addon.core.recipes import recipe_file
 
     _scene, _effect, strip = strips.find_effect(effect.scene)
     for steps in ("auto", 8, 1):

@@ -6,6 +6,9 @@ import numpy as np
 import pytest
 from support import image_strip, recipe, request, write_frames
 
+from shutter_addon.blender.data import recipe_import
+from shutter_addon.blender.editing import add_effect, bar_edits
+from shutter_addon.blender.rendering import sessions
 from shutter_addon.core.frames import light
 from shutter_addon.core.recipes import recipe_file
 
@@ -25,9 +28,6 @@ def frame(index):
 @pytest.fixture
 def edited(bpy, edit, tmp_path):
     """Makes an effect of a half open shutter whose length is the timeline's: its strip and the effect."""
-    from shutter_addon.blender.data import recipe_import
-    from shutter_addon.blender.editing import add_effect
-    from shutter_addon.blender.rendering import sessions
 
     def make(change=lambda source: None, **options):
         first = write_frames(tmp_path / "in", [frame(i) for i in range(COUNT)])
@@ -102,8 +102,6 @@ def test_the_last_frame_is_blurred_as_those_before(edited):
 
 
 def test_how_long_it_is_open_is_told(edited):
-    from shutter_addon.blender.editing import bar_edits
-
     strip, effect = edited(time=speed((1, 1), (7, 49)))
     strip.id_data.frame_set(3)
     assert bar_edits.open_for(strip.id_data, effect, strip, 0) == "Open for 4 of 16 frames here"

@@ -18,6 +18,7 @@ from hypothesis.stateful import (
 )
 from support import recipe, sequencer, state, write_frames
 
+from shutter_addon.blender.data import fcurves
 from shutter_addon.core.recipes import recipe_file
 
 REGION = {"name": "Face", "shutter": "S1", "strokes": [[[0.1, 0.1], [0.9, 0.1]]]}
@@ -56,8 +57,6 @@ def layers(effect):
 
 def snapshot(bpy):
     """All that the user made; what Blender or chance names, and values that curves drive, left out."""
-    from shutter_addon.blender.data import fcurves
-
     result = []
     for edit in edits(bpy):
         curves = {
