@@ -82,10 +82,3 @@ def test_without_ffmpeg(clip, tmp_path):
         "plain",
         "echo",
     }
-
-
-def test_a_film_that_is_not_there_is_one_sentence():
-    command = [sys.executable, "scripts/render_speed.py", "none.mp4"]
-    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
-    assert done.returncode == 2
-    assert done.stderr.splitlines()[-1].startswith("render_speed: none.mp4: no such file")
