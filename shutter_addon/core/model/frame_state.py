@@ -110,17 +110,21 @@ class Options:
     slid: int = 0
 
     @property
+    def filmed(self) -> int:
+        """How many filmed frames the window has."""
+        return -(-self.window // self.step)
+
+    @property
     def before(self) -> int:
         """How many frames of the window lie before the shown filmed frame. That one is `step` frames long."""
-        filmed = -(-self.window // self.step)
-        center, end = (filmed - 1) // 2 * self.step, max(self.window - self.step, 0)
+        center, end = (self.filmed - 1) // 2 * self.step, max(self.window - self.step, 0)
         return {"start": 0, "center": center, "end": end}[self.position] - self.slid
 
     @property
     def reach(self) -> int:
         """How many filmed frames of the window lie on that side of the shown one where there are most."""
-        filmed, before = -(-self.window // self.step), self.before // self.step
-        return max(before, filmed - 1 - before)
+        before = self.before // self.step
+        return max(before, self.filmed - 1 - before)
 
 
 @dataclass(frozen=True)
