@@ -31,6 +31,7 @@ class Options:
     edge_aware: 0 to 1, how much coefficients stop at the edges of the shown frame (core.pixels.conductances)
     step: moments from a filmed frame to the next; "auto": as the footage needs, which only an effect's options have
     slid: how many frames later the window lies than its position says (core.model.windows.slid)
+    backward: whether the source plays in reverse, where the last of a filmed frame's moments is the frame itself
     """
 
     window: int = whole(
@@ -108,6 +109,7 @@ class Options:
         recipe="inbetween",
     )
     slid: int = 0
+    backward: bool = False
 
     @property
     def filmed(self) -> int:
@@ -119,6 +121,11 @@ class Options:
         """How many frames of the window lie before the shown filmed frame. That one is `step` frames long."""
         center, end = (self.filmed - 1) // 2 * self.step, max(self.window - self.step, 0)
         return {"start": 0, "center": center, "end": end}[self.position] - self.slid
+
+    @property
+    def shown(self) -> int:
+        """Where in the window the shown frame lies."""
+        return self.before + (self.step - 1 if self.backward else 0)
 
     @property
     def reach(self) -> int:
@@ -250,7 +257,7 @@ class FrameState:
         """As shutters.open_span of the bars; with the shown frame where that is needed whatever they are."""
         first, last = shutters.open_span(self.bars)
         if any(combine.threshold is not None for combine in self.combines):
-            return min(first, self.options.before), max(last, self.options.before + 1)
+            return min(first, self.options.shown), max(last, self.options.shown + 1)
         return first, last
 
     @cached_property
