@@ -99,9 +99,9 @@ def _threshold(combine: Combine, request: Request, shot: range) -> Given:
     if combine.threshold is None:
         return {}
     options = request.state.options
-    is_there = windows.indices(options, request.index, shot, request.direction)[options.before] >= 0
+    is_there = windows.indices(options, request.index, shot, request.direction)[options.shown] >= 0
     half = max(combine.softness, 1e-6) / 2
-    return {"threshold": (combine.threshold, half), "shown": options.before if is_there else -1}
+    return {"threshold": (combine.threshold, half), "shown": options.shown if is_there else -1}
 
 
 def _in_window(state: FrameState, chosen: tuple[int, ...]) -> FrameState:
