@@ -35,8 +35,7 @@ def recipe_of(scene, effect, strip, contents: Sequence = ()) -> Effect:
 
 def _keyed(scene, effect) -> set[float]:
     """The timeline frames of the effect's keys and drawings."""
-    curves, pace = fcurves.curves_under(scene, effect.path_from_id() + "."), fcurves.stretched(scene)
-    frames = {frame / pace for frame in fcurves.key_frames(curves)}
+    frames = set(fcurves.key_frames(fcurves.curves_under(scene, effect.path_from_id() + ".")))
     layers = (annotations.layer_of(effect, region) for region in effect.regions)
     return frames.union(float(drawing.frame_number) for layer in layers if layer for drawing in layer.frames)
 
