@@ -277,6 +277,24 @@ def test_keys_are_set_at_the_edits_frame(bpy, edit, region):
     assert bar_edits.unkey_bars(effect, 0)
 
 
+def test_tracks_of_a_stretched_timeline(bpy, edit, region):
+    """Their keys lie where they are read; those that an editor sets as Blender's own, at the timeline's frame."""
+    edit.render.frame_map_old, edit.render.frame_map_new = 100, 300
+    effect = active(bpy)[1]
+    track(bpy)
+    assert max(apart(bpy, frame, frame - 11) for frame in range(11, 31)) < 2
+    assert [frame for frame, *_ in keys(bpy)[0]][:: len(keys(bpy)[0]) - 1] == pytest.approx([11 / 3, 10])
+    assert [track_region.confidence_at(effect, 0, frame) for frame in (11, 31)] == [1, None]
+    move(bpy, 8, 13)
+    effect.regions[0].location[1] += 12 / SIZE[1]
+    region_edits.key_region(effect, 0)
+    assert [key[0] for key in keys(bpy)[0] if key[2] == "KEYFRAME"] == pytest.approx([11 / 3, 8])
+    edit.frame_set(11)
+    track(bpy)
+    assert apart(bpy, 12, 1) < 2
+    assert apart(bpy, 24, 13) == pytest.approx(12, abs=0.1)
+
+
 def test_a_gap_keeps_the_keys_that_were_made_there(bpy, edit, region):
     track(bpy, all_keys=True)
     effect = active(bpy)[1]

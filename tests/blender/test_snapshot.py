@@ -160,15 +160,33 @@ def test_another_smoothness_is_another_source(found):
     assert request(edit, effect, strip, 3).renderer.source is sources[-1]
 
 
-def test_time_stretching_moves_no_keys(found):
-    from shutter_addon.blender.data import recipe_export
+def test_keys_follow_time_stretching(found):
+    """As Blender's own: a key's place on a timeline that is stretched is not its frame. What is sampled, kept by the
+    sequencer, exported and told of the bars follows; what changes bars at their keys does not move these."""
+    from shutter_addon.blender.data import fcurves, recipe_export, recipe_import
+    from shutter_addon.blender.editing import bar_edits
+    from shutter_addon.blender.rendering import invalidation
 
     edit, effect, strip = found
 
-    def seen():
-        keys = recipe_export.recipe_of(edit, effect, strip).shutters[1].bars.channel.frames
-        return keys, [state(edit, effect, strip, frame).bars[1].tolist() for frame in (1, 5.5, 10, 20)]
+    def seen(frame):
+        now = state(edit, effect, strip, frame)
+        return [*now.bars[1], now.options.position == "end"]
 
-    before = seen()
+    before = [seen(frame) for frame in (1, 5.5, 10, 20)]
+    assert len({*map(tuple, before)}) == 4
+    keys = recipe_export.recipe_of(edit, effect, strip).shutters[1].bars.channel.frames
+    invalidation.invalidate_changed(edit)
     edit.render.frame_map_old, edit.render.frame_map_new = 100, 200
-    assert seen() == before
+    assert invalidation.invalidate_changed(edit)
+    np.testing.assert_allclose([seen(frame) for frame in (2, 11, 20, 40)], before, atol=1e-6)
+    edit.frame_set(40)
+    assert bar_edits.key_state(effect, 1)[0] == "keyed"
+    np.testing.assert_allclose(bar_edits.bars_now(effect, 1), before[3][:4], atol=1e-6)
+    stretched = recipe_export.recipe_of(edit, effect, strip).shutters[1].bars.channel.frames
+    assert stretched[-1] == 2 * keys[-1]
+    recipe_import.apply(edit, effect, strip, recipe_export.recipe_of(edit, effect, strip))
+    assert recipe_export.recipe_of(edit, effect, strip).shutters[1].bars.channel.frames == stretched
+    effect.window = 5
+    path = f"{effect.path_from_id()}.shutters[1].bars[0].weight"
+    assert fcurves.key_frames([fcurves.find_curve(edit, path)]) == [1, 20]

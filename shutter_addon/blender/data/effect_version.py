@@ -93,6 +93,7 @@ def parts(
         yield from _strokes(effect, region, start)
         if region.kind == "MATTE":
             yield from _matte(region, files, start)
+    yield fcurves.stretched(scene)
     found = [(curve.data_path, curve.array_index, curve) for curve in fcurves.curves_under(scene, "")]
     yield from _curves(_below(effect.path_from_id() + ".", found), start)
     placed = _below(f"{strip.path_from_id()}.transform.", found)

@@ -20,13 +20,43 @@ from . import validation
 _EASES: dict[int, Ease] = {0: "constant", 1: "linear", 2: "bezier"}
 
 
+def stretched(scene) -> float:
+    """How far F-curves go on in a frame of the timeline, as Output ▸ Time Stretching has it."""
+    render = getattr(scene, "render", None)  # clips have none
+    return render.frame_map_old / render.frame_map_new if render else 1.0
+
+
+class Timed:
+    """An F-curve that is asked for by frames of a scene's timeline, which may be stretched."""
+
+    def __init__(self, curve, scene):
+        self._curve, self._pace = curve, stretched(scene)
+
+    def __getattr__(self, name: str):
+        return getattr(self._curve, name)
+
+    def evaluate(self, frame: float) -> float:
+        return self._curve.evaluate(frame * self._pace)
+
+    def points(self) -> np.ndarray:
+        """As points_of."""
+        points = points_of(self._curve)
+        if self._pace != 1:  # a key that was set at a whole frame lies there
+            points[:, 0] = np.round(points[:, 0] / self._pace, 3)
+        return points
+
+    def insert(self, frame: float, value: float, **how):
+        """As keyframe_points.insert."""
+        return self._curve.keyframe_points.insert(frame * self._pace, value, **how)
+
+
 class Curves:
     """The F-curves of a scene, found by path; each is looked through once."""
 
     def __init__(self, scene):
-        self._scene = scene
+        self._scene, self._pace = scene, stretched(scene)
         found = (c for c in curves_under(scene, "") if not (c.mute or c.is_empty))
-        self._curves = {(c.data_path, c.array_index): c for c in found}
+        self._curves = {(c.data_path, c.array_index): c if self._pace == 1 else Timed(c, scene) for c in found}
         self._frames: dict = {}  # by curve: the frames (n,) of its keys
 
     def find(self, path: str, index: int = 0):
@@ -39,7 +69,7 @@ class Curves:
             if beyond.size:
                 owner, _, name = path.rpartition(".")
                 validation.refuse_key(self._scene.path_resolve(owner), name, beyond[0])
-            self._frames[curve] = frames
+            self._frames[curve] = frames / self._pace
         return curve
 
     def of(self, owner, path: str, name: str) -> list:
@@ -114,6 +144,8 @@ def progress(curve, first: float, last: float, frame: float) -> float:
 
 def set_keys(scene, path: str, index: int, keys: Sequence[tuple[float, float, Ease]], group: str = "") -> None:
     """Replaces a property's F-curve by keys (frame, value, ease of the span that follows)."""
+    pace = stretched(scene)
+    keys = [(frame * pace, value, ease) for frame, value, ease in keys]
     points = new_curve(scene, path, index, group).keyframe_points
     points.add(len(keys))
     points.foreach_set("co", [number for frame, value, _ in keys for number in (frame, value)])
@@ -162,6 +194,7 @@ def remove_curves(scene, path: str) -> None:
 
 def move_curves(scene, path: str, frames: float) -> None:
     """Moves the keys of the F-curves whose path starts with `path` in time."""
+    frames *= stretched(scene)
     for curve in curves_under(scene, path):
         for point in curve.keyframe_points:
             point.co_ui[0] += frames  # and its handles

@@ -35,7 +35,8 @@ def recipe_of(scene, effect, strip, contents: Sequence = ()) -> Effect:
 
 def _keyed(scene, effect) -> set[float]:
     """The timeline frames of the effect's keys and drawings."""
-    frames = set(fcurves.key_frames(fcurves.curves_under(scene, effect.path_from_id() + ".")))
+    curves, pace = fcurves.curves_under(scene, effect.path_from_id() + "."), fcurves.stretched(scene)
+    frames = {frame / pace for frame in fcurves.key_frames(curves)}
     layers = (annotations.layer_of(effect, region) for region in effect.regions)
     return frames.union(float(drawing.frame_number) for layer in layers if layer for drawing in layer.frames)
 

@@ -127,8 +127,8 @@ def key_state(effect: PropertyGroup, index: int) -> list[str]:
 def _state(curve: FCurve | None, value: float, scene: Scene) -> str:
     if curve is None:
         return ""
-    frame = scene.frame_float
-    if abs(max(curve.evaluate(frame), 0.0) - value) > 1e-4:  # no bar is below 0, a curve may be
+    frame = scene.frame_current_final  # by which keys are stretched
+    if abs(max(curve.evaluate(scene.frame_float), 0.0) - value) > 1e-4:  # no bar is below 0, a curve may be
         return "changed"
     return "keyed" if any(abs(key.co[0] - frame) < 1e-3 for key in curve.keyframe_points) else "animated"
 

@@ -16,7 +16,7 @@ import numpy as np
 from bpy.app.translations import pgettext_iface as iface_
 from bpy.app.translations import pgettext_n as n_
 from bpy.app.translations import pgettext_rpt as rpt_
-from bpy.types import FCurve, PropertyGroup
+from bpy.types import PropertyGroup, Scene
 
 from ...core.frames import frame_ranges
 from ...core.messages import EffectError
@@ -119,7 +119,7 @@ class MotionKeys:
     def confidence(self) -> tuple[np.ndarray, np.ndarray]:
         """The frames (n,) that have a confidence, ascending, and what it is, 0 to 1."""
         curve = self._curve("confidence")
-        points = fcurves.points_of(curve) if curve else np.empty((0, 2))
+        points = curve.points() if curve else np.empty((0, 2))
         return points[:, 0], points[:, 1] / 100
 
     def fade(self, name: str, keys: Iterable[presence.Key]) -> None:
@@ -143,7 +143,7 @@ class MotionKeys:
             fcurves.remove_curves(self.effect.id_data, path)
             setattr(moving, name, whole)
 
-    def _curves(self, count: int = len(_COMPONENTS)) -> list[FCurve]:
+    def _curves(self, count: int = len(_COMPONENTS)) -> list[fcurves.Timed]:
         """Of the first components, those that are keyed."""
         found = (self._curve(name, component) for name, component in _COMPONENTS[:count])
         return [curve for curve in found if curve is not None]
@@ -152,8 +152,9 @@ class MotionKeys:
         moving = selection.moving(self.effect, self.index)
         scene, path = self.effect.id_data, f"{moving.path_from_id()}.{name}"
         if new:
-            return fcurves.ensure_curve(scene, path, component, moving.name)
-        return fcurves.find_curve(scene, path, component)
+            return fcurves.Timed(fcurves.ensure_curve(scene, path, component, moving.name), scene)
+        curve = fcurves.find_curve(scene, path, component)
+        return curve and fcurves.Timed(curve, scene)
 
 
 def check_curves(effect: PropertyGroup, index: int | None) -> None:
@@ -178,29 +179,36 @@ def insert(
     """Keys channels of a region or of the camera at the scene's current frame; where tracking has made a key, it is the
     editor's from now on, and sure. EffectError: as check_curves says.
 
-    begins: whether tracking begins there. Others keep what was tracked there, for the next MotionKeys.hold"""
+    begins: whether tracking begins there, so that they are read there; of a timeline that is stretched, others lie
+    where Blender's own do, and are read elsewhere. Those keep what was tracked there, for the next MotionKeys.hold"""
     check_curves(effect, index)
     scene, moving = effect.id_data, selection.moving(effect, index)
-    path, frame = moving.path_from_id(), scene.frame_current
+    path, pace, frame = moving.path_from_id(), fcurves.stretched(scene), scene.frame_current
+    if not begins and pace != 1:
+        frame = round(frame / pace, 3)
     for name in channels:
-        tracked = [_tracked_value(curve, frame) for curve in fcurves.curves_under(scene, f"{path}.{name}")]
+        tracked = [_tracked_value(curve, frame) for curve in _curves(scene, f"{path}.{name}")]
         # Without a frame Blender takes that of the window's scene, which may be another one.
-        scene.keyframe_insert(f"{path}.{name}", group=moving.name, frame=frame)
+        scene.keyframe_insert(f"{path}.{name}", group=moving.name, frame=frame * pace)
         tracked += [NOTHING_KEPT] * len(_COMPONENTS)
-        for curve, value in zip(fcurves.curves_under(scene, f"{path}.{name}"), tracked, strict=False):
+        for curve, value in zip(_curves(scene, f"{path}.{name}"), tracked, strict=False):
             for key in _keys_at(curve, frame):
                 key.type, key.back = "KEYFRAME", NOTHING_KEPT if begins else value
-    for curve in fcurves.curves_under(scene, f"{path}.confidence"):
+    for curve in _curves(scene, f"{path}.confidence"):
         for key in _keys_at(curve, frame):
             key.back = key.co[1] = 100
         curve.update()
 
 
-def _keys_at(curve: FCurve, frame: float) -> list:
-    return [curve.keyframe_points[i] for i in np.flatnonzero(fcurves.points_of(curve)[:, 0] == frame).tolist()]
+def _curves(scene: Scene, path: str) -> list[fcurves.Timed]:
+    return [fcurves.Timed(curve, scene) for curve in fcurves.curves_under(scene, path)]
 
 
-def _tracked_value(curve: FCurve, frame: float) -> float:
+def _keys_at(curve: fcurves.Timed, frame: float) -> list:
+    return [curve.keyframe_points[i] for i in np.flatnonzero(curve.points()[:, 0] == frame).tolist()]
+
+
+def _tracked_value(curve: fcurves.Timed, frame: float) -> float:
     """What tracking has made of a frame, for a key that the editor sets there; of the editor's key there, what it
     keeps."""
     for key in _keys_at(curve, frame):
@@ -209,10 +217,10 @@ def _tracked_value(curve: FCurve, frame: float) -> float:
     return NOTHING_KEPT if curve.is_empty else curve.evaluate(frame)
 
 
-def _as_tracked(curve: FCurve, edited: tuple[int, int], frames: list[float]) -> dict[float, float]:
+def _as_tracked(curve: fcurves.Timed, edited: tuple[int, int], frames: list[float]) -> dict[float, float]:
     """The values of an F-curve at frames without a key, straight between its keys, with what tracking said of two
     frames that the editor may have keyed since; it is forgotten after this."""
-    points = fcurves.points_of(curve)
+    points = curve.points()
     for i in np.flatnonzero(np.isin(points[:, 0], edited)).tolist():
         key = curve.keyframe_points[i]
         if key.type != MADE and key.back != NOTHING_KEPT:
@@ -226,7 +234,7 @@ def _values(placement: Placement) -> tuple[float, ...]:
     return *placement.location, np.radians(placement.rotation), placement.scale
 
 
-def _replace(curve: FCurve, values: dict[int, float], tracked: Iterable[int]) -> None:
+def _replace(curve: fcurves.Timed, values: dict[int, float], tracked: Iterable[int]) -> None:
     """Makes keys of these values by frame, in place of those that were made at the frames that were tracked."""
     points, (frames, made) = curve.keyframe_points, _read(curve)
     within = np.isin(frames, list(tracked))
@@ -241,14 +249,14 @@ def _replace(curve: FCurve, values: dict[int, float], tracked: Iterable[int]) ->
     curve.update()
 
 
-def _insert(curve: FCurve, frame: float, value: float, ease: str = "LINEAR") -> None:
-    key = curve.keyframe_points.insert(frame, value, options={"FAST"}, keyframe_type=MADE)
+def _insert(curve: fcurves.Timed, frame: float, value: float, ease: str = "LINEAR") -> None:
+    key = curve.insert(frame, value, options={"FAST"}, keyframe_type=MADE)
     key.interpolation, key.back = ease, key.co[1]
 
 
-def _read(curve: FCurve) -> tuple[np.ndarray, np.ndarray]:
+def _read(curve: fcurves.Timed) -> tuple[np.ndarray, np.ndarray]:
     """The frames (n,) of an F-curve's keys, and which of them were made and are as they were made."""
-    frames, values = fcurves.points_of(curve).T
+    points = curve.points()
     types = fcurves.numbers(curve.keyframe_points, "type", np.int32)
     kept = fcurves.numbers(curve.keyframe_points, "back")
-    return frames, (types == _MADE) & ((kept == values) | (kept == NOTHING_KEPT))
+    return points[:, 0], (types == _MADE) & ((kept == points[:, 1]) | (kept == NOTHING_KEPT))
