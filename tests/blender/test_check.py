@@ -16,7 +16,6 @@ from support import noise_film, recipe, sequencer, write_frames
 from shutter_addon.blender import command
 from shutter_addon.blender.data import recipe_import, versions
 from shutter_addon.blender.editing import add_effect, shutter_edits
-from shutter_addon.blender.rendering import render_settings, sessions
 from shutter_addon.core.farm import job_file
 from shutter_addon.core.recipes import recipe_file
 from shutter_addon.media import carrying
@@ -91,18 +90,11 @@ def test_the_report_for_people(noise, check, bpy, tmp_path, capsys):
     assert any(line.startswith("Effect Shutter: ") and "exposures of 4 frames, 2 shutters" in line for line in lines)
     assert lines[-1] == "Chunk size: 2 frames"
     assert command.main(["check", str(tmp_path / "edit.blend"), "--device", "cpu", "--gpu-memory", "0"]) == 0
-    assert next(line for line in capsys.readouterr().out.splitlines() if "Memory" in line).endswith(
-        "kB for decoded frames"
-    )
+    assert "Device: NumPy" in capsys.readouterr().out.splitlines()
 
 
-def test_the_device_and_its_memory_are_those_that_are_asked_for(noise, check):
-    report = check("--device", "cpu")[2]
-    assert (report["device"], report["memory"]["gpu_limit"]) == ("NumPy", None)
-    with render_settings.using(render_settings.RenderSettings(gpu_memory=123)):
-        sessions.settle()  # a process of its own has known no other limit
-    report = check("--gpu-memory", "123")[2]
-    assert report["device"] == "NumPy" or report["memory"]["gpu_limit"] == 123 << 20
+def test_the_device_is_the_one_that_is_asked_for(noise, check):
+    assert check("--device", "cpu")[2]["device"] == "NumPy"
 
 
 def test_the_key_is_what_pictures_carry(noise, check, tmp_path):
