@@ -49,10 +49,10 @@ from shutter_addon.compute import (
     edge_diffusion_gpu,
     guide,
 )
+from shutter_addon.compute.composition_passes import table as table_of
 from shutter_addon.compute.gpu import GPUCompositor
 from shutter_addon.compute.layer_frames import WeightedFrames
 from shutter_addon.compute.request import Behind, Coefficients, Exposure, Request
-from shutter_addon.compute.tables import table as table_of
 from shutter_addon.compute.window import Frames
 from shutter_addon.core.frames import light
 from shutter_addon.core.frames.frame_source import FrameSource

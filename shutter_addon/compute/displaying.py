@@ -10,8 +10,7 @@ import numpy as np
 
 from ..core.memo import Memo
 from ..core.pixels.shown_levels import Display
-from ..devices.device import Device, Texture
-from ..devices.named_textures import NamedTextures
+from ..devices.device import Device, NamedTextures, Texture
 from ..devices.passes import read_pass
 
 _OCTAVES, _LOWEST = 10, -9  # from here on, to 2; below, the display is linear

@@ -13,9 +13,8 @@ from ..core.model import windows
 from ..core.model.combining import AVERAGE, Combine
 from ..core.model.frame_state import Following, FrameState
 from ..core.pixels.shown_levels import Display
-from ..devices.device import Device, Given, Texture
+from ..devices.device import Device, Given, NamedTextures, Texture
 from ..devices.llvmpipe import MOST_ITERATIONS
-from ..devices.named_textures import NamedTextures
 from ..devices.passes import Pass
 from . import cpu, window_frames
 from .composition_passes import (
@@ -27,8 +26,10 @@ from .composition_passes import (
     filled_rows,
     lines_of,
     median_iterations,
+    moved_tables,
     moved_way,
     selection,
+    table,
     way_of,
     way_sum,
 )
@@ -36,7 +37,6 @@ from .displaying import Displaying
 from .request import Coefficients, Handle, Request
 from .running_sums import Sums, open_window
 from .stages import Stages
-from .tables import moved_tables, table
 from .window import BLOCK, PackedFrames, WholeFrames, Window
 
 

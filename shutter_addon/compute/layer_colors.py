@@ -14,8 +14,7 @@ from ..core.model.frame_state import Layers, Options
 from ..core.pixels import layering
 from ..core.pixels.decontamination import separated
 from . import plates
-from .layer_frames import LayerFrames, RecentFrames, linear, with_colors
-from .layer_mattes import LayerMattes
+from .layer_frames import LayerFrames, LayerMattes, RecentFrames, linear, with_colors
 
 T = TypeVar("T")
 # Frames of which both are kept, as several windows load them one after another.

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from test_composition import LEVEL, ROUNDED, Footage, device, footage, state  # noqa: F401 – a fixture
 
-from shutter_addon.compute import layer_colors, layer_frames, layer_mattes, running_sums
+from shutter_addon.compute import layer_colors, layer_frames, running_sums
 from shutter_addon.compute.gpu import GPUCompositor
 from shutter_addon.compute.renderer import Renderer, open_compositor, open_gl
 from shutter_addon.compute.request import Request
@@ -506,9 +506,9 @@ def _no_room(*_):
 
 
 def test_mattes_and_frames_are_kept_within_their_budgets(monkeypatch):
-    monkeypatch.setattr(layer_mattes, "KEPT_BYTES", 0)
+    monkeypatch.setattr(layer_frames, "KEPT_BYTES", 0)
     monkeypatch.setattr(layer_frames, "RECENT_BYTES", 0)
-    kept = layer_mattes.LayerMattes(SIZE, lambda state_, frame: np.zeros((2, *SIZE[::-1])), MatteValues(*SIZE))
+    kept = layer_frames.LayerMattes(SIZE, lambda state_, frame: np.zeros((2, *SIZE[::-1])), MatteValues(*SIZE))
     moment, _ = with_layers(FrameState(Options(4), np.ones((3, 4))), discs())
     source = layer_frames.RecentFrames(footage(np.random.default_rng(0), COUNT, SIZE))
     for frame in range(COUNT):

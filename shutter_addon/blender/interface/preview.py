@@ -18,7 +18,6 @@ from ...core import stopping, told
 from ...core.model.choices import CONTEXT
 from ...core.model.frame_state import FrameState
 from ...devices.device import Texture
-from ...media import MediaError
 from ..data import annotations, preview_areas, selection, strips
 from ..data.preview_areas import Shown
 from ..data.snapshot import Snapshot
@@ -189,8 +188,6 @@ def _show_picture(context: Context, quad: Quad, shown: Shown, wanted: Drawing, s
         _warn(shown, say)
     if wanted.left > 0:
         _show_source(quad, shown, renderer, request, wanted.left)
-    if wanted.has_result and not wanted.draws_result:
-        _tell_missing(renderer, request, say)
     if wanted.draws_result:
         texture = renderer.draw(replace(request, quick=previews.is_going(context), levels=True))
         quad.draw("PICTURE", {"picture": texture}, wanted.left, 1.0, opacity=shown.strip.blend_alpha)
@@ -272,14 +269,6 @@ def _show_sharp(context: Context, shown: Shown | None) -> None:
             quad = Quad(context.region, shown.strip, annotations.picture_size(shown.effect))
             snapshot = invalidation.current(shown.scene, shown.effect, shown.strip, shown.scene.frame_current)
             _show_strokes(context, quad, shown, snapshot)
-
-
-def _tell_missing(renderer: Renderer, request: Request, say: "_Notes") -> None:
-    """Says in the preview what the engine can only report."""
-    try:
-        renderer.check(request)
-    except MediaError as error:
-        _tell_fault(error, say)
 
 
 def _tell_carrying(say: "_Notes") -> None:

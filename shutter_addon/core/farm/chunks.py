@@ -7,8 +7,8 @@ LEAST = 24
 
 
 def decoded(frames: int, window: int, step: int = 1) -> int:
-    """How many frames of a source, moments between them included, a chunk of so many timeline frames reads: those of its
-    first picture's window, and `step` more for each later picture.
+    """How many frames of a source, moments between them included, a chunk of so many timeline frames reads: those of
+    its first picture's window, and `step` more for each later picture.
 
     window: frames that a shutter can expose, moments included; step: how many of these the source moves on from one
     timeline frame to the next, which is how many a filmed frame has unless it is retimed"""
