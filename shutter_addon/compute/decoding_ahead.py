@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from ..core.frames.frame_source import FrameSource
-from .memory_needs import frame_bytes
 
 # Pictures whose frames are decoded in advance, and how many frames or bytes of them lie decoded at most, besides those
 # on the device: enough for a long window, whose frames are decoded while its first picture is diffused and compiled.
@@ -24,18 +23,8 @@ def want(source: FrameSource, index: int, direction: int, missing: Callable[[int
 
 
 def _in_order(source: FrameSource, lacking: list[set[int]]) -> list[int]:
-    most = decoded_ahead(source)
+    frame_bytes = source.width * source.height * 4 * source.dtype.itemsize
+    most = max(_DECODED, _DECODED_BYTES // frame_bytes)
     # One that is not built yet would be remembered as a fault, and may come before it is needed.
     wanted = dict.fromkeys(i for frames in lacking for i in sorted(frames) if source.has(i))
     return list(wanted)[:most]
-
-
-def decoded_ahead(source: FrameSource) -> int:
-    """How many frames of a source may lie decoded on the host, besides a window that is kept there."""
-    return max(_DECODED, _DECODED_BYTES // frame_bytes(source))
-
-
-def decoded_bytes(source: FrameSource, window: int) -> int:
-    """Bytes that decoded frames take on the host at most: those of a window of so many frames, and of the next
-    pictures, as far as there is room."""
-    return min(decoded_ahead(source), window + _AHEAD * source.step) * frame_bytes(source)

@@ -17,7 +17,7 @@ from ..devices.device import Device, Given, Texture
 from ..devices.llvmpipe import MOST_ITERATIONS
 from ..devices.named_textures import NamedTextures
 from ..devices.passes import Pass
-from . import cpu, memory_needs, window_frames
+from . import cpu, window_frames
 from .composition_passes import (
     EDGES,
     LEVELS,
@@ -139,9 +139,6 @@ class GPUCompositor:
 
     def stages(self) -> Stages:
         return Stages(self.device)
-
-    def needs(self, source: FrameSource, kind: memory_needs.Kind) -> memory_needs.Needs:
-        return memory_needs.of_windows(self.device, source, kind)
 
     def labels(self, values: np.ndarray) -> Texture:
         """Labels (H, W) uint16 as a texture r32ui. Valid until the next call."""
