@@ -1,4 +1,4 @@
-"""The command `check`: planted faults are told, all of them, each by its place; and what a sound edit will take."""
+"""The command `check`: planted faults are told, all of them, each by its place; and what a sound edit is made of."""
 
 import json
 import os
@@ -77,7 +77,6 @@ def test_a_sound_edit(noise, check, tmp_path):
     ]
     assert report["extension"] == {"here": versions.extension(), "saved": versions.extension()}
     assert report["device"]
-    assert report["chunk"] == FRAMES
     assert job_file.read(tmp_path / "out").key == report["key"]
 
 
@@ -88,7 +87,6 @@ def test_the_report_for_people(noise, check, bpy, tmp_path, capsys):
     assert "Frames: 2 to 3, 64×48" in lines
     assert f"Virtual Shutter: {versions.extension()}, the edit was saved by {versions.extension()}" in lines
     assert any(line.startswith("Effect Shutter: ") and "exposures of 4 frames, 2 shutters" in line for line in lines)
-    assert lines[-1] == "Chunk size: 2 frames"
     assert command.main(["check", str(tmp_path / "edit.blend"), "--device", "cpu", "--gpu-memory", "0"]) == 0
     assert "Device: NumPy" in capsys.readouterr().out.splitlines()
 
@@ -254,30 +252,18 @@ def test_a_mask_and_a_strip_that_are_gone(noise, check, tmp_path):
 
 @pytest.mark.parametrize("smooth", ["2", "8"])
 def test_a_smooth_effect(noise, check, bpy, tmp_path, capsys, smooth):
-    """It needs nothing that is not there; exposures are told in filmed frames, and chunks stay as long as they were."""
+    """It needs nothing that is not there; exposures are told in filmed frames."""
     plain = check()[2]
     now()[1].inbetween = smooth
     code, sentences, report = check()
     assert (code, sentences) == (0, [])
     (effect,) = report["effects"]
     assert (effect["window"], effect["inbetween"]) == (WINDOW, int(smooth))
-    assert report["chunk"] == plain["chunk"]
     assert report["key"] != plain["key"]
     assert "build" not in report
     capsys.readouterr()
     assert command.main(["check", str(tmp_path / "edit.blend")]) == 0
     assert f"exposures of {WINDOW} frames, 2 shutters, {smooth} moments each" in capsys.readouterr().out
-
-
-def test_a_long_smooth_exposure_has_long_chunks(edit, check, tmp_path):
-    """Those of filmed frames: a neighbour decodes one in ten."""
-    frames = np.random.default_rng(2).integers(0, 256, (90, 16, 16, 3), dtype=np.uint8)
-    noise_film(edit, frames, tmp_path)
-    now()[1].window = 9
-    chunk = check()[2]["chunk"]
-    assert chunk == 9 * (9 - 1)
-    now()[1].inbetween = "4"
-    assert check()[2]["chunk"] == chunk
 
 
 def test_automatic_tells_how_smooth_it_is(edit, check, tmp_path):

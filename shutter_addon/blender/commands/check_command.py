@@ -1,4 +1,4 @@
-"""The command `check`: whether an edit can be rendered on this machine, and what that will take."""
+"""The command `check`: whether an edit can be rendered on this machine."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ import bpy
 from bpy.types import Scene
 
 from ...core import told
-from ...core.farm import chunks, job_file
+from ...core.farm import job_file
 from ...core.farm.edit_version import EditVersion
 from ...core.messages import UserError
 from ...devices.device import NoDeviceError
@@ -28,7 +28,7 @@ from .command_line import place
 
 
 def add(commands: argparse._SubParsersAction) -> None:
-    parser = commands.add_parser("check", help="find out whether an edit can be rendered here, and what that will take")
+    parser = commands.add_parser("check", help="find out whether an edit can be rendered here")
     option = parser.add_argument
     option("edit", metavar="FILE.blend", type=place, help="a saved edit")
     option("--frames", metavar="A:B", help="timeline frames A to B (default: all of the edit)")
@@ -90,7 +90,6 @@ def _report(arguments: Namespace, scene: Scene, frames: range, version: EditVers
         "blender": {"here": version.blender, "saved": _file_version()},
         "device": device,
         "effects": [_effect(each) for each in checks],
-        "chunk": min(len(frames), max([each.chunk for each in checks], default=chunks.LEAST)),
         "notes": notes,
         "faults": faults,
     }
@@ -147,7 +146,7 @@ def _on_device(
     scene: Scene, frames: range, faults: list[str], notes: list[str]
 ) -> tuple[str | None, list[EffectCheck]]:
     """The name of the device that will render, and what is found of the effects (edit_check.effects); without a device,
-    which is a fault, nothing of them."""
+    which is a fault, nothing."""
     try:
         kind, lesser = available.choose(render_settings.wanted())
     except NoDeviceError as error:
@@ -194,8 +193,6 @@ def _lines(report: dict) -> list[str]:
             words += f", {effect['inbetween']} moments each"
         lines.append(f"Effect {effect['strip']}: {words}")
     lines.append(f"Device: {report['device'] or 'none'}")
-    if all(effect["source"] for effect in report["effects"]):
-        lines.append(f"Chunk size: {report['chunk']} frames")
     return lines + [f"Note: {note}" for note in report["notes"]]
 
 

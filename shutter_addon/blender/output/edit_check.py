@@ -15,7 +15,6 @@ from bpy.types import PropertyGroup, Scene, Strip
 
 from ...compute.renderer import Renderer
 from ...compute.request import Request
-from ...core.farm.chunks import LEAST, chunk_size
 from ...core.frames import frame_ranges
 from ...core.frames.frame_source import FrameSource
 from ...core.messages import UserError
@@ -30,7 +29,7 @@ from ..rendering.session import RenderContext, RenderSession
 
 @dataclass
 class EffectCheck:
-    """What was found of an effect, of the frames that its strips show.
+    """What was found of an effect.
 
     scene: that its strip is in; name: of that strip; source: the footage's first file, "": it cannot be read
     size: of its pictures, width and height in pixels; window: filmed frames of the longest
@@ -41,7 +40,6 @@ class EffectCheck:
 
     scene: bpy.types.Scene
     name: str
-    frames: set[float]
     shutters: int
     source: str = ""
     size: tuple[int, int] = (0, 0)
@@ -51,13 +49,9 @@ class EffectCheck:
     faults: list[str] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
 
-    @property
-    def chunk(self) -> int:
-        return chunk_size(self.window * self.steps, self.steps) if self.window else LEAST
-
 
 def effects(scene: Scene, frames: range) -> list[EffectCheck]:
-    """Looks at the effects that the scene's frames show, those of scenes in it included: files are opened, and of each
+    """Looks at the effects that the scene's frames show, those of scenes in it included. Files are opened, and of each
     the first and the last frame that is needed are read."""
     # It asks no device, which would have to wait for its first picture: states and windows are known without.
     session = RenderSession(lambda: ("cpu", None), lambda: None)
@@ -83,7 +77,7 @@ def _shown_effects(film: Scene, frames: range) -> Iterator[tuple]:
 def _effect(session: RenderSession, shown: tuple) -> EffectCheck:
     """shown: of _shown_effects"""
     scene, effect, strip, frames = shown
-    check = EffectCheck(scene=scene, name=strip.name, frames=frames, shutters=len(effect.shutters))
+    check = EffectCheck(scene=scene, name=strip.name, shutters=len(effect.shutters))
     if not _look_at_footage(check, effect, strip):
         return check
     try:
