@@ -1,8 +1,6 @@
 """The passes that compose: one for each way to go through a window, compiled for what is composed; and which way is
 the fastest. And what they need to know of shutters, once per frame: gains, knots or bars, as float32 tables."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import lru_cache
 

@@ -7,8 +7,6 @@ the sums of theirs. Such corrections are about half as large as they should be, 
 algebraic multigrid for elliptic problems of second order", 1995). It is slow: devices have compute.diffusion_gpu.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

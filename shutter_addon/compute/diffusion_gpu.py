@@ -14,8 +14,6 @@ A solve that starts from nothing depends on the labels alone, to the bit. For th
 scribbles are or were in the last solve, and W and f are set to zero there and outside the tiles.
 """
 
-from __future__ import annotations
-
 from itertools import pairwise
 from typing import Any
 

@@ -4,8 +4,6 @@ A device cannot be trusted with powers to the bit. So it takes parabolas, which 
 these are too near to where a level ends; the few such pixels, one in some hundred, are asked of the display itself.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from ..core.memo import Memo

@@ -5,8 +5,6 @@ gradients, each iteration a cycle over it and the coarser ones: that whose cells
 pixels where these are pixels. On the grids before it conductances are smooth.
 """
 
-from __future__ import annotations
-
 from itertools import pairwise
 
 import numpy as np

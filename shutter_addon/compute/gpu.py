@@ -1,8 +1,5 @@
 """Compositing on a device: one compute pass per picture and band of rows, over the window's frames or running sums."""
 
-from __future__ import annotations
-
-from contextlib import AbstractContextManager
 from dataclasses import replace
 from typing import Any
 
@@ -123,14 +120,9 @@ class GPUCompositor:
 
     def __init__(self, device: Device) -> None:
         self.device, self.name, self.takes_planes = device, device.name, device.takes_planes
+        self.current, self.freeing = device.current, device.freeing
         self._textures = NamedTextures(device)
         self._displaying = Displaying(device)
-
-    def current(self) -> AbstractContextManager:
-        return self.device.current()
-
-    def freeing(self) -> AbstractContextManager:
-        return self.device.freeing()
 
     def window(
         self, source: FrameSource, capacity: int, moved: bool = False, shutters: int = 4, summed: bool = True

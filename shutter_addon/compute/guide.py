@@ -7,8 +7,6 @@ It is steadied: where the frames beside the shown one differ little from it, it 
 goes in a still picture would else make coefficients flicker. What moves differs more, and stays as it is shown.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 
 import numpy as np

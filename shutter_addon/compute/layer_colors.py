@@ -1,7 +1,5 @@
 """What source frames show of each layer, and of what lies behind all: the frames that windows of layers weigh."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any, TypeVar
 

@@ -1,8 +1,6 @@
 """What the windows of layers read: frames weighted, pixel by pixel, by a layer's matte or by what it leaves; and mattes
 of layers in source frames, each made once, and kept within a budget."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Hashable, Iterable
 from functools import partial
 from typing import Any

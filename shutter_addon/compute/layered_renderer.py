@@ -1,8 +1,6 @@
 """Pictures with layers: what lies behind them and each of them is composed from a window of its own, then laid over one
 another (core.pixels.layering)."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Collection
 from dataclasses import replace
 from functools import partial

@@ -1,8 +1,6 @@
 """What is asked of a renderer, a picture as a function of one value; and what makes it, stage by stage, on a device or
 with NumPy."""
 
-from __future__ import annotations
-
 from collections.abc import Hashable, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass

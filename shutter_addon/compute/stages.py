@@ -1,8 +1,6 @@
 """The stages of a picture on a device, beside its composition: coefficients are diffused, added up, and covered by
 mattes; layers are laid over what lies behind them."""
 
-from __future__ import annotations
-
 from collections.abc import Hashable, Sequence
 
 import numpy as np

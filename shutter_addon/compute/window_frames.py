@@ -5,8 +5,6 @@ beside, in all functions: how far the frames that guide the diffusion lie from t
 do.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 

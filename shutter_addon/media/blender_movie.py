@@ -1,8 +1,6 @@
 """Frames of a movie where PyAV is missing: decoded by a second Blender, those of movie.MovieSource. Whoever has Blender
 says how it is started (`lend`); it answers as blender/data/decoding_process.py says, and ends with this one."""
 
-from __future__ import annotations
-
 import itertools
 import json
 import math

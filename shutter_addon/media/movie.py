@@ -1,7 +1,5 @@
 """Frames of a movie: those that Blender's movie strip shows, converted to RGB as Blender converts them."""
 
-from __future__ import annotations
-
 import math
 import re
 import threading

@@ -5,8 +5,6 @@ GrabCut (Rother et al. 2004) tells the colours of the subject from those around 
 are those of Intelligent Scissors (Mortensen and Barrett 1995).
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from ..core.model.outlines import Curves, curves

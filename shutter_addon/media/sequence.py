@@ -1,7 +1,5 @@
 """Frames of an image sequence, or of one image: the samples that the files hold, whatever their format."""
 
-from __future__ import annotations
-
 import itertools
 import re
 from collections.abc import Callable, Iterable, Iterator, Sequence

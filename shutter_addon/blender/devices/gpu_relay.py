@@ -5,8 +5,6 @@ An engine's own way to it (bl_use_gpu_context) holds a lock of Blender's for as 
 is drawn meanwhile.
 """
 
-from __future__ import annotations
-
 import queue
 import time
 from collections.abc import Callable, Mapping

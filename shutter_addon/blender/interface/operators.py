@@ -1,7 +1,7 @@
 """Operators: what the user can do with effects, shutters and regions, as thin calls of plain functions; what gives an
 effect to another clip, its shutters and regions to another effect or a recipe, and a report to whoever helps."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from functools import partial
 from pathlib import Path
 
@@ -136,19 +136,15 @@ def show_panel(context: Context) -> None:
     for _window, area in preview_areas.previews(context):
         area.spaces.active.show_region_ui = True
     # A sidebar has tabs once it has been drawn, which a slow window does late, and one without room never.
-    _waits[:] = [0.1] * 30
-    main_thread.later(_choose_tab, 0.1)
+    main_thread.later(partial(_choose_tab, iter([0.1] * 30)), 0.1)
 
 
-_waits: list[float] = []
-
-
-def _choose_tab() -> float | None:
+def _choose_tab(waits: Iterator[float]) -> float | None:
     areas = [area for _window, area in preview_areas.previews(bpy.context)]
     sidebars = [next(region for region in area.regions if region.type == "UI") for area in areas]
     drawn = [s for s in sidebars if not s.is_property_readonly("active_panel_category")]
-    if len(drawn) < len(sidebars) and _waits:
-        return _waits.pop()
+    if len(drawn) < len(sidebars) and (wait := next(waits, None)):
+        return wait
     for sidebar in drawn:
         sidebar.active_panel_category = "Shutter"
         sidebar.tag_redraw()

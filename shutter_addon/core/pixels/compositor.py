@@ -1,7 +1,5 @@
 """The reference compositor: every pixel's own shutter, exact, in float64, one frame after the other."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np

@@ -5,8 +5,6 @@ up what that leaves of V, each as much as it covers ("Fast Multi-Level Foregroun
 "blur fusion", Forte 2021): twice, from wide surroundings and from near ones.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from .matte_grid import block_sums

@@ -1,8 +1,6 @@
 """A matte's values on the picture's grid: fitted to it, feathered, by blocks of pixels; and what else is blurred or
 summed over blocks. Pure NumPy, and separable."""
 
-from __future__ import annotations
-
 import math
 from typing import Literal
 
