@@ -1,17 +1,15 @@
 """Every change that changes pictures reaches the sequencer's cache of finished frames; playing does not."""
 
-import json
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from support import image_strip, recipe, remembering, request, write_frames
+from support import effect_of, image_strip, recipe, remembering, request, write_frames
 
 from shutter_addon.blender import handlers
-from shutter_addon.blender.data import fcurves, recipe_import, source_media, strips
-from shutter_addon.blender.editing import add_effect, reconcile
+from shutter_addon.blender.data import fcurves, source_media, strips
+from shutter_addon.blender.editing import reconcile
 from shutter_addon.blender.rendering import invalidation, session
-from shutter_addon.core.recipes import recipe_file
 
 REGION = {"name": "Face", "shutter": "S1", "kind": "lasso", "strokes": [[[0.1, 0.1], [0.9, 0.1], [0.5, 0.9]]]}
 MOVED = REGION | {"keys": [{"frame": 1}, {"frame": 9, "location": [0.2, 0.1], "ease": "bezier"}]}
@@ -30,8 +28,7 @@ def effect(bpy, edit, images):
     """An effect on an image strip, with keyed bars and a region that moves."""
     edit.render.resolution_x = edit.render.resolution_y = 32
     source = image_strip(edit, images)
-    strip, effect = add_effect.add_effect(edit, source)
-    recipe_import.apply(edit, effect, strip, recipe_file.parse(json.dumps(KEYED)))
+    _strip, effect = effect_of(edit, source, KEYED)
     bpy.context.view_layer.update()
     return effect
 

@@ -4,10 +4,9 @@ import json
 
 import numpy as np
 import pytest
-from support import state, write_frames
+from support import effect_of, state, write_frames
 
 from shutter_addon.blender.data import geometry, recipe_import
-from shutter_addon.blender.editing import add_effect
 from shutter_addon.core.model.scribbles import mapped
 from shutter_addon.core.recipes import recipe_file
 
@@ -74,8 +73,7 @@ def effect_on(bpy, edit, tmp_path):
         source.right_handle = 71
         for name, value in (transform or {}).items():
             setattr(source.transform, name, value)
-        strip, effect = add_effect.add_effect(edit, source)
-        recipe_import.apply(edit, effect, strip, recipe_file.parse(json.dumps(data)))
+        strip, effect = effect_of(edit, source, data)
         return lambda frame: state(edit, effect, strip, frame + 30)
 
     return make

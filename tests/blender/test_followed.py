@@ -5,10 +5,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from support import image_strip, read_picture, recipe, request, write_frames
+from support import effect_of, image_strip, read_picture, recipe, request, write_frames
 
 from shutter_addon.blender.data import recipe_import, snapshot
-from shutter_addon.blender.editing import add_effect, bar_edits, region_edits
+from shutter_addon.blender.editing import bar_edits, region_edits
 from shutter_addon.blender.rendering import sessions
 from shutter_addon.core.frames import light
 from shutter_addon.core.model.clip import Clip
@@ -56,8 +56,7 @@ def shown(bpy, edit, tmp_path):
         first = write_frames(tmp_path / "in", [film(index, velocity) for index in range(COUNT)])
         source = image_strip(edit, first)
         change(source)
-        strip, effect = add_effect.add_effect(edit, source)
-        recipe_import.apply(edit, effect, strip, recipe_file.parse(json.dumps(data)))
+        strip, effect = effect_of(edit, source, data)
         return edit, effect, strip, request(edit, effect, strip, frame)
 
     yield show

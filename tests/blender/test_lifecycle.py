@@ -1,15 +1,12 @@
 """Effects go with their strips, and come back with them: deleted, undone, cut and pasted, copied."""
 
-import json
-
 import numpy as np
 import pytest
-from support import image_strip, picture_of, recipe, remembering, sequencer, state, write_frames
+from support import effect_of, image_strip, picture_of, recipe, remembering, sequencer, state, write_frames
 
 from shutter_addon.blender import handlers
-from shutter_addon.blender.data import fcurves, recipe_import
+from shutter_addon.blender.data import fcurves
 from shutter_addon.blender.editing import add_effect, undelete
-from shutter_addon.core.recipes import recipe_file
 
 REGION = {"name": "Face", "shutter": "S1", "kind": "lasso", "strokes": [[[0.1, 0.1], [0.9, 0.1], [0.5, 0.9]]]}
 MOVED = REGION | {"keys": [{"frame": 1}, {"frame": 9, "location": [0.2, 0.1], "ease": "bezier"}]}
@@ -34,8 +31,7 @@ def add(edit, images):
 
     def add(start=1, data=KEYED):
         source = image_strip(edit, images, start)
-        strip, effect = add_effect.add_effect(edit, source)
-        recipe_import.apply(edit, effect, strip, recipe_file.parse(json.dumps(data)))
+        strip, _effect = effect_of(edit, source, data)
         return strip
 
     return add

@@ -1,18 +1,15 @@
 """An effect goes along with its source, by itself or by Match Source: a still shutter shows what the source shows."""
 
-import json
-
 import av
 import numpy as np
 import pytest
-from support import recipe, sequencer
+from support import effect_of, recipe, sequencer
 
 from shutter_addon.blender import handlers
-from shutter_addon.blender.data import annotations, fcurves, geometry, recipe_import, selection
+from shutter_addon.blender.data import annotations, fcurves, geometry, selection
 from shutter_addon.blender.editing import add_effect, match_source, reconcile, shutter_edits
 from shutter_addon.blender.rendering import render_job
 from shutter_addon.core.model.scribbles import mapped
-from shutter_addon.core.recipes import recipe_file
 
 LEVELS = 1
 STILL = recipe(4, [1, 0, 0, 0])
@@ -62,8 +59,7 @@ def made(bpy, edit, movie):
 
     def make(data=STILL):
         source = edit.sequence_editor.strips.new_movie("movie", str(movie), 1, 1)
-        strip, effect = add_effect.add_effect(edit, source)
-        recipe_import.apply(edit, effect, strip, recipe_file.parse(json.dumps(data)))
+        strip, _effect = effect_of(edit, source, data)
         selection.choose(edit, strip)
         bpy.context.view_layer.update()
         return strip, source

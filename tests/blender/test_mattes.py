@@ -8,11 +8,11 @@ import shutil
 import av
 import numpy as np
 import pytest
-from support import image_strip, read_picture, recipe, request, sequencer, write_frames
+from support import effect_of, image_strip, read_picture, recipe, request, sequencer, write_frames
 
 from shutter_addon.blender import command
 from shutter_addon.blender.data import geometry, matte_look, recipe_import, selection, snapshot, source_media, strips
-from shutter_addon.blender.editing import add_effect, reconcile, time_map
+from shutter_addon.blender.editing import reconcile, time_map
 from shutter_addon.blender.interface import region_gizmo
 from shutter_addon.blender.output import matte_export
 from shutter_addon.blender.rendering import invalidation, sessions
@@ -63,8 +63,7 @@ def shown(bpy, edit, footage):
     def show(content, change=lambda source: None):
         source = image_strip(edit, footage)
         change(source)
-        strip, effect = add_effect.add_effect(edit, source)
-        recipe_import.apply(edit, effect, strip, recipe_file.parse(json.dumps(content)))
+        strip, effect = effect_of(edit, source, content)
 
         def coefficients(frame):
             asked = request(edit, effect, strip, frame)

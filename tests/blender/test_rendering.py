@@ -1,19 +1,16 @@
 """Renders whose pictures fail: they end with a sentence, whoever renders, and nothing without its effect is written."""
 
-import json
 import subprocess
 import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
-from support import image_strip, read_picture, recipe, write_frames
+from support import effect_of, image_strip, read_picture, recipe, write_frames
 
 from shutter_addon.blender import handlers, rendering
-from shutter_addon.blender.data import recipe_import, source_media, strips
-from shutter_addon.blender.editing import add_effect
+from shutter_addon.blender.data import source_media, strips
 from shutter_addon.blender.rendering import render_job, sessions
-from shutter_addon.core.recipes import recipe_file
 from shutter_addon.media.completeness import whole_pictures
 
 ROOT = Path(__file__).parents[2]
@@ -27,8 +24,7 @@ def film(bpy, edit, tmp_path):
     frames = np.random.default_rng(0).integers(0, 256, (6, 32, 32, 3), dtype=np.uint8)
     first = write_frames(tmp_path / "in", frames)
     source = image_strip(edit, first)
-    strip, effect = add_effect.add_effect(edit, source)
-    recipe_import.apply(edit, effect, strip, recipe_file.parse(json.dumps(recipe(2, [0, 1]))))
+    _strip, _effect = effect_of(edit, source, recipe(2, [0, 1]))
     edit.render.resolution_x = edit.render.resolution_y = 32
     edit.frame_start, edit.frame_end = 1, 6
     edit.render.image_settings.media_type = "IMAGE"
@@ -83,8 +79,7 @@ def test_a_python_that_uses_blender_lives_on(bpy, film, tmp_path, capfd):
 
 def test_two_effects_of_a_frame_fail(bpy, film, tmp_path, capfd):
     source = image_strip(film, tmp_path / "in" / "f0001.png", 1, 5, "more")
-    strip, effect = add_effect.add_effect(film, source)
-    recipe_import.apply(film, effect, strip, recipe_file.parse(json.dumps(recipe(2, [0, 1]))))
+    strip, _effect = effect_of(film, source, recipe(2, [0, 1]))
     strip.blend_type = "ALPHA_OVER"
     broken(tmp_path)
     assert bpy.ops.render.render(animation=True) == {"CANCELLED"}

@@ -1,15 +1,10 @@
 """Colours of a still effect are those of its source in every colour space that Blender's sequencer has."""
 
-import json
-
 import numpy as np
 import pytest
-from support import recipe, write_frames
+from support import effect_of, recipe, write_frames
 
-from shutter_addon.blender.data import recipe_import
-from shutter_addon.blender.editing import add_effect
 from shutter_addon.blender.rendering import pictures
-from shutter_addon.core.recipes import recipe_file
 
 LEVELS = 1
 
@@ -32,8 +27,7 @@ def made(edit, tmp_path):
             edit.sequence_editor.strips.remove(strip)
         source = edit.sequence_editor.strips.new_image("colours", str(first), 1, 1)
         source.right_handle = 3
-        strip, effect = add_effect.add_effect(edit, source)
-        recipe_import.apply(edit, effect, strip, recipe_file.parse(json.dumps(recipe(1, [1]))))
+        strip, _effect = effect_of(edit, source, recipe(1, [1]))
         return strip
 
     return make

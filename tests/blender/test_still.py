@@ -6,7 +6,7 @@ import av
 import numpy as np
 import OpenImageIO
 import pytest
-from support import recipe
+from support import effect_of, recipe
 
 from shutter_addon.blender.data import recipe_import
 from shutter_addon.blender.editing import add_effect
@@ -21,8 +21,7 @@ def still_on(edit):
         source = edit.sequence_editor.strips.new_movie("movie", str(path), 1, 1)
         edit.render.resolution_x = source.elements[0].orig_width
         edit.render.resolution_y = source.elements[0].orig_height
-        strip, effect = add_effect.add_effect(edit, source)
-        recipe_import.apply(edit, effect, strip, recipe_file.parse(json.dumps(recipe(16, np.eye(16)[0]))))
+        strip, _effect = effect_of(edit, source, recipe(16, np.eye(16)[0]))
         edit.render.resolution_x, edit.render.resolution_y = (
             strip.scene.render.resolution_x,
             strip.scene.render.resolution_y,

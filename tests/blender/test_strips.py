@@ -5,14 +5,12 @@ import ctypes
 import av
 import numpy as np
 import pytest
-from support import image_strip, noise_film, picture_of, recipe, sequencer, write_frames
+from support import effect_of, image_strip, noise_film, picture_of, recipe, sequencer, write_frames
 
-from shutter_addon.blender.data import recipe_import
 from shutter_addon.blender.editing import add_effect, shutter_edits
 from shutter_addon.blender.rendering import effect_source
 from shutter_addon.blender.rendering import job_snapshots as snapshots
 from shutter_addon.core.frames import light
-from shutter_addon.core.recipes import recipe_file
 
 LEVELS = 1
 SELECTED = 1 << 4  # SEQ_KEY_SELECTED in a retiming key's flag, behind a double: Python cannot select one
@@ -58,10 +56,8 @@ def effect_on(bpy, edit):
     edit.frame_start, edit.frame_end = -100, 300
 
     def add(source, data=None):
-        import json
 
-        strip, effect = add_effect.add_effect(edit, source)
-        recipe_import.apply(edit, effect, strip, recipe_file.parse(json.dumps(data or recipe(4, [1, 0, 0, 0]))))
+        strip, effect = effect_of(edit, source, data or recipe(4, [1, 0, 0, 0]))
         return strip, effect
 
     return add
