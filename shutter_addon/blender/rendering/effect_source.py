@@ -59,20 +59,27 @@ class SourceKey:
     """What a renderer reads, in plain data: equal where it reads the same frames for the same effect.
 
     scene: session_uid of the effect's scene; spec: Snapshot's source
-    smooth, window: as Options has them of the effect: step and window"""
+    smooth, window, skip_repeats: as Options has them of the effect: step, window and skip_repeats"""
 
     scene: int
     spec: SourceSpec
     smooth: int | str
     window: int
+    skip_repeats: bool = False
     detail: Detail = FULL
 
     @staticmethod
     def of(snapshot: Snapshot, detail: Detail = FULL) -> SourceKey:
         options = snapshot.effect.options.at(min(snapshot.frames))  # neither has keys
         smooth = options.step if detail.smooth else 1
-        window = options.window if smooth != 1 else 0
-        return SourceKey(scene=snapshot.scene, spec=snapshot.source, smooth=smooth, window=window, detail=detail)
+        return SourceKey(
+            scene=snapshot.scene,
+            spec=snapshot.source,
+            smooth=smooth,
+            window=options.window if smooth != 1 else 0,
+            skip_repeats=smooth != 1 and options.skip_repeats,
+            detail=detail,
+        )
 
     def open(self, *, planes: bool = False) -> ShotSource:
         """The source; planes: see PrefetchSource. EffectError, MediaError: there is none."""
@@ -80,16 +87,18 @@ class SourceKey:
         if self.smooth == 1:
             return ShotSource(PrefetchSource(medium, planes=planes))
         try:
-            steps = _steps.ask((self.spec.key, self.smooth, self.window), lambda: self._steps(medium), _KEPT)
+            found_of = self.spec.key, self.smooth, self.window, self.skip_repeats
+            steps = _steps.ask(found_of, lambda: self._steps(medium), _KEPT)
             if steps == 1:
                 return ShotSource(PrefetchSource(medium, planes=planes))
-            return ShotSource(PrefetchSource(SmoothSource(medium, steps), planes=True), steps)
+            smooth = SmoothSource(medium, steps, skip_repeats=self.skip_repeats)
+            return ShotSource(PrefetchSource(smooth, planes=True), steps)
         except FAULTS:
             medium.close()
             raise
 
     def _steps(self, medium: FrameSource) -> int:
-        return steps_for(medium, self.smooth, self.window)
+        return steps_for(medium, self.smooth, self.window, skip_repeats=self.skip_repeats)
 
 
 def open_source(snapshot: Snapshot) -> ShotSource:
