@@ -13,7 +13,7 @@ from ..core.pixels.shown_levels import Display
 from ..devices.device import Device, Given, NamedTextures, Texture
 from ..devices.llvmpipe import MOST_ITERATIONS, median_iterations
 from ..devices.passes import Pass
-from . import cpu, memory_needs, window_frames
+from . import cpu, window_frames
 from .composition_passes import (
     EDGES,
     LEVELS,
@@ -95,9 +95,9 @@ def _threshold(combine: Combine, request: Request, shot: range) -> Given:
     if combine.threshold is None:
         return {}
     options = request.state.options
-    is_there = windows.indices(options, request.index, shot, request.direction)[options.before] >= 0
+    is_there = windows.indices(options, request.index, shot, request.direction)[options.shown] >= 0
     half = max(combine.softness, 1e-6) / 2
-    return {"threshold": (combine.threshold, half), "shown": options.before if is_there else -1}
+    return {"threshold": (combine.threshold, half), "shown": options.shown if is_there else -1}
 
 
 def _in_window(state: FrameState, chosen: tuple[int, ...]) -> FrameState:
@@ -130,9 +130,6 @@ class GPUCompositor:
 
     def stages(self) -> Stages:
         return Stages(self.device)
-
-    def needs(self, source: FrameSource, kind: memory_needs.Kind) -> memory_needs.Needs:
-        return memory_needs.of_windows(self.device, source, kind)
 
     def labels(self, values: np.ndarray) -> Texture:
         """Labels (H, W) uint16 as a texture r32ui. Valid until the next call."""

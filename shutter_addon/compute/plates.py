@@ -148,7 +148,7 @@ class LayerColors:
 
 def nearest_frames(index: int, frames: range, step: int) -> Iterable[int]:
     """The filmed ones of source frames, every step-th, in the order in which a plate is taken from them: those nearest
-    to frame `index`, of two the earlier. In-between frames are made of these, and may not be there."""
+    to frame `index`, of two the earlier. Moments between them are made of these."""
     filmed = (frame for frame in frames if frame % step == 0)
     return sorted(filmed, key=lambda frame: (abs(frame - index), frame))
 

@@ -12,7 +12,6 @@ import numpy as np
 
 from ..core.frames.frame_source import FrameSource, ShotFinder
 from ..core.model import windows
-from .memory_needs import frame_bytes
 from .request import Request
 
 # Pictures whose frames are decoded in advance, and how many frames or bytes of them lie decoded at most, besides those
@@ -111,10 +110,4 @@ def _in_order(source: FrameSource, lacking: list[set[int]]) -> list[int]:
 
 def decoded_ahead(source: FrameSource) -> int:
     """How many frames of a source may lie decoded on the host, besides a window that is kept there."""
-    return max(_DECODED, _DECODED_BYTES // frame_bytes(source))
-
-
-def decoded_bytes(source: FrameSource, window: int) -> int:
-    """Bytes that decoded frames take on the host at most: those of a window of so many frames, and of the next
-    pictures, as far as there is room."""
-    return min(decoded_ahead(source), window + _AHEAD * source.step) * frame_bytes(source)
+    return max(_DECODED, _DECODED_BYTES // (source.width * source.height * 4 * source.dtype.itemsize))

@@ -135,10 +135,13 @@ def _draw() -> None:
     # A stroke that is being drawn would lie below our picture: Blender's own shows the same.
     if previews.pen_is_down():
         previews.was_drawn()
-        return
-    if not context.window_manager.virtual_shutter.live:
+        previews.refine()
         return
     say = _Notes(context.region)
+    if not context.window_manager.virtual_shutter.live:
+        with suppress(*effect_source.FAULTS):  # nothing is told
+            previews.refine()
+        return
     with drawing.pixel_space(context.region):
         if (shown := preview_areas.shown(context)) is not None:
             _show(context, shown, decision, say)
@@ -146,6 +149,10 @@ def _draw() -> None:
             previews.looking.whole = None
             previews.was_drawn()
             _tell_unseen(context, say)
+        try:
+            previews.refine()
+        except effect_source.FAULTS as error:
+            _tell_fault(error, say)
         say.draw()
 
 
@@ -161,6 +168,8 @@ def _show(context: Context, shown: Shown, decision: Decision | None, say: "_Note
                 raise stopping.StoppedError
             with stopping.once(wanted.stopped):
                 _show_picture(context, quad, shown, wanted, say)
+            if wanted.decision.is_plain:
+                say(rpt_("Composing…"))
         except stopping.StoppedError:
             say(rpt_("Composing…"))
             _show_strokes(context, quad, shown, wanted.decision.snapshot)
@@ -209,8 +218,8 @@ def _show_picture(context: Context, quad: Quad, shown: Shown, wanted: Drawing, s
         told.shown(sentence)
         say(sentence)
     # What it measures would take from what runs.
-    if context.space_data.show_overlays and is_still and not previews.may_be_late():
-        decision = wanted.decision
+    decision = wanted.decision
+    if context.space_data.show_overlays and is_still and not decision.is_plain and not previews.may_be_late():
         looked = strobing.look(shown.effect, decision.snapshot, renderer, decision.request)
         _tell_strobing(looked, after_detail, say)
 
@@ -312,7 +321,7 @@ def _show_strokes(context: Context, quad: Quad, shown: Shown, snapshot: Snapshot
 
 def _show_source(quad: Quad, shown: Shown, renderer: Renderer, request: Request, right: float) -> None:
     """The source's own frame, from the left edge on: that of a shutter that is open for it alone."""
-    options = replace(request.state.options, step=1)  # no in-between frames come first in reverse
+    options = replace(request.state.options, step=1)  # no moments come first in reverse
     still = np.zeros((1, options.window))
     still[0, options.before] = 1
     # The shown frame lies where it is for all that move. Without a motion, other frames would have to be read for it.
