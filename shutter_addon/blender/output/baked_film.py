@@ -19,7 +19,7 @@ import numpy as np
 from bpy.app.translations import pgettext_rpt as rpt_
 from bpy.types import PropertyGroup, Scene, Strip
 
-from ...core import atomic_write
+from ...core import atomic_write, stopping
 from ...core.farm import edit_version
 from ...core.messages import EffectError
 from ...core.stopping import StoppedError
@@ -125,10 +125,10 @@ def render(scene: Scene, effect: PropertyGroup, strip: Strip, film: Film, told: 
         return
     start = round(strips.origin(strip))
     taken = snapshot.take(scene, effect, strip, [start + frame for frame in film.frames])
-    with film_output.stoppable() as stopped:
+    with film_output.stoppable() as stopped, stopping.once(lambda: bool(stopped)):
 
         def picture(frame: int) -> np.ndarray:
-            context = sessions.of_render(stopped=lambda: bool(stopped), levels=film.kind == "MOVIE")
+            context = sessions.of_render(levels=film.kind == "MOVIE")
             made = pictures.picture(context, taken, start + frame)
             context.session.begin_next(taken, start + frame, context)
             return made
