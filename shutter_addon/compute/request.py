@@ -1,8 +1,6 @@
 """What is asked of a renderer, a picture as a function of one value; and what makes it, stage by stage, on a device or
 with NumPy."""
 
-from __future__ import annotations
-
 from collections.abc import Hashable, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass
@@ -24,7 +22,7 @@ Handle: TypeAlias = Any
 class Request:
     """All that a picture depends on, in plain data.
 
-    index: the source frame that is shown, from 0; where there are in-between frames it counts them as well
+    index: the source frame that is shown, from 0; where Smooth is on it counts moments
     state: the effect there
     direction: 1, or −1 where the source plays in reverse, so that the window's next frames are those before `index`
     source: what is read and in how much detail, for who has several renderers

@@ -183,7 +183,7 @@ class ShotSource(SourceWrapper):
     """A source that knows where its shots end: a source itself.
 
     step: every step-th frame is one that was filmed. Cuts are looked for in these alone; those between two of them
-    belong to the nearer, the middle one to the first, as InbetweenSource has it.
+    belong to the nearer, the middle one to the first.
     Filmed frames get their signatures when a cut is first looked for, and wait for the next `read` then, as far as
     there is room for them, so that none is decoded twice. Cuts are remembered, and depend on the frames alone;
     what is decided without a frame that cannot be read is decided again.

@@ -1,8 +1,6 @@
 """How far what footage shows moves from frame to frame: whether an exposure over several of them streaks, or shows
 copies of what moves side by side. No bpy."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

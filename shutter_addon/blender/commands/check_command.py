@@ -149,15 +149,11 @@ def _on_device(
     which is a fault, nothing."""
     try:
         kind, lesser = available.choose(render_settings.wanted())
-        compositor = available.OPEN[kind](render_settings.memory())
     except NoDeviceError as error:
         faults.append(str(error))
         return None, []
     notes += [lesser] if lesser else []
-    try:
-        return compositor.name, edit_check.effects(scene, frames)
-    finally:
-        compositor.release()
+    return available.name(kind), edit_check.effects(scene, frames)
 
 
 def _written_folders(arguments: Namespace, checks: list[EffectCheck]) -> Iterator[Path]:

@@ -140,7 +140,7 @@ def _look_at_frames(check: EffectCheck, renderer: Renderer, requests: dict[float
     """Whether the frames that windows need are there: files of image sequences, and of a movie the first and the last
     one."""
     source = renderer.source
-    needed: set[int] = set().union(*map(renderer.needed, requests.values()))
+    needed: set[int] = set().union(*map(renderer.missing, requests.values()))
     ends = {end for index in needed for end in (index // source.step, -(-index // source.step))}
     check.faults += _unreadable(source, ends, source.step)
 

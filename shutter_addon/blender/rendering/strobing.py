@@ -71,7 +71,7 @@ def last(effect: PropertyGroup) -> float | None:
 
 
 def _look(effect: PropertyGroup, snapshot: Snapshot, renderer: Renderer, request: Request) -> float | None:
-    if request.state.options.step > 1:
+    if effect.inbetween != "1":
         return None
     ways = _ways(renderer, request)
     pairs = _chosen(sorted(ways))

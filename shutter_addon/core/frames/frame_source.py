@@ -91,14 +91,6 @@ class FrameSource(ABC):
         """Says which frames will be read next, in this order; others will not. A source may decode them ahead."""
         return  # or it need not
 
-    def has(self, index: int) -> bool:
-        """Whether the frame exists; in-between frames may not be built yet. It is not decoded."""
-        return True
-
-    def check(self, index: int) -> None:
-        """MediaError: the frame does not exist (see `has`)."""
-        return  # all do
-
     def close(self) -> None:
         """Closes the file; a later read opens it again."""
         return
