@@ -174,7 +174,7 @@ def _ended(source_recipe: Effect, index: int | None, tracked: dict, stops: list,
 def _steps(source_recipe: Effect, medium: FrameSource) -> int:
     """How many moments a recipe has from a filmed frame to the next."""
     options = source_recipe.options.at(1)
-    return steps_for(medium, options.step, options.window)
+    return steps_for(medium, options.step, options.window, skip_repeats=options.skip_repeats)
 
 
 def _shown(source_recipe: Effect, frame: float, count: int, step: int) -> int:

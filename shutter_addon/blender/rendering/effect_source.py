@@ -10,6 +10,7 @@ from ...core.frames.frame_source import FrameSource
 from ...core.memo import Kept
 from ...core.messages import EffectError, of_file
 from ...core.model.clip import Clip
+from ...core.model.frame_state import Options
 from ...devices.device import NoDeviceError
 from ...media import MediaError
 from ...media.cuts import ShotSource
@@ -59,11 +60,13 @@ class SourceKey:
     """What a renderer reads, in plain data: equal where it reads the same frames for the same effect.
 
     scene: session_uid of the effect's scene; spec: Snapshot's source; steps: moments from a filmed frame to the next
+    skip_repeats: as Options has it of the effect, where there are steps
     detail: smooth where nothing more than filmed frames is to be had"""
 
     scene: int
     spec: SourceSpec
     steps: int
+    skip_repeats: bool = False
     detail: Detail = FULL
 
     @staticmethod
@@ -72,7 +75,13 @@ class SourceKey:
         steps = find_steps(snapshot) if detail.smooth else 1
         if known_steps(snapshot) == 1:
             detail = replace(detail, smooth=True)
-        return SourceKey(scene=snapshot.scene, spec=snapshot.source, steps=steps, detail=detail)
+        return SourceKey(
+            scene=snapshot.scene,
+            spec=snapshot.source,
+            steps=steps,
+            skip_repeats=steps > 1 and _options(snapshot).skip_repeats,
+            detail=detail,
+        )
 
     @property
     def place(self) -> tuple[int, bool]:
@@ -91,7 +100,8 @@ class SourceKey:
         if self.steps == 1:
             return ShotSource(PrefetchSource(medium, planes=planes))
         try:
-            return ShotSource(PrefetchSource(SmoothSource(medium, self.steps), planes=True), self.steps)
+            smooth = SmoothSource(medium, self.steps, skip_repeats=self.skip_repeats)
+            return ShotSource(PrefetchSource(smooth, planes=True), self.steps)
         except FAULTS:
             medium.close()
             raise
@@ -106,18 +116,24 @@ def known_steps(snapshot: Snapshot) -> int | None:
 def find_steps(snapshot: Snapshot) -> int:
     """As known_steps. It may have to compare frames. EffectError, MediaError: they cannot be read."""
     key = steps_key(snapshot)
+    _source, smooth, window, skip_repeats = key
 
     def find() -> int:
         with snapshot.source.open() as medium:
-            return steps_for(medium, *key[1:])
+            return steps_for(medium, smooth, window, skip_repeats=skip_repeats)
 
-    return 1 if key[1] == 1 else _steps.ask(key, find, _KEPT)
+    return 1 if smooth == 1 else _steps.ask(key, find, _KEPT)
 
 
 def steps_key(snapshot: Snapshot) -> tuple:
     """What the steps are found of."""
-    options = snapshot.effect.options.at(min(snapshot.frames))  # neither has keys
-    return snapshot.source.key, options.step, options.window
+    options = _options(snapshot)
+    return snapshot.source.key, options.step, options.window, options.skip_repeats
+
+
+def _options(snapshot: Snapshot) -> Options:
+    """An effect's options, of which those that decide about steps have no keys."""
+    return snapshot.effect.options.at(min(snapshot.frames))
 
 
 def open_source(snapshot: Snapshot) -> ShotSource:

@@ -108,6 +108,12 @@ class Options:
         blender="inbetween",
         recipe="inbetween",
     )
+    skip_repeats: bool = switch(
+        "Skip Repeated Frames",
+        "Where Smooth is on, show moments between their neighbors in place of frames that repeat the one before, "
+        "as in 24 frames per second that play at 30",
+        default=True,
+    )
     slid: int = 0
     backward: bool = False
 
