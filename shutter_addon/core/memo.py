@@ -43,10 +43,11 @@ class Kept(dict[K, T]):
 
     def ask(self, key: K, make: Callable[[], T], most: int) -> T:
         """The value of a key: the kept one, or what `make` gives, which is kept beside most − 1 others."""
-        try:
-            value = self.pop(key)
-        except KeyError:
-            value = make()
+        return self.keep(key, self[key] if key in self else make(), most)
+
+    def keep(self, key: K, value: T, most: int) -> T:
+        """Keep a value, in place of the key's last one, beside most − 1 others."""
+        self.pop(key, None)
         self[key] = value
         while len(self) > most:
             del self[next(iter(self))]

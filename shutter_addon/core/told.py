@@ -1,6 +1,6 @@
 """The last errors and warnings that users were told, for a report of an error: in memory alone, a hundred at most.
 
-Sentences quote what is the user's. A report has the source text of the calls that made them instead, which is ours.
+Sentences quote what is the user's. A report has the lines of source that made them instead, which are ours.
 """
 
 import linecache
@@ -9,7 +9,7 @@ import threading
 import time
 import traceback
 from pathlib import Path
-from types import CodeType, FrameType
+from types import FrameType
 from typing import NamedTuple
 
 from .memo import Kept
@@ -34,7 +34,7 @@ class Told(NamedTuple):
 
 
 _told: Kept[tuple[str, str], Told] = Kept()  # in the order in which they were told last
-_made: Kept[str, tuple[CodeType, int]] = Kept()  # by sentence of an error: the code that made it last, and where
+_made: Kept[str, tuple[str, int]] = Kept()  # by sentence of an error: the file and the line that made it last
 
 
 def made(sentence: str) -> None:
@@ -43,10 +43,8 @@ def made(sentence: str) -> None:
     while frame and frame.f_code.co_name == "__init__":
         frame = frame.f_back
     if frame and len(sentence) >= _LEAST:
-        call = frame.f_code, frame.f_lasti
         with _lock:
-            _made.pop(sentence, None)
-            _made.ask(sentence, lambda: call, MOST)
+            _made.keep(sentence, (frame.f_code.co_filename, frame.f_lineno), MOST)
 
 
 def record(text: object, level: int = 1) -> None:
@@ -54,7 +52,7 @@ def record(text: object, level: int = 1) -> None:
     words = described(text)
     if not words:
         frame = sys._getframe(level)
-        words = _source(frame.f_code, frame.f_lasti)
+        words = _source(frame.f_code.co_filename, frame.f_lineno)
     _keep(str(text), words)
 
 
@@ -74,10 +72,10 @@ def exception(error: BaseException) -> None:
 
 
 def described(text: object) -> str:
-    """The source text that made the errors which a sentence quotes, the last made first; "": it quotes none."""
+    """The lines that made the errors which a sentence quotes, the last made first; "": it quotes none."""
     with _lock:
-        calls = [call for sentence, call in _made.items() if sentence in str(text)]
-    return " < ".join(_source(*call) for call in reversed(calls))
+        lines = [line for sentence, line in _made.items() if sentence in str(text)]
+    return " < ".join(_source(*line) for line in reversed(lines))
 
 
 def last() -> list[Told]:
@@ -98,18 +96,15 @@ def is_ours(error: BaseException) -> bool:
 
 def _keep(text: str, words: str) -> None:
     with _lock:
-        known = _told.pop((text, words), None)
-        times = known.times + 1 if known else 1
-        _told.ask((text, words), lambda: Told(text, words, time.monotonic() - _start, times), MOST)
+        times = _told[text, words].times + 1 if (text, words) in _told else 1
+        _told.keep((text, words), Told(text, words, time.monotonic() - _start, times), MOST)
 
 
-def _source(code: CodeType, at: int) -> str:
-    """The lines of the statement that an instruction belongs to, as one, and where they are."""
-    if not Path(code.co_filename).is_relative_to(_PACKAGE):
+def _source(file: str, line: int) -> str:
+    """A line of source, and where it is."""
+    if not Path(file).is_relative_to(_PACKAGE):
         return "(words that are not the extension's own)"
-    first, end, *_ = list(code.co_positions())[at // 2]
-    lines = linecache.getlines(code.co_filename)[(first or 1) - 1 : end or first]
-    return f"{' '.join(''.join(lines).split())} [{_place(code.co_filename, first)}]"
+    return f"{linecache.getline(file, line).strip()} [{_place(file, line)}]"
 
 
 def _place(file: str, line: int | None) -> str:

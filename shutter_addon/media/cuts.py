@@ -14,6 +14,7 @@ from ..core.frames.frame_source import FrameSource
 from ..core.frames.moments import Moment
 from ..core.frames.planes import Decoded, Planes, as_rgba
 from ..core.frames.source_wrapper import SourceWrapper
+from ..core.memo import Kept
 from . import plain_cuts
 from .errors import MediaError
 
@@ -176,7 +177,7 @@ class ShotSource(SourceWrapper):
         self.step = step
         self.filmed = (source.count - 1) // step + 1  # how many frames are
         self._cuts: dict[int, bool] = {}  # by filmed frame: whether there is a cut before it
-        self._signatures: dict[int, Signature] = {}  # likewise
+        self._signatures: Kept[int, Signature] = Kept()  # likewise
         self._handed: dict[int, Decoded] = {}
 
     @property  # an attribute would keep its frames until Python looks for cycles
@@ -273,12 +274,10 @@ class ShotSource(SourceWrapper):
             return self._signatures[index]
         frame = self.decoded(index * self.step)
         shown = frame.ends[0] if isinstance(frame, Moment) else frame  # which a repeated frame repeats
-        made = self._signatures[index] = signature(shown, self.transfer, self.alpha)
+        made = self._signatures.keep(index, signature(shown, self.transfer, self.alpha), _KEPT)
         self._handed[index * self.step] = frame
         while len(self._handed) > 1 and len(self._handed) * frame.nbytes > _HANDED_BYTES:
             del self._handed[next(iter(self._handed))]
-        while len(self._signatures) > _KEPT:
-            del self._signatures[next(iter(self._signatures))]
         return made
 
 

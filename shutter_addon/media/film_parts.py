@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from fractions import Fraction
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -29,24 +29,34 @@ _OPTIONS = {"crf": "8", "preset": "fast", "tune": "fastdecode", "g": "12", "bf":
 def write_part(path: Path, pictures: Iterable[np.ndarray], fps: Fraction) -> None:
     """Writes pictures, levels (H, W, 3 or 4) uint8 without alpha, as H.264. MediaError: they cannot be
     written. What `pictures` raises goes through, and nothing is written."""
+
+    def fill(container: OutputContainer) -> int:
+        stream, count = None, 0
+        for picture in pictures:
+            stream = stream or _stream(container, picture.shape, fps)
+            container.mux(stream.encode(_frame(picture, stream, count)))
+            count += 1
+        if stream is None:
+            raise MediaError(f"{path}: there are no frames")
+        container.mux(stream.encode(None))
+        return count
+
+    _write(path, fill)
+
+
+def _write(path: Path, fill: Callable[[OutputContainer], int]) -> None:
+    """Writes a movie whole or not at all. fill: puts frames into its container, and gives how many these are.
+    MediaError: it cannot be written."""
     import av
 
-    count = 0
     try:
         with atomic_write.writing(path) as part:
             with av.open(check_name(part), "w", format="mp4") as container:
-                stream = None
-                for picture in pictures:
-                    stream = stream or _stream(container, picture.shape, fps)
-                    container.mux(stream.encode(_frame(picture, stream, count)))
-                    count += 1
-                if stream is None:
-                    raise MediaError(f"{path}: there are no frames")
-                container.mux(stream.encode(None))
+                count = fill(container)
             if not is_whole_movie(part, count):
                 raise MediaError(f"{path}: could not be written whole")
-    except (OSError, ValueError, OverflowError, av.error.FFmpegError) as error:
-        raise _unwritten(path, error) from None
+    except (OSError, ValueError, IndexError, OverflowError, av.error.FFmpegError) as error:
+        raise MediaError(f"{path}: cannot be written ({getattr(error, 'strerror', None) or error})") from None
 
 
 def _stream(container: OutputContainer, shape: Sequence[int], fps: Fraction) -> VideoStream:
@@ -79,28 +89,20 @@ def join(paths: Sequence[Path], output: Path, fps: Fraction) -> None:
     written."""
     import av
 
-    index = 0
-    try:
-        with atomic_write.writing(output) as part:
-            with av.open(check_name(part), "w", format="mp4") as container:
-                stream = None
-                for path in paths:
-                    with av.open(check_name(path)) as read:
-                        if stream is None:
-                            stream = container.add_stream_from_template(read.streams.video[0])
-                            stream.time_base = 1 / fps
-                        for packet in read.demux(video=0):
-                            if packet.size:
-                                packet.stream, packet.time_base = stream, 1 / fps
-                                packet.pts = packet.dts = index  # no frame waits for a later one
-                                packet.duration = 1
-                                container.mux(packet)
-                                index += 1
-            if not is_whole_movie(part, index):
-                raise MediaError(f"{output}: could not be written whole")
-    except (OSError, ValueError, IndexError, av.error.FFmpegError) as error:
-        raise _unwritten(output, error) from None
+    def fill(container: OutputContainer) -> int:
+        stream, count = None, 0
+        for path in paths:
+            with av.open(check_name(path)) as read:
+                if stream is None:
+                    stream = container.add_stream_from_template(read.streams.video[0])
+                    stream.time_base = 1 / fps
+                for packet in read.demux(video=0):
+                    if packet.size:
+                        packet.stream, packet.time_base = stream, 1 / fps
+                        packet.pts = packet.dts = count  # no frame waits for a later one
+                        packet.duration = 1
+                        container.mux(packet)
+                        count += 1
+        return count
 
-
-def _unwritten(path: Path, error: Exception) -> MediaError:
-    return MediaError(f"{path}: cannot be written ({getattr(error, 'strerror', None) or error})")
+    _write(output, fill)

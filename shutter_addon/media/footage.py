@@ -6,6 +6,7 @@ import numpy as np
 
 from ..core import stopping
 from ..core.frames.frame_source import FrameSource
+from ..core.memo import Kept
 from . import flow, opencv
 
 WIDTH = 960  # pixels of the pictures that are compared, at most, along their longer side
@@ -25,7 +26,7 @@ class Footage:
         self._source, self._index_at = source, index_at
         share = min(1.0, WIDTH / max(source.width, source.height))
         self.size = max(1, round(source.width * share)), max(1, round(source.height * share))
-        self._kept: dict[int, np.ndarray] = {}
+        self._kept: Kept[int, np.ndarray] = Kept()
         self._wanted: Sequence[int] = ()
 
     def want(self, frames: Sequence[int]) -> None:
@@ -69,6 +70,5 @@ class Footage:
             stopping.check()
             self._cut(last, i)  # so that frames are read upwards, and once, to find cuts
             picture = flow.luma(self._source.read(i), self._source.transfer, self._source.alpha)
-            self._kept[i], last = flow.resized(picture, self.size), i
-        while len(self._kept) > KEPT:
-            del self._kept[next(iter(self._kept))]
+            self._kept.keep(i, flow.resized(picture, self.size), KEPT)
+            last = i

@@ -119,8 +119,10 @@ def source_time(edit, effect, frame):
 def picture_of(scene, scene_frame, say=print, stopped=lambda: False):
     """The picture of an effect scene, as the engine gives it to Blender."""
     from shutter_addon.blender.rendering import job_snapshots, pictures, sessions
+    from shutter_addon.core import stopping
 
-    return pictures.picture(sessions.of_engine(say, stopped), *job_snapshots.of(scene, scene_frame))
+    with stopping.once(stopped):
+        return pictures.picture(sessions.of_engine(say), *job_snapshots.of(scene, scene_frame))
 
 
 def request(edit, effect, strip, frame):

@@ -18,7 +18,7 @@ from support import noise_film, read_picture, small_disk
 from shutter_addon.blender import command
 from shutter_addon.blender.data import versions
 from shutter_addon.blender.editing import saved_edit
-from shutter_addon.core.farm import claims, job_file
+from shutter_addon.core.farm import job_file
 from shutter_addon.media import rendered_pictures
 
 ROOT = Path(__file__).parents[2]
@@ -196,7 +196,7 @@ def test_a_killed_worker_and_two_at_once_render_each_frame_once(saved, run, tmp_
         os.kill(killed.pid, signal.SIGKILL)
         assert killed.wait() == -signal.SIGKILL
     assert said == ["wrote 1\n", "wrote 2\n"]
-    assert [name for name in os.listdir(out) if claims.is_claim(name)]
+    assert [name for name in os.listdir(out) if name.startswith(".claim-")]
     finished = {int(path.stem) for path in out.glob("*.png")}
     assert 1 in finished
     assert len(finished) < COUNT
@@ -208,7 +208,7 @@ def test_a_killed_worker_and_two_at_once_render_each_frame_once(saved, run, tmp_
     wrote = [int(line.removeprefix("wrote ")) for line in said.splitlines() if line.startswith("wrote ")]
     assert sorted(wrote) == [frame for frame in range(1, COUNT + 1) if frame not in finished]
     assert bits(out) == bits(tmp_path / "whole")
-    assert not [name for name in os.listdir(out) if claims.is_claim(name)]
+    assert not [name for name in os.listdir(out) if name.startswith(".claim-")]
 
 
 def test_a_job_of_another_version_is_refused(bpy, saved, run, tmp_path):

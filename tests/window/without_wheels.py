@@ -73,7 +73,7 @@ def story():
     shot("preview")
     contexts, said = part("rendering.sessions"), []
     of_engine = contexts.of_engine
-    contexts.of_engine = lambda say, stopped: of_engine(lambda words: (said.append(words), say(words)), stopped)
+    contexts.of_engine = lambda say: of_engine(lambda words: (said.append(words), say(words)))
     edit.frame_set(3)
     yield 1.0
     assert not said, said

@@ -9,6 +9,7 @@ from __future__ import annotations
 import bpy
 from bpy.types import PropertyGroup, Scene, Strip, bpy_prop_collection, bpy_struct
 
+from ...core.memo import Kept
 from ..data import data_format, fcurves, property_copy, recipe_import, strips
 from ..data.annotations import annotation
 from . import add_effect, match_source
@@ -18,7 +19,7 @@ _COPIED = "copied"  # in place of an identity
 _OWN = {"name", "identity", "source", "start"}  # of an effect, what stays where another one is pasted over it
 # What effects point to, and where bpy.data has it.
 _POINTED = {"MovieClip": "movieclips", "Image": "images", "Mask": "masks"}
-_effects: dict[str, dict] = {}
+_effects: Kept[str, dict] = Kept()
 
 
 def keep(effect: PropertyGroup) -> None:
@@ -66,16 +67,14 @@ def _keep(identity: str, effect: PropertyGroup, **more: object) -> None:
     curves = [_plain(curve) for curve in fcurves.curves_under(scene, path + ".")]
     for curve in curves:
         curve["data_path"] = curve["data_path"].removeprefix(path)
-    _effects.pop(identity, None)  # the newest are the last
-    _effects[identity] = more | {
+    kept = more | {
         "scene": (effect_scene.name, (effect_scene.render.resolution_x, effect_scene.render.resolution_y)),
         "format": scene.virtual_shutter.format,
         "effect": _plain(effect),
         "curves": curves,
         "layers": [_plain(layer) for layer in effect_scene.annotation.layers] if effect_scene.annotation else [],
     }
-    while len(_effects) > _MOST:
-        del _effects[next(iter(_effects))]
+    _effects.keep(identity, kept, _MOST)
 
 
 def forget() -> None:

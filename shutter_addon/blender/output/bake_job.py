@@ -18,7 +18,6 @@ from bpy.types import PropertyGroup, Scene, Strip
 
 from ...core import atomic_write
 from ...core.messages import EffectError, signed
-from ...media.folder import Folder
 from ..data import preferences
 from .baked_film import KINDS, Film
 
@@ -110,7 +109,8 @@ def _clear_up(folder: Path, edit: Path) -> None:
     """Removes what bakes left behind that were killed: logs, and the copies of an edit that these name."""
     for left in atomic_write.left_behind(folder):
         with suppress(OSError):
-            name = Folder(left).read(_MANIFEST, 1024).decode(errors="replace")
+            manifest = left / _MANIFEST
+            name = manifest.read_text(encoding="utf-8", errors="replace") if manifest.is_file() else ""
             if _COPY.fullmatch(name):
                 edit.with_name(name).unlink(missing_ok=True)
     atomic_write.clear_up(folder)

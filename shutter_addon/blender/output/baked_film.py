@@ -6,6 +6,7 @@ through its own colour space and back: an EXR has their very bits.
 
 from __future__ import annotations
 
+import shutil
 from collections.abc import Callable, Iterator
 from contextlib import suppress
 from dataclasses import dataclass
@@ -18,7 +19,7 @@ import numpy as np
 from bpy.app.translations import pgettext_rpt as rpt_
 from bpy.types import PropertyGroup, Scene, Strip
 
-from ...core import atomic_write
+from ...core import atomic_write, stopping
 from ...core.farm import edit_version
 from ...core.messages import EffectError
 from ...core.stopping import StoppedError
@@ -26,7 +27,7 @@ from ...media import film_parts, image_writing, pyav, rendered_pictures
 from ...media.blender_movie import frame_rate
 from ...media.completeness import is_whole_movie, is_whole_picture
 from ...media.errors import MediaError
-from ...media.folder import Folder, own_folder
+from ...media.folder import own_folder, refuse_link
 from ..data import colour_configuration, effect_version, snapshot, source_media, strips
 from ..rendering import pictures, sessions
 from . import film_output
@@ -124,10 +125,10 @@ def render(scene: Scene, effect: PropertyGroup, strip: Strip, film: Film, told: 
         return
     start = round(strips.origin(strip))
     taken = snapshot.take(scene, effect, strip, [start + frame for frame in film.frames])
-    with film_output.stoppable() as stopped:
+    with film_output.stoppable() as stopped, stopping.once(lambda: bool(stopped)):
 
         def picture(frame: int) -> np.ndarray:
-            context = sessions.of_render(stopped=lambda: bool(stopped), levels=film.kind == "MOVIE")
+            context = sessions.of_render(levels=film.kind == "MOVIE")
             made = pictures.picture(context, taken, start + frame)
             context.session.begin_next(taken, start + frame, context)
             return made
@@ -180,14 +181,14 @@ def _prepare(place: Path) -> None:
 def _remove_parts(film: Film) -> None:
     """Removes the parts of a movie that is finished, and what killed processes left there, and no other file."""
     parts = [path for path, _frames in film.parts]
-    names, place = {path.name for path in parts}, parts[0].parent
+    place = parts[0].parent
     with suppress(OSError):
-        folder = Folder(place)
-        for entry in folder.entries():
-            if entry.name in names:
-                folder.remove(entry.name)
-            elif atomic_write.is_part(entry.name):
-                folder.remove_part(entry.name, names.__contains__)
+        refuse_link(place)
+        for path in parts:
+            path.unlink(missing_ok=True)
+        for path in place.iterdir():
+            if atomic_write.is_part(path.name):
+                shutil.rmtree(path, ignore_errors=True)
         place.rmdir()
 
 

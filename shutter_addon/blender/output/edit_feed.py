@@ -18,6 +18,7 @@ from pathlib import Path
 
 from bpy.types import Scene
 
+from ...core import stopping
 from ...core.pixels.shown_levels import Display
 from ...media import color
 from ..data import colour_configuration, seen_alone, strips
@@ -111,13 +112,14 @@ def _feed(film: _Film, scene: Scene, seen: seen_alone.Alone) -> bool:
         snapshot, frame = job_snapshots.of(strip.scene, int(shown))
         transfer = color.blended if seen.is_blended else color.shown
         display = None if _data.is_own else Display(scene.render.dither_intensity, transfer)
-        context = sessions.of_render(render_job.say, render_job.stopping, levels=_data.is_own, display=display)
-        source = context.renderer(context.request(snapshot, frame, FULL)).source
-        size = scene.render.resolution_x, scene.render.resolution_y
-        is_known = _data.is_own or source.alpha == "opaque"  # over black, what shines through is known
-        if not is_known or (source.width, source.height) != size:
-            return False
-        levels = pictures.picture(context, snapshot, frame)
+        context = sessions.of_render(render_job.say, levels=_data.is_own, display=display)
+        with stopping.once(render_job.stopping):
+            source = context.renderer(context.request(snapshot, frame, FULL)).source
+            size = scene.render.resolution_x, scene.render.resolution_y
+            is_known = _data.is_own or source.alpha == "opaque"  # over black, what shines through is known
+            if not is_known or (source.width, source.height) != size:
+                return False
+            levels = pictures.picture(context, snapshot, frame)
         _file(film, scene).write(levels)
         context.session.begin_next(snapshot, frame, context)
     except Exception:

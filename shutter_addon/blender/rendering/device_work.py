@@ -31,24 +31,23 @@ class Work(NamedTuple):
         self.ended.set()
         self.future.cancel()
 
-    def result(self, stopped: Callable[[], bool]) -> Any:
+    def result(self) -> Any:
         """As result_of. Not waited for, it is broken off."""
         try:
-            return result_of(self.future, self.relayed, stopped)
+            return result_of(self.future, self.relayed)
         except StoppedError:
             self.break_off()
             raise
 
 
-def result_of(future: Future[T], relayed: bool, stopped: Callable[[], bool]) -> T:
-    """The future's result. StoppedError: it is not waited for any longer. NoDeviceError: it cannot be waited for, as
-    Blender's GPU is not current."""
+def result_of(future: Future[T], relayed: bool) -> T:
+    """The future's result. StoppedError: it is not wanted any longer (`stopping.once`). NoDeviceError: it cannot be
+    waited for, as Blender's GPU is not current."""
     is_window = where() is Where.WINDOW
     while not wait([future], 0 if is_window else _PATIENCE).done:
         if is_window and not main_thread.serve() and relayed:
             require_context()
-        if stopped():
-            raise StoppedError
+        stopping.check()
     return future.result()
 
 

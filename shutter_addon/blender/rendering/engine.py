@@ -7,7 +7,7 @@ import mathutils
 import numpy as np
 from bpy.types import Depsgraph, RenderEngine
 
-from ...core import told
+from ...core import stopping, told
 from ...core.messages import signed
 from ...core.stopping import StoppedError
 from ..data.strips import ENGINE
@@ -50,9 +50,10 @@ class VirtualShutterEngine(bpy.types.RenderEngine):
         last = job_snapshots.pictures.get(scene.session_uid) if render_job.where() is Where.JOB else None
         if last is not None and last.shape == (height, width, 4):
             self._show(last)  # in the render's window, which would be empty until this one is made
-        context = sessions.of_engine(self._say, stopped or self._stopped)
+        context = sessions.of_engine(self._say)
         try:
-            picture = pictures.picture(context, shown, frame, detail)
+            with stopping.once(stopped or self._stopped):
+                picture = pictures.picture(context, shown, frame, detail)
         except StoppedError:
             if stopped is None:
                 raise

@@ -13,7 +13,7 @@ from bpy.app.translations import pgettext_rpt as rpt_
 
 from ...compute.renderer import Renderer
 from ...compute.request import Request
-from ...core.stopping import StoppedError
+from ...core import stopping
 from ...devices.budget import MEGABYTE
 from ...media import color
 from ...media.image_writing import write_exr
@@ -32,16 +32,15 @@ def picture(context: RenderContext, snapshot: Snapshot, frame: float, detail: De
     """The picture (H, W, 4) of an effect strip at a timeline frame, top row first: scene-linear float32, premultiplied,
     or levels, if the context asks for them. One of FAULTS: there is none, in one sentence. StoppedError: it is not
     wanted any longer."""
-    if context.stopped():
-        raise StoppedError
+    stopping.check()
     session, request = context.session, context.request(snapshot, frame, detail)
     renderer = context.renderer(request)  # meanwhile the window may close it: it would be opened again
     if (weights := render_settings.settings().weights) is not None:
         place = weights / f"{round(frame - snapshot.first + 1):04d}.exr"
-        _write_weights(place, snapshot, frame, session.weights(request, context.stopped))
+        _write_weights(place, snapshot, frame, session.weights(request))
     if renderer.source.by_blender:
         _say_once(rpt_(SLOW_DECODING), context.say)
-    made = session.picture(request, context.stopped)
+    made = session.picture(request)
     for sentence in shortages(renderer, snapshot, request):
         _say_once(sentence, context.say)
     return made

@@ -14,12 +14,11 @@ from bpy.app.translations import pgettext_rpt as rpt_
 
 from ...compute.renderer import Renderer
 from ...compute.request import Request
-from ...core import threads
+from ...core import stopping, threads
 from ...core.messages import translated
 from ...core.model.state_at import state_at
 from ...core.pixels.matte_grid import block_means
 from ...core.pixels.shown_levels import Display
-from ...core.stopping import never
 from ...devices.device import NoDeviceError
 from ...media.matte_values import Late, MatteValues
 from ..data.snapshot import Snapshot
@@ -39,13 +38,11 @@ class RenderContext:
 
     session: whose device makes them
     say: called with a sentence when the device is a lesser one, or something cannot be done
-    stopped: whether they are not wanted any longer
     levels: they are of 8-bit display code values (Request.levels)
     display: what shows them, whose levels are wanted (Request.display)"""
 
     session: RenderSession
     say: Callable[[str], None] = print
-    stopped: Callable[[], bool] = never
     levels: bool = False
     display: Display | None = None
 
@@ -55,7 +52,7 @@ class RenderContext:
 
     def renderer(self, request: Request) -> Renderer:
         """See RenderSession.renderer."""
-        return self.session.renderer(request.source, self.say, self.stopped)
+        return self.session.renderer(request.source, self.say)
 
 
 class RenderSession:
@@ -91,12 +88,13 @@ class RenderSession:
         """Whether the device belongs to a thread of its own; otherwise to whichever calls."""
         return self.device != "blender"
 
-    def run(self, function: Callable[..., T], *arguments: object, stopped: Callable[[], bool] = never) -> T:
-        """The result of a function that uses the device. StoppedError: it is not waited for any longer, and ends."""
-        return self._submit(function, *arguments, stopped=stopped).result(stopped)
+    def run(self, function: Callable[..., T], *arguments: object) -> T:
+        """The result of a function that uses the device, wanted whatever becomes of the picture that is made."""
+        with stopping.once(stopping.never):
+            return self._submit(function, *arguments).result()
 
-    def _submit(self, function: Callable, *arguments: object, stopped: Callable[[], bool] = never) -> Work:
-        """A function that uses the device, called after those before it. stopped: asked where it is called at once."""
+    def _submit(self, function: Callable, *arguments: object) -> Work:
+        """A function that uses the device, called after those before it."""
         ended = threading.Event()
         if self.threaded:
             if self._executor is None:
@@ -105,21 +103,21 @@ class RenderSession:
                 future = self._executor.submit(broken_off, ended.is_set, function, *arguments)
                 return Work(future, ended, self.device == "relayed")
         done: Future = Future()
-        done.set_result(broken_off(stopped, function, *arguments))
+        done.set_result(function(*arguments))
         return Work(done, ended, False)
 
     def request(
         self, snapshot: Snapshot, frame: float, context: RenderContext, detail: Detail | None = None
     ) -> Request:
-        """What an effect strip shows at a timeline frame. One of FAULTS: it cannot be shown. StoppedError: the device
-        is not waited for any longer.
+        """What an effect strip shows at a timeline frame. One of FAULTS: it cannot be shown. StoppedError: it is not
+        wanted any longer.
 
         detail: None: as it was the last time, for who asks for no picture"""
         if detail is None:
             known = (self._renderers.get((snapshot.scene, is_smooth)) for is_smooth in (False, True))
             detail = next((each[0].detail for each in known if each), FULL)
         key = SourceKey.of(snapshot, detail)
-        source = self.renderer(key, context.say, context.stopped).source
+        source = self.renderer(key, context.say).source
         if (last := self._requests.get(key.place)) and last[0] is snapshot and last[1] == frame:
             request = last[2]
             if (request.source, request.levels, request.display) == (key, context.levels, context.display):
@@ -137,16 +135,17 @@ class RenderSession:
         self._requests[key.place] = snapshot, frame, request
         return request
 
-    def picture(self, request: Request, stopped: Callable[[], bool] = never) -> np.ndarray:
-        """The requested picture, if need be the one that was begun for it. StoppedError: it is not waited for."""
+    def picture(self, request: Request) -> np.ndarray:
+        """The requested picture, if need be the one that was begun for it. StoppedError: it is not wanted any
+        longer."""
         key, begun = self._begun.pop(request.source.scene, (None, None))
         if begun is not None and key != request.key:
             begun.break_off()
             begun = None
-        return (begun or self._begin(request, stopped)).result(stopped)
+        return (begun or self._begin(request)).result()
 
-    def _begin(self, request: Request, stopped: Callable[[], bool] = never) -> Work:
-        return self._submit(self.renderer(request.source).picture, request, stopped=stopped)
+    def _begin(self, request: Request) -> Work:
+        return self._submit(self.renderer(request.source).picture, request)
 
     def begin_next(self, snapshot: Snapshot, frame: float, context: RenderContext) -> None:
         """Begins the picture after the one at that timeline frame, where a film is rendered: if the last two were
@@ -162,16 +161,14 @@ class RenderSession:
                 request = self.request(snapshot, frame + step, context, FULL)
                 self._begun[snapshot.scene] = request.key, self._begin(request)
 
-    def weights(self, request: Request, stopped: Callable[[], bool] = never) -> list[np.ndarray]:
+    def weights(self, request: Request) -> list[np.ndarray]:
         """Coefficients (h, w) of all shutters, and then the mattes of all layers, in blocks as large."""
-        return self.run(_weights, self.renderer(request.source), request, stopped=stopped)
+        return self._submit(_weights, self.renderer(request.source), request).result()
 
-    def renderer(
-        self, key: SourceKey, say: Callable[[str], None] = print, stopped: Callable[[], bool] = never
-    ) -> Renderer:
+    def renderer(self, key: SourceKey, say: Callable[[str], None] = print) -> Renderer:
         """The renderer that reads what the key says: its effect has one other at most, for plain pictures or for smooth
         ones. One of FAULTS: there is none."""
-        compositor = self._opened(say, stopped)
+        compositor = self._opened(say)
         known = self._renderers.pop(key.place, None)
         if known is None or known[0] != key:
             if known is not None:
@@ -191,14 +188,15 @@ class RenderSession:
         known = self._renderers.get(key.place)
         return known[1] if known and known[0] == key else None
 
-    def _opened(self, say: Callable[[str], None], stopped: Callable[[], bool]) -> Any:
+    def _opened(self, say: Callable[[str], None]) -> Any:
         """The compositor, opened if need be."""
         if self._compositor is None:
-            self._compositor = self._submit(available.OPEN[self.device], render_settings.memory(), self._ask).future
+            with stopping.once(stopping.never):
+                self._compositor = self._submit(available.OPEN[self.device], render_settings.memory(), self._ask).future
             if self._chosen and (message := self._chosen[1]):
                 say(message)
         try:
-            return result_of(self._compositor, self.device == "relayed", stopped)
+            return result_of(self._compositor, self.device == "relayed")
         except NoDeviceError:
             self._compositor = None
             raise

@@ -9,7 +9,6 @@ from collections.abc import Callable
 import bpy
 
 from ...core.pixels.shown_levels import Display
-from ...core.stopping import never
 from ..devices import available, main_thread
 from . import outline_carrying, render_job, render_settings, smooth_previews
 from .render_job import Where
@@ -45,20 +44,16 @@ def of_drawing() -> RenderContext:
     return RenderContext(WINDOW) if render_job.where() is Where.WINDOW else of_render()
 
 
-def of_engine(say: Callable[[str], None], stopped: Callable[[], bool]) -> RenderContext:
+def of_engine(say: Callable[[str], None]) -> RenderContext:
     """For the engine: a preview where Blender draws, else a render."""
-    return of_render(say, stopped) if render_job.ends_films() else RenderContext(WINDOW, say, stopped)
+    return of_render(say) if render_job.ends_films() else RenderContext(WINDOW, say)
 
 
 def of_render(
-    say: Callable[[str], None] = print,
-    stopped: Callable[[], bool] = never,
-    *,
-    levels: bool = False,
-    display: Display | None = None,
+    say: Callable[[str], None] = print, *, levels: bool = False, display: Display | None = None
 ) -> RenderContext:
     """For a render: on a device apart from the window's, which need not be current. NoDeviceError: there is none."""
-    return RenderContext(_of_render(), say, stopped, levels=levels, display=display)
+    return RenderContext(_of_render(), say, levels=levels, display=display)
 
 
 def _of_render() -> RenderSession:

@@ -19,6 +19,7 @@ from bpy.types import PropertyGroup
 from ...compute.renderer import Renderer
 from ...compute.request import Request
 from ...core import threads
+from ...core.memo import Kept
 from ...core.model import windows
 from ...core.model.frame_state import FrameState
 from ...core.model.motions import Similarity
@@ -38,7 +39,7 @@ class _Look(NamedTuple):
     repeats: bool
 
 
-_moved: dict[tuple, steps.Moved | None] = {}  # by a source's key and a pair
+_moved: Kept[tuple, steps.Moved | None] = Kept()  # by a source's key and a pair
 _last_looks: dict[int, _Look] = {}  # by scene
 
 
@@ -91,7 +92,9 @@ def _look(effect: PropertyGroup, snapshot: Snapshot, renderer: Renderer, request
     if lacking := [pair for pair in pairs if (snapshot.source.key, pair) not in _moved]:
         _measuring.wanted = partial(_measure_motion, snapshot.source, lacking)
         return None
-    known = [(motion, way) for pair in pairs for way in ways[pair] if (motion := _moved[snapshot.source.key, pair])]
+    known = [
+        (motion, way) for pair in pairs for way in ways[pair] if (motion := _moved.get((snapshot.source.key, pair)))
+    ]
     height = effect.scene.render.resolution_y
     step = max((steps.step(motion, *way) for motion, way in known), default=0.0) * height
     return step if step > steps.smooth(height) else None
@@ -167,12 +170,10 @@ def forget() -> None:
 
 def _measure_motion(spec: SourceSpec, lacking: list[int]) -> None:
     for pair in lacking:
-        _moved[spec.key, pair] = None  # what cannot be read is not tried again
+        _moved.keep((spec.key, pair), None, _KEPT)  # what cannot be read is not tried again
     if opencv.cv2 is None:
         return
     with suppress(MediaError, OSError), spec.open() as medium:
         for pair in lacking:
             if not _stopped.is_set():
-                _moved[spec.key, pair] = steps.moved(medium, pair)
-    while len(_moved) > _KEPT:
-        del _moved[next(iter(_moved))]
+                _moved.keep((spec.key, pair), steps.moved(medium, pair), _KEPT)

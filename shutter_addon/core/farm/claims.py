@@ -99,11 +99,6 @@ class Claims:
                     os.utime(self._path(name, generation))
 
 
-def is_claim(name: str) -> bool:
-    """Whether it is the name of a claim's file."""
-    return _NAME.fullmatch(name) is not None
-
-
 def _make(path: Path) -> bool:
     """Whether the claim was made; else there is one. What it holds is for people who wonder whose it is, and tells it
     from one that was made later by the same name."""
