@@ -305,7 +305,7 @@ def test_what_lies_elsewhere_in_another_blender_is_read_there(moving, other_blen
     from shutter_addon.blender.data import struct_dna
 
     other_blender("MaskLayer", moved=8)
-    size = struct_dna.record("MaskLayer", "char name[64]").itemsize
+    size = struct_dna.record("MaskLayer", ("char name[64]", "S64")).itemsize
     layer = moving.layers[0]
     grown = ctypes.create_string_buffer(bytes(8) + struct_dna.memory(layer.as_pointer(), size - 8))
     there = Like(moving, layers=[Like(layer, as_pointer=lambda: ctypes.addressof(grown))])
