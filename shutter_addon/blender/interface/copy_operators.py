@@ -4,9 +4,8 @@ to whoever helps."""
 from pathlib import Path
 
 import bpy
-from bpy.app.translations import contexts
 from bpy.app.translations import pgettext_rpt as rpt_
-from bpy.props import EnumProperty, StringProperty
+from bpy.props import StringProperty
 from bpy.types import Context, Operator, PropertyGroup
 from bpy_extras.io_utils import ExportHelper, ImportHelper
 
@@ -15,14 +14,12 @@ from ...core.recipes import recipe_file
 from ..data import data_format, recipe_import, selection
 from ..editing import add_effect, undelete
 from ..output import error_report, matte_export
-from .matte_operators import strip_items
+from .matte_operators import STRIP
 from .operator_bases import Named, OfEffect, chosen_file, operator, report_error, report_warning
 from .operators import MakesEffect
 
-_STRIP = EnumProperty(name="Strip", items=strip_items, translation_context=contexts.no_translation)
 
-
-@operator("Choose Source", strip=_STRIP)
+@operator("Choose Source", strip=STRIP)
 def source(self: Operator, _context: Context, effect: PropertyGroup) -> None:
     """Give the effect another clip: the movie, image or clip strip whose frames it exposes"""
     add_effect.choose_source(effect, self.effect_strip, self.edit.sequence_editor.strips_all[self.strip])
