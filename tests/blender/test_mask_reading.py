@@ -293,7 +293,7 @@ def test_a_layer_that_is_not_what_the_api_says(moving):
 def test_what_lies_elsewhere_in_another_blender_is_read_there(moving, other_blender):
     """As if a new field of eight bytes came first in the records of layers."""
     other_blender("MaskLayer", moved=8)
-    size = struct_dna.record("MaskLayer", "char name[64]").itemsize
+    size = struct_dna.record("MaskLayer", ("char name[64]", "S64")).itemsize
     layer = moving.layers[0]
     grown = ctypes.create_string_buffer(bytes(8) + struct_dna.memory(layer.as_pointer(), size - 8))
     there = Like(moving, layers=[Like(layer, as_pointer=lambda: ctypes.addressof(grown))])

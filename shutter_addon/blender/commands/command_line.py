@@ -20,6 +20,7 @@ from ...core.model.frame_state import Options
 from ...media import open_source
 from ...media.files import stamp
 from ...media.sequence import by_number
+from ..data import versions
 from ..devices import available
 from ..editing import saved_edit
 from ..output import film_output
@@ -98,8 +99,16 @@ class Edit(NamedTuple):
     opened: tuple[int, int] | None
 
     def version(self) -> EditVersion:
-        """See saved_edit.version."""
-        return saved_edit.version(self.scene, self.path, self.opened)
+        """Give the version of the edit as it was opened.
+
+        Raises:
+            SavedEditError: It was saved over since, so that its key would be that of another edit.
+            OSError: It is gone.
+        """
+        current = versions.of_edit(self.scene)
+        if stamp(self.path) != self.opened:
+            raise saved_edit.SavedEditError(f"{self.path}: was saved over while it was opened; start again")
+        return current
 
 
 def open_edit(path: Path, asked: str | None) -> Edit:

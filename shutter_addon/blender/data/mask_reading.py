@@ -9,7 +9,6 @@ from __future__ import annotations
 from bisect import bisect_right
 from collections.abc import Iterator
 from itertools import chain
-from typing import NamedTuple
 
 import bpy
 import numpy as np
@@ -24,26 +23,17 @@ from .struct_dna import LayoutError, memory, read, record, text
 
 # Coordinates that are farther off are no mask of any picture.
 _FARTHEST = 1e4
-# Numbers of a point in a shape key: two handles with the point between them, weight and radius.
+# Numbers of a point in a shape key, float32: two handles with the point between them, weight and radius.
 _SHAPE_NUMBERS = 8
 
-# Records of Blender's memory with their fields, as struct_dna.record takes them.
-_LAYER = "MaskLayer", "char name[64]", "ListBase splines", "ListBase splines_shapes"
-_LINKS = "MaskLayerShape *next", "MaskLayerShape *prev"
-_SHAPE = "MaskLayerShape", *_LINKS, "float *data", "int tot_vert", "int frame"
+# Records of Blender's memory, as struct_dna.record takes them.
+_LAYER = ("char name[64]", "S64"), ("ListBase splines", "2u8"), ("ListBase splines_shapes", "2u8")
+_SHAPE = (
+    *(("MaskLayerShape *next", "u8"), ("MaskLayerShape *prev", "u8"), ("float *data", "u8")),
+    *(("int tot_vert", "i4"), ("int frame", "i4")),
+)
 
-
-class Shape(NamedTuple):
-    """A shape key: its frame, how many points it has, and where their numbers lie."""
-
-    frame: int
-    points: int
-    address: int
-
-    def numbers(self) -> np.ndarray:
-        """(points, 8) float32."""
-        size = self.points * _SHAPE_NUMBERS * np.dtype(np.float32).itemsize
-        return np.frombuffer(memory(self.address, size), np.float32).reshape(-1, _SHAPE_NUMBERS)
+Shapes = dict[int, np.ndarray]  # shape keys by frame, ascending: (points, 8) float32
 
 
 def mask_at(mask: bpy.types.Mask, frame: float) -> MaskShape:
@@ -57,14 +47,14 @@ def mask_at(mask: bpy.types.Mask, frame: float) -> MaskShape:
 def motion(mask: bpy.types.Mask) -> Iterator[tuple]:
     """What lets a mask differ from frame to frame, F-curves apart: its shape keys. EffectError: they cannot be read."""
     for layer in mask.layers:
-        for shape in _shapes(mask, layer):
-            yield shape.frame, shape.numbers().tobytes()
+        for frame, points in _shapes(mask, layer).items():
+            yield frame, points.tobytes()
 
 
 def key_frames(mask: bpy.types.Mask) -> list[float]:
     """The frames of a mask at which something is said of it: shape keys, and keys of its F-curves. EffectError: they
     cannot be read."""
-    keyed = {float(shape.frame) for layer in mask.layers for shape in _shapes(mask, layer)}
+    keyed = {float(frame) for layer in mask.layers for frame in _shapes(mask, layer)}
     return sorted(keyed.union(fcurves.key_frames(fcurves.curves_under(mask, ""))))
 
 
@@ -128,25 +118,25 @@ def _checked(mask: bpy.types.Mask, values: ArrayLike) -> np.ndarray:
     return values
 
 
-def _keyed_points(layer: bpy.types.MaskLayer, shapes: list[Shape], frame: float) -> np.ndarray | None:
+def _keyed_points(layer: bpy.types.MaskLayer, shapes: Shapes, frame: float) -> np.ndarray | None:
     """The points of all splines of a layer (n, 8) by its shape keys, which are held before the first and behind the
     last; None where it has none that fit."""
     if not shapes:
         return None
-    place = bisect_right([shape.frame for shape in shapes], frame)
-    before, after = shapes[max(place - 1, 0)], shapes[min(place, len(shapes) - 1)]
-    count = sum(len(spline.points) for spline in layer.splines)
-    if (before.points, after.points) != (count, count):
+    frames, count = list(shapes), sum(len(spline.points) for spline in layer.splines)
+    place = bisect_right(frames, frame)
+    before, after = frames[max(place - 1, 0)], frames[min(place, len(frames) - 1)]
+    if any(len(shapes[each]) != count for each in (before, after)):
         return None
-    first, last = before.numbers().astype(np.float64), after.numbers().astype(np.float64)
-    share = (frame - before.frame) / max(after.frame - before.frame, 1) if frame > before.frame else 0.0
+    first, last = shapes[before].astype(np.float64), shapes[after].astype(np.float64)
+    share = (frame - before) / max(after - before, 1) if frame > before else 0.0
     return first + (last - first) * share
 
 
-def _shapes(mask: bpy.types.Mask, layer: bpy.types.MaskLayer) -> list[Shape]:
-    """The shape keys of a layer, in order, from Blender's memory. EffectError: they cannot be read in this Blender."""
+def _shapes(mask: bpy.types.Mask, layer: bpy.types.MaskLayer) -> Shapes:
+    """The shape keys of a layer, from Blender's memory. EffectError: they cannot be read in this Blender."""
     try:
-        return _shapes_in_memory(layer) if layer.splines else []
+        return _shapes_in_memory(layer) if layer.splines else {}
     except LayoutError:
         sentence = rpt_(
             'mask "{mask}": its shape keys cannot be read in this version of Blender, but a film of its Mask strip can'
@@ -155,21 +145,21 @@ def _shapes(mask: bpy.types.Mask, layer: bpy.types.MaskLayer) -> list[Shape]:
         raise EffectError(sentence.format(mask=mask.name)) from None
 
 
-def _shapes_in_memory(layer: bpy.types.MaskLayer) -> list[Shape]:
+def _shapes_in_memory(layer: bpy.types.MaskLayer) -> Shapes:
     """LayoutError: they are not there. No address is followed before the record that has it was found to be what the
     API says, or what leads there."""
-    kind, raw = record(*_SHAPE), read(record(*_LAYER), layer.as_pointer())
-    ends = layer.splines[0].as_pointer(), layer.splines[-1].as_pointer()
-    if text(raw["name"]) != layer.name.encode() or tuple(raw["splines"].tolist()) != ends:
+    kind = record("MaskLayerShape", *_SHAPE)
+    name, splines, (address, last) = read(record("MaskLayer", *_LAYER), layer.as_pointer())
+    ends = [layer.splines[0].as_pointer(), layer.splines[-1].as_pointer()]
+    if text(name) != layer.name.encode() or splines != ends:
         raise LayoutError("MaskLayer")
-    shapes: list[Shape] = []
-    (address, last), before = raw["splines_shapes"].tolist(), 0
+    shapes: Shapes = {}
+    before = 0
     while address:
-        following, previous, data, points, frame = read(kind, address).tolist()
-        ascends = not shapes or shapes[-1].frame < frame
-        if previous != before or points < 0 or not data or not ascends:
+        following, previous, data, points, frame = read(kind, address)
+        if previous != before or points < 0 or not data or (shapes and frame <= next(reversed(shapes))):
             raise LayoutError("MaskLayerShape")
-        shapes.append(Shape(frame, points, data))
+        shapes[frame] = np.frombuffer(memory(data, 4 * _SHAPE_NUMBERS * points), np.float32).reshape(-1, _SHAPE_NUMBERS)
         before, address = address, following
     if last != before:
         raise LayoutError("MaskLayerShape")

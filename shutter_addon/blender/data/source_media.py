@@ -96,11 +96,6 @@ def between(place: tuple, count: int, path: Callable[[int], Path]) -> int:
     return look.key
 
 
-def stem(strip: Strip) -> str:
-    """The name of the strip's first file, without its suffix. MediaError: it has none."""
-    return _files(strip)[1](0).stem
-
-
 def reading(strip: Strip) -> tuple:
     """How the strip's files are read: colour space, alpha and the like."""
     clip = strip.clip if strip.type == "MOVIECLIP" else None

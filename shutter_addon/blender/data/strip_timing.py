@@ -10,6 +10,9 @@ _FIELDS = (
     *("name", "content_start", "content_end", "content_trim_start", "content_trim_end", "left_handle"),
     *("use_reverse_frames", "strobe"),
 )
+# Records of Blender's memory, as struct_dna.record takes them.
+_SEQUENCE = ("char name[64]", "S64"), ("SeqRetimingHandle *retiming_handles", "u8"), ("int retiming_handle_num", "i4")
+_KEY = ("double strip_frame_index", "f8"), ("int flag", "i4"), ("float retiming_factor", "f4")
 
 
 def timing_of(strip) -> StripTiming:
@@ -33,14 +36,12 @@ def retiming_keys(strip) -> tuple[RetimingKey, ...] | None:
     """The strip's retiming keys from Blender's memory. Python gets their frames alone, in Blender 5.2 as if the strip
     began with the first one of the edit, and of a clip strip nothing at all. None: they cannot be read."""
     try:
-        fields = "char name[64]", "SeqRetimingHandle *retiming_handles", "int retiming_handle_num"
-        held = read(record("Sequence", *fields), strip.as_pointer())
-        kind = record("SeqRetimingHandle", "double strip_frame_index", "int flag", "float retiming_factor")
+        name, first, count = read(record("Sequence", *_SEQUENCE), strip.as_pointer())
+        kind = record("SeqRetimingHandle", *_KEY)
     except LayoutError:
         return None
-    if text(held["name"])[2:] != strip.name.encode():  # behind the letters SQ
+    if text(name)[2:] != strip.name.encode():  # behind the letters SQ
         return None
-    first, count = int(held["retiming_handles"]), int(held["retiming_handle_num"])
     stored = np.frombuffer(memory(first, count * kind.itemsize), kind) if count else ()
     keys = tuple(RetimingKey(*key.tolist()) for key in stored)
     return keys if are_retiming_keys(keys) else None

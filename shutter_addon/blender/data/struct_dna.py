@@ -19,8 +19,6 @@ import bpy
 import numpy as np
 
 _POINTER = 8  # bytes
-_NUMBERS = {"int": "i4", "float": "f4", "double": "f8"}
-_FIELD = re.compile(r"(\w+) (\**)(\w+)(?:\[(\d+)\])?")  # char name[64]
 
 
 class LayoutError(Exception):
@@ -28,28 +26,28 @@ class LayoutError(Exception):
 
 
 @cache
-def record(name: str, *fields: str) -> np.dtype:
-    """The type of a record of Blender's memory with some of its fields, under their names: numbers, addresses
-    (uintp), text (bytes) and lists ("first" and "last"). LayoutError: it is another one in this Blender.
+def record(name: str, *fields: tuple[str, str]) -> np.dtype:
+    """Give the type of a record of Blender's memory with some of its fields.
 
-    fields: as Blender declares them, `char name[64]`"""
+    Args:
+        fields: Each as Blender declares it, and as NumPy reads it: ("char name[64]", "S64"). A list has two addresses,
+            of its first and its last item.
+
+    Raises:
+        LayoutError: It is another one in this Blender.
+    """
     size, places = described().get(name, (0, {}))
-    parts = [match for field in fields if (match := _FIELD.fullmatch(field)) and field in places]
-    if len(parts) < len(fields):
+    declared = [words for words, _format in fields]
+    if not places.keys() >= set(declared):
         raise LayoutError(name)
-    return np.dtype(
-        {
-            "names": [part[3] for part in parts],
-            "formats": [_format(part[1], part[2], part[4]) for part in parts],
-            "offsets": [places[field] for field in fields],
-            "itemsize": size,
-        }
-    )
+    offsets, formats = [places[words] for words in declared], [kind for _words, kind in fields]
+    return np.dtype({"names": declared, "formats": formats, "offsets": offsets, "itemsize": size})
 
 
-def read(kind: np.dtype, address: int) -> np.void:
-    """A record (`record`) at an address in Blender's memory."""
-    return np.frombuffer(memory(address, kind.itemsize), kind)[0]
+def read(kind: np.dtype, address: int) -> tuple:
+    """Give the fields of a record (`record`) at an address in Blender's memory: numbers, bytes and lists."""
+    fields = np.frombuffer(memory(address, kind.itemsize), kind)[0]
+    return tuple(fields[name].tolist() for name in kind.names or ())
 
 
 def memory(address: int, size: int) -> bytes:
@@ -60,14 +58,6 @@ def memory(address: int, size: int) -> bytes:
 def text(field: bytes) -> bytes:
     """What a field of text says."""
     return field.partition(b"\0")[0]
-
-
-def _format(kind: str, stars: str, length: str) -> object:
-    if stars:
-        return np.uintp
-    if kind == "ListBase":
-        return record(kind, "void *first", "void *last")
-    return f"S{length}" if kind == "char" else _NUMBERS[kind]
 
 
 @cache

@@ -18,8 +18,6 @@ from bpy.app.translations import pgettext_rpt as rpt_
 from bpy.types import Property, PropertyGroup
 
 from ...core.messages import EffectError
-from ...core.model.effect import MatteRegion, Region
-from ...core.model.fields import fields_of
 from ...core.model.limits import MAX_FRAME
 
 _PLACES = {
@@ -63,20 +61,17 @@ def check(items: Sequence[PropertyGroup], name: str, numbers: np.ndarray) -> Non
         number(item, name, value)
 
 
-def check_region(region: PropertyGroup) -> None:
-    """EffectError: a property of a region, as it stands, is outside of its range."""
-    word(region, "kind")
-    for field in fields_of(Region, MatteRegion).values():
-        if field.is_channel:
-            number(region, field.blender)
-    check_placement(region)
+def check_moving(moving: PropertyGroup) -> None:
+    """Check the properties of a region or the camera, as they stand.
 
-
-def check_placement(moving: PropertyGroup) -> None:
-    """EffectError: a number of where a region or the camera is, as it stands, is outside of its range."""
-    for name in ("location", "rotation", "scale"):
-        for value in np.atleast_1d(getattr(moving, name)):
-            number(moving, name, float(value))
+    Raises:
+        EffectError: One is outside of its range.
+    """
+    for prop in moving.bl_rna.properties:
+        if prop.identifier == "kind":
+            word(moving, "kind")
+        for value in np.atleast_1d(getattr(moving, prop.identifier)) if prop.type == "FLOAT" else ():
+            number(moving, prop.identifier, float(value))
 
 
 def word(group: PropertyGroup, name: str, value: float | None = None) -> Any:

@@ -150,7 +150,7 @@ def _points(scene: Scene, effect: PropertyGroup, strip: Strip, index: int, start
     """By timeline frame of the strip the points that a region follows, as the strip shows them. EffectError,
     MediaError: there is nothing that it can follow from the frame `start` on."""
     region = effect.regions[index]
-    validation.check_region(region)
+    validation.check_moving(region)
     motion_keys.check_curves(effect, index)
     validation.word(region, "motion")
     tracks, size = _markers(region), annotations.picture_size(effect)
@@ -270,7 +270,7 @@ def follow_stabilization(scene: Scene, effect: PropertyGroup, strip: Strip) -> N
     """Keys the camera by the stabilization of its clip, from where it is now, at the current frame. EffectError,
     MediaError: there is nothing to follow, and nothing has changed."""
     camera, start, size = effect.camera, scene.frame_current, annotations.picture_size(effect)
-    validation.check_placement(camera)
+    validation.check_moving(camera)
     motion_keys.check_curves(effect, None)
     if camera.follow_clip is None:
         raise EffectError(rpt_("Choose a clip first"))

@@ -5,10 +5,8 @@ from pathlib import Path
 import bpy
 from bpy.types import Scene
 
-from ...core.farm.edit_version import EditVersion
 from ...core.messages import UserError, sentence
-from ...media.files import stamp
-from ..data import used_data, versions
+from ..data import used_data
 from ..output import film_output
 
 ENDING = ".blend"
@@ -50,17 +48,6 @@ def open_edit(path: Path, name: str | None = None) -> Scene:
         words += f" ({sentence(driver.expression, 40)}); bake it to keyframes, and save the file"
         raise SavedEditError(f"{path}: {words}")
     return scene
-
-
-def version(scene: Scene, path: Path, opened: tuple[int, int] | None) -> EditVersion:
-    """The version of an edit that was opened from a file.
-
-    opened: its stamp before (media.files.stamp). SavedEditError: it was saved over since, so that its key would be
-    that of another edit; OSError: it is gone"""
-    current = versions.of_edit(scene)
-    if stamp(path) != opened:
-        raise SavedEditError(f"{path}: was saved over while it was opened; start again")
-    return current
 
 
 def _scripts(scene: Scene) -> list[tuple]:

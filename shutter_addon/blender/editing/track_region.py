@@ -103,7 +103,7 @@ def track(
     where no frame was tracked yet, so that Blender goes on; None: it is waited for
     EffectError, MediaError: it cannot be tracked; where no frame has come yet, nothing has changed."""
     moving = selection.moving(effect, index)
-    (validation.check_placement if index is None else validation.check_region)(moving)
+    validation.check_moving(moving)
     motion_keys.check_curves(effect, index)
     start, keys = scene.frame_current, MotionKeys(effect, index, motion)
     # Those beyond the frames that are tracked tell how the subject looks as well.

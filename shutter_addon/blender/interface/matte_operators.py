@@ -48,16 +48,16 @@ class SHUTTER_OT_matte_add(OfEffect, ImportHelper, Operator):
 
 
 @kept
-def strip_items(context: Context) -> list[tuple]:
+def _strips(context: Context) -> list[tuple]:
     scene = selection.scene_of(context)
     all_strips = scene.sequence_editor.strips_all if scene and scene.sequence_editor else ()
     return [(strip.name, strip.name, "") for strip in all_strips if strip.type in strips.SOURCES]
 
 
-_STRIP = EnumProperty(name="Strip", items=strip_items, translation_context=contexts.no_translation)
+STRIP = EnumProperty(name="Strip", items=_strips, translation_context=contexts.no_translation)
 
 
-@operator("Matte from Strip", needs.room_for_a_region, strip=_STRIP)
+@operator("Matte from Strip", needs.room_for_a_region, strip=STRIP)
 def matte_strip(self: Operator, _context: Context, effect: PropertyGroup) -> None:
     """Make a movie, image or clip strip of the edit the matte of the active shutter, muted or not"""
     region = region_edits.add_region(effect, selection.active_shutter(effect), "MATTE", self.strip, matte="STRIP")

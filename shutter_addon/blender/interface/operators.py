@@ -32,7 +32,7 @@ from ..editing import (
 from ..editing import match_source as matching
 from ..output import error_report, matte_export
 from . import icons, needs, sharp_frame
-from .matte_operators import strip_items
+from .matte_operators import STRIP
 from .operator_bases import (
     UNDOABLE,
     Mixin,
@@ -390,10 +390,7 @@ def region_key(_self: Operator, _context: Context, effect: PropertyGroup) -> Non
     region_edits.key_region(effect, effect.active_region)
 
 
-_STRIP = EnumProperty(name="Strip", items=strip_items, translation_context=contexts.no_translation)
-
-
-@operator("Choose Source", strip=_STRIP)
+@operator("Choose Source", strip=STRIP)
 def source(self: Operator, _context: Context, effect: PropertyGroup) -> None:
     """Give the effect another clip: the movie, image or clip strip whose frames it exposes"""
     add_effect.choose_source(effect, self.effect_strip, self.edit.sequence_editor.strips_all[self.strip])

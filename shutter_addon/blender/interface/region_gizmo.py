@@ -57,7 +57,7 @@ def place(context: Context) -> Place | None:
     scene, effect, strip = seen
     try:
         strokes = _strokes_now(scene, effect, strip)
-        validation.check_region(region)
+        validation.check_moving(region)
     except EffectError:  # panels and the live preview tell it
         return None
     if not strokes:

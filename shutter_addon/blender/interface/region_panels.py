@@ -46,7 +46,7 @@ def draw_regions(layout: UILayout, scene: Scene, effect: PropertyGroup, strip: S
     if region.kind in strips.LAID:
         _draw_blend(layout, region)
     try:
-        validation.check_region(region)
+        validation.check_moving(region)
     except EffectError as error:
         sentence(layout, str(error), "ERROR")
 
