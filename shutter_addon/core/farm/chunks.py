@@ -7,11 +7,13 @@ LEAST = 24
 
 
 def decoded(frames: int, window: int, step: int = 1) -> int:
-    """How many frames of a source, moments between them included, a chunk of so many timeline frames reads: those of its
-    first picture's window, and `step` more for each later picture.
+    """Count the frames and moments of a source that a chunk of so many timeline frames reads.
 
-    window: frames that a shutter can expose, moments included; step: how many of these the source moves on from one
-    timeline frame to the next, which is how many a filmed frame has unless it is retimed"""
+    Args:
+        window: frames that a shutter can expose, moments included.
+        step: how many of these the source moves on by from one timeline frame to the next: as many as a filmed frame
+            has, unless the source is retimed.
+    """
     return (frames - 1) * step + window
 
 
