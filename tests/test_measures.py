@@ -40,7 +40,6 @@ def measured(folder, code):
     [
         ("quality", ["none.mp4"], "quality: none.mp4: no such file"),
         ("inbetween_quality", ["--films", "none.mp4", "--parts", "films"], "inbetween_quality: none.mp4: no such file"),
-        ("render_speed", ["none.mp4"], "render_speed: none.mp4: no such file"),
         ("truth", ["--samples", "100"], "truth.py: error: --samples: 100 is not a multiple of 64"),
     ],
 )

@@ -1,7 +1,5 @@
 """Plates: what lies behind layers where a frame does not show it, from other frames, or from what is around."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable
 
 import numpy as np

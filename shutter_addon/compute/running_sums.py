@@ -181,8 +181,8 @@ class Sums(Window):
 
     def _send(self, index: int) -> tuple[str, Given]:
         """Sends a source frame: as what (`accumulation`), and the arguments of the pass that adds it."""
-        is_moment = index % self.source.step > 0
-        frame = self.source.decoded(index) if self.device.takes_planes or is_moment else self.source.read(index)
+        may_be_moment = self.source.step > 1
+        frame = self.source.decoded(index) if self.device.takes_planes or may_be_moment else self.source.read(index)
         if isinstance(frame, Planes):
             return "PLANES", self._send_planes(frame)
         if isinstance(frame, Moment):
@@ -205,7 +205,7 @@ class Sums(Window):
         }
 
     def _send_moment(self, moment: Moment) -> Given:
-        first, second = (self._filmed(moment.pair + k, end) for k, end in enumerate(moment.ends))
+        first, second = self._filmed(moment)
         vectors = self._extra.filled("vectors", [moment.vectors], "rgba16")
         shift = (STEP**2 * moment.steps).bit_length() - 1
         return {
@@ -213,13 +213,18 @@ class Sums(Window):
             "moment": (moment.number, moment.steps, shift),
         }
 
-    def _filmed(self, number: int, frame: np.ndarray) -> Texture:
-        """A filmed frame on the device: those of a pair stay for all its moments."""
-        texture = self._own(f"filmed {number % 2}", "rgba8")
-        if self._sent.get(number % 2) != number:
-            self.device.write(texture, frame, opaque=True)
-            self._sent[number % 2] = number
-        return texture
+    def _filmed(self, moment: Moment) -> list[Texture]:
+        """The two frames of a moment on the device: they stay for all moments of their pair, and one for the next."""
+        textures = []
+        for number, frame in zip(moment.pair, moment.ends, strict=True):
+            place = next((i for i in range(2) if self._sent.get(i) == number), None)
+            if place is None:
+                place = next(i for i in range(2) if self._sent.get(i) not in moment.pair)
+            textures.append(self._own(f"filmed {place}", "rgba8"))
+            if self._sent.get(place) != number:
+                self.device.write(textures[-1], frame, opaque=True)
+                self._sent[place] = number
+        return textures
 
     def release(self) -> None:
         self._frames, self._light, self._sent = {}, None, {}

@@ -149,9 +149,6 @@ class Asked:
     def coefficients(self):
         return self.session.run(self.renderer.coefficients, self.request)
 
-    def check(self):
-        self.renderer.check(self.request)
-
 
 def packages(folder, blenders_python):
     """A folder, for PYTHONPATH, of what smooth effects need besides what the Blender of a distribution has."""

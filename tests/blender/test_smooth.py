@@ -3,6 +3,8 @@
 Pictures are compared with sums of moments that are known: random ones in place of flow's (standin.py)."""
 
 import itertools
+import threading
+import time
 from types import SimpleNamespace
 
 import numpy as np
@@ -342,6 +344,66 @@ def test_a_preview_is_plain_while_it_plays_and_smooth_when_it_stands(film, add, 
         picture = light.to_encoded(drawing.session.picture(asked)[..., :3]) * 255
         assert bool(made) != is_playing
         same_pixels(picture, plain if is_playing else shown(frames, around(4, bars), bars), 1)
+
+
+def test_a_still_preview_is_plain_until_its_moments_are_there(film, add, edit, bpy, monkeypatch, same_pixels):
+    """Drawn over and over, as the window does, and nobody has to click. No step of it waits for a frame that a thread
+    makes; both renderers stay as it plays and stands still again."""
+    from shutter_addon.blender.data import snapshot
+    from shutter_addon.blender.rendering import effect_source, sessions, smooth_previews
+
+    first, frames = film
+    bars = np.ones(3)
+    _source, strip, effect = add(first, COUNT, bars)
+    drawing, gate = sessions.of_drawing(), threading.Event()
+    monkeypatch.setattr(flow, "Between", lambda *given: gate.wait() and Between(*given))
+    taken = snapshot.take(edit, effect, strip, (2,))
+    plain = light.to_encoded(frames[[4, 8, 12]].mean(axis=0)) * 255
+
+    def asked():
+        smooth_previews.advance(60)
+        return smooth_previews.chosen(drawing, taken, 2, effect_source.FULL)
+
+    def same(request, expected):
+        same_pixels(light.to_encoded(drawing.session.picture(request)[..., :3]) * 255, expected, 1)
+
+    for _ in range(5):
+        request = asked()
+        assert request.state.options.step == 1
+        assert smooth_previews.is_busy()
+        same(request, plain)
+    gate.set()
+    until = time.monotonic() + 20
+    while (request := asked()).state.options.step == 1:
+        assert time.monotonic() < until
+    assert not smooth_previews.is_busy()
+    same(request, shown(frames, around(4, bars), bars))
+    both = drawing.request(taken, 2, effect_source.Detail(smooth=False)), request
+    renderers = [drawing.renderer(each) for each in both]
+    assert renderers[0] is not renderers[1]
+    smooth_previews.rest()  # as it plays
+    gate.clear()
+    assert asked() == request  # what it needs is there: nothing plain comes before
+    assert [drawing.renderer(each) for each in both] == renderers
+    gate.set()
+
+
+def test_footage_that_needs_no_moments_has_one_renderer(add, edit, tmp_path):
+    from shutter_addon.blender.data import snapshot
+    from shutter_addon.blender.rendering import effect_source, sessions, smooth_previews
+
+    _source, strip, effect = add(moving(tmp_path / "film", 0), 6, np.ones(4), "AUTO")
+    taken, drawing = snapshot.take(edit, effect, strip, (2,)), sessions.of_drawing()
+    first = smooth_previews.chosen(drawing, taken, 2, effect_source.FULL)
+    assert not first.source.detail.smooth
+    until = time.monotonic() + 20
+    while smooth_previews.is_busy():
+        assert time.monotonic() < until
+        smooth_previews.advance(60)
+        last = smooth_previews.chosen(drawing, taken, 2, effect_source.FULL)
+    assert last.source.detail == effect_source.FULL
+    assert last.state.options.step == 1
+    assert len(drawing.session._renderers) == 1  # where what is not needed would show
 
 
 def test_a_dragged_playhead_waits_for_no_flow(bpy, monkeypatch):

@@ -385,16 +385,16 @@ def test_a_single_shape_that_goes_leaves_the_default(device):
     assert pytest.approx(np.tile([0.75, 0.25, 0], (37 * 23, 1))) == found.reshape(3, -1).T
 
 
-def test_what_is_needed_is_what_is_read(device):
+def test_what_is_missing_is_what_is_read(device):
     rng = np.random.default_rng(21)
     for edges in ("hold", "mirror", "shorten"):
         for index, direction in ((0, 1), (18, 1), (2, -1)):
             source = footage(rng)
             moment = state(rng, edges=edges, position="center")
             renderer = Renderer(device, source)
-            needed = renderer.needed(Request(index, moment, direction))
+            missing = renderer.missing(Request(index, moment, direction))
             renderer.picture(Request(index, moment, direction))
-            assert set(source.reads) == needed
+            assert set(source.reads) == missing
 
 
 def test_no_new_solve_when_nothing_moved(device, monkeypatch):
