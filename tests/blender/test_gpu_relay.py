@@ -5,11 +5,12 @@ from unittest.mock import Mock
 
 import pytest
 
+from shutter_addon.blender.devices import gpu_relay
+
 
 @pytest.fixture
 def clock(monkeypatch):
     """A clock that stands still: `now` may be set forward, and `meanwhile` is called at the next look at the time."""
-    from shutter_addon.blender.devices import gpu_relay
 
     def look():
         meanwhile, clock.meanwhile = clock.meanwhile, None
@@ -25,8 +26,6 @@ def clock(monkeypatch):
 @pytest.fixture
 def relay(bpy, monkeypatch, clock):
     """As where Blender's GPU is current."""
-    from shutter_addon.blender.devices import gpu_relay
-
     monkeypatch.setattr(gpu_relay, "has_context", lambda: True)
     monkeypatch.setattr(gpu_relay, "gpu", Mock())
     return gpu_relay

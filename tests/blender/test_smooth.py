@@ -24,7 +24,7 @@ from shutter_addon.blender.data import (
     strips,
 )
 from shutter_addon.blender.editing import add_effect, bar_edits, shutter_edits
-from shutter_addon.blender.rendering import effect_source, invalidation, previews, render_job, sessions
+from shutter_addon.blender.rendering import effect_source, invalidation, previews, render_job, sessions, smooth_previews
 from shutter_addon.core.frames import light
 from shutter_addon.core.recipes import recipe_file
 from shutter_addon.media import MediaError, flow, open_source, opencv, smooth
@@ -349,9 +349,6 @@ def test_a_preview_is_plain_while_it_plays_and_smooth_when_it_stands(film, add, 
 def test_a_still_preview_is_plain_until_its_moments_are_there(film, add, edit, bpy, monkeypatch, same_pixels):
     """Drawn over and over, as the window does, and nobody has to click. No step of it waits for a frame that a thread
     makes; both renderers stay as it plays and stands still again."""
-    from shutter_addon.blender.data import snapshot
-    from shutter_addon.blender.rendering import effect_source, sessions, smooth_previews
-
     first, frames = film
     bars = np.ones(3)
     _source, strip, effect = add(first, COUNT, bars)
@@ -389,9 +386,6 @@ def test_a_still_preview_is_plain_until_its_moments_are_there(film, add, edit, b
 
 
 def test_footage_that_needs_no_moments_has_one_renderer(add, edit, tmp_path):
-    from shutter_addon.blender.data import snapshot
-    from shutter_addon.blender.rendering import effect_source, sessions, smooth_previews
-
     _source, strip, effect = add(moving(tmp_path / "film", 0), 6, np.ones(4), "AUTO")
     taken, drawing = snapshot.take(edit, effect, strip, (2,)), sessions.of_drawing()
     first = smooth_previews.chosen(drawing, taken, 2, effect_source.FULL)
