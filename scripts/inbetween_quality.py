@@ -1,7 +1,7 @@
 """How close moments between frames come to frames that were left out, beside other ways, measured in one run.
 
-    python scripts/inbetween_quality.py [--films A.mp4,B.avi] [--frames 121] [--scenes A,B] [--parts films,scenes]
-                                        [--table FILE] [--json FILE] [--picture FILE]
+    python scripts/inbetween_quality.py [--films A.mp4,B.avi] [--frames 121] [--scenes A,B] [--size 480x270]
+                                        [--parts films,scenes] [--table FILE] [--json FILE] [--docs]
 
 films: every second frame is dropped and rebuilt. PSNR and SSIM are of 8-bit pictures.
 scenes: of footage of the gallery, rendered at 240 fps, every eighth frame is kept, the others are rebuilt; and a box
@@ -23,10 +23,10 @@ import time
 from itertools import pairwise
 from pathlib import Path
 
-import cv2
 import numpy as np
-from comparing import ROOT, codes, listed, psnr, similarity, write_rows
+from comparing import ROOT, codes, listed, psnr, read_codes, rendered, similarity, write_rows
 
+from gallery import stills
 from shutter_addon.core.frames import light
 from shutter_addon.core.frames.planes import as_rgba
 from shutter_addon.media import MediaError, flow, open_source
@@ -34,6 +34,7 @@ from shutter_addon.media import MediaError, flow, open_source
 FILMS = [ROOT / "assets" / name for name in ("bigbuckbunny.mp4", "pedestrians.avi")]
 FACTOR = 8  # 240 fps from 30
 BOX = 4  # kept frames that the box exposes
+SHOWN, ARM = 100, np.s_[30:620, 60:700]  # of the picture for the manual: a frame of the demo's film, from 1, and a part
 
 
 def linear(picture: np.ndarray) -> np.ndarray:
@@ -117,9 +118,13 @@ def films(args) -> list[dict]:
     return rows
 
 
-def footage(name) -> list[np.ndarray]:
-    """The gallery's, at 240 fps."""
-    first = importlib.import_module(f"gallery.{name}").ITEM.footage(ROOT / "out" / "gallery" / name / "footage")
+def footage(name, size) -> list[np.ndarray]:
+    """The gallery's, at 240 fps; None: in the gallery's size."""
+    from gallery import scenes
+
+    scenes.SIZE = size or scenes.SIZE
+    folder = ROOT / "out" / "gallery" / name / ("footage" if size is None else f"footage {size[0]}")
+    first = importlib.import_module(f"gallery.{name}").ITEM.footage(folder)
     with open_source(first) as source:
         return [source.read(index)[..., :3] for index in range(source.count)]
 
@@ -129,7 +134,7 @@ def scenes(args) -> list[dict]:
 
 
 def scene(name, args) -> list[dict]:
-    truth = footage(name)[args.start * FACTOR : (args.start + BOX) * FACTOR + 1]
+    truth = footage(name, args.size)[args.start * FACTOR : (args.start + BOX) * FACTOR + 1]
     rows, rebuilt = compare(name, truth, FACTOR)
     kept = truth[::FACTOR]
     exposed = [exposure(truth[:-1])]
@@ -142,9 +147,6 @@ def scene(name, args) -> list[dict]:
         rows.append(row | {"psnr": psnr(picture, exposed[0]), "ssim": similarity(picture, exposed[0])})
         print("| {footage}, box | {box} | {psnr:.2f} | | {ssim:.4f} | | |".format(**rows[-1]), flush=True)
         exposed.append(picture)
-    if args.picture and name == args.scenes[0]:
-        few, many = f"{BOX} frames at 30 fps", f"30 fps, {FACTOR}x moments"
-        save(args.picture, [(exposed[1], few), (exposed[2], many), (exposed[0], "240 fps")])
     return rows
 
 
@@ -156,17 +158,15 @@ def exposure(frames) -> np.ndarray:
     return codes((total / len(frames)).astype(np.float32))
 
 
-def save(path, labelled) -> None:
-    """The pictures side by side, each with its words below."""
-    columns = []
-    for picture, words in labelled:
-        shown = cv2.resize(picture, (640, 640 * picture.shape[0] // picture.shape[1]), interpolation=cv2.INTER_AREA)
-        shown = cv2.copyMakeBorder(shown, 0, 40, 0, 8, cv2.BORDER_CONSTANT, value=(24, 24, 24))
-        place = (8, shown.shape[0] - 13)
-        cv2.putText(shown, words, place, cv2.FONT_HERSHEY_SIMPLEX, 0.7, (230, 230, 230), 1, cv2.LINE_AA)
-        columns.append(shown)
-    path.parent.mkdir(parents=True, exist_ok=True)
-    cv2.imwrite(str(path), np.hstack(columns)[..., ::-1], [cv2.IMWRITE_JPEG_QUALITY, 85])
+def picture(path: Path) -> None:
+    """A long exposure of the demo's film, without Smooth and with it, beside its first frame."""
+    box = {"version": 2, "window": BOX * 2, "shutters": [{"name": "Box", "bars": [1] * BOX * 2}]}
+    panels = [stills.Panel(read_codes(FILMS[0], SHOWN - 1)[ARM] / np.float32(255), "One frame")]
+    with tempfile.TemporaryDirectory() as folder:
+        for smooth, words in ((1, f"{BOX * 2} frames"), (FACTOR, f"{BOX * 2} frames, Smooth")):
+            files = rendered(FILMS[0], box | {"inbetween": smooth}, [SHOWN], Path(folder, str(smooth)), "png")
+            panels.append(stills.Panel(read_codes(*files)[ARM] / np.float32(255), words))
+    stills.save(stills.sheet(stills.row(*panels)), path)
 
 
 PARTS = {"films": films, "scenes": scenes}
@@ -179,8 +179,9 @@ def parse(arguments=None):
     add("--films", type=listed(Path), default=FILMS, help="separated by commas")
     add("--frames", type=int, default=121, help="of each film, from the first on")
     add("--scenes", type=listed(str), default="rolling_shutter,pendulum", help="of gallery/ (%(default)s)")
+    add("--size", type=lambda text: tuple(map(int, text.split("x"))), help="of the scenes' frames, WIDTHxHEIGHT")
     add("--start", type=int, default=1, help="first frame at 30 fps (%(default)s)")
-    add("--picture", type=Path, help="where the first scene's box shutters are written, side by side")
+    add("--docs", action="store_true", help="renew the manual's picture, docs/smooth.jpg, and measure nothing")
     add("--json", type=Path, help="where the rows are written")
     add("--table", type=Path, help="where the films' and scenes' table is written, as Markdown")
     return parser.parse_args(arguments)
@@ -188,6 +189,9 @@ def parse(arguments=None):
 
 def main(arguments=None) -> int:
     args = parse(arguments)
+    if args.docs:
+        picture(ROOT / "docs" / "smooth.jpg")
+        return 0
     try:
         rows = [row for part in args.parts for row in PARTS[part](args)]
     except MediaError as error:

@@ -5,11 +5,12 @@ from unittest.mock import Mock
 
 import pytest
 
+from shutter_addon.blender.devices import main_thread
+
 
 @pytest.fixture
 def clock(monkeypatch):
     """A clock that stands still: `now` may be set forward, and `meanwhile` is called at the next look at the time."""
-    from shutter_addon.blender.devices import main_thread
 
     def look():
         meanwhile, clock.meanwhile = clock.meanwhile, None
@@ -25,8 +26,6 @@ def clock(monkeypatch):
 @pytest.fixture
 def relay(bpy, monkeypatch, clock):
     """As where Blender's GPU is current."""
-    from shutter_addon.blender.devices import main_thread
-
     monkeypatch.setattr(main_thread, "has_context", lambda: True)
     monkeypatch.setattr(main_thread, "gpu", Mock())
     return main_thread

@@ -24,7 +24,7 @@ from shutter_addon.blender.data import (
     strips,
 )
 from shutter_addon.blender.editing import add_effect, bar_edits, shutter_edits
-from shutter_addon.blender.rendering import effect_source, invalidation, previews, render_job, sessions
+from shutter_addon.blender.rendering import effect_source, invalidation, previews, render_job, sessions, smooth_previews
 from shutter_addon.core.frames import light
 from shutter_addon.core.recipes import recipe_file
 from shutter_addon.media import MediaError, flow, open_source, opencv, smooth
@@ -338,9 +338,10 @@ def test_a_preview_is_plain_while_it_plays_and_smooth_when_it_stands(film, add, 
     taken = snapshot.take(edit, effect, strip, (2,))
     plain = light.to_encoded(frames[[4, 8, 12]].mean(axis=0)) * 255
     for is_playing in (True, False, True):
+        # No preview plays without a window.
         monkeypatch.setattr(previews, "_is_playing", lambda _context, is_playing=is_playing: is_playing)
         made.clear()
-        asked = drawing.request(taken, 2, previews._detail(bpy.context, look))
+        asked = drawing.request(taken, 2, previews._detail(bpy.context, look))  # as a preview asks, which is drawn
         picture = light.to_encoded(drawing.session.picture(asked)[..., :3]) * 255
         assert bool(made) != is_playing
         same_pixels(picture, plain if is_playing else shown(frames, around(4, bars), bars), 1)
@@ -349,9 +350,6 @@ def test_a_preview_is_plain_while_it_plays_and_smooth_when_it_stands(film, add, 
 def test_a_still_preview_is_plain_until_its_moments_are_there(film, add, edit, bpy, monkeypatch, same_pixels):
     """Drawn over and over, as the window does, and nobody has to click. No step of it waits for a frame that a thread
     makes; both renderers stay as it plays and stands still again."""
-    from shutter_addon.blender.data import snapshot
-    from shutter_addon.blender.rendering import effect_source, sessions, smooth_previews
-
     first, frames = film
     bars = np.ones(3)
     _source, strip, effect = add(first, COUNT, bars)
@@ -389,9 +387,6 @@ def test_a_still_preview_is_plain_until_its_moments_are_there(film, add, edit, b
 
 
 def test_footage_that_needs_no_moments_has_one_renderer(add, edit, tmp_path):
-    from shutter_addon.blender.data import snapshot
-    from shutter_addon.blender.rendering import effect_source, sessions, smooth_previews
-
     _source, strip, effect = add(moving(tmp_path / "film", 0), 6, np.ones(4), "AUTO")
     taken, drawing = snapshot.take(edit, effect, strip, (2,)), sessions.of_drawing()
     first = smooth_previews.chosen(drawing, taken, 2, effect_source.FULL)
@@ -408,9 +403,9 @@ def test_footage_that_needs_no_moments_has_one_renderer(add, edit, tmp_path):
 
 def test_a_dragged_playhead_waits_for_no_flow(bpy, monkeypatch):
     look = preview_areas.Look(scale=0.5, proxy=None, is_plain=True)
-    assert previews._detail(bpy.context, look).smooth
+    assert previews._detail(bpy.context, look).smooth  # as a preview asks, which is drawn
     monkeypatch.setattr(render_job, "operators_running", lambda: {"ANIM_OT_change_frame"})
-    assert not previews._detail(bpy.context, look).smooth
+    assert not previews._detail(bpy.context, look).smooth  # likewise
     monkeypatch.setattr(previews.looking, "late_until", 0.0)
 
 

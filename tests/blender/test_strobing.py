@@ -106,7 +106,7 @@ def test_where_smooth_is_on_nothing_is_said(add, smooth, window):
     edit, effect, strip = add(12, np.ones(window))
     effect.inbetween = smooth
     assert looked(edit, effect, strip) is None
-    assert not strobing._moved
+    assert not strobing._moved  # nobody else is told what is measured
     effect.inbetween = "1"
     assert looked(edit, effect, strip) == pytest.approx(12, abs=0.3)
 
@@ -136,10 +136,10 @@ def test_drawing_never_waits_and_measures_once(add, monkeypatch):
 
 def test_what_is_known_is_forgotten_with_the_file(add, bpy):
     looked(*add(12, np.ones(4)))
-    assert strobing._moved
+    assert strobing._moved  # nobody else is told what is kept
     bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
-    assert not strobing._moved
-    assert not strobing._last_looks
+    assert not strobing._moved  # likewise
+    assert not strobing._last_looks  # likewise
 
 
 # The button

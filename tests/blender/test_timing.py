@@ -11,7 +11,6 @@ from shutter_addon.blender.data import strip_timing, struct_dna
 from shutter_addon.blender.editing import add_effect, shutter_edits
 from shutter_addon.blender.output import edit_check
 from shutter_addon.blender.rendering import pictures
-from shutter_addon.compute.cpu import CPUCompositor
 from shutter_addon.core.frames.retiming import RetimingKey, are_retiming_keys
 from shutter_addon.core.model.clip import Clip
 
@@ -56,7 +55,7 @@ def test_what_cannot_be_read_is_shown_at_an_even_speed(bpy, edit, tmp_path, monk
         picture_of(strip.scene, frame, told.append)
     said = 'strip "images": its retiming keys cannot be read'
     assert sum(said in sentence for sentence in told) == 1
-    (check,) = edit_check.effects(edit, range(1, 52), CPUCompositor(), find_cuts=False)
+    (check,) = edit_check.effects(edit, range(1, 52))
     assert not check.faults
     assert any(said in note for note in check.notes)
 

@@ -132,15 +132,15 @@ def test_filmed_frames_of_a_pair_are_sent_once(gpu_device, monkeypatch):
     """With the vectors of each moment, a sixteenth of a picture."""
     from shutter_addon.compute.gpu import GPUCompositor
 
-    sent, own = [], running_sums.Sums._filmed
+    sent, own = [], running_sums.Sums._filmed  # what is sent shows nowhere else
 
     def noted(sums, number, frame):
-        before = dict(sums._sent)
+        before = dict(sums._sent)  # likewise
         texture = own(sums, number, frame)
-        sent.extend([number] if sums._sent != before else [])
+        sent.extend([number] if sums._sent != before else [])  # likewise
         return texture
 
-    monkeypatch.setattr(running_sums.Sums, "_filmed", noted)
+    monkeypatch.setattr(running_sums.Sums, "_filmed", noted)  # likewise
     source = SmoothSource(film(np.random.default_rng(7)), 8)
     moment = smooth(FrameState(Options(4), np.ones((1, 4))), 8)
     Renderer(GPUCompositor(gpu_device), source).picture(Request(0, moment))

@@ -239,10 +239,6 @@ def outlines(shapes):
     return [replace(shape, kind="line", width=0.0) if shape.kind == "lasso" else shape for shape in shapes]
 
 
-def unturned(ramp, *size):
-    return ramp_values(replace(ramp, rotation=0), *size)
-
-
 def twice(options, positions, shot):
     if options.edges != "mirror":
         return source_frames(options, positions, shot)

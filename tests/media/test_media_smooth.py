@@ -238,7 +238,7 @@ def test_few_pairs_tell_the_first_and_the_last_among_them(fast):
     own = film.read
     film.read = lambda index: asked.append(index) or own(index)
     assert steps_for(film, "auto", 8) == 4
-    assert len(asked) <= 2 * smooth._PAIRS
+    assert len(asked) <= 2 * smooth._PAIRS  # the number is nobody else's
     assert (min(asked), max(asked)) == (0, 1000)
 
 

@@ -39,7 +39,7 @@ def in_time():
 @pytest.fixture(autouse=True)
 def _nowhere_else(monkeypatch):
     """Where mattes are kept in place of a folder is each test's own."""
-    monkeypatch.setattr(carried_mattes, "_elsewhere", {})
+    monkeypatch.setattr(carried_mattes, "_elsewhere", {})  # which lasts as long as the program
 
 
 @pytest.fixture
