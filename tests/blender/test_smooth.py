@@ -349,9 +349,11 @@ def test_a_preview_is_plain_while_it_plays_and_smooth_when_it_stands(film, add, 
     taken = snapshot.take(edit, effect, strip, (2,))
     plain = light.to_encoded(frames[[4, 8, 12]].mean(axis=0)) * 255
     for is_playing in (True, False, True):
+        # No window plays here, and none draws: what a preview asks for.
         monkeypatch.setattr(previews, "_is_playing", lambda _context, is_playing=is_playing: is_playing)
         made.clear()
-        asked = drawing.request(taken, 2, previews._detail(bpy.context, look))
+        detail = previews._detail(bpy.context, look)  # likewise
+        asked = drawing.request(taken, 2, detail)
         picture = light.to_encoded(drawing.session.picture(asked)[..., :3]) * 255
         assert bool(made) != is_playing
         same_pixels(picture, plain if is_playing else shown(frames, around(4, bars), bars), 1)
@@ -422,9 +424,9 @@ def test_a_dragged_playhead_waits_for_no_flow(bpy, monkeypatch):
     from shutter_addon.blender.rendering import previews, render_job
 
     look = preview_areas.Look(scale=0.5, proxy=None, is_plain=True)
-    assert previews._detail(bpy.context, look).smooth
+    assert previews._detail(bpy.context, look).smooth  # which nothing shows without a window
     monkeypatch.setattr(render_job, "operators_running", lambda: {"ANIM_OT_change_frame"})
-    assert not previews._detail(bpy.context, look).smooth
+    assert not previews._detail(bpy.context, look).smooth  # likewise
     monkeypatch.setattr(previews.looking, "late_until", 0.0)
 
 
