@@ -55,6 +55,7 @@ def told():
     yield from first_stroke_story.movie_dragged()
     yield from first_stroke_story.gone_to(FRAME)
     yield from first_stroke_story.drawing_begun()
+    story.effect().inbetween = "AUTO"
     yield from stroke_drawn()
     driver.saw(clicks=first_stroke_story.actions(), smooth=story.effect().inbetween)
     yield from story.seen("2_smooth")

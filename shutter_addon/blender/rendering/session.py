@@ -114,7 +114,7 @@ class RenderSession:
 
         detail: None: as it was the last time, for who asks for no picture"""
         if detail is None:
-            known = (self._renderers.get((snapshot.scene, is_smooth)) for is_smooth in (False, True))
+            known = map(self._renderers.get, _places(snapshot.scene))
             detail = next((each[0].detail for each in known if each), FULL)
         key = SourceKey.of(snapshot, detail)
         source = self.renderer(key, context.say).source
@@ -238,12 +238,14 @@ class RenderSession:
         self._drop_begun(set(self._begun) - scenes)
         for scene in set(self._shown) - scenes:
             self._shown.pop(scene, None)
-        for place in [place for place in list(self._requests) if place[0] not in scenes]:
-            self._requests.pop(place, None)
-        for place in [place for place in list(self._renderers) if place[0] not in scenes]:
-            _key, renderer = self._renderers.pop(place, (None, None))
-            if renderer is not None:
-                self._submit(renderer.close)
+        for scene in {scene for scene, _ in list(self._requests)} - scenes:
+            for place in _places(scene):
+                self._requests.pop(place, None)
+        for scene in {scene for scene, _ in list(self._renderers)} - scenes:
+            for place in _places(scene):
+                _key, renderer = self._renderers.pop(place, (None, None))
+                if renderer is not None:
+                    self._submit(renderer.close)
 
     def forget(self) -> None:
         """Closes all sources and frees the device; where Blender's GPU is not current, once it is."""
@@ -267,6 +269,11 @@ class RenderSession:
         except NoDeviceError:
             pass  # met again when a picture is asked for
         self.forget()
+
+
+def _places(scene: int) -> tuple[Place, Place]:
+    """Where a scene's renderers are: of plain pictures, and of smooth ones."""
+    return (scene, False), (scene, True)
 
 
 def _weights(renderer: Renderer, request: Request) -> list[np.ndarray]:

@@ -98,15 +98,16 @@ _coming: dict[int, _Coming] = {}  # by effect scene
 
 def chosen(render: RenderContext, snapshot: Snapshot, frame: float, detail: Detail) -> Request:
     """The smooth picture, if nothing has to be waited for; else the plain one. One of FAULTS: there is none."""
-    plain, before = render.request(snapshot, frame, replace(detail, smooth=False)), _coming.get(snapshot.scene)
-    if known_steps(snapshot) == 1:
+    steps, before = known_steps(snapshot), _coming.get(snapshot.scene)
+    plain = render.request(snapshot, frame, replace(detail, smooth=False))
+    if steps == 1:
         _coming.pop(snapshot.scene, None)
         return plain
     coming, key = before, (plain.key, steps_key(snapshot))
     asked = render, snapshot, frame, detail
     if coming is None or coming.key != key:
-        steps = before.steps if before and before.key[1] == key[1] else None
-        coming = _coming[snapshot.scene] = _Coming(key, asked, steps)
+        found = before.steps if before and before.key[1] == key[1] else None
+        coming = _coming[snapshot.scene] = _Coming(key, asked, found)
     coming.asked, coming.since, coming.is_asked = asked, time.monotonic(), True
     if (request := coming.request()) is not None:
         coming.is_over = coming.is_alone or coming.made == request.key or not coming.lacks(request)
