@@ -5,7 +5,6 @@ from __future__ import annotations
 
 import inspect
 import sys
-from collections.abc import Iterable
 from functools import partial
 from types import TracebackType
 
@@ -42,21 +41,21 @@ def _after_load(*_) -> None:
     sharp_frame.listen()
     sessions.drop_removed()  # what a render job took up while the file was loaded
     if not data_format.is_file_newer():
-        data_format.migrate()
+        tell(data_format.migrate())
         reconciling.tidy()
     shown_annotations.follow()
-    tell_newer(bpy.data.scenes)
+    tell(data_format.note(bpy.data.scenes))
 
 
 def _after_import(imported: bpy.types.BlendImportContext, *_) -> None:
     items = [item for item in imported.import_items if item.id_type == "SCENE"]
-    tell_newer(item.id for item in items if item.id is not None)  # a name that was asked for may not be there
+    # A name that was asked for may not be there.
+    tell(data_format.note(item.id for item in items if item.id is not None))
 
 
-def tell_newer(scenes: Iterable[Scene]) -> None:
-    """Says once, of the first scene that holds what only a newer version of the extension knows, that it does: in the
-    window, or on stderr where there is none."""
-    if (words := data_format.note(scenes)) is None:
+def tell(words: str | None) -> None:
+    """Says something of a file that was loaded, if anything: in the window, or on stderr where there is none."""
+    if words is None:
         return
     told.record(words)
     if bpy.app.background:

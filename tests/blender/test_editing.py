@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from support import state
 
 from shutter_addon.blender.data import annotations, consistency, fcurves, selection, snapshot, strips
-from shutter_addon.blender.editing import bar_edits, region_edits, shutter_edits
+from shutter_addon.blender.editing import add_effect, bar_edits, region_edits, shutter_edits
 from shutter_addon.core.model import shutters
 
 RNG = np.random.default_rng(5)
@@ -541,3 +541,16 @@ def keyable(group, prop) -> bool:
         return group.keyframe_insert(prop.identifier)
     except TypeError:
         return False
+
+
+@pytest.mark.parametrize(("has_opencv", "smooth"), [(True, "AUTO"), (False, "1")])
+def test_a_new_effect_is_as_smooth_as_its_footage_needs(edit, effect, monkeypatch, has_opencv, smooth):
+    """Where moments can be found; an effect that is made for a recipe gets what that says."""
+    from shutter_addon.media import opencv
+
+    if not has_opencv:
+        monkeypatch.setattr(opencv, "cv2", None)
+    new = add_effect.add_effect(edit, edit.sequence_editor.strips["images"])[1]
+    assert new.inbetween == "1"
+    shutter_edits.start(new)
+    assert new.inbetween == smooth

@@ -442,6 +442,7 @@ SITUATIONS = {
 
 @pytest.mark.parametrize("situation", SITUATIONS, ids=lambda situation: situation.__name__)
 def test_what_cannot_be_used_says_why(bpy, operators, edit, effect, tmp_path, situation):
+    effect.inbetween = "1"
     situation(bpy, edit, effect, tmp_path)
     usual, others = SITUATIONS[situation]
     with bpy.context.temp_override(window=bpy.data.window_managers[0].windows[0]):

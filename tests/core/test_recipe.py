@@ -8,10 +8,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from made_recipes import comes_back, is_same, key, made
+from test_shutters import light
 
 from shutter_addon.core.model import limits, mattes, scribbles, windows
+from shutter_addon.core.model.clip import Clip
 from shutter_addon.core.model.frame_state import Options
+from shutter_addon.core.model.keyframes import between_bars, eased_span
 from shutter_addon.core.model.motions import Placement
+from shutter_addon.core.model.state_at import state_at
 from shutter_addon.core.recipes import recipe, recipe_file
 
 EXAMPLE = {
@@ -519,6 +523,89 @@ def test_a_first_recipe_comes_back_as_a_second():
         "inbetween": 2,
     }
     assert comes_back(found)
+
+
+def kept_bars(rng, filmed, steps, level):
+    """Bars of moments (filmed · steps,) that bars of filmed frames give: in a random span of frames some alone, others
+    in streaks from the first of them to the last."""
+    frames = rng.random(filmed).round(3) * (rng.random(filmed) < 0.6)
+    frames[rng.integers(filmed)] = 1
+    lit, found = {k: bar for k, bar in enumerate(frames) if bar}, np.zeros(filmed * steps)
+    if not level:
+        for moment, weight in light(lit, steps).items():
+            found[moment] = weight
+        return found
+    for moment in range(filmed * steps):
+        before, after = moment // steps, -(-moment // steps)
+        beside = [k for k in {before, after} if abs(k - moment / steps) <= 0.5]
+        if {before, after} <= lit.keys():
+            found[moment] = np.mean([lit[k] for k in beside])
+    return found
+
+
+def exposes(bars, steps, position, way):
+    """{moment from the shown frame: share} of bars that counted moments, as version 1 had them."""
+    filmed = -(-len(bars) // steps)
+    before = {"start": 0, "center": (filmed - 1) // 2 * steps, "end": len(bars) - steps}[position]
+    whole = bars.max() if way == "lightest" else bars.sum()
+    return {k - before: weight / whole for k, weight in enumerate(bars) if weight > 1e-9 * whole}
+
+
+@pytest.mark.parametrize("way", ["average", "lightest"])
+@pytest.mark.parametrize("position", ["start", "center", "end"])
+@pytest.mark.parametrize("steps", [2, 4, 8, 16])
+def test_moments_that_filmed_frames_expose_are_kept(steps, position, way):
+    """Of recipes of version 1: what they exposed, counted by hand, is within 1/255 of what they do, on keys and between
+    them, and nothing is said. One bar elsewhere, and its filmed frame is told."""
+    rng = np.random.default_rng([steps, len(position), len(way)])
+    clip = Clip(width=60, height=40, count=100).stepped(steps)
+    for _ in range(12):
+        filmed = int(rng.integers(1, min(9, 256 // steps) + 1))
+        keys = [kept_bars(rng, filmed, steps, way == "lightest") for _ in range(3)]
+        if position == "end":
+            unused = steps - 1 if all(not bars[: steps - 1].any() for bars in keys) else 0
+            keys = [bars[unused:] for bars in keys] if filmed > 1 else keys
+        else:
+            unused = next((k for k in range(steps) if any(bars[len(bars) - 1 - k] for bars in keys)), steps - 1)
+            keys = [bars[: len(bars) - unused] for bars in keys]
+        eases = [str(each) for each in rng.choice(["linear", "bezier", "constant"], 3)]
+        keyed = [
+            {"frame": frame, "bars": bars.tolist(), "ease": ease}
+            for frame, bars, ease in zip((10, 20, 33), keys, eases, strict=True)
+        ]
+        shutters = [{"name": "A", "keys": keyed, "combine": way}]
+        found = first(len(keys[0]), shutters, inbetween=steps, position=position)
+        assert found.lost is None
+        for frame in (5, 10, 13, 20, 26, 31, 40):
+            before, after, share = eased_span((10, 20, 33), eases, frame)
+            wanted = exposes(between_bars(keys[before], keys[after], share), steps, position, way)
+            moment = state_at(found.for_picture(1.5), clip, frame)
+            at = windows.positions(moment.state.options, moment.source_frame)
+            bars = moment.state.bars[0]
+            weights = bars / (bars.max() if way == "lightest" else bars.sum())
+            now = {int(place) - moment.source_frame: weight for place, weight in zip(at, weights, strict=True)}
+            apart = [abs(wanted.get(k, 0) - now.get(k, 0)) for k in wanted.keys() | now.keys()]
+            assert (max if way == "lightest" else sum)(apart) <= 1 / 255
+
+
+@pytest.mark.parametrize("position", ["start", "center", "end"])
+@pytest.mark.parametrize("steps", [2, 4, 8, 16])
+def test_moments_that_no_filmed_frame_exposes_are_told(steps, position):
+    still = np.eye(3 * steps)[steps].tolist()
+    off = np.eye(3 * steps)[steps + 1].tolist()
+    told = f"bars {steps + 1} to {2 * steps} of the older file are one filmed frame now"
+    fine = {"name": "Fine", "bars": still}
+    keys = {"keys": [{"frame": 1, "bars": still}, {"frame": 9, "bars": off}]}
+    for shutter in ({"bars": off}, keys, {"bars": [0] * steps + [1] * steps + [0] * steps}):
+        found = first(3 * steps, [fine, {"name": "Off"} | shutter], inbetween=steps, position=position)
+        assert str(found.lost) == f'shutter "Off": {told}, and expose other moments'
+        assert comes_back(found)
+    shape = {"name": "Shape", "bars": [1] * steps + [2] * steps + [0] * steps, "length": "timeline"}
+    assert first(3 * steps, [fine, shape], inbetween=steps, position=position).lost is None
+    fading = {"keys": [{"frame": 1 + k, "bars": np.eye(2 * steps)[k].tolist()} for k in (0, steps)]}
+    for interpolation, is_told in (("displacement", False), ("value", True)):
+        found = first(2 * steps, [{"name": "A"} | fading], inbetween=steps, interpolation=interpolation)
+        assert (found.lost is not None) == is_told
 
 
 @pytest.mark.parametrize("method", ["quick", "good"])

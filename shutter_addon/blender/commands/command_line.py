@@ -15,8 +15,10 @@ from bpy.types import Scene
 from ...core.farm.edit_version import EditVersion
 from ...core.frames.frame_source import FrameSource
 from ...core.messages import sentence
+from ...core.model.effect import Effect
 from ...core.model.fields import fields_of
 from ...core.model.frame_state import Options
+from ...core.recipes import recipe_file
 from ...media import open_source
 from ...media.files import stamp
 from ...media.sequence import by_number
@@ -70,6 +72,14 @@ def refuse(arguments: Namespace, names: Iterable[str], why: str) -> None:
     for name in names:
         if getattr(arguments, name) is not None:
             raise film_output.OutputError(f"--{name.replace('_', '-')}: {why}")
+
+
+def recipe(path: Path) -> Effect:
+    """The recipe in a file, with a word on stderr where it showed another picture once. RecipeError: there is none."""
+    found = recipe_file.load(path)
+    if found.lost is not None:
+        render_job.say(f"{path}: {found.lost}")
+    return found
 
 
 def opened(path: Path) -> FrameSource:

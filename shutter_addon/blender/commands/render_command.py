@@ -14,7 +14,7 @@ from ...core import atomic_write
 from ...core.farm import job_file
 from ...core.model.effect import Effect
 from ...core.model.keyframes import Constant
-from ...core.recipes import recipe, recipe_file
+from ...core.recipes import recipe
 from ...media.completeness import is_whole_blend, why_short
 from ...media.matte_files import MatteFile
 from ..data import missing_media, preferences, versions
@@ -131,7 +131,7 @@ def _mattes(source_recipe: Effect, folder: Path) -> list[Path]:
 
 def _recipe(arguments: Namespace) -> Effect:
     """The recipe, as smooth as was asked for."""
-    found = recipe_file.load(arguments.recipe)
+    found = command_line.recipe(arguments.recipe)
     if arguments.inbetween is None:
         return found
     step = int(arguments.inbetween) if arguments.inbetween.isdigit() else arguments.inbetween

@@ -50,7 +50,7 @@ def add(commands: argparse._SubParsersAction) -> None:
 def run(arguments: Namespace) -> None:
     if arguments.camera == (arguments.region is not None):
         raise film_output.OutputError("track: either --region NAME or --camera, one of the two")
-    source_recipe = recipe_file.load(arguments.recipe)
+    source_recipe = command_line.recipe(arguments.recipe)
     index = None if arguments.camera else _region_index(arguments, source_recipe)
     subject = recipe.CAMERA if arguments.camera else arguments.region
     with command_line.opened(arguments.source) as medium:

@@ -5,9 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable, Container
 
 import numpy as np
+from bpy.app.translations import pgettext_rpt as rpt_
 from bpy.types import Context, FCurve, PropertyGroup
 
-from ...core.model import limits, presets, shutters
+from ...core.messages import EffectError
+from ...core.model import keyframes, limits, presets, shutters
+from ...core.model.effect import OTHER_MOMENTS, STILL_CAMERA, Shutter
 from . import fcurves, strips, validation
 from .annotations import layer_of
 from .fcurves import numbers
@@ -93,14 +96,34 @@ def fit_bars(effect: PropertyGroup) -> None:
             _change_bars(effect, index, lambda old: shutters.resample(old, effect.window))
 
 
-def count_filmed(effect: PropertyGroup) -> None:
-    """Has an effect of format 1, whose bars counted moments between filmed frames, count filmed frames. EffectError: a
-    value that no effect can have is in the way."""
-    steps, position = int(effect.inbetween), validation.word(effect, "position").lower()
-    window = -(-effect.window // steps)
-    for index in range(len(effect.shutters)):
-        _change_bars(effect, index, lambda old: shutters.filmed(old, steps, position))
-    effect.window = window
+def count_filmed(effect: PropertyGroup) -> str | None:
+    """Has an effect of format 1, whose bars counted moments between filmed frames, count filmed frames. What says that
+    it exposes other moments now; None: it does not. EffectError: a value that no effect can have is in the way."""
+    steps = int(effect.inbetween)
+    lost = [_count_bars(effect, index, steps) for index in range(len(effect.shutters))]
+    effect.window = -(-effect.window // steps)
+    first = next(filter(None, lost), None)
+    return first and rpt_(OTHER_MOMENTS).format(**first.words)
+
+
+def _count_bars(effect: PropertyGroup, index: int, steps: int) -> EffectError | None:
+    """As count_filmed, of the bars of a shutter."""
+    shutter, keys = effect.shutters[index], []
+    position, interpolation = (validation.word(effect, name).lower() for name in ("position", "interpolation"))
+    counted = Shutter(
+        name=shutter.name,
+        bars=keyframes.Bars(keyframes.Constant(None)),
+        follow=None if shutter.follow == "NOTHING" else STILL_CAMERA,
+        length=shutter.length.lower(),
+        combine=shutter.combine.lower(),
+    )
+
+    def change(old: np.ndarray) -> np.ndarray:
+        keys.append(old)
+        return counted.filmed(old, steps, position).bars
+
+    _change_bars(effect, index, change)
+    return counted.lost(keys, steps, position, interpolation)
 
 
 def preset_of(effect: PropertyGroup, index: int) -> str:

@@ -3,20 +3,20 @@
 A file of a newer format opens: what is not known here stays as it is stored, unseen, and nothing is tidied by itself.
 """
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
 
 from bpy.app.translations import pgettext_rpt as rpt_
 
 from . import consistency, strips
 
 
-def _count_filmed() -> None:
+def _count_filmed() -> Iterator[str | None]:
     """Format 2: bars count filmed frames, not the moments between them as well; frames that repeat stayed."""
     for scene in _holding():
         for effect in scene.virtual_shutter.effects if scene.virtual_shutter.format < 2 else ():
             if effect.inbetween != "1":
-                consistency.count_filmed(effect)
                 effect.skip_repeats = False
+                yield consistency.count_filmed(effect)
 
 
 # Raise it with the first change after a release that older versions would not understand: a property, an item of an
@@ -24,7 +24,8 @@ def _count_filmed() -> None:
 FORMAT = 2
 # What then becomes of older files: by the format that each leads to, in order; the first version's was 1. They are run
 # as a file is loaded of which anything is older, and may find newer scenes beside: what needs no change stays as it is.
-MIGRATIONS: tuple[tuple[int, Callable[[], None]], ...] = ((2, _count_filmed),)
+# Each gives sentences of what it could not keep.
+MIGRATIONS: tuple[tuple[int, Callable[[], Iterable[str | None]]], ...] = ((2, _count_filmed),)
 
 
 def of_file() -> int:
@@ -53,16 +54,15 @@ def new_effect(scene, number: int):
     return group.effects.add()
 
 
-def migrate() -> None:
+def migrate() -> str | None:
     """Brings the file that was loaded to this format, and notes that in all scenes with effects: not as it is saved,
-    as autosave tells nobody."""
+    as autosave tells nobody. The sentence about the first thing that could not be kept; None: all was."""
     stored = of_file()
-    for number, change in MIGRATIONS:
-        if stored < number:
-            change()
+    lost = [sentence for number, change in MIGRATIONS if stored < number for sentence in change()]
     for scene in _holding():
         if scene.virtual_shutter.format != FORMAT:
             scene.virtual_shutter.format = FORMAT
+    return next(filter(None, lost), None)
 
 
 def stamp_saved(version: str) -> None:

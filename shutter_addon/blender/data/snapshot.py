@@ -33,6 +33,7 @@ _CORE = (
     n_('shutter "{name}" at frame {frame}: {fault}'),
     n_('region "{name}": a point of its strokes is nowhere near the picture'),
     n_('region "{name}": more than {most} points with those before it'),
+    n_('shutter "{name}": bars {first} to {last} of the older file are one filmed frame now, and expose other moments'),
 )
 
 

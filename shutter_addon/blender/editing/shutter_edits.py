@@ -5,6 +5,7 @@ from bpy.app.translations import pgettext_data as data_
 from bpy.types import PropertyGroup
 
 from ...core.model import presets
+from ...media import opencv
 from ..data import fcurves, property_copy, validation
 from . import bar_edits, collection_edits
 from .region_edits import remove_region
@@ -32,9 +33,11 @@ def start(effect: PropertyGroup) -> None:
     """What a new effect begins with: a long shutter everywhere, and a sharp one to scribble with.
 
     With the border, the first scribble is sharp around itself; without, it would be the only one, and hold everywhere.
-    Streaks keep their length up to the clip's ends. A recipe says so itself, and older files have another default.
+    Streaks keep their length up to the clip's ends, and are smooth where OpenCV finds moments between frames. A recipe
+    says so itself, and older files have another default.
     """
     effect.border, effect.edges = True, "SLIDE"
+    effect.inbetween = "1" if opencv.cv2 is None else "AUTO"
     add_shutter(effect, data_("Long"))
     add_shutter(effect, data_("Sharp"), "STILL")
 

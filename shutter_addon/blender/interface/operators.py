@@ -426,7 +426,10 @@ class SHUTTER_OT_recipe_import(OfEffect, ImportHelper, Operator):
 
     def change(self, _context: Context, effect: PropertyGroup) -> None:
         path = Path(chosen_file(self))
-        recipe_import.apply(self.edit, effect, self.effect_strip, recipe_file.load(path), path.parent)
+        found = recipe_file.load(path)
+        recipe_import.apply(self.edit, effect, self.effect_strip, found, path.parent)
+        if found.lost is not None:
+            self.report({"WARNING"}, rpt_(found.lost.template).format(**found.lost.words))
 
 
 class SHUTTER_OT_recipe_export(OfEffect, ExportHelper, Operator):

@@ -10,9 +10,11 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
+from itertools import pairwise
 from typing import Literal
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from ..messages import EffectError
 from . import combining, keyframes, limits, mattes, motions, outlines, scribbles, shutters
@@ -25,6 +27,9 @@ from .motions import Placement
 
 Length = Literal["frames", "timeline", "motion"]
 _CLOSED = 'shutter "{name}" at frame {frame}: {fault}'
+OTHER_MOMENTS = (
+    'shutter "{name}": bars {first} to {last} of the older file are one filmed frame now, and expose other moments'
+)
 _TOO_MANY_POINTS = 'region "{name}": more than {most} points with those before it'
 
 
@@ -354,6 +359,19 @@ class Shutter:
         level = self.combine in ("lightest", "darkest")
         return partial(shutters.smoothed, steps=steps, backward=backward, level=level)
 
+    def filmed(self, moments: ArrayLike, steps: int, position: str) -> shutters.Filmed:
+        """Bars of filmed frames for its bars of moments, which older versions had."""
+        return shutters.filmed(moments, steps, position, self.spread(steps))
+
+    def lost(self, keys: Sequence[ArrayLike], steps: int, position: str, interpolation: str) -> EffectError | None:
+        """What says that bars of filmed frames do not expose what its bars of moments did, at the first key where they
+        do not, or between two where bars fade by themselves; None: they do."""
+        fading = [np.add(*pair) / 2 for pair in pairwise(keys)] if interpolation == "value" else []
+        for moments in (*keys, *fading):
+            if (numbers := self.filmed(moments, steps, position).lost) is not None:
+                return EffectError(OTHER_MOMENTS, name=self.name, first=numbers[0], last=numbers[1])
+        return None
+
     def combine_at(self, frame: float) -> combining.Combine:
         threshold = float(self.threshold.at(frame)) if self.use_threshold else None
         return combining.Combine.of(self.combine, self.by_luminance, threshold, float(self.softness.at(frame)))
@@ -389,6 +407,7 @@ class Effect:
     options: channel of frame_state.Options, but for
     edge_aware: channel of its own, as its keys are numbers
     camera: which shutters may follow
+    lost: what says that a recipe of an older version showed another picture; None: it did not
     time: channel of (source frame, whether it runs backward), the source's first frame is 1; None: the strip's own
     timing tells what is shown"""
 
@@ -403,6 +422,7 @@ class Effect:
         subtype="FACTOR",
     )
     camera: Camera = STILL_CAMERA
+    lost: EffectError | None = None
 
     def at(self, frame: float) -> FrameState:
         """The effect at a frame. EffectError: no picture can be made of it."""

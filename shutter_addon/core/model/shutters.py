@@ -7,7 +7,9 @@ normalised accumulation S is piecewise linear on [0, L] and rises from 0 to 1, i
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -20,6 +22,7 @@ MAX_WINDOW = 256
 _SAME = 1e-12
 # Of an exposure: rounding may leave as much in a bar that is closed.
 _CLOSED = 1e-9
+_SEEN = 1 / 255  # of the largest bar: less light in other moments is not seen
 
 
 class ShutterError(ValueError):
@@ -205,9 +208,7 @@ def smoothed(bars: ArrayLike, steps: int, *, backward: bool = False, level: bool
         return bars
     if backward:
         return smoothed(bars[::-1], steps, level=level)[::-1]
-    is_open = bars > _CLOSED * bars.sum()
-    after = is_open & np.append(is_open[1:], False)
-    before = np.append(False, after[:-1])
+    before, after = _open_beside(bars)
     sides = before.astype(int) + after
     share = bars if level else bars / np.maximum(sides, 1)
     half = np.ones(steps // 2 + 1)
@@ -222,20 +223,52 @@ def smoothed(bars: ArrayLike, steps: int, *, backward: bool = False, level: bool
     return moments * (bars.sum() / moments.sum()) if level else moments
 
 
+def _open_beside(bars: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Which bars (L,) are open and have an open neighbour before them, and which one behind them."""
+    is_open = bars > _CLOSED * bars.sum()
+    after = is_open & np.append(is_open[1:], False)
+    return np.append(False, after[:-1]), after
+
+
 def held(bars: ArrayLike, steps: int) -> np.ndarray:
     """Spread each bar evenly over its frame's `steps` moments: (L · steps,), of the same sum."""
     return np.repeat(np.asarray(bars, dtype=np.float64) / steps, steps)
 
 
-def filmed(moments: ArrayLike, steps: int, position: str) -> np.ndarray:
-    """Bars of filmed frames, by those that counted `steps` moments in each (recipes of version 1).
+class Filmed(NamedTuple):
+    """Bars of filmed frames in place of bars of moments. lost: the numbers, from 1 on, of the first and the last moment
+    of the filmed frame whose light is now farthest from where it was; None: it is where it was."""
+
+    bars: np.ndarray
+    lost: tuple[int, int] | None = None
+
+
+def filmed(moments: ArrayLike, steps: int, position: str, spread: Callable[[np.ndarray], np.ndarray]) -> Filmed:
+    """Count filmed frames where bars counted `steps` moments in each, as in recipes of version 1.
 
     A window that ended within a filmed frame gets all of it; where `position` is "end" it is the first frame that
-    lacked some, otherwise the last. The largest bar keeps its weight."""
+    lacked some, otherwise the last. The largest bar keeps its weight.
+
+    Args:
+        spread: makes bars of moments of the new ones; where no bars give those that there were, each is the mean of its
+            frame's
+    """
     moments = np.asarray(moments, dtype=np.float64)
     lacking = -len(moments) % steps
     before = lacking if position == "end" else 0
-    return np.pad(moments, (before, lacking - before)).reshape(-1, steps).mean(axis=1)
+    rows = np.pad(moments, (before, lacking - before)).reshape(-1, steps)
+    means, first = rows.mean(axis=1), rows[:, 0]
+    if not moments.any():
+        return Filmed(means)
+    alone = ~np.logical_or(*_open_beside(first))
+    apart = []
+    for bars in (means, first, np.where(alone, first / steps, first)):
+        bars = bars * (means.sum() / bars.sum()) if bars.any() else means
+        apart.append(np.abs(spread(bars).reshape(rows.shape) * steps - rows).sum(axis=1))
+        if apart[-1].sum() <= _SEEN * moments.max():
+            return Filmed(bars)
+    start = int(apart[0].argmax()) * steps - before
+    return Filmed(means, (max(start, 0) + 1, min(start + steps, len(moments))))
 
 
 def open_angle(bars: ArrayLike) -> float:

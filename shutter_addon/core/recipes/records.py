@@ -6,7 +6,6 @@ the strip's first. Points are fractions of the picture, y up.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, field, make_dataclass, replace
 from functools import partial
 from typing import Any, Literal
@@ -19,7 +18,6 @@ from ..model.fields import MISSING, Field, fields_of
 from ..model.frame_state import Options
 from ..model.keyframes import Channel, Constant, Ease, Keys
 from ..model.motions import Placement
-from ..model.shutters import filmed
 from .recipe import CAMERA
 
 VERSION = 2  # the newest one that is read; in the first, bars counted moments between filmed frames
@@ -149,7 +147,6 @@ RecipeRecord: Any = _record(
 def effect_of(recipe: Any) -> model.Effect:
     """The effect of a recipe that was checked, for no picture in particular yet (Effect.for_picture)."""
     options = Options(**_values(Options, recipe))
-    steps = int(options.step) if recipe.version == 1 else 1
     order = {shutter.name: index for index, shutter in enumerate(recipe.shutters)}
     regions = tuple(_region(region, order[region.shutter]) for region in recipe.regions)
     camera = model.Camera(moves=_moves(recipe.camera), **_values(model.Camera, recipe))
@@ -158,17 +155,30 @@ def effect_of(recipe: Any) -> model.Effect:
     time = None
     if recipe.time:
         time = keyframes.SourceTime(_channel(recipe.time), tuple((key.frame, key.ease) for key in recipe.time))
-    return model.Effect(
-        shutters=tuple(
-            _shutter(shutter, followed[shutter.follow], partial(filmed, steps=steps, position=options.position))
-            for shutter in recipe.shutters
-        ),
+    effect = model.Effect(
+        shutters=tuple(_shutter(shutter, followed[shutter.follow]) for shutter in recipe.shutters),
         regions=regions,
-        options=Constant(replace(options, window=-(-options.window // steps))),
+        options=Constant(options),
         time=time,
         camera=camera,
         **_values(model.Effect, recipe),
     )
+    return _filmed(effect, options) if recipe.version == 1 and options.step > 1 else effect
+
+
+def _filmed(effect: model.Effect, options: Options) -> model.Effect:
+    """The effect of a recipe of version 1, whose bars counted moments between filmed frames."""
+    steps, position, lost = int(options.step), options.position, []
+    shutters = []
+    for shutter in effect.shutters:
+        channel = shutter.bars.channel
+        values = channel.values if isinstance(channel, Keys) else (channel.at(1),)
+        lost.append(shutter.lost(values, steps, position, options.interpolation))
+        made = tuple(shutter.filmed(moments, steps, position).bars for moments in values)
+        counted = replace(channel, values=made) if isinstance(channel, Keys) else Constant(made[0])
+        shutters.append(replace(shutter, bars=replace(shutter.bars, channel=counted)))
+    options = replace(options, window=-(-options.window // steps))
+    return replace(effect, shutters=tuple(shutters), options=Constant(options), lost=next(filter(None, lost), None))
 
 
 def _values(kind: type, record: Any) -> dict[str, Any]:
@@ -186,8 +196,7 @@ def _columns(keys: list, *names: str) -> list[tuple]:
     return [tuple(getattr(key, name) for key in keys) for name in names]
 
 
-def _shutter(record: Any, follow: model.Subject | None, filmed: Callable[[list[float]], np.ndarray]) -> model.Shutter:
-    """filmed: gives bars of filmed frames by those of a recipe"""
+def _shutter(record: Any, follow: model.Subject | None) -> model.Shutter:
     values = _values(model.Shutter, record)
     values["length"] = "frames" if record.length == "bars" else record.length
     if record.trail is not None:
@@ -198,10 +207,10 @@ def _shutter(record: Any, follow: model.Subject | None, filmed: Callable[[list[f
         del values["softness"]  # it says nothing
     if record.keys:
         frames, bars, eases = _columns(record.keys, "frame", "bars", "ease")
-        made = tuple(map(filmed, bars))
+        made = tuple(map(np.array, bars))
         exposed = keyframes.Bars(Keys(frames, made, eases), tuple(zip(frames, eases, strict=True)))
     else:
-        exposed = keyframes.Bars(Constant(filmed(record.bars)))
+        exposed = keyframes.Bars(Constant(np.array(record.bars)))
     return model.Shutter(bars=exposed, follow=follow, **values)
 
 

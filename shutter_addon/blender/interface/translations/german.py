@@ -139,6 +139,11 @@ MESSAGES = {
     ("*", "An effect has {most} regions at most"): "Ein Effekt hat höchstens {most} Regionen",
     (
         "*",
+        'shutter "{name}": bars {first} to {last} of the older file are one filmed frame now, and expose other moments',
+    ): "Verschluss „{name}“: Balken {first} bis {last} der älteren Datei sind jetzt ein gefilmtes Bild und belichten "
+    "andere Momente",
+    (
+        "*",
         'region "{name}": more than {most} points with those before it',
     ): "Region „{name}“: mehr als {most} Punkte mit denen davor",
     (
