@@ -320,13 +320,15 @@ def test_motion_is_measured_once(add, edit, tmp_path, monkeypatch):
     asked, steps_for = [], smooth.steps_for
     from shutter_addon.blender.rendering import effect_source, sessions
 
-    monkeypatch.setattr(effect_source, "steps_for", lambda *given: asked.append(given[1:]) or steps_for(*given))
+    monkeypatch.setattr(
+        effect_source, "steps_for", lambda *given, **more: asked.append((*given[1:], more)) or steps_for(*given, **more)
+    )
     _source, strip, effect = add(moving(tmp_path / "film", 5), 6, np.ones(4), "AUTO")
     for position in ("START", "CENTER", "END"):
         effect.position = position
         request(edit, effect, strip, 2)
         sessions.forget()
-    assert asked == [("auto", 4)]
+    assert asked == [("auto", 4, {"skip_repeats": True})]
 
 
 # Previews

@@ -176,7 +176,7 @@ def test_nothing_is_looked_for_where_it_is_off(monkeypatch):
 
 def test_across_a_cut_nothing_is_bridged():
     """All is as filmed; what repeats behind the cut is bridged to what comes then."""
-    shots = [blocks(seed, (HEIGHT, WIDTH)) for seed in (1, 2)]
+    shots = [np.kron(blocks(seed, (HEIGHT // 8, WIDTH // 8)), np.ones((8, 8, 1))) for seed in (1, 2)]
 
     def picture(number):
         return frame(np.roll(shots[number >= 3], SPEED * number, axis=1))
@@ -234,8 +234,8 @@ def test_what_a_codec_makes_of_repeats(tmp_path, shown, grain, crf):
 
 
 def test_automatic_counts_the_time_between_pictures():
-    """8 pixels in two frames are 4 in each."""
-    film, plain = (Texture(lambda k, times=times: shift(8)(k // times), (480, 270)) for times in (2, 1))
+    """7 pixels in two frames are 3.5 in each."""
+    film, plain = (Texture(lambda k, times=times: shift(7)(k // times), (480, 270)) for times in (2, 1))
     asked, own = [], film.read
     film.read = lambda index: asked.append(index) or own(index)
     for each in (film, plain):
