@@ -6,7 +6,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
-from support import request, write_frames
+from support import picture_of, request, write_frames
 
 from shutter_addon.media import steps
 
@@ -29,8 +29,8 @@ def add(bpy, edit, tmp_path):
 
     strobing.forget()
 
-    def added(pixels, *bars, **options):
-        first = write_frames(tmp_path / "film", film(pixels))
+    def added(pixels, *bars, repeat=1, **options):
+        first = write_frames(tmp_path / "film", film(pixels).repeat(repeat, 0)[:COUNT])
         source = edit.sequence_editor.strips.new_image("film", str(first), 1, 1)
         for number in range(2, COUNT + 1):
             source.elements.append(f"f{number:04d}.png")
@@ -106,6 +106,22 @@ def test_what_is_followed_has_no_steps(add):
             key.interpolation = "LINEAR"
     effect.shutters[0].follow = "CAMERA"
     assert looked(edit, effect, strip) is None
+
+
+def test_frames_that_repeat_are_told(add):
+    """Once the source was read; where they are shown as filmed, nobody looks."""
+    from shutter_addon.blender.rendering import strobing
+
+    edit, effect, strip = add(4, np.ones(4), inbetween="2", repeat=2)
+    assert looked(edit, effect, strip) is None
+    assert not strobing.repeats(effect)
+    picture_of(effect.scene, 4)
+    assert looked(edit, effect, strip) is None
+    assert strobing.repeats(effect)
+    effect.skip_repeats = False
+    picture_of(effect.scene, 4)
+    assert looked(edit, effect, strip) is None
+    assert not strobing.repeats(effect)
 
 
 @pytest.mark.parametrize("smooth", ["2", "4", "AUTO"])
