@@ -158,12 +158,10 @@ def test_each_frame_is_decoded_once(shown):
     assert film.asked == list(range(film.count))
 
 
-def test_elsewhere_a_frame_more_is_read():
+@pytest.mark.parametrize("moment", [5 * STEP, 5 * STEP + 1])
+def test_elsewhere_neighbours_alone_are_read(moment):
     film = Film(range(12))
-    skipping(film).read(5 * STEP)
-    assert film.asked == [4, 5]
-    film.asked.clear()
-    skipping(film).read(5 * STEP + 1)
+    skipping(film).read(moment)
     assert sorted(film.asked) == [4, 5, 6]
 
 
