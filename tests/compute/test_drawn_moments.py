@@ -157,15 +157,15 @@ def test_filmed_frames_of_a_pair_are_sent_once(gpu_device, monkeypatch):
     """With the vectors of each moment, a sixteenth of a picture."""
     from shutter_addon.compute.gpu import GPUCompositor
 
-    sent, own = [], running_sums.Sums._filmed
+    sent, own = [], running_sums.Sums._filmed  # all that sends filmed frames
 
     def noted(sums, moment):
-        before = set(sums._sent.values())
+        before = set(sums._sent.values())  # which frames are there
         textures = own(sums, moment)
-        sent.extend(sorted(set(sums._sent.values()) - before))
+        sent.extend(sorted(set(sums._sent.values()) - before))  # and are there now
         return textures
 
-    monkeypatch.setattr(running_sums.Sums, "_filmed", noted)
+    monkeypatch.setattr(running_sums.Sums, "_filmed", noted)  # as above
     source = SmoothSource(film(np.random.default_rng(7)), 8)
     moment = smooth(FrameState(Options(4), np.ones((1, 4))), 8)
     Renderer(GPUCompositor(gpu_device), source).picture(Request(0, moment))
