@@ -56,9 +56,10 @@ class Film(FrameSource):
         return made
 
 
-def pan(number):
-    """Coarse blocks that move to the left."""
-    return frame(np.roll(blocks(3, (HEIGHT, WIDTH)), -SPEED * number, axis=1))
+def pan(number, size=1):
+    """Blocks of four times as many pixels that move to the left."""
+    picture = np.kron(blocks(3, (HEIGHT // size, WIDTH // size)), np.ones((size, size, 1)))
+    return frame(np.roll(picture, -SPEED * number, axis=1))
 
 
 def skipping(film, step=STEP):
@@ -256,7 +257,7 @@ def test_what_a_codec_makes_of_repeats(tmp_path, shown, grain, crf):
         stream.width, stream.height, stream.pix_fmt = WIDTH, HEIGHT, "yuv420p"
         for number in shown:
             noise = np.random.default_rng(number).normal(0, grain, (HEIGHT, WIDTH, 1))
-            made = np.clip(pan(number)[..., :3] + noise, 0, 255).astype(np.uint8)
+            made = np.clip(pan(number, 8)[..., :3] + noise, 0, 255).astype(np.uint8)
             movie.mux(stream.encode(av.VideoFrame.from_ndarray(made, "rgb24")))
         movie.mux(stream.encode())
     with open_source(path) as movie:
