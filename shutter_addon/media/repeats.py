@@ -27,16 +27,12 @@ class Repeats:
     """Which frames of a source repeat the one before.
 
     What it says of a frame depends on MOST + 1 frames on each side alone. Of the source, which keeps what it has read
-    last, it reads the frame before, and more where something seems to repeat."""
+    last, it reads the neighbours, and more where something seems to repeat."""
 
     def __init__(self, source: FrameSource) -> None:
         self._source = source
         self._pictures: Kept[int, np.ndarray] = Kept()
         self._changes: Kept[int, float] = Kept()
-
-    def may_repeat(self, index: int) -> bool:
-        """Whether a frame can be a repeat, as far as it and the one before tell."""
-        return self._change(index) <= REPEATED
 
     def gap(self, index: int) -> tuple[int, int]:
         """The two frames between which the moments behind a frame lie: itself and the next one; where frames repeat

@@ -69,19 +69,13 @@ class SmoothSource(SourceWrapper):
         """The frame, or the moment with the two frames around it. MediaError: as the source's `read`."""
         check_index(self, index)
         filmed, number = divmod(index, self.step)
-        first, last = self._gap(filmed, number)
+        first, last = self._repeats.gap(filmed) if self._repeats else (filmed, filmed + 1)
         if last - first > 1 and index > first * self.step:
             made = self._moment((first, last), index - first * self.step)
             if isinstance(made, Moment):
                 self.repeats = True
                 return made
         return self._moment((filmed, filmed + 1), number) if number else self._source.read(filmed)
-
-    def _gap(self, filmed: int, number: int) -> tuple[int, int]:
-        """The two filmed frames between which a moment lies."""
-        if self._repeats is None or (number == 0 and not self._repeats.may_repeat(filmed)):
-            return filmed, filmed + 1
-        return self._repeats.gap(filmed)
 
     def _moment(self, pair: tuple[int, int], number: int) -> Decoded:
         """What is so many moments after the first of two frames."""

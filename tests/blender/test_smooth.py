@@ -269,15 +269,15 @@ def test_a_shape_is_spread_over_its_own_time(film, add, edit):
 # How many moments there are
 
 
-def moving(folder, pixels, count=6, size=(320, 180)):
-    """A film of a texture that moves to the left: its first file."""
+def moving(folder, pixels, count=6, size=(320, 180), repeat=1):
+    """A film of a texture that moves to the left, each frame shown so often: its first file."""
     import cv2
 
     noise = np.random.default_rng(2).integers(0, 256, (60, 160, 3), dtype=np.uint8)
     texture = cv2.resize(noise, None, fx=4, fy=4, interpolation=cv2.INTER_CUBIC)
     width, height = size
     frames = [texture[20 : 20 + height, 8 + k * pixels : 8 + k * pixels + width] for k in range(count)]
-    return write_frames(folder, np.stack(frames))
+    return write_frames(folder, np.stack(frames).repeat(repeat, 0))
 
 
 @pytest.mark.parametrize(("pixels", "steps"), [(0, 1), (1, 1), (3, 2), (5, 4), (7, 4), (12, 8), (20, 16)])
@@ -311,16 +311,34 @@ def test_without_opencv_automatic_is_off_and_a_number_is_refused(add, edit, tmp_
         request(edit, effect, strip, 2)
 
 
+@pytest.mark.parametrize(("smooth", "skips"), [("2", True), ("2", False), ("AUTO", True), ("AUTO", False)])
+def test_repeated_frames_are_skipped(add, edit, tmp_path, smooth, skips):
+    """Those that are shown twice are moments half-way then, and of Automatic's motion there is half."""
+    first = moving(tmp_path / "film", 5, repeat=2)
+    _source, strip, effect = add(first, 12, [1, 0], smooth, skip_repeats=skips, stop_at_cuts=False)
+    picture = picture_of(effect.scene, 2)
+    asked = request(edit, effect, strip, 2)
+    assert asked.renderer.source.step == (2 if smooth == "2" or skips else 4)
+    with open_source(first) as source:
+        filmed = light.to_linear(source.read(1)[..., :3] / 255)
+    is_filmed = np.allclose(picture[..., :3], filmed, atol=1e-3)
+    assert (is_filmed, asked.renderer.source.repeats) == (not skips, skips)
+    effect.inbetween = "1"
+    np.testing.assert_allclose(picture_of(effect.scene, 2)[..., :3], filmed, atol=1e-3)
+
+
 def test_motion_is_measured_once(add, edit, tmp_path, monkeypatch):
     """Whatever else changes; another file is another film."""
     asked, steps_for = [], smooth.steps_for
-    monkeypatch.setattr(effect_source, "steps_for", lambda *given: asked.append(given[1:]) or steps_for(*given))
+    monkeypatch.setattr(
+        effect_source, "steps_for", lambda *given, **more: asked.append((*given[1:], more)) or steps_for(*given, **more)
+    )
     _source, strip, effect = add(moving(tmp_path / "film", 5), np.ones(4), "AUTO")
     for position in ("START", "CENTER", "END"):
         effect.position = position
         request(edit, effect, strip, 2)
         sessions.forget()
-    assert asked == [("auto", 4)]
+    assert asked == [("auto", 4, {"skip_repeats": True})]
 
 
 # Previews
@@ -467,6 +485,7 @@ def test_bars_of_format_1_count_filmed_frames_now(older, steps, window, position
     effect = scene.virtual_shutter.effects[0]
     assert scene.virtual_shutter.format == 2
     assert (effect.inbetween, effect.window) == (str(steps), -(-window // steps))
+    assert not effect.skip_repeats, "nothing was bridged"
     for shutter, given in zip(effect.shutters, bars[:2], strict=True):
         assert consistency.bars(shutter) == pytest.approx(counted(given, steps, position), abs=1e-6)
 
@@ -484,6 +503,7 @@ def test_what_had_no_frames_in_between_stays(older):
     scene, bars = older(1, "START", 8)
     effect = scene.virtual_shutter.effects[0]
     assert (scene.virtual_shutter.format, effect.inbetween, effect.window) == (2, "1", 8)
+    assert effect.skip_repeats
     assert consistency.bars(effect.shutters[0]) == pytest.approx(bars[0], abs=1e-6)
 
 
@@ -520,7 +540,8 @@ def test_an_edit_and_a_recipe_of_the_first_versions_are_read_alike(older):
     stored = [[float(np.float32(bar)) for bar in row] for row in bars[:2]]
     parts = [{"name": name, "bars": row} for name, row in zip("AB", stored, strict=True)]
     read = made(10, parts, inbetween=4, position="end", version=1)
-    assert read.options.at(1).window == effect.window
+    options = read.options.at(1)
+    assert (options.window, options.skip_repeats) == (effect.window, effect.skip_repeats)
     for shutter, mine in zip(read.shutters, effect.shutters, strict=True):
         assert consistency.bars(mine) == pytest.approx(shutter.bars.channel.at(1), abs=1e-6)
 

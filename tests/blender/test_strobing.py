@@ -6,7 +6,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
-from support import image_strip, request, write_frames
+from support import image_strip, picture_of, request, write_frames
 
 from shutter_addon.blender.data import consistency, fcurves, selection, snapshot
 from shutter_addon.blender.editing import add_effect, bar_edits, shutter_edits
@@ -28,8 +28,8 @@ def add(bpy, edit, tmp_path):
     """Puts an effect of shutters with these bars on a film that moves by pixels a frame: edit, effect, strip."""
     strobing.forget()
 
-    def added(pixels, *bars, **options):
-        first = write_frames(tmp_path / "film", film(pixels))
+    def added(pixels, *bars, repeat=1, **options):
+        first = write_frames(tmp_path / "film", film(pixels).repeat(repeat, 0)[:COUNT])
         source = image_strip(edit, first, 1, 1, "film")
         edit.render.resolution_x, edit.render.resolution_y = WIDTH, HEIGHT
         strip, effect = add_effect.add_effect(edit, source)
@@ -98,6 +98,20 @@ def test_what_is_followed_has_no_steps(add):
             key.interpolation = "LINEAR"
     effect.shutters[0].follow = "CAMERA"
     assert looked(edit, effect, strip) is None
+
+
+def test_frames_that_repeat_are_told(add):
+    """Once the source was read; where they are shown as filmed, nobody looks."""
+    edit, effect, strip = add(4, np.ones(4), inbetween="2", repeat=2)
+    assert looked(edit, effect, strip) is None
+    assert not strobing.repeats(effect)
+    picture_of(effect.scene, 4)
+    assert looked(edit, effect, strip) is None
+    assert strobing.repeats(effect)
+    effect.skip_repeats = False
+    picture_of(effect.scene, 4)
+    assert looked(edit, effect, strip) is None
+    assert not strobing.repeats(effect)
 
 
 @pytest.mark.parametrize(("smooth", "window"), [("2", 4), ("4", 4), ("AUTO", 4), ("AUTO", 130)])

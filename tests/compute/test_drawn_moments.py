@@ -48,10 +48,10 @@ def compared(device, source, moment, index, direction=1):  # noqa: F811
     return picture, compositor.compose(moment, seen, indices >= 0, mix / mix.sum(axis=0))
 
 
-def check(device, source, moment, index, direction=1):  # noqa: F811
+def check(device, source, moment, index, direction=1, most=LEVEL):  # noqa: F811
     picture, expected = compared(device, source, moment, index, direction)
     difference = np.abs(light.to_encoded(picture.astype(np.float64)) - light.to_encoded(expected))
-    assert difference.max() <= LEVEL
+    assert difference.max() <= most
     return picture
 
 
@@ -128,19 +128,44 @@ def test_a_window_that_slides_is_one_that_was_just_opened(device):  # noqa: F811
         own.release_window()
 
 
+def repeating(steps):
+    """A film some of whose frames are shown twice, and one three times."""
+    found = film(np.random.default_rng(8))
+    found.frames = found.frames[[0, 1, 1, 2, 3, 3, 3, 4, 5]]
+    found.count = len(found.frames)
+    return SmoothSource(found, steps, skip_repeats=True)
+
+
+@pytest.mark.parametrize("steps", [2, 8])
+def test_across_repeated_frames(device, steps):  # noqa: F811
+    """Of pairs of frames that are two and three apart; what is left on the device of others changes nothing."""
+    source = repeating(steps)
+    moment = smooth(few_pieces(np.random.default_rng(9), 3), steps)
+    kept = Renderer(device, source)
+    for index in (0, steps, 2 * steps, 2 * steps + 1, 4 * steps, 5 * steps, 6 * steps - 1, steps):
+        own = Renderer(device, repeating(steps))
+        np.testing.assert_array_equal(kept.picture(Request(index, moment)), own.picture(Request(index, moment)))
+        own.release_window()
+    alone = FrameState(Options(1, step=steps), np.ones((1, 1)))
+    for shown, frames in ((moment, (1, 2, 4, 6)), (alone, (2, 5, 6))):
+        for index in frames:
+            check(device, source, shown, index * steps, most=1.1 * LEVEL)  # as one moment alone may be rounded
+    assert source.repeats
+
+
 def test_filmed_frames_of_a_pair_are_sent_once(gpu_device, monkeypatch):
     """With the vectors of each moment, a sixteenth of a picture."""
     from shutter_addon.compute.gpu import GPUCompositor
 
-    sent, own = [], running_sums.Sums._filmed  # what is sent shows nowhere else
+    sent, own = [], running_sums.Sums._filmed  # all that sends filmed frames
 
-    def noted(sums, number, frame):
-        before = dict(sums._sent)  # likewise
-        texture = own(sums, number, frame)
-        sent.extend([number] if sums._sent != before else [])  # likewise
-        return texture
+    def noted(sums, moment):
+        before = set(sums._sent.values())  # which frames are there
+        textures = own(sums, moment)
+        sent.extend(sorted(set(sums._sent.values()) - before))  # and are there now
+        return textures
 
-    monkeypatch.setattr(running_sums.Sums, "_filmed", noted)  # likewise
+    monkeypatch.setattr(running_sums.Sums, "_filmed", noted)  # as above
     source = SmoothSource(film(np.random.default_rng(7)), 8)
     moment = smooth(FrameState(Options(4), np.ones((1, 4))), 8)
     Renderer(GPUCompositor(gpu_device), source).picture(Request(0, moment))

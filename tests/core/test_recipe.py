@@ -621,6 +621,15 @@ def test_a_still_frame_that_counted_its_moments_is_one_bar():
     assert first(12, [{"name": "A", "bars": bars}], inbetween=4).bars_at(0, 1).tolist() == [0, 1, 0]
 
 
+@pytest.mark.parametrize(("version", "smooth", "skips"), [(1, 1, True), (1, 4, False), (2, 1, True), (2, 4, True)])
+def test_frames_of_a_first_recipe_that_repeat_stay(version, smooth, skips):
+    shutters = [{"name": "A", "bars": [1, 1, 1, 1]}]
+    for said, wanted in (({}, skips), ({"skip_repeats": True}, True), ({"skip_repeats": False}, False)):
+        found = first(4, shutters, version=version, inbetween=smooth, **said)
+        assert found.options.at(1).skip_repeats == wanted
+        assert comes_back(found)
+
+
 @pytest.mark.parametrize("smooth", [1, 2, 4, 8, 16, "auto"])
 def test_a_second_recipe_counts_filmed_frames(smooth):
     found = made(3, [{"name": "A", "bars": [0, 1, 2]}], inbetween=smooth)

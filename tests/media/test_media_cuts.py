@@ -1,4 +1,4 @@
-"""Cuts and repeated frames: films, pieces of them joined at known places, and what looks like a cut and is none."""
+"""Cuts: films, pieces of them joined at known places, and what looks like a cut and is none."""
 
 import sys
 from pathlib import Path
@@ -8,7 +8,7 @@ import pytest
 
 from shutter_addon.core.frames.frame_source import FrameSource
 from shutter_addon.media import MediaError, open_source
-from shutter_addon.media.cuts import NEIGHBOURS, ShotSource, is_cut, is_duplicate, signature
+from shutter_addon.media.cuts import NEIGHBOURS, ShotSource, is_cut, signature
 
 ROOT = Path(__file__).parents[2]
 
@@ -46,15 +46,6 @@ def test_films_without_cuts_have_none(film, bunny):
     with open_source(bunny.with_name("pedestrians.avi")) as source:
         frames = (source.read(i) for i in range(source.count))
         assert decided(is_cut, frames) == []
-
-
-def test_its_frames_that_repeat_are_found(film):
-    """Made at 24 frames per second, it has one more in each second."""
-    assert decided(is_duplicate, film) == [7, 32, 57, 82, 107]
-
-
-def test_a_still_scene_has_no_duplicates(film):
-    assert decided(is_duplicate, film[[0] * 12]) == []
 
 
 def test_shots_that_are_joined(film):

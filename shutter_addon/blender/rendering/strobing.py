@@ -31,16 +31,10 @@ _PAIRS = 4  # of neighbouring frames that are measured for a picture, at most
 _KEPT = 64  # pairs whose motion is kept, of half a megabyte each
 
 
-class _Look(NamedTuple):
-    """frame: the timeline frame that was looked at; known: as Looked has it; repeats: as the source says it"""
-
-    frame: float
-    known: float | None
-    repeats: bool
-
-
 _moved: Kept[tuple, steps.Moved | None] = Kept()  # by a source's key and a pair
-_last_looks: dict[int, _Look] = {}  # by scene
+# By scene: the timeline frame that was looked at last, what is known of it, and whether its source repeats frames.
+_last_looks: dict[int, tuple[float | None, float | None, bool]] = {}
+_NEVER = None, None, False
 
 
 @dataclass
@@ -68,20 +62,19 @@ def look(effect: PropertyGroup, snapshot: Snapshot, renderer: Renderer, request:
     """Looks at a picture's exposure. What is not known is asked for."""
     _measuring.wanted, before = None, (last(effect), repeats(effect))
     frame, known = effect.id_data.frame_current, _look(effect, snapshot, renderer, request)
-    _last_looks[snapshot.scene] = _Look(frame, known, renderer.source.repeats)
+    _last_looks[snapshot.scene] = frame, known, renderer.source.repeats
     return Looked(known=known, is_new=(known, renderer.source.repeats) != before, is_busy=is_busy())
 
 
 def last(effect: PropertyGroup) -> float | None:
     """What the last look has found, if it was at the effect's current frame."""
-    seen = _last_looks.get(effect.scene.session_uid)
-    return seen.known if seen is not None and seen.frame == effect.id_data.frame_current else None
+    frame, known, _repeats = _last_looks.get(effect.scene.session_uid, _NEVER)
+    return known if frame == effect.id_data.frame_current else None
 
 
 def repeats(effect: PropertyGroup) -> bool:
     """Whether the last look has found that frames of the source repeat the one before."""
-    seen = _last_looks.get(effect.scene.session_uid)
-    return seen is not None and seen.repeats
+    return _last_looks.get(effect.scene.session_uid, _NEVER)[-1]
 
 
 def _look(effect: PropertyGroup, snapshot: Snapshot, renderer: Renderer, request: Request) -> float | None:
