@@ -1,7 +1,7 @@
 // Adds a frame to the running sums, or takes it away: from the layer `known` to the layer `next`.
 // The frame: the one that was sent, in the light that is summed, `whole` for white,
 // with COVER weighted, its colours with NUMBERS in one of 0 to 2²⁴ − 1, R + 256 G + 65536 B;
-// with MOMENT one between two frames that were sent (include/moment.glsl);
+// with MOMENT or WORDS one between two frames that were sent (include/moment.glsl);
 // with PLANES by the whole numbers of libswscale (core/frames/planes.py) from samples of luma and chroma;
 // or with AGAIN one that the sums hold already, between the layers `before` and `after`.
 layout(local_size_x = 8, local_size_y = 16) in;  // a tile
@@ -20,16 +20,19 @@ uniform sampler2DArray weights;
 layout(r32ui) uniform readonly uimage2DArray luma, chroma;  // a software renderer's texelFetch takes longer
 uniform ivec2 chroma_step, luma_of, green_of;
 uniform int red_of, blue_of;
+#  elif WORDS
+layout(r32ui) uniform readonly uimage2DArray filmed, vectors;
+uniform ivec4 moment;
 #  elif MOMENT
-uniform sampler2DArray first_frame, second_frame, vectors;
-uniform ivec3 moment;
+uniform sampler2DArray filmed, vectors;
+uniform ivec4 moment;
 #  else
 uniform sampler2DArray frame;
 #  endif
 #endif
 #include "light.glsl"
 #include "sums.glsl"
-#if MOMENT
+#if MOMENT || WORDS
 #  include "moment.glsl"
 #endif
 
@@ -60,24 +63,27 @@ void main() {
   SUM light = minus(sum_at(place, after), sum_at(place, before));
 #else
 #  if PLANES
-  vec3 color = color_at(pixel + ivec2(0, top));
-#  elif MOMENT
+  vec3 color = decoded(color_at(pixel + ivec2(0, top)));
+#  elif MOMENT || WORDS
   vec3 color = moment_at(pixel + ivec2(0, top));
+#    if DECODE == 0
+  color = to_encoded(color);
+#    endif
 #  else
   vec4 sent = texelFetch(frame, ivec3(pixel + ivec2(0, top), 0), 0);
 #    if NUMBERS
   uint bytes = uint(sent.r);
-  vec3 color = vec3(uvec3(bytes, bytes >> 8, bytes >> 16) & 255u) / 255.0;
+  vec3 color = decoded(vec3(uvec3(bytes, bytes >> 8, bytes >> 16) & 255u) / 255.0);
 #    else
-  vec3 color = sent.rgb;
+  vec3 color = decoded(sent.rgb);
 #    endif
 #  endif
 #  if COVER
   float weight = texelFetch(weights, ivec3(pixel + ivec2(0, top), 0), 0).r;
-  vec4 weighted = vec4(decoded(color) * weight, COVER == 2 ? 1.0 - weight : weight);
+  vec4 weighted = vec4(color * weight, COVER == 2 ? 1.0 - weight : weight);
   uvec4 light = uvec4(ivec4(weighted * whole + 0.5));
 #  else
-  uvec2 light = packed_light(uvec3(ivec3(decoded(color) * whole + 0.5)));
+  uvec2 light = packed_light(uvec3(ivec3(color * whole + 0.5)));
 #  endif
 #endif
   SUM sum = sum_at(place, known);

@@ -53,8 +53,8 @@ def accumulation(decode: int, sent: str, back: bool, tiled: bool, cover: int = 0
     """The pass that makes a layer of sums from its neighbour: with the frame between the two added, or subtracted.
 
     decode: of `decoding`
-    sent: as what the frame was sent, "COLOURS", "NUMBERS" (Device.send), "PLANES" or "MOMENT"; "AGAIN": it is taken as
-    the difference of two layers that hold it already
+    sent: as what the frame was sent, "COLOURS", "NUMBERS" (Device.send), "PLANES", "MOMENT" or
+    "WORDS", a moment as planes are sent; "AGAIN": it is taken as the difference of two layers that hold it already
     back: it is subtracted
     tiled: the sums are stored in tiles
     cover: of WeightedSums
@@ -93,17 +93,20 @@ class Sums(Window):
         self.start = self.stop = 0
         self._frames: dict[int, int] = {}  # position: source frame
         self._light: Light | None = None
-        self._sent: dict[int, int] = {}  # by texture of `_filmed`: the number of the frame in it
+        self._sent: dict[int, np.ndarray] = {}  # by layer of `_filmed`: the frame in it
         # White is the largest 2ⁿ − 1 for which the sum of a whole window fits into 21 bits, and n is 16 at most.
         self.whole = (1 << min(16, 21 - (capacity - 1).bit_length())) - 1
         self.kind = STORED_SUMS[self.cover]
-        if source.step > 1:
-            self._loading = (*self._loading, ("filmed 0", "rgba8"), ("filmed 1", "rgba8"))
         # A workgroup reads all layers of its pixels. In tiles, they are one run of memory.
         across, down = TILE
         fits = across * down * self.layers <= device.max_size and -(-source.height // down) <= device.max_layers
         self.tiled = stores_rows(device) and fits
         super().__init__(device, source, capacity, shutters)
+
+    def _allocate(self) -> None:
+        super()._allocate()
+        if self.source.step > 1:
+            self._two_frames()
 
     @property
     def held(self) -> Collection[int]:
@@ -186,7 +189,7 @@ class Sums(Window):
         if isinstance(frame, Planes):
             return "PLANES", self._send_planes(frame)
         if isinstance(frame, Moment):
-            return "MOMENT", self._send_moment(frame)
+            return self._send_moment(frame)
         own = self._own("frame", "rgba8")
         sent = self.device.send(own, frame)
         return "COLOURS" if sent is own else "NUMBERS", {"textures": {"frame": sent}}
@@ -204,22 +207,27 @@ class Sums(Window):
             "blue_of": matrix.blue_of_cb,
         }
 
-    def _send_moment(self, moment: Moment) -> Given:
-        first, second = (self._filmed(moment.pair + k, end) for k, end in enumerate(moment.ends))
-        vectors = self._extra.filled("vectors", [moment.vectors], "rgba16")
+    def _send_moment(self, moment: Moment) -> tuple[str, Given]:
+        words = self.device.takes_planes
+        filmed = self._filmed(moment, words)
+        vectors = moment.vectors.view("<u4").reshape(len(moment.vectors), -1) if words else moment.vectors
+        bound = {"filmed": filmed, "vectors": self._extra.filled("vectors", [vectors], "r32ui" if words else "rgba16")}
         shift = (STEP**2 * moment.steps).bit_length() - 1
-        return {
-            "textures": {"first_frame": first, "second_frame": second, "vectors": vectors},
-            "moment": (moment.number, moment.steps, shift),
-        }
+        place = moment.number, moment.steps, shift, moment.pair % 2
+        return ("WORDS", {"images": bound, "moment": place}) if words else ("MOMENT", {"textures": bound, "moment": place})
 
-    def _filmed(self, number: int, frame: np.ndarray) -> Texture:
-        """A filmed frame on the device: those of a pair stay for all its moments."""
-        texture = self._own(f"filmed {number % 2}", "rgba8")
-        if self._sent.get(number % 2) != number:
-            self.device.write(texture, frame, opaque=True)
-            self._sent[number % 2] = number
+    def _filmed(self, moment: Moment, words: bool) -> Texture:
+        """Both filmed frames on the device, the first in the layer pair mod 2: they stay for all moments of a pair."""
+        texture = self._two_frames()
+        for number, frame in enumerate(moment.ends, moment.pair):
+            if self._sent.get(number % 2) is not frame:
+                self.device.write(texture, frame.view("<u4")[..., 0] if words else frame, number % 2, opaque=True)
+                self._sent[number % 2] = frame
         return texture
+
+    def _two_frames(self) -> Texture:
+        size = self.source.width, self.source.height, 2
+        return self._extra.of("filmed", size, "r32ui" if self.device.takes_planes else "rgba8")
 
     def release(self) -> None:
         self._frames, self._light, self._sent = {}, None, {}

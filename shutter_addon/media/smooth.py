@@ -1,7 +1,7 @@
 """The moments between the frames of footage, found by optical flow as they are read: smooth exposures of any footage.
 
-Nothing is kept on disk. Whatever a pair of frames needs is found when its first moment is read, which the thread that
-decodes ahead does (prefetch).
+Whatever a pair of frames needs is found when its first moment is read, which the thread that decodes ahead does
+(prefetch). No moment is kept on disk, but vectors may be (stored_vectors).
 """
 
 from __future__ import annotations
@@ -17,6 +17,7 @@ from ..core.model.shutters import MAX_WINDOW
 from . import flow, opencv, steps
 from .errors import MediaError
 from .files import check_index
+from .stored_vectors import StoredVectors
 
 SMOOTH = 1, 2, 4, 8, 16  # moments from a filmed frame to the next
 _PAIRS = 8  # of neighbouring frames, spread over the footage, that "auto" looks at
@@ -29,9 +30,10 @@ class SmoothSource(SourceWrapper):
     Moment i · step is the source's frame i. Where two frames have nothing in common, as at a cut, those between them
     are the nearer one."""
 
-    def __init__(self, source: FrameSource, step: int) -> None:
+    def __init__(self, source: FrameSource, step: int, vectors: StoredVectors | None = None) -> None:
         super().__init__(source)
         flow.check()
+        self._find = flow.found if vectors is None else vectors.found
         self.step = step
         self.count = (source.count - 1) * step + 1
         self.fps = None if source.fps is None else source.fps * step
@@ -55,7 +57,7 @@ class SmoothSource(SourceWrapper):
         return self._frames.ask(index, lambda: self._source.read(index), _FRAMES)
 
     def _between(self, pair: int) -> flow.Between:
-        return flow.Between(self._frame(pair), self._frame(pair + 1), self.transfer, self.alpha)
+        return flow.Between(self._frame(pair), self._frame(pair + 1), self.transfer, self.alpha, self._find)
 
     def close(self) -> None:
         """Closes the file, and lets go of all frames."""

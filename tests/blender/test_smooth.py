@@ -508,3 +508,20 @@ def test_a_recipe_says_it(bpy, effect, edit):
         recipe_import.apply(edit, effect, strip, recipe_file.parse(json.dumps(data)))
         assert (effect.inbetween, effect.window) == (str(steps).upper(), 4)
         assert json.loads(recipe_file.dump(recipe_export.recipe_of(edit, effect, strip)))["inbetween"] == steps
+
+
+def test_vectors_are_kept_beside_the_file(bpy, filmed, add, edit, render, tmp_path, monkeypatch):
+    """Where a film is rendered, for the next time; not of an edit that was not saved."""
+    add(filmed, COUNT, [1, 1])
+    folder = tmp_path / "virtual_shutter_vectors"
+    wanted = render(edit, (2, 3))
+    assert not folder.exists()
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "edit.blend"))
+    from shutter_addon.blender.rendering import sessions
+
+    for _ in range(2):
+        sessions.forget()
+        for frame, picture in render(edit, (2, 3)).items():
+            np.testing.assert_array_equal(picture, wanted[frame])
+        assert len(list(folder.iterdir())) == 3
+        monkeypatch.setattr(flow, "found", None)  # nothing is found any more

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import traceback
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from pathlib import Path
 
 from ...core import told
 from ...core.frames.frame_source import FrameSource
@@ -15,6 +16,7 @@ from ...media import MediaError
 from ...media.cuts import ShotSource
 from ...media.prefetch import PrefetchSource
 from ...media.smooth import SmoothSource, steps_for
+from ...media.stored_vectors import FOLDER, StoredVectors
 from ..data.snapshot import Snapshot
 from ..data.source_media import SourceSpec
 from ..data.strip_proxies import Proxy
@@ -59,23 +61,34 @@ class SourceKey:
     """What a renderer reads, in plain data: equal where it reads the same frames for the same effect.
 
     scene: session_uid of the effect's scene; spec: Snapshot's source
-    smooth, window: as Options has them of the effect: step and window"""
+    smooth, window: as Options has them of the effect: step and window
+    folder: where vectors are kept; None: nowhere"""
 
     scene: int
     spec: SourceSpec
     smooth: int | str
     window: int
     detail: Detail = FULL
+    folder: Path | None = field(default=None, compare=False)
 
     @staticmethod
     def of(snapshot: Snapshot, detail: Detail = FULL) -> SourceKey:
         options = snapshot.effect.options.at(min(snapshot.frames))  # neither has keys
         smooth = options.step if detail.smooth else 1
         window = options.window if smooth != 1 else 0
-        return SourceKey(scene=snapshot.scene, spec=snapshot.source, smooth=smooth, window=window, detail=detail)
+        return SourceKey(
+            scene=snapshot.scene,
+            spec=snapshot.source,
+            smooth=smooth,
+            window=window,
+            detail=detail,
+            folder=snapshot.folder,
+        )
 
-    def open(self, *, planes: bool = False) -> ShotSource:
-        """The source; planes: see PrefetchSource. EffectError, MediaError: there is none."""
+    def open(self, *, planes: bool = False, keeps: bool = False) -> ShotSource:
+        """The source. EffectError, MediaError: there is none.
+
+        planes: see PrefetchSource; keeps: whether vectors are written to the folder"""
         medium = self.spec.open(self.detail.divisor, self.detail.proxy)
         if self.smooth == 1:
             return ShotSource(PrefetchSource(medium, planes=planes))
@@ -83,7 +96,8 @@ class SourceKey:
             steps = _steps.ask((self.spec.key, self.smooth, self.window), lambda: self._steps(medium), _KEPT)
             if steps == 1:
                 return ShotSource(PrefetchSource(medium, planes=planes))
-            return ShotSource(PrefetchSource(SmoothSource(medium, steps), planes=True), steps)
+            vectors = None if self.folder is None else StoredVectors(self.folder / FOLDER, keeps)
+            return ShotSource(PrefetchSource(SmoothSource(medium, steps, vectors), planes=True), steps)
         except FAULTS:
             medium.close()
             raise

@@ -172,7 +172,7 @@ class RenderSession:
         if known is None or known[0] != key:
             if known is not None:
                 self._submit(known[1].close)
-            source = key.open(planes=compositor.takes_planes)
+            source = key.open(planes=compositor.takes_planes, keeps=self._late is None)
             known = key, Renderer(compositor, source, MatteValues.of(source, self._late))
         self._renderers[key.scene] = known
         while len(self._renderers) > _KEPT:
