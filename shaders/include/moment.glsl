@@ -5,8 +5,8 @@
 #define ZERO 32768
 
 #if WORDS
-ivec4 stored_at(int x, int y) {
-  uint path = imageLoad(vectors, ivec3(2 * x, y, 0)).r, shown = imageLoad(vectors, ivec3(2 * x + 1, y, 0)).r;
+ivec4 stored_at(int x, int y, int which) {
+  uint path = imageLoad(vectors, ivec3(2 * x, y, which)).r, shown = imageLoad(vectors, ivec3(2 * x + 1, y, which)).r;
   return ivec4(path & 0xFFFFu, path >> 16, shown & 0xFFFFu, shown >> 16);
 }
 
@@ -23,8 +23,8 @@ ivec2 last_pixel() {
   return imageSize(filmed).xy - 1;
 }
 #else
-ivec4 stored_at(int x, int y) {
-  return ivec4(texelFetch(vectors, ivec3(x, y, 0), 0) * 65535.0 + 0.5);
+ivec4 stored_at(int x, int y, int which) {
+  return ivec4(texelFetch(vectors, ivec3(x, y, which), 0) * 65535.0 + 0.5);
 }
 
 ivec2 last_vector() {
@@ -41,11 +41,11 @@ ivec2 last_pixel() {
 #endif
 
 // What the vectors say of a pixel, 16 times as large.
-ivec4 spread_at(ivec2 pixel) {
+ivec4 spread_at(ivec2 pixel, int which) {
   ivec2 last = last_vector(), place = pixel / APART, part = pixel - place * APART;
   ivec2 beside = min(place + 1, last);
-  ivec4 above = stored_at(place.x, place.y) * (APART - part.x) + stored_at(beside.x, place.y) * part.x;
-  ivec4 below = stored_at(place.x, beside.y) * (APART - part.x) + stored_at(beside.x, beside.y) * part.x;
+  ivec4 above = stored_at(place.x, place.y, which) * (APART - part.x) + stored_at(beside.x, place.y, which) * part.x;
+  ivec4 below = stored_at(place.x, beside.y, which) * (APART - part.x) + stored_at(beside.x, beside.y, which) * part.x;
   return above * (APART - part.y) + below * part.y;
 }
 
@@ -72,15 +72,15 @@ vec3 looked_up(ivec2 place, int end) {
   return to_linear(floor(clamp(levels, 0.0, 255.0) + 0.5) / 255.0);
 }
 
-// The moment's linear light at a pixel. moment: its number, of how many; the shift of a path's parts; the first frame's
-// layer
-vec3 moment_at(ivec2 pixel) {
-  ivec4 said = spread_at(pixel);
+// The linear light of one of the moments at a pixel. which: its vectors' layer; moment: the first one's number, of how
+// many; the shift of a path's parts; the first frame's layer
+vec3 moment_at(ivec2 pixel, int which) {
+  ivec4 said = spread_at(pixel, which);
   ivec2 path = said.xy - ZERO * APART * APART, here = pixel * UNIT;
-  int left = moment.y - moment.x, half_ = 1 << (moment.z - 1);
-  vec3 first = looked_up(here - ((moment.x * path + half_) >> moment.z), moment.w);
+  int number = moment.x + which, left = moment.y - number, half_ = 1 << (moment.z - 1);
+  vec3 first = looked_up(here - ((number * path + half_) >> moment.z), moment.w);
   vec3 second = looked_up(here + ((left * path + half_) >> moment.z), 1 - moment.w);
   vec2 shown = vec2(said.zw) / float(255 * APART * APART) + 0.05;
-  float late = float(moment.x) * shown.y;
+  float late = float(number) * shown.y;
   return mix(first, second, late / (late + float(left) * shown.x));
 }

@@ -127,12 +127,12 @@ class Sums(Window):
             self._light, self._frames = options.light, {}
             self.start = self.stop = first
         while self.stop < last:
-            self._keep(max(self.start, self.stop + 1 - self.capacity), self.stop)
-            self._add(options.light, frames[self.stop - first], self.stop, self.stop + 1)
-            self.stop += 1
+            next_ = self._together(frames[self.stop - first :])
+            self._keep(max(self.start, self.stop + len(next_) - self.capacity), self.stop)
+            self.stop += self._add(options.light, next_, self.stop, self.stop + 1)
         while self.start > first:
             self._keep(self.start, min(self.stop, self.start - 1 + self.capacity))
-            self._add(options.light, frames[self.start - 1 - first], self.start, self.start - 1)
+            self._add(options.light, [frames[self.start - 1 - first]], self.start, self.start - 1)
             self.start -= 1
 
     def _continues(self, first: int, frames: list[int], options: Options) -> bool:
@@ -152,16 +152,26 @@ class Sums(Window):
         self.start, self.stop = start, stop
         self._frames = {position: frame for position, frame in self._frames.items() if start <= position < stop}
 
-    def _add(self, light: Light, frame: int, known: int, next_: int) -> None:
-        """Makes the sum at position next_, from that at its neighbour `known` and the source frame between the two.
+    def _together(self, frames: list[int]) -> list[int]:
+        """Those of the next source frames that one pass may add: moments of a pair, one after the other."""
+        step, first = self.source.step, frames[0]
+        pair = range(first, first - first % step + step)
+        if self.cover or first % step == 0 or any(frame in pair for frame in self.held):
+            return frames[:1]
+        return [frame for frame, wanted in zip(frames, pair, strict=False) if frame == wanted]
+
+    def _add(self, light: Light, frames: list[int], known: int, next_: int) -> int:
+        """Makes the sum at position next_, from that at its neighbour `known` and the source frame between the two; of
+        several frames, those at the positions behind as well, if they are moments. Returns how many it has made.
 
         light: what is summed"""
+        frame = frames[0]
         # A position that shows this frame already: it need not be read.
         same = next((position for position, held in self._frames.items() if held == frame), None)
         images: dict[str, Texture] = {}
         given: Given = {"known": known % self.layers, "next": next_ % self.layers}
         if same is None:
-            sent, arguments = self._send(frame)
+            sent, arguments = self._send(frames)
             given |= arguments | {"whole": float(self.whole)}
             images = given.pop("images", images)
         else:
@@ -172,8 +182,10 @@ class Sums(Window):
         for part, sums in self.stored():
             size = self.source.width, part.height
             self.device.run(program, size, images=images | {"sums": sums}, size=size, top=part.top, **given)
-        self._frames[min(known, next_)] = frame
+        frames = frames[: given.get("count", 1)]
+        self._frames |= dict(enumerate(frames, min(known, next_)))
         kept()
+        return len(frames)
 
     def _size(self, part: Part) -> tuple[int, int, int]:
         if not self.tiled:
@@ -182,14 +194,17 @@ class Sums(Window):
         across, down = TILE
         return across * down * self.layers, -(-self.source.width // across), -(-part.height // down)
 
-    def _send(self, index: int) -> tuple[str, Given]:
-        """Sends a source frame: as what (`accumulation`), and the arguments of the pass that adds it."""
+    def _send(self, frames: list[int]) -> tuple[str, Given]:
+        """Sends a source frame: as what (`accumulation`), and the arguments of the pass that adds it; with those behind
+        it where they are moments."""
+        index = frames[0]
         is_moment = index % self.source.step > 0
         frame = self.source.decoded(index) if self.device.takes_planes or is_moment else self.source.read(index)
         if isinstance(frame, Planes):
             return "PLANES", self._send_planes(frame)
         if isinstance(frame, Moment):
-            return self._send_moment(frame)
+            others = map(self.source.decoded, frames[1:])  # moments as well, of the same pair
+            return self._send_moments([frame, *(other for other in others if isinstance(other, Moment))])
         own = self._own("frame", "rgba8")
         sent = self.device.send(own, frame)
         return "COLOURS" if sent is own else "NUMBERS", {"textures": {"frame": sent}}
@@ -207,14 +222,26 @@ class Sums(Window):
             "blue_of": matrix.blue_of_cb,
         }
 
-    def _send_moment(self, moment: Moment) -> tuple[str, Given]:
-        words = self.device.takes_planes
-        filmed = self._filmed(moment, words)
-        vectors = moment.vectors.view("<u4").reshape(len(moment.vectors), -1) if words else moment.vectors
-        bound = {"filmed": filmed, "vectors": self._extra.filled("vectors", [vectors], "r32ui" if words else "rgba16")}
-        shift = (STEP**2 * moment.steps).bit_length() - 1
-        place = moment.number, moment.steps, shift, moment.pair % 2
-        return ("WORDS", {"images": bound, "moment": place}) if words else ("MOMENT", {"textures": bound, "moment": place})
+    def _send_moments(self, moments: list[Moment]) -> tuple[str, Given]:
+        words, first = self.device.takes_planes, moments[0]
+        height, width, _ = first.vectors.shape
+        layers = self.source.step - 1
+        if words:
+            vectors = self._extra.of("vectors", (2 * width, height, layers), "r32ui")
+        else:
+            vectors = self._extra.of("vectors", (width, height, layers), "rgba16")
+        for layer, moment in enumerate(moments):
+            stored = moment.vectors.view("<u4").reshape(height, -1) if words else moment.vectors
+            self.device.write(vectors, stored, layer)
+        bound = {"filmed": self._filmed(first, words), "vectors": vectors}
+        shift = (STEP**2 * first.steps).bit_length() - 1
+        given: Given = {
+            "images" if words else "textures": bound,
+            "moment": (first.number, first.steps, shift, first.pair % 2),
+            "count": len(moments),
+            "layers": self.layers,
+        }
+        return "WORDS" if words else "MOMENT", given
 
     def _filmed(self, moment: Moment, words: bool) -> Texture:
         """Both filmed frames on the device, the first in the layer pair mod 2: they stay for all moments of a pair."""
@@ -245,8 +272,8 @@ class WeightedSums(Sums):
         self.cover, self._weight = 2 if source.rest else 1, source.weight
         super().__init__(device, source.base, capacity, shutters)
 
-    def _send(self, index: int) -> tuple[str, Given]:
-        weights = self._extra.filled("weights", [self._weight(index)], "r32f")
-        sent, given = super()._send(index)
+    def _send(self, frames: list[int]) -> tuple[str, Given]:
+        weights = self._extra.filled("weights", [self._weight(frames[0])], "r32f")
+        sent, given = super()._send(frames)
         given["textures"] = given.get("textures", {}) | {"weights": weights}
         return sent, given

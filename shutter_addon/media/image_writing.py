@@ -41,7 +41,7 @@ def write_levels(path: Path, levels: np.ndarray, description: str) -> None:
     _write(path, spec, levels[..., None])
 
 
-def _exr(values: np.ndarray, samples: str, names: tuple[str, ...]) -> OpenImageIO.ImageSpec:
+def _exr(values: np.ndarray, samples: OpenImageIO.BASETYPE, names: tuple[str, ...]) -> OpenImageIO.ImageSpec:
     spec = OpenImageIO.ImageSpec(*_size(values), samples)
     spec.channelnames = names
     spec["compression"] = "zip"

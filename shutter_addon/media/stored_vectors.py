@@ -5,13 +5,14 @@ The name of a file is made of the content of both frames, so that whatever else 
 from __future__ import annotations
 
 import hashlib
-from contextlib import closing, suppress
+from contextlib import closing
 from pathlib import Path
 
 import numpy as np
 from OpenImageIO import ImageSpec
 
 from ..core import atomic_write
+from ..core.frames.moments import STEP
 from . import derived, flow
 from .errors import MediaError
 from .folder import own_folder
@@ -43,7 +44,7 @@ class StoredVectors:
 
     def _kept(self, path: Path, shape: tuple[int, ...]) -> np.ndarray | None:
         """What is in a file; None: there is none of ours, or it is damaged."""
-        height, width = (-(-n // flow.STEP) for n in shape)
+        height, width = (-(-n // STEP) for n in shape)
         spec = ImageSpec(width, height, len(_CHANNELS), "half")
         spec.channelnames = _CHANNELS
         if self._folder.is_symlink() or (image := derived.opened(path, spec)) is None:
