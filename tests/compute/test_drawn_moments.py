@@ -132,15 +132,16 @@ def test_filmed_frames_of_a_pair_are_sent_once(gpu_device, monkeypatch):
     """With the vectors of each moment, a sixteenth of a picture."""
     from shutter_addon.compute.gpu import GPUCompositor
 
-    sent, own = [], running_sums.Sums._filmed
+    sent, own = [], running_sums.Sums._filmed  # nothing else tells what is sent
 
     def noted(sums, moment, *given):
-        before = dict(sums._sent)
+        before = dict(sums._sent)  # by layer
         texture = own(sums, moment, *given)
+        # A layer whose frame is another one now.
         sent.extend(moment.pair + (k != moment.pair % 2) for k in (0, 1) if sums._sent[k] is not before.get(k))
         return texture
 
-    monkeypatch.setattr(running_sums.Sums, "_filmed", noted)
+    monkeypatch.setattr(running_sums.Sums, "_filmed", noted)  # as above
     source = SmoothSource(film(np.random.default_rng(7)), 8)
     moment = smooth(FrameState(Options(4), np.ones((1, 4))), 8)
     Renderer(GPUCompositor(gpu_device), source).picture(Request(0, moment))

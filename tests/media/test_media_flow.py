@@ -207,7 +207,8 @@ def test_what_is_not_finite_becomes_finite(dtype, transfer, alpha):
 
 
 def test_flow_is_found_once_for_all_times(monkeypatch):
-    found, own = [], flow._dis
+    found, own = [], flow._dis  # what is slow, and called by nobody else
+    # as above
     monkeypatch.setattr(flow, "_dis", lambda *given, **more: found.append(1) or own(*given, **more))
     pair = flow.Between(pan(0), pan(8))
     assert len(found) == 2  # there, and back

@@ -13,6 +13,7 @@ from shutter_addon.media.smooth import SmoothSource
 from shutter_addon.media.stored_vectors import StoredVectors
 
 STEPS = 4
+NAMES = stored_vectors._CHANNELS  # a file with others is none of ours
 
 
 @pytest.fixture
@@ -83,11 +84,11 @@ def emptied(path):
 
 
 def infinite(path):
-    stored_vectors.write_halves(path, np.full((24, 40, 6), np.inf, np.float16), stored_vectors._CHANNELS)  # as ours are
+    stored_vectors.write_halves(path, np.full((24, 40, 6), np.inf, np.float16), NAMES)
 
 
 def of_another_size(path):
-    stored_vectors.write_halves(path, np.zeros((24, 41, 6), np.float16), stored_vectors._CHANNELS)
+    stored_vectors.write_halves(path, np.zeros((24, 41, 6), np.float16), NAMES)
 
 
 @pytest.mark.parametrize("damage", [cut_short, flipped, emptied, infinite, of_another_size])
