@@ -40,6 +40,9 @@ from unittest import mock
 import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests"))
+
+import exact_layers
 
 from shutter_addon.compute import (
     composition_passes,
@@ -49,17 +52,17 @@ from shutter_addon.compute import (
     edge_diffusion_gpu,
     guide,
 )
+from shutter_addon.compute.composition_passes import table as table_of
 from shutter_addon.compute.gpu import GPUCompositor
 from shutter_addon.compute.layer_frames import WeightedFrames
 from shutter_addon.compute.request import Behind, Coefficients, Exposure, Request
-from shutter_addon.compute.tables import table as table_of
 from shutter_addon.compute.window import Frames
 from shutter_addon.core.frames import light
 from shutter_addon.core.frames.frame_source import FrameSource
 from shutter_addon.core.model import mattes, presets, scribbles, shutters
 from shutter_addon.core.model.combining import Combine
 from shutter_addon.core.model.frame_state import Following, FrameState, Layers, Options
-from shutter_addon.core.pixels import combined, compositor, layering
+from shutter_addon.core.pixels import combined, compositor
 from shutter_addon.devices.gl import GLDevice
 from shutter_addon.devices.passes import Pass, read_pass
 
@@ -248,7 +251,7 @@ class LayerCase:
         mattes_ = np.stack([self.matte(int(k))[y, x].astype(np.float64)[None] for k in frames])[None]
         layers = Layers(shutters=(1,), opacities=(1.0,), first=0, scribbles=(), mattes=())
         state, present = replace(self._state, layers=layers), np.ones(len(colors), bool)
-        return layering.compose(state, colors, present, coefficients[:, None].astype(np.float64), mattes_)[0, :, :3]
+        return exact_layers.compose(state, colors, present, coefficients[:, None].astype(np.float64), mattes_)[0, :, :3]
 
     def release(self) -> None:
         for window in self.windows:

@@ -11,7 +11,6 @@ coefficients are in 255ths. `steadied` is as it renders, with the frames beside 
 """
 
 import argparse
-import json
 import sys
 from itertools import pairwise
 from pathlib import Path
@@ -19,17 +18,15 @@ from unittest import mock
 
 import cv2
 import numpy as np
+from comparing import ROOT, listed, write_rows
 
-ROOT = Path(__file__).resolve().parents[1]
-sys.path.insert(0, str(ROOT))
-
-from shutter_addon.compute import guide  # noqa: E402
-from shutter_addon.compute.renderer import Renderer, open_compositor  # noqa: E402
-from shutter_addon.compute.request import Request  # noqa: E402
-from shutter_addon.core.frames.source_wrapper import SourceWrapper  # noqa: E402
-from shutter_addon.core.model.frame_state import FrameState, Options  # noqa: E402
-from shutter_addon.core.model.scribbles import Shape  # noqa: E402
-from shutter_addon.media import open_source  # noqa: E402
+from shutter_addon.compute import guide
+from shutter_addon.compute.renderer import Renderer, open_compositor
+from shutter_addon.compute.request import Request
+from shutter_addon.core.frames.source_wrapper import SourceWrapper
+from shutter_addon.core.model.frame_state import FrameState, Options
+from shutter_addon.core.model.scribbles import Shape
+from shutter_addon.media import open_source
 
 # Film, its first frame here, and a stroke inside something that its picture shows.
 FILMS = (
@@ -101,7 +98,7 @@ def parse(arguments=None):
     names = [film.name for film, *_ in FILMS]
     parser.add_argument("--films", nargs="+", choices=names, default=names)
     parser.add_argument("--frames", type=int, default=24)
-    parser.add_argument("--noise", type=lambda text: [float(part) for part in text.split(",")], default="0,8")
+    parser.add_argument("--noise", type=listed(float), default="0,8")
     parser.add_argument("--aggregate", type=int, choices=(1, 2, 4), default=2)
     parser.add_argument("--device", choices=("gpu", "cpu"), default="gpu")
     parser.add_argument("--json", type=Path, help="where the rows are written")
@@ -112,8 +109,7 @@ def main(arguments=None) -> int:
     args = parse(arguments)
     print("| film | noise | guide | still | mean | worst frame | 99 % |\n|---|---|---|---|---|---|---|")
     rows = run(args)
-    if args.json:
-        args.json.write_text(json.dumps(rows, indent=1) + "\n", encoding="utf-8")
+    write_rows(args.json, rows)
     return 0
 
 

@@ -1,59 +1,43 @@
 """How close moments between frames come to frames that were left out, beside other ways, measured in one run.
 
-    python scripts/inbetween_quality.py [--films A.mp4,B.avi] [--frames 121] [--scenes A,B] [--parts films,scenes,speed]
+    python scripts/inbetween_quality.py [--films A.mp4,B.avi] [--frames 121] [--scenes A,B] [--parts films,scenes]
                                         [--table FILE] [--json FILE] [--picture FILE]
 
-films: every second frame is dropped and rebuilt. PSNR and SSIM are of 8-bit pictures; the SSIM is scripts/quality.py's.
+films: every second frame is dropped and rebuilt. PSNR and SSIM are of 8-bit pictures.
 scenes: of footage of the gallery, rendered at 240 fps, every eighth frame is kept, the others are rebuilt; and a box
     shutter over four of the kept frames is compared with the same over all 32.
-speed: frames per second and peak memory at 1920×1080, between frames of the first film, eight to one.
 
 Ways: "flow" is shutter_addon.media.flow's, "blend" mixes both neighbours in linear light, "repeat" shows the earlier
 one, "minterpolate" is `ffmpeg -vf minterpolate=mi_mode=mci`, taken from PATH. Its frames are matched by those that it
 was given and returns. Footage that is not there yet is rendered, which needs Blender as a library (bpy).
-Peak memory is read from /proc, hence on Linux alone.
 """
 
 from __future__ import annotations
 
 import argparse
 import importlib
-import json
-import multiprocessing
-import os
-import re
 import subprocess
 import sys
 import tempfile
 import time
 from itertools import pairwise
 from pathlib import Path
-from statistics import median
 
 import cv2
 import numpy as np
-
-sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
-
-from quality import similarity
+from comparing import ROOT, codes, listed, psnr, similarity, write_rows
 
 from shutter_addon.core.frames import light
 from shutter_addon.core.frames.planes import as_rgba
 from shutter_addon.media import MediaError, flow, open_source
 
-ROOT = Path(__file__).resolve().parents[1]
 FILMS = [ROOT / "assets" / name for name in ("bigbuckbunny.mp4", "pedestrians.avi")]
 FACTOR = 8  # 240 fps from 30
 BOX = 4  # kept frames that the box exposes
-HD = 1920, 1080
 
 
 def linear(picture: np.ndarray) -> np.ndarray:
     return light.to_linear(picture.astype(np.float32) / 255)
-
-
-def codes(picture: np.ndarray) -> np.ndarray:
-    return np.rint(255 * light.to_encoded(np.clip(picture, 0, 1))).astype(np.uint8)
 
 
 def by_flow(kept, factor):
@@ -76,7 +60,7 @@ def repeat(kept, factor):
 
 def minterpolate(kept, factor):
     # It ends a few frames early: the last is given again.
-    made = through_ffmpeg([*kept, kept[-1], kept[-1]], factor)[0]
+    made = through_ffmpeg([*kept, kept[-1], kept[-1]], factor)
     for index, frame in enumerate(kept):
         if psnr(made[index * factor], frame) < 40:
             sys.exit(f"minterpolate: its frame {index * factor} is not the frame {index} that it was given")
@@ -87,7 +71,7 @@ WAYS = {"flow": by_flow, "blend": blend, "repeat": repeat, "minterpolate": minte
 
 
 def through_ffmpeg(kept, factor):
-    """What minterpolate makes of frames, its seconds and its peak memory in bytes."""
+    """What minterpolate makes of frames."""
     height, width = kept[0].shape[:2]
     raw = f"-f rawvideo -pix_fmt rgb24 -s {width}x{height}".split()
     command = ["ffmpeg", "-v", "error", *raw, "-r", "10"]
@@ -95,30 +79,9 @@ def through_ffmpeg(kept, factor):
     with tempfile.TemporaryDirectory() as folder:
         given, made = Path(folder, "given"), Path(folder, "made")
         np.stack(kept).tofile(given)
-        start, peak = time.perf_counter(), 0
-        with subprocess.Popen([*command, "-i", given, *options, *raw, made]) as ffmpeg:
-            while ffmpeg.poll() is None:
-                peak = max(peak, peak_memory(ffmpeg.pid))
-                time.sleep(0.02)
-        seconds = time.perf_counter() - start
-        if ffmpeg.returncode:
+        if subprocess.run([*command, "-i", given, *options, *raw, made], check=False).returncode:
             sys.exit("minterpolate: ffmpeg failed")
-        return np.fromfile(made, np.uint8).reshape(-1, height, width, 3), seconds, peak
-
-
-def peak_memory(process) -> int:
-    """The most bytes of a process that were resident so far; without those of its parent, which rusage includes."""
-    try:
-        status = Path(f"/proc/{process}/status").read_text(encoding="utf-8")
-    except OSError:  # it has ended
-        return 0
-    found = re.search(r"VmHWM:\s+(\d+) kB", status)
-    return 1024 * int(found[1]) if found else 0
-
-
-def psnr(picture, other) -> float:
-    error = np.mean((picture.astype(np.float32) - other) ** 2)
-    return float(10 * np.log10(255**2 / max(error, 1e-6)))
+        return np.fromfile(made, np.uint8).reshape(-1, height, width, 3)
 
 
 def compare(name, truth, factor) -> tuple[list[dict], dict]:
@@ -206,54 +169,17 @@ def save(path, labelled) -> None:
     cv2.imwrite(str(path), np.hstack(columns)[..., ::-1], [cv2.IMWRITE_JPEG_QUALITY, 85])
 
 
-def speed(args) -> list[dict]:
-    """In processes of their own, which tell their peak memory; by turns."""
-    ways = ("flow", "minterpolate")
-    results = {way: [] for way in ways}
-    spawn = multiprocessing.get_context("spawn")
-    for _ in range(args.rounds):
-        for way in ways:
-            with spawn.Pool(1) as pool:
-                results[way].append(pool.apply(one_speed, (way, args.films[0], args.gaps)))
-    rows = []
-    for way, found in results.items():
-        rates, peaks = zip(*found, strict=True)
-        rows.append({"speed": way, "size": "1920x1080", "factor": FACTOR, "fps": median(rates), "memory": max(peaks)})
-        rows[-1]["all"] = rates
-        print(f"| {way} | {rows[-1]['fps']:.2f} | {rows[-1]['memory'] / 1e6:.0f} |", flush=True)
-    return rows
-
-
-def one_speed(way, film, gaps):
-    """New frames per second, and the peak of resident memory in bytes."""
-    with open_source(film) as source:
-        kept = [cv2.resize(source.read(20 + i)[..., :3], HD, interpolation=cv2.INTER_CUBIC) for i in range(gaps + 1)]
-    if way == "minterpolate":
-        made, seconds, peak = through_ffmpeg(kept, FACTOR)
-        return len(made) * (FACTOR - 1) / FACTOR / seconds, peak
-    start = time.perf_counter()
-    # One gap at a time, as they are read: no more than two are kept.
-    count = sum(len(WAYS[way](list(pair), FACTOR)[0]) for pair in pairwise(kept))
-    seconds = time.perf_counter() - start
-    return count / seconds, peak_memory(os.getpid())
-
-
-PARTS = {"films": films, "scenes": scenes, "speed": speed}
+PARTS = {"films": films, "scenes": scenes}
 
 
 def parse(arguments=None):
-    def listed(of):
-        return lambda text: [of(part) for part in text.split(",")]
-
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     add = parser.add_argument
     add("--parts", type=listed(str), default=list(PARTS), help=",".join(PARTS))
-    add("--films", type=listed(Path), default=FILMS, help="separated by commas; the first also for the speed")
+    add("--films", type=listed(Path), default=FILMS, help="separated by commas")
     add("--frames", type=int, default=121, help="of each film, from the first on")
     add("--scenes", type=listed(str), default="rolling_shutter,pendulum", help="of gallery/ (%(default)s)")
     add("--start", type=int, default=1, help="first frame at 30 fps (%(default)s)")
-    add("--rounds", type=int, default=3, help="of the speed")
-    add("--gaps", type=int, default=3, help="pairs of frames of a round of the speed")
     add("--picture", type=Path, help="where the first scene's box shutters are written, side by side")
     add("--json", type=Path, help="where the rows are written")
     add("--table", type=Path, help="where the films' and scenes' table is written, as Markdown")
@@ -267,18 +193,11 @@ def main(arguments=None) -> int:
     except MediaError as error:
         print(f"inbetween_quality: {error}", file=sys.stderr)
         return 2
-    if args.json:
-        write(args.json, json.dumps(rows, indent=1) + "\n")
+    write_rows(args.json, rows)
     if args.table:
         head = "| footage | way | PSNR | worst | SSIM | worst | s/frame |\n|---|---|---|---|---|---|---|\n"
-        write(args.table, head + "".join(line(row) + "\n" for row in rows if "way" in row))
+        args.table.write_text(head + "".join(line(row) + "\n" for row in rows if "way" in row), encoding="utf-8")
     return 0
-
-
-def write(path, text) -> None:
-    part = path.with_name(f".{path.name}.part")
-    part.write_text(text, encoding="utf-8")
-    os.replace(part, path)
 
 
 if __name__ == "__main__":

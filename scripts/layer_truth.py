@@ -24,8 +24,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-
-sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+from comparing import ROOT, psnr, write_rows
 
 from gallery import stills
 from shutter_addon.compute.renderer import Renderer, open_compositor
@@ -41,7 +40,6 @@ from shutter_addon.media import open_source
 from shutter_addon.media.matte_files import MatteFile
 from shutter_addon.media.matte_values import MatteValues
 
-ROOT = Path(__file__).resolve().parents[1]
 COUNT, WINDOW, SHOWN = 33, 13, 16  # frames of the footage, of an exposure, and the shown one, from 0
 WIDE = 16.0  # units of the scene in the picture's width
 RING = 8
@@ -386,8 +384,7 @@ def codes(picture: np.ndarray) -> np.ndarray:
 
 
 def decibels(picture: np.ndarray, truth: np.ndarray, where: np.ndarray) -> float:
-    error = np.rint(codes(picture))[where] - codes(truth)[where]
-    return float(10 * np.log10(255**2 / max((error**2).mean(), 1e-9)))
+    return psnr(np.rint(codes(picture))[where], codes(truth)[where])
 
 
 def table(rows: list[dict]) -> str:
@@ -417,8 +414,7 @@ def main() -> int:
         found = measure(case, arguments.output)
         print("\n".join(table(found).splitlines()[0 if not number else 2 :]), flush=True)
         rows += found
-    if arguments.json:
-        arguments.json.write_text(json.dumps(rows, indent=1) + "\n", encoding="utf-8")
+    write_rows(arguments.json, rows)
     return 0
 
 

@@ -21,7 +21,7 @@ from pathlib import Path
 ROOT = Path(__file__).parents[1]
 sys.path.insert(0, str(ROOT))
 
-from shutter_addon.media import decoding_child, open_source  # noqa: E402
+from shutter_addon.media import blender_movie, open_source  # noqa: E402
 from shutter_addon.media.blender_movie import BlenderMovie  # noqa: E402
 
 SCRIPT = ROOT / "shutter_addon" / "blender" / "data" / "decoding_process.py"
@@ -86,7 +86,7 @@ def main() -> None:
     parser.add_argument("--no-films", action="store_true")
     options = parser.parse_args()
     decoder = [*shlex.split(options.blender), *ALONE, SCRIPT, "--"] if options.blender else [sys.executable, SCRIPT]
-    decoding_child.lend(list(map(str, decoder)))
+    blender_movie.lend(list(map(str, decoder)))
     ways = {"PyAV": open_source(options.footage), "Blender": BlenderMovie(options.footage)}
     far = [(37 * k) % options.frames for k in range(12)]
     kinds = "onward", "processor", "far", "film"

@@ -19,16 +19,13 @@ from __future__ import annotations
 
 import argparse
 import json
-import subprocess
 import sys
 from dataclasses import replace
 from pathlib import Path
 
+import comparing
 import cv2
 import numpy as np
-
-sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
-
 import one_stroke_scenes as truth
 
 from gallery import stills
@@ -39,7 +36,6 @@ from shutter_addon.core.model.effect import Effect
 from shutter_addon.core.recipes import recipe_file
 from shutter_addon.media import open_source
 
-ROOT = Path(__file__).resolve().parents[1]
 NAME = "subject"
 SURE = 0.5
 SHOWN = (1, 14, 27, 40)  # frames of the pictures
@@ -52,7 +48,7 @@ def main() -> int:
         "one_stroke", description="One tracked stroke with Follow Edges, beside the truth."
     )
     parser.add_argument("scenes", nargs="*", metavar="SCENE", help=", ".join(names))
-    parser.add_argument("--output", type=Path, default=ROOT / "out" / "one_stroke", metavar="DIR")
+    parser.add_argument("--output", type=Path, default=comparing.ROOT / "out" / "one_stroke", metavar="DIR")
     parser.add_argument("--json", type=Path, metavar="FILE", help="write the figures there")
     parser.add_argument("--aggregate", type=int, choices=(1, 2, 4), default=1, help="as in the recipe: 2 is quicker")
     parser.add_argument("--docs", action="store_true", help="renew docs/one_stroke_SCENE.jpg")
@@ -70,10 +66,9 @@ def main() -> int:
             picture = masks.picture()
             stills.save(picture, folder.with_suffix(".png"))
             if arguments.docs:
-                stills.save(picture, ROOT / "docs" / f"one_stroke_{scene.name}.jpg")
+                stills.save(picture, comparing.ROOT / "docs" / f"one_stroke_{scene.name}.jpg")
         print(json.dumps(rows[-1]), flush=True)
-    if arguments.json:
-        arguments.json.write_text(json.dumps(rows, indent=1) + "\n", encoding="utf-8")
+    comparing.write_rows(arguments.json, rows)
     return 0
 
 
@@ -107,8 +102,7 @@ def tracked(scene: truth.Scene, folder: Path, aggregate: int = 1) -> dict[str, E
     found = {"drawn": drawn}
     for name, option in (("thinned", []), ("all", ["--all-keys", "--report", folder / "report.json"])):
         output = folder / f"{name}.json"
-        command = [sys.executable, "-m", "shutter_addon", "track", footage, *options, "--output", output, *option]
-        subprocess.run(list(map(str, command)), cwd=ROOT, check=True, stdout=subprocess.DEVNULL)
+        comparing.run("track", footage, *options, "--output", output, *option)
         found[name] = recipe_file.load(output)
     return found
 

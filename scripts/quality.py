@@ -11,32 +11,19 @@ from __future__ import annotations
 
 import argparse
 import itertools
-import json
 import sys
 from pathlib import Path
 
 import numpy as np
-from skimage.metrics import structural_similarity
-
-sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
-
 from benchmark import BARS, bars, shapes
+from comparing import ROOT, codes, listed, similarity, write_rows
 
 from shutter_addon.compute.renderer import Renderer, open_compositor
 from shutter_addon.compute.request import Request
-from shutter_addon.core.frames import light
 from shutter_addon.core.model.frame_state import FrameState, Options
 from shutter_addon.media import MediaError, open_source
 
-ASSETS = Path(__file__).resolve().parents[1] / "assets"
-FILMS = [ASSETS / name for name in ("bigbuckbunny.mp4", "pedestrians.avi")]
-
-
-def similarity(picture: np.ndarray, other: np.ndarray, where: np.ndarray | None = None) -> float:
-    """Structural similarity of two 8-bit pictures (H, W, 3); where: (H, W) bool, the mean over these pixels alone."""
-    how = {"gaussian_weights": True, "sigma": 1.5, "use_sample_covariance": False}
-    mean, each = structural_similarity(picture, other, channel_axis=2, data_range=255, full=True, **how)
-    return float(mean if where is None else each[where].mean())
+FILMS = [ROOT / "assets" / name for name in ("bigbuckbunny.mp4", "pedestrians.avi")]
 
 
 def similarities(compositor, film, kind: str, count: int, window: int, block: int, frames: int) -> list[float]:
@@ -47,15 +34,12 @@ def similarities(compositor, film, kind: str, count: int, window: int, block: in
     moments = [FrameState(Options(window, aggregate=b), bars(kind, count, window), shapes(count)) for b in (1, block)]
     result = []
     for index in np.linspace(0, source.count - window, frames).astype(int).tolist():
-        pictures = [_codes(r.picture(Request(index, moment))) for r, moment in zip(renderers, moments, strict=True)]
-        result.append(similarity(*pictures))
+        asked = [Request(index, moment) for moment in moments]
+        pictures = [renderer.picture(each) for renderer, each in zip(renderers, asked, strict=True)]
+        result.append(similarity(*(codes(picture[..., :3]) for picture in pictures)))
     for renderer in renderers:
         renderer.close()
     return result
-
-
-def _codes(picture: np.ndarray) -> np.ndarray:
-    return np.rint(np.clip(light.to_encoded(picture[..., :3]), 0, 1) * 255).astype(np.uint8)
 
 
 def run(args) -> list[dict]:
@@ -70,9 +54,6 @@ def run(args) -> list[dict]:
 
 
 def parse(arguments=None):
-    def listed(of):
-        return lambda text: [of(part) for part in text.split(",")]
-
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     add = parser.add_argument
     add("films", type=Path, nargs="*", default=FILMS)
@@ -94,8 +75,7 @@ def main(arguments=None) -> int:
     except MediaError as error:
         print(f"quality: {error}", file=sys.stderr)
         return 2
-    if args.json:
-        args.json.write_text(json.dumps(rows, indent=1) + "\n", encoding="utf-8")
+    write_rows(args.json, rows)
     return 0
 
 

@@ -16,24 +16,19 @@ when the other camera films all. Needs Blender as a library (bpy).
 
 from __future__ import annotations
 
-import subprocess
-import sys
 import tempfile
 from pathlib import Path
 
 import bpy
 import numpy as np
-
-sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
-
-from truth import ROOT, codes, fail, labelled, make_folders, parser_of, place, read, saved, stage
+from comparing import codes, labelled, listed, make_folders, parser_of, psnr, read, rendered, saved
+from truth import place, stage
 
 from gallery import stills
 from shutter_addon import blender
 from shutter_addon.blender.data import selection
 from shutter_addon.blender.editing import add_effect, rolling_shutter, shutter_edits
 from shutter_addon.blender.output import matte_export
-from shutter_addon.core.recipes import recipe_file
 from shutter_addon.media import MediaError, open_source, readout
 
 COUNT, SHOWN = 22, (8, 11, 15)  # frames of the footage, and those that are compared, from 0
@@ -88,20 +83,8 @@ def repaired(first: Path, share: float, folder: Path) -> list[np.ndarray]:
     shutter_edits.start(effect)
     selection.choose(edit, strip)
     rolling_shutter.repair(edit, effect, strip, share, "TOP")
-    recipe_file.save(matte_export.recipe_for(edit, effect, strip, folder / "recipe.json"), folder / "recipe.json")
-    command = [sys.executable, "-m", "shutter_addon", "render", str(first), "--recipe", str(folder / "recipe.json")]
-    command += ["--output", str(folder / "made"), "--format", "exr"]
-    for frame in SHOWN:
-        done = subprocess.run([*command, "--frames", str(frame + 1)], cwd=ROOT, capture_output=True, text=True)
-        if done.returncode:
-            fail(done.stderr.strip())
-    return [read(folder / "made" / f"{frame + 1:04d}.exr") for frame in SHOWN]
-
-
-def psnr(picture: np.ndarray, other: np.ndarray) -> float:
-    """In decibels, of 8-bit sRGB."""
-    apart = codes(picture).astype(float) - codes(other)
-    return float(10 * np.log10(255**2 / max((apart**2).mean(), 1e-9)))
+    recipe = matte_export.recipe_for(edit, effect, strip, folder / "recipe.json")
+    return [read(file) for file in rendered(first, recipe, [frame + 1 for frame in SHOWN], folder)]
 
 
 def bent(picture: np.ndarray) -> float:
@@ -137,8 +120,8 @@ def measure(args, folder: Path) -> tuple[list[dict], np.ndarray]:
         for frame, truth, own, before in zip(SHOWN, truths, made, plain, strict=True):
             row = {"readout": share, "frame": frame, "found": words, "truth": bent(truth)}
             row |= {
-                "psnr": psnr(own, truth),
-                "unrepaired": psnr(before, truth),
+                "psnr": psnr(codes(own), codes(truth)),
+                "unrepaired": psnr(codes(before), codes(truth)),
                 "bent": bent(own),
                 "skewed": bent(before),
             }
@@ -157,13 +140,7 @@ WORDS = "| {readout} % | {found} | {frame} | {unrepaired:.1f} | {psnr:.1f} | {sk
 
 def parse(arguments=None):
     parser = parser_of(__doc__, "rolling_truth", (320, 180), 64)
-    add = parser.add_argument
-    add(
-        "--readouts",
-        type=lambda text: list(map(int, text.split(","))),
-        default=[25, 50, 95],
-        help="per cent of a frame",
-    )
+    parser.add_argument("--readouts", type=listed(int), default=[25, 50, 95], help="per cent of a frame")
     args = parser.parse_args(arguments)
     make_folders(args, parser)
     return args

@@ -2,7 +2,7 @@
 
     blender --factory-startup --python scripts/stop_speed.py -- FOOTAGE.mp4 OUT.json \\
         [--presses 20] [--jobs render,play,scrub,track] [--window 16] [--device auto] [--smooth 1] \\
-        [--packages DIR] [--whole]
+        [--packages DIR]
 
 xdotool presses Esc at some moment of each job, from a process of its own: Blender need not have time for it. What
 counts is the time from that press until the job has ended and a timer ticks again; `idle` is the time until what works
@@ -19,7 +19,6 @@ strokes' region is tracked.
 Any Blender 5.2 with the extension enabled, started with a window and `--python` this file, will do.
 --smooth: moments for a filmed frame, or auto.
 --packages: a folder with OpenCV, where Blender has none.
---whole: still pictures are composed to their end before Blender looks at its keys.
 """
 
 import argparse
@@ -54,7 +53,6 @@ def arguments():
     parser.add_argument("--smooth", default="1", choices=("1", "auto", "2", "4", "8", "16"))
     parser.add_argument("--zoom", default="fit", choices=("fit", "full"))
     parser.add_argument("--packages")
-    parser.add_argument("--whole", action="store_true")
     return parser.parse_args(sys.argv[sys.argv.index("--") + 1 :])
 
 
@@ -337,11 +335,6 @@ def story():
         part("blender.editing.layer_presets").sharp_subject(effect_now(), 0)
         edit_now().frame_set(40)
         yield 1.0
-    if OPTIONS.whole:
-        previews = part("blender.rendering.previews")
-        in_slices = previews._time_up  # which is no option of the extension
-        # As it was before.
-        previews._time_up = lambda key: in_slices(key) if previews.may_be_late() else previews.never
     results = {"renderer": (gpu.platform.renderer_get(), gpu.platform.backend_type_get()), "options": str(OPTIONS)}
     for name in OPTIONS.jobs.split(","):
         job, times = globals()[name], []

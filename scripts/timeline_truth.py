@@ -18,18 +18,13 @@ which the length of an evenly lit one comes, once the still rod's is taken off. 
 
 from __future__ import annotations
 
-import json
-import subprocess
-import sys
 import tempfile
 from pathlib import Path
 
 import bpy
 import numpy as np
-
-sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
-
-from truth import ROOT, codes, compare, fail, labelled, make_folders, parser_of, place, read, saved, stage
+from comparing import codes, labelled, listed, make_folders, parser_of, read, rendered, saved
+from truth import compare, place, stage
 
 from gallery import stills
 
@@ -79,17 +74,9 @@ def recipe(case: str, *, timeline: bool = True, smooth: int = 8) -> dict:
     return said | {"inbetween": smooth, "stop_at_cuts": False}
 
 
-def exposed(first: Path, said: dict, frames: list[int], folder: Path) -> list[np.ndarray]:
+def exposed(folder: Path, said: dict, frames: list[int], name: str) -> list[np.ndarray]:
     """Pictures (H, W, 3), scene-linear, that the command makes of the footage at frames of the timeline, from 0."""
-    folder.mkdir()
-    (folder / "recipe.json").write_text(json.dumps(said), encoding="utf-8")
-    command = [sys.executable, "-m", "shutter_addon", "render", str(first), "--recipe", str(folder / "recipe.json")]
-    command += ["--output", str(folder), "--format", "exr"]
-    for frame in frames:
-        done = subprocess.run([*command, "--frames", str(frame + 1)], cwd=ROOT, capture_output=True, text=True)
-        if done.returncode:
-            fail(done.stderr.strip())
-    return [read(folder / f"{frame + 1:04d}.exr") for frame in frames]
+    return [read(file) for file in rendered(folder / "0001.exr", said, [k + 1 for k in frames], folder / name)]
 
 
 def spread(picture: np.ndarray) -> float:
@@ -119,10 +106,7 @@ def measure(args, folder: Path) -> tuple[list[dict], np.ndarray]:
         truths = [
             render(scene, folder / f"{case}-{frame}.exr", frame, args.samples, shutter=0.5) for frame in args.frames
         ]
-        made = {
-            way: exposed(folder / "0001.exr", recipe(case, **said), args.frames, folder / f"{case} {way}")
-            for way, said in ways.items()
-        }
+        made = {way: exposed(folder, recipe(case, **said), args.frames, f"{case} {way}") for way, said in ways.items()}
         for at, (frame, truth) in enumerate(zip(args.frames, map(read, truths), strict=True)):
             speed = (position(case, frame + 0.5) - position(case, frame)) * 2
             for way, pictures in made.items():
@@ -145,9 +129,7 @@ WORDS = "| {case} | {frame} | {speed:.2f} | {picture} | {similarity:.4f} | {mean
 def parse(arguments=None):
     parser = parser_of(__doc__, "timeline_truth", (320, 180), 256)
     add = parser.add_argument
-    add(
-        "--frames", type=lambda text: list(map(int, text.split(","))), default=[1, 3, 5], help="of the timeline, from 0"
-    )
+    add("--frames", type=listed(int), default=[1, 3, 5], help="of the timeline, from 0")
     args = parser.parse_args(arguments)
     if not all(0 <= frame < TIMELINE for frame in args.frames):
         parser.error(f"--frames: the timeline goes from 0 to {TIMELINE - 1}")

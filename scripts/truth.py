@@ -18,27 +18,15 @@ the top, (r + 1) / H of the delay, where the diffusion between two lines gives r
 
 from __future__ import annotations
 
-import argparse
-import json
-import re
-import subprocess
-import sys
 import tempfile
-from collections.abc import Sequence
 from pathlib import Path
 
 import bpy
 import numpy as np
-
-sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
-
-from quality import similarity
+from comparing import ROOT, codes, fail, labelled, make_folders, parser_of, read, rendered, saved, similarity
 
 from gallery import stills
-from shutter_addon.core.frames import light
-from shutter_addon.media import open_source
 
-ROOT = Path(__file__).resolve().parents[1]
 SUBFRAMES = 64
 # How open the shutter is at the points of Cycles' curve: at its begin, middle and end, straight in between.
 CURVES = {"box": (1, 1, 1), "triangle": (0, 1, 0), "rolling": (1, 1, 1)}
@@ -174,26 +162,9 @@ def closed_early(effect: dict) -> dict:
     return effect | {"shutters": shutters}
 
 
-def compose(first: Path, effect: dict, folder: Path) -> np.ndarray:
+def composed(first: Path, effect: dict, folder: Path) -> np.ndarray:
     """The picture (H, W, 3), scene-linear, that the command makes of the sub-frames."""
-    folder.mkdir()
-    (folder / "recipe.json").write_text(json.dumps(effect), encoding="utf-8")
-    command = [sys.executable, "-m", "shutter_addon", "render", str(first), "--recipe", str(folder / "recipe.json")]
-    command += ["--output", str(folder), "--format", "exr", "--frames", "1"]
-    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True)
-    if done.returncode:
-        fail(done.stderr.strip())
-    return read(folder / "0001.exr")
-
-
-def read(file: Path) -> np.ndarray:
-    with open_source(file) as source:
-        return source.read(0)[..., :3]
-
-
-def codes(picture: np.ndarray) -> np.ndarray:
-    """Scene-linear to 8-bit sRGB, as the view transform Standard does."""
-    return np.rint(np.clip(light.to_encoded(picture), 0, 1) * 255).astype(np.uint8)
+    return read(*rendered(first, effect, [1], folder))
 
 
 def compare(picture: np.ndarray, other: np.ndarray) -> dict:
@@ -213,8 +184,8 @@ def measure(args, folder: Path) -> tuple[list[dict], np.ndarray]:
     rows, strips = [], []
     for case in CURVES:
         halves = expose(scene, case, args.samples, folder)
-        ours = compose(first, recipe(case), folder / case)
-        wrong = compose(first, closed_early(recipe(case)), folder / f"{case}-wrong")
+        ours = composed(first, recipe(case), folder / case)
+        wrong = composed(first, closed_early(recipe(case)), folder / f"{case}-wrong")
         truth, one, other, ours, wrong = (codes(picture) for picture in (sum(halves) / 2, *halves, ours, wrong))
         for name, pair in (("ours", (truth, ours)), ("noise", (one, other)), ("wrong", (truth, wrong))):
             rows.append({"case": case, "picture": name} | compare(*pair))
@@ -229,11 +200,6 @@ def side_by_side(case: str, *pictures: np.ndarray) -> np.ndarray:
     )
 
 
-def labelled(pictures: Sequence[np.ndarray], texts: Sequence[str]) -> np.ndarray:
-    """Pictures of 8-bit sRGB side by side, each with a text."""
-    return stills.beside(*(stills.labelled(p / np.float32(255), text) for p, text in zip(pictures, texts, strict=True)))
-
-
 def amplified(picture: np.ndarray, other: np.ndarray) -> np.ndarray:
     return np.clip(apart(picture, other) * AMPLIFIED, 0, 255).astype(np.uint8)
 
@@ -242,47 +208,6 @@ def write(args, rows: list[dict], sheet: np.ndarray) -> None:
     if args.docs:
         stills.save(stills.scaled(sheet, sheet.shape[1] // 2), ROOT / "docs" / "truth.jpg")
     saved(args, "truth", rows, sheet)
-
-
-def saved(args, name: str, rows: list[dict], sheet: np.ndarray) -> None:
-    """Writes the sheet of pictures and the rows to where the options of `parser_of` say."""
-    stills.save(sheet, args.output / f"{name}.png")
-    if args.json:
-        part = args.json.with_name(f".part-{args.json.name}")
-        part.write_text(json.dumps(rows, indent=1) + "\n", encoding="utf-8")
-        part.replace(args.json)
-
-
-def fail(sentence: str) -> None:
-    print(sentence, file=sys.stderr)
-    sys.exit(2)
-
-
-def parser_of(about: str, name: str, size: tuple[int, int], samples: int) -> argparse.ArgumentParser:
-    """The options that scripts have which measure beside Cycles. name: of the sheet that they write"""
-
-    def size_in(text):
-        match = re.fullmatch(r"(\d+)x(\d+)", text)
-        if not match or min(map(int, match.groups())) < 16:
-            raise argparse.ArgumentTypeError(f"{text!r} is not WIDTHxHEIGHT of 16 or more")
-        return tuple(map(int, match.groups()))
-
-    parser = argparse.ArgumentParser(description=about, formatter_class=argparse.RawDescriptionHelpFormatter)
-    add = parser.add_argument
-    add("--output", type=Path, default=ROOT / "out" / name, metavar="DIR", help=f"where {name}.png is written")
-    add("--json", type=Path, metavar="FILE", help="where the rows are written")
-    add("--size", type=size_in, default=size, metavar="WIDTHxHEIGHT")
-    add("--samples", type=int, default=samples, help="for each pixel of Cycles' pictures")
-    return parser
-
-
-def make_folders(args, parser: argparse.ArgumentParser) -> None:
-    """Makes the folders that are written to, before anything is measured."""
-    try:
-        for folder in (args.output, *([args.json.parent] if args.json else [])):
-            folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        parser.error(f"{error.filename}: {error.strerror}")
 
 
 def parse(arguments=None):

@@ -1,4 +1,4 @@
-"""How quick the live preview is, measured in Blender's own window beside two references, interleaved in one run.
+"""How quick the live preview is, measured in Blender's own window beside the plain strip, interleaved in one run.
 
     blender --factory-startup --python scripts/window_speed.py -- FOOTAGE.mp4 OUT.json \\
         [--size 1280x720] [--percent 100] [--zoom fit|full] [--ways plain,live] [--sync NONE|FRAME_DROP]
@@ -9,9 +9,7 @@ advanced beside the clock (1 keeps time), by how much the shown frame strayed fr
 process.
 
 Any Blender 5.2 with the extension enabled, started with a window and `--python` this file, will do. Ways:
-plain: the movie strip alone; texture: its picture replaced by a draw handler that draws one texture of its size;
-engine: the effect strip, live preview off; live: the effect strip with its live preview; baked: what it was baked to,
-a movie, which is made beside OUT.json.
+plain: the movie strip alone; live: the effect strip with its live preview.
 """
 
 import argparse
@@ -23,11 +21,9 @@ from pathlib import Path
 
 import bpy
 import gpu
-import numpy as np
-from gpu_extras.batch import batch_for_shader
 
 WINDOW, ROUNDS, SECONDS = 16, 3, 4.0
-WAYS = "plain", "texture", "engine", "live", "baked"
+WAYS = "plain", "live"
 
 
 def arguments():
@@ -92,54 +88,7 @@ def add_effect(edit, source):
         "regions": [{"shutter": n, "kind": "line", "width": 0.02, "strokes": [points]} for n, points in lines.items()],
     }
     recipe_import.apply(edit, effect, strip, recipe_file.parse(json.dumps(data)))
-    return strip, effect
-
-
-def baked_strip(edit, strip):
-    """The effect as a movie, in a strip above it; generator, which returns that."""
-    bpy.ops.wm.save_as_mainfile(filepath=str(Path(OPTIONS.out).with_suffix(".blend")))
-    edit.sequence_editor.active_strip = strip
-    with bpy.context.temp_override(**timeline()):
-        bpy.ops.shutter.bake("INVOKE_DEFAULT", file_format="MOVIE")
-    while not (found := [s for s in edit.sequence_editor.strips if s.type == "MOVIE" and s.name != "Footage"]):
-        yield 0.5
-    return found[0]
-
-
-def texture_handler():
-    """A draw handler that draws one texture of the picture's size over the preview."""
-    pixels = np.random.default_rng(0).random((*SIZE[::-1], 4), dtype=np.float32)
-    texture = gpu.types.GPUTexture(SIZE, format="RGBA32F", data=gpu.types.Buffer("FLOAT", pixels.size, pixels.ravel()))
-    shader = gpu.shader.from_builtin("IMAGE")
-
-    def draw():
-        region = bpy.context.region
-        corners = [(0, 0), (region.width, 0), (0, region.height), (region.width, region.height)]
-        shader.bind()
-        shader.uniform_sampler("image", texture)
-        places = [(0, 0), (1, 0), (0, 1), (1, 1)]
-        batch_for_shader(shader, "TRI_STRIP", {"pos": corners, "texCoord": places}).draw(shader)
-
-    return draw
-
-
-class Ways:
-    """Switches between the ways; each leaves the others' work undone."""
-
-    def __init__(self, source, strip, baked):
-        self.source, self.strip, self.baked, self.handler = source, strip, baked, None
-
-    def __call__(self, way):
-        if self.handler:
-            bpy.types.SpaceSequenceEditor.draw_handler_remove(self.handler, "PREVIEW")
-            self.handler = None
-        self.strip.mute = way not in ("engine", "live")
-        self.source.mute = way == "texture"
-        if self.baked:
-            self.baked.mute = way != "baked"
-        bpy.context.window_manager.virtual_shutter.live = way == "live"
-        if way == "texture":
-            self.handler = bpy.types.SpaceSequenceEditor.draw_handler_add(texture_handler(), (), "PREVIEW", "POST_VIEW")
+    return strip
 
 
 def timeline():
@@ -202,44 +151,20 @@ def previewed():
             bpy.ops.sequencer.view_zoom_ratio(ratio=1.0)
 
 
-def drawing(change):
-    """Milliseconds from a change to the window drawn with it, the median of several."""
-    times = []
-    for step in range(9):
-        start = time.perf_counter()
-        change(step)
-        for area in bpy.context.window_manager.windows[0].screen.areas:
-            if area.type == "SEQUENCE_EDITOR" and area.spaces.active.view_type == "PREVIEW":
-                area.tag_redraw()
-        with bpy.context.temp_override(**timeline()):
-            bpy.ops.wm.redraw_timer(type="DRAW_WIN_SWAP", iterations=1)
-        times.append((time.perf_counter() - start) * 1000)
-    return statistics.median(times)
-
-
 def story():
     edit, source = make_edit()
     yield 1.0
-    strip, effect = add_effect(edit, source)
-    ways = Ways(source, strip, (yield from baked_strip(edit, strip)) if "baked" in OPTIONS.ways else None)
-    bar = effect.shutters[0].bars[3]
-
-    def drag(step):
-        bar.weight = 0.2 + 0.05 * step
-
+    strip = add_effect(edit, source)
     previewed()
     yield 1.0
     results = {}
     for _ in range(ROUNDS):
         for way in OPTIONS.ways.split(","):
-            ways(way)
+            strip.mute = way == "plain"
+            bpy.context.window_manager.virtual_shutter.live = way == "live"
             edit.frame_set(1)
             yield 0.5
             numbers = yield from playing(edit, SECONDS)
-            edit.frame_set(min(40, edit.frame_end))
-            yield 0.5
-            if OPTIONS.sync == "NONE" and OPTIONS.percent == "100":  # what a script draws is asked for in full
-                numbers["ms"] = drawing(drag if way in ("engine", "live") else lambda step: None)
             for name, value in numbers.items():
                 results.setdefault(f"{way} {name}", []).append(value)
             yield 0.2

@@ -19,8 +19,6 @@ _MODULES = (
     "interface.operators",
     "interface.track_operators",
     "interface.matte_operators",
-    "interface.outline_operators",
-    "interface.copy_operators",
     "interface.bake_operators",
     "interface.full_quality",
     "interface.panels",
@@ -29,7 +27,7 @@ _MODULES = (
     "interface.gizmo_groups",
     "interface.bar_editor",
     "interface.region_gizmo",
-    "interface.outline_gizmo",
+    "interface.outline_operators",
     "interface.probe_gizmo",
     "handlers",
 )

@@ -31,7 +31,7 @@ def main(argv: list[str]) -> int:
         arguments.run(arguments)
     except SystemExit as stop:  # argparse: --help, or what it has said on stderr
         return int(stop.code or 0)
-    except KeyboardInterrupt:  # while in-between frames are built; those that are finished stay
+    except KeyboardInterrupt:  # between the frames of a render; those that are finished stay
         return film_output.INTERRUPTED
     except film_output.InterruptedRenderError as stopped:
         return _refuse(str(stopped), film_output.INTERRUPTED)

@@ -14,7 +14,6 @@ from ..core.model import mattes, windows
 from ..core.model.frame_state import Options
 from ..core.pixels import compositor, layering
 from ..core.pixels.shown_levels import Display
-from . import memory_needs
 from .diffusion import diffuse
 from .layer_frames import LARGEST, linear
 from .request import Behind, Coefficients, Exposure, Request
@@ -119,9 +118,6 @@ class CPUCompositor:
 
     def stages(self) -> CPUCompositor:
         return self
-
-    def needs(self, source: FrameSource, kind: memory_needs.Kind) -> memory_needs.Needs:
-        return memory_needs.with_numpy(source, kind)
 
     def upload(self, values: np.ndarray) -> np.ndarray:
         return values.astype(np.float32, copy=False)

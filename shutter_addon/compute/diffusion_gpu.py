@@ -14,17 +14,14 @@ A solve that starts from nothing depends on the labels alone, to the bit. For th
 scribbles are or were in the last solve, and W and f are set to zero there and outside the tiles.
 """
 
-from __future__ import annotations
-
 from itertools import pairwise
 from typing import Any
 
 import numpy as np
 
-from ..devices.device import Device, Given, Texture
-from ..devices.named_textures import NamedTextures
+from ..devices.device import Device, Given, NamedTextures, Texture
 from ..devices.passes import Pass, read_pass
-from .diffusion import COLOURS, NOTHING
+from .diffusion import NOTHING
 
 # V-cycles of a solve that starts from nothing. Largest error × 255 after 1, 2, 3, 4 cycles: 3.9, 0.67, 0.66, 0.66 over
 # the scenes of the tests (median 2.1, 0.13, 0.07, 0.07), and 11, 1.6, 0.25, 0.24 over their lattices of dots. The error
@@ -37,6 +34,8 @@ WARM_CYCLES = 1
 # error that a moved scribble leaves is all there.
 SWEEPS = 1
 FINEST_SWEEPS = 2
+# Cells (x, y) of 2 × 2 in the order of a sweep.
+COLOURS = ((0, 0), (1, 1), (1, 0), (0, 1))
 # Cells along the longer side of a grid: with this many or fewer it has cells everywhere. The finest such grid is
 # visited twice in a cycle.
 WHOLE = 128
@@ -268,7 +267,7 @@ class Diffusion:
         cells: int = 32
         colours: list[int | tuple[int, int]] = [0, 1]
         if not grid.finest:
-            cells, colours = 16, [(x, y) for y, x in COLOURS if x < grid.size[0] and y < grid.size[1]]
+            cells, colours = 16, [(x, y) for x, y in COLOURS if x < grid.size[0] and y < grid.size[1]]
         values = grid.textures["solution"]
         for colour in (colours[::-1] if back else colours) * sweeps:
             self._run(self._pass(grid, "smooth"), grid, "near", cells, grid.layers, values=values, colour=colour)

@@ -4,14 +4,11 @@ A device cannot be trusted with powers to the bit. So it takes parabolas, which 
 these are too near to where a level ends; the few such pixels, one in some hundred, are asked of the display itself.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from ..core.memo import Memo
 from ..core.pixels.shown_levels import Display
-from ..devices.device import Device, Texture
-from ..devices.named_textures import NamedTextures
+from ..devices.device import Device, NamedTextures, Texture
 from ..devices.passes import read_pass
 
 _OCTAVES, _LOWEST = 10, -9  # from here on, to 2; below, the display is linear

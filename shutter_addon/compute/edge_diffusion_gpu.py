@@ -5,8 +5,6 @@ gradients, each iteration a cycle over it and the coarser ones: that whose cells
 pixels where these are pixels. On the grids before it conductances are smooth.
 """
 
-from __future__ import annotations
-
 from itertools import pairwise
 
 import numpy as np
@@ -14,7 +12,7 @@ import numpy as np
 from ..core.pixels.conductances import cell_side, resistances
 from ..devices.device import Device, Given, Texture
 from ..devices.passes import read_pass
-from .diffusion import NOTHING, SWEEPS
+from .diffusion import NOTHING
 from .diffusion_gpu import FINISH, Diffusion, _Grid, operators
 
 # Cycles at most, and the iterations of conjugate gradients in each: frames of films at 640 × 360 take four cycles,
@@ -29,8 +27,8 @@ TWICE = 2
 # near scribbles alone, then of those everywhere. Largest error × 255 in frames of three films at 1920 × 1080: 0.6.
 NEAR_CYCLES = (4, 2)
 LAST_CYCLES = (1,)
-# Sweeps over a grid, before and after its correction, in cycles over smooth conductances.
-SMOOTH_SWEEPS = 1
+# Sweeps over a grid, before and after its correction; and in cycles over smooth conductances.
+SWEEPS, SMOOTH_SWEEPS = 2, 1
 NEAR_SWEEPS = 2  # over the pixels near scribbles
 # Parts that a sum over all cells is made of.
 PARTS = 1024

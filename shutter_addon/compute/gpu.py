@@ -1,8 +1,5 @@
 """Compositing on a device: one compute pass per picture and band of rows, over the window's frames or running sums."""
 
-from __future__ import annotations
-
-from contextlib import AbstractContextManager
 from dataclasses import replace
 from typing import Any
 
@@ -13,11 +10,10 @@ from ..core.model import windows
 from ..core.model.combining import AVERAGE, Combine
 from ..core.model.frame_state import Following, FrameState
 from ..core.pixels.shown_levels import Display
-from ..devices.device import Device, Given, Texture
+from ..devices.device import Device, Given, NamedTextures, Texture
 from ..devices.llvmpipe import MOST_ITERATIONS
-from ..devices.named_textures import NamedTextures
 from ..devices.passes import Pass
-from . import cpu, memory_needs, window_frames
+from . import cpu, window_frames
 from .composition_passes import (
     EDGES,
     LEVELS,
@@ -27,8 +23,10 @@ from .composition_passes import (
     filled_rows,
     lines_of,
     median_iterations,
+    moved_tables,
     moved_way,
     selection,
+    table,
     way_of,
     way_sum,
 )
@@ -36,7 +34,6 @@ from .displaying import Displaying
 from .request import Coefficients, Handle, Request
 from .running_sums import Sums, open_window
 from .stages import Stages
-from .tables import moved_tables, table
 from .window import BLOCK, PackedFrames, WholeFrames, Window
 
 
@@ -99,9 +96,9 @@ def _threshold(combine: Combine, request: Request, shot: range) -> Given:
     if combine.threshold is None:
         return {}
     options = request.state.options
-    is_there = windows.indices(options, request.index, shot, request.direction)[options.before] >= 0
+    is_there = windows.indices(options, request.index, shot, request.direction)[options.shown] >= 0
     half = max(combine.softness, 1e-6) / 2
-    return {"threshold": (combine.threshold, half), "shown": options.before if is_there else -1}
+    return {"threshold": (combine.threshold, half), "shown": options.shown if is_there else -1}
 
 
 def _in_window(state: FrameState, chosen: tuple[int, ...]) -> FrameState:
@@ -123,14 +120,9 @@ class GPUCompositor:
 
     def __init__(self, device: Device) -> None:
         self.device, self.name, self.takes_planes = device, device.name, device.takes_planes
+        self.current, self.freeing = device.current, device.freeing
         self._textures = NamedTextures(device)
         self._displaying = Displaying(device)
-
-    def current(self) -> AbstractContextManager:
-        return self.device.current()
-
-    def freeing(self) -> AbstractContextManager:
-        return self.device.freeing()
 
     def window(
         self, source: FrameSource, capacity: int, moved: bool = False, shutters: int = 4, summed: bool = True
@@ -139,9 +131,6 @@ class GPUCompositor:
 
     def stages(self) -> Stages:
         return Stages(self.device)
-
-    def needs(self, source: FrameSource, kind: memory_needs.Kind) -> memory_needs.Needs:
-        return memory_needs.of_windows(self.device, source, kind)
 
     def labels(self, values: np.ndarray) -> Texture:
         """Labels (H, W) uint16 as a texture r32ui. Valid until the next call."""

@@ -7,8 +7,6 @@ It is steadied: where the frames beside the shown one differ little from it, it 
 goes in a still picture would else make coefficients flicker. What moves differs more, and stays as it is shown.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 
 import numpy as np
@@ -19,6 +17,7 @@ from ..core.frames.planes import Decoded, as_rgba
 from ..core.frames.source_wrapper import SourceWrapper
 from ..core.memo import Memo
 from ..core.messages import UserError
+from ..core.pixels.matte_grid import block_sums, blurred
 
 # Rows of the picture whose pixels are smoothed over about one, by a Gaussian of so many pixels.
 ROWS = 240
@@ -105,8 +104,8 @@ class Guides:
             colours = light.to_encoded(colours)
         # What averaging and interpolation smooth by themselves: variances of 1/12 and 1/6 of a cell.
         variance = (BLUR * self._short / (ROWS * self._cell)) ** 2 - (1 - 1 / self._cell**2) / 4
-        sigma = variance**0.5
-        smooth = _smoothed(_smoothed(np.ascontiguousarray(np.moveaxis(colours, -1, 0)), sigma, 1), sigma, 2)
+        kernel = _gaussian(variance**0.5)
+        smooth = np.stack([blurred(np.ascontiguousarray(plane), kernel) for plane in np.moveaxis(colours, -1, 0)])
         return np.rint(smooth * np.float32(_WHITE)).astype(np.uint16)
 
 
@@ -131,39 +130,19 @@ class NotedSource(SourceWrapper):
 
 
 def _averaged(picture: np.ndarray, size: int) -> np.ndarray:
-    """Means (h, w, 3) float32, 0 to 1, over squares of size × size pixels; at the right and the bottom, the last pixel
-    goes on."""
+    """Means (h, w, 3), 0 to 1, over squares of size × size pixels; at the right and the bottom, the last pixel goes
+    on."""
     whole = picture.dtype.kind == "u"
     unit = np.float32(size * size * (np.iinfo(picture.dtype).max if whole else 1))
     if size > 1:
-        down, right = (-length % size for length in picture.shape[:2])
-        if down or right:
-            picture = np.pad(picture, ((0, down), (0, right), (0, 0)), mode="edge")
-        height, width, channels = picture.shape
-        sums = np.uint32 if whole else np.float32
-        rows = picture.reshape(height // size, size, -1).sum(axis=1, dtype=sums)
-        picture = rows.reshape(height // size, width // size, size, channels).sum(axis=2)
+        picture = block_sums(picture, size, np.uint32 if whole else np.float32)
     return picture[..., :3] / unit
 
 
-def _smoothed(planes: np.ndarray, sigma: float, axis: int) -> np.ndarray:
-    """Planes (3, h, w) float32 after a Gaussian along an axis; beyond the edge, the last pixel goes on."""
-    radius, length = round(3 * sigma), planes.shape[axis]
-    weights = np.exp(-0.5 * (np.arange(radius + 1) / sigma) ** 2)
-    weights = (weights / (2 * weights.sum() - weights[0])).astype(np.float32)
-    padded = np.pad(planes, [(radius, radius) if a == axis else (0, 0) for a in range(3)], mode="edge")
-
-    def at(offset: int) -> np.ndarray:
-        cells = [slice(None)] * 3
-        cells[axis] = slice(radius + offset, radius + offset + length)
-        return padded[tuple(cells)]
-
-    total = at(0) * weights[0]
-    for k in range(1, radius + 1):
-        pair = at(-k) + at(k)
-        pair *= weights[k]
-        total += pair
-    return total
+def _gaussian(sigma: float) -> np.ndarray:
+    """Weights of a pixel and of those at distances 1, 2, …"""
+    weights = np.exp(-0.5 * (np.arange(round(3 * sigma) + 1) / sigma) ** 2)
+    return (weights / (2 * weights.sum() - weights[0])).astype(np.float32)
 
 
 def _steadied(shown: np.ndarray, beside: list[np.ndarray]) -> np.ndarray:

@@ -1,7 +1,5 @@
 """What source frames show of each layer, and of what lies behind all: the frames that windows of layers weigh."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any, TypeVar
 
@@ -14,8 +12,7 @@ from ..core.model.frame_state import Layers, Options
 from ..core.pixels import layering
 from ..core.pixels.decontamination import separated
 from . import plates
-from .layer_frames import LayerFrames, RecentFrames, linear, with_colors
-from .layer_mattes import LayerMattes
+from .layer_frames import LayerFrames, LayerMattes, RecentFrames, linear, with_colors
 
 T = TypeVar("T")
 # Frames of which both are kept, as several windows load them one after another.

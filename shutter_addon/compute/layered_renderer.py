@@ -1,8 +1,6 @@
 """Pictures with layers: what lies behind them and each of them is composed from a window of its own, then laid over one
 another (core.pixels.layering)."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Collection
 from dataclasses import replace
 from functools import partial
@@ -16,8 +14,7 @@ from ..core.model.windows import source_frames
 from ..core.pixels import layering
 from . import plates
 from .layer_colors import TOGETHER, LayerColors
-from .layer_frames import RecentFrames, WeightedFrames, with_layers
-from .layer_mattes import LayerMattes
+from .layer_frames import LayerMattes, RecentFrames, WeightedFrames, with_layers
 from .request import Behind, Coefficients, Compositor, Exposure, Handle, Request, Stages
 
 # How much of what lies behind layers has to be seen for a plate to be looked for.

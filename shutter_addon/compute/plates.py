@@ -1,7 +1,5 @@
 """Plates: what lies behind layers where a frame does not show it, from other frames, or from what is around."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable
 
 import numpy as np
@@ -21,7 +19,7 @@ OPEN, TAKEN, FILLED = 0, 1, 2
 
 def nearest_frames(index: int, frames: range, step: int) -> Iterable[int]:
     """The filmed ones of source frames, every step-th, in the order in which a plate is taken from them: those nearest
-    to frame `index`, of two the earlier. In-between frames are made of these, and may not be there."""
+    to frame `index`, of two the earlier. Moments between them are made of these."""
     filmed = (frame for frame in frames if frame % step == 0)
     return sorted(filmed, key=lambda frame: (abs(frame - index), frame))
 

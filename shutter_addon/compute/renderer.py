@@ -3,21 +3,22 @@ coefficients, composition."""
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Callable, Collection
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from ..core.frames.frame_source import FrameSource
 from ..core.memo import Memo
+from ..core.model import scribbles
 from ..core.model.frame_state import FrameState
 from ..core.model.mattes import MatteReader
 from ..devices.budget import Budget
 from ..devices.device import NoDeviceError
-from . import decoding_ahead, guide, window_frames
+from . import guide, window_frames
 from .cpu import CPUCompositor
-from .labelling import LabelLayer, grid, labelled, sole_of
 from .layered_renderer import LayeredRenderer
 from .request import Coefficients, Compositor, Handle, Request
 
@@ -45,6 +46,19 @@ def open_gl(budget: Budget | None = None, ask_others: Callable[[], None] | None 
     except ImportError as error:  # a package without wheels, or one for another Python
         raise NoDeviceError(f"the Python package moderngl cannot be loaded ({error})") from None
     return GLDevice(budget, ask_others)
+
+
+class LabelLayer(NamedTuple):
+    """Labels that count for a share of the coefficients.
+
+    labels: (h, w) uint16, of pixels or of blocks of Options.aggregate a side: 0 free, 1 + shutter scribbled
+    sole: the shutter that they give to the whole picture; None: it is not one
+    key: equal for equal layers, whatever shapes they were drawn from"""
+
+    share: float
+    labels: np.ndarray
+    sole: int | None
+    key: tuple
 
 
 class Renderer:
@@ -197,12 +211,6 @@ class Renderer:
             return request
         return window_frames.slid(request, self.shot(request, known=known))
 
-    def needed(self, request: Request, *, known: bool = True) -> set[int]:
-        """The source frames at window_frames.positions, and those that guide the diffusion. known: as for `shot`."""
-        request = self.slid(request, known=known)
-        shot = self.shot(request, known=known)
-        return window_frames.exposed_frames(request, shot).union(self._guiding(request, shot))
-
     def missing(self, request: Request) -> set[int]:
         """The source frames that `draw` would read: needed ones that are not loaded, and those in which it looks for
         cuts."""
@@ -233,15 +241,9 @@ class Renderer:
         with self.compositor.current():
             return self._layered.holes if self._layered else None
 
-    def check(self, request: Request) -> None:
-        """MediaError: an in-between frame that the picture needs is missing. No frame is read."""
-        if self.source.step > 1:
-            for index in sorted(self.needed(request)):
-                self.source.check(index)
-
     def _want(self, request: Request) -> list[int]:
-        """See decoding_ahead.want."""
-        return decoding_ahead.want(
+        """See window_frames.want."""
+        return window_frames.want(
             self.source, request.index, request.direction, lambda index: self.missing(replace(request, index=index))
         )
 
@@ -397,3 +399,37 @@ class Renderer:
 def _sole(request: Request, labels: list[LabelLayer]) -> int | None:
     """The shutter that holds for the whole picture, if one does."""
     return None if request.state.mattes else sole_of(labels)
+
+
+def labelled(state: FrameState, size: tuple[int, int]) -> list[LabelLayer]:
+    """The layers of a state's scribbles (scribbles.layers); size: (w, h) of the labels."""
+    return [
+        _layer(share, scribbles.rasterise(shapes, *size, border=state.options.border))
+        for share, shapes in scribbles.layers(state.shapes)
+    ]
+
+
+def grid(source: FrameSource, state: FrameState) -> tuple[int, int]:
+    """The size (w, h) of the labels and the coefficients of a source's pictures."""
+    block = state.options.aggregate
+    return -(-source.width // block), -(-source.height // block)
+
+
+def sole_of(layers: list[LabelLayer]) -> int | None:
+    """The shutter that all layers give to the whole picture, if it is one."""
+    first, *others = layers
+    return first.sole if all(layer.sole == first.sole for layer in others) else None
+
+
+def _layer(share: float, labels: np.ndarray) -> LabelLayer:
+    digest = hashlib.blake2b(np.ascontiguousarray(labels), digest_size=16).digest()
+    return LabelLayer(share=share, labels=labels, sole=_shutter_of(labels), key=(share, labels.shape, digest))
+
+
+def _shutter_of(labels: np.ndarray) -> int | None:
+    """The shutter of all scribbles, if it is one; the first where there is no scribble. It holds everywhere."""
+    highest = int(labels.max())
+    if highest == scribbles.FREE:
+        return 0
+    lowest = int((labels - np.uint16(1)).min())  # the lowest shutter: a free pixel's 0 wraps around to 65,535
+    return lowest if lowest == highest - 1 else None

@@ -1,8 +1,6 @@
 """What is asked of a renderer, a picture as a function of one value; and what makes it, stage by stage, on a device or
 with NumPy."""
 
-from __future__ import annotations
-
 from collections.abc import Hashable, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass
@@ -14,7 +12,6 @@ from ..core.frames.frame_source import FrameSource
 from ..core.model.frame_state import FrameState
 from ..core.model.mattes import Matte
 from ..core.pixels.shown_levels import Display
-from .memory_needs import Kind, Needs
 
 # What a compositor has on its device, which nothing else looks into: of a picture or of coefficients, on a GPU a
 # Texture, with NumPy an array; of the frames that are exposed, a window.Window or a cpu.HostWindow.
@@ -25,7 +22,7 @@ Handle: TypeAlias = Any
 class Request:
     """All that a picture depends on, in plain data.
 
-    index: the source frame that is shown, from 0; where there are in-between frames it counts them as well
+    index: the source frame that is shown, from 0; where Smooth is on it counts moments
     state: the effect there
     direction: 1, or −1 where the source plays in reverse, so that the window's next frames are those before `index`
     source: what is read and in how much detail, for who has several renderers
@@ -134,9 +131,6 @@ class Compositor(Protocol):
         summed: all of them average."""
 
     def stages(self) -> Stages: ...
-
-    def needs(self, source: FrameSource, kind: Kind) -> Needs:
-        """What the windows of a picture need of memory."""
 
     def labels(self, values: np.ndarray) -> Handle:
         """Labels (H, W) uint16, on a GPU a texture r32ui. Valid until the next call."""

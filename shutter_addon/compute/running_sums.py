@@ -3,7 +3,7 @@ the fastest."""
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Iterator
 from contextlib import suppress
 
 import numpy as np
@@ -93,7 +93,7 @@ class Sums(Window):
         self.start = self.stop = 0
         self._frames: dict[int, int] = {}  # position: source frame
         self._light: Light | None = None
-        self._sent: dict[int, np.ndarray] = {}  # by layer of `_filmed`: the frame in it
+        self._sent: dict[int, int] = {}  # by layer of `_filmed`: the number of the frame in it
         # White is the largest 2ⁿ − 1 for which the sum of a whole window fits into 21 bits, and n is 16 at most.
         self.whole = (1 << min(16, 21 - (capacity - 1).bit_length())) - 1
         self.kind = STORED_SUMS[self.cover]
@@ -197,14 +197,12 @@ class Sums(Window):
     def _send(self, frames: list[int]) -> tuple[str, Given]:
         """Sends a source frame: as what (`accumulation`), and the arguments of the pass that adds it; with those behind
         it where they are moments."""
-        index = frames[0]
-        is_moment = index % self.source.step > 0
-        frame = self.source.decoded(index) if self.device.takes_planes or is_moment else self.source.read(index)
+        index, may_be_moment = frames[0], self.source.step > 1
+        frame = self.source.decoded(index) if self.device.takes_planes or may_be_moment else self.source.read(index)
         if isinstance(frame, Planes):
             return "PLANES", self._send_planes(frame)
         if isinstance(frame, Moment):
-            others = map(self.source.decoded, frames[1:])  # moments as well, of the same pair
-            return self._send_moments([frame, *(other for other in others if isinstance(other, Moment))])
+            return self._send_moments([frame, *self._evenly(frame, frames[1:])])
         own = self._own("frame", "rgba8")
         sent = self.device.send(own, frame)
         return "COLOURS" if sent is own else "NUMBERS", {"textures": {"frame": sent}}
@@ -233,24 +231,34 @@ class Sums(Window):
         for layer, moment in enumerate(moments):
             stored = moment.vectors.view("<u4").reshape(height, -1) if words else moment.vectors
             self.device.write(vectors, stored, layer)
-        bound = {"filmed": self._filmed(first, words), "vectors": vectors}
+        filmed, start = self._filmed(first, words)
         shift = (STEP**2 * first.steps).bit_length() - 1
         given: Given = {
-            "images" if words else "textures": bound,
-            "moment": (first.number, first.steps, shift, first.pair % 2),
+            "images" if words else "textures": {"filmed": filmed, "vectors": vectors},
+            "moment": (first.number, first.steps, shift, start),
             "count": len(moments),
             "layers": self.layers,
         }
         return "WORDS" if words else "MOMENT", given
 
-    def _filmed(self, moment: Moment, words: bool) -> Texture:
-        """Both filmed frames on the device, the first in the layer pair mod 2: they stay for all moments of a pair."""
-        texture = self._two_frames()
-        for number, frame in enumerate(moment.ends, moment.pair):
-            if self._sent.get(number % 2) is not frame:
-                self.device.write(texture, frame.view("<u4")[..., 0] if words else frame, number % 2, opaque=True)
-                self._sent[number % 2] = frame
-        return texture
+    def _evenly(self, moment: Moment, indices: list[int]) -> Iterator[Moment]:
+        """Of the next source frames those that are moments of the same pair, as far apart as its steps."""
+        for number, index in enumerate(indices, moment.number + 1):
+            frame = self.source.decoded(index)
+            if not isinstance(frame, Moment) or (frame.pair, frame.number) != (moment.pair, number):
+                break
+            yield frame
+
+    def _filmed(self, moment: Moment, words: bool) -> tuple[Texture, int]:
+        """The two frames of a moment on the device, and the layer of the first: they stay for all moments of their
+        pair, and one for the next."""
+        texture, sent = self._two_frames(), self._sent
+        start = int(sent.get(1) == moment.pair[0] or sent.get(0) == moment.pair[1])
+        for layer, number, frame in zip((start, 1 - start), moment.pair, moment.ends, strict=True):
+            if sent.get(layer) != number:
+                self.device.write(texture, frame.view("<u4")[..., 0] if words else frame, layer, opaque=True)
+                sent[layer] = number
+        return texture, start
 
     def _two_frames(self) -> Texture:
         size = self.source.width, self.source.height, 2

@@ -1,21 +1,18 @@
 """The stages of a picture on a device, beside its composition: coefficients are diffused, added up, and covered by
 mattes; layers are laid over what lies behind them."""
 
-from __future__ import annotations
-
 from collections.abc import Hashable, Sequence
 
 import numpy as np
 
 from ..core.model.mattes import Matte
-from ..devices.device import Device, Texture
-from ..devices.named_textures import NamedTextures
+from ..devices.device import Device, NamedTextures, Texture
 from ..devices.passes import read_pass
+from .composition_passes import padded
 from .diffusion import follows_edges
 from .diffusion_gpu import Diffusion
 from .edge_diffusion_gpu import EdgeDiffusion
 from .request import Behind, Exposure
-from .tables import padded
 
 # Mattes that one pass lays, whose values are on the device at once.
 MOST_MATTES = 8

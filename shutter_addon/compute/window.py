@@ -12,8 +12,7 @@ from ..core.frames.frame_source import FrameSource
 from ..core.model import windows
 from ..core.model.frame_state import Light, Options
 from ..devices import llvmpipe
-from ..devices.device import TEXEL_BYTES, Device, NoDeviceError, Texture
-from ..devices.named_textures import NamedTextures
+from ..devices.device import TEXEL_BYTES, Device, NamedTextures, NoDeviceError, Texture
 from ..devices.passes import Pass, read_pass
 
 # Bytes of a texture array, at most.

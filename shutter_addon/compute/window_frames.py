@@ -1,11 +1,11 @@
-"""Which source frames a picture is made of: those of its window, within its shot, and those that guide its diffusion.
+"""Which source frames a picture is made of: those of its window, within its shot, and those that guide its diffusion;
+and which are decoded in advance: those that a picture lacks, then those of the next ones.
 
 beside, in all functions: how far the frames that guide the diffusion lie from the shown one (guide.reach), 0 where none
 do.
 """
 
-from __future__ import annotations
-
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -13,6 +13,10 @@ import numpy as np
 from ..core.frames.frame_source import FrameSource, ShotFinder
 from ..core.model import windows
 from .request import Request
+
+# Pictures whose frames are decoded in advance, and how many frames or bytes of them lie decoded at most, besides those
+# on the device: enough for a long window, whose frames are decoded while its first picture is diffused and compiled.
+_AHEAD, _DECODED, _DECODED_BYTES = 4, 8, 256 << 20
 
 
 def shots_of(request: Request, source: FrameSource) -> ShotFinder | None:
@@ -86,3 +90,24 @@ def guided_later(request: Request, beside: int) -> list[int]:
     index, step, (low, high) = request.index, request.state.options.step, reach(request, beside)
     onwards = range(index - beside, high + 1) if request.direction > 0 else range(low, index + beside + 1)
     return [i for i in onwards if i % step == 0 or i == index]
+
+
+def want(source: FrameSource, index: int, direction: int, missing: Callable[[int], set[int]]) -> list[int]:
+    """Has the frames decoded that the picture of frame `index` lacks, then those of the next pictures. Returns the
+    frames to be wanted once that picture is made: the rest is on the device by then.
+
+    missing: gives the source frames that the picture of a frame lacks, as far as cuts are known"""
+    indices = (index + step * direction * source.step for step in range(_AHEAD + 1))
+    lacking = [missing(min(max(shown, 0), source.count - 1)) for shown in indices]
+    source.want(_in_order(source, lacking))
+    return _in_order(source, [frames - lacking[0] for frames in lacking[1:]])
+
+
+def _in_order(source: FrameSource, lacking: list[set[int]]) -> list[int]:
+    wanted = dict.fromkeys(i for frames in lacking for i in sorted(frames))
+    return list(wanted)[: decoded_ahead(source)]
+
+
+def decoded_ahead(source: FrameSource) -> int:
+    """How many frames of a source may lie decoded on the host, besides a window that is kept there."""
+    return max(_DECODED, _DECODED_BYTES // (source.width * source.height * 4 * source.dtype.itemsize))

@@ -31,6 +31,17 @@ def pool(workers: int | None = None) -> ThreadPoolExecutor:
     return ThreadPoolExecutor(workers, _NAME)
 
 
+def fulfil(future: Future[T], function: Callable[[], T]) -> bool:
+    """Has a future what a function gives or raises. Whether it was called: not where the future was cancelled."""
+    if not future.set_running_or_notify_cancel():
+        return False
+    try:
+        future.set_result(function())
+    except Exception as error:
+        future.set_exception(error.with_traceback(None))  # whose frames may refer to textures
+    return True
+
+
 def daemon(function: Callable[..., object], *arguments: object) -> threading.Thread:
     """A thread that calls a function, which goes on until it is told to end. Python ends without it, and prints what it
     raises."""

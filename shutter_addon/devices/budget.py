@@ -1,7 +1,5 @@
 """How much of a GPU's memory textures may take."""
 
-from __future__ import annotations
-
 import ctypes
 import os
 import sys

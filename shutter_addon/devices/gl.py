@@ -1,7 +1,5 @@
 """The GL device: a moderngl context of its own, with a window or without one (EGL, WGL)."""
 
-from __future__ import annotations
-
 import ctypes
 import sys
 from collections.abc import Callable, Iterator, Mapping

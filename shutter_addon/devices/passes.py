@@ -6,8 +6,6 @@ conditions are resolved here: of steps, and of macros whose values Python gives,
 NAME, !NAME, NAME == number or defined(STEP), or several of these joined by && and ||.
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field

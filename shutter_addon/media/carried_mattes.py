@@ -27,7 +27,7 @@ from .cuts import ShotSource
 from .errors import MediaError
 from .folder import own_folder
 from .image_writing import write_levels
-from .outline_tracing import traced
+from .outlining import traced
 
 FOLDER = "virtual_shutter_mattes"
 CONFIDENCE = "confidence "  # what a file's description says (carrying.Carried)

@@ -14,8 +14,6 @@ a linear function of them (Levin et al. 2008, "A closed-form solution to natural
 Flow and votes are found in pictures of at most WORKING pixels a side, edges in the whole picture.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from itertools import product

@@ -1,5 +1,5 @@
-"""Cuts within a source, found as PySceneDetect finds them, and frames that repeat the one before: decisions about few
-neighbouring frames, made of a small picture of each; and a source that knows where its shots end."""
+"""Cuts within a source, found as PySceneDetect finds them: decisions about few neighbouring frames, made of a small
+picture of each; and a source that knows where its shots end."""
 
 from __future__ import annotations
 
@@ -38,12 +38,9 @@ CHANGE, GREY, NOISE = 27.0, 90.0, 2.0
 # The share of it by which a cut changes each part of the picture, of so many across and down: 0.36 or more. Where an
 # object jumps or leaves, one part hardly changes.
 PARTS, PART = 4, 0.2
-# The frames on each side that have a say in whether a frame repeats the one before: films animated on threes, or with a
-# 3:2 pulldown, move twice in so many.
-BESIDE = 4
 # Levels by which blocks of repeated frames differ: 0.6 to 2.8 after H.264 and MPEG-4 of several qualities, mostly below
-# 2. Slow motion may be as small; but beside a repeated frame there is more, on the two films eight times as much.
-REPEATED, STILLER = 2.0, 4.0
+# 2.
+REPEATED = 2.0
 
 _ROWS, _COLUMNS = 18, 32  # of a signature; each block is a mean of some 5 × 10 samples
 _KEPT = 4 * 256  # signatures that are remembered: more than the longest window
@@ -149,29 +146,14 @@ def _moving(pictures: list[Signature]) -> list[Signature]:
     return kept
 
 
-def is_duplicate(before: list[Signature], after: list[Signature]) -> bool:
-    """Whether the frame after[0] repeats before[-1], but for the noise of a codec; arguments as for is_cut.
-
-    Nothing in the picture may have moved, and something must have moved beside: a still scene has no duplicates."""
-    before, after = before[-BESIDE:], after[:BESIDE]
-    here = _most(before[-1], after[0])
-    beside = max((_most(a, b) for side in (before, after) for a, b in pairwise(side)), default=0.0)
-    return here <= REPEATED and here * STILLER < beside
-
-
-def may_be_duplicate(before: Signature, after: Signature) -> bool:
-    """Whether `is_duplicate` can be true of these two neighbours, as far as they alone tell."""
-    return _most(before, after) <= REPEATED
-
-
 def neighbours(index: int, count: int) -> range:
     """The frames of a clip of `count` that have a say in whether there is a cut before frame `index`."""
     return range(max(index - NEIGHBOURS, 0), min(index + NEIGHBOURS, count))
 
 
 def sides(signatures: Mapping[int, Signature | None], index: int) -> tuple[list[Signature], list[Signature]]:
-    """Of the neighbours' signatures, those before frame `index` and those from it on, as is_cut and is_duplicate take
-    them: on each side up to the first frame that has none."""
+    """Of the neighbours' signatures, those before frame `index` and those from it on, as is_cut takes them: on each
+    side up to the first frame that has none."""
     return _run(signatures, index - 1, -1)[::-1], _run(signatures, index, 1)
 
 
@@ -183,7 +165,7 @@ class ShotSource(SourceWrapper):
     """A source that knows where its shots end: a source itself.
 
     step: every step-th frame is one that was filmed. Cuts are looked for in these alone; those between two of them
-    belong to the nearer, the middle one to the first, as InbetweenSource has it.
+    belong to the nearer, the middle one to the first.
     Filmed frames get their signatures when a cut is first looked for, and wait for the next `read` then, as far as
     there is room for them, so that none is decoded twice. Cuts are remembered, and depend on the frames alone;
     what is decided without a frame that cannot be read is decided again.
@@ -279,17 +261,6 @@ class ShotSource(SourceWrapper):
         beside = {i: self._readable(i) for i in neighbours(index, self.filmed)}
         return is_cut(*sides(beside, index)), all(picture is not None for picture in beside.values())
 
-    def kind(self, index: int) -> str | None:
-        """What follows a filmed frame: "cut", where the next one is of another shot, "same", where it repeats this one,
-        or None. MediaError: one that has a say in it cannot be read."""
-        here = self._signature(index), self._signature(index + 1)
-        if not (may_be_cut(*here) or may_be_duplicate(*here)):
-            return None
-        beside = sides({i: self._signature(i) for i in neighbours(index + 1, self.filmed)}, index + 1)
-        if is_cut(*beside):
-            return "cut"
-        return "same" if is_duplicate(*beside) else None
-
     def _readable(self, index: int) -> Signature | None:
         """None: the frame cannot be read now. Whoever needs the frame itself will hear why."""
         try:
@@ -301,8 +272,8 @@ class ShotSource(SourceWrapper):
         if index in self._signatures:
             return self._signatures[index]
         frame = self.decoded(index * self.step)
-        assert not isinstance(frame, Moment)  # that index is a filmed frame's
-        made = self._signatures[index] = signature(frame, self.transfer, self.alpha)
+        shown = frame.ends[0] if isinstance(frame, Moment) else frame  # which a repeated frame repeats
+        made = self._signatures[index] = signature(shown, self.transfer, self.alpha)
         self._handed[index * self.step] = frame
         while len(self._handed) > 1 and len(self._handed) * frame.nbytes > _HANDED_BYTES:
             del self._handed[next(iter(self._handed))]

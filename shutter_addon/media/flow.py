@@ -58,7 +58,7 @@ class Between:
     def _encoded(self) -> list[np.ndarray]:
         return [_encoded(end, self._transfer, self._alpha) for end in self.ends]
 
-    def moment(self, pair: int, number: int, steps: int) -> np.ndarray | Moment:
+    def moment(self, pair: tuple[int, int], number: int, steps: int) -> np.ndarray | Moment:
         """One of `steps` moments, a power of two. What only one of the two frames shows is taken from it, all else is
         mixed in linear light; of two frames that have nothing in common it is the nearer one. pair: Moment's."""
         if self._paths is None:

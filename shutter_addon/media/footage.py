@@ -1,7 +1,5 @@
 """What a strip shows, for tracking: grey pictures of a size that is enough for it."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Frames of a movie: those that Blender's movie strip shows, converted to RGB as Blender converts them."""
 
-from __future__ import annotations
-
 import math
 import re
 import threading
@@ -16,13 +14,14 @@ import numpy as np
 from av.container import InputContainer
 from av.stream import Stream
 from av.video.format import VideoFormat
+from av.video.plane import VideoPlane
 from av.video.reformatter import ColorRange, Interpolation, VideoReformatter
 from av.video.stream import VideoStream
+from numpy.typing import DTypeLike
 
 from ..core.frames.frame_source import FrameSource
 from ..core.frames.planes import Decoded, Matrix, Planes, matrix
 from .decode import FrameReader, fraction, reason
-from .deinterlace import blur_rows, has_fields, interpolate_fields, samples_of
 from .errors import MediaError
 from .files import check_file, check_index
 from .reduced import reduced, reduced_size
@@ -34,6 +33,8 @@ _NO_COUNT = 1 << 31  # frames: Blender has no number for so many, and a header t
 # Whether a frame tells where its chroma lies: with PyAV 19.
 _TELLS_CHROMA = hasattr(av.VideoFrame, "chroma_location")
 _UNSPECIFIED = 2  # in ITU-T H.273
+# Formats of which Blender interpolates one field; it blurs all others.
+_WITH_FIELDS = frozenset({"yuv420p", "yuvj420p", "yuv422p", "yuvj422p", "yuv444p", "yuv411p", "gray"})
 _PLANAR_420 = frozenset({"yuv420p", "yuvj420p"})
 _PLANAR_YUV = re.compile(r"yuv[aj]?4\d\dp(\d+le)?")
 
@@ -107,7 +108,7 @@ class MovieSource(FrameSource):
             frame = self._frame(index)
             if (to_rgb := self._matrix(frame)) is None:
                 return self._pixels(frame)
-            luma, cb, cr = map(samples_of, frame.planes)
+            luma, cb, cr = map(_samples_of, frame.planes)
             rgba = partial(self._picture, index, frame)
             return Planes(luma=luma, chroma=(cb, cr), matrix=to_rgb, rgba=rgba)
 
@@ -149,11 +150,11 @@ class MovieSource(FrameSource):
         return matrix(frame.colorspace, frame.format.name == "yuvj420p" or self._tags.is_full)
 
     def _pixels(self, frame: av.VideoFrame) -> np.ndarray:
-        by_fields = self._deinterlace and has_fields(frame)
-        frame = interpolate_fields(frame) if by_fields else frame
+        by_fields = self._deinterlace and _has_fields(frame)
+        frame = _interpolate_fields(frame) if by_fields else frame
         picture = self._converted(frame, self._format)
         if self._deinterlace and not by_fields and self._divisor == 1:  # smaller frames have both fields' means
-            picture = blur_rows(picture, opaque=self.alpha == "opaque")
+            picture = _blur_rows(picture, opaque=self.alpha == "opaque")
         if self.alpha == "straight":
             picture = reduced(picture, self._divisor, self.alpha)
         return self._upright(picture)
@@ -209,7 +210,7 @@ def _is_grey(frame: av.VideoFrame) -> bool:
     if not _PLANAR_YUV.fullmatch(name):
         return False
     neutral, dtype = 1 << (bits - 1), np.uint8 if bits == 8 else np.uint16
-    return all((samples_of(plane, dtype) == neutral).all() for plane in list(frame.planes)[1:3])
+    return all((_samples_of(plane, dtype) == neutral).all() for plane in list(frame.planes)[1:3])
 
 
 def _round(x: float) -> int:
@@ -232,3 +233,39 @@ def _count(container: InputContainer, stream: VideoStream, fps: Fraction) -> int
 
 def _start(stream: Stream) -> float:
     return float((stream.start_time or 0) * fraction(stream.time_base))
+
+
+def _has_fields(frame: av.VideoFrame) -> bool:
+    """Whether Blender interpolates one field of such a frame; it blurs all others."""
+    return frame.format.name in _WITH_FIELDS and frame.width % 4 == 0 and frame.height % 4 == 0
+
+
+def _interpolate_fields(frame: av.VideoFrame) -> av.VideoFrame:
+    """A copy of the frame, its odd rows filtered with (-1 4 2 4 -1)/8 down the columns."""
+    result = av.VideoFrame(frame.width, frame.height, frame.format.name)
+    result.colorspace, result.color_range = frame.colorspace, frame.color_range
+    for source, target in zip(frame.planes, result.planes, strict=True):
+        rows, out = _samples_of(source), _samples_of(target)
+        r = np.concatenate([rows[:1], rows, rows[-1:], rows[-1:]]).astype(np.int16)  # r[i]: row i - 1
+        odd = (-r[0:-4:2] + 4 * r[1:-3:2] + 2 * r[2:-2:2] + 4 * r[3:-1:2] - r[4::2] + 4) >> 3
+        out[0::2], out[1::2] = rows[0::2], np.clip(odd, 0, 255)
+    return result
+
+
+def _blur_rows(picture: np.ndarray, opaque: bool) -> np.ndarray:
+    """A copy of the RGBA picture, filtered with (1 2 1)/4 down the columns from the bottom row upwards.
+
+    It hands on what rounding leaves over to the next row. Blender leaves out an opaque picture's red."""
+    result = picture.copy()
+    rows = result[::-1, :, 1:] if opaque else result[::-1]
+    wide = rows.astype(np.int64)
+    total = np.concatenate([wide[:1], wide[:-1]]) + 2 * wide + np.concatenate([wide[1:], wide[-1:]])
+    # The remainders add up along the column, so one running sum replaces a loop over the rows.
+    rows[:] = np.diff((np.cumsum(total, axis=0) + 2) >> 2, axis=0, prepend=0)
+    return result
+
+
+def _samples_of(plane: VideoPlane, dtype: DTypeLike = np.uint8) -> np.ndarray:
+    """A plane's samples as a view (height, width) of its memory."""
+    samples = np.frombuffer(plane, dtype)
+    return samples.reshape(-1, plane.line_size // samples.itemsize)[: plane.height, : plane.width]

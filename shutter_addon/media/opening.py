@@ -5,16 +5,17 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
+import numpy as np
+
 from ..core.frames.frame_source import FrameSource
-from . import decoding_child, pyav
-from .blender_movie import BlenderMovie
-from .channels import CHANNELS, MovieChannel, no_channel
+from ..core.frames.source_wrapper import SourceWrapper
+from . import pyav
+from .blender_movie import BlenderMovie, is_lent
 from .color import in_colorspace
 from .errors import MediaError
 from .files import check_file
-from .proxy import ProxySource, fits
-from .reduced import smaller
-from .sequence import IMAGE_SUFFIXES, SequenceChannel, SequenceSource
+from .reduced import ProxySource, fits, smaller
+from .sequence import CHANNELS, IMAGE_SUFFIXES, SequenceChannel, SequenceSource, no_channel
 
 
 def open_source(
@@ -77,7 +78,7 @@ def open_channel(
 ) -> SequenceChannel | MovieChannel:
     """Opens what `open_source` opens, for one channel alone. MediaError: it cannot be read, or has no such channel.
 
-    channel: one of channels.CHANNELS, or the name of a channel of the images' own; files, stream: see open_source"""
+    channel: one of sequence.CHANNELS, or the name of a channel of the images' own; files, stream: see open_source"""
     path = Path(path)
     if not _is_movie(path, files):
         return SequenceChannel(path, channel, files=files)
@@ -102,11 +103,28 @@ def _opened_movie(path: Path, stream: int, deinterlace: bool = False, divisor: i
 
 def _check_lent(path: Path, stream: int) -> None:
     """MediaError: without PyAV (a package without wheels, or one for another system) that movie cannot be read."""
-    if decoding_child.is_lent() and stream == 0:
+    if is_lent() and stream == 0:
         return
     check_file(path)
-    what = f"video stream {stream} of a movie needs" if decoding_child.is_lent() else "movies need"
+    what = f"video stream {stream} of a movie needs" if is_lent() else "movies need"
     raise MediaError(
         f"{path.name}: {what} the Python package PyAV ({pyav.missing()}); "
         "install the zip of Virtual Shutter that is made for your system, or use an image sequence"
     )
+
+
+class MovieChannel(SourceWrapper):
+    """One channel of a movie's frames."""
+
+    def __init__(self, movie: FrameSource, channel: str) -> None:
+        super().__init__(movie)
+        self._channel = channel
+        self._grey = getattr(movie, "grey", lambda _index: None)  # which a second Blender's movies have not
+
+    def read(self, index: int) -> np.ndarray:
+        """The samples (height, width, n) that the channel is made of: n is 3, RGB, for the luminance of colours, 0 for
+        the alpha of an opaque movie, 1 otherwise. Raises what the movie's `read` raises."""
+        if self._channel == "alpha" and self.alpha == "opaque":
+            return np.empty((self.height, self.width, 0), self.dtype)
+        grey = self._grey(index) if self._channel == "luminance" else None
+        return self._source.read(index)[..., CHANNELS[self._channel]] if grey is None else grey

@@ -1,19 +1,16 @@
-"""A proposal of an outline, by colours: of what a stroke runs over, or what a lasso is drawn around; and the way along
-edges from one point of an outline to the next.
+"""Curves around what a matte covers; a proposal of an outline, by colours: of what a stroke runs over, or what a lasso
+is drawn around; and the way along edges from one point of an outline to the next.
 
 GrabCut (Rother et al. 2004) tells the colours of the subject from those around it, and keeps to edges. Ways along edges
 are those of Intelligent Scissors (Mortensen and Barrett 1995).
 """
 
-from __future__ import annotations
-
 import numpy as np
 
-from ..core.model.outlines import Curves
+from ..core.model.outlines import Curves, curves
 from . import opencv
 from .carrying import working_size
 from .opencv import cv2
-from .outline_tracing import traced
 
 ROUNDS = 6
 # Of what is drawn: beyond that it is no subject; within that it may be; of a lasso, so deep inside it surely is.
@@ -23,6 +20,9 @@ MARGIN = 0.06  # of a lasso's size, by which it may have missed the subject
 # far apart these are at least, in parts of the picture's height, as what is drawn finer is better left as it is.
 ROOM, MISSED, LONG = 8, 3, 0.05
 CANNY, STEEPEST = (16, 60), 100  # thresholds of edges, and the gradient from which on all are as good
+
+FINE = 4  # contours are followed in mattes so many times as large
+SPOT = 6.0  # pixels: what covers no more of them is no part of a subject
 
 
 def working_shape(picture: np.ndarray) -> tuple[int, int]:
@@ -113,3 +113,30 @@ def _enclosed(drawn: np.ndarray) -> np.ndarray:
 def _extent(drawn: np.ndarray) -> int:
     """The larger side of the box around it, in pixels."""
     return max(int(np.ptp(np.flatnonzero(drawn.any(axis=axis)))) + 1 for axis in (0, 1))
+
+
+def traced(matte: np.ndarray, off: float = 0.5) -> Curves:
+    """Curves (core.model.outlines) around what a matte covers by more than half, the largest first; holes have their
+    own.
+
+    matte: (height, width) float32, 0 to 1; off: how far curves may be from its contours, in pixels
+    MediaError: OpenCV is missing."""
+    opencv.check("outlines are traced by")
+    rows, columns = (np.flatnonzero(matte.max(axis=axis) > 0.5) for axis in (1, 0))
+    if not rows.size:
+        return ()
+    top, left = max(rows[0] - 1, 0), max(columns[0] - 1, 0)
+    part = np.pad(matte[top : rows[-1] + 2, left : columns[-1] + 2], 1)  # it is closed at the picture's edges
+    height, width = part.shape
+    fine = cv2.resize(part, (width * FINE, height * FINE), interpolation=cv2.INTER_LINEAR)
+    contours, _ = cv2.findContours((fine > 0.5).astype(np.uint8), cv2.RETR_CCOMP, cv2.CHAIN_APPROX_NONE)
+    found = [cv2.approxPolyDP(contour, off * FINE, True)[:, 0] for contour in contours if _area(contour) > SPOT]
+    found = sorted((each for each in found if len(each) > 2), key=cv2.contourArea, reverse=True)
+    size = np.array(matte.shape[::-1])
+    placed = [(points + 0.5) / FINE + (left - 1, top - 1) for points in found]
+    return curves([np.clip(points / size, 0, 1) * (1, -1) + (0, 1) for points in placed])
+
+
+def _area(contour: np.ndarray) -> float:
+    """In pixels of the matte."""
+    return cv2.contourArea(contour) / FINE**2

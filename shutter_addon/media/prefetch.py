@@ -2,6 +2,7 @@
 
 import threading
 from collections.abc import Iterable
+from functools import partial
 
 import numpy as np
 
@@ -26,6 +27,7 @@ class PrefetchSource(SourceWrapper):
         self._fetch = source.decoded if planes else source.read
         self._wanted: list[int] = []  # in the order of decoding
         self._asked: list[int] = []  # by reads that wait
+        self._due: int | None = None  # by the last read, which did not wait
         self._done: dict[int, Decoded | Exception] = {}
         self._changed = threading.Condition()
         self._thread: threading.Thread | None = None
@@ -34,6 +36,7 @@ class PrefetchSource(SourceWrapper):
         """Decodes these frames, in this order, and frees all others."""
         with self._changed:
             self._wanted = list(dict.fromkeys(indices))
+            self._due = self._due if self._wanted else None
             self._drop()
             self._wake()
 
@@ -41,7 +44,8 @@ class PrefetchSource(SourceWrapper):
         """The source's frame, read-only. One that is not decoded yet is decoded next, before all wanted ones.
 
         An error of the source's `read` is raised here once; the next call decodes the frame again. MediaError as well
-        if `close` is called meanwhile, and core.stopping.StoppedError."""
+        if `close` is called meanwhile, and core.stopping.StoppedError; also where this step may not wait
+        (stopping.waits) and the frame is not decoded yet."""
         picture = as_rgba(self.decoded(index))
         picture.flags.writeable = False
         return picture
@@ -50,6 +54,10 @@ class PrefetchSource(SourceWrapper):
         """As `read`, but for the conversion."""
         stopping.check()
         with self._changed:
+            self._due = None if stopping.waits() or index in self._done else index
+            if self._due is not None:
+                self._wake()
+                raise stopping.StoppedError
             self._asked.append(index)
             self._wake()
             try:
@@ -73,7 +81,7 @@ class PrefetchSource(SourceWrapper):
         """Ends the thread, closes the file and frees all frames; a later read starts again."""
         with self._changed:
             thread, self._thread = self._thread, None
-            self._wanted, self._done = [], {}
+            self._wanted, self._due, self._done = [], None, {}
             self._changed.notify_all()
         if thread is not None:
             thread.join()
@@ -85,11 +93,14 @@ class PrefetchSource(SourceWrapper):
         self._changed.notify_all()
 
     def _drop(self) -> None:
-        kept = {*self._wanted, *self._asked}
-        self._done = {index: frame for index, frame in self._done.items() if index in kept}
+        self._done = {index: frame for index, frame in self._done.items() if not self._is_unwanted(index)}
+
+    def _is_unwanted(self, index: int) -> bool:
+        return index != self._due and index not in self._asked and index not in self._wanted
 
     def _next(self) -> int | None:
-        return next((index for index in (*self._asked, *self._wanted) if index not in self._done), None)
+        due = () if self._due is None else (self._due,)
+        return next((index for index in (*self._asked, *due, *self._wanted) if index not in self._done), None)
 
     def _decode(self) -> None:
         mine = threading.current_thread()
@@ -98,7 +109,11 @@ class PrefetchSource(SourceWrapper):
                 self._changed.wait_for(lambda: self._thread is not mine or self._next() is not None)
                 if self._thread is not mine or (index := self._next()) is None:
                     return
-            frame = self._frame(index)
+            try:
+                with stopping.once(partial(self._is_unwanted, index)):
+                    frame = self._frame(index)
+            except stopping.StoppedError:
+                continue
             with self._changed:
                 if self._thread is mine:
                     self._done[index] = frame
@@ -111,5 +126,7 @@ class PrefetchSource(SourceWrapper):
             if isinstance(frame, np.ndarray):
                 frame.flags.writeable = False
             return frame
+        except stopping.StoppedError:  # it is not wanted any longer
+            raise
         except Exception as error:  # raised to whoever reads the frame
             return error

@@ -7,8 +7,6 @@ have in common is the readout. Speeds have to change, therefore: what always mov
 bpy.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import NamedTuple

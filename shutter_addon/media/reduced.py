@@ -1,12 +1,19 @@
-"""Frames at a half or a quarter of their width and height, for previews."""
+"""Frames for previews: at a half or a quarter of their width and height, or read from a proxy, the smaller or lighter
+copy that Blender's sequencer has made of the footage."""
+
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import DTypeLike
 
 from ..core.frames.frame_source import FrameSource
+from ..core.frames.light import to_linear
 from ..core.frames.source_wrapper import SourceWrapper
+from .errors import MediaError
+from .opencv import cv2
 
 DIVISORS = 1, 2, 4
+STRETCHED = 0.1  # by which share the sides may differ: Blender's movies have even ones
 
 
 class ReducedSource(SourceWrapper):
@@ -63,3 +70,59 @@ def _sums(frame: np.ndarray, divisor: int, dtype: DTypeLike) -> np.ndarray:
         for column in range(divisor):
             sums += squares[:, row, :, column]
     return sums
+
+
+class ProxySource(SourceWrapper):
+    """A source whose frames are those of a proxy that `fits`, made to its size and samples. A frame that the proxy
+    lacks, or that is damaged there, is the source's own."""
+
+    from_proxy = True
+
+    def __init__(self, source: FrameSource, proxy: FrameSource) -> None:
+        super().__init__(source)
+        self._proxy = proxy
+        source.close()  # until a frame is wanted of it
+
+    def read(self, index: int) -> np.ndarray:
+        """The frame (height, width, 4), of new memory."""
+        try:
+            frame = self._proxy.read(index)
+        except MediaError:
+            return self._source.read(index)
+        if frame.shape[:2] != (self.height, self.width):
+            dtype = np.float32 if frame.dtype == np.float16 else frame.dtype  # which OpenCV does not resize
+            size = self.width, self.height
+            fitted = cv2.resize(frame.astype(dtype, copy=False), size, interpolation=cv2.INTER_AREA)
+            frame = fitted.astype(frame.dtype, copy=False)
+        if (self._proxy.dtype, self._proxy.transfer) == (self.dtype, self.transfer):
+            return frame
+        return self._samples[frame if frame.dtype == np.uint8 else frame.view(np.uint16)]
+
+    @cached_property
+    def _samples(self) -> np.ndarray:
+        """What the source has for each sample of the proxy: bytes, or halves by their bits."""
+        is_byte = self._proxy.dtype == np.uint8
+        levels = np.arange(256) / 255 if is_byte else np.arange(1 << 16, dtype=np.uint16).view(np.float16).astype(float)
+        with np.errstate(invalid="ignore", over="ignore"):  # not every half is a number
+            if self._proxy.transfer != self.transfer:
+                levels = to_linear(levels)
+            if self.dtype.kind == "u":
+                levels = np.rint(np.nan_to_num(levels).clip(0, 1) * np.iinfo(self.dtype).max)
+            return levels.astype(self.dtype)
+
+    def close(self) -> None:
+        self._proxy.close()
+        self._source.close()
+
+
+def fits(proxy: FrameSource, source: FrameSource) -> bool:
+    """Whether a proxy may stand for a source: as many frames, not turned, nothing to see through in either, and bytes
+    or halves: what Blender writes of float images, named .jpg, is EXR with sRGB values. To resize it takes OpenCV."""
+    stretched = proxy.width * source.height / (proxy.height * source.width)
+    return (
+        proxy.count == source.count
+        and (cv2 is not None or (proxy.width, proxy.height) == (source.width, source.height))
+        and abs(stretched - 1) < STRETCHED
+        and proxy.alpha == source.alpha == "opaque"
+        and (proxy.dtype in (np.uint8, np.float16) or (proxy.dtype, proxy.transfer) == (source.dtype, source.transfer))
+    )

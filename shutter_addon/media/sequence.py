@@ -1,7 +1,5 @@
 """Frames of an image sequence, or of one image: the samples that the files hold, whatever their format."""
 
-from __future__ import annotations
-
 import itertools
 import re
 from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -13,10 +11,18 @@ import numpy as np
 from OpenImageIO import ImageInput, ImageSpec, geterror
 
 from ..core.frames.frame_source import FrameSource
-from .channels import CHANNELS, no_channel
 from .errors import MediaError
 from .files import FOREIGN, check_file, check_index, check_name, check_size, stamp
 
+# Those that every picture has, whatever its file calls them.
+CHANNELS = {
+    "luminance": slice(0, 3),
+    "red": slice(0, 1),
+    "green": slice(1, 2),
+    "blue": slice(2, 3),
+    "alpha": slice(3, 4),
+}
+_TOLD = 6  # channels of a file that a sentence names
 # Blender takes these for scene linear, even logarithmic DPX, and every other format for sRGB, even float TIFF.
 LINEAR_SUFFIXES = frozenset({".exr", ".hdr", ".rgbe", ".dpx", ".cin"})
 OTHER_SUFFIXES = ".png .jpg .jpeg .jpe .tif .tiff .tga .bmp .webp .jp2 .j2k .j2c .psd .sgi .rgb .rgba .bw"
@@ -384,3 +390,11 @@ def _told(geterror: Callable[[], str], path: Path, otherwise: str) -> str:
 
 def _as_text(error: UnicodeDecodeError) -> str:
     return error.object.decode(errors="replace")
+
+
+def no_channel(path: Path, channel: str, names: Iterable[str]) -> MediaError:
+    """What is said where a file has no such channel, but others."""
+    names = list(names)
+    others = len(names) - _TOLD
+    told = ", ".join(names[:_TOLD]) + (f" and {others} others" if others > 0 else "")
+    return MediaError(f"{path.name}: has no channel {channel}, but {told}")

@@ -9,6 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..core.frames.frame_source import FrameSource
+from ..core.frames.moments import Moment
 from ..core.frames.planes import Decoded, as_rgba
 from ..core.frames.source_wrapper import SourceWrapper
 from ..core.memo import Kept
@@ -17,29 +18,52 @@ from ..core.model.shutters import MAX_WINDOW
 from . import flow, opencv, steps
 from .errors import MediaError
 from .files import check_index
+from .repeats import MOST, Repeats
 from .stored_vectors import StoredVectors
 
 SMOOTH = 1, 2, 4, 8, 16  # moments from a filmed frame to the next
 _PAIRS = 8  # of neighbouring frames, spread over the footage, that "auto" looks at
-_FRAMES = 3  # frames that are kept: those of a pair, and the one before, which running sums take back
+_FRAMES = MOST + 2  # frames that are kept: those that say what repeats
+_THIRDS = 256  # moments that stand for those of a gap of three frames, as their number has to be a power of two
+
+
+class _Recent(SourceWrapper):
+    """A source whose last frames are kept."""
+
+    def __init__(self, source: FrameSource) -> None:
+        super().__init__(source)
+        self._frames: Kept[int, np.ndarray] = Kept()
+
+    def read(self, index: int) -> np.ndarray:
+        return self._frames.ask(index, lambda: self._source.read(index), _FRAMES)
+
+    def close(self) -> None:
+        self._frames.clear()
+        self._source.close()
 
 
 class SmoothSource(SourceWrapper):
     """A source with the moments between its frames, `step` from a frame to the next.
 
     Moment i · step is the source's frame i. Where two frames have nothing in common, as at a cut, those between them
-    are the nearer one."""
+    are the nearer one.
 
-    def __init__(self, source: FrameSource, step: int, vectors: StoredVectors | None = None) -> None:
-        super().__init__(source)
+    skip_repeats: frames that repeat the one before count as moments between the others, evenly spaced; `repeats` says
+    whether there were any so far"""
+
+    def __init__(
+        self, source: FrameSource, step: int, vectors: StoredVectors | None = None, *, skip_repeats: bool = False
+    ) -> None:
+        super().__init__(_Recent(source))
         flow.check()
         self._find = flow.found if vectors is None else vectors.found
         self.step = step
         self.count = (source.count - 1) * step + 1
         self.fps = None if source.fps is None else source.fps * step
         self.options = {**source.options, "inbetween": step}
-        self._frames: Kept[int, np.ndarray] = Kept()
-        self._pairs: Kept[int, flow.Between] = Kept()
+        self._pairs: Kept[tuple[int, int], flow.Between] = Kept()
+        self._repeats = Repeats(self._source) if skip_repeats else None
+        self.repeats = False
 
     def read(self, index: int) -> np.ndarray:
         """The frame or the moment (height, width, 4). MediaError: as the source's `read`."""
@@ -48,30 +72,45 @@ class SmoothSource(SourceWrapper):
     def decoded(self, index: int) -> Decoded:
         """The frame, or the moment with the two frames around it. MediaError: as the source's `read`."""
         check_index(self, index)
-        pair, number = divmod(index, self.step)
-        if number == 0:
-            return self._frame(pair)
-        return self._pairs.ask(pair, lambda: self._between(pair), 2).moment(pair, number, self.step)
+        filmed, number = divmod(index, self.step)
+        first, last = self._gap(filmed, number)
+        if last - first > 1 and index > first * self.step:
+            made = self._moment((first, last), index - first * self.step)
+            if isinstance(made, Moment):
+                self.repeats = True
+                return made
+        return self._moment((filmed, filmed + 1), number) if number else self._source.read(filmed)
 
-    def _frame(self, index: int) -> np.ndarray:
-        return self._frames.ask(index, lambda: self._source.read(index), _FRAMES)
+    def _gap(self, filmed: int, number: int) -> tuple[int, int]:
+        """The two filmed frames between which a moment lies."""
+        if self._repeats is None or (number == 0 and not self._repeats.may_repeat(filmed)):
+            return filmed, filmed + 1
+        return self._repeats.gap(filmed)
 
-    def _between(self, pair: int) -> flow.Between:
-        return flow.Between(self._frame(pair), self._frame(pair + 1), self.transfer, self.alpha, self._find)
+    def _moment(self, pair: tuple[int, int], number: int) -> Decoded:
+        """What is so many moments after the first of two frames."""
+        steps = (pair[1] - pair[0]) * self.step
+        if steps % 3 == 0:
+            number, steps = round(number * _THIRDS / steps), _THIRDS
+        return self._pairs.ask(pair, lambda: self._between(pair), 2).moment(pair, number, steps)
+
+    def _between(self, pair: tuple[int, int]) -> flow.Between:
+        first, second = map(self._source.read, pair)
+        return flow.Between(first, second, self.transfer, self.alpha, self._find)
 
     def close(self) -> None:
         """Closes the file, and lets go of all frames."""
-        self._frames.clear()
         self._pairs.clear()
         self._source.close()
 
 
-def steps_for(source: FrameSource, smooth: int | str, window: int) -> int:
+def steps_for(source: FrameSource, smooth: int | str, window: int, *, skip_repeats: bool = False) -> int:
     """How many moments an effect has from a filmed frame to the next.
 
     Args:
         smooth: as frame_state.Options.step; "auto": as many as the fastest motion of a few pairs of frames needs
         window: filmed frames of its shutters, all of whose moments have to fit into shutters.MAX_WINDOW
+        skip_repeats: as SmoothSource has it
 
     Returns:
         One of SMOOTH.
@@ -81,19 +120,22 @@ def steps_for(source: FrameSource, smooth: int | str, window: int) -> int:
         return min(int(smooth), most)
     if opencv.cv2 is None or source.count < 2:
         return 1
-    needed = _fastest(source) / steps.smooth(source.height)
+    needed = _fastest(source, skip_repeats) / steps.smooth(source.height)
     return next((count for count in SMOOTH if needed <= count <= most), most)
 
 
-def _fastest(source: FrameSource) -> float:
+def _fastest(source: FrameSource, skip_repeats: bool) -> float:
     """Pixels from a frame to the next, of what moves fastest in a few pairs of neighbouring frames."""
+    filmed = _Recent(source)
+    repeats = Repeats(filmed) if skip_repeats else None
     pairs = sorted({(source.count - 2) * k // (_PAIRS - 1) for k in range(_PAIRS)})
     moved = []
     for pair in pairs:
         try:
-            found = steps.moved(source, pair)
+            first, last = repeats.gap(pair) if repeats else (pair, pair + 1)
+            found = steps.moved(filmed, first, last)
         except MediaError:  # who needs these frames is told
             continue
         if found is not None:
-            moved.append(steps.step(found, Similarity(), Similarity()) * source.height)
+            moved.append(steps.step(found, Similarity(), Similarity()) * source.height / (last - first))
     return max(moved, default=0.0)

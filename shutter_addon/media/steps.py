@@ -1,8 +1,6 @@
 """How far what footage shows moves from frame to frame: whether an exposure over several of them streaks, or shows
 copies of what moves side by side. No bpy."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np
@@ -28,10 +26,10 @@ class Moved(NamedTuple):
     after: np.ndarray
 
 
-def moved(source: FrameSource, index: int) -> Moved | None:
-    """What moves from a frame to the next one; None: that cannot be told, as across a cut. It reads both. It takes
-    OpenCV. MediaError: they cannot be read."""
-    first, second = (flow.of_rows(source.read(i), source, ROWS) for i in (index, index + 1))
+def moved(source: FrameSource, index: int, other: int | None = None) -> Moved | None:
+    """What moves from a frame to another, or else to the next one; None: that cannot be told, as across a cut. It reads
+    both. It takes OpenCV. MediaError: they cannot be read."""
+    first, second = (flow.of_rows(source.read(i), source, ROWS) for i in (index, other or index + 1))
     if min(first.shape) < flow.SMALLEST:
         return None
     forth, back = flow.vectors(first, second), flow.vectors(second, first)

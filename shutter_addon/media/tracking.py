@@ -4,8 +4,6 @@ Every frame is compared with the one that tracking started from, so that what is
 fails, with the last one in which the subject was surely seen. No bpy.
 """
 
-from __future__ import annotations
-
 from abc import ABC, abstractmethod
 from collections.abc import Collection, Iterator
 from dataclasses import dataclass, replace

@@ -34,6 +34,13 @@ def _no_data_on_threads():
 
 
 @pytest.fixture
+def no_exception(capfd):
+    """Blender prints what a handler raises, and goes on."""
+    yield
+    assert "Traceback" not in capfd.readouterr().err
+
+
+@pytest.fixture
 def edit(bpy):
     """An empty edit, set up to show code values as the source has them."""
     bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)

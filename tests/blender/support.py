@@ -52,26 +52,38 @@ def recipe(window, *shutters, regions=(), **options):
     return {"version": 2, "window": window, "shutters": entries, "regions": list(regions), **options}
 
 
-def noise_film(edit, frames, folder):
-    """Frames (n, H, W, C) as the edit's source, under an effect of two shutters: source, effect and strip."""
+def image_strip(edit, first, start=1, channel=1, name="images"):
+    """A strip of all pictures in the folder of the first one."""
+    strip = edit.sequence_editor.strips.new_image(name, str(first), channel, start)
+    for path in sorted(first.parent.iterdir())[1:]:
+        strip.elements.append(path.name)
+    return strip
+
+
+def effect_of(edit, source, data):
+    """Puts an effect of a recipe (a dictionary) on a strip; the effect's strip, and the effect."""
     from shutter_addon.blender.data import recipe_import
     from shutter_addon.blender.editing import add_effect
-    from shutter_addon.blender.rendering import sessions
     from shutter_addon.core.recipes import recipe_file
+
+    strip, effect = add_effect.add_effect(edit, source)
+    recipe_import.apply(edit, effect, strip, recipe_file.parse(json.dumps(data)))
+    return strip, effect
+
+
+def noise_film(edit, frames, folder):
+    """Frames (n, H, W, C) as the edit's source, under an effect of two shutters: source, effect and strip."""
+    from shutter_addon.blender.rendering import sessions
 
     sessions.forget()
     height, width = frames.shape[1:3]
-    source = edit.sequence_editor.strips.new_image("images", str(write_frames(folder / "in", frames[:1])), 1, 1)
-    write_frames(folder / "in", frames)
-    for i in range(2, len(frames) + 1):
-        source.elements.append(f"f{i:04d}.png")
+    source = image_strip(edit, write_frames(folder / "in", frames))
     edit.render.resolution_x, edit.render.resolution_y = width, height
     edit.frame_start, edit.frame_end = 1, len(frames)
     edit.sequence_editor.use_cache_raw = edit.sequence_editor.use_cache_final = False
-    strip, effect = add_effect.add_effect(edit, source)
     line = {"shutter": "S1", "kind": "line", "width": 0.1, "strokes": [[[0.2, 0.2], [0.3, 0.8]]]}
     data = recipe(4, [1, 1, 1, 1], [0, 0, 1, 0], regions=[line], border=True)
-    recipe_import.apply(edit, effect, strip, recipe_file.parse(json.dumps(data)))
+    strip, effect = effect_of(edit, source, data)
     return source, effect, strip
 
 
@@ -136,9 +148,6 @@ class Asked:
 
     def coefficients(self):
         return self.session.run(self.renderer.coefficients, self.request)
-
-    def check(self):
-        self.renderer.check(self.request)
 
 
 def packages(folder, blenders_python):

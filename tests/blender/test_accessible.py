@@ -5,7 +5,9 @@ from types import SimpleNamespace
 import pytest
 from support import sequencer
 
-from shutter_addon.blender.data import selection
+from shutter_addon.blender.data import fcurves, selection
+from shutter_addon.blender.editing import region_edits
+from shutter_addon.blender.interface import menus
 
 
 class Recorder:
@@ -59,8 +61,6 @@ def test_every_operator_has_a_name_of_its_own_and_a_description(operators):
 
 
 def test_every_operator_is_in_the_menu_of_strips_which_blenders_search_reads(bpy, effect, operators):
-    from shutter_addon.blender.interface import menus
-
     assert set(in_menu(bpy, "SHUTTER_MT_strip")) == set(operators)
     recorder = Recorder()
     entry = bpy.types.SEQUENCER_MT_strip.draw._draw_funcs[-1]  # Blender tells of what was appended nowhere else
@@ -69,9 +69,6 @@ def test_every_operator_is_in_the_menu_of_strips_which_blenders_search_reads(bpy
 
 
 def test_a_region_is_moved_by_numbers_and_keyed_where_blender_keys_by_itself(bpy, effect, edit):
-    from shutter_addon.blender.data import fcurves
-    from shutter_addon.blender.editing import region_edits
-
     region = region_edits.add_region(effect, effect.shutters[1], "RAMP")
     values = {"location": (0.25, -0.5), "rotation": 0.5, "scale": 2.0}
     assert bpy.ops.shutter.region_transform(**values) == {"FINISHED"}

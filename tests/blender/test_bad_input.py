@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 from support import read_picture, recipe, write_frames
 
+from shutter_addon.blender.editing import add_effect
 from shutter_addon.media import MediaError, open_source
 from shutter_addon.media.completeness import whole_pictures
 
@@ -76,8 +77,6 @@ def test_names_that_are_not_utf8(command, frames, tmp_path, option):
 @pytest.mark.skipif(os.name != "posix", reason="names are bytes on POSIX systems only")
 def test_a_strip_whose_folder_is_not_utf8(edit, frames, tmp_path):
     """Blender's file browser finds such files."""
-    from shutter_addon.blender.editing import add_effect
-
     odd = tmp_path / os.fsdecode(b"caf\xe9")
     shutil.copytree(frames.parent, odd)
     source = edit.sequence_editor.strips.new_image("images", str(frames), 1, 1)

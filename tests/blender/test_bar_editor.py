@@ -5,11 +5,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from shutter_addon.blender.interface import bar_editor
+
 
 @pytest.fixture(scope="module")
 def editor(bpy):
-    from shutter_addon.blender.interface import bar_editor
-
     return bar_editor
 
 

@@ -6,6 +6,11 @@ import numpy as np
 import pytest
 from support import noise_film, picture_of
 
+from shutter_addon.blender.data import snapshot
+from shutter_addon.blender.devices import available
+from shutter_addon.blender.rendering import effect_source, job_snapshots, session, sessions
+from shutter_addon.blender.rendering.session import RenderContext
+from shutter_addon.compute.renderer import Renderer
 from shutter_addon.core.stopping import StoppedError
 
 
@@ -20,8 +25,6 @@ def film(bpy, edit, tmp_path):
 @pytest.fixture
 def composed(monkeypatch):
     """The source frames of which pictures were made, in order."""
-    from shutter_addon.compute.renderer import Renderer
-
     made, picture = [], Renderer.picture
 
     def noted(self, request):
@@ -39,8 +42,6 @@ def test_each_picture_of_a_film_is_made_once(film, render, composed):
 
 
 def test_nothing_is_begun_for_single_pictures(film, render, composed):
-    from shutter_addon.blender.rendering import sessions
-
     edit, *_ = film
     render(edit, [5, 2, 9])
     sessions.forget()  # which waits for what was begun
@@ -70,8 +71,6 @@ def replace(edit, source, effect, strip):
 @pytest.mark.parametrize("change", [weigh, move, slip, widen, replace])
 def test_a_change_leaves_no_trace(film, render, change):
     """Frame 4 is begun when 2 and 3 are rendered; what is shown after a change is what a fresh start shows."""
-    from shutter_addon.blender.rendering import sessions
-
     edit = film[0]
     before = render(edit, [2, 3, 4], "16")[4]
     render(edit, [2, 3], "16")
@@ -96,11 +95,6 @@ def test_a_frame_that_cannot_be_read_fails_only_when_it_is_shown(film, render, t
 def test_what_a_job_takes_away_meanwhile_is_not_missed(film, monkeypatch, look):
     """Scenes that are gone are forgotten on the main thread; a render job may take up what was begun for them between
     the look at what is known and its removal, which is where this one does: at one of the looks."""
-    from shutter_addon.blender.data import snapshot
-    from shutter_addon.blender.rendering import session
-    from shutter_addon.blender.rendering.session import RenderContext
-    from shutter_addon.compute.renderer import Renderer
-
     edit, _source, effect, strip = film
     found, looks, closed, close = session.RenderSession(lambda: ("cpu", None), None), iter(range(9)), [], Renderer.close
     is_closed = threading.Event()  # on the session's thread, for which nobody waits
@@ -143,8 +137,6 @@ def held_up(session, until):
 
 def test_who_is_stopped_waits_neither_for_a_device_nor_for_others_to_be_closed(film):
     """Though the session's thread waits, as for a window that does not answer."""
-    from shutter_addon.blender.rendering import effect_source, job_snapshots, sessions
-
     scene, answer, half = film[2].scene, threading.Event(), effect_source.Detail(2)
     waits = held_up(sessions.OFFSCREEN, answer)
     stops = iter([False])  # and then it is stopped
@@ -165,10 +157,6 @@ def test_who_is_stopped_waits_neither_for_a_device_nor_for_others_to_be_closed(f
 
 def test_who_asks_for_room_keeps_what_it_uses(film, monkeypatch):
     """The other one may ask it in turn, while it waits for that."""
-    from shutter_addon.blender.devices import available
-    from shutter_addon.blender.rendering import effect_source, job_snapshots, session
-    from shutter_addon.blender.rendering.session import RenderContext
-
     asks, opened = [], available.OPEN["cpu"]
     monkeypatch.setitem(available.OPEN, "cpu", lambda memory, ask: asks.append(ask) or opened(memory, ask))
     found = session.RenderSession(lambda: ("cpu", None), lambda: found.free())

@@ -4,6 +4,8 @@ from types import SimpleNamespace
 
 import pytest
 
+from shutter_addon.blender.interface import operator_bases
+
 TICK, ESCAPE = (SimpleNamespace(type=kind, value="PRESS") for kind in ("TIMER", "ESC"))
 OTHER = SimpleNamespace(type="A", value="PRESS")
 
@@ -11,7 +13,6 @@ OTHER = SimpleNamespace(type="A", value="PRESS")
 @pytest.fixture
 def going(bpy):
     """One that has three steps, and what its timers are."""
-    from shutter_addon.blender.interface import operator_bases
 
     class Going(operator_bases.Beside):
         left, ends, leaves, blocks = 3, None, 0, True

@@ -1,13 +1,15 @@
 """Every change that changes pictures reaches the sequencer's cache of finished frames; playing does not."""
 
-import json
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from support import recipe, remembering, request, write_frames
+from support import effect_of, image_strip, recipe, remembering, request, write_frames
 
-from shutter_addon.core.recipes import recipe_file
+from shutter_addon.blender import handlers
+from shutter_addon.blender.data import fcurves, source_media, strips
+from shutter_addon.blender.editing import reconcile
+from shutter_addon.blender.rendering import invalidation, session
 
 REGION = {"name": "Face", "shutter": "S1", "kind": "lasso", "strokes": [[[0.1, 0.1], [0.9, 0.1], [0.5, 0.9]]]}
 MOVED = REGION | {"keys": [{"frame": 1}, {"frame": 9, "location": [0.2, 0.1], "ease": "bezier"}]}
@@ -24,22 +26,14 @@ def images(tmp_path):
 @pytest.fixture
 def effect(bpy, edit, images):
     """An effect on an image strip, with keyed bars and a region that moves."""
-    from shutter_addon.blender.data import recipe_import
-    from shutter_addon.blender.editing import add_effect
-
     edit.render.resolution_x = edit.render.resolution_y = 32
-    source = edit.sequence_editor.strips.new_image("images", str(images), 1, 1)
-    for file in sorted(images.parent.iterdir())[1:]:
-        source.elements.append(file.name)
-    strip, effect = add_effect.add_effect(edit, source)
-    recipe_import.apply(edit, effect, strip, recipe_file.parse(json.dumps(KEYED)))
+    source = image_strip(edit, images)
+    _strip, effect = effect_of(edit, source, KEYED)
     bpy.context.view_layer.update()
     return effect
 
 
 def curve(edit, name):
-    from shutter_addon.blender.data import fcurves
-
     return next(c for c in fcurves.curves_under(edit, "virtual_shutter") if c.data_path.endswith(name))
 
 
@@ -185,8 +179,6 @@ def test_undo_and_redo_are_rendered(bpy, edit, effect, render, change):
 
 def test_the_cache_is_on(bpy, edit, effect, render):
     """What the other tests rest on: without the handlers, a frame would be the old one."""
-    from shutter_addon.blender import handlers
-
     before = render(edit, [FRAME])[FRAME]
     handlers.unregister()
     try:
@@ -198,9 +190,6 @@ def test_the_cache_is_on(bpy, edit, effect, render):
 
 
 def test_what_is_known_of_effects_goes_with_them(edit, effect):
-    from shutter_addon.blender.editing import reconcile
-    from shutter_addon.blender.rendering import invalidation
-
     scene = effect.scene.session_uid
     invalidation.invalidate_changed(edit)
     assert "invalidation" in remembering(scene)
@@ -226,8 +215,6 @@ def test_a_file_replaced_in_the_middle_is_rendered(bpy, edit, effect, render, im
 @pytest.fixture
 def clock(monkeypatch):
     """A clock that stands still: a function that sets it forward."""
-    from shutter_addon.blender.data import source_media
-
     now = [1000.0]
     monkeypatch.setattr(source_media, "time", SimpleNamespace(monotonic=lambda: now[0]))
 
@@ -240,8 +227,6 @@ def clock(monkeypatch):
 @pytest.fixture
 def asked(monkeypatch):
     """The files of which it was asked whether they are the same."""
-    from shutter_addon.blender.data import source_media
-
     asked, stamp = [], source_media.stamp
     monkeypatch.setattr(source_media, "stamp", lambda path: asked.append(path) or stamp(path))
     return asked
@@ -259,9 +244,6 @@ def long(edit, effect, images):
 @pytest.mark.usefixtures("long")
 def test_replaced_files_of_a_long_sequence_are_noticed_little_by_little(edit, images, clock, asked):
     """Each look asks few of its files, and all of them are asked in turn."""
-    from shutter_addon.blender.data import source_media
-    from shutter_addon.blender.rendering import invalidation
-
     invalidation.invalidate_changed(edit)
     for _ in range(10):
         asked.clear()
@@ -278,9 +260,6 @@ def test_replaced_files_of_a_long_sequence_are_noticed_little_by_little(edit, im
 
 @pytest.mark.usefixtures("clock", "long")
 def test_a_redraw_asks_the_ends_of_a_sequence_alone(edit, effect, asked):
-    from shutter_addon.blender.data import strips
-    from shutter_addon.blender.rendering import invalidation
-
     (strip,) = strips.effect_strips(edit)
     invalidation.invalidate_changed(edit)
     for frame in (FRAME, FRAME + 1):
@@ -292,9 +271,6 @@ def test_a_redraw_asks_the_ends_of_a_sequence_alone(edit, effect, asked):
 
 def test_a_film_asks_all_files_before_it_and_then_the_ends_alone(bpy, edit, render, long, clock, asked, monkeypatch):
     """However long a picture takes."""
-    from shutter_addon.blender.data import source_media
-    from shutter_addon.blender.rendering import session
-
     begin, counts = session.RenderSession.begin_next, []
 
     def begin_next(*arguments):
@@ -318,8 +294,6 @@ def test_a_film_asks_all_files_before_it_and_then_the_ends_alone(bpy, edit, rend
 
 @pytest.mark.usefixtures("effect", "clock")
 def test_what_is_known_of_files_is_bounded(edit, asked):
-    from shutter_addon.blender.data import source_media
-
     source = edit.sequence_editor.strips["images"]
 
     def asks(number):

@@ -5,9 +5,10 @@ import math
 import cv2
 import numpy as np
 import pytest
-from support import request, write_frames
+from support import image_strip, request, write_frames
 
 from shutter_addon.blender.data import annotations, consistency, fcurves, selection, snapshot, strips, validation
+from shutter_addon.blender.data.property_copy import copy_properties
 from shutter_addon.blender.editing import (
     add_effect,
     follow_track,
@@ -63,9 +64,7 @@ def effect(edit, frames):
 
 def new_source(edit, first):
     edit.render.resolution_x, edit.render.resolution_y = SIZE
-    source = edit.sequence_editor.strips.new_image("images", str(first), 1, 11)
-    for path in sorted(first.parent.iterdir())[1:]:
-        source.elements.append(path.name)
+    source = image_strip(edit, first, 11)
     return source
 
 
@@ -272,8 +271,6 @@ def test_a_button_goes_to_the_frames_that_need_a_look(bpy, edit, effect):
 
 
 def test_a_copy_of_the_effect_has_the_cameras_keys_and_stops(bpy, edit, effect):
-    from shutter_addon.blender.data.property_copy import copy_properties
-
     effect.camera.location, effect.camera.track_all_keys = (0.25, 0), True
     effect.camera.stops.add().frame = 7
     new = edit.virtual_shutter.effects.add()

@@ -1,14 +1,13 @@
 """Clip strips as sources: what Blender shows of the plain strip, whatever the clip's settings."""
 
-import json
-
 import av
 import numpy as np
 import OpenImageIO
 import pytest
-from support import picture_of, recipe, sequencer, write_frames
+from support import effect_of, picture_of, recipe, sequencer, write_frames
 
-from shutter_addon.core.recipes import recipe_file
+from shutter_addon.blender.editing import add_effect, shutter_edits
+from shutter_addon.blender.rendering import effect_source
 
 RNG = np.random.default_rng(0)
 
@@ -61,12 +60,8 @@ def clip_strip(bpy, edit):
 
 
 def check(edit, render, source, frames, depth="8", levels=1):
-    from shutter_addon.blender.data import recipe_import
-    from shutter_addon.blender.editing import add_effect
-
     plain = render(edit, frames, depth)
-    strip, effect = add_effect.add_effect(edit, source)
-    recipe_import.apply(edit, effect, strip, recipe_file.parse(json.dumps(recipe(4, [1, 0, 0, 0]))))
+    strip, _effect = effect_of(edit, source, recipe(4, [1, 0, 0, 0]))
     shown = render(edit, [int(frame) for frame in np.random.default_rng(0).permutation(list(frames))], depth)
     for frame in frames:
         solid = plain[frame][..., 3] > 25
@@ -137,9 +132,6 @@ def test_colour_spaces(edit, render, tmp_path, clip_strip, movie, space):
 
 
 def test_what_is_not_supported_is_said(edit, clip_strip, movie):
-    from shutter_addon.blender.editing import add_effect, shutter_edits
-    from shutter_addon.blender.rendering import effect_source
-
     source = clip_strip(movie)
     strip, effect = add_effect.add_effect(edit, source)
     shutter_edits.start(effect)

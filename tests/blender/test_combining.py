@@ -4,8 +4,11 @@ import json
 
 import numpy as np
 import pytest
-from support import recipe, request, write_frames
+from support import image_strip, recipe, request, write_frames
 
+from shutter_addon.blender.data import recipe_import
+from shutter_addon.blender.editing import add_effect
+from shutter_addon.blender.rendering import sessions
 from shutter_addon.core.frames import light
 from shutter_addon.core.recipes import recipe_file
 from shutter_addon.core.recipes.recipe import RecipeError
@@ -29,15 +32,10 @@ def frame(index):
 @pytest.fixture
 def edited(bpy, edit, tmp_path):
     """Makes an effect of a recipe of one shutter: its strip and the effect."""
-    from shutter_addon.blender.data import recipe_import
-    from shutter_addon.blender.editing import add_effect
-    from shutter_addon.blender.rendering import sessions
 
     def make(*regions, bars=(1,) * WINDOW, **shutter):
         first = write_frames(tmp_path / "in", [frame(i) for i in range(COUNT)])
-        source = edit.sequence_editor.strips.new_image("images", str(first), 1, 1)
-        for i in range(2, COUNT + 1):
-            source.elements.append(f"f{i:04d}.png")
+        source = image_strip(edit, first)
         strip, effect = add_effect.add_effect(edit, source)
         said = recipe(WINDOW, bars, [1] + [0] * (WINDOW - 1), regions=regions, position="center")
         said["shutters"][0] |= shutter

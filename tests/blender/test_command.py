@@ -5,7 +5,10 @@ import OpenImageIO
 import pytest
 from support import read_picture, recipe, write_frames
 
+from shutter_addon.blender.commands import command_line
 from shutter_addon.core.frames import light
+from shutter_addon.core.pixels import compositor
+from shutter_addon.core.recipes import recipe_file
 from shutter_addon.media import open_source
 
 
@@ -102,9 +105,6 @@ def test_a_keyed_delta_stays_one_sharp_frame(command, noise, tmp_path, same_pixe
 
 @pytest.mark.parametrize("interpolation", ["displacement", "value"])
 def test_random_bars_equal_the_reference(command, noise, tmp_path, same_pixels, interpolation):
-    from shutter_addon.core.pixels import compositor
-    from shutter_addon.core.recipes import recipe_file
-
     rng = np.random.default_rng(1)
     data = recipe(
         8,
@@ -240,8 +240,6 @@ def test_a_gap_in_the_numbering_holds(command, noise, tmp_path, same_pixels):
 @pytest.mark.parametrize("suffix", [".png", ".jp2"])
 def test_files_that_a_gap_would_show_are_the_sources_own(noise, tmp_path, suffix):
     """The number in a suffix is none of theirs."""
-    from shutter_addon.blender.commands import command_line
-
     for path in sorted(write_frames(tmp_path, noise[1][:4]).parent.iterdir()):
         path.rename(path.with_suffix(suffix))
     (tmp_path / f"f0003{suffix}").unlink()

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 from support import recipe, sequencer, write_frames
 
-from shutter_addon.blender.data import annotations, data_format, fcurves, geometry, selection, strips
-from shutter_addon.blender.editing import match_source, undelete
+from shutter_addon.blender.data import annotations, data_format, fcurves, geometry, recipe_import, selection, strips
+from shutter_addon.blender.editing import add_effect, match_source, undelete
 from shutter_addon.core.model.scribbles import mapped
 from shutter_addon.core.recipes import recipe_file
 
@@ -54,11 +54,7 @@ def test_many_copies_at_once(tmp_path):
     assert "EFFECTS [1.0, 200.0, 300.0, 400.0, 500.0, 600.0, 700.0] 7" in done.stdout, (done.returncode, done.stderr)
 
 
-@pytest.fixture(autouse=True)
-def _no_exception(capfd):
-    """Blender prints what a handler raises, and goes on."""
-    yield
-    assert "Traceback" not in capfd.readouterr().err
+pytestmark = pytest.mark.usefixtures("no_exception")
 
 
 @pytest.fixture
@@ -81,8 +77,6 @@ def clip(edit, tmp_path):
 @pytest.fixture
 def add(bpy, edit, clip):
     """A clip with a keyed effect; its strip."""
-    from shutter_addon.blender.data import recipe_import
-    from shutter_addon.blender.editing import add_effect
 
     def made(start=1, data=KEYED):
         strip, effect = add_effect.add_effect(edit, clip(start))

@@ -5,6 +5,9 @@ import numpy as np
 import pytest
 from support import picture_of, read_picture, recipe, write_frames
 
+from shutter_addon.blender.data import preferences
+from shutter_addon.blender.devices import available
+from shutter_addon.blender.rendering import job_snapshots, render_settings, sessions
 from shutter_addon.compute.cpu import CPUCompositor
 from shutter_addon.compute.gpu import GPUCompositor
 from shutter_addon.devices.device import NoDeviceError
@@ -67,8 +70,6 @@ def test_a_blender_on_vulkan_without_opengl(blender, command, given, tmp_path, s
 @pytest.fixture
 def preferred(bpy):
     """The extension's preferences, as of an enabled one."""
-    from shutter_addon.blender.data import preferences
-
     addon = bpy.context.preferences.addons.new()
     addon.module = preferences.ADDON
     yield addon.preferences
@@ -77,9 +78,6 @@ def preferred(bpy):
 
 def test_the_preference_chooses(effect, preferred):
     """From the next render on, if the command asks for nothing else."""
-    from shutter_addon.blender.data import preferences
-    from shutter_addon.blender.devices import available
-    from shutter_addon.blender.rendering import job_snapshots, render_settings, sessions
 
     def composed_by():
         sessions.settle()
@@ -97,8 +95,6 @@ def test_the_preference_chooses(effect, preferred):
 
 
 def test_what_is_lacking_is_said_of_all(bpy, monkeypatch):
-    from shutter_addon.blender.devices import available
-
     monkeypatch.setattr(available, "opengl", lambda: available.OpenGL(lacking="no OpenGL 4.3: none"))
     monkeypatch.setattr(available, "opens_in_background", lambda: False)
     both = "no OpenGL 4.3: none, and Blender's own GPU cannot be used without a window here"

@@ -6,8 +6,11 @@ import cv2
 import exact_diffusion
 import numpy as np
 import pytest
-from support import picture_of, read_picture, recipe, request, state, write_frames
+from support import image_strip, picture_of, read_picture, recipe, request, state, write_frames
 
+from shutter_addon.blender.data import recipe_import
+from shutter_addon.blender.editing import add_effect
+from shutter_addon.blender.rendering import invalidation, previews
 from shutter_addon.compute.guide import Guides, guiding
 from shutter_addon.core.frames import light
 from shutter_addon.core.model import scribbles, windows
@@ -78,13 +81,9 @@ def test_chunks_are_the_whole(command, film, tmp_path):
 @pytest.fixture
 def add(bpy, edit):
     """Puts an effect of a recipe on the film; gives edit, effect and strip."""
-    from shutter_addon.blender.data import recipe_import
-    from shutter_addon.blender.editing import add_effect
 
     def added(first, data):
-        source = edit.sequence_editor.strips.new_image("film", str(first), 1, 1)
-        for number in range(2, COUNT + 1):
-            source.elements.append(f"f{number:04d}.png")
+        source = image_strip(edit, first, 1, 1, "film")
         strip, effect = add_effect.add_effect(edit, source)
         edit.render.resolution_x, edit.render.resolution_y = SIZE
         recipe_import.apply(edit, effect, strip, recipe_file.parse(json.dumps(data)))
@@ -94,8 +93,6 @@ def add(bpy, edit):
 
 
 def test_keys_are_blenders_and_change_what_is_shown(bpy, add, film):
-    from shutter_addon.blender.rendering import invalidation
-
     edit, effect, strip = add(film, effect_recipe())
     for frame, value in ((2, 0.0), (6, 1.0)):
         effect.edge_aware = value
@@ -138,8 +135,6 @@ def test_moments_that_are_shown_guide_it(bpy, add, film):
 
 def test_a_draft_has_larger_blocks_where_edges_are_followed(add, film, monkeypatch):
     """Coefficients of a draft are those of the blocks; films and what has no edges to follow are never drafts."""
-    from shutter_addon.blender.rendering import previews
-
     monkeypatch.setattr(previews, "DRAFT_ROWS", SIZE[1] // 3)
     edit, effect, strip = add(film, effect_recipe(edge_aware=1))
     exact = request(edit, effect, strip, 3)

@@ -8,6 +8,12 @@ import OpenImageIO
 import pytest
 from support import EXTENSION, noise_film
 
+from shutter_addon.blender.editing import add_effect, shutter_edits
+from shutter_addon.blender.output import edit_feed, levels_file
+from shutter_addon.blender.output.levels_file import LevelsFile
+from shutter_addon.blender.rendering import render_job
+from shutter_addon.media import open_source
+
 COUNT, HEIGHT, WIDTH = 8, 24, 40
 
 
@@ -49,8 +55,6 @@ def pictures(bpy, edit, folder):
 def compared(bpy, edit, tmp_path, monkeypatch):
     """Renders an edit by the engine alone, and as ever: asserts equal bits, and gives the frames that needed no
     engine."""
-    from shutter_addon.blender.output import edit_feed
-    from shutter_addon.blender.output.levels_file import LevelsFile
 
     def compare():
         edit.frame_set(edit.frame_start)  # animation is as it will be left
@@ -274,8 +278,6 @@ def in_a_meta(edit, source, strip, folder):
 
 
 def two_effects(edit, source, strip, folder):
-    from shutter_addon.blender.editing import add_effect, shutter_edits
-
     source.right_handle = strip.right_handle = 5
     other = edit.sequence_editor.strips.new_image("second", str(folder / "in" / "f0005.png"), 1, 5)
     other.right_handle = COUNT + 1
@@ -358,9 +360,6 @@ def test_a_single_picture_keeps_its_floats(bpy, edit, made, tmp_path):
 
 
 def test_a_movie_has_the_engines_bits(bpy, edit, made, tmp_path, monkeypatch):
-    from shutter_addon.blender.output import edit_feed
-    from shutter_addon.media import open_source
-
     made()
     edit.render.image_settings.media_type = "VIDEO"
     edit.render.ffmpeg.format, edit.render.ffmpeg.codec = "MKV", "FFV1"
@@ -388,8 +387,6 @@ def test_the_edit_is_put_back(bpy, edit, made, tmp_path, how):
             return
         seen.append(look(edit) != before)
         if how == "stopped":
-            from shutter_addon.blender.rendering import render_job
-
             render_job.stop()
         elif how == "saved":
             bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "edit.blend"), copy=True)
@@ -411,8 +408,6 @@ def test_the_edit_is_put_back(bpy, edit, made, tmp_path, how):
 
 
 def test_what_cannot_be_written_is_left_to_the_engine(edit, made, compared, monkeypatch):
-    from shutter_addon.blender.output import levels_file
-
     made()
 
     def no_room(*_):

@@ -6,8 +6,9 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from support import state
 
-from shutter_addon.blender.data import annotations, consistency, fcurves, selection
+from shutter_addon.blender.data import annotations, consistency, fcurves, selection, snapshot, strips
 from shutter_addon.blender.editing import bar_edits, region_edits, shutter_edits
+from shutter_addon.core.model import shutters
 
 RNG = np.random.default_rng(5)
 
@@ -29,8 +30,6 @@ def three(effect):
 
 def curves(effect, under):
     """Keys of the effect's F-curves under a path: {(path from there, index): [(frame, value, interpolation)]}."""
-    from shutter_addon.blender.data import fcurves
-
     path = f"{effect.path_from_id()}.{under}"
     return {
         (c.data_path.removeprefix(path), c.array_index): [(*k.co, k.interpolation) for k in c.keyframe_points]
@@ -59,8 +58,6 @@ def draw(effect, index, points=((0, 0), (5, 5)), frame=1):
 
 def picture_bars(effect, index, frame):
     """What a picture at a frame is made with."""
-    from shutter_addon.blender.data import strips
-
     edit, _, strip = strips.find_effect(effect.scene)
     return state(edit, effect, strip, frame).bars[index]
 
@@ -225,8 +222,6 @@ def test_set_bars(effect):
 
 
 def test_bars_that_stay_keep_the_sequencers_frames(effect, monkeypatch):
-    from shutter_addon.blender.data import strips
-
     dropped = []
     monkeypatch.setattr(strips, "invalidate", dropped.append)
     bar_edits.set_bars(effect.shutters[0], np.ones(8))
@@ -257,8 +252,6 @@ def test_a_summary_in_words():
 @settings(suppress_health_check=[HealthCheck.function_scoped_fixture], max_examples=20)
 def test_another_window_keeps_shape_and_share_of_light(effect, window, shape, closed):
     """Edited ones: test_kept_presets.py has the others."""
-    from shutter_addon.core.model import shutters
-
     for shutter in effect.shutters:
         bar_edits.set_bars(shutter, np.repeat([1.0, 0.25][: 2 - closed] + [0.0] * closed, 4))
     before = [consistency.bars(shutter) for shutter in effect.shutters]
@@ -285,9 +278,6 @@ def test_another_window_and_back_is_exact(three, window):
 
 
 def test_another_window_keeps_keys_at_their_frames_with_their_ease(three):
-    from shutter_addon.blender.data import fcurves
-    from shutter_addon.core.model import shutters
-
     for curve in fcurves.curves_under(three.id_data, f"{three.path_from_id()}.shutters[0]"):
         curve.keyframe_points[0].interpolation = "CONSTANT"
     old = {frame: picture_bars(three, 0, frame) for frame in (1, 5, 9)}
@@ -532,8 +522,6 @@ def test_only_what_renders_by_its_keys_can_be_keyed(effect):
 
 
 def test_keyed_options_hold_from_their_key_on(effect):
-    from shutter_addon.blender.data import snapshot, strips
-
     edit = effect.id_data
     for frame, border, edges, aggregate in ((1, False, "HOLD", "1"), (20, True, "SHORTEN", "4")):
         effect.border, effect.edges, effect.aggregate = border, edges, aggregate

@@ -4,8 +4,9 @@ import json
 
 import numpy as np
 import pytest
-from support import state, write_frames
+from support import effect_of, state, write_frames
 
+from shutter_addon.blender.data import geometry, recipe_import
 from shutter_addon.core.model.scribbles import mapped
 from shutter_addon.core.recipes import recipe_file
 
@@ -65,8 +66,6 @@ def keyed_recipe(window=8):
 @pytest.fixture
 def effect_on(bpy, edit, tmp_path):
     """An image strip at frame 31 with a recipe's effect; gives a function of the strip's own frames."""
-    from shutter_addon.blender.data import recipe_import
-    from shutter_addon.blender.editing import add_effect
 
     def make(data, transform=None):
         first = write_frames(tmp_path / "in", np.zeros((2, 24, 40, 3), dtype=np.uint8))
@@ -74,8 +73,7 @@ def effect_on(bpy, edit, tmp_path):
         source.right_handle = 71
         for name, value in (transform or {}).items():
             setattr(source.transform, name, value)
-        strip, effect = add_effect.add_effect(edit, source)
-        recipe_import.apply(edit, effect, strip, recipe_file.parse(json.dumps(data)))
+        strip, effect = effect_of(edit, source, data)
         return lambda frame: state(edit, effect, strip, frame + 30)
 
     return make
@@ -110,8 +108,6 @@ def test_a_moved_scaled_and_turned_strip(effect_on):
 
 def test_a_picture_point_lies_where_blender_draws_it(bpy, edit, render, tmp_path):
     """geometry.picture_to_image against a bright pixel block in a rendered, transformed strip."""
-    from shutter_addon.blender.data import geometry
-
     picture = np.zeros((1, 40, 60, 3), dtype=np.uint8)
     picture[0, 10:14, 40:44] = 255  # centre: 42/60 across, 12/40 from the top
     strip = edit.sequence_editor.strips.new_image("image", str(write_frames(tmp_path / "in", picture)), 1, 1)
@@ -126,8 +122,6 @@ def test_a_picture_point_lies_where_blender_draws_it(bpy, edit, render, tmp_path
 
 
 def test_applying_another_recipe_leaves_nothing_of_the_first(bpy, edit, effect_on):
-    from shutter_addon.blender.data import recipe_import
-
     effect_on(keyed_recipe())
     effect = edit.virtual_shutter.effects[0]
     strip = next(s for s in edit.sequence_editor.strips if s.type == "SCENE")

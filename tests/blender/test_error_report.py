@@ -13,6 +13,15 @@ import numpy as np
 import pytest
 from support import recipe, sequencer, write_frames
 
+from shutter_addon.blender import command
+from shutter_addon.blender.data import colour_configuration, recipe_import, selection, versions
+from shutter_addon.blender.devices import available
+from shutter_addon.blender.editing import add_effect, bar_edits
+from shutter_addon.blender.interface import panel_parts
+from shutter_addon.blender.output import edit_structure, error_report
+from shutter_addon.blender.output.error_report import without_paths
+from shutter_addon.core.recipes import recipe_file
+
 NAME = "Qanarix"
 ROOT = Path(__file__).parents[2]
 
@@ -30,10 +39,6 @@ def _nothing_told():
 def named(bpy, edit, tmp_path, monkeypatch):
     """An edit in which all that can have a name has the same, folders and the user's own included: scene, effect,
     effect strip."""
-    from shutter_addon.blender.data import recipe_import, selection
-    from shutter_addon.blender.editing import add_effect
-    from shutter_addon.core.recipes import recipe_file
-
     home = tmp_path / NAME
     for variable, value in {"HOME": home, "USERPROFILE": home, "USER": NAME, "LOGNAME": NAME, "USERNAME": NAME}.items():
         monkeypatch.setenv(variable, str(value))
@@ -67,8 +72,6 @@ def named(bpy, edit, tmp_path, monkeypatch):
 
 
 def report(edit):
-    from shutter_addon.blender.output import error_report
-
     text = error_report.text(edit)
     assert NAME.lower() not in text.lower()
     assert str(Path.home()) not in text
@@ -83,8 +86,6 @@ def line(text, start):
 def test_versions_and_device_are_those_that_there_are(bpy, edit):
     import av
     import cv2
-
-    from shutter_addon.blender.devices import available
 
     text = report(edit)
     manifest = tomllib.loads((ROOT / "blender_manifest.toml").read_text(encoding="utf-8"))
@@ -106,8 +107,6 @@ def test_versions_and_device_are_those_that_there_are(bpy, edit):
 
 
 def test_a_package_that_is_missing_and_one_that_is_broken(edit, tmp_path, monkeypatch):
-    from shutter_addon.blender.output import error_report
-
     (tmp_path / "broken.py").write_text("import not_there_either")
     (tmp_path / "foreign.py").write_text(f"raise ImportError('{NAME}.so: wrong ELF class')")
     monkeypatch.syspath_prepend(str(tmp_path))
@@ -118,8 +117,6 @@ def test_a_package_that_is_missing_and_one_that_is_broken(edit, tmp_path, monkey
 
 
 def test_the_zip_with_wheels_says_so(edit, tmp_path, monkeypatch):
-    from shutter_addon.blender.data import versions
-
     manifest = tmp_path / "blender_manifest.toml"
     words = 'version = "1.2.3"\nplatforms = ["linux-x64"]\nwheels = ["./wheels/a.whl", "./wheels/b.whl"]\n'
     manifest.write_text(words)
@@ -158,8 +155,6 @@ def test_what_the_edit_is_made_of(bpy, named):
 
 
 def test_a_movie(bpy, edit):
-    from shutter_addon.blender.editing import add_effect
-
     film = ROOT / "assets" / "bigbuckbunny.mp4"
     add_effect.add_effect(edit, edit.sequence_editor.strips.new_movie("film", str(film), 1, 1))
     found = line(report(edit), "- Footage:")
@@ -170,8 +165,6 @@ def test_a_movie(bpy, edit):
 
 def test_after_several_errors_it_names_nothing(bpy, named, tmp_path):
     """Reports of operators, a film that fails, and an error that nobody expected."""
-    from shutter_addon.blender.editing import bar_edits
-
     edit, effect, strip = named
     folder, ops = tmp_path / NAME, bpy.ops.shutter
 
@@ -202,8 +195,6 @@ def test_after_several_errors_it_names_nothing(bpy, named, tmp_path):
 
 
 def test_an_edit_that_is_broken_beyond_all_that_is_foreseen_has_a_report(named, monkeypatch):
-    from shutter_addon.blender.output import edit_structure
-
     def surprised(*_arguments):
         raise KeyError(NAME)
 
@@ -214,15 +205,11 @@ def test_an_edit_that_is_broken_beyond_all_that_is_foreseen_has_a_report(named, 
 
 
 def test_names_of_another_colour_configuration_are_somebodys(edit, monkeypatch):
-    from shutter_addon.blender.data import colour_configuration
-
     monkeypatch.setattr(colour_configuration, "name", lambda: "0123abcd")
     assert "view (of another configuration), look (of another" in line(report(edit), "- Colors:")
 
 
 def test_paths_are_taken_from_what_drivers_say():
-    from shutter_addon.blender.output.error_report import without_paths
-
     for told, expected in {
         f"no OpenGL 4.3: /home/Jane {NAME} Doe/lib x/libGL.so is missing": "no OpenGL 4.3: (path) is missing",
         rf"cannot load C:\Users\Jane {NAME}\gl.dll": "cannot load (path)",
@@ -240,7 +227,6 @@ def test_without_a_window_the_button_says_where_the_report_is(bpy, edit):
 @pytest.mark.usefixtures("named")
 def test_the_command(tmp_path, capsys):
     """It has the edit's faults as well."""
-    from shutter_addon.blender import command
     from shutter_addon.core import told
 
     next((tmp_path / NAME / "in").iterdir()).unlink()
@@ -259,7 +245,6 @@ def test_the_command(tmp_path, capsys):
 def test_whatever_a_panel_shows_as_an_error_is_kept(bpy):
     from unittest.mock import MagicMock
 
-    from shutter_addon.blender.interface import panel_parts
     from shutter_addon.core import told
 
     for icon in ("NONE", "INFO", "ERROR", "ERROR"):

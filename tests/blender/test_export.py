@@ -10,6 +10,10 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from support import source_time, state, write_frames
 
+from shutter_addon.blender.data import fcurves, recipe_import, validation
+from shutter_addon.blender.editing import add_effect, shutter_edits
+from shutter_addon.blender.output.matte_export import recipe_for
+from shutter_addon.core.messages import EffectError
 from shutter_addon.core.model.effect import Camera, Effect
 from shutter_addon.core.model.fields import fields_of
 from shutter_addon.core.model.frame_state import Options
@@ -168,8 +172,6 @@ def following_recipes(draw, longest=6):
 @pytest.fixture
 def effect_on(bpy, edit, tmp_path):
     """An effect on an image strip from frame 31 to 70; gives edit, effect and strip."""
-    from shutter_addon.blender.editing import add_effect
-
     first = write_frames(tmp_path / "in", np.zeros((2, 24, 40, 3), dtype=np.uint8))
     source = edit.sequence_editor.strips.new_image("images", str(first), 1, FIRST)
     source.right_handle = LAST + 1
@@ -178,15 +180,11 @@ def effect_on(bpy, edit, tmp_path):
 
 
 def apply(effect_on, data):
-    from shutter_addon.blender.data import recipe_import
-
     source = recipe_file.parse(json.dumps(data)) if isinstance(data, dict) else records.effect_of(data)
     recipe_import.apply(*effect_on, source, folder_of(effect_on))
 
 
 def export(effect_on):
-    from shutter_addon.blender.output.matte_export import recipe_for
-
     return records.recipe_of(recipe_for(*effect_on, folder_of(effect_on) / "recipe.json"))
 
 
@@ -272,8 +270,6 @@ BASE = {
 
 
 def curve(edit, name, index=0):
-    from shutter_addon.blender.data import fcurves
-
     found = (c for c in fcurves.curves_under(edit, "virtual_shutter") if c.data_path.endswith(name))
     return next(c for c in found if c.array_index == index)
 
@@ -293,8 +289,6 @@ def free_handles(edit, effect):
 def keyed_by_blender_in_part(edit, effect):
     """Some bars, some channels, some frames."""
     for name in ("bars[0].weight", "bars[3].weight", "rotation", "scale"):
-        from shutter_addon.blender.data import fcurves
-
         found = next(c for c in fcurves.curves_under(edit, "") if c.data_path.endswith(name))
         fcurves.remove_curves(edit, found.data_path)
     for frame, weight in ((35, 0.9), (50, 0.2)):
@@ -333,8 +327,6 @@ def sampled(edit, effect):
 
 
 def placed_without_keys(edit, effect):
-    from shutter_addon.blender.data import fcurves
-
     fcurves.remove_curves(edit, "virtual_shutter.effects[0].regions")
     layer = effect.scene.annotation.layers[0]
     layer.frames.remove(layer.frames[1])
@@ -405,9 +397,6 @@ def test_keys_of_the_source_time_lie_in_a_group_of_the_effect(effect_on):
 @pytest.mark.parametrize("ease", ["linear", "bezier"])
 def test_a_source_time_that_stands_still_keeps_its_direction(effect_on, ease):
     """At the last key of a ramp, and in a freeze behind it; a jump has none."""
-    from shutter_addon.blender.data import fcurves
-    from shutter_addon.blender.editing import shutter_edits
-
     edit, effect, _ = effect_on
     shutter_edits.add_shutter(effect)
     keys = [
@@ -442,8 +431,6 @@ def test_a_source_time_without_keys_holds_a_frame(effect_on):
 @pytest.mark.parametrize("letter", ["a", "ä", "字", "𝄞"])
 def test_names_are_as_long_as_recipes_have_them(effect_on, letter):
     """In characters; whoever types more gets as many as there may be."""
-    from shutter_addon.blender.editing import shutter_edits
-
     _, effect, _ = effect_on
     apply(effect_on, BASE)
     for item in (effect.shutters[0], effect.regions[0]):
@@ -463,8 +450,6 @@ def test_names_are_as_long_as_recipes_have_them(effect_on, letter):
 
 @pytest.mark.parametrize("place", ["shutter", "region"])
 def test_a_longer_name_of_a_file_shows_and_is_no_recipe(effect_on, place):
-    from shutter_addon.blender.data import validation
-
     edit, effect, strip = effect_on
     apply(effect_on, BASE)
     item, name = getattr(effect, f"{place}s")[0], "n" * 70
@@ -480,8 +465,6 @@ def test_a_longer_name_of_a_file_shows_and_is_no_recipe(effect_on, place):
 
 
 def test_what_no_recipe_can_hold(effect_on):
-    from shutter_addon.core.messages import EffectError
-
     edit, effect, _ = effect_on
     with pytest.raises(EffectError, match='"Shutter" has no shutter'):
         export(effect_on)
@@ -507,8 +490,6 @@ def test_what_no_recipe_can_hold(effect_on):
 @pytest.mark.parametrize("part", ["time", "shutters", "regions"])
 def test_keys_that_cannot_lie_there_leave_the_effect_as_it_was(effect_on, part, keys, sentence):
     """The strip begins at frame 31, and Blender counts frames in float32."""
-    from shutter_addon.core.messages import EffectError
-
     apply(effect_on, BASE)
     before = export(effect_on)
     data = {"version": 2, "window": 1, "shutters": [{"name": "A", "bars": [1]}]}

@@ -4,6 +4,9 @@ import numpy as np
 import pytest
 from support import write_frames
 
+from shutter_addon.blender.data import effect_version, fcurves, recipe_export, snapshot, strips
+from shutter_addon.blender.data.property_copy import copy_properties
+from shutter_addon.blender.editing import region_edits
 from shutter_addon.core.model import effect as model
 from shutter_addon.core.model.fields import Field, fields_of
 from shutter_addon.core.model.frame_state import Options
@@ -34,8 +37,6 @@ def _region(read: model.Effect, index: int):
 @pytest.fixture
 def whole(bpy, effect, tmp_path):
     """An effect in which every property counts."""
-    from shutter_addon.blender.editing import region_edits
-
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "edit.blend"))
     shutter = effect.shutters[1]
     shutter.follow, shutter.length, shutter.combine, shutter.use_threshold = "CAMERA", "MOTION", "LIGHTEST", True
@@ -70,9 +71,6 @@ def _in_blender(field: Field, value):
 
 @pytest.mark.parametrize(("kind", "name"), EVERY, ids=[f"{kind.__name__} {name}" for kind, name in EVERY])
 def test_a_field_counts_everywhere(whole, kind, name):
-    from shutter_addon.blender.data import effect_version, fcurves, recipe_export, snapshot, strips
-    from shutter_addon.blender.data.property_copy import copy_properties
-
     field, (group_of, model_of) = fields_of(kind)[name], KINDS[kind]
     scene, effect, strip = strips.find_effect(whole.scene)
     group, other = group_of(effect), _other(field)
@@ -146,8 +144,6 @@ def _is_registered(group, field: Field) -> None:
 
 def test_what_does_not_count_is_not_asked_for_its_keys(whole):
     """Keys are sampled at every frame."""
-    from shutter_addon.blender.data import fcurves, snapshot, strips
-
     scene, effect, strip = strips.find_effect(whole.scene)
     shutter = effect.shutters[1]
     for name in ("trail", "threshold", "softness"):

@@ -5,8 +5,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from support import read_picture, recipe, request, write_frames
+from support import effect_of, image_strip, read_picture, recipe, request, write_frames
 
+from shutter_addon.blender.data import recipe_import, snapshot
+from shutter_addon.blender.editing import bar_edits, region_edits
+from shutter_addon.blender.rendering import sessions
 from shutter_addon.core.frames import light
 from shutter_addon.core.model.clip import Clip
 from shutter_addon.core.model.state_at import state_at
@@ -48,18 +51,12 @@ def following(keys, follow="car", **options):
 def shown(bpy, edit, tmp_path):
     """Gives the picture of an effect at a timeline frame, and the recipe's, for footage of a velocity; change: what
     happens to the source strip first."""
-    from shutter_addon.blender.data import recipe_import
-    from shutter_addon.blender.editing import add_effect
-    from shutter_addon.blender.rendering import sessions
 
     def show(data, velocity, frame, change=lambda source: None, film=codes):
         first = write_frames(tmp_path / "in", [film(index, velocity) for index in range(COUNT)])
-        source = edit.sequence_editor.strips.new_image("images", str(first), 1, 1)
-        for i in range(2, COUNT + 1):
-            source.elements.append(f"f{i:04d}.png")
+        source = image_strip(edit, first)
         change(source)
-        strip, effect = add_effect.add_effect(edit, source)
-        recipe_import.apply(edit, effect, strip, recipe_file.parse(json.dumps(data)))
+        strip, effect = effect_of(edit, source, data)
         return edit, effect, strip, request(edit, effect, strip, frame)
 
     yield show
@@ -128,8 +125,6 @@ def test_the_exposure_ends_at_a_cut(shown, position):
 
 def test_the_camera_and_nothing_left_behind(shown):
     """What the camera sees is followed by its keys, and a recipe without them puts them back."""
-    from shutter_addon.blender.data import recipe_import
-
     velocity = 2, -1
     camera = [{"frame": frame, "location": place(frame - 1, velocity)} for frame in (1, COUNT)]
     edit, effect, strip, found = shown(following({}, "camera", camera=camera), velocity, 9)
@@ -149,9 +144,6 @@ def test_a_region_called_as_new_ones_are_is_followed(shown):
 
 
 def test_a_region_that_is_renamed_or_removed(shown):
-    from shutter_addon.blender.data import snapshot
-    from shutter_addon.blender.editing import region_edits
-
     velocity = 2, -1
     edit, effect, strip, _ = shown(following({frame: place(frame, velocity) for frame in (0, COUNT)}), velocity, 9)
     effect.regions[0].name = "truck"
@@ -168,8 +160,6 @@ def test_a_region_that_is_renamed_or_removed(shown):
 
 def test_the_trails_length_is_keyed(shown):
     """Bars in Blender are those of the recipe; of what is not keyed, too, and of what has no length."""
-    from shutter_addon.blender.editing import bar_edits
-
     velocity, keys = (3, 0), {frame: place((frame - 1) ** 2 / COUNT, (3, 0)) for frame in range(1, COUNT + 1)}
     data = following(keys, position="center")
     shutter = data["shutters"][0]

@@ -7,6 +7,11 @@ from pathlib import Path
 
 import frame_trace
 
+from shutter_addon.blender.editing import new_edit
+from shutter_addon.blender.rendering import sessions
+from shutter_addon.core.recipes import recipe_file
+from shutter_addon.media import open_source
+
 ROOT = Path(__file__).parents[2]
 sys.path.append(str(ROOT / "scripts"))  # at the end: gallery is a package, and a script there
 frame_way = importlib.import_module("frame_way")
@@ -23,10 +28,6 @@ RECIPE = {
 def ways(bpy, footage, frames, tmp_path):
     """The stops of each of these frames, rendered one after the other."""
     import shutter_addon
-    from shutter_addon.blender.editing import new_edit
-    from shutter_addon.blender.rendering import sessions
-    from shutter_addon.core.recipes import recipe_file
-    from shutter_addon.media import open_source
 
     sessions.forget()
     with open_source(footage) as medium:

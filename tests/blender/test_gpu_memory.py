@@ -4,6 +4,9 @@ import numpy as np
 import pytest
 from support import picture_of, read_picture, recipe, write_frames
 
+from shutter_addon.blender.command import main
+from shutter_addon.blender.rendering import render_settings, sessions
+
 SIZE = 480, 270
 # In megabytes, for windows of 8 frames of that size: room for their running sums, and for no window.
 ROOMY, SMALL = 64, 12
@@ -47,15 +50,11 @@ def test_what_cannot_be_is_a_sentence(command, film, tmp_path):
 
 @pytest.mark.parametrize("given", ["-5", "1.5", "much"])
 def test_a_limit_is_a_number_of_megabytes(bpy, capsys, given):
-    from shutter_addon.blender.command import main
-
     assert main(["render", "film.mp4", "--recipe", "r.json", "--output", "out", "--gpu-memory", given]) == 2
     assert "--gpu-memory: " in capsys.readouterr().err
 
 
 def test_a_session_gives_back_what_it_took_and_settles_for_another_limit(bpy, edit, effect):
-    from shutter_addon.blender.rendering import render_settings, sessions
-
     sessions.forget()
     with render_settings.using(render_settings.RenderSettings(gpu_memory=ROOMY)):
         sessions.settle()

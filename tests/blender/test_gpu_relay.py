@@ -22,27 +22,41 @@ def clock(monkeypatch):
     return clock
 
 
-def test_a_call_that_is_made_before_anyone_looks(bpy, monkeypatch, clock):
-    """The main thread, waiting in `serve`, takes it as soon as it is there: it must look for the next all the same."""
-    from shutter_addon.blender.devices import gpu_relay, main_thread
+@pytest.fixture
+def relay(bpy, monkeypatch, clock):
+    """As where Blender's GPU is current."""
+    from shutter_addon.blender.devices import gpu_relay
 
-    looking, made = [], []
-    monkeypatch.setattr(main_thread, "soon", lambda function: function())
     monkeypatch.setattr(gpu_relay, "has_context", lambda: True)
     monkeypatch.setattr(gpu_relay, "gpu", Mock())
-    monkeypatch.setattr(bpy.app.timers, "register", lambda look, **_: looking.append(look))
+    return gpu_relay
 
-    def ask(what):
-        clock.meanwhile = lambda: gpu_relay.serve(0.01)
-        gpu_relay.ask(lambda: made.append(what), 0)
 
-    ask("first")
-    assert (made, len(looking)) == (["first"], 1)
-    ask("second")
-    assert (made, len(looking)) == (["first", "second"], 1)
-    clock.now += 10
-    assert looking[0]() is None  # after a rest it looks for none
-    ask("third")
-    assert (made, len(looking)) == (["first", "second", "third"], 2)
-    clock.now += 10
-    assert looking[1]() is None
+def test_the_main_thread_looks_for_calls_until_there_are_none_for_a_while(relay, clock):
+    """Whether they come before it looks, or while it waits in `serve`."""
+    made = []
+
+    def call():
+        return relay._called(lambda: made.append(len(made)))  # what a RelayedDevice's methods do
+
+    assert not relay.look()
+    for _ in range(2):
+        call()
+        assert relay.look()
+        clock.now += 0.5
+        assert relay.look()
+        clock.now += 10
+        assert not relay.look()
+    clock.meanwhile = lambda: [call(), relay.serve(0.01)]
+    call()
+    assert relay.look()
+    assert made == [0, 1, 2, 3]
+
+
+def test_a_call_that_fails_and_one_that_is_not_waited_for(relay):
+    made = []
+    failing = relay._called(lambda: 1 / 0)  # what a RelayedDevice's methods do
+    relay.ask(lambda: made.append("late"), 0)
+    assert relay.look()
+    assert isinstance(failing.exception(0), ZeroDivisionError)
+    assert not made

@@ -11,6 +11,10 @@ import OpenImageIO
 import pytest
 from support import noise_film
 
+from shutter_addon.blender import command
+from shutter_addon.blender.data import versions
+from shutter_addon.blender.output import film_join
+from shutter_addon.blender.rendering import render_job
 from shutter_addon.core.farm import job_file
 
 FRAMES = 8
@@ -43,8 +47,6 @@ def saved(bpy, tmp_path_factory):
     edit.render.filepath = str(folder / "film.mkv")
     bpy.ops.wm.save_as_mainfile(filepath=str(folder / "edit.blend"), copy=True)
     bpy.ops.render.render(animation=True, scene=edit.name)
-    from shutter_addon.blender import command
-
     assert command.main(["render", str(folder / "edit.blend"), "--output", str(folder / "ours")]) == 0
     return folder
 
@@ -66,7 +68,6 @@ def _render(bpy, edit, folder, file_format, depth):
 @pytest.fixture
 def join(saved, tmp_path, capsys):
     """Runs the command on an edit of `saved`, in this process; the exit code, what it said, and where the film is."""
-    from shutter_addon.blender import command
 
     def run(folder, *options, edit="edit", ending=".mkv"):
         capsys.readouterr()
@@ -192,8 +193,6 @@ def test_faults_are_told_by_name(frames, join, plant, sentence):
 
 
 def test_a_frame_that_is_removed_meanwhile(bpy, frames, join):
-    from shutter_addon.blender.rendering import render_job
-
     @bpy.app.handlers.persistent  # the command opens the edit
     def remove(scene, *_):
         if scene.frame_current == 2:
@@ -270,8 +269,6 @@ def test_sound_that_cannot_be_had(saved, join, change, words):
 
 
 def test_more_pictures_than_a_strip_is_given(saved, join, monkeypatch):
-    from shutter_addon.blender.output import film_join
-
     monkeypatch.setattr(film_join, "AT_ONCE", 3)
     _, _, output = join(saved / "exr")
     assert np.array_equal(_pictures(output), _pictures(saved / "film.mkv"))
@@ -295,8 +292,6 @@ def test_a_frame_among_those_of_the_edit_that_may_be_of_any(saved, tmp_path, joi
 
 def test_frames_of_a_job_of_another_version(bpy, saved, frames, join):
     """Plain Blender's frames do not say it, but the file beside them does."""
-    from shutter_addon.blender.data import versions
-
     bpy.ops.wm.open_mainfile(filepath=str(saved / "edit.blend"))
     version = versions.of_edit(bpy.context.scene)
     job_file.write(frames, version)

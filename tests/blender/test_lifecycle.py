@@ -1,12 +1,12 @@
 """Effects go with their strips, and come back with them: deleted, undone, cut and pasted, copied."""
 
-import json
-
 import numpy as np
 import pytest
-from support import picture_of, recipe, remembering, sequencer, state, write_frames
+from support import effect_of, image_strip, picture_of, recipe, remembering, sequencer, state, write_frames
 
-from shutter_addon.core.recipes import recipe_file
+from shutter_addon.blender import handlers
+from shutter_addon.blender.data import fcurves
+from shutter_addon.blender.editing import add_effect, undelete
 
 REGION = {"name": "Face", "shutter": "S1", "kind": "lasso", "strokes": [[[0.1, 0.1], [0.9, 0.1], [0.5, 0.9]]]}
 MOVED = REGION | {"keys": [{"frame": 1}, {"frame": 9, "location": [0.2, 0.1], "ease": "bezier"}]}
@@ -14,11 +14,7 @@ REMEMBER = "reconcile", "invalidation"  # what modules know of an effect's annot
 KEYED = recipe(4, {1: [1, 0, 0, 0], 9: [0, 0, 0, 1]}, [1, 1, 1, 1], regions=[MOVED])
 
 
-@pytest.fixture(autouse=True)
-def _no_exception(capfd):
-    """Blender prints what a handler raises, and goes on."""
-    yield
-    assert "Traceback" not in capfd.readouterr().err
+pytestmark = pytest.mark.usefixtures("no_exception")
 
 
 @pytest.fixture
@@ -31,17 +27,11 @@ def images(tmp_path):
 @pytest.fixture
 def add(edit, images):
     """Puts an image strip with an effect at a frame of the edit."""
-    from shutter_addon.blender.data import recipe_import
-    from shutter_addon.blender.editing import add_effect
-
     edit.render.resolution_x = edit.render.resolution_y = 32
 
     def add(start=1, data=KEYED):
-        source = edit.sequence_editor.strips.new_image("images", str(images), 1, start)
-        for file in sorted(images.parent.iterdir())[1:]:
-            source.elements.append(file.name)
-        strip, effect = add_effect.add_effect(edit, source)
-        recipe_import.apply(edit, effect, strip, recipe_file.parse(json.dumps(data)))
+        source = image_strip(edit, images, start)
+        strip, _effect = effect_of(edit, source, data)
         return strip
 
     return add
@@ -63,8 +53,6 @@ def census(bpy):
 
 
 def curves(edit):
-    from shutter_addon.blender.data import fcurves
-
     return {
         (curve.data_path, curve.array_index): [tuple(key.co) for key in curve.keyframe_points]
         for curve in fcurves.curves_under(edit, "")
@@ -111,8 +99,6 @@ def test_a_source_that_was_muted_shows_again(bpy, edit, add):
 
 
 def test_a_source_that_the_user_muted_stays_so(bpy, edit, images):
-    from shutter_addon.blender.editing import add_effect
-
     source = edit.sequence_editor.strips.new_image("images", str(images), 1, 1)
     source.mute = True
     strip, _ = add_effect.add_effect(edit, source)
@@ -148,8 +134,6 @@ def test_a_scene_that_the_window_shows_stays(bpy, edit, add):
 @pytest.mark.parametrize("late", [True, False])
 def test_undo_brings_an_effect_back_and_redo_removes_it_again(bpy, edit, add, render, late):
     """late: in a window, the handler comes after the undo push."""
-    from shutter_addon.blender import handlers
-
     add(1), add(101, recipe(4, {101: [0, 1, 0, 0], 111: [0, 0, 1, 0]}))
     before = render(edit, [5, 105])
     known, everything = curves(edit), census(bpy)
@@ -193,8 +177,6 @@ def _copy(edit):
 @pytest.mark.parametrize("change", [_delete, _move, _copy])
 def test_undo_takes_back_what_handlers_did_after_the_step_before(bpy, edit, add, change):
     """Blender's undo keeps data that is equal in both steps as it is now: keys and drawings that a handler changed."""
-    from shutter_addon.blender import handlers
-
     add(1), add(101, recipe(4, {101: [0, 1, 0, 0], 111: [0, 0, 1, 0]}))
     update(bpy)
     known = curves(edit), drawings(edit), [effect.start for effect in edit.virtual_shutter.effects]
@@ -246,8 +228,6 @@ def test_scenes_and_keys_are_found_again_that_undo_loses(bpy, edit, add, tmp_pat
 
 def test_a_renamed_drawing_stays_its_regions_when_steps_are_undone(bpy, edit, add):
     """Blender comes to handlers after the undo push: the step of the rename has the region's old name for it."""
-    from shutter_addon.blender import handlers
-
     add(1)
     update(bpy)
     layer = edit.virtual_shutter.effects[0].scene.annotation.layers[0]
@@ -378,8 +358,6 @@ def test_linked_scenes_stay(bpy, edit, add, tmp_path):
 
 
 def test_effect_and_source_are_connected_as_the_source_was(edit, add, images):
-    from shutter_addon.blender.editing import add_effect
-
     source = edit.sequence_editor.strips.new_image("images", str(images), 1, 1)
     friend = edit.sequence_editor.strips.new_image("friend", str(images), 2, 1)
     add_effect.connect(edit, [source, friend])
@@ -473,8 +451,6 @@ def test_nothing_is_remembered_of_what_is_gone(bpy, edit, add):
 
 
 def test_only_the_last_effects_that_were_removed_are_kept(edit, add):
-    from shutter_addon.blender.editing import undelete
-
     scene, effect = add().scene, edit.virtual_shutter.effects[0]
     for number in (*range(64), 0, *range(64, 127)):
         scene.virtual_shutter.identity = f"identity {number}"
@@ -486,9 +462,6 @@ def test_only_the_last_effects_that_were_removed_are_kept(edit, add):
 
 
 def test_the_extension_leaves_nothing_kept(bpy, edit, add):
-    from shutter_addon.blender import handlers
-    from shutter_addon.blender.editing import undelete
-
     scene = add().scene
     undelete.keep(edit.virtual_shutter.effects[0])
     update(bpy)

@@ -1,16 +1,15 @@
 """An effect goes along with its source, by itself or by Match Source: a still shutter shows what the source shows."""
 
-import json
-
 import av
 import numpy as np
 import pytest
-from support import recipe, sequencer
+from support import effect_of, recipe, sequencer
 
+from shutter_addon.blender import handlers
 from shutter_addon.blender.data import annotations, fcurves, geometry, selection
-from shutter_addon.blender.editing import match_source, reconcile
+from shutter_addon.blender.editing import add_effect, match_source, reconcile, shutter_edits
+from shutter_addon.blender.rendering import render_job
 from shutter_addon.core.model.scribbles import mapped
-from shutter_addon.core.recipes import recipe_file
 
 LEVELS = 1
 STILL = recipe(4, [1, 0, 0, 0])
@@ -23,11 +22,7 @@ SCRIBBLED = recipe(
 )
 
 
-@pytest.fixture(autouse=True)
-def _no_exception(capfd):
-    """Blender prints what a handler raises, and goes on."""
-    yield
-    assert "Traceback" not in capfd.readouterr().err
+pytestmark = pytest.mark.usefixtures("no_exception")
 
 
 @pytest.fixture(scope="module")
@@ -59,16 +54,12 @@ def make_movie(path, width, height, count=40):
 @pytest.fixture
 def made(bpy, edit, movie):
     """A movie strip from frame 1 to 40 with a still effect, or that of a recipe; effect strip and source."""
-    from shutter_addon.blender.data import recipe_import
-    from shutter_addon.blender.editing import add_effect
-
     edit.render.resolution_x, edit.render.resolution_y = 48, 48
     edit.frame_start, edit.frame_end = -100, 300
 
     def make(data=STILL):
         source = edit.sequence_editor.strips.new_movie("movie", str(movie), 1, 1)
-        strip, effect = add_effect.add_effect(edit, source)
-        recipe_import.apply(edit, effect, strip, recipe_file.parse(json.dumps(data)))
+        strip, _effect = effect_of(edit, source, data)
         selection.choose(edit, strip)
         bpy.context.view_layer.update()
         return strip, source
@@ -375,8 +366,6 @@ def test_undo_takes_size_and_scribbles_along(bpy, edit, made, large_movie):
 
 
 def test_a_render_without_a_window_follows_a_file_that_was_replaced(edit, made, render, large_movie):
-    from shutter_addon.blender import handlers
-
     strip, source = made()
     updates = handlers.bpy.app.handlers.depsgraph_update_post
     updates.remove(handlers.HANDLERS["depsgraph_update_post"])
@@ -388,8 +377,6 @@ def test_a_render_without_a_window_follows_a_file_that_was_replaced(edit, made, 
 
 
 def test_a_film_keeps_its_size(bpy, edit, made, large_movie, monkeypatch):
-    from shutter_addon.blender.rendering import render_job
-
     _strip, source = made()
     monkeypatch.setattr(render_job, "runs", lambda: True)
     source.filepath = str(large_movie)
@@ -427,8 +414,6 @@ def test_another_rate_of_the_edit(bpy, edit, made, shown):
 
 def test_another_rate_of_the_edit_where_the_source_keeps_its_speed(bpy, edit, movie, shown):
     """Blender makes the source longer."""
-    from shutter_addon.blender.editing import add_effect, shutter_edits
-
     edit.render.resolution_x = edit.render.resolution_y = 48
     with sequencer(bpy):
         bpy.ops.sequencer.movie_strip_add(

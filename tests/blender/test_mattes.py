@@ -8,10 +8,18 @@ import shutil
 import av
 import numpy as np
 import pytest
-from support import read_picture, recipe, request, sequencer, write_frames
+from support import effect_of, image_strip, read_picture, recipe, request, sequencer, write_frames
 
+from shutter_addon.blender import command
+from shutter_addon.blender.data import geometry, matte_look, recipe_import, selection, snapshot, source_media, strips
+from shutter_addon.blender.editing import reconcile, time_map
+from shutter_addon.blender.interface import region_gizmo
+from shutter_addon.blender.output import matte_export
+from shutter_addon.blender.rendering import invalidation, sessions
+from shutter_addon.core import revision
 from shutter_addon.core.frames import light
 from shutter_addon.core.recipes import recipe_file, records
+from shutter_addon.media import MediaError
 from shutter_addon.media.image_writing import write_exr
 
 WIDTH, HEIGHT, COUNT = 48, 32, 12
@@ -51,17 +59,11 @@ def data(*regions, **options):
 def shown(bpy, edit, footage):
     """Makes an effect of a recipe; its strip, the effect, and a function that gives the coefficients of its second
     shutter (H, W), as the pictures at a timeline frame show them."""
-    from shutter_addon.blender.data import recipe_import
-    from shutter_addon.blender.editing import add_effect
-    from shutter_addon.blender.rendering import sessions
 
     def show(content, change=lambda source: None):
-        source = edit.sequence_editor.strips.new_image("images", str(footage), 1, 1)
-        for i in range(2, COUNT + 1):
-            source.elements.append(f"f{i:04d}.png")
+        source = image_strip(edit, footage)
         change(source)
-        strip, effect = add_effect.add_effect(edit, source)
-        recipe_import.apply(edit, effect, strip, recipe_file.parse(json.dumps(content)))
+        strip, effect = effect_of(edit, source, content)
 
         def coefficients(frame):
             asked = request(edit, effect, strip, frame)
@@ -118,10 +120,6 @@ def test_the_timeline_and_an_offset(shown, matte):
 
 def test_a_cut_of_the_effect_changes_nothing(shown, matte, tmp_path):
     """Neither with the timeline's frames nor with the footage's."""
-    from shutter_addon.blender.data import recipe_import, strips
-    from shutter_addon.blender.editing import reconcile
-    from shutter_addon.blender.output import matte_export
-
     regions = region(matte, timing="timeline", offset=1, opacity=0.5), region(matte, opacity=0.5, name="n")
     strip, effect, _coefficients = shown(data(*regions))
     before = request(strip.id_data, effect, strip, 9).coefficients()
@@ -209,8 +207,6 @@ def test_a_strip_is_read_as_it_is_trimmed_muted_and_retimed(edit, shown, matte):
 
 def test_a_file_is_moved_with_its_mattes(bpy, edit, shown, matte, footage, tmp_path):
     """Chosen after the file was saved, and before that; then appended to another file, and linked."""
-    from shutter_addon.blender.data import recipe_import, strips
-
     first = tmp_path / "here"
     first.mkdir()
     for folder in (matte.parent, footage.parent):
@@ -299,8 +295,6 @@ def test_sentences_for_what_is_not_there(bpy, edit, shown, matte):
 
 def test_a_frame_that_is_written_again_is_read_again(shown, matte):
     """In its file, which leaves the first file and the folder as they are."""
-    from shutter_addon.blender.data import source_media
-
     _strip, _effect, coefficients = shown(data(region(matte)))
     assert close(coefficients(6), values(5) / 255)
     matte.with_name("m0006.png").write_bytes(matte.read_bytes())
@@ -327,9 +321,6 @@ def test_the_stream_of_a_movie_strip(edit, shown, tmp_path):
 
 
 def test_a_recipe_whose_matte_is_missing_changes_nothing(shown, matte):
-    from shutter_addon.blender.data import recipe_import
-    from shutter_addon.media import MediaError
-
     strip, effect, coefficients = shown(data(region(matte)))
     gone = recipe_file.parse(json.dumps(data(region(matte.with_name("gone.png")))))
     with pytest.raises(MediaError, match=r"gone\.png: no such file"):
@@ -347,8 +338,6 @@ def test_drawn_regions_stay_beside_mattes(shown, matte):
 
 
 def test_copies_have_mattes_of_their_own(bpy, edit, shown, matte):
-    from shutter_addon.blender.editing import reconcile
-
     _strip, effect, coefficients = shown(data(region(matte)))
     own = strip_of(edit, matte, 3)
     effect.regions[0].matte, effect.regions[0].strip_name = "STRIP", own.name
@@ -362,9 +351,6 @@ def test_copies_have_mattes_of_their_own(bpy, edit, shown, matte):
 
 
 def test_export_writes_strips_and_points_to_files(edit, shown, matte, tmp_path):
-    from shutter_addon.blender.data import recipe_import
-    from shutter_addon.blender.output import matte_export
-
     content = data(
         region(matte, offset=1, channel="green", opacity=0.25),
         region(matte, name="strip/1", width=0.0),
@@ -393,8 +379,6 @@ def test_export_writes_strips_and_points_to_files(edit, shown, matte, tmp_path):
 
 
 def test_a_still_strip_is_exported_as_one_picture(edit, shown, matte, tmp_path):
-    from shutter_addon.blender.output import matte_export
-
     strip, effect, _coefficients = shown(data(region(matte)))
     own = edit.sequence_editor.strips.new_image("still", str(matte), 4, 1)
     effect.regions[0].matte, effect.regions[0].strip_name = "STRIP", own.name
@@ -404,9 +388,6 @@ def test_a_still_strip_is_exported_as_one_picture(edit, shown, matte, tmp_path):
 
 
 def test_a_single_picture_among_numbered_ones_is_exported_as_one(shown, matte, tmp_path):
-    from shutter_addon.blender.data import recipe_import
-    from shutter_addon.blender.output import matte_export
-
     strip, effect, coefficients = shown(data(region(matte)))
     effect.regions[0].image.source = "FILE"
     saved = matte_export.recipe_for(strip.id_data, effect, strip, tmp_path / "r.json")
@@ -416,8 +397,6 @@ def test_a_single_picture_among_numbered_ones_is_exported_as_one(shown, matte, t
 
 def test_an_export_spares_what_it_reads(edit, shown, matte, tmp_path):
     """A strip of the pictures that an export has written."""
-    from shutter_addon.blender.output import matte_export
-
     strip, effect, _coefficients = shown(data(region(matte)))
     one = effect.regions[0]
     one.matte, one.strip_name = "STRIP", strip_of(edit, matte).name
@@ -430,9 +409,6 @@ def test_an_export_spares_what_it_reads(edit, shown, matte, tmp_path):
 
 
 def test_an_export_through_a_linked_folder(shown, matte, tmp_path):
-    from shutter_addon.blender.data import recipe_import
-    from shutter_addon.blender.output import matte_export
-
     (tmp_path / "there" / "deep").mkdir(parents=True)
     (tmp_path / "link").symlink_to(tmp_path / "there" / "deep")
     strip, effect, coefficients = shown(data(region(matte)))
@@ -449,9 +425,6 @@ def test_two_slashes_before_a_path(shown, matte):
 
 
 def test_a_path_longer_than_blenders(shown, matte, tmp_path):
-    from shutter_addon.blender.data import recipe_import
-    from shutter_addon.media import MediaError
-
     strip, effect, _coefficients = shown(data(region(matte)))
     folder = tmp_path / "/".join(["d" * 200] * 6)
     shutil.copytree(matte.parent, folder)
@@ -504,9 +477,6 @@ def test_a_mask_over_footage_that_is_retimed(bpy, edit, shown, mask):
 
 
 def test_a_mask_is_exported_as_pictures(shown, mask, tmp_path):
-    from shutter_addon.blender.data import recipe_import
-    from shutter_addon.blender.output import matte_export
-
     strip, effect, coefficients = shown(data(region(ramp="linear", opacity=0.5)))
     one = effect.regions[0]
     one.kind, one.matte, one.mask = "MATTE", "MASK", mask
@@ -519,8 +489,6 @@ def test_a_mask_is_exported_as_pictures(shown, mask, tmp_path):
 
 
 def test_a_time_map_shows_each_column_at_its_moment(bpy, edit, shown):
-    from shutter_addon.blender.editing import time_map
-
     content = data(light="encoded", interpolation="value")
     _strip, effect, coefficients = shown(content | {"window": 9, "shutters": [{"name": "A", "bars": [1] * 9}]})
     region_ = time_map.add(effect, "LINEAR")
@@ -533,9 +501,6 @@ def test_a_time_map_shows_each_column_at_its_moment(bpy, edit, shown):
 
 def test_handles_of_a_ramp(bpy, edit, shown, monkeypatch):
     """About the middle of the line that it runs along."""
-    from shutter_addon.blender.data import geometry, selection
-    from shutter_addon.blender.interface import region_gizmo
-
     strip, effect, _coefficients = shown(data(region(ramp="linear")))
     selection.choose(edit, strip)
     effect.active_shutter, ramp = 1, effect.regions[0]
@@ -553,8 +518,6 @@ def test_handles_of_a_ramp(bpy, edit, shown, monkeypatch):
 
 
 def test_what_panels_tell(edit, shown, matte):
-    from shutter_addon.blender.data import matte_look
-
     strip, effect, _coefficients = shown(data(region(matte)))
     one = effect.regions[0]
 
@@ -576,9 +539,6 @@ def test_what_panels_tell(edit, shown, matte):
 
 def run(*arguments):
     """The command, within this process, and what it leaves open is closed, as where its own ends."""
-    from shutter_addon.blender import command
-    from shutter_addon.blender.rendering import sessions
-
     assert command.main([*arguments]) == 0
     sessions.forget()
 
@@ -610,7 +570,6 @@ def test_weights_are_read_back(bpy, tmp_path, footage):
 @pytest.mark.parametrize(("kind", "short"), [("fast", True), ("trimmed", False), ("keyed", True), ("timeline", False)])
 def test_a_panel_tells_of_a_matte_shorter_than_what_is_shown(bpy, edit, shown, matte, kind, short):
     """A matte of 7 frames, and 6 of the film: at twice its speed, as it is, or backward by keys, from the eleventh."""
-    from shutter_addon.blender.data import matte_look
 
     def change(source):
         if kind == "fast":
@@ -644,8 +603,6 @@ def triangle(bpy, shown, matte):
 
 def test_cut_and_pasted_effects_have_their_mattes(bpy, edit, shown, matte, mask):
     """The strip that is a matte is cut and pasted as well, and has another name by then."""
-    from shutter_addon.blender.data import strips
-
     _strip, effect, coefficients = shown(data(region(matte), region(matte, name="n"), region(matte, name="o")))
     own, image = strip_of(edit, matte, 3), effect.regions[0].image
     effect.regions[1].matte, effect.regions[1].strip_name = "STRIP", own.name
@@ -671,9 +628,6 @@ def test_cut_and_pasted_effects_have_their_mattes(bpy, edit, shown, matte, mask)
 
 
 def test_a_changed_mask_drops_finished_frames(bpy, edit, matte, triangle):
-    from shutter_addon.blender.rendering import invalidation
-    from shutter_addon.core import revision
-
     layer = triangle.layers[0]
     point = layer.splines[0].points[0]
     clip = bpy.data.movieclips.load(str(matte))
@@ -717,8 +671,6 @@ def test_a_copy_of_a_matte_strip_is_no_part_of_it(edit, shown, matte):
 
 
 def test_a_pasted_effect_has_the_matte_strip_beside_it(bpy, edit, shown, matte):
-    from shutter_addon.blender.data import snapshot
-
     strip, effect, _coefficients = shown(data(region(matte)))
     own = strip_of(edit, matte, 3)
     effect.regions[0].matte, effect.regions[0].strip_name = "STRIP", own.name
@@ -730,8 +682,6 @@ def test_a_pasted_effect_has_the_matte_strip_beside_it(bpy, edit, shown, matte):
 
 
 def test_a_sequence_is_one_image_however_often_it_is_imported(bpy, shown, matte):
-    from shutter_addon.blender.data import recipe_import
-
     strip, effect, _coefficients = shown(data(region(matte)))
     images = len(bpy.data.images)
     recipe_import.apply(strip.id_data, effect, strip, recipe_file.parse(json.dumps(data(region(matte), region(matte)))))

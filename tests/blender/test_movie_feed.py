@@ -10,6 +10,8 @@ import OpenImageIO
 import pytest
 from support import noise_film
 
+from shutter_addon.blender.output import edit_feed
+from shutter_addon.blender.output.levels_file import LevelsFile
 from shutter_addon.core import atomic_write
 
 
@@ -40,8 +42,6 @@ def rendered(edit, folder):
 
 def test_levels_are_those_of_the_engine(bpy, film, tmp_path, monkeypatch):
     """And what a killed render has left is removed. OCIO is as a Blender with a window has it: its own file."""
-    from shutter_addon.blender.output import edit_feed
-
     monkeypatch.setenv("OCIO", str(blenders_own(bpy)))
     monkeypatch.setattr(tempfile, "tempdir", str(place := tmp_path / "temporary"))
     left = place / f".part-{0:016x}"
@@ -65,9 +65,6 @@ def test_levels_are_those_of_the_engine(bpy, film, tmp_path, monkeypatch):
 
 
 def test_a_studios_colour_configuration_leaves_the_film_to_the_engine(bpy, film, tmp_path, monkeypatch):
-    from shutter_addon.blender.output import edit_feed
-    from shutter_addon.blender.output.levels_file import LevelsFile
-
     own, studio = blenders_own(bpy), tmp_path / "config.ocio"
     studio.write_text(f"# of a studio\n{own.read_text()}")
     written, write = [], LevelsFile.write
@@ -82,8 +79,6 @@ def test_a_studios_colour_configuration_leaves_the_film_to_the_engine(bpy, film,
 
 def test_a_file_that_is_gone_leaves_the_film_to_the_engine(bpy, film, tmp_path, monkeypatch):
     """Blender would show it as a picture of one colour."""
-    from shutter_addon.blender.output import edit_feed
-
     monkeypatch.setattr(tempfile, "tempdir", str(tmp_path / "temporary"))
     (tmp_path / "temporary").mkdir()
     expected = rendered(film, tmp_path / "engine").astype(int)
@@ -102,8 +97,6 @@ def test_a_file_that_is_gone_leaves_the_film_to_the_engine(bpy, film, tmp_path, 
 @pytest.mark.parametrize("width", [7, 16, 40])
 @pytest.mark.parametrize("height", [5, 64, 65, 200])
 def test_a_file_whose_pixels_are_replaced(tmp_path, width, height):
-    from shutter_addon.blender.output.levels_file import LevelsFile
-
     levels = np.random.default_rng(0).integers(0, 256, (2, height, width, 4), dtype=np.uint8)
     levels[..., 3] = 255
     file = LevelsFile(tmp_path / "levels.tif", width, height)

@@ -10,9 +10,10 @@ import pytest
 from support import recipe, sequencer
 
 from shutter_addon import blender
-from shutter_addon.blender.data import annotations, consistency, selection
+from shutter_addon.blender.data import annotations, consistency, fcurves, selection
 from shutter_addon.blender.editing import bar_edits, region_edits
-from shutter_addon.core.model import limits
+from shutter_addon.blender.interface.region_gizmo import SHUTTER_GGT_region
+from shutter_addon.core.model import limits, presets
 from shutter_addon.core.recipes import recipe_file
 
 
@@ -35,8 +36,6 @@ def effect_now(bpy):
 
 def state(bpy):
     """All that operators change."""
-    from shutter_addon.blender.data import fcurves
-
     edit = bpy.context.scene
     keys = {
         (c.data_path, c.array_index): [tuple(k.co) for k in c.keyframe_points]
@@ -140,8 +139,6 @@ def test_shutters_come_go_and_move(bpy, effect, does):
 
 @pytest.mark.parametrize("preset", ["ANGLE_180", "GAUSSIAN", "LAST"])
 def test_preset(bpy, effect, does, preset):
-    from shutter_addon.core.model import presets
-
     effect = does("preset", preset=preset)
     assert consistency.bars(effect.shutters[1]) == pytest.approx(presets.bars(preset, 8), abs=1e-6)
     assert bar_edits.key_state(effect, 1) == [""] * 8
@@ -204,8 +201,6 @@ def test_draw_makes_a_region_and_takes_up_the_pen(bpy, effect, preview):
 
 
 def test_a_stroke_over_a_regions_handle_is_the_pens(bpy, effect, preview):
-    from shutter_addon.blender.interface.region_gizmo import SHUTTER_GGT_region
-
     handles = []
     for operator in ("draw", "erase"):
         getattr(bpy.ops.shutter, operator)()

@@ -5,11 +5,15 @@ import json
 import numpy as np
 import pytest
 from OpenImageIO import ImageBuf
-from support import recipe, request, write_frames
+from support import image_strip, recipe, request, write_frames
 
+from shutter_addon.blender.data import annotations, mask_reading, recipe_export, recipe_import, selection, snapshot
+from shutter_addon.blender.editing import add_effect, outline_drawings, outline_masks
+from shutter_addon.blender.rendering import outline_carrying, sessions
 from shutter_addon.core.frames import light
 from shutter_addon.core.model import outlines
 from shutter_addon.core.recipes import recipe_file, records
+from shutter_addon.media.carried_mattes import CarriedFile, CarriedMattes
 
 WIDTH, HEIGHT, COUNT = 96, 64, 12
 OPTIONS = {"light": "encoded", "interpolation": "value"}
@@ -45,14 +49,9 @@ def region(*frames, shown=lambda frame: frame - 1, **fields):
 @pytest.fixture
 def edited(bpy, edit, footage):
     """Makes an effect of a recipe with regions: its strip and the effect."""
-    from shutter_addon.blender.data import recipe_import
-    from shutter_addon.blender.editing import add_effect
-    from shutter_addon.blender.rendering import sessions
 
     def make(*regions, change=lambda source: None):
-        source = edit.sequence_editor.strips.new_image("images", str(footage), 1, 1)
-        for i in range(2, COUNT + 1):
-            source.elements.append(f"f{i:04d}.png")
+        source = image_strip(edit, footage)
         change(source)
         strip, effect = add_effect.add_effect(edit, source)
         content = recipe(2, [1, 0], [0, 1], regions=regions, **OPTIONS)
@@ -102,8 +101,6 @@ def test_drawings_stay_with_the_footage(edited):
 
 @pytest.mark.parametrize("layer", [False, True])
 def test_out_and_in_again(edited, layer):
-    from shutter_addon.blender.data import recipe_export
-
     said = region(1, 9, between="straight", layer=layer, invert=True, blend="add", opacity=0.5, width=0.125)
     strip, effect = edited(said)
     (back,) = records.recipe_of(recipe_export.recipe_of(strip.id_data, effect, strip)).regions
@@ -139,8 +136,6 @@ def chosen(bpy, edited):
     """An outline that is drawn at two frames, the second time elsewhere; its region and strip."""
 
     def make(*args, **fields):
-        from shutter_addon.blender.data import selection
-
         strip, effect = edited(region(*args, **fields))
         selection.choose(strip.id_data, strip)
         effect.active_shutter = 1
@@ -163,8 +158,6 @@ def test_what_is_carried_becomes_a_drawing(bpy, chosen, between):
     expected = coefficients(strip, effect, 6)
     assert bpy.ops.shutter.outline_draw() == {"FINISHED"}
     assert drawn_at(effect) == [1, 6, 9]
-    from shutter_addon.blender.editing import outline_drawings
-
     found = outline_drawings.curves_now(scene, effect, strip, 0)
     assert np.abs(outlines.coverage(found, WIDTH, HEIGHT) - expected).mean() < 0.01
     assert bpy.ops.shutter.outline_draw() == {"FINISHED"}
@@ -176,8 +169,6 @@ def test_the_next_drawing_needed(bpy, chosen):
     together."""
     strip, effect = chosen(1, 5, 9)
     assert bpy.ops.shutter.outline_needed() == {"CANCELLED"}
-    from shutter_addon.blender.editing import outline_drawings
-
     scene = strip.id_data
     scene.frame_set(9)
     wrong = [[(x + 0.12, y) for x, y in each] for each in outline_drawings.curves_now(scene, effect, strip, 0)]
@@ -191,9 +182,6 @@ def test_the_next_drawing_needed(bpy, chosen):
 
 def test_one_drawing_says_where_the_next_is_needed(bpy, chosen, monkeypatch):
     """Where half of the doubt lies on each side, not beside the drawing and not at the farthest frame."""
-    from shutter_addon.blender.editing import outline_drawings
-    from shutter_addon.media.carried_mattes import CarriedMattes
-
     strip, effect = chosen(1)
     assert bpy.ops.shutter.outline_needed() in ({"FINISHED"}, {"CANCELLED"})
     sure = [1.0, 0.9, 0.9, 0.7, 0.7, 0.6, 0.4, 0.2, 0.0, 0.0, 0.0, None]
@@ -217,8 +205,6 @@ def test_its_motion_is_that_of_what_it_encloses(bpy, chosen, frames, fields):
     strip.id_data.frame_set(1)
     before = coefficients(strip, effect, 6)
     assert bpy.ops.shutter.track(direction="FORWARD") == {"FINISHED"}
-    from shutter_addon.blender.data import snapshot
-
     frames = range(1, 10)  # at the last one the recipe has set a key
     (found,) = snapshot.read(strip.id_data, effect, strip, frames).regions
     centres = [found.centre(frame) + found.placement(frame).location for frame in frames]
@@ -239,9 +225,6 @@ def test_its_motion_is_that_of_what_it_encloses(bpy, chosen, frames, fields):
 )
 def test_outline_it(bpy, edited, kind, strokes):
     """A stroke through the square, or a rough line around it, becomes its outline at that frame."""
-    from shutter_addon.blender.data import selection
-    from shutter_addon.blender.editing import outline_drawings
-
     said = {"name": "o", "shutter": "S1", "kind": kind, "strokes": strokes, "width": 0.02}
     strip, effect = edited(said)
     selection.choose(strip.id_data, strip)
@@ -259,8 +242,6 @@ def test_outline_it(bpy, edited, kind, strokes):
 
 
 def test_nothing_to_outline(bpy, edited):
-    from shutter_addon.blender.data import selection
-
     strip, effect = edited({"name": "o", "shutter": "S1", "kind": "line", "strokes": [[[3, 3]]]})
     selection.choose(strip.id_data, strip)
     effect.active_shutter = 1
@@ -290,9 +271,6 @@ def test_export(bpy, chosen, tmp_path, word, levels):
 def test_to_a_mask_and_back(bpy, chosen):
     """A mask with shape keys covers what the outline does, in every frame of the source; an outline of that mask, the
     same at its keys."""
-    from shutter_addon.blender.data import mask_reading
-    from shutter_addon.blender.editing import outline_masks
-
     strip, effect = chosen(2, 6, 12)
     edit = strip.id_data
     before = edit.frame_current, [area.ui_type for area in bpy.context.window.screen.areas]
@@ -314,8 +292,6 @@ def test_to_a_mask_and_back(bpy, chosen):
 
 
 def test_a_straight_outline_to_a_mask(bpy, chosen):
-    from shutter_addon.blender.data import mask_reading
-
     chosen(1, 9, between="straight")
     assert bpy.ops.shutter.outline_mask() == {"FINISHED"}
     mask = bpy.data.masks["o"]
@@ -325,8 +301,6 @@ def test_a_straight_outline_to_a_mask(bpy, chosen):
 
 def test_masks_that_give_no_outline(bpy, chosen):
     """Neither does an outline in which nothing is drawn give a mask; nothing is left behind."""
-    from shutter_addon.blender.data import annotations
-
     _strip, effect = chosen(1, 9)
     bpy.data.masks.new("empty")
     with pytest.raises(RuntimeError, match='mask "empty" encloses nothing in the strip'):
@@ -342,8 +316,6 @@ def test_masks_that_give_no_outline(bpy, chosen):
 
 def test_a_mask_of_a_strip_that_runs_backward(bpy, edited):
     """Its frames are the source's, and drawings lie where the strip shows these."""
-    from shutter_addon.blender.data import mask_reading
-    from shutter_addon.blender.editing import outline_masks
 
     def change(source):
         source.left_handle = 3
@@ -359,9 +331,6 @@ def test_a_mask_of_a_strip_that_runs_backward(bpy, edited):
 
 def test_what_fails_beside_blender_is_told_once(bpy):
     """Whatever it is: else the file would be asked for with every look at the preview."""
-    from shutter_addon.blender.rendering import outline_carrying
-    from shutter_addon.media.carried_mattes import CarriedFile
-
     file, arrived = CarriedFile(footage=Unreadable(), drawings=((0, outlines.curves(square(0))),)), []
     outline_carrying.carry(file, [0], lambda: arrived.append(True))
     outline_carrying._running[0].future.exception()  # waits for the thread

@@ -4,11 +4,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from shutter_addon.blender.interface import probe_gizmo
+
 
 @pytest.fixture(scope="module")
 def gizmo(bpy):
-    from shutter_addon.blender.interface import probe_gizmo
-
     return probe_gizmo
 
 

@@ -6,6 +6,9 @@ import OpenImageIO
 import pytest
 from support import sequencer, write_frames
 
+from shutter_addon.blender.data import source_media, strip_proxies
+from shutter_addon.blender.data.strip_proxies import proxy_of
+
 COUNT, WIDTH, HEIGHT = 6, 72, 48
 
 
@@ -53,15 +56,11 @@ def built(bpy, edit, tmp_path):
 
 def proxied(edit, strip):
     """The strip's medium at half its size, as a preview reads it."""
-    from shutter_addon.blender.data import source_media, strip_proxies
-
     return source_media.spec(strip).open(2, strip_proxies.proxy_of(edit, strip, 50))
 
 
 def assert_read(edit, strip):
     """Every frame is from a proxy, and nearest to the footage's own."""
-    from shutter_addon.blender.data import source_media
-
     with proxied(edit, strip) as source, source_media.spec(strip).open(2) as footage:
         assert source.from_proxy
         assert (source.width, source.height, source.count) == (WIDTH // 2, HEIGHT // 2, COUNT)
@@ -101,8 +100,6 @@ def test_of_a_linked_edit(bpy, edit, built, tmp_path, kind):
 
 @pytest.mark.parametrize("kind", ["MOVIE", "IMAGE"])
 def test_when_they_are_read(bpy, edit, built, tmp_path, kind):
-    from shutter_addon.blender.data.strip_proxies import proxy_of
-
     strip = built(kind)
     first = proxy_of(edit, strip, 50)
     assert first == proxy_of(edit, strip, 50)
@@ -147,8 +144,6 @@ def test_a_file_of_the_strips_own(edit, built, tmp_path):
 @pytest.mark.parametrize("divisor", [1, 2])
 def test_samples_of_images(bpy, edit, tmp_path, name, samples, space, divisor):
     """Whatever Blender makes of them, it is the footage's light; brighter than white too, where that has it."""
-    from shutter_addon.blender.data import source_media, strip_proxies
-
     picture = np.full((HEIGHT, WIDTH, 3), 0.25, np.float32)
     picture[:, WIDTH // 2 :] = 3.0 if name == "f.exr" else 0.6
     image = OpenImageIO.ImageBuf(picture)

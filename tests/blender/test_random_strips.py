@@ -9,6 +9,8 @@ import pytest
 import random_strips
 from support import recipe
 
+from shutter_addon.blender.data import recipe_import
+from shutter_addon.blender.editing import add_effect
 from shutter_addon.core.recipes import recipe_file
 
 SEEDS = [int(seed) for seed in os.environ.get("SHUTTER_SEEDS", "1,4,7,18,21,42").split(",")]
@@ -17,9 +19,6 @@ LEVELS = 1
 
 @pytest.mark.parametrize("seed", SEEDS)
 def test_still_effects_are_their_sources(bpy, edit, render, tmp_path, seed):
-    from shutter_addon.blender.data import recipe_import
-    from shutter_addon.blender.editing import add_effect
-
     drawn = random_strips.build(edit, tmp_path / "footage", seed)
     plain = render(edit, drawn.frames)
     strip, effect = add_effect.add_effect(edit, drawn.strip)

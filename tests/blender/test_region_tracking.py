@@ -2,11 +2,12 @@
 
 import numpy as np
 import pytest
-from support import write_frames
+from support import image_strip, write_frames
 
-from shutter_addon.blender.data import annotations, fcurves, selection, strips, validation
+from shutter_addon.blender.data import annotations, fcurves, selection, snapshot, strips, validation
 from shutter_addon.blender.editing import add_effect, bar_edits, follow_track, region_edits, shutter_edits, track_region
 from shutter_addon.blender.editing.motion_keys import MotionKeys
+from shutter_addon.core import revision
 from shutter_addon.core.model.motions import Placement
 from shutter_addon.media import pursuit
 
@@ -64,9 +65,7 @@ def region(bpy, edit, frames):
 
 def new_source(edit, first):
     edit.render.resolution_x, edit.render.resolution_y = SIZE.tolist()
-    source = edit.sequence_editor.strips.new_image("images", str(first), 1, 11)
-    for path in sorted(first.parent.iterdir())[1:]:
-        source.elements.append(path.name)
+    source = image_strip(edit, first, 11)
     return source
 
 
@@ -98,8 +97,6 @@ def track(bpy, direction="BOTH", motion="SCALE", **options):
 def apart(bpy, frame, index, *, of=0):
     """Pixels between the corners of the region at a frame, and those of the subject in a source frame; `of`: the frame
     of the source in which it was drawn."""
-    from shutter_addon.blender.data import snapshot
-
     edit, effect, strip = active(bpy)
     (stroke,) = snapshot.region_at(edit, effect, strip, 0, (frame,)).at(frame).strokes
     (angle, scale), (angle_drawn, scale_drawn) = turned(index), turned(of)
@@ -721,8 +718,6 @@ def test_a_changed_track_is_followed_anew(bpy, edit, region, clip, does):
 
 
 def test_it_says_that_the_track_has_changed(bpy, edit, region, clip):
-    from shutter_addon.core import revision
-
     set_up(region, clip, "TRACK", "middle")
     call(bpy, "follow")
     clip.tracking.objects[0].tracks["middle"].markers.find_frame(10).mute = True

@@ -1,15 +1,16 @@
 """Renders whose pictures fail: they end with a sentence, whoever renders, and nothing without its effect is written."""
 
-import json
 import subprocess
 import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
-from support import read_picture, recipe, write_frames
+from support import effect_of, image_strip, read_picture, recipe, write_frames
 
-from shutter_addon.core.recipes import recipe_file
+from shutter_addon.blender import handlers, rendering
+from shutter_addon.blender.data import source_media, strips
+from shutter_addon.blender.rendering import render_job, sessions
 from shutter_addon.media.completeness import whole_pictures
 
 ROOT = Path(__file__).parents[2]
@@ -19,18 +20,11 @@ BROKEN = 4
 @pytest.fixture
 def film(bpy, edit, tmp_path):
     """Six frames under an effect that shows them a frame late, to be rendered as pictures; the edit."""
-    from shutter_addon.blender.data import recipe_import
-    from shutter_addon.blender.editing import add_effect
-    from shutter_addon.blender.rendering import render_job, sessions
-
     sessions.forget()
     frames = np.random.default_rng(0).integers(0, 256, (6, 32, 32, 3), dtype=np.uint8)
     first = write_frames(tmp_path / "in", frames)
-    source = edit.sequence_editor.strips.new_image("images", str(first), 1, 1)
-    for i in range(2, 7):
-        source.elements.append(f"f{i:04d}.png")
-    strip, effect = add_effect.add_effect(edit, source)
-    recipe_import.apply(edit, effect, strip, recipe_file.parse(json.dumps(recipe(2, [0, 1]))))
+    source = image_strip(edit, first)
+    _strip, _effect = effect_of(edit, source, recipe(2, [0, 1]))
     edit.render.resolution_x = edit.render.resolution_y = 32
     edit.frame_start, edit.frame_end = 1, 6
     edit.render.image_settings.media_type = "IMAGE"
@@ -67,8 +61,6 @@ def effect_scene(edit):
 
 
 def test_a_python_that_uses_blender_lives_on(bpy, film, tmp_path, capfd):
-    from shutter_addon.blender.rendering import sessions
-
     mend = broken(tmp_path)
     for _ in range(2):  # the sequencer keeps what it showed in the failed picture's place
         assert bpy.ops.render.render(animation=True) == {"CANCELLED"}
@@ -86,14 +78,8 @@ def test_a_python_that_uses_blender_lives_on(bpy, film, tmp_path, capfd):
 
 
 def test_two_effects_of_a_frame_fail(bpy, film, tmp_path, capfd):
-    from shutter_addon.blender.data import recipe_import
-    from shutter_addon.blender.editing import add_effect
-
-    source = film.sequence_editor.strips.new_image("more", str(tmp_path / "in" / "f0001.png"), 5, 1)
-    for i in range(2, 7):
-        source.elements.append(f"f{i:04d}.png")
-    strip, effect = add_effect.add_effect(film, source)
-    recipe_import.apply(film, effect, strip, recipe_file.parse(json.dumps(recipe(2, [0, 1]))))
+    source = image_strip(film, tmp_path / "in" / "f0001.png", 1, 5, "more")
+    strip, _effect = effect_of(film, source, recipe(2, [0, 1]))
     strip.blend_type = "ALPHA_OVER"
     broken(tmp_path)
     assert bpy.ops.render.render(animation=True) == {"CANCELLED"}
@@ -134,8 +120,6 @@ def test_a_single_frame_that_fails_is_not_written(bpy, film, tmp_path):
 @pytest.mark.parametrize("name", ["pictures.resized", "pictures.picture", "sessions.of_engine"])
 @pytest.mark.parametrize("fault", [MemoryError(), KeyboardInterrupt(), ValueError("odd")])
 def test_no_fault_gives_a_plain_frame(bpy, film, tmp_path, capfd, monkeypatch, name, fault):
-    from shutter_addon.blender import rendering
-
     def fails(*_arguments):
         raise fault
 
@@ -203,9 +187,6 @@ CHANGES = [
 @pytest.mark.parametrize("late", [True, False])
 def test_effects_mend_what_hides_them(bpy, film, tmp_path, change, late):
     """late: no update came before the render, as in a file that was saved by a Blender without the extension."""
-    from shutter_addon.blender import handlers
-    from shutter_addon.blender.data import strips
-
     update = handlers.HANDLERS["depsgraph_update_post"]
     film.frame_set(2)
     film.render.filepath = str(tmp_path / "before.png")
@@ -240,8 +221,6 @@ def test_an_effect_that_lost_its_scene_is_no_plain_film(bpy, film, tmp_path, cap
 
 
 def test_a_linked_effect_that_cannot_be_mended_is_refused(bpy, film, tmp_path, capfd):
-    from shutter_addon.blender import handlers
-
     mending = "depsgraph_update_post", "save_pre"
     for name in mending:
         getattr(bpy.app.handlers, name).remove(handlers.HANDLERS[name])
@@ -313,8 +292,6 @@ def test_blender_itself_ends_with_exit_code_2(bpy, film, blender, tmp_path, outp
 
 
 def test_blender_itself_renders_an_effect_without_its_camera(bpy, film, blender, tmp_path):
-    from shutter_addon.blender import handlers
-
     bpy.app.handlers.depsgraph_update_post.remove(handlers.HANDLERS["depsgraph_update_post"])
     bpy.data.objects.remove(effect_scene(film).camera)
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "edit.blend"))
@@ -327,9 +304,6 @@ def test_blender_itself_renders_an_effect_without_its_camera(bpy, film, blender,
 
 def test_a_scene_within_a_film_does_not_begin_it_again(bpy, film, monkeypatch):
     """Blender tells of a render's beginning for every Scene strip, at every frame."""
-    from shutter_addon.blender.data import source_media
-    from shutter_addon.blender.rendering import render_job
-
     shown = bpy.data.scenes.new("Shown")
     shown.render.engine, shown.render.resolution_x, shown.render.resolution_y = "CYCLES", 8, 8
     shown.cycles.samples = 1

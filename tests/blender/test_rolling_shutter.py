@@ -4,9 +4,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from support import request, write_frames
+from support import image_strip, request, write_frames
 
-from shutter_addon.blender.data import consistency, selection
+from shutter_addon.blender.data import consistency, recipe_import, selection
+from shutter_addon.blender.editing import add_effect, rolling_shutter, shutter_edits, time_map
+from shutter_addon.blender.output import matte_export
+from shutter_addon.blender.rendering import sessions
 from shutter_addon.core.model import limits, windows
 from shutter_addon.core.pixels import compositor
 
@@ -29,14 +32,10 @@ def frames(share, way=18):
 @pytest.fixture
 def edited(bpy, edit, tmp_path):
     """Makes an effect of footage with a readout, as the button does; its strip and the effect. From frame 1 on."""
-    from shutter_addon.blender.editing import add_effect, shutter_edits
-    from shutter_addon.blender.rendering import sessions
 
     def make(share=0.0, turned=False):
         pictures = [picture.swapaxes(0, 1) if turned else picture for picture in frames(share)]
-        source = edit.sequence_editor.strips.new_image("images", str(write_frames(tmp_path / "in", pictures)), 1, 1)
-        for number in range(2, COUNT + 1):
-            source.elements.append(f"f{number:04d}.png")
+        source = image_strip(edit, write_frames(tmp_path / "in", pictures))
         strip, effect = add_effect.add_effect(edit, source)
         shutter_edits.start(effect)
         effect.inbetween = "1"
@@ -92,8 +91,6 @@ def call(bpy, name="rolling_shutter", **settings):
 
 
 def test_again_it_changes_the_readout(bpy, edited):
-    from shutter_addon.blender.editing import rolling_shutter
-
     strip, effect = edited()
     call(bpy, side="TOP", readout=30)
     for shutter, name in zip(effect.shutters, "ABCD", strict=True):
@@ -125,8 +122,6 @@ def test_what_is_smooth_stays_so(bpy, edited, smooth):
 
 
 def test_another_smoothness_keeps_it(bpy, edited):
-    from shutter_addon.blender.editing import rolling_shutter
-
     strip, effect = edited()
     call(bpy, side="TOP", readout=30)
     effect.inbetween = "16"
@@ -186,8 +181,6 @@ def test_milliseconds_are_of_the_footage_s_rate(bpy, edit, edited):
 
 
 def test_a_movie_has_a_rate_of_its_own(bpy, edit):
-    from shutter_addon.blender.editing import add_effect, rolling_shutter
-
     edit.render.fps = 50
     movie = Path(__file__).parents[2] / "assets" / "bigbuckbunny.mp4"
     strip, effect = add_effect.add_effect(edit, edit.sequence_editor.strips.new_movie("film", str(movie), 1, 1))
@@ -195,8 +188,6 @@ def test_a_movie_has_a_rate_of_its_own(bpy, edit):
 
 
 def test_a_time_map_is_no_repair(bpy, edited):
-    from shutter_addon.blender.editing import rolling_shutter, time_map
-
     _strip, effect = edited()
     effect.position, effect.inbetween = "CENTER", "2"
     time_map.add(effect, "LINEAR")
@@ -206,10 +197,6 @@ def test_a_time_map_is_no_repair(bpy, edited):
 
 
 def test_a_recipe_keeps_it(bpy, edit, edited, tmp_path):
-    from shutter_addon.blender.data import recipe_import
-    from shutter_addon.blender.editing import rolling_shutter
-    from shutter_addon.blender.output import matte_export
-
     strip, effect = edited()
     call(bpy, side="BOTTOM", readout=40)
     saved = matte_export.recipe_for(edit, effect, strip, tmp_path / "r.json")
@@ -224,16 +211,12 @@ def test_a_recipe_keeps_it(bpy, edit, edited, tmp_path):
     [(0.4, "ROWS", "TOP"), (-0.6, "ROWS", "BOTTOM"), (0.4, "COLUMNS", "LEFT"), (-0.4, "COLUMNS", "RIGHT")],
 )
 def test_a_readout_is_found_and_repaired(bpy, edited, share, reads, side):
-    from shutter_addon.blender.editing import rolling_shutter
-
     _strip, effect = edited(share, turned=reads == "COLUMNS")
     assert call(bpy, "find_readout", reads=reads) == {"FINISHED"}
     assert rolling_shutter.of(effect) == (0, pytest.approx(abs(share), rel=0.1), side)
 
 
 def test_what_is_found_again_changes_the_repair(bpy, edited):
-    from shutter_addon.blender.editing import rolling_shutter
-
     _strip, effect = edited(0.4)
     call(bpy, side="BOTTOM", readout=90)
     assert call(bpy, "find_readout", reads="ROWS") == {"FINISHED"}
@@ -290,6 +273,4 @@ def test_it_does_not_look_beyond_a_cut(bpy, edited, tmp_path):
     for number in range(1, COUNT):
         source.elements.append(f"g{number:04d}.png")
     assert call(bpy, "find_readout", reads="ROWS") == {"FINISHED"}
-    from shutter_addon.blender.editing import rolling_shutter
-
     assert rolling_shutter.of(effect) == (0, pytest.approx(0.4, rel=0.1), "TOP")

@@ -15,7 +15,11 @@ import numpy as np
 import pytest
 from support import noise_film, read_picture, small_disk
 
+from shutter_addon.blender import command
+from shutter_addon.blender.data import versions
+from shutter_addon.blender.editing import saved_edit
 from shutter_addon.core.farm import claims, job_file
+from shutter_addon.media import rendered_pictures
 
 ROOT = Path(__file__).parents[2]
 COUNT = 14  # frames
@@ -75,7 +79,6 @@ def saved(bpy, edit, noise, save, tmp_path):
 @pytest.fixture
 def run(bpy, capfd):
     """Runs the command in this process: its exit code, and what it says on stderr."""
-    from shutter_addon.blender import command
 
     def main(*arguments):
         capfd.readouterr()
@@ -209,8 +212,6 @@ def test_a_killed_worker_and_two_at_once_render_each_frame_once(saved, run, tmp_
 
 
 def test_a_job_of_another_version_is_refused(bpy, saved, run, tmp_path):
-    from shutter_addon.blender.data import versions
-
     out = tmp_path / "out"
     out.mkdir()
     bpy.ops.wm.open_mainfile(filepath=str(saved))
@@ -249,8 +250,6 @@ def at_frame(bpy):
 
 def test_pictures_of_another_version_are_read_once(saved, run, tmp_path, monkeypatch):
     """There may be thousands of them, on a network drive."""
-    from shutter_addon.media import rendered_pictures
-
     out, looked = tmp_path / "out", []
     out.mkdir()
     for number in range(1, COUNT + 1):
@@ -268,8 +267,6 @@ def test_pictures_of_another_version_are_read_once(saved, run, tmp_path, monkeyp
 
 @pytest.mark.parametrize("command", ["render", "check", "join"])
 def test_an_edit_that_is_saved_over_while_it_is_opened(saved, run, tmp_path, monkeypatch, command):
-    from shutter_addon.blender.editing import saved_edit
-
     def open_edit(path, opened=saved_edit.open_edit):
         found = opened(path)
         path.write_bytes(path.read_bytes() + b"newer")
@@ -285,8 +282,6 @@ def test_an_edit_that_is_saved_over_while_it_is_opened(saved, run, tmp_path, mon
 
 @pytest.mark.parametrize("resume", [[], ["--resume"]])
 def test_a_job_of_a_newer_version_ends_an_older_ones_render(bpy, saved, run, at_frame, tmp_path, resume):
-    from shutter_addon.blender.data import versions
-
     bpy.ops.wm.open_mainfile(filepath=str(saved))
     newer = replace(versions.of_edit(bpy.context.scene), blend="00" * 32)
     out = tmp_path / "out"

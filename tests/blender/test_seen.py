@@ -7,12 +7,7 @@ from support import sequencer, write_frames
 from shutter_addon.blender.data import selection
 from shutter_addon.blender.editing import add_effect, reconcile, shown_annotations, shutter_edits, undelete
 
-
-@pytest.fixture(autouse=True)
-def _no_exception(capfd):
-    """Blender prints what a handler raises, and goes on."""
-    yield
-    assert "Traceback" not in capfd.readouterr().err
+pytestmark = pytest.mark.usefixtures("no_exception")
 
 
 def seen(edit):

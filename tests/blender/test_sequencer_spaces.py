@@ -1,12 +1,10 @@
 """Colours of a still effect are those of its source in every colour space that Blender's sequencer has."""
 
-import json
-
 import numpy as np
 import pytest
-from support import recipe, write_frames
+from support import effect_of, recipe, write_frames
 
-from shutter_addon.core.recipes import recipe_file
+from shutter_addon.blender.rendering import pictures
 
 LEVELS = 1
 
@@ -20,9 +18,6 @@ def spaces(edit):
 @pytest.fixture
 def made(edit, tmp_path):
     """Makes an effect on a picture of all colours in steps of 17 levels: its strip."""
-    from shutter_addon.blender.data import recipe_import
-    from shutter_addon.blender.editing import add_effect
-
     cube = np.stack(np.meshgrid(*[np.arange(0, 256, 17, dtype=np.uint8)] * 3), axis=-1).reshape(1, 64, 64, 3)
     first = write_frames(tmp_path / "in", cube)
     edit.render.resolution_x = edit.render.resolution_y = 64
@@ -32,8 +27,7 @@ def made(edit, tmp_path):
             edit.sequence_editor.strips.remove(strip)
         source = edit.sequence_editor.strips.new_image("colours", str(first), 1, 1)
         source.right_handle = 3
-        strip, effect = add_effect.add_effect(edit, source)
-        recipe_import.apply(edit, effect, strip, recipe_file.parse(json.dumps(recipe(1, [1]))))
+        strip, _effect = effect_of(edit, source, recipe(1, [1]))
         return strip
 
     return make
@@ -63,8 +57,6 @@ def test_an_effect_that_is_added_keeps_all_colours(edit, render, spaces, made):
 
 def test_colours_that_blender_changes_are_told(edit, render, spaces, made, capfd, monkeypatch):
     """A strip that is laid over others loses some in a few spaces, an effect as any other."""
-    from shutter_addon.blender.rendering import pictures
-
     strip = made()
     assert strip.blend_type == "ALPHA_OVER"
     for space in spaces:

@@ -4,6 +4,8 @@ import numpy as np
 import pytest
 from skimage import color
 
+from shutter_addon.blender.editing import shutter_edits
+
 # What is left of linear light for eyes that lack a kind of cones: Machado, Oliveira and Fernandes, "A Physiologically-
 # based Model for Simulation of Color Vision Deficiency", 2009, severity 1.
 EYES = {
@@ -27,8 +29,6 @@ def seen(colors, eyes) -> np.ndarray:
 
 @pytest.fixture(scope="module")
 def colors(bpy):
-    from shutter_addon.blender.editing import shutter_edits
-
     return shutter_edits.COLORS
 
 
@@ -54,8 +54,6 @@ def test_red_and_green_would_not_be_told_apart_without_red_cones():
 
 
 def test_new_shutters_have_colours_that_no_other_has(effect):
-    from shutter_addon.blender.editing import shutter_edits
-
     for _ in range(4):
         shutter_edits.add_shutter(effect)
     shutter_edits.duplicate_shutter(effect, 1)

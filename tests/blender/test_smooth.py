@@ -3,16 +3,31 @@
 Pictures are compared with sums of moments that are known: random ones in place of flow's (standin.py)."""
 
 import itertools
+import threading
+import time
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from standin import Between, moments, spread
-from support import picture_of, recipe, request, state, write_frames
+from support import image_strip, picture_of, recipe, request, state, write_frames
 
-from shutter_addon.blender.data import fcurves
+from shutter_addon.blender.data import (
+    consistency,
+    fcurves,
+    preview_areas,
+    property_copy,
+    recipe_export,
+    recipe_import,
+    snapshot,
+    source_media,
+    strips,
+)
+from shutter_addon.blender.editing import add_effect, bar_edits, shutter_edits
+from shutter_addon.blender.rendering import effect_source, invalidation, previews, render_job, sessions
 from shutter_addon.core.frames import light
-from shutter_addon.media import flow, open_source, smooth
+from shutter_addon.core.recipes import recipe_file
+from shutter_addon.media import MediaError, flow, open_source, opencv, smooth
 
 STEPS, COUNT, CUT = 4, 12, 6
 LAST = (CUT - 1) * STEPS  # the first shot's last filmed frame, and the moments that are nearest to it:
@@ -44,13 +59,9 @@ def film(filmed, monkeypatch):
 @pytest.fixture
 def add(bpy, edit):
     """Puts a smooth effect on an image strip of files from frame 1 on; bars: of its shutter."""
-    from shutter_addon.blender.editing import add_effect, bar_edits, shutter_edits
-    from shutter_addon.blender.rendering import sessions
 
-    def added(first, count, bars, smooth=str(STEPS), **options):
-        source = edit.sequence_editor.strips.new_image("film", str(first), 1, 1)
-        for number in range(2, count + 1):
-            source.elements.append(f"f{number:04d}.png")
+    def added(first, bars, smooth=str(STEPS), **options):
+        source = image_strip(edit, first, 1, 1, "film")
         strip, effect = add_effect.add_effect(edit, source)
         edit.render.resolution_x, edit.render.resolution_y = (
             effect.scene.render.resolution_x,
@@ -82,7 +93,7 @@ def around(start, bars):
 @pytest.mark.parametrize("bars", [[1, 1], [1, 1, 1], [0.25, 1, 0.5], [1, 0, 1], [1, 1, 0, 0.5, 0.5], [0, 1, 0]])
 def test_light_counts_between_bars_that_are_both_open(film, add, edit, render, same_pixels, bars):
     first, frames = film
-    add(first, COUNT, bars, stop_at_cuts=False)
+    add(first, bars, stop_at_cuts=False)
     for frame, picture in render(edit, (1, 3)).items():
         start = (frame - 1) * STEPS
         same_pixels(picture[..., :3], shown(frames, around(start, bars), bars), 1)
@@ -92,7 +103,7 @@ def test_a_window_stops_in_the_middle_of_a_cut_pair(film, add, edit, render, sam
     """Whose moments are copies of the nearer frame; hold repeats the last of the shot."""
     first, frames = film
     bars = np.ones(3)
-    _source, _strip, effect = add(first, COUNT, bars)
+    _source, _strip, effect = add(first, bars)
     for frame, picture in render(edit, (4, 5, 6, 7)).items():
         window = around((frame - 1) * STEPS, bars)
         window = np.minimum(window, END) if frame <= CUT else window
@@ -107,7 +118,7 @@ def test_a_window_stops_in_the_middle_of_a_cut_pair(film, add, edit, render, sam
 def test_at_a_cut_it_slides_by_filmed_frames(film, add, edit, render, same_pixels):
     first, frames = film
     bars = np.ones(3)
-    add(first, COUNT, bars, edges="SLIDE")
+    add(first, bars, edges="SLIDE")
     for frame, picture in render(edit, (3, 5, 6)).items():
         start = min((frame - 1) * STEPS, LAST - (len(bars) - 1) * STEPS)
         window = np.minimum(around(start, bars), END)
@@ -118,7 +129,7 @@ def test_an_exposure_that_follows_takes_the_motion_between(film, add, edit, rend
     """By four pixels a filmed frame, so that moments are seen at whole pixels; those beyond the cut are not."""
     first, frames = film
     bars = np.ones(2)
-    _source, _strip, effect = add(first, COUNT, bars)
+    _source, _strip, effect = add(first, bars)
     effect.shutters[0].follow = "CAMERA"
     for frame in (1, COUNT):
         effect.camera.location = (STEPS * frame / 40, 0)
@@ -137,7 +148,7 @@ def test_reversed_frames(film, add, edit, render, same_pixels):
     """The filmed frame that is shown comes first, and then those before it."""
     first, frames = film
     bars = np.array([1.0, 1.0, 0.5])
-    source, *_ = add(first, COUNT, bars)
+    source, *_ = add(first, bars)
     source.use_reverse_frames = True
     frame = 2
     at = (COUNT - frame) * STEPS
@@ -149,7 +160,7 @@ def test_reversed_frames(film, add, edit, render, same_pixels):
 
 def test_a_slow_strip_shows_moments(film, add, edit, render, same_pixels):
     first, frames = film
-    source, strip, effect = add(first, COUNT, [1.0])
+    source, strip, effect = add(first, [1.0])
     source.retiming_keys.add(timeline_frame=1)
     source.retiming_keys.add(timeline_frame=source.right_handle)
     source.retiming_keys[-1].timeline_frame = 1 + 4 * COUNT
@@ -163,13 +174,10 @@ def test_a_slow_strip_shows_moments(film, add, edit, render, same_pixels):
 
 def test_a_file_that_was_replaced_is_shown(film, add, edit, monkeypatch):
     """With the moments beside it."""
-    from shutter_addon.blender.data import source_media
-    from shutter_addon.blender.rendering import invalidation
-
     seconds = itertools.count(1e6, 10)  # so that all files are looked at each time
     monkeypatch.setattr(source_media, "time", SimpleNamespace(monotonic=lambda: next(seconds)))
     first, _ = film
-    *_, effect = add(first, COUNT, np.ones(2))
+    *_, effect = add(first, np.ones(2))
     before = picture_of(effect.scene, 2)
     invalidation.invalidate_changed(edit)
     (first.parent / "f0003.png").write_bytes((first.parent / "f0009.png").read_bytes())
@@ -183,9 +191,7 @@ def test_a_file_that_was_replaced_is_shown(film, add, edit, monkeypatch):
 @pytest.mark.parametrize("position", ["START", "CENTER", "END"])
 def test_a_still_frame_is_the_filmed_one_bit_for_bit(filmed, add, edit, render, position):
     """As the preset makes it, at every smoothness, before a shutter that streaks."""
-    from shutter_addon.blender.editing import shutter_edits
-
-    *_, effect = add(filmed, COUNT, np.ones(4), "1", position=position)
+    *_, effect = add(filmed, np.ones(4), "1", position=position)
     shutter_edits.apply_preset(effect, 0, "STILL")
     frames = 1, 5, 6, 7, 12
     plain = {frame: picture_of(effect.scene, frame) for frame in frames}
@@ -200,9 +206,7 @@ def test_a_still_frame_is_the_filmed_one_bit_for_bit(filmed, add, edit, render, 
 
 @pytest.mark.parametrize("way", ["reversed", "custom time"])
 def test_it_is_so_however_the_source_runs(filmed, add, way):
-    from shutter_addon.blender.editing import shutter_edits
-
-    source, _strip, effect = add(filmed, COUNT, np.ones(4), "1")
+    source, _strip, effect = add(filmed, np.ones(4), "1")
     shutter_edits.apply_preset(effect, 0, "STILL")
     if way == "reversed":
         source.use_reverse_frames = True
@@ -220,9 +224,6 @@ def test_it_is_so_however_the_source_runs(filmed, add, way):
 @pytest.mark.parametrize("smooth", ["2", "4", "8", "16", "AUTO"])
 def test_bars_stay_as_they_are(effect, smooth):
     """Keyed ones as well, and their number; those of presets are the presets'."""
-    from shutter_addon.blender.data import consistency, snapshot
-    from shutter_addon.blender.editing import bar_edits
-
     rng = np.random.default_rng(3)
     bar_edits.set_bars(effect.shutters[0], rng.random(8))
     bar_edits.key_bars(effect, 0)
@@ -245,8 +246,6 @@ def test_bars_stay_as_they_are(effect, smooth):
 
 
 def test_a_copy_of_an_effect_is_as_smooth(effect, edit):
-    from shutter_addon.blender.data import property_copy
-
     effect.inbetween = "AUTO"
     path = effect.path_from_id()
     copy = edit.virtual_shutter.effects.add()
@@ -259,7 +258,7 @@ def test_a_copy_of_an_effect_is_as_smooth(effect, edit):
 def test_a_shape_is_spread_over_its_own_time(film, add, edit):
     """Bars that are the shape of a frame of the timeline, which are no frames."""
     first, _ = film
-    _source, strip, effect = add(first, COUNT, [1, 1, 0, 0], stop_at_cuts=False)
+    _source, strip, effect = add(first, [1, 1, 0, 0], stop_at_cuts=False)
     effect.shutters[0].length = "TIMELINE"
     (bars,) = request(edit, effect, strip, 3).state.bars
     # The first half of one filmed frame, which is two of its four moments.
@@ -284,7 +283,7 @@ def moving(folder, pixels, count=6, size=(320, 180)):
 @pytest.mark.parametrize(("pixels", "steps"), [(0, 1), (1, 1), (3, 2), (5, 4), (7, 4), (12, 8), (20, 16)])
 def test_automatic_takes_as_many_as_the_fastest_motion_needs(add, edit, tmp_path, pixels, steps):
     """At this height, two pixels look smooth."""
-    _source, strip, effect = add(moving(tmp_path / "film", pixels), 6, np.ones(4), "AUTO")
+    _source, strip, effect = add(moving(tmp_path / "film", pixels), np.ones(4), "AUTO")
     found = request(edit, effect, strip, 2)
     assert found.renderer.source.step == steps
     assert found.state.bars.shape == (1, 4 * steps)
@@ -296,17 +295,14 @@ def test_automatic_takes_as_many_as_the_fastest_motion_needs(add, edit, tmp_path
     [("16", 16, 16), ("16", 17, 8), ("8", 64, 4), ("4", 200, 1), ("AUTO", 100, 2), ("AUTO", 256, 1), ("2", 128, 2)],
 )
 def test_no_more_than_there_is_room_for(add, edit, tmp_path, smooth, window, steps):
-    _source, strip, effect = add(moving(tmp_path / "film", 12), 6, np.ones(window), smooth)
+    _source, strip, effect = add(moving(tmp_path / "film", 12), np.ones(window), smooth)
     assert request(edit, effect, strip, 2).renderer.source.step == steps
     assert (effect.inbetween, effect.window) == (smooth, window)
 
 
 def test_without_opencv_automatic_is_off_and_a_number_is_refused(add, edit, tmp_path, monkeypatch):
-    from shutter_addon.blender.rendering import effect_source
-    from shutter_addon.media import MediaError, opencv
-
     first = moving(tmp_path / "film", 12)
-    _source, strip, effect = add(first, 6, np.ones(4), "AUTO")
+    _source, strip, effect = add(first, np.ones(4), "AUTO")
     monkeypatch.setattr(opencv, "cv2", None)
     monkeypatch.setattr(effect_source, "_steps", type(effect_source._steps)())  # found in a process of its own
     assert request(edit, effect, strip, 2).renderer.source.step == 1
@@ -318,10 +314,8 @@ def test_without_opencv_automatic_is_off_and_a_number_is_refused(add, edit, tmp_
 def test_motion_is_measured_once(add, edit, tmp_path, monkeypatch):
     """Whatever else changes; another file is another film."""
     asked, steps_for = [], smooth.steps_for
-    from shutter_addon.blender.rendering import effect_source, sessions
-
     monkeypatch.setattr(effect_source, "steps_for", lambda *given: asked.append(given[1:]) or steps_for(*given))
-    _source, strip, effect = add(moving(tmp_path / "film", 5), 6, np.ones(4), "AUTO")
+    _source, strip, effect = add(moving(tmp_path / "film", 5), np.ones(4), "AUTO")
     for position in ("START", "CENTER", "END"):
         effect.position = position
         request(edit, effect, strip, 2)
@@ -334,12 +328,9 @@ def test_motion_is_measured_once(add, edit, tmp_path, monkeypatch):
 
 def test_a_preview_is_plain_while_it_plays_and_smooth_when_it_stands(film, add, edit, bpy, monkeypatch, same_pixels):
     """It never waits for flow, and nobody has to click."""
-    from shutter_addon.blender.data import preview_areas, snapshot
-    from shutter_addon.blender.rendering import previews, sessions
-
     first, frames = film
     bars = np.ones(3)
-    _source, strip, effect = add(first, COUNT, bars)
+    _source, strip, effect = add(first, bars)
     made = []
     monkeypatch.setattr(flow, "Between", lambda *given: made.append(given) or Between(*given))
     look = preview_areas.Look(scale=1.0, proxy=None, is_plain=True)
@@ -355,10 +346,67 @@ def test_a_preview_is_plain_while_it_plays_and_smooth_when_it_stands(film, add, 
         same_pixels(picture, plain if is_playing else shown(frames, around(4, bars), bars), 1)
 
 
-def test_a_dragged_playhead_waits_for_no_flow(bpy, monkeypatch):
-    from shutter_addon.blender.data import preview_areas
-    from shutter_addon.blender.rendering import previews, render_job
+def test_a_still_preview_is_plain_until_its_moments_are_there(film, add, edit, bpy, monkeypatch, same_pixels):
+    """Drawn over and over, as the window does, and nobody has to click. No step of it waits for a frame that a thread
+    makes; both renderers stay as it plays and stands still again."""
+    from shutter_addon.blender.data import snapshot
+    from shutter_addon.blender.rendering import effect_source, sessions, smooth_previews
 
+    first, frames = film
+    bars = np.ones(3)
+    _source, strip, effect = add(first, COUNT, bars)
+    drawing, gate = sessions.of_drawing(), threading.Event()
+    monkeypatch.setattr(flow, "Between", lambda *given: gate.wait() and Between(*given))
+    taken = snapshot.take(edit, effect, strip, (2,))
+    plain = light.to_encoded(frames[[4, 8, 12]].mean(axis=0)) * 255
+
+    def asked():
+        smooth_previews.advance(60)
+        return smooth_previews.chosen(drawing, taken, 2, effect_source.FULL)
+
+    def same(request, expected):
+        same_pixels(light.to_encoded(drawing.session.picture(request)[..., :3]) * 255, expected, 1)
+
+    for _ in range(5):
+        request = asked()
+        assert request.state.options.step == 1
+        assert smooth_previews.is_busy()
+        same(request, plain)
+    gate.set()
+    until = time.monotonic() + 20
+    while (request := asked()).state.options.step == 1:
+        assert time.monotonic() < until
+    assert not smooth_previews.is_busy()
+    same(request, shown(frames, around(4, bars), bars))
+    both = drawing.request(taken, 2, effect_source.Detail(smooth=False)), request
+    renderers = [drawing.renderer(each) for each in both]
+    assert renderers[0] is not renderers[1]
+    smooth_previews.rest()  # as it plays
+    gate.clear()
+    assert asked() == request  # what it needs is there: nothing plain comes before
+    assert [drawing.renderer(each) for each in both] == renderers
+    gate.set()
+
+
+def test_footage_that_needs_no_moments_has_one_renderer(add, edit, tmp_path):
+    from shutter_addon.blender.data import snapshot
+    from shutter_addon.blender.rendering import effect_source, sessions, smooth_previews
+
+    _source, strip, effect = add(moving(tmp_path / "film", 0), 6, np.ones(4), "AUTO")
+    taken, drawing = snapshot.take(edit, effect, strip, (2,)), sessions.of_drawing()
+    first = smooth_previews.chosen(drawing, taken, 2, effect_source.FULL)
+    assert not first.source.detail.smooth
+    until = time.monotonic() + 20
+    while smooth_previews.is_busy():
+        assert time.monotonic() < until
+        smooth_previews.advance(60)
+        last = smooth_previews.chosen(drawing, taken, 2, effect_source.FULL)
+    assert last.source.detail == effect_source.FULL
+    assert last.state.options.step == 1
+    assert len(drawing.session._renderers) == 1  # where what is not needed would show
+
+
+def test_a_dragged_playhead_waits_for_no_flow(bpy, monkeypatch):
     look = preview_areas.Look(scale=0.5, proxy=None, is_plain=True)
     assert previews._detail(bpy.context, look).smooth
     monkeypatch.setattr(render_job, "operators_running", lambda: {"ANIM_OT_change_frame"})
@@ -368,7 +416,7 @@ def test_a_dragged_playhead_waits_for_no_flow(bpy, monkeypatch):
 
 def test_nothing_is_written(film, add, edit, bpy, tmp_path):
     first, _ = film
-    add(first, COUNT, np.ones(3))
+    add(first, np.ones(3))
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "edit.blend"))
     before = sorted(path for path in tmp_path.rglob("*"))
     picture_of(bpy.context.scene.virtual_shutter.effects[0].scene, 2)
@@ -395,7 +443,6 @@ def counted(bars, steps, position):
 @pytest.fixture
 def older(bpy, effect, tmp_path):
     """Has an effect be one of a file of format 1, whose bars count moments; opens that file."""
-    from shutter_addon.blender.editing import bar_edits
 
     def opened(steps, position, window, keyed=False):
         scene = effect.id_data
@@ -421,8 +468,6 @@ def older(bpy, effect, tmp_path):
 @pytest.mark.parametrize("position", ["START", "CENTER", "END"])
 @pytest.mark.parametrize(("steps", "window"), [(2, 8), (4, 8), (8, 12), (16, 33), (4, 1)])
 def test_bars_of_format_1_count_filmed_frames_now(older, steps, window, position):
-    from shutter_addon.blender.data import consistency
-
     scene, bars = older(steps, position, window)
     effect = scene.virtual_shutter.effects[0]
     assert scene.virtual_shutter.format == 2
@@ -432,8 +477,6 @@ def test_bars_of_format_1_count_filmed_frames_now(older, steps, window, position
 
 
 def test_keyed_bars_of_format_1_do(older):
-    from shutter_addon.blender.data import snapshot
-
     scene, bars = older(4, "START", 10, keyed=True)
     effect = scene.virtual_shutter.effects[0]
     for frame, given in ((1, bars[0]), (9, bars[2])):
@@ -443,8 +486,6 @@ def test_keyed_bars_of_format_1_do(older):
 
 
 def test_what_had_no_frames_in_between_stays(older):
-    from shutter_addon.blender.data import consistency
-
     scene, bars = older(1, "START", 8)
     effect = scene.virtual_shutter.effects[0]
     assert (scene.virtual_shutter.format, effect.inbetween, effect.window) == (2, "1", 8)
@@ -452,8 +493,6 @@ def test_what_had_no_frames_in_between_stays(older):
 
 
 def test_files_of_format_2_stay(bpy, effect, tmp_path):
-    from shutter_addon.blender.data import consistency
-
     effect.inbetween = "4"
     before = [consistency.bars(shutter).tolist() for shutter in effect.shutters]
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "now.blend"))
@@ -465,9 +504,6 @@ def test_files_of_format_2_stay(bpy, effect, tmp_path):
 
 def test_a_still_frame_of_format_1_is_one(bpy, effect, tmp_path):
     """It was as many equal bars as there were moments."""
-    from shutter_addon.blender.data import consistency
-    from shutter_addon.blender.editing import bar_edits
-
     effect.window = 32
     bar_edits.set_bars(effect.shutters[1], [1] * 8 + [0] * 24)
     effect.inbetween = "8"
@@ -484,8 +520,6 @@ def test_a_still_frame_of_format_1_is_one(bpy, effect, tmp_path):
 def test_an_edit_and_a_recipe_of_the_first_versions_are_read_alike(older):
     from made_recipes import made
 
-    from shutter_addon.blender.data import consistency
-
     scene, bars = older(4, "END", 10)
     effect = scene.virtual_shutter.effects[0]
     stored = [[float(np.float32(bar)) for bar in row] for row in bars[:2]]
@@ -498,9 +532,6 @@ def test_an_edit_and_a_recipe_of_the_first_versions_are_read_alike(older):
 
 def test_a_recipe_says_it(bpy, effect, edit):
     import json
-
-    from shutter_addon.blender.data import recipe_export, recipe_import, strips
-    from shutter_addon.core.recipes import recipe_file
 
     _scene, _effect, strip = strips.find_effect(effect.scene)
     for steps in ("auto", 8, 1):

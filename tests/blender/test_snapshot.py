@@ -4,7 +4,20 @@ import pickle
 
 import numpy as np
 import pytest
-from support import sequencer, state, write_frames
+from support import image_strip, sequencer, state, write_frames
+
+from shutter_addon.blender.data import (
+    annotations,
+    fcurves,
+    recipe_export,
+    recipe_import,
+    snapshot,
+    source_media,
+    strips,
+)
+from shutter_addon.blender.editing import add_effect, bar_edits, region_edits, shutter_edits
+from shutter_addon.blender.rendering import invalidation
+from shutter_addon.core.messages import EffectError
 
 FRAMES = range(1, 25)
 
@@ -12,14 +25,9 @@ FRAMES = range(1, 25)
 @pytest.fixture
 def found(bpy, edit, tmp_path):
     """Edit, effect and strip; shutters keyed by bars and by value, a region keyed and drawn twice, options keyed."""
-    from shutter_addon.blender.data import annotations
-    from shutter_addon.blender.editing import add_effect, bar_edits, region_edits, shutter_edits
-
     frames = np.random.default_rng(0).integers(0, 256, (24, 24, 40, 3), dtype=np.uint8)
     first = write_frames(tmp_path / "in", frames)
-    source = edit.sequence_editor.strips.new_image("images", str(first), 1, 1)
-    for file in sorted(first.parent.iterdir())[1:]:
-        source.elements.append(file.name)
+    source = image_strip(edit, first)
     strip, effect = add_effect.add_effect(edit, source)
     effect.window = 4
     shutter_edits.start(effect)
@@ -44,9 +52,6 @@ def states(snapshot) -> list:
 
 def test_it_holds_no_blender_data_and_does_not_change(found):
     """What a pickle holds is plain."""
-    from shutter_addon.blender.data import snapshot
-    from shutter_addon.blender.editing import bar_edits, region_edits, shutter_edits
-
     edit, effect, strip = found
     taken = snapshot.take(edit, effect, strip, FRAMES)
     before, plain = states(taken), pickle.dumps(taken)
@@ -62,8 +67,6 @@ def test_it_holds_no_blender_data_and_does_not_change(found):
 
 def test_many_frames_are_those_of_each(found):
     """However many are sampled at once, and in whatever way bars are interpolated."""
-    from shutter_addon.blender.data import snapshot
-
     for interpolation in ("DISPLACEMENT", "VALUE"):
         found[1].interpolation = interpolation
         single = [snapshot.take(*found, (frame,)).effect.at(frame).key for frame in FRAMES]
@@ -71,9 +74,6 @@ def test_many_frames_are_those_of_each(found):
 
 
 def test_what_is_wrong_at_one_frame_is_told_there(found):
-    from shutter_addon.blender.data import fcurves, snapshot
-    from shutter_addon.core.messages import EffectError
-
     edit, effect, _ = found
     path = f"{effect.path_from_id()}.shutters[0].bars"
     for i in range(4):  # closes at frame 9 alone
@@ -85,8 +85,6 @@ def test_what_is_wrong_at_one_frame_is_told_there(found):
 
 
 def test_scribbles_follow_a_keyed_transform(found):
-    from shutter_addon.blender.data import snapshot
-
     *_, strip = found
     still = snapshot.take(*found, FRAMES)
     for frame, offset in ((1, 0), (12, 10)):
@@ -99,9 +97,6 @@ def test_scribbles_follow_a_keyed_transform(found):
 
 
 def test_what_is_drawn_is_read_once_until_something_changes(bpy, found, monkeypatch):
-    from shutter_addon.blender.data import snapshot, source_media
-    from shutter_addon.blender.rendering import invalidation
-
     edit, effect, strip = found
     asked, take, look = [], snapshot.take, source_media.media_key
     monkeypatch.setattr(snapshot, "take", lambda *a, **k: asked.append("take") or take(*a, **k))
@@ -125,9 +120,6 @@ def test_what_is_drawn_is_read_once_until_something_changes(bpy, found, monkeypa
 
 def test_a_part_of_a_cut_source_is_read_as_itself(bpy, found):
     """Though the files of another part were looked at last."""
-    from shutter_addon.blender.data import snapshot, strips
-    from shutter_addon.blender.rendering import invalidation
-
     edit, effect, strip = found
     source = strips.source_of(edit, effect, strip)
     right = source.split(12, "SOFT")
@@ -163,10 +155,6 @@ def test_another_smoothness_is_another_source(found):
 def test_keys_follow_time_stretching(found):
     """As Blender's own: a key's place on a timeline that is stretched is not its frame. What is sampled, kept by the
     sequencer, exported and told of the bars follows; what changes bars at their keys does not move these."""
-    from shutter_addon.blender.data import fcurves, recipe_export, recipe_import
-    from shutter_addon.blender.editing import bar_edits
-    from shutter_addon.blender.rendering import invalidation
-
     edit, effect, strip = found
 
     def seen(frame):

@@ -4,8 +4,11 @@ import json
 
 import numpy as np
 import pytest
-from support import recipe, request, write_frames
+from support import image_strip, recipe, request, write_frames
 
+from shutter_addon.blender.data import recipe_import
+from shutter_addon.blender.editing import add_effect, bar_edits
+from shutter_addon.blender.rendering import sessions
 from shutter_addon.core.frames import light
 from shutter_addon.core.recipes import recipe_file
 
@@ -25,15 +28,10 @@ def frame(index):
 @pytest.fixture
 def edited(bpy, edit, tmp_path):
     """Makes an effect of a half open shutter whose length is the timeline's: its strip and the effect."""
-    from shutter_addon.blender.data import recipe_import
-    from shutter_addon.blender.editing import add_effect
-    from shutter_addon.blender.rendering import sessions
 
     def make(change=lambda source: None, **options):
         first = write_frames(tmp_path / "in", [frame(i) for i in range(COUNT)])
-        source = edit.sequence_editor.strips.new_image("images", str(first), 1, 1)
-        for i in range(2, COUNT + 1):
-            source.elements.append(f"f{i:04d}.png")
+        source = image_strip(edit, first)
         change(source)
         strip, effect = add_effect.add_effect(edit, source)
         said = recipe(WINDOW, [1] * (WINDOW // 2) + [0] * (WINDOW // 2), **options)
@@ -104,8 +102,6 @@ def test_the_last_frame_is_blurred_as_those_before(edited):
 
 
 def test_how_long_it_is_open_is_told(edited):
-    from shutter_addon.blender.editing import bar_edits
-
     strip, effect = edited(time=speed((1, 1), (7, 49)))
     strip.id_data.frame_set(3)
     assert bar_edits.open_for(strip.id_data, effect, strip, 0) == "Open for 4 of 16 frames here"

@@ -4,8 +4,11 @@ import json
 
 import numpy as np
 import pytest
-from support import recipe, write_frames
+from support import image_strip, recipe, write_frames
 
+from shutter_addon.blender.data import recipe_import, snapshot
+from shutter_addon.blender.editing import add_effect
+from shutter_addon.blender.rendering import sessions
 from shutter_addon.compute.request import Request
 from shutter_addon.core.model.clip import Clip
 from shutter_addon.core.model.state_at import state_at
@@ -40,18 +43,12 @@ RECIPES = {
 
 @pytest.mark.parametrize("name", RECIPES)
 def test_it_is_what_the_session_asks_for(bpy, edit, tmp_path, name):
-    from shutter_addon.blender.data import recipe_import, snapshot
-    from shutter_addon.blender.editing import add_effect
-    from shutter_addon.blender.rendering import sessions
-
     found = recipe_file.parse(json.dumps(RECIPES[name]))
     clip = Clip(width=WIDTH, height=HEIGHT, count=COUNT).stepped(found.options.at(1).step)
     made = {frame: Request(*state_at(found.for_picture(WIDTH / HEIGHT), clip, frame)) for frame in (1, 8, COUNT)}
 
     first = write_frames(tmp_path / "in", np.zeros((COUNT, HEIGHT, WIDTH, 3), np.uint8))
-    source = edit.sequence_editor.strips.new_image("images", str(first), 1, 1)
-    for number in range(2, COUNT + 1):
-        source.elements.append(f"f{number:04d}.png")
+    source = image_strip(edit, first)
     strip, effect = add_effect.add_effect(edit, source)
     recipe_import.apply(edit, effect, strip, found)
     for frame, ours in made.items():

@@ -2,7 +2,6 @@
 
 import contextlib
 import io
-import json
 import sys
 
 import numpy as np
@@ -16,9 +15,9 @@ from hypothesis.stateful import (
     rule,
     run_state_machine_as_test,
 )
-from support import recipe, sequencer, state, write_frames
+from support import effect_of, recipe, sequencer, state, write_frames
 
-from shutter_addon.core.recipes import recipe_file
+from shutter_addon.blender.data import fcurves
 
 REGION = {"name": "Face", "shutter": "S1", "strokes": [[[0.1, 0.1], [0.9, 0.1]]]}
 MOVED = REGION | {"keys": [{"frame": 1}, {"frame": 9, "location": [0.2, 0.1], "ease": "bezier"}]}
@@ -56,8 +55,6 @@ def layers(effect):
 
 def snapshot(bpy):
     """All that the user made; what Blender or chance names, and values that curves drive, left out."""
-    from shutter_addon.blender.data import fcurves
-
     result = []
     for edit in edits(bpy):
         curves = {
@@ -146,11 +143,7 @@ class Work(RuleBasedStateMachine):
             source.elements.append(file.name)
 
     def add_recipe(self, edit, source, chosen):
-        from shutter_addon.blender.data import recipe_import
-        from shutter_addon.blender.editing import add_effect
-
-        strip, effect = add_effect.add_effect(edit, source)
-        recipe_import.apply(edit, effect, strip, recipe_file.parse(json.dumps(chosen)))
+        _strip, _effect = effect_of(edit, source, chosen)
 
     # Undo
 

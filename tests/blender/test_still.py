@@ -6,8 +6,10 @@ import av
 import numpy as np
 import OpenImageIO
 import pytest
-from support import recipe
+from support import effect_of, recipe
 
+from shutter_addon.blender.data import recipe_import
+from shutter_addon.blender.editing import add_effect
 from shutter_addon.core.recipes import recipe_file
 
 
@@ -16,14 +18,10 @@ def still_on(edit):
     """An edit of a movie under a still-frame effect, in the movie's size; gives the effect's strip."""
 
     def make(path):
-        from shutter_addon.blender.data import recipe_import
-        from shutter_addon.blender.editing import add_effect
-
         source = edit.sequence_editor.strips.new_movie("movie", str(path), 1, 1)
         edit.render.resolution_x = source.elements[0].orig_width
         edit.render.resolution_y = source.elements[0].orig_height
-        strip, effect = add_effect.add_effect(edit, source)
-        recipe_import.apply(edit, effect, strip, recipe_file.parse(json.dumps(recipe(16, np.eye(16)[0]))))
+        strip, _effect = effect_of(edit, source, recipe(16, np.eye(16)[0]))
         edit.render.resolution_x, edit.render.resolution_y = (
             strip.scene.render.resolution_x,
             strip.scene.render.resolution_y,
@@ -142,9 +140,6 @@ def _compare(edit, render, tmp_path, same_pixels, name, samples, channels, corne
         source.elements.append(name.replace("a.", f"a{i}."))
     edit.render.resolution_x, edit.render.resolution_y = 32, 24
     plain = render(edit, [1, 2, 3], "16")
-    from shutter_addon.blender.data import recipe_import
-    from shutter_addon.blender.editing import add_effect
-
     _, effect = add_effect.add_effect(edit, source)
     strip = next(s for s in edit.sequence_editor.strips if s.type == "SCENE")
     recipe_import.apply(edit, effect, strip, recipe_file.parse(json.dumps(recipe(2, [1, 0]))))

@@ -5,7 +5,12 @@ import ctypes
 import av
 import numpy as np
 import pytest
-from support import noise_film, picture_of, recipe, sequencer, write_frames
+from support import effect_of, image_strip, noise_film, picture_of, recipe, sequencer, write_frames
+
+from shutter_addon.blender.editing import add_effect, shutter_edits
+from shutter_addon.blender.rendering import effect_source
+from shutter_addon.blender.rendering import job_snapshots as snapshots
+from shutter_addon.core.frames import light
 
 LEVELS = 1
 SELECTED = 1 << 4  # SEQ_KEY_SELECTED in a retiming key's flag, behind a double: Python cannot select one
@@ -47,18 +52,12 @@ def images(tmp_path_factory):
 @pytest.fixture
 def effect_on(bpy, edit):
     """Puts an effect on a strip: still frames by default; gives strip and effect."""
-    from shutter_addon.blender.data import recipe_import
-    from shutter_addon.blender.editing import add_effect
-    from shutter_addon.core.recipes import recipe_file
-
     edit.render.resolution_x = edit.render.resolution_y = 32
     edit.frame_start, edit.frame_end = -100, 300
 
     def add(source, data=None):
-        import json
 
-        strip, effect = add_effect.add_effect(edit, source)
-        recipe_import.apply(edit, effect, strip, recipe_file.parse(json.dumps(data or recipe(4, [1, 0, 0, 0]))))
+        strip, effect = effect_of(edit, source, data or recipe(4, [1, 0, 0, 0]))
         return strip, effect
 
     return add
@@ -69,9 +68,7 @@ def new_movie(edit, path, start=1, channel=1):
 
 
 def new_images(edit, first, start=1, channel=1):
-    strip = edit.sequence_editor.strips.new_image("images", str(first), channel, start)
-    for file in sorted(first.parent.iterdir())[1:]:
-        strip.elements.append(file.name)
+    strip = image_strip(edit, first, start, channel)
     return strip
 
 
@@ -275,8 +272,6 @@ def test_the_window_counts_source_frames_in_playing_order(edit, render, effect_o
 
 def test_streaks_of_a_new_effect_keep_their_length_up_to_the_clips_ends(edit, render, effect_on, images):
     """What is sharp stays the shown frame; a recipe that does not say "slide" holds."""
-    from shutter_addon.blender.editing import add_effect, shutter_edits
-    from shutter_addon.core.frames import light
 
     def mean(*frames):
         return light.to_encoded(light.to_linear(np.array([12 * f + 5 for f in frames]) / 255).mean()) * 255
@@ -438,8 +433,6 @@ def test_half_resolution(edit, render, effect_on, movie):
 
 
 def test_a_deleted_source_is_said(bpy, edit, effect_on, movie):
-    from shutter_addon.blender.rendering import effect_source
-
     source = new_movie(edit, movie)
     _, effect = effect_on(source)
     edit.sequence_editor.strips.remove(source)
@@ -448,8 +441,6 @@ def test_a_deleted_source_is_said(bpy, edit, effect_on, movie):
 
 
 def test_no_shutters_and_a_closed_shutter_are_said(bpy, edit, effect_on, movie):
-    from shutter_addon.blender.rendering import effect_source
-
     _, effect = effect_on(new_movie(edit, movie))
     effect.shutters[0].bars[0].weight = 0
     with pytest.raises(effect_source.FAULTS, match='shutter "S0" at frame 5: all bars are zero'):
@@ -468,8 +459,6 @@ def test_a_hard_cut_changes_no_picture(bpy, edit, render, tmp_path):
     right = next(each for each in edit.sequence_editor.strips if each.type == "SCENE" and each != strip)
     after = render(edit, [3, 5, 8])
     assert all(np.array_equal(after[frame], before[frame]) for frame in before)
-    from shutter_addon.blender.rendering import job_snapshots as snapshots
-
     snapshots.begin(edit.session_uid)
     try:
         # What a job of the window reads, which is not to be seen.

@@ -6,9 +6,12 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
-from support import request, write_frames
+from support import image_strip, request, write_frames
 
-from shutter_addon.media import steps
+from shutter_addon.blender.data import consistency, fcurves, selection, snapshot
+from shutter_addon.blender.editing import add_effect, bar_edits, shutter_edits
+from shutter_addon.blender.rendering import strobing
+from shutter_addon.media import opencv, steps
 
 WIDTH, HEIGHT, COUNT = 320, 180, 12  # at this height, 2 pixels look smooth
 
@@ -23,17 +26,11 @@ def film(pixels):
 @pytest.fixture
 def add(bpy, edit, tmp_path):
     """Puts an effect of shutters with these bars on a film that moves by pixels a frame: edit, effect, strip."""
-    from shutter_addon.blender.data import selection
-    from shutter_addon.blender.editing import add_effect, bar_edits, shutter_edits
-    from shutter_addon.blender.rendering import strobing
-
     strobing.forget()
 
     def added(pixels, *bars, **options):
         first = write_frames(tmp_path / "film", film(pixels))
-        source = edit.sequence_editor.strips.new_image("film", str(first), 1, 1)
-        for number in range(2, COUNT + 1):
-            source.elements.append(f"f{number:04d}.png")
+        source = image_strip(edit, first, 1, 1, "film")
         edit.render.resolution_x, edit.render.resolution_y = WIDTH, HEIGHT
         strip, effect = add_effect.add_effect(edit, source)
         effect.inbetween, effect.window = "1", len(bars[0])
@@ -58,9 +55,6 @@ def asked(edit, effect, strip, frame):
 
 def looked(edit, effect, strip):
     """What is said once all is measured, as a frame that stays is drawn again and again."""
-    from shutter_addon.blender.data import snapshot
-    from shutter_addon.blender.rendering import strobing
-
     for _ in range(4):
         frame = edit.frame_current
         taken = snapshot.take(edit, effect, strip, (frame,))
@@ -99,8 +93,6 @@ def test_what_is_followed_has_no_steps(add):
     for frame in (1, COUNT):
         effect.camera.location = (-12 * (frame - 1) / WIDTH, 0)
         effect.camera.keyframe_insert("location", frame=frame)
-    from shutter_addon.blender.data import fcurves
-
     for curve in fcurves.curves_under(edit, effect.camera.path_from_id()):
         for key in curve.keyframe_points:
             key.interpolation = "LINEAR"
@@ -108,12 +100,10 @@ def test_what_is_followed_has_no_steps(add):
     assert looked(edit, effect, strip) is None
 
 
-@pytest.mark.parametrize("smooth", ["2", "4", "AUTO"])
-def test_where_smooth_is_on_nothing_is_said(add, smooth):
-    """And nothing is measured."""
-    from shutter_addon.blender.rendering import strobing
-
-    edit, effect, strip = add(12, np.ones(4))
+@pytest.mark.parametrize(("smooth", "window"), [("2", 4), ("4", 4), ("AUTO", 4), ("AUTO", 130)])
+def test_where_smooth_is_on_nothing_is_said(add, smooth, window):
+    """And nothing is measured. 130 frames leave no room for moments."""
+    edit, effect, strip = add(12, np.ones(window))
     effect.inbetween = smooth
     assert looked(edit, effect, strip) is None
     assert not strobing._moved
@@ -122,9 +112,6 @@ def test_where_smooth_is_on_nothing_is_said(add, smooth):
 
 
 def test_without_opencv_nothing_is_said(add, monkeypatch):
-    from shutter_addon.blender.rendering import strobing
-    from shutter_addon.media import opencv
-
     monkeypatch.setattr(opencv, "cv2", None)
     edit, effect, strip = add(12, np.ones(4))
     assert looked(edit, effect, strip) is None
@@ -132,13 +119,9 @@ def test_without_opencv_nothing_is_said(add, monkeypatch):
 
 
 def test_drawing_never_waits_and_measures_once(add, monkeypatch):
-    from shutter_addon.blender.rendering import strobing
-
     edit, effect, strip = add(12, np.ones(4))
     measured, moved = [], steps.moved
     monkeypatch.setattr(steps, "moved", lambda *given: measured.append(given[1]) or moved(*given))
-    from shutter_addon.blender.data import snapshot
-
     taken = snapshot.take(edit, effect, strip, (4,))
     assert strobing.look(effect, taken, *asked(edit, effect, strip, 4)).known is None
     assert not measured
@@ -152,8 +135,6 @@ def test_drawing_never_waits_and_measures_once(add, monkeypatch):
 
 
 def test_what_is_known_is_forgotten_with_the_file(add, bpy):
-    from shutter_addon.blender.rendering import strobing
-
     looked(*add(12, np.ones(4)))
     assert strobing._moved
     bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
@@ -166,8 +147,6 @@ def test_what_is_known_is_forgotten_with_the_file(add, bpy):
 
 def test_smooth_streaks_has_as_many_moments_as_it_takes(add, bpy):
     """By one click, and back by one undo; the bars stay, and nothing is written."""
-    from shutter_addon.blender.data import consistency, selection
-
     edit, effect, strip = add(12, np.ones(4))
     folder = sorted(path.name for path in Path(bpy.data.filepath).parent.rglob("*"))
     bpy.ops.ed.undo_push(message="before")

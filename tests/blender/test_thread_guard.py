@@ -2,6 +2,10 @@
 
 import thread_guard
 
+from shutter_addon.blender.data import selection
+from shutter_addon.blender.rendering import device_work
+from shutter_addon.core import stopping, threads
+
 
 def test_a_render_works_on_threads_that_touch_no_data(bpy, edit, render, effect):
     thread_guard.seen.clear()
@@ -11,9 +15,6 @@ def test_a_render_works_on_threads_that_touch_no_data(bpy, edit, render, effect)
 
 
 def test_data_on_a_thread_are_found(bpy, effect):
-    from shutter_addon.blender.data import selection
-    from shutter_addon.core import threads
-
     selection.active_shutter(effect)
     assert not thread_guard.faults()
     threads.start(selection.active_shutter, effect).result()
@@ -27,9 +28,6 @@ def test_data_on_a_thread_are_found(bpy, effect):
 def test_calls_of_blender_on_a_thread_are_found(bpy):
     """From modules that never import it, too."""
     import gpu
-
-    from shutter_addon.blender.rendering import device_work
-    from shutter_addon.core import stopping, threads
 
     timers, texts, scenes = bpy.app.timers, bpy.app.translations, bpy.data.scenes
     for function in (timers.is_registered, texts.pgettext_rpt, scenes.get, gpu.types.GPUTexture):

@@ -5,42 +5,36 @@ import time
 
 import numpy as np
 import pytest
-from support import Like, picture_of, write_frames
+from support import Like, image_strip, picture_of, write_frames
+
+from shutter_addon.blender.data import strip_timing, struct_dna
+from shutter_addon.blender.editing import add_effect, shutter_edits
+from shutter_addon.blender.output import edit_check
+from shutter_addon.blender.rendering import pictures
+from shutter_addon.compute.cpu import CPUCompositor
+from shutter_addon.core.frames.retiming import RetimingKey, are_retiming_keys
+from shutter_addon.core.model.clip import Clip
 
 
 def keys_of(pairs):
-    from shutter_addon.core.frames.retiming import RetimingKey
-
     return [RetimingKey(index, 0, factor) for index, factor in pairs]
 
 
 @pytest.mark.parametrize("pairs", [[], [(0.0, 0.0)], [(0.0, 0.0), (7.2, 0.5), (7.2, 0.5), (19.6, 1.0)]])
 def test_good_keys(bpy, pairs):
-    from shutter_addon.core.frames.retiming import are_retiming_keys
-
     assert are_retiming_keys(keys_of(pairs))
 
 
 @pytest.mark.parametrize("pair", [(29.0, math.nan), (math.nan, 0.5), (math.inf, 0.5), (1e300, 0.5), (-1.0, 0.5)])
 def test_keys_that_cannot_be(bpy, pair):
-    from shutter_addon.core.frames.retiming import are_retiming_keys
-
     assert not are_retiming_keys(keys_of([(0.0, 0.0), pair, (51.0, 1.0)]))
 
 
 @pytest.mark.parametrize("keys", [2, 3])
 def test_what_cannot_be_read_is_shown_at_an_even_speed(bpy, edit, tmp_path, monkeypatch, keys):
     """In a version of Blender whose layout is not known: the film is rendered, and that is said once."""
-    from shutter_addon.blender.data import strip_timing, struct_dna
-    from shutter_addon.blender.editing import add_effect, shutter_edits
-    from shutter_addon.blender.output import edit_check
-    from shutter_addon.blender.rendering import pictures
-    from shutter_addon.compute.cpu import CPUCompositor
-
     first = write_frames(tmp_path / "in", np.zeros((20, 8, 8, 3), dtype=np.uint8))
-    source = edit.sequence_editor.strips.new_image("images", str(first), 1, 1)
-    for file in sorted(first.parent.iterdir())[1:]:
-        source.elements.append(file.name)
+    source = image_strip(edit, first)
     source.right_handle = 21
     for frame in (1, 11)[: keys - 1]:
         source.retiming_keys.add(timeline_frame=frame)
@@ -69,8 +63,6 @@ def test_what_cannot_be_read_is_shown_at_an_even_speed(bpy, edit, tmp_path, monk
 
 def test_other_memory_than_the_strips(bpy, edit, tmp_path):
     """As if its record lay elsewhere than Blender says: no address in it is followed."""
-    from shutter_addon.blender.data import strip_timing
-
     first = write_frames(tmp_path / "in", np.zeros((1, 8, 8, 3), dtype=np.uint8))
     source = edit.sequence_editor.strips.new_image("images", str(first), 1, 1)
     assert strip_timing.retiming_keys(source) == ()
@@ -80,9 +72,6 @@ def test_other_memory_than_the_strips(bpy, edit, tmp_path):
 
 def test_a_still_of_a_million_frames_takes_no_time(bpy, edit, tmp_path):
     """Blender shows one frame of it all along; where that began is not sought frame by frame."""
-    from shutter_addon.blender.data import strip_timing
-    from shutter_addon.core.model.clip import Clip
-
     first = write_frames(tmp_path / "in", np.zeros((1, 8, 8, 3), dtype=np.uint8))
     source = edit.sequence_editor.strips.new_image("images", str(first), 1, 1)
     source.right_handle = 1_000_000

@@ -191,7 +191,7 @@ def test_an_outline_gets_keys_of_what_it_encloses(track, film, tmp_path, between
 
 
 @pytest.mark.parametrize(
-    ("shown", "last"), [({}, 6), ({"inbetween": 4, "time": [{"frame": 1, "value": 1}, {"frame": 45, "value": 12}]}, 21)]
+    ("shown", "last"), [({}, 6), ({"inbetween": 4, "time": [{"frame": 1, "value": 1}, {"frame": 45, "value": 12}]}, 23)]
 )
 def test_where_it_ends_is_said(track, tmp_path, shown, last):
     rng = np.random.default_rng(1)

@@ -6,13 +6,13 @@ from pathlib import Path
 
 import pytest
 
+from shutter_addon.blender.interface.translations import LANGUAGES
+
 TOLD = Path(__file__).parent / "told.py"
 
 
 @pytest.fixture(scope="module")
 def german(bpy):
-    from shutter_addon.blender.interface.translations import LANGUAGES
-
     return LANGUAGES["de_DE"]
 
 

@@ -11,32 +11,29 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 import pytest
-from support import picture_of, sequencer, state, write_frames
+from support import image_strip, picture_of, sequencer, state, write_frames
 
+from shutter_addon import blender
+from shutter_addon.blender.data import annotations, fcurves, preview_areas, recipe_export, selection
+from shutter_addon.blender.editing import add_effect, bar_edits, reconcile, region_edits, shutter_edits, undelete
+from shutter_addon.blender.interface import bar_editor, operators, panels, probe_gizmo, region_gizmo
+from shutter_addon.blender.output import matte_export
+from shutter_addon.blender.rendering import effect_source, invalidation, render_settings, sessions
 from shutter_addon.core.model.limits import MAX_REGIONS, MAX_SHUTTERS
+from shutter_addon.core.recipes.recipe import RecipeError
 
 NAN, INF = math.nan, math.inf
 
 
-@pytest.fixture(autouse=True)
-def _no_exception(capfd):
-    """Blender prints what a handler raises, and goes on."""
-    yield
-    assert "Traceback" not in capfd.readouterr().err
+pytestmark = pytest.mark.usefixtures("no_exception")
 
 
 @pytest.fixture
 def effect(bpy, edit, tmp_path):
     """An effect of two shutters, the second keyed and drawn with; its strip active."""
-    from shutter_addon.blender.data import annotations, selection
-    from shutter_addon.blender.editing import add_effect, bar_edits, region_edits, shutter_edits
-    from shutter_addon.blender.rendering import render_settings, sessions
-
     frames = np.random.default_rng(0).integers(0, 256, (12, 24, 40, 3), dtype=np.uint8)
     first = write_frames(tmp_path / "in", frames)
-    source = edit.sequence_editor.strips.new_image("images", str(first), 1, 1)
-    for file in sorted(first.parent.iterdir())[1:]:
-        source.elements.append(file.name)
+    source = image_strip(edit, first)
     strip, effect = add_effect.add_effect(edit, source)
     effect.window = 4
     shutter_edits.start(effect)
@@ -69,15 +66,11 @@ def raw(group, name, value):
 
 
 def unkey(group, name):
-    from shutter_addon.blender.data import fcurves
-
     fcurves.remove_curves(group.id_data, f"{group.path_from_id()}.{name}")
 
 
 def key(group, name, *points, index=0):
     """Gives a property an F-curve with these keys (frame, value)."""
-    from shutter_addon.blender.data import fcurves
-
     curve = fcurves.new_curve(group.id_data, f"{group.path_from_id()}.{name}", index)
     curve.keyframe_points.add(len(points))
     curve.keyframe_points.foreach_set("co", [number for point in points for number in point])
@@ -114,8 +107,6 @@ def use_time(effect, value):
 
 def ramp(effect, kind="RAMP", **values):
     """A new ramp or matte of the second shutter."""
-    from shutter_addon.blender.editing import region_edits
-
     return region_edits.add_region(effect, effect.shutters[1], kind, "Ramp", **values)
 
 
@@ -236,8 +227,6 @@ IMPOSSIBLE = {
 @pytest.mark.parametrize("name", IMPOSSIBLE)
 def test_one_sentence_tells_the_place(bpy, edit, effect, name):
     """From the renderer, and from wherever the effect is shown no trace."""
-    from shutter_addon.blender.rendering import effect_source
-
     scene = effect.scene
     assert picture_of(scene, 4).shape == (24, 40, 4)
     change, sentence = IMPOSSIBLE[name]
@@ -267,9 +256,6 @@ def test_what_f_curves_give_stays_in_range(bpy, edit, effect):
 
 def test_a_strip_that_is_scaled_to_nothing(bpy, edit, effect):
     """A strip may grow from nothing: where nobody sees it, its scribbles do not matter. A recipe would lack them."""
-    from shutter_addon.blender.data import recipe_export
-    from shutter_addon.blender.rendering import effect_source
-
     strip = strip_of(effect)
     strip.transform.scale_x = 0
     assert picture_of(effect.scene, 4).shape == (24, 40, 4)
@@ -280,8 +266,6 @@ def test_a_strip_that_is_scaled_to_nothing(bpy, edit, effect):
 
 def test_what_nobody_renders_does_not_matter(bpy, edit, effect):
     """Names twice, layers and shutters that there are not, places in lists beyond their ends."""
-    from shutter_addon.blender.data import selection
-
     before = picture_of(effect.scene, 4)
     raw(effect, "active_shutter", -3)
     raw(effect, "active_region", 99)
@@ -300,9 +284,6 @@ def test_what_nobody_renders_does_not_matter(bpy, edit, effect):
 
 @pytest.mark.parametrize("start", [NAN, 1e30])
 def test_keys_stay_where_they_are_when_the_start_is_none(bpy, edit, effect, start):
-    from shutter_addon.blender.data import fcurves
-    from shutter_addon.blender.editing import reconcile
-
     def keys():
         return [tuple(point.co) for curve in fcurves.curves_under(edit, "") for point in curve.keyframe_points]
 
@@ -315,9 +296,6 @@ def test_keys_stay_where_they_are_when_the_start_is_none(bpy, edit, effect, star
 
 def test_a_copy_has_the_same_impossible_choice(bpy, edit, effect):
     """Copies of what cannot be copied would come with every update, and never be finished."""
-    from shutter_addon.blender.editing import reconcile
-    from shutter_addon.blender.rendering import effect_source
-
     raw(effect, "position", 77)
     raw(effect.regions[0], "kind", 5)
     edit.sequence_editor.strips.new_scene("copy", effect.scene, 5, 100)
@@ -330,8 +308,6 @@ def test_a_copy_has_the_same_impossible_choice(bpy, edit, effect):
 
 
 def test_a_cut_strip_comes_back_with_its_impossible_choice(bpy, edit, effect):
-    from shutter_addon.blender.editing import undelete
-
     raw(effect, "position", 77)
     identity = effect.scene.virtual_shutter.identity
     undelete.keep(effect)
@@ -441,17 +417,11 @@ def corrupt(rng, effect):
 
 
 def rendered(scene):
-    from shutter_addon.blender.rendering import effect_source
-
     with suppress(effect_source.FAULTS):
         assert np.isfinite(picture_of(scene, 4)).all()
 
 
 def exported(edit, effect):
-    from shutter_addon.blender.output import matte_export
-    from shutter_addon.blender.rendering import effect_source
-    from shutter_addon.core.recipes.recipe import RecipeError
-
     with suppress(*effect_source.FAULTS, RecipeError), TemporaryDirectory() as folder:
         matte_export.recipe_for(edit, effect, strip_of(effect), Path(folder, "r.json"))
 
@@ -471,18 +441,6 @@ class Layout:
 
 def show(bpy, edit):
     """Calls what Blender calls where an effect is shown: handlers, polls, panels, gizmos."""
-    from shutter_addon import blender
-    from shutter_addon.blender.data import preview_areas, selection
-    from shutter_addon.blender.editing import reconcile
-    from shutter_addon.blender.interface import (
-        bar_editor,
-        operators,
-        panels,
-        probe_gizmo,
-        region_gizmo,
-    )
-    from shutter_addon.blender.rendering import invalidation
-
     reconcile.update()
     invalidation.invalidate_changed(edit)
     assert not invalidation.invalidate_changed(edit), "it would be drawn again and again"

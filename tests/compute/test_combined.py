@@ -38,15 +38,6 @@ def combining(rng, *combines, window=9, **options):
     return dataclasses.replace(moment, combines=combines)
 
 
-@pytest.mark.parametrize("mode", MODES)
-@pytest.mark.parametrize("interpolation", ["displacement", "value"])
-@pytest.mark.parametrize("light", ["linear", "encoded"])
-def test_random_bars(device, mode, interpolation, light):
-    rng = np.random.default_rng(1)
-    moment = combining(rng, *[MODES[mode]] * 3, interpolation=interpolation, light=light, exposure="weighted")
-    check(device, footage(rng), moment, 2)
-
-
 @pytest.mark.parametrize("mode", ["lightest", "darkest", "median"])
 @pytest.mark.parametrize("window", [2, 3, 16, 64, 256])
 def test_windows_of_any_length(device, mode, window):
@@ -74,14 +65,6 @@ def test_ways_of_which_one_follows(device, edges, index, kind):
     turns, shifts = np.ones((20, 4), complex), np.zeros((20, 4), complex)
     shifts[:, 1] = np.arange(20) * (0.7 - 0.3j)
     check(device, footage(rng, **kind), dataclasses.replace(moment, following=Following(0, turns, shifts)), index)
-
-
-@pytest.mark.parametrize("edges", ["hold", "mirror", "shorten", "slide"])
-@pytest.mark.parametrize("mode", ["threshold", "darkest", "median"])
-@pytest.mark.parametrize("index", [0, 19])
-def test_ends_of_the_clip(device, edges, mode, index):
-    rng = np.random.default_rng(5)
-    check(device, footage(rng), combining(rng, AVERAGE, MODES[mode], edges=edges, position="center"), index)
 
 
 @pytest.mark.parametrize("mode", FEW)
@@ -140,22 +123,6 @@ def test_light_below_black(device, mode, first):
     picture, expected = composed(device, source, combining(rng, MODES[mode], shapes=()), 2)
     assert expected.min() < -0.03
     np.testing.assert_allclose(picture, expected, atol=1e-4)
-
-
-@pytest.mark.parametrize("mode", FEW)
-@pytest.mark.parametrize(
-    "kind",
-    [
-        {"alpha": "straight"},
-        {"alpha": "premultiplied", "transfer": "linear", "dtype": np.float16},
-        {"dtype": np.uint16},
-        {"dtype": np.float32, "transfer": "linear"},
-    ],
-    ids=["straight", "premultiplied", "16 bit", "float"],
-)
-def test_sources(device, mode, kind):
-    rng = np.random.default_rng(7)
-    check(device, footage(rng, **kind), combining(rng, MODES[mode], AVERAGE, MODES[mode]), 3)
 
 
 @pytest.mark.parametrize("mode", FEW)

@@ -104,14 +104,6 @@ def check(device, source, moment, index, direction=1, shot=None, mattes=None):
     return picture, expected
 
 
-@pytest.mark.parametrize("interpolation", ["displacement", "value"])
-@pytest.mark.parametrize("light_", ["linear", "encoded"])
-@pytest.mark.parametrize("exposure", ["normalized", "weighted"])
-def test_random_bars(device, interpolation, light_, exposure):
-    rng = np.random.default_rng(1)
-    check(device, footage(rng), state(rng, interpolation=interpolation, light=light_, exposure=exposure), 2)
-
-
 def few_pieces(rng, window=16, **options):
     """Boxes, deltas and cuts, which are composed from running sums, or piece by piece."""
     moment = state(rng, window, **options)
@@ -140,21 +132,6 @@ def test_few_pieces_of_any_length(device, window, dtype):
     check(device, source, few_pieces(rng, window), 2)
 
 
-@pytest.mark.parametrize("edges", ["hold", "mirror", "shorten", "slide"])
-@pytest.mark.parametrize("position", ["start", "center", "end"])
-@pytest.mark.parametrize("index", [0, 7, 19])
-@pytest.mark.parametrize("direction", [1, -1])
-def test_edges(device, edges, position, index, direction):
-    rng = np.random.default_rng(2)
-    check(device, footage(rng), state(rng, edges=edges, position=position), index, direction)
-
-
-@pytest.mark.parametrize("edges", ["hold", "mirror", "shorten", "slide"])
-def test_window_longer_than_clip(device, edges):
-    rng = np.random.default_rng(3)
-    check(device, footage(rng, count=3), state(rng, window=50, edges=edges, position="center"), 1)
-
-
 def test_shortened_to_nothing_shows_the_nearest_frame(device):
     rng = np.random.default_rng(4)
     bars = np.zeros((2, 8))
@@ -176,19 +153,6 @@ def test_of_two_frames_that_are_as_near_the_windows_earlier_is_shown(device, bar
     index = {1: 0, -1: 1}[direction]
     picture, _ = check(device, source, moment, index, direction)
     assert np.abs(picture - source.linear()[index]).max() < 2e-5
-
-
-@pytest.mark.parametrize("dtype", [np.uint8, np.uint16, np.float16, np.float32])
-@pytest.mark.parametrize("alpha", ["opaque", "straight", "premultiplied"])
-@pytest.mark.parametrize("transfer", ["srgb", "linear"])
-def test_stored_types(device, dtype, alpha, transfer):
-    rng = np.random.default_rng(5)
-    source = footage(rng, dtype=dtype, alpha=alpha, transfer=transfer)
-    if alpha == "premultiplied":
-        top = source.frames[..., 3:]
-        source.frames[..., :3] = np.minimum(source.frames[..., :3], top)
-    for light_ in ("linear", "encoded"):
-        check(device, source, state(rng, light=light_), 1)
 
 
 def soft_edges(rng, dtype, **kind):
@@ -256,13 +220,6 @@ def test_light_without_cover_is_kept(device, dtype):
         assert (picture[..., 3] == 0).all()
 
 
-@pytest.mark.parametrize("block", [2, 4])
-def test_aggregation(device, block):
-    rng = np.random.default_rng(6)
-    check(device, footage(rng), state(rng, aggregate=block), 0)
-    check(device, footage(rng), few_pieces(rng, aggregate=block), 0)
-
-
 @pytest.mark.parametrize("tile", [4, 12, 64])
 @pytest.mark.parametrize("made", [state, few_pieces])
 @pytest.mark.parametrize("block", [1, 2, 4])
@@ -278,12 +235,6 @@ def test_number_of_shutters(device, count):
     rng = np.random.default_rng(7)
     shapes = tuple(Shape(i, "line", 0.05, (np.array([[i / count, 0.1], [i / count, 0.8]]),)) for i in range(count))
     check(device, footage(rng, size=(64, 40)), state(rng, count=count, shapes=shapes), 0)
-
-
-@pytest.mark.parametrize("window", [1, 2, 64, 256])
-def test_window_lengths(device, window):
-    rng = np.random.default_rng(8)
-    check(device, footage(rng, count=40), state(rng, window=window), 3)
 
 
 def far_apart(rng, count, window, **options):
@@ -434,16 +385,16 @@ def test_a_single_shape_that_goes_leaves_the_default(device):
     assert pytest.approx(np.tile([0.75, 0.25, 0], (37 * 23, 1))) == found.reshape(3, -1).T
 
 
-def test_what_is_needed_is_what_is_read(device):
+def test_what_is_missing_is_what_is_read(device):
     rng = np.random.default_rng(21)
     for edges in ("hold", "mirror", "shorten"):
         for index, direction in ((0, 1), (18, 1), (2, -1)):
             source = footage(rng)
             moment = state(rng, edges=edges, position="center")
             renderer = Renderer(device, source)
-            needed = renderer.needed(Request(index, moment, direction))
+            missing = renderer.missing(Request(index, moment, direction))
             renderer.picture(Request(index, moment, direction))
-            assert set(source.reads) == needed
+            assert set(source.reads) == missing
 
 
 def test_no_new_solve_when_nothing_moved(device, monkeypatch):

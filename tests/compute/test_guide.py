@@ -264,7 +264,7 @@ def test_what_is_missing_is_what_is_read(position):
     source, moment = film(), guided(np.random.default_rng(54), 4, position=position)
     renderer = Renderer(CPUCompositor(), ShotSource(source))
     for index in range(22):
-        renderer.needed(Request(index, moment), known=False)  # which finds the cuts
+        renderer.shot(Request(index, moment))  # which finds the cuts
     renderer.release_window()
     for index in (5, 9, 20):
         source.reads.clear()
@@ -281,11 +281,17 @@ def test_in_betweens_that_guide_are_needed():
     renderer = Renderer(CPUCompositor(), ShotSource(source, STEP))
     still = FrameState(Options(1, step=STEP, edge_aware=1.0), np.ones((2, 1)), SHAPES[:1])
     moment = FrameState(Options(1, border=True, step=STEP, edge_aware=1.0), np.ones((2, 1)), SHAPES[:1])
-    assert renderer.needed(Request(42, still), known=False) == {42}
-    assert renderer.needed(Request(42, moment), known=False) == {36, 40, 42, 44, 48}
+
+    def needed(index, moment):
+        renderer.shot(Request(index, moment))  # which finds the cuts
+        renderer.release_window()
+        return renderer.missing(Request(index, moment))
+
+    assert needed(42, still) == {42}
+    assert needed(42, moment) == {36, 40, 42, 44, 48}
     first = BETWEEN[1]
-    assert renderer.needed(Request(first + 1, moment), known=False) == {28, 32, 36}
-    assert renderer.needed(Request(first + 2, moment), known=False) == {29, 28, 32, 36}
+    assert needed(first + 1, moment) == {28, 32, 36}
+    assert needed(first + 2, moment) == {29, 28, 32, 36}
 
 
 def test_a_frame_that_cannot_be_read_is_missed_only_where_it_is_shown():

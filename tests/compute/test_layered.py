@@ -3,11 +3,12 @@
 import dataclasses
 import itertools
 
+import exact_layers
 import numpy as np
 import pytest
 from test_composition import LEVEL, ROUNDED, Footage, device, footage, state  # noqa: F401 – a fixture
 
-from shutter_addon.compute import layer_colors, layer_frames, layer_mattes, running_sums
+from shutter_addon.compute import layer_colors, layer_frames, running_sums
 from shutter_addon.compute.gpu import GPUCompositor
 from shutter_addon.compute.renderer import Renderer, open_compositor, open_gl
 from shutter_addon.compute.request import Request
@@ -201,7 +202,7 @@ def test_layers_and_what_lies_behind_follow(device, alpha, interpolation):  # no
         np.stack([each[indices] for each in mattes]),
         following.at(indices),
     )
-    expected = layering.compose(moment, frames, indices >= 0, c / c.sum(axis=0), of_frames, moves)
+    expected = exact_layers.compose(moment, frames, indices >= 0, c / c.sum(axis=0), of_frames, moves)
     seen = np.ones(SIZE[::-1], bool) if renderer.holes is None else renderer.holes == 0
     assert seen.mean() > 0.5
     assert_near(picture, expected, seen)
@@ -366,7 +367,7 @@ def test_a_threshold_tells_how_much_a_layer_covers(device):  # noqa: F811
     indices = windows.indices(moment.options, SHOWN, range(COUNT))
     c = renderer.coefficients(Request(SHOWN, plain(moment))).astype(np.float64)
     of_frames = np.stack([each[indices] for each in mattes])
-    expected = layering.compose(moment, source.linear()[indices], indices >= 0, c / c.sum(axis=0), of_frames)
+    expected = exact_layers.compose(moment, source.linear()[indices], indices >= 0, c / c.sum(axis=0), of_frames)
     seen = np.ones(SIZE[::-1], bool) if renderer.holes is None else renderer.holes == 0
     assert seen.mean() > 0.5
     assert_near(picture, expected, seen)
@@ -506,9 +507,9 @@ def _no_room(*_):
 
 
 def test_mattes_and_frames_are_kept_within_their_budgets(monkeypatch):
-    monkeypatch.setattr(layer_mattes, "KEPT_BYTES", 0)
+    monkeypatch.setattr(layer_frames, "KEPT_BYTES", 0)
     monkeypatch.setattr(layer_frames, "RECENT_BYTES", 0)
-    kept = layer_mattes.LayerMattes(SIZE, lambda state_, frame: np.zeros((2, *SIZE[::-1])), MatteValues(*SIZE))
+    kept = layer_frames.LayerMattes(SIZE, lambda state_, frame: np.zeros((2, *SIZE[::-1])), MatteValues(*SIZE))
     moment, _ = with_layers(FrameState(Options(4), np.ones((3, 4))), discs())
     source = layer_frames.RecentFrames(footage(np.random.default_rng(0), COUNT, SIZE))
     for frame in range(COUNT):

@@ -33,15 +33,6 @@ def following(rng, source, moment, followers=(1,)):
     return replace(moment, following=motions(rng, source.count, len(moment.bars), followers, size))
 
 
-@pytest.mark.parametrize(("interpolation", "light"), [("displacement", "linear"), ("value", "encoded")])
-@pytest.mark.parametrize("followers", [(0,), (0, 1, 2)])
-def test_random_motions(device, interpolation, light, followers):  # noqa: F811
-    rng = np.random.default_rng(31)
-    source = footage(rng)
-    moment = state(rng, interpolation=interpolation, light=light, exposure="weighted")
-    check(device, source, following(rng, source, moment, followers), 2)
-
-
 @pytest.mark.parametrize("interpolation", ["displacement", "value"])
 @pytest.mark.parametrize("edges", ["hold", "mirror", "shorten", "slide"])
 @pytest.mark.parametrize(("index", "direction"), [(1, 1), (18, 1), (2, -1)])
@@ -62,26 +53,6 @@ def test_windows_end_at_cuts(device, edges, index, direction):  # noqa: F811
     source, options = shots_of(np.uint8), {"edges": edges, "position": "center"}
     for moment in (state(rng, **options), few_pieces(rng, 12, **options)):
         check(device, source, following(rng, source, moment, (0, 1)), index, direction, SHOTS[index])
-
-
-@pytest.mark.parametrize("alpha", ["straight", "premultiplied"])
-@pytest.mark.parametrize(
-    ("dtype", "transfer"), [(np.uint8, "srgb"), (np.uint16, "linear"), (np.float16, "srgb"), (np.float32, "linear")]
-)
-def test_kinds_of_footage(device, dtype, transfer, alpha):  # noqa: F811
-    rng = np.random.default_rng(33)
-    source = footage(rng, dtype=dtype, transfer=transfer, alpha=alpha)
-    if alpha == "premultiplied":
-        colours = source.frames[..., :3] * (source.frames[..., 3:] / source.frames.max())
-        source.frames[..., :3] = colours.astype(dtype)
-    moment = state(rng, light="encoded" if dtype == np.uint16 else "linear")
-    check(device, source, following(rng, source, moment, (0, 2)), 3)
-
-
-def test_many_shutters(device):  # noqa: F811
-    rng = np.random.default_rng(34)
-    source, moment = footage(rng), state(rng, count=6)
-    check(device, source, following(rng, source, moment, (0, 4, 5)), 3)
 
 
 def test_most_shutters_and_frames(gpu_device):
@@ -121,12 +92,6 @@ def test_levels(device, monkeypatch):  # noqa: F811
         assert np.abs(levels - 255 * light.to_encoded(picture.astype(np.float64))).max() <= ROUNDED
 
 
-def test_one_shutter_everywhere(device):  # noqa: F811
-    rng = np.random.default_rng(36)
-    source = footage(rng)
-    check(device, source, following(rng, source, state(rng, shapes=()), (0,)), 3)
-
-
 def test_following_nothing_changes_no_bit(device):  # noqa: F811
     """Nor does what is followed by a shutter that holds nowhere, or what stands still."""
     rng = np.random.default_rng(37)
@@ -145,36 +110,6 @@ def test_chunks_have_the_same_bits(device):  # noqa: F811
     in_order = [renderer.picture(Request(index, moment)) for index, moment in enumerate(moments)]
     for index in (3, 1, 0, 2):
         assert np.array_equal(Renderer(device, source).picture(Request(index, moments[index])), in_order[index])
-
-
-@pytest.mark.parametrize("seed", range(41, 45))
-def test_anything(device, seed):  # noqa: F811
-    rng = np.random.default_rng(seed)
-
-    def one(*options):
-        return options[rng.integers(len(options))]
-
-    count, length = int(rng.integers(1, 5)), int(rng.integers(1, 30))
-    alpha, dtype = one("opaque", "straight"), one(np.uint8, np.uint16, np.float32)
-    size = int(rng.integers(1, 90)), int(rng.integers(1, 50))
-    source = footage(
-        rng, count=int(rng.integers(1, 40)), size=size, dtype=dtype, alpha=alpha, transfer=one("srgb", "linear")
-    )
-    moment = state(
-        rng,
-        length,
-        shapes=tuple(shape for shape in SHAPES if shape.shutter < count),
-        count=count,
-        interpolation=one("displacement", "value"),
-        light="linear" if alpha == "straight" else one("linear", "encoded"),
-        exposure=one("normalized", "weighted"),
-        edges=one("hold", "mirror", "shorten", "slide"),
-        position=one("start", "center", "end"),
-        aggregate=one(1, 2, 4),
-        step=one(1, 2),
-    )
-    followers = [i for i in range(count) if rng.random() < 0.7] or [0]
-    check(device, source, following(rng, source, moment, followers), int(rng.integers(source.count)), one(1, -1))
 
 
 def test_frames_that_are_left_out_are_not_read(device):  # noqa: F811

@@ -200,3 +200,23 @@ def test_a_bezier_way_is_straight_between_frames():
     start = effect.regions[0].placement(1)
     assert found[0] == pytest.approx((halfway.location[0] - start.location[0]) * 64)
     assert isinstance(start, Placement)
+
+
+@pytest.mark.parametrize("steps", [1, 8])
+@pytest.mark.parametrize("layer", [False, True])
+def test_moments_between_frames_ask_for_no_more_of_the_timeline(steps, layer):
+    """Four times the window around the shown frame, and as far as what lies behind layers is looked for: whoever
+    samples F-curves knows no other frames."""
+    source, asked = made(STRAIGHT), []
+    if layer:
+        source = dataclasses.replace(
+            source,
+            shutters=tuple(dataclasses.replace(each, follow=None) for each in source.shutters),
+            regions=tuple(dataclasses.replace(each, layer=True) for each in source.regions),
+            options=Constant(dataclasses.replace(source.options.at(1), plate_reach=3)),
+        )
+    time = SimpleNamespace(at=lambda other: asked.append(other) or (20, False))
+    effect = dataclasses.replace(source.for_picture(SOURCE.width / SOURCE.height), time=time)
+    state_at(effect, SOURCE.stepped(steps), 50)
+    reach = 4 * 6 + (3 if layer else 0)
+    assert (min(asked), max(asked)) == (50 - reach, 50 + reach)

@@ -1,6 +1,5 @@
-"""What masks cover, against distances, angles and floods found pixel by pixel."""
+"""What masks cover, against distances and angles found pixel by pixel."""
 
-from collections import deque
 from dataclasses import replace
 
 import numpy as np
@@ -8,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from shutter_addon.core.masks import mask_filling, mask_handles
+from shutter_addon.core.masks import mask_filling
 from shutter_addon.core.masks.mask import MaskLayer, MaskShape, MaskSpline
 
 SIZES = [(96, 54), (54, 96), (61, 61)]
@@ -45,20 +44,6 @@ def winding(corners, points):
     return np.rint(total / (2 * np.pi)).astype(int)
 
 
-def enclosed(walls):
-    """What no way of open pixels, up, down or aside, leads to from outside."""
-    outside = np.pad(~walls, 1, constant_values=True)
-    reached, ahead = np.zeros(outside.shape, bool), deque([(0, 0)])
-    reached[0, 0] = True
-    while ahead:
-        y, x = ahead.popleft()
-        for at in ((y - 1, x), (y + 1, x), (y, x - 1), (y, x + 1)):
-            if 0 <= at[0] < outside.shape[0] and 0 <= at[1] < outside.shape[1] and outside[at] and not reached[at]:
-                reached[at] = True
-                ahead.append(at)
-    return ~reached[1:-1, 1:-1]
-
-
 @pytest.mark.parametrize("size", SIZES)
 def test_a_mask_lies_in_a_square_around_the_picture(size):
     x, y = np.moveaxis(places(size), -1, 0)
@@ -91,16 +76,13 @@ def test_a_feather_falls_from_the_spline_to_its_width(falloff):
     assert np.abs(value[45] - expected).max() < 0.02
 
 
-@pytest.mark.parametrize("offset_mode", ["EVEN", "SMOOTH"])
-def test_a_circle_and_its_feather_are_round(offset_mode):
+def test_a_circle_and_its_feather_are_round():
     size = 200, 120
     angles = -np.arange(12) * np.pi / 6
     turn = np.stack([np.cos(angles), np.sin(angles)], axis=1)
     along = np.stack([np.sin(angles), -np.cos(angles)], axis=1) * (4 / 3 * np.tan(np.pi / 24))
     points = 0.5 + 0.15 * np.stack([turn - along, turn, turn + along], axis=1)
-    spline = MaskSpline(
-        tuple(tuple(map(tuple, p)) for p in points.tolist()), (0.08,) * 12, ((),) * 12, offset_mode=offset_mode
-    )
+    spline = MaskSpline(tuple(tuple(map(tuple, p)) for p in points.tolist()), (0.08,) * 12, ((),) * 12)
     radius = np.linalg.norm(places(size) - 0.5, axis=-1)
     value = covered([spline], size, falloff="LINEAR")
     assert np.abs(value - np.clip(1 - (radius - 0.15) / 0.08, 0, 1)).max() < 0.02
@@ -163,7 +145,7 @@ def test_what_splines_fill_together(name, holes):
     size = 120, 120
     points = places(size)
     around = [winding(corners, points) for corners in CROSSED[name]]
-    expected = sum(around) != 0 if holes else enclosed(np.any(around, axis=0))
+    expected = sum(around) != 0 if holes else np.any(around, axis=0)
     value = covered([straight(corners) for corners in CROSSED[name]], size, holes=holes)
     # Borders have a feather of a pixel, on one side.
     beside = [np.roll(expected, shift, axis) != expected for shift in (-2, -1, 1, 2) for axis in (0, 1)]
@@ -182,15 +164,6 @@ def test_the_sweep_line_fills_each_or_what_an_odd_number_covers(holes):
     splines = [straight(corners[::-1] if k == 0 else corners) for k, corners in enumerate(CROSSED["two"])]
     value = covered(splines, size, fill_solver="SWEEP_LINE", holes=holes)
     assert np.abs(value - expected).mean() < 0.03
-
-
-def test_the_sweep_line_fills_the_outer_loops_of_what_overlaps_itself():
-    corners, size = CROSSED["star"][0], (100, 100)
-    around = winding(corners, places(size))
-    outer = covered([straight(corners[::-1])], size, fill_solver="SWEEP_LINE")
-    odd = covered([straight(corners[::-1])], size, fill_solver="SWEEP_LINE", overlap=False)
-    assert np.abs(outer - (around != 0)).mean() < 0.03 < np.abs(outer - (around % 2 != 0)).mean()
-    assert np.abs(odd - (around % 2 != 0)).mean() < 0.03
 
 
 EVERYWHERE = straight([(-1, -1), (2, -1), (2, 2), (-1, 2)])
@@ -252,12 +225,10 @@ def test_no_mask_is_too_odd(polygons, data):
             data.draw(st.sampled_from([0, 0.1, -0.1, 2])),
             cyclic=data.draw(st.booleans()),
             fill=data.draw(st.booleans()),
-            offset_mode=data.draw(st.sampled_from(["EVEN", "SMOOTH"])),
-            collapse=data.draw(st.booleans()),
         )
         for corners in polygons
     ]
-    options = {name: data.draw(st.booleans()) for name in ("holes", "overlap", "invert")}
+    options = {name: data.draw(st.booleans()) for name in ("holes", "invert")}
     value = covered(splines, (16, 12), fill_solver=data.draw(st.sampled_from(["CDT", "SWEEP_LINE"])), **options)
     assert value.min() >= 0
     assert value.max() <= 1
@@ -269,42 +240,3 @@ def test_masks_are_keys():
     assert mask == same
     assert hash(mask) == hash(same)
     assert mask != other
-
-
-def test_automatic_handles_of_four_points_make_a_circle():
-    centre = np.array([(0.5, 0.7), (0.7, 0.5), (0.5, 0.3), (0.3, 0.5)])
-    points = np.stack([centre] * 3, axis=1)
-    types = np.full((4, 2), mask_handles.AUTO)
-    made = mask_handles.with_handles(points, types, np.zeros(4, bool), True)
-    reach = np.linalg.norm(made[:, [0, 2]] - centre[:, None], axis=2)
-    assert reach == pytest.approx(0.2 * 0.5523, abs=1e-3)
-    assert np.sum((made[:, 2] - made[:, 0]) * (centre - 0.5), axis=1) == pytest.approx(0, abs=1e-12)
-
-
-def test_automatic_handles_reach_at_most_five_times_as_far_as_the_other_side():
-    middle = np.array([(0.0, 0.0), (0.1, 0.0), (2.1, 0.0)])
-    types = np.full((3, 2), mask_handles.AUTO)
-    made = mask_handles.with_handles(np.stack([middle] * 3, axis=1), types, np.zeros(3, bool), False)
-    assert made[1, :, 0] == pytest.approx([0.1 - 0.2 / 5.1228, 0.1, 0.1 + 1 / 5.1228])
-
-
-def test_vector_handles_point_at_the_neighbours_and_free_ones_stay():
-    points = np.random.default_rng(1).random((5, 3, 2))
-    types = np.array([(mask_handles.VECTOR, mask_handles.FREE)] * 5)
-    made = mask_handles.with_handles(points, types, np.zeros(5, bool), True)
-    before = np.roll(points[:, 1], 1, axis=0)
-    assert made[:, 0] == pytest.approx(points[:, 1] + (before - points[:, 1]) / 3)
-    assert np.array_equal(made[:, 1:], points[:, 1:])
-
-
-@pytest.mark.parametrize("selected", [False, True])
-def test_aligned_handles_are_in_line_and_keep_their_lengths(selected):
-    points = np.random.default_rng(2).random((6, 3, 2))
-    types = np.full((6, 2), mask_handles.ALIGNED)
-    made = mask_handles.with_handles(points, types, np.full(6, selected), False)
-    left, right = made[:, 0] - made[:, 1], made[:, 2] - made[:, 1]
-    assert left[:, 0] * right[:, 1] - left[:, 1] * right[:, 0] == pytest.approx(0, abs=1e-12)
-    assert (np.sum(left * right, axis=1) < 0).all()
-    assert np.linalg.norm(left, axis=1) == pytest.approx(np.linalg.norm(points[:, 0] - points[:, 1], axis=1))
-    kept = 0 if selected else 2
-    assert np.array_equal(made[:, kept], points[:, kept])

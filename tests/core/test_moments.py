@@ -118,3 +118,35 @@ def test_trails_of_light_are_as_bright_as_their_lights(mode, steps, direction):
         is_open = all(bars[k] for k in between) and (len(between) == 2 or place in near)
         wanted[int(place)] = np.mean([bars[k] for k in beside]) / 4 if is_open else 0.0
     assert dict(zip(map(int, at), counts, strict=True)) == pytest.approx(wanted)
+
+
+@pytest.mark.parametrize("direction", [1, -1])
+def test_on_the_way_from_one_frame_to_the_next_a_sharp_frame_is_a_moment(direction):
+    """Displacement passes through the moments, and no streak comes and goes between a sharp frame and a long one."""
+    bars = {"sharp": [1, 0, 0, 0], "next": [0, 1, 0, 0], "long": [4, 4, 4, 4]}
+
+    def between(first, second, share):
+        keys = [{"frame": 16, "bars": bars[first]}, {"frame": 24, "bars": bars[second]}]
+        _index, found = state([{"keys": keys}], 8, frame=16 + 8 * share, direction=direction)
+        return found.bars[0]
+
+    shown = 7 if direction < 0 else 0
+    for eighths in range(9):
+        assert np.flatnonzero(between("sharp", "next", eighths / 8) > 1e-9).tolist() == [shown + eighths]
+    for share in (0.125, 0.25, 0.5):
+        found = between("sharp", "long", share)
+        length = (found > 1e-9 * found.sum()).sum()
+        assert length == pytest.approx(1 + share * 24, abs=1)
+
+
+@pytest.mark.parametrize("edges", ["hold", "shorten"])
+@pytest.mark.parametrize("position", ["start", "center", "end"])
+@pytest.mark.parametrize("steps", STEPS)
+@pytest.mark.parametrize("direction", [1, -1])
+def test_a_threshold_counts_the_frame_that_is_shown(direction, steps, position, edges):
+    bars = [0, 0, 1, 0]
+    shutter = {"bars": bars, "combine": "lightest", "threshold": 0.5, "softness": 0}
+    index, found = state([shutter], steps, direction=direction, position=position, edges=edges)
+    assert windows.positions(found.options, index, direction)[found.options.shown] == index
+    first, last = found.open_span
+    assert first <= found.options.shown < last

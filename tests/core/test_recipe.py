@@ -117,15 +117,8 @@ def broken(change):
         (lambda d: d.update(version=0), "version: 0 is none of 1, 2"),
         (lambda d: d.update(version=True), "version: true is none of 1, 2"),
         (lambda d: d.update(version=1, inbetween="auto"), 'inbetween: recipes have "auto" from version 2 on'),
-        (lambda d: d.update(inbetween=3), "inbetween: 3 is none of 1, 2, 4, 8, 16, auto"),
-        (lambda d: d.update(inbetween="2"), 'inbetween: "2" is none of 1, 2, 4'),
         (lambda d: d.update(inbetween_method="good"), "recipe: unknown field inbetween_method"),
-        (lambda d: d.update(window=0), "window: 0 is not 1 to 256"),
-        (lambda d: d.update(window=257), "window: 257 is not 1 to 256"),
-        (lambda d: d.update(window=8.0), "window: 8.0 is not a whole number"),
         (lambda d: d.update(light="bright"), 'light: "bright" is none of linear, encoded'),
-        (lambda d: d.update(aggregate=3), "aggregate: 3 is none of 1, 2, 4"),
-        (lambda d: d.update(border=1), "border: 1 is not true or false"),
         (lambda d: d.update(shutters=[]), "shutters: there is none"),
         (lambda d: d.update(shutters="Long"), 'shutters: "Long" is not a list'),
         (lambda d: d.update(regions={"a": 1}), "regions: {"),
@@ -138,15 +131,12 @@ def broken(change):
         (lambda d: d["shutters"][0]["bars"].__setitem__(3, "1"), 'shutters[0].bars[3]: "1" is not a number'),
         (lambda d: d["shutters"][0]["bars"].__setitem__(3, True), "shutters[0].bars[3]: true is not a number"),
         (lambda d: d["shutters"][0].update(name="Sharp"), 'shutters[1].name: "Sharp" is taken by shutters[0]'),
-        (lambda d: d["shutters"][0].update(color=[1, 2, 3]), "shutters[0].color: not three numbers"),
-        (lambda d: d["shutters"][0].update(color=[1, 1]), "shutters[0].color: 2 values, not 3"),
         (lambda d: d["shutters"][0].pop("bars"), "shutters[0]: either bars or keys"),
         (lambda d: d["shutters"][1].update(bars=[1] * 8), "shutters[1]: either bars or keys"),
         (lambda d: d["shutters"][1]["keys"][1].update(frame=1), "shutters[1].keys[1].frame: 1 does not follow 1"),
         (lambda d: d["shutters"][1]["keys"][0].update(bars=[1]), "shutters[1].keys[0].bars: 1 values"),
         (lambda d: d["shutters"][1]["keys"][0].update(ease="in"), 'shutters[1].keys[0].ease: "in" is none of'),
         (lambda d: d["regions"][0].update(shutter="X"), 'regions[0].shutter: there is no shutter "X"'),
-        (lambda d: d["regions"][0].update(width=-1), "regions[0].width: -1 is not 0 to 1000"),
         (
             lambda d: d["regions"][0].update(kind="blob"),
             'regions[0].kind: "blob" is none of line, lasso, outline, matte, ramp',
@@ -154,22 +144,9 @@ def broken(change):
         (lambda d: d["regions"].append(MATTE | {"path": ""}), "regions[1].path: empty"),
         (lambda d: d["regions"].append(MATTE | {"path": "a\0b"}), "regions[1].path: U+0000 is no character of a name"),
         (lambda d: d["regions"].append(MATTE | {"strokes": []}), "regions[1]: unknown field strokes"),
-        (lambda d: d["regions"].append(MATTE | {"opacity": 2}), "regions[1].opacity: 2 is not 0 to 1"),
         (lambda d: d["regions"].append(MATTE | {"opacity": []}), "regions[1].opacity: empty: there is no key"),
-        (lambda d: d["regions"].append(MATTE | {"offset": 0.5}), "regions[1].offset: 0.5 is not a whole number"),
-        (lambda d: d["regions"].append(MATTE | {"offset": 10**9}), "regions[1].offset: 1000000000 is not -1048574 to"),
         (lambda d: d["regions"].append(MATTE | {"channel": "x" * 256}), "regions[1].channel: 256 characters, the most"),
-        (
-            lambda d: d["regions"].append(MATTE | {"timing": "edit"}),
-            'regions[1].timing: "edit" is none of source, time',
-        ),
-        (
-            lambda d: d["regions"].append(RAMP | {"ramp": "spiral"}),
-            'regions[1].ramp: "spiral" is none of linear, radial',
-        ),
         (lambda d: d["regions"].append(RAMP | {"path": "a"}), "regions[1]: unknown field path"),
-        (lambda d: d["regions"].append(RAMP | {"blend": "screen"}), 'regions[1].blend: "screen" is none of over, add'),
-        (lambda d: d["regions"].append(RAMP | {"width": -1}), "regions[1].width: -1 is not 0 to"),
         (lambda d: d["regions"].append(RAMP | {"shutter": "Z"}), 'regions[1].shutter: there is no shutter "Z"'),
         (lambda d: d["regions"][0].update(strokes=[]), "regions[0].strokes: empty"),
         (lambda d: d["regions"][0].update(strokes=[[]]), "regions[0].strokes[0]: empty"),
@@ -187,10 +164,7 @@ def broken(change):
         (lambda d: d["shutters"][0].update(bars=["1"] * 1_000_000), 'shutters[0].bars[0]: "1" is not a number'),
         (lambda d: d["shutters"][0].update(bars=[1e6] * 7 + [1.1e6]), "shutters[0].bars: a bar is above a million"),
         (lambda d: d["shutters"][0].update(bars=[1e-46] * 8), "shutters[0].bars: the bars are less than a millionth"),
-        (lambda d: d["shutters"][0].update(name="x" * 64), "shutters[0].name: 64 characters, the most are 63"),
-        (lambda d: d["shutters"][0].update(name="a\0"), "shutters[0].name: U+0000 is no character"),
         (lambda d: d["regions"][0].update(name="\udcff"), "regions[0].name: U+DCFF is no character"),
-        (lambda d: d["regions"][0].update(name="x" * 64), "regions[0].name: 64 characters"),
         (lambda d: d["regions"][0].update(shutter="X" * 999), 'regions[0].shutter: there is no shutter "XXXX'),
         (
             lambda d: d.update(shutters=[{"name": f"{i}", "bars": [1] * 8} for i in range(20_000)]),
@@ -207,7 +181,6 @@ def broken(change):
             lambda d: d["regions"][0]["keys"][1].update(strokes=[[[0, 1e4]]]),
             "regions[0].keys[1].strokes[0][0][1]: 10000 is not -1000 to 1000",
         ),
-        (lambda d: d["regions"][0].update(width=1e4), "regions[0].width: 10000 is not 0 to 1000"),
         (lambda d: d["regions"][0]["keys"][0].update(scale=1e30), "regions[0].keys[0].scale: 1e+30 is not -1000 to"),
         (lambda d: d["regions"][0]["keys"][0].update(rotation=4e5), "regions[0].keys[0].rotation: 400000 is not"),
         (lambda d: d["regions"][0]["keys"][0].update(location=[0, 2e3]), "regions[0].keys[0].location[1]: 2000 is not"),
@@ -217,11 +190,8 @@ def broken(change):
             lambda d: d.update(time=[{"frame": 1048575, "value": 1}]),
             "time[0].frame: 1048575 is not -1048574 to 1048574",
         ),
-        (lambda d: d.update(edge_aware=1.5), "edge_aware: 1.5 is not 0 to 1"),
-        (lambda d: d.update(edge_aware=True), "edge_aware: true is not a number, nor a list of keys"),
         (lambda d: d.update(edge_aware={"keys": []}), 'edge_aware: {"keys": []} is not a number, nor a list of keys'),
         (lambda d: d.update(edge_aware=[]), "edge_aware: empty: there is no key"),
-        (lambda d: d.update(edge_aware=[{"frame": 1, "value": -0.1}]), "edge_aware[0].value: -0.1 is not 0 to 1"),
         (lambda d: d.update(edge_aware=[{"frame": 1, "value": "1"}]), 'edge_aware[0].value: "1" is not a number'),
         (
             lambda d: d.update(edge_aware=[{"frame": 2, "value": 1}, {"frame": 2, "value": 0}]),
@@ -242,7 +212,6 @@ def broken(change):
             lambda d: d["shutters"][0].update(trail=0.1),
             "shutters[0].trail: the shutter follows nothing that could move so far",
         ),
-        (lambda d: trailing(d, -0.1), "shutters[0].trail: -0.1 is not 0 to 1000"),
         (lambda d: trailing(d, "long"), 'shutters[0].trail: "long" is not a number, nor a list of keys'),
         (lambda d: trailing(d, []), "shutters[0].trail: empty: there is no key"),
         (lambda d: trailing(d, [{"frame": 1, "value": 1001}]), "shutters[0].trail[0].value: 1001 is not 0 to 1000"),
@@ -580,20 +549,6 @@ def test_time_between_its_keys():
     found = recipe_file.parse(json.dumps(source | {"time": keys}))
     assert [found.time.at(frame)[0] for frame in (-3, 2, 5, 8.9, 9, 40)] == [5, 6, 9, 9, 1, 1]
     assert comes_back(found)
-
-
-def test_edge_aware_between_its_keys():
-    source = {"version": 2, "window": 1, "shutters": [{"name": "A", "bars": [1]}]}
-
-    def strengths(value, *frames):
-        found = recipe_file.parse(json.dumps(source | {"edge_aware": value}))
-        assert comes_back(found)
-        return [found.for_picture(1).at(frame).options.edge_aware for frame in frames]
-
-    assert recipe_file.parse(json.dumps(source)).at(1).options.edge_aware == 0
-    assert strengths(0.5, -3, 9) == [0.5, 0.5]
-    keys = [{"frame": 2, "value": 0.2}, {"frame": 6, "value": 1, "ease": "constant"}, {"frame": 9, "value": 0}]
-    assert strengths(keys, 1, 4, 6, 8.5, 40) == pytest.approx([0.2, 0.6, 1, 1, 0])
 
 
 def test_what_is_drawn_comes_in_the_order_of_its_regions():

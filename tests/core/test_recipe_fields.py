@@ -1,6 +1,7 @@
 """Recipes say each property as its field defines it."""
 
 import json
+import re
 
 import pytest
 from made_recipes import comes_back
@@ -87,8 +88,9 @@ def test_a_recipe_has_each_field_in_its_range(name, field, way, part):
         found = recipe_file.parse(said(field, way, value))
         assert value_of(found) == value
         assert comes_back(found)
+    place = f"{way[0]}[{way[1]}].{field.recipe}" if way else field.recipe
     for value in wrong:
-        with pytest.raises(recipe.RecipeError, match=field.recipe):
+        with pytest.raises(recipe.RecipeError, match=rf"^{re.escape(place)}(\[\d\])?: "):
             recipe_file.parse(said(field, way, value))
     if field.absent is MISSING:
         with pytest.raises(recipe.RecipeError, match=f"{field.recipe}: missing"):

@@ -138,8 +138,6 @@ def make_smooth(seed: int) -> Case:
     recipe["inbetween"] = int(choose(rng, 2, 4, 8)) if recipe["window"] <= 11 else 2
     add_combining(rng, recipe, len(case.stored), mixed=True)
     direction = -1 if rng.random() < 0.4 else 1
-    if any("threshold" in shutter for shutter in recipe["shutters"]):
-        direction = 1  # in reverse it is the window's first moment that is shown whatever counts
     last = (len(case.stored) - 1) // recipe["inbetween"] * recipe["inbetween"]  # the last filmed frame
     return Case(
         seed,

@@ -38,6 +38,7 @@ premultiplied; coefficients are (N, h, w), of the pixels or of the blocks that s
 """
 
 from collections import namedtuple
+from functools import partial
 from itertools import pairwise
 
 import numpy as np
@@ -130,15 +131,15 @@ def shown(recipe, frame, count):
     return min(max(index, 0), count - 1), -1 if moving and moving[-1] < 0 else 1
 
 
-def bars_at(shutter, frame, interpolation):
-    """A shutter's bars (L,) at a frame."""
+def bars_at(shutter, frame, interpolation, spread=lambda bars: bars):
+    """A shutter's bars (L,) at a frame. spread: gives those of moments, which is what times are displaced among."""
     if "keys" not in shutter:
-        return np.array(shutter["bars"], float)
+        return spread(np.array(shutter["bars"], float))
     a, b, u = between(shutter["keys"], frame)
     both = np.array([a["bars"], b["bars"]], float)
     if interpolation == "value":
-        return (1 - u) * both[0] + u * both[1]
-    mix = np.array([1 - u, u])
+        return spread((1 - u) * both[0] + u * both[1])
+    both, mix = np.array([spread(bars) for bars in both]), np.array([1 - u, u])
     return displaced(both, mix[:, None])[:, 0] * (mix @ both.sum(axis=1))
 
 
@@ -858,10 +859,11 @@ def whole(light):
 def opened(recipe, frame, index, direction, count, aspect):
     """The bars (N, L) of all shutters as they are open, and the turns and shifts (2, N, L), or None, of `motions`."""
     shutters = recipe["shutters"]
-    bars = np.array([bars_at(shutter, frame, option(recipe, "interpolation")) for shutter in shutters])
-    if (steps := option(recipe, "inbetween")) > 1:
-        ways = [shutter.get("combine", "average") for shutter in shutters]
-        bars = np.array([in_moments(own, steps, direction, way) for own, way in zip(bars, ways, strict=True)])
+    spread = [
+        partial(in_moments, shutter, steps=option(recipe, "inbetween"), direction=direction) for shutter in shutters
+    ]
+    each = zip(shutters, spread, strict=True)
+    bars = np.array([bars_at(shutter, frame, option(recipe, "interpolation"), way) for shutter, way in each])
     for i, shutter in enumerate(shutters):
         if shutter.get("length") == "timeline":
             bars[i] = on_timeline(recipe, bars[i], frame, index, direction, count)
@@ -879,10 +881,14 @@ def opened(recipe, frame, index, direction, count, aspect):
     return slid(recipe, bars, where, where, count), moves
 
 
-def in_moments(bars, steps, direction, way):
+def in_moments(shutter, bars, steps, direction):
     """What each moment has of the bars of filmed frames: of its own time, a step long, as much as lies in the half
     intervals between frames whose bars are open, over which these are spread; or of what is lightest or darkest as much
     as the frames count that are nearest."""
+    if steps == 1:
+        return bars
+    if shutter.get("length") == "timeline" or "trail" in shutter:
+        return np.repeat(bars / steps, steps)  # the shape of an exposure, which is moved to its moments later
     length, found = len(bars), np.zeros(len(bars) * steps)
     bars = np.where(bars > 1e-9 * bars.sum(), bars, 0)  # rounding leaves some
     frames = np.arange(length) * steps + (steps - 1 if direction < 0 else 0)
@@ -893,7 +899,7 @@ def in_moments(bars, steps, direction, way):
                 if not (0 <= j < length and bars[k] > 0 and bars[j] > 0):
                     continue
                 half = sorted((frame, (frame + frames[j]) / 2))
-                if way in ("lightest", "darkest"):
+                if shutter.get("combine") in ("lightest", "darkest"):
                     is_half = moment == (frame + frames[j]) / 2
                     found[moment] = found[moment] + bars[k] / 2 if is_half else found[moment]
                     found[moment] = bars[k] if half[0] <= moment <= half[1] and not is_half else found[moment]

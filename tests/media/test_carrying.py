@@ -13,7 +13,7 @@ import pytest
 from shutter_addon.core.frames.light import to_encoded, to_linear
 from shutter_addon.core.model import outlines
 from shutter_addon.core.model.mattes import FileFrame, Matte
-from shutter_addon.media import carried_mattes, carrying, image_writing, matte_tracking, opencv, outline_tracing
+from shutter_addon.media import carried_mattes, carrying, image_writing, matte_tracking, opencv, outlining
 from shutter_addon.media.errors import MediaError
 from shutter_addon.media.matte_values import MatteValues
 
@@ -279,13 +279,13 @@ def test_traced(off):
     away = np.hypot(x - 100, y - 40)
     matte = np.clip(30.5 - away, 0, 1) * np.clip(away - 14.5, 0, 1)
     matte[80, 5] = 1
-    found = outline_tracing.traced(matte.astype(np.float32), off)
+    found = outlining.traced(matte.astype(np.float32), off)
     assert len(found) == 2
     matte[80, 5] = 0
     apart = np.abs(outlines.coverage(found, 120, 90) - matte)
     assert apart.max() <= off + 0.5
     assert apart.mean() <= 0.02 * off + 0.005
-    assert outline_tracing.traced(np.zeros((4, 4), np.float32)) == ()
+    assert outlining.traced(np.zeros((4, 4), np.float32)) == ()
 
 
 def test_what_stands_in(footage, tmp_path):

@@ -4,7 +4,6 @@ import os
 import re
 import struct
 
-import av
 import numpy as np
 import pytest
 from footage import cut_file, damage_frame, make_movie, rotate_movie, save_image
@@ -350,16 +349,6 @@ def test_a_turned_movie(tmp_path):
         assert np.array_equal(matte.read(0), np.rot90(upright, -1))
 
 
-@pytest.mark.parametrize("name", ["m.mp4", "m_01.png"])
-def test_no_file(tmp_path, name):
-    assert sentence(tmp_path / name) == f"{name}: no such file in {tmp_path}"
-    (tmp_path / name).touch()
-    assert sentence(tmp_path / name) == f"{name}: file is empty"
-    (tmp_path / name).unlink()
-    (tmp_path / name).mkdir()
-    assert sentence(tmp_path / name) == f"{name}: is a folder, not a file"
-
-
 @pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="no pipes by name")
 def test_a_pipe(tmp_path):
     """In the place of the first file, of another one, and of a movie."""
@@ -426,11 +415,6 @@ def test_a_channel_that_a_later_frame_lacks(tmp_path):
         matte.read(1)
 
 
-def test_a_movie_of_unknown_length(tmp_path):
-    path = make_movie(tmp_path / "raw.h264", "libx264", 5, format="h264")
-    assert sentence(path) == "raw.h264: its length is unknown; put it into an MP4 or MKV file first"
-
-
 def test_a_display_window_of_absurd_size(tmp_path):
     path = save_image(tmp_path / "a.exr", noise(), "half", names=["m"], display=(0, 0, 47, 43))
     data = path.read_bytes()
@@ -438,12 +422,3 @@ def test_a_display_window_of_absurd_size(tmp_path):
     assert data.count(window) == 1
     path.write_bytes(data.replace(window, struct.pack("<4i", 0, 0, 59_999, 59_999)))
     assert "60000×60000 are too many pixels" in sentence(path, "m") or "cannot be read" in sentence(path, "m")
-
-
-def test_sound_alone(tmp_path):
-    with av.open(str(tmp_path / "song.wav"), "w") as out:
-        stream = out.add_stream("pcm_s16le", rate=8000, layout="mono")
-        frame = av.AudioFrame.from_ndarray(np.zeros((1, 8000), np.int16), format="s16", layout="mono")
-        frame.sample_rate = 8000
-        out.mux(stream.encode(frame))
-    assert sentence(tmp_path / "song.wav") == "song.wav: no video stream"

@@ -188,3 +188,44 @@ def test_it_is_a_source_of_the_same_kind(bunny):
         ahead.want(range(30, 34))
         for index in (33, 30, 3):
             assert np.array_equal(ahead.read(index), plain.read(index))
+
+
+def test_a_read_that_may_not_wait(ahead, source):
+    """It ends at once where the frame is not decoded yet; the thread decodes it next, and it is kept until then."""
+    source.gate.clear()
+    ahead.want([3, 4])
+    now = time.monotonic()
+    for _ in range(2):
+        with stopping.once(stopping.Slice(now + 60, now + 60, waits=False)), pytest.raises(stopping.StoppedError):
+            ahead.read(9)
+    source.gate.set()
+    wait(source, [9])
+    ahead.want([3, 4, 5])  # it does not say so again, and keeps it all the same
+    wait(source, [3, 4, 5])
+    with stopping.once(stopping.Slice(now + 60, now + 60, waits=False)):
+        assert np.array_equal(ahead.read(9), source.frames[9])
+    assert source.reads.count(9) == 1
+
+
+def test_a_frame_is_not_made_on_once_it_is_not_wanted(monkeypatch):
+    """Of frames that take steps, as moments do: the thread goes on with what is wanted now."""
+    source, begun, ended = Footage(), threading.Event(), []
+
+    def read(index):
+        begun.set()
+        while index == 1 and not ended:
+            try:
+                stopping.check()
+            except stopping.StoppedError:
+                ended.append(index)
+                raise
+        return source.frames[index]
+
+    monkeypatch.setattr(source, "read", read)
+    with PrefetchSource(source) as ahead:
+        ahead.want([1, 2])
+        assert begun.wait(10)
+        ahead.want([2])
+        assert np.array_equal(ahead.read(2), source.frames[2])
+        assert ended == [1]
+        assert np.array_equal(ahead.read(1), source.frames[1])

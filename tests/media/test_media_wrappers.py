@@ -29,9 +29,6 @@ def test_through_all_wrappers(bunny):
         assert (source.step, movie.step) == (2, 1)
         assert source.shots is source
         assert movie.shots is None
-        for index in (6, 7):
-            assert source.has(index)
-            source.check(index)
         source.want([6, 7])
         assert np.array_equal(source.read(6), movie.read(3))
         assert np.array_equal(source.read(7), SmoothSource(movie, 2).read(7))

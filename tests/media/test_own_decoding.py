@@ -17,10 +17,9 @@ import numpy as np
 import pytest
 from footage import COUNT, cut_file, damage_frame, make_movie, number, picture, save_image
 
-from shutter_addon.media import MediaError, decoding_child, open_source, pyav
+from shutter_addon.media import MediaError, blender_movie, open_source, pyav
 from shutter_addon.media.blender_movie import BlenderMovie, frame_rate
-from shutter_addon.media.channels import MovieChannel
-from shutter_addon.media.opening import open_channel
+from shutter_addon.media.opening import MovieChannel, open_channel
 from shutter_addon.media.smooth import SmoothSource
 
 ROOT = Path(__file__).parents[2]
@@ -35,19 +34,19 @@ linux = pytest.mark.skipif(not sys.platform.startswith("linux"), reason="looks a
 @pytest.fixture(autouse=True)
 def _lent():
     """Blender as a library decodes; one process for all tests that lend no other."""
-    if decoding_child._command != [sys.executable, str(SCRIPT)]:  # nobody else is told which it is
-        decoding_child.lend([sys.executable, str(SCRIPT)])
+    if blender_movie._command != [sys.executable, str(SCRIPT)]:  # nobody else is told which it is
+        blender_movie.lend([sys.executable, str(SCRIPT)])
 
 
 @pytest.fixture(autouse=True, scope="module")
 def _ended():
     yield
-    decoding_child.lend(None)
+    blender_movie.lend(None)
 
 
 def process():
     """The process that decodes."""
-    return decoding_child._process.pid  # nobody else is told which it is
+    return blender_movie._process.pid  # nobody else is told which it is
 
 
 def assert_same(path, *, deinterlace=False):
@@ -245,7 +244,7 @@ def test_without_pyav_movies_are_opened_so(coloured):
 
 @pytest.mark.usefixtures("_no_pyav")
 def test_without_a_blender_movies_are_refused(coloured):
-    decoding_child.lend(None)
+    blender_movie.lend(None)
     with pytest.raises(MediaError, match=r"^bt709\.mp4: movies need the Python package PyAV"):
         open_source(coloured["bt709.mp4"])
 
@@ -259,7 +258,7 @@ def test_without_a_blender_movies_are_refused(coloured):
     ],
 )
 def test_a_blender_that_does_not_answer_is_one_sentence(coloured, command, reason):
-    decoding_child.lend(command)
+    blender_movie.lend(command)
     sentence = rf"^bt709\.mp4: cannot be read as a movie \(the Blender that decodes it {reason}\)$"
     with pytest.raises(MediaError, match=sentence):
         BlenderMovie(coloured["bt709.mp4"])
@@ -269,23 +268,23 @@ SILENT = [sys.executable, "-c", "import time; time.sleep(600)"]
 
 
 def test_a_blender_that_is_never_ready_is_killed_and_one_sentence(coloured, monkeypatch):
-    monkeypatch.setattr(decoding_child, "STARTING", 0.3)
-    monkeypatch.setattr(decoding_child, "ENDING", 0.1)
-    decoding_child.lend(SILENT)
+    monkeypatch.setattr(blender_movie, "STARTING", 0.3)
+    monkeypatch.setattr(blender_movie, "ENDING", 0.1)
+    blender_movie.lend(SILENT)
     with pytest.raises(MediaError, match=r"\(the Blender that decodes it is not ready after 0\.3 seconds\)$"):
         BlenderMovie(coloured["bt709.mp4"])
-    assert decoding_child._process is None  # nobody else is told whether one runs
+    assert blender_movie._process is None  # nobody else is told whether one runs
 
 
 def test_nobody_waits_for_an_answer_that_does_not_come(coloured, monkeypatch):
     """Who lends no Blender any more, as the extension that is switched off, least of all."""
-    decoding_child.lend(SILENT)
+    blender_movie.lend(SILENT)
     with ThreadPoolExecutor(1) as threads:
         asked = threads.submit(BlenderMovie, coloured["bt709.mp4"])
-        while decoding_child._process is None:  # nobody else is told whether one runs
+        while blender_movie._process is None:  # nobody else is told whether one runs
             assert not asked.done()
-        monkeypatch.setattr(decoding_child, "ENDING", 0.1)
-        decoding_child.lend(None)
+        monkeypatch.setattr(blender_movie, "ENDING", 0.1)
+        blender_movie.lend(None)
         with pytest.raises(MediaError, match=r"\(no Blender decodes it any more\)$"):
             asked.result(20)
 
@@ -298,8 +297,8 @@ def test_where_no_pipe_may_be_enlarged_movies_are_read(movies, monkeypatch):
         raise PermissionError
 
     monkeypatch.setattr(fcntl, "fcntl", refused)
-    decoding_child.lend(None)
-    decoding_child.lend([sys.executable, str(SCRIPT)])
+    blender_movie.lend(None)
+    blender_movie.lend([sys.executable, str(SCRIPT)])
     path, numbers = movies["b_frames.mp4"]
     with BlenderMovie(path) as source:
         assert number(source.read(2)) == numbers[2]
@@ -320,9 +319,9 @@ time.sleep(600)
 def test_no_blender_is_begun_to_close_a_movie(coloured, tmp_path, monkeypatch):
     """Nor does a movie of one that cannot be asked any more fail to be closed."""
     begun = tmp_path / "begun"
-    decoding_child.lend([sys.executable, "-c", LEAVING, str(begun)])
+    blender_movie.lend([sys.executable, "-c", LEAVING, str(begun)])
     source = BlenderMovie(coloured["bt709.mp4"])
-    monkeypatch.setattr(decoding_child, "ENDING", 0.1)
+    monkeypatch.setattr(blender_movie, "ENDING", 0.1)
     source.close()
     source.close()
     assert begun.read_text() == "begun "
@@ -357,7 +356,7 @@ def test_an_answer_that_nobody_waited_for_is_not_the_next_one(movies, tmp_path):
         raise InterruptedTestError
 
     before = signal.signal(signal.SIGUSR1, interrupt)
-    decoding_child.lend([sys.executable, "-c", INTERRUPTING, str(tmp_path / "interrupted")])
+    blender_movie.lend([sys.executable, "-c", INTERRUPTING, str(tmp_path / "interrupted")])
     path, numbers = movies["b_frames.mp4"]
     try:
         with BlenderMovie(path) as source:
@@ -388,7 +387,7 @@ def test_a_blender_that_was_killed_is_followed_by_another(movies):
 
 @pytest.mark.skipif(os.name != "posix", reason="processes are stopped by signals there alone")
 def test_a_blender_that_was_stopped_is_followed_by_another(movies, monkeypatch):
-    monkeypatch.setattr(decoding_child, "ANSWERING", 20)  # in which another one starts, too
+    monkeypatch.setattr(blender_movie, "ANSWERING", 20)  # in which another one starts, too
     with BlenderMovie(movies["open.mp4"][0]) as source, ThreadPoolExecutor(1) as pool:
         before, stopped = source.read(3), process()
         os.kill(stopped, signal.SIGSTOP)
@@ -413,11 +412,11 @@ def assert_ends(pid):
 
 PARENT = """
 import sys
-from shutter_addon.media import decoding_child
+from shutter_addon.media import blender_movie
 from shutter_addon.media.blender_movie import BlenderMovie
-decoding_child.lend([sys.executable, sys.argv[1]])
+blender_movie.lend([sys.executable, sys.argv[1]])
 source = BlenderMovie(sys.argv[2])
-print(decoding_child._process.pid, flush=True)
+print(blender_movie._process.pid, flush=True)
 sys.stdin.read()
 """
 

@@ -58,7 +58,7 @@ def play(story, seconds=STEP):
             return 0.01
         # What comes next is done with what a picture looks like; a window that goes on shows it later.
         previews = sys.modules.get(PREVIEWS)
-        is_composing = previews and previews.looking.slice is not None and not previews.may_be_late()
+        is_composing = previews and previews.is_composing() and not previews.may_be_late()
         del previews  # a module that is held would be taken for one that outlives the extension
         if is_composing:
             return 0.01

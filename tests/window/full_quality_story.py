@@ -109,14 +109,14 @@ def composed_late():
             said.clear()
             yield from driver.until(lambda: late(said), "it says so in full quality")
             assert previews.looking.whole.key is not None
-        assert previews.looking.slice is not None
+        assert previews.looking.slices.last is not None
         driver.shot(step)
         driver.move(story.preview(), 50, 50)
         driver.key("Right")
         yield from driver.until(lambda frame=frame: story.edit().frame_current == frame + 1, "the playhead moves")
         yield from driver.until(lambda: late(said), "it says so of this frame as well")
-        previews._SLICE = previews.looking.seconds = first  # as it was
-        yield from driver.until(lambda: previews.looking.slice is None, "the picture comes", 60)
+        previews._SLICE = previews.looking.slices.seconds = first  # as it was
+        yield from driver.until(lambda: not previews.is_composing(), "the picture comes", 60)
         yield from driver.until(lambda: not late(said), "nothing is late")
     driver.PREVIEWS, preview._Notes = name, notes  # as they were
     story.edit().frame_set(FRAME)

@@ -33,7 +33,7 @@ def sessions():
 def held(which):
     """What a session's textures take, and the kind of its window; None: it has none."""
     # Whoever asks a session for its renderer has it made, and the memory that it takes is what is told here.
-    device, ((_key, renderer),) = which._compositor.result().device, which._renderers.values()
+    device, (*_, (_key, renderer)) = which._compositor.result().device, which._renderers.values()
     window = renderer._window  # likewise
     kind = type(window).__name__ if window is not None and window.is_open else None
     return sum(texture.bytes for texture in device._held), kind  # a budget is shared with the other session's

@@ -62,7 +62,7 @@ def carried():
 
 def mended():
     """The carried curve is pulled up at her head, and let go again by Esc; then that is undone."""
-    drawings, gizmo = part("blender.editing.outline_drawings"), part("blender.interface.outline_gizmo")
+    drawings, gizmo = part("blender.editing.outline_drawings"), part("blender.interface.outline_operators")
     before = shapes()
     with driver.override("PREVIEW"):
         scene, effect, strip = part("blender.data.selection").active(bpy.context)

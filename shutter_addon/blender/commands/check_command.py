@@ -1,4 +1,4 @@
-"""The command `check`: whether an edit can be rendered on this machine, and what that will take."""
+"""The command `check`: whether an edit can be rendered on this machine."""
 
 from __future__ import annotations
 
@@ -14,10 +14,9 @@ import bpy
 from bpy.types import Scene
 
 from ...core import told
-from ...core.farm import chunks, job_file
+from ...core.farm import job_file
 from ...core.farm.edit_version import EditVersion
 from ...core.messages import UserError
-from ...devices.budget import machine_memory
 from ...devices.device import NoDeviceError
 from ..data import missing_media, versions
 from ..devices import available
@@ -29,7 +28,7 @@ from .command_line import place
 
 
 def add(commands: argparse._SubParsersAction) -> None:
-    parser = commands.add_parser("check", help="find out whether an edit can be rendered here, and what that will take")
+    parser = commands.add_parser("check", help="find out whether an edit can be rendered here")
     option = parser.add_argument
     option("edit", metavar="FILE.blend", type=place, help="a saved edit")
     option("--frames", metavar="A:B", help="timeline frames A to B (default: all of the edit)")
@@ -72,7 +71,7 @@ def _report(arguments: Namespace, scene: Scene, frames: range, version: EditVers
     """What is found, as JSON has it (docs/command.md)."""
     faults = [*_version_faults(scene), *_setting_faults(arguments, scene, frames)]
     notes: list[str] = []
-    device, checks, limit = _on_device(scene, frames, faults, notes)
+    device, checks = _on_device(scene, frames, faults, notes)
     for check in checks:
         faults += [f'"{check.name}": {fault}' for fault in check.faults]
         notes += [f'"{check.name}": {note}' for note in check.notes]
@@ -80,10 +79,6 @@ def _report(arguments: Namespace, scene: Scene, frames: range, version: EditVers
     notes += edit_check.stale_films(scene, frames)
     faults += missing_media.faults(scene, frames, sources=False)  # of these the effects' own say more
     faults += missing_media.sound_faults(scene, frames)
-    memory = _memory(checks, limit)
-    if (most := machine_memory()) and memory["host"] > most:
-        words = f"{_in_units(memory['host'])} of memory, the machine has {_in_units(most)}"
-        faults.append(f"a frame needs {words}")
     for folder in dict.fromkeys(_written_folders(arguments, checks)):
         faults += _fault(film_output.check_writable, folder)
     report = {
@@ -95,8 +90,6 @@ def _report(arguments: Namespace, scene: Scene, frames: range, version: EditVers
         "blender": {"here": version.blender, "saved": _file_version()},
         "device": device,
         "effects": [_effect(each) for each in checks],
-        "memory": memory,
-        "chunk": min(len(frames), max([each.chunk for each in checks], default=chunks.LEAST)),
         "notes": notes,
         "faults": faults,
     }
@@ -151,30 +144,16 @@ def _fault(check: Callable, *arguments) -> list[str]:
 
 def _on_device(
     scene: Scene, frames: range, faults: list[str], notes: list[str]
-) -> tuple[str | None, list[EffectCheck], int | None]:
-    """The name of the device that will render, what is found of the effects (edit_check.effects), and the bytes that
-    textures may take of a GPU; without a device, which is a fault, nothing of the effects."""
+) -> tuple[str | None, list[EffectCheck]]:
+    """The name of the device that will render, and what is found of the effects (edit_check.effects); without a device,
+    which is a fault, nothing."""
     try:
         kind, lesser = available.choose(render_settings.wanted())
-        compositor = available.OPEN[kind](render_settings.memory())
     except NoDeviceError as error:
         faults.append(str(error))
-        return None, [], None
+        return None, []
     notes += [lesser] if lesser else []
-    try:
-        limit = compositor.device.budget.limit if hasattr(compositor, "device") else None
-        return compositor.name, edit_check.effects(scene, frames, compositor), limit
-    finally:
-        compositor.release()
-
-
-def _memory(checks: list[EffectCheck], limit: int | None) -> dict:
-    """Bytes that a frame needs at most, where several effects are shown in it of all of them."""
-    shown = [(each.frames, each.needs) for each in checks if each.needs]
-    all_frames = set().union(*(frames for frames, _ in shown))
-    gpu = max((sum(needs.gpu for frames, needs in shown if frame in frames) for frame in all_frames), default=0)
-    host = max((sum(needs.host for frames, needs in shown if frame in frames) for frame in all_frames), default=0)
-    return {"gpu": min(gpu, limit or gpu), "gpu_limit": limit, "host": host}
+    return available.name(kind), edit_check.effects(scene, frames)
 
 
 def _written_folders(arguments: Namespace, checks: list[EffectCheck]) -> Iterator[Path]:
@@ -200,7 +179,6 @@ def _effect(check: EffectCheck) -> dict:
 
 def _lines(report: dict) -> list[str]:
     """The report for people."""
-    memory = report["memory"]
     lines = [
         f"Edit: {report['edit']}, version {report['key']}",
         "Frames: {} to {}, {}×{}".format(*report["frames"], *report["size"]),
@@ -215,19 +193,7 @@ def _lines(report: dict) -> list[str]:
             words += f", {effect['inbetween']} moments each"
         lines.append(f"Effect {effect['strip']}: {words}")
     lines.append(f"Device: {report['device'] or 'none'}")
-    if is_known := all(effect["source"] for effect in report["effects"]):
-        limit = memory["gpu_limit"]
-        gpu = f"{_in_units(memory['gpu'])} of the {_in_units(limit)} that may be taken of the GPU, " if limit else ""
-        lines.append(f"Memory: {gpu}{_in_units(memory['host'])} for decoded frames")
-    lines += [f"Chunk size: {report['chunk']} frames"] if is_known else []
     return lines + [f"Note: {note}" for note in report["notes"]]
-
-
-def _in_units(count: int) -> str:
-    """Bytes for people."""
-    sizes = {"GB": 1 << 30, "MB": 1 << 20, "kB": 1 << 10}
-    unit = next((unit for unit, size in sizes.items() if count >= size), "kB")
-    return f"{count / sizes[unit]:.1f} {unit}"
 
 
 def _saved_by(name: str, version: dict) -> str:

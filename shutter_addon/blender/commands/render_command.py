@@ -109,7 +109,7 @@ def _check_device(arguments: Namespace) -> None:
 
 
 def _written(arguments: Namespace, file_format: str, frames: range) -> list[Path]:
-    """All files that a render writes, but for in-between frames."""
+    """All files that a render writes."""
     files = [arguments.save] if arguments.save else []
     if arguments.output and film_output.is_movie(arguments.output):
         files.append(arguments.output)

@@ -18,9 +18,8 @@ from ...core.recipes import recipe, recipe_file, region_keys
 from ...media import PrefetchSource, camera_tracking, matte_tracking, registration, tracking
 from ...media.carried_mattes import CarriedMattes
 from ...media.cuts import ShotSource
-from ...media.filmed_frames import FilmedFrames
 from ...media.footage import Footage
-from ...media.smooth import steps_for
+from ...media.smooth import SmoothSource, steps_for
 from ...media.tracking import Tracked
 from ..editing import new_edit
 from ..output import film_output
@@ -100,45 +99,47 @@ def _followed(
     effect = source_recipe.for_picture(medium.width / medium.height)
     subject: Any = effect.camera if index is None else effect.regions[index]
     step = _steps(source_recipe, medium)
-    times = {frame: _shown(source_recipe, frame, medium.count, step) for frame in frames}
-    filmed = FilmedFrames(times, arguments.frame)
+    shown = {frame: _shown(source_recipe, frame, medium.count, step) for frame in frames}
     with ExitStack() as ends:
-        shots = ends.enter_context(ShotSource(PrefetchSource(medium)))
-        moved = ends.enter_context(film_output.progress(len(filmed.frames), "frame"))
-        footage = Footage(shots, filmed.index_at)
-        what = footage, filmed.start, filmed.frames
+        moments = medium if step == 1 else SmoothSource(medium, step)
+        shots = ends.enter_context(ShotSource(PrefetchSource(moments), step))
+        moved = ends.enter_context(film_output.progress(len(frames), "frame"))
+        what = Footage(shots, shown.__getitem__), arguments.frame, frames
         if index is None:
-            drawn = [region for region in effect.regions if isinstance(region, Region)]
-            regions = [filmed.seen(region) for region in drawn]
-            found = camera_tracking.follow_camera(filmed.seen(subject), regions, *what, motion=arguments.motion)
+            regions = [region for region in effect.regions if isinstance(region, Region)]
+            found = camera_tracking.follow_camera(subject, regions, *what, motion=arguments.motion)
         elif isinstance(subject, OutlineRegion):
-            cover = _cover(arguments, source_recipe, subject, filmed, ends)
-            found = matte_tracking.follow_cover(filmed.seen(subject), cover, *what, motion=arguments.motion)
+            cover = _cover(arguments, source_recipe, subject, shown, step, ends)
+            found = matte_tracking.follow_cover(subject, cover, *what, motion=arguments.motion)
         else:
-            found = tracking.follow(filmed.seen(subject), *what, motion=arguments.motion)
+            found = tracking.follow(subject, *what, motion=arguments.motion)
         tracked = []
         for each in found:
             tracked.append(each)
             moved()
-    shown = list(filmed.on_timeline(subject, tracked, footage.size))
-    stops = [each for each in shown if each.fault]
-    if len(shown) - len(stops) < 2:
+    stops = [each for each in tracked if each.fault]
+    if len(tracked) - len(stops) < 2:
         raise tracking.TrackingError(stops[0].fault if stops else tracking.ALONE)
-    return {each.frame: each for each in shown if not each.fault}, stops
+    return {each.frame: each for each in tracked if not each.fault}, stops
 
 
 def _cover(
-    arguments: Namespace, source_recipe: Effect, region: OutlineRegion, filmed: FilmedFrames, ends: ExitStack
+    arguments: Namespace,
+    source_recipe: Effect,
+    region: OutlineRegion,
+    shown: dict[int, int],
+    step: int,
+    ends: ExitStack,
 ) -> matte_tracking.Cover:
-    """What an outline covers at the places of filmed frames; ends: what closes its mattes."""
+    """What an outline covers; shown: by timeline frame, the source's moment; ends: what closes its mattes."""
     if region.between == "straight":
-        return lambda place, size: outlines.coverage(region.drawings.at(filmed.timeline[place]), *size)
+        return matte_tracking.cover_within(region.drawings.at)
     medium = ends.enter_context(command_line.opened(arguments.source))
-    drawn, step = {}, _steps(source_recipe, medium)
+    drawn = {}
     for strokes, frame in zip(region.drawings.strokes, region.drawings.frames, strict=True):
-        drawn[int(_shown(source_recipe, frame, medium.count, step))] = outlines.curves(strokes)
+        drawn[_shown(source_recipe, frame, medium.count, step) // step] = outlines.curves(strokes)
     mattes = ends.enter_context(closing(CarriedMattes(medium, tuple(sorted(drawn.items())))))
-    return matte_tracking.cover_of(mattes, filmed.index_at)
+    return matte_tracking.cover_of(mattes, lambda frame: shown[frame] // step)
 
 
 def _keyed(
@@ -173,13 +174,13 @@ def _ended(source_recipe: Effect, index: int | None, tracked: dict, stops: list,
 def _steps(source_recipe: Effect, medium: FrameSource) -> int:
     """How many moments a recipe has from a filmed frame to the next."""
     options = source_recipe.options.at(1)
-    return steps_for(medium, options.step, options.window)
+    return steps_for(medium, options.step, options.window, skip_repeats=options.skip_repeats)
 
 
-def _shown(source_recipe: Effect, frame: float, count: int, step: int) -> float:
-    """Which of a source's frames, from 0 on, a recipe shows at a timeline frame; a fraction: a moment between two."""
+def _shown(source_recipe: Effect, frame: float, count: int, step: int) -> int:
+    """Which of a source's moments, from 0 on, a recipe shows at a timeline frame."""
     filmed = (source_recipe.time.at(frame)[0] if source_recipe.time else frame) - 1
-    return nearest(filmed, step, (count - 1) * step + 1) / step
+    return nearest(filmed, step, (count - 1) * step + 1)
 
 
 def _write_track(arguments: Namespace, result: Effect, tracked: dict, stops: list) -> None:

@@ -11,11 +11,12 @@ from . import consistency, strips
 
 
 def _count_filmed() -> None:
-    """Format 2: bars count filmed frames, not the moments between them as well."""
+    """Format 2: bars count filmed frames, not the moments between them as well; frames that repeat stayed."""
     for scene in _holding():
         for effect in scene.virtual_shutter.effects if scene.virtual_shutter.format < 2 else ():
             if effect.inbetween != "1":
                 consistency.count_filmed(effect)
+                effect.skip_repeats = False
 
 
 # Raise it with the first change after a release that older versions would not understand: a property, an item of an

@@ -16,7 +16,6 @@ import numpy as np
 from bpy.app.translations import pgettext_rpt as rpt_
 from numpy.typing import ArrayLike
 
-from ...core.masks import mask_handles
 from ...core.masks.mask import MaskLayer, MaskShape, MaskSpline
 from ...core.messages import EffectError
 from . import fcurves
@@ -48,7 +47,7 @@ class Shape(NamedTuple):
 
 
 def mask_at(mask: bpy.types.Mask, frame: float) -> MaskShape:
-    """A mask at one of its frames: shape keys, handles and the layers' animated opacity are evaluated.
+    """A mask at one of its frames: shape keys and the layers' animated opacity are evaluated.
 
     EffectError: its points or opacities are no usable numbers, its shape keys cannot be read, or a point has a parent.
     """
@@ -71,7 +70,7 @@ def key_frames(mask: bpy.types.Mask) -> list[float]:
 
 def moves(mask: bpy.types.Mask) -> bool:
     """Whether a mask may differ from frame to frame. EffectError: nobody knows."""
-    return bool(fcurves.curves_under(mask, "")) or any(_shapes(mask, layer) for layer in mask.layers)
+    return bool(key_frames(mask))
 
 
 def _layer_at(mask: bpy.types.Mask, layer: bpy.types.MaskLayer, frame: float) -> MaskLayer:
@@ -85,7 +84,6 @@ def _layer_at(mask: bpy.types.Mask, layer: bpy.types.MaskLayer, frame: float) ->
         splines=tuple(splines),
         alpha=float(_checked(mask, _alpha_at(mask, layer, frame))),
         holes=layer.use_fill_holes,
-        overlap=layer.use_fill_overlap,
         **{name: getattr(layer, name) for name in ("blend", "invert", "falloff", "fill_solver")},
     )
 
@@ -104,9 +102,6 @@ def _spline_at(mask: bpy.types.Mask, spline: bpy.types.MaskSpline, keyed: np.nda
         )
         raise EffectError(sentence.format(mask=mask.name))
     points, weights = _standing_points(spline) if keyed is None else (keyed[:, :6].reshape(-1, 3, 2), keyed[:, 6])
-    types = np.stack([numbers(spline.points, f"handle_{side}_type", np.int32) for side in ("left", "right")], axis=1)
-    selected = numbers(spline.points, "select_left_handle", bool)
-    points = mask_handles.with_handles(points, types, selected, spline.use_cyclic)
     feathers = tuple(tuple((f.u, f.weight) for f in point.feather_points) for point in spline.points)
     _checked(mask, [*points.flat, *weights, *chain(*chain(*feathers))])
     return MaskSpline(
@@ -115,9 +110,7 @@ def _spline_at(mask: bpy.types.Mask, spline: bpy.types.MaskSpline, keyed: np.nda
         feathers=feathers,
         cyclic=spline.use_cyclic,
         fill=spline.use_fill,
-        offset_mode=spline.offset_mode,
         weight_interpolation=spline.weight_interpolation,
-        collapse=spline.use_self_intersection_check,
     )
 
 

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import bpy
 
-from ...media import decoding_child
+from ...media import blender_movie
 
 _SCRIPT = Path(__file__).with_name("decoding_process.py")
 
@@ -19,8 +19,8 @@ def _command() -> list[str]:
 
 
 def register() -> None:
-    decoding_child.lend(_command())
+    blender_movie.lend(_command())
 
 
 def unregister() -> None:
-    decoding_child.lend(None)
+    blender_movie.lend(None)

@@ -5,10 +5,7 @@ An engine's own way to it (bl_use_gpu_context) holds a lock of Blender's for as 
 is drawn meanwhile.
 """
 
-from __future__ import annotations
-
 import queue
-import threading
 import time
 from collections.abc import Callable, Mapping
 from concurrent.futures import Future
@@ -19,9 +16,9 @@ from typing import Any, TypeVar
 import bpy
 import gpu
 
+from ...core import threads
 from ...devices.device import Device
 from ...devices.passes import Pass
-from . import main_thread
 from .blender_gpu import BlenderDevice, has_context
 
 T = TypeVar("T")
@@ -32,23 +29,21 @@ _MOMENT = 0.01  # seconds that the passes take for which it waits at once
 _AHEAD = 4  # passes that wait for the main thread at most: they are run, too, where the picture is not wanted any more
 _REST = 1.0  # seconds without a call, after which the main thread looks for none
 
-_calls: queue.SimpleQueue[tuple] = queue.SimpleQueue()
-_lock = threading.Lock()
-
 
 @dataclass
 class _MainThread:
-    """looks: whether the main thread looks for calls; until: until when at least; looked: when it looked last
+    """calls: that wait for it, as (future, function); until: until when it looks for more; looked: when it did last
     unfinished: passes that may be under way; batch: after how many they are waited for"""
 
-    looks: bool = False
+    calls: queue.SimpleQueue[tuple[Future, Callable]]
     until: float = 0.0
     looked: float = 0.0
     unfinished: int = 0
     batch: int = 8
 
 
-_main = _MainThread()
+# Apart from main_thread's queue: these calls are made while Blender draws as well, where no data may be changed.
+_main = _MainThread(queue.SimpleQueue())
 
 
 class RelayedDevice(BlenderDevice):
@@ -117,22 +112,17 @@ def serve(seconds: float = _LEAST) -> bool:
     if not has_context():
         _redraw()
         time.sleep(_GAP)
-        return _calls.empty()
+        return _main.calls.empty()
     end = time.monotonic() + seconds
     while (left := end - time.monotonic()) > 0:
         try:
-            done, function = _calls.get(timeout=min(left, _GAP))
+            done, function = _main.calls.get(timeout=min(left, _GAP))
         except queue.Empty:
             return True
         _keep_looking()
-        if not done.set_running_or_notify_cancel():
-            continue
-        try:
-            done.set_result(function())
-        except Exception as error:
-            done.set_exception(error.with_traceback(None))  # whose frames refer to textures
-        with suppress(RuntimeError):  # the GPU is full: that is met by who needs it
-            _finish_some()
+        if threads.fulfil(done, function):
+            with suppress(RuntimeError):  # the GPU is full: that is met by who needs it
+                _finish_some()
     return True
 
 
@@ -149,30 +139,22 @@ def _finish_some() -> None:
 def _called(function: Callable[[], T]) -> Future[T]:
     """The function, called on the main thread after all calls before."""
     done: Future[T] = Future()
-    _calls.put((done, function))
     _keep_looking()
-    with _lock:
-        if not _main.looks:
-            _main.looks = True
-            main_thread.soon(_begin_to_look)
+    _main.calls.put((done, function))
     return done
-
-
-def _begin_to_look() -> None:
-    bpy.app.timers.register(_look, persistent=True)
 
 
 def _keep_looking() -> None:
     _main.until = time.monotonic() + _REST
 
 
-def _look() -> float | None:
-    """A timer."""
+def look() -> bool:
+    """Makes calls, on the main thread while it waits for nothing. Whether it has to look again at once."""
+    if _main.calls.empty() and time.monotonic() >= _main.until:
+        return False
     serve(min(max(time.monotonic() - _main.looked, _LEAST), _MOST))
     _main.looked = time.monotonic()
-    with _lock:
-        _main.looks = not _calls.empty() or time.monotonic() < _main.until
-        return 0.0 if _main.looks else None
+    return True
 
 
 def _redraw() -> None:

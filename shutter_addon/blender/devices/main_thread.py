@@ -9,23 +9,25 @@ from collections.abc import Callable
 
 import bpy
 
+from . import gpu_relay
+
 _TICK = 0.02  # seconds from one look at the queue to the next
-_calls: queue.SimpleQueue[Callable[[], None]] = queue.SimpleQueue()
+_calls: queue.SimpleQueue[Callable[[], object]] = queue.SimpleQueue()
 
 
-def soon(function: Callable[[], None]) -> None:
+def soon(function: Callable[[], object]) -> None:
     """Has the main thread of a window call a function, after those before it; for any thread."""
     _calls.put(function)
 
 
 def call_waiting() -> float:
-    """A timer, which is there as long as the extension is."""
+    """A timer, which is there as long as the extension is: it makes the calls of gpu_relay as well."""
     for _ in range(_calls.qsize()):
         try:
             _calls.get_nowait()()
         except Exception:  # Blender would end the timer
             sys.excepthook(*sys.exc_info())  # as Blender does, which prints it and keeps ours (handlers)
-    return _TICK
+    return 0.0 if gpu_relay.look() else _TICK
 
 
 _timers: set[Callable[[], float | None]] = set()  # that Blender may have still once the extension is disabled

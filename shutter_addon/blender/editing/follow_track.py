@@ -135,9 +135,7 @@ def _track_markers(track: MovieTrackingTrack) -> tuple[str, np.ndarray, np.ndarr
 def markers_of(track: MovieTrackingTrack) -> tuple[np.ndarray, np.ndarray]:
     """The frames (n,) of a track's markers that are not muted, ascending, and where these are (n, 2)."""
     frames, shown = _marker_frames(track.markers)
-    places = np.empty(2 * len(frames), np.float32)
-    track.markers.foreach_get("co", places)
-    return frames[shown], places.reshape(-1, 2)[shown]
+    return frames[shown], fcurves.numbers(track.markers, "co", size=2)[shown]
 
 
 def _corners(plane: bpy.types.MovieTrackingPlaneTrack) -> list[tuple[str, np.ndarray, np.ndarray]]:
@@ -148,10 +146,7 @@ def _corners(plane: bpy.types.MovieTrackingPlaneTrack) -> list[tuple[str, np.nda
 
 def _marker_frames(markers: bpy.types.MovieTrackingMarkers) -> tuple[np.ndarray, np.ndarray]:
     """The frames (n,) of markers, ascending, and which of them are not muted."""
-    frames, muted = np.empty(len(markers), np.int32), np.empty(len(markers), bool)
-    markers.foreach_get("frame", frames)
-    markers.foreach_get("mute", muted)
-    return frames, ~muted
+    return fcurves.numbers(markers, "frame", np.int32), ~fcurves.numbers(markers, "mute", bool)
 
 
 def _points(scene: Scene, effect: PropertyGroup, strip: Strip, index: int, start: int) -> dict[int, Points]:
@@ -177,7 +172,7 @@ def _points(scene: Scene, effect: PropertyGroup, strip: Strip, index: int, start
 
 
 def clip_times(scene: Scene, effect: PropertyGroup, strip: Strip, clip: MovieClip) -> dict[int, float]:
-    """By timeline frame of the strip what it shows, in the clip's frames: in-between frames lie between two of them.
+    """By timeline frame of the strip what it shows, in the clip's frames; moments lie between two of them.
     EffectError, MediaError: the strip does not show the clip's footage."""
     frames = range(strip.left_handle, strip.right_handle)
     source = strips.source_of(scene, effect, strip)

@@ -169,8 +169,7 @@ def _drawings(effect: PropertyGroup) -> list[AnnotationFrame]:
 def _move(drawing: AnnotationFrame, change: np.ndarray) -> None:
     """Moves the strokes of a drawing on the image."""
     for stroke in drawing.strokes:
-        points = np.empty((len(stroke.points), 3), np.float32)
-        stroke.points.foreach_get("co", points.ravel())
+        points = fcurves.numbers(stroke.points, "co", size=3)
         points[:, :2] = mapped(change, points[:, :2].astype(np.float64))
         stroke.points.foreach_set("co", points.ravel())
 

@@ -256,8 +256,7 @@ def _insert(curve: fcurves.Timed, frame: float, value: float, ease: str = "LINEA
 
 def _read(curve: fcurves.Timed) -> tuple[np.ndarray, np.ndarray]:
     """The frames (n,) of an F-curve's keys, and which of them were made and are as they were made."""
-    points, count = curve.points(), len(curve.keyframe_points)
-    types, kept = np.empty(count, np.int32), np.empty(count, np.float32)
-    curve.keyframe_points.foreach_get("type", types)
-    curve.keyframe_points.foreach_get("back", kept)
+    points = curve.points()
+    types = fcurves.numbers(curve.keyframe_points, "type", np.int32)
+    kept = fcurves.numbers(curve.keyframe_points, "back")
     return points[:, 0], (types == _MADE) & ((kept == points[:, 1]) | (kept == NOTHING_KEPT))

@@ -11,7 +11,7 @@ from bpy.types import Context, Mask, MaskSpline, PropertyGroup, Scene, Strip
 from ...core.messages import EffectError
 from ...core.model import outline_chains, outlines
 from ...core.model.keyframes import Ease
-from ...media.outline_tracing import traced
+from ...media.outlining import traced
 from ..data import annotations, fcurves, mask_reading, snapshot, strips
 from ..data.property_copy import for_a_while
 from . import outline_drawings, region_edits

@@ -1,10 +1,10 @@
 """An effect's regions and their annotation layers: added, removed, moved, keyed."""
 
 import numpy as np
-from bpy.types import Annotation, AnnotationFrame, AnnotationLayer, PropertyGroup
+from bpy.types import Annotation, AnnotationLayer, PropertyGroup
 
 from ..data import selection, strips
-from ..data.annotations import annotation, layer_of
+from ..data.annotations import add_stroke, annotation, layer_of, strokes_of
 from ..data.consistency import bars, choose_region, color_layers, forget_followed, unique
 from . import collection_edits, motion_keys
 
@@ -90,20 +90,12 @@ def take_layer(effect: PropertyGroup, shutter: PropertyGroup, layer: AnnotationL
     region = add_region(effect, shutter, name=layer.info)
     copy = layer_of(effect, region)
     for drawing in layer.frames:
-        _copy_strokes(drawing, copy.frames.new(drawing.frame_number))
+        copied = copy.frames.new(drawing.frame_number)
+        for points in strokes_of(drawing):
+            add_stroke(copied, points)
     if own:
         effect.scene.annotation.layers.remove(layer)
     return region
-
-
-def _copy_strokes(old: AnnotationFrame, new: AnnotationFrame) -> None:
-    for stroke in old.strokes:
-        copy = new.strokes.new()
-        copy.display_mode = "2DSPACE"
-        copy.points.add(len(stroke.points))
-        flat = np.empty(len(stroke.points) * 3, dtype=np.float32)
-        stroke.points.foreach_get("co", flat)
-        copy.points.foreach_set("co", flat)
 
 
 def free_layers(effect: PropertyGroup, annotation: Annotation | None) -> list:

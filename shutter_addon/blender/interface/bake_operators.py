@@ -6,7 +6,7 @@ from bpy.app.translations import pgettext_rpt as rpt_
 from bpy.props import EnumProperty
 from bpy.types import Context, Operator, PropertyGroup, Scene, Strip, UILayout
 
-from ...core import messages, revision
+from ...core import messages
 from ...core.messages import EffectError, UserError
 from ..data import selection, strips
 from ..devices import main_thread
@@ -16,14 +16,13 @@ from .operator_bases import Named, operator, redraw
 from .panel_parts import draw_progress, sentence
 
 TICK = 0.5  # seconds from one look at the job to the next
-STILL = 1.0  # seconds without a change after which it is asked whether a film is stale
+STILL = 1.0  # seconds from one look at whether a film is stale to the next, at least
 FORMATS = (
     ("MOVIE", "Movie", "H.264, for playing: levels are off by little, and there is no transparency"),
     ("OPEN_EXR", "OpenEXR", "A folder of pictures in full precision, which play more slowly"),
 )
 _running: list[bake_job.BakeJob] = []  # one at most
 _stopped: list[bake_job.BakeJob] = []  # that finish the frame they are at
-_asked: list[int] = []  # revision.number() when that was wanted
 _failures: dict[str, str] = {}  # by the effect's identity: why its last bake failed
 
 
@@ -152,8 +151,6 @@ def _draw_state(layout: UILayout, scene: Scene, effect: PropertyGroup, strip: St
     if not baked_strips.baked_of(scene, strip):
         sentence(layout, iface_("The baked strip was deleted"), "ERROR")
     elif (is_stale := baked_strips.known_stale(scene, effect, strip)) is None:
-        if not bpy.app.timers.is_registered(_ask_whether_stale):
-            _asked[:] = [revision.number()]
         main_thread.later(_ask_whether_stale, STILL)  # beside drawing: it reads all of the effect
     elif is_stale:
         sentence(layout, iface_("The effect has changed since it was baked"), "ERROR")
@@ -161,16 +158,10 @@ def _draw_state(layout: UILayout, scene: Scene, effect: PropertyGroup, strip: St
         sentence(layout, iface_("Baked, and up to date"), "CHECKMARK")
 
 
-def _ask_whether_stale() -> float | None:
-    """Asks once the edit has been left alone for a moment."""
-    if _asked != [revision.number()]:
-        _asked[:] = [revision.number()]
-        return STILL
+def _ask_whether_stale() -> None:
     if (active := selection.active(bpy.context)) is not None:
         baked_strips.is_stale(*active)
         redraw(bpy.context)
-    return None
 
 
-def unregister() -> None:
-    forget()
+unregister = forget

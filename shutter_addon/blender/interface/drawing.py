@@ -140,7 +140,7 @@ def plated(x: float, y: float, words: str) -> None:
     text(x, y, words)
 
 
-def text_width(words: str, size: float = SIZE) -> float:
+def text_width(words: str) -> float:
     """How wide `text` draws words, in pixels."""
-    blf.size(0, size * ui_scale())
+    blf.size(0, SIZE * ui_scale())
     return blf.dimensions(0, words)[0]

@@ -123,5 +123,4 @@ def forget() -> None:
     _before = previews.looking.whole = None
 
 
-def unregister() -> None:
-    forget()
+unregister = forget

@@ -13,8 +13,6 @@ from .operator_bases import Mixin
 
 TWEAK = ("gizmogroup.gizmo_tweak", "LEFTMOUSE", "PRESS", {"any": True})
 
-_made: set[str] = set()  # of which groups
-
 
 class Dragged(Mixin):
     """A gizmo that is drawn while it is dragged as well."""
@@ -54,7 +52,6 @@ class WithKeys(InPreview):
 
     @classmethod
     def setup_keymap(cls, keyconfig: KeyConfig) -> KeyMap:
-        _made.add(cls.__name__)
         keymap = keyconfig.keymaps.new(cls.__name__, space_type=cls.bl_space_type, region_type="WINDOW")
         pen = keymap.keymap_items.new("gpencil.annotate", "LEFTMOUSE", "PRESS", key_modifier="D")
         pen.properties.mode, pen.properties.wait_for_input = "DRAW", False
@@ -88,7 +85,8 @@ def view(effect: PropertyGroup, strip: Strip, region: Region) -> View:
 
 def unregister() -> None:
     """Once the groups are gone."""
+    made = {group.__name__ for group in WithKeys.__subclasses__()}
     keyconfigs = bpy.context.window_manager.keyconfigs
     for keyconfig in filter(None, (keyconfigs.default, keyconfigs.user)):
-        for keymap in [keymap for keymap in keyconfig.keymaps if keymap.name in _made]:
+        for keymap in [keymap for keymap in keyconfig.keymaps if keymap.name in made]:
             keyconfig.keymaps.remove(keymap)

@@ -1,19 +1,23 @@
-"""Operators: what the user can do, as thin calls of plain functions."""
+"""Operators: what the user can do with effects, shutters and regions, as thin calls of plain functions; what gives an
+effect to another clip, its shutters and regions to another effect or a recipe, and a report to whoever helps."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from functools import partial
+from pathlib import Path
 
 import bpy
 from bpy.app.translations import contexts
 from bpy.app.translations import pgettext_iface as iface_
 from bpy.app.translations import pgettext_rpt as rpt_
-from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty
+from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty, StringProperty
 from bpy.types import Annotation, Context, Event, Operator, PropertyGroup
+from bpy_extras.io_utils import ExportHelper, ImportHelper
 
-from ...core.messages import EffectError
+from ...core.messages import EffectError, UserError
 from ...core.model import presets
 from ...core.model.choices import CONTEXT, DRAWN
-from ..data import annotations, consistency, preview_areas, selection, strips
+from ...core.recipes import recipe_file
+from ..data import annotations, consistency, data_format, preview_areas, recipe_import, selection, strips
 from ..devices import main_thread
 from ..editing import (
     add_effect,
@@ -23,10 +27,24 @@ from ..editing import (
     region_edits,
     shown_annotations,
     shutter_edits,
+    undelete,
 )
 from ..editing import match_source as matching
+from ..output import error_report, matte_export
 from . import icons, needs, sharp_frame
-from .operator_bases import UNDOABLE, Mixin, Named, OfEffect, kept, operator, redraw, report_warning
+from .matte_operators import strip_items
+from .operator_bases import (
+    UNDOABLE,
+    Mixin,
+    Named,
+    OfEffect,
+    chosen_file,
+    kept,
+    operator,
+    redraw,
+    report_error,
+    report_warning,
+)
 
 
 class SHUTTER_OT_add_effect(Named, Operator):
@@ -118,19 +136,15 @@ def show_panel(context: Context) -> None:
     for _window, area in preview_areas.previews(context):
         area.spaces.active.show_region_ui = True
     # A sidebar has tabs once it has been drawn, which a slow window does late, and one without room never.
-    _waits[:] = [0.1] * 30
-    main_thread.later(_choose_tab, 0.1)
+    main_thread.later(partial(_choose_tab, iter([0.1] * 30)), 0.1)
 
 
-_waits: list[float] = []
-
-
-def _choose_tab() -> float | None:
+def _choose_tab(waits: Iterator[float]) -> float | None:
     areas = [area for _window, area in preview_areas.previews(bpy.context)]
     sidebars = [next(region for region in area.regions if region.type == "UI") for area in areas]
     drawn = [s for s in sidebars if not s.is_property_readonly("active_panel_category")]
-    if len(drawn) < len(sidebars) and _waits:
-        return _waits.pop()
+    if len(drawn) < len(sidebars) and (wait := next(waits, None)):
+        return wait
     for sidebar in drawn:
         sidebar.active_panel_category = "Shutter"
         sidebar.tag_redraw()
@@ -374,3 +388,80 @@ def region_move(self: Operator, _context: Context, effect: PropertyGroup) -> set
 def region_key(_self: Operator, _context: Context, effect: PropertyGroup) -> None:
     """Insert keyframes for location, rotation and scale of the active region at the current frame"""
     region_edits.key_region(effect, effect.active_region)
+
+
+_STRIP = EnumProperty(name="Strip", items=strip_items, translation_context=contexts.no_translation)
+
+
+@operator("Choose Source", strip=_STRIP)
+def source(self: Operator, _context: Context, effect: PropertyGroup) -> None:
+    """Give the effect another clip: the movie, image or clip strip whose frames it exposes"""
+    add_effect.choose_source(effect, self.effect_strip, self.edit.sequence_editor.strips_all[self.strip])
+
+
+@operator("Copy Effect", options={"REGISTER"})
+def effect_copy(self: Operator, _context: Context, effect: PropertyGroup) -> None:
+    """Copy the shutters, regions, keyframes and options of the effect, for other strips and scenes of this file"""
+    undelete.copy(effect, self.effect_strip)
+    if data_format.is_newer(self.edit):
+        report_warning(self, rpt_("Copied, without what a newer version of Virtual Shutter has added"))
+
+
+class SHUTTER_OT_effect_paste(MakesEffect, OfEffect, Operator):
+    """Give the active strip the copied effect; where it has one, that is replaced"""
+
+    bl_label = "Paste Effect"
+
+    @classmethod
+    def refusal(cls, context: Context) -> str | None:
+        return super().refusal(context) if undelete.has_copy() else rpt_("Copy an effect first")
+
+    def change(self, _context: Context, effect: PropertyGroup) -> None:
+        undelete.paste(effect, self.effect_strip)
+
+
+class SHUTTER_OT_recipe_import(OfEffect, ImportHelper, Operator):
+    """Replace the shutters, regions, keyframes and options of the effect with those of a recipe file"""
+
+    bl_label = "Import Recipe"
+    filename_ext = ".json"
+    filter_glob: StringProperty(default="*.json", options={"HIDDEN"})
+
+    def change(self, _context: Context, effect: PropertyGroup) -> None:
+        path = Path(chosen_file(self))
+        recipe_import.apply(self.edit, effect, self.effect_strip, recipe_file.load(path), path.parent)
+
+
+class SHUTTER_OT_recipe_export(OfEffect, ExportHelper, Operator):
+    """Save the shutters, regions, keyframes and options of the effect as a recipe file"""
+
+    bl_label = "Export Recipe"
+    bl_options = {"REGISTER"}
+    filename_ext = ".json"
+    filter_glob: StringProperty(default="*.json", options={"HIDDEN"})
+
+    def change(self, _context: Context, effect: PropertyGroup) -> None:
+        path = chosen_file(self)
+        try:
+            recipe_file.save(matte_export.recipe_for(self.edit, effect, self.effect_strip, Path(path)), path)
+        except OSError as error:
+            raise UserError(f"{path}: {error.strerror or error}") from None
+        if data_format.is_newer(self.edit):
+            words = rpt_('Saved "{path}", without what a newer version of Virtual Shutter has added')
+            report_warning(self, words.format(path=path))
+        else:
+            self.report({"INFO"}, rpt_('Saved "{path}"').format(path=path))
+
+
+class SHUTTER_OT_copy_report(Named, Operator):
+    """Copy versions, device, kinds and numbers of the edit, and last errors: no names, no paths. Nothing is sent"""
+
+    bl_label = "Copy Report"
+
+    def execute(self, context: Context) -> set[str]:
+        if bpy.app.background:
+            report_error(self, rpt_("Without a window there is no clipboard: use the command check with --report"))
+            return {"CANCELLED"}
+        context.window_manager.clipboard = error_report.text(selection.scene_of(context))
+        self.report({"INFO"}, rpt_("Report copied: paste it into your message, and read it before you send it"))
+        return {"FINISHED"}

@@ -155,6 +155,10 @@ def _draw_exposure(layout: UILayout, scene: Scene, effect: PropertyGroup, strip:
     row.operator("shutter.bars_unkey", text="", icon="KEY_DEHLT")
     layout.prop(effect, "window")
     layout.prop(effect, "inbetween")
+    if effect.inbetween != "1":
+        layout.prop(effect, "skip_repeats")
+        if strobing.repeats(effect):
+            sentence(layout, iface_("Frames of the source repeat: motion goes on across them"), "INFO")
     layout.prop(shutter, "length")
     if shutter.length == "MOTION" and shutter.follow != "NOTHING":
         layout.prop(shutter, "trail")

@@ -18,7 +18,6 @@ from ...core import stopping, told
 from ...core.model.choices import CONTEXT
 from ...core.model.frame_state import FrameState
 from ...devices.device import Texture
-from ...media import MediaError
 from ..data import annotations, preview_areas, selection, strips
 from ..data.preview_areas import Shown
 from ..data.snapshot import Snapshot
@@ -136,10 +135,13 @@ def _draw() -> None:
     # A stroke that is being drawn would lie below our picture: Blender's own shows the same.
     if previews.pen_is_down():
         previews.was_drawn()
-        return
-    if not context.window_manager.virtual_shutter.live:
+        previews.refine()
         return
     say = _Notes(context.region)
+    if not context.window_manager.virtual_shutter.live:
+        with suppress(*effect_source.FAULTS):  # nothing is told
+            previews.refine()
+        return
     with drawing.pixel_space(context.region):
         if (shown := preview_areas.shown(context)) is not None:
             _show(context, shown, decision, say)
@@ -147,6 +149,10 @@ def _draw() -> None:
             previews.looking.whole = None
             previews.was_drawn()
             _tell_unseen(context, say)
+        try:
+            previews.refine()
+        except effect_source.FAULTS as error:
+            _tell_fault(error, say)
         say.draw()
 
 
@@ -162,6 +168,8 @@ def _show(context: Context, shown: Shown, decision: Decision | None, say: "_Note
                 raise stopping.StoppedError
             with stopping.once(wanted.stopped):
                 _show_picture(context, quad, shown, wanted, say)
+            if wanted.decision.is_plain:
+                say(rpt_("Composing…"))
         except stopping.StoppedError:
             say(rpt_("Composing…"))
             _show_strokes(context, quad, shown, wanted.decision.snapshot)
@@ -189,8 +197,6 @@ def _show_picture(context: Context, quad: Quad, shown: Shown, wanted: Drawing, s
         _warn(shown, say)
     if wanted.left > 0:
         _show_source(quad, shown, renderer, request, wanted.left)
-    if wanted.has_result and not wanted.draws_result:
-        _tell_missing(renderer, request, say)
     if wanted.draws_result:
         texture = renderer.draw(replace(request, quick=previews.is_going(context), levels=True))
         quad.draw("PICTURE", {"picture": texture}, wanted.left, 1.0, opacity=shown.strip.blend_alpha)
@@ -212,8 +218,8 @@ def _show_picture(context: Context, quad: Quad, shown: Shown, wanted: Drawing, s
         told.shown(sentence)
         say(sentence)
     # What it measures would take from what runs.
-    if context.space_data.show_overlays and is_still and not previews.may_be_late():
-        decision = wanted.decision
+    decision = wanted.decision
+    if context.space_data.show_overlays and is_still and not decision.is_plain and not previews.may_be_late():
         looked = strobing.look(shown.effect, decision.snapshot, renderer, decision.request)
         _tell_strobing(looked, after_detail, say)
 
@@ -274,14 +280,6 @@ def _show_sharp(context: Context, shown: Shown | None) -> None:
             _show_strokes(context, quad, shown, snapshot)
 
 
-def _tell_missing(renderer: Renderer, request: Request, say: "_Notes") -> None:
-    """Says in the preview what the engine can only report."""
-    try:
-        renderer.check(request)
-    except MediaError as error:
-        _tell_fault(error, say)
-
-
 def _tell_carrying(say: "_Notes") -> None:
     """Has mattes carried that the picture lacks, and says so."""
     fault, progress = outline_carrying.begin(show_carried), outline_carrying.progress()
@@ -323,7 +321,7 @@ def _show_strokes(context: Context, quad: Quad, shown: Shown, snapshot: Snapshot
 
 def _show_source(quad: Quad, shown: Shown, renderer: Renderer, request: Request, right: float) -> None:
     """The source's own frame, from the left edge on: that of a shutter that is open for it alone."""
-    options = replace(request.state.options, step=1)  # no in-between frames come first in reverse
+    options = replace(request.state.options, step=1)  # no moments come first in reverse
     still = np.zeros((1, options.window))
     still[0, options.before] = 1
     # The shown frame lies where it is for all that move. Without a motion, other frames would have to be read for it.

@@ -13,14 +13,11 @@ from pathlib import Path
 import bpy
 from bpy.types import PropertyGroup, Scene, Strip
 
-from ...compute import decoding_ahead, memory_needs
 from ...compute.renderer import Renderer
-from ...compute.request import Compositor, Request
-from ...core.farm.chunks import LEAST, chunk_size
+from ...compute.request import Request
 from ...core.frames import frame_ranges
 from ...core.frames.frame_source import FrameSource
 from ...core.messages import UserError
-from ...core.model.frame_state import FrameState
 from ...core.model.mattes import FileFrame
 from ...media import MediaError
 from ...media.carried_mattes import CarriedMattes
@@ -32,43 +29,34 @@ from ..rendering.session import RenderContext, RenderSession
 
 @dataclass
 class EffectCheck:
-    """What was found of an effect, of the frames that its strips show.
+    """What was found of an effect.
 
     scene: that its strip is in; name: of that strip; source: the footage's first file, "": it cannot be read
     size: of its pictures, width and height in pixels; window: filmed frames of the longest
     shutters: how many
     steps: moments for a filmed frame, 1: it is not smooth
     mattes: how many mattes of outlines are to be carried first, by the folder that they are kept in
-    needs: memory for a frame, None: its frames cannot be asked for
     faults, notes: sentences; notes are of what can be rendered, but otherwise than one may think"""
 
     scene: bpy.types.Scene
     name: str
-    frames: set[float]
     shutters: int
     source: str = ""
     size: tuple[int, int] = (0, 0)
     window: int = 0
     steps: int = 1
     mattes: dict[Path, int] = field(default_factory=dict)
-    needs: memory_needs.Needs | None = None
     faults: list[str] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
 
-    @property
-    def chunk(self) -> int:
-        return chunk_size(self.window * self.steps, self.steps) if self.window else LEAST
 
-
-def effects(scene: Scene, frames: range, compositor: Compositor) -> list[EffectCheck]:
-    """Looks at the effects that the scene's frames show, those of scenes in it included.
-
-    compositor: of the device that will render. Files are opened, and of each the first and the last frame that is
-    needed are read."""
+def effects(scene: Scene, frames: range) -> list[EffectCheck]:
+    """Looks at the effects that the scene's frames show, those of scenes in it included. Files are opened, and of each
+    the first and the last frame that is needed are read."""
     # It asks no device, which would have to wait for its first picture: states and windows are known without.
     session = RenderSession(lambda: ("cpu", None), lambda: None)
     try:
-        return [_effect(session, shown, compositor) for shown in _shown_effects(scene, frames)]
+        return [_effect(session, shown) for shown in _shown_effects(scene, frames)]
     finally:
         session.forget()
 
@@ -86,10 +74,10 @@ def _shown_effects(film: Scene, frames: range) -> Iterator[tuple]:
             yield scene, effect, parts[0], shown
 
 
-def _effect(session: RenderSession, shown: tuple, compositor: Compositor) -> EffectCheck:
+def _effect(session: RenderSession, shown: tuple) -> EffectCheck:
     """shown: of _shown_effects"""
     scene, effect, strip, frames = shown
-    check = EffectCheck(scene=scene, name=strip.name, frames=frames, shutters=len(effect.shutters))
+    check = EffectCheck(scene=scene, name=strip.name, shutters=len(effect.shutters))
     if not _look_at_footage(check, effect, strip):
         return check
     try:
@@ -105,7 +93,6 @@ def _effect(session: RenderSession, shown: tuple, compositor: Compositor) -> Eff
         check.window = max(request.state.options.window for request in requests.values()) // source.step
         _look_at_frames(check, renderer, requests)
         _look_at_mattes(check, source, requests)
-        check.needs = _needs(source, requests, compositor)
         check.notes += _notes(check, taken, requests, renderer.source)
     return check
 
@@ -153,7 +140,7 @@ def _look_at_frames(check: EffectCheck, renderer: Renderer, requests: dict[float
     """Whether the frames that windows need are there: files of image sequences, and of a movie the first and the last
     one."""
     source = renderer.source
-    needed: set[int] = set().union(*map(renderer.needed, requests.values()))
+    needed: set[int] = set().union(*map(renderer.missing, requests.values()))
     ends = {end for index in needed for end in (index // source.step, -(-index // source.step))}
     check.faults += _unreadable(source, ends, source.step)
 
@@ -210,23 +197,7 @@ def _notes(
         notes.append(pictures.SLOW_DECODING)
     if lacking := sum(check.mattes.values()):
         notes.append(f"{lacking} mattes of outlines are not tracked yet: the first render does that, frame by frame")
-    if check.needs and check.needs.sends:
-        notes.append("the GPU has no room for all frames of an exposure: every picture sends them anew, which is slow")
     return notes
-
-
-def _needs(source: FrameSource, requests: dict[float, Request], compositor: Compositor) -> memory_needs.Needs:
-    """The most that one of the windows needs, decoded frames included."""
-    kinds = {_kind(request.state) for request in requests.values()}
-    most = max(compositor.needs(source, kind) for kind in kinds)
-    window = max(request.state.options.window for request in requests.values())
-    return most._replace(host=most.host + decoding_ahead.decoded_bytes(source, window))
-
-
-def _kind(state: FrameState) -> memory_needs.Kind:
-    layers = len(state.layers.shutters) if state.layers else 0
-    moved, count = state.following is not None, len(state.bars)
-    return memory_needs.Kind(state.options.window, moved, count, layers, state.averages)
 
 
 def left_out(scene: Scene, frames: range) -> list[str]:

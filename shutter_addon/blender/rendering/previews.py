@@ -10,7 +10,7 @@ them. Drawn by our handler, the picture stays on the GPU, and is as small as it 
 import math
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
 from bpy.types import Context, Scene
@@ -18,12 +18,12 @@ from bpy.types import Context, Scene
 from ...compute.renderer import Renderer
 from ...compute.request import Request
 from ...core.frames.frame_source import FrameSource
-from ...core.stopping import Slice, never
+from ...core.stopping import Slice, Slices, never
 from ...media.reduced import DIVISORS
 from ..data import annotations, preview_areas, selection, strips
 from ..data.preview_areas import Look, Shown
 from ..data.snapshot import Snapshot
-from . import effect_source, invalidation, render_job, sessions
+from . import effect_source, invalidation, render_job, sessions, smooth_previews
 from .session import RenderContext
 
 # Operators that read the sequencer's pictures, from the window.
@@ -35,8 +35,6 @@ _PEN = "GPENCIL_OT_annotate"
 _MOMENT = 0.3  # seconds
 _SLICE = 0.15  # seconds
 _PLAYED = 1.0  # seconds: of a frame that plays, which has one slice, as the next one is another frame
-# By how much the next slice is longer, so that all ends: of each, and of one that begins again what the last one did.
-_LONGER, _AGAIN = 1.02, 1.5
 _READING_TOOL = "builtin.sample"  # reads once before it is one of those that run
 DRAFT_ROWS = 270  # blocks along the shorter side of a draft in which shutters follow edges
 RESULTS = "RESULT", "SPLIT", "EDGES", "HOLES"  # views of the live preview that show the result
@@ -59,11 +57,13 @@ class Decision:
 
     snapshot: of the effect; request: its picture in the previews' detail
     is_drawn: whether our draw handler shows the result in place of Blender
+    is_plain: whether it is the plain picture, and the smooth one is on its way
     is_late: whether the engine was stopped, for the window to look at its keys"""
 
     snapshot: Snapshot
     request: Request
     is_drawn: bool
+    is_plain: bool = False
     is_late: bool = False
 
 
@@ -104,17 +104,13 @@ class _Looking:
 
     whole: the picture that is looked at as it will be rendered; late_until: the time until which pictures may be late
     decision: the engine's, for the draw handler, which Blender calls after it
-    slice_of: key of the request that is composed in slices of time; slice: the last one
-    soon, seconds: how long that was to be, with something kept and at most
+    slices: of time, in which a request is composed, by its key
     """
 
     whole: Whole | None = None
     late_until: float = 0.0
     decision: Decision | None = None
-    slice_of: tuple | None = None
-    slice: Slice | None = None
-    soon: float = _SLICE
-    seconds: float = _SLICE
+    slices: Slices = field(default_factory=Slices)
 
 
 looking = _Looking()
@@ -139,7 +135,8 @@ def for_engine(context: Context, effect_scene: Scene) -> Asked | None:
         stopped = _time_up(context, decision.request.key) if is_told else None
         return Asked(snapshot, frame, decision.request.source.detail, decision.is_drawn, stopped)
     detail = effect_source.FULL if look is None or looking.whole is not None else _detail(context, look)
-    return Asked(snapshot, frame, detail, False)
+    request = _best(context, sessions.of_drawing(), snapshot, frame, detail)
+    return Asked(snapshot, frame, request.source.detail, False)
 
 
 def engine_stopped() -> None:
@@ -193,7 +190,10 @@ def _look(context: Context, shown: Shown) -> Look:
 def _decide(context: Context, shown: Shown, look: Look, snapshot: Snapshot) -> Decision:
     render = sessions.of_drawing()
     request = _requested(context, render, shown, snapshot, look)
-    return Decision(snapshot, request, _is_drawn(context, shown, look, render.renderer(request).source))
+    is_plain = smooth_previews.comes(snapshot.scene)
+    is_less = is_plain or is_going(context)
+    is_drawn = _is_drawn(context, shown, look, render.renderer(request).source, is_less=is_less)
+    return Decision(snapshot, request, is_drawn, is_plain)
 
 
 def _snapshot(shown: Shown) -> Snapshot:
@@ -209,33 +209,46 @@ def _requested(context: Context, render: RenderContext, shown: Shown, snapshot: 
         and (whole.scene, whole.frame) == (snapshot.scene, frame)
         and not is_going(context)
     ):
-        request = render.request(snapshot, frame, effect_source.FULL)
-        if whole.key in (None, request.key[1:]):
-            whole.key = request.key[1:]
-            return request
+        plain = render.request(snapshot, frame, replace(effect_source.FULL, smooth=False))
+        if whole.key in (None, plain.key[1:]):
+            whole.key = plain.key[1:]
+            return _best(context, render, snapshot, frame, effect_source.FULL)
     looking.whole = None
-    return render.request(snapshot, frame, _detail(context, look))
+    return _best(context, render, snapshot, frame, _detail(context, look))
+
+
+def _best(
+    context: Context, render: RenderContext, snapshot: Snapshot, frame: float, detail: effect_source.Detail
+) -> Request:
+    """The picture in a detail; the plain one, where the smooth one would have to be waited for."""
+    if is_read(context) or not detail.smooth:
+        smooth_previews.rest()
+        return render.request(snapshot, frame, detail)
+    return smooth_previews.chosen(render, snapshot, frame, detail)
 
 
 def _detail(context: Context, look: Look) -> effect_source.Detail:
     """What a picture is composed in for the previews of its scene: smaller by the power of two, of reduced.DIVISORS,
     that is nearest to the largest of them, and from the proxy that Blender reads for that one. What plays is not
-    smooth: it would wait for optical flow."""
+    smooth: it would wait for optical flow. Nor is what the other views show."""
     if (scale := look.scale) is None:
         return effect_source.FULL
     divisor = min(DIVISORS, key=lambda number: abs(math.log2(max(scale, 1e-3) * number)))
-    return effect_source.Detail(divisor, look.proxy, smooth=not is_going(context))
+    is_smooth = not is_going(context) and context.window_manager.virtual_shutter.view in RESULTS
+    return effect_source.Detail(divisor, look.proxy, smooth=is_smooth)
 
 
-def _is_drawn(context: Context, shown: Shown, look: Look, source: FrameSource) -> bool:
+def _is_drawn(context: Context, shown: Shown, look: Look, source: FrameSource, *, is_less: bool) -> bool:
     """Whether our draw handler shows the result, or in another view what covers it, in place of what Blender makes of
     the engine's picture: wherever both are the same, in all previews of the scene. Not a still picture of full size:
-    what is drawn passes through 8 bits on its way to the screen, and lacks shades next to black."""
+    what is drawn passes through 8 bits on its way to the screen, and lacks shades next to black.
+
+    is_less: whether a better one will follow"""
     settings = context.window_manager.virtual_shutter
-    is_less = source.from_proxy or source.width < annotations.picture_size(shown.effect)[0]
+    is_small = source.from_proxy or source.width < annotations.picture_size(shown.effect)[0]
     return (
         settings.live
-        and (is_less or is_going(context) or settings.view not in RESULTS)
+        and (is_small or is_less or settings.view not in RESULTS)
         and not shown.strips_above
         and source.alpha == "opaque"
         and look.is_plain
@@ -271,20 +284,27 @@ def _time_up(context: Context, key: tuple) -> Slice:
     """What says whether a picture, by its request's key, has been composed for so long that Blender has to look at its
     keys: it goes on when it is drawn again."""
     if _is_playing(context):
-        looking.soon = looking.seconds = _PLAYED
-    elif looking.slice is None or looking.slice_of != key:
-        looking.soon = looking.seconds = _SLICE / 2  # the playhead moves with it, and a note
-    else:
-        looking.soon = max(_SLICE, looking.soon * _LONGER)
-        looking.seconds = max(looking.soon, looking.seconds * (1 if looking.slice.has_kept else _AGAIN))
-    now = time.monotonic()
-    looking.slice_of, looking.slice = key, Slice(now + looking.soon, now + looking.seconds)
-    return looking.slice
+        looking.slices.end()
+        return looking.slices.next(key, _PLAYED, _PLAYED)
+    return looking.slices.next(key, _SLICE / 2, _SLICE)  # the playhead moves with the first one, and a note
 
 
 def was_drawn() -> None:
     """A picture is there, however many times it took."""
-    looking.slice_of = looking.slice = None
+    looking.slices.end()
+
+
+def is_composing() -> bool:
+    """Whether a picture is on its way, a better one or the first."""
+    return looking.slices.last is not None or smooth_previews.is_busy()
+
+
+def refine() -> None:
+    """Goes on with the smooth pictures behind what was drawn. One of effect_source.FAULTS: there is none."""
+    if pen_is_down():
+        smooth_previews.rest()
+    elif looking.slices.last is None:
+        smooth_previews.advance(_SLICE)
 
 
 def is_going(context: Context) -> bool:
@@ -307,8 +327,8 @@ def is_tracking() -> bool:
 
 
 def may_be_late() -> bool:
-    """Whether the playhead is dragged, something is tracked or in-between frames are built, or was a moment ago: keys
-    count for more than pictures."""
+    """Whether the playhead is dragged, or something is tracked, or was a moment ago: keys count for more than
+    pictures."""
     if _GOING & render_job.operators_running():
         looking.late_until = time.monotonic() + _MOMENT
     return time.monotonic() < looking.late_until

@@ -15,6 +15,7 @@ from concurrent.futures import Future, wait
 from contextlib import AbstractContextManager, contextmanager, suppress
 from dataclasses import dataclass
 from enum import Enum
+from functools import partial
 from itertools import chain
 from types import FrameType
 from typing import TypeVar
@@ -22,7 +23,7 @@ from typing import TypeVar
 import bpy
 from bpy.types import Scene
 
-from ...core import told
+from ...core import threads, told
 from ...core.messages import sentence, signed
 from ..data.property_copy import for_a_while
 from ..data.strips import ENGINE
@@ -182,15 +183,7 @@ def on_main_thread(function: Callable[[], T], ended: Callable[[], bool] | None =
     future: Future[T] = Future()
     deadline = time.monotonic() + _LONG
     ended = ended or (lambda: time.monotonic() > deadline)
-
-    def call() -> None:
-        if future.set_running_or_notify_cancel():
-            try:
-                future.set_result(function())
-            except Exception as error:
-                future.set_exception(error)
-
-    main_thread.soon(call)
+    main_thread.soon(partial(threads.fulfil, future, function))
     while not wait([future], _PATIENCE).done:
         if ended() and future.cancel():
             return None

@@ -28,8 +28,9 @@ from . import render_settings
 from .device_work import T, Work, broken_off, result_of
 from .effect_source import FAULTS, FULL, Detail, SourceKey, clip_of
 
-# Renderers whose frames are kept: more effects than these in one frame decode their windows again for every frame.
+# Effects whose frames are kept: more than these in one frame decode their windows again for every frame.
 _KEPT = 4
+Place = tuple[int, bool]  # of a renderer: SourceKey.place
 
 
 @dataclass(frozen=True)
@@ -73,8 +74,8 @@ class RenderSession:
         self._chosen: tuple[str, str | None] | None = None
         self._executor: Executor | None = None
         self._compositor: Future | None = None
-        self._renderers: dict[int, tuple[SourceKey, Renderer]] = {}
-        self._requests: dict[int, tuple[Snapshot, float, Request]] = {}  # by scene: the last one
+        self._renderers: dict[Place, tuple[SourceKey, Renderer]] = {}
+        self._requests: dict[Place, tuple[Snapshot, float, Request]] = {}  # the last ones
         self._shown: dict[int, float] = {}  # by scene: the timeline frame that was shown last
         self._begun: dict[int, tuple[tuple, Work]] = {}  # by scene: the key of a request, its picture
 
@@ -114,10 +115,12 @@ class RenderSession:
         is not waited for any longer.
 
         detail: None: as it was the last time, for who asks for no picture"""
-        known = self._renderers.get(snapshot.scene)
-        key = SourceKey.of(snapshot, detail or (known[0].detail if known else FULL))
+        if detail is None:
+            known = (self._renderers.get((snapshot.scene, is_smooth)) for is_smooth in (False, True))
+            detail = next((each[0].detail for each in known if each), FULL)
+        key = SourceKey.of(snapshot, detail)
         source = self.renderer(key, context.say, context.stopped).source
-        if (last := self._requests.get(snapshot.scene)) and last[0] is snapshot and last[1] == frame:
+        if (last := self._requests.get(key.place)) and last[0] is snapshot and last[1] == frame:
             request = last[2]
             if (request.source, request.levels, request.display) == (key, context.levels, context.display):
                 return request
@@ -131,7 +134,7 @@ class RenderSession:
             levels=context.levels,
             display=context.display,
         )
-        self._requests[snapshot.scene] = snapshot, frame, request
+        self._requests[key.place] = snapshot, frame, request
         return request
 
     def picture(self, request: Request, stopped: Callable[[], bool] = never) -> np.ndarray:
@@ -166,18 +169,27 @@ class RenderSession:
     def renderer(
         self, key: SourceKey, say: Callable[[str], None] = print, stopped: Callable[[], bool] = never
     ) -> Renderer:
-        """The renderer that reads what the key says: the only one that its effect has. One of FAULTS: there is none."""
+        """The renderer that reads what the key says: its effect has one other at most, for plain pictures or for smooth
+        ones. One of FAULTS: there is none."""
         compositor = self._opened(say, stopped)
-        known = self._renderers.pop(key.scene, None)
+        known = self._renderers.pop(key.place, None)
         if known is None or known[0] != key:
             if known is not None:
                 self._submit(known[1].close)
             source = key.open(planes=compositor.takes_planes, keeps=self._late is None)
             known = key, Renderer(compositor, source, MatteValues.of(source, self._late))
-        self._renderers[key.scene] = known
-        while len(self._renderers) > _KEPT:
+            other = key.scene, not key.place[1]
+            if other in self._renderers and not self._renderers[other][0].is_beside(key):
+                self._submit(self._renderers.pop(other)[1].close)
+        self._renderers[key.place] = known
+        while len({scene for scene, _ in list(self._renderers)}) > _KEPT:
             self._submit(self._renderers.pop(next(iter(self._renderers)))[1].close)
         return known[1]
+
+    def open_renderer(self, key: SourceKey) -> Renderer | None:
+        """As `renderer`; None: it was not opened yet."""
+        known = self._renderers.get(key.place)
+        return known[1] if known and known[0] == key else None
 
     def _opened(self, say: Callable[[str], None], stopped: Callable[[], bool]) -> Any:
         """The compositor, opened if need be."""
@@ -226,10 +238,11 @@ class RenderSession:
         """Closes what belongs to other scenes than those of these session_uids. A render job may take them away
         meanwhile."""
         self._drop_begun(set(self._begun) - scenes)
-        for known in (self._shown, self._requests):
-            for place in set(known) - scenes:
-                known.pop(place, None)
-        for place in set(self._renderers) - scenes:
+        for scene in set(self._shown) - scenes:
+            self._shown.pop(scene, None)
+        for place in [place for place in list(self._requests) if place[0] not in scenes]:
+            self._requests.pop(place, None)
+        for place in [place for place in list(self._renderers) if place[0] not in scenes]:
             _key, renderer = self._renderers.pop(place, (None, None))
             if renderer is not None:
                 self._submit(renderer.close)

@@ -11,7 +11,7 @@ import bpy
 from ...core.pixels.shown_levels import Display
 from ...core.stopping import never
 from ..devices import available, gpu_relay
-from . import outline_carrying, render_job, render_settings
+from . import outline_carrying, render_job, render_settings, smooth_previews
 from .render_job import Where
 from .session import RenderContext, RenderSession
 
@@ -95,5 +95,6 @@ def drop_removed() -> None:
 def forget(*_: object) -> None:
     """Closes all sources and frees the devices: when a file is loaded, and when the extension goes."""
     outline_carrying.forget()
+    smooth_previews.forget()
     for session in SESSIONS:
         session.forget()

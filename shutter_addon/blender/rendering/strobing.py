@@ -30,8 +30,16 @@ _PAIRS = 4  # of neighbouring frames that are measured for a picture, at most
 _KEPT = 64  # pairs whose motion is kept, of half a megabyte each
 
 
+class _Look(NamedTuple):
+    """frame: the timeline frame that was looked at; known: as Looked has it; repeats: as the source says it"""
+
+    frame: float
+    known: float | None
+    repeats: bool
+
+
 _moved: dict[tuple, steps.Moved | None] = {}  # by a source's key and a pair
-_last_looks: dict[int, tuple[float, float | None]] = {}  # by scene: the timeline frame that was looked at last
+_last_looks: dict[int, _Look] = {}  # by scene
 
 
 @dataclass
@@ -48,7 +56,7 @@ _stopped = threading.Event()
 
 class Looked(NamedTuple):
     """known: pixels of the footage from one frame of a picture's exposure to the next, None: nothing is known, or it is
-    smooth; is_new: whether the last look saw another; is_busy: whether something is measured, or asked for"""
+    smooth; is_new: whether the last look saw something else; is_busy: whether something is measured, or asked for"""
 
     known: float | None
     is_new: bool
@@ -57,20 +65,26 @@ class Looked(NamedTuple):
 
 def look(effect: PropertyGroup, snapshot: Snapshot, renderer: Renderer, request: Request) -> Looked:
     """Looks at a picture's exposure. What is not known is asked for."""
-    _measuring.wanted, before = None, last(effect)
+    _measuring.wanted, before = None, (last(effect), repeats(effect))
     frame, known = effect.id_data.frame_current, _look(effect, snapshot, renderer, request)
-    _last_looks[snapshot.scene] = frame, known
-    return Looked(known=known, is_new=known != before, is_busy=is_busy())
+    _last_looks[snapshot.scene] = _Look(frame, known, renderer.source.repeats)
+    return Looked(known=known, is_new=(known, renderer.source.repeats) != before, is_busy=is_busy())
 
 
 def last(effect: PropertyGroup) -> float | None:
     """What the last look has found, if it was at the effect's current frame."""
-    frame, known = _last_looks.get(effect.scene.session_uid, (None, None))
-    return known if frame == effect.id_data.frame_current else None
+    seen = _last_looks.get(effect.scene.session_uid)
+    return seen.known if seen is not None and seen.frame == effect.id_data.frame_current else None
+
+
+def repeats(effect: PropertyGroup) -> bool:
+    """Whether the last look has found that frames of the source repeat the one before."""
+    seen = _last_looks.get(effect.scene.session_uid)
+    return seen is not None and seen.repeats
 
 
 def _look(effect: PropertyGroup, snapshot: Snapshot, renderer: Renderer, request: Request) -> float | None:
-    if request.state.options.step > 1:
+    if effect.inbetween != "1":
         return None
     ways = _ways(renderer, request)
     pairs = _chosen(sorted(ways))

@@ -1,1 +1,1 @@
-"""How machines render one film together: claims, chunks, and versions of an edit. Uses no other room."""
+"""How machines render one film together: claims, and versions of an edit. Uses no other room."""

@@ -54,6 +54,7 @@ class FrameSource(ABC):
     shots: what knows where its shots end; None: it is one shot
     from_proxy: whether frames are read from a proxy, as far as it has them
     by_blender: whether a second Blender decodes them, for want of PyAV
+    repeats: whether frames repeated others so far, and are moments between these
     windows: how many windows of a picture read it, which have to have room beside one another
     """
 
@@ -74,6 +75,7 @@ class FrameSource(ABC):
     shots: ShotFinder | None = None
     from_proxy: bool = False
     by_blender: bool = False
+    repeats: bool = False
     windows: int = 1
 
     @abstractmethod
@@ -90,14 +92,6 @@ class FrameSource(ABC):
     def want(self, indices: Iterable[int]) -> None:
         """Says which frames will be read next, in this order; others will not. A source may decode them ahead."""
         return  # or it need not
-
-    def has(self, index: int) -> bool:
-        """Whether the frame exists; in-between frames may not be built yet. It is not decoded."""
-        return True
-
-    def check(self, index: int) -> None:
-        """MediaError: the frame does not exist (see `has`)."""
-        return  # all do
 
     def close(self) -> None:
         """Closes the file; a later read opens it again."""

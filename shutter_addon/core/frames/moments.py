@@ -14,10 +14,10 @@ ZERO = 1 << 15  # what a coordinate of 0 is stored as
 
 @dataclass(frozen=True)
 class Moment:
-    """A moment between two neighbouring frames.
+    """A moment between two frames.
 
     Attributes:
-        pair: number of the first frame, among filmed ones
+        pair: numbers of the two frames among filmed ones: neighbours, but where those between repeat the first
         ends: the two frames (H, W, 4), of a FrameSource's type
         number, steps: how many of so many moments after the first frame it is
         vectors: uint16 (⌈H / STEP⌉, ⌈W / STEP⌉, 4). For every STEPth pixel: x and y of the way from the first frame to
@@ -26,7 +26,7 @@ class Moment:
         rgba: makes the frame, as FrameSource.read gives it
     """
 
-    pair: int
+    pair: tuple[int, int]
     ends: tuple[np.ndarray, np.ndarray]
     number: int
     steps: int

@@ -33,12 +33,6 @@ class SourceWrapper(FrameSource):
     def want(self, indices: Iterable[int]) -> None:
         self._source.want(indices)
 
-    def has(self, index: int) -> bool:
-        return self._source.has(index)
-
-    def check(self, index: int) -> None:
-        self._source.check(index)
-
     def close(self) -> None:
         self._source.close()
 

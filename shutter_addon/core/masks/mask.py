@@ -37,13 +37,12 @@ _BLENDS: dict[str, Callable[[np.ndarray, np.ndarray], np.ndarray]] = {
 
 @dataclass(frozen=True)
 class MaskSpline:
-    """A spline whose handles are evaluated; numbers in mask space, tuples so that it can be a key.
+    """A spline with its handles; numbers in mask space, tuples so that it can be a key.
 
     points: of each its left handle, itself and its right handle ((x, y), (x, y), (x, y))
     weights: the width of the feather at each point
     feathers: for each point, the feather points ((u, factor), …) of the segment that follows it, u ascending; the
     factors multiply the points' weights
-    collapse: whether loops of the feather's outline are taken out
     """
 
     points: tuple[tuple[tuple[float, float], ...], ...]
@@ -51,9 +50,7 @@ class MaskSpline:
     feathers: tuple[tuple[tuple[float, float], ...], ...]
     cyclic: bool = True
     fill: bool = True
-    offset_mode: str = "EVEN"  # EVEN | SMOOTH
     weight_interpolation: str = "EASE"  # EASE | LINEAR
-    collapse: bool = False
 
 
 @dataclass(frozen=True)
@@ -67,7 +64,6 @@ class MaskLayer:
     falloff: str = "SMOOTH"
     fill_solver: str = "CDT"  # CDT | SWEEP_LINE
     holes: bool = False
-    overlap: bool = True
 
 
 @dataclass(frozen=True)
@@ -103,7 +99,7 @@ def _layer_value(layer: MaskLayer, width: int, height: int) -> np.ndarray:
     if not outlined or layer.alpha == 0:
         return value
     filled = [edge for spline, (edge, _) in outlined if spline.fill]
-    mask_filling.fill(value, filled, layer.fill_solver, layer.holes, layer.overlap)
+    mask_filling.fill(value, filled, layer.fill_solver, layer.holes)
     quads = [mask_outlines.feather_quads(spline, *both, width, height) for spline, both in outlined]
     mask_filling.feather(value, np.concatenate(quads), _FALLOFFS[layer.falloff])
     return value

@@ -13,7 +13,6 @@ import numpy as np
 
 from .. import scanlines
 from ..scanlines import ranges
-from .mask_outlines import crossings
 
 # Pixels that are computed at once: what their numbers take stays in a processor's cache.
 _BLOCK = 1 << 14
@@ -21,96 +20,16 @@ _BLOCK = 1 << 14
 _SEAM = 1e-6
 
 
-def fill(value: np.ndarray, polygons: list[np.ndarray], solver: str, holes: bool, overlap: bool) -> None:
-    """Sets the pixels of `value` (h, w) that polygons (n, 2) fill to 1, by the rules of Blender's solvers.
+def fill(value: np.ndarray, polygons: list[np.ndarray], solver: str, holes: bool) -> None:
+    """Set the pixels of `value` (h, w) that polygons (n, 2) fill to 1.
 
-    CDT fills all that the polygons enclose together; with `holes` only what they go around, by their winding number.
-    SWEEP_LINE fills each polygon by itself; with `holes` what lies inside an odd number of them; with `overlap` each is
-    first cut down to its outer loops.
+    Args:
+        holes: Fill what the polygons go around together: by CDT, Blender's solver, the sum of their windings, by
+            SWEEP_LINE an odd number of them. Otherwise each polygon is filled by itself.
     """
-    if solver == "SWEEP_LINE":
-        filled = [loop for polygon in polygons for loop in (_outer_loops(polygon) if overlap else [polygon])]
-    else:
-        filled = polygons if holes else polygons + _outer_borders(polygons)
-    in_pixels = [polygon * value.shape[::-1] for polygon in filled]
+    in_pixels = [polygon * value.shape[::-1] for polygon in polygons]
     for group in [in_pixels] if holes else [[polygon] for polygon in in_pixels]:
-        scanlines.fill(value, group, 1, odd=solver == "SWEEP_LINE", seam=_SEAM)
-
-
-def _outer_borders(polygons: list[np.ndarray]) -> list[np.ndarray]:
-    """The outer borders of all groups of polygons that cross one another or themselves."""
-    start, end = scanlines.edges(polygons)
-    first, second, at, other = crossings(start, end)
-    if not len(first):
-        return []
-    count, meetings = len(start), np.arange(len(first))
-    points = np.concatenate([start, start[first] + (end - start)[first] * at[:, None]])
-    behind = np.concatenate(
-        [np.roll(part, -1) for part in np.split(np.arange(count), np.cumsum([*map(len, polygons)]))]
-    )
-    # The parts that crossings leave of each edge, as pairs of indices into the points.
-    edge = np.concatenate([np.arange(count), first, second])
-    corner = np.concatenate([np.arange(count), count + meetings, count + meetings])
-    order = np.lexsort((np.concatenate([np.full(count, -1.0), at, other]), edge))
-    edge, corner = edge[order], corner[order]
-    following = np.where(np.append(edge[1:] == edge[:-1], False), np.roll(corner, -1), behind[edge])
-    angle = np.arctan2(*(end - start)[edge].T[::-1])
-    ways: dict = {}  # by point: the parts that begin or end there, as (the other point, direction)
-    for a, b, turn in zip(corner.tolist(), following.tolist(), angle.tolist(), strict=True):
-        ways.setdefault(a, []).append((b, turn))
-        ways.setdefault(b, []).append((a, turn + np.pi))
-    return [points[walk] for walk in _walks_around(points, ways)]
-
-
-def _walks_around(points: np.ndarray, ways: dict) -> list[list[int]]:
-    """Walks around the groups of points that ways connect, with the outside to the right."""
-    walks, seen = [], set()
-    for start in np.argsort(points[:, 0], kind="stable").tolist():
-        if start in seen:
-            continue
-        group = [start]
-        seen.add(start)
-        for point in group:
-            beside = {there for there, _ in ways[point]} - seen
-            group += beside
-            seen |= beside
-        walk, here, back, steps = [], start, np.pi, set()
-        while True:
-            # The way farthest to the right is the next one counterclockwise from that back.
-            there, turn = min(ways[here], key=lambda way: (way[1] - back - 1e-9) % (2 * np.pi))
-            if (here, there) in steps:
-                break
-            steps.add((here, there))
-            walk.append(here)
-            here, back = there, turn + np.pi
-        walks.append(walk)
-    return walks
-
-
-def _outer_loops(polygon: np.ndarray) -> list[np.ndarray]:
-    """The loops of a polygon that crosses itself: its way, from the leftmost point on, without every second part
-    between two crossings."""
-    first, second, at, other = crossings(polygon, np.roll(polygon, -1, axis=0))
-    if not len(first):
-        return [polygon]
-    count, meetings = len(polygon), np.arange(len(first))
-    place = np.concatenate([np.arange(count), first + at, second + other])
-    corner = np.concatenate([np.arange(count), count + meetings, count + meetings])
-    behind = (place - np.argmin(polygon[:, 0])) % count
-    way = corner[np.lexsort((corner, behind))].tolist()
-    following, inside = {}, False
-    for here, there in pairwise([*way, way[0]]):
-        inside ^= here >= count
-        if not inside:
-            following[here] = there
-    points = np.concatenate([polygon, polygon[first] + (np.roll(polygon, -1, axis=0) - polygon)[first] * at[:, None]])
-    loops = []
-    while following:
-        loop = [next(iter(following))]
-        while (there := following.pop(loop[-1], None)) is not None:
-            loop.append(there)
-        loops.append(points[loop])
-    return loops
+        scanlines.fill(value, group, 1, odd=holes and solver == "SWEEP_LINE", seam=_SEAM)
 
 
 def feather(value: np.ndarray, quads: np.ndarray, falloff: Callable[[np.ndarray], np.ndarray]) -> None:

@@ -9,8 +9,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..scanlines import ranges
-
 if TYPE_CHECKING:
     from .mask import MaskSpline
 
@@ -20,8 +18,6 @@ _FEWEST, _MOST = 4, 32
 _REACH = 0.05
 # The round ends of an open spline that is not filled have a point every two pixels, in these limits.
 _CAP_POINTS = 8, 64
-# Segments that are compared at once with all others that may cross them.
-_SEGMENTS = 1 << 11
 
 
 def outlines(spline: MaskSpline, width: int, height: int) -> tuple[np.ndarray, np.ndarray] | None:
@@ -37,14 +33,10 @@ def outlines(spline: MaskSpline, width: int, height: int) -> tuple[np.ndarray, n
     edge = _at(spline, points, segment, u)
     if len(edge) < 4:
         return None
-    offset = _even_offset if spline.offset_mode == "EVEN" else _smooth_offset
-    feather = offset(spline, points, weights, segment, u, edge)
+    feather = _offset(spline, points, weights, segment, u, edge)
     larger = max(width, height)
     edge, feather = ((p - 0.5) * (larger / width, larger / height) + 0.5 for p in (edge, feather))
-    feather = _pixel_wide(edge, feather, 1 / min(width, height))
-    if spline.collapse and spline.fill:
-        feather = _without_loops(feather, spline.cyclic)
-    return edge, feather
+    return edge, _pixel_wide(edge, feather, 1 / min(width, height))
 
 
 def _longest_segment(points: np.ndarray, cyclic: bool) -> float:
@@ -86,7 +78,7 @@ def _at(spline: MaskSpline, points: np.ndarray, segment: np.ndarray, u: np.ndarr
     return inside if spline.cyclic else np.where((segment == len(points) - 1)[:, None], points[-1, 1], inside)
 
 
-def _even_offset(
+def _offset(
     spline: MaskSpline, points: np.ndarray, weights: np.ndarray, segment: np.ndarray, u: np.ndarray, edge: np.ndarray
 ) -> np.ndarray:
     """The feather's outline (n, 2), at right angles to the spline."""
@@ -98,24 +90,6 @@ def _even_offset(
         start = before & (segment == 0)
         along[start] = (following - points[0, 1])[start]
     return edge + _left_of(along) * _widths(spline, weights, segment, u)[:, None]
-
-
-def _smooth_offset(
-    spline: MaskSpline, points: np.ndarray, weights: np.ndarray, segment: np.ndarray, u: np.ndarray, edge: np.ndarray
-) -> np.ndarray:
-    """The feather's outline (n, 2): a spline through the moved points, whose handles grow with the distances."""
-    moves = _left_of(points[:, 1] - points[:, 0]) * weights[:, None]
-    handles, moved = points - points[:, 1:2], points[:, 1] + moves
-    after = (np.arange(len(points)) + 1) % len(points)
-    base = np.linalg.norm(points[:, 1] - points[after, 1], axis=1)
-    grown = np.linalg.norm(moved - moved[after], axis=1) / np.where(base > 0, base, 1)
-    right, left = moved + handles[:, 2] * grown[:, None], moved[after] + handles[after, 0] * grown[:, None]
-    feather = _bezier(moved[segment], right[segment], left[segment], moved[after][segment], u)
-    # Feather points scale what there is; where there is none, they make none.
-    plain = weights[segment] * (1 - u) + weights[after][segment] * u
-    scaled = np.array([len(feather) > 0 for feather in spline.feathers])[segment] & (plain != 0)
-    scale = np.divide(_widths(spline, weights, segment, u), plain, out=np.ones_like(plain), where=scaled)
-    return edge + (feather - edge) * scale[:, None]
 
 
 def _widths(spline: MaskSpline, weights: np.ndarray, segment: np.ndarray, u: np.ndarray) -> np.ndarray:
@@ -149,8 +123,6 @@ def feather_quads(spline: MaskSpline, edge: np.ndarray, feather: np.ndarray, wid
     if spline.fill:
         return _between(edge, feather, closed=True)
     other = 2 * edge - feather
-    if spline.collapse:
-        feather, other = _without_loops(feather, spline.cyclic), _without_loops(other, spline.cyclic)
     sides = [_between(edge, feather, spline.cyclic), _between(edge, other, spline.cyclic)]
     if spline.cyclic:
         return np.concatenate(sides)
@@ -174,53 +146,6 @@ def _cap(centre: np.ndarray, start: np.ndarray, turn: float, size: np.ndarray, w
     rim = centre + around / size
     middle = np.broadcast_to(centre, rim[1:].shape)
     return np.stack([middle, middle, rim[:-1], rim[1:]], axis=1)
-
-
-def _without_loops(outline: np.ndarray, cyclic: bool) -> np.ndarray:
-    """The outline with the smaller part between any two segments that cross drawn together in their crossing."""
-    outline, count = outline.copy(), len(outline)
-    ends = np.roll(outline, -1, axis=0)
-    first, second, _, _ = crossings(outline, ends)
-    for i, j in sorted(zip(second.tolist(), first.tolist(), strict=True)):
-        if j >= i - 1 or (i + 1) % count == j or not (cyclic or i < count - 1):
-            continue
-        _, _, at, _ = crossings(outline[[i, j]], outline[[(i + 1) % count, j + 1]])
-        if not len(at):
-            continue
-        meeting = outline[i] + (outline[(i + 1) % count] - outline[i]) * at[0]
-        inner = np.arange(count)
-        inner = (inner >= j + 1) & (inner <= i)
-        if (np.ptp(outline[inner], axis=0) < np.ptp(outline[~inner], axis=0)).any():
-            outline[inner] = meeting
-        else:
-            outline[~inner] = meeting
-    return outline
-
-
-def crossings(starts: np.ndarray, ends: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Pairs of segments that cross: indices first < second, and where on each, 0 to 1. Neighbours that share a point
-    do not cross."""
-    ways = ends - starts
-    lowest, highest = np.minimum(starts, ends), np.maximum(starts, ends)
-    # In the order of their left ends, a segment can meet those that follow until one begins behind its right end.
-    order = np.argsort(lowest[:, 0], kind="stable")
-    reach = np.searchsorted(lowest[order, 0], highest[order, 0], side="right")
-    pairs = [np.zeros((2, 0), int)]
-    for a in range(0, len(order), _SEGMENTS):
-        part = np.arange(a, min(a + _SEGMENTS, len(order)))
-        here, there = ranges(part + 1, reach[part])
-        here, there = order[here + a], order[there]
-        near = (lowest[here, 1] <= highest[there, 1]) & (lowest[there, 1] <= highest[here, 1])
-        pairs.append(np.stack([here[near], there[near]]))
-    first, second = np.sort(np.concatenate(pairs, axis=1), axis=0)
-    a, b, gap = ways[first], ways[second], starts[second] - starts[first]
-    area = a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]
-    with np.errstate(divide="ignore", invalid="ignore"):
-        at = (gap[:, 0] * b[:, 1] - gap[:, 1] * b[:, 0]) / area
-        other = (gap[:, 0] * a[:, 1] - gap[:, 1] * a[:, 0]) / area
-    shared = (ends[first] == starts[second]).all(1) | (ends[second] == starts[first]).all(1)
-    cross = (at >= 0) & (at <= 1) & (other >= 0) & (other <= 1) & ~shared
-    return first[cross], second[cross], at[cross], other[cross]
 
 
 def _normalized(vectors: np.ndarray) -> np.ndarray:

@@ -36,7 +36,7 @@ class Shown(NamedTuple):
 @dataclass(frozen=True)
 class Clip:
     """width, height: of its pictures, in pixels
-    count: of its frames, in-between ones too; every step-th was filmed, from the first on
+    count: of its frames, moments between them too; every step-th was filmed, from the first on
     fps: frames per second, None: they are images
     timing: what tells which of them a timeline frame shows: how its strip lies there, or keys (Effect.time); None:
     timeline frame 1 shows the first one, and each next frame the next filmed one, as recipes have it"""
@@ -53,7 +53,7 @@ class Clip:
         return Clip(medium.width, medium.height, medium.count, medium.step, medium.fps, timing)
 
     def stepped(self, factor: int) -> Clip:
-        """The clip of filmed frames with those in between, as many for each as the factor says."""
+        """Return the clip with `factor` moments for each filmed frame."""
         fps = None if self.fps is None else self.fps * factor
         return replace(self, count=(self.count - 1) * factor + 1, step=factor, fps=fps)
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Literal
 
 import numpy as np
@@ -346,6 +346,13 @@ class Shutter:
     def has_trail(self) -> bool:
         """Whether it is open while what it follows moves by a distance."""
         return self.follow is not None and self.length == "motion"
+
+    def spread(self, steps: int, backward: bool = False) -> Callable[[np.ndarray], np.ndarray]:
+        """What makes its bars of moments, so many for each filmed frame, of those of filmed frames."""
+        if self.length == "timeline" or self.has_trail:
+            return partial(shutters.held, steps=steps)
+        level = self.combine in ("lightest", "darkest")
+        return partial(shutters.smoothed, steps=steps, backward=backward, level=level)
 
     def combine_at(self, frame: float) -> combining.Combine:
         threshold = float(self.threshold.at(frame)) if self.use_threshold else None

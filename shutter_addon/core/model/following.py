@@ -2,7 +2,7 @@
 
 Keys of regions and of the camera are on timeline frames, a window has frames of the source. What a source frame shows
 is where the keys have it at the timeline frame that shows it: of several the one nearest to the shown frame; between
-two timeline frames for a source frame that is passed over there, or for an in-between frame. Between timeline frames
+two timeline frames for a source frame that is passed over there, or for a moment between two. Between timeline frames
 motion is straight.
 """
 
@@ -34,7 +34,7 @@ def followed(effect: Effect, state: FrameState, clip: Clip, at: Shown) -> FrameS
     if not any(shutter.follow for shutter in effect.shutters):
         return state
     frames = seen(state.options, at, clip.count)
-    times = times_of(clip, at, frames, reach(state.options.window))
+    times = times_of(clip, at, frames, reach(state.options.filmed))
     turns = np.ones((len(frames), len(effect.shutters)), np.complex128)
     shifts = np.zeros_like(turns)
     known: dict[tuple, np.ndarray] = {}
@@ -74,10 +74,11 @@ def _with_trails(
     return bars, open_for
 
 
-def reach(window: int) -> int:
-    """How many timeline frames before and after the shown one say where the source frames of a window lie: enough for
-    footage that is slowed down to a quarter. Source frames shown beyond have the motion of the nearest within."""
-    return 4 * window
+def reach(filmed: int) -> int:
+    """How many timeline frames before and after the shown one say where the source frames of a window lie, which has so
+    many filmed frames: enough for footage that is slowed down to a quarter. Source frames shown beyond have the motion
+    of the nearest within."""
+    return 4 * filmed
 
 
 def seen(options: Options, at: Shown, count: int) -> range:

@@ -31,6 +31,7 @@ class Options:
     edge_aware: 0 to 1, how much coefficients stop at the edges of the shown frame (core.pixels.conductances)
     step: moments from a filmed frame to the next; "auto": as the footage needs, which only an effect's options have
     slid: how many frames later the window lies than its position says (core.model.windows.slid)
+    backward: whether the source plays in reverse, where the last of a filmed frame's moments is the frame itself
     """
 
     window: int = whole(
@@ -107,20 +108,36 @@ class Options:
         blender="inbetween",
         recipe="inbetween",
     )
+    skip_repeats: bool = switch(
+        "Skip Repeated Frames",
+        "Where Smooth is on, show moments between their neighbors in place of frames that repeat the one before, "
+        "as in 24 frames per second that play at 30",
+        default=True,
+    )
     slid: int = 0
+    backward: bool = False
+
+    @property
+    def filmed(self) -> int:
+        """How many filmed frames the window has."""
+        return -(-self.window // self.step)
 
     @property
     def before(self) -> int:
         """How many frames of the window lie before the shown filmed frame. That one is `step` frames long."""
-        filmed = -(-self.window // self.step)
-        center, end = (filmed - 1) // 2 * self.step, max(self.window - self.step, 0)
+        center, end = (self.filmed - 1) // 2 * self.step, max(self.window - self.step, 0)
         return {"start": 0, "center": center, "end": end}[self.position] - self.slid
+
+    @property
+    def shown(self) -> int:
+        """Where in the window the shown frame lies."""
+        return self.before + (self.step - 1 if self.backward else 0)
 
     @property
     def reach(self) -> int:
         """How many filmed frames of the window lie on that side of the shown one where there are most."""
-        filmed, before = -(-self.window // self.step), self.before // self.step
-        return max(before, filmed - 1 - before)
+        before = self.before // self.step
+        return max(before, self.filmed - 1 - before)
 
 
 @dataclass(frozen=True)
@@ -246,7 +263,7 @@ class FrameState:
         """As shutters.open_span of the bars; with the shown frame where that is needed whatever they are."""
         first, last = shutters.open_span(self.bars)
         if any(combine.threshold is not None for combine in self.combines):
-            return min(first, self.options.before), max(last, self.options.before + 1)
+            return min(first, self.options.shown), max(last, self.options.shown + 1)
         return first, last
 
     @cached_property

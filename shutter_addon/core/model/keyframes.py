@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from bisect import bisect_right
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal, Protocol
 
@@ -133,21 +133,25 @@ class Bars:
     keys: tuple[tuple[float, Ease], ...] = ()
     share: Channel | None = None
 
-    def at(self, frame: float, interpolation: str) -> np.ndarray:
+    def at(
+        self, frame: float, interpolation: str, spread: Callable[[np.ndarray], np.ndarray] = np.asarray
+    ) -> np.ndarray:
         """Between keys by displacement (paper §3.4.1, over time), or by `channel`: where interpolation is "value", and
-        on the way to and from a closed shutter, which is no displacement."""
+        on the way to and from a closed shutter, which is no displacement.
+
+        spread: makes the bars of moments of those of filmed frames, so that what is displaced passes through moments"""
         if not self.keys:
-            return self.channel.at(frame)
+            return spread(self.channel.at(frame))
         frames = [key for key, _ in self.keys]
         before, after, _ = span(frames, frame)
         if before == after:
-            return self.channel.at(frames[before])
+            return spread(self.channel.at(frames[before]))
         if interpolation == "value":
-            return self.channel.at(frame)
+            return spread(self.channel.at(frame))
         first, second = self.channel.at(frames[before]), self.channel.at(frames[after])
         if not (first.any() and second.any()):
-            return self.channel.at(frame)
-        return between_bars(first, second, self._share_at(frame, frames))
+            return spread(self.channel.at(frame))
+        return between_bars(spread(first), spread(second), self._share_at(frame, frames))
 
     def _share_at(self, frame: float, frames: list[float]) -> float:
         if self.share is not None:

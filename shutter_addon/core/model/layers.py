@@ -21,7 +21,7 @@ def layered(effect: Effect, state: FrameState, clip: Clip, at: Shown) -> FrameSt
         return state
     seen, beyond = following.seen(state.options, at, clip.count), state.options.plate_reach
     frames = range(max(seen.start - beyond, 0), min(seen.stop + beyond, clip.count))
-    times = following.times_of(clip, at, frames, following.reach(state.options.window) + beyond)
+    times = following.times_of(clip, at, frames, following.reach(state.options.filmed) + beyond)
     moments = [(at.frame + math.floor(time - at.frame), (time - at.frame) % 1.0) for time in times]
     drawn = [(1 + i, region) for i, region in enumerate(regions) if isinstance(region, Region)]
     others = [(0, region) for region in effect.regions if isinstance(region, Region) and region not in regions]

@@ -7,8 +7,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from . import following, layers, shutters, timeline_exposure, windows
-from .clip import Clip
+from . import following, layers, timeline_exposure, windows
+from .clip import Clip, Shown
 from .effect import Effect
 from .frame_state import FrameState
 
@@ -30,7 +30,7 @@ def state_at(effect: Effect, clip: Clip, frame: float) -> Moment:
     if effect.time is not None:
         clip = replace(clip, timing=effect.time)
     at = clip.shown(frame)
-    state = _in_moments(effect, effect.at(frame), clip.step, at.direction)
+    state = _in_moments(effect, effect.at(frame), clip, at)
     state = timeline_exposure.exposed(effect, state, clip, at)
     has_trails = any(shutter.has_trail for shutter in effect.shutters)
     state = windows.slid(state, at.source_frame, at.direction, range(clip.count), whole=has_trails)
@@ -38,14 +38,14 @@ def state_at(effect: Effect, clip: Clip, frame: float) -> Moment:
     return Moment(at.source_frame, layers.layered(effect, state, clip, at), at.direction)
 
 
-def _in_moments(effect: Effect, state: FrameState, steps: int, direction: int) -> FrameState:
-    """The state whose bars are of the moments that a clip has, `steps` for each filmed frame. Bars that say the shape
-    of an exposure of another length stay that shape, and are moved to its moments later."""
+def _in_moments(effect: Effect, state: FrameState, clip: Clip, at: Shown) -> FrameState:
+    """The state whose bars are of the moments that a clip has, `clip.step` for each filmed frame. Bars that say the
+    shape of an exposure of another length stay that shape, and are moved to its moments later."""
+    options = replace(state.options, window=state.options.window * clip.step, step=clip.step, backward=at.direction < 0)
+    if clip.step == 1:
+        return replace(state, options=options)
     bars = [
-        shutters.held(row, steps)
-        if shutter.length == "timeline" or shutter.has_trail
-        else shutters.smoothed(row, steps, backward=direction < 0, level=shutter.combine in ("lightest", "darkest"))
-        for shutter, row in zip(effect.shutters, state.bars, strict=True)
+        shutter.bars.at(at.frame, options.interpolation, shutter.spread(clip.step, options.backward))
+        for shutter in effect.shutters
     ]
-    options = replace(state.options, window=state.options.window * steps, step=steps)
     return replace(state, bars=np.stack(bars), options=options)

@@ -35,11 +35,11 @@ def exposed(effect: Effect, state: FrameState, clip: Clip, at: Shown) -> FrameSt
         places[3:] = 2 * here - places[1::-1]
     bars, open_for = state.bars.copy(), dict(state.open_for)
     for index in chosen:
-        bars[index], open_for[index] = on_timeline(bars[index], state.options, at.direction, places)
+        bars[index], open_for[index] = on_timeline(bars[index], state.options, places)
     return replace(state, bars=bars, open_for=open_for)
 
 
-def on_timeline(bars: np.ndarray, options: Options, direction: int, positions: np.ndarray) -> tuple[np.ndarray, float]:
+def on_timeline(bars: np.ndarray, options: Options, positions: np.ndarray) -> tuple[np.ndarray, float]:
     """Bars (L,) of a window by those that are the shape of an exposure over a timeline frame, of the same sum; and how
     many frames it goes through, from its first open time to its last.
 
@@ -54,19 +54,18 @@ def on_timeline(bars: np.ndarray, options: Options, direction: int, positions: n
         "end": (-1.0, float(options.step)),
     }[options.position]
     times = begin + np.arange(window + 1) / window
-    way = direction * (np.interp(times, np.linspace(-1, 1, len(positions)), positions) - here)
-    places = options.before + anchor + way
-    found = np.zeros(window)
+    way = np.interp(times, np.linspace(-1, 1, len(positions)), positions) - here
+    places = options.before + anchor + (-way if options.backward else way)
+    found, shown = np.zeros(window), min(options.shown, window - 1)  # it may be shorter than a filmed frame
     if np.ptp(places) < _SHORTEST:
-        shown = options.before + (options.step - 1 if direction < 0 else 0)
-        found[min(shown, window - 1)] = bars.sum()  # a window may be shorter than a filmed frame
+        found[shown] = bars.sum()
         return found, 0.0
     for weight, start, end in zip(bars, places[:-1], places[1:], strict=True):
         found += weight * _spread(min(start, end), max(start, end), window)
     is_open = np.flatnonzero(bars)
     length = float(np.ptp(places[is_open[0] : is_open[-1] + 2]))
     if found.sum() <= _LEAST * bars.sum():  # all of it lies beyond the window
-        found[options.before] = 1.0
+        found[shown] = 1.0
     return found * (bars.sum() / found.sum()), length
 
 

@@ -17,7 +17,7 @@ def positions(options: Options, index: int, direction: int = 1) -> np.ndarray:
     """Where the window's frames (L,) lie around source frame `index`, beyond the clip's ends as well.
 
     direction: 1, or −1 where the source plays in reverse, and the window's next frames are those before `index`. A
-    filmed frame lasts until the next one, so that in reverse its in-between frames come first, from the last one on.
+    filmed frame lasts until the next one, so that in reverse the moments after it come first, from the last one on.
     """
     return origin(options, index, direction) + direction * np.arange(options.window)
 

@@ -11,8 +11,6 @@ and A = max wₖ aₖ / max wₖ, the alpha of the first two. Their brightness d
 A threshold lowers wₖ, but not what A divides by: a pixel without light that passes is transparent.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import NamedTuple
 

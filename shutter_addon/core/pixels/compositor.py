@@ -1,7 +1,5 @@
 """The reference compositor: every pixel's own shutter, exact, in float64, one frame after the other."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
@@ -134,14 +132,14 @@ def _samples(
     samples = []
     counted = weights.any(axis=(0, 1, 2))
     if combine.threshold is not None:
-        counted[options.before] = True
+        counted[options.shown] = True
     for k in np.flatnonzero(counted & present).tolist():
         looks = looks_at(k)
         weight = weights[..., k].sum(axis=0)
         light_ = sum(own[..., k, None] * sight for own, sight in zip(weights, looks, strict=True))
         shown = sum(share[..., None] * sight for share, sight in zip(shares, looks, strict=True))
         there = np.where(weight[..., None] > 0, light_ / np.where(weight > 0, weight, 1)[..., None], shown)
-        samples.append(combined.Sample(there, weight, shown if k == options.before else None))
+        samples.append(combined.Sample(there, weight, shown if k == options.shown else None))
     return samples
 
 

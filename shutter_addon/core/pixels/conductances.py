@@ -6,8 +6,6 @@ not conduct along itself either. Cells may be larger than pixels; between their 
 pixels are tied by half the resistance of each, one after the other.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 # The slope of a guide, per cell, at which a conductance has fallen to 1/e.

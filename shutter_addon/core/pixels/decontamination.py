@@ -5,9 +5,9 @@ up what that leaves of V, each as much as it covers ("Fast Multi-Level Foregroun
 "blur fusion", Forte 2021): twice, from wide surroundings and from near ones.
 """
 
-from __future__ import annotations
-
 import numpy as np
+
+from .matte_grid import block_sums
 
 # How far the surroundings reach, as a share of the picture's height: wider than edges are soft, then to their detail.
 WIDE, NEAR = 1 / 18, 1 / 90
@@ -47,23 +47,13 @@ def _surroundings(own: np.ndarray, behind: np.ndarray, matte: np.ndarray, radius
     """The means (h, w, C) around each pixel of colours, weighted by a matte (h, w, 1), and of others, by its rest."""
     cell = max(radius // _CELLS, 1)
     weighted = np.concatenate([own * matte, behind * (1 - matte), matte, 1 - matte], axis=-1)
-    sums = _box_sums(_in_cells(weighted, cell), radius // cell)
+    sums = _box_sums(block_sums(weighted, cell, beyond="constant"), radius // cell)
     count = own.shape[-1]
     totals = np.maximum(sums[..., 2 * count :], 1e-6)
     means = sums[..., :count] / totals[..., :1], sums[..., count : 2 * count] / totals[..., 1:]
     height, width = matte.shape[:2]
     whole = [mean.repeat(cell, 0).repeat(cell, 1)[:height, :width].astype(np.float32) for mean in means]
     return whole[0], whole[1]
-
-
-def _in_cells(values: np.ndarray, size: int) -> np.ndarray:
-    """Sums (h, w, C) over cells of size × size pixels."""
-    if size == 1:
-        return values
-    height, width, channels = values.shape
-    padded = np.pad(values, [(0, -height % size), (0, -width % size), (0, 0)])
-    rows = padded.reshape(-1, size, padded.shape[1], channels).sum(axis=1)
-    return rows.reshape(len(rows), -1, size, channels).sum(axis=2)
 
 
 def _box_sums(values: np.ndarray, radius: int) -> np.ndarray:

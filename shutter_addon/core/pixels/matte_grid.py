@@ -1,10 +1,11 @@
-"""A matte's values on the picture's grid: fitted to it, feathered, by blocks of pixels. Pure NumPy, and separable."""
-
-from __future__ import annotations
+"""A matte's values on the picture's grid: fitted to it, feathered, by blocks of pixels; and what else is blurred or
+summed over blocks. Pure NumPy, and separable."""
 
 import math
+from typing import Literal
 
 import numpy as np
+from numpy.typing import DTypeLike
 
 Taps = tuple[np.ndarray, np.ndarray]  # for each row that comes out: which rows go in, and their weights, both (rows, k)
 
@@ -36,11 +37,11 @@ def feathered(values: np.ndarray, width: float) -> np.ndarray:
     sigma = width / EDGE_SIGMAS
     step = max(1, int(sigma / _COARSE))
     if step == 1:
-        return _blurred(values, sigma)
+        return blurred(values, _gaussian(sigma))
     # Coarse cells and lines between them widen an edge as well, by a quarter of the square of a cell on average.
     narrower = math.sqrt((sigma / step) ** 2 - 1 / 4)
     coarse = _resampled(values, *(_means(length, step) for length in values.shape))
-    return _resampled(_blurred(coarse, narrower), *(_lines(length, step) for length in values.shape))
+    return _resampled(blurred(coarse, _gaussian(narrower)), *(_lines(length, step) for length in values.shape))
 
 
 def block_means(values: np.ndarray, block: int) -> np.ndarray:
@@ -51,14 +52,29 @@ def block_means(values: np.ndarray, block: int) -> np.ndarray:
     return _resampled(values, *(_blocks(length, block) for length in values.shape))
 
 
+def block_sums(
+    picture: np.ndarray, size: int, dtype: DTypeLike | None = None, *, beyond: Literal["edge", "constant"] = "edge"
+) -> np.ndarray:
+    """Sums (⌈h/size⌉, ⌈w/size⌉, C) over blocks of a picture's pixels (h, w, C).
+
+    beyond: what comes after its last pixels, as numpy.pad has it: these again, or "constant", nothing"""
+    height, width, channels = picture.shape
+    if height % size or width % size:
+        picture = np.pad(picture, [(0, -height % size), (0, -width % size), (0, 0)], beyond)
+    rows = picture.reshape(len(picture) // size, size, -1).sum(axis=1, dtype=dtype)
+    return rows.reshape(len(rows), -1, size, channels).sum(axis=2)
+
+
 def _resampled(values: np.ndarray, down: Taps, across: Taps) -> np.ndarray:
     if len(across[0]) > values.shape[1]:  # turned twice before it is large, or after it is small
         return _weighted(_turned(_weighted(_turned(values), *across)), *down)
     return _turned(_weighted(_turned(_weighted(values, *down)), *across))
 
 
-def _blurred(values: np.ndarray, sigma: float) -> np.ndarray:
-    kernel = _gaussian(sigma)
+def blurred(values: np.ndarray, kernel: np.ndarray) -> np.ndarray:
+    """Values (h, w), 1 at most, weighted down and across; beyond the picture its edges go on.
+
+    kernel: the weights of a pixel itself and of those at distances 1, 2, …"""
     return _turned(_convolved(_turned(_convolved(values, kernel)), kernel))
 
 
@@ -82,7 +98,7 @@ def _weighted(values: np.ndarray, indices: np.ndarray, weights: np.ndarray) -> n
 
 
 def _convolved(values: np.ndarray, kernel: np.ndarray) -> np.ndarray:
-    """As `_weighted`, with the same weights everywhere: those of a row itself and of those at distances 1, 2, …"""
+    """As `_weighted`, with the same weights everywhere: see `blurred`."""
     reach = len(kernel) - 1
     padded = np.pad(values, ((reach, reach), (0, 0)), "edge")
     result = np.empty_like(values)

@@ -1,7 +1,5 @@
 """Levels of 8 bits as Blender makes them of scene-linear light, to the bit, dither included."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache

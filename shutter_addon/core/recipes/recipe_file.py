@@ -71,6 +71,8 @@ def parse(text: str) -> model.Effect:
         raise RecipeError(newer)
     if isinstance(data, dict) and data.get("version") == 1:
         data.pop("inbetween_method", None)  # there is one way by now
+        if data.get("inbetween", 1) != 1:
+            data.setdefault("skip_repeats", False)  # as it was
     converter = _converter()
     try:
         recipe: Any = converter.structure(data, records.RecipeRecord)

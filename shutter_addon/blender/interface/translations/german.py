@@ -942,6 +942,17 @@ MESSAGES = {
         "Expose moments between filmed frames as well, as many as the footage needs",
     ): "Auch Zeitpunkte zwischen gefilmten Bildern belichten, so viele, wie das Filmmaterial braucht",
     ("*", "The exposures are smooth"): "Die Belichtungen sind geglättet",
+    ("*", "Skip Repeated Frames"): "Wiederholte Bilder überspringen",
+    (
+        "*",
+        "Where Smooth is on, show moments between their neighbors in place of frames that repeat the one before, "
+        "as in 24 frames per second that play at 30",
+    ): "Wo Glätten an ist, statt Bildern, die das vorige wiederholen, Zeitpunkte zwischen ihren Nachbarn zeigen, etwa "
+    "bei 24 Bildern pro Sekunde, die mit 30 laufen",
+    (
+        "*",
+        "Frames of the source repeat: motion goes on across them",
+    ): "Bilder der Quelle wiederholen sich: Die Bewegung läuft über sie hinweg",
     (
         "*",
         "Smooth is off: the nearest source frame is shown",

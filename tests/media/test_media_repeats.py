@@ -1,0 +1,247 @@
+"""Frames that repeat the one before: which ones are found, and that moments go evenly across them."""
+
+from fractions import Fraction
+from pathlib import Path
+
+import av
+import numpy as np
+import pytest
+from test_media_flow import blocks, frame
+from test_media_steps import Film as Texture
+from test_media_steps import shift
+
+from shutter_addon.core.frames.frame_source import FrameSource
+from shutter_addon.media import MediaError, PrefetchSource, open_source
+from shutter_addon.media.cuts import ShotSource
+from shutter_addon.media.repeats import MOST, Repeats
+from shutter_addon.media.smooth import SmoothSource, steps_for
+
+WIDTH, HEIGHT, SPEED, STEP = 256, 144, 4, 4
+PULLDOWN = [k * 4 // 5 for k in range(15)]  # 24 in 30: pictures 0 0 1 2 3 4 4 5 …
+TWOS, THREES = ([k // times for k in range(13)] for times in (2, 3))
+
+
+def disc(x, ground=60):
+    """A frame with a soft disc at a place, on an even ground."""
+    down, right = np.mgrid[:HEIGHT, :WIDTH]
+    share = np.clip(20.5 - np.hypot(right - x, down - HEIGHT / 2), 0, 1)[..., None]
+    return frame((ground * (1 - share) + 230 * share).repeat(3, 2) / 255)
+
+
+def place(picture, ground=60):
+    """Where a disc lies: its centre of mass, in pixels."""
+    seen = picture[..., 0].astype(float) - ground
+    seen[seen < 40] = 0  # grain
+    return (seen * np.arange(WIDTH)).sum() / seen.sum()
+
+
+class Film(FrameSource):
+    """A film of a disc that moves from picture to picture; frame k shows picture shown[k]. It notes what is read."""
+
+    transfer, alpha, options, fps, dtype = "srgb", "opaque", {}, Fraction(30), np.dtype(np.uint8)
+    path, width, height = Path("disc.mov"), WIDTH, HEIGHT
+
+    def __init__(self, shown, picture=lambda number: disc(40 + SPEED * number), noise=0.0):
+        self.shown, self.picture, self.count, self.noise = shown, picture, len(shown), noise
+        self.asked, self.lost = [], None
+
+    def read(self, index):
+        if index == self.lost:
+            raise MediaError(f"frame {index} is lost")
+        self.asked.append(index)
+        made = self.picture(self.shown[index])
+        if self.noise:
+            grain = np.random.default_rng(index).normal(0, self.noise, (HEIGHT, WIDTH, 1))
+            made[..., :3] = np.rint(np.clip(made[..., :3] + grain, 0, 255))
+        return made
+
+
+def pan(number):
+    """Coarse blocks that move to the left."""
+    return frame(np.roll(blocks(3, (HEIGHT, WIDTH)), -SPEED * number, axis=1))
+
+
+def skipping(film, step=STEP):
+    return SmoothSource(film, step, skip_repeats=True)
+
+
+def even(shown, step=STEP):
+    """Which picture each moment shows, by the pictures that are the first of their kind and the time between them."""
+    firsts = [k for k in range(len(shown)) if k == 0 or shown[k] != shown[k - 1]]
+    times = np.arange((len(shown) - 1) * step + 1) / step
+    return np.interp(times, firsts, [shown[k] for k in firsts])
+
+
+@pytest.mark.parametrize("noise", [0, 1])
+@pytest.mark.parametrize("shown", [PULLDOWN, TWOS, THREES, [0, 1, 2, 2, 2, 2, 3, 4]])
+def test_moments_go_evenly_across_repeats(shown, noise):
+    film = Film(shown, noise=noise)
+    source = skipping(film)
+    plain = SmoothSource(film, STEP)
+    found, stands = ([(place(each.read(k)) - 40) / SPEED for k in range(source.count)] for each in (source, plain))
+    np.testing.assert_allclose(found, even(shown), atol=0.5 / SPEED)
+    assert np.abs(stands - even(shown)).max() >= 0.5
+    assert (source.repeats, plain.repeats) == (True, False)
+
+
+def test_what_does_not_repeat_has_the_footages_bits():
+    film = Film(PULLDOWN)
+    source = skipping(film)
+    for k in range(1, film.count):
+        is_alike = np.array_equal(source.read(k * STEP), film.read(k))
+        assert is_alike == (PULLDOWN[k] != PULLDOWN[k - 1])
+
+
+def still(_number):
+    return disc(100)
+
+
+def slow(number):
+    """A pan by a fifth of a pixel, of soft lines."""
+    rows = 120 + 60 * np.sin((np.arange(WIDTH) + 0.2 * number) / 5)
+    return frame(np.broadcast_to(rows[None, :, None], (HEIGHT, WIDTH, 3)) / 255)
+
+
+def stops(number):
+    """A disc that moves, stands still for as long as no repeats do, and goes on."""
+    return disc(40 + SPEED * (number - min(max(number - 3, 0), MOST)))
+
+
+@pytest.mark.parametrize(
+    ("picture", "noise"),
+    [(pan, 0), (pan, 12), (still, 0), (still, 1), (still, 12), (slow, 0), (slow, 4), (stops, 0), (stops, 1)],
+)
+def test_footage_without_repeats_keeps_its_bits(picture, noise):
+    film = Film(range(12), picture, noise)
+    source, plain = skipping(film), SmoothSource(film, STEP)
+    for k in range(source.count):
+        np.testing.assert_array_equal(source.read(k), plain.read(k))
+    assert not source.repeats
+
+
+def test_at_the_ends_of_a_clip():
+    """The first frame has no other before it; those at the end, none behind them that they could go to."""
+    film = Film([0, 0, 0, 1, 2, 3, 3, 3])
+    source = skipping(film)
+    found = [(place(source.read(k)) - 40) / SPEED for k in range(source.count)]
+    np.testing.assert_allclose(found, even(film.shown), atol=0.5 / SPEED)
+    np.testing.assert_array_equal(source.read(0), film.read(0))
+    for k in range(5, 8):
+        np.testing.assert_array_equal(source.read(k * STEP), film.read(k))
+
+
+def test_a_clip_that_only_repeats():
+    film = Film([0, 0, 0])
+    source = skipping(film)
+    for k in range(source.count):
+        np.testing.assert_array_equal(source.read(k), film.read(0))
+    np.testing.assert_array_equal(skipping(Film([0])).read(0), film.read(0))
+
+
+@pytest.mark.parametrize("shown", [PULLDOWN, THREES, [0] * 9 + [1, 1, 2, 3, 3, 3]])
+def test_the_order_of_reading_changes_no_bit(shown):
+    first = skipping(Film(shown, noise=1))
+    wanted = [first.read(moment) for moment in range(first.count)]
+    orders = [range(first.count)[::-1], np.random.default_rng(2).permutation(first.count).tolist()]
+    for order in (*orders, [17], [22], [30]):  # a machine of a farm begins anywhere
+        source = skipping(Film(shown, noise=1))
+        for moment in order:
+            np.testing.assert_array_equal(source.read(moment), wanted[moment])
+
+
+@pytest.mark.parametrize("shown", [PULLDOWN, TWOS, THREES, [0] * 9 + [1, 1, 2], range(12)])
+def test_each_frame_is_decoded_once(shown):
+    film = Film(shown)
+    source = skipping(film)
+    for moment in range(source.count):
+        source.read(moment)
+    assert film.asked == list(range(film.count))
+
+
+def test_elsewhere_a_frame_more_is_read():
+    film = Film(range(12))
+    skipping(film).read(5 * STEP)
+    assert film.asked == [4, 5]
+    film.asked.clear()
+    skipping(film).read(5 * STEP + 1)
+    assert sorted(film.asked) == [4, 5, 6]
+
+
+def test_nothing_is_looked_for_where_it_is_off(monkeypatch):
+    monkeypatch.setattr(Repeats, "_change", None)  # the only way to look
+    film = Film(TWOS)
+    np.testing.assert_array_equal(SmoothSource(film, STEP).read(STEP), film.read(1))
+    assert steps_for(film, "auto", 8) == 2
+
+
+def test_across_a_cut_nothing_is_bridged():
+    """All is as filmed; what repeats behind the cut is bridged to what comes then."""
+    shots = [blocks(seed, (HEIGHT, WIDTH)) for seed in (1, 2)]
+
+    def picture(number):
+        return frame(np.roll(shots[number >= 3], SPEED * number, axis=1))
+
+    film = Film([0, 1, 2, 2, 3, 3, 4, 5], picture)
+    source = skipping(film)
+    plain = SmoothSource(film, STEP)
+    for k in range(2 * STEP, 4 * STEP + 1):
+        np.testing.assert_array_equal(source.read(k), plain.read(k))
+    assert not np.array_equal(source.read(5 * STEP), film.read(5))
+    with ShotSource(PrefetchSource(skipping(film), planes=True), STEP) as shots_:
+        assert shots_.around(0, 0, shots_.count - 1) == range(4 * STEP - (STEP - 1) // 2)
+
+
+def test_a_lost_frame_beside_is_no_fault():
+    film = Film([0, 0, 1, 1, 2, 2, 3])
+    film.lost = 4
+    source = skipping(film)
+    np.testing.assert_array_equal(source.read(3 * STEP), film.read(3))  # it cannot be told how it goes on
+    assert not np.array_equal(source.read(STEP), film.read(1))
+    with pytest.raises(MediaError, match="frame 4 is lost"):
+        source.read(3 * STEP + 1)
+    film.lost = None
+    assert not np.array_equal(source.read(3 * STEP), film.read(3))
+
+
+def test_frames_of_a_real_film_that_repeat(bunny):
+    """Made at 24 frames per second, it has one more in each second. The pedestrians have none."""
+    for name, wanted in (("bigbuckbunny.mp4", [7, 32, 57, 82, 107]), ("pedestrians.avi", [])):
+        with open_source(bunny.with_name(name)) as movie:
+            repeats = Repeats(movie)
+            found = [repeats.gap(k) for k in range(movie.count)]
+        assert [k for k, (first, _stop) in enumerate(found) if first < k] == wanted
+        assert found == [(k - (k in wanted), k + 1 + (k + 1 in wanted)) for k in range(movie.count)]
+
+
+@pytest.mark.parametrize("crf", [18, 28])
+@pytest.mark.parametrize(("shown", "grain"), [(PULLDOWN, 0), (TWOS, 0), (PULLDOWN, 5), (range(15), 0), (range(15), 5)])
+def test_what_a_codec_makes_of_repeats(tmp_path, shown, grain, crf):
+    """H.264 of a film whose grain is repeated with the frame."""
+    path = tmp_path / "film.mp4"
+    with av.open(str(path), "w") as movie:
+        stream = movie.add_stream("libx264", rate=30, options={"crf": str(crf)})
+        stream.width, stream.height, stream.pix_fmt = WIDTH, HEIGHT, "yuv420p"
+        for number in shown:
+            noise = np.random.default_rng(number).normal(0, grain, (HEIGHT, WIDTH, 1))
+            made = np.clip(pan(number)[..., :3] + noise, 0, 255).astype(np.uint8)
+            movie.mux(stream.encode(av.VideoFrame.from_ndarray(made, "rgb24")))
+        movie.mux(stream.encode())
+    with open_source(path) as movie:
+        repeats = Repeats(movie)
+        found = {k for k in range(movie.count) if repeats.gap(k)[0] < k}
+    wanted = {k for k in range(1, len(shown)) if shown[k] == shown[k - 1] and shown[k] != shown[-1]}
+    assert found == wanted
+
+
+def test_automatic_counts_the_time_between_pictures():
+    """8 pixels in two frames are 4 in each."""
+    film, plain = (Texture(lambda k, times=times: shift(8)(k // times), (480, 270)) for times in (2, 1))
+    asked, own = [], film.read
+    film.read = lambda index: asked.append(index) or own(index)
+    for each in (film, plain):
+        each.count, each.width, each.height = 20, 480, 270
+        assert steps_for(each, "auto", 8) == 4
+    asked.clear()
+    assert steps_for(film, "auto", 8, skip_repeats=True) == 2
+    assert len(asked) <= 8 * 4
+    assert steps_for(plain, "auto", 8, skip_repeats=True) == 4
