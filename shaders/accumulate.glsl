@@ -1,7 +1,8 @@
-// Adds a frame to the running sums, or takes it away: from the layer `known` to the layer `next`.
+// Adds a frame to the running sums, or takes it away: from the layer `known` to the layer `next`; of moments, `count` of
+// them, one after the other, to as many layers of `layers`.
 // The frame: the one that was sent, in the light that is summed, `whole` for white,
 // with COVER weighted, its colours with NUMBERS in one of 0 to 2²⁴ − 1, R + 256 G + 65536 B;
-// with MOMENT one between two frames that were sent (include/moment.glsl);
+// with MOMENT or WORDS one between two frames that were sent (include/moment.glsl);
 // with PLANES by the whole numbers of libswscale (core/frames/planes.py) from samples of luma and chroma;
 // or with AGAIN one that the sums hold already, between the layers `before` and `after`.
 layout(local_size_x = 8, local_size_y = 16) in;  // a tile
@@ -20,16 +21,21 @@ uniform sampler2DArray weights;
 layout(r32ui) uniform readonly uimage2DArray luma, chroma;  // a software renderer's texelFetch takes longer
 uniform ivec2 chroma_step, luma_of, green_of;
 uniform int red_of, blue_of;
+#  elif WORDS
+layout(r32ui) uniform readonly uimage2DArray filmed, vectors;
+uniform ivec4 moment;
+uniform int count, layers;
 #  elif MOMENT
-uniform sampler2DArray first_frame, second_frame, vectors;
-uniform ivec3 moment;
+uniform sampler2DArray filmed, vectors;
+uniform ivec4 moment;
+uniform int count, layers;
 #  else
 uniform sampler2DArray frame;
 #  endif
 #endif
 #include "light.glsl"
 #include "sums.glsl"
-#if MOMENT
+#if MOMENT || WORDS
 #  include "moment.glsl"
 #endif
 
@@ -50,41 +56,61 @@ vec3 color_at(ivec2 pixel) {
 }
 #endif
 
+SUM added(SUM sum, SUM light) {
+  return BACK != 0 ? minus(sum, light) : plus(sum, light);
+}
+
+void store(ivec3 place, int layer, SUM sum) {
+#if COVER
+  imageStore(sums, place_in_layer(place, layer), sum);
+#else
+  imageStore(sums, place_in_layer(place, layer), halves_of(sum));
+#endif
+}
+
+#if !AGAIN
+SUM light_of(vec3 color, ivec2 pixel) {
+#  if COVER
+  float weight = texelFetch(weights, ivec3(pixel + ivec2(0, top), 0), 0).r;
+  vec4 weighted = vec4(color * weight, COVER == 2 ? 1.0 - weight : weight);
+  return uvec4(ivec4(weighted * whole + 0.5));
+#  else
+  return packed_light(uvec3(ivec3(color * whole + 0.5)));
+#  endif
+}
+#endif
+
 void main() {
   ivec2 pixel = ivec2(gl_GlobalInvocationID.xy);
   if (any(greaterThanEqual(pixel, size))) {
     return;
   }
   ivec3 place = place_of_sums(pixel);
-#if AGAIN
-  SUM light = minus(sum_at(place, after), sum_at(place, before));
+  SUM sum = sum_at(place, known);
+#if MOMENT || WORDS
+  for (int k = 0; k < count; ++k) {
+    vec3 color = moment_at(pixel + ivec2(0, top), k);
+#  if DECODE == 0
+    color = to_encoded(color);
+#  endif
+    sum = added(sum, light_of(color, pixel));
+    int layer = next + k;
+    store(place, layer < layers ? layer : layer - layers, sum);
+  }
+#elif AGAIN
+  store(place, next, added(sum, minus(sum_at(place, after), sum_at(place, before))));
 #else
 #  if PLANES
-  vec3 color = color_at(pixel + ivec2(0, top));
-#  elif MOMENT
-  vec3 color = moment_at(pixel + ivec2(0, top));
+  vec3 color = decoded(color_at(pixel + ivec2(0, top)));
 #  else
   vec4 sent = texelFetch(frame, ivec3(pixel + ivec2(0, top), 0), 0);
 #    if NUMBERS
   uint bytes = uint(sent.r);
-  vec3 color = vec3(uvec3(bytes, bytes >> 8, bytes >> 16) & 255u) / 255.0;
+  vec3 color = decoded(vec3(uvec3(bytes, bytes >> 8, bytes >> 16) & 255u) / 255.0);
 #    else
-  vec3 color = sent.rgb;
+  vec3 color = decoded(sent.rgb);
 #    endif
 #  endif
-#  if COVER
-  float weight = texelFetch(weights, ivec3(pixel + ivec2(0, top), 0), 0).r;
-  vec4 weighted = vec4(decoded(color) * weight, COVER == 2 ? 1.0 - weight : weight);
-  uvec4 light = uvec4(ivec4(weighted * whole + 0.5));
-#  else
-  uvec2 light = packed_light(uvec3(ivec3(decoded(color) * whole + 0.5)));
-#  endif
-#endif
-  SUM sum = sum_at(place, known);
-  sum = BACK != 0 ? minus(sum, light) : plus(sum, light);
-#if COVER
-  imageStore(sums, place_in_layer(place, next), sum);
-#else
-  imageStore(sums, place_in_layer(place, next), halves_of(sum));
+  store(place, next, added(sum, light_of(color, pixel)));
 #endif
 }

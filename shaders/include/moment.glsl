@@ -1,19 +1,51 @@
 // A moment between two frames (core/frames/moments.py); media/flow.py is the reference. Places are whole numbers, so that
-// these are the same ones.
+// these are the same ones. WORDS: texels come as whole words, which a software renderer loads in half of the time.
 #define APART 4  // pixels between two vectors
 #define UNIT 32  // of a coordinate, in a pixel
 #define ZERO 32768
 
-ivec4 stored_at(int x, int y) {
-  return ivec4(texelFetch(vectors, ivec3(x, y, 0), 0) * 65535.0 + 0.5);
+#if WORDS
+ivec4 stored_at(int x, int y, int which) {
+  uint path = imageLoad(vectors, ivec3(2 * x, y, which)).r, shown = imageLoad(vectors, ivec3(2 * x + 1, y, which)).r;
+  return ivec4(path & 0xFFFFu, path >> 16, shown & 0xFFFFu, shown >> 16);
 }
 
+ivec2 last_vector() {
+  return imageSize(vectors).xy / ivec2(2, 1) - 1;
+}
+
+vec3 levels_at(int x, int y, int end) {
+  uint bytes = imageLoad(filmed, ivec3(x, y, end)).r;
+  return vec3(ivec3(bytes, bytes >> 8, bytes >> 16) & 255);
+}
+
+ivec2 last_pixel() {
+  return imageSize(filmed).xy - 1;
+}
+#else
+ivec4 stored_at(int x, int y, int which) {
+  return ivec4(texelFetch(vectors, ivec3(x, y, which), 0) * 65535.0 + 0.5);
+}
+
+ivec2 last_vector() {
+  return textureSize(vectors, 0).xy - 1;
+}
+
+vec3 levels_at(int x, int y, int end) {
+  return texelFetch(filmed, ivec3(x, y, end), 0).rgb * 255.0;
+}
+
+ivec2 last_pixel() {
+  return textureSize(filmed, 0).xy - 1;
+}
+#endif
+
 // What the vectors say of a pixel, 16 times as large.
-ivec4 spread_at(ivec2 pixel) {
-  ivec2 last = textureSize(vectors, 0).xy - 1, place = pixel / APART, part = pixel - place * APART;
+ivec4 spread_at(ivec2 pixel, int which) {
+  ivec2 last = last_vector(), place = pixel / APART, part = pixel - place * APART;
   ivec2 beside = min(place + 1, last);
-  ivec4 above = stored_at(place.x, place.y) * (APART - part.x) + stored_at(beside.x, place.y) * part.x;
-  ivec4 below = stored_at(place.x, beside.y) * (APART - part.x) + stored_at(beside.x, beside.y) * part.x;
+  ivec4 above = stored_at(place.x, place.y, which) * (APART - part.x) + stored_at(beside.x, place.y, which) * part.x;
+  ivec4 below = stored_at(place.x, beside.y, which) * (APART - part.x) + stored_at(beside.x, beside.y, which) * part.x;
   return above * (APART - part.y) + below * part.y;
 }
 
@@ -25,35 +57,30 @@ vec4 cubic_weights(float x) {
   return vec4(before, here, after, 1.0 - before - here - after);
 }
 
-vec3 row_at(sampler2DArray frame, ivec4 columns, int row, vec4 shares) {
-  return texelFetch(frame, ivec3(columns.x, row, 0), 0).rgb * shares.x +
-         texelFetch(frame, ivec3(columns.y, row, 0), 0).rgb * shares.y +
-         texelFetch(frame, ivec3(columns.z, row, 0), 0).rgb * shares.z +
-         texelFetch(frame, ivec3(columns.w, row, 0), 0).rgb * shares.w;
+vec3 row_at(ivec4 columns, int row, vec4 shares, int end) {
+  return levels_at(columns.x, row, end) * shares.x + levels_at(columns.y, row, end) * shares.y +
+         levels_at(columns.z, row, end) * shares.z + levels_at(columns.w, row, end) * shares.w;
 }
 
-// A frame at a place in 1 / UNIT of a pixel, in levels of 8 bits.
-vec3 looked_up(sampler2DArray frame, ivec2 place) {
-  ivec2 last = textureSize(frame, 0).xy - 1, corner = place >> 5, part = place & (UNIT - 1);
-  if (part == ivec2(0)) {
-    return texelFetch(frame, ivec3(clamp(corner, ivec2(0), last), 0), 0).rgb;
-  }
+// Linear light of a filmed frame at a place in 1 / UNIT of a pixel. end: its layer
+vec3 looked_up(ivec2 place, int end) {
+  ivec2 last = last_pixel(), corner = place >> 5, part = place & (UNIT - 1);
   ivec4 columns = clamp(corner.x + ivec4(-1, 0, 1, 2), 0, last.x), rows = clamp(corner.y + ivec4(-1, 0, 1, 2), 0, last.y);
   vec4 across = cubic_weights(float(part.x) / float(UNIT)), down = cubic_weights(float(part.y) / float(UNIT));
-  vec3 color = row_at(frame, columns, rows.x, across) * down.x + row_at(frame, columns, rows.y, across) * down.y +
-               row_at(frame, columns, rows.z, across) * down.z + row_at(frame, columns, rows.w, across) * down.w;
-  return floor(clamp(color, 0.0, 1.0) * 255.0 + 0.5) / 255.0;
+  vec3 levels = row_at(columns, rows.x, across, end) * down.x + row_at(columns, rows.y, across, end) * down.y +
+                row_at(columns, rows.z, across, end) * down.z + row_at(columns, rows.w, across, end) * down.w;
+  return to_linear(floor(clamp(levels, 0.0, 255.0) + 0.5) / 255.0);
 }
 
-// The moment's color at a pixel, in levels of 8 bits. moment: its number, of how many; the shift of a path's parts
-vec3 moment_at(ivec2 pixel) {
-  ivec4 said = spread_at(pixel);
+// The linear light of one of the moments at a pixel. which: its vectors' layer; moment: the first one's number, of how
+// many; the shift of a path's parts; the first frame's layer
+vec3 moment_at(ivec2 pixel, int which) {
+  ivec4 said = spread_at(pixel, which);
   ivec2 path = said.xy - ZERO * APART * APART, here = pixel * UNIT;
-  int left = moment.y - moment.x, half_ = 1 << (moment.z - 1);
-  vec3 first = to_linear(looked_up(first_frame, here - ((moment.x * path + half_) >> moment.z)));
-  vec3 second = to_linear(looked_up(second_frame, here + ((left * path + half_) >> moment.z)));
+  int number = moment.x + which, left = moment.y - number, half_ = 1 << (moment.z - 1);
+  vec3 first = looked_up(here - ((number * path + half_) >> moment.z), moment.w);
+  vec3 second = looked_up(here + ((left * path + half_) >> moment.z), 1 - moment.w);
   vec2 shown = vec2(said.zw) / float(255 * APART * APART) + 0.05;
-  float late = float(moment.x) * shown.y;
-  vec3 mixed = mix(first, second, late / (late + float(left) * shown.x));
-  return floor(to_encoded(mixed) * 255.0 + 0.5) / 255.0;
+  float late = float(number) * shown.y;
+  return mix(first, second, late / (late + float(left) * shown.x));
 }

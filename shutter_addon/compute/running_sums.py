@@ -3,7 +3,7 @@ the fastest."""
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Iterator
 from contextlib import suppress
 
 import numpy as np
@@ -53,8 +53,8 @@ def accumulation(decode: int, sent: str, back: bool, tiled: bool, cover: int = 0
     """The pass that makes a layer of sums from its neighbour: with the frame between the two added, or subtracted.
 
     decode: of `decoding`
-    sent: as what the frame was sent, "COLOURS", "NUMBERS" (Device.send), "PLANES" or "MOMENT"; "AGAIN": it is taken as
-    the difference of two layers that hold it already
+    sent: as what the frame was sent, "COLOURS", "NUMBERS" (Device.send), "PLANES", "MOMENT" or
+    "WORDS", a moment as planes are sent; "AGAIN": it is taken as the difference of two layers that hold it already
     back: it is subtracted
     tiled: the sums are stored in tiles
     cover: of WeightedSums
@@ -93,17 +93,20 @@ class Sums(Window):
         self.start = self.stop = 0
         self._frames: dict[int, int] = {}  # position: source frame
         self._light: Light | None = None
-        self._sent: dict[int, int] = {}  # by texture of `_filmed`: the number of the frame in it
+        self._sent: dict[int, int] = {}  # by layer of `_filmed`: the number of the frame in it
         # White is the largest 2ⁿ − 1 for which the sum of a whole window fits into 21 bits, and n is 16 at most.
         self.whole = (1 << min(16, 21 - (capacity - 1).bit_length())) - 1
         self.kind = STORED_SUMS[self.cover]
-        if source.step > 1:
-            self._loading = (*self._loading, ("filmed 0", "rgba8"), ("filmed 1", "rgba8"))
         # A workgroup reads all layers of its pixels. In tiles, they are one run of memory.
         across, down = TILE
         fits = across * down * self.layers <= device.max_size and -(-source.height // down) <= device.max_layers
         self.tiled = stores_rows(device) and fits
         super().__init__(device, source, capacity, shutters)
+
+    def _allocate(self) -> None:
+        super()._allocate()
+        if self.source.step > 1:
+            self._two_frames()
 
     @property
     def held(self) -> Collection[int]:
@@ -124,12 +127,12 @@ class Sums(Window):
             self._light, self._frames = options.light, {}
             self.start = self.stop = first
         while self.stop < last:
-            self._keep(max(self.start, self.stop + 1 - self.capacity), self.stop)
-            self._add(options.light, frames[self.stop - first], self.stop, self.stop + 1)
-            self.stop += 1
+            next_ = self._together(frames[self.stop - first :])
+            self._keep(max(self.start, self.stop + len(next_) - self.capacity), self.stop)
+            self.stop += self._add(options.light, next_, self.stop, self.stop + 1)
         while self.start > first:
             self._keep(self.start, min(self.stop, self.start - 1 + self.capacity))
-            self._add(options.light, frames[self.start - 1 - first], self.start, self.start - 1)
+            self._add(options.light, [frames[self.start - 1 - first]], self.start, self.start - 1)
             self.start -= 1
 
     def _continues(self, first: int, frames: list[int], options: Options) -> bool:
@@ -149,16 +152,26 @@ class Sums(Window):
         self.start, self.stop = start, stop
         self._frames = {position: frame for position, frame in self._frames.items() if start <= position < stop}
 
-    def _add(self, light: Light, frame: int, known: int, next_: int) -> None:
-        """Makes the sum at position next_, from that at its neighbour `known` and the source frame between the two.
+    def _together(self, frames: list[int]) -> list[int]:
+        """Those of the next source frames that one pass may add: moments of a pair, one after the other."""
+        step, first = self.source.step, frames[0]
+        pair = range(first, first - first % step + step)
+        if self.cover or first % step == 0 or any(frame in pair for frame in self.held):
+            return frames[:1]
+        return [frame for frame, wanted in zip(frames, pair, strict=False) if frame == wanted]
+
+    def _add(self, light: Light, frames: list[int], known: int, next_: int) -> int:
+        """Makes the sum at position next_, from that at its neighbour `known` and the source frame between the two; of
+        several frames, those at the positions behind as well, if they are moments. Returns how many it has made.
 
         light: what is summed"""
+        frame = frames[0]
         # A position that shows this frame already: it need not be read.
         same = next((position for position, held in self._frames.items() if held == frame), None)
         images: dict[str, Texture] = {}
         given: Given = {"known": known % self.layers, "next": next_ % self.layers}
         if same is None:
-            sent, arguments = self._send(frame)
+            sent, arguments = self._send(frames)
             given |= arguments | {"whole": float(self.whole)}
             images = given.pop("images", images)
         else:
@@ -169,8 +182,10 @@ class Sums(Window):
         for part, sums in self.stored():
             size = self.source.width, part.height
             self.device.run(program, size, images=images | {"sums": sums}, size=size, top=part.top, **given)
-        self._frames[min(known, next_)] = frame
+        frames = frames[: given.get("count", 1)]
+        self._frames |= dict(enumerate(frames, min(known, next_)))
         kept()
+        return len(frames)
 
     def _size(self, part: Part) -> tuple[int, int, int]:
         if not self.tiled:
@@ -179,14 +194,15 @@ class Sums(Window):
         across, down = TILE
         return across * down * self.layers, -(-self.source.width // across), -(-part.height // down)
 
-    def _send(self, index: int) -> tuple[str, Given]:
-        """Sends a source frame: as what (`accumulation`), and the arguments of the pass that adds it."""
-        may_be_moment = self.source.step > 1
+    def _send(self, frames: list[int]) -> tuple[str, Given]:
+        """Sends a source frame: as what (`accumulation`), and the arguments of the pass that adds it; with those behind
+        it where they are moments."""
+        index, may_be_moment = frames[0], self.source.step > 1
         frame = self.source.decoded(index) if self.device.takes_planes or may_be_moment else self.source.read(index)
         if isinstance(frame, Planes):
             return "PLANES", self._send_planes(frame)
         if isinstance(frame, Moment):
-            return "MOMENT", self._send_moment(frame)
+            return self._send_moments([frame, *self._evenly(frame, frames[1:])])
         own = self._own("frame", "rgba8")
         sent = self.device.send(own, frame)
         return "COLOURS" if sent is own else "NUMBERS", {"textures": {"frame": sent}}
@@ -204,27 +220,49 @@ class Sums(Window):
             "blue_of": matrix.blue_of_cb,
         }
 
-    def _send_moment(self, moment: Moment) -> Given:
-        first, second = self._filmed(moment)
-        vectors = self._extra.filled("vectors", [moment.vectors], "rgba16")
-        shift = (STEP**2 * moment.steps).bit_length() - 1
-        return {
-            "textures": {"first_frame": first, "second_frame": second, "vectors": vectors},
-            "moment": (moment.number, moment.steps, shift),
+    def _send_moments(self, moments: list[Moment]) -> tuple[str, Given]:
+        words, first = self.device.takes_planes, moments[0]
+        height, width, _ = first.vectors.shape
+        layers = self.source.step - 1
+        if words:
+            vectors = self._extra.of("vectors", (2 * width, height, layers), "r32ui")
+        else:
+            vectors = self._extra.of("vectors", (width, height, layers), "rgba16")
+        for layer, moment in enumerate(moments):
+            stored = moment.vectors.view("<u4").reshape(height, -1) if words else moment.vectors
+            self.device.write(vectors, stored, layer)
+        filmed, start = self._filmed(first, words)
+        shift = (STEP**2 * first.steps).bit_length() - 1
+        given: Given = {
+            "images" if words else "textures": {"filmed": filmed, "vectors": vectors},
+            "moment": (first.number, first.steps, shift, start),
+            "count": len(moments),
+            "layers": self.layers,
         }
+        return "WORDS" if words else "MOMENT", given
 
-    def _filmed(self, moment: Moment) -> list[Texture]:
-        """The two frames of a moment on the device: they stay for all moments of their pair, and one for the next."""
-        textures = []
-        for number, frame in zip(moment.pair, moment.ends, strict=True):
-            place = next((i for i in range(2) if self._sent.get(i) == number), None)
-            if place is None:
-                place = next(i for i in range(2) if self._sent.get(i) not in moment.pair)
-            textures.append(self._own(f"filmed {place}", "rgba8"))
-            if self._sent.get(place) != number:
-                self.device.write(textures[-1], frame, opaque=True)
-                self._sent[place] = number
-        return textures
+    def _evenly(self, moment: Moment, indices: list[int]) -> Iterator[Moment]:
+        """Of the next source frames those that are moments of the same pair, as far apart as its steps."""
+        for number, index in enumerate(indices, moment.number + 1):
+            frame = self.source.decoded(index)
+            if not isinstance(frame, Moment) or (frame.pair, frame.number) != (moment.pair, number):
+                break
+            yield frame
+
+    def _filmed(self, moment: Moment, words: bool) -> tuple[Texture, int]:
+        """The two frames of a moment on the device, and the layer of the first: they stay for all moments of their
+        pair, and one for the next."""
+        texture, sent = self._two_frames(), self._sent
+        start = int(sent.get(1) == moment.pair[0] or sent.get(0) == moment.pair[1])
+        for layer, number, frame in zip((start, 1 - start), moment.pair, moment.ends, strict=True):
+            if sent.get(layer) != number:
+                self.device.write(texture, frame.view("<u4")[..., 0] if words else frame, layer, opaque=True)
+                sent[layer] = number
+        return texture, start
+
+    def _two_frames(self) -> Texture:
+        size = self.source.width, self.source.height, 2
+        return self._extra.of("filmed", size, "r32ui" if self.device.takes_planes else "rgba8")
 
     def release(self) -> None:
         self._frames, self._light, self._sent = {}, None, {}
@@ -242,8 +280,8 @@ class WeightedSums(Sums):
         self.cover, self._weight = 2 if source.rest else 1, source.weight
         super().__init__(device, source.base, capacity, shutters)
 
-    def _send(self, index: int) -> tuple[str, Given]:
-        weights = self._extra.filled("weights", [self._weight(index)], "r32f")
-        sent, given = super()._send(index)
+    def _send(self, frames: list[int]) -> tuple[str, Given]:
+        weights = self._extra.filled("weights", [self._weight(frames[0])], "r32f")
+        sent, given = super()._send(frames)
         given["textures"] = given.get("textures", {}) | {"weights": weights}
         return sent, given

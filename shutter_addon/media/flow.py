@@ -7,7 +7,8 @@ methodology for optical flow"). Along what has arrived, both frames are looked u
 
 from __future__ import annotations
 
-from functools import cache, lru_cache, partial
+from collections.abc import Callable
+from functools import cache, cached_property, lru_cache, partial
 
 import numpy as np
 
@@ -24,6 +25,7 @@ HALF_MAX = 65504  # the largest value of a half float, which infinite samples co
 # brighter; in darker ones in proportion, but for noise.
 UNLIKE, GREY, NOISE = 24.0, 90.0, 4.0
 SHARED = 0.5  # of all vectors, in both directions, have to
+VERSION = 1  # raise it when `found` gives something else of the same pictures
 
 
 def check() -> None:
@@ -34,15 +36,27 @@ def check() -> None:
 class Between:
     """What lies between two frames: a function of the two alone, the same bits whatever the number of cores."""
 
-    def __init__(self, first: np.ndarray, second: np.ndarray, transfer: str = "srgb", alpha: str = "opaque") -> None:
+    def __init__(
+        self,
+        first: np.ndarray,
+        second: np.ndarray,
+        transfer: str = "srgb",
+        alpha: str = "opaque",
+        find: Callable[[np.ndarray, np.ndarray], np.ndarray] | None = None,
+    ) -> None:
         """first, second: arrays (height, width, 4) of a FrameSource's dtype
-        transfer, alpha: how samples are encoded, as FrameSource says; the new frames are encoded alike"""
+        transfer, alpha: how samples are encoded, as FrameSource says; the new frames are encoded alike
+        find: gives what `found` gives; None: that"""
         self.ends, self._transfer, self._alpha = (first, second), transfer, alpha
         self._paths: _Paths | None = None
         if not np.array_equal(first, second):
-            self._encoded = [_encoded(frame, transfer, alpha) for frame in (first, second)]
-            paths = _Paths([_luma(end) for end in self._encoded])
+            pictures = [luma(end, transfer, alpha) for end in self.ends]
+            paths = _Paths(pictures, (find or found)(*pictures))
             self._paths = paths if paths.meet else None
+
+    @cached_property
+    def _encoded(self) -> list[np.ndarray]:
+        return [_encoded(end, self._transfer, self._alpha) for end in self.ends]
 
     def moment(self, pair: tuple[int, int], number: int, steps: int) -> np.ndarray | Moment:
         """One of `steps` moments, a power of two. What only one of the two frames shows is taken from it, all else is
@@ -85,38 +99,70 @@ def of_rows(frame: np.ndarray, source: FrameSource, most: int, *, turned: bool =
 
 def vectors(first: np.ndarray, second: np.ndarray) -> np.ndarray:
     """Where the pixels of a small picture (H, W) uint8 go in another one, quickly: vectors (H, W, 2) in pixels."""
-    return np.nan_to_num(_dis(first, second, finest=0, stride=4), posinf=0, neginf=0)
+    return _dis(first, second, stride=4)
 
 
 def fine_vectors(first: np.ndarray, second: np.ndarray) -> np.ndarray:
     """As `vectors`, more exactly at the edges of what moves, which takes a third longer."""
-    return np.nan_to_num(_dis(first, second, finest=0, stride=3, smoothness=10), posinf=0, neginf=0)
+    return _dis(first, second, stride=3, smoothness=10)
 
 
-def _dis(first: np.ndarray, second: np.ndarray, finest: int, stride: int, smoothness: float = 20) -> np.ndarray:
+def found(first: np.ndarray, second: np.ndarray) -> np.ndarray:
+    """What tells how two pictures (H, W) uint8 go into each other: float16 (⌈H / STEP⌉, ⌈W / STEP⌉, 6). For every
+    STEPth pixel of the first, the vector to the second, x and y in pixels, and its cost: how much, in levels, the two
+    ends differ; then the same from the second to the first."""
+    height, width = first.shape
+    shape = -(-height // STEP), -(-width // STEP)
+    if min(height, width) < SMALLEST:
+        way = np.zeros((-(-height // 2), -(-width // 2), 2), np.float32)
+    halves = [_half(picture) for picture in (first, second)]
+    sides = []
+    for a, b in (halves, halves[::-1]):
+        stopping.check()
+        if min(height, width) >= SMALLEST:
+            way = _dis(a, b, stride=4, quick=True)
+        cost = cv2.blur(cv2.absdiff(a, look(b, grid(*a.shape) + way, cv2.INTER_LINEAR)).astype(np.float32), (3, 3))
+        sides += [2 * way, cost]
+    apart = STEP // 2
+    values = np.dstack(sides)[::apart, ::apart][: shape[0], : shape[1]]
+    return values.clip(-HALF_MAX, HALF_MAX).astype(np.float16)
+
+
+def _half(picture: np.ndarray) -> np.ndarray:
+    """A picture of half the size, in which each pixel is the mean of four."""
+    height, width = picture.shape
+    even = cv2.copyMakeBorder(picture, 0, height % 2, 0, width % 2, cv2.BORDER_REPLICATE)
+    return resized(even, (even.shape[1] // 2, even.shape[0] // 2))
+
+
+def _dis(first: np.ndarray, second: np.ndarray, stride: int, smoothness: float = 20, quick: bool = False) -> np.ndarray:
     """Vectors (H, W, 2) from the first picture's pixels to the second's.
 
-    finest: how often the pictures are halved at least; stride: from a patch to the next, in pixels of these;
-    smoothness: of the vectors (OpenCV's alpha)"""
+    stride: from a patch to the next, in pixels; smoothness: of the vectors (OpenCV's alpha)
+    quick: they are refined less, which takes half as long and costs moments nothing"""
     # A new one each time: it keeps buffers, which threads must not share.
     dis = cv2.DISOpticalFlow_create(cv2.DISOPTICAL_FLOW_PRESET_MEDIUM)
-    dis.setFinestScale(finest)
+    dis.setFinestScale(0)
     dis.setPatchStride(stride)
     dis.setVariationalRefinementAlpha(smoothness)
+    if quick:
+        dis.setGradientDescentIterations(12)
+        dis.setVariationalRefinementIterations(3)
     height, width = first.shape
     beyond = max(SMALLEST - height, 0), max(SMALLEST - width, 0)
     wide = (cv2.copyMakeBorder(each, 0, beyond[0], 0, beyond[1], cv2.BORDER_REPLICATE) for each in (first, second))
-    return dis.calc(*wide, None)[:height, :width]
+    # Of pictures without any structure they may be infinite.
+    return np.nan_to_num(dis.calc(*wide, None)[:height, :width], posinf=0, neginf=0)
 
 
 class _Paths:
     """Where the pixels of two pictures go from one to the other."""
 
-    def __init__(self, luma: list[np.ndarray]) -> None:
+    def __init__(self, luma: list[np.ndarray], found: np.ndarray) -> None:
         self._shape = luma[0].shape
         brightness = max(float(each.mean()) for each in luma)
         self._unlike = max(UNLIKE * min(brightness / GREY, 1.0), NOISE)
-        self._sides = [_carriers(a, b) for a, b in (luma, luma[::-1])]
+        self._sides = [_carriers(each) for each in np.split(found, 2, axis=2)]
 
     @property
     def meet(self) -> bool:
@@ -129,10 +175,13 @@ class _Paths:
             self._carry(*side, t=s) for side, s in zip(self._sides, (t, 1 - t), strict=True)
         )
         vectors = np.where((cost <= other)[..., None], forth, -back)
-        arrived = np.dstack([cost, other]) < np.inf
-        vectors = _filled(vectors.astype(np.float32), arrived.any(axis=2))
-        stored = np.rint(UNIT * vectors).clip(-ZERO, ZERO - 1) + ZERO
-        return np.dstack([stored, 255 * arrived]).astype(np.uint16)
+        arrived = [each < np.inf for each in (cost, other)]
+        vectors = _filled(vectors, arrived[0] | arrived[1])
+        stored = np.empty((*cost.shape, 4), np.uint16)
+        stored[..., :2] = np.rint(UNIT * vectors).clip(-ZERO, ZERO - 1) + ZERO
+        for end, shows in enumerate(arrived, 2):
+            stored[..., end] = np.uint16(255) * shows
+        return stored
 
     def _carry(
         self, places: np.ndarray, vectors: np.ndarray, costs: np.ndarray, t: float
@@ -145,26 +194,25 @@ class _Paths:
         stopping.check()
         corners = (cells[:, 1] + 2) * (w + 4) + cells[:, 0] + 2
         # Of several that arrive the cheapest stays, the last; -1, where nothing arrives, takes what is appended.
-        chosen = np.full((h + 4) * (w + 4), -1, np.int32)
-        for corner in (0, 1, w + 4, w + 5):
-            np.maximum.at(chosen, corners + corner, np.arange(len(corners), dtype=np.int32))
-        chosen = chosen.reshape(h + 4, w + 4)[2:-2, 2:-2]
+        last = np.full((h + 4) * (w + 4), -1, np.int32)
+        np.maximum.at(last, corners, np.arange(len(corners), dtype=np.int32))
+        last = last.reshape(h + 4, w + 4)[1:-2, 1:-2]
+        # Each arrives at the four corners of its cell.
+        last = np.maximum(last[1:], last[:-1])
+        chosen = np.maximum(last[:, 1:], last[:, :-1])
         nowhere, infinite = np.zeros((1, 2), np.float32), np.full(1, np.inf, np.float32)
         return np.concatenate([vectors, nowhere])[chosen], np.concatenate([costs, infinite])[chosen]
 
 
-def _carriers(first: np.ndarray, second: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Places (n, 2) on every STEPth pixel, vectors (n, 2) and costs (n,), the dearest first: how much, in levels, the
-    two ends differ."""
-    stopping.check()
-    places = grid(*first.shape)
-    vectors = np.zeros_like(places) if min(first.shape) < SMALLEST else _dis(first, second, finest=1, stride=3)
-    vectors = np.nan_to_num(vectors, posinf=0, neginf=0)  # of pictures without any structure
-    cost = cv2.blur(cv2.absdiff(first, look(second, places + vectors, cv2.INTER_LINEAR)).astype(np.float32), (5, 5))
-    cost = cost[::STEP, ::STEP].ravel()
-    order = np.argsort(-cost, kind="stable")
-    places, vectors = (each[::STEP, ::STEP].reshape(-1, 2)[order] for each in (places, vectors))
-    return places, vectors, cost[order]
+def _carriers(side: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Places (n, 2), vectors (n, 2) and costs (n,) of a side of `found`, the dearest first."""
+    values = side.reshape(-1, 3)
+    # As whole numbers, which NumPy sorts ten times as fast; costs are not negative.
+    order = np.argsort(~values[:, 2].view(np.uint16), kind="stable")
+    # Of pixels of half the size, whose middle lies half a pixel further.
+    places = (STEP * grid(*side.shape[:2]) + np.float32(0.5)).reshape(-1, 2)
+    values = values[order].astype(np.float32)
+    return places[order], values[:, :2], values[:, 2]
 
 
 def _filled(vectors: np.ndarray, known: np.ndarray) -> np.ndarray:
@@ -227,7 +275,7 @@ def look(picture: np.ndarray, places: np.ndarray, how: int | None = None) -> np.
     return cv2.remap(picture, places, None, cv2.INTER_CUBIC if how is None else how, borderMode=cv2.BORDER_REPLICATE)
 
 
-@lru_cache(maxsize=1)  # 66 MB at 4K; a build has pictures of one size
+@lru_cache(maxsize=2)  # 16 MB at 4K, and a fourth of that
 def grid(height: int, width: int) -> np.ndarray:
     """The places (H, W, 2) of all pixels."""
     return np.dstack(np.meshgrid(*(np.arange(n, dtype=np.float32) for n in (width, height))))

@@ -15,13 +15,15 @@ def write_exr(path: Path, values: np.ndarray, names: list[str], note: str = "") 
     """Writes values (height, width, channels) float32 with these channel names, whole or not at all.
 
     note: for its metadata, which rendered_pictures reads. MediaError: it cannot be written."""
-    spec = OpenImageIO.ImageSpec(*_size(values), OpenImageIO.FLOAT)
-    spec.channelnames = tuple(names)
-    spec["compression"] = "zip"
-    spec["DateTime"] = "1970:01:01 00:00:00"  # else the time of writing: equal samples are equal files
+    spec = _exr(values, OpenImageIO.FLOAT, tuple(names))
     if note:
         spec["Note"] = note
     _write(path, spec, np.asarray(values, np.float32))
+
+
+def write_halves(path: Path, values: np.ndarray, names: tuple[str, ...]) -> None:
+    """Writes values (height, width, channels) float16 with these channel names, as `write_exr`."""
+    _write(path, _exr(values, OpenImageIO.HALF, names), values)
 
 
 def write_grey(path: Path, values: np.ndarray) -> None:
@@ -37,6 +39,14 @@ def write_levels(path: Path, levels: np.ndarray, description: str) -> None:
     spec = OpenImageIO.ImageSpec(*_size(levels[..., None]), OpenImageIO.UINT8)
     spec["ImageDescription"] = description
     _write(path, spec, levels[..., None])
+
+
+def _exr(values: np.ndarray, samples: OpenImageIO.BASETYPE, names: tuple[str, ...]) -> OpenImageIO.ImageSpec:
+    spec = OpenImageIO.ImageSpec(*_size(values), samples)
+    spec.channelnames = names
+    spec["compression"] = "zip"
+    spec["DateTime"] = "1970:01:01 00:00:00"  # else the time of writing: equal samples are equal files
+    return spec
 
 
 def _size(values: np.ndarray) -> tuple[int, int, int]:

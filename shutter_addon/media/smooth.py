@@ -1,7 +1,7 @@
 """The moments between the frames of footage, found by optical flow as they are read: smooth exposures of any footage.
 
-Nothing is kept on disk. Whatever a pair of frames needs is found when its first moment is read, which the thread that
-decodes ahead does (prefetch).
+Whatever a pair of frames needs is found when its first moment is read, which the thread that decodes ahead does
+(prefetch). No moment is kept on disk, but vectors may be (stored_vectors).
 """
 
 from __future__ import annotations
@@ -19,6 +19,7 @@ from . import flow, opencv, steps
 from .errors import MediaError
 from .files import check_index
 from .repeats import MOST, Repeats
+from .stored_vectors import StoredVectors
 
 SMOOTH = 1, 2, 4, 8, 16  # moments from a filmed frame to the next
 _PAIRS = 8  # of neighbouring frames, spread over the footage, that "auto" looks at
@@ -50,9 +51,12 @@ class SmoothSource(SourceWrapper):
     skip_repeats: frames that repeat the one before count as moments between the others, evenly spaced; `repeats` says
     whether there were any so far"""
 
-    def __init__(self, source: FrameSource, step: int, *, skip_repeats: bool = False) -> None:
+    def __init__(
+        self, source: FrameSource, step: int, vectors: StoredVectors | None = None, *, skip_repeats: bool = False
+    ) -> None:
         super().__init__(_Recent(source))
         flow.check()
+        self._find = flow.found if vectors is None else vectors.found
         self.step = step
         self.count = (source.count - 1) * step + 1
         self.fps = None if source.fps is None else source.fps * step
@@ -86,7 +90,7 @@ class SmoothSource(SourceWrapper):
 
     def _between(self, pair: tuple[int, int]) -> flow.Between:
         first, second = map(self._source.read, pair)
-        return flow.Between(first, second, self.transfer, self.alpha)
+        return flow.Between(first, second, self.transfer, self.alpha, self._find)
 
     def close(self) -> None:
         """Closes the file, and lets go of all frames."""

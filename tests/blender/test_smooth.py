@@ -555,3 +555,21 @@ def test_a_recipe_says_it(bpy, effect, edit):
         recipe_import.apply(edit, effect, strip, recipe_file.parse(json.dumps(data)))
         assert (effect.inbetween, effect.window) == (str(steps).upper(), 4)
         assert json.loads(recipe_file.dump(recipe_export.recipe_of(edit, effect, strip)))["inbetween"] == steps
+
+
+def test_vectors_are_kept_beside_the_file(bpy, filmed, add, edit, tmp_path, monkeypatch):
+    """Where pictures are rendered, for the next time; not of an edit that was not saved."""
+    from shutter_addon.blender.rendering import sessions
+
+    _source, strip, effect = add(filmed, COUNT, [1, 1])
+    folder = tmp_path / "virtual_shutter_vectors"
+    wanted = request(edit, effect, strip, 2).picture().copy()
+    assert not folder.exists()
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "edit.blend"))
+    scene = bpy.context.scene
+    effect = scene.virtual_shutter.effects[0]
+    for _ in range(2):
+        sessions.forget()
+        np.testing.assert_array_equal(request(scene, effect, strip, 2).picture(), wanted)
+        assert len(list(folder.iterdir())) == 1
+        monkeypatch.setattr(flow, "found", None)  # nothing is found any more

@@ -157,13 +157,13 @@ def test_filmed_frames_of_a_pair_are_sent_once(gpu_device, monkeypatch):
     """With the vectors of each moment, a sixteenth of a picture."""
     from shutter_addon.compute.gpu import GPUCompositor
 
-    sent, own = [], running_sums.Sums._filmed  # all that sends filmed frames
+    sent, own = [], running_sums.Sums._filmed  # nothing else tells what is sent
 
-    def noted(sums, moment):
-        before = set(sums._sent.values())  # which frames are there
-        textures = own(sums, moment)
-        sent.extend(sorted(set(sums._sent.values()) - before))  # and are there now
-        return textures
+    def noted(sums, moment, *given):
+        before = dict(sums._sent)  # by layer
+        texture = own(sums, moment, *given)
+        sent.extend(number for number in sums._sent.values() if number not in before.values())  # as above
+        return texture
 
     monkeypatch.setattr(running_sums.Sums, "_filmed", noted)  # as above
     source = SmoothSource(film(np.random.default_rng(7)), 8)

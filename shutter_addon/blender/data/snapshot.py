@@ -9,8 +9,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Any
 
+import bpy
 import numpy as np
 from bpy.app.translations import pgettext_n as n_
 from bpy.app.translations import pgettext_rpt as rpt_
@@ -45,7 +47,8 @@ class Snapshot:
     effect: its channels are sampled at `frames`
     source: what is read, and `timing`, when; None: the effect's own source time says that
     blended: the sequencer's colour space, in which Blender lays the strip over others; "": it does not
-    first: the strip's first timeline frame; film: from frame to frame of the scene's film, and its last frame"""
+    first: the strip's first timeline frame; film: from frame to frame of the scene's film, and its last frame
+    folder: that of the .blend file; None: it was not saved"""
 
     scene: int
     origin: float
@@ -56,6 +59,7 @@ class Snapshot:
     source: source_media.SourceSpec
     timing: StripTiming | None
     blended: str
+    folder: Path | None = None
 
     def timeline_frame(self, scene_frame: float) -> float:
         """The timeline frame at which the effect's scene is at one of its own."""
@@ -76,6 +80,7 @@ def take(scene: Scene, effect: PropertyGroup, strip: Strip, frames: Frames) -> S
         source=source_media.spec(source),
         timing=None if effect.use_source_time else timing_of(source),
         blended="" if strip.blend_type == "REPLACE" or source.mute else scene.sequencer_colorspace_settings.name,
+        folder=Path(bpy.data.filepath).parent if bpy.data.filepath else None,
     )
 
 

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import traceback
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
+from pathlib import Path
 
 from ...core import told
 from ...core.frames.frame_source import FrameSource
@@ -16,6 +17,7 @@ from ...media import MediaError
 from ...media.cuts import ShotSource
 from ...media.prefetch import PrefetchSource
 from ...media.smooth import SmoothSource, steps_for
+from ...media.stored_vectors import FOLDER, StoredVectors
 from ..data.snapshot import Snapshot
 from ..data.source_media import SourceSpec
 from ..data.strip_proxies import Proxy
@@ -61,13 +63,15 @@ class SourceKey:
 
     scene: session_uid of the effect's scene; spec: Snapshot's source; steps: moments from a filmed frame to the next
     skip_repeats: as Options has it of the effect, where there are steps
-    detail: smooth where nothing more than filmed frames is to be had"""
+    detail: smooth where nothing more than filmed frames is to be had
+    folder: where vectors are kept; None: nowhere"""
 
     scene: int
     spec: SourceSpec
     steps: int
     skip_repeats: bool = False
     detail: Detail = FULL
+    folder: Path | None = field(default=None, compare=False)
 
     @staticmethod
     def of(snapshot: Snapshot, detail: Detail = FULL) -> SourceKey:
@@ -81,6 +85,7 @@ class SourceKey:
             steps=steps,
             skip_repeats=steps > 1 and _options(snapshot).skip_repeats,
             detail=detail,
+            folder=snapshot.folder,
         )
 
     @property
@@ -94,13 +99,16 @@ class SourceKey:
         same = self.spec == other.spec and replace(self.detail, smooth=is_smooth[1]) == other.detail
         return same and is_smooth[0] != is_smooth[1]
 
-    def open(self, *, planes: bool = False) -> ShotSource:
-        """The source; planes: see PrefetchSource. EffectError, MediaError: there is none."""
+    def open(self, *, planes: bool = False, keeps: bool = False) -> ShotSource:
+        """The source. EffectError, MediaError: there is none.
+
+        planes: see PrefetchSource; keeps: whether vectors are written to the folder"""
         medium = self.spec.open(self.detail.divisor, self.detail.proxy)
         if self.steps == 1:
             return ShotSource(PrefetchSource(medium, planes=planes))
         try:
-            smooth = SmoothSource(medium, self.steps, skip_repeats=self.skip_repeats)
+            vectors = None if self.folder is None else StoredVectors(self.folder / FOLDER, keeps)
+            smooth = SmoothSource(medium, self.steps, vectors, skip_repeats=self.skip_repeats)
             return ShotSource(PrefetchSource(smooth, planes=True), self.steps)
         except FAULTS:
             medium.close()

@@ -173,7 +173,7 @@ class RenderSession:
         if known is None or known[0] != key:
             if known is not None:
                 self._submit(known[1].close)
-            source = key.open(planes=compositor.takes_planes)
+            source = key.open(planes=compositor.takes_planes, keeps=self._late is None)
             known = key, Renderer(compositor, source, MatteValues.of(source, self._late))
             other = key.scene, not key.place[1]
             if other in self._renderers and not self._renderers[other][0].is_beside(key):

@@ -1,0 +1,165 @@
+"""Vectors that are kept as files: moments have the same bits with them and without, whatever became of the files."""
+
+import os
+
+import numpy as np
+import pytest
+from test_media_flow import off, pan
+from test_media_smooth import Panned
+
+from shutter_addon.core.frames.planes import as_rgba
+from shutter_addon.media import MediaError, flow, stored_vectors
+from shutter_addon.media.smooth import SmoothSource
+from shutter_addon.media.stored_vectors import StoredVectors
+
+STEPS = 4
+NAMES = stored_vectors._CHANNELS  # a file with others is none of ours
+
+
+@pytest.fixture
+def folder(tmp_path):
+    return tmp_path / "vectors"
+
+
+def read(folder=None, writes=True, **kind):
+    """All moments of a film, as a program that begins anew reads them."""
+    source = SmoothSource(Panned(4, **kind), STEPS, folder and StoredVectors(folder, writes))
+    return np.stack([as_rgba(source.decoded(index)) for index in range(source.count)])
+
+
+def files(folder):
+    return sorted(path for path in folder.rglob("*") if path.is_file())
+
+
+@pytest.fixture
+def nothing_found(monkeypatch):
+    """No flow is found any more."""
+
+    def never():
+        monkeypatch.setattr(flow, "found", None)
+
+    return never
+
+
+@pytest.mark.parametrize("kind", [{}, {"cut": 2}, {"dtype": np.uint16}, {"dtype": np.float16}])
+def test_stored_or_not_gives_the_same_bits(folder, nothing_found, kind):
+    wanted = read(**kind)
+    np.testing.assert_array_equal(read(folder, **kind), wanted)
+    assert len(files(folder)) == 3
+    before = [path.stat().st_mtime_ns for path in files(folder)]
+    nothing_found()
+    np.testing.assert_array_equal(read(folder, **kind), wanted)
+    assert [path.stat().st_mtime_ns for path in files(folder)] == before
+
+
+def test_a_pair_is_read_once(folder, monkeypatch):
+    read(folder)
+    asked, own = [], StoredVectors.found
+    monkeypatch.setattr(StoredVectors, "found", lambda *given: asked.append(1) or own(*given))
+    read(folder)
+    assert len(asked) == 3
+
+
+def test_who_does_not_write_reads(folder, nothing_found):
+    wanted = read()
+    np.testing.assert_array_equal(read(folder, writes=False), wanted)
+    assert not folder.exists()
+    read(folder)
+    nothing_found()
+    np.testing.assert_array_equal(read(folder, writes=False), wanted)
+
+
+def cut_short(path):
+    path.write_bytes(path.read_bytes()[:-100])
+
+
+def flipped(path):
+    data = bytearray(path.read_bytes())
+    data[len(data) // 2] ^= 0xFF
+    path.write_bytes(data)
+
+
+def emptied(path):
+    path.write_bytes(b"")
+
+
+def infinite(path):
+    stored_vectors.write_halves(path, np.full((24, 40, 6), np.inf, np.float16), NAMES)
+
+
+def of_another_size(path):
+    stored_vectors.write_halves(path, np.zeros((24, 41, 6), np.float16), NAMES)
+
+
+@pytest.mark.parametrize("damage", [cut_short, flipped, emptied, infinite, of_another_size])
+def test_a_damaged_file_is_made_again(folder, nothing_found, damage):
+    wanted = read(folder)
+    before = [path.read_bytes() for path in files(folder)]
+    for path in files(folder):
+        damage(path)
+    np.testing.assert_array_equal(read(folder), wanted)
+    assert [path.read_bytes() for path in files(folder)] == before
+    nothing_found()
+    np.testing.assert_array_equal(read(folder), wanted)
+
+
+@pytest.mark.skipif(os.name != "posix", reason="links need rights elsewhere")
+def test_a_link_is_not_followed(folder, tmp_path):
+    """Neither in place of the folder nor of a file, which is replaced."""
+    elsewhere = tmp_path / "elsewhere"
+    elsewhere.mkdir()
+    folder.symlink_to(elsewhere)
+    wanted = read()
+    np.testing.assert_array_equal(read(folder), wanted)
+    assert not files(elsewhere)
+    folder.unlink()
+    read(folder)
+    first = files(folder)[0]
+    kept = first.read_bytes()
+    target = elsewhere / "target"
+    target.write_bytes(b"theirs")
+    first.unlink()
+    first.symlink_to(target)
+    np.testing.assert_array_equal(read(folder), wanted)
+    assert target.read_bytes() == b"theirs"
+    assert not first.is_symlink()
+    assert first.read_bytes() == kept
+
+
+@pytest.mark.parametrize("error", [OSError(28, "No space left on device"), MediaError("could not be written whole")])
+def test_where_nothing_can_be_written_nothing_is_kept(folder, monkeypatch, error):
+    """It is tried once."""
+    tried = []
+
+    def full(*_):
+        tried.append(1)
+        raise error
+
+    monkeypatch.setattr(stored_vectors, "write_halves", full)
+    np.testing.assert_array_equal(read(folder), read())
+    assert tried == [1]
+
+
+def test_a_file_in_place_of_the_folder(folder):
+    folder.write_text("theirs")
+    np.testing.assert_array_equal(read(folder), read())
+    assert folder.read_text() == "theirs"
+
+
+def test_what_changes_is_found_anew(folder, monkeypatch):
+    """Another frame, the same ones the other way round, and another way to find them."""
+    pictures = [flow.luma(pan(x), "srgb", "opaque") for x in (0, 4, 8)]
+    vectors = StoredVectors(folder, writes=True)
+    for first, second in ((0, 1), (1, 0), (0, 2)):
+        found = vectors.found(pictures[first], pictures[second])
+        np.testing.assert_array_equal(found, flow.found(pictures[first], pictures[second]))
+    assert len(files(folder)) == 3
+    monkeypatch.setattr(flow, "VERSION", flow.VERSION + 1)
+    vectors.found(pictures[0], pictures[1])
+    assert len(files(folder)) == 4
+
+
+def test_moments_are_those_of_the_film(folder):
+    read(folder)
+    source = SmoothSource(Panned(4), STEPS, StoredVectors(folder, writes=False))
+    assert off(source.read(2), pan(4)) < 1
