@@ -1,18 +1,24 @@
 """Moments between filmed frames, which devices make of the two frames and their vectors, beside the reference."""
 
 import dataclasses
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
+import test_shots
+from made_recipes import made
 from test_composition import LEVEL, ROUNDED, Footage, device, few_pieces, state  # noqa: F401
 
 from shutter_addon.compute import running_sums
 from shutter_addon.compute.renderer import Renderer
 from shutter_addon.compute.request import Request
 from shutter_addon.core.frames import light
-from shutter_addon.core.model import shutters, windows
+from shutter_addon.core.model import presets, shutters, windows
+from shutter_addon.core.model.clip import Clip
 from shutter_addon.core.model.frame_state import FrameState, Options
+from shutter_addon.core.model.state_at import state_at
 from shutter_addon.core.pixels import compositor
+from shutter_addon.media.cuts import ShotSource
 from shutter_addon.media.smooth import SmoothSource
 
 STEPS = 4
@@ -170,3 +176,26 @@ def test_filmed_frames_of_a_pair_are_sent_once(gpu_device, monkeypatch):
     moment = smooth(FrameState(Options(4), np.ones((1, 4))), 8)
     Renderer(GPUCompositor(gpu_device), source).picture(Request(0, moment))
     assert sent == [0, 1, 2, 3]
+
+
+@pytest.mark.parametrize("edges", ["hold", "mirror", "shorten", "slide"])
+@pytest.mark.parametrize("position", ["start", "center", "end"])
+@pytest.mark.parametrize("steps", [1, 2, 4, 8, 16])
+def test_a_still_frame_is_the_filmed_one(device, steps, position, edges):  # noqa: F811
+    """Bit for bit, forward and backward, at the clip's ends and on both sides of a cut."""
+    plain = test_shots.film()
+    plain.fps, plain.options = None, {}
+    source = ShotSource(SmoothSource(plain, steps) if steps > 1 else plain, steps)
+    last, cut = plain.count - 1, test_shots.LENGTHS[0]
+    bars = {"Still": "STILL", "Long": "ANGLE_360"}
+    shutters_ = [{"name": name, "bars": presets.bars(each, 5, position).tolist()} for name, each in bars.items()]
+    effect = made(5, shutters_, position=position, edges=edges, inbetween=steps).for_picture(37 / 23)
+    renderer = Renderer(device, source)
+    for backward in (False, True):
+        moving = dataclasses.replace(effect, time=SimpleNamespace(at=lambda frame, way=backward: (frame, way)))
+        for frame in (0, 1, cut - 1, cut, last):
+            asked = Request(*state_at(moving, Clip.of(source), frame + 1))
+            assert asked.index == frame * steps
+            assert np.array_equal(renderer.picture(dataclasses.replace(asked, levels=True)), plain.read(frame))
+    assert source.around(cut * steps, 0, source.count - 1).start > (cut - 1) * steps  # there is a cut
+    renderer.release_window()

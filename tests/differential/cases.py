@@ -270,7 +270,7 @@ def add_others(rng, recipe: dict, count: int) -> None:
             region["opacity"] = share()
         if region["name"] not in followed and rng.random() < 0.5:
             region["name"] = choose(rng, "", "same")
-    recipe["inbetween"] = int(choose(rng, 1, 1, 1, 2, 4))
+    recipe["inbetween"] = choose(rng, 1, 1, 1, 2, 4, "auto")
     if "decontaminate" in recipe:
         recipe["decontaminate"] = choose(rng, False, True)
 

@@ -130,10 +130,13 @@ def check_mixed(case: Case, devices: dict, folder: Path) -> dict:
     from shutter_addon.media import open_source
     from shutter_addon.media.cuts import ShotSource
     from shutter_addon.media.matte_values import MatteValues
+    from shutter_addon.media.smooth import steps_for
 
     found = check(case, devices, folder) if is_referable(case) else {}
-    step = json.loads(case.recipe).get("inbetween", 1)
-    with tempfile.TemporaryDirectory() as files, ShotSource(open_source(write(case, Path(files))), step) as source:
+    recipe = json.loads(case.recipe)
+    with tempfile.TemporaryDirectory() as files, open_source(write(case, Path(files))) as medium:
+        # Its frames are as many moments for each filmed one.
+        source = ShotSource(medium, steps_for(medium, recipe.get("inbetween", 1), recipe["window"]))
         asked = asked_of(case, source, Path(files))
 
         @contextmanager
