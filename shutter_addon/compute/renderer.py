@@ -226,12 +226,13 @@ class Renderer:
         missing |= self._guides.lacking(self._guiding(request, shot))
         return (missing | unread) - handed
 
-    def layer_mattes(self, request: Request) -> list[np.ndarray]:
-        """The mattes (H, W) float32 of the request's layers, with their opacities."""
+    def layer_mattes(self, request: Request, frame: int | None = None) -> list[np.ndarray]:
+        """The mattes (H, W) float32 of the request's layers in a source frame, its own where none is said; with their
+        opacities."""
         if request.state.layers is None:
             return []
         with self.compositor.current():
-            return self._layering().mattes.of(request.state.layers, request.index)
+            return self._layering().mattes.of(request.state.layers, request.index if frame is None else frame)
 
     @property
     def holes(self) -> np.ndarray | None:
