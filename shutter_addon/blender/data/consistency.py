@@ -103,7 +103,7 @@ def count_filmed(effect: PropertyGroup) -> str | None:
     lost = [_count_bars(effect, index, steps) for index in range(len(effect.shutters))]
     effect.window = -(-effect.window // steps)
     first = next(filter(None, lost), None)
-    return first and rpt_(OTHER_MOMENTS).format(**first.words)
+    return None if first is None else rpt_(OTHER_MOMENTS).format(**first.words)
 
 
 def _count_bars(effect: PropertyGroup, index: int, steps: int) -> EffectError | None:
