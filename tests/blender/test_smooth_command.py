@@ -119,8 +119,8 @@ def test_a_recipe_of_the_first_version(run, film, tmp_path, same_pixels, more):
     first, frames = film
     data = recipe(8, [1, 1, 1, 1, 0.5, 0.5, 0.5, 0.5], inbetween=STEPS, **more) | {"version": 1}
     done = run("render", first, "--output", tmp_path / "out", "--frames", 2, recipe=data)
-    told = f'{tmp_path / "recipe.json"}: shutter "Long": bars 1 to 4 of the older file are one filmed frame now'
-    assert told in done.stderr
+    assert f'{tmp_path / "recipe.json"}: shutter "S0": bars ' in done.stderr
+    assert "of the older file are one filmed frame now" in done.stderr
     bars = [1, 0.5]
     same_pixels(read_picture(tmp_path / "out" / "0002.png"), shown(frames, window(2, bars), spread(bars, STEPS)), 1)
 
