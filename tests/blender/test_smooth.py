@@ -499,6 +499,45 @@ def test_keyed_bars_of_format_1_do(older):
     assert paths == {f"{bar}].weight" for bar in range(3)}
 
 
+TOLD = 'shutter "Long": bars {first} to {last} of the older file are one filmed frame now, and expose other moments'
+
+
+def test_bars_of_format_1_that_cannot_be_kept_are_told(bpy, older, capfd):
+    older(4, "START", 8)
+    said = capfd.readouterr().err
+    assert any(TOLD.format(first=first, last=first + 3) in said for first in (1, 5))
+    bpy.ops.wm.save_mainfile()
+    bpy.ops.wm.open_mainfile(filepath=bpy.data.filepath)
+    assert "older file" not in capfd.readouterr().err
+
+
+def test_of_bars_of_format_1_that_are_kept_nothing_is_said(bpy, effect, tmp_path, capfd):
+    """A sharp frame alone, and a shape over a frame of the timeline."""
+    from shutter_addon.blender.editing import bar_edits
+
+    effect.window = 8
+    effect.shutters[0].length = "TIMELINE"
+    bar_edits.set_bars(effect.shutters[0], [1] * 4 + [0.5] * 4)
+    bar_edits.set_bars(effect.shutters[1], [1] + [0] * 7)
+    effect.inbetween = "4"
+    effect.id_data.virtual_shutter.format = 1
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "older.blend"))
+    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "older.blend"))
+    assert "older file" not in capfd.readouterr().err
+
+
+@pytest.mark.parametrize("kept", [True, False])
+def test_an_imported_recipe_of_version_1_tells_what_it_lost(bpy, effect, tmp_path, capfd, kept):
+    import json
+
+    bars = [1, 0, 0, 0] if kept else [1, 1, 1, 0]
+    data = {"version": 1, "window": 4, "inbetween": 4, "shutters": [{"name": "Long", "bars": bars}]}
+    (tmp_path / "r.json").write_text(json.dumps(data))
+    assert bpy.ops.shutter.recipe_import(filepath=str(tmp_path / "r.json")) == {"FINISHED"}
+    said = "".join(capfd.readouterr())
+    assert (f"Warning: {TOLD.format(first=1, last=4)}" in said) == (not kept)
+
+
 def test_what_had_no_frames_in_between_stays(older):
     scene, bars = older(1, "START", 8)
     effect = scene.virtual_shutter.effects[0]

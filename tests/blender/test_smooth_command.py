@@ -118,7 +118,9 @@ def test_a_recipe_of_the_first_version(run, film, tmp_path, same_pixels, more):
     """Its bars count moments, and it says a method; what is shown is within the frames that it showed."""
     first, frames = film
     data = recipe(8, [1, 1, 1, 1, 0.5, 0.5, 0.5, 0.5], inbetween=STEPS, **more) | {"version": 1}
-    run("render", first, "--output", tmp_path / "out", "--frames", 2, recipe=data)
+    done = run("render", first, "--output", tmp_path / "out", "--frames", 2, recipe=data)
+    assert f'{tmp_path / "recipe.json"}: shutter "S0": bars ' in done.stderr
+    assert "of the older file are one filmed frame now" in done.stderr
     bars = [1, 0.5]
     same_pixels(read_picture(tmp_path / "out" / "0002.png"), shown(frames, window(2, bars), spread(bars, STEPS)), 1)
 
