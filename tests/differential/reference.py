@@ -724,7 +724,7 @@ def camera_moves(recipe, frame, times, aspect):
     """By which turn and shift source frames show what the picture shows, {source: (turn, shift)}; none: it stands
     still."""
     found = {source: motion(subject(recipe, "camera"), frame, time, aspect) for source, time in times.items()}
-    return found if any(turn != 1 or shift for turn, shift in found.values()) else {}
+    return found if any(abs(turn - 1) + abs(shift) > ROUNDING for turn, shift in found.values()) else {}
 
 
 def uncovered(recipe, frame, footage, index, direction, layers):
