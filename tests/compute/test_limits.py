@@ -25,7 +25,7 @@ LIMITS = {
     # is another reason to stay far below.
     "Metal": (8, 64, 13, 65536, 4096, (1024, 1024, 1024), 1024),
 }
-BYTES = {"int": 4, "float": 4, "ivec2": 8, "vec2": 8, "ivec3": 16}
+BYTES = {"int": 4, "float": 4, "ivec2": 8, "vec2": 8, "ivec3": 16, "ivec4": 16}
 # Apple's reference, MTLReadWriteTextureTier2: all Macs have it on which Blender 5 runs. The first line is tier 1.
 METAL_LOADS_AND_STORES = {
     *("r32f", "r32ui", "r32i"),

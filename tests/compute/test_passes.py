@@ -8,7 +8,7 @@ from shutter_addon.devices.passes import SHADERS
 
 # Of what is declared inside the sources, whatever it is: variables, parameters, functions.
 DECLARED = re.compile(r"\b(?:bool|u?int|float|[biu]?vec[234])\s+(\w+)")
-BYTES = {"int": 4, "float": 4, "ivec2": 8, "vec2": 8, "ivec3": 16}
+BYTES = {"int": 4, "float": 4, "ivec2": 8, "vec2": 8, "ivec3": 16, "ivec4": 16}
 
 
 @each_pass
