@@ -38,7 +38,6 @@ premultiplied; coefficients are (N, h, w), of the pixels or of the blocks that s
 """
 
 from collections import namedtuple
-from functools import partial
 from itertools import pairwise
 
 import numpy as np
@@ -859,11 +858,14 @@ def whole(light):
 def opened(recipe, frame, index, direction, count, aspect):
     """The bars (N, L) of all shutters as they are open, and the turns and shifts (2, N, L), or None, of `motions`."""
     shutters = recipe["shutters"]
-    spread = [
-        partial(in_moments, shutter, steps=option(recipe, "inbetween"), direction=direction) for shutter in shutters
-    ]
-    each = zip(shutters, spread, strict=True)
-    bars = np.array([bars_at(shutter, frame, option(recipe, "interpolation"), way) for shutter, way in each])
+    steps, bars = option(recipe, "inbetween"), []
+    for shutter in shutters:
+
+        def spread(own, shutter=shutter):
+            return in_moments(shutter, own, steps, direction)
+
+        bars.append(bars_at(shutter, frame, option(recipe, "interpolation"), spread))
+    bars = np.array(bars)
     for i, shutter in enumerate(shutters):
         if shutter.get("length") == "timeline":
             bars[i] = on_timeline(recipe, bars[i], frame, index, direction, count)

@@ -78,7 +78,8 @@ def recipe(path: Path) -> Effect:
     """The recipe in a file, with a word on stderr where it showed another picture once. RecipeError: there is none."""
     found = recipe_file.load(path)
     if found.lost is not None:
-        render_job.say(f"{path}: {found.lost}")
+        told = f"{path}: {found.lost}"  # no message that is translated
+        render_job.say(told)
     return found
 
 
