@@ -86,14 +86,13 @@ class Drawing:
 
     request: the picture, as a draft where a still result is not exact anyway; renderer: of it
     left: where the source ends and the result begins, as a fraction of the picture's width; 0: there is no source
-    has_result: whether the result is shown at all; draws_result: by our handler
+    draws_result: whether our handler draws the result
     stopped: says that it takes too long, and Blender has to look at its keys"""
 
     decision: Decision
     request: Request
     renderer: Renderer
     left: float
-    has_result: bool
     draws_result: bool
     stopped: Callable[[], bool]
 
@@ -171,7 +170,6 @@ def for_drawing(context: Context, shown: Shown, decision: Decision | None) -> Dr
         request=request,
         renderer=renderer,
         left=left,
-        has_result=has_result,
         draws_result=draws_result,
         stopped=stopped,
     )
