@@ -197,11 +197,9 @@ class LayeredRenderer:
         self._kinds = None
         if layers is None or (holes := self._lacks(exposed, layering.CLEAR)) is None:
             return None
-        reach = request.state.options.plate_reach
-        near = range(max(request.index - reach, shot.start), min(request.index + reach + 1, shot.stop))
         picture, self._kinds = plates.plate(
             holes,
-            plates.nearest_frames(request.index, near, request.state.options.step),
+            plates.nearest_frames(request.index, request.state.options, shot),
             self._colors.linear_part,
             lambda frame: self.mattes.behind(layers, frame),
             lambda frame: self._colors.motion(request.index, frame),

@@ -114,8 +114,7 @@ class LayerColors:
         return with_colors(picture, colors, kinds == TAKEN, self._source), share
 
     def _plate(self, frame: int, covered: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        layers, reach = self.layers, self._options.plate_reach
-        near = range(max(frame - reach, self._shot.start), min(frame + reach + 1, self._shot.stop))
+        layers = self.layers
         asked = self.asked[frame] = {}
         for old in [old for old in self.asked if abs(old - frame) > 4096]:
             del self.asked[old]
@@ -126,7 +125,7 @@ class LayerColors:
 
         return plate(
             covered,
-            (other for other in nearest_frames(frame, near, self._options.step) if other != frame),
+            (other for other in nearest_frames(frame, self._options, self._shot) if other != frame),
             self.linear_part,
             lambda other: self._mattes.behind(layers, other),
             motion,
@@ -146,10 +145,12 @@ class LayerColors:
         self.asked.clear()
 
 
-def nearest_frames(index: int, frames: range, step: int) -> Iterable[int]:
-    """The filmed ones of source frames, every step-th, in the order in which a plate is taken from them: those nearest
-    to frame `index`, of two the earlier. Moments between them are made of these."""
-    filmed = (frame for frame in frames if frame % step == 0)
+def nearest_frames(index: int, options: Options, shot: range) -> Iterable[int]:
+    """The filmed ones of a shot's frames in reach, in the order in which a plate is taken from them: those nearest to
+    frame `index`, of two the earlier. Moments between them are made of these."""
+    reach = options.plate_reach * options.step
+    near = range(max(index - reach, shot.start), min(index + reach + 1, shot.stop))
+    filmed = (frame for frame in near if frame % options.step == 0)
     return sorted(filmed, key=lambda frame: (abs(frame - index), frame))
 
 

@@ -19,9 +19,9 @@ def layered(effect: Effect, state: FrameState, clip: Clip, at: Shown) -> FrameSt
     """The effect's state at a timeline frame, with its layers. EffectError: one lies nowhere."""
     if not (regions := effect.layers_at(at.frame)):
         return state
-    seen, beyond = following.seen(state.options, at, clip.count), state.options.plate_reach
-    frames = range(max(seen.start - beyond, 0), min(seen.stop + beyond, clip.count))
-    times = following.times_of(clip, at, frames, following.reach(state.options.filmed) + beyond)
+    seen, reach, step = following.seen(state.options, at, clip.count), state.options.plate_reach, state.options.step
+    frames = range(max(seen.start - reach * step, 0), min(seen.stop + reach * step, clip.count))
+    times = following.times_of(clip, at, frames, following.reach(state.options.filmed) + reach)
     moments = [(at.frame + math.floor(time - at.frame), (time - at.frame) % 1.0) for time in times]
     drawn = [(1 + i, region) for i, region in enumerate(regions) if isinstance(region, Region)]
     others = [(0, region) for region in effect.regions if isinstance(region, Region) and region not in regions]
@@ -36,8 +36,10 @@ def layered(effect: Effect, state: FrameState, clip: Clip, at: Shown) -> FrameSt
             opacities=tuple(float(region.opacity.at(at.frame)) for region in regions),
             first=frames.start,
             scribbles=tuple(
-                _scribbles(effect, state, (*others, *drawn), len(regions), *moment) if drawn else None
-                for moment in moments
+                _scribbles(effect, state, (*others, *drawn), len(regions), *moment)
+                if drawn and (frame in seen or frame % step == 0)  # plates are taken from filmed frames
+                else None
+                for frame, moment in zip(frames, moments, strict=True)
             ),
             mattes=tuple(tuple(_matte(region, *moment) for region in regions) for moment in moments),
             camera=camera,
