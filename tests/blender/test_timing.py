@@ -35,7 +35,6 @@ def test_what_cannot_be_read_is_shown_at_an_even_speed(bpy, edit, tmp_path, monk
     from shutter_addon.blender.editing import add_effect, shutter_edits
     from shutter_addon.blender.output import edit_check
     from shutter_addon.blender.rendering import pictures
-    from shutter_addon.compute.cpu import CPUCompositor
 
     first = write_frames(tmp_path / "in", np.zeros((20, 8, 8, 3), dtype=np.uint8))
     source = edit.sequence_editor.strips.new_image("images", str(first), 1, 1)
@@ -62,7 +61,7 @@ def test_what_cannot_be_read_is_shown_at_an_even_speed(bpy, edit, tmp_path, monk
         picture_of(strip.scene, frame, told.append)
     said = 'strip "images": its retiming keys cannot be read'
     assert sum(said in sentence for sentence in told) == 1
-    (check,) = edit_check.effects(edit, range(1, 52), CPUCompositor(), find_cuts=False)
+    (check,) = edit_check.effects(edit, range(1, 52))
     assert not check.faults
     assert any(said in note for note in check.notes)
 
