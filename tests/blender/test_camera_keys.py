@@ -71,6 +71,7 @@ def new_source(edit, first):
 def new_effect(edit, source):
     strip, effect = add_effect.add_effect(edit, source)
     shutter_edits.start(effect)
+    effect.inbetween = "1"
     selection.choose(edit, strip)
     edit.frame_set(16)
     region = region_edits.add_region(effect, effect.shutters[1], "LASSO")
@@ -236,6 +237,7 @@ def flash(edit, folder, black=range(20, 50), count=70):
     source = new_source(edit, write_frames(folder / "black", shots))
     strip, effect = add_effect.add_effect(edit, source)
     shutter_edits.start(effect)
+    effect.inbetween = "1"
     effect.stop_at_cuts = False
     selection.choose(edit, strip)
     edit.frame_set(16)

@@ -135,6 +135,7 @@ def test_what_is_not_supported_is_said(edit, clip_strip, movie):
     source = clip_strip(movie)
     strip, effect = add_effect.add_effect(edit, source)
     shutter_edits.start(effect)
+    effect.inbetween = "1"
     picture_of(strip.scene, 1)
     source.stabilize2d = True
     with pytest.raises(effect_source.FAULTS, match='"clip": undistorted or stabilized clips are not supported'):

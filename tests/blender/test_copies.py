@@ -31,6 +31,7 @@ edit = bpy.context.scene
 source = edit.sequence_editor_create().strips.new_image("images", {path!r}, 1, 1)
 strip, effect = add_effect.add_effect(edit, source)
 shutter_edits.start(effect)
+effect.inbetween = "1"
 for i in range({count}):
     edit.sequence_editor.strips.new_scene("copy", effect.scene, 5, 200 + 100 * i)
 reconcile.tidy()

@@ -285,6 +285,7 @@ def two_effects(edit, source, strip, folder):
         other.elements.append(name)
     second, effect = add_effect.add_effect(edit, other)
     shutter_edits.start(effect)
+    effect.inbetween = "1"
     effect.edges = "SHORTEN"  # an exposure longer than its clip would slide to one place
     second.right_handle = COUNT + 1
     return ALL

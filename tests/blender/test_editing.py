@@ -394,6 +394,7 @@ def test_a_region_has_a_layer_of_its_own(effect):
 
 def test_the_pen_draws_for_the_chosen_shutter(effect):
     shutter_edits.start(effect)
+    effect.inbetween = "1"
     for shutter in effect.shutters:
         region_edits.add_region(effect, shutter)
     layers = effect.scene.annotation.layers

@@ -423,6 +423,7 @@ def test_another_rate_of_the_edit_where_the_source_keeps_its_speed(bpy, edit, mo
     source.transform.filter = "NEAREST"
     strip, effect = add_effect.add_effect(edit, source)
     shutter_edits.start(effect)
+    effect.inbetween = "1"
     for i, bar in enumerate(effect.shutters[0].bars):
         bar.weight = float(i == 0)
     selection.choose(edit, strip)

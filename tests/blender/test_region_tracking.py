@@ -72,6 +72,7 @@ def new_source(edit, first):
 def drawn(edit, source, at=None):
     strip, effect = add_effect.add_effect(edit, source)
     shutter_edits.start(effect)
+    effect.inbetween = "1"
     selection.choose(edit, strip)
     edit.frame_set(11)
     region = region_edits.add_region(effect, effect.shutters[1], "LASSO")

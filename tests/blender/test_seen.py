@@ -27,6 +27,7 @@ def another(bpy, edit, tmp_path, channel=5, start=1):
     source.right_handle = start + 40
     strip, effect = add_effect.add_effect(edit, source)
     shutter_edits.start(effect)
+    effect.inbetween = "1"
     return strip
 
 

@@ -31,6 +31,7 @@ def found(bpy, edit, tmp_path):
     strip, effect = add_effect.add_effect(edit, source)
     effect.window = 4
     shutter_edits.start(effect)
+    effect.inbetween = "1"
     for frame, bars in ((1, [1, 0, 0, 0]), (20, [0, 0, 0, 1])):
         edit.frame_set(frame)
         bar_edits.paint(effect, 1, bars, key=True)

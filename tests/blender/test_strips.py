@@ -279,6 +279,7 @@ def test_streaks_of_a_new_effect_keep_their_length_up_to_the_clips_ends(edit, re
     edit.render.resolution_x = edit.render.resolution_y = 32
     _, effect = add_effect.add_effect(edit, new_images(edit, images))
     shutter_edits.start(effect)
+    effect.inbetween = "1"
     effect.window, effect.position = 5, "CENTER"
     for index, bars in enumerate(([1] * 5, [0, 0, 1, 0, 0])):
         for bar, weight in zip(effect.shutters[index].bars, bars, strict=True):

@@ -51,6 +51,7 @@ def test_what_cannot_be_read_is_shown_at_an_even_speed(bpy, edit, tmp_path, monk
     assert timing.keys == (known.keys[0], known.keys[-1])
     strip, effect = add_effect.add_effect(edit, source)
     shutter_edits.start(effect)
+    effect.inbetween = "1"
     for frame in (2, 3):
         picture_of(strip.scene, frame, told.append)
     said = 'strip "images": its retiming keys cannot be read'

@@ -37,6 +37,7 @@ def effect(bpy, edit, tmp_path):
     strip, effect = add_effect.add_effect(edit, source)
     effect.window = 4
     shutter_edits.start(effect)
+    effect.inbetween = "1"
     region = region_edits.add_region(effect, effect.shutters[1], name="Face")
     draw(annotations.layer_of(effect, region), [(-9, -9), (9, 0), (3, 8)])
     for frame in (1, 9):
