@@ -154,6 +154,7 @@ def test_an_older_file_is_migrated_once(bpy, edit, effect, tmp_path, monkeypatch
         for scene in bpy.data.scenes:
             for each in scene.virtual_shutter.effects:
                 each.name += "!"
+        return ()
 
     number = data_format.FORMAT + 1
     monkeypatch.setattr(data_format, "FORMAT", number)
@@ -200,8 +201,8 @@ def test_an_effect_that_is_added_makes_nothing_older_or_newer(newer):
 
 def test_a_recipe_of_a_newer_version(tmp_path):
     """It is not read, whatever else it holds, and nothing is written."""
-    newer = recipe(2, [1, 1]) | {"version": 2, "glow": [1], "shutters": "elsewhere"}
-    with pytest.raises(RecipeError, match=r"^version: 2 is of a newer version of Virtual Shutter"):
+    newer = recipe(2, [1, 1]) | {"version": 3, "glow": [1], "shutters": "elsewhere"}
+    with pytest.raises(RecipeError, match=r"^version: 3 is of a newer version of Virtual Shutter"):
         recipe_file.parse(json.dumps(newer))
     with pytest.raises(RecipeError, match=r"^recipe: unknown field glow$"):
         recipe_file.parse(json.dumps(recipe(2, [1, 1]) | {"glow": 1}))

@@ -405,7 +405,7 @@ def test_an_edit_without_an_effect_renders(bpy, edit, run, save, tmp_path):
 
 
 def test_chunks_of_a_smooth_edit_are_the_whole(bpy, edit, run, save, tmp_path):
-    """Bit for bit, wherever they begin; beside the edit nothing is written."""
+    """Bit for bit, wherever they begin; beside the edit vectors are kept, and nothing else."""
     noise = np.random.default_rng(4).integers(0, 256, (6, 10, 3), dtype=np.uint8).repeat(4, 0).repeat(4, 1)
     _source, effect, _strip = noise_film(edit, np.stack([np.roll(noise, k, axis=1) for k in range(COUNT)]), tmp_path)
     effect.inbetween = "4"
@@ -416,7 +416,7 @@ def test_chunks_of_a_smooth_edit_are_the_whole(bpy, edit, run, save, tmp_path):
         assert run("render", saved, "--output", tmp_path / "parts", "--frames", chunk) == (0, "")
     assert bits(tmp_path / "parts") == bits(tmp_path / "whole")
     assert len(bits(tmp_path / "whole")) == COUNT
-    assert {path.name for path in tmp_path.iterdir()} == before | {"whole", "parts"}
+    assert {path.name for path in tmp_path.iterdir()} == before | {"whole", "parts", "virtual_shutter_vectors"}
 
 
 def test_what_cannot_be_done_is_one_sentence(bpy, saved, run, save, tmp_path):

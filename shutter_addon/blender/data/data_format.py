@@ -14,7 +14,7 @@ def _count_filmed() -> Iterator[str | None]:
     """Format 2: bars count filmed frames, not the moments between them as well; frames that repeat stayed."""
     for scene in _holding():
         for effect in scene.virtual_shutter.effects if scene.virtual_shutter.format < 2 else ():
-            if effect.inbetween != "1":
+            if effect.inbetween not in ("1", "AUTO"):
                 effect.skip_repeats = False
                 yield consistency.count_filmed(effect)
 

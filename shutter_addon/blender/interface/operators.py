@@ -429,7 +429,7 @@ class SHUTTER_OT_recipe_import(OfEffect, ImportHelper, Operator):
         found = recipe_file.load(path)
         recipe_import.apply(self.edit, effect, self.effect_strip, found, path.parent)
         if found.lost is not None:
-            self.report({"WARNING"}, rpt_(found.lost.template).format(**found.lost.words))
+            report_warning(self, rpt_(found.lost.template).format(**found.lost.words))
 
 
 class SHUTTER_OT_recipe_export(OfEffect, ExportHelper, Operator):
