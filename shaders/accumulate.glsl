@@ -89,9 +89,10 @@ void main() {
   SUM sum = sum_at(place, known);
 #if MOMENT || WORDS
   for (int k = 0; k < count; ++k) {
-    vec3 color = moment_at(pixel + ivec2(0, top), k);
-#  if DECODE == 0
-    color = to_encoded(color);
+    // Rounded to levels, as the reference reads it.
+    vec3 color = floor(to_level(moment_at(pixel + ivec2(0, top), k)) * 255.0 + 0.5) / 255.0;
+#  if DECODE == 1
+    color = to_linear(color);
 #  endif
     sum = added(sum, light_of(color, pixel));
     int layer = next + k;

@@ -55,7 +55,7 @@ REVIEWED: dict[str, set[str]] = {
     "editing/track_region.py": {"_each", "track.<lambda>"},
     "rendering/device_work.py": {"broken_off"},
     "rendering/outline_carrying.py": {"_Carrying._carry"},
-    "rendering/effect_source.py": {"find_steps", "find_steps.find", "steps_key"},
+    "rendering/effect_source.py": {"_options", "find_steps", "find_steps.find", "steps_key"},
     "rendering/render_job.py": {"where"},
     "rendering/session.py": {"RenderSession._ask", "RenderSession.forget.<lambda>", "_weights"},
     "rendering/sessions.py": {"_ask_window"},

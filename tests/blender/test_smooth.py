@@ -315,7 +315,7 @@ def test_without_opencv_automatic_is_off_and_a_number_is_refused(add, edit, tmp_
 def test_repeated_frames_are_skipped(add, edit, tmp_path, smooth, skips):
     """Those that are shown twice are moments half-way then, and of Automatic's motion there is half."""
     first = moving(tmp_path / "film", 5, repeat=2)
-    _source, strip, effect = add(first, 12, [1, 0], smooth, skip_repeats=skips, stop_at_cuts=False)
+    _source, strip, effect = add(first, [1, 0], smooth, skip_repeats=skips, stop_at_cuts=False)
     picture = picture_of(effect.scene, 2)
     asked = request(edit, effect, strip, 2)
     assert asked.renderer.source.step == (2 if smooth == "2" or skips else 4)
@@ -370,7 +370,7 @@ def test_a_still_preview_is_plain_until_its_moments_are_there(film, add, edit, b
     makes; both renderers stay as it plays and stands still again."""
     first, frames = film
     bars = np.ones(3)
-    _source, strip, effect = add(first, COUNT, bars)
+    _source, strip, effect = add(first, bars)
     drawing, gate = sessions.of_drawing(), threading.Event()
     monkeypatch.setattr(flow, "Between", lambda *given: gate.wait() and Between(*given))
     taken = snapshot.take(edit, effect, strip, (2,))
@@ -405,7 +405,7 @@ def test_a_still_preview_is_plain_until_its_moments_are_there(film, add, edit, b
 
 
 def test_footage_that_needs_no_moments_has_one_renderer(add, edit, tmp_path):
-    _source, strip, effect = add(moving(tmp_path / "film", 0), 6, np.ones(4), "AUTO")
+    _source, strip, effect = add(moving(tmp_path / "film", 0), np.ones(4), "AUTO")
     taken, drawing = snapshot.take(edit, effect, strip, (2,)), sessions.of_drawing()
     first = smooth_previews.chosen(drawing, taken, 2, effect_source.FULL)
     assert not first.source.detail.smooth
