@@ -82,7 +82,7 @@ def _layers():
         yield _of_sums(4, 2, cover == 1, tiled, light)
         for way in _WAYS:
             yield composition(way, 3, light, EDGES=2, SUMS=1, TILED=tiled)
-        for sent in ("COLOURS", "PLANES", "MOMENT", "WORDS", "AGAIN"):
+        for sent in ("COLOURS", "PLANES", "MOMENT", "AGAIN"):
             yield running_sums.accumulation(1, sent, cover == 1, cover == 2, cover)
     for ends, opaque in itertools.product((True, False), repeat=2):
         macros = {"ENDS": int(ends), "OPAQUE": int(opaque)}
@@ -91,7 +91,7 @@ def _layers():
 
 
 def _filling():
-    for tiled, sent in itertools.product((True, False), ("COLOURS", "NUMBERS", "PLANES", "MOMENT", "WORDS", "AGAIN")):
+    for tiled, sent in itertools.product((True, False), ("COLOURS", "NUMBERS", "PLANES", "MOMENT", "AGAIN")):
         yield running_sums.accumulation(1, sent, tiled, tiled)
     yield window.packing(1, True)
     yield window.packing(2, False)
