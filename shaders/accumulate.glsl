@@ -77,11 +77,8 @@ SUM light_of(vec3 color, ivec2 pixel) {
 }
 #endif
 
-void main() {
-  ivec2 pixel = ivec2(gl_GlobalInvocationID.xy);
-  if (any(greaterThanEqual(pixel, size))) {
-    return;
-  }
+void at(ivec3 p) {
+  ivec2 pixel = p.xy;
   ivec3 place = place_of_sums(pixel);
   SUM sum = sum_at(place, known);
 #if MOMENT
@@ -111,3 +108,5 @@ void main() {
   store(place, next, added(sum, light_of(color, pixel)));
 #endif
 }
+
+#include "pixels.glsl"
