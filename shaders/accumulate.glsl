@@ -58,11 +58,7 @@ SUM added(SUM sum, SUM light) {
 }
 
 void store(ivec3 place, int layer, SUM sum) {
-#if COVER
-  imageStore(sums, place_in_layer(place, layer), sum);
-#else
-  imageStore(sums, place_in_layer(place, layer), halves_of(sum));
-#endif
+  imageStore(sums, place_in_layer(place, layer), AS_STORED(sum));
 }
 
 #if !AGAIN
