@@ -194,12 +194,10 @@ class GPUCompositor:
         given["images"] |= {"picture": picture, "coefficients": coefficients.handle}
         if isinstance(window, Sums):
             given |= {"held": window.stop - window.start, "unit": 1 / window.whole}
-        lines, name = (
-            lines_of(way, is_median=combine.mode == "median"),
-            "sums" if isinstance(window, Sums) else "frames",
-        )
+        lines = lines_of(way, is_median=combine.mode == "median")
+        bound, name = ("images", "sums") if isinstance(window, Sums) else ("textures", "frames")
         for part, stored in window.stored():
-            given["images" if name == "sums" else "textures"][name] = stored
+            given[bound][name] = stored
             size = window.source.width, part.height
             self.device.run(program, (size[0], -(-part.height // lines)), size=size, top=part.top, **given)
         return picture
