@@ -13,8 +13,9 @@ from ..core.model.mattes import MatteReader
 from ..core.model.windows import source_frames
 from ..core.pixels import layering
 from . import plates, window_frames
-from .layer_frames import LayerMattes, RecentFrames, WeightedFrames, with_layers
+from .layer_frames import LayerMattes, RecentFrames, WeightedFrames
 from .request import Behind, Coefficients, Compositor, Exposure, Handle, Request, Stages
+from .window import summable
 
 # How much of what lies behind layers has to be seen for a plate to be looked for.
 _SEEN = 1 / 1024
@@ -107,7 +108,8 @@ class LayeredRenderer:
     ) -> Handle:
         count = max(layer for layer, _ in parts) + 1
         moves = any(part.state.following is not None for part in parts.values())
-        self.recent.windows = self._crowd * with_layers(self._source, len(parts), moves)
+        # Where there are no running sums, the picture without layers is composed as well.
+        self.recent.windows = self._crowd * (len(parts) + int(moves or not summable(self._source)))
         windows = {name: self._window(name, part, len(request.state.bars)) for name, part in parts.items()}
         self._load(windows, request, shot)
         whole = Coefficients(self._stages.upload(np.ones((1, 1, 1))), max(self._source.width, self._source.height))
