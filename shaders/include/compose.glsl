@@ -295,11 +295,7 @@ vec4 nearest_light(int quad, int pixel, int frame) {
   int position = clamp(origin + direction * frame, 0, count - 1);
   ivec3 place = place_of_light(quad, pixel);
   SUM sum = minus(sum_at(place, layer_at(position + 1)), sum_at(place, layer_at(position)));
-#if COVER
   return covered(unit * unpacked_light(sum));
-#else
-  return vec4(unit * unpacked_light(sum), 1.0);
-#endif
 #else
   return frame_light(pixel_at(quad, pixel), layer_of(frame));
 #endif

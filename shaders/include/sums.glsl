@@ -50,6 +50,10 @@ vec3 unpacked_light(uvec2 difference) {
   uint green = (difference.x >> 21) | (difference.y << 11);
   return vec3(ivec3(difference.x & FIELD, green & FIELD, difference.y >> 10));
 }
+
+vec4 covered(vec3 light) {
+  return vec4(light, 1.0);
+}
 #endif
 
 // Where a pixel's sums begin. TILED: those of a tile of 8 × 16 pixels lie behind one another in a row of texels, a layer
