@@ -2,7 +2,7 @@
 // them, one after the other, to as many layers of `layers`.
 // The frame: the one that was sent, in the light that is summed, `whole` for white,
 // with COVER weighted, its colours with NUMBERS in one of 0 to 2²⁴ − 1, R + 256 G + 65536 B;
-// with MOMENT or WORDS one between two frames that were sent (include/moment.glsl);
+// with MOMENT one between two frames that were sent (include/moment.glsl);
 // with PLANES by the whole numbers of libswscale (core/frames/planes.py) from samples of luma and chroma;
 // or with AGAIN one that the sums hold already, between the layers `before` and `after`.
 layout(local_size_x = 8, local_size_y = 16) in;  // a tile
@@ -21,12 +21,9 @@ uniform sampler2DArray weights;
 layout(r32ui) uniform readonly uimage2DArray luma, chroma;  // a software renderer's texelFetch takes longer
 uniform ivec2 chroma_step, luma_of, green_of;
 uniform int red_of, blue_of;
-#  elif WORDS
-layout(r32ui) uniform readonly uimage2DArray filmed, vectors;
-uniform ivec4 moment;
-uniform int count, layers;
 #  elif MOMENT
-uniform sampler2DArray filmed, vectors;
+layout(r32ui) uniform readonly uimage2DArray filmed;  // images: see `luma`
+layout(rgba16) uniform readonly image2DArray vectors;
 uniform ivec4 moment;
 uniform int count, layers;
 #  else
@@ -35,7 +32,7 @@ uniform sampler2DArray frame;
 #endif
 #include "light.glsl"
 #include "sums.glsl"
-#if MOMENT || WORDS
+#if MOMENT
 #  include "moment.glsl"
 #endif
 
@@ -61,11 +58,7 @@ SUM added(SUM sum, SUM light) {
 }
 
 void store(ivec3 place, int layer, SUM sum) {
-#if COVER
-  imageStore(sums, place_in_layer(place, layer), sum);
-#else
-  imageStore(sums, place_in_layer(place, layer), halves_of(sum));
-#endif
+  imageStore(sums, place_in_layer(place, layer), AS_STORED(sum));
 }
 
 #if !AGAIN
@@ -80,14 +73,11 @@ SUM light_of(vec3 color, ivec2 pixel) {
 }
 #endif
 
-void main() {
-  ivec2 pixel = ivec2(gl_GlobalInvocationID.xy);
-  if (any(greaterThanEqual(pixel, size))) {
-    return;
-  }
+void at(ivec3 p) {
+  ivec2 pixel = p.xy;
   ivec3 place = place_of_sums(pixel);
   SUM sum = sum_at(place, known);
-#if MOMENT || WORDS
+#if MOMENT
   for (int k = 0; k < count; ++k) {
     // Rounded to levels, as the reference reads it.
     vec3 color = floor(to_level(moment_at(pixel + ivec2(0, top), k)) * 255.0 + 0.5) / 255.0;
@@ -115,3 +105,5 @@ void main() {
   store(place, next, added(sum, light_of(color, pixel)));
 #endif
 }
+
+#include "pixels.glsl"

@@ -14,12 +14,8 @@ layout(FORMAT) uniform writeonly image2DArray stored;
 uniform ivec2 size;
 uniform int top, layer;
 
-void main() {
-  ivec2 p = ivec2(gl_GlobalInvocationID.xy);
-  if (any(greaterThanEqual(p, size))) {
-    return;
-  }
-  vec4 values = texelFetch(sent, ivec3(p, 0), 0);
+void at(ivec3 p) {
+  vec4 values = texelFetch(sent, p, 0);
 #  if PACKING == 1
   imageStore(stored, ivec3(p.x, p.y + top, layer), uvec4(values));
 #  else
@@ -35,6 +31,7 @@ void main() {
   imageStore(stored, ivec3(p.x, p.y + top, layer), values);
 #  endif
 }
+#  include "pixels.glsl"
 
 #elif defined(LET_GO)
 // Uses as many samplers and images as any pass, so that all of them are bound anew.

@@ -74,13 +74,9 @@ void add_piece(int quad, int row, float dz) {
 }
 
 void add_frame(int quad) {
-#if MOVED && COMBINE
   start_sight(quad);
   expose(quad, frame, after[quad] - before[quad]);
   fold_sight(quad, frame);
-#else
-  expose(quad, frame, after[quad] - before[quad]);
-#endif
   before[quad] = after[quad];
 }
 

@@ -42,13 +42,9 @@ void expose_frames() {
   for (frame = first; frame < last; frame++) {
     boundary = float(frame + 1);
     vec4 after = vec4(searched(0, row.x), searched(1, row.y), searched(2, row.z), searched(3, row.w));
-#if MOVED && COMBINE
     start_sight(0);
     expose(0, frame, after - before);
     fold_sight(0, frame);
-#else
-    expose(0, frame, after - before);
-#endif
     before = after;
   }
 }

@@ -75,16 +75,9 @@ void add_piece(int k) {
 
 void finish_pixel(int k) {
   ivec2 pixel = pixel_at(k);
-#if COVER
   vec4 color = covered(total[k] * unit);
-#  if ENCODED
+#if ENCODED
   color.rgb = to_linear_exact(straight(color)) * color.a;
-#  endif
-#else
-  vec4 color = vec4(total[k] * unit, 1.0);
-#  if ENCODED
-  color.rgb = to_linear_exact(color.rgb);
-#  endif
 #endif
   float gain = 0.0;
   for (int g = 0; g < GROUPS; g++) {

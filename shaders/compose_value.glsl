@@ -5,33 +5,23 @@ uniform int first, last;
 int frame;
 
 void add_frame(int quad) {
-#if MOVED
   expose(quad, frame, mixed(quad, 0, 1 + (frame - first) * motions + motion));
-#else
-  expose(quad, frame, mixed(quad, 0, 1 + frame - first));
-#endif
 }
 
-#if MOVED && COMBINE
 void fold_frame(int quad) {
   fold_sight(quad, frame);
 }
-#endif
 
 void expose_frames() {
   for (frame = first; frame < last; frame++) {
-#if MOVED && COMBINE
     EACH(start_sight);
-#endif
 #if MOVED
     for (motion = 0; motion < motions; motion++)
 #endif
     {
       EACH(add_frame);
     }
-#if MOVED && COMBINE
     EACH(fold_frame);
-#endif
   }
 }
 

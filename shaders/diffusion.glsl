@@ -139,13 +139,9 @@ void at(ivec3 p) {
 }
 #endif
 
-void main() {
 #if defined(PROLONG) || defined(EXPAND) || defined(EXPAND_RIM)
-  ivec3 p = ivec3(corner(size) + 2 * IN_FOURS, gl_GlobalInvocationID.z);
+#  define PLACE 2 * IN_FOURS
 #else
-  ivec3 p = ivec3(corner(size) + IN_EIGHTS, gl_GlobalInvocationID.z);
+#  define PLACE IN_EIGHTS
 #endif
-  if (inside(p.xy, size)) {
-    at(p);
-  }
-}
+#include "cells.glsl"

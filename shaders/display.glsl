@@ -24,21 +24,16 @@ float level(float light, float added) {
   return clamp(floor(value), 0.0, 255.0) / 255.0;
 }
 
-void main() {
-  ivec2 p = ivec2(gl_GlobalInvocationID.xy);
-  if (any(greaterThanEqual(p, size))) {
-    return;
-  }
+void at(ivec3 p) {
   is_sure = true;
   ivec3 from = ivec3(p.x, size.y - 1 - p.y, 0);
   vec3 light = imageLoad(picture, from).rgb;
   float added = imageLoad(grain, from).r;
   vec3 found = vec3(level(light.r, added), level(light.g, added), level(light.b, added));
-  imageStore(levels, ivec3(p, 0), vec4(found, is_sure ? 1.0 : 0.0));
+  imageStore(levels, p, vec4(found, is_sure ? 1.0 : 0.0));
 }
-#endif
 
-#ifdef PICK
+#elif defined(PICK)
 // The light of some pixels. places: their numbers, row by row from the bottom.
 layout(local_size_x = 64) in;
 layout(rgba32f) uniform readonly image2DArray picture;
@@ -47,12 +42,10 @@ layout(rgba32f) uniform writeonly image2DArray picked;
 uniform ivec2 size;
 uniform int width;
 
-void main() {
-  ivec2 p = ivec2(gl_GlobalInvocationID.xy);
-  if (any(greaterThanEqual(p, size))) {
-    return;
-  }
-  int place = int(imageLoad(places, ivec3(p, 0)).r);
-  imageStore(picked, ivec3(p, 0), imageLoad(picture, ivec3(place % width, place / width, 0)));
+void at(ivec3 p) {
+  int place = int(imageLoad(places, p).r);
+  imageStore(picked, p, imageLoad(picture, ivec3(place % width, place / width, 0)));
 }
 #endif
+
+#include "pixels.glsl"

@@ -29,22 +29,18 @@ float resistance(ivec2 p) {
   return mix(above, below, share.y);
 }
 
-void main() {
-  ivec2 p = corner(size) + IN_EIGHTS;
-  if (!inside(p, size)) {
-    return;
-  }
+void at(ivec3 p) {
   vec4 tied = vec4(0.0);
-  if (imageLoad(labels, ivec3(p, 0)).r == 0u) {
-    float own_one = resistance(p);
+  if (imageLoad(labels, p).r == 0u) {
+    float own_one = resistance(p.xy);
     for (int k = 1; k < 9; k += 2) {
-      ivec2 j = p + OFFSET(k);
+      ivec2 j = p.xy + OFFSET(k);
       if (inside(j, size)) {
         tied[k / 2] = 2.0 / (own_one + resistance(j));
       }
     }
   }
-  imageStore(links, ivec3(p, 0), tied);
+  imageStore(links, p, tied);
 }
 
 #elif defined(ZERO)
@@ -118,11 +114,7 @@ layout(rgba32f) uniform readonly image2DArray sums;  // residual · guess of thi
 layout(rgba32f) uniform image2DArray result;
 uniform int fresh;
 
-void main() {
-  ivec3 p = ivec3(corner(size) + IN_EIGHTS, gl_GlobalInvocationID.z);
-  if (!inside(p.xy, size)) {
-    return;
-  }
+void at(ivec3 p) {
   vec4 now = imageLoad(sums, ivec3(0, 0, p.z));
   vec4 before = imageLoad(sums, ivec3(1, 0, p.z));
   vec4 turned = imageLoad(values, p);
@@ -139,15 +131,16 @@ uniform sampler2DArray sums;  // residual · guess, and direction · answer, its
 layout(rgba32f) uniform readonly image2DArray values, right;
 layout(rgba32f) uniform image2DArray solution, result;
 
-void main() {
-  ivec3 p = ivec3(corner(size) + IN_EIGHTS, gl_GlobalInvocationID.z);
-  if (!inside(p.xy, size)) {
-    return;
-  }
+void at(ivec3 p) {
   vec4 power = texelFetch(sums, ivec3(0, 0, p.z), 0);
   vec4 answer = texelFetch(sums, ivec3(2, 0, p.z), 0);
   vec4 way = vec4(lessThan(answer, vec4(0.0))) * power / max(-answer, vec4(1e-37));
   imageStore(solution, p, imageLoad(solution, p) + way * imageLoad(values, p));
   imageStore(result, p, imageLoad(result, p) + way * imageLoad(right, p));
 }
+#endif
+
+#if defined(LINKS) || defined(TURN) || defined(STEP)
+#  define PLACE IN_EIGHTS
+#  include "cells.glsl"
 #endif

@@ -53,42 +53,38 @@ layout(rgba32f) uniform writeonly image2DArray picture;
 const float CLEAR = 1.0 / 16.0;
 const float UNCOVERED = 1.0 - 2e-5;
 
-void main() {
-  ivec2 pixel = ivec2(gl_GlobalInvocationID.xy);
-  if (any(greaterThanEqual(pixel, size))) {
-    return;
-  }
-  ivec3 place = ivec3(pixel, 0);
-  vec4 light = imageLoad(under, place);
-  vec4 own = imageLoad(exposed, place);
+void at(ivec3 p) {
+  vec4 light = imageLoad(under, p);
+  vec4 own = imageLoad(exposed, p);
 #if OPAQUE
   float covered = own.a;
 #else
-  float covered = texelFetch(share, place, 0).a;
+  float covered = texelFetch(share, p, 0).a;
 #endif
 #if BEGINS
 #  if OPAQUE
   float seen = light.a;
 #  else
-  float seen = texelFetch(clear, place, 0).a;
+  float seen = texelFetch(clear, p, 0).a;
 #  endif
 #  if PLATE
   float lacking = max(CLEAR - seen, 0.0);
-  light = (light + lacking * texelFetch(plate, place, 0)) / max(seen, CLEAR);
+  light = (light + lacking * texelFetch(plate, p, 0)) / max(seen, CLEAR);
 #  else
   light /= max(seen, 1e-6);
 #  endif
 #  if PLAIN
   if (seen > UNCOVERED) {
-    light = texelFetch(plain, place, 0);
+    light = texelFetch(plain, p, 0);
   }
 #  endif
 #endif
   light = own + (1.0 - covered) * light;
 #if ENDS
-  finish(ivec2(pixel.x, size.y - 1 - pixel.y), light);
+  finish(ivec2(p.x, size.y - 1 - p.y), light);
 #else
-  imageStore(picture, place, light);
+  imageStore(picture, p, light);
 #endif
 }
+#  include "pixels.glsl"
 #endif

@@ -5,11 +5,9 @@ layout(rgba8) uniform writeonly image2DArray levels;
 uniform ivec2 size;
 #include "light.glsl"
 
-void main() {
-  ivec2 p = ivec2(gl_GlobalInvocationID.xy);
-  if (any(greaterThanEqual(p, size))) {
-    return;
-  }
+void at(ivec3 p) {
   vec3 linear = imageLoad(picture, ivec3(p.x, size.y - 1 - p.y, 0)).rgb;
-  imageStore(levels, ivec3(p, 0), vec4(to_level(clamp(linear, 0.0, 1.0)), 1.0));
+  imageStore(levels, p, vec4(to_level(clamp(linear, 0.0, 1.0)), 1.0));
 }
+
+#include "pixels.glsl"

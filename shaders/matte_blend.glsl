@@ -6,11 +6,7 @@ layout(rgba32f) uniform image2DArray over;
 layout(std140) uniform table_block { vec4 table[MOST]; };  // of each matte: its shutter, whether it adds, its opacity
 uniform ivec2 size, beneath;
 
-void main() {
-  ivec3 p = ivec3(gl_GlobalInvocationID);
-  if (any(greaterThanEqual(p.xy, size))) {
-    return;
-  }
+void at(ivec3 p) {
   // Coefficients of the whole picture have one texel.
   ivec2 own = min(p.xy, beneath - 1);
   vec4 c = imageLoad(under, ivec3(own, p.z));
@@ -37,3 +33,5 @@ void main() {
     imageStore(over, p, c);
   }
 }
+
+#include "pixels.glsl"

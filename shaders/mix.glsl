@@ -9,11 +9,7 @@ layout(rgba32f) uniform image2DArray mixed;
 uniform ivec2 size, given;
 uniform float share;
 
-void main() {
-  ivec3 p = ivec3(gl_GlobalInvocationID);
-  if (any(greaterThanEqual(p.xy, size))) {
-    return;
-  }
+void at(ivec3 p) {
   // Coefficients of the whole picture have one texel.
   vec4 sum = share * imageLoad(added, ivec3(min(p.xy, given - 1), p.z));
 #if !BEGINS
@@ -21,3 +17,5 @@ void main() {
 #endif
   imageStore(mixed, p, sum);
 }
+
+#include "pixels.glsl"

@@ -302,13 +302,11 @@ vec4 taken_around(ivec3 p) {
 // A quarter of a Gauss-Seidel sweep. Invocations run over the cells of one of four colours.
 uniform ivec2 colour;
 
-void main() {
-  ivec3 p = ivec3(corner(size) + 2 * IN_FOURS + colour, gl_GlobalInvocationID.z);
-  if (!inside(p.xy, size)) {
-    return;
-  }
+void at(ivec3 p) {
   imageStore(values, p, (imageLoad(right, p) - taken_around(p)) * imageLoad(stencil, ivec3(p.xy, 2)).x);
 }
+#    define PLACE 2 * IN_FOURS + colour
+#    include "cells.glsl"
 #  else
 // Half a red-black Gauss-Seidel sweep. Invocations run over the pixels of one colour.
 uniform int colour;
@@ -334,12 +332,10 @@ void main() {
 layout(rgba32f) uniform writeonly image2DArray result;
 uniform float amount;
 
-void main() {
-  ivec3 p = ivec3(corner(size) + IN_EIGHTS, gl_GlobalInvocationID.z);
-  if (!inside(p.xy, size)) {
-    return;
-  }
+void at(ivec3 p) {
   vec4 total = imageLoad(stencil, ivec3(p.xy, 2)).y * NEAR(0, 0) + taken_around(p);
   imageStore(result, p, amount * imageLoad(right, p) - total);
 }
+#  define PLACE IN_EIGHTS
+#  include "cells.glsl"
 #endif

@@ -34,12 +34,16 @@ void main() {
   shown = on_region(texture(picture, vec3(at.x, 1.0 - at.y, 0.0)) * opacity);
 }
 
-#elif defined(COEFFICIENTS)
-// The shutters' colours, with their patterns, in shares of a pixel's coefficients, four shutters per layer.
+#elif defined(COEFFICIENTS) || defined(EDGES)
+// Four shutters per layer.
 uniform sampler2DArray coefficients, palette;
 uniform ivec2 size;
 uniform int block, count;
 uniform float unit;  // of the interface, in the region's pixels
+#endif
+
+#ifdef COEFFICIENTS
+// The shutters' colours, with their patterns, in shares of a pixel's coefficients.
 
 bool is_line(float place, float period) {
   return place - floor(place / period) * period < 1.7;
@@ -80,11 +84,6 @@ void main() {
 
 #elif defined(EDGES)
 // A line, in a shutter's colour, around what that gets more than half of; around the first one's there is none.
-uniform sampler2DArray coefficients, palette;
-uniform ivec2 size;
-uniform int block, count;
-uniform float unit;  // of the interface, in the region's pixels
-
 int most(vec2 place) {
   vec2 all = vec2(size) / float(block);
   vec2 texels = clamp(vec2(place.x, 1.0 - place.y) * all, vec2(0.5), all - 0.5);

@@ -10,14 +10,10 @@ layout(std140) uniform Chosen { vec4 chosen[GROUPS]; };
 uniform ivec2 size;
 uniform int count;
 
-void main() {
-  ivec2 place = ivec2(gl_GlobalInvocationID.xy);
-  if (any(greaterThanEqual(place, size))) {
-    return;
-  }
+void at(ivec3 p) {
   float sum = 0.0;
   for (int k = 0; k < ALL; k++) {
-    sum += max(imageLoad(coefficients, ivec3(place, k / 4))[k % 4], 0.0);
+    sum += max(imageLoad(coefficients, ivec3(p.xy, k / 4))[k % 4], 0.0);
   }
   float own = 0.0;
   vec4 found[GROUPS];
@@ -26,16 +22,16 @@ void main() {
     for (int k = 0; k < 4; k++) {
       int number = int(chosen[g][k]);
       int there = max(number, 0);
-      float value = max(imageLoad(coefficients, ivec3(place, there / 4))[there % 4], 0.0);
+      float value = max(imageLoad(coefficients, ivec3(p.xy, there / 4))[there % 4], 0.0);
       found[g][k] = number < 0 ? 0.0 : value;
       own += found[g][k];
     }
   }
   for (int g = 0; g < GROUPS; g++) {
     vec4 equal_parts = vec4(greaterThanEqual(chosen[g], vec4(0.0))) / float(count);
-    imageStore(selected, ivec3(place, g), own > 0.0 ? found[g] / own : equal_parts);
+    imageStore(selected, ivec3(p.xy, g), own > 0.0 ? found[g] / own : equal_parts);
   }
-  imageStore(share, ivec3(place, 0), vec4(own / sum));
+  imageStore(share, p, vec4(own / sum));
 }
 #else
 // Adds a way's picture, as much as its shutters have, to `mixed`. Both are scene-linear, bottom row first. BEGINS: it is
@@ -57,20 +53,18 @@ uniform int block_bits;
 #  include "finish.glsl"
 #endif
 
-void main() {
-  ivec2 pixel = ivec2(gl_GlobalInvocationID.xy);  // top row first
-  if (any(greaterThanEqual(pixel, size))) {
-    return;
-  }
-  ivec3 place = ivec3(pixel.x, size.y - 1 - pixel.y, 0);
-  vec4 light = imageLoad(share, ivec3(pixel >> block_bits, 0)).r * imageLoad(part, place);
+void at(ivec3 p) {  // top row first
+  ivec3 place = ivec3(p.x, size.y - 1 - p.y, 0);
+  vec4 light = imageLoad(share, ivec3(p.xy >> block_bits, 0)).r * imageLoad(part, place);
 #if !BEGINS
   light += imageLoad(mixed, place);
 #endif
 #if LEVELS
-  finish(pixel, light);
+  finish(p.xy, light);
 #else
   imageStore(mixed, place, light);
 #endif
 }
 #endif
+
+#include "pixels.glsl"

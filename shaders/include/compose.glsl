@@ -218,6 +218,16 @@ int layer_of(int frame) {
 #  include "combine.glsl"
 #endif
 
+// What moved.glsl has for frames that are seen elsewhere.
+#if !MOVED
+const int motions = 1;
+int motion = 0;
+#endif
+#if !MOVED || !COMBINE
+void start_sight(int quad) {}
+void fold_sight(int quad, int frame) {}
+#endif
+
 #if MOVED
 #  include "moved.glsl"
 #elif COMBINE
@@ -233,24 +243,18 @@ void expose(int quad, int frame, vec4 weight) {
 #endif
   int layer = layer_of(frame);
 #if COMBINE == 3
-  count_sample(0, sample_at(pixel_at(quad, 0), layer), weight.x);
-  count_sample(1, sample_at(pixel_at(quad, 1), layer), weight.y);
-  count_sample(2, sample_at(pixel_at(quad, 2), layer), weight.z);
-  count_sample(3, sample_at(pixel_at(quad, 3), layer), weight.w);
+  for (int pixel = 0; pixel < 4; pixel++) {
+    count_sample(pixel, sample_at(pixel_at(quad, pixel), layer), weight[pixel]);
+  }
 #else
   weight *= gain[quad];
-#if THRESHOLD
   for (int pixel = 0; pixel < 4; pixel++) {
     vec4 light = frame_light(pixel_at(quad, pixel), layer);
     fold(quad, pixel, light, weight[pixel] * passed(light));
+#if THRESHOLD
     fold(quad, pixel, light, frame == shown ? 1.0 : 0.0);
-  }
-#else
-  fold(quad, 0, frame_light(pixel_at(quad, 0), layer), weight.x);
-  fold(quad, 1, frame_light(pixel_at(quad, 1), layer), weight.y);
-  fold(quad, 2, frame_light(pixel_at(quad, 2), layer), weight.z);
-  fold(quad, 3, frame_light(pixel_at(quad, 3), layer), weight.w);
 #endif
+  }
 #if THRESHOLD
   share[quad] = frame == shown ? vec4(1.0) : share[quad];
 #endif
@@ -291,11 +295,7 @@ vec4 nearest_light(int quad, int pixel, int frame) {
   int position = clamp(origin + direction * frame, 0, count - 1);
   ivec3 place = place_of_light(quad, pixel);
   SUM sum = minus(sum_at(place, layer_at(position + 1)), sum_at(place, layer_at(position)));
-#if COVER
   return covered(unit * unpacked_light(sum));
-#else
-  return vec4(unit * unpacked_light(sum), 1.0);
-#endif
 #else
   return frame_light(pixel_at(quad, pixel), layer_of(frame));
 #endif

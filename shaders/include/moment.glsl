@@ -1,17 +1,11 @@
 // A moment between two frames (core/frames/moments.py); media/flow.py is the reference. Places are whole numbers, so that
-// these are the same ones. WORDS: texels come as whole words, which a software renderer loads in half of the time.
+// these are the same ones. A filmed pixel is a whole number, R + 256 G + 65536 B.
 #define APART 4  // pixels between two vectors
 #define UNIT 32  // of a coordinate, in a pixel
 #define ZERO 32768
 
-#if WORDS
 ivec4 stored_at(int x, int y, int which) {
-  uint path = imageLoad(vectors, ivec3(2 * x, y, which)).r, shown = imageLoad(vectors, ivec3(2 * x + 1, y, which)).r;
-  return ivec4(path & 0xFFFFu, path >> 16, shown & 0xFFFFu, shown >> 16);
-}
-
-ivec2 last_vector() {
-  return imageSize(vectors).xy / ivec2(2, 1) - 1;
+  return ivec4(imageLoad(vectors, ivec3(x, y, which)) * 65535.0 + 0.5);
 }
 
 vec3 levels_at(int x, int y, int end) {
@@ -19,30 +13,9 @@ vec3 levels_at(int x, int y, int end) {
   return vec3(ivec3(bytes, bytes >> 8, bytes >> 16) & 255);
 }
 
-ivec2 last_pixel() {
-  return imageSize(filmed).xy - 1;
-}
-#else
-ivec4 stored_at(int x, int y, int which) {
-  return ivec4(texelFetch(vectors, ivec3(x, y, which), 0) * 65535.0 + 0.5);
-}
-
-ivec2 last_vector() {
-  return textureSize(vectors, 0).xy - 1;
-}
-
-vec3 levels_at(int x, int y, int end) {
-  return texelFetch(filmed, ivec3(x, y, end), 0).rgb * 255.0;
-}
-
-ivec2 last_pixel() {
-  return textureSize(filmed, 0).xy - 1;
-}
-#endif
-
 // What the vectors say of a pixel, 16 times as large.
 ivec4 spread_at(ivec2 pixel, int which) {
-  ivec2 last = last_vector(), place = pixel / APART, part = pixel - place * APART;
+  ivec2 last = imageSize(vectors).xy - 1, place = pixel / APART, part = pixel - place * APART;
   ivec2 beside = min(place + 1, last);
   ivec4 above = stored_at(place.x, place.y, which) * (APART - part.x) + stored_at(beside.x, place.y, which) * part.x;
   ivec4 below = stored_at(place.x, beside.y, which) * (APART - part.x) + stored_at(beside.x, beside.y, which) * part.x;
@@ -64,7 +37,7 @@ vec3 row_at(ivec4 columns, int row, vec4 shares, int end) {
 
 // Linear light of a filmed frame at a place in 1 / UNIT of a pixel. end: its layer
 vec3 looked_up(ivec2 place, int end) {
-  ivec2 last = last_pixel(), corner = place >> 5, part = place & (UNIT - 1);
+  ivec2 last = imageSize(filmed).xy - 1, corner = place >> 5, part = place & (UNIT - 1);
   ivec4 columns = clamp(corner.x + ivec4(-1, 0, 1, 2), 0, last.x), rows = clamp(corner.y + ivec4(-1, 0, 1, 2), 0, last.y);
   vec4 across = cubic_weights(float(part.x) / float(UNIT)), down = cubic_weights(float(part.y) / float(UNIT));
   vec3 levels = row_at(columns, rows.x, across, end) * down.x + row_at(columns, rows.y, across, end) * down.y +

@@ -4,6 +4,8 @@
 #if COVER
 #define SUM uvec4
 #define LIGHT vec4
+#define AS_STORED(sum) sum
+#define AS_SUM(stored) stored
 
 uvec4 minus(uvec4 a, uvec4 b) {
   return a - b;
@@ -25,6 +27,8 @@ vec4 covered(vec4 light) {
 #include "halves.glsl"
 #define SUM uvec2
 #define LIGHT vec3
+#define AS_STORED(sum) halves_of(sum)
+#define AS_SUM(stored) words_of(stored)
 
 const uint FIELD = 0x1FFFFFu;
 
@@ -45,6 +49,10 @@ uvec2 packed_light(uvec3 light) {
 vec3 unpacked_light(uvec2 difference) {
   uint green = (difference.x >> 21) | (difference.y << 11);
   return vec3(ivec3(difference.x & FIELD, green & FIELD, difference.y >> 10));
+}
+
+vec4 covered(vec3 light) {
+  return vec4(light, 1.0);
 }
 #endif
 
@@ -68,9 +76,5 @@ ivec3 place_in_layer(ivec3 place, int layer) {
 
 // imageLoad: a software renderer's texelFetch of whole numbers takes three times as long.
 SUM sum_at(ivec3 place, int layer) {
-#if COVER
-  return imageLoad(sums, place_in_layer(place, layer));
-#else
-  return words_of(imageLoad(sums, place_in_layer(place, layer)));
-#endif
+  return AS_SUM(imageLoad(sums, place_in_layer(place, layer)));
 }

@@ -1,7 +1,6 @@
 """The passes that compose: one for each way to go through a window, compiled for what is composed; and which way is
 the fastest. And what they need to know of shutters, once per frame: gains, knots or bars, as float32 tables."""
 
-from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
@@ -11,7 +10,7 @@ from ..core.model.combining import AVERAGE, Combine
 from ..core.model.frame_state import FrameState, Options
 from ..devices.llvmpipe import MOST_ITERATIONS, frames_iterations
 from ..devices.passes import Pass, read_pass
-from .running_sums import STORED_SUMS, Sums
+from .running_sums import Sums
 from .window import BLOCK, Window
 
 # Rows of pixels that one invocation of compose_sums composes.
@@ -28,55 +27,17 @@ _LINES = {"sums": PAIR, "search": 4}
 _ROWS = (1, 2, 3, 4, 6, 8, 12, 16, 24, 32)
 
 
-@dataclass(frozen=True)
-class LightFormat:
-    """How light is read, summed and stored.
-
-    decode: a number of window.decoding
-    premultiplied: whether the frames' colours are
-    encoded: whether the sums are of encoded light (Options.light)
-    levels: whether the picture is of levels, not scene-linear
-    cover: of running_sums.WeightedSums
-    combine: how frames are combined; kind: of the texture that has them; opaque: their alpha is 1"""
-
-    decode: int
-    premultiplied: bool
-    encoded: bool
-    levels: bool
-    cover: int = 0
-    combine: Combine = AVERAGE
-    kind: str = "rgba32f"
-    opaque: bool = False
-
-    def defines(self) -> dict[str, int | str]:
-        """The macros of include/compose.glsl that say so."""
-        raw = {"rgba8": 0, "rgba16": 1}.get(self.kind, 2)
-        return {
-            "DECODE": self.decode,
-            "PREMULTIPLIED": int(self.premultiplied),
-            "ENCODED": int(self.encoded),
-            "LEVELS": int(self.levels),
-            "COVER": self.cover,
-            "STORED": STORED_SUMS[self.cover],
-            "COMBINE": MODES[self.combine.mode],
-            "BY_LUMINANCE": int(self.combine.by_luminance),
-            "OPAQUE": int(self.opaque),
-            "THRESHOLD": int(self.combine.threshold is not None),
-            "LEVELS_OF": 2 if self.premultiplied else raw,
-        }
-
-
-def composition(way: str, groups: int, light: LightFormat, **macros: int) -> Pass:
+def composition(way: str, groups: int, **macros: int | str) -> Pass:
     """The pass compose_<way>, for `groups` of four shutters. macros: others of shaders/include/compose.glsl and
     moved.glsl, or of compose_sums, as far as they are not 0."""
-    given: dict[str, int | str] = {"GROUPS": groups, "VALUE": int(way == "value"), **light.defines()}
-    given["QUADS"] = lines_of(way, light.combine) // 4
+    lines = lines_of(way, is_median=macros.get("COMBINE") == MODES["median"])
+    given: dict[str, int | str] = {"GROUPS": groups, "VALUE": int(way == "value"), "QUADS": lines // 4}
     return read_pass(f"compose_{way}", **(given | macros))
 
 
-def lines_of(way: str, combine: Combine = AVERAGE) -> int:
+def lines_of(way: str, *, is_median: bool) -> int:
     """The rows of pixels that one invocation of a way's pass composes."""
-    return 4 if combine.mode == "median" else _LINES.get(way, BLOCK)
+    return 4 if is_median else _LINES.get(way, BLOCK)
 
 
 def way_of(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Hashable, Iterator, Sequence
 from contextlib import AbstractContextManager, nullcontext
+from typing import Any
 
 import numpy as np
 
@@ -142,16 +143,8 @@ class CPUCompositor:
         levels[..., :3] = display.levels(drawn[..., :3], noise)
         return levels
 
-    def solve(
-        self,
-        labels: np.ndarray,
-        count: int,
-        guide: np.ndarray | None = None,
-        strength: float = 0.0,
-        *,
-        warm: bool = False,
-    ) -> np.ndarray:
-        return diffuse(labels, count, guide, strength)
+    def solve(self, labels: np.ndarray, count: int, *guided: Any, warm: bool = False) -> np.ndarray:
+        return diffuse(labels, count, *guided)
 
     def add(self, mixed: np.ndarray | None, added: np.ndarray, share: float, size: tuple[int, int]) -> np.ndarray:
         part = np.broadcast_to(added * np.float32(share), (len(added), *size))

@@ -17,8 +17,8 @@ from . import cpu, window_frames
 from .composition_passes import (
     EDGES,
     LEVELS,
+    MODES,
     PICTURE,
-    LightFormat,
     composition,
     filled_rows,
     lines_of,
@@ -31,24 +31,30 @@ from .composition_passes import (
 )
 from .displaying import Displaying
 from .request import Coefficients, Handle, Request
-from .running_sums import Sums, open_window
+from .running_sums import STORED_SUMS, Sums, open_window
 from .stages import Stages
 from .window import BLOCK, PackedFrames, WholeFrames, Window
 
+# What a median's levels are of (shaders/include/combine.glsl), by the kind of texture.
+_LEVELS_OF = {"rgba8": 0, "rgba16": 1}
 
-def _light(window: Any, request: Request) -> LightFormat:
-    """How the passes over a window read light, and what they store."""
-    (combine,) = request.state.groups
-    return LightFormat(
-        decode=window.decode(request.state.options.light),
-        premultiplied=window.source.alpha == "premultiplied",
-        encoded=request.state.options.light == "encoded",
-        levels=request.levels,
-        cover=window.cover,
-        combine=combine,
-        kind=window.kind,
-        opaque=window.source.alpha == "opaque",
-    )
+
+def _light(window: Any, request: Request) -> dict[str, int | str]:
+    """The macros that say how the passes over a window read, sum, combine and store light."""
+    (combine,), alpha = request.state.groups, window.source.alpha
+    return {
+        "DECODE": window.decode(request.state.options.light),
+        "PREMULTIPLIED": int(alpha == "premultiplied"),
+        "ENCODED": int(request.state.options.light == "encoded"),
+        "LEVELS": int(request.levels),
+        "COVER": window.cover,
+        "STORED": STORED_SUMS[window.cover],
+        "COMBINE": MODES[combine.mode],
+        "BY_LUMINANCE": int(combine.by_luminance),
+        "OPAQUE": int(alpha == "opaque"),
+        "THRESHOLD": int(combine.threshold is not None),
+        "LEVELS_OF": 2 if alpha == "premultiplied" else _LEVELS_OF.get(window.kind, 2),
+    }
 
 
 def _from_sums(window: Sums, request: Request, values: np.ndarray, origin: int) -> tuple[Pass, Given]:
@@ -59,7 +65,7 @@ def _from_sums(window: Sums, request: Request, values: np.ndarray, origin: int) 
     filled = np.zeros((1 + rows, *values.shape[1:]), np.float32)
     filled[: len(values)] = values
     macros = {"ROWS": rows, "TABLE": len(filled) * values.shape[1], "BACK": int(back), "TILED": int(window.tiled)}
-    return composition("sums", groups, _light(window, request), **macros), {
+    return composition("sums", groups, **_light(window, request), **macros), {
         "images": {},
         "blocks": {"table": filled.reshape(-1, 4)},
         "first_layer": window.start % window.layers,
@@ -87,7 +93,7 @@ def _from_frames(
     # In these shaders, frame 0 is the shot's first.
     given |= {"count": len(shot), "origin": origin - shot.start, "lowest": lowest - shot.start}
     given |= _threshold(combine, request, shot)
-    return composition(way, -(-len(state.bars) // 4), _light(window, request), EDGES=edges, **macros), given
+    return composition(way, -(-len(state.bars) // 4), **_light(window, request), EDGES=edges, **macros), given
 
 
 def _threshold(combine: Combine, request: Request, shot: range) -> Given:
@@ -188,9 +194,10 @@ class GPUCompositor:
         given["images"] |= {"picture": picture, "coefficients": coefficients.handle}
         if isinstance(window, Sums):
             given |= {"held": window.stop - window.start, "unit": 1 / window.whole}
-        lines, name = lines_of(way, combine), "sums" if isinstance(window, Sums) else "frames"
+        lines = lines_of(way, is_median=combine.mode == "median")
+        bound, name = ("images", "sums") if isinstance(window, Sums) else ("textures", "frames")
         for part, stored in window.stored():
-            given["images" if name == "sums" else "textures"][name] = stored
+            given[bound][name] = stored
             size = window.source.width, part.height
             self.device.run(program, (size[0], -(-part.height // lines)), size=size, top=part.top, **given)
         return picture
@@ -270,7 +277,7 @@ class GPUCompositor:
             several = {"QUADS": 1 if before or after else quads, "SEVERAL": int(before or after)}
             several |= {"CONTINUED": int(before), "UNFINISHED": int(after)}
             groups = -(-len(state.bars) // 4)
-            program = composition(way, groups, _light(window, request), **macros, **several)
+            program = composition(way, groups, **_light(window, request), **macros, **several)
             extent = size[0], -(-size[1] // (4 * several["QUADS"]))
             self.device.run(program, extent, textures={**images, "frames": stack}, images=images, **given)
         return picture

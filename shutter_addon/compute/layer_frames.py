@@ -16,7 +16,6 @@ from ..core.model.frame_state import FrameState, Layers
 from ..core.model.mattes import FileFrame, Matte, MatteReader, Ramp
 from ..core.pixels import layering
 from ..core.stopping import kept
-from .window import summable
 
 # Bytes of frames that are kept as they were read, for all windows and mattes that need them.
 RECENT_BYTES = 256 << 20
@@ -99,12 +98,6 @@ class WeightedFrames(SourceWrapper):
             seen[..., :3] = light.straight(seen)[..., :3] * weight[..., None]
             seen[..., 3] = weight
         return seen.astype(self.dtype)
-
-
-def with_layers(source: FrameSource, weighted: int, moves: bool) -> int:
-    """How many windows a picture has, of which so many are weighted: where there are no running sums, the picture
-    without layers is composed as well. moves: something is followed."""
-    return weighted + int(moves or not summable(source))
 
 
 def linear(frame: np.ndarray, source: FrameSource) -> np.ndarray:

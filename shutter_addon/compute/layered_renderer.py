@@ -12,9 +12,10 @@ from ..core.model.frame_state import FrameState, Layers
 from ..core.model.mattes import MatteReader
 from ..core.model.windows import source_frames
 from ..core.pixels import layering
-from . import plates
-from .layer_frames import LayerMattes, RecentFrames, WeightedFrames, with_layers
+from . import plates, window_frames
+from .layer_frames import LayerMattes, RecentFrames, WeightedFrames
 from .request import Behind, Coefficients, Compositor, Exposure, Handle, Request, Stages
+from .window import summable
 
 # How much of what lies behind layers has to be seen for a plate to be looked for.
 _SEEN = 1 / 1024
@@ -70,18 +71,12 @@ class LayeredRenderer:
         return set.intersection(*held) if held else ()
 
     def draw(
-        self,
-        request: Request,
-        behind: Request,
-        coefficients: Coefficients,
-        positions: np.ndarray,
-        shot: range,
-        plain: Callable[[], Handle],
+        self, request: Request, behind: Request, coefficients: Coefficients, shot: range, plain: Callable[[], Handle]
     ) -> Handle:
         """The picture, as the compositor's `draw` gives it.
 
         behind: of what lies behind, without layers, and its coefficients
-        positions, shot: what windows load
+        shot: the source frames that windows may show
         plain: gives the picture without layers"""
         layers = request.state.layers
         if layers is None:
@@ -91,7 +86,7 @@ class LayeredRenderer:
         self._forget_changed(layers, parts)
         self._layers = layers
 
-        composed = partial(self._composed, request, parts, coefficients, positions, shot, plain)
+        composed = partial(self._composed, request, parts, coefficients, shot, plain)
         for crowd in (2, 8, 1 << 16):
             try:
                 return composed()
@@ -108,15 +103,15 @@ class LayeredRenderer:
         request: Request,
         parts: dict[tuple[int, bool], Request],
         coefficients: Coefficients,
-        positions: np.ndarray,
         shot: range,
         plain: Callable[[], Handle],
     ) -> Handle:
         count = max(layer for layer, _ in parts) + 1
         moves = any(part.state.following is not None for part in parts.values())
-        self.recent.windows = self._crowd * with_layers(self._source, len(parts), moves)
+        # Where there are no running sums, the picture without layers is composed as well.
+        self.recent.windows = self._crowd * (len(parts) + int(moves or not summable(self._source)))
         windows = {name: self._window(name, part, len(request.state.bars)) for name, part in parts.items()}
-        self._load(windows, positions, request, shot)
+        self._load(windows, request, shot)
         whole = Coefficients(self._stages.upload(np.ones((1, 1, 1))), max(self._source.width, self._source.height))
         drawn = {
             name: self._compositor.draw(
@@ -157,9 +152,9 @@ class LayeredRenderer:
             window = self._windows[key] = self._compositor.window(weighted, options.window, moved, shutters, summed)
         return window
 
-    def _load(self, windows: dict, positions: np.ndarray, request: Request, shot: range) -> None:
+    def _load(self, windows: dict, request: Request, shot: range) -> None:
         """Loads all windows. Where many frames lack, they are loaded a few at a time: each is read once for all."""
-        options, ordered = request.state.options, np.sort(positions)
+        options, ordered = request.state.options, np.sort(window_frames.positions(request, shot))
         lacking = set(source_frames(options, ordered, shot).tolist()).difference(self.held)
         step = plates.TOGETHER if len(lacking) > 1 else len(ordered)
         for end in range(step, len(ordered) + step, step):

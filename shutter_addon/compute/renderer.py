@@ -119,15 +119,8 @@ class Renderer:
         behind = replace(request, state=replace(request.state, layers=None), levels=False)
         labels, shot = self.labels(behind), self.shot(request)
         self._keep_guides(request)
-        positions = window_frames.positions(request, shot)
-        return self._layering().draw(
-            request,
-            self._exposing(behind, labels),
-            self._coefficients(behind, labels),
-            positions,
-            shot,
-            lambda: self._plain(behind),
-        )
+        exposing, coefficients = self._exposing(behind, labels), self._coefficients(behind, labels)
+        return self._layering().draw(request, exposing, coefficients, shot, lambda: self._plain(behind))
 
     def _layering(self) -> LayeredRenderer:
         if self._layered is None:

@@ -78,16 +78,10 @@ class Behind(NamedTuple):
 class Stages(Protocol):
     """What a renderer has for itself. What a method gives is valid until its next call."""
 
-    def solve(
-        self,
-        labels: np.ndarray,
-        count: int,
-        guide: np.ndarray | None = None,
-        strength: float = 0.0,
-        *,
-        warm: bool = False,
-    ) -> Handle:
-        """Coefficients as compute.diffusion.diffuse has them; warm: they may start from the last ones."""
+    def solve(self, labels: np.ndarray, count: int, *guided: Any, warm: bool = False) -> Handle:
+        """Coefficients as compute.diffusion.diffuse has them.
+
+        guided: its guide and strength, or nothing; warm: they may start from the last ones"""
 
     def upload(self, values: np.ndarray) -> Handle:
         """Coefficients (N, h, w), or (N, 1, 1) of the whole picture. Valid until the next call."""

@@ -53,8 +53,8 @@ def accumulation(decode: int, sent: str, back: bool, tiled: bool, cover: int = 0
     """The pass that makes a layer of sums from its neighbour: with the frame between the two added, or subtracted.
 
     decode: of `decoding`
-    sent: as what the frame was sent, "COLOURS", "NUMBERS" (Device.send), "PLANES", "MOMENT" or
-    "WORDS", a moment as planes are sent; "AGAIN": it is taken as the difference of two layers that hold it already
+    sent: as what the frame was sent, "COLOURS", "NUMBERS" (Device.send), "PLANES" or "MOMENT"; "AGAIN": it is taken as
+    the difference of two layers that hold it already
     back: it is subtracted
     tiled: the sums are stored in tiles
     cover: of WeightedSums
@@ -202,7 +202,7 @@ class Sums(Window):
         if isinstance(frame, Planes):
             return "PLANES", self._send_planes(frame)
         if isinstance(frame, Moment):
-            return self._send_moments([frame, *self._evenly(frame, frames[1:])])
+            return "MOMENT", self._send_moments([frame, *self._evenly(frame, frames[1:])])
         own = self._own("frame", "rgba8")
         sent = self.device.send(own, frame)
         return "COLOURS" if sent is own else "NUMBERS", {"textures": {"frame": sent}}
@@ -220,26 +220,20 @@ class Sums(Window):
             "blue_of": matrix.blue_of_cb,
         }
 
-    def _send_moments(self, moments: list[Moment]) -> tuple[str, Given]:
-        words, first = self.device.takes_planes, moments[0]
+    def _send_moments(self, moments: list[Moment]) -> Given:
+        first = moments[0]
         height, width, _ = first.vectors.shape
-        layers = self.source.step - 1
-        if words:
-            vectors = self._extra.of("vectors", (2 * width, height, layers), "r32ui")
-        else:
-            vectors = self._extra.of("vectors", (width, height, layers), "rgba16")
+        vectors = self._extra.of("vectors", (width, height, self.source.step - 1), "rgba16")
         for layer, moment in enumerate(moments):
-            stored = moment.vectors.view("<u4").reshape(height, -1) if words else moment.vectors
-            self.device.write(vectors, stored, layer)
-        filmed, start = self._filmed(first, words)
+            self.device.write(vectors, moment.vectors, layer)
+        filmed, start = self._filmed(first)
         shift = (STEP**2 * first.steps).bit_length() - 1
-        given: Given = {
-            "images" if words else "textures": {"filmed": filmed, "vectors": vectors},
+        return {
+            "images": {"filmed": filmed, "vectors": vectors},
             "moment": (first.number, first.steps, shift, start),
             "count": len(moments),
             "layers": self.layers,
         }
-        return "WORDS" if words else "MOMENT", given
 
     def _evenly(self, moment: Moment, indices: list[int]) -> Iterator[Moment]:
         """Of the next source frames those that are moments of the same pair, as far apart as its steps."""
@@ -249,20 +243,20 @@ class Sums(Window):
                 break
             yield frame
 
-    def _filmed(self, moment: Moment, words: bool) -> tuple[Texture, int]:
+    def _filmed(self, moment: Moment) -> tuple[Texture, int]:
         """The two frames of a moment on the device, and the layer of the first: they stay for all moments of their
         pair, and one for the next."""
         texture, sent = self._two_frames(), self._sent
         start = int(sent.get(1) == moment.pair[0] or sent.get(0) == moment.pair[1])
         for layer, number, frame in zip((start, 1 - start), moment.pair, moment.ends, strict=True):
             if sent.get(layer) != number:
-                self.device.write(texture, frame.view("<u4")[..., 0] if words else frame, layer, opaque=True)
+                numbers = frame.view("<u4")[..., 0] & 0xFFFFFF  # without the alpha: Blender's device sends floats
+                self.device.write(texture, numbers, layer)
                 sent[layer] = number
         return texture, start
 
     def _two_frames(self) -> Texture:
-        size = self.source.width, self.source.height, 2
-        return self._extra.of("filmed", size, "r32ui" if self.device.takes_planes else "rgba8")
+        return self._extra.of("filmed", (self.source.width, self.source.height, 2), "r32ui")
 
     def release(self) -> None:
         self._frames, self._light, self._sent = {}, None, {}

@@ -2,6 +2,7 @@
 mattes; layers are laid over what lies behind them."""
 
 from collections.abc import Hashable, Sequence
+from typing import Any
 
 import numpy as np
 
@@ -36,19 +37,11 @@ class Stages:
         self._mattes: Texture | None = None
         self._held: dict[int, Hashable] = {}  # by layer of that: the key of the values in it
 
-    def solve(
-        self,
-        labels: np.ndarray,
-        count: int,
-        guide: np.ndarray | None = None,
-        strength: float = 0.0,
-        *,
-        warm: bool = False,
-    ) -> Texture:
+    def solve(self, labels: np.ndarray, count: int, *guided: Any, warm: bool = False) -> Texture:
         """See request.Stages. What the other kind of diffusion has on the device is freed."""
-        if guide is not None and follows_edges(labels, guide, strength):
+        if guided and follows_edges(labels, *guided):
             self._plain.release()
-            return self._edged.solve(labels, count, guide, strength)
+            return self._edged.solve(labels, count, *guided)
         self._edged.release()
         return self._plain.solve(labels, count, warm=warm)
 

@@ -12,7 +12,7 @@ from ..core.frames.frame_source import FrameSource
 from ..core.model import windows
 from ..core.model.frame_state import Light, Options
 from ..devices import llvmpipe
-from ..devices.device import TEXEL_BYTES, Device, NamedTextures, NoDeviceError, Texture
+from ..devices.device import Device, NamedTextures, NoDeviceError, Texture, texel_bytes
 from ..devices.passes import Pass, read_pass
 
 # Bytes of a texture array, at most.
@@ -86,7 +86,7 @@ class Window:
         """Makes the texture arrays, and the picture. NoDeviceError: with as large windows of the same picture, they
         leave too little of the device's memory; or there is no room for all of them."""
         width, height = self._texels(self.source.width, self.source.height)
-        size = width * height * TEXEL_BYTES[self.kind] * self.layers * self.source.windows
+        size = width * height * texel_bytes(self.kind) * self.layers * self.source.windows
         if size + beside(self.source, self.shutters) > self.device.budget.limit:
             raise NoDeviceError("over the budget")
         self.parts = self._divided(BAND_BYTES)
@@ -100,7 +100,7 @@ class Window:
         """Bands of rows, of all layers, of so many bytes at most, but for those of a few rows. Each has a multiple of
         BLOCK, but for the last."""
         source = self.source
-        row_bytes = source.width * TEXEL_BYTES[self.kind] * self.layers
+        row_bytes = source.width * texel_bytes(self.kind) * self.layers
         rows = max(1, most // row_bytes // BLOCK) * BLOCK
         tops = range(0, source.height, rows)
         return [Part(top, min(rows, source.height - top), range(self.layers)) for top in tops]
@@ -240,7 +240,7 @@ class WholeFrames(Frames):
     def _divided(self, most: int) -> list[Part]:
         height = self.source.height
         across, down = self._texels(self.source.width, height)
-        count = max(1, min(most // (across * down * TEXEL_BYTES[self.kind]), self.capacity, self.device.max_layers))
+        count = max(1, min(most // (across * down * texel_bytes(self.kind)), self.capacity, self.device.max_layers))
         layers = range(self.capacity)
         return [Part(0, height, layers[start : start + count]) for start in layers[::count]]
 

@@ -105,9 +105,5 @@ def want(source: FrameSource, index: int, direction: int, missing: Callable[[int
 
 def _in_order(source: FrameSource, lacking: list[set[int]]) -> list[int]:
     wanted = dict.fromkeys(i for frames in lacking for i in sorted(frames))
-    return list(wanted)[: decoded_ahead(source)]
-
-
-def decoded_ahead(source: FrameSource) -> int:
-    """How many frames of a source may lie decoded on the host, besides a window that is kept there."""
-    return max(_DECODED, _DECODED_BYTES // (source.width * source.height * 4 * source.dtype.itemsize))
+    most = _DECODED_BYTES // (source.width * source.height * 4 * source.dtype.itemsize)
+    return list(wanted)[: max(_DECODED, most)]

@@ -7,6 +7,7 @@ that is not enough, windows that other pictures show are freed, to be read again
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import AbstractContextManager
 from typing import Any, Protocol, TypeAlias
@@ -17,23 +18,18 @@ from ..core import stopping
 from .budget import MEGABYTE, Budget
 from .passes import Pass
 
-TEXEL_BYTES = {
-    "rgba8": 4,
-    "rgba16": 8,
-    "rgba16f": 8,
-    "rgba16ui": 8,
-    "rgba32ui": 16,
-    "rgba32f": 16,
-    "r32f": 4,
-    "r32ui": 4,
-    "rg32f": 8,
-}
 # Formats that can move to the host. Those of frames stay: a window that does not fit is kept on the host as a whole.
 MOVABLE = ("rgba32f", "r32f", "r32ui")
 
 Bound: TypeAlias = Mapping[str, "Texture"]  # textures by the names that a pass has for them
 Given: TypeAlias = dict[str, Any]  # arguments of Device.run, by name
 Own: TypeAlias = Any  # what the library of a device has for a texture
+
+
+def texel_bytes(kind: str) -> int:
+    """The bytes of a texel of a format, as GLSL calls it: its components and the bits of each."""
+    components, bits = re.findall(r"[a-z]+|\d+", kind)[:2]
+    return len(components) * int(bits) // 8
 
 
 class NoDeviceError(RuntimeError):
@@ -58,7 +54,7 @@ class Texture:
 
     def __init__(self, device: Device | None, size: tuple[int, int, int], kind: str, own: Own = None) -> None:
         width, height, layers = size
-        self.size, self.kind, self.bytes = size, kind, width * height * layers * TEXEL_BYTES[kind]
+        self.size, self.kind, self.bytes = size, kind, width * height * layers * texel_bytes(kind)
         self.device, self.own = device, own
         self.waiting: np.ndarray | None = None
 

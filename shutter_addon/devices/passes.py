@@ -14,8 +14,8 @@ from pathlib import Path
 
 SHADERS = Path(__file__).resolve().parents[2] / "shaders"
 
-_DIRECTIVE = re.compile(r"#\s*(include|ifdef|ifndef|if|elif|else|endif)\b\s*(.*)")
-_LOCAL_SIZE = re.compile(r"layout\(local_size_x = (\d+)(?:, local_size_y = (\d+))?(?:, local_size_z = (\d+))?\) in;")
+_DIRECTIVE = re.compile(r"#\s*(include|ifdef|if|elif|else|endif)\b\s*(.*)")
+_LOCAL_SIZE = re.compile(r"layout\(local_size_x = (\d+)(?:, local_size_y = (\d+))?\) in;")
 _SAMPLERS = re.compile(r"uniform (u?sampler2DArray) ([\w, ]+);")
 _IMAGES = re.compile(r"layout\((\w+)\) (uniform (?:(readonly|writeonly) )?u?image2DArray) ([\w, ]+);")
 _BLOCK = re.compile(r"layout\(std140\) uniform \w+ \{ vec4 (\w+)\[(\w+)\]; \};")
@@ -86,8 +86,7 @@ def _declared(program: Pass, line: str) -> str:
     """Notes what a line declares. The line with its bindings; empty: it declares nothing."""
     defines, samplers, images = program.defines, len(program.samplers), len(program.images)
     if found := _LOCAL_SIZE.fullmatch(line):
-        x, y, z = (int(size or 1) for size in found.groups())
-        program.local_size = x, y, z
+        program.local_size = int(found[1]), int(found[2] or 1), 1
     elif found := _SAMPLERS.fullmatch(line):
         kind, names = found[1], found[2].split(", ")
         program.samplers |= dict.fromkeys(names, kind)
@@ -120,8 +119,8 @@ def _live(path: Path, macros: Mapping[str, int | str]) -> Iterator[str]:
     around: list[int] = []  # the states of the conditions around a line
     for number, line in enumerate(path.read_text(encoding="utf-8").splitlines(), 1):
         word, rest = found.groups() if (found := _DIRECTIVE.fullmatch(line.partition("  //")[0])) else ("", "")
-        if word in ("if", "ifdef", "ifndef"):
-            condition = {"if": rest, "ifdef": f"defined({rest})", "ifndef": f"!defined({rest})"}[word]
+        if word in ("if", "ifdef"):
+            condition = rest if word == "if" else f"defined({rest})"
             reached = all(state == _LIVE for state in around)
             around.append((_LIVE if _holds(condition, macros) else _WAITS) if reached else _OVER)
         elif word in ("elif", "else"):

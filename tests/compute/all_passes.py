@@ -14,11 +14,20 @@ from shutter_addon.compute import (
     stages,
     window,
 )
-from shutter_addon.compute.composition_passes import LightFormat, composition
-from shutter_addon.core.model.combining import Combine
+from shutter_addon.compute.composition_passes import MODES, composition
+from shutter_addon.core.model.combining import AVERAGE, Combine
 from shutter_addon.devices.passes import Pass, read_pass
 
 _WAYS = ("frames", "search", "value")
+
+
+def _light(decode, premultiplied, encoded, levels, cover=0, combine=AVERAGE, kind="rgba32f"):
+    """The macros of light that a window has (compute/gpu.py)."""
+    macros = {"DECODE": decode, "PREMULTIPLIED": int(premultiplied), "ENCODED": int(encoded), "LEVELS": int(levels)}
+    macros |= {"COVER": cover, "STORED": running_sums.STORED_SUMS[cover], "OPAQUE": 0}
+    macros |= {"COMBINE": MODES[combine.mode], "BY_LUMINANCE": int(combine.by_luminance)}
+    macros["LEVELS_OF"] = 2 if premultiplied else {"rgba8": 0, "rgba16": 1}.get(kind, 2)
+    return macros | {"THRESHOLD": int(combine.threshold is not None)}
 
 
 def _declared():
@@ -30,12 +39,12 @@ def _declared():
 
 def _composing():
     def light(levels, encoded=False, premultiplied=True):
-        return LightFormat(1, premultiplied, encoded, levels)
+        return _light(1, premultiplied, encoded, levels)
 
     for way, edges in itertools.product(("pieces", *_WAYS), (1, 2)):
-        yield composition(way, 3, light(edges == 2), EDGES=edges)
+        yield composition(way, 3, **light(edges == 2), EDGES=edges)
     for way, tiled in itertools.product(_WAYS, (0, 1)):
-        yield composition(way, 3, light(not tiled), EDGES=2, SUMS=1, TILED=tiled)
+        yield composition(way, 3, **light(not tiled), EDGES=2, SUMS=1, TILED=tiled)
     for rows, groups, back, tiled in ((1, 1, False, True), (4, 2, True, False), (32, 4, True, True)):
         yield _of_sums(rows, groups, back, tiled, light(back, encoded=True))
     for way, packed in itertools.product(_WAYS, (True, False)):
@@ -48,14 +57,14 @@ def _composing():
 
 def _of_sums(rows, groups, back, tiled, light):
     macros = {"ROWS": rows, "TABLE": (1 + rows) * (2 * groups + 1), "BACK": int(back), "TILED": int(tiled)}
-    return composition("sums", groups, light, **macros)
+    return composition("sums", groups, **light, **macros)
 
 
 def _moved(way, light, quads, packed, at=(False, False), **others):
     macros = {"MOVED": 1, "QUADS": quads, "PACKED": int(packed), "SHUTTERS": 3, "MIXED": 3, "SHARP": 1, "SQUARED": 1}
     macros |= {"CONTINUED": int(at[0]), "UNFINISHED": int(at[1]), "SEVERAL": int(any(at))}
     groups = others.pop("GROUPS", 1)
-    return composition(way, groups, light, **(macros | others))
+    return composition(way, groups, **(light | macros | others))
 
 
 def _combining():
@@ -63,13 +72,13 @@ def _combining():
         has_threshold = mode == "darkest" and {"by_luminance": True, "threshold": 0.5}
         combine = Combine.of(mode, **(has_threshold or {}))
         for edges, kind in ((1, "rgba8"), (2, "rgba16f")):
-            light = LightFormat(1, kind != "rgba8", edges == 2, edges == 1, combine=combine, kind=kind)
-            yield composition(way, 3, light, EDGES=edges)
+            light = _light(1, kind != "rgba8", edges == 2, edges == 1, combine=combine, kind=kind)
+            yield composition(way, 3, **light, EDGES=edges)
         if mode != "median":
             for quads, packed, at in ((4, True, (False, False)), (1, False, (True, False)), (1, False, (False, True))):
                 for each in (way, "value"):
                     own = quads if each != "search" else 1
-                    light = LightFormat(1, False, False, at == (False, False), combine=combine)
+                    light = _light(1, False, False, at == (False, False), combine=combine)
                     yield _moved(each, light, own, packed, at, EDGES=2)
     yield composition_passes.selection(2, 9)
     for begins, levels in ((True, False), (False, False), (False, True)):
@@ -78,11 +87,11 @@ def _combining():
 
 def _layers():
     for cover, tiled in ((1, 0), (2, 1)):
-        light = LightFormat(0, False, True, cover == 2, cover)
+        light = _light(0, False, True, cover == 2, cover)
         yield _of_sums(4, 2, cover == 1, tiled, light)
         for way in _WAYS:
-            yield composition(way, 3, light, EDGES=2, SUMS=1, TILED=tiled)
-        for sent in ("COLOURS", "PLANES", "MOMENT", "WORDS", "AGAIN"):
+            yield composition(way, 3, **light, EDGES=2, SUMS=1, TILED=tiled)
+        for sent in ("COLOURS", "PLANES", "MOMENT", "AGAIN"):
             yield running_sums.accumulation(1, sent, cover == 1, cover == 2, cover)
     for ends, opaque in itertools.product((True, False), repeat=2):
         macros = {"ENDS": int(ends), "OPAQUE": int(opaque)}
@@ -91,7 +100,7 @@ def _layers():
 
 
 def _filling():
-    for tiled, sent in itertools.product((True, False), ("COLOURS", "NUMBERS", "PLANES", "MOMENT", "WORDS", "AGAIN")):
+    for tiled, sent in itertools.product((True, False), ("COLOURS", "NUMBERS", "PLANES", "MOMENT", "AGAIN")):
         yield running_sums.accumulation(1, sent, tiled, tiled)
     yield window.packing(1, True)
     yield window.packing(2, False)

@@ -20,7 +20,7 @@ import numpy as np
 from bpy.app.translations import pgettext_rpt as rpt_
 
 from ...devices.budget import Budget, machine_memory
-from ...devices.device import TEXEL_BYTES, Device, NoDeviceError, Texture
+from ...devices.device import Device, NoDeviceError, Texture, texel_bytes
 from ...devices.llvmpipe import is_llvmpipe
 from ...devices.passes import Pass, read_pass
 
@@ -131,7 +131,7 @@ class BlenderDevice(Device):
         _, sent_format, packing = _exchanged(texture)
         if texture.kind == "rgba8" and opaque:
             sent_format, packing = "R32F", _OPAQUE_BYTES
-        rows = max(1, _SENT_BYTES // (width * TEXEL_BYTES[sent_format.lower()]))
+        rows = max(1, _SENT_BYTES // (width * texel_bytes(sent_format.lower())))
         for top in range(0, height, rows):
             strip = array[top : top + rows]
             sent = (width, len(strip)), sent_format, _buffer("FLOAT", _packed(strip, packing))
@@ -140,7 +140,7 @@ class BlenderDevice(Device):
     def send(self, texture: Texture, frame: np.ndarray) -> Texture:
         """See Device. Numbers are what is sent anyway."""
         height, width = frame.shape[:2]
-        if width * height * TEXEL_BYTES["r32f"] > _SENT_BYTES:
+        if width * height * texel_bytes("r32f") > _SENT_BYTES:
             return super().send(texture, frame)
         data = _buffer("FLOAT", _packed(frame, _OPAQUE_BYTES))
         return Texture(None, (width, height, 1), "r32f", _of_numbers((width, height), "R32F", data))

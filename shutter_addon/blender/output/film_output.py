@@ -108,24 +108,23 @@ def check_writable(folder: Path) -> None:
 
 def spare(written: Iterable[Path], read: Collection[Path]) -> None:
     """OutputError: a file that would be written is one that is read, whatever link leads to it, or is written twice."""
-    taken: dict[object, Path] = {os.path.realpath(path): path for path in read}
-    taken |= {identity: path for path in read if (identity := _identity(path)) is not None}
+    taken = {_identity(path): path for path in read}
     places = set()
     for path in written:
         place = os.path.realpath(path)
         if place in places:
             raise OutputError(f"{path}: two files cannot have the same place")
         places.add(place)
-        if (other := taken.get(place) or taken.get(_identity(path))) is not None:
+        if (other := taken.get(_identity(path))) is not None:
             raise OutputError(f"{path}: would be written over {other}, which is read; choose another place")
 
 
-def _identity(path: Path) -> tuple[int, int] | None:
-    """Equal for all paths of a file; None: there is none."""
+def _identity(path: Path) -> tuple[int, int] | str:
+    """Equal for all paths of a file; where there is none, for all that lead to its place."""
     try:
         status = os.stat(path)
     except OSError:
-        return None
+        return os.path.realpath(path)
     return status.st_dev, status.st_ino
 
 

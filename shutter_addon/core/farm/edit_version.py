@@ -72,12 +72,7 @@ class EditVersion:
     @classmethod
     def from_data(cls, data: dict) -> EditVersion:
         """What `as_data` gave. KeyError, TypeError, ValueError: it gave no such thing."""
-        footage = tuple(
-            Footage(
-                name=str(one["name"]), files=int(one["files"]), content=str(one["content"]), missing=str(one["missing"])
-            )
-            for one in data["footage"]
-        )
+        footage = tuple(Footage(**one) for one in data["footage"])
         texts = {name: str(data[name]) for name in ("blend", "extension", "blender", "colours")}
         return cls(footage=footage, **texts)
 
