@@ -19,13 +19,11 @@ from OpenImageIO import ImageSpec
 
 from ..core import stopping
 from ..core.farm.claims import Claims
-from ..core.frames.frame_source import FrameSource
-from ..core.frames.source_wrapper import SourceWrapper
+from ..core.frames.frame_source import FrameSource, SourceWrapper
 from ..core.model import outlines, scribbles
 from . import carrying, derived, flow, opencv
 from .cuts import ShotSource
 from .errors import MediaError
-from .folder import own_folder
 from .image_writing import write_levels
 from .outlining import traced
 
@@ -159,7 +157,7 @@ class CarriedMattes(SourceWrapper):
             path = self._path(index, first, last)
             with Claims(path.parent, _PATIENCE, _BEAT) as claims:
                 try:
-                    own_folder(path.parent)
+                    derived.own_folder(path.parent)
                     while not claims.take(name):
                         stopping.check()
                         time.sleep(_PAUSE)

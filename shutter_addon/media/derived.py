@@ -6,6 +6,7 @@ a frame is made of is in the name of its file, or of the folder; so what changes
 
 from __future__ import annotations
 
+import errno
 import hashlib
 import json
 import stat
@@ -22,6 +23,8 @@ from .files import check_name
 WHOLE = 8 << 20  # bytes; files of a source up to this size, such as uncompressed 8-bit HD pictures, are hashed whole
 BLOCKS, BLOCK = 16, 4096  # of a larger file so many blocks, of so many bytes each, are hashed
 _LARGER = 1 << 20  # bytes; a file that is larger than its samples by more holds something else
+
+_JUNCTION = 0xA0000003  # st_reparse_tag of a folder on Windows that leads to another
 
 _SHAPE = (
     *("x", "y", "z", "width", "height", "depth", "full_x", "full_y", "full_width", "full_height"),
@@ -108,3 +111,20 @@ def opened(path: Path, spec: ImageSpec) -> ImageInput | None:
     if image is not None:
         image.close()
     return None
+
+
+def own_folder(path: Path) -> None:
+    """Make a folder of ours, if there is none. The one that it lies in may be a link to another disk.
+
+    Raises:
+        OSError: It cannot be made, or it is a link itself.
+    """
+    path.mkdir(parents=True, exist_ok=True)
+    refuse_link(path)
+
+
+def refuse_link(path: Path) -> None:
+    """Raise OSError for a link, and where there is nothing."""
+    status = path.lstat()
+    if stat.S_ISLNK(status.st_mode) or getattr(status, "st_reparse_tag", 0) == _JUNCTION:
+        raise OSError(errno.ELOOP, "it is a link, and none is followed")

@@ -8,8 +8,8 @@ from pathlib import Path
 
 import numpy as np
 
+from ..core.frames.frame_source import SourceWrapper
 from ..core.frames.light import REC709
-from ..core.frames.source_wrapper import SourceWrapper
 from .opening import open_channel
 
 

@@ -7,8 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ..core.frames.frame_source import FrameSource
-from ..core.frames.source_wrapper import SourceWrapper
+from ..core.frames.frame_source import FrameSource, SourceWrapper
 from . import pyav
 from .blender_movie import BlenderMovie, is_lent
 from .color import in_colorspace

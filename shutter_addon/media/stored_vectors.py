@@ -15,7 +15,6 @@ from ..core import atomic_write
 from ..core.frames.moments import STEP
 from . import derived, flow
 from .errors import MediaError
-from .folder import own_folder
 from .image_writing import write_halves
 
 FOLDER = "virtual_shutter_vectors"
@@ -60,7 +59,7 @@ class StoredVectors:
         if not self._writes:
             return
         try:
-            own_folder(self._folder)
+            derived.own_folder(self._folder)
             if self._is_new:
                 atomic_write.clear_up(self._folder)
                 self._is_new = False

@@ -76,7 +76,7 @@ def check(case: Case, devices: dict, folder: Path) -> dict:
     """How far each device is off, as {device: (picture, coefficients)}. DifferenceError: too far; what differs is left
     in the folder."""
     from shutter_addon.compute.renderer import Renderer
-    from shutter_addon.core.frames.source_wrapper import SourceWrapper
+    from shutter_addon.core.frames.frame_source import SourceWrapper
     from shutter_addon.media import open_source
     from shutter_addon.media.matte_values import MatteValues
 
