@@ -3,7 +3,7 @@ picture of each; and a source that knows where its shots end."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable
 from functools import lru_cache
 from itertools import pairwise, product
 
@@ -141,28 +141,13 @@ def _moving(pictures: list[Signature]) -> list[Signature]:
     """Those that do not repeat the one before."""
     kept = pictures[:1]
     for picture in pictures[1:]:
-        if _most(kept[-1], picture) > REPEATED:
+        if np.abs(kept[-1] - picture).max() > REPEATED:
             kept.append(picture)
     return kept
 
 
-def neighbours(index: int, count: int) -> range:
-    """The frames of a clip of `count` that have a say in whether there is a cut before frame `index`."""
-    return range(max(index - NEIGHBOURS, 0), min(index + NEIGHBOURS, count))
-
-
-def sides(signatures: Mapping[int, Signature | None], index: int) -> tuple[list[Signature], list[Signature]]:
-    """Of the neighbours' signatures, those before frame `index` and those from it on, as is_cut takes them: on each
-    side up to the first frame that has none."""
-    return _run(signatures, index - 1, -1)[::-1], _run(signatures, index, 1)
-
-
-def _most(a: Signature, b: Signature) -> float:
-    return float(np.abs(a - b).max())
-
-
-# What PySceneDetect's detectors say of pictures, by NumPy alone, without OpenCV, which PySceneDetect needs. The sums are
-# the same but for pictures of fewer rows than HashDetector has bits. Levels are rounded.
+# What PySceneDetect's detectors say of pictures, by NumPy alone, as OpenCV may be missing. The sums are the same, but
+# for pictures of fewer rows than HashDetector has bits. Levels are rounded.
 
 
 def _change(before: np.ndarray, after: np.ndarray) -> float:
@@ -307,8 +292,10 @@ class ShotSource(SourceWrapper):
             return False, False
         if not may_be_cut(last, next_):
             return False, True
-        beside = {i: self._readable(i) for i in neighbours(index, self.filmed)}
-        return is_cut(*sides(beside, index)), all(picture is not None for picture in beside.values())
+        start, stop = max(index - NEIGHBOURS, 0), min(index + NEIGHBOURS, self.filmed)
+        beside = [self._readable(i) for i in range(start, stop)]
+        before, after = _known(reversed(beside[: index - start]))[::-1], _known(beside[index - start :])
+        return is_cut(before, after), len(before) + len(after) == len(beside)
 
     def _readable(self, index: int) -> Signature | None:
         """None: the frame cannot be read now. Whoever needs the frame itself will hear why."""
@@ -329,10 +316,11 @@ class ShotSource(SourceWrapper):
         return made
 
 
-def _run(signatures: Mapping[int, Signature | None], start: int, step: int) -> list[Signature]:
-    """The signatures from a frame on, as far as there are any."""
-    run = []
-    while (picture := signatures.get(start)) is not None:
-        run.append(picture)
-        start += step
-    return run
+def _known(signatures: Iterable[Signature | None]) -> list[Signature]:
+    """Those before the first that is missing."""
+    known: list[Signature] = []
+    for picture in signatures:
+        if picture is None:
+            break
+        known.append(picture)
+    return known

@@ -75,7 +75,7 @@ def luma(frame: np.ndarray, transfer: str, alpha: str) -> np.ndarray:
     """A frame (H, W, 4) of a source, as it is displayed, in grey (H, W) uint8; transfer, alpha: the source's."""
     if frame.dtype == np.uint8 and (transfer, alpha) == ("srgb", "opaque"):
         return cv2.cvtColor(frame, cv2.COLOR_RGBA2GRAY)
-    return _luma(_encoded(frame, transfer, alpha))
+    return cv2.cvtColor(displayed(frame, transfer, alpha), cv2.COLOR_RGB2GRAY)
 
 
 def displayed(frame: np.ndarray, transfer: str, alpha: str) -> np.ndarray:
@@ -305,12 +305,6 @@ def levels(samples: np.ndarray) -> np.ndarray:
     if samples.dtype != np.uint8:
         return np.rint(255 * np.clip(samples, 0, 1)).astype(np.uint8)
     return samples
-
-
-def _luma(samples: np.ndarray) -> np.ndarray:
-    """(H, W) uint8, which DIS needs."""
-    samples = levels(samples)
-    return cv2.cvtColor(np.ascontiguousarray(samples[..., :3]), cv2.COLOR_RGB2GRAY)
 
 
 def _light(samples: np.ndarray) -> np.ndarray:
