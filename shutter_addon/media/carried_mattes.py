@@ -255,13 +255,8 @@ class CarriedMattes(SourceWrapper):
 
     def _kept(self, path: Path) -> np.ndarray | None:
         """The matte (H, W) uint8 of a file; None: there is none of ours, or it is damaged."""
-        if (image := derived.opened(path, self._spec)) is None:
-            return None
-        with closing(image):
-            if not image.spec().get_string_attribute("ImageDescription").startswith(CONFIDENCE):  # another's
-                return None
-            samples = image.read_image(0, 0, 0, 1, "uint8")
-            return None if samples is None or image.has_error else samples[..., 0]
+        samples = derived.read(path, self._spec, CONFIDENCE)
+        return None if samples is None else samples[..., 0]
 
 
 def _use_elsewhere(parent: Path | None) -> str:

@@ -1,7 +1,7 @@
 """The moments between the frames of footage, found by optical flow as they are read: smooth exposures of any footage.
 
 Whatever a pair of frames needs is found when its first moment is read, which the thread that decodes ahead does
-(prefetch). No moment is kept on disk, but vectors may be (stored_vectors).
+(prefetch). No moment is kept on disk, but vectors may be (derived.StoredVectors).
 """
 
 from __future__ import annotations
@@ -18,9 +18,9 @@ from ..core.model.motions import Similarity
 from ..core.model.shutters import MAX_WINDOW
 from . import flow, opencv, steps
 from .cuts import may_be_cut
+from .derived import StoredVectors
 from .errors import MediaError
 from .files import check_index
-from .stored_vectors import StoredVectors
 
 SMOOTH = 1, 2, 4, 8, 16  # moments from a filmed frame to the next
 MOST = 4  # equal frames in a row; more are a still shot
