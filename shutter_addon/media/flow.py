@@ -48,11 +48,11 @@ class Between:
         transfer, alpha: how samples are encoded, as FrameSource says; the new frames are encoded alike
         find: gives what `found` gives; None: that"""
         self.ends, self._transfer, self._alpha = (first, second), transfer, alpha
-        self._paths: _Paths | None = None
+        self._sides: list[_Carriers] | None = None
         if not np.array_equal(first, second):
             pictures = [luma(end, transfer, alpha) for end in self.ends]
-            paths = _Paths(pictures, (find or found)(*pictures))
-            self._paths = paths if paths.meet else None
+            sides = [_carriers(each) for each in np.split((find or found)(*pictures), 2, axis=2)]
+            self._sides = sides if _meet(pictures, sides) else None
 
     @cached_property
     def _encoded(self) -> list[np.ndarray]:
@@ -61,9 +61,9 @@ class Between:
     def moment(self, pair: tuple[int, int], number: int, steps: int) -> np.ndarray | Moment:
         """One of `steps` moments, a power of two. What only one of the two frames shows is taken from it, all else is
         mixed in linear light; of two frames that have nothing in common it is the nearer one. pair: Moment's."""
-        if self._paths is None:
+        if self._sides is None:
             return self.ends[2 * number > steps]
-        vectors = self._paths.at(number / steps)
+        vectors = _paths(self._sides, self.ends[0].shape[:2], number / steps)
         return Moment(pair, self.ends, number, steps, vectors, partial(self._rgba, vectors, number, steps))
 
     def _rgba(self, vectors: np.ndarray, number: int, steps: int) -> np.ndarray:
@@ -155,57 +155,53 @@ def _dis(first: np.ndarray, second: np.ndarray, stride: int, smoothness: float =
     return np.nan_to_num(dis.calc(*wide, None)[:height, :width], posinf=0, neginf=0)
 
 
-class _Paths:
-    """Where the pixels of two pictures go from one to the other."""
-
-    def __init__(self, luma: list[np.ndarray], found: np.ndarray) -> None:
-        self._shape = luma[0].shape
-        brightness = max(float(each.mean()) for each in luma)
-        self._unlike = max(UNLIKE * min(brightness / GREY, 1.0), NOISE)
-        self._sides = [_carriers(each) for each in np.split(found, 2, axis=2)]
-
-    @property
-    def meet(self) -> bool:
-        """Whether the pictures have anything in common: enough vectors have ends that look alike."""
-        return min(float((costs <= self._unlike).mean()) for _places, _vectors, costs in self._sides) >= SHARED
-
-    def at(self, t: float) -> np.ndarray:
-        """Moment.vectors at a time in 0 … 1."""
-        (forth, cost), (back, other) = (
-            self._carry(*side, t=s) for side, s in zip(self._sides, (t, 1 - t), strict=True)
-        )
-        vectors = np.where((cost <= other)[..., None], forth, -back)
-        arrived = [each < np.inf for each in (cost, other)]
-        vectors = _filled(vectors, arrived[0] | arrived[1])
-        stored = np.empty((*cost.shape, 4), np.uint16)
-        stored[..., :2] = np.rint(UNIT * vectors).clip(-ZERO, ZERO - 1) + ZERO
-        for end, shows in enumerate(arrived, 2):
-            stored[..., end] = np.uint16(255) * shows
-        return stored
-
-    def _carry(
-        self, places: np.ndarray, vectors: np.ndarray, costs: np.ndarray, t: float
-    ) -> tuple[np.ndarray, np.ndarray]:
-        """On every STEPth pixel at time t: vectors (h, w, 2) and costs (h, w), infinite where nothing arrives."""
-        h, w = (-(-n // STEP) for n in self._shape)
-        cells = np.floor((places + np.float32(t) * vectors) / STEP).astype(np.int32)
-        # A margin of two takes what leaves the picture.
-        np.clip(cells, -2, (w, h), out=cells)
-        stopping.check()
-        corners = (cells[:, 1] + 2) * (w + 4) + cells[:, 0] + 2
-        # Of several that arrive the cheapest stays, the last; -1, where nothing arrives, takes what is appended.
-        last = np.full((h + 4) * (w + 4), -1, np.int32)
-        np.maximum.at(last, corners, np.arange(len(corners), dtype=np.int32))
-        last = last.reshape(h + 4, w + 4)[1:-2, 1:-2]
-        # Each arrives at the four corners of its cell.
-        last = np.maximum(last[1:], last[:-1])
-        chosen = np.maximum(last[:, 1:], last[:, :-1])
-        nowhere, infinite = np.zeros((1, 2), np.float32), np.full(1, np.inf, np.float32)
-        return np.concatenate([vectors, nowhere])[chosen], np.concatenate([costs, infinite])[chosen]
+_Carriers = tuple[np.ndarray, np.ndarray, np.ndarray]  # places (n, 2), vectors (n, 2) and costs (n,), the dearest first
 
 
-def _carriers(side: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Places (n, 2), vectors (n, 2) and costs (n,) of a side of `found`, the dearest first."""
+def _meet(pictures: list[np.ndarray], sides: list[_Carriers]) -> bool:
+    """Whether two pictures have anything in common: enough vectors have ends that look alike."""
+    brightness = max(float(each.mean()) for each in pictures)
+    unlike = max(UNLIKE * min(brightness / GREY, 1.0), NOISE)
+    return min(float((costs <= unlike).mean()) for _places, _vectors, costs in sides) >= SHARED
+
+
+def _paths(sides: list[_Carriers], shape: tuple[int, ...], t: float) -> np.ndarray:
+    """Moment.vectors at a time in 0 … 1."""
+    (forth, cost), (back, other) = (_carry(*side, shape, s) for side, s in zip(sides, (t, 1 - t), strict=True))
+    vectors = np.where((cost <= other)[..., None], forth, -back)
+    arrived = [each < np.inf for each in (cost, other)]
+    vectors = _filled(vectors, arrived[0] | arrived[1])
+    stored = np.empty((*cost.shape, 4), np.uint16)
+    stored[..., :2] = np.rint(UNIT * vectors).clip(-ZERO, ZERO - 1) + ZERO
+    for end, shows in enumerate(arrived, 2):
+        stored[..., end] = np.uint16(255) * shows
+    return stored
+
+
+def _carry(
+    places: np.ndarray, vectors: np.ndarray, costs: np.ndarray, shape: tuple[int, ...], t: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """On every STEPth pixel of a picture of that shape at time t: vectors (h, w, 2) and costs (h, w), infinite where
+    nothing arrives."""
+    h, w = (-(-n // STEP) for n in shape)
+    cells = np.floor((places + np.float32(t) * vectors) / STEP).astype(np.int32)
+    # A margin of two takes what leaves the picture.
+    np.clip(cells, -2, (w, h), out=cells)
+    stopping.check()
+    corners = (cells[:, 1] + 2) * (w + 4) + cells[:, 0] + 2
+    # Of several that arrive the cheapest stays, the last; -1, where nothing arrives, takes what is appended.
+    last = np.full((h + 4) * (w + 4), -1, np.int32)
+    np.maximum.at(last, corners, np.arange(len(corners), dtype=np.int32))
+    last = last.reshape(h + 4, w + 4)[1:-2, 1:-2]
+    # Each arrives at the four corners of its cell.
+    last = np.maximum(last[1:], last[:-1])
+    chosen = np.maximum(last[:, 1:], last[:, :-1])
+    nowhere, infinite = np.zeros((1, 2), np.float32), np.full(1, np.inf, np.float32)
+    return np.concatenate([vectors, nowhere])[chosen], np.concatenate([costs, infinite])[chosen]
+
+
+def _carriers(side: np.ndarray) -> _Carriers:
+    """Those of a side of `found`."""
     values = side.reshape(-1, 3)
     # As whole numbers, which NumPy sorts ten times as fast; costs are not negative.
     order = np.argsort(~values[:, 2].view(np.uint16), kind="stable")
