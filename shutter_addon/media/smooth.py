@@ -96,10 +96,10 @@ class Repeats:
 
     def _picture(self, index: int) -> np.ndarray:
         """A frame in grey (h, w) float32, small."""
-        return self._pictures.ask(index, lambda: self._made(index), _PICTURES)
-
-    def _made(self, index: int) -> np.ndarray:
-        return flow.of_rows(self._source.read(index), self._source, _ROWS).astype(np.float32)
+        source = self._source
+        return self._pictures.ask(
+            index, lambda: flow.of_rows(source.read(index), source, _ROWS).astype(np.float32), _PICTURES
+        )
 
 
 class SmoothSource(SourceWrapper):
