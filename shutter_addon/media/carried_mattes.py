@@ -82,7 +82,8 @@ class CarriedMattes(SourceWrapper):
         super().__init__(source)
         self._shots = source if isinstance(source, ShotSource) else ShotSource(source)
         self._drawings = {frame: curves for frame, curves in drawings if 0 <= frame < self.count}
-        self._drawing_keys: dict[int, str] = {}  # previews ask for paths again and again
+        # of the names of files, for which previews ask again and again
+        self._keys = {frame: derived.key({"frame": frame, "curves": it}) for frame, it in self._drawings.items()}
         self._parent = folder
         self._spec = ImageSpec(self.width, self.height, 1, "uint8")
 
@@ -152,7 +153,7 @@ class CarriedMattes(SourceWrapper):
     @contextmanager
     def _claimed(self, index: int, first: int | None, last: int | None) -> Iterator[np.ndarray | None]:
         """While this process alone carries what lies between two drawings; what another has kept of a matte by then."""
-        name = derived.key({"drawn": [self._drawing_key(frame) for frame in (first, last) if frame is not None]})
+        name = derived.key({"drawn": self._drawn(first, last)})
         while True:
             path = self._path(index, first, last)
             with Claims(path.parent, _PATIENCE, _BEAT) as claims:
@@ -235,18 +236,15 @@ class CarriedMattes(SourceWrapper):
 
     def _path(self, index: int, first: int | None, last: int | None) -> Path:
         """The file of a frame's matte, made of these drawings."""
-        drawn = [self._drawing_key(frame) for frame in (first, last) if frame is not None]
-        key = derived.key({"version": VERSION, "frame": index, "drawn": drawn})
+        key = derived.key({"version": VERSION, "frame": index, "drawn": self._drawn(first, last)})
         file = Path(self._folder, f"{index:08d}-{key}.png")
         kept = Path(self._parent or "", file)
         if self._parent and (self._parent not in _elsewhere or derived.is_kept(kept)):
             return kept
         return Path(_use_elsewhere(self._parent), file)
 
-    def _drawing_key(self, frame: int) -> str:
-        if frame not in self._drawing_keys:
-            self._drawing_keys[frame] = derived.key({"frame": frame, "curves": self._drawings[frame]})
-        return self._drawing_keys[frame]
+    def _drawn(self, first: int | None, last: int | None) -> list[str]:
+        return [self._keys[frame] for frame in (first, last) if frame is not None]
 
     @cached_property
     def _folder(self) -> str:

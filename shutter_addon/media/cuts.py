@@ -11,8 +11,7 @@ import numpy as np
 
 from ..core.frames import light
 from ..core.frames.frame_source import FrameSource, SourceWrapper
-from ..core.frames.moments import Moment
-from ..core.frames.planes import Decoded, Planes, as_rgba
+from ..core.frames.planes import Decoded, Moment, Planes, as_rgba
 from ..core.memo import Kept
 from .errors import MediaError
 

@@ -19,7 +19,7 @@ from OpenImageIO import ImageInput, ImageSpec, geterror
 
 from ..core import atomic_write
 from ..core.frames.frame_source import FrameSource
-from ..core.frames.moments import STEP
+from ..core.frames.planes import STEP
 from . import flow
 from .errors import MediaError
 from .files import check_name

@@ -15,7 +15,7 @@ import numpy as np
 from ..core import stopping
 from ..core.frames import light
 from ..core.frames.frame_source import FrameSource
-from ..core.frames.moments import STEP, UNIT, ZERO, Moment
+from ..core.frames.planes import STEP, UNIT, ZERO, Moment
 from . import opencv
 from .opencv import cv2
 

@@ -11,8 +11,7 @@ import math
 import numpy as np
 
 from ..core.frames.frame_source import FrameSource, SourceWrapper
-from ..core.frames.moments import Moment
-from ..core.frames.planes import Decoded, as_rgba
+from ..core.frames.planes import Decoded, Moment, as_rgba
 from ..core.memo import Kept
 from ..core.model.motions import Similarity
 from ..core.model.shutters import MAX_WINDOW
