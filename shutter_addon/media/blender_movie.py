@@ -131,16 +131,12 @@ def _answer(wanted: dict) -> tuple[dict, np.ndarray | None] | None:
         return asked.result(STARTING if is_new else ANSWERING)
     except MediaError:
         raise
-    except TimeoutError:  # it was stopped, say
+    except BaseException as error:  # an interrupt, say: what is still to come would be taken for the next answer
         _end()
-        if is_new:
+        if is_new and isinstance(error, TimeoutError):  # it was stopped, say
             raise MediaError(f"the Blender that decodes it is not ready after {STARTING} seconds") from None
-        return None
-    except (EOFError, OSError, ValueError):
-        _end()
-        return None
-    except BaseException:  # an interrupt, say: what is still to come would be taken for the next answer
-        _end()
+        if isinstance(error, (EOFError, OSError, ValueError)):
+            return None
         raise
 
 

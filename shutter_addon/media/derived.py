@@ -107,9 +107,7 @@ def opened(path: Path, spec: ImageSpec) -> ImageInput | None:
     size = _bytes(path)
     if size is None or size > 2 * spec.image_bytes() + _LARGER:
         return None
-    wishes = ImageSpec()
-    wishes.attribute("oiio:UnassociatedAlpha", 1)  # no premultiplication on reading
-    image = ImageInput.open(check_name(path), wishes)
+    image = ImageInput.open(check_name(path))
     with suppress(UnicodeDecodeError):  # of names and errors in a damaged file
         if image is None:
             geterror()

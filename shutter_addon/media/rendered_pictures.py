@@ -44,7 +44,10 @@ def read(path: Path, edit: str | None = None) -> RenderedPicture | None:
     try:
         spec = image.spec()
         key = edit_version.key_in(spec.get_string_attribute("Note"))
-        if edit not in (None, key) or not _is_sound(path, image):
+        if edit not in (None, key):
+            return None
+        is_png = path.suffix.lower() == ".png"
+        if not (_is_sound_png(path) if is_png else image.read_image(spec.format) is not None):
             return None
         size = spec.width, spec.height
         return RenderedPicture(size=size, channels=spec.nchannels, samples=str(spec.format), edit=key)
@@ -76,12 +79,6 @@ def is_transparent(path: Path) -> bool:
         return alpha is not None and bool(alpha.min() < 1)
     finally:
         image.close()
-
-
-def _is_sound(path: Path, image: ImageInput) -> bool:
-    if path.suffix.lower() == ".png":
-        return _is_sound_png(path)
-    return image.read_image(image.spec().format) is not None
 
 
 def _is_sound_png(path: Path) -> bool:

@@ -1,4 +1,4 @@
-"""Frames as they are quickest to have: of movies luma and subsampled chroma, and the RGB that libswscale makes of these,
+"""Frames as they are quickest to have: of movies luma and subsampled chroma, and the RGB that libswscale makes of them,
 to the bit; of a moment between two filmed frames the two, and where what they show lies in between."""
 
 from __future__ import annotations
