@@ -14,12 +14,13 @@ from dataclasses import replace
 import numpy as np
 
 from ..core.model import scribbles
+from ..core.model.effect import Region, Subject
 from ..core.model.motions import Motion, Placement, Similarity
 from . import pursuit, registration, tracking
 from .footage import Footage
 from .pursuit import Sighting
 from .registration import Part
-from .tracking import Drawn, Subject, Tracked, TrackingError
+from .tracking import Tracked, TrackingError
 
 BARE = "what the regions leave of the picture has too few corners to follow"
 UNLIKE = "the picture is too unlike those before"
@@ -38,7 +39,7 @@ _MARGIN = 0.02  # heights of the picture about a region, where corners may be th
 class CameraTrack(tracking.Track):
     """Tracks what the camera sees."""
 
-    def __init__(self, camera: Subject, regions: Sequence[Drawn]) -> None:
+    def __init__(self, camera: Subject, regions: Sequence[Region]) -> None:
         """regions: what they cover is left out; evaluated at any of the frames"""
         super().__init__(camera)
         self._regions = regions

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from ..core.model import outlines
+from ..core.model.effect import Subject
 from ..core.model.motions import Motion, Similarity
 from . import flow, registration, tracking
 from .carried_mattes import CarriedFile, CarriedMattes
@@ -17,7 +18,7 @@ from .carrying import box_around
 from .footage import Footage
 from .opencv import cv2
 from .pursuit import COVERED, LEFT, Sighting
-from .tracking import Subject, Tracked, TrackingError
+from .tracking import Tracked, TrackingError
 
 EMPTY = "the outline encloses nothing here"
 

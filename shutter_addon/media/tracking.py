@@ -13,6 +13,7 @@ from typing import Protocol
 import numpy as np
 
 from ..core.model import motions, scribbles
+from ..core.model.effect import Region, Subject
 from ..core.model.motions import Motion, Placement, Similarity
 from . import registration
 from .errors import MediaError
@@ -53,20 +54,6 @@ class Tracked:
     placement: Placement
     confidence: float
     fault: str = ""
-
-
-class Subject(Protocol):
-    """What is tracked: as effect.Region and effect.Camera, whole frames alone."""
-
-    def placement(self, frame: int, /) -> Placement: ...
-
-    def centre(self, frame: int, /) -> np.ndarray | None: ...
-
-
-class Drawn(Subject, Protocol):
-    """A subject that has strokes."""
-
-    def at(self, frame: int, /) -> scribbles.Shape: ...
 
 
 class Pursuit(Protocol):
@@ -230,7 +217,7 @@ class Track(ABC):
 class RegionTrack(Track):
     """Tracks what a region covers, whose drawings are evaluated at all of the frames."""
 
-    _subject: Drawn
+    _subject: Region
 
     def _part(self, frame: int) -> tuple[Part, float]:
         """Corners far from the region are less surely its own; those of a pattern may be those of its next period."""
