@@ -121,7 +121,7 @@ def found(first: np.ndarray, second: np.ndarray) -> np.ndarray:
         stopping.check()
         if min(height, width) >= SMALLEST:
             way = _dis(a, b, stride=4, quick=True)
-        cost = cv2.blur(cv2.absdiff(a, look(b, grid(*a.shape) + way, cv2.INTER_LINEAR)).astype(np.float32), (3, 3))
+        cost = cv2.blur(cv2.absdiff(a, look(b, grid(*a.shape) + way)).astype(np.float32), (3, 3))
         sides += [2 * way, cost]
     apart = STEP // 2
     values = np.dstack(sides)[::apart, ::apart][: shape[0], : shape[1]]
@@ -266,9 +266,9 @@ def _cubic(picture: np.ndarray, places: np.ndarray) -> np.ndarray:
     return cv2.remap(picture, whole, fraction, cv2.INTER_CUBIC, borderMode=cv2.BORDER_REPLICATE)
 
 
-def look(picture: np.ndarray, places: np.ndarray, how: int | None = None) -> np.ndarray:
+def look(picture: np.ndarray, places: np.ndarray) -> np.ndarray:
     """The picture (H, W, …) at places (h, w, 2), x and y in pixels; its edge goes on beyond it."""
-    return cv2.remap(picture, places, None, cv2.INTER_CUBIC if how is None else how, borderMode=cv2.BORDER_REPLICATE)
+    return cv2.remap(picture, places, None, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
 
 
 @lru_cache(maxsize=2)  # 16 MB at 4K, and a fourth of that

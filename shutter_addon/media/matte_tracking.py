@@ -16,7 +16,6 @@ from . import flow, registration, tracking
 from .carried_mattes import CarriedFile, CarriedMattes
 from .carrying import box_around
 from .footage import Footage
-from .opencv import cv2
 from .pursuit import COVERED, LEFT, Sighting
 from .tracking import Tracked, TrackingError
 
@@ -112,13 +111,9 @@ def moved(
         return None
     grid = flow.grid(*first.shape)
     there = grid + flow.fine_vectors(first, second)
-    here = there + flow.look(flow.fine_vectors(second, first), there, cv2.INTER_LINEAR)
+    here = there + flow.look(flow.fine_vectors(second, first), there)
     inside = before > _INSIDE
-    held = (
-        inside
-        & (flow.look(after, there, cv2.INTER_LINEAR) > 0.5)
-        & (np.hypot(*np.moveaxis(here - grid, -1, 0)) < _BACK * unit)
-    )
+    held = inside & (flow.look(after, there) > 0.5) & (np.hypot(*np.moveaxis(here - grid, -1, 0)) < _BACK * unit)
     chosen = np.flatnonzero(held)
     if chosen.size < _FEWEST:
         return None
