@@ -51,18 +51,12 @@ def _spec(samples: np.ndarray) -> OpenImageIO.ImageSpec:
 def _write(path: Path, spec: OpenImageIO.ImageSpec, samples: np.ndarray) -> None:
     try:
         with atomic_write.writing(path) as part:
-            if (said := put(part, spec, samples)) is not None:
-                why = why_short(part.parent)
+            name = check_name(part)
+            if (output := OpenImageIO.ImageOutput.create(name)) is None:
+                raise MediaError(f"{path}: cannot be written ({OpenImageIO.geterror()})")
+            written = output.open(name, spec) and output.write_image(np.ascontiguousarray(samples))
+            if not (output.close() and written):
+                said, why = output.geterror(), why_short(part.parent)
                 raise MediaError(f"{path}: could not be written whole; {said or why if why == UNKNOWN else why}")
     except OSError as error:
         raise MediaError(f"{path}: cannot be written ({error.strerror or error})") from None
-
-
-def put(path: Path, spec: OpenImageIO.ImageSpec, samples: np.ndarray) -> str | None:
-    """Writes samples (height, width, channels) to a file. Returns why it is not whole, in OpenImageIO's words; None: it
-    is, as far as is known. MediaError: there is no such kind of file."""
-    name = check_name(path)
-    if (output := OpenImageIO.ImageOutput.create(name)) is None:
-        raise MediaError(f"{path}: cannot be written ({OpenImageIO.geterror()})")
-    written = output.open(name, spec) and output.write_image(np.ascontiguousarray(samples))
-    return None if output.close() and written else output.geterror()
