@@ -19,8 +19,8 @@ from shutter_addon.core.model.frame_state import FrameState
 from shutter_addon.core.model.state_at import state_at
 from shutter_addon.core.recipes import recipe_file
 from shutter_addon.media import open_source
-from shutter_addon.media.matte_files import MatteFile
 from shutter_addon.media.matte_values import MatteValues
+from shutter_addon.media.opening import MatteFile
 
 ROOT = Path(__file__).resolve().parents[1]
 HERE = ROOT / "gallery"

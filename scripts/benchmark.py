@@ -204,7 +204,7 @@ def write_mattes(folder: Path, width: int, height: int) -> dict[str, mattes.Matt
     import av
     from OpenImageIO import ImageBuf
 
-    from shutter_addon.media.matte_files import MatteFile
+    from shutter_addon.media.opening import MatteFile
 
     width, height = width - width % 2, height - height % 2  # as H.264 has it
     with av.open(str(folder / "matte.mp4"), "w") as movie:

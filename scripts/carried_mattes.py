@@ -22,7 +22,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from shutter_addon.core.model import outlines, scribbles
 from shutter_addon.media import carrying, flow, open_source
-from shutter_addon.media.matte_files import MatteFile
+from shutter_addon.media.opening import MatteFile
 
 POINTS = 48
 APART = (5, 10, 20)

@@ -23,7 +23,7 @@ from comparing import ROOT, listed, write_rows
 from shutter_addon.compute import guide
 from shutter_addon.compute.renderer import Renderer, open_compositor
 from shutter_addon.compute.request import Request
-from shutter_addon.core.frames.source_wrapper import SourceWrapper
+from shutter_addon.core.frames.frame_source import SourceWrapper
 from shutter_addon.core.model.frame_state import FrameState, Options
 from shutter_addon.core.model.scribbles import Shape
 from shutter_addon.media import open_source

@@ -37,8 +37,8 @@ from shutter_addon.core.model.state_at import state_at
 from shutter_addon.core.pixels import layering
 from shutter_addon.core.recipes import recipe_file
 from shutter_addon.media import open_source
-from shutter_addon.media.matte_files import MatteFile
 from shutter_addon.media.matte_values import MatteValues
+from shutter_addon.media.opening import MatteFile
 
 COUNT, WINDOW, SHOWN = 33, 13, 16  # frames of the footage, of an exposure, and the shown one, from 0
 WIDE = 16.0  # units of the scene in the picture's width

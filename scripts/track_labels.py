@@ -71,7 +71,7 @@ def measured(source, points: list[dict]) -> list[tuple[float, float, float]]:
     for point in points:
         start, *labels = ((int(frame), place) for frame, place in point.items())
         cross = Cross(start[1], size)
-        steps = tracking.follow(cross, Footage(source, int), start[0], range(last + 1))
+        steps = tracking.RegionTrack(cross).follow(Footage(source, int), start[0], range(last + 1))
         found = {step.frame: step for step in steps if not step.fault}
         flowed = by_flow(grey, start[1])
         for frame, place in labels:

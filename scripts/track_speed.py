@@ -80,7 +80,8 @@ def track_alone(path: Path, kind: str) -> dict:
 def _followed(footage, source, kind: str) -> dict:
     frames = range(min(source.count, KEPT))
     with timed(len(frames)) as taken:
-        found = list(tracking.follow(region(kind, source.width / source.height), footage, 0, frames))
+        track = tracking.RegionTrack(region(kind, source.width / source.height))
+        found = list(track.follow(footage, 0, frames))
     if len(found) < len(frames) or found[-1].fault:
         raise SystemExit(f"{kind}: lost at frame {found[-1].frame}")
     return taken

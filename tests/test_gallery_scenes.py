@@ -11,7 +11,7 @@ from OpenImageIO import ImageBuf
 from gallery import object_matte
 from gallery.item import ROOT
 from shutter_addon.core.recipes import recipe_file
-from shutter_addon.media.matte_files import MatteFile
+from shutter_addon.media.opening import MatteFile
 
 # Each in a process of its own: an empty scene would take the other tests' edits away.
 RENDER = """

@@ -122,8 +122,8 @@ def compose(found, plan: dict, folder):
     from shutter_addon.compute.request import Request
     from shutter_addon.core.model.effect import FileContent
     from shutter_addon.core.model.keyframes import Keys
-    from shutter_addon.media.matte_files import MatteFile
     from shutter_addon.media.matte_values import MatteValues
+    from shutter_addon.media.opening import MatteFile
 
     def file(region):
         if not isinstance(region.content, FileContent):

@@ -12,9 +12,8 @@ from collections.abc import Iterable
 import numpy as np
 
 from ..core.frames import light
-from ..core.frames.frame_source import FrameSource
+from ..core.frames.frame_source import FrameSource, SourceWrapper
 from ..core.frames.planes import Decoded, as_rgba
-from ..core.frames.source_wrapper import SourceWrapper
 from ..core.memo import Memo
 from ..core.messages import UserError
 from ..core.pixels.matte_grid import block_sums, blurred

@@ -8,9 +8,8 @@ from typing import Any
 import numpy as np
 
 from ..core.frames import light
-from ..core.frames.frame_source import FrameSource
+from ..core.frames.frame_source import FrameSource, SourceWrapper
 from ..core.frames.planes import Decoded
-from ..core.frames.source_wrapper import SourceWrapper
 from ..core.memo import Kept
 from ..core.model.frame_state import FrameState, Layers
 from ..core.model.mattes import FileFrame, Matte, MatteReader, Ramp

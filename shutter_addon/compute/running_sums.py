@@ -9,8 +9,7 @@ from contextlib import suppress
 import numpy as np
 
 from ..core.frames.frame_source import FrameSource
-from ..core.frames.moments import STEP, Moment
-from ..core.frames.planes import Planes, chroma_step
+from ..core.frames.planes import STEP, Moment, Planes, chroma_step
 from ..core.model import windows
 from ..core.model.frame_state import Light, Options
 from ..core.stopping import kept

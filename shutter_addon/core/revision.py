@@ -14,25 +14,18 @@ _MOST = 128  # values of until_change
 
 
 class Revision:
-    """number: grows with every change"""
+    """number: grows with every change
+    kept: values of until_change, each with whether it could be made; at: the number at which they were made"""
 
     def __init__(self) -> None:
-        self.number = 0
+        self.number = self.at = 0
+        self.kept: Kept[Hashable, tuple[bool, Any]] = Kept()
 
     def changed(self) -> None:
         self.number += 1
 
 
-class _Data(Revision):
-    """kept: values of until_change, each with whether it could be made; at: the number at which they were made"""
-
-    def __init__(self) -> None:
-        super().__init__()
-        self.kept: Kept[Hashable, tuple[bool, Any]] = Kept()
-        self.at = 0
-
-
-_data = _Data()
+_data = Revision()
 
 
 def number() -> int:

@@ -88,10 +88,6 @@ def frame_rate(number: float) -> Fraction:
     )
 
 
-class _EndedError(Exception):
-    """The process ended before it answered."""
-
-
 def lend(command: list[str] | None) -> None:
     """Says what starts the process, whose last argument will be ANSWER; None: nothing does. One that runs is ended,
     without the answer that somebody may be waiting for, if that takes long."""
@@ -135,21 +131,17 @@ def _answer(wanted: dict) -> tuple[dict, np.ndarray | None] | None:
         return asked.result(STARTING if is_new else ANSWERING)
     except MediaError:
         raise
-    except TimeoutError:  # it was stopped, say
+    except BaseException as error:  # an interrupt, say: what is still to come would be taken for the next answer
         _end()
-        if is_new:
+        if is_new and isinstance(error, TimeoutError):  # it was stopped, say
             raise MediaError(f"the Blender that decodes it is not ready after {STARTING} seconds") from None
-        return None
-    except (_EndedError, OSError, ValueError):
-        _end()
-        return None
-    except BaseException:  # an interrupt, say: what is still to come would be taken for the next answer
-        _end()
+        if isinstance(error, (EOFError, OSError, ValueError)):
+            return None
         raise
 
 
 def _asked(process: subprocess.Popen[bytes], question: bytes) -> tuple[dict, np.ndarray | None]:
-    """By a thread, as Windows waits for no pipe for some time only."""
+    """By a thread, as Windows waits for no pipe for some time only. EOFError: the process ended before it answered."""
     assert process.stdin is not None
     assert process.stdout is not None
     process.stdin.write(question)
@@ -161,7 +153,7 @@ def _asked(process: subprocess.Popen[bytes], question: bytes) -> tuple[dict, np.
         return said, None
     frame = np.empty(said["shape"], said["dtype"])
     if process.stdout.readinto(memoryview(frame).cast("B")) != frame.nbytes:  # type: ignore[attr-defined]
-        raise _EndedError
+        raise EOFError
     return said, frame
 
 
@@ -170,7 +162,7 @@ def _line(stream: IO[bytes]) -> bytes:
     while line := stream.readline():
         if line.startswith(ANSWER.encode()):
             return line.removeprefix(ANSWER.encode())
-    raise _EndedError
+    raise EOFError
 
 
 def _started() -> subprocess.Popen[bytes]:

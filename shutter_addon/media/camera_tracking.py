@@ -8,18 +8,19 @@ has passed: what a window shows at once is right, what it comes back to after a 
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable, Collection, Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
 
 from ..core.model import scribbles
+from ..core.model.effect import Region, Subject
 from ..core.model.motions import Motion, Placement, Similarity
 from . import pursuit, registration, tracking
 from .footage import Footage
 from .pursuit import Sighting
 from .registration import Part
-from .tracking import Drawn, Subject, Tracked, TrackingError
+from .tracking import Tracked, TrackingError
 
 BARE = "what the regions leave of the picture has too few corners to follow"
 UNLIKE = "the picture is too unlike those before"
@@ -35,28 +36,12 @@ _FADING = 0.9  # what a frame keeps of the doubt in the one before
 _MARGIN = 0.02  # heights of the picture about a region, where corners may be those of its edge
 
 
-def follow_camera(
-    camera: Subject,
-    regions: Sequence[Drawn],
-    footage: Footage,
-    start: int,
-    frames: range,
-    *,
-    motion: Motion = "scale",
-    anchors: Collection[int] = (),
-) -> Iterator[Tracked]:
-    """Where what the camera sees is at frames of the timeline, as tracking.follow has it of a region.
+class CameraTrack(tracking.Track):
+    """Tracks what the camera sees."""
 
-    camera: its placement is evaluated at `start` and at anchors
-    regions: what they cover is left out; evaluated at any of the frames"""
-    return _CameraTrack(camera, regions, footage, motion, {*frames, *anchors}).both_ways(start, frames, anchors)
-
-
-class _CameraTrack(tracking.Track):
-    def __init__(
-        self, camera: Subject, regions: Sequence[Drawn], footage: Footage, motion: Motion, frames: Collection[int]
-    ) -> None:
-        super().__init__(camera, footage, motion, frames)
+    def __init__(self, camera: Subject, regions: Sequence[Region]) -> None:
+        """regions: what they cover is left out; evaluated at any of the frames"""
+        super().__init__(camera)
         self._regions = regions
         self._begun: dict[int, Placement] = {}  # where it has begun anew
 

@@ -19,13 +19,11 @@ from OpenImageIO import ImageSpec
 
 from ..core import stopping
 from ..core.farm.claims import Claims
-from ..core.frames.frame_source import FrameSource
-from ..core.frames.source_wrapper import SourceWrapper
+from ..core.frames.frame_source import FrameSource, SourceWrapper
 from ..core.model import outlines, scribbles
 from . import carrying, derived, flow, opencv
 from .cuts import ShotSource
 from .errors import MediaError
-from .folder import own_folder
 from .image_writing import write_levels
 from .outlining import traced
 
@@ -84,7 +82,8 @@ class CarriedMattes(SourceWrapper):
         super().__init__(source)
         self._shots = source if isinstance(source, ShotSource) else ShotSource(source)
         self._drawings = {frame: curves for frame, curves in drawings if 0 <= frame < self.count}
-        self._drawing_keys: dict[int, str] = {}  # previews ask for paths again and again
+        # of the names of files, for which previews ask again and again
+        self._keys = {frame: derived.key({"frame": frame, "curves": it}) for frame, it in self._drawings.items()}
         self._parent = folder
         self._spec = ImageSpec(self.width, self.height, 1, "uint8")
 
@@ -154,12 +153,12 @@ class CarriedMattes(SourceWrapper):
     @contextmanager
     def _claimed(self, index: int, first: int | None, last: int | None) -> Iterator[np.ndarray | None]:
         """While this process alone carries what lies between two drawings; what another has kept of a matte by then."""
-        name = derived.key({"drawn": [self._drawing_key(frame) for frame in (first, last) if frame is not None]})
+        name = derived.key({"drawn": self._drawn(first, last)})
         while True:
             path = self._path(index, first, last)
             with Claims(path.parent, _PATIENCE, _BEAT) as claims:
                 try:
-                    own_folder(path.parent)
+                    derived.own_folder(path.parent)
                     while not claims.take(name):
                         stopping.check()
                         time.sleep(_PAUSE)
@@ -237,18 +236,15 @@ class CarriedMattes(SourceWrapper):
 
     def _path(self, index: int, first: int | None, last: int | None) -> Path:
         """The file of a frame's matte, made of these drawings."""
-        drawn = [self._drawing_key(frame) for frame in (first, last) if frame is not None]
-        key = derived.key({"version": VERSION, "frame": index, "drawn": drawn})
+        key = derived.key({"version": VERSION, "frame": index, "drawn": self._drawn(first, last)})
         file = Path(self._folder, f"{index:08d}-{key}.png")
         kept = Path(self._parent or "", file)
         if self._parent and (self._parent not in _elsewhere or derived.is_kept(kept)):
             return kept
         return Path(_use_elsewhere(self._parent), file)
 
-    def _drawing_key(self, frame: int) -> str:
-        if frame not in self._drawing_keys:
-            self._drawing_keys[frame] = derived.key({"frame": frame, "curves": self._drawings[frame]})
-        return self._drawing_keys[frame]
+    def _drawn(self, first: int | None, last: int | None) -> list[str]:
+        return [self._keys[frame] for frame in (first, last) if frame is not None]
 
     @cached_property
     def _folder(self) -> str:
@@ -257,13 +253,8 @@ class CarriedMattes(SourceWrapper):
 
     def _kept(self, path: Path) -> np.ndarray | None:
         """The matte (H, W) uint8 of a file; None: there is none of ours, or it is damaged."""
-        if (image := derived.opened(path, self._spec)) is None:
-            return None
-        with closing(image):
-            if not image.spec().get_string_attribute("ImageDescription").startswith(CONFIDENCE):  # another's
-                return None
-            samples = image.read_image(0, 0, 0, 1, "uint8")
-            return None if samples is None or image.has_error else samples[..., 0]
+        samples = derived.read(path, self._spec, CONFIDENCE)
+        return None if samples is None else samples[..., 0]
 
 
 def _use_elsewhere(parent: Path | None) -> str:

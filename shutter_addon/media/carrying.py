@@ -328,4 +328,4 @@ def _at(values: np.ndarray, places: Places) -> np.ndarray:
     """Values (h, w), (h, w, 2) or planes (3, h, w) at places; beyond the picture its edge goes on."""
     if values.ndim == 3 and values.shape[0] == 3:
         return np.stack([_at(plane, places) for plane in values])
-    return flow.look(values, places, cv2.INTER_LINEAR)
+    return flow.look(values, places)

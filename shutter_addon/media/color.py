@@ -12,8 +12,7 @@ import numpy as np
 from OpenImageIO import FLOAT, ColorConfig, ImageBuf, ImageBufAlgo
 
 from ..core.frames import light
-from ..core.frames.frame_source import FrameSource
-from ..core.frames.source_wrapper import SourceWrapper
+from ..core.frames.frame_source import FrameSource, SourceWrapper
 from .errors import MediaError
 
 SCENE_LINEAR = "Linear Rec.709"  # of Blender's own configuration

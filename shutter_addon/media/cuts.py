@@ -3,19 +3,16 @@ picture of each; and a source that knows where its shots end."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable
 from functools import lru_cache
 from itertools import pairwise, product
 
 import numpy as np
 
 from ..core.frames import light
-from ..core.frames.frame_source import FrameSource
-from ..core.frames.moments import Moment
-from ..core.frames.planes import Decoded, Planes, as_rgba
-from ..core.frames.source_wrapper import SourceWrapper
+from ..core.frames.frame_source import FrameSource, SourceWrapper
+from ..core.frames.planes import Decoded, Moment, Planes, as_rgba
 from ..core.memo import Kept
-from . import plain_cuts
 from .errors import MediaError
 
 # The frames on each side of two neighbours that have a say in whether there is a cut between them: in so many, a film
@@ -46,6 +43,7 @@ REPEATED = 2.0
 _ROWS, _COLUMNS = 18, 32  # of a signature; each block is a mean of some 5 × 10 samples
 _KEPT = 4 * 256  # signatures that are remembered: more than the longest window
 _HANDED_BYTES = 256 << 20
+_GREY = np.array([9798, 19235, 3735])  # OpenCV's, in 1 / 32768
 
 Signature = np.ndarray
 
@@ -84,7 +82,7 @@ def is_cut(before: list[Signature], after: list[Signature]) -> bool:
     """Whether there is a cut between the frames before[-1] and after[0].
 
     before, after: signatures of up to NEIGHBOURS successive frames on each side, fewer at the clip's ends alone.
-    There is one where HashDetector (plain_cuts) finds that the pictures have nothing in common, its ContentDetector
+    There is one where HashDetector finds that the pictures have nothing in common, its ContentDetector
     that brightness changes, and its AdaptiveDetector that it changes by far more than between neighbours. The first
     two are asked as well about what comes a little later or came a little earlier, for what passes is no cut; then
     ContentDetector about each part, and HashDetector about what the pictures share if the camera has jumped. Not
@@ -100,7 +98,7 @@ def is_cut(before: list[Signature], after: list[Signature]) -> bool:
 
 def may_be_cut(before: Signature, after: Signature) -> bool:
     """Whether `is_cut` can be true of these two neighbours, as far as they alone tell."""
-    return _differ(before, after, NOISE) and plain_cuts.unlike(before, after, BITS) >= APART
+    return _differ(before, after, NOISE) and _unlike(before, after, BITS) >= APART
 
 
 def _all_changes(before: Signature, after: Signature) -> bool:
@@ -108,7 +106,7 @@ def _all_changes(before: Signature, after: Signature) -> bool:
     in common wherever the camera may have jumped."""
     jumps = product(*(range(-(length // REACH), length // REACH + 1) for length in before.shape[:2]))
     return all(_differ(*parts, 0.0, PART) for parts in zip(_parts(before), _parts(after), strict=True)) and all(
-        plain_cuts.unlike(_shared(before, y, x), _shared(after, -y, -x), BITS) >= MOVED for y, x in jumps
+        _unlike(_shared(before, y, x), _shared(after, -y, -x), BITS) >= MOVED for y, x in jumps
     )
 
 
@@ -126,15 +124,15 @@ def _shared(picture: Signature, down: int, right: int) -> Signature:
 def _differ(before: Signature, after: Signature, least: float, share: float = 1.0) -> bool:
     """Whether brightness changes by that share of what a cut changes, and by no fewer levels than `least`."""
     threshold = max(share * CHANGE * min(max(before.mean(), after.mean()) / GREY, 1.0), least)
-    return plain_cuts.change(before, after) >= threshold
+    return _change(before, after) >= threshold
 
 
 def _stands_out(before: list[Signature], after: list[Signature]) -> bool:
     """Whether AdaptiveDetector finds that from before[0] to after[0] more changes than between neighbours; both lists
     lead away from there."""
     sides = before[: WINDOW + 1], after[: WINDOW + 1]
-    beside = [plain_cuts.change(*pair) for side in sides for pair in pairwise(side)]
-    here = plain_cuts.change(before[0], after[0])
+    beside = [_change(*pair) for side in sides for pair in pairwise(side)]
+    here = _change(before[0], after[0])
     return here >= NOISE and here * len(beside) >= RATIO * sum(beside)
 
 
@@ -142,24 +140,58 @@ def _moving(pictures: list[Signature]) -> list[Signature]:
     """Those that do not repeat the one before."""
     kept = pictures[:1]
     for picture in pictures[1:]:
-        if _most(kept[-1], picture) > REPEATED:
+        if np.abs(kept[-1] - picture).max() > REPEATED:
             kept.append(picture)
     return kept
 
 
-def neighbours(index: int, count: int) -> range:
-    """The frames of a clip of `count` that have a say in whether there is a cut before frame `index`."""
-    return range(max(index - NEIGHBOURS, 0), min(index + NEIGHBOURS, count))
+# What PySceneDetect's detectors say of pictures, by NumPy alone, as OpenCV may be missing. The sums are the same, but
+# for pictures of fewer rows than HashDetector has bits. Levels are rounded.
 
 
-def sides(signatures: Mapping[int, Signature | None], index: int) -> tuple[list[Signature], list[Signature]]:
-    """Of the neighbours' signatures, those before frame `index` and those from it on, as is_cut takes them: on each
-    side up to the first frame that has none."""
-    return _run(signatures, index - 1, -1)[::-1], _run(signatures, index, 1)
+def _change(before: np.ndarray, after: np.ndarray) -> float:
+    """ContentDetector's score of luma alone: by how many levels the largest colour differs on average."""
+    return float(np.abs(_whole(before).max(axis=-1).astype(int) - _whole(after).max(axis=-1)).mean())
 
 
-def _most(a: Signature, b: Signature) -> float:
-    return float(np.abs(a - b).max())
+def _unlike(before: np.ndarray, after: np.ndarray, bits: int) -> float:
+    """Which share of HashDetector's bits differs, of so many in each direction."""
+    return np.count_nonzero(_hash(before, bits) != _hash(after, bits)) / bits**2
+
+
+def _whole(picture: np.ndarray) -> np.ndarray:
+    return np.rint(picture).clip(0, 255).astype(np.uint8)
+
+
+def _hash(picture: np.ndarray, bits: int) -> np.ndarray:
+    """Which of the lowest frequencies are above their median."""
+    size = 2 * bits
+    small = _resized((_whole(picture) @ _GREY + (1 << 14)) >> 15, size)
+    waves = _waves(size)[:bits]
+    low = np.float32(waves @ np.float32(small / max(small.max(), 1)) @ waves.T)
+    return np.greater(low, np.median(low))
+
+
+def _resized(grey: np.ndarray, size: int) -> np.ndarray:
+    """A square of a picture, by means, as OpenCV's INTER_AREA makes it but for rounding."""
+    down, right = (_means(length, size) for length in grey.shape)
+    return np.rint(down @ grey @ right.T)
+
+
+@lru_cache(16)
+def _means(length: int, size: int) -> np.ndarray:
+    """Which shares so many samples along an axis have in `size` even parts of it."""
+    scale = length / size
+    edges = np.clip(np.arange(length + 1), *(np.arange(size)[:, None] * scale + end for end in (0, scale)))
+    return np.diff(edges) / scale
+
+
+@lru_cache(2)
+def _waves(size: int) -> np.ndarray:
+    """The orthonormal discrete cosine transform of so many samples, a row for each frequency."""
+    waves = np.cos(np.pi / size * np.outer(np.arange(size), np.arange(size) + 0.5)) * np.sqrt(2 / size)
+    waves[0] /= np.sqrt(2)
+    return waves
 
 
 class ShotSource(SourceWrapper):
@@ -259,8 +291,10 @@ class ShotSource(SourceWrapper):
             return False, False
         if not may_be_cut(last, next_):
             return False, True
-        beside = {i: self._readable(i) for i in neighbours(index, self.filmed)}
-        return is_cut(*sides(beside, index)), all(picture is not None for picture in beside.values())
+        start, stop = max(index - NEIGHBOURS, 0), min(index + NEIGHBOURS, self.filmed)
+        beside = [self._readable(i) for i in range(start, stop)]
+        before, after = _known(reversed(beside[: index - start]))[::-1], _known(beside[index - start :])
+        return is_cut(before, after), len(before) + len(after) == len(beside)
 
     def _readable(self, index: int) -> Signature | None:
         """None: the frame cannot be read now. Whoever needs the frame itself will hear why."""
@@ -281,10 +315,11 @@ class ShotSource(SourceWrapper):
         return made
 
 
-def _run(signatures: Mapping[int, Signature | None], start: int, step: int) -> list[Signature]:
-    """The signatures from a frame on, as far as there are any."""
-    run = []
-    while (picture := signatures.get(start)) is not None:
-        run.append(picture)
-        start += step
-    return run
+def _known(signatures: Iterable[Signature | None]) -> list[Signature]:
+    """Those before the first that is missing."""
+    known: list[Signature] = []
+    for picture in signatures:
+        if picture is None:
+            break
+        known.append(picture)
+    return known

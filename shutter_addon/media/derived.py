@@ -1,4 +1,4 @@
-"""Frames that are made from footage and kept as files: mattes of outlines.
+"""What is made from footage and kept as files: mattes of outlines, and vectors of optical flow.
 
 One rule holds for their folders: we choose the names, no link is followed, and nothing else is opened or removed. What
 a frame is made of is in the name of its file, or of the folder; so what changes gets another one.
@@ -6,22 +6,32 @@ a frame is made of is in the name of its file, or of the folder; so what changes
 
 from __future__ import annotations
 
+import errno
 import hashlib
 import json
 import stat
-from contextlib import suppress
+from contextlib import closing, suppress
 from functools import lru_cache
 from pathlib import Path
 
+import numpy as np
 from OpenImageIO import ImageInput, ImageSpec, geterror
 
+from ..core import atomic_write
 from ..core.frames.frame_source import FrameSource
+from ..core.frames.planes import STEP
+from . import flow
 from .errors import MediaError
 from .files import check_name
+from .image_writing import write_exr
 
+VECTORS = "virtual_shutter_vectors"  # the folder of StoredVectors
 WHOLE = 8 << 20  # bytes; files of a source up to this size, such as uncompressed 8-bit HD pictures, are hashed whole
 BLOCKS, BLOCK = 16, 4096  # of a larger file so many blocks, of so many bytes each, are hashed
 _LARGER = 1 << 20  # bytes; a file that is larger than its samples by more holds something else
+
+_JUNCTION = 0xA0000003  # st_reparse_tag of a folder on Windows that leads to another
+_CHANNELS = tuple(f"value{k}" for k in range(6))  # of a file of vectors
 
 _SHAPE = (
     *("x", "y", "z", "width", "height", "depth", "full_x", "full_y", "full_width", "full_height"),
@@ -97,9 +107,7 @@ def opened(path: Path, spec: ImageSpec) -> ImageInput | None:
     size = _bytes(path)
     if size is None or size > 2 * spec.image_bytes() + _LARGER:
         return None
-    wishes = ImageSpec()
-    wishes.attribute("oiio:UnassociatedAlpha", 1)  # no premultiplication on reading
-    image = ImageInput.open(check_name(path), wishes)
+    image = ImageInput.open(check_name(path))
     with suppress(UnicodeDecodeError):  # of names and errors in a damaged file
         if image is None:
             geterror()
@@ -108,3 +116,75 @@ def opened(path: Path, spec: ImageSpec) -> ImageInput | None:
     if image is not None:
         image.close()
     return None
+
+
+def read(path: Path, spec: ImageSpec, description: str = "") -> np.ndarray | None:
+    """A frame's samples (height, width, channels), of the type of `spec`. None: as `opened`, what is in it is damaged,
+    or its description does not begin so."""
+    if (image := opened(path, spec)) is None:
+        return None
+    with closing(image), suppress(UnicodeDecodeError):
+        is_ours = image.spec().get_string_attribute("ImageDescription").startswith(description)
+        samples = image.read_image(0, 0, 0, spec.nchannels, spec.format) if is_ours else None
+        if samples is not None and not image.has_error:
+            return samples
+        image.geterror()
+    return None
+
+
+def own_folder(path: Path) -> None:
+    """Make a folder of ours, if there is none. The one that it lies in may be a link to another disk.
+
+    Raises:
+        OSError: It cannot be made, or it is a link itself.
+    """
+    path.mkdir(parents=True, exist_ok=True)
+    refuse_link(path)
+
+
+def refuse_link(path: Path) -> None:
+    """Raise OSError for a link, and where there is nothing."""
+    status = path.lstat()
+    if stat.S_ISLNK(status.st_mode) or getattr(status, "st_reparse_tag", 0) == _JUNCTION:
+        raise OSError(errno.ELOOP, "it is a link, and none is followed")
+
+
+class StoredVectors:
+    """The vectors of pairs of frames: those of a folder, and others found as they are asked for."""
+
+    def __init__(self, folder: Path, writes: bool) -> None:
+        """writes: whether what is found is kept, as far as the folder can be written to"""
+        self._folder, self._writes = folder, writes
+        self._is_new = True  # nothing was written yet
+
+    def found(self, first: np.ndarray, second: np.ndarray) -> np.ndarray:
+        """What flow.found gives of two pictures."""
+        digest = hashlib.blake2b(f"{flow.VERSION} {first.shape}".encode(), digest_size=16)
+        for picture in (first, second):
+            digest.update(picture)
+        path = self._folder / f"{digest.hexdigest()}.exr"
+        values = self._kept(path, first.shape)
+        if values is None:
+            values = flow.found(first, second)
+            self._keep(path, values)
+        return values
+
+    def _kept(self, path: Path, shape: tuple[int, ...]) -> np.ndarray | None:
+        """What is in a file; None: there is none of ours, or it is damaged."""
+        height, width = (-(-n // STEP) for n in shape)
+        spec = ImageSpec(width, height, len(_CHANNELS), "half")
+        spec.channelnames = _CHANNELS
+        values = None if self._folder.is_symlink() else read(path, spec)
+        return None if values is None or not np.isfinite(values).all() else values
+
+    def _keep(self, path: Path, values: np.ndarray) -> None:
+        if not self._writes:
+            return
+        try:
+            own_folder(self._folder)
+            if self._is_new:
+                atomic_write.clear_up(self._folder)
+                self._is_new = False
+            write_exr(path, values, _CHANNELS)
+        except (OSError, MediaError):  # it is found again the next time
+            self._writes = False

@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..core import atomic_write
-from .completeness import is_whole_movie
 from .errors import MediaError
 from .files import check_name
+from .rendered_pictures import is_whole_movie
 
 if TYPE_CHECKING:
     from av import VideoFrame

@@ -15,7 +15,7 @@ import numpy as np
 from ..core import stopping
 from ..core.frames import light
 from ..core.frames.frame_source import FrameSource
-from ..core.frames.moments import STEP, UNIT, ZERO, Moment
+from ..core.frames.planes import STEP, UNIT, ZERO, Moment
 from . import opencv
 from .opencv import cv2
 
@@ -48,11 +48,11 @@ class Between:
         transfer, alpha: how samples are encoded, as FrameSource says; the new frames are encoded alike
         find: gives what `found` gives; None: that"""
         self.ends, self._transfer, self._alpha = (first, second), transfer, alpha
-        self._paths: _Paths | None = None
+        self._sides: list[_Carriers] | None = None
         if not np.array_equal(first, second):
             pictures = [luma(end, transfer, alpha) for end in self.ends]
-            paths = _Paths(pictures, (find or found)(*pictures))
-            self._paths = paths if paths.meet else None
+            sides = [_carriers(each) for each in np.split((find or found)(*pictures), 2, axis=2)]
+            self._sides = sides if _meet(pictures, sides) else None
 
     @cached_property
     def _encoded(self) -> list[np.ndarray]:
@@ -61,9 +61,9 @@ class Between:
     def moment(self, pair: tuple[int, int], number: int, steps: int) -> np.ndarray | Moment:
         """One of `steps` moments, a power of two. What only one of the two frames shows is taken from it, all else is
         mixed in linear light; of two frames that have nothing in common it is the nearer one. pair: Moment's."""
-        if self._paths is None:
+        if self._sides is None:
             return self.ends[2 * number > steps]
-        vectors = self._paths.at(number / steps)
+        vectors = _paths(self._sides, self.ends[0].shape[:2], number / steps)
         return Moment(pair, self.ends, number, steps, vectors, partial(self._rgba, vectors, number, steps))
 
     def _rgba(self, vectors: np.ndarray, number: int, steps: int) -> np.ndarray:
@@ -75,7 +75,7 @@ def luma(frame: np.ndarray, transfer: str, alpha: str) -> np.ndarray:
     """A frame (H, W, 4) of a source, as it is displayed, in grey (H, W) uint8; transfer, alpha: the source's."""
     if frame.dtype == np.uint8 and (transfer, alpha) == ("srgb", "opaque"):
         return cv2.cvtColor(frame, cv2.COLOR_RGBA2GRAY)
-    return _luma(_encoded(frame, transfer, alpha))
+    return cv2.cvtColor(displayed(frame, transfer, alpha), cv2.COLOR_RGB2GRAY)
 
 
 def displayed(frame: np.ndarray, transfer: str, alpha: str) -> np.ndarray:
@@ -121,7 +121,7 @@ def found(first: np.ndarray, second: np.ndarray) -> np.ndarray:
         stopping.check()
         if min(height, width) >= SMALLEST:
             way = _dis(a, b, stride=4, quick=True)
-        cost = cv2.blur(cv2.absdiff(a, look(b, grid(*a.shape) + way, cv2.INTER_LINEAR)).astype(np.float32), (3, 3))
+        cost = cv2.blur(cv2.absdiff(a, look(b, grid(*a.shape) + way)).astype(np.float32), (3, 3))
         sides += [2 * way, cost]
     apart = STEP // 2
     values = np.dstack(sides)[::apart, ::apart][: shape[0], : shape[1]]
@@ -155,57 +155,53 @@ def _dis(first: np.ndarray, second: np.ndarray, stride: int, smoothness: float =
     return np.nan_to_num(dis.calc(*wide, None)[:height, :width], posinf=0, neginf=0)
 
 
-class _Paths:
-    """Where the pixels of two pictures go from one to the other."""
-
-    def __init__(self, luma: list[np.ndarray], found: np.ndarray) -> None:
-        self._shape = luma[0].shape
-        brightness = max(float(each.mean()) for each in luma)
-        self._unlike = max(UNLIKE * min(brightness / GREY, 1.0), NOISE)
-        self._sides = [_carriers(each) for each in np.split(found, 2, axis=2)]
-
-    @property
-    def meet(self) -> bool:
-        """Whether the pictures have anything in common: enough vectors have ends that look alike."""
-        return min(float((costs <= self._unlike).mean()) for _places, _vectors, costs in self._sides) >= SHARED
-
-    def at(self, t: float) -> np.ndarray:
-        """Moment.vectors at a time in 0 … 1."""
-        (forth, cost), (back, other) = (
-            self._carry(*side, t=s) for side, s in zip(self._sides, (t, 1 - t), strict=True)
-        )
-        vectors = np.where((cost <= other)[..., None], forth, -back)
-        arrived = [each < np.inf for each in (cost, other)]
-        vectors = _filled(vectors, arrived[0] | arrived[1])
-        stored = np.empty((*cost.shape, 4), np.uint16)
-        stored[..., :2] = np.rint(UNIT * vectors).clip(-ZERO, ZERO - 1) + ZERO
-        for end, shows in enumerate(arrived, 2):
-            stored[..., end] = np.uint16(255) * shows
-        return stored
-
-    def _carry(
-        self, places: np.ndarray, vectors: np.ndarray, costs: np.ndarray, t: float
-    ) -> tuple[np.ndarray, np.ndarray]:
-        """On every STEPth pixel at time t: vectors (h, w, 2) and costs (h, w), infinite where nothing arrives."""
-        h, w = (-(-n // STEP) for n in self._shape)
-        cells = np.floor((places + np.float32(t) * vectors) / STEP).astype(np.int32)
-        # A margin of two takes what leaves the picture.
-        np.clip(cells, -2, (w, h), out=cells)
-        stopping.check()
-        corners = (cells[:, 1] + 2) * (w + 4) + cells[:, 0] + 2
-        # Of several that arrive the cheapest stays, the last; -1, where nothing arrives, takes what is appended.
-        last = np.full((h + 4) * (w + 4), -1, np.int32)
-        np.maximum.at(last, corners, np.arange(len(corners), dtype=np.int32))
-        last = last.reshape(h + 4, w + 4)[1:-2, 1:-2]
-        # Each arrives at the four corners of its cell.
-        last = np.maximum(last[1:], last[:-1])
-        chosen = np.maximum(last[:, 1:], last[:, :-1])
-        nowhere, infinite = np.zeros((1, 2), np.float32), np.full(1, np.inf, np.float32)
-        return np.concatenate([vectors, nowhere])[chosen], np.concatenate([costs, infinite])[chosen]
+_Carriers = tuple[np.ndarray, np.ndarray, np.ndarray]  # places (n, 2), vectors (n, 2) and costs (n,), the dearest first
 
 
-def _carriers(side: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Places (n, 2), vectors (n, 2) and costs (n,) of a side of `found`, the dearest first."""
+def _meet(pictures: list[np.ndarray], sides: list[_Carriers]) -> bool:
+    """Whether two pictures have anything in common: enough vectors have ends that look alike."""
+    brightness = max(float(each.mean()) for each in pictures)
+    unlike = max(UNLIKE * min(brightness / GREY, 1.0), NOISE)
+    return min(float((costs <= unlike).mean()) for _places, _vectors, costs in sides) >= SHARED
+
+
+def _paths(sides: list[_Carriers], shape: tuple[int, ...], t: float) -> np.ndarray:
+    """Moment.vectors at a time in 0 … 1."""
+    (forth, cost), (back, other) = (_carry(*side, shape, s) for side, s in zip(sides, (t, 1 - t), strict=True))
+    vectors = np.where((cost <= other)[..., None], forth, -back)
+    arrived = [each < np.inf for each in (cost, other)]
+    vectors = _filled(vectors, arrived[0] | arrived[1])
+    stored = np.empty((*cost.shape, 4), np.uint16)
+    stored[..., :2] = np.rint(UNIT * vectors).clip(-ZERO, ZERO - 1) + ZERO
+    for end, shows in enumerate(arrived, 2):
+        stored[..., end] = np.uint16(255) * shows
+    return stored
+
+
+def _carry(
+    places: np.ndarray, vectors: np.ndarray, costs: np.ndarray, shape: tuple[int, ...], t: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """On every STEPth pixel of a picture of that shape at time t: vectors (h, w, 2) and costs (h, w), infinite where
+    nothing arrives."""
+    h, w = (-(-n // STEP) for n in shape)
+    cells = np.floor((places + np.float32(t) * vectors) / STEP).astype(np.int32)
+    # A margin of two takes what leaves the picture.
+    np.clip(cells, -2, (w, h), out=cells)
+    stopping.check()
+    corners = (cells[:, 1] + 2) * (w + 4) + cells[:, 0] + 2
+    # Of several that arrive the cheapest stays, the last; -1, where nothing arrives, takes what is appended.
+    last = np.full((h + 4) * (w + 4), -1, np.int32)
+    np.maximum.at(last, corners, np.arange(len(corners), dtype=np.int32))
+    last = last.reshape(h + 4, w + 4)[1:-2, 1:-2]
+    # Each arrives at the four corners of its cell.
+    last = np.maximum(last[1:], last[:-1])
+    chosen = np.maximum(last[:, 1:], last[:, :-1])
+    nowhere, infinite = np.zeros((1, 2), np.float32), np.full(1, np.inf, np.float32)
+    return np.concatenate([vectors, nowhere])[chosen], np.concatenate([costs, infinite])[chosen]
+
+
+def _carriers(side: np.ndarray) -> _Carriers:
+    """Those of a side of `found`."""
     values = side.reshape(-1, 3)
     # As whole numbers, which NumPy sorts ten times as fast; costs are not negative.
     order = np.argsort(~values[:, 2].view(np.uint16), kind="stable")
@@ -270,9 +266,9 @@ def _cubic(picture: np.ndarray, places: np.ndarray) -> np.ndarray:
     return cv2.remap(picture, whole, fraction, cv2.INTER_CUBIC, borderMode=cv2.BORDER_REPLICATE)
 
 
-def look(picture: np.ndarray, places: np.ndarray, how: int | None = None) -> np.ndarray:
+def look(picture: np.ndarray, places: np.ndarray) -> np.ndarray:
     """The picture (H, W, …) at places (h, w, 2), x and y in pixels; its edge goes on beyond it."""
-    return cv2.remap(picture, places, None, cv2.INTER_CUBIC if how is None else how, borderMode=cv2.BORDER_REPLICATE)
+    return cv2.remap(picture, places, None, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
 
 
 @lru_cache(maxsize=2)  # 16 MB at 4K, and a fourth of that
@@ -305,12 +301,6 @@ def levels(samples: np.ndarray) -> np.ndarray:
     if samples.dtype != np.uint8:
         return np.rint(255 * np.clip(samples, 0, 1)).astype(np.uint8)
     return samples
-
-
-def _luma(samples: np.ndarray) -> np.ndarray:
-    """(H, W) uint8, which DIS needs."""
-    samples = levels(samples)
-    return cv2.cvtColor(np.ascontiguousarray(samples[..., :3]), cv2.COLOR_RGB2GRAY)
 
 
 def _light(samples: np.ndarray) -> np.ndarray:

@@ -39,7 +39,7 @@ class Footage:
         stopping.check()
         index = self._index_at(frame)
         if index not in self._kept:
-            self._read(index, *self._beside(frame))
+            self._read(frame, index)
         return self._kept[index]
 
     def cut(self, before: int, after: int) -> bool:
@@ -51,17 +51,14 @@ class Footage:
         shots = self._source.shots
         return shots is not None and low != high and high not in shots.around(low, low, high)
 
-    def _beside(self, frame: int) -> tuple[int, list[int]]:
-        """The source's frame that is shown before a wanted frame, and those that are lacking behind it, in order."""
-        if frame not in self._wanted:
-            return self._index_at(frame), []
-        place = self._wanted.index(frame)
-        before = self._index_at(self._wanted[place - 1] if place else frame)
-        upcoming = dict.fromkeys(map(self._index_at, self._wanted[place + 1 : place + BLOCK]))
-        return before, [index for index in upcoming if index not in self._kept]
-
-    def _read(self, index: int, before: int, upcoming: list[int]) -> None:
-        """Reads a frame, and those that come next if they lie before it."""
+    def _read(self, frame: int, index: int) -> None:
+        """Reads the source's frame that a timeline frame shows, and those that come next if they lie before it."""
+        before, upcoming = index, list[int]()  # the one that is shown before it, and those that are lacking behind it
+        if frame in self._wanted:
+            place = self._wanted.index(frame)
+            before = self._index_at(self._wanted[place - 1] if place else frame)
+            shown = dict.fromkeys(map(self._index_at, self._wanted[place + 1 : place + BLOCK]))
+            upcoming = [i for i in shown if i not in self._kept]
         backward = [i for i in upcoming if i < index]
         block = sorted({index, *backward})
         self._source.want([*block, *(upcoming[:AHEAD] if not backward else ())])

@@ -1,74 +1,62 @@
 """Pictures of numbers: float EXR files with channels of any name, and grey PNG files."""
 
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 import OpenImageIO
 
 from ..core import atomic_write
-from .completeness import UNKNOWN, why_short
 from .errors import MediaError
 from .files import check_name
+from .rendered_pictures import UNKNOWN, why_short
 
 
-def write_exr(path: Path, values: np.ndarray, names: list[str], note: str = "") -> None:
-    """Writes values (height, width, channels) float32 with these channel names, whole or not at all.
+def write_exr(path: Path, values: np.ndarray, names: Sequence[str], note: str = "") -> None:
+    """Writes values (height, width, channels) with these channel names, whole or not at all: halves where they are, and
+    else float32.
 
     note: for its metadata, which rendered_pictures reads. MediaError: it cannot be written."""
-    spec = _exr(values, OpenImageIO.FLOAT, tuple(names))
+    samples = values if values.dtype == np.float16 else np.asarray(values, np.float32)
+    spec = _spec(samples)
+    spec.channelnames = tuple(names)
+    spec["compression"] = "zip"
+    spec["DateTime"] = "1970:01:01 00:00:00"  # else the time of writing: equal samples are equal files
     if note:
         spec["Note"] = note
-    _write(path, spec, np.asarray(values, np.float32))
-
-
-def write_halves(path: Path, values: np.ndarray, names: tuple[str, ...]) -> None:
-    """Writes values (height, width, channels) float16 with these channel names, as `write_exr`."""
-    _write(path, _exr(values, OpenImageIO.HALF, names), values)
+    _write(path, spec, samples)
 
 
 def write_grey(path: Path, values: np.ndarray) -> None:
     """Writes values (height, width) float32, 0 to 1, as a PNG of 16 bits, whole or not at all. MediaError: it cannot be
     written."""
     samples = np.rint(values[..., None] * np.float32(65535)).astype(np.uint16)
-    _write(path, OpenImageIO.ImageSpec(*_size(samples), OpenImageIO.UINT16), samples)
+    _write(path, _spec(samples), samples)
 
 
 def write_levels(path: Path, levels: np.ndarray, description: str) -> None:
     """Writes levels (height, width) uint8 as a grey PNG of 8 bits with a description, whole or not at all. MediaError:
     it cannot be written."""
-    spec = OpenImageIO.ImageSpec(*_size(levels[..., None]), OpenImageIO.UINT8)
+    spec = _spec(levels[..., None])
     spec["ImageDescription"] = description
     _write(path, spec, levels[..., None])
 
 
-def _exr(values: np.ndarray, samples: OpenImageIO.BASETYPE, names: tuple[str, ...]) -> OpenImageIO.ImageSpec:
-    spec = OpenImageIO.ImageSpec(*_size(values), samples)
-    spec.channelnames = names
-    spec["compression"] = "zip"
-    spec["DateTime"] = "1970:01:01 00:00:00"  # else the time of writing: equal samples are equal files
-    return spec
-
-
-def _size(values: np.ndarray) -> tuple[int, int, int]:
-    height, width, channels = values.shape
-    return width, height, channels
+def _spec(samples: np.ndarray) -> OpenImageIO.ImageSpec:
+    height, width, channels = samples.shape
+    kind = {"float16": "half", "float32": "float"}.get(samples.dtype.name, samples.dtype.name)
+    return OpenImageIO.ImageSpec(width, height, channels, kind)
 
 
 def _write(path: Path, spec: OpenImageIO.ImageSpec, samples: np.ndarray) -> None:
     try:
         with atomic_write.writing(path) as part:
-            if (said := put(part, spec, samples)) is not None:
-                why = why_short(part.parent)
+            name = check_name(part)
+            if (output := OpenImageIO.ImageOutput.create(name)) is None:
+                raise MediaError(f"{path}: cannot be written ({OpenImageIO.geterror()})")
+            written = output.open(name, spec) and output.write_image(np.ascontiguousarray(samples))
+            if not (output.close() and written):
+                said, why = output.geterror(), why_short(part.parent)
                 raise MediaError(f"{path}: could not be written whole; {said or why if why == UNKNOWN else why}")
     except OSError as error:
         raise MediaError(f"{path}: cannot be written ({error.strerror or error})") from None
-
-
-def put(path: Path, spec: OpenImageIO.ImageSpec, samples: np.ndarray) -> str | None:
-    """Writes samples (height, width, channels) to a file. Returns why it is not whole, in OpenImageIO's words; None: it
-    is, as far as is known. MediaError: there is no such kind of file."""
-    name = check_name(path)
-    if (output := OpenImageIO.ImageOutput.create(name)) is None:
-        raise MediaError(f"{path}: cannot be written ({OpenImageIO.geterror()})")
-    written = output.open(name, spec) and output.write_image(np.ascontiguousarray(samples))
-    return None if output.close() and written else output.geterror()

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import closing
 from functools import lru_cache
 from typing import Any
@@ -10,21 +10,19 @@ from typing import Any
 import numpy as np
 
 from ..core.model import outlines
+from ..core.model.effect import Subject
 from ..core.model.motions import Motion, Similarity
 from . import flow, registration, tracking
 from .carried_mattes import CarriedFile, CarriedMattes
 from .carrying import box_around
 from .footage import Footage
-from .opencv import cv2
 from .pursuit import COVERED, LEFT, Sighting
-from .tracking import Subject, Tracked, TrackingError
+from .tracking import Tracked, TrackingError
 
 EMPTY = "the outline encloses nothing here"
 
-# The share (h, w) float32 of each pixel that a matte covers at a timeline frame, of pictures of a width and height; and
-# of the footage's pictures.
+# The share (h, w) float32 of each pixel that a matte covers at a timeline frame, of pictures of a width and height.
 Cover = Callable[[int, tuple[int, int]], np.ndarray]
-Covered = Callable[[int], np.ndarray]
 
 _INSIDE = 0.9  # of a matte: its soft edge may move with what is behind it
 _AROUND = 24  # pixels around a matte, in which flow is found
@@ -48,42 +46,22 @@ def cover_within(drawn: Callable[[int], Sequence]) -> Cover:
 def follow_carried(
     region: Subject, file: CarriedFile, shown: Mapping[float, int], *what: Any, **how: Any
 ) -> Iterator[Tracked]:
-    """As `follow_cover`, of what a carried outline encloses; shown: the filmed frames that timeline frames show.
+    """As MatteTrack.follow, of what a carried outline encloses; shown: the filmed frames that timeline frames show.
     MediaError, too: a matte cannot be carried."""
     with closing(file.open()) as mattes:
-        yield from follow_cover(region, cover_of(mattes, shown.__getitem__), *what, **how)
+        yield from MatteTrack(region, cover_of(mattes, shown.__getitem__)).follow(*what, **how)
 
 
-def follow_cover(
-    region: Subject,
-    cover: Cover,
-    footage: Footage,
-    start: int,
-    frames: range,
-    *,
-    motion: Motion = "location",
-    anchors: Collection[int] = (),
-) -> Iterator[Tracked]:
-    """As tracking.follow, of what a matte covers; region: says where its centre is."""
+class MatteTrack(tracking.Track):
+    """Tracks what a matte covers."""
 
-    @lru_cache(2)  # a step looks at two frames, of which one was looked at before
-    def covered(frame: int) -> np.ndarray:
-        return cover(frame, footage.size)
+    def __init__(self, region: Subject, cover: Cover) -> None:
+        """region: says where its centre is"""
+        super().__init__(region)
+        self._covers = lru_cache(2)(cover)  # a step looks at two frames, of which one was looked at before
 
-    return _MatteTrack(region, covered, footage, motion, {*frames, *anchors}).both_ways(start, frames, anchors)
-
-
-class _MatteTrack(tracking.Track):
-    def __init__(
-        self,
-        region: Subject,
-        cover: Callable[[int], np.ndarray],
-        footage: Footage,
-        motion: Motion,
-        frames: Collection[int],
-    ) -> None:
-        super().__init__(region, footage, motion, frames)
-        self._cover = cover
+    def _cover(self, frame: int) -> np.ndarray:
+        return self._covers(frame, self._footage.size)
 
     def _check(self, frame: int) -> None:
         if not (self._cover(frame) > _INSIDE).any():
@@ -96,7 +74,7 @@ class _MatteTrack(tracking.Track):
 class _Pursuit:
     """The motion of what a matte covers, from one frame to those after it."""
 
-    def __init__(self, cover: Covered, footage: Footage, frame: int, motion: Motion) -> None:
+    def __init__(self, cover: Callable[[int], np.ndarray], footage: Footage, frame: int, motion: Motion) -> None:
         self._cover, self._footage, self._way = cover, footage, motion
         self._last, self._motion, self.reason = frame, Similarity(), COVERED
 
@@ -133,13 +111,9 @@ def moved(
         return None
     grid = flow.grid(*first.shape)
     there = grid + flow.fine_vectors(first, second)
-    here = there + flow.look(flow.fine_vectors(second, first), there, cv2.INTER_LINEAR)
+    here = there + flow.look(flow.fine_vectors(second, first), there)
     inside = before > _INSIDE
-    held = (
-        inside
-        & (flow.look(after, there, cv2.INTER_LINEAR) > 0.5)
-        & (np.hypot(*np.moveaxis(here - grid, -1, 0)) < _BACK * unit)
-    )
+    held = inside & (flow.look(after, there) > 0.5) & (np.hypot(*np.moveaxis(here - grid, -1, 0)) < _BACK * unit)
     chosen = np.flatnonzero(held)
     if chosen.size < _FEWEST:
         return None

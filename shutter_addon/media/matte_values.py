@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Hashable
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -47,45 +48,32 @@ class MatteValues:
                 self._sources.pop(file).close()
         known, self._made = dict(self._made), []
         for matte in mattes:
-            key = self._content_key(matte.content, index), matte.feather, matte.invert, block
-            self._made.append((key, known[key] if key in known else self._values(matte, index, block)))
+            content, read = self._content(matte.content, index)
+            key = content, matte.feather, matte.invert, block
+            self._made.append((key, known[key] if key in known else self._values(matte, read(), block)))
         return list(self._made)
 
-    def _content_key(self, content: Content, index: int) -> Hashable:
+    def _content(self, content: Content, index: int) -> tuple[Hashable, Callable[[], np.ndarray]]:
+        """A key of what a matte shows at a frame of the source, and what gives it; its file is opened."""
         if not isinstance(content, FileFrame):
-            return content
-        frame = self._frame(content, index)
-        return content.file, frame, self._stands_in(content.file, frame) is not None
-
-    def _stands_in(self, file: MatteFile, frame: int) -> CarriedMattes | None:
-        """What has a matte that stands in for that of a frame; None: its own is taken."""
+            return content, partial(content.values, *self._size)
+        file, late = content.file, self._late
+        if file not in self._sources:
+            self._sources[file] = file.open()
         source = self._sources[file]
-        if self._late is None or not isinstance(source, CarriedMattes) or source.has(frame):
-            return None
-        return source
+        frame = min(max(content.index(source, index // self._step), 0), source.count - 1)
+        if late is None or not isinstance(source, CarriedMattes) or source.has(frame):
+            return (file, frame, False), partial(source.read, frame)
 
-    def _frame(self, content: FileFrame, index: int) -> int:
-        """The frame of its file, which is opened."""
-        if content.file not in self._sources:
-            self._sources[content.file] = content.file.open()
-        source = self._sources[content.file]
-        return min(max(content.index(source, index // self._step), 0), source.count - 1)
+        def straight() -> np.ndarray:
+            late(file, frame)
+            return source.straight(frame)
 
-    def _values(self, matte: Matte, index: int, block: int) -> np.ndarray:
-        if isinstance(matte.content, FileFrame):
-            frame = self._frame(matte.content, index)
-            values = fitted(self._read(matte.content.file, frame), *self._size)
-        else:
-            values = matte.content.values(*self._size)
-        values = feathered(values, matte.feather * self._size[1])
+        return (file, frame, True), straight
+
+    def _values(self, matte: Matte, shown: np.ndarray, block: int) -> np.ndarray:
+        values = feathered(fitted(shown, *self._size), matte.feather * self._size[1])
         return block_means(1 - values if matte.invert else values, block)
-
-    def _read(self, file: MatteFile, frame: int) -> np.ndarray:
-        source = self._stands_in(file, frame)
-        if source is None or self._late is None:
-            return self._sources[file].read(frame)
-        self._late(file, frame)
-        return source.straight(frame)
 
     def close(self) -> None:
         """Closes the files; they are opened again when they are needed."""

@@ -7,9 +7,8 @@ from functools import partial
 import numpy as np
 
 from ..core import stopping, threads
-from ..core.frames.frame_source import FrameSource
+from ..core.frames.frame_source import FrameSource, SourceWrapper
 from ..core.frames.planes import Decoded, as_rgba
-from ..core.frames.source_wrapper import SourceWrapper
 from .errors import MediaError
 
 _PATIENCE = 0.1  # seconds between two looks at whether a frame is still wanted

@@ -5,9 +5,8 @@ from functools import cached_property
 
 import numpy as np
 
-from ..core.frames.frame_source import FrameSource
+from ..core.frames.frame_source import FrameSource, SourceWrapper
 from ..core.frames.light import to_linear
-from ..core.frames.source_wrapper import SourceWrapper
 from ..core.pixels.matte_grid import block_sums
 from .errors import MediaError
 from .opencv import cv2

@@ -1,27 +1,35 @@
 """The moments between the frames of footage, found by optical flow as they are read: smooth exposures of any footage.
 
 Whatever a pair of frames needs is found when its first moment is read, which the thread that decodes ahead does
-(prefetch). No moment is kept on disk, but vectors may be (stored_vectors).
+(prefetch). No moment is kept on disk, but vectors may be (derived.StoredVectors).
 """
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
-from ..core.frames.frame_source import FrameSource
-from ..core.frames.moments import Moment
-from ..core.frames.planes import Decoded, as_rgba
-from ..core.frames.source_wrapper import SourceWrapper
+from ..core.frames.frame_source import FrameSource, SourceWrapper
+from ..core.frames.planes import Decoded, Moment, as_rgba
 from ..core.memo import Kept
 from ..core.model.motions import Similarity
 from ..core.model.shutters import MAX_WINDOW
 from . import flow, opencv, steps
+from .cuts import may_be_cut
+from .derived import StoredVectors
 from .errors import MediaError
 from .files import check_index
-from .repeats import MOST, Repeats
-from .stored_vectors import StoredVectors
 
 SMOOTH = 1, 2, 4, 8, 16  # moments from a filmed frame to the next
+MOST = 4  # equal frames in a row; more are a still shot
+# Levels of 255 by which a patch changes most: repeats by 0 to 2.8 after H.264 of CRF 18 to 28, with grain as without;
+# what moves on either side by at least as much, and TIMES as much as the repeats.
+REPEATED, TIMES = 3.0, 3.0
+
+_ROWS, _PATCH = 68, 3  # of the pictures that are compared; across and down, as grain goes in a mean
+_PICTURES, _CHANGES = 4, 1024  # that are kept
+
 _PAIRS = 8  # of neighbouring frames, spread over the footage, that "auto" looks at
 _FRAMES = MOST + 2  # frames that are kept: those that say what repeats
 _THIRDS = 256  # moments that stand for those of a gap of three frames, as their number has to be a power of two
@@ -40,6 +48,57 @@ class _Recent(SourceWrapper):
     def close(self) -> None:
         self._frames.clear()
         self._source.close()
+
+
+class Repeats:
+    """Which frames of a source repeat the one before.
+
+    What it says of a frame depends on MOST + 1 frames on each side alone. Of the source, which keeps what it has read
+    last, it reads the neighbours, and more where something seems to repeat."""
+
+    def __init__(self, source: FrameSource) -> None:
+        self._source = source
+        self._pictures: Kept[int, np.ndarray] = Kept()
+        self._changes: Kept[int, float] = Kept()
+
+    def gap(self, index: int) -> tuple[int, int]:
+        """The two frames between which the moments behind a frame lie: itself and the next one; where frames repeat
+        around it, the first of these and the next that is another, of the same shot."""
+        first, stop = index, index + 1
+        while stop - first <= MOST and self._change(first) <= REPEATED:
+            first -= 1
+        while stop - first <= MOST and self._change(stop) <= REPEATED:
+            stop += 1
+        if not 1 < stop - first <= MOST:
+            return index, index + 1
+        moves = max(REPEATED, TIMES * max(self._change(i) for i in range(first + 1, stop)))
+        is_repeated = self._change(first) > moves and moves < self._change(stop) < math.inf
+        return (first, stop) if is_repeated else (index, index + 1)
+
+    def _change(self, index: int) -> float:
+        """By how many levels a frame differs from the one before; infinitely where that is none, or of another shot;
+        "not a number" where that cannot be told."""
+        if index == 0:
+            return math.inf
+        try:
+            return self._changes.ask(index, lambda: self._found(index), _CHANGES)
+        except MediaError:  # who needs these frames is told
+            return math.nan
+
+    def _found(self, index: int) -> float:
+        if index == self._source.count:
+            return math.inf
+        before, after = self._picture(index - 1), self._picture(index)
+        if may_be_cut(*(np.dstack([picture] * 3) for picture in (before, after))):
+            return math.inf
+        return float(np.abs(opencv.cv2.blur(after - before, (_PATCH, _PATCH))).max())
+
+    def _picture(self, index: int) -> np.ndarray:
+        """A frame in grey (h, w) float32, small."""
+        source = self._source
+        return self._pictures.ask(
+            index, lambda: flow.of_rows(source.read(index), source, _ROWS).astype(np.float32), _PICTURES
+        )
 
 
 class SmoothSource(SourceWrapper):

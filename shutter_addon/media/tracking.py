@@ -13,6 +13,7 @@ from typing import Protocol
 import numpy as np
 
 from ..core.model import motions, scribbles
+from ..core.model.effect import Region, Subject
 from ..core.model.motions import Motion, Placement, Similarity
 from . import registration
 from .errors import MediaError
@@ -55,45 +56,6 @@ class Tracked:
     fault: str = ""
 
 
-class Subject(Protocol):
-    """What is tracked: as effect.Region and effect.Camera, whole frames alone."""
-
-    def placement(self, frame: int, /) -> Placement: ...
-
-    def centre(self, frame: int, /) -> np.ndarray | None: ...
-
-
-class Drawn(Subject, Protocol):
-    """A subject that has strokes."""
-
-    def at(self, frame: int, /) -> scribbles.Shape: ...
-
-
-def follow(
-    region: Drawn,
-    footage: Footage,
-    start: int,
-    frames: range,
-    *,
-    motion: Motion = "scale",
-    anchors: Collection[int] = (),
-) -> Iterator[Tracked]:
-    """Where a region is at frames of the timeline, if it moves with what it covers at `start`: that frame itself, then
-    those behind it, then those before it.
-
-    region: its drawings are evaluated at all of the frames; location, rotation and scale at `start` and at anchors
-    frames: all that may be tracked, `start` among them
-    motion: what changes beside the location: "rotation", or "scale" and rotation
-    anchors: frames whose placement is right as it is. Tracking ends at the nearest one on each side; what lies between
-    comes a second time then, blended with what is tracked back from there. What the region covers is compared with what
-    it covers there, so that a frame in which something lies over the subject does not count as its look: anchors beyond
-    `frames` are of use, too.
-    A direction that ends early ends with a Tracked that has a fault; where a gap is left on the way to an anchor, there
-    is one on each side of it. TrackingError: nothing can be tracked from there.
-    MediaError, while it goes on: a frame cannot be read."""
-    return _RegionTrack(region, footage, motion, {*frames, *anchors}).both_ways(start, frames, anchors)
-
-
 class Pursuit(Protocol):
     """What is looked for in one frame after another.
 
@@ -106,16 +68,45 @@ class Pursuit(Protocol):
 
 
 class Track(ABC):
-    """What tracking a subject, a region or the camera, needs to know."""
+    """How a subject is tracked, a region or the camera; for one `follow`."""
 
-    def __init__(self, subject: Subject, footage: Footage, motion: Motion, frames: Collection[int]) -> None:
-        """frames: all at which the subject's centre is asked for."""
-        self._subject, self._footage, self._motion = subject, footage, motion
-        centres = {frame: subject.centre(frame) for frame in frames}
+    def __init__(self, subject: Subject) -> None:
+        """subject: its placement is evaluated at the frame that tracking starts from, and at anchors."""
+        self._subject = subject
+        self._parts: dict[int, tuple[Part, float]] = {}
+
+    def follow(
+        self,
+        footage: Footage,
+        start: int,
+        frames: range,
+        *,
+        motion: Motion = "scale",
+        anchors: Collection[int] = (),
+    ) -> Iterator[Tracked]:
+        """Where it is at frames of the timeline, if it moves with what it covers at `start`: that frame itself, then
+        those behind it, then those before it.
+
+        frames: all that may be tracked, `start` among them
+        motion: what changes beside the location: "rotation", or "scale" and rotation
+        anchors: frames whose placement is right as it is. Tracking ends at the nearest one on each side; what lies
+        between comes a second time then, blended with what is tracked back from there. What a region covers is compared
+        with what it covers there, so that a frame in which something lies over the subject does not count as its look:
+        anchors beyond `frames` are of use, too.
+        A direction that ends early ends with a Tracked that has a fault; where a gap is left on the way to an anchor,
+        there is one on each side of it. TrackingError, at once: nothing can be tracked from there.
+        MediaError, while it goes on: a frame cannot be read."""
+        self._footage, self._motion = footage, motion
+        centres = {frame: self._subject.centre(frame) for frame in {*frames, *anchors}}
         self._centres = {frame: centre for frame, centre in centres.items() if centre is not None}
         if len(self._centres) < len(centres):
             raise TrackingError(EMPTY)
-        self._parts: dict[int, tuple[Part, float]] = {}
+        if start not in frames:
+            raise TrackingError(NOT_SHOWN)
+        if len(frames) < 2:
+            raise TrackingError(ALONE)
+        self._check(start)
+        return self._both_ways(start, range(min(frames), max(frames) + 1), {*anchors} - {start})
 
     def part(self, frame: int) -> tuple[Part, float]:
         """What is seen of the subject at a frame, and how surely its corners are those of the subject, up to 1.
@@ -135,15 +126,6 @@ class Track(ABC):
     @abstractmethod
     def _pursuit(self, start: int) -> tuple[int, Pursuit, float]:
         """The frame whose look is searched for from `start` on, the pursuit of it, and what that is worth."""
-
-    def both_ways(self, start: int, frames: range, anchors: Collection[int]) -> Iterator[Tracked]:
-        """As `follow`. TrackingError, at once: nothing can be tracked from there."""
-        if start not in frames:
-            raise TrackingError(NOT_SHOWN)
-        if len(frames) < 2:
-            raise TrackingError(ALONE)
-        self._check(start)
-        return self._both_ways(start, range(min(frames), max(frames) + 1), {*anchors} - {start})
 
     def _both_ways(self, start: int, frames: range, anchors: set[int]) -> Iterator[Tracked]:
         yield Tracked(frame=start, placement=self._subject.placement(start), confidence=1.0)
@@ -232,10 +214,10 @@ class Track(ABC):
             yield Tracked(frame=missing, placement=replace(straight, location=(x, y)), confidence=0.0)
 
 
-class _RegionTrack(Track):
-    """Tracks what a region covers."""
+class RegionTrack(Track):
+    """Tracks what a region covers, whose drawings are evaluated at all of the frames."""
 
-    _subject: Drawn
+    _subject: Region
 
     def _part(self, frame: int) -> tuple[Part, float]:
         """Corners far from the region are less surely its own; those of a pattern may be those of its next period."""

@@ -16,7 +16,7 @@ from support import read_picture, recipe, write_frames
 
 from shutter_addon.blender.editing import add_effect
 from shutter_addon.media import MediaError, open_source
-from shutter_addon.media.completeness import whole_pictures
+from shutter_addon.media.rendered_pictures import whole_pictures
 
 STILL = recipe(4, [1, 0, 0, 0])
 

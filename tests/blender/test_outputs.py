@@ -13,7 +13,7 @@ import pytest
 from support import read_picture, recipe, small_disk, write_frames
 
 from shutter_addon.media import open_source
-from shutter_addon.media.completeness import whole_pictures
+from shutter_addon.media.rendered_pictures import whole_pictures
 
 ROOT = Path(__file__).parents[2]
 STILL = recipe(1, [1])

@@ -11,7 +11,7 @@ from support import effect_of, image_strip, read_picture, recipe, write_frames
 from shutter_addon.blender import handlers, rendering
 from shutter_addon.blender.data import source_media, strips
 from shutter_addon.blender.rendering import render_job, sessions
-from shutter_addon.media.completeness import whole_pictures
+from shutter_addon.media.rendered_pictures import whole_pictures
 
 ROOT = Path(__file__).parents[2]
 BROKEN = 4

@@ -76,7 +76,7 @@ def check(case: Case, devices: dict, folder: Path) -> dict:
     """How far each device is off, as {device: (picture, coefficients)}. DifferenceError: too far; what differs is left
     in the folder."""
     from shutter_addon.compute.renderer import Renderer
-    from shutter_addon.core.frames.source_wrapper import SourceWrapper
+    from shutter_addon.core.frames.frame_source import SourceWrapper
     from shutter_addon.media import open_source
     from shutter_addon.media.matte_values import MatteValues
 
@@ -299,7 +299,7 @@ def exact_layers(case: Case, source, footage, index: int, direction: int) -> dic
 
 def matte_file(folder: Path, source, region):
     """What the product reads for a matte region of a recipe in that folder, or for the luminance of its source."""
-    from shutter_addon.media.matte_files import MatteFile
+    from shutter_addon.media.opening import MatteFile
 
     content = region.content
     return MatteFile(folder / content.path, content.channel) if hasattr(content, "path") else MatteFile(source.path)

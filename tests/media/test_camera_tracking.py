@@ -69,7 +69,8 @@ def lasso(count):
 def tracked(source, regions=(), start=0, camera=STILL_CAMERA, **options):
     """The placements by frame, and the faults by frame."""
     footage = Footage(source, lambda frame: frame)
-    found = list(camera_tracking.follow_camera(camera, regions, footage, start, range(source.count), **options))
+    track = camera_tracking.CameraTrack(camera, regions)
+    found = list(track.follow(footage, start, range(source.count), **options))
     return {f.frame: f for f in found if not f.fault}, {f.frame: f.fault for f in found if f.fault}
 
 

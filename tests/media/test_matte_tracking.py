@@ -78,8 +78,13 @@ def covers(cover):
     return lambda frame, _size: cover(frame)
 
 
+def follow(cover, start, frames):
+    track = matte_tracking.MatteTrack(Still(), covers(cover))
+    return list(track.follow(Footage(), start, frames, motion="location"))
+
+
 def test_from_frame_to_frame():
-    steps = list(matte_tracking.follow_cover(Still(), covers(lambda frame: scene(frame)[1]), Footage(), 4, range(9)))
+    steps = follow(lambda frame: scene(frame)[1], 4, range(9))
     places = {step.frame: np.multiply(step.placement.location, SIZE) for step in steps}
     assert sorted(places) == list(range(9))
     for frame, (x, y) in places.items():
@@ -92,8 +97,8 @@ def test_it_ends_where_there_is_no_matte():
         matte = scene(frame)[1]
         return matte if frame < 6 else 0 * matte
 
-    steps = list(matte_tracking.follow_cover(Still(), covers(cover), Footage(), 4, range(4, 40)))
+    steps = follow(cover, 4, range(4, 40))
     assert [step.frame for step in steps] == [4, 5, 6]
     assert steps[-1].fault == "the subject has left the picture"
     with pytest.raises(matte_tracking.TrackingError, match="the outline encloses nothing here"):
-        list(matte_tracking.follow_cover(Still(), covers(cover), Footage(), 6, range(4, 40)))
+        follow(cover, 6, range(4, 40))

@@ -11,7 +11,7 @@ from OpenImageIO import ImageOutput, ImageSpec
 
 from shutter_addon.media import MediaError, open_source
 from shutter_addon.media.image_writing import write_exr
-from shutter_addon.media.matte_files import MatteFile, MatteSource
+from shutter_addon.media.opening import MatteFile
 
 LEVEL = 1 / 255
 SIZE = WIDTH, HEIGHT = 36, 20
@@ -409,7 +409,7 @@ def test_a_channel_that_a_later_frame_lacks(tmp_path):
     for n, name in enumerate(["Sharp", "Soft"]):
         save_image(tmp_path / f"m_{n}.exr", noise(), "half", names=[name])
     with (
-        MatteSource(tmp_path / "m_0.exr", "Sharp") as matte,
+        MatteFile(tmp_path / "m_0.exr", "Sharp").open() as matte,
         pytest.raises(MediaError, match=r"^m_1\.exr: has no channel Sharp, but Soft$"),
     ):
         matte.read(1)

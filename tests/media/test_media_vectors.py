@@ -8,12 +8,12 @@ from test_media_flow import off, pan
 from test_media_smooth import Panned
 
 from shutter_addon.core.frames.planes import as_rgba
-from shutter_addon.media import MediaError, flow, stored_vectors
+from shutter_addon.media import MediaError, derived, flow
+from shutter_addon.media.derived import StoredVectors
 from shutter_addon.media.smooth import SmoothSource
-from shutter_addon.media.stored_vectors import StoredVectors
 
 STEPS = 4
-NAMES = stored_vectors._CHANNELS  # a file with others is none of ours
+NAMES = derived._CHANNELS  # a file with others is none of ours
 
 
 @pytest.fixture
@@ -84,11 +84,11 @@ def emptied(path):
 
 
 def infinite(path):
-    stored_vectors.write_halves(path, np.full((24, 40, 6), np.inf, np.float16), NAMES)
+    derived.write_exr(path, np.full((24, 40, 6), np.inf, np.float16), NAMES)
 
 
 def of_another_size(path):
-    stored_vectors.write_halves(path, np.zeros((24, 41, 6), np.float16), NAMES)
+    derived.write_exr(path, np.zeros((24, 41, 6), np.float16), NAMES)
 
 
 @pytest.mark.parametrize("damage", [cut_short, flipped, emptied, infinite, of_another_size])
@@ -135,7 +135,7 @@ def test_where_nothing_can_be_written_nothing_is_kept(folder, monkeypatch, error
         tried.append(1)
         raise error
 
-    monkeypatch.setattr(stored_vectors, "write_halves", full)
+    monkeypatch.setattr(derived, "write_exr", full)
     np.testing.assert_array_equal(read(folder), read())
     assert tried == [1]
 

@@ -2,8 +2,7 @@
 
 import numpy as np
 
-from shutter_addon.core.frames.frame_source import FrameSource
-from shutter_addon.core.frames.source_wrapper import SourceWrapper
+from shutter_addon.core.frames.frame_source import FrameSource, SourceWrapper
 from shutter_addon.media import PrefetchSource, open_source
 from shutter_addon.media.cuts import ShotSource
 from shutter_addon.media.smooth import SmoothSource

@@ -122,7 +122,7 @@ def followed(source, kind, start, frames=None, **options):
     footage = Footage(source, lambda frame: frame)
     given = region(kind) if "region" not in options else options.pop("region")
     tracked, faults = {}, {}
-    for found in tracking.follow(given, footage, start, frames or range(source.count), **options):
+    for found in tracking.RegionTrack(given).follow(footage, start, frames or range(source.count), **options):
         if found.fault:
             faults[found.frame] = found.fault
         else:
@@ -401,7 +401,7 @@ def test_the_order_of_reading_and_threads_change_no_bit(subject, ground, tmp_pat
         footage = Footage(source, lambda frame: frame)
         for frame in (13, 3, 8, 0):
             footage.picture(frame)
-        again = list(tracking.follow(region("lasso"), footage, 6, range(14)))
+        again = list(tracking.RegionTrack(region("lasso")).follow(footage, 6, range(14)))
     finally:
         cv2.setNumThreads(threads)
     assert again == list(first[0].values())
@@ -417,7 +417,8 @@ def test_what_a_retimed_strip_shows_is_tracked(subject, ground):
     """Reversed, every frame twice."""
     source, truth = film(subject, ground, lambda t: (3 * t, 0, t), 8, 7)
     footage = Footage(source, lambda frame: 7 - (frame - 100) // 2)
-    tracked = {each.frame: each for each in tracking.follow(region("line"), footage, 100, range(100, 116))}
+    found = tracking.RegionTrack(region("line")).follow(footage, 100, range(100, 116))
+    tracked = {each.frame: each for each in found}
     shown = {frame: truth[7 - (frame - 100) // 2] for frame in tracked}
     assert sorted(tracked) == list(range(100, 116))
     assert max(errors(tracked, shown, "line").values()) <= 1
@@ -480,7 +481,7 @@ def test_what_cannot_be_tracked_is_one_sentence(subject, given, start, frames, f
     flat = np.random.default_rng(0).normal(128, 2, (3, HEIGHT, WIDTH, 3)).round().astype(np.uint8)
     source = Film(list(flat) if given.pop("flat", False) else [subject] * 3)
     with pytest.raises(tracking.TrackingError) as raised:
-        tracking.follow(region("line", **given), Footage(source, lambda frame: frame), start, frames)
+        tracking.RegionTrack(region("line", **given)).follow(Footage(source, lambda frame: frame), start, frames)
     assert str(raised.value) == fault
 
 

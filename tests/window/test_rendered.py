@@ -10,7 +10,7 @@ import pytest
 from screens import TOLERANCE, apart_on_screen, assert_alike, pixels
 from telling import ROOT, linked, needs_window, tell
 
-from shutter_addon.media.completeness import whole_pictures
+from shutter_addon.media.rendered_pictures import whole_pictures
 
 pytestmark = needs_window
 

@@ -15,8 +15,8 @@ from ...core.farm import job_file
 from ...core.model.effect import Effect
 from ...core.model.keyframes import Constant
 from ...core.recipes import recipe
-from ...media.completeness import is_whole_blend, why_short
-from ...media.matte_files import MatteFile
+from ...media.opening import MatteFile
+from ...media.rendered_pictures import is_whole_blend, why_short
 from ..data import missing_media, preferences, versions
 from ..devices import available
 from ..editing import new_edit, saved_edit

@@ -107,14 +107,14 @@ def _followed(
         what = Footage(shots, shown.__getitem__), arguments.frame, frames
         if index is None:
             regions = [region for region in effect.regions if isinstance(region, Region)]
-            found = camera_tracking.follow_camera(subject, regions, *what, motion=arguments.motion)
+            track: tracking.Track = camera_tracking.CameraTrack(subject, regions)
         elif isinstance(subject, OutlineRegion):
             cover = _cover(arguments, source_recipe, subject, shown, step, ends)
-            found = matte_tracking.follow_cover(subject, cover, *what, motion=arguments.motion)
+            track = matte_tracking.MatteTrack(subject, cover)
         else:
-            found = tracking.follow(subject, *what, motion=arguments.motion)
+            track = tracking.RegionTrack(subject)
         tracked = []
-        for each in found:
+        for each in track.follow(*what, motion=arguments.motion):
             tracked.append(each)
             moved()
     stops = [each for each in tracked if each.fault]

@@ -20,7 +20,7 @@ from ...core.model.keyframes import Channel
 from ...media import MediaError
 from ...media.carried_mattes import FOLDER, CarriedFile
 from ...media.files import stamp
-from ...media.matte_files import MatteFile
+from ...media.opening import MatteFile
 from ...media.sequence import sequence_files
 from . import mask_reading, matte_strips, source_media, strip_timing, strips, validation
 from .external_files import absolute

@@ -14,7 +14,7 @@ from ...core import revision
 from ...core.messages import UserError, translated
 from ...core.model import keyframes
 from ...core.model.mattes import FileFrames
-from ...media.matte_files import MatteFile
+from ...media.opening import MatteFile
 from . import matte_strips, snapshot
 
 

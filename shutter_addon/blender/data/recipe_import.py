@@ -19,7 +19,7 @@ from ...core.model.fields import fields_of
 from ...core.model.scribbles import mapped
 from ...media import MediaError
 from ...media.files import check_name
-from ...media.matte_files import MatteFile
+from ...media.opening import MatteFile
 from ...media.sequence import IMAGE_SUFFIXES
 from . import fcurves, geometry, strips
 from .annotations import add_stroke, annotation, picture_size

@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 
 import bpy
@@ -127,12 +128,12 @@ class SourceSpec:
         medium = open_source(self.path, files=self.files, divisor=divisor, **self.options)
         if proxy is None:
             return medium
-        space = self.options["colorspace"]
-        if not (proxy.of_images and self.files):
-            return with_proxy(medium, proxy.path, colorspace=space, config=self.options["config"])
-        files = [strip_proxies.of_image(proxy.path, file) for file in self.files]
-        # Blender has converted them to the sequencer's colour space, but for data.
-        return with_proxy(medium, proxy.path, files=files, colorspace="Non-Color" if space == "Non-Color" else None)
+        how = {name: self.options[name] for name in ("colorspace", "config")}
+        if proxy.of_images and self.files:
+            files = [strip_proxies.of_image(proxy.path, file) for file in self.files]
+            # Blender has converted them to the sequencer's colour space, but for data.
+            how = {"files": files, "colorspace": "Non-Color" if how["colorspace"] == "Non-Color" else None}
+        return with_proxy(medium, partial(open_source, proxy.path, **how))
 
 
 def spec(strip: Strip, key: tuple | None = None) -> SourceSpec:

@@ -233,19 +233,20 @@ def lost(effect: PropertyGroup, index: int | None) -> tuple[int, str] | None:
 def _subject(
     scene: Scene, effect: PropertyGroup, strip: Strip, index: int | None, frames: Sequence[int], here: Tracked
 ) -> tuple[Region | Camera, Callable]:
-    """A region or the camera as plain data, and what follows it: a function as tracking.follow behind its region."""
+    """A region or the camera as plain data, and what follows it: a function as tracking.Track.follow."""
     if index is None:
         camera = _standing(snapshot.camera_at(scene, effect, frames), here)
         drawn = [i for i, region in enumerate(effect.regions) if region.kind not in strips.MATTES]
         left_out = [snapshot.region_at(scene, effect, strip, i, frames) for i in drawn]
-        return camera, partial(camera_tracking.follow_camera, camera, left_out)
+        return camera, camera_tracking.CameraTrack(camera, left_out).follow
     shape = _standing(snapshot.region_at(scene, effect, strip, index, frames), here)
     if strips.is_carried(effect.regions[index]):
         carried = snapshot.carried_outline(scene, effect, strip, index, frames)
         return shape, partial(matte_tracking.follow_carried, shape, *carried)
     if effect.regions[index].kind == "OUTLINE":
-        return shape, partial(matte_tracking.follow_cover, shape, matte_tracking.cover_within(shape.drawings.at))
-    return shape, partial(tracking.follow, shape)
+        cover = matte_tracking.cover_within(shape.drawings.at)
+        return shape, matte_tracking.MatteTrack(shape, cover).follow
+    return shape, tracking.RegionTrack(shape).follow
 
 
 def _standing(moving: Any, here: Tracked) -> Any:
@@ -259,8 +260,8 @@ def _standing(moving: Any, here: Tracked) -> Any:
 
 
 def _followed(follow: Callable, patience: float | None) -> Iterator[Tracked | None]:
-    """What `follow` gives, a function as tracking.follow, found by a thread beside Blender (threads.beside); its
-    sentences are in the user's language."""
+    """What `follow` gives, a tracking.Track.follow with all it takes, found by a thread beside Blender
+    (threads.beside); its sentences are in the user's language."""
     with translated(rpt_):
         try:
             with closing(threads.beside(_each(follow), patience)) as steps:

@@ -25,9 +25,9 @@ from ...core.messages import EffectError
 from ...core.stopping import StoppedError
 from ...media import film_parts, image_writing, pyav, rendered_pictures
 from ...media.blender_movie import frame_rate
-from ...media.completeness import is_whole_movie, is_whole_picture
+from ...media.derived import own_folder, refuse_link
 from ...media.errors import MediaError
-from ...media.folder import own_folder, refuse_link
+from ...media.rendered_pictures import is_whole_movie, is_whole_picture
 from ..data import colour_configuration, effect_version, snapshot, source_media, strips
 from ..rendering import pictures, sessions
 from . import film_output

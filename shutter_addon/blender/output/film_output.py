@@ -16,7 +16,7 @@ from bpy.types import ImageFormatSettings, RenderSettings, Scene
 
 from ...core import atomic_write
 from ...core.messages import UserError, of_file
-from ...media.completeness import is_whole_movie, is_whole_picture, whole_pictures, why_short
+from ...media.rendered_pictures import is_whole_movie, is_whole_picture, whole_pictures, why_short
 from ..data import strips
 from ..data.property_copy import for_a_while
 from ..rendering import render_job

@@ -15,9 +15,9 @@ from ...core.model.frame_state import Options
 from ...devices.device import NoDeviceError
 from ...media import MediaError
 from ...media.cuts import ShotSource
+from ...media.derived import VECTORS, StoredVectors
 from ...media.prefetch import PrefetchSource
 from ...media.smooth import SmoothSource, steps_for
-from ...media.stored_vectors import FOLDER, StoredVectors
 from ..data.snapshot import Snapshot
 from ..data.source_media import SourceSpec
 from ..data.strip_proxies import Proxy
@@ -107,7 +107,7 @@ class SourceKey:
         if self.steps == 1:
             return ShotSource(PrefetchSource(medium, planes=planes))
         try:
-            vectors = None if self.folder is None else StoredVectors(self.folder / FOLDER, keeps)
+            vectors = None if self.folder is None else StoredVectors(self.folder / VECTORS, keeps)
             smooth = SmoothSource(medium, self.steps, vectors, skip_repeats=self.skip_repeats)
             return ShotSource(PrefetchSource(smooth, planes=True), self.steps)
         except FAULTS:

@@ -1,4 +1,5 @@
-"""Frames as movies hold them: luma and subsampled chroma, and the RGB that libswscale makes of them, to the bit."""
+"""Frames as they are quickest to have: of movies luma and subsampled chroma, and the RGB that libswscale makes of them,
+to the bit; of a moment between two filmed frames the two, and where what they show lies in between."""
 
 from __future__ import annotations
 
@@ -8,7 +9,9 @@ from typing import TypeAlias
 
 import numpy as np
 
-from .moments import Moment
+STEP = 4  # pixels between two vectors of a moment
+UNIT = 32  # of a vector's coordinates, in a pixel
+ZERO = 1 << 15  # what a coordinate of 0 is stored as
 
 # Of the matrices, by the numbers of ITU-T H.273: red of Cr, blue of Cb, green of Cb and of Cr, which is taken away; in
 # libswscale's units of 1/65536 for samples of limited range. Where a file names none, it is BT.601.
@@ -104,6 +107,33 @@ def _chroma_places(chosen: slice, length: int) -> np.ndarray:
     """The samples of chroma that pixels have, of so many along an axis."""
     step = chroma_step(length)
     return (np.arange(length)[chosen] * step + step // 2) >> 16
+
+
+@dataclass(frozen=True)
+class Moment:
+    """A moment between two frames.
+
+    Attributes:
+        pair: numbers of the two frames among filmed ones: neighbours, but where those between repeat the first
+        ends: the two frames (H, W, 4), of a FrameSource's type
+        number, steps: how many of so many moments after the first frame it is
+        vectors: uint16 (⌈H / STEP⌉, ⌈W / STEP⌉, 4). For every STEPth pixel: x and y of the way from the first frame to
+            the second that passes there, in 1 / UNIT of a pixel from ZERO; and how surely the first and the second show
+            what goes it, 0 to 255. Between these pixels they are bilinear.
+        rgba: makes the frame, as FrameSource.read gives it
+    """
+
+    pair: tuple[int, int]
+    ends: tuple[np.ndarray, np.ndarray]
+    number: int
+    steps: int
+    vectors: np.ndarray
+    rgba: Callable[[], np.ndarray]
+
+    @property
+    def nbytes(self) -> int:
+        """Bytes that it takes; its frames are shared by all moments of the pair."""
+        return self.vectors.nbytes + sum(end.nbytes for end in self.ends) // self.steps
 
 
 Decoded: TypeAlias = np.ndarray | Planes | Moment  # what FrameSource.decoded gives
