@@ -75,7 +75,7 @@ def _keys(
 
 
 def _in_mask(points: np.ndarray, size: tuple[int, int]) -> np.ndarray:
-    """Points (..., 2) in mask space (core.masks.mask), of fractions of the picture."""
+    """Points (..., 2) in mask space (core.model.masks), of fractions of the picture."""
     return (points - 0.5) * np.array(size) / max(size) + 0.5
 
 
