@@ -15,7 +15,7 @@ from bpy.types import PropertyGroup, Scene, Strip
 from ...core.messages import EffectError
 from ...core.model import keyframes, mattes, outlines
 from ...core.model.clip import Clip
-from ...core.model.effect import Moves, PlacedRamp
+from ...core.model.effect import Moves, placed_ramp
 from ...core.model.keyframes import Channel
 from ...media import MediaError
 from ...media.carried_mattes import FOLDER, CarriedFile
@@ -38,7 +38,7 @@ def content(
     if region.kind == "RAMP":
         ramp = validation.word(region, "ramp")
         if ramp != "LUMINANCE":
-            return PlacedRamp(ramp.lower(), moves)
+            return placed_ramp(ramp.lower(), moves)
         return mattes.FileFrames(file=_of_strip(strips.source_of(scene, effect, strip), "luminance"))
     matte = validation.word(region, "matte")
     if matte == "STRIP":

@@ -178,8 +178,8 @@ def _add_region(
         if region.kind == "RAMP":
             _set_fields(scene, region, path, source.content, first)
     _set_fields(scene, region, path, source, first)
-    if isinstance(source, model.Region | model.OutlineRegion):
-        region.layer = _draw(effect, strip, source, shutter.color, first)
+    if source.drawings:
+        region.layer = _draw(effect, strip, source, source.drawings, shutter.color, first)
     _set_moves(scene, region, path, source.moves, first)
 
 
@@ -212,13 +212,15 @@ def _set_moves(scene, moving, path: str, moves: model.Moves, first: float, **cur
     _set_keys(scene, f"{path}.scale", 0, location, scale.values, first, **curve)
 
 
-def _draw(effect, strip, source: model.Region | model.OutlineRegion, color: Sequence[float], first: float) -> str:
+def _draw(
+    effect, strip, source: model.AnyRegion, drawings: model.Drawings, color: Sequence[float], first: float
+) -> str:
     """Draws a region's strokes on an annotation layer of its own, a frame per drawing; the layer's name."""
     layer = annotation(effect).layers.new(source.name or data_("Region"), set_active=False)
     layer.color = color
     to_image = geometry.picture_to_image(strip, picture_size(effect))
     is_keyed = isinstance(source.moves.location, keyframes.Keys)
-    for frame, strokes in zip(source.drawings.frames, source.drawings.strokes, strict=True):
+    for frame, strokes in zip(drawings.frames, drawings.strokes, strict=True):
         drawing = layer.frames.new(int((frame if is_keyed else 1) + first))
         for points in strokes:
             add_stroke(drawing, mapped(to_image, points))

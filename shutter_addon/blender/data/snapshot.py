@@ -376,7 +376,7 @@ def _any_region(sampling: _Sampling, index: int, shutter: int) -> model.Region |
 def _outlines(sampling: _Sampling, region: PropertyGroup, drawings: model.Drawings) -> keyframes.Channel:
     """The content of an outline. EffectError, MediaError: there is no source."""
     if validation.word(region, "between") == "STRAIGHT":
-        return model.DrawnOutlines(drawings)
+        return model.drawn_outlines(drawings)
     return mattes.FileFrames(file=_carried(sampling, drawings))
 
 
