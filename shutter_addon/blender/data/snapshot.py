@@ -358,7 +358,7 @@ def _any_region(sampling: _Sampling, index: int, shutter: int) -> model.Region |
     kind: type[model.MatteRegion] = model.MatteRegion
     drawn: dict = {}
     if region.kind == "OUTLINE":
-        drawings = sampled.drawings(curves, path, effect, region, sampling.placement, None)
+        drawings = _drawings(sampling, index)
         kind, drawn = model.OutlineRegion, {"drawings": drawings}
         content = sampled.tried(_outlines, sampling, region, drawings)
     else:
