@@ -9,7 +9,7 @@ from bpy.app.translations import pgettext_rpt as rpt_
 from bpy.types import Context, Mask, MaskSpline, PropertyGroup, Scene, Strip
 
 from ...core.messages import EffectError
-from ...core.model import outline_chains, outlines
+from ...core.model import outlines
 from ...core.model.keyframes import Ease
 from ...media.outlining import traced
 from ..data import annotations, fcurves, mask_reading, snapshot, strips
@@ -32,7 +32,7 @@ def to_mask(context: Context, of: tuple[Scene, PropertyGroup, Strip], index: int
     last = int(snapshot.last_shown(scene, effect, strip))
     mask = bpy.data.masks.new(effect.regions[index].name)
     mask.frame_start, mask.frame_end = 1, max(last, keys[-1][0]) + 1
-    chains = outline_chains.chains(keys, size[0] / size[1])
+    chains = outlines.chains(keys, size[0] / size[1])
     try:
         with _mask_editor(context, mask):
             for number, chain in enumerate(chains, 1):
@@ -79,7 +79,7 @@ def _in_mask(points: np.ndarray, size: tuple[int, int]) -> np.ndarray:
     return (points - 0.5) * np.array(size) / max(size) + 0.5
 
 
-def _add_layer(mask: Mask, name: str, chain: outline_chains.Chain, size: tuple[int, int]) -> None:
+def _add_layer(mask: Mask, name: str, chain: outlines.Chain, size: tuple[int, int]) -> None:
     """A layer of one spline, which is there from its first frame on until it is gone."""
     layer = mask.layers.new(name=name)
     layer.blend, layer.alpha = "DIFFERENCE", 1.0  # Blender's own begin with 0 where a script makes them
@@ -103,7 +103,7 @@ def _place(spline: MaskSpline, points: np.ndarray) -> None:
         spline.points.foreach_set(name, flat)
 
 
-def _insert_keys(context: Context, mask: Mask, chains: list[outline_chains.Chain], size: tuple[int, int]) -> None:
+def _insert_keys(context: Context, mask: Mask, chains: list[outlines.Chain], size: tuple[int, int]) -> None:
     """Blender gives shape keys to selected layers, at its current frame."""
     edited = context.window.scene
     with for_a_while([(edited, "frame_current", edited.frame_current)]):
@@ -152,7 +152,7 @@ def _drawn_frames(scene: Scene, effect: PropertyGroup, strip: Strip, mask: Mask)
 def _in_order(shapes: dict[int, outlines.Curves], aspect: float) -> dict[int, outlines.Curves]:
     """Curves by frame, so that those go into each other, as they go straight from drawing to drawing, that belong
     together: those first that are there all the time."""
-    chains = outline_chains.chains(sorted(shapes.items()), aspect)
+    chains = outlines.chains(sorted(shapes.items()), aspect)
     chains.sort(key=lambda chain: -len(chain.frames))
     return {
         frame: outlines.curves([chain.points[chain.frames.index(frame)] for chain in chains if frame in chain.frames])
