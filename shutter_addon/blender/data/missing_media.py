@@ -10,7 +10,7 @@ from bpy.types import ID, Scene, Strip
 from ...core.frames import frame_ranges
 from ...media import MediaError, open_source
 from ...media.files import check_file, check_sound
-from . import external_files, requirements, strips, used_data
+from . import external_files, requirements, strips
 
 
 def faults(scene: Scene, frames: range, *, sources: bool) -> list[str]:
@@ -20,7 +20,7 @@ def faults(scene: Scene, frames: range, *, sources: bool) -> list[str]:
 
     sources: those of effects, too, as far as the sources are shown themselves"""
     sentences = _of_strips(scene, frames, strips.SOURCES, sources=sources)
-    used, data = used_data.used(scene, frames) - _clips(scene), bpy.data
+    used, data = requirements.used_data(scene, frames) - _clips(scene), bpy.data
     for items in (data.images, data.volumes, data.cache_files, data.movieclips, data.fonts):
         sentences += [_words(item, fault) for item in items if item in used for fault in _of_item(item)]
     sentences += [_words(library, fault) for library in data.libraries for fault in _of_item(library)]
