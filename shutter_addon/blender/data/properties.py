@@ -26,8 +26,7 @@ from ...core.model.frame_state import Options
 from ...core.model.limits import MAX_BAR, MAX_FRAME
 from . import consistency, selection
 from .consistency import changed
-from .field_properties import with_fields
-from .region_properties import MOVING, ShutterCamera, ShutterRegion, choice
+from .region_properties import MOVING, ShutterCamera, ShutterRegion, choice, with_fields
 
 
 def _renamed(shutter: PropertyGroup, new: str, old: str, _is_set: bool) -> str:
