@@ -16,8 +16,7 @@ from ...core.messages import EffectError, UserError
 from ...core.model.choices import CONTEXT, RAMPS, READOUT_UNITS, READS, SIDES
 from ...core.model.limits import MAX_CHANNEL
 from ..data import matte_strips, recipe_import, selection, strips
-from ..editing import collection_edits, outline_masks, region_edits, rolling_shutter
-from ..editing import time_map as time_maps
+from ..editing import collection_edits, outline_masks, region_edits, rolling_shutter, shutter_edits
 from ..output import matte_export
 from . import needs
 from .operator_bases import OfEffect, chosen_file, kept, operator
@@ -140,7 +139,7 @@ def _why_no_time_map(effect: PropertyGroup) -> str | None:
 @operator("Time Map", needs.a_shutter, _why_no_time_map, ramp=_RAMP)
 def time_map(self: Operator, _context: Context, effect: PropertyGroup) -> None:
     """Show every pixel at its own moment: a ramp from the first of the frames to the last (slit-scan)"""
-    time_maps.add(effect, self.ramp)
+    shutter_edits.add_time_map(effect, self.ramp)
 
 
 def _why_no_repair(effect: PropertyGroup) -> str | None:
