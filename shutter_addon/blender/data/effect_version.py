@@ -8,7 +8,7 @@ from collections.abc import Callable, Hashable, Iterable, Iterator
 from dataclasses import replace
 
 import numpy as np
-from bpy.types import FCurve, Mask, PropertyGroup, Scene, Strip, bpy_struct
+from bpy.types import FCurve, Mask, PropertyGroup, Scene, Strip
 
 from ...core import revision
 from ...core.frames.retiming import StripTiming
@@ -25,6 +25,7 @@ from . import (
     mask_reading,
     matte_content,
     matte_strips,
+    property_copy,
     snapshot,
     source_media,
     strip_timing,
@@ -165,19 +166,7 @@ def _curve(curve: FCurve, start: int | None) -> Iterator[Hashable]:
         yield numbers(points, "easing", np.int32).tobytes()
         yield tuple(numbers(points, name).tobytes() for name in ("back", "amplitude", "period"))
     for modifier in curve.modifiers:
-        yield repr(_plain(modifier))
-
-
-def _plain(modifier: bpy_struct) -> list:
-    """All that it is, in plain data."""
-    plain: list = []
-    for prop in modifier.bl_rna.properties:
-        value = getattr(modifier, prop.identifier)
-        if prop.type == "COLLECTION":
-            plain += [_plain(item) for item in value]
-        elif prop.type != "POINTER":
-            plain.append((prop.identifier, tuple(value) if getattr(prop, "is_array", False) else value))
-    return plain
+        yield repr(property_copy.plain(modifier))
 
 
 def _strokes(effect: PropertyGroup, region: PropertyGroup, start: int | None) -> Iterator[Hashable]:
