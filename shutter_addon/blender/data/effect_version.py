@@ -28,7 +28,6 @@ from . import (
     property_copy,
     snapshot,
     source_media,
-    strip_timing,
     strips,
     versions,
 )
@@ -203,7 +202,7 @@ def _mask(mask: Mask) -> Iterator[Hashable]:
 
 def timing(strip: Strip, start: int = 0) -> StripTiming:
     """How a movie, image or clip strip lies on the timeline, whatever it is called and wherever it was cut."""
-    lies = strip_timing.timing_of(strip)
+    lies = source_media.timing_of(strip)
     begins, ends = lies.content_start - start, lies.content_end - start
     return replace(lies, name="", left_handle=0, content_start=begins, content_end=ends)
 

@@ -22,7 +22,7 @@ from ...media.carried_mattes import FOLDER, CarriedFile
 from ...media.files import stamp
 from ...media.matte_files import MatteFile
 from ...media.sequence import sequence_files
-from . import mask_reading, matte_strips, source_media, strip_timing, strips, validation
+from . import mask_reading, matte_strips, source_media, strips, validation
 from .external_files import absolute
 from .sampled import Frames, over
 
@@ -116,7 +116,7 @@ def shown_frame(scene: Scene, effect: PropertyGroup, strip: Strip, time: Channel
     """What gives the source's frame that an effect strip shows at a timeline frame: filmed ones counted from 0, those
     between them in parts. time: see `content`. EffectError, MediaError: it cannot be known."""
     source = strips.source_of(scene, effect, strip)
-    spec, timing = source_media.spec(source), time or strip_timing.timing_of(source)
+    spec, timing = source_media.spec(source), time or source_media.timing_of(source)
     filmed, fps = (len(spec.files), None) if spec.files else _movie(spec)
     size = 0, 0  # nothing of it is in pixels
     clip = Clip(*size, filmed, fps=fps, timing=timing).stepped(_MOMENTS if effect.inbetween != "1" else 1)
@@ -134,7 +134,7 @@ def _movie(spec: source_media.SourceSpec) -> tuple[int, Fraction | None]:
 def _strip_frames(strip: Strip, region: PropertyGroup, frames: Frames) -> Channel:
     parts, word = matte_strips.parts_for(region, strip), channel(region)
     shown = {
-        part.name: mattes.FileFrames(file=_of_strip(part, word), timing=strip_timing.timing_of(part)) for part in parts
+        part.name: mattes.FileFrames(file=_of_strip(part, word), timing=source_media.timing_of(part)) for part in parts
     }
     if len(parts) == 1:
         return shown[parts[0].name]

@@ -28,7 +28,6 @@ from ...media.carried_mattes import CarriedFile
 from . import matte_content, sampled, source_media, strips, validation
 from .fcurves import Curves, leading, progress
 from .sampled import Frames
-from .strip_timing import timing_of
 
 # Sentences of core/model/effect.py, which are looked up where they are passed on.
 _CORE = (
@@ -78,7 +77,7 @@ def take(scene: Scene, effect: PropertyGroup, strip: Strip, frames: Frames) -> S
         frames=frozenset(frames),
         effect=read(scene, effect, strip, frames),
         source=source_media.spec(source),
-        timing=None if effect.use_source_time else timing_of(source),
+        timing=None if effect.use_source_time else source_media.timing_of(source),
         blended="" if strip.blend_type == "REPLACE" or source.mute else scene.sequencer_colorspace_settings.name,
         folder=Path(bpy.data.filepath).parent if bpy.data.filepath else None,
     )

@@ -1,4 +1,5 @@
-"""The medium of a source strip: what it is, opened as shutter_addon.media has it."""
+"""The medium of a source strip: what it is, opened as shutter_addon.media has it; and how the strip lies on the
+timeline, with its retiming keys, of which Blender's Python API gives a part."""
 
 from __future__ import annotations
 
@@ -8,20 +9,30 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 import bpy
+import numpy as np
 from bpy.app.translations import pgettext_rpt as rpt_
 from bpy.types import Strip
 
 from ...core.frames.frame_source import FrameSource
+from ...core.frames.retiming import RetimingKey, StripTiming, are_retiming_keys
 from ...core.memo import Kept
 from ...media import MediaError, open_source
 from ...media.files import stamp
 from ...media.opening import with_proxy
 from ...media.sequence import by_number
 from . import external_files, strip_proxies
+from .struct_dna import LayoutError, memory, read, record, text
 
 _AT_ONCE = 100  # files of a sequence, which may be long, that one look asks, beside the first and the last
 _REST = 1.0  # seconds from one look at them to the next: on a network's drive a look takes a while
 _KEPT = 256
+_TIMES = (
+    *("name", "content_start", "content_end", "content_trim_start", "content_trim_end", "left_handle"),
+    *("use_reverse_frames", "strobe"),
+)
+# Records of Blender's memory, as struct_dna.record takes them.
+_SEQUENCE = ("char name[64]", "S64"), ("SeqRetimingHandle *retiming_handles", "u8"), ("int retiming_handle_num", "i4")
+_KEY = ("double strip_frame_index", "f8"), ("int flag", "i4"), ("float retiming_factor", "f4")
 
 
 @dataclass
@@ -206,3 +217,35 @@ def _clip_files(strip: Strip) -> tuple[int, Callable[[int], Path]]:
     if clip.source == "MOVIE" or beside is None:
         return 1, lambda _i: path
     return max(clip.frame_duration, 1), lambda i: beside(clip.frame_offset + i)
+
+
+def timing_of(strip: Strip) -> StripTiming:
+    """The timing of a source strip, as plain data."""
+    render = strip.id_data.render
+    keys = retiming_keys(strip)
+    is_known = keys is not None
+    if keys is None:
+        even = RetimingKey(0.0, 0, 0.0), RetimingKey(strip.content_end - strip.content_start, 0, 1.0)
+        keys = even if len(getattr(strip, "retiming_keys", ())) > 1 else ()
+    return StripTiming(
+        first=first_frame(strip) if strip.type == "MOVIECLIP" else 0,
+        scene_fps=render.fps / render.fps_base,
+        keys=keys,
+        is_known=is_known,
+        **{name: getattr(strip, name) for name in _TIMES},
+    )
+
+
+def retiming_keys(strip: Strip) -> tuple[RetimingKey, ...] | None:
+    """The strip's retiming keys from Blender's memory. Python gets their frames alone, in Blender 5.2 as if the strip
+    began with the first one of the edit, and of a clip strip nothing at all. None: they cannot be read."""
+    try:
+        name, first, count = read(record("Sequence", *_SEQUENCE), strip.as_pointer())
+        kind = record("SeqRetimingHandle", *_KEY)
+    except LayoutError:
+        return None
+    if text(name)[2:] != strip.name.encode():  # behind the letters SQ
+        return None
+    stored = np.frombuffer(memory(first, count * kind.itemsize), kind) if count else ()
+    keys = tuple(RetimingKey(*key.tolist()) for key in stored)
+    return keys if are_retiming_keys(keys) else None

@@ -22,7 +22,6 @@ from ...media.cuts import ShotSource
 from ..data import sampled, snapshot, source_media, strips, validation
 from ..data.consistency import bars
 from ..data.fcurves import Curves
-from ..data.strip_timing import timing_of
 from . import bar_edits, collection_edits, shutter_edits
 
 SMOOTH = "8"  # of effects that were not smooth
@@ -104,7 +103,7 @@ def _is_backward(scene: Scene, effect: PropertyGroup, strip: Strip) -> bool:
     if effect.use_source_time:
         time = sampled.source_time(Curves(scene), effect.path_from_id(), effect, (frame,))
         return bool(time.at(frame)[1])
-    return bool(timing_of(strips.source_of(scene, effect, strip)).use_reverse_frames)
+    return bool(source_media.timing_of(strips.source_of(scene, effect, strip)).use_reverse_frames)
 
 
 def _begin(effect: PropertyGroup) -> PropertyGroup:
