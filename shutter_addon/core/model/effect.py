@@ -19,11 +19,11 @@ from numpy.typing import ArrayLike
 from ..messages import EffectError
 from . import combining, keyframes, limits, mattes, motions, outlines, scribbles, shutters
 from .choices import BETWEEN, BLENDS, CHANNELS, COMBINES, CONTEXT, LENGTHS, MOTIONS, RAMPS, TIMINGS
-from .drawings import Drawings as Drawings
 from .fields import MISSING, choice, color, number, switch, text, whole
 from .frame_state import FrameState
 from .keyframes import Bars, Channel
 from .motions import Placement
+from .scribbles import Drawings as Drawings
 
 Length = Literal["frames", "timeline", "motion"]
 _CLOSED = 'shutter "{name}" at frame {frame}: {fault}'
