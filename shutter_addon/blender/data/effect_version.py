@@ -18,7 +18,6 @@ from ...core.model.fields import fields_of
 from ...core.model.frame_state import Options
 from ...media import MediaError
 from . import (
-    colour_configuration,
     external_files,
     fcurves,
     geometry,
@@ -58,7 +57,7 @@ def key(scene: Scene, effect: PropertyGroup, strip: Strip, frames: range) -> str
     rate = scene.render.fps / scene.render.fps_base
     digest = hashlib.sha256()
     for part in (
-        (versions.extension(), colour_configuration.name(), rate, frames, picture_size(effect)),
+        (versions.extension(), versions.colours(), rate, frames, picture_size(effect)),
         (None if effect.use_source_time else timing(source, start), _contents(source)),
         *_settings(effect),
         *parts(scene, effect, strip, _contents, start),
