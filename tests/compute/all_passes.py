@@ -15,7 +15,7 @@ from shutter_addon.compute import (
     window,
 )
 from shutter_addon.compute.composition_passes import LightFormat, composition
-from shutter_addon.core.model.combining import Combine
+from shutter_addon.core.model.frame_state import Combine
 from shutter_addon.devices.passes import Pass, read_pass
 
 _WAYS = ("frames", "search", "value")

@@ -17,10 +17,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..messages import EffectError
-from . import combining, keyframes, limits, mattes, motions, outlines, scribbles, shutters
+from . import keyframes, limits, mattes, motions, outlines, scribbles, shutters
 from .choices import BETWEEN, BLENDS, CHANNELS, COMBINES, CONTEXT, LENGTHS, MOTIONS, RAMPS, TIMINGS
 from .fields import MISSING, choice, color, number, switch, text, whole
-from .frame_state import FrameState
+from .frame_state import Combine, FrameState, Mode
 from .keyframes import Bars, Channel
 from .motions import Placement
 from .scribbles import Drawings as Drawings
@@ -303,7 +303,7 @@ class Shutter:
         precision=3,
         recipe="",
     )
-    combine: combining.Mode = choice(
+    combine: Mode = choice(
         "Combine", "What the frames that are exposed become", COMBINES, default="average", told=False
     )
     by_luminance: bool = switch(
@@ -361,9 +361,9 @@ class Shutter:
                 return EffectError(OTHER_MOMENTS, name=self.name, first=numbers[0], last=numbers[1])
         return None
 
-    def combine_at(self, frame: float) -> combining.Combine:
+    def combine_at(self, frame: float) -> Combine:
         threshold = float(self.threshold.at(frame)) if self.use_threshold else None
-        return combining.Combine.of(self.combine, self.by_luminance, threshold, float(self.softness.at(frame)))
+        return Combine.of(self.combine, self.by_luminance, threshold, float(self.softness.at(frame)))
 
 
 MatteFiles = Callable[[MatteRegion], mattes.MatteFile]
