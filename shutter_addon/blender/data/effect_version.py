@@ -23,7 +23,6 @@ from . import (
     geometry,
     mask_reading,
     matte_content,
-    matte_strips,
     property_copy,
     snapshot,
     source_media,
@@ -180,7 +179,7 @@ def _matte(region: PropertyGroup, files: Files, start: int | None) -> Iterator[H
     try:
         if region.matte == "IMAGE":
             yield files(region)
-        for part in matte_strips.strips_of(region) if region.matte == "STRIP" else ():
+        for part in matte_content.strips_of(region) if region.matte == "STRIP" else ():
             yield part.left_handle - (start or 0), part.right_handle - (start or 0)
             yield timing(part, start or 0)
             yield files(part)

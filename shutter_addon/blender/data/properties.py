@@ -30,7 +30,7 @@ from ...core.model.choices import CONTEXT, FOLLOWED, FOLLOWS, KINDS, MATTE_SOURC
 from ...core.model.fields import Field, fields_of
 from ...core.model.frame_state import Options
 from ...core.model.limits import MAX_BAR, MAX_CHANNEL, MAX_DEGREES, MAX_DISTANCE, MAX_FRAME, MAX_NAME, MAX_SCALE
-from . import consistency, matte_strips, selection
+from . import consistency, matte_content, selection
 from .consistency import changed
 
 KEYED = {"ANIMATABLE"}  # as properties are where nothing else is said
@@ -206,8 +206,8 @@ class ShutterRegion(_Tracked, PropertyGroup):
     strip_name: StringProperty(
         name="Strip",
         description="Strip that is the matte",
-        get=matte_strips.strip_name,
-        set=matte_strips.choose_strip,
+        get=matte_content.strip_name,
+        set=matte_content.choose_strip,
         options={"SKIP_SAVE"},
     )
     mask: PointerProperty(name="Mask", description="Mask that is the matte", type=bpy.types.Mask, update=changed)

@@ -15,7 +15,7 @@ from bpy_extras.io_utils import ImportHelper
 from ...core.messages import EffectError, UserError
 from ...core.model.choices import CONTEXT, RAMPS, READOUT_UNITS, READS, SIDES
 from ...core.model.limits import MAX_CHANNEL
-from ..data import matte_strips, recipe_import, selection, strips
+from ..data import matte_content, recipe_import, selection, strips
 from ..editing import collection_edits, outline_masks, region_edits, rolling_shutter, shutter_edits
 from ..output import matte_export
 from . import needs
@@ -60,7 +60,7 @@ STRIP = EnumProperty(name="Strip", items=_strips, translation_context=contexts.n
 def matte_strip(self: Operator, _context: Context, effect: PropertyGroup) -> None:
     """Make a movie, image or clip strip of the edit the matte of the active shutter, muted or not"""
     region = region_edits.add_region(effect, selection.active_shutter(effect), "MATTE", self.strip, matte="STRIP")
-    matte_strips.choose_strip(region, self.strip)
+    matte_content.choose_strip(region, self.strip)
 
 
 @kept

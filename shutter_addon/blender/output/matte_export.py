@@ -21,7 +21,7 @@ from ...core.recipes import recipe
 from ...media.image_writing import write_exr, write_grey
 from ...media.matte_values import MatteValues
 from ...media.sequence import sequence_files
-from ..data import matte_content, matte_strips, recipe_export, snapshot, source_media, strips, validation
+from ..data import matte_content, recipe_export, snapshot, source_media, strips, validation
 from ..rendering import effect_source
 
 
@@ -77,7 +77,7 @@ def _read(scene: Scene, effect: PropertyGroup, strip: Strip, regions: list) -> I
         if region.kind == "MATTE" and region.matte == "IMAGE":
             yield matte_content.image_path(region)
         elif region.kind == "MATTE" and region.matte == "STRIP":
-            yield from (source_media.spec(part).path for part in matte_strips.parts_for(region, strip))
+            yield from (source_media.spec(part).path for part in matte_content.parts_for(region, strip))
 
 
 def _spare(folders: list[Path | None], read: Iterator[Path]) -> None:
