@@ -16,7 +16,7 @@ from ...core.messages import EffectError, UserError
 from ...core.model.choices import CONTEXT, RAMPS, READOUT_UNITS, READS, SIDES
 from ...core.model.limits import MAX_CHANNEL
 from ..data import matte_content, recipe_import, selection, strips
-from ..editing import collection_edits, outline_masks, region_edits, rolling_shutter, shutter_edits
+from ..editing import collection_edits, outline_drawings, region_edits, rolling_shutter, shutter_edits
 from ..output import matte_export
 from . import needs
 from .operator_bases import OfEffect, chosen_file, kept, operator
@@ -90,7 +90,7 @@ def matte_mask(self: Operator, _context: Context, effect: PropertyGroup) -> None
 def outline_from_mask(self: Operator, _context: Context, effect: PropertyGroup) -> None:
     """Make an outline of the active shutter that is drawn at each key of a mask"""
     shutter = selection.active_shutter(effect)
-    outline_masks.from_mask(self.edit, effect, self.effect_strip, shutter, _chosen(self.mask))
+    outline_drawings.from_mask(self.edit, effect, self.effect_strip, shutter, _chosen(self.mask))
 
 
 def _why_not_laid(effect: PropertyGroup) -> str | None:
