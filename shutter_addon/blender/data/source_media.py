@@ -1,5 +1,6 @@
 """The medium of a source strip: what it is, opened as shutter_addon.media has it; and how the strip lies on the
-timeline, with its retiming keys, of which Blender's Python API gives a part."""
+timeline, where Blender's sequencer keeps its proxies, and its retiming keys, of which Blender's Python API gives a
+part."""
 
 from __future__ import annotations
 
@@ -11,7 +12,7 @@ from pathlib import Path
 import bpy
 import numpy as np
 from bpy.app.translations import pgettext_rpt as rpt_
-from bpy.types import Strip
+from bpy.types import Scene, Strip
 
 from ...core.frames.frame_source import FrameSource
 from ...core.frames.retiming import RetimingKey, StripTiming, are_retiming_keys
@@ -20,7 +21,7 @@ from ...media import MediaError, open_source
 from ...media.files import stamp
 from ...media.opening import with_proxy
 from ...media.sequence import by_number
-from . import external_files, strip_proxies
+from . import external_files
 from .struct_dna import LayoutError, memory, read, record, text
 
 _AT_ONCE = 100  # files of a sequence, which may be long, that one look asks, beside the first and the last
@@ -121,6 +122,18 @@ def reading(strip: Strip) -> tuple:
 
 
 @dataclass(frozen=True)
+class Proxy:
+    """What previews of one size read in place of a strip's footage.
+
+    path: a movie; of_images: a folder with a picture for each of the strip's
+    stamp: tells files that were built anew"""
+
+    path: Path
+    of_images: bool
+    stamp: tuple
+
+
+@dataclass(frozen=True)
 class SourceSpec:
     """What a source strip reads, and how: plain data, equal where it gives the same frames.
 
@@ -132,7 +145,7 @@ class SourceSpec:
     files: tuple[Path, ...] | None = field(compare=False)
     options: dict = field(compare=False)
 
-    def open(self, divisor: int = 1, proxy: strip_proxies.Proxy | None = None) -> FrameSource:
+    def open(self, divisor: int = 1, proxy: Proxy | None = None) -> FrameSource:
         """The medium, as Blender would show it; divisor: of media.open_source; proxy: what frames are read from, where
         it fits. MediaError: it cannot be read."""
         medium = open_source(self.path, files=self.files, divisor=divisor, **self.options)
@@ -141,7 +154,7 @@ class SourceSpec:
         space = self.options["colorspace"]
         if not (proxy.of_images and self.files):
             return with_proxy(medium, proxy.path, colorspace=space, config=self.options["config"])
-        files = [strip_proxies.of_image(proxy.path, file) for file in self.files]
+        files = [of_image(proxy.path, file) for file in self.files]
         # Blender has converted them to the sequencer's colour space, but for data.
         return with_proxy(medium, proxy.path, files=files, colorspace="Non-Color" if space == "Non-Color" else None)
 
@@ -249,3 +262,46 @@ def retiming_keys(strip: Strip) -> tuple[RetimingKey, ...] | None:
     stored = np.frombuffer(memory(first, count * kind.itemsize), kind) if count else ()
     keys = tuple(RetimingKey(*key.tolist()) for key in stored)
     return keys if are_retiming_keys(keys) else None
+
+
+def proxy_of(scene: Scene, strip: Strip, percent: int) -> Proxy | None:
+    """What Blender reads of a strip in previews of that size, in percent; None: the footage itself."""
+    if strip.type not in ("MOVIE", "IMAGE") or not strip.use_proxy or not getattr(strip.proxy, f"build_{percent}"):
+        return None
+    by_strip = scene.sequence_editor.proxy_storage == "PER_STRIP"
+    if by_strip and strip.proxy.use_proxy_custom_file:
+        return _proxy(_absolute(strip.proxy.filepath))
+    if strip.type == "MOVIE":
+        movie = external_files.absolute(strip, strip.filepath)
+        stream = f"_st{strip.stream_index}" if strip.stream_index else ""
+        return _proxy(_folder(scene, strip, movie.parent) / movie.name / f"proxy_{percent}{stream}.avi")
+    if scene.sequencer_colorspace_settings.name != "sRGB":  # what Blender keeps its pictures in
+        return None
+    folder = _folder(scene, strip, external_files.absolute(strip, strip.directory)) / "images" / str(percent)
+    ends = strip.elements[0], strip.elements[-1]
+    return _proxy(folder, *(of_image(folder, element.filename) for element in ends))
+
+
+def of_image(folder: Path, image: str | Path) -> Path:
+    """The proxy of an image file, by its name or path."""
+    return folder / f"{Path(image).name}_proxy.jpg"
+
+
+def _folder(scene: Scene, strip: Strip, beside: Path) -> Path:
+    """Where the strip's proxies lie; beside: the folder of its footage."""
+    if scene.sequence_editor.proxy_storage == "PROJECT":
+        return _absolute(scene.sequence_editor.proxy_dir or "//BL_proxy")
+    if strip.proxy.use_proxy_custom_directory:
+        return _absolute(strip.proxy.directory)
+    return beside / "BL_proxy"
+
+
+def _proxy(path: Path, *files: Path) -> Proxy | None:
+    """files: those of a folder that are looked at. None: one is missing."""
+    stamps = tuple(map(stamp, files or (path,)))
+    return None if None in stamps else Proxy(path, bool(files), stamps)
+
+
+def _absolute(path: str) -> Path:
+    """Blender finds folders of proxies from the file that is open, wherever their strip is from."""
+    return Path(bpy.path.abspath(path))
