@@ -147,23 +147,19 @@ def _below(path: str, curves: Iterable[_Curve]) -> list[_Curve]:
 def _curves(curves: Iterable[_Curve], start: int | None) -> Iterator[Hashable]:
     for path, index, curve in curves:
         yield path, index, curve.mute, curve.extrapolation
-        yield from _curve(curve, start)
-
-
-def _curve(curve: FCurve, start: int | None) -> Iterator[Hashable]:
-    points = curve.keyframe_points
-    for name in ("handle_left", "co", "handle_right"):
-        places = numbers(points, name, size=2)
-        if start is not None:  # floats of other frames are others
-            places[:, 0] = np.round(places[:, 0] - start, 2) + 0.0
-        yield places.tobytes()
-    interpolations = numbers(points, "interpolation", np.int32)
-    yield interpolations.tobytes()
-    if max(interpolations.tolist(), default=0) > _BEZIER:  # one of those that have parameters
-        yield numbers(points, "easing", np.int32).tobytes()
-        yield tuple(numbers(points, name).tobytes() for name in ("back", "amplitude", "period"))
-    for modifier in curve.modifiers:
-        yield repr(property_copy.plain(modifier))
+        points = curve.keyframe_points
+        for name in ("handle_left", "co", "handle_right"):
+            places = numbers(points, name, size=2)
+            if start is not None:  # floats of other frames are others
+                places[:, 0] = np.round(places[:, 0] - start, 2) + 0.0
+            yield places.tobytes()
+        interpolations = numbers(points, "interpolation", np.int32)
+        yield interpolations.tobytes()
+        if max(interpolations.tolist(), default=0) > _BEZIER:  # one of those that have parameters
+            yield numbers(points, "easing", np.int32).tobytes()
+            yield tuple(numbers(points, name).tobytes() for name in ("back", "amplitude", "period"))
+        for modifier in curve.modifiers:
+            yield repr(property_copy.plain(modifier))
 
 
 def _strokes(effect: PropertyGroup, region: PropertyGroup, start: int | None) -> Iterator[Hashable]:

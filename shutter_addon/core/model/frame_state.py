@@ -279,11 +279,10 @@ class FrameState:
 
         It scales linear light, as an aperture would: where encoded values are summed, it applies after decoding."""
         exposures = self.bars.sum(axis=1)
-        if self.options.exposure == "normalized":
-            return np.ones_like(exposures)
         gains = np.ones_like(exposures)
-        averaging = list(self.groups.get(AVERAGE, ()))
-        gains[averaging] = exposures[averaging] / (self.reference or exposures[0])
+        if self.options.exposure == "weighted":
+            averaging = list(self.groups.get(AVERAGE, ()))
+            gains[averaging] = exposures[averaging] / (self.reference or exposures[0])
         return gains
 
     @cached_property
