@@ -7,7 +7,7 @@ import pytest
 from OpenImageIO import ImageBuf
 from support import image_strip, recipe, request, write_frames
 
-from shutter_addon.blender.data import annotations, mask_reading, recipe_export, recipe_import, selection, snapshot
+from shutter_addon.blender.data import annotations, mask_reading, recipe_import, selection, snapshot
 from shutter_addon.blender.editing import add_effect, outline_drawings
 from shutter_addon.blender.rendering import outline_carrying, sessions
 from shutter_addon.core.frames import light
@@ -103,7 +103,7 @@ def test_drawings_stay_with_the_footage(edited):
 def test_out_and_in_again(edited, layer):
     said = region(1, 9, between="straight", layer=layer, invert=True, blend="add", opacity=0.5, width=0.125)
     strip, effect = edited(said)
-    (back,) = records.recipe_of(recipe_export.recipe_of(strip.id_data, effect, strip)).regions
+    (back,) = records.recipe_of(snapshot.recipe_of(strip.id_data, effect, strip)).regions
     parsed = recipe_file.parse(json.dumps(recipe(2, [1, 0], [0, 1], regions=[said], **OPTIONS)))
     expected = records.recipe_of(parsed).regions[0]
     assert (back.between, back.layer, back.invert, back.blend) == ("straight", layer, True, "add")
