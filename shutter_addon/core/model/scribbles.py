@@ -98,8 +98,7 @@ def transform(
     strokes = [np.asarray(s, dtype=np.float64) for s in strokes]
     if not strokes:
         return ()
-    points = np.concatenate(strokes)
-    centre = (points.min(axis=0) + points.max(axis=0)) / 2
+    centre = motions.centre(strokes)
     sin, cos = np.sin(np.radians(rotation)) * scale, np.cos(np.radians(rotation)) * scale
     turn = np.array([[cos, -sin / aspect], [sin * aspect, cos]])
     return tuple((s - centre) @ turn.T + centre + np.asarray(location, dtype=np.float64) for s in strokes)
