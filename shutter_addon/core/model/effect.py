@@ -19,7 +19,7 @@ from numpy.typing import ArrayLike
 from ..messages import EffectError
 from . import keyframes, limits, mattes, motions, outlines, scribbles, shutters
 from .choices import BETWEEN, BLENDS, CHANNELS, COMBINES, CONTEXT, LENGTHS, MOTIONS, RAMPS, TIMINGS
-from .fields import MISSING, choice, color, number, switch, text, whole
+from .fields import MISSING, choice, color, fixed, number, switch
 from .frame_state import Combine, FrameState, Mode
 from .keyframes import Bars, Channel
 from .motions import Placement
@@ -88,7 +88,7 @@ class AnyRegion(Subject):
     """Where a shutter holds. shutter: its index; layer: core.pixels.layering; drawings: of what is drawn, about whose
     centre it moves; None: it is no drawing, and moves about the picture's"""
 
-    name: str = text("Name", "Name of the region", default="Region", absent="", most=limits.MAX_NAME)
+    name: str = fixed("Name", "Name of the region", default="Region", absent="", most=limits.MAX_NAME)
     shutter: int
     opacity: Channel = number(
         "Opacity",
@@ -211,7 +211,7 @@ class FileContent:
         default="luminance",
         recipe="",
     )
-    offset: int = whole(
+    offset: int = fixed(
         "Offset",
         "Frames by which the matte is ahead",
         default=0,
@@ -273,7 +273,7 @@ class Shutter:
 
     follow: what its exposure moves with, None: nothing"""
 
-    name: str = text("Name", "Name of the shutter", default="Shutter", absent=MISSING, most=limits.MAX_NAME)
+    name: str = fixed("Name", "Name of the shutter", default="Shutter", absent=MISSING, most=limits.MAX_NAME)
     color: tuple[float, float, float] = color(
         "Color", "Color of the shutter's bars, scribbles and matte", default=(0.8, 0.8, 0.8)
     )
@@ -282,7 +282,7 @@ class Shutter:
     follow_motion: motions.Motion = choice(
         "Motion", "What of its motion is followed", MOTIONS, default="scale", context=CONTEXT, told=False
     )
-    follow_smooth: int = whole(
+    follow_smooth: int = fixed(
         "Smoothness",
         "Frames before and after each over which the motion is averaged, as the mass of a camera does: "
         "at 0 it is followed as it is",

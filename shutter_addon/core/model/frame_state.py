@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 
 from . import limits, scribbles, shutters
 from .choices import AGGREGATES, CONTEXT, EDGES, EXPOSURES, INTERPOLATIONS, LIGHTS, POSITIONS, SMOOTH
-from .fields import MISSING, choice, switch, whole
+from .fields import MISSING, choice, fixed, switch
 from .mattes import Matte
 
 Interpolation = Literal["displacement", "value"]
@@ -62,7 +62,7 @@ class Options:
     backward: whether the source plays in reverse, where the last of a filmed frame's moments is the frame itself
     """
 
-    window: int = whole(
+    window: int = fixed(
         "Frames",
         "Number of source frames that a shutter can expose",
         default=8,
@@ -113,7 +113,7 @@ class Options:
         keyed=True,
     )
     edge_aware: float = 0.0
-    plate_reach: int = whole(
+    plate_reach: int = fixed(
         "Background Search",
         "Frames before and after the shown one in which what lies behind layers is looked for, "
         "where no exposed frame shows it",
