@@ -60,8 +60,7 @@ from shutter_addon.compute.window import Frames
 from shutter_addon.core.frames import light
 from shutter_addon.core.frames.frame_source import FrameSource
 from shutter_addon.core.model import mattes, presets, scribbles, shutters
-from shutter_addon.core.model.combining import Combine
-from shutter_addon.core.model.frame_state import Following, FrameState, Layers, Options
+from shutter_addon.core.model.frame_state import Combine, Following, FrameState, Layers, Options
 from shutter_addon.core.pixels import combined, compositor
 from shutter_addon.devices.gl import GLDevice
 from shutter_addon.devices.passes import Pass, read_pass

@@ -10,7 +10,7 @@ import bpy
 import numpy as np
 from support import write_frames
 
-from shutter_addon.blender.data import matte_strips, recipe_import, strips
+from shutter_addon.blender.data import matte_content, recipe_import, strips
 from shutter_addon.blender.editing import add_effect, baked_strips
 from shutter_addon.blender.output import baked_film
 from shutter_addon.core.recipes import recipe_file
@@ -208,7 +208,7 @@ def _add_other_regions(scene: Any, effect: Any, footage: Path) -> None:
         point.co = place
     spline.use_cyclic = True
     cut.matte = "STRIP"
-    matte_strips.choose_strip(cut, "combined")
+    matte_content.choose_strip(cut, "combined")
     followed.kind = "LINE"
     followed.follow_clip = bpy.data.movieclips.load(str(footage / "f0001.png"))
     followed.follow_kind, followed.follow_object, followed.follow_track = "PLANE", "Camera", "Plane Track"

@@ -53,7 +53,6 @@ ROOMS = {
         "model": {"frames", *BASICS},
         "pixels": {"frames", "model", *BASICS},
         "recipes": {"frames", "model", *BASICS},
-        "masks": BASICS,
         "farm": BASICS,
     },
     "blender": {

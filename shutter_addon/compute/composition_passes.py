@@ -6,8 +6,7 @@ from functools import lru_cache
 import numpy as np
 
 from ..core.model import shutters
-from ..core.model.combining import AVERAGE, Combine
-from ..core.model.frame_state import FrameState, Options
+from ..core.model.frame_state import AVERAGE, Combine, FrameState, Options
 from ..devices.llvmpipe import MOST_ITERATIONS, frames_iterations
 from ..devices.passes import Pass, read_pass
 from .running_sums import Sums

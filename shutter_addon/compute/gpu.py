@@ -7,8 +7,7 @@ import numpy as np
 
 from ..core.frames.frame_source import FrameSource
 from ..core.model import windows
-from ..core.model.combining import AVERAGE, Combine
-from ..core.model.frame_state import Following, FrameState
+from ..core.model.frame_state import AVERAGE, Combine, Following, FrameState
 from ..core.pixels.shown_levels import Display
 from ..devices.device import Device, Given, NamedTextures, Texture
 from ..devices.llvmpipe import MOST_ITERATIONS, median_iterations

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from shutter_addon.blender.data import annotations, recipe_export, selection, snapshot
+from shutter_addon.blender.data import annotations, selection, snapshot
 from shutter_addon.blender.editing import drawn_places, outline_drawings, region_edits
 from shutter_addon.core.model import scribbles
 from shutter_addon.core.model.motions import Placement
@@ -130,7 +130,7 @@ def test_a_recipe_keeps_its_meaning(bpy, region):
     move(bpy, 1, Placement())
     move(bpy, 11, MOVES["all"])
     pen(bpy, 11, SECOND)
-    exported = recipe_export.recipe_of(*selection.active(bpy.context)).regions[0]
+    exported = snapshot.recipe_of(*selection.active(bpy.context)).regions[0]
     strokes, there = exported.drawings.strokes[exported.drawings.frames.index(11)], exported.placement(11)
     placed = scribbles.transform(strokes, there.location, there.rotation, there.scale, 640 / 360)
     assert same([points * (640, 360) - (320, 180) for points in placed], SECOND)

@@ -14,7 +14,7 @@ import pytest
 from support import recipe, sequencer, write_frames
 
 from shutter_addon.blender import command
-from shutter_addon.blender.data import colour_configuration, recipe_import, selection, versions
+from shutter_addon.blender.data import recipe_import, selection, versions
 from shutter_addon.blender.devices import available
 from shutter_addon.blender.editing import add_effect, bar_edits
 from shutter_addon.blender.interface import panel_parts
@@ -205,7 +205,7 @@ def test_an_edit_that_is_broken_beyond_all_that_is_foreseen_has_a_report(named, 
 
 
 def test_names_of_another_colour_configuration_are_somebodys(edit, monkeypatch):
-    monkeypatch.setattr(colour_configuration, "name", lambda: "0123abcd")
+    monkeypatch.setattr(versions, "colours", lambda: "0123abcd")
     assert "view (of another configuration), look (of another" in line(report(edit), "- Colors:")
 
 

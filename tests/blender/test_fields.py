@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from support import write_frames
 
-from shutter_addon.blender.data import effect_version, fcurves, recipe_export, snapshot, strips
+from shutter_addon.blender.data import effect_version, fcurves, snapshot, strips
 from shutter_addon.blender.data.property_copy import copy_properties
 from shutter_addon.blender.editing import region_edits
 from shutter_addon.core.model import effect as model
@@ -98,9 +98,7 @@ def test_a_field_counts_everywhere(whole, kind, name):
     assert (version() == was) == is_unseen
 
     if kind in EXPORTED:
-        exported = model_of(
-            recipe_export.recipe_of(scene, effect, strip, (model.RampContent(), model.FileContent("x.png")))
-        )
+        exported = model_of(snapshot.recipe_of(scene, effect, strip, (model.RampContent(), model.FileContent("x.png"))))
         value = getattr(exported.at(1) if kind is Options else exported, name)
         assert (value.at(1) if field.is_channel else value) == pytest.approx(other)
 

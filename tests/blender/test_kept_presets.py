@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from shutter_addon.blender.data import consistency, recipe_import, selection, strips
-from shutter_addon.blender.editing import bar_edits, layer_presets, reconcile, region_edits, shutter_edits, time_map
+from shutter_addon.blender.editing import bar_edits, layer_presets, reconcile, region_edits, shutter_edits
 from shutter_addon.core.model import presets, shutters
 from shutter_addon.core.model.frame_state import Options
 
@@ -55,7 +55,7 @@ def test_the_still_frame_is_the_shown_one(effect, smooth):
 
 
 def test_shutters_of_one_frame_stay_so(bpy, effect):
-    time_map.add(effect, "LINEAR")
+    shutter_edits.add_time_map(effect, "LINEAR")
     for window in (32, 2, 1, 256):
         effect.window = window
         by_name = {shutter.name: opened(effect, i) for i, shutter in enumerate(effect.shutters)}

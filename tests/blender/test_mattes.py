@@ -12,7 +12,7 @@ from support import effect_of, image_strip, read_picture, recipe, request, seque
 
 from shutter_addon.blender import command
 from shutter_addon.blender.data import geometry, matte_look, recipe_import, selection, snapshot, source_media, strips
-from shutter_addon.blender.editing import reconcile, time_map
+from shutter_addon.blender.editing import reconcile, shutter_edits
 from shutter_addon.blender.interface import region_gizmo
 from shutter_addon.blender.output import matte_export
 from shutter_addon.blender.rendering import invalidation, sessions
@@ -491,7 +491,7 @@ def test_a_mask_is_exported_as_pictures(shown, mask, tmp_path):
 def test_a_time_map_shows_each_column_at_its_moment(bpy, edit, shown):
     content = data(light="encoded", interpolation="value")
     _strip, effect, coefficients = shown(content | {"window": 9, "shutters": [{"name": "A", "bars": [1] * 9}]})
-    region_ = time_map.add(effect, "LINEAR")
+    region_ = shutter_edits.add_time_map(effect, "LINEAR")
     assert next(shutter.name for shutter in effect.shutters) == "First"
     assert region_.shutter == "Last"
     found = coefficients(2)

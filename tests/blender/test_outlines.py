@@ -7,8 +7,8 @@ import pytest
 from OpenImageIO import ImageBuf
 from support import image_strip, recipe, request, write_frames
 
-from shutter_addon.blender.data import annotations, mask_reading, recipe_export, recipe_import, selection, snapshot
-from shutter_addon.blender.editing import add_effect, outline_drawings, outline_masks
+from shutter_addon.blender.data import annotations, mask_reading, recipe_import, selection, snapshot
+from shutter_addon.blender.editing import add_effect, outline_drawings
 from shutter_addon.blender.rendering import outline_carrying, sessions
 from shutter_addon.core.frames import light
 from shutter_addon.core.model import outlines
@@ -103,7 +103,7 @@ def test_drawings_stay_with_the_footage(edited):
 def test_out_and_in_again(edited, layer):
     said = region(1, 9, between="straight", layer=layer, invert=True, blend="add", opacity=0.5, width=0.125)
     strip, effect = edited(said)
-    (back,) = records.recipe_of(recipe_export.recipe_of(strip.id_data, effect, strip)).regions
+    (back,) = records.recipe_of(snapshot.recipe_of(strip.id_data, effect, strip)).regions
     parsed = recipe_file.parse(json.dumps(recipe(2, [1, 0], [0, 1], regions=[said], **OPTIONS)))
     expected = records.recipe_of(parsed).regions[0]
     assert (back.between, back.layer, back.invert, back.blend) == ("straight", layer, True, "add")
@@ -283,7 +283,7 @@ def test_to_a_mask_and_back(bpy, chosen):
         values = mask_reading.mask_at(mask, 1 + number).values(WIDTH, HEIGHT)
         assert np.abs(values - covered(number)).mean() < 0.015, number
     assert mask_reading.mask_at(mask, 1).values(WIDTH, HEIGHT).max() == 0, "before its first drawing"
-    again = outline_masks.from_mask(edit, effect, strip, effect.shutters["S1"], mask)
+    again = outline_drawings.from_mask(edit, effect, strip, effect.shutters["S1"], mask)
     index = len(effect.regions) - 1
     assert (again.kind, again.between, effect.active_region) == ("OUTLINE", "STRAIGHT", index)
     effect.regions[0].opacity = 0
@@ -323,9 +323,9 @@ def test_a_mask_of_a_strip_that_runs_backward(bpy, edited):
 
     said = region(1, 4, shown=lambda frame: COUNT - 2 - frame, between="straight")
     strip, effect = edited(said, change=change)
-    mask = outline_masks.to_mask(bpy.context, (strip.id_data, effect, strip), 0, 0)
+    mask = outline_drawings.to_mask(bpy.context, (strip.id_data, effect, strip), 0, 0)
     assert mask_reading.key_frames(mask)[-2:] == [COUNT - 5, COUNT - 2]
-    outline_masks.from_mask(strip.id_data, effect, strip, effect.shutters["S1"], mask)
+    outline_drawings.from_mask(strip.id_data, effect, strip, effect.shutters["S1"], mask)
     assert drawn_at(effect, 1) == [3, 6, COUNT], "at the last it is not there yet"
 
 

@@ -6,8 +6,8 @@ import OpenImageIO
 import pytest
 from support import sequencer, write_frames
 
-from shutter_addon.blender.data import source_media, strip_proxies
-from shutter_addon.blender.data.strip_proxies import proxy_of
+from shutter_addon.blender.data import source_media
+from shutter_addon.blender.data.source_media import proxy_of
 
 COUNT, WIDTH, HEIGHT = 6, 72, 48
 
@@ -56,7 +56,7 @@ def built(bpy, edit, tmp_path):
 
 def proxied(edit, strip):
     """The strip's medium at half its size, as a preview reads it."""
-    return source_media.spec(strip).open(2, strip_proxies.proxy_of(edit, strip, 50))
+    return source_media.spec(strip).open(2, source_media.proxy_of(edit, strip, 50))
 
 
 def assert_read(edit, strip):
@@ -155,7 +155,7 @@ def test_samples_of_images(bpy, edit, tmp_path, name, samples, space, divisor):
     strip.proxy.quality = 95
     with sequencer(bpy):
         bpy.ops.sequencer.rebuild_proxy()
-    spec, proxy = source_media.spec(strip), strip_proxies.proxy_of(edit, strip, 50)
+    spec, proxy = source_media.spec(strip), source_media.proxy_of(edit, strip, 50)
     with spec.open(divisor, proxy) as source, spec.open(divisor) as footage:
         assert source.from_proxy
         ours, own = source.read(0), footage.read(0)

@@ -7,7 +7,7 @@ import pytest
 from support import image_strip, request, write_frames
 
 from shutter_addon.blender.data import consistency, recipe_import, selection
-from shutter_addon.blender.editing import add_effect, rolling_shutter, shutter_edits, time_map
+from shutter_addon.blender.editing import add_effect, rolling_shutter, shutter_edits
 from shutter_addon.blender.output import matte_export
 from shutter_addon.blender.rendering import sessions
 from shutter_addon.core.model import limits, windows
@@ -190,7 +190,7 @@ def test_a_movie_has_a_rate_of_its_own(bpy, edit):
 def test_a_time_map_is_no_repair(bpy, edited):
     _strip, effect = edited()
     effect.position, effect.inbetween = "CENTER", "2"
-    time_map.add(effect, "LINEAR")
+    shutter_edits.add_time_map(effect, "LINEAR")
     assert rolling_shutter.of(effect) is None
     effect.shutters.clear()
     assert rolling_shutter.of(effect) is None

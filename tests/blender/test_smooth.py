@@ -17,7 +17,6 @@ from shutter_addon.blender.data import (
     fcurves,
     preview_areas,
     property_copy,
-    recipe_export,
     recipe_import,
     snapshot,
     source_media,
@@ -593,7 +592,7 @@ def test_a_recipe_says_it(bpy, effect, edit):
         data = recipe(4, [1, 1, 1, 1], [1, 0, 0, 0], inbetween=steps)
         recipe_import.apply(edit, effect, strip, recipe_file.parse(json.dumps(data)))
         assert (effect.inbetween, effect.window) == (str(steps).upper(), 4)
-        assert json.loads(recipe_file.dump(recipe_export.recipe_of(edit, effect, strip)))["inbetween"] == steps
+        assert json.loads(recipe_file.dump(snapshot.recipe_of(edit, effect, strip)))["inbetween"] == steps
 
 
 def test_vectors_are_kept_beside_the_file(bpy, filmed, add, edit, tmp_path):

@@ -9,7 +9,6 @@ from support import image_strip, sequencer, state, write_frames
 from shutter_addon.blender.data import (
     annotations,
     fcurves,
-    recipe_export,
     recipe_import,
     snapshot,
     source_media,
@@ -164,7 +163,7 @@ def test_keys_follow_time_stretching(found):
 
     before = [seen(frame) for frame in (1, 5.5, 10, 20)]
     assert len({*map(tuple, before)}) == 4
-    keys = recipe_export.recipe_of(edit, effect, strip).shutters[1].bars.channel.frames
+    keys = snapshot.recipe_of(edit, effect, strip).shutters[1].bars.channel.frames
     invalidation.invalidate_changed(edit)
     edit.render.frame_map_old, edit.render.frame_map_new = 100, 200
     assert invalidation.invalidate_changed(edit)
@@ -172,10 +171,10 @@ def test_keys_follow_time_stretching(found):
     edit.frame_set(40)
     assert bar_edits.key_state(effect, 1)[0] == "keyed"
     np.testing.assert_allclose(bar_edits.bars_now(effect, 1), before[3][:4], atol=1e-6)
-    stretched = recipe_export.recipe_of(edit, effect, strip).shutters[1].bars.channel.frames
+    stretched = snapshot.recipe_of(edit, effect, strip).shutters[1].bars.channel.frames
     assert stretched[-1] == 2 * keys[-1]
-    recipe_import.apply(edit, effect, strip, recipe_export.recipe_of(edit, effect, strip))
-    assert recipe_export.recipe_of(edit, effect, strip).shutters[1].bars.channel.frames == stretched
+    recipe_import.apply(edit, effect, strip, snapshot.recipe_of(edit, effect, strip))
+    assert snapshot.recipe_of(edit, effect, strip).shutters[1].bars.channel.frames == stretched
     effect.window = 5
     path = f"{effect.path_from_id()}.shutters[1].bars[0].weight"
     assert fcurves.key_frames([fcurves.find_curve(edit, path)]) == [1, 20]

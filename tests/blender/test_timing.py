@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from support import Like, image_strip, picture_of, write_frames
 
-from shutter_addon.blender.data import strip_timing, struct_dna
+from shutter_addon.blender.data import source_media, struct_dna
 from shutter_addon.blender.editing import add_effect, shutter_edits
 from shutter_addon.blender.output import edit_check
 from shutter_addon.blender.rendering import pictures
@@ -38,7 +38,7 @@ def test_what_cannot_be_read_is_shown_at_an_even_speed(bpy, edit, tmp_path, monk
     for frame in (1, 11)[: keys - 1]:
         source.retiming_keys.add(timeline_frame=frame)
     source.retiming_keys[-1].timeline_frame = 52
-    known = strip_timing.timing_of(source)
+    known = source_media.timing_of(source)
     assert [key.index for key in known.keys] == {2: [0, 51], 3: [0, 10, 51]}[keys]
 
     def unknown(*_):
@@ -46,8 +46,8 @@ def test_what_cannot_be_read_is_shown_at_an_even_speed(bpy, edit, tmp_path, monk
 
     told: list[str] = []
     monkeypatch.setattr(pictures, "_said", set())  # by which a sentence is told once: as a new Blender has it
-    monkeypatch.setattr(strip_timing, "record", unknown)
-    timing = strip_timing.timing_of(source)
+    monkeypatch.setattr(source_media, "record", unknown)
+    timing = source_media.timing_of(source)
     assert timing.keys == (known.keys[0], known.keys[-1])
     strip, effect = add_effect.add_effect(edit, source)
     shutter_edits.start(effect)
@@ -65,9 +65,9 @@ def test_other_memory_than_the_strips(bpy, edit, tmp_path):
     """As if its record lay elsewhere than Blender says: no address in it is followed."""
     first = write_frames(tmp_path / "in", np.zeros((1, 8, 8, 3), dtype=np.uint8))
     source = edit.sequence_editor.strips.new_image("images", str(first), 1, 1)
-    assert strip_timing.retiming_keys(source) == ()
+    assert source_media.retiming_keys(source) == ()
     moved = Like(source, as_pointer=lambda: source.as_pointer() + 8)
-    assert strip_timing.retiming_keys(moved) is None
+    assert source_media.retiming_keys(moved) is None
 
 
 def test_a_still_of_a_million_frames_takes_no_time(bpy, edit, tmp_path):
@@ -76,5 +76,5 @@ def test_a_still_of_a_million_frames_takes_no_time(bpy, edit, tmp_path):
     source = edit.sequence_editor.strips.new_image("images", str(first), 1, 1)
     source.right_handle = 1_000_000
     start = time.perf_counter()
-    assert Clip(width=8, height=8, count=1, timing=strip_timing.timing_of(source)).shown(999_999).source_frame == 0
+    assert Clip(width=8, height=8, count=1, timing=source_media.timing_of(source)).shown(999_999).source_frame == 0
     assert time.perf_counter() - start < 1

@@ -5,7 +5,7 @@ import pytest
 from support import request, write_frames
 from test_region_tracking import COUNT, SIZE, active, call, drawn, keys, new_source, picture, texture, track
 
-from shutter_addon.blender.data import fcurves, recipe_export, recipe_import, snapshot
+from shutter_addon.blender.data import fcurves, recipe_import, snapshot
 from shutter_addon.blender.editing import track_region
 from shutter_addon.blender.rendering import sessions
 from shutter_addon.core.recipes import recipe_file
@@ -136,7 +136,7 @@ def test_recipes_keep_it(bpy, between_cuts):
     call(bpy, "track")
     edit, effect, strip = active(bpy)
     effect.camera.influence = 0.25
-    found = recipe_file.parse(recipe_file.dump(recipe_export.recipe_of(edit, effect, strip)))
+    found = recipe_file.parse(recipe_file.dump(snapshot.recipe_of(edit, effect, strip)))
     assert found.camera.influence.at(1) == 0.25
     before = opacity(bpy, range(11, 47))
     assert [found.for_picture(1.5).regions[0].opacity.at(frame) for frame in range(1, 37)] == before

@@ -14,7 +14,7 @@ import pytest
 from support import image_strip, picture_of, sequencer, state, write_frames
 
 from shutter_addon import blender
-from shutter_addon.blender.data import annotations, fcurves, preview_areas, recipe_export, selection
+from shutter_addon.blender.data import annotations, fcurves, preview_areas, selection, snapshot
 from shutter_addon.blender.editing import add_effect, bar_edits, reconcile, region_edits, shutter_edits, undelete
 from shutter_addon.blender.interface import bar_editor, operators, panels, probe_gizmo, region_gizmo
 from shutter_addon.blender.output import matte_export
@@ -261,7 +261,7 @@ def test_a_strip_that_is_scaled_to_nothing(bpy, edit, effect):
     strip.transform.scale_x = 0
     assert picture_of(effect.scene, 4).shape == (24, 40, 4)
     with pytest.raises(effect_source.FAULTS, match='strip "Shutter" is too small to find its scribbles'):
-        recipe_export.recipe_of(edit, effect, strip)
+        snapshot.recipe_of(edit, effect, strip)
     show(bpy, edit)
 
 

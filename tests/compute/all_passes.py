@@ -15,7 +15,7 @@ from shutter_addon.compute import (
     window,
 )
 from shutter_addon.compute.composition_passes import MODES, composition
-from shutter_addon.core.model.combining import AVERAGE, Combine
+from shutter_addon.core.model.frame_state import AVERAGE, Combine
 from shutter_addon.devices.passes import Pass, read_pass
 
 _WAYS = ("frames", "search", "value")

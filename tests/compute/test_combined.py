@@ -8,8 +8,7 @@ from test_composition import SHAPES, check, composed, footage, state
 
 from shutter_addon.compute.gpu import GPUCompositor
 from shutter_addon.compute.renderer import open_compositor
-from shutter_addon.core.model.combining import AVERAGE, Combine
-from shutter_addon.core.model.frame_state import Following, FrameState, Options
+from shutter_addon.core.model.frame_state import AVERAGE, Combine, Following, FrameState, Options
 from shutter_addon.core.pixels import combined, compositor
 
 LIGHTEST, DARKEST, MEDIAN = (Combine.of(mode) for mode in ("lightest", "darkest", "median"))

@@ -14,8 +14,7 @@ from shutter_addon.compute.renderer import Renderer, open_compositor, open_gl
 from shutter_addon.compute.request import Request
 from shutter_addon.core.frames import light
 from shutter_addon.core.model import windows
-from shutter_addon.core.model.combining import Combine
-from shutter_addon.core.model.frame_state import Following, FrameState, Layers, Options
+from shutter_addon.core.model.frame_state import Combine, Following, FrameState, Layers, Options
 from shutter_addon.core.model.mattes import FileFrame, Matte
 from shutter_addon.core.model.scribbles import Shape
 from shutter_addon.core.pixels import compositor, layering

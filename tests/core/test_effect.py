@@ -77,7 +77,7 @@ def test_bars_that_are_closed_are_told_with_their_frame():
         {"drawn": (1.0, 5.0)},
         {"placement": Samples({1: np.eye(3), 3: np.diag([0.5, 0.5, 1])})},
         {"content": Samples({i: mattes.Ramp("linear", (i, 0), 0.0, 1.0) for i in (1, 3)})},
-        {"content": effect.PlacedRamp("linear", effect.Moves(rotation=keyed(0.0, 90.0)))},
+        {"content": effect.placed_ramp("linear", effect.Moves(rotation=keyed(0.0, 90.0)))},
         {"opacity": keyed(1.0, 0.5)},
         {"feather": keyed(0.0, 0.5)},
     ],

@@ -7,8 +7,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from shutter_addon.core.masks import mask_filling
-from shutter_addon.core.masks.mask import MaskLayer, MaskShape, MaskSpline
+from shutter_addon.core.model import masks
+from shutter_addon.core.model.masks import MaskLayer, MaskShape, MaskSpline
 
 SIZES = [(96, 54), (54, 96), (61, 61)]
 RECTANGLE = ((0.25, 0.35), (0.25, 0.65), (0.75, 0.65), (0.75, 0.35))
@@ -118,7 +118,7 @@ def test_quads_that_are_twisted_are_two_triangles():
         [[(0.2, 0.2), (0.8, 0.8), (0.8, 0.2), (0.2, 0.8)], [(0.1, 0.9), (0.5, 0.92), (0.9, 0.9), (0.5, 0.95)]]
     )
     value = np.zeros((100, 100), np.float32)
-    mask_filling.feather(value, quads, np.ones_like)
+    masks.feather(value, quads, np.ones_like)
     points = places((100, 100))[::-1]
     triangles = [quad[list(corners)] for quad in quads for corners in ((0, 1, 2), (0, 2, 3))]
     inside = np.any([winding(list(triangle), points) != 0 for triangle in triangles], axis=0)

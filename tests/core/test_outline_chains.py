@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from shutter_addon.core.model import outline_chains, outlines
+from shutter_addon.core.model import outlines
 
 ASPECT, SIZE = 1.5, (240, 160)
 
@@ -30,7 +30,7 @@ def test_what_is_drawn_is_covered_and_goes_straight_in_between():
         (10, [circle(0.72, 0.5, 0.1, 25, -1, 2.0), circle(0.4, 0.5, 0.25, 70, -1, 1.0)]),
         (14, [circle(0.4, 0.5, 0.25), circle(0.75, 0.5, 0.1)]),
     ]
-    chains = outline_chains.chains(drawn, ASPECT)
+    chains = outlines.chains(drawn, ASPECT)
     assert [(chain.frames, chain.gone) for chain in chains] == [((0, 10, 14), None)] * 2
     for frame, curves in drawn:
         assert np.abs(covered(chains, frame) - outlines.coverage(curves, *SIZE)).mean() < 0.002
@@ -41,7 +41,7 @@ def test_what_is_drawn_is_covered_and_goes_straight_in_between():
 def test_curves_come_and_go():
     """A hole is a curve of its own, and none goes into what lies elsewhere."""
     large, hole, apart = circle(0.4, 0.5, 0.3), circle(0.4, 0.5, 0.15), circle(0.8, 0.2, 0.1)
-    chains = outline_chains.chains([(2, [large]), (5, [hole, large]), (9, [apart, large]), (12, [apart])], ASPECT)
+    chains = outlines.chains([(2, [large]), (5, [hole, large]), (9, [apart, large]), (12, [apart])], ASPECT)
     assert sorted((chain.frames, chain.gone) for chain in chains) == [((2, 5, 9), 12), ((5,), 9), ((9, 12), None)]
     for frame, curves in ((2, [large]), (4, [large]), (5, [hole, large]), (8, [hole, large]), (12, [apart])):
         assert np.abs(covered(chains, frame) - outlines.coverage(curves, *SIZE)).mean() < 0.002, frame
@@ -49,10 +49,10 @@ def test_curves_come_and_go():
 
 @pytest.mark.parametrize("drawn", [[], [(1, [])], [(1, [[(0.1, 0.1), (0.5, 0.5)]])]])
 def test_nothing_is_no_chain(drawn):
-    assert outline_chains.chains(drawn, ASPECT) == []
+    assert outlines.chains(drawn, ASPECT) == []
 
 
 def test_points_are_as_many_as_the_longest_needs():
-    (chain,) = outline_chains.chains([(1, [circle(0.5, 0.5, 0.15)]), (2, [circle(0.5, 0.5, 0.4)])], ASPECT)
+    (chain,) = outlines.chains([(1, [circle(0.5, 0.5, 0.15)]), (2, [circle(0.5, 0.5, 0.4)])], ASPECT)
     assert chain.points.shape[0] == 2
     assert 200 < chain.points.shape[1] <= 256

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from shutter_addon.core.model import timeline_exposure
+from shutter_addon.core.model import trails
 from shutter_addon.core.model.frame_state import Options
 
 HALF = [1, 1, 1, 1, 0, 0, 0, 0]  # 180°
@@ -17,7 +17,7 @@ def exposed(bars, speed=1.0, direction=1, here=100.0, after=None, before=None, *
     before = here - direction * speed if before is None else before
     after = here + direction * speed if after is None else after
     options = Options(len(bars), backward=direction < 0, **options)
-    return timeline_exposure.on_timeline(np.array(bars, float), options, np.array([before, here, after]))
+    return trails.on_timeline(np.array(bars, float), options, np.array([before, here, after]))
 
 
 def test_half_open_at_eight_times_the_speed_is_four_frames():
@@ -65,7 +65,7 @@ def test_along_a_ramp_it_is_as_long_as_the_way_goes():
 def test_speed_that_changes_within_a_frame_counts():
     """Half of a frame at one source frame, the other at three: half open, it is one."""
     places = np.array([98.0, 99.0, 100.0, 101.0, 104.0])
-    bars, length = timeline_exposure.on_timeline(np.array(HALF, float), Options(8), places)
+    bars, length = trails.on_timeline(np.array(HALF, float), Options(8), places)
     assert length == pytest.approx(1)
     np.testing.assert_allclose(bars, [4, 0, 0, 0, 0, 0, 0, 0], atol=1e-9)
 

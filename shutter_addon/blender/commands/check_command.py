@@ -18,7 +18,7 @@ from ...core.farm import job_file
 from ...core.farm.edit_version import EditVersion
 from ...core.messages import UserError
 from ...devices.device import NoDeviceError
-from ..data import missing_media, versions
+from ..data import external_files, versions
 from ..devices import available
 from ..output import edit_check, error_report, film_join, film_output, shared_frames
 from ..output.edit_check import EffectCheck
@@ -77,8 +77,8 @@ def _report(arguments: Namespace, scene: Scene, frames: range, version: EditVers
         notes += [f'"{check.name}": {note}' for note in check.notes]
     faults += edit_check.left_out(scene, frames)
     notes += edit_check.stale_films(scene, frames)
-    faults += missing_media.faults(scene, frames, sources=False)  # of these the effects' own say more
-    faults += missing_media.sound_faults(scene, frames)
+    faults += external_files.faults(scene, frames, sources=False)  # of these the effects' own say more
+    faults += external_files.sound_faults(scene, frames)
     for folder in dict.fromkeys(_written_folders(arguments, checks)):
         faults += _fault(film_output.check_writable, folder)
     report = {

@@ -6,7 +6,7 @@ import argparse
 from argparse import Namespace
 
 from ...core.farm import job_file
-from ..data import missing_media, versions
+from ..data import external_files, versions
 from ..output import film_join, film_output
 from . import command_line
 from .command_line import place
@@ -25,7 +25,7 @@ def add(commands: argparse._SubParsersAction) -> None:
 def run(arguments: Namespace) -> None:
     edit = command_line.open_edit(arguments.edit, arguments.frames)
     film_join.check(arguments.output, [edit.path, *versions.read_files(edit.scene), *versions.sounds()])
-    for fault in missing_media.sound_faults(edit.scene, edit.frames):
+    for fault in external_files.sound_faults(edit.scene, edit.frames):
         raise film_output.OutputError(fault)  # Blender would make a silent film
     film_join.say_what_is_left_out(arguments.folder, edit.whole)
     version = edit.version()

@@ -17,7 +17,7 @@ from ...core.model.keyframes import Constant
 from ...core.recipes import recipe
 from ...media.opening import MatteFile
 from ...media.rendered_pictures import is_whole_blend, why_short
-from ..data import missing_media, preferences, versions
+from ..data import external_files, preferences, versions
 from ..devices import available
 from ..editing import new_edit, saved_edit
 from ..output import film_output, shared_frames
@@ -59,7 +59,7 @@ def _render_edit(arguments: Namespace) -> None:
     edit = command_line.open_edit(arguments.source, arguments.frames)
     scene, frames = edit.scene, edit.frames
     scene.frame_start, scene.frame_end = frames[0], frames[-1]
-    for fault in missing_media.faults(scene, frames, sources=True):
+    for fault in external_files.faults(scene, frames, sources=True):
         raise film_output.OutputError(fault)  # Blender would render on without it
     with command_line.rendered_by(arguments), shared_frames.of_same_footage(scene) as rendered:
         version = edit.version()

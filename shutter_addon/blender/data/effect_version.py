@@ -8,7 +8,7 @@ from collections.abc import Callable, Hashable, Iterable, Iterator
 from dataclasses import replace
 
 import numpy as np
-from bpy.types import FCurve, Mask, PropertyGroup, Scene, Strip, bpy_struct
+from bpy.types import FCurve, Mask, PropertyGroup, Scene, Strip
 
 from ...core import revision
 from ...core.frames.retiming import StripTiming
@@ -18,16 +18,14 @@ from ...core.model.fields import fields_of
 from ...core.model.frame_state import Options
 from ...media import MediaError
 from . import (
-    colour_configuration,
     external_files,
     fcurves,
     geometry,
     mask_reading,
     matte_content,
-    matte_strips,
+    property_copy,
     snapshot,
     source_media,
-    strip_timing,
     strips,
     versions,
 )
@@ -58,7 +56,7 @@ def key(scene: Scene, effect: PropertyGroup, strip: Strip, frames: range) -> str
     rate = scene.render.fps / scene.render.fps_base
     digest = hashlib.sha256()
     for part in (
-        (versions.extension(), colour_configuration.name(), rate, frames, picture_size(effect)),
+        (versions.extension(), versions.colours(), rate, frames, picture_size(effect)),
         (None if effect.use_source_time else timing(source, start), _contents(source)),
         *_settings(effect),
         *parts(scene, effect, strip, _contents, start),
@@ -149,35 +147,19 @@ def _below(path: str, curves: Iterable[_Curve]) -> list[_Curve]:
 def _curves(curves: Iterable[_Curve], start: int | None) -> Iterator[Hashable]:
     for path, index, curve in curves:
         yield path, index, curve.mute, curve.extrapolation
-        yield from _curve(curve, start)
-
-
-def _curve(curve: FCurve, start: int | None) -> Iterator[Hashable]:
-    points = curve.keyframe_points
-    for name in ("handle_left", "co", "handle_right"):
-        places = numbers(points, name, size=2)
-        if start is not None:  # floats of other frames are others
-            places[:, 0] = np.round(places[:, 0] - start, 2) + 0.0
-        yield places.tobytes()
-    interpolations = numbers(points, "interpolation", np.int32)
-    yield interpolations.tobytes()
-    if max(interpolations.tolist(), default=0) > _BEZIER:  # one of those that have parameters
-        yield numbers(points, "easing", np.int32).tobytes()
-        yield tuple(numbers(points, name).tobytes() for name in ("back", "amplitude", "period"))
-    for modifier in curve.modifiers:
-        yield repr(_plain(modifier))
-
-
-def _plain(modifier: bpy_struct) -> list:
-    """All that it is, in plain data."""
-    plain: list = []
-    for prop in modifier.bl_rna.properties:
-        value = getattr(modifier, prop.identifier)
-        if prop.type == "COLLECTION":
-            plain += [_plain(item) for item in value]
-        elif prop.type != "POINTER":
-            plain.append((prop.identifier, tuple(value) if getattr(prop, "is_array", False) else value))
-    return plain
+        points = curve.keyframe_points
+        for name in ("handle_left", "co", "handle_right"):
+            places = numbers(points, name, size=2)
+            if start is not None:  # floats of other frames are others
+                places[:, 0] = np.round(places[:, 0] - start, 2) + 0.0
+            yield places.tobytes()
+        interpolations = numbers(points, "interpolation", np.int32)
+        yield interpolations.tobytes()
+        if max(interpolations.tolist(), default=0) > _BEZIER:  # one of those that have parameters
+            yield numbers(points, "easing", np.int32).tobytes()
+            yield tuple(numbers(points, name).tobytes() for name in ("back", "amplitude", "period"))
+        for modifier in curve.modifiers:
+            yield repr(property_copy.plain(modifier))
 
 
 def _strokes(effect: PropertyGroup, region: PropertyGroup, start: int | None) -> Iterator[Hashable]:
@@ -193,7 +175,7 @@ def _matte(region: PropertyGroup, files: Files, start: int | None) -> Iterator[H
     try:
         if region.matte == "IMAGE":
             yield files(region)
-        for part in matte_strips.strips_of(region) if region.matte == "STRIP" else ():
+        for part in matte_content.strips_of(region) if region.matte == "STRIP" else ():
             yield part.left_handle - (start or 0), part.right_handle - (start or 0)
             yield timing(part, start or 0)
             yield files(part)
@@ -214,7 +196,7 @@ def _mask(mask: Mask) -> Iterator[Hashable]:
 
 def timing(strip: Strip, start: int = 0) -> StripTiming:
     """How a movie, image or clip strip lies on the timeline, whatever it is called and wherever it was cut."""
-    lies = strip_timing.timing_of(strip)
+    lies = source_media.timing_of(strip)
     begins, ends = lies.content_start - start, lies.content_end - start
     return replace(lies, name="", left_handle=0, content_start=begins, content_end=ends)
 

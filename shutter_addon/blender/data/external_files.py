@@ -1,15 +1,19 @@
-"""The files beside the .blend file that images, volumes, sounds, libraries and the like name."""
+"""The files beside the .blend file that images, volumes, sounds, libraries and the like name; and those of an edit that
+are not there, or cannot be read."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import bpy
-from bpy.types import ID, Image, Strip
+from bpy.types import ID, Image, Scene, Strip
 
-from ...media import MediaError
+from ...core.frames import frame_ranges
+from ...media import MediaError, open_source
+from ...media.files import check_file, check_sound
 from ...media.sequence import numbered_alike, sequence_files
+from . import requirements, strips
 
 _MADE = "GENERATED", "VIEWER"  # sources of images that are in no file
 
@@ -49,3 +53,71 @@ def _sequence(item: ID, path: Path) -> list[Path]:
     except MediaError:
         return [path]
     return files or [path]
+
+
+def faults(scene: Scene, frames: range, *, sources: bool) -> list[str]:
+    """A sentence for each file that the pictures of these frames need and that cannot be had: of movie, image and clip
+    strips, of images, volumes, caches and fonts that what is shown uses, and of libraries. Edits that it shows count as
+    a whole; files of mattes are not looked for.
+
+    sources: those of effects, too, as far as the sources are shown themselves"""
+    sentences = _of_strips(scene, frames, strips.SOURCES, sources=sources)
+    used, data = requirements.used_data(scene, frames) - _clips(scene), bpy.data
+    for items in (data.images, data.volumes, data.cache_files, data.movieclips, data.fonts):
+        sentences += [_words(item, fault) for item in items if item in used for fault in _of_item(item)]
+    sentences += [_words(library, fault) for library in data.libraries for fault in _of_item(library)]
+    return list(dict.fromkeys(sentences))
+
+
+def sound_faults(scene: Scene, frames: range) -> list[str]:
+    """As `faults`, of sound strips."""
+    return _of_strips(scene, frames, ("SOUND",), sources=False)
+
+
+def _clips(scene: Scene) -> set:
+    """Those of the strips, which are looked at as such."""
+    shown = (strip for each in strips.shown_scenes(scene) for strip in each.sequence_editor.strips_all)
+    return {strip.clip for strip in shown if strip.type == "MOVIECLIP"}
+
+
+def _words(item: ID, fault: str) -> str:
+    return f'{item.bl_rna.name.lower()} "{item.name}": {fault}'
+
+
+def _of_strips(scene: Scene, frames: range, kinds: tuple[str, ...], *, sources: bool) -> list[str]:
+    sentences = []
+    for shown, wanted in requirements.scenes_at(scene, frames):
+        others = () if sources else strips.shown_sources(shown)
+        for strip in shown.sequence_editor.strips_all:
+            at = frame_ranges.common(requirements.shown_frames(shown, strip), wanted)
+            if at and strip.type in kinds and strip.name not in others:
+                sentences += [f'strip "{strip.name}": {fault}' for fault in _of_strip(strip, at)]
+    return sentences
+
+
+def _of_strip(strip: Strip, frames: range) -> Iterator[str]:
+    if strip.type == "MOVIE":
+        yield from _fault(lambda: open_source(absolute(strip, strip.filepath)).close())
+    elif strip.type == "IMAGE":
+        elements = {element.filename for frame in frames if (element := strip.strip_elem_from_frame(frame))}
+        folder = absolute(strip, strip.directory)
+        gone = [fault for name in sorted(elements) for fault in _fault(check_file, folder / name)]
+        yield from [gone[0] + (f" (and {len(gone) - 1} more files)" if len(gone) > 1 else "")] if gone else ()
+    elif strip.type == "MOVIECLIP":
+        yield from _of_item(strip.clip) if strip.clip else ["it has no clip"]
+    elif strip.type == "SOUND":
+        yield from _of_item(strip.sound, check_sound) if strip.sound else ["it has no sound"]
+
+
+def _of_item(item: ID, check: Callable = check_file) -> Iterator[str]:
+    """Of a sound, a library, an image or the like; of a sequence its first file. check: raises MediaError for a
+    file."""
+    for path in named(item):
+        yield from _fault(check, path)
+
+
+def _fault(function: Callable, *arguments) -> Iterator[str]:
+    try:
+        function(*arguments)
+    except MediaError as error:
+        yield str(error)

@@ -15,8 +15,8 @@ import numpy as np
 from bpy.app.translations import pgettext_rpt as rpt_
 from numpy.typing import ArrayLike
 
-from ...core.masks.mask import MaskLayer, MaskShape, MaskSpline
 from ...core.messages import EffectError
+from ...core.model.masks import MaskLayer, MaskShape, MaskSpline
 from . import fcurves
 from .fcurves import numbers
 from .struct_dna import LayoutError, memory, read, record, text

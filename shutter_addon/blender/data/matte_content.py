@@ -1,7 +1,9 @@
-"""What the mattes and ramps of an effect show, as plain data (core.model.mattes.Content)."""
+"""What the mattes and ramps of an effect show, as plain data (core.model.mattes.Content); and the strips of the scene
+that are mattes, which are found by an identity, so that they may be renamed and cut."""
 
 from __future__ import annotations
 
+import uuid
 from collections.abc import Callable
 from contextlib import closing
 from fractions import Fraction
@@ -15,14 +17,14 @@ from bpy.types import PropertyGroup, Scene, Strip
 from ...core.messages import EffectError
 from ...core.model import keyframes, mattes, outlines
 from ...core.model.clip import Clip
-from ...core.model.effect import Moves, PlacedRamp
+from ...core.model.effect import Moves, placed_ramp
 from ...core.model.keyframes import Channel
 from ...media import MediaError
 from ...media.carried_mattes import FOLDER, CarriedFile
 from ...media.files import stamp
 from ...media.opening import MatteFile
 from ...media.sequence import sequence_files
-from . import mask_reading, matte_strips, source_media, strip_timing, strips, validation
+from . import mask_reading, source_media, strips, validation
 from .external_files import absolute
 from .sampled import Frames, over
 
@@ -38,7 +40,7 @@ def content(
     if region.kind == "RAMP":
         ramp = validation.word(region, "ramp")
         if ramp != "LUMINANCE":
-            return PlacedRamp(ramp.lower(), moves)
+            return placed_ramp(ramp.lower(), moves)
         return mattes.FileFrames(file=_of_strip(strips.source_of(scene, effect, strip), "luminance"))
     matte = validation.word(region, "matte")
     if matte == "STRIP":
@@ -116,7 +118,7 @@ def shown_frame(scene: Scene, effect: PropertyGroup, strip: Strip, time: Channel
     """What gives the source's frame that an effect strip shows at a timeline frame: filmed ones counted from 0, those
     between them in parts. time: see `content`. EffectError, MediaError: it cannot be known."""
     source = strips.source_of(scene, effect, strip)
-    spec, timing = source_media.spec(source), time or strip_timing.timing_of(source)
+    spec, timing = source_media.spec(source), time or source_media.timing_of(source)
     filmed, fps = (len(spec.files), None) if spec.files else _movie(spec)
     size = 0, 0  # nothing of it is in pixels
     clip = Clip(*size, filmed, fps=fps, timing=timing).stepped(_MOMENTS if effect.inbetween != "1" else 1)
@@ -132,16 +134,100 @@ def _movie(spec: source_media.SourceSpec) -> tuple[int, Fraction | None]:
 
 
 def _strip_frames(strip: Strip, region: PropertyGroup, frames: Frames) -> Channel:
-    parts, word = matte_strips.parts_for(region, strip), channel(region)
+    parts, word = parts_for(region, strip), channel(region)
     shown = {
-        part.name: mattes.FileFrames(file=_of_strip(part, word), timing=strip_timing.timing_of(part)) for part in parts
+        part.name: mattes.FileFrames(file=_of_strip(part, word), timing=source_media.timing_of(part)) for part in parts
     }
     if len(parts) == 1:
         return shown[parts[0].name]
-    return keyframes.Samples({f: shown[matte_strips.part_at(parts, f).name].at(f) for f in frames})
+    return keyframes.Samples({f: shown[part_at(parts, f).name].at(f) for f in frames})
 
 
 def _of_strip(strip: Strip, word: str) -> MatteFile:
     """A channel of what a movie, image or clip strip reads. MediaError: it has no files."""
     spec = source_media.spec(strip)
     return MatteFile(path=spec.path, channel=word, files=spec.files, stream=spec.options["stream"], stamp=spec.key)
+
+
+def strip_name(region: PropertyGroup) -> str:
+    """The name of the first strip that is a region's matte; "": there is none."""
+    return next((strip.name for strip in _with_identity(region)), "")
+
+
+def choose_strip(region: PropertyGroup, name: str) -> None:
+    """Makes a strip a region's matte, by its name, with the other parts of it, if it was cut; no strip, where none is
+    called so."""
+    editor = region.id_data.sequence_editor
+    strip = editor and editor.strips_all.get(name)
+    if strip is None:
+        region.strip = ""
+        return
+    known = strip.virtual_shutter_matte
+    same = [other for other in editor.strips_all if known and other.virtual_shutter_matte == known]
+    parts = [strip, *(other for other in same if _is_part(other, strip))]
+    if len(parts) != len(same):  # it has no identity yet, or that of a strip which it is a copy of
+        identity = uuid.uuid4().hex
+        for part in parts:
+            part.virtual_shutter_matte = identity
+    region.strip = strip.virtual_shutter_matte
+
+
+def _is_part(other: Strip, strip: Strip) -> bool:
+    """Whether a strip and another one that has its identity were cut from one."""
+    return strips.origin(other) == strips.origin(strip) and not _overlap(_content(other), _content(strip))
+
+
+def strips_of(region: PropertyGroup) -> list:
+    """The movie, image and clip strips that have the identity of a region's matte: several, where it was cut or copied.
+    EffectError: there is none."""
+    matching = _with_identity(region)
+    if not matching:
+        words = rpt_("{place}: its matte strip was deleted") if region.strip else rpt_("{place}: it has no matte strip")
+        raise EffectError(words.format(place=validation.place(region)))
+    shown = [strip for strip in matching if strip.type in strips.SOURCES]
+    if not shown:
+        sentence = rpt_('{place}: its matte strip "{strip}" is not a movie, image or clip strip')
+        raise EffectError(sentence.format(place=validation.place(region), strip=matching[0].name))
+    return shown
+
+
+def parts_for(region: PropertyGroup, effect_strip: Strip) -> list:
+    """The parts of the strip that is a region's matte, where an effect strip shows it: of copies, the nearest in time.
+    EffectError: there is none."""
+    copies: list[list] = []
+    for strip in sorted(strips_of(region), key=lambda strip: (strips.origin(strip), strip.left_handle)):
+        fitting = [parts for parts in copies if not any(_overlap(_content(strip), _content(part)) for part in parts)]
+        # Parts that were moved apart have other origins.
+        same = [parts for parts in fitting if strips.origin(parts[-1]) == strips.origin(strip)]
+        if fitting:
+            (same or fitting)[-1].append(strip)
+        else:
+            copies.append([strip])
+    shown = effect_strip.left_handle, effect_strip.right_handle
+    nearest = min(copies, key=lambda parts: min(_apart(shown, (part.left_handle, part.right_handle)) for part in parts))
+    return sorted(nearest, key=lambda part: part.left_handle)
+
+
+def _content(strip: Strip) -> tuple[float, float]:
+    """What a strip shows of its content, from frame to frame."""
+    return strip.left_handle - strips.origin(strip), strip.right_handle - strips.origin(strip)
+
+
+def _overlap(one: tuple[float, float], other: tuple[float, float]) -> bool:
+    return min(one[1], other[1]) > max(one[0], other[0])
+
+
+def _apart(one: tuple[float, float], other: tuple[float, float]) -> tuple[float, float]:
+    """How far apart two spans lie, and where they meet, how far their starts."""
+    return max(other[0] - one[1], one[0] - other[1], 0), abs(other[0] - one[0])
+
+
+def part_at(parts: list, frame: float) -> Strip:
+    """Of the parts of a strip that was cut the one that shows a timeline frame, or the nearest."""
+    return min(parts, key=lambda part: max(part.left_handle - frame, frame - part.right_handle + 1, 0))
+
+
+def _with_identity(region: PropertyGroup) -> list:
+    editor = region.id_data.sequence_editor
+    strips_all = editor.strips_all if editor and region.strip else ()
+    return [strip for strip in strips_all if strip.virtual_shutter_matte == region.strip]

@@ -15,7 +15,7 @@ from ...core.messages import UserError, translated
 from ...core.model import keyframes
 from ...core.model.mattes import FileFrames
 from ...media.opening import MatteFile
-from . import matte_strips, snapshot
+from . import matte_content, snapshot
 
 
 class Look(NamedTuple):
@@ -60,7 +60,7 @@ def _note(
 ) -> str:
     """That a matte is shorter than what it is for."""
     if region.matte == "STRIP":
-        ends = max(part.right_handle for part in matte_strips.parts_for(region, strip))
+        ends = max(part.right_handle for part in matte_content.parts_for(region, strip))
         return iface_("Ends before the film: its last frame holds") if ends < strip.right_handle else ""
     if not isinstance(content, FileFrames) or count == 1:
         return ""

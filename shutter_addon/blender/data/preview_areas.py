@@ -9,7 +9,7 @@ import bpy
 import numpy as np
 from bpy.types import Area, Context, PropertyGroup, Scene, Space, Strip
 
-from . import annotations, geometry, seen_alone, selection, strip_proxies, strips
+from . import annotations, geometry, seen_alone, selection, source_media, strips
 
 _PERCENT = {"PROXY_25": 25, "PROXY_50": 50, "PROXY_75": 75, "PROXY_100": 100}
 _PLAIN_STRIP = {"blend_alpha": 1.0, "color_saturation": 1.0, "scene_input": "CAMERA"}
@@ -38,7 +38,7 @@ class Look:
     is_plain: whether they show the strip's picture as it is, so that it may be drawn in their place"""
 
     scale: float | None
-    proxy: strip_proxies.Proxy | None
+    proxy: source_media.Proxy | None
     is_plain: bool
 
 
@@ -114,12 +114,12 @@ def _is_plain(scene: Scene, strip: Strip) -> bool:
     )
 
 
-def _proxy(scene: Scene, effect: PropertyGroup, strip: Strip, space: Space) -> strip_proxies.Proxy | None:
+def _proxy(scene: Scene, effect: PropertyGroup, strip: Strip, space: Space) -> source_media.Proxy | None:
     """What Blender reads of an effect's source in a preview; None: the footage itself."""
     source, percent = strips.nearest_source(scene, effect, strip), _PERCENT.get(space.proxy_render_size)
     if source is None or percent is None or not space.use_proxies:
         return None
-    return strip_proxies.proxy_of(scene, source, percent)
+    return source_media.proxy_of(scene, source, percent)
 
 
 def _scale(context: Context, scene: Scene, strip: Strip, area: Area) -> float:

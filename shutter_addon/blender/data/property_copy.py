@@ -8,6 +8,9 @@ from typing import Any
 
 from bpy.types import PropertyGroup, bpy_struct
 
+# What effects point to, and where bpy.data has it.
+POINTED = {"MovieClip": "movieclips", "Image": "images", "Mask": "masks"}
+
 
 def copy_properties(old: PropertyGroup, new: PropertyGroup) -> None:
     """Gives a new property group all that is stored in another one, also what a newer version has stored there; IDs
@@ -17,12 +20,24 @@ def copy_properties(old: PropertyGroup, new: PropertyGroup) -> None:
         copied[name] = value
 
 
-def is_group(struct: bpy_struct, name: str) -> bool:
-    """Whether a property is a property group within a struct."""
-    return name != "rna_type" and isinstance(getattr(struct, name), PropertyGroup)
+def plain(struct: bpy_struct) -> dict[str, Any]:
+    """A struct of Blender's with all that is in it as plain data; of what it points to, the session_uid."""
+    found: dict[str, Any] = {}
+    for prop in struct.bl_rna.properties:
+        name, value = prop.identifier, getattr(struct, prop.identifier)
+        if prop.type == "COLLECTION":
+            found[name] = [plain(item) for item in value]
+        elif name != "rna_type" and isinstance(value, PropertyGroup):
+            found[name] = plain(value)
+        elif prop.type == "POINTER":
+            if value is not None and prop.fixed_type.identifier in POINTED:
+                found[name] = value.session_uid
+        elif name != "co_ui" and not prop.is_skip_save:  # setting co_ui moves a key's handles
+            found[name] = tuple(value) if getattr(prop, "is_array", False) else _stored(struct, name)
+    return found
 
 
-def stored(group: bpy_struct, name: str) -> Any:
+def _stored(group: bpy_struct, name: str) -> Any:
     """A property's value for a copy of the group; of an enum that has none of its items, the number it is kept as."""
     value = getattr(group, name)
     if value == "" and group.bl_rna.properties[name].type == "ENUM" and isinstance(group, PropertyGroup):
@@ -31,7 +46,7 @@ def stored(group: bpy_struct, name: str) -> Any:
 
 
 def store(group: bpy_struct, name: str, value: object) -> None:
-    """Gives a property what `stored` gave."""
+    """Gives a property what `plain` has of it."""
     if isinstance(value, int) and group.bl_rna.properties[name].type == "ENUM":
         group.bl_system_properties_get(do_create=True)[name] = value
     else:

@@ -1,7 +1,7 @@
 """A recipe into Blender's data: shutters, regions, strokes, keys and options."""
 
 import os
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
@@ -62,13 +62,17 @@ def _set_fields(scene, owner, path: str, part: Any, first: float, **curve) -> No
             setattr(owner, each.blender, str(value).upper() if each.choices else value)
 
 
-def _set_channel(scene, owner, path: str, name: str, channel: keyframes.Channel, first: float, **curve) -> None:
-    """A number of a property group, or its keys."""
+def _set_channel(
+    scene, owner, path: str, name: str, channel: keyframes.Channel, first: float, change: Callable = float, **curve
+) -> None:
+    """A number or a vector of a property group, or its keys; change: makes Blender's values of the channel's."""
     if not isinstance(channel, keyframes.Keys):
-        setattr(owner, name, channel.at(1))
+        setattr(owner, name, change(channel.at(1)))
         return
-    setattr(owner, name, channel.values[0])
-    _set_keys(scene, f"{path}.{name}", 0, channel, channel.values, first, **curve)
+    values = [change(value) for value in channel.values]
+    setattr(owner, name, values[0])
+    for index, numbers in enumerate(np.reshape(values, (len(values), -1)).T.tolist()):
+        _set_keys(scene, f"{path}.{name}", index, channel, numbers, first, **curve)
 
 
 def _set_keys(scene, path: str, index: int, keys: keyframes.Keys, values: Iterable[float], first: float, **curve):
@@ -178,8 +182,8 @@ def _add_region(
         if region.kind == "RAMP":
             _set_fields(scene, region, path, source.content, first)
     _set_fields(scene, region, path, source, first)
-    if isinstance(source, model.Region | model.OutlineRegion):
-        region.layer = _draw(effect, strip, source, shutter.color, first)
+    if source.drawings:
+        region.layer = _draw(effect, strip, source, source.drawings, shutter.color, first)
     _set_moves(scene, region, path, source.moves, first)
 
 
@@ -196,29 +200,19 @@ def _set_file(region, strip, content: model.FileContent, image) -> None:
 
 def _set_moves(scene, moving, path: str, moves: model.Moves, first: float, **curve) -> None:
     """Location, rotation and scale of a region or of the camera, and their keys."""
-    channels = moves.location, moves.rotation, moves.scale
-    keyed = [channel for channel in channels if isinstance(channel, keyframes.Keys)]
-    if not keyed:
-        start = moves.at(1)
-        moving.location, moving.rotation, moving.scale = start.location, np.radians(start.rotation), start.scale
-        return
-    location, rotation, scale = keyed
-    radians = np.radians(rotation.values)
-    moving.location, moving.rotation, moving.scale = location.values[0], radians[0], scale.values[0]
-    for index in range(2):
-        values = (place[index] for place in location.values)
-        _set_keys(scene, f"{path}.location", index, location, values, first, **curve)
-    _set_keys(scene, f"{path}.rotation", 0, location, radians, first, **curve)
-    _set_keys(scene, f"{path}.scale", 0, location, scale.values, first, **curve)
+    for name, change in (("location", tuple), ("rotation", np.radians), ("scale", float)):
+        _set_channel(scene, moving, path, name, getattr(moves, name), first, change, **curve)
 
 
-def _draw(effect, strip, source: model.Region | model.OutlineRegion, color: Sequence[float], first: float) -> str:
+def _draw(
+    effect, strip, source: model.AnyRegion, drawings: model.Drawings, color: Sequence[float], first: float
+) -> str:
     """Draws a region's strokes on an annotation layer of its own, a frame per drawing; the layer's name."""
     layer = annotation(effect).layers.new(source.name or data_("Region"), set_active=False)
     layer.color = color
     to_image = geometry.picture_to_image(strip, picture_size(effect))
     is_keyed = isinstance(source.moves.location, keyframes.Keys)
-    for frame, strokes in zip(source.drawings.frames, source.drawings.strokes, strict=True):
+    for frame, strokes in zip(drawings.frames, drawings.strokes, strict=True):
         drawing = layer.frames.new(int((frame if is_keyed else 1) + first))
         for points in strokes:
             add_stroke(drawing, mapped(to_image, points))

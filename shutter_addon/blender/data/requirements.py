@@ -1,11 +1,13 @@
-"""What an effect strip and its scene need so that Blender's sequencer asks the engine for the whole picture."""
+"""What an effect strip and its scene need so that Blender's sequencer asks the engine for the whole picture; and what
+the pictures of an edit are made of: scenes, objects, materials, images and all other data of a file."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 
+import bpy
 from bpy.app.translations import pgettext_rpt as rpt_
-from bpy.types import Object, Scene, Strip, bpy_struct
+from bpy.types import ID, Object, Scene, Strip, bpy_struct
 
 from ...core.frames import frame_ranges
 from ...core.model.limits import MAX_FRAME
@@ -85,3 +87,32 @@ def shown_frames(scene: Scene, strip: Strip) -> range:
         first, last = max(first, strip.left_handle), min(last, strip.right_handle)
         strip = outer
     return range(first, last)
+
+
+def used_data(scene: Scene, frames: range) -> set[ID]:
+    """The scene, those in its Scene strips, what the strips name that are shown at these frames, and whatever that uses
+    in turn. What scenes hold beside their strips is in no picture."""
+    shown = scenes_at(scene, frames)
+    uses: dict = {}
+    for item, users in bpy.data.user_map().items():
+        for user in users:
+            uses.setdefault(user, []).append(item)
+    items = set()
+    new = [item for each, at in shown for item in _named(each, at)]
+    while new:
+        if (item := new.pop()) not in items:
+            items.add(item)
+            new += uses.get(item, ())
+    return items.union(each for each, _ in shown)
+
+
+def _named(scene: Scene, frames: range) -> Iterator[ID]:
+    for strip in scene.sequence_editor.strips_all:
+        if not is_shown(scene, strip, frames):
+            continue
+        for owner in (strip, *strip.modifiers):
+            for setting in owner.bl_rna.properties:
+                value = getattr(owner, setting.identifier) if setting.type == "POINTER" else None
+                is_edit = isinstance(value, Scene) and strip.scene_input == "SEQUENCER"
+                if isinstance(value, ID) and not is_edit:
+                    yield value

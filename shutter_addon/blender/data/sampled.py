@@ -143,13 +143,6 @@ def placement(curves: Curves, effect: PropertyGroup, strip: Strip, frames: Frame
     return over(frames if keyed else None, at)
 
 
-class _Evaluated:
-    """Channel of a number that Blender evaluates: for sampling alone."""
-
-    def __init__(self, function: Callable) -> None:
-        self.at = function
-
-
 def source_time(curves: Curves, path: str, effect: PropertyGroup, frames: Frames) -> keyframes.Channel:
     def value(frame: float) -> float:
         return curves.value(effect, path, "source_time", frame)
@@ -159,4 +152,4 @@ def source_time(curves: Curves, path: str, effect: PropertyGroup, frames: Frames
     except EffectError as error:
         return keyframes.Constant(error)
     keys = curves.keys(keyed)
-    return over(frames if keyed else None, keyframes.SourceTime(_Evaluated(value), keys).at, keys)
+    return over(frames if keyed else None, keyframes.SourceTime(keyframes.Computed(value), keys).at, keys)

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import bpy
 from bpy.types import Scene, Strip, bpy_struct
 
-from . import colour_configuration, fcurves, strips
+from . import fcurves, strips, versions
 
 # Of Blender's dither and colours no other versions are known to the bit.
 _KNOWN_TO = (5, 4)
@@ -96,7 +96,7 @@ def makes_levels(scene: Scene) -> bool:
     """Whether a scene's render makes levels of 8 bits of what its sequencer shows, by sRGB alone."""
     return (
         bpy.app.version < _KNOWN_TO
-        and not colour_configuration.name()
+        and not versions.colours()
         and bpy.data.colorspace.working_space == "Linear Rec.709"
         and scene.sequencer_colorspace_settings.name == "sRGB"
         and scene.display_settings.display_device == "sRGB"

@@ -1,4 +1,4 @@
-"""An effect strip as plain data: the one place that reads what an effect is from Blender's data.
+"""An effect strip as plain data, and as a recipe: the one place that reads what an effect is from Blender's data.
 
 On Blender's main thread alone. What comes of it holds no Blender data, so that threads may read it, and it does not
 change when the scene does. Channels are sampled at the frames that are asked for: Blender's F-curves are evaluated by
@@ -24,11 +24,12 @@ from ...core.model import effect as model
 from ...core.model import following, keyframes, limits, mattes, outlines
 from ...core.model.fields import fields_of
 from ...core.model.frame_state import Options
+from ...core.recipes import baking
 from ...media.carried_mattes import CarriedFile
 from . import matte_content, sampled, source_media, strips, validation
-from .fcurves import Curves, leading, progress
+from .annotations import image_to_picture, layer_of, picture_size
+from .fcurves import Curves, curves_under, key_frames, leading, progress, stretched
 from .sampled import Frames
-from .strip_timing import timing_of
 
 # Sentences of core/model/effect.py, which are looked up where they are passed on.
 _CORE = (
@@ -78,7 +79,7 @@ def take(scene: Scene, effect: PropertyGroup, strip: Strip, frames: Frames) -> S
         frames=frozenset(frames),
         effect=read(scene, effect, strip, frames),
         source=source_media.spec(source),
-        timing=None if effect.use_source_time else timing_of(source),
+        timing=None if effect.use_source_time else source_media.timing_of(source),
         blended="" if strip.blend_type == "REPLACE" or source.mute else scene.sequencer_colorspace_settings.name,
         folder=Path(bpy.data.filepath).parent if bpy.data.filepath else None,
     )
@@ -358,7 +359,7 @@ def _any_region(sampling: _Sampling, index: int, shutter: int) -> model.Region |
     kind: type[model.MatteRegion] = model.MatteRegion
     drawn: dict = {}
     if region.kind == "OUTLINE":
-        drawings = sampled.drawings(curves, path, effect, region, sampling.placement, None)
+        drawings = _drawings(sampling, index)
         kind, drawn = model.OutlineRegion, {"drawings": drawings}
         content = sampled.tried(_outlines, sampling, region, drawings)
     else:
@@ -376,7 +377,7 @@ def _any_region(sampling: _Sampling, index: int, shutter: int) -> model.Region |
 def _outlines(sampling: _Sampling, region: PropertyGroup, drawings: model.Drawings) -> keyframes.Channel:
     """The content of an outline. EffectError, MediaError: there is no source."""
     if validation.word(region, "between") == "STRAIGHT":
-        return model.DrawnOutlines(drawings)
+        return model.drawn_outlines(drawings)
     return mattes.FileFrames(file=_carried(sampling, drawings))
 
 
@@ -420,3 +421,41 @@ def _camera(curves: Curves, effect: PropertyGroup, frames: Frames) -> model.Came
     path = effect.camera.path_from_id()
     moves = sampled.moves(curves, effect.camera, path, frames)
     return model.Camera(moves, **sampled.sampled_fields(curves, effect.camera, path, model.Camera, frames))
+
+
+def recipe_of(scene: Scene, effect: PropertyGroup, strip: Strip, contents: Sequence = ()) -> model.Effect:
+    """The effect as a recipe, whose frame 1 is the strip's first; left out is what baking.baked leaves out, and regions
+    without a shutter. contents: see baking.baked. EffectError: it cannot be rendered as it stands."""
+    check_counts(effect)
+    shown = range(strip.left_handle, strip.right_handle)
+    if not -limits.MAX_FRAME <= shown.start <= shown.stop <= limits.MAX_FRAME:
+        sentence = rpt_('strip "{strip}" lies at frames {first} to {last}, where no timeline is')
+        raise EffectError(sentence.format(strip=strip.name, first=shown.start, last=shown.stop - 1))
+    drawn = [region for region in strips.drawn_regions(effect) if layer_of(effect, region)]
+    for item in (*effect.shutters, *drawn, *strips.matte_regions(effect)):
+        _check_name(item)
+    for shutter in effect.shutters:
+        for component in shutter.color:
+            validation.number(shutter, "color", component)
+    if effect.regions and image_to_picture(strip, picture_size(effect)) is None:
+        sentence = rpt_('strip "{strip}" is too small to find its scribbles')
+        raise EffectError(sentence.format(strip=strip.name))
+    with translated(rpt_):
+        plain = read(scene, effect, strip, sorted({*shown, *_keyed(scene, effect)}))
+        return baking.baked(plain, shown, contents)
+
+
+def _keyed(scene: Scene, effect: PropertyGroup) -> set[float]:
+    """The timeline frames of the effect's keys and drawings."""
+    curves, pace = curves_under(scene, effect.path_from_id() + "."), stretched(scene)
+    frames = {frame / pace for frame in key_frames(curves)}
+    layers = (layer_of(effect, region) for region in effect.regions)
+    return frames.union(float(drawing.frame_number) for layer in layers if layer for drawing in layer.frames)
+
+
+def _check_name(item: PropertyGroup) -> None:
+    """EffectError: the name is longer than a recipe has it, from a script or a file of another version."""
+    if len(item.name) > limits.MAX_NAME:
+        sentence = rpt_("{place}: its name has {count} characters, {most} are the most")
+        words = {"place": validation.place(item), "count": len(item.name), "most": limits.MAX_NAME}
+        raise EffectError(sentence.format(**words))

@@ -1,4 +1,6 @@
-"""The medium of a source strip: what it is, opened as shutter_addon.media has it."""
+"""The medium of a source strip: what it is, opened as shutter_addon.media has it; and how the strip lies on the
+timeline, where Blender's sequencer keeps its proxies, and its retiming keys, of which Blender's Python API gives a
+part."""
 
 from __future__ import annotations
 
@@ -9,20 +11,30 @@ from functools import partial
 from pathlib import Path
 
 import bpy
+import numpy as np
 from bpy.app.translations import pgettext_rpt as rpt_
-from bpy.types import Strip
+from bpy.types import Scene, Strip
 
 from ...core.frames.frame_source import FrameSource
+from ...core.frames.retiming import RetimingKey, StripTiming, are_retiming_keys
 from ...core.memo import Kept
 from ...media import MediaError, open_source
 from ...media.files import stamp
 from ...media.opening import with_proxy
 from ...media.sequence import by_number
-from . import external_files, strip_proxies
+from . import external_files
+from .struct_dna import LayoutError, memory, read, record, text
 
 _AT_ONCE = 100  # files of a sequence, which may be long, that one look asks, beside the first and the last
 _REST = 1.0  # seconds from one look at them to the next: on a network's drive a look takes a while
 _KEPT = 256
+_TIMES = (
+    *("name", "content_start", "content_end", "content_trim_start", "content_trim_end", "left_handle"),
+    *("use_reverse_frames", "strobe"),
+)
+# Records of Blender's memory, as struct_dna.record takes them.
+_SEQUENCE = ("char name[64]", "S64"), ("SeqRetimingHandle *retiming_handles", "u8"), ("int retiming_handle_num", "i4")
+_KEY = ("double strip_frame_index", "f8"), ("int flag", "i4"), ("float retiming_factor", "f4")
 
 
 @dataclass
@@ -111,6 +123,18 @@ def reading(strip: Strip) -> tuple:
 
 
 @dataclass(frozen=True)
+class Proxy:
+    """What previews of one size read in place of a strip's footage.
+
+    path: a movie; of_images: a folder with a picture for each of the strip's
+    stamp: tells files that were built anew"""
+
+    path: Path
+    of_images: bool
+    stamp: tuple
+
+
+@dataclass(frozen=True)
 class SourceSpec:
     """What a source strip reads, and how: plain data, equal where it gives the same frames.
 
@@ -122,7 +146,7 @@ class SourceSpec:
     files: tuple[Path, ...] | None = field(compare=False)
     options: dict = field(compare=False)
 
-    def open(self, divisor: int = 1, proxy: strip_proxies.Proxy | None = None) -> FrameSource:
+    def open(self, divisor: int = 1, proxy: Proxy | None = None) -> FrameSource:
         """The medium, as Blender would show it; divisor: of media.open_source; proxy: what frames are read from, where
         it fits. MediaError: it cannot be read."""
         medium = open_source(self.path, files=self.files, divisor=divisor, **self.options)
@@ -130,7 +154,7 @@ class SourceSpec:
             return medium
         how = {name: self.options[name] for name in ("colorspace", "config")}
         if proxy.of_images and self.files:
-            files = [strip_proxies.of_image(proxy.path, file) for file in self.files]
+            files = [of_image(proxy.path, file) for file in self.files]
             # Blender has converted them to the sequencer's colour space, but for data.
             how = {"files": files, "colorspace": "Non-Color" if how["colorspace"] == "Non-Color" else None}
         return with_proxy(medium, partial(open_source, proxy.path, **how))
@@ -207,3 +231,78 @@ def _clip_files(strip: Strip) -> tuple[int, Callable[[int], Path]]:
     if clip.source == "MOVIE" or beside is None:
         return 1, lambda _i: path
     return max(clip.frame_duration, 1), lambda i: beside(clip.frame_offset + i)
+
+
+def timing_of(strip: Strip) -> StripTiming:
+    """The timing of a source strip, as plain data."""
+    render = strip.id_data.render
+    keys = retiming_keys(strip)
+    is_known = keys is not None
+    if keys is None:
+        even = RetimingKey(0.0, 0, 0.0), RetimingKey(strip.content_end - strip.content_start, 0, 1.0)
+        keys = even if len(getattr(strip, "retiming_keys", ())) > 1 else ()
+    return StripTiming(
+        first=first_frame(strip) if strip.type == "MOVIECLIP" else 0,
+        scene_fps=render.fps / render.fps_base,
+        keys=keys,
+        is_known=is_known,
+        **{name: getattr(strip, name) for name in _TIMES},
+    )
+
+
+def retiming_keys(strip: Strip) -> tuple[RetimingKey, ...] | None:
+    """The strip's retiming keys from Blender's memory. Python gets their frames alone, in Blender 5.2 as if the strip
+    began with the first one of the edit, and of a clip strip nothing at all. None: they cannot be read."""
+    try:
+        name, first, count = read(record("Sequence", *_SEQUENCE), strip.as_pointer())
+        kind = record("SeqRetimingHandle", *_KEY)
+    except LayoutError:
+        return None
+    if text(name)[2:] != strip.name.encode():  # behind the letters SQ
+        return None
+    stored = np.frombuffer(memory(first, count * kind.itemsize), kind) if count else ()
+    keys = tuple(RetimingKey(*key.tolist()) for key in stored)
+    return keys if are_retiming_keys(keys) else None
+
+
+def proxy_of(scene: Scene, strip: Strip, percent: int) -> Proxy | None:
+    """What Blender reads of a strip in previews of that size, in percent; None: the footage itself."""
+    if strip.type not in ("MOVIE", "IMAGE") or not strip.use_proxy or not getattr(strip.proxy, f"build_{percent}"):
+        return None
+    by_strip = scene.sequence_editor.proxy_storage == "PER_STRIP"
+    if by_strip and strip.proxy.use_proxy_custom_file:
+        return _proxy(_absolute(strip.proxy.filepath))
+    if strip.type == "MOVIE":
+        movie = external_files.absolute(strip, strip.filepath)
+        stream = f"_st{strip.stream_index}" if strip.stream_index else ""
+        return _proxy(_folder(scene, strip, movie.parent) / movie.name / f"proxy_{percent}{stream}.avi")
+    if scene.sequencer_colorspace_settings.name != "sRGB":  # what Blender keeps its pictures in
+        return None
+    folder = _folder(scene, strip, external_files.absolute(strip, strip.directory)) / "images" / str(percent)
+    ends = strip.elements[0], strip.elements[-1]
+    return _proxy(folder, *(of_image(folder, element.filename) for element in ends))
+
+
+def of_image(folder: Path, image: str | Path) -> Path:
+    """The proxy of an image file, by its name or path."""
+    return folder / f"{Path(image).name}_proxy.jpg"
+
+
+def _folder(scene: Scene, strip: Strip, beside: Path) -> Path:
+    """Where the strip's proxies lie; beside: the folder of its footage."""
+    if scene.sequence_editor.proxy_storage == "PROJECT":
+        return _absolute(scene.sequence_editor.proxy_dir or "//BL_proxy")
+    if strip.proxy.use_proxy_custom_directory:
+        return _absolute(strip.proxy.directory)
+    return beside / "BL_proxy"
+
+
+def _proxy(path: Path, *files: Path) -> Proxy | None:
+    """files: those of a folder that are looked at. None: one is missing."""
+    stamps = tuple(map(stamp, files or (path,)))
+    return None if None in stamps else Proxy(path, bool(files), stamps)
+
+
+def _absolute(path: str) -> Path:
+    """Blender finds folders of proxies from the file that is open, wherever their strip is from."""
+    return Path(bpy.path.abspath(path))

@@ -7,7 +7,7 @@ import os
 import tomllib
 from collections.abc import Iterator
 from contextlib import suppress
-from functools import partial
+from functools import cache, partial
 from itertools import groupby
 from pathlib import Path
 
@@ -18,7 +18,7 @@ from ...core import threads
 from ...core.farm.edit_version import EditVersion, Footage
 from ...media import MediaError, derived
 from ...media.files import stamp
-from . import colour_configuration, external_files, source_media, strips
+from . import external_files, source_media, strips
 
 MANIFEST = Path(__file__).parents[3] / "blender_manifest.toml"
 _FEW = 256  # files of a sequence; of a longer one's, blocks are hashed: to read all of it would take hours
@@ -35,14 +35,41 @@ def blender() -> str:
     return ".".join(map(str, bpy.app.version))
 
 
+def colours() -> str:
+    """The OpenColorIO configuration that Blender has taken: of one that OpenColorIO brings, its name; of a file, its
+    SHA-256 in hexadecimal; "": Blender's own, wherever it is installed. Of the tables that a file names, only the names
+    count."""
+    # Blender itself sets OCIO to its own file as it starts, and what it starts inherits that.
+    path = os.environ.get("BLENDER_OCIO", os.environ.get("OCIO", ""))
+    if path.startswith("ocio://"):
+        return path
+    digest = _config_digest(Path(path))
+    return "" if digest == _own_config() else digest
+
+
+@cache
+def _own_config() -> str:
+    return _config_digest(Path(bpy.utils.system_resource("DATAFILES", path="colormanagement")) / "config.ocio")
+
+
+def _config_digest(path: Path) -> str:
+    """ "": there is no such file; Blender then takes its own."""
+    try:
+        return _sha256(path)
+    except OSError:
+        return ""
+
+
+def _sha256(path: str | Path) -> str:
+    with open(path, "rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()
+
+
 def of_edit(scene: Scene) -> EditVersion:
     """The version of an edit, as it is in the .blend file that is open. OSError: the file is gone."""
-    with open(bpy.data.filepath, "rb") as file:
-        blend = hashlib.file_digest(file, "sha256").hexdigest()
+    blend = _sha256(bpy.data.filepath)
     footage = tuple(map(_footage, _footage_files(scene)))
-    return EditVersion(
-        blend=blend, extension=extension(), blender=blender(), colours=colour_configuration.name(), footage=footage
-    )
+    return EditVersion(blend=blend, extension=extension(), blender=blender(), colours=colours(), footage=footage)
 
 
 def read_files(scene: Scene) -> list[Path]:

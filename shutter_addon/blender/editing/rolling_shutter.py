@@ -22,8 +22,7 @@ from ...media.cuts import ShotSource
 from ..data import sampled, snapshot, source_media, strips, validation
 from ..data.consistency import bars
 from ..data.fcurves import Curves
-from ..data.strip_timing import timing_of
-from . import bar_edits, collection_edits, time_map
+from . import bar_edits, collection_edits, shutter_edits
 
 SMOOTH = "8"  # of effects that were not smooth
 FRAMES = 3  # of the window, at least: the shown one and those beside it
@@ -104,13 +103,13 @@ def _is_backward(scene: Scene, effect: PropertyGroup, strip: Strip) -> bool:
     if effect.use_source_time:
         time = sampled.source_time(Curves(scene), effect.path_from_id(), effect, (frame,))
         return bool(time.at(frame)[1])
-    return bool(timing_of(strips.source_of(scene, effect, strip)).use_reverse_frames)
+    return bool(source_media.timing_of(strips.source_of(scene, effect, strip)).use_reverse_frames)
 
 
 def _begin(effect: PropertyGroup) -> PropertyGroup:
     """The two shutters, the first of which is the default, and the ramp; which is returned."""
     earlier, later = (data_("Earlier"), "ANGLE_360"), (data_("Later"), "ANGLE_360")
-    return time_map.ramp_between(effect, earlier, later, data_("Rolling Shutter"), "LINEAR")
+    return shutter_edits.ramp_between(effect, earlier, later, data_("Rolling Shutter"), "LINEAR")
 
 
 def share_of(scene: Scene, effect: PropertyGroup, strip: Strip, milliseconds: float) -> float:

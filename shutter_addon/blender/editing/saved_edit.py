@@ -6,7 +6,7 @@ import bpy
 from bpy.types import Scene
 
 from ...core.messages import UserError, sentence
-from ..data import used_data
+from ..data import requirements
 from ..output import film_output
 
 ENDING = ".blend"
@@ -53,7 +53,7 @@ def open_edit(path: Path, name: str | None = None) -> Scene:
 def _scripts(scene: Scene) -> list[tuple]:
     """(owner, driver) of each driver that Blender does not evaluate because it could do anything, of all that the
     edit's pictures are made of."""
-    used = used_data.used(scene, range(scene.frame_start, scene.frame_end + 1))
+    used = requirements.used_data(scene, range(scene.frame_start, scene.frame_end + 1))
     drivers = [(item, curve.driver) for item in used for curve in _driven(item)]
     scripted = ((owner, driver) for owner, driver in drivers if driver.type == "SCRIPTED")
     complex_ones = [(owner, driver) for owner, driver in scripted if not driver.is_simple_expression]

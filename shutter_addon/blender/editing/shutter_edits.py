@@ -1,4 +1,5 @@
-"""An effect's shutters: added, duplicated, removed, moved."""
+"""An effect's shutters: added, duplicated, removed, moved; and time maps, of which every pixel shows its own moment of
+the window, as a ramp or a matte says."""
 
 import numpy as np
 from bpy.app.translations import pgettext_data as data_
@@ -8,7 +9,7 @@ from ...core.model import presets
 from ...media import opencv
 from ..data import fcurves, property_copy, validation
 from . import bar_edits, collection_edits
-from .region_edits import remove_region
+from .region_edits import add_region, remove_region
 
 # Told apart by eyes that lack red, green or blue cones: seven by Okabe and Ito (https://jfly.uni-koeln.de/color), then
 # three that lie farthest from these to all eyes.
@@ -104,3 +105,22 @@ def move_shutter(effect: PropertyGroup, index: int, to: int) -> None:
     """Moves a shutter in the list; whichever comes first is the default."""
     collection_edits.move(effect, "shutters", index, to)
     effect.active_shutter = to
+
+
+def add_time_map(effect: PropertyGroup, ramp: str) -> PropertyGroup:
+    """Gives an effect two shutters, that show the first and the last frame of its window, the first one everywhere, and
+    a ramp from one to the other; the ramp's region, which is the active one then.
+
+    ramp: one of properties.RAMPS. EffectError: the window has no length, and nothing has changed."""
+    region = ramp_between(effect, (data_("First"), "FIRST"), (data_("Last"), "LAST"), data_("Time Map"), ramp)
+    effect.interpolation = "DISPLACEMENT"
+    return region
+
+
+def ramp_between(
+    effect: PropertyGroup, first: tuple[str, str], last: tuple[str, str], name: str, ramp: str
+) -> PropertyGroup:
+    """Adds two shutters, by name and preset, the first of which is the default, and the ramp between them."""
+    add_shutter(effect, *first)
+    move_shutter(effect, effect.active_shutter, 0)
+    return add_region(effect, add_shutter(effect, *last), "RAMP", name, ramp=ramp)

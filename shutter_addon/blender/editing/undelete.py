@@ -17,8 +17,6 @@ from . import add_effect, match_source
 _MOST = 64
 _COPIED = "copied"  # in place of an identity
 _OWN = {"name", "identity", "source", "start"}  # of an effect, what stays where another one is pasted over it
-# What effects point to, and where bpy.data has it.
-_POINTED = {"MovieClip": "movieclips", "Image": "images", "Mask": "masks"}
 _effects: Kept[str, dict] = Kept()
 
 
@@ -64,15 +62,16 @@ def paste(effect: PropertyGroup, strip: Strip) -> None:
 
 def _keep(identity: str, effect: PropertyGroup, **more: object) -> None:
     scene, effect_scene, path = effect.id_data, effect.scene, effect.path_from_id()
-    curves = [_plain(curve) for curve in fcurves.curves_under(scene, path + ".")]
+    layers = effect_scene.annotation.layers if effect_scene.annotation else ()
+    curves = [property_copy.plain(curve) for curve in fcurves.curves_under(scene, path + ".")]
     for curve in curves:
         curve["data_path"] = curve["data_path"].removeprefix(path)
     kept = more | {
         "scene": (effect_scene.name, (effect_scene.render.resolution_x, effect_scene.render.resolution_y)),
         "format": scene.virtual_shutter.format,
-        "effect": _plain(effect),
+        "effect": property_copy.plain(effect),
         "curves": curves,
-        "layers": [_plain(layer) for layer in effect_scene.annotation.layers] if effect_scene.annotation else [],
+        "layers": [property_copy.plain(layer) for layer in layers],
     }
     _effects.keep(identity, kept, _MOST)
 
@@ -105,24 +104,6 @@ def _restore(scene: Scene, effect: PropertyGroup, data: dict, content: dict) -> 
         _fill(annotation(effect).layers.new(plain["info"], set_active=False), plain)
 
 
-def _plain(struct: bpy_struct) -> dict:
-    """A struct of Blender's with all that is in it as plain data; of what it points to, the session_uid."""
-    plain: dict[str, object] = {}
-    for prop in struct.bl_rna.properties:
-        name = prop.identifier
-        if prop.type == "COLLECTION":
-            plain[name] = [_plain(item) for item in getattr(struct, name)]
-        elif property_copy.is_group(struct, name):
-            plain[name] = _plain(getattr(struct, name))
-        elif prop.type == "POINTER":
-            if getattr(struct, name) is not None and prop.fixed_type.identifier in _POINTED:
-                plain[name] = getattr(struct, name).session_uid
-        elif name != "co_ui" and not prop.is_skip_save:  # setting co_ui moves a key's handles
-            value = property_copy.stored(struct, name)
-            plain[name] = tuple(value) if getattr(prop, "is_array", False) else value
-    return plain
-
-
 def _fill(struct: bpy_struct, plain: dict) -> None:
     for name, value in plain.items():
         if isinstance(value, list):
@@ -131,7 +112,7 @@ def _fill(struct: bpy_struct, plain: dict) -> None:
         elif isinstance(value, dict):
             _fill(getattr(struct, name), value)
         elif (prop := struct.bl_rna.properties[name]).type == "POINTER":
-            items = getattr(bpy.data, _POINTED[prop.fixed_type.identifier])
+            items = getattr(bpy.data, property_copy.POINTED[prop.fixed_type.identifier])
             setattr(struct, name, next((each for each in items if each.session_uid == value), None))
         elif not struct.is_property_readonly(name):
             property_copy.store(struct, name, value)

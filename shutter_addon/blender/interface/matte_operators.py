@@ -15,9 +15,8 @@ from bpy_extras.io_utils import ImportHelper
 from ...core.messages import EffectError, UserError
 from ...core.model.choices import CONTEXT, RAMPS, READOUT_UNITS, READS, SIDES
 from ...core.model.limits import MAX_CHANNEL
-from ..data import matte_strips, recipe_import, selection, strips
-from ..editing import collection_edits, outline_masks, region_edits, rolling_shutter
-from ..editing import time_map as time_maps
+from ..data import matte_content, recipe_import, selection, strips
+from ..editing import collection_edits, outline_drawings, region_edits, rolling_shutter, shutter_edits
 from ..output import matte_export
 from . import needs
 from .operator_bases import OfEffect, chosen_file, kept, operator
@@ -61,7 +60,7 @@ STRIP = EnumProperty(name="Strip", items=_strips, translation_context=contexts.n
 def matte_strip(self: Operator, _context: Context, effect: PropertyGroup) -> None:
     """Make a movie, image or clip strip of the edit the matte of the active shutter, muted or not"""
     region = region_edits.add_region(effect, selection.active_shutter(effect), "MATTE", self.strip, matte="STRIP")
-    matte_strips.choose_strip(region, self.strip)
+    matte_content.choose_strip(region, self.strip)
 
 
 @kept
@@ -91,7 +90,7 @@ def matte_mask(self: Operator, _context: Context, effect: PropertyGroup) -> None
 def outline_from_mask(self: Operator, _context: Context, effect: PropertyGroup) -> None:
     """Make an outline of the active shutter that is drawn at each key of a mask"""
     shutter = selection.active_shutter(effect)
-    outline_masks.from_mask(self.edit, effect, self.effect_strip, shutter, _chosen(self.mask))
+    outline_drawings.from_mask(self.edit, effect, self.effect_strip, shutter, _chosen(self.mask))
 
 
 def _why_not_laid(effect: PropertyGroup) -> str | None:
@@ -140,7 +139,7 @@ def _why_no_time_map(effect: PropertyGroup) -> str | None:
 @operator("Time Map", needs.a_shutter, _why_no_time_map, ramp=_RAMP)
 def time_map(self: Operator, _context: Context, effect: PropertyGroup) -> None:
     """Show every pixel at its own moment: a ramp from the first of the frames to the last (slit-scan)"""
-    time_maps.add(effect, self.ramp)
+    shutter_edits.add_time_map(effect, self.ramp)
 
 
 def _why_no_repair(effect: PropertyGroup) -> str | None:

@@ -16,7 +16,7 @@ from ...core.messages import UserError
 from ...core.model import outlines
 from ...media import outlining
 from ..data import preview_areas, selection, strips
-from ..editing import outline_drawings, outline_masks, track_region
+from ..editing import outline_drawings, track_region
 from ..rendering import outline_carrying
 from . import drawing, needs, sharp_frame
 from .gizmo_groups import Dragged, View, WithKeys, view
@@ -119,7 +119,7 @@ class SHUTTER_OT_outline_mask(_Carries, Operator):
     )
 
     def carried(self, context: Context) -> None:
-        mask = outline_masks.to_mask(context, selection.active(context), self._target.index, self.step)
+        mask = outline_drawings.to_mask(context, selection.active(context), self._target.index, self.step)
         self.report({"INFO"}, rpt_('Made the mask "{mask}"').format(mask=mask.name))
 
 

@@ -28,7 +28,7 @@ from ...media.blender_movie import frame_rate
 from ...media.derived import own_folder, refuse_link
 from ...media.errors import MediaError
 from ...media.rendered_pictures import is_whole_movie, is_whole_picture
-from ..data import colour_configuration, effect_version, snapshot, source_media, strips
+from ..data import effect_version, snapshot, source_media, strips, versions
 from ..rendering import pictures, sessions
 from . import film_output
 
@@ -103,7 +103,7 @@ def _check(scene: Scene, effect: PropertyGroup, strip: Strip, kind: Kind) -> Non
     if pyav.missing():
         sentence = rpt_("the Python package {package} is missing, which movies need: bake to OpenEXR")
         raise EffectError(sentence.format(package="av"))
-    if colour_configuration.name():
+    if versions.colours():
         raise EffectError(
             rpt_("movies are baked in Blender's own colours: with another configuration, bake to OpenEXR")
         )

@@ -22,7 +22,7 @@ from ...core.model.mattes import FileFrame
 from ...media import MediaError
 from ...media.carried_mattes import CarriedMattes
 from ...media.files import check_file
-from ..data import effect_version, requirements, selection, snapshot, source_media, strip_timing, strips
+from ..data import effect_version, requirements, selection, snapshot, source_media, strips
 from ..rendering import effect_source, job_snapshots, pictures
 from ..rendering.session import RenderContext, RenderSession
 
@@ -128,7 +128,7 @@ def _look_at_footage(check: EffectCheck, effect: PropertyGroup, strip: Strip) ->
     if saved != check.size:
         words = "{}×{}, but was {}×{} when the edit was saved".format(*check.size, *saved)
         check.faults.append(f"{medium.path.name}: is {words}")
-    timing = strip_timing.timing_of(source)
+    timing = source_media.timing_of(source)
     rate = min(float(medium.fps or math.inf) / timing.scene_fps, 1.0)  # the strip may keep the movie's speed
     if not timing.keys and medium.count < int(source.content_duration * rate):
         words = f"{medium.count} frames, fewer than the {source.content_duration} of strip"

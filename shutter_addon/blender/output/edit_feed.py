@@ -21,7 +21,7 @@ from bpy.types import Scene
 from ...core import stopping
 from ...core.pixels.shown_levels import Display
 from ...media import color
-from ..data import colour_configuration, seen_alone, strips
+from ..data import seen_alone, strips, versions
 from ..data.property_copy import for_a_while
 from ..rendering import job_snapshots, pictures, render_job, sessions
 from ..rendering.effect_source import FULL, in_words
@@ -97,7 +97,7 @@ def before_frame(scene: Scene) -> None:
 def _seen(film: _Film, scene: Scene) -> seen_alone.Alone | None:
     """The effect that is all that is seen at the current frame, where Blender makes known levels of it."""
     if _data.is_own:
-        is_known = not colour_configuration.name()
+        is_known = not versions.colours()
         return seen_alone.Alone(strips.effect_strips(scene)[0], is_blended=False) if is_known else None
     if film.makes_levels is None or render_job.scripts_act():
         film.makes_levels = seen_alone.makes_levels(scene)

@@ -10,7 +10,7 @@ from bpy.types import PropertyGroup, Scene, Strip
 
 from ...core import told
 from ...core.messages import UserError
-from ..data import annotations, colour_configuration, fcurves, snapshot, source_media, strips
+from ..data import annotations, fcurves, snapshot, source_media, strips, versions
 from ..data.validation import word
 
 
@@ -144,5 +144,5 @@ def _word(owner: PropertyGroup, name: str) -> str:
 
 def _standard(name: str) -> str:
     """A name of Blender's own OpenColorIO configuration, or of one that OpenColorIO brings; others are somebody's."""
-    configuration = colour_configuration.name()
+    configuration = versions.colours()
     return name if not configuration or configuration.startswith("ocio://") else "(of another configuration)"

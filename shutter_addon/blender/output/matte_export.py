@@ -21,7 +21,7 @@ from ...core.recipes import recipe
 from ...media.image_writing import write_exr, write_grey
 from ...media.matte_values import MatteValues
 from ...media.sequence import sequence_files
-from ..data import matte_content, matte_strips, recipe_export, snapshot, source_media, strips, validation
+from ..data import matte_content, snapshot, source_media, strips, validation
 from ..rendering import effect_source
 
 
@@ -31,11 +31,11 @@ def recipe_for(scene: Scene, effect: PropertyGroup, strip: Strip, path: Path) ->
     written. OSError: there can be no such folder."""
     regions = strips.matte_regions(effect)
     # Once before anything is written.
-    recipe_export.recipe_of(scene, effect, strip, [_ramp(region) for region in regions])
+    snapshot.recipe_of(scene, effect, strip, [_ramp(region) for region in regions])
     folders = [_folder(region, path, number) for number, region in enumerate(regions, 1)]
     _spare(folders, _read(scene, effect, strip, regions))
     words = [_words(scene, effect, strip, *both, path) for both in zip(regions, folders, strict=True)]
-    return recipe_export.recipe_of(scene, effect, strip, words)
+    return snapshot.recipe_of(scene, effect, strip, words)
 
 
 def save(scene: Scene, effect: PropertyGroup, strip: Strip, region: PropertyGroup, folder: Path, word: str) -> int:
@@ -77,7 +77,7 @@ def _read(scene: Scene, effect: PropertyGroup, strip: Strip, regions: list) -> I
         if region.kind == "MATTE" and region.matte == "IMAGE":
             yield matte_content.image_path(region)
         elif region.kind == "MATTE" and region.matte == "STRIP":
-            yield from (source_media.spec(part).path for part in matte_strips.parts_for(region, strip))
+            yield from (source_media.spec(part).path for part in matte_content.parts_for(region, strip))
 
 
 def _spare(folders: list[Path | None], read: Iterator[Path]) -> None:

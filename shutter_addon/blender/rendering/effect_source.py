@@ -19,8 +19,7 @@ from ...media.derived import VECTORS, StoredVectors
 from ...media.prefetch import PrefetchSource
 from ...media.smooth import SmoothSource, steps_for
 from ..data.snapshot import Snapshot
-from ..data.source_media import SourceSpec
-from ..data.strip_proxies import Proxy
+from ..data.source_media import Proxy, SourceSpec
 
 FAULTS = (EffectError, MediaError, NoDeviceError, MemoryError)
 

@@ -17,13 +17,13 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..messages import EffectError
-from . import combining, keyframes, limits, mattes, motions, outlines, scribbles, shutters
+from . import keyframes, limits, mattes, motions, outlines, scribbles, shutters
 from .choices import BETWEEN, BLENDS, CHANNELS, COMBINES, CONTEXT, LENGTHS, MOTIONS, RAMPS, TIMINGS
-from .drawings import Drawings as Drawings
-from .fields import MISSING, choice, color, number, switch, text, whole
-from .frame_state import FrameState
+from .fields import MISSING, choice, color, fixed, number, switch
+from .frame_state import Combine, FrameState, Mode
 from .keyframes import Bars, Channel
 from .motions import Placement
+from .scribbles import Drawings as Drawings
 
 Length = Literal["frames", "timeline", "motion"]
 _CLOSED = 'shutter "{name}" at frame {frame}: {fault}'
@@ -85,9 +85,10 @@ class Subject:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class AnyRegion(Subject):
-    """Where a shutter holds. shutter: its index; layer: core.pixels.layering"""
+    """Where a shutter holds. shutter: its index; layer: core.pixels.layering; drawings: of what is drawn, about whose
+    centre it moves; None: it is no drawing, and moves about the picture's"""
 
-    name: str = text("Name", "Name of the region", default="Region", absent="", most=limits.MAX_NAME)
+    name: str = fixed("Name", "Name of the region", default="Region", absent="", most=limits.MAX_NAME)
     shutter: int
     opacity: Channel = number(
         "Opacity",
@@ -101,6 +102,13 @@ class AnyRegion(Subject):
         "Expose the region by itself, before all else, which is exposed without it: it leaves no ghost",
         blender="is_layer",
     )
+    drawings: Drawings | None = None
+
+    def centre(self, frame: float) -> np.ndarray | None:
+        return self.drawings.centre(frame) if self.drawings else super().centre(frame)
+
+    def corners(self, frame: float) -> np.ndarray:
+        return self.drawings.corners(frame, self.placement(frame)) if self.drawings else super().corners(frame)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -124,12 +132,6 @@ class Region(AnyRegion):
         moved = self.drawings.moved(frame, self.placement(frame))
         kind, width, opacity = (channel.at(frame) for channel in (self.kind, self.width, self.opacity))
         return scribbles.Shape(shutter=self.shutter, kind=kind, width=width, strokes=moved, opacity=float(opacity))
-
-    def centre(self, frame: float) -> np.ndarray | None:
-        return self.drawings.centre(frame)
-
-    def corners(self, frame: float) -> np.ndarray:
-        return self.drawings.corners(frame, self.placement(frame))
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -188,21 +190,10 @@ class OutlineRegion(MatteRegion):
         strokes = tuple(self.drawings.at(frame)) if has_curves else ()
         return scribbles.Shape(shutter=self.shutter, kind="lasso", width=0.0, strokes=strokes)
 
-    def centre(self, frame: float) -> np.ndarray | None:
-        return self.drawings.centre(frame)
 
-    def corners(self, frame: float) -> np.ndarray:
-        return self.drawings.corners(frame, self.placement(frame))
-
-
-@dataclass(frozen=True)
-class DrawnOutlines:
+def drawn_outlines(drawings: Drawings) -> Channel:
     """Channel of outlines (mattes.Outline) that go straight from one drawing to the next."""
-
-    drawings: Drawings
-
-    def at(self, frame: float) -> mattes.Outline:
-        return mattes.Outline(outlines.curves(self.drawings.at(frame)))
+    return keyframes.Computed(lambda frame: mattes.Outline(outlines.curves(drawings.at(frame))))
 
 
 @dataclass(frozen=True)
@@ -220,7 +211,7 @@ class FileContent:
         default="luminance",
         recipe="",
     )
-    offset: int = whole(
+    offset: int = fixed(
         "Offset",
         "Frames by which the matte is ahead",
         default=0,
@@ -247,16 +238,14 @@ class RampContent:
         raise NotImplementedError
 
 
-@dataclass(frozen=True)
-class PlacedRamp:
+def placed_ramp(kind: mattes.RampKind, moves: Moves) -> Channel:
     """Channel of a ramp (mattes.Ramp) that is moved by keys."""
 
-    kind: mattes.RampKind
-    moves: Moves
+    def at(frame: float) -> mattes.Ramp:
+        placed = moves.at(frame)
+        return mattes.Ramp(kind=kind, location=placed.location, rotation=placed.rotation, scale=placed.scale)
 
-    def at(self, frame: float) -> mattes.Ramp:
-        placed = self.moves.at(frame)
-        return mattes.Ramp(kind=self.kind, location=placed.location, rotation=placed.rotation, scale=placed.scale)
+    return keyframes.Computed(at)
 
 
 @dataclass(frozen=True)
@@ -284,7 +273,7 @@ class Shutter:
 
     follow: what its exposure moves with, None: nothing"""
 
-    name: str = text("Name", "Name of the shutter", default="Shutter", absent=MISSING, most=limits.MAX_NAME)
+    name: str = fixed("Name", "Name of the shutter", default="Shutter", absent=MISSING, most=limits.MAX_NAME)
     color: tuple[float, float, float] = color(
         "Color", "Color of the shutter's bars, scribbles and matte", default=(0.8, 0.8, 0.8)
     )
@@ -293,7 +282,7 @@ class Shutter:
     follow_motion: motions.Motion = choice(
         "Motion", "What of its motion is followed", MOTIONS, default="scale", context=CONTEXT, told=False
     )
-    follow_smooth: int = whole(
+    follow_smooth: int = fixed(
         "Smoothness",
         "Frames before and after each over which the motion is averaged, as the mass of a camera does: "
         "at 0 it is followed as it is",
@@ -314,7 +303,7 @@ class Shutter:
         precision=3,
         recipe="",
     )
-    combine: combining.Mode = choice(
+    combine: Mode = choice(
         "Combine", "What the frames that are exposed become", COMBINES, default="average", told=False
     )
     by_luminance: bool = switch(
@@ -372,9 +361,9 @@ class Shutter:
                 return EffectError(OTHER_MOMENTS, name=self.name, first=numbers[0], last=numbers[1])
         return None
 
-    def combine_at(self, frame: float) -> combining.Combine:
+    def combine_at(self, frame: float) -> Combine:
         threshold = float(self.threshold.at(frame)) if self.use_threshold else None
-        return combining.Combine.of(self.combine, self.by_luminance, threshold, float(self.softness.at(frame)))
+        return Combine.of(self.combine, self.by_luminance, threshold, float(self.softness.at(frame)))
 
 
 MatteFiles = Callable[[MatteRegion], mattes.MatteFile]
@@ -382,11 +371,11 @@ MatteFiles = Callable[[MatteRegion], mattes.MatteFile]
 
 def _placed(region: Region | MatteRegion, aspect: float, files: MatteFiles) -> Region | MatteRegion:
     """A region of a recipe with what its content is."""
-    if isinstance(region, Region | OutlineRegion):
+    if region.drawings:
         region = replace(region, drawings=replace(region.drawings, aspect=aspect))
     if isinstance(region, OutlineRegion):
         if region.between == "straight":
-            return replace(region, content=DrawnOutlines(region.drawings))
+            return replace(region, content=drawn_outlines(region.drawings))
         return replace(region, content=mattes.FileFrames(file=files(region)))
     if isinstance(region, MatteRegion) and isinstance(said := region.content, FileContent):
         first = None if said.timing == "source" else 1
@@ -394,7 +383,7 @@ def _placed(region: Region | MatteRegion, aspect: float, files: MatteFiles) -> R
     if isinstance(region, MatteRegion) and isinstance(said := region.content, RampContent):
         if said.ramp == "luminance":
             return replace(region, content=mattes.FileFrames(file=files(region)))
-        return replace(region, content=PlacedRamp(said.ramp, region.moves))
+        return replace(region, content=placed_ramp(said.ramp, region.moves))
     return region
 
 
@@ -472,7 +461,7 @@ class Effect:
         well; each counts with the drawing that has the most."""
         room = limits.MAX_POINTS
         for region in self.regions:
-            if isinstance(region, Region | OutlineRegion):
+            if region.drawings:
                 room -= max((sum(map(len, drawing)) for drawing in region.drawings.strokes if drawing), default=0)
             if room < 0:
                 return region.name

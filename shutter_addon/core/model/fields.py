@@ -11,7 +11,7 @@ fields come from these. What a field has no Field for, such as bars and strokes,
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import cache
 from typing import Any
 
@@ -45,7 +45,7 @@ class Field:
     most: float = 1.0
     soft_most: float | None = None
     choices: Sequence[Choice] = ()
-    keyed: bool = True
+    keyed: bool = False
     is_channel: bool = False
     keyed_in_recipe: bool = False
     told: bool = True
@@ -71,36 +71,27 @@ MISSING = dataclasses.MISSING
 
 def number(label: str, description: str, *, default: float, **more: Any) -> Any:
     """Make a number that keys may change; the model has a channel of it."""
-    more = {"is_channel": True, "keyed_in_recipe": True} | more
-    return _field(label, description, default, lambda: Constant(default), **more)
-
-
-def whole(label: str, description: str, *, default: int, **more: Any) -> Any:
-    """Make a whole number, without keys."""
-    return _field(label, description, default, **({"keyed": False} | more))
+    more = {"keyed": True, "is_channel": True, "keyed_in_recipe": True} | more
+    return fixed(label, description, default=default, made=lambda: Constant(default), **more)
 
 
 def switch(label: str, description: str, *, default: bool = False, **more: Any) -> Any:
     """Make a property that is on or off, without keys."""
-    return _field(label, description, default, **({"keyed": False} | more))
+    return fixed(label, description, default=default, **more)
 
 
 def choice(label: str, description: str, choices: Sequence[Choice], *, default: str | int, **more: Any) -> Any:
     """Make a choice of one word among several, without keys."""
-    return _field(label, description, default, choices=choices, **({"keyed": False} | more))
-
-
-def text(label: str, description: str, *, default: str, **more: Any) -> Any:
-    """Make a text, without keys."""
-    return _field(label, description, default, **({"keyed": False} | more))
+    return fixed(label, description, default=default, choices=choices, **more)
 
 
 def color(label: str, description: str, *, default: tuple[float, float, float], **more: Any) -> Any:
     """Make a color: red, green and blue display values, 0 to 1."""
-    return _field(label, description, default, **({"keyed": False, "subtype": "COLOR_GAMMA"} | more))
+    return fixed(label, description, default=default, **({"subtype": "COLOR_GAMMA"} | more))
 
 
-def _field(label: str, description: str, default: Any, made: Any = None, **more: Any) -> Any:
+def fixed(label: str, description: str, *, default: Any, made: Callable[[], Any] | None = None, **more: Any) -> Any:
+    """Make a whole number or a text, without keys; made: makes the model's value, where that is not the default."""
     said = {"absent": default, "blender": "", "recipe": None} | more
     factory = made or (lambda: default)
     return dataclasses.field(default_factory=factory, metadata={"said": (label, description, default, said)})

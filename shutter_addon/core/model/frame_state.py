@@ -12,8 +12,7 @@ from numpy.typing import ArrayLike
 
 from . import limits, scribbles, shutters
 from .choices import AGGREGATES, CONTEXT, EDGES, EXPOSURES, INTERPOLATIONS, LIGHTS, POSITIONS, SMOOTH
-from .combining import AVERAGE, Combine
-from .fields import MISSING, choice, switch, whole
+from .fields import MISSING, choice, fixed, switch
 from .mattes import Matte
 
 Interpolation = Literal["displacement", "value"]
@@ -21,6 +20,35 @@ Light = Literal["linear", "encoded"]
 Exposure = Literal["normalized", "weighted"]
 Edges = Literal["hold", "mirror", "shorten", "slide"]
 Position = Literal["start", "center", "end"]
+Mode = Literal["average", "lightest", "darkest", "median"]
+
+
+@dataclass(frozen=True)
+class Combine:
+    """How the frames that a shutter exposes become one picture.
+
+    mode: the average of all, the lightest or the darkest of them, or their median (core.pixels.combined)
+
+    Of the lightest and the darkest:
+    by_luminance: whether a pixel's light is that of one frame; else each channel goes by itself
+    threshold: luminance of linear light below which, or of the darkest above which, a frame leaves no trail beside
+    what is shown; None: all leaves one
+    softness: over how much luminance, around the threshold, that fades in"""
+
+    mode: Mode = "average"
+    by_luminance: bool = False
+    threshold: float | None = None
+    softness: float = 0.0
+
+    @staticmethod
+    def of(mode: Mode, by_luminance: bool = False, threshold: float | None = None, softness: float = 0.0) -> Combine:
+        """What changes nothing of a mode is left out, so that equal ones are one."""
+        if mode in ("average", "median"):
+            return Combine(mode)
+        return Combine(mode, by_luminance, threshold, 0.0 if threshold is None else softness)
+
+
+AVERAGE = Combine()
 
 
 @dataclass(frozen=True)
@@ -34,7 +62,7 @@ class Options:
     backward: whether the source plays in reverse, where the last of a filmed frame's moments is the frame itself
     """
 
-    window: int = whole(
+    window: int = fixed(
         "Frames",
         "Number of source frames that a shutter can expose",
         default=8,
@@ -85,7 +113,7 @@ class Options:
         keyed=True,
     )
     edge_aware: float = 0.0
-    plate_reach: int = whole(
+    plate_reach: int = fixed(
         "Background Search",
         "Frames before and after the shown one in which what lies behind layers is looked for, "
         "where no exposed frame shows it",
@@ -251,11 +279,10 @@ class FrameState:
 
         It scales linear light, as an aperture would: where encoded values are summed, it applies after decoding."""
         exposures = self.bars.sum(axis=1)
-        if self.options.exposure == "normalized":
-            return np.ones_like(exposures)
         gains = np.ones_like(exposures)
-        averaging = list(self.groups.get(AVERAGE, ()))
-        gains[averaging] = exposures[averaging] / (self.reference or exposures[0])
+        if self.options.exposure == "weighted":
+            averaging = list(self.groups.get(AVERAGE, ()))
+            gains[averaging] = exposures[averaging] / (self.reference or exposures[0])
         return gains
 
     @cached_property

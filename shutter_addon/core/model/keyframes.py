@@ -98,6 +98,13 @@ class Samples:
 
 
 @dataclass(frozen=True)
+class Computed:
+    """What a function gives at a frame."""
+
+    at: Callable[[float], Any]
+
+
+@dataclass(frozen=True)
 class SourceTime:
     """Channel of (source frame, whether it runs backward from there), made of a channel of numbers.
 
@@ -151,12 +158,9 @@ class Bars:
         first, second = self.channel.at(frames[before]), self.channel.at(frames[after])
         if not (first.any() and second.any()):
             return spread(self.channel.at(frame))
-        return between_bars(spread(first), spread(second), self._share_at(frame, frames))
-
-    def _share_at(self, frame: float, frames: list[float]) -> float:
-        if self.share is not None:
-            return self.share.at(frame)
-        return eased_span(frames, [ease for _, ease in self.keys], frame)[2]
+        eases = [ease for _, ease in self.keys]
+        share = self.share.at(frame) if self.share else eased_span(frames, eases, frame)[2]
+        return between_bars(spread(first), spread(second), share)
 
 
 def eased_span(frames: Sequence[float], eases: Sequence[Ease], frame: float) -> tuple[int, int, float]:

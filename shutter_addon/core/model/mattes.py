@@ -14,6 +14,7 @@ import numpy as np
 
 from ..frames.retiming import StripTiming
 from .clip import Clip, Medium
+from .masks import MaskShape
 from .outlines import Curves, coverage
 
 Blend = Literal["over", "add"]
@@ -131,13 +132,6 @@ class Outline:
     def values(self, width: int, height: int) -> np.ndarray:
         """As Ramp.values."""
         return coverage(self.curves, width, height)
-
-
-class MaskShape(Hashable, Protocol):
-    """A mask at one frame (core.masks.mask)."""
-
-    def values(self, width: int, height: int) -> np.ndarray:
-        """As Ramp.values."""
 
 
 Content = FileFrame | Ramp | Outline | MaskShape

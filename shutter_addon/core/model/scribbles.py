@@ -1,4 +1,4 @@
-"""Scribbles: strokes that move, and the label image they leave (paper §3.3).
+"""Scribbles: strokes over time, how they move, and the label image they leave (paper §3.3).
 
 Points are fractions of the picture, x to the right and y up from the lower left corner; widths are fractions
 of its height. Pictures here have their top row first.
@@ -14,6 +14,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .. import scanlines
+from ..messages import EffectError
+from . import keyframes, limits, motions
+from .keyframes import Channel
+from .motions import Placement
 
 # A line never gets thinner than this radius in pixels: a 5-point diffusion would leak through it.
 _MIN_RADIUS = 0.7072
@@ -22,6 +26,7 @@ _MAX_SEGMENT = 128.0
 # In pixels, far beyond all that limits.py allows: from here on float64 could not say where a line crosses the picture.
 _FARTHEST = 1e12
 FREE = 0
+_FAR = 'region "{name}": a point of its strokes is nowhere near the picture'
 
 
 @dataclass(frozen=True)
@@ -93,8 +98,7 @@ def transform(
     strokes = [np.asarray(s, dtype=np.float64) for s in strokes]
     if not strokes:
         return ()
-    points = np.concatenate(strokes)
-    centre = (points.min(axis=0) + points.max(axis=0)) / 2
+    centre = motions.centre(strokes)
     sin, cos = np.sin(np.radians(rotation)) * scale, np.cos(np.radians(rotation)) * scale
     turn = np.array([[cos, -sin / aspect], [sin * aspect, cos]])
     return tuple((s - centre) @ turn.T + centre + np.asarray(location, dtype=np.float64) for s in strokes)
@@ -108,6 +112,64 @@ def taken_back(
     turned = transform(strokes, (0, 0), -rotation, 1 / scale, aspect)  # about another centre, perhaps
     (there, *_) = transform(turned, location, rotation, scale, aspect)
     return tuple(points + (np.asarray(strokes[0]) - there)[0] for points in turned)
+
+
+@dataclass(frozen=True)
+class Drawings:
+    """A region's strokes over time, before it is moved: drawings at ascending frames, each a list of strokes (n, 2); in
+    between every stroke goes from one drawing to the next with the ease of the span.
+
+    name: the region's; aspect: the picture's width over its height
+    placement: channel of the matrix (3, 3) from the strokes' space to fractions of the picture, or of None where they
+    are not on it; without one, strokes are fractions of the picture
+    origins: where the region was as each was drawn, which is seen there; none: where it has not moved"""
+
+    name: str
+    frames: tuple[float, ...]
+    strokes: tuple
+    eases: tuple[keyframes.Ease, ...]
+    aspect: float
+    placement: Channel | None = None
+    origins: tuple[Placement, ...] = ()
+
+    def at(self, frame: float) -> list[np.ndarray]:
+        """Strokes (n, 2) in fractions of the picture. EffectError: a point is nowhere near it (limits.MAX_DISTANCE)."""
+        placement = self.placement.at(frame) if self.placement else None
+        if not self.frames or (self.placement and placement is None):
+            return []
+        before, after, share = keyframes.eased_span(self.frames, self.eases, frame)
+        first, second = (self._on_picture(index, placement) for index in (before, after))
+        return between_strokes(first, second, share, self.aspect)
+
+    def moved(self, frame: float, placed: Placement) -> tuple[np.ndarray, ...]:
+        """As `at`, moved about the centre of what is drawn."""
+        return transform(self.at(frame), placed.location, placed.rotation, placed.scale, self.aspect)
+
+    def centre(self, frame: float) -> np.ndarray | None:
+        """See Subject."""
+        strokes = self.at(frame)
+        return motions.centre(strokes) if strokes else None
+
+    def corners(self, frame: float, placed: Placement) -> np.ndarray:
+        """See Subject; placed: where it lies at the frame."""
+        strokes = self.moved(frame, placed)
+        return motions.corners(strokes) if strokes else np.empty((0, 2))
+
+    def drawing(self, index: int, frame: float) -> list[np.ndarray]:
+        """The strokes of a drawing as they lie on the picture at a frame; raises as `at`."""
+        placement = self.placement.at(frame) if self.placement else None
+        return [] if self.placement and placement is None else self._on_picture(index, placement)
+
+    def _on_picture(self, index: int, placement: np.ndarray | None) -> list[np.ndarray]:
+        if placement is None:
+            return self.strokes[index]
+        placed = [mapped(placement, points) for points in self.strokes[index]]
+        if not all((np.abs(points) <= limits.MAX_DISTANCE).all() for points in placed):
+            raise EffectError(_FAR, name=self.name)
+        origin = self.origins[index] if self.origins and placed else Placement()
+        if origin == Placement():
+            return placed
+        return list(taken_back(placed, origin.location, origin.rotation, origin.scale, self.aspect))
 
 
 def rasterise(shapes: Iterable[Shape], width: int, height: int, *, border: bool = False) -> np.ndarray:

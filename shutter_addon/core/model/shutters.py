@@ -20,8 +20,8 @@ MAX_WINDOW = 256
 
 # Levels of z closer than this are one: float rounding of equal sums, far below any visible weight.
 _SAME = 1e-12
-# Of an exposure: rounding may leave as much in a bar that is closed.
-_CLOSED = 1e-9
+# Of an exposure: where bars go from key to key, rounding may leave as much in a bar that is closed.
+CLOSED = 1e-9
 _SEEN = 1 / 255  # of the largest bar: less light in other moments is not seen
 
 
@@ -225,7 +225,7 @@ def smoothed(bars: ArrayLike, steps: int, *, backward: bool = False, level: bool
 
 def _open_beside(bars: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Which bars (L,) are open and have an open neighbour before them, and which one behind them."""
-    is_open = bars > _CLOSED * bars.sum()
+    is_open = bars > CLOSED * bars.sum()
     after = is_open & np.append(is_open[1:], False)
     return np.append(False, after[:-1]), after
 

@@ -39,20 +39,12 @@ class Measured(NamedTuple):
     """How the picture has moved since the anchor frame: shifted; turned in radians and scaled, about a pivot."""
 
     shift: complex
-    pivot: complex
-    angle: float
-    log_scale: float
+    pivot: complex = 0j
+    angle: float = 0.0
+    log_scale: float = 0.0
 
     def between(self, other: Measured, share: float) -> Measured:
         return Measured._make((1 - share) * here + share * there for here, there in zip(self, other, strict=True))
-
-
-class Base(NamedTuple):
-    """What is added to a track's shift, angle and logarithm of the scale."""
-
-    shift: complex
-    angle: float
-    log_scale: float
 
 
 class Stabilization:
@@ -60,19 +52,20 @@ class Stabilization:
 
     def __init__(self, tracks: Collection[Track], anchor: int, *, turned: bool, scaled: bool):
         self._turned, self._scaled = turned, scaled
-        self._bases: list[tuple[Track, Base]] = []
+        self._bases: list[tuple[Track, Measured]] = []
         near = [(min(frames, key=lambda f: (abs(f - anchor), f)), t) for t in tracks if (frames := t.frames())]
         location = [track for track in tracks if track.location]
         known = sorted({frame for track in location for frame in track.frames()})
         before = max((frame for frame in known if frame <= anchor), default=known[0] if known else anchor)
-        frame, there = anchor, Measured(shift=0, pivot=_mean(location, before) or 0, angle=0.0, log_scale=0.0)
+        frame, there = anchor, Measured(shift=0, pivot=_mean(location, before) or 0)
         for reference, track in sorted(near, key=lambda each: abs(each[0] - anchor)):
             if reference != frame:
-                still = Measured(shift=0, pivot=there.pivot, angle=0.0, log_scale=0.0)
+                still = Measured(shift=0, pivot=there.pivot)
                 frame, there = reference, self._averaged(reference) or still
             away = track.markers[reference] - there.pivot
-            base = there.shift - track.markers[reference], there.angle - cmath.phase(away)
-            self._bases.append((track, Base(*base, there.log_scale - math.log(abs(away) + _BIAS))))
+            angle, scale = there.angle - cmath.phase(away), there.log_scale - math.log(abs(away) + _BIAS)
+            base = Measured(there.shift - track.markers[reference], angle=angle, log_scale=scale)
+            self._bases.append((track, base))  # what is added to a track's shift, angle and logarithm of the scale
         self.frames = known  # at which a track for the location has a marker, ascending
 
     def at(self, frame: int) -> Measured | None:
@@ -104,7 +97,7 @@ class Stabilization:
                 angle += share * cmath.phase(away * cmath.rect(1, base.angle))
                 log_scale += share * (math.log(abs(away) + _BIAS) + base.log_scale)
         if not total:
-            return Measured(shift=shift, pivot=pivot, angle=0.0, log_scale=0.0)
+            return Measured(shift=shift, pivot=pivot)
         return Measured(
             shift=shift, pivot=pivot, angle=angle / total, log_scale=log_scale / total if self._scaled else 0.0
         )

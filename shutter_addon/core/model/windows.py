@@ -9,9 +9,6 @@ import numpy as np
 from . import shutters
 from .frame_state import FrameState, Options
 
-# Of an exposure: rounding may leave as much in a bar that is closed.
-_CLOSED = 1e-9
-
 
 def positions(options: Options, index: int, direction: int = 1) -> np.ndarray:
     """Where the window's frames (L,) lie around source frame `index`, beyond the clip's ends as well.
@@ -48,7 +45,7 @@ def slid(state: FrameState, index: int, direction: int, shot: range, *, whole: b
     def way(start: int, stop: int) -> int:
         return sorted((0, low - start, high + 1 - stop))[1]
 
-    spans = [_filmed(shutters.open_span(bars > _CLOSED * bars.sum()), options) for bars in state.bars]
+    spans = [_filmed(shutters.open_span(bars > shutters.CLOSED * bars.sum()), options) for bars in state.bars]
     if options.edges != "slide" or not (whole or any(way(*span) for span in spans)):
         return state
     moved, by = np.zeros_like(state.bars), way(0, options.window)

@@ -1,4 +1,4 @@
-"""What a shutter makes of the frames that it exposes where it does not average them (core.model.combining): the
+"""What a shutter makes of the frames that it exposes where it does not average them (frame_state.Combine): the
 reference, in float64.
 
 With wₖ how much a frame counts, from 0 to 1 (`counts`), and Vₖ its light with alpha aₖ, both premultiplied:
@@ -19,7 +19,7 @@ from numpy.typing import ArrayLike
 
 from ..frames import light
 from ..model import shutters
-from ..model.combining import Combine
+from ..model.frame_state import Combine
 
 # Around the middle of a median's weights: within so much of it, both neighbours count, as of an even number of frames.
 # Rounding must not choose between them, for devices round differently.

@@ -7,8 +7,7 @@ from numpy.typing import ArrayLike
 
 from ..frames import light
 from ..model import shutters
-from ..model.combining import Combine
-from ..model.frame_state import FrameState
+from ..model.frame_state import Combine, FrameState
 from . import combined
 
 # By how much of a frame the window's earlier ones are preferred, where the nearest frame is shown: of two that are as

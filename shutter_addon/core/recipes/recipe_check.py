@@ -12,7 +12,7 @@ from ..model.fields import Field, fields_of
 from ..model.frame_state import Options
 from .recipe import CAMERA, RecipeError
 from .records import (
-    Keyable,
+    MODELS,
     MatteRecord,
     MoveKey,
     OutlineRecord,
@@ -79,8 +79,9 @@ def check(recipe: Any) -> None:
         there_is_none = f"there is no shutter {shown(region.shutter)}"
         _require(region.shutter in places, f"regions[{i}].shutter", there_is_none)
         _check_region(region, f"regions[{i}]")
-    drawn = [region for region in recipe.regions if isinstance(region, RegionRecord | OutlineRecord)]
-    points = sum(map(_most_points, drawn))
+    drawn = [drawings_of(region) for region in recipe.regions if isinstance(region, RegionRecord | OutlineRecord)]
+    # Of each region, those of the drawing that has the most.
+    points = sum(max(sum(map(len, strokes)) for _, strokes in drawings) for drawings in drawn)
     _require(points <= limits.MAX_POINTS, "regions", f"{points} points at once, the most are {limits.MAX_POINTS}")
 
 
@@ -92,14 +93,20 @@ def _check_fields(kind: type, record: Any, place: str) -> None:
 
 
 def _check_field(each: Field, value: Any, place: str) -> None:
+    """A value, or keys of a number."""
     if each.choices or isinstance(value, bool):
         return
     if isinstance(value, str):
         _check_name(value, place, round(each.most))
     elif isinstance(value, tuple):
         _require(all(0 <= c <= 1 for c in value), place, "not three numbers from 0 to 1")
+    elif not isinstance(value, list):
+        _require_within(value, each.most, place, each.least)
     else:
-        _check_number(value, place, each.most, each.least)
+        _require(value, place, "empty: there is no key")
+        _check_keys(value, place)
+        for k, key in enumerate(value):
+            _require_within(key.value, each.most, f"{place}[{k}].value", each.least)
 
 
 def _check_bars(shutter: Any, window: int, place: str) -> None:
@@ -148,8 +155,7 @@ def _check_follow(follow: str | None, regions: list, place: str) -> None:
 
 
 def _check_region(region: Any, place: str) -> None:
-    kinds = {RegionRecord: model.Region, OutlineRecord: model.OutlineRegion}
-    _check_fields(kinds.get(type(region), model.MatteRegion), region, f"{place}.")
+    _check_fields(MODELS[type(region)], region, f"{place}.")
     _check_moves(region.keys, f"{place}.keys")
     if isinstance(region, MatteRecord):
         _check_fields(model.FileContent, region, f"{place}.")
@@ -190,11 +196,6 @@ def _check_strokes(strokes: list[Stroke], place: str) -> None:
                     _require_within(value, limits.MAX_DISTANCE, f"{place}[{j}][{n}][{axis}]")
 
 
-def _most_points(region: Any) -> int:
-    """The points of the region's drawing that has the most."""
-    return max(sum(map(len, strokes)) for _, strokes in drawings_of(region))
-
-
 def _check_count(items: list, most: int, place: str) -> None:
     _require(len(items) <= most, place, f"{len(items)}, the most are {most}")
 
@@ -203,17 +204,6 @@ def _check_name(name: str, place: str, most: int = limits.MAX_NAME) -> None:
     _require(len(name) <= most, place, f"{len(name)} characters, the most are {most}")
     wrong = next((c for c in name if c == "\0" or "\ud800" <= c <= "\udfff"), "")
     _require(not wrong, place, f"U+{ord(wrong or ' '):04X} is no character of a name")
-
-
-def _check_number(value: Keyable, place: str, most: float, least: float) -> None:
-    """A number, or keys of it."""
-    if not isinstance(value, list):
-        _require_within(value, most, place, least)
-        return
-    _require(value, place, "empty: there is no key")
-    _check_keys(value, place)
-    for k, key in enumerate(value):
-        _require_within(key.value, most, f"{place}[{k}].value", least)
 
 
 def _check_keys(keys: list, place: str) -> None:

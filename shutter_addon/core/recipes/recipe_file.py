@@ -186,25 +186,21 @@ def _tuple(kind: Any, converter: Converter) -> Callable[[Any, Any], Any]:
     return structure
 
 
-def _list(kind: Any, converter: Converter) -> Callable[[Any, Any], Any]:
+def _list(converter: Converter, value: Any, kind: Any) -> list:
     (inner,) = get_args(kind)
-    structure_item = converter.get_structure_hook(inner)
+    if not isinstance(value, list):
+        raise ValueError(f"{shown(value)} is not a list")
+    structure, structured = converter.get_structure_hook(inner), []
+    try:
+        for each in value:
+            structured.append(structure(each, inner))
+    except Exception as error:  # the first one is enough; cattrs' own lists gather millions
+        from cattrs.errors import IterableValidationError, IterableValidationNote
 
-    def structure(value: Any, _kind: Any) -> Any:
-        if not isinstance(value, list):
-            raise ValueError(f"{shown(value)} is not a list")
-        return [item(value, index) for index in range(len(value))]
-
-    def item(value: list, index: int) -> Any:
-        try:
-            return structure_item(value[index], inner)
-        except Exception as error:  # the first one is enough; cattrs' own lists gather millions
-            from cattrs.errors import IterableValidationError, IterableValidationNote
-
-            error.add_note(IterableValidationNote(f"index {index}", index, inner))
-            raise IterableValidationError("in a list", [error], kind) from None
-
-    return structure
+        index = len(structured)
+        error.add_note(IterableValidationNote(f"index {index}", index, inner))
+        raise IterableValidationError("in a list", [error], kind) from None
+    return structured
 
 
 def _dataclass(kind: Any, converter: Converter) -> Callable[[Any, Any], Any]:
@@ -261,7 +257,7 @@ def _converter() -> Converter:
         lambda kind: kind is records.AnyRegionRecord, partial(_one_region, converter)
     )
     converter.register_structure_hook_factory(_made_of(tuple), _tuple)
-    converter.register_structure_hook_factory(_made_of(list), _list)
+    converter.register_structure_hook_func(_made_of(list), partial(_list, converter))
     converter.register_structure_hook_factory(is_dataclass, _dataclass)
     return converter
 

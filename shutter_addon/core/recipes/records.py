@@ -121,7 +121,7 @@ KINDS = {
     "matte": MatteRecord,
     "ramp": RampRecord,
 }
-_MODELS = {
+MODELS = {
     RegionRecord: model.Region,
     OutlineRecord: model.OutlineRegion,
     MatteRecord: model.MatteRegion,
@@ -220,7 +220,7 @@ def _moves(keys: list) -> model.Moves:
 
 
 def _region(record: Any, shutter: int) -> model.Region | model.MatteRegion:
-    kind: Any = _MODELS.get(type(record), model.MatteRegion)
+    kind: Any = MODELS[type(record)]
     values: dict[str, Any] = _values(kind, record) | {"shutter": shutter, "moves": _moves(record.keys)}
     if isinstance(record, RegionRecord | OutlineRecord):
         values["drawings"] = _drawings(record)

@@ -1,0 +1,332 @@
+"""Blender's masks: one as it stands at a frame, as plain data, and what it covers, as Blender's Mask strip shows it.
+
+Mask space has its origin in the lower left corner of a square around the picture, as large as the picture's larger side
+and centred on it: x to the right and y up, from 0 to 1. Splines become polygons in units of the picture: x to the right
+and y up from the lower left corner, both from 0 to 1. Pictures of these have the lowest row first.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from .. import scanlines
+from ..scanlines import ranges
+
+# Points a segment has at least and at most.
+_FEWEST, _MOST = 4, 32
+# The direction of a spline at a point is that of the way through points so far before and behind it on its segment.
+_REACH = 0.05
+# The round ends of an open spline that is not filled have a point every two pixels, in these limits.
+_CAP_POINTS = 8, 64
+# Pixels that are computed at once: what their numbers take stays in a processor's cache.
+_BLOCK = 1 << 14
+# By so many pixels quads overlap, so that rounding opens no seam between them.
+_SEAM = 1e-6
+# Share 0 to 1 of a feather's way inward -> value.
+_FALLOFFS: dict[str, Callable[[np.ndarray], np.ndarray]] = {
+    "SMOOTH": lambda v: v * v * (3 - 2 * v),
+    "SPHERE": lambda v: np.sqrt(2 * v - v * v),
+    "ROOT": np.sqrt,
+    "INVERSE_SQUARE": lambda v: v * (2 - v),
+    "SHARP": np.square,
+    "LINEAR": lambda v: v,
+}
+# What lies below and a layer's value -> both. Sums are clamped after each layer.
+_BLENDS: dict[str, Callable[[np.ndarray, np.ndarray], np.ndarray]] = {
+    "MERGE_ADD": lambda below, v: below + v * (1 - below),
+    "MERGE_SUBTRACT": lambda below, v: below - v * below,
+    "ADD": np.add,
+    "SUBTRACT": np.subtract,
+    "LIGHTEN": np.maximum,
+    "DARKEN": np.minimum,
+    "MUL": np.multiply,
+    "DIFFERENCE": lambda below, v: np.abs(below - v),
+}
+
+
+@dataclass(frozen=True)
+class MaskSpline:
+    """A spline with its handles; numbers in mask space, tuples so that it can be a key.
+
+    points: of each its left handle, itself and its right handle ((x, y), (x, y), (x, y))
+    weights: the width of the feather at each point
+    feathers: for each point, the feather points ((u, factor), …) of the segment that follows it, u ascending; the
+    factors multiply the points' weights
+    """
+
+    points: tuple[tuple[tuple[float, float], ...], ...]
+    weights: tuple[float, ...]
+    feathers: tuple[tuple[tuple[float, float], ...], ...]
+    cyclic: bool = True
+    fill: bool = True
+    weight_interpolation: str = "EASE"  # EASE | LINEAR
+
+
+@dataclass(frozen=True)
+class MaskLayer:
+    """A layer; its words are those of Blender's MaskLayer."""
+
+    splines: tuple[MaskSpline, ...]
+    alpha: float = 1.0
+    blend: str = "MERGE_ADD"
+    invert: bool = False
+    falloff: str = "SMOOTH"
+    fill_solver: str = "CDT"  # CDT | SWEEP_LINE
+    holes: bool = False
+
+
+@dataclass(frozen=True)
+class MaskShape:
+    """A mask as it stands at one frame: the layers that are rendered, from the lowest up."""
+
+    layers: tuple[MaskLayer, ...]
+
+    def values(self, width: int, height: int) -> np.ndarray:
+        """What it covers of a picture: (height, width) float32, 0 to 1, the top row first."""
+        value = np.zeros((height, width), np.float32)
+        for layer in self.layers:
+            value = _blend(layer, value, _layer_value(layer, width, height))
+        return np.ascontiguousarray(value[::-1])
+
+
+def _blend(layer: MaskLayer, below: np.ndarray, value: np.ndarray) -> np.ndarray:
+    """A layer's value (h, w) over what lies below."""
+    alpha = np.float32(layer.alpha)
+    if layer.blend != "REPLACE" and alpha != 1:
+        value = value * alpha
+    if layer.invert:
+        value = 1 - value
+    both = below + (value - below) * alpha if layer.blend == "REPLACE" else _BLENDS[layer.blend](below, value)
+    return np.clip(both, 0, 1, out=both)
+
+
+def _layer_value(layer: MaskLayer, width: int, height: int) -> np.ndarray:
+    """What the splines of a layer cover: (height, width) float32, the lowest row first."""
+    value = np.zeros((height, width), np.float32)
+    outlines = [_outlines(spline, width, height) for spline in layer.splines]
+    outlined = [(spline, both) for spline, both in zip(layer.splines, outlines, strict=True) if both is not None]
+    if not outlined or layer.alpha == 0:
+        return value
+    filled = [edge for spline, (edge, _) in outlined if spline.fill]
+    _fill(value, filled, layer.fill_solver, layer.holes)
+    quads = [_feather_quads(spline, *both, width, height) for spline, both in outlined]
+    feather(value, np.concatenate(quads), _FALLOFFS[layer.falloff])
+    return value
+
+
+def _outlines(spline: MaskSpline, width: int, height: int) -> tuple[np.ndarray, np.ndarray] | None:
+    """The outline of a spline and that of its feather, (n, 2) float64 each, point by point; None: it covers nothing.
+
+    A feather is a pixel wide at least: that is all there is of anti-aliasing.
+    """
+    points, weights = np.array(spline.points, np.float64), np.array(spline.weights, np.float64)
+    if len(points) < 2:
+        return None
+    steps = _steps(spline, points, weights, max(width, height))
+    segment, u = _positions(spline, len(points), steps)
+    edge = _at(spline, points, segment, u)
+    if len(edge) < 4:
+        return None
+    feather = _offset(spline, points, weights, segment, u, edge)
+    larger = max(width, height)
+    edge, feather = ((p - 0.5) * (larger / width, larger / height) + 0.5 for p in (edge, feather))
+    return edge, _pixel_wide(edge, feather, 1 / min(width, height))
+
+
+def _longest_segment(points: np.ndarray, cyclic: bool) -> float:
+    """Of the segments of a spline (n, 3, 2), the length of the longest, along its handles."""
+    following = np.roll(points, -1, axis=0)
+    hull = np.stack([points[:, 1], points[:, 2], following[:, 0], following[:, 1]], axis=1)
+    lengths = np.linalg.norm(np.diff(hull, axis=1), axis=2).sum(axis=1)
+    return float(lengths[: None if cyclic else -1].max(initial=0))
+
+
+def _steps(spline: MaskSpline, points: np.ndarray, weights: np.ndarray, larger: int) -> int:
+    """Points that a segment is cut into: one in four pixels of the longest segment, more where its feather changes."""
+    longest = _longest_segment(points, spline.cyclic) * larger
+    steepest = 0.0
+    for weight, feather in zip(weights, spline.feathers, strict=True):
+        u, factor = np.array([(0.0, weight), *feather]).T
+        apart = np.diff(u) > 1e-7
+        steepest = max(steepest, np.abs(np.diff(factor)[apart] / np.diff(u)[apart]).max(initial=0))
+    return int(np.clip(min(max(longest, 1), 128) // 1 + steepest / 0.005, 4 * _FEWEST, 4 * _MOST)) // 4
+
+
+def _positions(spline: MaskSpline, count: int, steps: int) -> tuple[np.ndarray, np.ndarray]:
+    """Where on a spline of `count` points its outline's points lie: segment (n,) and u (n,) 0 to 1."""
+    segments = count if spline.cyclic else count - 1
+    segment, u = np.repeat(np.arange(segments), steps), np.tile(np.arange(steps) / steps, segments)
+    return (segment, u) if spline.cyclic else (np.append(segment, segments - 1), np.append(u, 1.0))
+
+
+def _bezier(a: np.ndarray, b: np.ndarray, c: np.ndarray, d: np.ndarray, u: np.ndarray) -> np.ndarray:
+    u = u[:, None]
+    v = 1 - u
+    return v * v * v * a + 3 * u * v * v * b + 3 * u * u * v * c + u * u * u * d
+
+
+def _at(spline: MaskSpline, points: np.ndarray, segment: np.ndarray, u: np.ndarray) -> np.ndarray:
+    """Points (n, 2) of a spline; behind the end of an open one its last point."""
+    this, following = points[segment % len(points)], points[(segment + 1) % len(points)]
+    inside = _bezier(this[:, 1], this[:, 2], following[:, 0], following[:, 1], u)
+    return inside if spline.cyclic else np.where((segment == len(points) - 1)[:, None], points[-1, 1], inside)
+
+
+def _offset(
+    spline: MaskSpline, points: np.ndarray, weights: np.ndarray, segment: np.ndarray, u: np.ndarray, edge: np.ndarray
+) -> np.ndarray:
+    """The feather's outline (n, 2), at right angles to the spline."""
+    before, after = u - _REACH < 0, u + _REACH > 1
+    last = _at(spline, points, segment - before, u - _REACH + before)
+    following = _at(spline, points, segment + after, u + _REACH - after)
+    along = _normalized(edge - last) + _normalized(following - edge)
+    if not spline.cyclic:
+        start = before & (segment == 0)
+        along[start] = (following - points[0, 1])[start]
+    return edge + _left_of(along) * _widths(spline, weights, segment, u)[:, None]
+
+
+def _widths(spline: MaskSpline, weights: np.ndarray, segment: np.ndarray, u: np.ndarray) -> np.ndarray:
+    """The feather's width (n,) in mask space, eased or linear between points and feather points."""
+    result = np.empty(len(u))
+    for index, feather in enumerate(spline.feathers):
+        here = segment == index
+        at, factor = np.array([(0.0, 1.0), *feather, (1.0, 1.0)]).T
+        ends = weights[index], weights[(index + 1) % len(weights)]
+        width = factor * (ends[0] * (1 - at) + ends[1] * at)
+        first = np.clip(np.searchsorted(at, u[here]) - 1, 0, len(at) - 2)
+        gap = at[first + 1] - at[first]
+        share = (u[here] - at[first]) / np.where(gap > 0, gap, 1)
+        if spline.weight_interpolation == "EASE":
+            share = share * share * (3 - 2 * share)
+        result[here] = width[first] + (width[first + 1] - width[first]) * share
+    return result
+
+
+def _pixel_wide(edge: np.ndarray, feather: np.ndarray, pixel: float) -> np.ndarray:
+    """The feather's outline, a pixel from the edge where it was nearer. The normal is that of the point before, as
+    Blender has it."""
+    steps = _normalized(np.roll(edge, 1, axis=0) - edge)
+    along = _normalized(np.roll(steps, 1, axis=0) + steps)
+    narrow = np.sum((feather - edge) ** 2, axis=1) < pixel * pixel
+    return np.where(narrow[:, None], edge + np.stack([along[:, 1], -along[:, 0]], axis=1) * pixel, feather)
+
+
+def _feather_quads(spline: MaskSpline, edge: np.ndarray, feather: np.ndarray, width: int, height: int) -> np.ndarray:
+    """The feather of a spline as quads (n, 4, 2): two corners on the spline, whose value is 1, and two beyond, of 0."""
+    if spline.fill:
+        return _between(edge, feather, closed=True)
+    other = 2 * edge - feather
+    sides = [_between(edge, feather, spline.cyclic), _between(edge, other, spline.cyclic)]
+    if spline.cyclic:
+        return np.concatenate(sides)
+    size = np.array([width, height]) / min(width, height)
+    caps = [_cap(edge[0], feather[0], 1.0, size, width, height), _cap(edge[-1], feather[-1], -1.0, size, width, height)]
+    return np.concatenate(sides + caps)
+
+
+def _between(edge: np.ndarray, feather: np.ndarray, closed: bool) -> np.ndarray:
+    quads = np.stack([edge, np.roll(edge, -1, axis=0), np.roll(feather, -1, axis=0), feather], axis=1)
+    return quads if closed else quads[:-1]
+
+
+def _cap(centre: np.ndarray, start: np.ndarray, turn: float, size: np.ndarray, width: int, height: int) -> np.ndarray:
+    """The half disc (n, 4, 2) at an end of an open spline, from a point of its feather on."""
+    pixels = np.linalg.norm(start - centre) * min(width, height)
+    count = int(np.clip(pixels // 2, *_CAP_POINTS))
+    angle = turn * np.pi * np.arange(count + 1) / count
+    x, y = (start - centre) * size
+    around = np.stack([x * np.cos(angle) - y * np.sin(angle), x * np.sin(angle) + y * np.cos(angle)], axis=1)
+    rim = centre + around / size
+    middle = np.broadcast_to(centre, rim[1:].shape)
+    return np.stack([middle, middle, rim[:-1], rim[1:]], axis=1)
+
+
+def _normalized(vectors: np.ndarray) -> np.ndarray:
+    lengths = np.linalg.norm(vectors, axis=1, keepdims=True)
+    return vectors / np.where(lengths > 0, lengths, 1)
+
+
+def _left_of(vectors: np.ndarray) -> np.ndarray:
+    """Directions (n, 2) of length 1 at a right angle to vectors, to their left."""
+    return _normalized(np.stack([-vectors[:, 1], vectors[:, 0]], axis=1))
+
+
+def _fill(value: np.ndarray, polygons: list[np.ndarray], solver: str, holes: bool) -> None:
+    """Set the pixels of `value` (h, w) that polygons (n, 2) fill to 1.
+
+    Args:
+        holes: Fill what the polygons go around together: by CDT, Blender's solver, the sum of their windings, by
+            SWEEP_LINE an odd number of them. Otherwise each polygon is filled by itself.
+    """
+    in_pixels = [polygon * value.shape[::-1] for polygon in polygons]
+    for group in [in_pixels] if holes else [[polygon] for polygon in in_pixels]:
+        scanlines.fill(value, group, 1, odd=holes and solver == "SWEEP_LINE", seam=_SEAM)
+
+
+def feather(value: np.ndarray, quads: np.ndarray, falloff: Callable[[np.ndarray], np.ndarray]) -> None:
+    """Raises the pixels of `value` (h, w) that quads (n, 4, 2) cover to theirs: 1 at the first two corners, 0 at the
+    last two, between them by mean value coordinates, and `falloff` of all."""
+    height, width = value.shape
+    flat = value.reshape(-1)
+    quad, row, start, stop = _quad_rows(quads, width, height)
+    x_of, y_of = np.ascontiguousarray(quads.transpose(2, 1, 0), np.float32)
+    last = np.cumsum(stop - start)
+    blocks = np.searchsorted(last, np.arange(0, last[-1] if len(last) else 0, _BLOCK))
+    for a, b in pairwise(np.unique([*blocks, len(quad)]).tolist()):
+        span, x = ranges(start[a:b], stop[a:b])
+        pixel = row[a:b][span] * width + x
+        bare = np.flatnonzero(flat[pixel] < 1)
+        span, x, pixel = span[bare] + a, x[bare], pixel[bare]
+        of = quad[span]
+        ways_x = np.take(x_of, of, axis=1) - (x.astype(np.float32) + np.float32(0.5)) / np.float32(width)
+        ways_y = np.take(y_of, of, axis=1) - (row[span].astype(np.float32) + np.float32(0.5)) / np.float32(height)
+        np.maximum.at(flat, pixel, falloff(_nearness(ways_x, ways_y)))
+
+
+def _quad_rows(quads: np.ndarray, width: int, height: int) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """The pixels that quads (n, 4, 2) cover, row by row: quad, row, first pixel and that behind the last, (m,) each.
+
+    A quad is its two triangles on the sides of the way between its first and its third corner, as in Blender, which
+    matters where they are not side by side.
+    """
+    sides = np.roll(quads, -1, axis=1) - quads
+    following = np.roll(sides, -1, axis=1)
+    turns = sides[..., 0] * following[..., 1] - sides[..., 1] * following[..., 0]
+    convex = (turns >= 0).all(axis=1) | (turns <= 0).all(axis=1)
+    others = np.flatnonzero(~convex)
+    parts = np.concatenate([quads[convex], quads[others][:, [0, 1, 2, 2]], quads[others][:, [0, 2, 3, 3]]])
+    index = np.concatenate([np.flatnonzero(convex), others, others])
+    start, end = (corners.reshape(-1, 2) * (width, height) for corners in (parts, np.roll(parts, -1, axis=1)))
+    edge, row, x = scanlines.crossings(start, end, range(height))
+    # Each part on each row, from the first to the last place where its edges cross it.
+    place = edge // 4 * height + row
+    order = np.argsort(place, kind="stable")
+    place, x = place[order], x[order]
+    first = np.flatnonzero(np.diff(place, prepend=-1))
+    left, right = (extreme.reduceat(x, first) if len(x) else x for extreme in (np.minimum, np.maximum))
+    part, row = np.divmod(place[first], height)
+    start = np.ceil(np.clip(left - 0.5 - _SEAM, 0, width)).astype(int)
+    stop = np.floor(np.clip(right + 0.5 + _SEAM, 0, width)).astype(int)
+    some = stop > start
+    return index[part[some]], row[some], start[some], stop[some]
+
+
+def _nearness(x: np.ndarray, y: np.ndarray) -> np.ndarray:
+    """How near points are to the first two corners of quads: 0 to 1 (n,), by mean value coordinates; x, y (4, n): the
+    ways from the points to the corners."""
+    lengths = np.sqrt(x * x + y * y)
+    tangents = []
+    for a, b in ((0, 1), (1, 2), (2, 3), (3, 0)):
+        area = x[a] * y[b] - y[a] * x[b]
+        far = lengths[a] * lengths[b] - (x[a] * x[b] + y[a] * y[b])
+        tangents.append(np.abs(np.divide(far, area, out=np.zeros_like(far), where=area != 0)))
+    np.maximum(lengths, np.float32(1e-7), out=lengths)
+    near = (tangents[3] + tangents[0]) / lengths[0] + (tangents[0] + tangents[1]) / lengths[1]
+    away = (tangents[1] + tangents[2]) / lengths[2] + (tangents[2] + tangents[3]) / lengths[3]
+    total = near + away
+    return np.divide(near, total, out=np.full_like(near, 0.5), where=total > 0)
