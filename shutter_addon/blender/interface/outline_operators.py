@@ -310,49 +310,51 @@ class SHUTTER_OT_outline_points(OfEffect, Operator):
 class SHUTTER_GT_outline(Dragged, Gizmo):
     """The curves."""
 
-    def draw(self, context: Context) -> None:
-        if context.screen.is_animation_playing:
-            return
-        if not (curves := _curves(context)):
-            return
-        seen = _seen(context)
+    def seen(self, context: Context) -> tuple[outlines.Curves, View] | None:
+        """The active outline's curves at the current frame, and how the picture lies; none are while it plays."""
+        seen = None if context.screen.is_animation_playing else selection.in_picture(context)
+        if seen is None:
+            return None
+        scene, effect, strip = seen
+        try:
+            curves = outline_drawings.shown_curves(scene, effect, strip, effect.active_region)
+        except UserError:  # panels and the live preview tell it
+            return None
+        return (curves, view(effect, strip, context.region)) if curves else None
+
+    def show(self, _context: Context, seen: tuple[outlines.Curves, View]) -> None:
+        curves, seen_as = seen
         for points in self.mended() if self.is_modal else curves:
             width = 2 if self.is_highlight or self.is_modal else 1
-            drawing.lines(seen.on_region(points), _COLOR, closed=True, width=width)
+            drawing.lines(seen_as.on_region(points), _COLOR, closed=True, width=width)
 
-    def test_select(self, context: Context, location: tuple[int, int]) -> int:
-        if not (curves := _curves(context)):
-            return -1
-        seen = _seen(context)
-        _index, apart = outlines.nearest(curves, _on_picture(seen, location), seen.aspect)
-        height = float(np.hypot(*seen.matrix[:2, 1]))  # of the picture, in pixels of the region
-        return 0 if apart * height <= drawing.ui_scale() * _NEAR else -1
+    def is_at(self, _context: Context, seen: tuple[outlines.Curves, View], location: tuple[int, int]) -> bool:
+        curves, seen_as = seen
+        _index, apart = outlines.nearest(curves, _on_picture(seen_as, location), seen_as.aspect)
+        height = float(np.hypot(*seen_as.matrix[:2, 1]))  # of the picture, in pixels of the region
+        return bool(apart * height <= drawing.ui_scale() * _NEAR)
 
-    def invoke(self, context: Context, event: Event) -> set[str]:
-        if not (curves := _curves(context)):
-            return {"CANCELLED"}
+    def grab(self, context: Context, event: Event, seen: tuple[outlines.Curves, View]) -> None:
+        curves, seen_as = seen
         scene, effect, strip = selection.in_picture(context)
         self.target, self.frame = track_region.Target.of(effect, effect.active_region), scene.frame_current
         self.strip, self.curves, self.by, self.reach = strip.name, curves, (0.0, 0.0), _REACH
-        seen = _seen(context)
-        self.aspect = seen.aspect
-        self.grabbed = _on_picture(seen, (event.mouse_region_x, event.mouse_region_y))
+        self.aspect = seen_as.aspect
+        self.grabbed = _on_picture(seen_as, (event.mouse_region_x, event.mouse_region_y))
         self.pulled, _apart = outlines.nearest(curves, self.grabbed, self.aspect)
-        return {"RUNNING_MODAL"}
 
     def mended(self) -> outlines.Curves:
         return outlines.dragged(self.curves, self.pulled, self.grabbed, self.by, self.reach, self.aspect)
 
-    def modal(self, context: Context, event: Event, _tweak: set[str]) -> set[str]:
+    def drag(self, context: Context, event: Event, _tweak: set[str]) -> None:
         if (effect := self.target.effect()) is None or (strip := self._strip(effect)) is None:
-            return {"RUNNING_MODAL"}
+            return
         if event.type in {"WHEELUPMOUSE", "WHEELDOWNMOUSE"}:
             self.reach *= _MORE if event.type == "WHEELUPMOUSE" else 1 / _MORE
         seen = view(effect, strip, context.region)
         point = _on_picture(seen, (event.mouse_region_x, event.mouse_region_y))
         self.by = tuple(np.subtract(point, self.grabbed))
         context.area.tag_redraw()
-        return {"RUNNING_MODAL"}
 
     def exit(self, context: Context, cancel: bool) -> None:
         if cancel or not any(self.by) or (effect := self.target.effect()) is None:
@@ -367,26 +369,10 @@ class SHUTTER_GT_outline(Dragged, Gizmo):
         return effect.id_data.sequence_editor.strips_all.get(self.strip)
 
 
-def _seen(context: Context) -> View:
-    _scene, effect, strip = selection.in_picture(context)
-    return view(effect, strip, context.region)
-
-
 def _on_picture(seen: View, location: tuple[int, int]) -> tuple[float, float]:
     """A point of the preview's region in fractions of the picture."""
     x, y = seen.on_picture(*location)
     return float(x), float(y)
-
-
-def _curves(context: Context) -> outlines.Curves:
-    """The active outline's at the current frame, where it is seen."""
-    if (seen := selection.in_picture(context)) is None:  # while it plays, it may just have gone
-        return ()
-    scene, effect, strip = seen
-    try:
-        return outline_drawings.shown_curves(scene, effect, strip, effect.active_region)
-    except UserError:  # panels and the live preview tell it
-        return ()
 
 
 class SHUTTER_GGT_outline(WithKeys, GizmoGroup):

@@ -207,40 +207,32 @@ class SHUTTER_OT_probe_pixel(OfEffect, Operator):
         preview_areas.redraw()
 
 
-def _line(context: Context) -> np.ndarray | None:
-    """Where the split is, in pixels of the region (2, 2); None: nothing is seen of it."""
-    at = context.window_manager.virtual_shutter.split
-    return None if (seen := _view(context)) is None else seen.on_region([(at, 0.0), (at, 1.0)])
-
-
 class SHUTTER_GT_split(Dragged, Gizmo):
-    def draw(self, context: Context) -> None:
-        if (line := _line(context)) is None:
-            return
-        x, y = line.mean(axis=0)
+    def seen(self, context: Context) -> np.ndarray | None:
+        """Where the split is, in pixels of the region (2, 2)."""
+        at = context.window_manager.virtual_shutter.split
+        return None if (seen := _view(context)) is None else seen.on_region([(at, 0.0), (at, 1.0)])
+
+    def show(self, _context: Context, seen: np.ndarray) -> None:
+        x, y = seen.mean(axis=0)
         half = drawing.ui_scale() * _REACH / 2
-        drawing.lines(line, _MARK, width=2 if self.is_highlight else 1)
+        drawing.lines(seen, _MARK, width=2 if self.is_highlight else 1)
         drawing.rectangles([(x - half, y - 3 * half, x + half, y + 3 * half)], [_MARK])
 
-    def test_select(self, context: Context, location: tuple[int, int]) -> int:
-        if (line := _line(context)) is None:
-            return -1
-        first, second = line
+    def is_at(self, _context: Context, seen: np.ndarray, location: tuple[int, int]) -> bool:
+        first, second = seen
         along = (second - first) / max(np.hypot(*(second - first)), 1e-6)
         offset = np.array(location) - first
         apart, place = abs(along[0] * offset[1] - along[1] * offset[0]), along @ offset
-        near = apart <= drawing.ui_scale() * _REACH and 0 <= place <= np.hypot(*(second - first))
-        return 0 if near else -1
+        return bool(apart <= drawing.ui_scale() * _REACH and 0 <= place <= np.hypot(*(second - first)))
 
-    def invoke(self, context: Context, _event: Event) -> set[str]:
+    def grab(self, context: Context, _event: Event, _seen: np.ndarray) -> None:
         self.before = context.window_manager.virtual_shutter.split
-        return {"RUNNING_MODAL"}
 
-    def modal(self, context: Context, event: Event, _tweak: set[str]) -> set[str]:
+    def drag(self, context: Context, event: Event, _tweak: set[str]) -> None:
         if (seen := _view(context)) is not None:
             x, _y = seen.on_picture(event.mouse_region_x, event.mouse_region_y)
             context.window_manager.virtual_shutter.split = x
-        return {"RUNNING_MODAL"}
 
     def exit(self, context: Context, cancel: bool) -> None:
         if cancel:
