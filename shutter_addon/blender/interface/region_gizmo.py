@@ -1,21 +1,19 @@
 """Where the active region lies, and handles to move, turn and scale it in the sequencer's preview; and the same by
 numbers."""
 
-import math
 from typing import NamedTuple
 
 import bpy
 import numpy as np
 from bpy.app.translations import contexts
 from bpy.app.translations import pgettext_iface as iface_
-from bpy.props import FloatProperty, FloatVectorProperty
 from bpy.types import Context, Event, Gizmo, GizmoGroup, Operator, PropertyGroup, Scene, Strip
 
 from ...core import revision
 from ...core.messages import EffectError
 from ...core.model import scribbles
-from ...core.model.limits import MAX_DEGREES, MAX_DISTANCE, MAX_SCALE
 from ..data import selection, snapshot, validation
+from ..data.region_properties import location_property, rotation_property, scale_property
 from ..editing import bar_edits, drawn_places, region_edits, track_region
 from ..editing.motion_keys import MotionKeys
 from . import drawing, needs
@@ -204,25 +202,9 @@ class SHUTTER_OT_region_transform(OfEffect, Operator):
     bl_label = "Transform Region"
     needs = (needs.a_region,)
 
-    location: FloatVectorProperty(
-        name="Location",
-        description="Distance from where the region was drawn, as a fraction of the picture",
-        subtype="XYZ",
-        size=2,
-        min=-MAX_DISTANCE,
-        max=MAX_DISTANCE,
-        step=1,
-    )
-    rotation: FloatProperty(
-        name="Rotation",
-        description="Rotation about the region's center",
-        subtype="ANGLE",
-        min=-math.radians(MAX_DEGREES),
-        max=math.radians(MAX_DEGREES),
-    )
-    scale: FloatProperty(
-        name="Scale", description="Scale about the region's center", default=1.0, min=-MAX_SCALE, max=MAX_SCALE
-    )
+    location: location_property("Distance from where the region was drawn, as a fraction of the picture", step=1)
+    rotation: rotation_property("Rotation about the region's center")
+    scale: scale_property("Scale about the region's center")
 
     def invoke(self, context: Context, _event: Event) -> set[str]:
         region = selection.active_region(selection.active(context)[1])
