@@ -162,7 +162,7 @@ def _show(context: Context, shown: Shown, decision: Decision | None, say: "_Note
         wanted = previews.for_drawing(context, shown, decision)
         if previews.is_going(context):
             main_thread.later(_redraw_when_still, _SOON)
-        quad = Quad(context.region, shown.strip, annotations.picture_size(shown.effect))
+        quad = Quad(context.region, shown)
         try:
             if wanted.decision.is_late:
                 raise stopping.StoppedError
@@ -275,7 +275,7 @@ def _show_sharp(context: Context, shown: Shown | None) -> None:
     with drawing.pixel_space(context.region), suppress(*effect_source.FAULTS):
         say.draw()
         if shown is not None and not previews.pen_is_down():
-            quad = Quad(context.region, shown.strip, annotations.picture_size(shown.effect))
+            quad = Quad(context.region, shown)
             snapshot = invalidation.current(shown.scene, shown.effect, shown.strip, shown.scene.frame_current)
             _show_strokes(context, quad, shown, snapshot)
 
@@ -284,8 +284,7 @@ def _tell_carrying(say: "_Notes") -> None:
     """Has mattes carried that the picture lacks, and says so."""
     fault, progress = outline_carrying.begin(show_carried), outline_carrying.progress()
     if fault is not None:
-        told.shown(fault)
-        say(rpt_("Shutter: {fault}").format(fault=fault))
+        _tell_fault(fault, say)
     if progress is not None:
         done, total = progress
         say(rpt_("Tracking the outline: {done} of {total} frames").format(done=done, total=total))
@@ -300,7 +299,7 @@ def show_carried() -> None:
     preview_areas.redraw()
 
 
-def _tell_fault(error: Exception, say: "_Notes") -> None:
+def _tell_fault(error: Exception | str, say: "_Notes") -> None:
     """Says why there is no picture."""
     told.shown(error)
     say(rpt_("Shutter: {fault}").format(fault=error))
@@ -316,7 +315,7 @@ def _show_strokes(context: Context, quad: Quad, shown: Shown, snapshot: Snapshot
             continue
         color = (*shown.effect.shutters[shape.shutter].color, shape.opacity)
         for points in shape.strokes:
-            drawing.lines(quad.on_region(points), color, closed=shape.kind == "lasso", width=2)
+            drawing.lines(quad.view.on_region(points), color, closed=shape.kind == "lasso", width=2)
 
 
 def _show_source(quad: Quad, shown: Shown, renderer: Renderer, request: Request, right: float) -> None:

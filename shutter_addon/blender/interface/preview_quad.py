@@ -2,32 +2,29 @@
 
 import gpu
 import numpy as np
-from bpy.types import Region, Strip
+from bpy.types import Region
 from gpu.types import GPUBatch, GPUShader
 from gpu_extras.batch import batch_for_shader
-from numpy.typing import ArrayLike
 
 from ...core.model.scribbles import mapped
 from ...devices.passes import read_pass
-from ..data import geometry
+from ..data import annotations, geometry
+from ..data.preview_areas import Shown
 from ..devices import blender_gpu
+from .gizmo_groups import view
 
 
 class Quad:
-    """Where a strip's picture lies in a preview's region, its crop considered."""
+    """Where the picture of the strip that a preview shows lies in its region, the crop considered."""
 
-    def __init__(self, region: Region, strip: Strip, size: tuple[int, int]) -> None:
-        self._matrix = geometry.picture_to_region(strip, size, region)
-        render = strip.id_data.render
+    def __init__(self, region: Region, shown: Shown) -> None:
+        self.view = view(shown.effect, shown.strip, region)
+        strip, render = shown.strip, shown.scene.render
         half = np.array([render.resolution_x, render.resolution_y]) / 2
         self._image = mapped(geometry.image_to_region(region), np.array([-half, half]))
-        crop, (width, height) = strip.crop, size
+        crop, (width, height) = strip.crop, annotations.picture_size(shown.effect)
         self._low = np.array([crop.min_x / width, crop.min_y / height])
         self._high = 1 - np.array([crop.max_x / width, crop.max_y / height])
-
-    def on_region(self, points: ArrayLike) -> np.ndarray:
-        """Points (n, 2) of the strip's picture, in fractions, in pixels of the region."""
-        return mapped(self._matrix, np.asarray(points, dtype=np.float64))
 
     def draw(self, name: str, textures: dict, left: float = 0.0, right: float = 1.0, **constants) -> None:
         """Draws from `left` to `right`, in fractions of the picture's width, by a step of shaders/show.glsl."""
@@ -41,7 +38,7 @@ class Quad:
             shader.uniform_sampler(sampler, texture.gpu)
         for constant, value in constants.items():
             (shader.uniform_float if isinstance(value, float) else shader.uniform_int)(constant, value)
-        where = {"corner": self.on_region(corners).tolist(), "place": corners}
+        where = {"corner": self.view.on_region(corners).tolist(), "place": corners}
         gpu.state.blend_set("ALPHA_PREMULT")
         self._clipped(batch_for_shader(shader, "TRI_STRIP", where), shader)
         gpu.state.blend_set("NONE")
