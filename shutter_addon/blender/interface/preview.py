@@ -166,7 +166,7 @@ def _show(context: Context, shown: Shown, decision: Decision | None, say: "_Note
         try:
             if wanted.decision.is_late:
                 raise stopping.StoppedError
-            with stopping.once(wanted.stopped):
+            with stopping.once(wanted.decision.stopped or stopping.never):
                 _show_picture(context, quad, shown, wanted, say)
             if wanted.decision.is_plain:
                 say(rpt_("Composing…"))
