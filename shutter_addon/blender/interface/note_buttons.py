@@ -22,14 +22,10 @@ class Button:
     label: str
 
 
-def strobing_in_words(step: float) -> str:
-    """That an exposure has too few frames. step: pixels from one to the next"""
-    return rpt_("Too few frames: steps of {pixels} pixels").format(pixels=f"{step:.0f}")
-
-
-def smoothing() -> Button:
-    """What helps against that."""
-    return Button("shutter.smooth_streaks", iface_("Smooth"))
+def of_strobing(step: float) -> tuple[str, Button]:
+    """That an exposure has too few frames, and what helps against that. step: pixels from one to the next"""
+    words = rpt_("Too few frames: steps of {pixels} pixels").format(pixels=f"{step:.0f}")
+    return words, Button("shutter.smooth_streaks", iface_("Smooth"))
 
 
 places: dict[tuple[int, str], tuple[drawing.Box, Button]] = {}  # by region and operator: a handler puts them there

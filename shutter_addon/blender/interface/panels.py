@@ -197,9 +197,7 @@ def _draw_bars(layout: UILayout, scene: Scene, effect: PropertyGroup, strip: Str
 
 
 def _draw_live(layout: UILayout, context: Context) -> None:
-    live = getattr(context.window_manager, "virtual_shutter", None)
-    if live is None:
-        return
+    live = context.window_manager.virtual_shutter
     row = layout.row(align=True)
     row.prop(live, "live", toggle=True, icon="HIDE_OFF" if live.live else "HIDE_ON")
     view = row.row(align=True)
@@ -241,7 +239,7 @@ def _notes(context: Context) -> Iterator[tuple[str, Button | None]]:
             words = iface_("Effect strips on the source do not reach the effect: make the Shutter strip their input")
             yield words, None
     if (step := strobing.last(effect)) is not None:
-        yield note_buttons.strobing_in_words(step), note_buttons.smoothing()
+        yield note_buttons.of_strobing(step)
 
 
 def _tracked(effect: PropertyGroup) -> list[int | None]:

@@ -192,7 +192,6 @@ def _show_picture(context: Context, quad: Quad, shown: Shown, wanted: Drawing, s
     is_still = not context.screen.is_animation_playing
     if context.space_data.show_overlays:
         _tell_detail(wanted, annotations.picture_size(shown.effect), is_still, say)
-    after_detail = say.count
     if wanted.left > 0 or wanted.draws_result:
         _warn(shown, say)
     if wanted.left > 0:
@@ -221,7 +220,7 @@ def _show_picture(context: Context, quad: Quad, shown: Shown, wanted: Drawing, s
     decision = wanted.decision
     if context.space_data.show_overlays and is_still and not decision.is_plain and not previews.may_be_late():
         looked = strobing.look(shown.effect, decision.snapshot, renderer, decision.request)
-        _tell_strobing(looked, after_detail, say)
+        _tell_strobing(looked, say)
 
 
 def _warn(shown: Shown, say: "_Notes") -> None:
@@ -250,10 +249,10 @@ def _tell_detail(wanted: Drawing, size: tuple[int, int], is_still: bool, say: "_
         say(rpt_("Preview: {what}").format(what=", ".join(less)), button)
 
 
-def _tell_strobing(looked: strobing.Looked, place: int, say: "_Notes") -> None:
-    """Says, in that place among what is said, that the exposure has too few frames, and gives the way to more."""
+def _tell_strobing(looked: strobing.Looked, say: "_Notes") -> None:
+    """Says that the exposure has too few frames, and gives the way to more."""
     if looked.known is not None:
-        say(note_buttons.strobing_in_words(looked.known), note_buttons.smoothing(), place)
+        say(*note_buttons.of_strobing(looked.known))
     if looked.is_new:
         main_thread.later(preview_areas.redraw_panels)  # which may have been drawn before
     if looked.is_busy:
@@ -367,13 +366,9 @@ class _Notes:
         self._region = region
         self._lines: list[tuple[str, Button | None]] = []
 
-    @property
-    def count(self) -> int:
-        return len(self._lines)
-
-    def __call__(self, sentence: str, button: Button | None = None, place: int | None = None) -> None:
-        """Says a sentence after all others, or in a place among them."""
-        self._lines.insert(self.count if place is None else place, (sentence, button))
+    def __call__(self, sentence: str, button: Button | None = None) -> None:
+        """Says a sentence after all others."""
+        self._lines.append((sentence, button))
 
     def draw(self) -> None:
         unit = drawing.ui_scale()

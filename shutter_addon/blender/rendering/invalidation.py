@@ -18,7 +18,7 @@ from ..data import effect_version, matte_content, snapshot, source_media, strips
 from ..data.snapshot import Snapshot
 from ..devices import main_thread
 
-_signatures: dict[int, int] = {}  # by effect scene
+_signatures: dict[int, int] = {}  # by session_uid of the effect scene, which no other one gets
 _spoilt: set[int] = set()  # session_uids of scenes of whose frames the sequencer may keep one that failed
 _lesser: set[int] = set()  # likewise, one that is less than the full picture, for a preview
 
@@ -37,13 +37,6 @@ def forget() -> None:
     """Forgets what the effects of a file were, before another one is loaded."""
     _signatures.clear()
     revision.changed()
-
-
-def drop_removed() -> None:
-    """Forgets effect scenes that are gone."""
-    scenes = {scene.session_uid for scene in bpy.data.scenes}
-    for uid in _signatures.keys() - scenes:
-        del _signatures[uid]
 
 
 def spoil(scene: int) -> None:
@@ -83,7 +76,6 @@ def invalidate_changed(scene: Scene) -> bool:
     whether there are any.
 
     The values of keyed properties do not count: they change with every frame that plays."""
-    drop_removed()
     if not scene.virtual_shutter.effects:
         return False
     changed = False
