@@ -1,6 +1,7 @@
 """What panels are made of: sentences, lists, and when there is an effect to show."""
 
 from collections.abc import Callable, Sequence
+from typing import Any
 
 import bpy
 from bpy.app.translations import contexts
@@ -107,16 +108,16 @@ def draw_progress(layout: UILayout, done: int, total: int) -> None:
     layout.progress(factor=done / max(total, 1), text=text, translate=False)
 
 
-def of_effect(label: str, draws: Draws, shows: Callable[[PropertyGroup], bool] | None = None, **look: object) -> type:
+def of_effect(label: str, draws: Draws, shows: Callable[[PropertyGroup], Any] | None = None, **look: object) -> type:
     """Makes a panel of the effect, closed at first.
 
-    shows: whether there is anything to show of an effect; look: what else the class has for Blender"""
+    shows: gives what there is to show of an effect, if anything; look: what else the class has for Blender"""
 
     class Drawn(Mixin):
         @classmethod
         def poll(cls, context: Context) -> bool:
             active = selection.active(context) if super().poll(context) else None
-            return active is not None and (shows is None or shows(active[1]))
+            return active is not None and (shows is None or bool(shows(active[1])))
 
         def draw(self, context: Context) -> None:
             self.layout.use_property_split = True

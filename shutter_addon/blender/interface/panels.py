@@ -138,15 +138,13 @@ class _Shutters(Mixin):
 
 
 def _draw_header(self: Panel, context: Context) -> None:
-    if (shutter := selection.active_shutter(selection.active(context)[1])) is not None:
-        words = iface_('Exposure of "{shutter}"').format(shutter=shutter.name)
-        self.layout.label(text=words, translate=False)
+    shutter = selection.active_shutter(selection.active(context)[1])
+    self.layout.label(text=iface_('Exposure of "{shutter}"').format(shutter=shutter.name), translate=False)
 
 
 def _draw_exposure(layout: UILayout, scene: Scene, effect: PropertyGroup, strip: Strip) -> None:
     """What the active shutter makes of the frames."""
-    if (shutter := selection.active_shutter(effect)) is None:
-        return
+    shutter = selection.active_shutter(effect)
     row = layout.row(align=True)
     preset = consistency.preset_of(effect, effect.active_shutter)
     label = iface_(presets.PRESETS[preset][0], CONTEXT) if preset else None
@@ -274,8 +272,7 @@ class SHUTTER_PT_notes(Panel):
 
 
 def _draw_move(layout: UILayout, _scene: Scene, effect: PropertyGroup, _strip: Strip) -> None:
-    if (shutter := selection.active_shutter(effect)) is None:
-        return
+    shutter = selection.active_shutter(effect)
     layout.prop(shutter, "follow")
     if shutter.follow == "REGION":
         layout.prop_search(shutter, "follow_region", effect, "regions", text="Region")
@@ -334,14 +331,17 @@ class _InSidebar:
 _PANELS = {
     "": (_Shutters, None),
     "_regions": (of_effect("Regions", region_panels.draw_regions, bl_options=set()), ""),
-    "_transform": (of_effect("Transform", region_panels.draw_transform, region_panels.has_region), "_regions"),
+    "_transform": (of_effect("Transform", region_panels.draw_transform, selection.active_region), "_regions"),
     "_track": (
         of_effect("Track", region_panels.draw_track, region_panels.has_strokes, bl_translation_context=CONTEXT),
         "_regions",
     ),
-    "_follow": (of_effect("Follow Track", region_panels.draw_follow, region_panels.has_region), "_regions"),
-    "_exposure": (of_effect("", _draw_exposure, bl_options=set(), draw_header=_draw_header), ""),
-    "_move": (of_effect("Exposure Moves With", _draw_move), "_exposure"),
+    "_follow": (of_effect("Follow Track", region_panels.draw_follow, selection.active_region), "_regions"),
+    "_exposure": (
+        of_effect("", _draw_exposure, selection.active_shutter, bl_options=set(), draw_header=_draw_header),
+        "",
+    ),
+    "_move": (of_effect("Exposure Moves With", _draw_move, selection.active_shutter), "_exposure"),
     "_camera": (of_effect("Camera", region_panels.draw_camera, region_panels.has_camera), ""),
     "_options": (of_effect("Options", _draw_options), ""),
     "_bake": (of_effect("Bake", bake_operators.draw_panel), ""),

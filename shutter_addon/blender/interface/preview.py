@@ -219,8 +219,7 @@ def _show_picture(context: Context, quad: Quad, shown: Shown, wanted: Drawing, s
     # What it measures would take from what runs.
     decision = wanted.decision
     if context.space_data.show_overlays and is_still and not decision.is_plain and not previews.may_be_late():
-        looked = strobing.look(shown.effect, decision.snapshot, renderer, decision.request)
-        _tell_strobing(looked, say)
+        _tell_strobing(*strobing.look(shown.effect, decision.snapshot, renderer, decision.request), say)
 
 
 def _warn(shown: Shown, say: "_Notes") -> None:
@@ -249,13 +248,13 @@ def _tell_detail(wanted: Drawing, size: tuple[int, int], is_still: bool, say: "_
         say(rpt_("Preview: {what}").format(what=", ".join(less)), button)
 
 
-def _tell_strobing(looked: strobing.Looked, say: "_Notes") -> None:
-    """Says that the exposure has too few frames, and gives the way to more."""
-    if looked.known is not None:
-        say(*note_buttons.of_strobing(looked.known))
-    if looked.is_new:
+def _tell_strobing(known: float | None, is_new: bool, say: "_Notes") -> None:
+    """Says that the exposure has too few frames, and gives the way to more; as strobing.look has it."""
+    if known is not None:
+        say(*note_buttons.of_strobing(known))
+    if is_new:
         main_thread.later(preview_areas.redraw_panels)  # which may have been drawn before
-    if looked.is_busy:
+    if strobing.is_busy():
         main_thread.drop(_measure)
         main_thread.later(_measure, _STILL)  # once a frame stays
 

@@ -157,7 +157,7 @@ class RenderSession:
 
         detail: None: as it was the last time, for who asks for no picture"""
         if detail is None:
-            known = map(self._renderers.get, _places(snapshot.scene))
+            known = map(self._renderers.get, ((snapshot.scene, False), (snapshot.scene, True)))
             detail = next((each[0].detail for each in known if each), FULL)
         key = SourceKey.of(snapshot, detail)
         source = self.renderer(key, context.say).source
@@ -279,16 +279,12 @@ class RenderSession:
         """Closes what belongs to other scenes than those of these session_uids. A render job may take them away
         meanwhile."""
         self._drop_begun(set(self._begun) - scenes)
-        for scene in set(self._shown) - scenes:
-            self._shown.pop(scene, None)
-        for scene in {scene for scene, _ in list(self._requests)} - scenes:
-            for place in _places(scene):
-                self._requests.pop(place, None)
-        for scene in {scene for scene, _ in list(self._renderers)} - scenes:
-            for place in _places(scene):
-                _key, renderer = self._renderers.pop(place, (None, None))
-                if renderer is not None:
-                    self._submit(renderer.close)
+        for place in [place for place in list(self._requests) if place[0] not in scenes]:
+            self._requests.pop(place, None)
+        for place in [place for place in list(self._renderers) if place[0] not in scenes]:
+            _key, renderer = self._renderers.pop(place, (None, None))
+            if renderer is not None:
+                self._submit(renderer.close)
 
     def forget(self) -> None:
         """Closes all sources and frees the device; where Blender's GPU is not current, once it is."""
@@ -312,11 +308,6 @@ class RenderSession:
         except NoDeviceError:
             pass  # met again when a picture is asked for
         self.forget()
-
-
-def _places(scene: int) -> tuple[Place, Place]:
-    """Where a scene's renderers are: of plain pictures, and of smooth ones."""
-    return (scene, False), (scene, True)
 
 
 def _weights(renderer: Renderer, request: Request) -> list[np.ndarray]:
