@@ -90,10 +90,6 @@ def _update(scene: Scene | None = None, depsgraph: Depsgraph | None = None) -> N
         preview_areas.redraw()
 
 
-def _before_undo(*_) -> None:
-    shown_annotations.before_undo()
-
-
 def _after_undo(*_) -> None:
     revision.changed()
     reconciling.find_lost()
@@ -178,8 +174,8 @@ HANDLERS = {
     "blend_import_post": _after_import,
     "save_pre": _before_save,
     "depsgraph_update_post": _update,
-    "undo_pre": _before_undo,
-    "redo_pre": _before_undo,
+    "undo_pre": shown_annotations.before_undo,
+    "redo_pre": shown_annotations.before_undo,
     "undo_post": _after_undo,
     "redo_post": _after_undo,
     "render_init": _before_render,

@@ -3,6 +3,7 @@ point: between two of them a curve goes along the picture's edges. And the activ
 to the current frame: pulling at it mends it, and makes that frame a drawing."""
 
 from contextlib import closing
+from typing import Any
 
 import bpy
 import numpy as np
@@ -153,7 +154,7 @@ def outline_it(self: Operator, _context: Context, effect: PropertyGroup) -> set[
     return None
 
 
-def _there(held: Operator | Gizmo) -> tuple[Scene, PropertyGroup, Strip] | None:
+def _there(held: Operator | Gizmo) -> Any:
     """Scene, effect and strip of what has a `target` and a `strip` by its name, as Blender has them now; None: they are
     gone."""
     effect = held.target.effect()

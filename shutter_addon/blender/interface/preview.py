@@ -34,9 +34,9 @@ from ..rendering import (
     strobing,
 )
 from ..rendering.previews import Decision, Drawing
-from . import drawing, note_buttons, preview_quad, sharp_frame
+from . import drawing, note_buttons, sharp_frame
+from .drawing import Quad
 from .note_buttons import Button
-from .preview_quad import Quad
 
 VIEWS = (
     ("RESULT", "Result", "The finished picture"),
@@ -401,5 +401,5 @@ def unregister() -> None:
     global _handler
     bpy.types.SpaceSequenceEditor.draw_handler_remove(_handler, "PREVIEW")
     _handler = None
-    preview_quad.free()
+    drawing.free()
     del bpy.types.WindowManager.virtual_shutter
