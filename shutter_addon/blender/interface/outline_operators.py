@@ -354,7 +354,8 @@ class SHUTTER_GT_outline(Dragged, Gizmo):
             return
         if event.type in {"WHEELUPMOUSE", "WHEELDOWNMOUSE"}:
             self.reach *= _MORE if event.type == "WHEELUPMOUSE" else 1 / _MORE
-        seen = view(*there[1:], context.region)
+        _scene, effect, strip = there
+        seen = view(effect, strip, context.region)
         point = _on_picture(seen, (event.mouse_region_x, event.mouse_region_y))
         self.by = tuple(np.subtract(point, self.grabbed))
         context.area.tag_redraw()

@@ -13,7 +13,7 @@ from ...core.model.effect import Shutter
 from ..data import annotations, consistency, data_format, selection, strips
 from ..editing import bar_edits, match_source
 from ..rendering import strobing
-from . import bake_operators, icons, note_buttons, region_panels
+from . import bake_operators, note_buttons, region_panels
 from .note_buttons import Button
 from .operator_bases import Mixin
 from .panel_parts import (
@@ -24,6 +24,7 @@ from .panel_parts import (
     draw_operators,
     draw_properties,
     of_effect,
+    pattern_icon,
     sentence,
 )
 
@@ -34,7 +35,7 @@ class SHUTTER_UL_shutters(UIList):
         color = row.row(align=True)
         color.ui_units_x = 1.0
         color.prop(shutter, "color", text="")
-        row.label(text="", icon_value=icons.of_pattern(index))
+        row.label(text="", icon_value=pattern_icon(index))
         row.prop(shutter, "name", text="", emboss=False)
         if index == 0:
             hint = row.row()
