@@ -104,9 +104,7 @@ def _key_colors() -> dict:
 
 
 class SHUTTER_GT_bars(Dragged, Gizmo):
-    @staticmethod
-    def seen(context: Context) -> tuple | None:
-        return _seen(context)
+    seen = staticmethod(_seen)
 
     def show(self, context: Context, seen: tuple) -> None:
         scene, effect, strip, shown = seen

@@ -90,9 +90,7 @@ def outline(context: Context, where: Place) -> list[np.ndarray]:
 class SHUTTER_GT_region(Dragged, Gizmo):
     """One handle; `turns`: turns and scales, or moves."""
 
-    @staticmethod
-    def seen(context: Context) -> Place | None:
-        return place(context)
+    seen = staticmethod(place)
 
     def show(self, context: Context, seen: Place) -> None:
         if self.is_modal:  # what is keyed is shown where its keys have it

@@ -26,11 +26,8 @@ _lesser: set[int] = set()  # likewise, one that is less than the full picture, f
 def current(scene: Scene, effect: PropertyGroup, strip: Strip, frame: float) -> Snapshot:
     """The snapshot of an effect strip at a timeline frame, for what is drawn: taken once until something changes.
     EffectError, MediaError: as snapshot.take."""
-
-    def take() -> Snapshot:
-        return snapshot.take(scene, effect, strip, (frame,))
-
-    return revision.until_change("snapshot", (effect.scene.session_uid, strip.name, frame), take)
+    key = effect.scene.session_uid, strip.name, frame
+    return revision.until_change("snapshot", key, lambda: snapshot.take(scene, effect, strip, (frame,)))
 
 
 def forget() -> None:
