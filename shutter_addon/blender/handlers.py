@@ -94,7 +94,7 @@ def _after_undo(*_) -> None:
     revision.changed()
     reconciling.find_lost()
     track_region.data_replaced()
-    _drop_frames()
+    invalidation.drop_frames()
     sessions.drop_removed()
     sharp_frame.give_back(bpy.context)
     shown_annotations.follow()
@@ -151,12 +151,6 @@ def _after_render(scene: Scene, *_) -> None:
     source_media.rest(render_job.runs())
 
 
-def _drop_frames() -> None:
-    """Drops the finished frames of all effects."""
-    for scene in bpy.data.scenes:
-        strips.invalidate(scene)
-
-
 _hooks: list = []  # what Python called with errors that nobody caught before it called ours: one, or none
 
 
@@ -192,7 +186,7 @@ def register() -> None:
         _hooks.append(sys.excepthook)
         sys.excepthook = _uncaught
     # Those that the sequencer keeps from before lack the effects; while this registers, Blender's data cannot be had.
-    main_thread.later(_drop_frames)
+    main_thread.later(invalidation.drop_frames)
 
 
 def unregister() -> None:

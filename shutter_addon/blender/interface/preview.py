@@ -18,7 +18,7 @@ from ...core import stopping, told
 from ...core.model.choices import CONTEXT
 from ...core.model.frame_state import FrameState
 from ...devices.device import Texture
-from ..data import annotations, preview_areas, selection, strips
+from ..data import annotations, preview_areas, selection
 from ..data.preview_areas import Shown
 from ..data.snapshot import Snapshot
 from ..devices import blender_gpu, main_thread
@@ -291,9 +291,7 @@ def _tell_carrying(say: "_Notes") -> None:
 def show_carried() -> None:
     """Previews are made anew, with what was carried."""
     sessions.WINDOW.keep(set())
-    for scene in strips.local_scenes():
-        if scene.virtual_shutter.effects:
-            strips.invalidate(scene)
+    invalidation.drop_frames()
     preview_areas.redraw()
 
 

@@ -59,6 +59,12 @@ def drop_lesser() -> None:
     _drop(_lesser)
 
 
+def drop_frames() -> None:
+    """Drops the finished frames of all effects; a timer as well."""
+    for scene in bpy.data.scenes:
+        strips.invalidate(scene)
+
+
 def _drop(noted: set[int]) -> None:
     """Empties a set of session_uids of effect scenes, and drops what the sequencer keeps of those."""
     uids = {noted.pop() for _ in range(len(noted))}
