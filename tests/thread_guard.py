@@ -53,11 +53,10 @@ REVIEWED: dict[str, set[str]] = {
         "soon",
     },
     "editing/track_region.py": {"_each", "track.<lambda>"},
-    "rendering/device_work.py": {"broken_off"},
     "rendering/outline_carrying.py": {"_Carrying._carry"},
     "rendering/effect_source.py": {"_options", "find_steps", "find_steps.find", "steps_key"},
     "rendering/render_job.py": {"where"},
-    "rendering/session.py": {"RenderSession._ask", "RenderSession.forget.<lambda>", "_weights"},
+    "rendering/session.py": {"RenderSession._ask", "RenderSession.forget.<lambda>", "_weights", "broken_off"},
     "rendering/sessions.py": {"_ask_window"},
     "rendering/strobing.py": {"_measure_motion"},
 }

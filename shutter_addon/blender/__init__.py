@@ -13,7 +13,7 @@ _MODULES = (
     "data.properties",
     "data.movie_decoding",
     "rendering.engine",
-    "interface.icons",
+    "interface.panel_parts",
     "interface.sharp_frame",
     "interface.preview",
     "interface.operators",

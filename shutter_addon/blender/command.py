@@ -35,9 +35,7 @@ def main(argv: list[str]) -> int:
         return film_output.INTERRUPTED
     except film_output.InterruptedRenderError as stopped:
         return _refuse(str(stopped), film_output.INTERRUPTED)
-    except (UserError, NoDeviceError) as error:
-        return _refuse(str(error))
-    except MemoryError as error:
+    except (UserError, NoDeviceError, MemoryError) as error:
         return _refuse(str(error) or "not enough memory")
     except OSError as error:
         places = (getattr(arguments, name, None) for name in PLACES)

@@ -90,15 +90,11 @@ def _update(scene: Scene | None = None, depsgraph: Depsgraph | None = None) -> N
         preview_areas.redraw()
 
 
-def _before_undo(*_) -> None:
-    shown_annotations.before_undo()
-
-
 def _after_undo(*_) -> None:
     revision.changed()
     reconciling.find_lost()
     track_region.data_replaced()
-    _drop_frames()
+    invalidation.drop_frames()
     sessions.drop_removed()
     sharp_frame.give_back(bpy.context)
     shown_annotations.follow()
@@ -155,12 +151,6 @@ def _after_render(scene: Scene, *_) -> None:
     source_media.rest(render_job.runs())
 
 
-def _drop_frames() -> None:
-    """Drops the finished frames of all effects."""
-    for scene in bpy.data.scenes:
-        strips.invalidate(scene)
-
-
 _hooks: list = []  # what Python called with errors that nobody caught before it called ours: one, or none
 
 
@@ -178,8 +168,8 @@ HANDLERS = {
     "blend_import_post": _after_import,
     "save_pre": _before_save,
     "depsgraph_update_post": _update,
-    "undo_pre": _before_undo,
-    "redo_pre": _before_undo,
+    "undo_pre": shown_annotations.before_undo,
+    "redo_pre": shown_annotations.before_undo,
     "undo_post": _after_undo,
     "redo_post": _after_undo,
     "render_init": _before_render,
@@ -196,7 +186,7 @@ def register() -> None:
         _hooks.append(sys.excepthook)
         sys.excepthook = _uncaught
     # Those that the sequencer keeps from before lack the effects; while this registers, Blender's data cannot be had.
-    main_thread.later(_drop_frames)
+    main_thread.later(invalidation.drop_frames)
 
 
 def unregister() -> None:

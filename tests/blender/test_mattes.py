@@ -513,7 +513,8 @@ def test_handles_of_a_ramp(bpy, edit, shown, monkeypatch):
         assert np.allclose(where.corner, (0.6, 0.5 + 0.125 * WIDTH / HEIGHT))
         ramp.ramp = "LUMINANCE"
         assert region_gizmo.place(bpy.context) is None
-        pressed = region_gizmo.SHUTTER_GT_region.invoke(None, bpy.context, None)
+        handle = region_gizmo.SHUTTER_GT_region
+        pressed = handle.invoke(handle, bpy.context, None)
         assert pressed == {"CANCELLED"}, "a handle that was there a moment ago moves nothing"
 
 

@@ -58,7 +58,7 @@ def looked(edit, effect, strip):
     for _ in range(4):
         frame = edit.frame_current
         taken = snapshot.take(edit, effect, strip, (frame,))
-        found = strobing.look(effect, taken, *asked(edit, effect, strip, frame)).known
+        found = strobing.look(effect, taken, *asked(edit, effect, strip, frame))[0]
         if not strobing.is_busy():
             return found
         until = time.monotonic() + 60
@@ -137,7 +137,7 @@ def test_drawing_never_waits_and_measures_once(add, monkeypatch):
     measured, moved = [], steps.moved
     monkeypatch.setattr(steps, "moved", lambda *given: measured.append(given[1]) or moved(*given))
     taken = snapshot.take(edit, effect, strip, (4,))
-    assert strobing.look(effect, taken, *asked(edit, effect, strip, 4)).known is None
+    assert strobing.look(effect, taken, *asked(edit, effect, strip, 4))[0] is None
     assert not measured
     for frame in (4, 5, 6, 4):
         edit.frame_set(frame)

@@ -3,7 +3,7 @@
 import thread_guard
 
 from shutter_addon.blender.data import selection
-from shutter_addon.blender.rendering import device_work
+from shutter_addon.blender.rendering import session
 from shutter_addon.core import stopping, threads
 
 
@@ -31,6 +31,6 @@ def test_calls_of_blender_on_a_thread_are_found(bpy):
 
     timers, texts, scenes = bpy.app.timers, bpy.app.translations, bpy.data.scenes
     for function in (timers.is_registered, texts.pgettext_rpt, scenes.get, gpu.types.GPUTexture):
-        threads.start(device_work.broken_off, stopping.never, function, "Shutter").exception()
+        threads.start(session.broken_off, stopping.never, function, "Shutter").exception()
         found = [fault.partition(" calls ")[0] for fault in thread_guard.faults()]
-        assert found == ["blender/rendering/device_work.py: broken_off"], function
+        assert found == ["blender/rendering/session.py: broken_off"], function

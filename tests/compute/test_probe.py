@@ -24,7 +24,7 @@ def request_of(blender_device):
 @pytest.mark.parametrize("aggregate", [1, 2, 4])
 @pytest.mark.parametrize("count", [2, 6])
 def test_a_point_shows_its_pixels_coefficients_and_shutter(request_of, interpolation, aggregate, count):
-    from shutter_addon.blender.rendering import probe
+    from shutter_addon.blender.interface.probe_gizmo import probed_at
 
     rng = np.random.default_rng(count)
     shapes = SHAPES if count > 2 else SHAPES[::2]
@@ -35,7 +35,7 @@ def test_a_point_shows_its_pixels_coefficients_and_shutter(request_of, interpola
     source = renderer.source
     for x, y in POINTS:
         row, column = int((1 - y) * source.height) // aggregate, int(x * source.width) // aggregate
-        probed = probe.at(renderer, request, (x, y))
+        probed = probed_at(renderer, request, (x, y))
         assert np.abs(probed.coefficients - values[:, row, column]).max() < 1e-3
         assert probed.coefficients.sum() == pytest.approx(1)
         between = shutters.INTERPOLATIONS[interpolation]
@@ -43,19 +43,19 @@ def test_a_point_shows_its_pixels_coefficients_and_shutter(request_of, interpola
 
 
 def test_one_shutter_is_everywhere(request_of):
-    from shutter_addon.blender.rendering import probe
+    from shutter_addon.blender.interface.probe_gizmo import probed_at
 
     renderer, request = request_of(state(np.random.default_rng(0), shapes=()))
-    probed = probe.at(renderer, request, (0.7, 0.2))
+    probed = probed_at(renderer, request, (0.7, 0.2))
     assert probed.coefficients.tolist() == [1, 0, 0]
     assert probed.bars == pytest.approx(request.state.bars[0])
 
 
 @pytest.mark.parametrize("point", [(-1, -1), (1.0, 0.5), (0.5, 0.0), (0.5, 1.01)])
 def test_beside_the_picture_there_is_nothing(request_of, point):
-    from shutter_addon.blender.rendering import probe
+    from shutter_addon.blender.interface.probe_gizmo import probed_at
 
-    assert probe.at(*request_of(state(np.random.default_rng(0))), point) is None
+    assert probed_at(*request_of(state(np.random.default_rng(0))), point) is None
 
 
 def test_a_texel_is_that_of_the_whole_texture(blender_device):
@@ -72,7 +72,7 @@ def test_a_texel_is_that_of_the_whole_texture(blender_device):
 def test_layers_and_what_takes_the_place_of_what_lies_behind(blender_device):
     from test_layered import COUNT, SHOWN, SIZE, with_layers
 
-    from shutter_addon.blender.rendering import probe
+    from shutter_addon.blender.interface.probe_gizmo import probed_at
     from shutter_addon.compute import plates
     from shutter_addon.media.matte_values import MatteValues
 
@@ -82,7 +82,7 @@ def test_layers_and_what_takes_the_place_of_what_lies_behind(blender_device):
     renderer = Renderer(GPUCompositor(blender_device), footage(rng, COUNT, SIZE), MatteValues(*SIZE))
     request = Request(SHOWN, moment)
     renderer.picture(request)
-    behind, before = (probe.at(renderer, request, (0.5, y)) for y in (0.2, 0.8))
+    behind, before = (probed_at(renderer, request, (0.5, y)) for y in (0.2, 0.8))
     assert (behind.layers, behind.hole) == ((0.0,), plates.OPEN)
     assert (before.layers, before.hole) == ((pytest.approx(0.97, abs=1e-4),), plates.TAKEN)
     with renderer.compositor.current():

@@ -76,7 +76,7 @@ def by_blender(colors, shares, unit, step="COEFFICIENTS") -> np.ndarray:
     from gpu_extras.batch import batch_for_shader
     from mathutils import Matrix
 
-    from shutter_addon.blender.interface import preview_quad
+    from shutter_addon.blender.interface import drawing
 
     data = layers(shares)
     palette = np.ones((1, 1, SHUTTERS, 4), dtype=np.float32)
@@ -87,7 +87,7 @@ def by_blender(colors, shares, unit, step="COEFFICIENTS") -> np.ndarray:
         gpu.state.active_framebuffer_get().clear(color=(0.0, 0.0, 0.0, 0.0))
         gpu.matrix.load_identity()
         gpu.matrix.load_projection_matrix(Matrix(TO_CLIP.tolist()))
-        shader = preview_quad.shader_of(step)
+        shader = drawing.shader_of(step)
         shader.bind()
         for name, values in (("coefficients", data), ("palette", palette)):
             buffer = gpu.types.Buffer("FLOAT", values.size, values.reshape(-1))
@@ -104,7 +104,7 @@ def by_blender(colors, shares, unit, step="COEFFICIENTS") -> np.ndarray:
         read = gpu.state.active_framebuffer_get().read_color(0, 0, WIDTH, HEIGHT, 4, 0, "FLOAT")
     picture = np.array(read.to_list()).reshape(HEIGHT, WIDTH, 4)
     target.free()
-    preview_quad.free()
+    drawing.free()
     return picture
 
 

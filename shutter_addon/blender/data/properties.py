@@ -157,7 +157,7 @@ class _Tracked:
     )
 
 
-def _location(description: str) -> object:
+def location_property(description: str, **more: Any) -> object:
     return FloatVectorProperty(
         name="Location",
         description=description,
@@ -165,21 +165,17 @@ def _location(description: str) -> object:
         size=2,
         min=-MAX_DISTANCE,
         max=MAX_DISTANCE,
-        update=changed,
+        **more,
     )
 
 
-def _rotation(description: str) -> object:
+def rotation_property(description: str, **more: Any) -> object:
     limit = math.radians(MAX_DEGREES)
-    return FloatProperty(
-        name="Rotation", description=description, subtype="ANGLE", min=-limit, max=limit, update=changed
-    )
+    return FloatProperty(name="Rotation", description=description, subtype="ANGLE", min=-limit, max=limit, **more)
 
 
-def _scale(description: str) -> object:
-    return FloatProperty(
-        name="Scale", description=description, default=1.0, min=-MAX_SCALE, max=MAX_SCALE, update=changed
-    )
+def scale_property(description: str, **more: Any) -> object:
+    return FloatProperty(name="Scale", description=description, default=1.0, min=-MAX_SCALE, max=MAX_SCALE, **more)
 
 
 @with_fields(
@@ -214,9 +210,11 @@ class ShutterRegion(_Tracked, PropertyGroup):
     channel_name: StringProperty(
         name="Channel Name", description="Name of the channel in the EXR file", maxlen=MAX_CHANNEL, update=changed
     )
-    location: _location("Distance from where the region was drawn, as a fraction of the picture")
-    rotation: _rotation("Rotation about the region's center")
-    scale: _scale("Scale about the region's center")
+    location: location_property(
+        "Distance from where the region was drawn, as a fraction of the picture", update=changed
+    )
+    rotation: rotation_property("Rotation about the region's center", update=changed)
+    scale: scale_property("Scale about the region's center", update=changed)
     follow_kind: choice("Follow Track", "What the region follows", FOLLOWED, update=None, default="TRACK")
     follow_object: StringProperty(
         name="Object", description="Tracking object that has the tracks; without one, the camera"
@@ -231,9 +229,9 @@ class ShutterRegion(_Tracked, PropertyGroup):
 @with_fields(model.Camera)
 class ShutterCamera(_Tracked, PropertyGroup):
     name: StringProperty(name="Name", description="Name of the camera's animation channels", default="Camera")
-    location: _location("Where what the camera sees has moved to, as a fraction of the picture")
-    rotation: _rotation("Rotation of what the camera sees, about the picture's center")
-    scale: _scale("Scale of what the camera sees, about the picture's center")
+    location: location_property("Where what the camera sees has moved to, as a fraction of the picture", update=changed)
+    rotation: rotation_property("Rotation of what the camera sees, about the picture's center", update=changed)
+    scale: scale_property("Scale of what the camera sees, about the picture's center", update=changed)
 
 
 def _renamed(shutter: PropertyGroup, new: str, old: str, _is_set: bool) -> str:

@@ -351,7 +351,6 @@ def _remove_scenes(updated: Scene | None) -> None:
         if scene not in stay:
             bpy.data.scenes.remove(scene)
             sessions.drop_removed()
-            invalidation.drop_removed()
 
 
 def _remove_left() -> None:

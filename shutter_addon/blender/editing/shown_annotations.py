@@ -72,7 +72,7 @@ def let_go(annotation: ID) -> None:
             give(space, None)
 
 
-def before_undo() -> None:
+def before_undo(*_: object) -> None:
     """Notes where scribbles are shown: Blender takes away what undo removes, and does not give it back."""
     for space in _spaces():
         if space.annotation is not None and is_own(space.annotation):

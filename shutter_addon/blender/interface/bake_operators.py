@@ -26,13 +26,9 @@ _stopped: list[bake_job.BakeJob] = []  # that finish the frame they are at
 _failures: dict[str, str] = {}  # by the effect's identity: why its last bake failed
 
 
-def _is_baking() -> bool:
-    _stopped[:] = [job for job in _stopped if not job.is_over()]
-    return bool(_running or _stopped)
-
-
 def _why_baking(_effect: PropertyGroup) -> str | None:
-    return rpt_("An effect is being baked") if _is_baking() else None
+    _stopped[:] = [job for job in _stopped if not job.is_over()]
+    return rpt_("An effect is being baked") if _running or _stopped else None
 
 
 @operator("Bake to Strip", _why_baking, file_format=EnumProperty(name="Format", items=FORMATS))
@@ -70,8 +66,7 @@ class SHUTTER_OT_bake_stop(Named, Operator):
 
 
 def _why_not_baked(_effect: PropertyGroup) -> str | None:
-    is_baked = bool(selection.active(bpy.context)[2].virtual_shutter_bake.identity)
-    return None if is_baked else rpt_("The effect is not baked")
+    return None if selection.active(bpy.context)[2].virtual_shutter_bake.identity else rpt_("The effect is not baked")
 
 
 @operator("Unbake", _why_not_baked)

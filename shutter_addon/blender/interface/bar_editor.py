@@ -7,7 +7,7 @@ import bpy
 import numpy as np
 from bpy.app.translations import contexts
 from bpy.app.translations import pgettext_iface as iface_
-from bpy.types import Context, Event, Gizmo, GizmoGroup, PropertyGroup
+from bpy.types import Context, Event, Gizmo, GizmoGroup, PropertyGroup, Scene, Strip
 
 from ...core.messages import EffectError
 from ..data import consistency, selection
@@ -79,21 +79,20 @@ def painted(
 
 def bar_under(context: Context, x: float, y: float) -> int | None:
     """The bar of the active shutter at a point of the preview's region, or None."""
-    seen = selection.in_picture(context)
-    if seen is None or context.region is None or context.region.type != "PREVIEW":
+    if context.region is None or context.region.type != "PREVIEW" or (seen := _seen(context)) is None:
         return None
-    if (shown := _shown(seen[1])) is None:
-        return None
-    place = _layout(context, shown.bars)
+    place = _layout(context, seen[-1].bars)
     return place.bar_at(x) if place.contains(x, y) else None
 
 
-def _shown(effect: PropertyGroup) -> bar_edits.BarsShown | None:
-    """Bars that the editor shows; None: there is no shutter, or none that a picture can be made with."""
-    if selection.active_shutter(effect) is None:
+def _seen(context: Context) -> tuple[Scene, PropertyGroup, Strip, bar_edits.BarsShown] | None:
+    """Scene, effect and strip that are seen, and the bars that the editor shows; None: there is no shutter, or none
+    that a picture can be made with."""
+    seen = selection.in_picture(context)
+    if seen is None or selection.active_shutter(effect := seen[1]) is None:
         return None
     try:
-        return bar_edits.shown(effect, effect.active_shutter)
+        return (*seen, bar_edits.shown(effect, effect.active_shutter))
     except EffectError:  # panels and the live preview tell it
         return None
 
@@ -105,12 +104,10 @@ def _key_colors() -> dict:
 
 
 class SHUTTER_GT_bars(Dragged, Gizmo):
-    def draw(self, context: Context) -> None:
-        if (seen := selection.in_picture(context)) is None:
-            return
-        scene, effect, strip = seen
-        if (shown := _shown(effect)) is None:
-            return
+    seen = staticmethod(_seen)
+
+    def show(self, context: Context, seen: tuple) -> None:
+        scene, effect, strip, shown = seen
         shutter = selection.active_shutter(effect)
         words = bar_edits.open_for(scene, effect, strip, effect.active_shutter)
         words = words or bar_edits.summary(shown.bars, shutter.combine)
@@ -118,11 +115,11 @@ class SHUTTER_GT_bars(Dragged, Gizmo):
         _draw(place, shutter, *shown)
         _draw_header(place, shutter, effect.active_shutter, f"{shutter.name}   {words}")
 
-    def test_select(self, context: Context, location: tuple[int, int]) -> int:
-        return 0 if bar_under(context, *location) is not None else -1
+    def is_at(self, context: Context, seen: tuple, location: tuple[int, int]) -> bool:
+        return _layout(context, seen[-1].bars).contains(*location)
 
-    def invoke(self, context: Context, event: Event) -> set[str]:
-        effect = selection.active(context)[1]
+    def grab(self, context: Context, event: Event, seen: tuple) -> None:
+        effect = seen[1]
         self.index = effect.active_shutter
         self.target = track_region.Target.of(effect, None)  # while it plays, another may come into the picture
         self.before = consistency.bars(effect.shutters[self.index])
@@ -132,9 +129,8 @@ class SHUTTER_GT_bars(Dragged, Gizmo):
         self.place = _layout(context, self.values)
         self.mouse = self.point = event.mouse_region_x, event.mouse_region_y
         self.paints = False  # a click does not, nor the two of a double click
-        return {"RUNNING_MODAL"}
 
-    def modal(self, context: Context, event: Event, tweak: set[str]) -> set[str]:
+    def drag(self, context: Context, event: Event, tweak: set[str]) -> None:
         mouse = event.mouse_region_x, event.mouse_region_y
         threshold = _THRESHOLD * drawing.ui_scale()
         self.paints = self.paints or max(abs(a - b) for a, b in zip(mouse, self.mouse, strict=True)) >= threshold
@@ -144,7 +140,6 @@ class SHUTTER_GT_bars(Dragged, Gizmo):
             point = mouse[0], self.point[1] + (mouse[1] - self.mouse[1]) * (_FINE if fine else 1.0)
             self.mouse = mouse
             self._paint(context, point, snap)
-        return {"RUNNING_MODAL"}
 
     def _paint(self, context: Context, point: tuple[float, float], snap: bool) -> None:
         if (effect := self.target.effect()) is None:

@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import bpy
 import numpy as np
-from bpy.types import Context, Gizmo, KeyConfig, KeyMap, PropertyGroup, Region, Strip
+from bpy.types import Context, Event, Gizmo, KeyConfig, KeyMap, PropertyGroup, Region, Strip
 from numpy.typing import ArrayLike
 
 from ...core.model.scribbles import mapped
@@ -14,11 +14,39 @@ from .operator_bases import Mixin
 TWEAK = ("gizmogroup.gizmo_tweak", "LEFTMOUSE", "PRESS", {"any": True})
 
 
-class Dragged(Mixin):
-    """A gizmo that is drawn while it is dragged as well."""
+class Seen(Mixin):
+    """A gizmo that is drawn, and hit, where there is something to see.
+
+    Each has `seen(context)`, what is drawn, or None; `show(context, seen)`, which draws it; and `is_at(context, seen,
+    location)`, whether it lies at a point of the region."""
+
+    def draw(self, context: Context) -> None:
+        if (seen := self.seen(context)) is not None:
+            self.show(context, seen)
+
+    def test_select(self, context: Context, location: tuple[int, int]) -> int:
+        seen = self.seen(context)
+        return 0 if seen is not None and self.is_at(context, seen, location) else -1
+
+
+class Dragged(Seen):
+    """A gizmo that is dragged, and is drawn meanwhile as well.
+
+    Each has `grab(context, event, seen)`, which begins that; and `drag(context, event, tweak)`, which follows the
+    pointer."""
 
     def setup(self) -> None:
         self.use_draw_modal = True
+
+    def invoke(self, context: Context, event: Event) -> set[str]:
+        if (seen := self.seen(context)) is None:  # while it plays, it may just have gone
+            return {"CANCELLED"}
+        self.grab(context, event, seen)
+        return {"RUNNING_MODAL"}
+
+    def modal(self, context: Context, event: Event, tweak: set[str]) -> set[str]:
+        self.drag(context, event, tweak)
+        return {"RUNNING_MODAL"}
 
 
 class InPreview(Mixin):

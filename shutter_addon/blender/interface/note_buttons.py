@@ -7,7 +7,7 @@ from bpy.app.translations import pgettext_rpt as rpt_
 from bpy.types import Context, Gizmo, GizmoGroup, Region
 
 from . import drawing
-from .gizmo_groups import InPreview
+from .gizmo_groups import InPreview, Seen
 
 HEIGHT = 19  # in units of the interface
 _PAD = 8
@@ -22,14 +22,10 @@ class Button:
     label: str
 
 
-def strobing_in_words(step: float) -> str:
-    """That an exposure has too few frames. step: pixels from one to the next"""
-    return rpt_("Too few frames: steps of {pixels} pixels").format(pixels=f"{step:.0f}")
-
-
-def smoothing() -> Button:
-    """What helps against that."""
-    return Button("shutter.smooth_streaks", iface_("Smooth"))
+def of_strobing(step: float) -> tuple[str, Button]:
+    """That an exposure has too few frames, and what helps against that. step: pixels from one to the next"""
+    words = rpt_("Too few frames: steps of {pixels} pixels").format(pixels=f"{step:.0f}")
+    return words, Button("shutter.smooth_streaks", iface_("Smooth"))
 
 
 places: dict[tuple[int, str], tuple[drawing.Box, Button]] = {}  # by region and operator: a handler puts them there
@@ -52,15 +48,12 @@ def place(region: Region, left: float, bottom: float, button: Button) -> None:
     places[region.as_pointer(), button.operator] = box, button
 
 
-def _placed(context: Context, operator: str) -> tuple[drawing.Box, Button] | None:
-    return places.get((context.region.as_pointer(), operator))
+class SHUTTER_GT_note_button(Seen, Gizmo):
+    def seen(self, context: Context) -> tuple[drawing.Box, Button] | None:
+        return places.get((context.region.as_pointer(), self.operator))
 
-
-class SHUTTER_GT_note_button(Gizmo):
-    def draw(self, context: Context) -> None:
-        if (placed := _placed(context, self.operator)) is None:
-            return
-        (left, bottom, right, top), button = placed
+    def show(self, context: Context, seen: tuple[drawing.Box, Button]) -> None:
+        (left, bottom, right, top), button = seen
         look = context.preferences.themes[0].user_interface.wcol_tool
         unit, thin = drawing.ui_scale(), drawing.line_width()
         with drawing.pixel_space(context.region):
@@ -70,11 +63,9 @@ class SHUTTER_GT_note_button(Gizmo):
             color = look.text_sel if self.is_highlight else look.text
             drawing.text(left + _PAD * unit, bottom + 6 * unit, button.label, color=(*color, 1.0))
 
-    def test_select(self, context: Context, location: tuple[int, int]) -> int:
-        if (placed := _placed(context, self.operator)) is None:
-            return -1
-        (left, bottom, right, top), _button = placed
-        return 0 if left <= location[0] <= right and bottom <= location[1] <= top else -1
+    def is_at(self, _context: Context, seen: tuple[drawing.Box, Button], location: tuple[int, int]) -> bool:
+        (left, bottom, right, top), _button = seen
+        return left <= location[0] <= right and bottom <= location[1] <= top
 
 
 class SHUTTER_GGT_note_buttons(InPreview, GizmoGroup):

@@ -31,7 +31,7 @@ from ..editing import (
 )
 from ..editing import match_source as matching
 from ..output import error_report, matte_export
-from . import icons, needs, sharp_frame
+from . import needs, sharp_frame
 from .matte_operators import STRIP
 from .operator_bases import (
     UNDOABLE,
@@ -45,6 +45,7 @@ from .operator_bases import (
     report_error,
     report_warning,
 )
+from .panel_parts import icon_of
 
 
 class SHUTTER_OT_add_effect(Named, Operator):
@@ -196,7 +197,7 @@ def shutter_move(self: Operator, _context: Context, effect: PropertyGroup) -> se
 def _presets(_context: Context) -> list[tuple]:
     """With icons, which exist only once the extension is registered."""
     return [
-        (name, label, description, icons.of(name), i)
+        (name, label, description, icon_of(name), i)
         for i, (name, (label, description, _make)) in enumerate(presets.PRESETS.items())
     ]
 

@@ -3,6 +3,7 @@ point: between two of them a curve goes along the picture's edges. And the activ
 to the current frame: pulling at it mends it, and makes that frame a drawing."""
 
 from contextlib import closing
+from typing import Any
 
 import bpy
 import numpy as np
@@ -153,6 +154,14 @@ def outline_it(self: Operator, _context: Context, effect: PropertyGroup) -> set[
     return None
 
 
+def _there(held: Operator | Gizmo) -> Any:
+    """Scene, effect and strip of what has a `target` and a `strip` by its name, as Blender has them now; None: they are
+    gone."""
+    effect = held.target.effect()
+    strip = effect and effect.id_data.sequence_editor.strips_all.get(held.strip)
+    return (effect.id_data, effect, strip) if effect is not None and strip is not None else None
+
+
 class SHUTTER_OT_outline_points(OfEffect, Operator):
     """Draw a curve of the active outline point by point, along the picture's edges (Ctrl for straight lines)"""
 
@@ -169,8 +178,8 @@ class SHUTTER_OT_outline_points(OfEffect, Operator):
         self._area = context.area if context.area in areas else areas[0]
         if self.tried(self._read, scene, effect, strip) == {"CANCELLED"}:
             return {"CANCELLED"}
-        self._target, self._frame = track_region.Target.of(effect, effect.active_region), scene.frame_current
-        self._strip, self._next, self._is_down = strip.name, np.zeros((0, 2)), False
+        self.target, self._frame = track_region.Target.of(effect, effect.active_region), scene.frame_current
+        self.strip, self._next, self._is_down = strip.name, np.zeros((0, 2)), False
         self._ways: list[np.ndarray] = []
         sharp_frame.show(context)
         self._drawn = bpy.types.SpaceSequenceEditor.draw_handler_add(self._draw, (), "PREVIEW", "POST_PIXEL")
@@ -191,7 +200,7 @@ class SHUTTER_OT_outline_points(OfEffect, Operator):
         return {"CANCELLED"}
 
     def modal(self, context: Context, event: Event) -> set[str]:
-        there, has_preview = self._there(), self._area.type == "SEQUENCE_EDITOR"
+        there, has_preview = _there(self), self._area.type == "SEQUENCE_EDITOR"
         has_preview = has_preview and self._area.spaces.active.view_type != "SEQUENCER"
         if there is None or there[0].frame_current != self._frame or not has_preview:
             return self._ended(context, {"CANCELLED"})
@@ -247,8 +256,8 @@ class SHUTTER_OT_outline_points(OfEffect, Operator):
         if len(self._ways) < 3:
             report_warning(self, rpt_("A curve has three points at least"))
             return {"RUNNING_MODAL"}
-        _scene, effect, strip = self._there()
-        region = effect.regions[self._target.index]
+        _scene, effect, strip = _there(self)
+        region = effect.regions[self.target.index]
         # The first click is at no edge; the way from it begins at the one beside it.
         first = self._ways[1][0]
         curve = np.concatenate([*self._ways[1:], self._way(first, False)])
@@ -269,12 +278,6 @@ class SHUTTER_OT_outline_points(OfEffect, Operator):
         show_status(None)
         sharp_frame.give_back(context)
 
-    def _there(self):
-        """Scene, effect and strip as Blender has them now; None: they are gone."""
-        effect = self._target.effect()
-        strip = effect and effect.id_data.sequence_editor.strips_all.get(self._strip)
-        return (effect.id_data, effect, strip) if effect is not None and strip is not None else None
-
     def _way(self, point: np.ndarray, is_straight: bool) -> np.ndarray:
         """From the last point to another one; the first is on its own."""
         if not self._ways:
@@ -288,7 +291,7 @@ class SHUTTER_OT_outline_points(OfEffect, Operator):
         return 0 <= x < region.width and 0 <= y < region.height
 
     def _view(self) -> View:
-        _scene, effect, strip = self._there()
+        _scene, effect, strip = _there(self)
         return view(effect, strip, preview_areas.preview_region(self._area))
 
     def _on_picture(self, event: Event) -> np.ndarray:
@@ -301,7 +304,7 @@ class SHUTTER_OT_outline_points(OfEffect, Operator):
         return float(np.hypot(*np.diff(self._view().on_region(points), axis=0)[0]))
 
     def _draw(self) -> None:
-        if bpy.context.area != self._area or self._there() is None or not self._ways:
+        if bpy.context.area != self._area or _there(self) is None or not self._ways:
             return
         curve = np.concatenate([*self._ways, self._next])
         drawing.lines(self._view().on_region(curve), _COLOR, width=2)
@@ -310,83 +313,66 @@ class SHUTTER_OT_outline_points(OfEffect, Operator):
 class SHUTTER_GT_outline(Dragged, Gizmo):
     """The curves."""
 
-    def draw(self, context: Context) -> None:
-        if context.screen.is_animation_playing:
-            return
-        if not (curves := _curves(context)):
-            return
-        seen = _seen(context)
+    def seen(self, context: Context) -> tuple[outlines.Curves, View] | None:
+        """The active outline's curves at the current frame, and how the picture lies; none are while it plays."""
+        seen = None if context.screen.is_animation_playing else selection.in_picture(context)
+        if seen is None:
+            return None
+        scene, effect, strip = seen
+        try:
+            curves = outline_drawings.shown_curves(scene, effect, strip, effect.active_region)
+        except UserError:  # panels and the live preview tell it
+            return None
+        return (curves, view(effect, strip, context.region)) if curves else None
+
+    def show(self, _context: Context, seen: tuple[outlines.Curves, View]) -> None:
+        curves, seen_as = seen
         for points in self.mended() if self.is_modal else curves:
             width = 2 if self.is_highlight or self.is_modal else 1
-            drawing.lines(seen.on_region(points), _COLOR, closed=True, width=width)
+            drawing.lines(seen_as.on_region(points), _COLOR, closed=True, width=width)
 
-    def test_select(self, context: Context, location: tuple[int, int]) -> int:
-        if not (curves := _curves(context)):
-            return -1
-        seen = _seen(context)
-        _index, apart = outlines.nearest(curves, _on_picture(seen, location), seen.aspect)
-        height = float(np.hypot(*seen.matrix[:2, 1]))  # of the picture, in pixels of the region
-        return 0 if apart * height <= drawing.ui_scale() * _NEAR else -1
+    def is_at(self, _context: Context, seen: tuple[outlines.Curves, View], location: tuple[int, int]) -> bool:
+        curves, seen_as = seen
+        _index, apart = outlines.nearest(curves, _on_picture(seen_as, location), seen_as.aspect)
+        height = float(np.hypot(*seen_as.matrix[:2, 1]))  # of the picture, in pixels of the region
+        return bool(apart * height <= drawing.ui_scale() * _NEAR)
 
-    def invoke(self, context: Context, event: Event) -> set[str]:
-        if not (curves := _curves(context)):
-            return {"CANCELLED"}
+    def grab(self, context: Context, event: Event, seen: tuple[outlines.Curves, View]) -> None:
+        curves, seen_as = seen
         scene, effect, strip = selection.in_picture(context)
         self.target, self.frame = track_region.Target.of(effect, effect.active_region), scene.frame_current
         self.strip, self.curves, self.by, self.reach = strip.name, curves, (0.0, 0.0), _REACH
-        seen = _seen(context)
-        self.aspect = seen.aspect
-        self.grabbed = _on_picture(seen, (event.mouse_region_x, event.mouse_region_y))
+        self.aspect = seen_as.aspect
+        self.grabbed = _on_picture(seen_as, (event.mouse_region_x, event.mouse_region_y))
         self.pulled, _apart = outlines.nearest(curves, self.grabbed, self.aspect)
-        return {"RUNNING_MODAL"}
 
     def mended(self) -> outlines.Curves:
         return outlines.dragged(self.curves, self.pulled, self.grabbed, self.by, self.reach, self.aspect)
 
-    def modal(self, context: Context, event: Event, _tweak: set[str]) -> set[str]:
-        if (effect := self.target.effect()) is None or (strip := self._strip(effect)) is None:
-            return {"RUNNING_MODAL"}
+    def drag(self, context: Context, event: Event, _tweak: set[str]) -> None:
+        if (there := _there(self)) is None:
+            return
         if event.type in {"WHEELUPMOUSE", "WHEELDOWNMOUSE"}:
             self.reach *= _MORE if event.type == "WHEELUPMOUSE" else 1 / _MORE
+        _scene, effect, strip = there
         seen = view(effect, strip, context.region)
         point = _on_picture(seen, (event.mouse_region_x, event.mouse_region_y))
         self.by = tuple(np.subtract(point, self.grabbed))
         context.area.tag_redraw()
-        return {"RUNNING_MODAL"}
 
     def exit(self, context: Context, cancel: bool) -> None:
-        if cancel or not any(self.by) or (effect := self.target.effect()) is None:
+        if cancel or not any(self.by) or (there := _there(self)) is None:
             return
-        if (strip := self._strip(effect)) is None:
-            return
+        _scene, effect, strip = there
         outline_drawings.draw(effect, strip, effect.regions[self.target.index], self.mended(), self.frame)
         context.area.tag_redraw()
         bpy.ops.ed.undo_push(message=iface_("Mend Outline", contexts.operator_default))
-
-    def _strip(self, effect: PropertyGroup) -> Strip | None:
-        return effect.id_data.sequence_editor.strips_all.get(self.strip)
-
-
-def _seen(context: Context) -> View:
-    _scene, effect, strip = selection.in_picture(context)
-    return view(effect, strip, context.region)
 
 
 def _on_picture(seen: View, location: tuple[int, int]) -> tuple[float, float]:
     """A point of the preview's region in fractions of the picture."""
     x, y = seen.on_picture(*location)
     return float(x), float(y)
-
-
-def _curves(context: Context) -> outlines.Curves:
-    """The active outline's at the current frame, where it is seen."""
-    if (seen := selection.in_picture(context)) is None:  # while it plays, it may just have gone
-        return ()
-    scene, effect, strip = seen
-    try:
-        return outline_drawings.shown_curves(scene, effect, strip, effect.active_region)
-    except UserError:  # panels and the live preview tell it
-        return ()
 
 
 class SHUTTER_GGT_outline(WithKeys, GizmoGroup):

@@ -1,15 +1,21 @@
-"""What panels are made of: sentences, lists, and when there is an effect to show."""
+"""What panels are made of: sentences, lists, and when there is an effect to show. And icons: little pictures of the
+presets' bars, for menus, and of the patterns that mattes show, for lists."""
 
 from collections.abc import Callable, Sequence
+from typing import Any
 
-import bpy
+import bpy.utils.previews
+import numpy as np
 from bpy.app.translations import contexts
 from bpy.app.translations import pgettext_iface as iface_
 from bpy.app.translations import pgettext_n as n_
 from bpy.types import Context, PropertyGroup, Scene, Strip, UILayout
+from bpy.utils.previews import ImagePreviewCollection
 
 from ...core import told
+from ...core.model import presets
 from ...core.model.fields import fields_of
+from ...core.pixels import patterns
 from ..data import selection
 from . import drawing
 from .operator_bases import Mixin
@@ -21,6 +27,10 @@ _MARGIN, _ICON = 64, 20
 WIDEST = 360  # units of the interface that a sentence takes at most, as a popover does
 
 _MOST_ROWS = 5  # of a list; the rest is scrolled to
+_SIZE, _WINDOW = 32, 8  # of an icon, in pixels, and of the bars that it shows
+_UNITS = 16  # of the interface, along each side of an icon
+_LIGHT = (0.8, 0.8, 0.8)
+_icons: list[ImagePreviewCollection] = []  # of Blender's: one while the extension is registered
 
 
 def sentence(layout: UILayout, words: str, icon: str = "NONE", room: float = 1.0, is_quiet: bool = False) -> None:
@@ -107,19 +117,61 @@ def draw_progress(layout: UILayout, done: int, total: int) -> None:
     layout.progress(factor=done / max(total, 1), text=text, translate=False)
 
 
-def of_effect(label: str, draws: Draws, shows: Callable[[PropertyGroup], bool] | None = None, **look: object) -> type:
+def of_effect(label: str, draws: Draws, shows: Callable[[PropertyGroup], Any] | None = None, **look: object) -> type:
     """Makes a panel of the effect, closed at first.
 
-    shows: whether there is anything to show of an effect; look: what else the class has for Blender"""
+    shows: gives what there is to show of an effect, if anything; look: what else the class has for Blender"""
 
     class Drawn(Mixin):
         @classmethod
         def poll(cls, context: Context) -> bool:
             active = selection.active(context) if super().poll(context) else None
-            return active is not None and (shows is None or shows(active[1]))
+            return active is not None and (shows is None or bool(shows(active[1])))
 
         def draw(self, context: Context) -> None:
             self.layout.use_property_split = True
             draws(self.layout, *selection.active(context))
 
     return type("Drawn", (Drawn,), {"bl_label": label, "bl_options": {"DEFAULT_CLOSED"}} | look)
+
+
+def icon_of(name: str) -> int:
+    """The icon of a preset; 0, which is none, in the background."""
+    return _icons[0][name].icon_id if _icons and name in _icons[0] else 0
+
+
+def pattern_icon(index: int) -> int:
+    """The icon of the pattern that the shutter at an index of the list has; 0, which is none, in the background."""
+    return icon_of(str(index % patterns.COUNT))
+
+
+def _drawn(bars: np.ndarray) -> np.ndarray:
+    """Bars as a picture (size, size, 4), bottom row first."""
+    picture = np.zeros((_SIZE, _SIZE, 4), dtype=np.float32)
+    width = _SIZE // len(bars)
+    picture[1, :] = 0.5
+    for k, weight in enumerate(bars):
+        picture[2 : 2 + round(weight * (_SIZE - 4)), k * width : (k + 1) * width - 1] = (0.9, 0.9, 0.9, 1.0)
+    return picture
+
+
+def _painted(index: int) -> np.ndarray:
+    """A pattern as a picture (size, size, 4), bottom row first."""
+    y, x = (np.mgrid[:_SIZE, :_SIZE] + 0.5) * _UNITS / _SIZE
+    picture = np.ones((_SIZE, _SIZE, 4), dtype=np.float32)
+    picture[..., :3] = patterns.painted(_LIGHT, index, x, y)
+    return picture
+
+
+def register() -> None:
+    _icons.append(bpy.utils.previews.new())
+    pictures = {name: _drawn(presets.bars(name, _WINDOW)) for name in presets.PRESETS}
+    pictures |= {str(index): _painted(index) for index in range(patterns.COUNT)}
+    for name, picture in pictures.items():
+        icon = _icons[0].new(name)
+        icon.icon_size = icon.image_size = (_SIZE, _SIZE)
+        icon.icon_pixels_float = icon.image_pixels_float = picture.ravel()
+
+
+def unregister() -> None:
+    bpy.utils.previews.remove(_icons.pop())

@@ -13,7 +13,7 @@ from ...core.model.effect import Shutter
 from ..data import annotations, consistency, data_format, selection, strips
 from ..editing import bar_edits, match_source
 from ..rendering import strobing
-from . import bake_operators, icons, note_buttons, region_panels
+from . import bake_operators, note_buttons, region_panels
 from .note_buttons import Button
 from .operator_bases import Mixin
 from .panel_parts import (
@@ -24,6 +24,7 @@ from .panel_parts import (
     draw_operators,
     draw_properties,
     of_effect,
+    pattern_icon,
     sentence,
 )
 
@@ -34,7 +35,7 @@ class SHUTTER_UL_shutters(UIList):
         color = row.row(align=True)
         color.ui_units_x = 1.0
         color.prop(shutter, "color", text="")
-        row.label(text="", icon_value=icons.of_pattern(index))
+        row.label(text="", icon_value=pattern_icon(index))
         row.prop(shutter, "name", text="", emboss=False)
         if index == 0:
             hint = row.row()
@@ -138,15 +139,13 @@ class _Shutters(Mixin):
 
 
 def _draw_header(self: Panel, context: Context) -> None:
-    if (shutter := selection.active_shutter(selection.active(context)[1])) is not None:
-        words = iface_('Exposure of "{shutter}"').format(shutter=shutter.name)
-        self.layout.label(text=words, translate=False)
+    shutter = selection.active_shutter(selection.active(context)[1])
+    self.layout.label(text=iface_('Exposure of "{shutter}"').format(shutter=shutter.name), translate=False)
 
 
 def _draw_exposure(layout: UILayout, scene: Scene, effect: PropertyGroup, strip: Strip) -> None:
     """What the active shutter makes of the frames."""
-    if (shutter := selection.active_shutter(effect)) is None:
-        return
+    shutter = selection.active_shutter(effect)
     row = layout.row(align=True)
     preset = consistency.preset_of(effect, effect.active_shutter)
     label = iface_(presets.PRESETS[preset][0], CONTEXT) if preset else None
@@ -197,9 +196,7 @@ def _draw_bars(layout: UILayout, scene: Scene, effect: PropertyGroup, strip: Str
 
 
 def _draw_live(layout: UILayout, context: Context) -> None:
-    live = getattr(context.window_manager, "virtual_shutter", None)
-    if live is None:
-        return
+    live = context.window_manager.virtual_shutter
     row = layout.row(align=True)
     row.prop(live, "live", toggle=True, icon="HIDE_OFF" if live.live else "HIDE_ON")
     view = row.row(align=True)
@@ -241,7 +238,7 @@ def _notes(context: Context) -> Iterator[tuple[str, Button | None]]:
             words = iface_("Effect strips on the source do not reach the effect: make the Shutter strip their input")
             yield words, None
     if (step := strobing.last(effect)) is not None:
-        yield note_buttons.strobing_in_words(step), note_buttons.smoothing()
+        yield note_buttons.of_strobing(step)
 
 
 def _tracked(effect: PropertyGroup) -> list[int | None]:
@@ -276,8 +273,7 @@ class SHUTTER_PT_notes(Panel):
 
 
 def _draw_move(layout: UILayout, _scene: Scene, effect: PropertyGroup, _strip: Strip) -> None:
-    if (shutter := selection.active_shutter(effect)) is None:
-        return
+    shutter = selection.active_shutter(effect)
     layout.prop(shutter, "follow")
     if shutter.follow == "REGION":
         layout.prop_search(shutter, "follow_region", effect, "regions", text="Region")
@@ -336,14 +332,17 @@ class _InSidebar:
 _PANELS = {
     "": (_Shutters, None),
     "_regions": (of_effect("Regions", region_panels.draw_regions, bl_options=set()), ""),
-    "_transform": (of_effect("Transform", region_panels.draw_transform, region_panels.has_region), "_regions"),
+    "_transform": (of_effect("Transform", region_panels.draw_transform, selection.active_region), "_regions"),
     "_track": (
         of_effect("Track", region_panels.draw_track, region_panels.has_strokes, bl_translation_context=CONTEXT),
         "_regions",
     ),
-    "_follow": (of_effect("Follow Track", region_panels.draw_follow, region_panels.has_region), "_regions"),
-    "_exposure": (of_effect("", _draw_exposure, bl_options=set(), draw_header=_draw_header), ""),
-    "_move": (of_effect("Exposure Moves With", _draw_move), "_exposure"),
+    "_follow": (of_effect("Follow Track", region_panels.draw_follow, selection.active_region), "_regions"),
+    "_exposure": (
+        of_effect("", _draw_exposure, selection.active_shutter, bl_options=set(), draw_header=_draw_header),
+        "",
+    ),
+    "_move": (of_effect("Exposure Moves With", _draw_move, selection.active_shutter), "_exposure"),
     "_camera": (of_effect("Camera", region_panels.draw_camera, region_panels.has_camera), ""),
     "_options": (of_effect("Options", _draw_options), ""),
     "_bake": (of_effect("Bake", bake_operators.draw_panel), ""),

@@ -18,7 +18,7 @@ from ...core import stopping, told
 from ...core.model.choices import CONTEXT
 from ...core.model.frame_state import FrameState
 from ...devices.device import Texture
-from ..data import annotations, preview_areas, selection, strips
+from ..data import annotations, preview_areas, selection
 from ..data.preview_areas import Shown
 from ..data.snapshot import Snapshot
 from ..devices import blender_gpu, main_thread
@@ -34,9 +34,9 @@ from ..rendering import (
     strobing,
 )
 from ..rendering.previews import Decision, Drawing
-from . import drawing, note_buttons, preview_quad, sharp_frame
+from . import drawing, note_buttons, sharp_frame
+from .drawing import Quad
 from .note_buttons import Button
-from .preview_quad import Quad
 
 VIEWS = (
     ("RESULT", "Result", "The finished picture"),
@@ -162,11 +162,11 @@ def _show(context: Context, shown: Shown, decision: Decision | None, say: "_Note
         wanted = previews.for_drawing(context, shown, decision)
         if previews.is_going(context):
             main_thread.later(_redraw_when_still, _SOON)
-        quad = Quad(context.region, shown.strip, annotations.picture_size(shown.effect))
+        quad = Quad(context.region, shown)
         try:
             if wanted.decision.is_late:
                 raise stopping.StoppedError
-            with stopping.once(wanted.stopped):
+            with stopping.once(wanted.decision.stopped or stopping.never):
                 _show_picture(context, quad, shown, wanted, say)
             if wanted.decision.is_plain:
                 say(rpt_("Composing…"))
@@ -192,7 +192,6 @@ def _show_picture(context: Context, quad: Quad, shown: Shown, wanted: Drawing, s
     is_still = not context.screen.is_animation_playing
     if context.space_data.show_overlays:
         _tell_detail(wanted, annotations.picture_size(shown.effect), is_still, say)
-    after_detail = say.count
     if wanted.left > 0 or wanted.draws_result:
         _warn(shown, say)
     if wanted.left > 0:
@@ -220,8 +219,7 @@ def _show_picture(context: Context, quad: Quad, shown: Shown, wanted: Drawing, s
     # What it measures would take from what runs.
     decision = wanted.decision
     if context.space_data.show_overlays and is_still and not decision.is_plain and not previews.may_be_late():
-        looked = strobing.look(shown.effect, decision.snapshot, renderer, decision.request)
-        _tell_strobing(looked, after_detail, say)
+        _tell_strobing(*strobing.look(shown.effect, decision.snapshot, renderer, decision.request), say)
 
 
 def _warn(shown: Shown, say: "_Notes") -> None:
@@ -250,13 +248,13 @@ def _tell_detail(wanted: Drawing, size: tuple[int, int], is_still: bool, say: "_
         say(rpt_("Preview: {what}").format(what=", ".join(less)), button)
 
 
-def _tell_strobing(looked: strobing.Looked, place: int, say: "_Notes") -> None:
-    """Says, in that place among what is said, that the exposure has too few frames, and gives the way to more."""
-    if looked.known is not None:
-        say(note_buttons.strobing_in_words(looked.known), note_buttons.smoothing(), place)
-    if looked.is_new:
+def _tell_strobing(known: float | None, is_new: bool, say: "_Notes") -> None:
+    """Says that the exposure has too few frames, and gives the way to more; as strobing.look has it."""
+    if known is not None:
+        say(*note_buttons.of_strobing(known))
+    if is_new:
         main_thread.later(preview_areas.redraw_panels)  # which may have been drawn before
-    if looked.is_busy:
+    if strobing.is_busy():
         main_thread.drop(_measure)
         main_thread.later(_measure, _STILL)  # once a frame stays
 
@@ -275,7 +273,7 @@ def _show_sharp(context: Context, shown: Shown | None) -> None:
     with drawing.pixel_space(context.region), suppress(*effect_source.FAULTS):
         say.draw()
         if shown is not None and not previews.pen_is_down():
-            quad = Quad(context.region, shown.strip, annotations.picture_size(shown.effect))
+            quad = Quad(context.region, shown)
             snapshot = invalidation.current(shown.scene, shown.effect, shown.strip, shown.scene.frame_current)
             _show_strokes(context, quad, shown, snapshot)
 
@@ -284,8 +282,7 @@ def _tell_carrying(say: "_Notes") -> None:
     """Has mattes carried that the picture lacks, and says so."""
     fault, progress = outline_carrying.begin(show_carried), outline_carrying.progress()
     if fault is not None:
-        told.shown(fault)
-        say(rpt_("Shutter: {fault}").format(fault=fault))
+        _tell_fault(fault, say)
     if progress is not None:
         done, total = progress
         say(rpt_("Tracking the outline: {done} of {total} frames").format(done=done, total=total))
@@ -294,13 +291,11 @@ def _tell_carrying(say: "_Notes") -> None:
 def show_carried() -> None:
     """Previews are made anew, with what was carried."""
     sessions.WINDOW.keep(set())
-    for scene in strips.local_scenes():
-        if scene.virtual_shutter.effects:
-            strips.invalidate(scene)
+    invalidation.drop_frames()
     preview_areas.redraw()
 
 
-def _tell_fault(error: Exception, say: "_Notes") -> None:
+def _tell_fault(error: Exception | str, say: "_Notes") -> None:
     """Says why there is no picture."""
     told.shown(error)
     say(rpt_("Shutter: {fault}").format(fault=error))
@@ -316,7 +311,7 @@ def _show_strokes(context: Context, quad: Quad, shown: Shown, snapshot: Snapshot
             continue
         color = (*shown.effect.shutters[shape.shutter].color, shape.opacity)
         for points in shape.strokes:
-            drawing.lines(quad.on_region(points), color, closed=shape.kind == "lasso", width=2)
+            drawing.lines(quad.view.on_region(points), color, closed=shape.kind == "lasso", width=2)
 
 
 def _show_source(quad: Quad, shown: Shown, renderer: Renderer, request: Request, right: float) -> None:
@@ -368,13 +363,9 @@ class _Notes:
         self._region = region
         self._lines: list[tuple[str, Button | None]] = []
 
-    @property
-    def count(self) -> int:
-        return len(self._lines)
-
-    def __call__(self, sentence: str, button: Button | None = None, place: int | None = None) -> None:
-        """Says a sentence after all others, or in a place among them."""
-        self._lines.insert(self.count if place is None else place, (sentence, button))
+    def __call__(self, sentence: str, button: Button | None = None) -> None:
+        """Says a sentence after all others."""
+        self._lines.append((sentence, button))
 
     def draw(self) -> None:
         unit = drawing.ui_scale()
@@ -408,5 +399,5 @@ def unregister() -> None:
     global _handler
     bpy.types.SpaceSequenceEditor.draw_handler_remove(_handler, "PREVIEW")
     _handler = None
-    preview_quad.free()
+    drawing.free()
     del bpy.types.WindowManager.virtual_shutter

@@ -2,7 +2,7 @@
 split view."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import bpy
 import numpy as np
@@ -12,9 +12,13 @@ from bpy.props import IntProperty
 from bpy.types import Context, Event, Gizmo, GizmoGroup, Operator, PropertyGroup, Region, Strip
 
 from ...compute import plates
+from ...compute.renderer import Renderer
+from ...compute.request import Request
 from ...core.messages import EffectError
+from ...core.pixels import compositor
 from ..data import annotations, geometry, preview_areas, selection
-from ..rendering import effect_source, previews, probe, sessions
+from ..devices import blender_gpu
+from ..rendering import effect_source, previews, sessions
 from . import drawing
 from .gizmo_groups import Dragged, InPreview, View, view
 from .operator_bases import OfEffect
@@ -22,6 +26,41 @@ from .operator_bases import OfEffect
 _WIDTH, _HEIGHT, _LINE, _PAD, _APART = 180, 64, 17, 8, 14  # in units of the interface
 _REACH = 8  # of the pointer to the split's handle, in units of the interface
 _MARK = (1.0, 1.0, 1.0, 0.9)
+
+
+@dataclass(frozen=True)
+class Probed:
+    """A pixel's coefficients (N,), which sum to 1, and its shutter's bars (L,).
+
+    layers: how much of each layer covers it; hole: of compute.plates, how it gets what lies behind these"""
+
+    coefficients: np.ndarray
+    bars: np.ndarray
+    layers: tuple[float, ...] = ()
+    hole: int = plates.OPEN
+
+
+def probed_at(renderer: Renderer, request: Request, point: Sequence[float]) -> Probed | None:
+    """What the pixel at a point is made with; None: the point lies beside the picture.
+
+    point: fractions of the picture, y up. It is called where Blender's GPU draws; one texel is read, and coefficients
+    are solved for only if what they depend on has changed since they were drawn."""
+    source = renderer.source
+    column, row = int(np.floor(point[0] * source.width)), int(np.floor((1 - point[1]) * source.height))
+    if not (0 <= column < source.width and 0 <= row < source.height):
+        return None
+    texture, block = renderer.drawn_coefficients(replace(request, quick=True))
+    values = np.maximum(blender_gpu.texel(texture, column // block, row // block)[: len(request.state.bars)], 0).astype(
+        np.float64
+    )
+    coefficients = values / values.sum()
+    holes = renderer.holes if request.state.layers else None
+    return Probed(
+        coefficients=coefficients,
+        bars=compositor.mixed_shutter(renderer.slid(request, known=True).state, coefficients),
+        layers=tuple(float(matte[row, column]) for matte in renderer.layer_mattes(request)),
+        hole=plates.OPEN if holes is None else int(holes[row, column]),
+    )
 
 
 @dataclass(frozen=True)
@@ -75,7 +114,7 @@ class SHUTTER_GT_probe(Gizmo):
         try:
             render = sessions.of_drawing()
             request = previews.request_of(context, shown)
-            probed = probe.at(render.renderer(request), request, at)
+            probed = probed_at(render.renderer(request), request, at)
         except effect_source.FAULTS:  # which the live preview tells
             return
         if probed is not None:
@@ -90,7 +129,7 @@ class SHUTTER_GT_probe(Gizmo):
         return -1
 
 
-def _of_layers(shown: preview_areas.Shown, probed: probe.Probed) -> list[tuple[str, str]]:
+def _of_layers(shown: preview_areas.Shown, probed: Probed) -> list[tuple[str, str]]:
     """Of each layer its name and how much of it covers the pixel; and what takes the place of what lies behind."""
     regions = [region for region in shown.effect.regions if region.is_layer and region.opacity > 0]
     lines = [(region.name, f"{share:.1%}") for region, share in zip(regions, probed.layers, strict=False)]
@@ -102,7 +141,7 @@ def _draw(
     region: Region,
     point: Sequence[float],
     shutters: Sequence[PropertyGroup],
-    probed: probe.Probed,
+    probed: Probed,
     of_layers: list[tuple[str, str]],
 ) -> None:
     unit = drawing.ui_scale()
@@ -168,40 +207,32 @@ class SHUTTER_OT_probe_pixel(OfEffect, Operator):
         preview_areas.redraw()
 
 
-def _line(context: Context) -> np.ndarray | None:
-    """Where the split is, in pixels of the region (2, 2); None: nothing is seen of it."""
-    at = context.window_manager.virtual_shutter.split
-    return None if (seen := _view(context)) is None else seen.on_region([(at, 0.0), (at, 1.0)])
-
-
 class SHUTTER_GT_split(Dragged, Gizmo):
-    def draw(self, context: Context) -> None:
-        if (line := _line(context)) is None:
-            return
-        x, y = line.mean(axis=0)
+    def seen(self, context: Context) -> np.ndarray | None:
+        """Where the split is, in pixels of the region (2, 2)."""
+        at = context.window_manager.virtual_shutter.split
+        return None if (seen := _view(context)) is None else seen.on_region([(at, 0.0), (at, 1.0)])
+
+    def show(self, _context: Context, seen: np.ndarray) -> None:
+        x, y = seen.mean(axis=0)
         half = drawing.ui_scale() * _REACH / 2
-        drawing.lines(line, _MARK, width=2 if self.is_highlight else 1)
+        drawing.lines(seen, _MARK, width=2 if self.is_highlight else 1)
         drawing.rectangles([(x - half, y - 3 * half, x + half, y + 3 * half)], [_MARK])
 
-    def test_select(self, context: Context, location: tuple[int, int]) -> int:
-        if (line := _line(context)) is None:
-            return -1
-        first, second = line
+    def is_at(self, _context: Context, seen: np.ndarray, location: tuple[int, int]) -> bool:
+        first, second = seen
         along = (second - first) / max(np.hypot(*(second - first)), 1e-6)
         offset = np.array(location) - first
         apart, place = abs(along[0] * offset[1] - along[1] * offset[0]), along @ offset
-        near = apart <= drawing.ui_scale() * _REACH and 0 <= place <= np.hypot(*(second - first))
-        return 0 if near else -1
+        return bool(apart <= drawing.ui_scale() * _REACH and 0 <= place <= np.hypot(*(second - first)))
 
-    def invoke(self, context: Context, _event: Event) -> set[str]:
+    def grab(self, context: Context, _event: Event, _seen: np.ndarray) -> None:
         self.before = context.window_manager.virtual_shutter.split
-        return {"RUNNING_MODAL"}
 
-    def modal(self, context: Context, event: Event, _tweak: set[str]) -> set[str]:
+    def drag(self, context: Context, event: Event, _tweak: set[str]) -> None:
         if (seen := _view(context)) is not None:
             x, _y = seen.on_picture(event.mouse_region_x, event.mouse_region_y)
             context.window_manager.virtual_shutter.split = x
-        return {"RUNNING_MODAL"}
 
     def exit(self, context: Context, cancel: bool) -> None:
         if cancel:

@@ -1,21 +1,19 @@
 """Where the active region lies, and handles to move, turn and scale it in the sequencer's preview; and the same by
 numbers."""
 
-import math
 from typing import NamedTuple
 
 import bpy
 import numpy as np
 from bpy.app.translations import contexts
 from bpy.app.translations import pgettext_iface as iface_
-from bpy.props import FloatProperty, FloatVectorProperty
 from bpy.types import Context, Event, Gizmo, GizmoGroup, Operator, PropertyGroup, Scene, Strip
 
 from ...core import revision
 from ...core.messages import EffectError
 from ...core.model import scribbles
-from ...core.model.limits import MAX_DEGREES, MAX_DISTANCE, MAX_SCALE
 from ..data import selection, snapshot, validation
+from ..data.properties import location_property, rotation_property, scale_property
 from ..editing import bar_edits, drawn_places, region_edits, track_region
 from ..editing.motion_keys import MotionKeys
 from . import drawing, needs
@@ -92,15 +90,15 @@ def outline(context: Context, where: Place) -> list[np.ndarray]:
 class SHUTTER_GT_region(Dragged, Gizmo):
     """One handle; `turns`: turns and scales, or moves."""
 
-    def draw(self, context: Context) -> None:
-        if (where := place(context)) is None:
-            return
+    seen = staticmethod(place)
+
+    def show(self, context: Context, seen: Place) -> None:
         if self.is_modal:  # what is keyed is shown where its keys have it
-            for points in outline(context, where):
+            for points in outline(context, seen):
                 drawing.lines(points, _MARK, width=2)
         if not self.turns:
-            drawing.lines([where.centre, where.corner], (1, 1, 1, 0.4))
-        x, y = where.corner if self.turns else where.centre
+            drawing.lines([seen.centre, seen.corner], (1, 1, 1, 0.4))
+        x, y = seen.corner if self.turns else seen.centre
         radius = drawing.ui_scale() * _RADIUS * (1.3 if self.is_highlight else 1.0)
         turn = np.linspace(0, 2 * np.pi, 17)[:-1]
         around = np.stack([x + radius * np.cos(turn), y + radius * np.sin(turn)], axis=1)
@@ -109,15 +107,11 @@ class SHUTTER_GT_region(Dragged, Gizmo):
             drawing.lines([(x - radius, y), (x + radius, y)], _MARK)
             drawing.lines([(x, y - radius), (x, y + radius)], _MARK)
 
-    def test_select(self, context: Context, location: tuple[int, int]) -> int:
-        if (where := place(context)) is None:
-            return -1
-        handle = where.corner if self.turns else where.centre
-        return 0 if np.hypot(*(handle - location)) <= drawing.ui_scale() * _RADIUS * 1.5 else -1
+    def is_at(self, _context: Context, seen: Place, location: tuple[int, int]) -> bool:
+        handle = seen.corner if self.turns else seen.centre
+        return bool(np.hypot(*(handle - location)) <= drawing.ui_scale() * _RADIUS * 1.5)
 
-    def invoke(self, context: Context, event: Event) -> set[str]:
-        if (where := place(context)) is None:  # while it plays, it may just have gone
-            return {"CANCELLED"}
+    def grab(self, context: Context, event: Event, seen: Place) -> None:
         effect = selection.active(context)[1]
         region = selection.active_region(effect)
         drawn_places.hold(effect, effect.active_region)
@@ -125,19 +119,17 @@ class SHUTTER_GT_region(Dragged, Gizmo):
         self.target = track_region.Target.of(effect, effect.active_region)
         self.before = tuple(region.location), region.rotation, region.scale
         self.grabbed = event.mouse_region_x, event.mouse_region_y
-        self.where = where
-        return {"RUNNING_MODAL"}
+        self.where = seen
 
-    def modal(self, context: Context, event: Event, tweak: set[str]) -> set[str]:
+    def drag(self, context: Context, event: Event, tweak: set[str]) -> None:
         mouse = event.mouse_region_x, event.mouse_region_y
         fine = 0.1 if "PRECISE" in tweak or event.shift else 1.0
         point = np.array(self.grabbed) + fine * (np.array(mouse) - self.grabbed)
         if (effect := self.target.effect()) is None:
-            return {"RUNNING_MODAL"}
+            return
         region = effect.regions[self.target.index]
         (self._turn if self.turns else self._move)(region, point, "SNAP" in tweak or event.ctrl)
         context.area.tag_redraw()
-        return {"RUNNING_MODAL"}
 
     def _move(self, region: PropertyGroup, point: np.ndarray, snap: bool) -> None:
         moved = self.where.view.on_picture(*point) - self.where.view.on_picture(*self.grabbed)
@@ -208,25 +200,9 @@ class SHUTTER_OT_region_transform(OfEffect, Operator):
     bl_label = "Transform Region"
     needs = (needs.a_region,)
 
-    location: FloatVectorProperty(
-        name="Location",
-        description="Distance from where the region was drawn, as a fraction of the picture",
-        subtype="XYZ",
-        size=2,
-        min=-MAX_DISTANCE,
-        max=MAX_DISTANCE,
-        step=1,
-    )
-    rotation: FloatProperty(
-        name="Rotation",
-        description="Rotation about the region's center",
-        subtype="ANGLE",
-        min=-math.radians(MAX_DEGREES),
-        max=math.radians(MAX_DEGREES),
-    )
-    scale: FloatProperty(
-        name="Scale", description="Scale about the region's center", default=1.0, min=-MAX_SCALE, max=MAX_SCALE
-    )
+    location: location_property("Distance from where the region was drawn, as a fraction of the picture", step=1)
+    rotation: rotation_property("Rotation about the region's center")
+    scale: scale_property("Scale about the region's center")
 
     def invoke(self, context: Context, _event: Event) -> set[str]:
         region = selection.active_region(selection.active(context)[1])

@@ -9,7 +9,7 @@ from ...core.messages import EffectError
 from ...media.pursuit import SURE
 from ..data import matte_look, selection, strips, validation
 from ..editing import follow_track, outline_drawings, track_region
-from . import track_operators
+from . import needs, track_operators
 from .panel_parts import draw_list, draw_properties, sentence
 
 _PLACEMENT = "location", "rotation", "scale"
@@ -138,12 +138,8 @@ def _draw_camera_gaps(layout: UILayout, effect: PropertyGroup) -> None:
         sentence(layout, text.format(first=gap.first, last=gap.last), "INFO")
 
 
-def has_region(effect: PropertyGroup) -> bool:
-    return selection.active_region(effect) is not None
-
-
 def has_strokes(effect: PropertyGroup) -> bool:
-    return has_region(effect) and selection.active_region(effect).kind not in strips.MATTES
+    return needs.strokes(effect) is None
 
 
 def has_camera(effect: PropertyGroup) -> bool:

@@ -118,8 +118,7 @@ def listen() -> None:
     bpy.msgbus.subscribe_rna(key=tools, owner=_OWNER, args=(), notify=_tool_chosen)
 
 
-def register() -> None:
-    listen()
+register = listen
 
 
 def unregister() -> None:

@@ -35,14 +35,15 @@ class VirtualShutterEngine(bpy.types.RenderEngine):
 
     def _render(self, depsgraph: Depsgraph, called_by_script: bool) -> None:
         scene, width, height = depsgraph.scene, self.resolution_x, self.resolution_y
-        asked, stopped = None, None
+        asked = None
         if render_job.where() is Where.WINDOW and not (called_by_script or render_job.runs()):
             asked = previews.for_engine(bpy.context, scene)
         if asked is None:
             shown, frame = job_snapshots.of(scene, scene.frame_current, self._stopped)
-            detail, is_drawn = effect_source.FULL, False
+            detail, is_drawn, stopped = effect_source.FULL, False, None
         else:
-            shown, frame, detail, is_drawn, stopped = asked
+            shown, frame, detail = asked.snapshot, asked.frame, asked.request.source.detail
+            is_drawn, stopped = asked.is_drawn, asked.stopped
         if detail != effect_source.FULL or is_drawn:
             invalidation.keep_until_drawn(scene.session_uid)
         if is_drawn:

@@ -18,7 +18,7 @@ from ..data import effect_version, matte_content, snapshot, source_media, strips
 from ..data.snapshot import Snapshot
 from ..devices import main_thread
 
-_signatures: dict[int, int] = {}  # by effect scene
+_signatures: dict[int, int] = {}  # by session_uid of the effect scene, which no other one gets
 _spoilt: set[int] = set()  # session_uids of scenes of whose frames the sequencer may keep one that failed
 _lesser: set[int] = set()  # likewise, one that is less than the full picture, for a preview
 
@@ -26,24 +26,14 @@ _lesser: set[int] = set()  # likewise, one that is less than the full picture, f
 def current(scene: Scene, effect: PropertyGroup, strip: Strip, frame: float) -> Snapshot:
     """The snapshot of an effect strip at a timeline frame, for what is drawn: taken once until something changes.
     EffectError, MediaError: as snapshot.take."""
-
-    def take() -> Snapshot:
-        return snapshot.take(scene, effect, strip, (frame,))
-
-    return revision.until_change("snapshot", (effect.scene.session_uid, strip.name, frame), take)
+    key = effect.scene.session_uid, strip.name, frame
+    return revision.until_change("snapshot", key, lambda: snapshot.take(scene, effect, strip, (frame,)))
 
 
 def forget() -> None:
     """Forgets what the effects of a file were, before another one is loaded."""
     _signatures.clear()
     revision.changed()
-
-
-def drop_removed() -> None:
-    """Forgets effect scenes that are gone."""
-    scenes = {scene.session_uid for scene in bpy.data.scenes}
-    for uid in _signatures.keys() - scenes:
-        del _signatures[uid]
 
 
 def spoil(scene: int) -> None:
@@ -69,6 +59,12 @@ def drop_lesser() -> None:
     _drop(_lesser)
 
 
+def drop_frames() -> None:
+    """Drops the finished frames of all effects; a timer as well."""
+    for scene in bpy.data.scenes:
+        strips.invalidate(scene)
+
+
 def _drop(noted: set[int]) -> None:
     """Empties a set of session_uids of effect scenes, and drops what the sequencer keeps of those."""
     uids = {noted.pop() for _ in range(len(noted))}
@@ -83,7 +79,6 @@ def invalidate_changed(scene: Scene) -> bool:
     whether there are any.
 
     The values of keyed properties do not count: they change with every frame that plays."""
-    drop_removed()
     if not scene.virtual_shutter.effects:
         return False
     changed = False

@@ -117,14 +117,12 @@ def _of_film(scene: Scene, effect: PropertyGroup, strip: Strip, frame: float) ->
     return taken
 
 
-def _late(uid: int, scene_frame: float) -> Snapshot | Exception:
+def _late(uid: int, scene_frame: float) -> Snapshot:
+    """What a job did not read when it began. One of effect_source.FAULTS: there is none."""
     if (effect_scene := strips.scene_of_uid(uid)) is None:
-        return EffectError(rpt_("the effect was deleted while it was rendered"))
-    try:
-        scene, effect, strip = strips.find_effect(effect_scene, scene_frame)
-        return snapshot.take(scene, effect, strip, (strips.timeline_frame(strip, scene_frame),))
-    except effect_source.FAULTS as error:
-        return error
+        raise EffectError(rpt_("the effect was deleted while it was rendered"))
+    scene, effect, strip = strips.find_effect(effect_scene, scene_frame)
+    return snapshot.take(scene, effect, strip, (strips.timeline_frame(strip, scene_frame),))
 
 
 def shown_effects(film: Scene) -> Iterator[tuple[Scene, PropertyGroup, list[Strip]]]:

@@ -11,7 +11,6 @@ import math
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-from typing import NamedTuple
 
 from bpy.types import Context, Scene
 
@@ -55,28 +54,18 @@ class Whole:
 class Decision:
     """What a preview shows of an effect as it is drawn once.
 
-    snapshot: of the effect; request: its picture in the previews' detail
-    is_drawn: whether our draw handler shows the result in place of Blender
+    snapshot: of the effect; frame: of the timeline; request: its picture in the previews' detail
+    is_drawn: whether our draw handler shows the result in place of Blender, and the engine need not
     is_plain: whether it is the plain picture, and the smooth one is on its way
-    is_late: whether the engine was stopped, for the window to look at its keys"""
-
-    snapshot: Snapshot
-    request: Request
-    is_drawn: bool
-    is_plain: bool = False
-    is_late: bool = False
-
-
-class Asked(NamedTuple):
-    """What the engine is asked for: the picture of an effect at a timeline frame, in a detail.
-
-    is_drawn: our draw handler shows it, and the engine need not
-    stopped: says that it takes too long, where the draw handler says so; None: it is waited for"""
+    is_late: whether the engine was stopped, for the window to look at its keys
+    stopped: says that it takes too long, and Blender has to look at its keys; None: it is waited for"""
 
     snapshot: Snapshot
     frame: float
-    detail: effect_source.Detail
-    is_drawn: bool
+    request: Request
+    is_drawn: bool = False
+    is_plain: bool = False
+    is_late: bool = False
     stopped: Callable[[], bool] | None = None
 
 
@@ -86,15 +75,13 @@ class Drawing:
 
     request: the picture, as a draft where a still result is not exact anyway; renderer: of it
     left: where the source ends and the result begins, as a fraction of the picture's width; 0: there is no source
-    draws_result: whether our handler draws the result
-    stopped: says that it takes too long, and Blender has to look at its keys"""
+    draws_result: whether our handler draws the result"""
 
     decision: Decision
     request: Request
     renderer: Renderer
     left: float
     draws_result: bool
-    stopped: Callable[[], bool]
 
 
 @dataclass
@@ -115,7 +102,7 @@ class _Looking:
 looking = _Looking()
 
 
-def for_engine(context: Context, effect_scene: Scene) -> Asked | None:
+def for_engine(context: Context, effect_scene: Scene) -> Decision | None:
     """What the engine is asked for while Blender draws a preview; None: somebody else asks. One of
     effect_source.FAULTS: the effect cannot be shown."""
     region, looking.decision = context.region, None
@@ -131,11 +118,9 @@ def for_engine(context: Context, effect_scene: Scene) -> Asked | None:
     if seen and look:
         decision = looking.decision = _decide(context, seen, look, snapshot)
         is_told = context.window_manager.virtual_shutter.live and not decision.is_drawn
-        stopped = _time_up(context, decision.request.key) if is_told else None
-        return Asked(snapshot, frame, decision.request.source.detail, decision.is_drawn, stopped)
+        return replace(decision, stopped=_time_up(context, decision.request.key) if is_told else None)
     detail = effect_source.FULL if look is None or looking.whole is not None else _detail(context, look)
-    request = _best(context, sessions.of_drawing(), snapshot, frame, detail)
-    return Asked(snapshot, frame, request.source.detail, False)
+    return Decision(snapshot, frame, _best(context, sessions.of_drawing(), snapshot, frame, detail))
 
 
 def engine_stopped() -> None:
@@ -156,7 +141,7 @@ def for_drawing(context: Context, shown: Shown, decision: Decision | None) -> Dr
     settings, snapshot = context.window_manager.virtual_shutter, _snapshot(shown)
     if decision is None or decision.snapshot is not snapshot:
         decision = _decide(context, shown, _look(context, shown), snapshot)
-    stopped = never if is_read(context) else _time_up(context, decision.request.key)
+    decision = replace(decision, stopped=never if is_read(context) else _time_up(context, decision.request.key))
     request = _drafted(context, shown, decision.request)
     has_result = settings.view in RESULTS
     left = settings.split if settings.view == "SPLIT" else 0.0 if has_result else 1.0
@@ -171,7 +156,6 @@ def for_drawing(context: Context, shown: Shown, decision: Decision | None) -> Dr
         renderer=renderer,
         left=left,
         draws_result=draws_result,
-        stopped=stopped,
     )
 
 
@@ -191,7 +175,7 @@ def _decide(context: Context, shown: Shown, look: Look, snapshot: Snapshot) -> D
     is_plain = smooth_previews.comes(snapshot.scene)
     is_less = is_plain or is_going(context)
     is_drawn = _is_drawn(context, shown, look, render.renderer(request).source, is_less=is_less)
-    return Decision(snapshot, request, is_drawn, is_plain)
+    return Decision(snapshot, shown.scene.frame_current, request, is_drawn, is_plain)
 
 
 def _snapshot(shown: Shown) -> Snapshot:

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable, Iterable
-from concurrent.futures import Executor, Future
+from concurrent.futures import Executor, Future, wait
 from contextlib import suppress
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 from bpy.app.translations import pgettext_rpt as rpt_
@@ -19,17 +19,60 @@ from ...core.messages import translated
 from ...core.model.state_at import state_at
 from ...core.pixels.matte_grid import block_means
 from ...core.pixels.shown_levels import Display
+from ...core.stopping import StoppedError
 from ...devices.device import NoDeviceError
 from ...media.matte_values import Late, MatteValues
 from ..data.snapshot import Snapshot
-from ..devices import available
+from ..devices import available, main_thread
+from ..devices.blender_gpu import require_context
 from . import render_settings
-from .device_work import T, Work, broken_off, result_of
 from .effect_source import FAULTS, FULL, Detail, SourceKey, clip_of
+from .render_job import Where, where
 
+T = TypeVar("T")
+_PATIENCE = 0.1  # seconds between two looks at whether a picture is still wanted
 # Effects whose frames are kept: more than these in one frame decode their windows again for every frame.
 _KEPT = 4
 Place = tuple[int, bool]  # of a renderer: SourceKey.place
+
+
+class Work(NamedTuple):
+    """What a session's device does.
+
+    future: its result to come; ended: set, it ends before its next step; relayed: the main thread has its GPU"""
+
+    future: Future
+    ended: threading.Event
+    relayed: bool
+
+    def break_off(self) -> None:
+        self.ended.set()
+        self.future.cancel()
+
+    def result(self) -> Any:
+        """As result_of. Not waited for, it is broken off."""
+        try:
+            return result_of(self.future, self.relayed)
+        except StoppedError:
+            self.break_off()
+            raise
+
+
+def result_of(future: Future[T], relayed: bool) -> T:
+    """The future's result. StoppedError: it is not wanted any longer (`stopping.once`). NoDeviceError: it cannot be
+    waited for, as Blender's GPU is not current."""
+    is_window = where() is Where.WINDOW
+    while not wait([future], 0 if is_window else _PATIENCE).done:
+        if is_window and not main_thread.serve() and relayed:
+            require_context()
+        stopping.check()
+    return future.result()
+
+
+def broken_off(stopped: Callable[[], bool], function: Callable[..., T], *arguments: object) -> T:
+    """What a function gives, unless it is broken off."""
+    with stopping.once(stopped):
+        return function(*arguments)
 
 
 @dataclass(frozen=True)
@@ -114,7 +157,7 @@ class RenderSession:
 
         detail: None: as it was the last time, for who asks for no picture"""
         if detail is None:
-            known = map(self._renderers.get, _places(snapshot.scene))
+            known = map(self._renderers.get, ((snapshot.scene, False), (snapshot.scene, True)))
             detail = next((each[0].detail for each in known if each), FULL)
         key = SourceKey.of(snapshot, detail)
         source = self.renderer(key, context.say).source
@@ -236,16 +279,12 @@ class RenderSession:
         """Closes what belongs to other scenes than those of these session_uids. A render job may take them away
         meanwhile."""
         self._drop_begun(set(self._begun) - scenes)
-        for scene in set(self._shown) - scenes:
-            self._shown.pop(scene, None)
-        for scene in {scene for scene, _ in list(self._requests)} - scenes:
-            for place in _places(scene):
-                self._requests.pop(place, None)
-        for scene in {scene for scene, _ in list(self._renderers)} - scenes:
-            for place in _places(scene):
-                _key, renderer = self._renderers.pop(place, (None, None))
-                if renderer is not None:
-                    self._submit(renderer.close)
+        for place in [place for place in list(self._requests) if place[0] not in scenes]:
+            self._requests.pop(place, None)
+        for place in [place for place in list(self._renderers) if place[0] not in scenes]:
+            _key, renderer = self._renderers.pop(place, (None, None))
+            if renderer is not None:
+                self._submit(renderer.close)
 
     def forget(self) -> None:
         """Closes all sources and frees the device; where Blender's GPU is not current, once it is."""
@@ -269,11 +308,6 @@ class RenderSession:
         except NoDeviceError:
             pass  # met again when a picture is asked for
         self.forget()
-
-
-def _places(scene: int) -> tuple[Place, Place]:
-    """Where a scene's renderers are: of plain pictures, and of smooth ones."""
-    return (scene, False), (scene, True)
 
 
 def _weights(renderer: Renderer, request: Request) -> list[np.ndarray]:

@@ -11,7 +11,6 @@ from concurrent.futures import Future, wait
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import partial
-from typing import NamedTuple
 
 import numpy as np
 from bpy.types import PropertyGroup
@@ -49,21 +48,13 @@ _measuring = _Measuring()
 _stopped = threading.Event()
 
 
-class Looked(NamedTuple):
-    """known: pixels of the footage from one frame of a picture's exposure to the next, None: nothing is known, or it is
-    smooth; is_new: whether the last look saw something else; is_busy: whether something is measured, or asked for"""
-
-    known: float | None
-    is_new: bool
-    is_busy: bool
-
-
-def look(effect: PropertyGroup, snapshot: Snapshot, renderer: Renderer, request: Request) -> Looked:
-    """Looks at a picture's exposure. What is not known is asked for."""
+def look(effect: PropertyGroup, snapshot: Snapshot, renderer: Renderer, request: Request) -> tuple[float | None, bool]:
+    """Pixels of the footage from one frame of a picture's exposure to the next, None: nothing is known, or it is
+    smooth; and whether the last look saw something else. What is not known is asked for."""
     _measuring.wanted, before = None, (last(effect), repeats(effect))
     frame, known = effect.id_data.frame_current, _look(effect, snapshot, renderer, request)
     _last_looks[snapshot.scene] = frame, known, renderer.source.repeats
-    return Looked(known=known, is_new=(known, renderer.source.repeats) != before, is_busy=is_busy())
+    return known, (known, renderer.source.repeats) != before
 
 
 def last(effect: PropertyGroup) -> float | None:
