@@ -48,19 +48,6 @@ class RecentFrames(SourceWrapper):
         self._kept.clear()
 
 
-class LayerFrames(SourceWrapper):
-    """A source of what its frames show of a layer, or of what lies behind all.
-
-    frame: gives a frame (H, W, 4), in the source's samples"""
-
-    def __init__(self, source: FrameSource, frame: Callable[[int], np.ndarray]) -> None:
-        super().__init__(source)
-        self._frame = frame
-
-    def read(self, index: int) -> np.ndarray:
-        return self._frame(index)
-
-
 class WeightedFrames(SourceWrapper):
     """A FrameSource of frames that are premultiplied by weights, in linear light.
 

@@ -6,13 +6,13 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from ..core.frames.frame_source import FrameSource
+from ..core.frames.frame_source import FrameSource, SourceWrapper
 from ..core.frames.planes import as_rgba
 from ..core.memo import Kept
 from ..core.model.frame_state import Layers, Options
 from ..core.pixels import compositor, layering
 from ..core.pixels.decontamination import separated
-from .layer_frames import LayerFrames, LayerMattes, RecentFrames, linear, with_colors
+from .layer_frames import LayerMattes, RecentFrames, linear, with_colors
 
 T = TypeVar("T")
 Motion = tuple[complex, complex]
@@ -61,9 +61,9 @@ class LayerColors:
     def frames(self, layer: int) -> FrameSource:
         """A source of frames with the colours of a layer, or with −1 of what lies behind all layers."""
         if layer < 0 and self._uncovers:
-            return LayerFrames(self._source, lambda frame: self._uncovered(frame)[0])
+            return SourceWrapper(self._source, lambda frame: self._uncovered(frame)[0])
         if self._separates:
-            return LayerFrames(self._source, lambda frame: self._separated(frame, layer)[int(layer < 0)])
+            return SourceWrapper(self._source, lambda frame: self._separated(frame, layer)[int(layer < 0)])
         return self._source
 
     def weights(self, layer: int) -> Callable[[int], np.ndarray]:

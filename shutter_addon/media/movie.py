@@ -50,7 +50,7 @@ class MovieSource(FrameSource):
     transfer = "srgb"
 
     def __init__(self, path: str | Path, *, stream: int = 0, deinterlace: bool = False, divisor: int = 1) -> None:
-        """divisor: how many times smaller than the file's the frames are each way (ReducedSource)"""
+        """divisor: how many times smaller than the file's the frames are each way (reduced.smaller)"""
         self.path = check_file(path)
         self.files = [self.path]
         self._deinterlace, self._divisor = deinterlace, divisor

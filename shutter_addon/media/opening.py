@@ -142,27 +142,15 @@ class MatteFile:
     stream: int = 0
     stamp: Hashable = None
 
-    def open(self) -> MatteSource:
-        """MediaError: it cannot be read, or has no such channel."""
-        return MatteSource(open_channel(self.path, self.channel, files=self.files, stream=self.stream))
+    def open(self) -> SourceWrapper:
+        """The frames of the matte (core.model.mattes.MatteSource), each a new array; what is no number is 0. Not for
+        two threads at once. MediaError: it cannot be read, or has no such channel.
 
-
-class MatteSource(SourceWrapper):
-    """The frames of a matte; close it, or use it in a `with`. Not for two threads at once.
-
-    Values are samples as they are stored: no transfer function, no colour space, alpha neither multiplied nor divided;
-    a movie's range is expanded to 0 … 1. Luminance is that of Rec.709's weights, and of a grey file its grey.
-
-    path: the movie, or the first image; width, height: pixels; count: of frames, 1 for a still picture
-    fps: frames per second, None for images; files: the movie, or those of the frames
-    """
-
-    def read(self, index: int) -> np.ndarray:
-        """The values of a frame, a new array (height, width) float32, 0 … 1, top row first; what is no number is 0.
-
-        index: from 0; before the first frame that one is given, beyond the last the last. Ascending is fastest.
-        MediaError: the frame is missing, damaged, or of another size than the first."""
-        return _values(self._source.read(min(max(index, 0), self.count - 1)))
+        Values are samples as they are stored: no transfer function, no colour space, alpha neither multiplied nor
+        divided; a movie's range is expanded to 0 … 1. Luminance is that of Rec.709's weights, and of a grey file its
+        grey."""
+        channel = open_channel(self.path, self.channel, files=self.files, stream=self.stream)
+        return SourceWrapper(channel, lambda index: _values(channel.read(min(max(index, 0), channel.count - 1))))
 
 
 def _values(samples: np.ndarray) -> np.ndarray:

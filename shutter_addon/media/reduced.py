@@ -15,22 +15,13 @@ DIVISORS = 1, 2, 4
 STRETCHED = 0.1  # by which share the sides may differ: Blender's movies have even ones
 
 
-class ReducedSource(SourceWrapper):
-    """A source whose frames are the other's, `divisor` times smaller each way; a last pixel stands for what is left."""
-
-    def __init__(self, source: FrameSource, divisor: int) -> None:
-        super().__init__(source)
-        self._divisor = divisor
-        self.width, self.height = (reduced_size(length, divisor) for length in (source.width, source.height))
-
-    def read(self, index: int) -> np.ndarray:
-        """The frame (height, width, 4), of new memory."""
-        return reduced(self._source.read(index), self._divisor, self.alpha)
-
-
 def smaller(source: FrameSource, divisor: int) -> FrameSource:
-    """The source, that many times smaller each way."""
-    return source if divisor == 1 else ReducedSource(source, divisor)
+    """The source, that many times smaller each way; a last pixel stands for what is left."""
+    if divisor == 1:
+        return source
+    made = SourceWrapper(source, lambda index: reduced(source.read(index), divisor, source.alpha))
+    made.width, made.height = (reduced_size(length, divisor) for length in (source.width, source.height))
+    return made
 
 
 def reduced_size(length: int, divisor: int) -> int:

@@ -7,6 +7,7 @@ Whatever a pair of frames needs is found when its first moment is read, which th
 from __future__ import annotations
 
 import math
+from functools import lru_cache
 
 import numpy as np
 
@@ -33,21 +34,6 @@ _PICTURES, _CHANGES = 4, 1024  # that are kept
 _PAIRS = 8  # of neighbouring frames, spread over the footage, that "auto" looks at
 _FRAMES = MOST + 2  # frames that are kept: those that say what repeats
 _THIRDS = 256  # moments that stand for those of a gap of three frames, as their number has to be a power of two
-
-
-class _Recent(SourceWrapper):
-    """A source whose last frames are kept."""
-
-    def __init__(self, source: FrameSource) -> None:
-        super().__init__(source)
-        self._frames: Kept[int, np.ndarray] = Kept()
-
-    def read(self, index: int) -> np.ndarray:
-        return self._frames.ask(index, lambda: self._source.read(index), _FRAMES)
-
-    def close(self) -> None:
-        self._frames.clear()
-        self._source.close()
 
 
 class Repeats:
@@ -113,7 +99,8 @@ class SmoothSource(SourceWrapper):
     def __init__(
         self, source: FrameSource, step: int, vectors: StoredVectors | None = None, *, skip_repeats: bool = False
     ) -> None:
-        super().__init__(_Recent(source))
+        self._recent = lru_cache(_FRAMES)(source.read)
+        super().__init__(SourceWrapper(source, self._recent))
         flow.check()
         self._find = flow.found if vectors is None else vectors.found
         self.step = step
@@ -154,6 +141,7 @@ class SmoothSource(SourceWrapper):
     def close(self) -> None:
         """Closes the file, and lets go of all frames."""
         self._pairs.clear()
+        self._recent.cache_clear()
         self._source.close()
 
 
@@ -179,7 +167,7 @@ def steps_for(source: FrameSource, smooth: int | str, window: int, *, skip_repea
 
 def _fastest(source: FrameSource, skip_repeats: bool) -> float:
     """Pixels from a frame to the next, of what moves fastest in a few pairs of neighbouring frames."""
-    filmed = _Recent(source)
+    filmed = SourceWrapper(source, lru_cache(_FRAMES)(source.read))
     repeats = Repeats(filmed) if skip_repeats else None
     pairs = sorted({(source.count - 2) * k // (_PAIRS - 1) for k in range(_PAIRS)})
     moved = []

@@ -6,7 +6,7 @@ import pytest
 
 from shutter_addon.core.frames import light
 from shutter_addon.media import open_source
-from shutter_addon.media.reduced import ReducedSource, reduced
+from shutter_addon.media.reduced import reduced, smaller
 
 
 def means(frame, divisor):
@@ -85,7 +85,7 @@ def test_it_is_made_smaller_before_its_colours_are_converted(tmp_path, blender_c
 
 
 def test_it_wraps_any_source(bunny):
-    with ReducedSource(open_source(bunny), 4) as small:
+    with smaller(open_source(bunny), 4) as small:
         assert (small.width, small.height) == (320, 180)
         assert small.read(5).shape == (180, 320, 4)
         assert small.options == {"stream": 0, "deinterlace": False}

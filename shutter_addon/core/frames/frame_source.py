@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from fractions import Fraction
 from pathlib import Path
 from typing import Protocol, Self
@@ -117,11 +117,12 @@ class _Forwarded:
 class SourceWrapper(FrameSource):
     """A source around another one. It has all attributes and frames of that one, but for those that a subclass sets."""
 
-    def __init__(self, source: FrameSource) -> None:
-        self._source = source
+    def __init__(self, source: FrameSource, frames: Callable[[int], np.ndarray] | None = None) -> None:
+        """frames: gives what `read` gives; None: the source does"""
+        self._source, self._frames_of = source, frames
 
     def read(self, index: int) -> np.ndarray:
-        return self._source.read(index)
+        return (self._frames_of or self._source.read)(index)
 
     def decoded(self, index: int) -> Decoded:
         return self.read(index)  # which may give other frames than the source
