@@ -118,7 +118,7 @@ class Sums(Window):
         positions: of core.model.windows.positions; the first and the last less than `capacity` apart
         shot: the source frames that the window may show (core.model.windows.source_frames)
         """
-        self.device.use(self)
+        self.device.use(self.release)
         self.shot = shot
         first, last = int(positions.min()), int(positions.max()) + 1
         frames = windows.source_frames(options, np.arange(first, last), shot).tolist()

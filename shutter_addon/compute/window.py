@@ -74,7 +74,7 @@ class Window:
         self.parts: list[Part] = []
         self._textures: list[Texture] = []  # of the parts
         self._extra = NamedTextures(device)  # when they are first asked for
-        device.use(self)
+        device.use(self.release)
         try:
             self._allocate()
         except NoDeviceError:
@@ -138,7 +138,7 @@ class Window:
             texture.release()
         self._extra.release()
         self._textures, self.is_open = [], False
-        self.device.forget(self)
+        self.device.forget(self.release)
 
 
 class Frames(Window):
@@ -167,7 +167,7 @@ class Frames(Window):
             super()._allocate()
         except NoDeviceError:
             self.release()
-            self.device.use(self)
+            self.device.use(self.release)
             self._host, self.sends = {}, True
             self.parts = self._divided(min(int(self.device.budget.limit * SENT_SHARE), SENT_BYTES, BAND_BYTES))
             self.picture()
@@ -180,7 +180,7 @@ class Frames(Window):
     def load(self, positions: np.ndarray, options: Options, shot: range) -> None:
         """See running_sums.Sums.load."""
         self.shot = shot
-        self.device.use(self)
+        self.device.use(self.release)
         for index in sorted(set(windows.source_frames(options, positions, shot).tolist())):
             layer = index % self.capacity
             if self._held.get(layer) == index:

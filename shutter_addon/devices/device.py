@@ -10,7 +10,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import AbstractContextManager
-from typing import Any, Protocol, TypeAlias
+from typing import Any, TypeAlias
 
 import numpy as np
 
@@ -34,13 +34,6 @@ def texel_bytes(kind: str) -> int:
 
 class NoDeviceError(RuntimeError):
     """The device cannot be used, or has no room; the message is one sentence for the user."""
-
-
-class Holder(Protocol):
-    """What holds textures that can be made again: a window."""
-
-    def release(self) -> None:
-        """Frees them."""
 
 
 class Texture:
@@ -94,7 +87,7 @@ class Device:
     def __init__(self, budget: Budget | None = None, ask_others: Callable[[], None] | None = None) -> None:
         self.budget, self.ask_others = budget or Budget(), ask_others
         self._held: dict[Texture, None] = {}  # on the device, used longest ago first
-        self._windows: dict[Holder, None] = {}  # likewise; the last one is in use
+        self._windows: dict[Callable[[], None], None] = {}  # what frees each, likewise; the last one is in use
 
     def current(self) -> AbstractContextManager[Device]:
         """Makes the device usable on this thread until the `with` block ends. NoDeviceError: it cannot be, just now."""
@@ -158,14 +151,14 @@ class Device:
         own = ({name: texture.own for name, texture in bound.items()} for bound in (sampled, stored))
         self._dispatch(program, program.groups(extent), *own, blocks or {}, constants)
 
-    def use(self, window: Holder) -> None:
-        """Notes that a window is in use: others are freed (`window.release`) before it, where there is no room."""
-        self._windows.pop(window, None)
-        self._windows[window] = None
+    def use(self, release: Callable[[], None]) -> None:
+        """Notes that what `release` frees, a window, is in use: others are freed before it, where there is no room."""
+        self.forget(release)
+        self._windows[release] = None
 
-    def forget(self, window: Holder) -> None:
+    def forget(self, release: Callable[[], None]) -> None:
         """Notes that a window was freed."""
-        self._windows.pop(window, None)
+        self._windows.pop(release, None)
 
     def release(self) -> None:
         """Frees the device, at any time, but not its textures: each has its own `release`."""
@@ -220,8 +213,8 @@ class Device:
             texture.waiting = self.read(texture)
             self.drop(texture)
             return True
-        for window in list(self._windows)[:-1]:
-            window.release()
+        for release in list(self._windows)[:-1]:
+            release()
             return True
         return False
 
