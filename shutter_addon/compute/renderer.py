@@ -15,8 +15,7 @@ from ..core.memo import Memo
 from ..core.model import scribbles
 from ..core.model.frame_state import FrameState
 from ..core.model.mattes import MatteReader
-from ..devices.budget import Budget
-from ..devices.device import NoDeviceError
+from ..devices.device import Budget, NoDeviceError
 from . import guide, window_frames
 from .cpu import CPUCompositor
 from .layered_renderer import LayeredRenderer

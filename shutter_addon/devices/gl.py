@@ -10,8 +10,7 @@ from typing import Any, Self
 import moderngl
 import numpy as np
 
-from .budget import Budget, machine_memory
-from .device import Device, NoDeviceError, Texture
+from .device import Budget, Device, NoDeviceError, Texture, machine_memory
 from .llvmpipe import is_llvmpipe
 from .passes import Pass
 

@@ -15,9 +15,8 @@ from shutter_addon.compute.renderer import Renderer
 from shutter_addon.compute.request import Request
 from shutter_addon.core.frames.frame_source import FrameSource
 from shutter_addon.core.model.mattes import Matte
-from shutter_addon.devices import budget
-from shutter_addon.devices.budget import Budget
-from shutter_addon.devices.device import NoDeviceError
+from shutter_addon.devices import device as devices
+from shutter_addon.devices.device import Budget, NoDeviceError
 
 SIZE = 128, 72
 PIXELS = SIZE[0] * SIZE[1]
@@ -265,24 +264,24 @@ def test_a_driver_that_has_less_than_it_says_gets_less(kind, limited, monkeypatc
 
 
 def test_what_is_allowed(monkeypatch):
-    monkeypatch.setattr(budget, "machine_memory", lambda: 16 << 30)
-    assert budget.allowed(8 << 30) == 6 << 30
-    assert budget.allowed(48 << 30) == 8 << 30
-    assert budget.allowed(None) == 6 << 30
-    monkeypatch.setattr(budget, "machine_memory", lambda: None)
-    assert budget.allowed(48 << 30) == 36 << 30
+    monkeypatch.setattr(devices, "machine_memory", lambda: 16 << 30)
+    assert devices.allowed(8 << 30) == 6 << 30
+    assert devices.allowed(48 << 30) == 8 << 30
+    assert devices.allowed(None) == 6 << 30
+    monkeypatch.setattr(devices, "machine_memory", lambda: None)
+    assert devices.allowed(48 << 30) == 36 << 30
 
 
 def test_the_machines_memory():
     lines = Path("/proc/meminfo").read_text().splitlines()
     kilobytes = next(int(line.split()[1]) for line in lines if line.startswith("MemTotal"))
-    assert budget.machine_memory() == kilobytes << 10
+    assert devices.machine_memory() == kilobytes << 10
 
 
 def test_a_device_tells_what_there_is(kind):
     """A software renderer has the machine's memory, a GPU may have less of its own; a limit that was set stays."""
-    for given, wanted in ((None, budget.allowed(budget.machine_memory())), (5, 5)):
+    for given, wanted in ((None, devices.allowed(devices.machine_memory())), (5, 5)):
         device = kind(Budget(given))
         assert device.budget.limit == wanted or (given is None and "llvmpipe" not in device.name)
-        assert budget.MEGABYTE < device.budget.limit <= wanted or given
+        assert devices.MEGABYTE < device.budget.limit <= wanted or given
         device.release()

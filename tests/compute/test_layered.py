@@ -19,8 +19,7 @@ from shutter_addon.core.model.mattes import FileFrame, Matte
 from shutter_addon.core.model.scribbles import Shape
 from shutter_addon.core.pixels import compositor, layering
 from shutter_addon.core.pixels.decontamination import separated
-from shutter_addon.devices.budget import Budget
-from shutter_addon.devices.device import NoDeviceError
+from shutter_addon.devices.device import Budget, NoDeviceError
 from shutter_addon.media.matte_values import MatteValues
 
 SIZE, COUNT, SHOWN = (37, 23), 20, 9

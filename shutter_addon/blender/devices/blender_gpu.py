@@ -19,8 +19,7 @@ import gpu
 import numpy as np
 from bpy.app.translations import pgettext_rpt as rpt_
 
-from ...devices.budget import Budget, machine_memory
-from ...devices.device import Device, NoDeviceError, Texture, texel_bytes
+from ...devices.device import Budget, Device, NoDeviceError, Texture, machine_memory, texel_bytes
 from ...devices.llvmpipe import is_llvmpipe
 from ...devices.passes import Pass, read_pass
 

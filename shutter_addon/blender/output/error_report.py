@@ -16,8 +16,7 @@ import gpu
 from bpy.types import Scene
 
 from ...core import told
-from ...devices.budget import MEGABYTE, machine_memory
-from ...devices.device import NoDeviceError
+from ...devices.device import MEGABYTE, NoDeviceError, machine_memory
 from ..data import preferences, versions
 from ..devices import available
 from ..rendering import render_settings

@@ -14,7 +14,7 @@ from bpy.app.translations import pgettext_rpt as rpt_
 from ...compute.renderer import Renderer
 from ...compute.request import Request
 from ...core import stopping
-from ...devices.budget import MEGABYTE
+from ...devices.device import MEGABYTE
 from ...media import color
 from ...media.image_writing import write_exr
 from ..data import consistency

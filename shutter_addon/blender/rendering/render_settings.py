@@ -6,7 +6,7 @@ from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from pathlib import Path
 
-from ...devices.budget import MEGABYTE, Budget
+from ...devices.device import MEGABYTE, Budget
 from ..data import preferences
 from ..data.property_copy import for_a_while
 from ..devices import available
@@ -18,7 +18,7 @@ class RenderSettings:
 
     device: one of available.CHOICES, in place of the user's preference
     weights: folder for the coefficients of every picture, as EXR files
-    gpu_memory: megabytes of the GPU that textures may take, in place of the user's preference; 0: as budget.allowed"""
+    gpu_memory: megabytes of the GPU that textures may take, in place of the user's preference; 0: as device.allowed"""
 
     device: str | None = None
     weights: Path | None = None
