@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 from OpenImageIO import ImageInput, geterror
 
-from ..core.farm import edit_version
+from ..core.farm import job_file
 from . import pyav
 from .files import check_name
 
@@ -23,7 +23,7 @@ _SIGNATURE = b"\x89PNG\r\n\x1a\n"
 
 class RenderedPicture(NamedTuple):
     """size: width and height in pixels; channels: how many; samples: as "uint16"
-    edit: the key of the edit's version (core.farm.edit_version); None: the picture has none"""
+    edit: the key of the edit's version (core.farm.job_file); None: the picture has none"""
 
     size: tuple[int, int]
     channels: int
@@ -43,7 +43,7 @@ def read(path: Path, edit: str | None = None) -> RenderedPicture | None:
         return None
     try:
         spec = image.spec()
-        key = edit_version.key_in(spec.get_string_attribute("Note"))
+        key = job_file.key_in(spec.get_string_attribute("Note"))
         if edit not in (None, key):
             return None
         is_png = path.suffix.lower() == ".png"

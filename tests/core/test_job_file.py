@@ -5,8 +5,8 @@ from dataclasses import replace
 
 import pytest
 
-from shutter_addon.core.farm import edit_version, job_file
-from shutter_addon.core.farm.edit_version import EditVersion, Footage
+from shutter_addon.core.farm import job_file
+from shutter_addon.core.farm.job_file import EditVersion, Footage
 
 FOOTAGE = Footage("film.mp4", 1, "cd" * 32), Footage("f0001.png", 9, "ef")
 VERSION = EditVersion("ab" * 32, "0.1.0", "5.2.0", "", FOOTAGE)
@@ -69,9 +69,9 @@ def test_what_is_no_file_is_told(tmp_path, make):
 
 
 def test_a_pictures_note_is_read_back():
-    assert edit_version.key_in(edit_version.note(VERSION.key)) == VERSION.key
+    assert job_file.key_in(job_file.note(VERSION.key)) == VERSION.key
     for text in ("", "mine", "virtual_shutter edit ", f"virtual_shutter edit {VERSION.key}0"):
-        assert edit_version.key_in(text) is None
+        assert job_file.key_in(text) is None
 
 
 def test_a_job_of_a_newer_version_is_told(tmp_path):

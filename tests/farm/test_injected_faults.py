@@ -18,7 +18,7 @@ import OpenImageIO
 import pytest
 from farm_job import ROOT, Job
 
-from shutter_addon.core.farm import edit_version
+from shutter_addon.core.farm import job_file
 
 sys.path.insert(1, str(ROOT / "tests" / "blender"))
 
@@ -362,7 +362,7 @@ def test_a_fault_that_a_worker_meets(whole, node, worker, submit, fault):
 def _rewrite(path, size=(WIDTH, HEIGHT), key="0123456789abcdef"):
     """A picture like a frame's, of that size, and of another version of the edit."""
     spec = OpenImageIO.ImageSpec(*size, 4, "uint16")
-    spec.attribute("Note", edit_version.note(key))
+    spec.attribute("Note", job_file.note(key))
     output = OpenImageIO.ImageOutput.create(str(path))
     output.open(str(path), spec)
     output.write_image(np.zeros((size[1], size[0], 4), np.uint16))

@@ -15,7 +15,7 @@ from bpy.types import Scene
 
 from ...core import told
 from ...core.farm import job_file
-from ...core.farm.edit_version import EditVersion
+from ...core.farm.job_file import EditVersion
 from ...core.messages import UserError
 from ...devices.device import NoDeviceError
 from ..data import external_files, versions

@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 from bpy.types import Scene
 
-from ...core.farm.edit_version import EditVersion
+from ...core.farm.job_file import EditVersion
 from ...core.frames.frame_source import FrameSource
 from ...core.messages import sentence
 from ...core.model.effect import Effect

@@ -15,7 +15,7 @@ import bpy
 from bpy.types import Scene
 
 from ...core import threads
-from ...core.farm.edit_version import EditVersion, Footage
+from ...core.farm.job_file import EditVersion, Footage
 from ...media import MediaError, derived
 from ...media.files import stamp
 from . import external_files, source_media, strips

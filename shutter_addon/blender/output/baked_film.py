@@ -20,7 +20,7 @@ from bpy.app.translations import pgettext_rpt as rpt_
 from bpy.types import PropertyGroup, Scene, Strip
 
 from ...core import atomic_write, stopping
-from ...core.farm import edit_version
+from ...core.farm import job_file
 from ...core.messages import EffectError
 from ...core.stopping import StoppedError
 from ...media import film_parts, image_writing, pyav, rendered_pictures
@@ -148,7 +148,7 @@ def render(scene: Scene, effect: PropertyGroup, strip: Strip, film: Film, told: 
 
 def _make_pictures(film: Film, picture: Picture, size: tuple[int, int], told: Callable[[int], object]) -> None:
     _prepare(film.place)
-    note = edit_version.note(film.version)
+    note = job_file.note(film.version)
     for number, (path, frame) in enumerate(zip(film.pictures, film.frames, strict=True), start=1):
         there = rendered_pictures.read(path, film.version)
         if there is None or there.size != size:

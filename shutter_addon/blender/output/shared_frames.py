@@ -10,9 +10,9 @@ from pathlib import Path
 
 from bpy.types import Scene
 
-from ...core.farm import edit_version, job_file
+from ...core.farm import job_file
 from ...core.farm.claims import Claims
-from ...core.farm.edit_version import EditVersion
+from ...core.farm.job_file import EditVersion
 from ...core.frames import frame_ranges
 from ...media import rendered_pictures
 from ..data import versions
@@ -72,7 +72,7 @@ def render(
     the folder cannot be written to"""
     if resume:
         check_resumable(scene)
-    film_output.set_pictures(scene, file_format, edit_version.note(version.key))
+    film_output.set_pictures(scene, file_format, job_file.note(version.key))
     film_output.prepare(folder)
     samples = film_output.FORMATS[file_format].samples
     is_finished = partial(_is_finished, film_output.size(scene), samples, version.key, {})
