@@ -14,18 +14,16 @@ _MOST = 128  # values of until_change
 
 
 class Revision:
-    """number: grows with every change
-    kept: values of until_change, each with whether it could be made; at: the number at which they were made"""
+    """number: grows with every change"""
 
-    def __init__(self) -> None:
-        self.number = self.at = 0
-        self.kept: Kept[Hashable, tuple[bool, Any]] = Kept()
+    number = 0
 
     def changed(self) -> None:
         self.number += 1
 
 
 _data = Revision()
+_kept: Kept[tuple, tuple[bool, Any]] = Kept()  # values of until_change, by number, each with whether it was made
 
 
 def number() -> int:
@@ -43,12 +41,9 @@ def until_change(what: str, key: Hashable, make: Callable[[], T]) -> T:
     did. The values that were asked for last are kept.
 
     For what is drawn: operators, which may follow a change that nobody has told of yet, read anew."""
-    if _data.at != (start := number()):
-        _data.at = start
-        _data.kept.clear()
-    good, value = _data.kept.ask((what, key), lambda: _outcome(make), _MOST)
-    if number() != start:  # meanwhile
-        _data.at = -1
+    if next(reversed(_kept), (number(),))[0] != number():
+        _kept.clear()  # all were made before
+    good, value = _kept.ask((number(), what, key), lambda: _outcome(make), _MOST)
     if not good:
         raise value.with_traceback(None)  # which would grow with every raise
     return value
@@ -56,8 +51,8 @@ def until_change(what: str, key: Hashable, make: Callable[[], T]) -> T:
 
 def known(what: str, key: Hashable) -> Any:
     """The value of until_change that has been made since something changed; None: none has, or it could not be."""
-    good, value = _data.kept.get((what, key), (False, None))
-    return value if good and _data.at == number() else None
+    good, value = _kept.get((number(), what, key), (False, None))
+    return value if good else None
 
 
 def _outcome(make: Callable[[], object]) -> tuple[bool, Any]:
