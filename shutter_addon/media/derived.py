@@ -33,10 +33,7 @@ _LARGER = 1 << 20  # bytes; a file that is larger than its samples by more holds
 _JUNCTION = 0xA0000003  # st_reparse_tag of a folder on Windows that leads to another
 _CHANNELS = tuple(f"value{k}" for k in range(6))  # of a file of vectors
 
-_SHAPE = (
-    *("x", "y", "z", "width", "height", "depth", "full_x", "full_y", "full_width", "full_height"),
-    *("nchannels", "channelnames", "format", "channelformats", "deep"),
-)
+_SHAPE = "roi", "roi_full", "channelnames", "format", "channelformats", "deep"
 
 
 def identity(source: FrameSource) -> dict:

@@ -20,7 +20,7 @@ from av.video.stream import VideoStream
 from numpy.typing import DTypeLike
 
 from ..core.frames.frame_source import FrameSource
-from ..core.frames.planes import Decoded, Matrix, Planes, matrix
+from ..core.frames.planes import Decoded, Matrix, Planes, as_rgba, matrix
 from .decode import FrameReader, fraction, reason
 from .errors import MediaError
 from .files import check_file, check_index
@@ -93,8 +93,7 @@ class MovieSource(FrameSource):
         self._size, self._scaler = (size, REDUCER) if in_conversion else (filmed, SCALER)
 
     def read(self, index: int) -> np.ndarray:
-        with self._named(index):
-            return self._pixels(self._frame(index))
+        return as_rgba(self.decoded(index))
 
     def _picture(self, index: int, frame: av.VideoFrame) -> np.ndarray:
         with self._named(index):
