@@ -33,26 +33,23 @@ OPEN, TAKEN, FILLED = 0, 1, 2
 class LayerColors:
     """Frames with the colours of a layer, in the source's samples, and how much (H, W) float32 each pixel counts.
 
-    source: what is read; recent: the same, with the frames that were read last
+    source: what is read; recent: the same, with the frames that were read last; layers: of the last `begin`
     asked: by source frame whose covered places are taken from others, which these are, and how the camera moves there
     """
+
+    layers: Layers
+    _options: Options
+    _shot: range
 
     def __init__(self, source: FrameSource, recent: RecentFrames, mattes: LayerMattes) -> None:
         self._source, self._recent, self._mattes = source, recent, mattes
         self._kept: Kept[tuple, Any] = Kept()
         self.asked: dict[int, dict[int, Motion]] = {}
-        self.begin(None, Options(1), range(0))
 
-    def begin(self, layers: Layers | None, options: Options, shot: range) -> None:
+    def begin(self, layers: Layers, options: Options, shot: range) -> None:
         """What the frames are asked for, until this is called again. shot: the frames that may show what lies behind"""
-        self._layers, self._options, self._shot = layers, options, shot
+        self.layers, self._options, self._shot = layers, options, shot
         self._kept.clear()
-
-    @property
-    def layers(self) -> Layers:
-        if self._layers is None:
-            raise ValueError("there are no layers")
-        return self._layers
 
     def changes(self, layer: int) -> tuple:
         """Hashable: what `frames` of a layer, or with −1 of what lies behind all, changes in the source's."""

@@ -12,6 +12,7 @@ light. Where Σ qₖ hₖ is less than CLEAR, too little of B was seen: a plate 
 """
 
 from collections.abc import Sequence
+from functools import reduce
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -33,10 +34,7 @@ def matte_of(coefficients: ArrayLike) -> np.ndarray:
 
 def behind(mattes: Sequence[np.ndarray]) -> np.ndarray:
     """How much of what lies behind layers with these mattes (h, w) is seen: Π (1 − m)."""
-    clear = 1 - mattes[0]
-    for matte in mattes[1:]:
-        clear = clear * (1 - matte)
-    return clear
+    return reduce(np.multiply, [1 - matte for matte in mattes])
 
 
 def laid_over(under: np.ndarray, color: np.ndarray, cover: np.ndarray) -> np.ndarray:
