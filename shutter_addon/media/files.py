@@ -1,15 +1,26 @@
 """Small checks that movies and sequences share."""
 
 import os
+from functools import cache
 from pathlib import Path
 
 from ..core.frames.frame_source import FrameSource
-from . import pyav
 from .errors import MediaError
 
 PIXELS = 1 << 28  # 16384×16384; FFmpeg decodes no more either, and a damaged header may promise anything
 OTHER = "is no file, but a pipe, a socket or a device"
 FOREIGN = "an image of a kind that Blender does not read; save it as PNG, TIFF or EXR first"
+
+
+@cache
+def pyav_missing() -> str:
+    """Why PyAV does not decode movies, in Python's words; "": it does. A package without wheels lacks it: a second
+    Blender decodes movies then, where one is lent."""
+    try:
+        from .movie import MovieSource  # noqa: F401
+    except ImportError as error:
+        return str(error)
+    return ""
 
 
 def check_file(path: str | Path) -> Path:
@@ -40,7 +51,7 @@ def stamp(path: str | Path) -> tuple[int, int] | None:
 def check_sound(path: str | Path) -> None:
     """MediaError unless it is a file that has sound; without PyAV, unless it is a file."""
     path = check_file(path)
-    if pyav.missing():
+    if pyav_missing():
         return
     import av
 

@@ -11,11 +11,10 @@ import numpy as np
 
 from ..core.frames.frame_source import FrameSource, SourceWrapper
 from ..core.frames.light import REC709
-from . import pyav
 from .blender_movie import BlenderMovie, is_lent
 from .color import in_colorspace
 from .errors import MediaError
-from .files import check_file
+from .files import check_file, pyav_missing
 from .reduced import ProxySource, fits, smaller
 from .sequence import CHANNELS, IMAGE_SUFFIXES, SequenceChannel, SequenceSource, no_channel
 
@@ -88,7 +87,7 @@ def _is_movie(path: Path, files: Sequence[str | Path] | None) -> bool:
 
 def _opened_movie(path: Path, stream: int, deinterlace: bool = False, divisor: int = 1) -> FrameSource:
     """See open_source."""
-    if pyav.missing():
+    if pyav_missing():
         _check_lent(path, stream)
         return smaller(BlenderMovie(path, deinterlace=deinterlace), divisor)
     from .movie import MovieSource
@@ -103,7 +102,7 @@ def _check_lent(path: Path, stream: int) -> None:
     check_file(path)
     what = f"video stream {stream} of a movie needs" if is_lent() else "movies need"
     raise MediaError(
-        f"{path.name}: {what} the Python package PyAV ({pyav.missing()}); "
+        f"{path.name}: {what} the Python package PyAV ({pyav_missing()}); "
         "install the zip of Virtual Shutter that is made for your system, or use an image sequence"
     )
 

@@ -11,8 +11,7 @@ from typing import NamedTuple
 from OpenImageIO import ImageInput, geterror
 
 from ..core.farm import job_file
-from . import pyav
-from .files import check_name
+from .files import check_name, pyav_missing
 
 UNKNOWN = "nothing says why"  # why a file is short
 _PNG_END = b"IEND\xaeB`\x82"
@@ -114,14 +113,14 @@ def is_whole_picture(path: Path) -> bool:
 
 def is_whole_movie(path: Path, count: int) -> bool:
     """Whether a movie holds that many pictures, without decoding them; without PyAV, whether there is anything."""
-    if pyav.missing():
+    if pyav_missing():
         return path.is_file() and path.stat().st_size > 0
     return whole_pictures(path) >= count
 
 
 def whole_pictures(path: Path) -> int:
     """How many pictures a movie holds, without decoding them; 0: it cannot be read, or PyAV is missing."""
-    if pyav.missing():
+    if pyav_missing():
         return 0
     import av
 

@@ -17,7 +17,7 @@ import numpy as np
 import pytest
 from footage import COUNT, cut_file, damage_frame, make_movie, number, picture, save_image
 
-from shutter_addon.media import MediaError, blender_movie, open_source, pyav
+from shutter_addon.media import MediaError, blender_movie, files, open_source
 from shutter_addon.media.blender_movie import BlenderMovie, frame_rate
 from shutter_addon.media.opening import MovieChannel, open_channel
 from shutter_addon.media.smooth import SmoothSource
@@ -207,9 +207,9 @@ def test_frame_rates_are_those_of_films():
 def _no_pyav(monkeypatch):
     monkeypatch.setitem(sys.modules, "shutter_addon.media.movie", None)
     monkeypatch.setitem(sys.modules, "av", None)
-    pyav.missing.cache_clear()
+    files.pyav_missing.cache_clear()
     yield
-    pyav.missing.cache_clear()
+    files.pyav_missing.cache_clear()
 
 
 def test_channels_are_those_that_pyav_decodes(coloured):

@@ -23,7 +23,7 @@ from ...core import atomic_write, stopping
 from ...core.farm import job_file
 from ...core.messages import EffectError
 from ...core.stopping import StoppedError
-from ...media import film_parts, image_writing, pyav, rendered_pictures
+from ...media import files, film_parts, image_writing, rendered_pictures
 from ...media.blender_movie import frame_rate
 from ...media.derived import own_folder, refuse_link
 from ...media.errors import MediaError
@@ -100,7 +100,7 @@ def _check(scene: Scene, effect: PropertyGroup, strip: Strip, kind: Kind) -> Non
         )
     if kind != "MOVIE":
         return
-    if pyav.missing():
+    if files.pyav_missing():
         sentence = rpt_("the Python package {package} is missing, which movies need: bake to OpenEXR")
         raise EffectError(sentence.format(package="av"))
     if versions.colours():
