@@ -69,7 +69,7 @@ def with_proxy(source: FrameSource, opened: Callable[[], FrameSource]) -> FrameS
 
 def open_channel(
     path: str | Path, channel: str, *, files: Sequence[str | Path] | None = None, stream: int = 0
-) -> SequenceChannel | MovieChannel:
+) -> FrameSource:
     """Opens what `open_source` opens, for one channel alone. MediaError: it cannot be read, or has no such channel.
 
     channel: one of sequence.CHANNELS, or the name of a channel of the images' own; files, stream: see open_source"""
@@ -78,7 +78,7 @@ def open_channel(
         return SequenceChannel(path, channel, files=files)
     if channel not in CHANNELS:
         raise no_channel(check_file(path), channel, CHANNELS)
-    return MovieChannel(_opened_movie(path, stream), channel)
+    return movie_channel(_opened_movie(path, stream), channel)
 
 
 def _is_movie(path: Path, files: Sequence[str | Path] | None) -> bool:
@@ -107,21 +107,18 @@ def _check_lent(path: Path, stream: int) -> None:
     )
 
 
-class MovieChannel(SourceWrapper):
-    """One channel of a movie's frames."""
+def movie_channel(movie: FrameSource, channel: str) -> FrameSource:
+    """One channel of a movie's frames. Its samples are (height, width, n): n is 3, RGB, for the luminance of colours, 0
+    for the alpha of an opaque movie, 1 otherwise."""
+    grey_of = getattr(movie, "grey", lambda _index: None)  # which a second Blender's movies have not
 
-    def __init__(self, movie: FrameSource, channel: str) -> None:
-        super().__init__(movie)
-        self._channel = channel
-        self._grey = getattr(movie, "grey", lambda _index: None)  # which a second Blender's movies have not
+    def samples(index: int) -> np.ndarray:
+        if channel == "alpha" and movie.alpha == "opaque":
+            return np.empty((movie.height, movie.width, 0), movie.dtype)
+        grey = grey_of(index) if channel == "luminance" else None
+        return movie.read(index)[..., CHANNELS[channel]] if grey is None else grey
 
-    def read(self, index: int) -> np.ndarray:
-        """The samples (height, width, n) that the channel is made of: n is 3, RGB, for the luminance of colours, 0 for
-        the alpha of an opaque movie, 1 otherwise. Raises what the movie's `read` raises."""
-        if self._channel == "alpha" and self.alpha == "opaque":
-            return np.empty((self.height, self.width, 0), self.dtype)
-        grey = self._grey(index) if self._channel == "luminance" else None
-        return self._source.read(index)[..., CHANNELS[self._channel]] if grey is None else grey
+    return SourceWrapper(movie, samples)
 
 
 @dataclass(frozen=True)

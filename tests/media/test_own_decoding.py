@@ -19,7 +19,7 @@ from footage import COUNT, cut_file, damage_frame, make_movie, number, picture, 
 
 from shutter_addon.media import MediaError, blender_movie, files, open_source
 from shutter_addon.media.blender_movie import BlenderMovie, frame_rate
-from shutter_addon.media.opening import MovieChannel, open_channel
+from shutter_addon.media.opening import movie_channel, open_channel
 from shutter_addon.media.smooth import SmoothSource
 
 ROOT = Path(__file__).parents[2]
@@ -217,7 +217,7 @@ def test_channels_are_those_that_pyav_decodes(coloured):
         for channel in ("luminance", "red", "green", "blue", "alpha"):
             with (
                 open_channel(coloured[name], channel) as theirs,
-                MovieChannel(BlenderMovie(coloured[name]), channel) as ours,
+                movie_channel(BlenderMovie(coloured[name]), channel) as ours,
             ):
                 one, other = ours.read(1), theirs.read(1)  # PyAV's luminance of grey pictures is their luma
                 assert one.shape == other.shape or (name, channel) == ("gray.mkv", "luminance")
