@@ -11,7 +11,6 @@ from ..core.frames.planes import as_rgba
 from ..core.memo import Kept
 from ..core.model.frame_state import Layers, Options
 from ..core.pixels import compositor, layering
-from ..core.pixels.decontamination import separated
 from .layer_frames import LayerMattes, RecentFrames, linear, with_colors
 
 T = TypeVar("T")
@@ -92,7 +91,7 @@ class LayerColors:
         matte = 1 - layering.behind(mattes) if number < 0 else mattes[number]
         picture, mixed = self._decoded(frame), (matte > 0) & (matte < 1)
         colors = linear(picture, self._source)[..., :3]
-        own, behind = (with_colors(picture, c, mixed, self._source) for c in separated(colors, matte))
+        own, behind = (with_colors(picture, c, mixed, self._source) for c in layering.separated(colors, matte))
         return own, behind
 
     def _decoded(self, frame: int) -> np.ndarray:

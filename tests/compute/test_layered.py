@@ -18,7 +18,7 @@ from shutter_addon.core.model.frame_state import Combine, Following, FrameState,
 from shutter_addon.core.model.mattes import FileFrame, Matte
 from shutter_addon.core.model.scribbles import Shape
 from shutter_addon.core.pixels import compositor, layering
-from shutter_addon.core.pixels.decontamination import separated
+from shutter_addon.core.pixels.layering import separated
 from shutter_addon.devices.device import Budget, NoDeviceError
 from shutter_addon.media.matte_values import MatteValues
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from shutter_addon.core.pixels.decontamination import separated
+from shutter_addon.core.pixels.layering import separated
 
 HEIGHT, WIDTH = 90, 120
 

@@ -9,6 +9,10 @@ regions and s the layer's own, both normalised:
 
 So no layer leaves its ghost beside it. The sums are made in the light of Options.light, laid over one another in linear
 light. Where Σ qₖ hₖ is less than CLEAR, too little of B was seen: a plate takes the place of what lacks.
+
+A pixel V at the edge of a subject is m S + (1 − m) P (`separated`). S and P are first taken from their surroundings,
+then both take up what that leaves of V, each as much as it covers ("Fast Multi-Level Foreground Estimation", Germer et
+al. 2020, and "blur fusion", Forte 2021): twice, from wide surroundings and from near ones.
 """
 
 from collections.abc import Sequence
@@ -17,6 +21,8 @@ from functools import reduce
 import numpy as np
 from numpy.typing import ArrayLike
 
+from .matte_grid import block_sums
+
 # The share of the exposure that must have fallen on what lies behind layers.
 CLEAR = 1 / 16
 # The share from where on no layer was in the way, but for rounding: there the picture is that without layers.
@@ -24,6 +30,10 @@ UNCOVERED = 1 - 2e-5
 # Diffused coefficients that are no matte yet, and those that are a whole one: far from its stroke a subject has little
 # more than half of its shutter, and what is around has a little of it (scripts/layer_truth.py).
 NONE, WHOLE = 0.3, 0.5
+# How far the surroundings reach, as a share of the picture's height: wider than edges are soft, then to their detail.
+WIDE, NEAR = 1 / 18, 1 / 90
+# Radii in cells that are enough to tell surroundings: larger ones are seen in larger cells.
+_CELLS = 4
 
 
 def matte_of(coefficients: ArrayLike) -> np.ndarray:
@@ -48,3 +58,56 @@ def with_plate(sums: np.ndarray, clear: np.ndarray, plate: np.ndarray | None) ->
         return sums / np.maximum(clear, 1e-6)[..., None]
     lacking = np.maximum(CLEAR - clear, 0)[..., None]
     return (sums + lacking * plate) / np.maximum(clear, CLEAR)[..., None]
+
+
+def separated(colors: np.ndarray, matte: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The colours (H, W, C) float32 of a subject, and of what lies behind it, of a picture's in linear light.
+
+    What is no mixed pixel of the matte (H, W) stays as it is."""
+    own, behind = colors.copy(), colors.copy()
+    mixed = (matte > 0) & (matte < 1)
+    if not mixed.any():
+        return own, behind
+    height = len(matte)
+    wide, near = max(round(height * WIDE), 2), max(round(height * NEAR), 1)
+    box = tuple(_around(mixed.any(axis=1 - axis), wide + near) for axis in (0, 1))
+    picture, m, inside = colors[box], matte[box][..., None].astype(np.float32), mixed[box]
+    first = second = picture
+    for radius in (wide, near):
+        first, second = _surroundings(first, second, m, radius)
+        left = picture - m * first - (1 - m) * second
+        first, second = first + m * left, second + (1 - m) * left
+    own[box][inside] = np.maximum(first, 0)[inside]
+    behind[box][inside] = np.maximum(second, 0)[inside]
+    return own, behind
+
+
+def _around(mixed: np.ndarray, reach: int) -> slice:
+    """The rows, or columns, from the first to the last that has mixed pixels, and as many around as are looked at."""
+    places = np.flatnonzero(mixed)
+    return slice(max(int(places[0]) - reach, 0), int(places[-1]) + reach + 1)
+
+
+def _surroundings(own: np.ndarray, behind: np.ndarray, matte: np.ndarray, radius: int) -> tuple[np.ndarray, np.ndarray]:
+    """The means (h, w, C) around each pixel of colours, weighted by a matte (h, w, 1), and of others, by its rest."""
+    cell = max(radius // _CELLS, 1)
+    weighted = np.concatenate([own * matte, behind * (1 - matte), matte, 1 - matte], axis=-1)
+    sums = _box_sums(block_sums(weighted, cell, np.float32, beyond="constant"), radius // cell)
+    count = own.shape[-1]
+    totals = np.maximum(sums[..., 2 * count :], 1e-6)
+    means = sums[..., :count] / totals[..., :1], sums[..., count : 2 * count] / totals[..., 1:]
+    height, width = matte.shape[:2]
+    whole = [mean.repeat(cell, 0).repeat(cell, 1)[:height, :width].astype(np.float32) for mean in means]
+    return whole[0], whole[1]
+
+
+def _box_sums(values: np.ndarray, radius: int) -> np.ndarray:
+    """Sums (h, w, C) float64 over squares of 2 · radius + 1 cells, of which nothing lies beyond the edges."""
+    for axis in (0, 1):
+        length = values.shape[axis]
+        sums = np.cumsum(values, axis=axis, dtype=np.float64)
+        sums = np.concatenate([np.zeros_like(sums.take([0], axis)), sums], axis=axis)
+        places = np.arange(length)
+        ends = np.minimum(places + radius + 1, length), np.maximum(places - radius, 0)
+        values = sums.take(ends[0], axis) - sums.take(ends[1], axis)
+    return values
