@@ -42,19 +42,8 @@ class File(NamedTuple):
     codec: VideoCodecContext
 
 
-class Tags(NamedTuple):
-    """What Blender takes from a file before it decodes a frame, and keeps for all of them.
-
-    colorspace: matrix of YUV, by its number in ITU-T H.273; is_full: whether samples are of full range
-    turns: quarter turns counter-clockwise by which pictures are stored"""
-
-    colorspace: int
-    is_full: bool
-    turns: int
-
-
 class FrameReader:
-    """A file's video stream, with its `tags`. Time stamps are in units of time_base; `start` is the stream's own.
+    """A file's video stream; tags: of `_tags`. Time stamps are in units of time_base; `start` is the stream's own.
 
     Memory: the frame on screen, its successor, and what the decoder holds. Not for two threads at once.
     """
@@ -310,11 +299,14 @@ def reason(error: Exception) -> str:
     return text[:1].lower() + text[1:]
 
 
-def _tags(codec: VideoCodecContext) -> Tags:
+def _tags(codec: VideoCodecContext) -> tuple[int, bool, int]:
+    """What Blender takes from a file before it decodes a frame, and keeps for all of them: the matrix of YUV, by its
+    number in ITU-T H.273; whether samples are of full range; and the quarter turns counter-clockwise by which pictures
+    are stored."""
     # libswscale takes what it does not know for BT.601.
     space = {1: 1, 4: 4, 7: 7, 9: 9, 10: 9}.get(int(codec.colorspace), 5)
     side_data = getattr(codec, "coded_side_data", {})  # PyAV before 19 has none, and pictures lie as they are stored
-    return Tags(space, codec.color_range == ColorRange.JPEG, _turns(side_data.get("display_matrix")))
+    return space, codec.color_range == ColorRange.JPEG, _turns(side_data.get("display_matrix"))
 
 
 def _turns(display_matrix: bytes | None) -> int:

@@ -78,8 +78,8 @@ class MovieSource(FrameSource):
             raise MediaError(f"{self.path.name}: its length is unknown; put it into an MP4 or MKV file first")
         self.has_audio = bool(file.container.streams.audio)
         self._step = float(1 / (self.fps * self._reader.time_base))
-        self._tags = tags = self._reader.tags
-        self._turns, self._range = tags.turns, ColorRange.JPEG if tags.is_full else ColorRange.MPEG
+        self._space, self._is_full, self._turns = self._reader.tags
+        self._range = ColorRange.JPEG if self._is_full else ColorRange.MPEG
         filmed = first.width, first.height
         size = reduced_size(first.width, self._divisor), reduced_size(first.height, self._divisor)
         self.width, self.height = size[::-1] if self._turns % 2 else size
@@ -123,7 +123,7 @@ class MovieSource(FrameSource):
         check_index(self, index)
         frame = self._reader.frame_at(self._reader.start + _round(index * self._step), self._step)
         if not frame.format.is_rgb:
-            frame.colorspace, frame.color_range = self._tags.colorspace, self._range
+            frame.colorspace, frame.color_range = self._space, self._range
         # Light is converted later; and Blender has libswscale take chroma where it takes what is not specified.
         frame.color_primaries = frame.color_trc = _UNSPECIFIED
         if _TELLS_CHROMA:
@@ -146,7 +146,7 @@ class MovieSource(FrameSource):
             return None
         if (frame.width, frame.height) != self._size or self._scaler != SCALER:
             return None
-        return matrix(frame.colorspace, frame.format.name == "yuvj420p" or self._tags.is_full)
+        return matrix(frame.colorspace, frame.format.name == "yuvj420p" or self._is_full)
 
     def _pixels(self, frame: av.VideoFrame) -> np.ndarray:
         by_fields = self._deinterlace and _has_fields(frame)
