@@ -1,4 +1,4 @@
-// Levels of 8 bits as Blender makes them of light (compute/displaying.py).
+// Levels of 8 bits as Blender makes them of light (compute/gpu.py).
 
 #ifdef SHOW
 // A picture as its levels, top row first, their alpha full; 0 where rounding is too near for the curve to tell.

@@ -120,7 +120,8 @@ def table(state: FrameState) -> np.ndarray:
     Displacement: a row per piece of the quantiles: starts, ends, then dz, the time by which the shutters differ at most
     at either, and z at its start. Value: a row per frame of the shutters' open span, how much it counts.
     """
-    rows = _pieces(state.bars) if state.options.interpolation == "displacement" else _bars(state)
+    by_pieces, bars = state.options.interpolation == "displacement", state.bars
+    rows = _pieces(bars.tobytes(), bars.dtype, bars.shape) if by_pieces else _bars(state)
     result = np.zeros((1 + len(rows), rows.shape[1], 4), dtype=np.float32)
     gains = padded(_gains(state))
     result[0, : len(gains)] = gains
@@ -128,12 +129,8 @@ def table(state: FrameState) -> np.ndarray:
     return result
 
 
-def _pieces(bars: np.ndarray) -> np.ndarray:
-    return _pieces_of(bars.tobytes(), bars.dtype, bars.shape)
-
-
 @lru_cache(16)
-def _pieces_of(content: bytes, dtype: np.dtype, shape: tuple[int, ...]) -> np.ndarray:
+def _pieces(content: bytes, dtype: np.dtype, shape: tuple[int, ...]) -> np.ndarray:
     """Bars seldom change from frame to frame."""
     knots = shutters.knots(np.frombuffer(content, dtype).reshape(shape))
     start, end = padded(knots.start), padded(knots.end)

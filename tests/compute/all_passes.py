@@ -8,8 +8,8 @@ import pytest
 from shutter_addon.compute import (
     composition_passes,
     diffusion_gpu,
-    displaying,
     edge_diffusion_gpu,
+    gpu,
     running_sums,
     stages,
     window,
@@ -31,7 +31,7 @@ def _light(decode, premultiplied, encoded, levels, cover=0, combine=AVERAGE, kin
 
 
 def _declared():
-    for module in (diffusion_gpu, displaying, edge_diffusion_gpu, composition_passes, stages):
+    for module in (diffusion_gpu, gpu, edge_diffusion_gpu, composition_passes, stages):
         yield from (value for value in vars(module).values() if isinstance(value, Pass))
     for ties in ("LABELS", "LINKS", "STENCIL"):
         yield from diffusion_gpu.operators(ties).values()

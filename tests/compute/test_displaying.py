@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from shutter_addon.compute.cpu import CPUCompositor
-from shutter_addon.compute.displaying import Displaying
+from shutter_addon.compute.gpu import Displaying
 from shutter_addon.core.pixels.shown_levels import Display, rounded
 from shutter_addon.media import color
 
