@@ -51,7 +51,8 @@ def sentence(text: object, longest: int = LONGEST) -> str:
     """The text on one line of at most `longest` characters; where it is longer, its middle is left out, for it begins
     with the place and ends with the reason. What cannot be shown (control characters, names of files that are not
     UTF-8) is escaped."""
-    line = "".join(c if c.isprintable() else _escaped(c) for c in " ".join(str(text).split()))
+    words = " ".join(str(text).split())
+    line = "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in words)
     if len(line) <= longest:
         return line
     head = (longest - 3) // 2
@@ -66,7 +67,3 @@ def of_file(error: OSError, place: str | os.PathLike[str] = "") -> str:
 def signed(text: object) -> str:
     """The sentence with the name of who says it, where it stands among Blender's own."""
     return sentence(f"Virtual Shutter: {text}")
-
-
-def _escaped(character: str) -> str:
-    return character.encode("unicode_escape").decode()
