@@ -49,7 +49,7 @@ def device() -> str:
 
 
 def gpu_memory() -> int:
-    """Megabytes of the GPU that textures may take; 0: as devices.budget allows."""
+    """Megabytes of the GPU that textures may take; 0: as devices.device allows."""
     preferences = _preferences()
     return preferences.gpu_memory if preferences else 0
 
