@@ -8,7 +8,7 @@ from bpy.types import PropertyGroup
 from ...core.model import presets
 from ...media import opencv
 from ..data import fcurves, property_copy, validation
-from . import bar_edits, collection_edits
+from . import bar_edits
 from .region_edits import add_region, remove_region
 
 # Told apart by eyes that lack red, green or blue cones: seven by Okabe and Ito (https://jfly.uni-koeln.de/color), then
@@ -97,13 +97,13 @@ def remove_shutter(effect: PropertyGroup, index: int) -> None:
     name = effect.shutters[index].name
     for i in reversed([i for i, region in enumerate(effect.regions) if region.shutter == name]):
         remove_region(effect, i)
-    collection_edits.remove(effect, "shutters", index)
+    fcurves.remove_item(effect, "shutters", index)
     effect.active_shutter = min(effect.active_shutter, max(len(effect.shutters) - 1, 0))
 
 
 def move_shutter(effect: PropertyGroup, index: int, to: int) -> None:
     """Moves a shutter in the list; whichever comes first is the default."""
-    collection_edits.move(effect, "shutters", index, to)
+    fcurves.move_item(effect, "shutters", index, to)
     effect.active_shutter = to
 
 
