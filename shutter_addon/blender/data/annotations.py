@@ -1,4 +1,4 @@
-"""Scribbles: Blender's annotation layers and strokes; and where they lie on an effect's picture, and that picture on the
+"""Scribbles: Blender's annotation layers and strokes; and where they lie on an effect's picture, and that on the
 sequencer's image."""
 
 from __future__ import annotations
