@@ -185,7 +185,7 @@ def _draw_combine(layout: UILayout, shutter: PropertyGroup) -> None:
 def _draw_bars(layout: UILayout, scene: Scene, effect: PropertyGroup, strip: Strip) -> None:
     """What the active shutter's bars come to."""
     try:
-        bars = bar_edits.shown(effect, effect.active_shutter).bars
+        bars, _states = bar_edits.shown(effect, effect.active_shutter)
     except EffectError as error:
         sentence(layout, str(error), "ERROR")
         return
