@@ -332,7 +332,7 @@ def story():
     yield from make_edit()
     if any(job.__name__ in OPTIONS.jobs.split(",") for job in TOLD):
         effect_now().active_region = 0
-        part("blender.editing.layer_presets").sharp_subject(effect_now(), 0)
+        part("blender.editing.shutter_edits").sharp_subject(effect_now(), 0)
         edit_now().frame_set(40)
         yield 1.0
     results = {"renderer": (gpu.platform.renderer_get(), gpu.platform.backend_type_get()), "options": str(OPTIONS)}

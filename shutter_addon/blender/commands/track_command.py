@@ -68,7 +68,7 @@ def run(arguments: Namespace) -> None:
         size = medium.width, medium.height
     old: Any = source_recipe.camera if index is None else source_recipe.regions[index]
     placements = {frame: step.placement for frame, step in tracked.items()}
-    new = region_keys.with_placements(old, placements, {arguments.frame}, size, thin=not arguments.all_keys)
+    new: Any = region_keys.with_placements(old, placements, {arguments.frame}, size, thin=not arguments.all_keys)
     if not arguments.hold:
         new = _ended(new, source_recipe.options.at(1).reach, tracked, stops, arguments.frame, frames)
     regions = [new if region is old else region for region in source_recipe.regions]
