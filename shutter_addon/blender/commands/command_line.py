@@ -24,7 +24,7 @@ from ...media.files import stamp
 from ...media.sequence import by_number
 from ..data import versions
 from ..devices import available
-from ..editing import saved_edit
+from ..editing import whole_edits
 from ..output import film_output
 from ..rendering import render_job, render_settings
 
@@ -118,14 +118,14 @@ class Edit(NamedTuple):
         """
         current = versions.of_edit(self.scene)
         if stamp(self.path) != self.opened:
-            raise saved_edit.SavedEditError(f"{self.path}: was saved over while it was opened; start again")
+            raise whole_edits.SavedEditError(f"{self.path}: was saved over while it was opened; start again")
         return current
 
 
 def open_edit(path: Path, asked: str | None) -> Edit:
     """Opens a saved edit; asked: as for `frames`. SavedEditError, OutputError: there is no such edit, or frame."""
     opened = stamp(path)
-    scene = saved_edit.open_edit(path)
+    scene = whole_edits.open_edit(path)
     whole = range(scene.frame_start, scene.frame_end + 1)
     return Edit(path, scene, frames(asked, whole, "edit"), whole, opened)
 

@@ -20,7 +20,7 @@ from ...media.carried_mattes import CarriedMattes
 from ...media.cuts import ShotSource
 from ...media.footage import Footage
 from ...media.smooth import SmoothSource, steps_for
-from ..editing import new_edit
+from ..editing import whole_edits
 from ..output import film_output
 from ..rendering import render_job
 from . import command_line
@@ -57,7 +57,7 @@ def run(arguments: Namespace) -> None:
             filter(None, (arguments.output, arguments.report)),
             [arguments.source, *command_line.files(medium), arguments.recipe],
         )
-        frames = command_line.frames(arguments.frames, range(1, new_edit.length(medium, source_recipe) + 1))
+        frames = command_line.frames(arguments.frames, range(1, whole_edits.length(medium, source_recipe) + 1))
         if arguments.frame not in frames:
             fault = f"{arguments.frame} is not within the frames {frames[0]}:{frames[-1]}"
             raise film_output.OutputError(f"--frame: {fault}")

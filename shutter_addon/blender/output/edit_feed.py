@@ -51,7 +51,7 @@ class _Film:
 
 @dataclass
 class _Feed:
-    """film: that renders; is_own: whether renders are movies of new_edit.make_edit"""
+    """film: that renders; is_own: whether renders are movies of whole_edits.make_edit"""
 
     film: _Film | None = None
     is_own: bool = False
@@ -61,7 +61,7 @@ _data = _Feed()
 
 
 def feeding() -> AbstractContextManager[None]:
-    """Inside, renders are movies of edits of new_edit.make_edit, from their first frame on."""
+    """Inside, renders are movies of edits of whole_edits.make_edit, from their first frame on."""
     return for_a_while([(_data, "is_own", True)])
 
 
