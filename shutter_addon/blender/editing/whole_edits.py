@@ -22,10 +22,6 @@ from . import add_effect
 _PATHS = {"MOVIE": "filepath", "IMAGE": "directory", "SOUND": "filepath"}  # the property of a strip of that type
 
 
-class SavedEditError(UserError, ValueError):
-    """This file is no edit that can be rendered; the message is one sentence for the user."""
-
-
 def make_edit(path: Path, medium: FrameSource, source_recipe: Effect, folder: Path) -> Scene:
     """An edit of one source strip (an opened medium's) under one effect strip; its scene. folder: of the recipe.
     MediaError: the recipe has mattes that cannot be read."""
@@ -95,30 +91,30 @@ def is_saved(path: Path) -> bool:
 
 def open_edit(path: Path, name: str | None = None) -> Scene:
     """Opens a .blend file, none of whose scripts is run: it may be a stranger's. Its scene of that name; None: the
-    active one, which Blender would render. SavedEditError: it cannot be opened, or shows no edit."""
+    active one, which Blender would render. UserError: it cannot be opened, or shows no edit."""
     if not path.is_file():
-        raise SavedEditError(f"{path}: " + ("is no file" if path.exists() else "no such file"))
+        raise UserError(f"{path}: " + ("is no file" if path.exists() else "no such file"))
     try:
         with film_output.quiet():
             # With its windows, as `blender -b` does: load_ui=False would hold for all that this process opens after it.
             bpy.ops.wm.open_mainfile(filepath=str(path), use_scripts=False)
     except RuntimeError as error:
-        raise SavedEditError(f"{path}: {film_output.message(error)}") from None
+        raise UserError(f"{path}: {film_output.message(error)}") from None
     if name is not None and name not in bpy.data.scenes:
-        raise SavedEditError(f'{path}: has no scene "{sentence(name, 40)}"')
+        raise UserError(f'{path}: has no scene "{sentence(name, 40)}"')
     scene = bpy.context.scene if name is None else bpy.data.scenes[name]
     if name is None and not _has_strips(scene):
         others = [other.name for other in bpy.data.scenes if _has_strips(other)]
         where = f'; make "{others[0]}" the active one, and save the file' if others else ""
-        raise SavedEditError(f'{path}: its active scene, "{scene.name}", has no strips{where}')
+        raise UserError(f'{path}: its active scene, "{scene.name}", has no strips{where}')
     for setting, wanted in (("use_sequencer", True), ("use_multiview", False)):
         if getattr(scene.render, setting) != wanted:
             name, turn = scene.render.bl_rna.properties[setting].name, "on" if wanted else "off"
-            raise SavedEditError(f'{path}: turn "{name}" {turn} in the scene "{scene.name}", and save the file')
+            raise UserError(f'{path}: turn "{name}" {turn} in the scene "{scene.name}", and save the file')
     for owner, driver in _scripts(scene) if name is None else ():  # of a scene's effects drivers do not count
         words = f'a driver of the {owner.bl_rna.name.lower()} "{owner.name}" needs scripts, which are not run'
         words += f" ({sentence(driver.expression, 40)}); bake it to keyframes, and save the file"
-        raise SavedEditError(f"{path}: {words}")
+        raise UserError(f"{path}: {words}")
     return scene
 
 
