@@ -8,7 +8,7 @@ import pytest
 
 from shutter_addon.blender.data import consistency, recipe_import, selection, strips
 from shutter_addon.blender.editing import bar_edits, reconcile, region_edits, shutter_edits
-from shutter_addon.core.model import presets, shutters
+from shutter_addon.core.model import shutters
 from shutter_addon.core.model.frame_state import Options
 
 WINDOWS = 1, 2, 8, 32, 256
@@ -23,11 +23,11 @@ def opened(effect, index=1):
 
 
 def made(name, effect):
-    weights = presets.bars(name, effect.window, effect.position.lower())
+    weights = shutters.preset_bars(name, effect.window, effect.position.lower())
     return pytest.approx(weights, abs=1e-7)
 
 
-@pytest.mark.parametrize("name", presets.PRESETS)
+@pytest.mark.parametrize("name", shutters.PRESETS)
 @pytest.mark.parametrize("position", ["START", "CENTER", "END"])
 def test_it_is_what_the_preset_makes_however_it_came_there(effect, name, position):
     shutter_edits.apply_preset(effect, 1, name)

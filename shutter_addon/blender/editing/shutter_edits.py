@@ -11,7 +11,7 @@ from bpy.app.translations import pgettext_rpt as rpt_
 from bpy.types import PropertyGroup, Scene, Strip
 
 from ...core.messages import EffectError
-from ...core.model import presets
+from ...core.model import shutters
 from ...media import opencv
 from ..data import fcurves, property_copy, snapshot, validation
 from ..data.consistency import unique
@@ -70,7 +70,7 @@ def apply_preset(effect: PropertyGroup, index: int, preset: str, key: bool = Fal
     frame. EffectError: the window has no length, and nothing has changed."""
     shutter, window = effect.shutters[index], validation.number(effect, "window")
     shutter.preset, shutter.preset_position = preset, effect.position
-    weights = presets.bars(preset, window, effect.position.lower())
+    weights = shutters.preset_bars(preset, window, effect.position.lower())
     bar_edits.paint(effect, index, weights, key)
 
 

@@ -14,7 +14,7 @@ from bpy.types import Annotation, Context, Event, Operator, PropertyGroup
 from bpy_extras.io_utils import ExportHelper, ImportHelper
 
 from ...core.messages import EffectError, UserError
-from ...core.model import presets
+from ...core.model import shutters
 from ...core.model.choices import CONTEXT, DRAWN
 from ...core.recipes import recipe_file
 from ..data import annotations, consistency, data_format, preview_areas, recipe_import, selection, strips
@@ -197,7 +197,7 @@ def _presets(_context: Context) -> list[tuple]:
     """With icons, which exist only once the extension is registered."""
     return [
         (name, label, description, icon_of(name), i)
-        for i, (name, (label, description, _make)) in enumerate(presets.PRESETS.items())
+        for i, (name, (label, description, _make)) in enumerate(shutters.PRESETS.items())
     ]
 
 
