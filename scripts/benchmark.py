@@ -59,7 +59,7 @@ from shutter_addon.compute.request import Behind, Coefficients, Exposure, Reques
 from shutter_addon.compute.window import Frames
 from shutter_addon.core.frames import light
 from shutter_addon.core.frames.frame_source import FrameSource
-from shutter_addon.core.model import mattes, presets, scribbles, shutters
+from shutter_addon.core.model import mattes, scribbles, shutters
 from shutter_addon.core.model.frame_state import Combine, Following, FrameState, Layers, Options
 from shutter_addon.core.pixels import combined, compositor
 from shutter_addon.devices.gl import GLDevice
@@ -105,7 +105,7 @@ def bars(kind: str, count: int, window: int) -> np.ndarray:
     """Bars (count, window) of some shutters, of a kind of BARS or "random" ones."""
     if kind == "random":
         return np.random.default_rng(window).random((count, window))
-    return np.stack([presets.bars(name, window) for name in BARS[kind][:count]])
+    return np.stack([shutters.preset_bars(name, window) for name in BARS[kind][:count]])
 
 
 def shapes(count: int) -> tuple[scribbles.Shape, ...]:

@@ -129,7 +129,7 @@ def make_edit():
 
 
 def add_effect(edit, source):
-    recipe_file, presets = part("core.recipes.recipe_file"), part("core.model.presets")
+    recipe_file, shutters = part("core.recipes.recipe_file"), part("core.model.shutters")
     strip, effect = part("blender.editing.add_effect").add_effect(edit, source)
     bars = {"Long": "ANGLE_360", "Half": "ANGLE_180", "Ramp": "RAMP_UP"}
     strokes = {"Half": [[0.4, 0.3], [0.45, 0.6]], "Ramp": [[0.75, 0.2], [0.7, 0.7]]}
@@ -143,7 +143,7 @@ def add_effect(edit, source):
         "inbetween": OPTIONS.smooth if OPTIONS.smooth == "auto" else int(OPTIONS.smooth),
         "border": True,
         "edge_aware": 1,
-        "shutters": [{"name": n, "bars": presets.bars(p, OPTIONS.window).tolist()} for n, p in bars.items()],
+        "shutters": [{"name": n, "bars": shutters.preset_bars(p, OPTIONS.window).tolist()} for n, p in bars.items()],
         "regions": regions,
     }
     part("blender.data.recipe_import").apply(edit, effect, strip, recipe_file.parse(json.dumps(data)))
@@ -332,7 +332,7 @@ def story():
     yield from make_edit()
     if any(job.__name__ in OPTIONS.jobs.split(",") for job in TOLD):
         effect_now().active_region = 0
-        part("blender.editing.layer_presets").sharp_subject(effect_now(), 0)
+        part("blender.editing.shutter_edits").sharp_subject(effect_now(), 0)
         edit_now().frame_set(40)
         yield 1.0
     results = {"renderer": (gpu.platform.renderer_get(), gpu.platform.backend_type_get()), "options": str(OPTIONS)}

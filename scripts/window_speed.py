@@ -76,7 +76,7 @@ def add_effect(edit, source):
         import_module(f"{layer}.{name}") for name in ("editing.add_effect", "data.recipe_import")
     )
     recipe_file = import_module(f"{layer.rpartition('.')[0]}.core.recipes.recipe_file")
-    presets = import_module(f"{layer.rpartition('.')[0]}.core.model.presets")
+    shutters = import_module(f"{layer.rpartition('.')[0]}.core.model.shutters")
     strip, effect = add_effect.add_effect(edit, source)
     lines = {"Sharp": [[0.3, 0.2], [0.5, 0.8]], "Ramp": [[0.7, 0.2], [0.7, 0.8]]}
     bars = {"Long": "ANGLE_360", "Sharp": "STILL", "Ramp": "RAMP_UP"}
@@ -84,7 +84,7 @@ def add_effect(edit, source):
         "version": 1,
         "window": WINDOW,
         "border": True,
-        "shutters": [{"name": n, "bars": presets.bars(p, WINDOW).tolist()} for n, p in bars.items()],
+        "shutters": [{"name": n, "bars": shutters.preset_bars(p, WINDOW).tolist()} for n, p in bars.items()],
         "regions": [{"shutter": n, "kind": "line", "width": 0.02, "strokes": [points]} for n, points in lines.items()],
     }
     recipe_import.apply(edit, effect, strip, recipe_file.parse(json.dumps(data)))

@@ -53,5 +53,5 @@ def compose(
     whole = np.ones((1, *np.shape(coefficients)[1:]))
     for i, shutter in enumerate(state.layers.shutters):
         moved = moves and (moves[0][:, [shutter]], moves[1][:, [shutter]])
-        picture = layering.laid_over(picture, *exposed(state.alone(shutter), mattes[i], whole, moved))
+        picture = layering.laid_over(picture, *exposed(state.of([shutter]), mattes[i], whole, moved))
     return picture

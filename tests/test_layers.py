@@ -98,7 +98,7 @@ def test_they_run_without_bpy():
     code = """
 import sys
 sys.modules["bpy"] = sys.modules["gpu"] = None
-import shutter_addon.core.recipes.recipe, shutter_addon.core.pixels.compositor, shutter_addon.core.model.presets
+import shutter_addon.core.recipes.recipe, shutter_addon.core.pixels.compositor, shutter_addon.core.model.shutters
 import shutter_addon.media, shutter_addon.compute.renderer, shutter_addon.compute.gpu
 """
     subprocess.run([sys.executable, "-c", code], check=True, cwd=PACKAGE.parent)

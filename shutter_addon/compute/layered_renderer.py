@@ -130,7 +130,7 @@ class LayeredRenderer:
     def _parts(self, request: Request, behind: Request) -> dict[tuple[int, bool], Request]:
         """What is composed, by layer, −1 for what lies behind, and whether it is of the weights alone."""
         layers = request.state.layers
-        states = [behind.state, *(request.state.alone(shutter) for shutter in (layers.shutters if layers else ()))]
+        states = [behind.state, *(request.state.of([shutter]) for shutter in (layers.shutters if layers else ()))]
         parts = {(i, False): replace(behind, state=state) for i, state in enumerate(states, -1)}
         if self._source.alpha != "opaque":
             for i, state in enumerate(states, -1):

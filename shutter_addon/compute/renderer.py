@@ -261,7 +261,7 @@ class Renderer:
     def _exposing(self, request: Request, labels: list[LabelLayer]) -> Request:
         """The request as the window and the composition see it: of one shutter, where one holds everywhere."""
         sole = _sole(request, labels)
-        return request if sole is None else replace(request, state=request.state.alone(sole))
+        return request if sole is None else replace(request, state=request.state.of([sole]))
 
     def _loaded_window(self, request: Request, labels: list[LabelLayer]) -> Handle:
         """The window, with the frames loaded that the picture exposes."""

@@ -9,7 +9,7 @@ import pytest
 from _bl_i18n_utils import bl_extract_messages, settings
 
 from shutter_addon import blender
-from shutter_addon.core.model import presets, shutters
+from shutter_addon.core.model import shutters
 from shutter_addon.core.model.choices import CONTEXT
 from shutter_addon.media import camera_tracking, matte_tracking, pursuit, readout, tracking
 
@@ -25,7 +25,7 @@ def of_presets() -> set:
     """Labels and tooltips of the presets, whose list Blender gets from a function."""
     return {
         (context, words)
-        for label, description, *_ in presets.PRESETS.values()
+        for label, description, *_ in shutters.PRESETS.values()
         for context, words in ((CONTEXT, label), ("*", description))
     }
 

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from support import recipe, sequencer, write_frames
 
-from shutter_addon.blender.data import annotations, data_format, fcurves, geometry, recipe_import, selection, strips
+from shutter_addon.blender.data import annotations, data_format, fcurves, recipe_import, selection, strips
 from shutter_addon.blender.editing import add_effect, match_source, undelete
 from shutter_addon.core.model.scribbles import mapped
 from shutter_addon.core.recipes import recipe_file
@@ -264,7 +264,7 @@ def test_an_effect_is_pasted_onto_another_clip(bpy, edit, add, clip, where):
     assert fcurves.key_frames(curves) == [98, 106]
     ((drawing,),) = [list(layer.frames) for layer in effect.scene.annotation.layers]
     assert drawing.frame_number == 98 == effect.start + effect.regions[0].drawn[0].frame
-    to_picture = np.linalg.inv(geometry.picture_to_image(pasted, annotations.picture_size(effect)))
+    to_picture = np.linalg.inv(annotations.picture_to_image(pasted, annotations.picture_size(effect)))
     assert np.abs(mapped(to_picture, annotations.strokes_of(drawing)[0]) - LINE["strokes"][0]).max() < 1e-5
     name = scene.name
     bpy.ops.ed.undo()

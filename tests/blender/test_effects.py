@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from support import effect_of, state, write_frames
 
-from shutter_addon.blender.data import geometry, recipe_import
+from shutter_addon.blender.data import annotations, recipe_import
 from shutter_addon.core.model.scribbles import mapped
 from shutter_addon.core.recipes import recipe_file
 
@@ -107,7 +107,7 @@ def test_a_moved_scaled_and_turned_strip(effect_on):
 
 
 def test_a_picture_point_lies_where_blender_draws_it(bpy, edit, render, tmp_path):
-    """geometry.picture_to_image against a bright pixel block in a rendered, transformed strip."""
+    """annotations.picture_to_image against a bright pixel block in a rendered, transformed strip."""
     picture = np.zeros((1, 40, 60, 3), dtype=np.uint8)
     picture[0, 10:14, 40:44] = 255  # centre: 42/60 across, 12/40 from the top
     strip = edit.sequence_editor.strips.new_image("image", str(write_frames(tmp_path / "in", picture)), 1, 1)
@@ -116,7 +116,7 @@ def test_a_picture_point_lies_where_blender_draws_it(bpy, edit, render, tmp_path
     t.offset_x, t.offset_y, t.scale_x, t.scale_y, t.rotation, t.origin = 7, -5, 1.2, 0.9, 0.5, (0.3, 0.6)
     shown = render(edit, [1])[1][..., 0]
     y, x = (np.indices(shown.shape).reshape(2, -1) * shown.ravel()).sum(axis=1) / shown.sum() + 0.5
-    matrix = geometry.picture_to_image(strip, (60, 40))
+    matrix = annotations.picture_to_image(strip, (60, 40))
     expected = mapped(matrix, np.array([[42 / 60, 1 - 12 / 40]]))[0]
     assert (x - 50, 40 - y) == pytest.approx(tuple(expected), abs=0.6)
 

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import frame_trace
 
-from shutter_addon.blender.editing import new_edit
+from shutter_addon.blender.editing import whole_edits
 from shutter_addon.blender.rendering import sessions
 from shutter_addon.core.recipes import recipe_file
 from shutter_addon.media import open_source
@@ -31,7 +31,7 @@ def ways(bpy, footage, frames, tmp_path):
 
     sessions.forget()
     with open_source(footage) as medium:
-        scene = new_edit.make_edit(footage, medium, recipe_file.parse(json.dumps(RECIPE)), tmp_path)
+        scene = whole_edits.make_edit(footage, medium, recipe_file.parse(json.dumps(RECIPE)), tmp_path)
     scene.render.image_settings.file_format, scene.render.image_settings.color_depth = "PNG", "16"
     door = "VirtualShutterEngine.render"
     for frame in frames:

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from shutter_addon.blender.data import consistency, recipe_import, selection, strips
-from shutter_addon.blender.editing import bar_edits, layer_presets, reconcile, region_edits, shutter_edits
-from shutter_addon.core.model import presets, shutters
+from shutter_addon.blender.editing import bar_edits, reconcile, region_edits, shutter_edits
+from shutter_addon.core.model import shutters
 from shutter_addon.core.model.frame_state import Options
 
 WINDOWS = 1, 2, 8, 32, 256
@@ -23,11 +23,11 @@ def opened(effect, index=1):
 
 
 def made(name, effect):
-    weights = presets.bars(name, effect.window, effect.position.lower())
+    weights = shutters.preset_bars(name, effect.window, effect.position.lower())
     return pytest.approx(weights, abs=1e-7)
 
 
-@pytest.mark.parametrize("name", presets.PRESETS)
+@pytest.mark.parametrize("name", shutters.PRESETS)
 @pytest.mark.parametrize("position", ["START", "CENTER", "END"])
 def test_it_is_what_the_preset_makes_however_it_came_there(effect, name, position):
     shutter_edits.apply_preset(effect, 1, name)
@@ -64,7 +64,7 @@ def test_shutters_of_one_frame_stay_so(bpy, effect):
 
 def test_still_frame_after_sharp_subject_opens_the_shown_one(bpy, effect):
     region_edits.add_region(effect, effect.shutters[1])
-    layer_presets.sharp_subject(effect, 0)
+    shutter_edits.sharp_subject(effect, 0)
     assert opened(effect) == [3]
     effect.active_shutter = 1
     assert bpy.ops.shutter.preset("EXEC_DEFAULT", True, preset="STILL") == {"FINISHED"}

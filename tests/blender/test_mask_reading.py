@@ -253,13 +253,13 @@ def first_x(mask, frame):
 )
 def test_shape_keys_in_another_blender_are_refused(moving, other_blender, change):
     assert first_x(moving, 5) == pytest.approx(0.1)
-    assert mask_reading.moves(moving)
+    assert mask_reading.key_frames(moving)
     other_blender(*change)
     assert_unreadable(moving)
 
 
 def assert_unreadable(mask):
-    for read in (mask_reading.moves, mask_reading.key_frames, lambda mask: mask_reading.mask_at(mask, 5)):
+    for read in (mask_reading.key_frames, lambda mask: mask_reading.mask_at(mask, 5)):
         with pytest.raises(EffectError, match='mask "M": its shape keys cannot be read in this version of Blender'):
             read(mask)
 

@@ -6,7 +6,7 @@ import pytest
 from support import effect_of, recipe, sequencer
 
 from shutter_addon.blender import handlers
-from shutter_addon.blender.data import annotations, fcurves, geometry, selection
+from shutter_addon.blender.data import annotations, fcurves, selection
 from shutter_addon.blender.editing import add_effect, match_source, reconcile, shutter_edits
 from shutter_addon.blender.rendering import render_job
 from shutter_addon.core.model.scribbles import mapped
@@ -228,7 +228,7 @@ def test_scribbles_stay_on_the_picture(bpy, edit, made, change):
 
 def on_picture(effect, strip) -> np.ndarray:
     """The strokes' points, as fractions of the strip's picture."""
-    to_image = geometry.picture_to_image(strip, annotations.picture_size(effect))
+    to_image = annotations.picture_to_image(strip, annotations.picture_size(effect))
     return mapped(np.linalg.inv(to_image), np.array(strokes(effect))[:, :2])
 
 

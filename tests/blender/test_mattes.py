@@ -11,7 +11,7 @@ import pytest
 from support import effect_of, image_strip, read_picture, recipe, request, sequencer, write_frames
 
 from shutter_addon.blender import command
-from shutter_addon.blender.data import geometry, matte_look, recipe_import, selection, snapshot, source_media, strips
+from shutter_addon.blender.data import annotations, matte_look, recipe_import, selection, snapshot, source_media, strips
 from shutter_addon.blender.editing import reconcile, shutter_edits
 from shutter_addon.blender.interface import region_gizmo
 from shutter_addon.blender.output import matte_export
@@ -506,7 +506,7 @@ def test_handles_of_a_ramp(bpy, edit, shown, monkeypatch):
     effect.active_shutter, ramp = 1, effect.regions[0]
     ramp.location, ramp.rotation, ramp.scale = (0.1, 0), np.pi / 2, 0.5
     # Without a window, a region has no pixels.
-    monkeypatch.setattr(geometry, "picture_to_region", lambda *_: np.eye(3))
+    monkeypatch.setattr(annotations, "picture_to_region", lambda *_: np.eye(3))
     with sequencer(bpy):
         where = region_gizmo.place(bpy.context)
         assert np.allclose(where.centre, (0.6, 0.5))

@@ -13,7 +13,7 @@ from shutter_addon import blender
 from shutter_addon.blender.data import annotations, consistency, fcurves, selection
 from shutter_addon.blender.editing import bar_edits, region_edits
 from shutter_addon.blender.interface.region_gizmo import SHUTTER_GGT_region
-from shutter_addon.core.model import limits, presets
+from shutter_addon.core.model import limits, shutters
 from shutter_addon.core.recipes import recipe_file
 
 
@@ -140,7 +140,7 @@ def test_shutters_come_go_and_move(bpy, effect, does):
 @pytest.mark.parametrize("preset", ["ANGLE_180", "GAUSSIAN", "LAST"])
 def test_preset(bpy, effect, does, preset):
     effect = does("preset", preset=preset)
-    assert consistency.bars(effect.shutters[1]) == pytest.approx(presets.bars(preset, 8), abs=1e-6)
+    assert consistency.bars(effect.shutters[1]) == pytest.approx(shutters.preset_bars(preset, 8), abs=1e-6)
     assert bar_edits.key_state(effect, 1) == [""] * 8
     bpy.context.scene.tool_settings.use_keyframe_insert_auto = True
     effect = does("preset", preset="TRAIL")

@@ -350,10 +350,10 @@ def test_whatever_goes_wrong_is_one_sentence(frames, tmp_path, fault, words):
     code = f"""
 import sys
 from shutter_addon import __main__
-from shutter_addon.blender.editing import new_edit
+from shutter_addon.blender.editing import whole_edits
 def make_edit(*_):
     raise {fault}
-new_edit.make_edit = make_edit
+whole_edits.make_edit = make_edit
 sys.argv[1:] = ["render", {str(frames)!r}, "--recipe", {str(tmp_path / "recipe.json")!r}, "--output", "out"]
 sys.exit(__main__.main())
 """

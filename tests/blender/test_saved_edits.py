@@ -17,7 +17,7 @@ from support import noise_film, read_picture, small_disk
 
 from shutter_addon.blender import command
 from shutter_addon.blender.data import versions
-from shutter_addon.blender.editing import saved_edit
+from shutter_addon.blender.editing import whole_edits
 from shutter_addon.core.farm import job_file
 from shutter_addon.media import rendered_pictures
 
@@ -267,12 +267,12 @@ def test_pictures_of_another_version_are_read_once(saved, run, tmp_path, monkeyp
 
 @pytest.mark.parametrize("command", ["render", "check", "join"])
 def test_an_edit_that_is_saved_over_while_it_is_opened(saved, run, tmp_path, monkeypatch, command):
-    def open_edit(path, opened=saved_edit.open_edit):
+    def open_edit(path, opened=whole_edits.open_edit):
         found = opened(path)
         path.write_bytes(path.read_bytes() + b"newer")
         return found
 
-    monkeypatch.setattr(saved_edit, "open_edit", open_edit)
+    monkeypatch.setattr(whole_edits, "open_edit", open_edit)
     out = tmp_path / "out"
     arguments = [tmp_path / "in", "--edit", saved, "--output", tmp_path / "film.mp4"]
     done = run(command, *(arguments if command == "join" else [saved, "--output", out]))

@@ -279,12 +279,12 @@ class Work(RuleBasedStateMachine):
 
     @rule(data=st.data(), late=st.booleans(), name=st.sampled_from(["sharp_subject", "clean_trail"]))
     def make_layer(self, data, late, name):
-        from shutter_addon.blender.editing import layer_presets
+        from shutter_addon.blender.editing import shutter_edits
 
         edit = data.draw(st.sampled_from(edits(self.bpy)))
         if effects := [e for e in edit.virtual_shutter.effects if e.regions]:
             with self.step(late):
-                getattr(layer_presets, name)(data.draw(st.sampled_from(effects)), 0)
+                getattr(shutter_edits, name)(data.draw(st.sampled_from(effects)), 0)
 
     @rule(data=st.data(), late=st.booleans())
     def change_window(self, data, late):

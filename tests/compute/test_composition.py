@@ -12,7 +12,7 @@ from shutter_addon.compute.renderer import Renderer, open_compositor
 from shutter_addon.compute.request import Request
 from shutter_addon.core.frames import light
 from shutter_addon.core.frames.frame_source import FrameSource
-from shutter_addon.core.model import presets, windows
+from shutter_addon.core.model import shutters, windows
 from shutter_addon.core.model.frame_state import FrameState, Options
 from shutter_addon.core.model.scribbles import Shape, rasterise
 from shutter_addon.core.pixels import compositor
@@ -107,7 +107,7 @@ def check(device, source, moment, index, direction=1, shot=None, mattes=None):
 def few_pieces(rng, window=16, **options):
     """Boxes, deltas and cuts, which are composed from running sums, or piece by piece."""
     moment = state(rng, window, **options)
-    moment.bars[:] = np.stack([presets.bars(name, window) for name in ("ANGLE_360", "STILL", "CUTS")])
+    moment.bars[:] = np.stack([shutters.preset_bars(name, window) for name in ("ANGLE_360", "STILL", "CUTS")])
     return moment
 
 

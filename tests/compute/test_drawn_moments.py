@@ -13,7 +13,7 @@ from shutter_addon.compute import running_sums
 from shutter_addon.compute.renderer import Renderer
 from shutter_addon.compute.request import Request
 from shutter_addon.core.frames import light
-from shutter_addon.core.model import presets, shutters, windows
+from shutter_addon.core.model import shutters, windows
 from shutter_addon.core.model.clip import Clip
 from shutter_addon.core.model.frame_state import FrameState, Options
 from shutter_addon.core.model.state_at import state_at
@@ -188,7 +188,9 @@ def test_a_still_frame_is_the_filmed_one(device, steps, position, edges):  # noq
     source = ShotSource(SmoothSource(plain, steps) if steps > 1 else plain, steps)
     last, cut = plain.count - 1, test_shots.LENGTHS[0]
     bars = {"Still": "STILL", "Long": "ANGLE_360"}
-    shutters_ = [{"name": name, "bars": presets.bars(each, 5, position).tolist()} for name, each in bars.items()]
+    shutters_ = [
+        {"name": name, "bars": shutters.preset_bars(each, 5, position).tolist()} for name, each in bars.items()
+    ]
     effect = made(5, shutters_, position=position, edges=edges, inbetween=steps).for_picture(37 / 23)
     renderer = Renderer(device, source)
     for backward in (False, True):

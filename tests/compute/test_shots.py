@@ -9,7 +9,7 @@ from test_composition import SHAPES, Footage, check, few_pieces, state
 
 from shutter_addon.compute.renderer import Renderer, open_compositor
 from shutter_addon.compute.request import Request
-from shutter_addon.core.model import presets, shutters
+from shutter_addon.core.model import shutters
 from shutter_addon.core.model.frame_state import FrameState, Options
 from shutter_addon.media.cuts import NEIGHBOURS, ShotSource
 from shutter_addon.media.smooth import SmoothSource
@@ -72,9 +72,9 @@ def test_a_window_shows_its_own_shot_alone(device, edges, position, direction, d
             check(device, shots_of(dtype), moment, index, direction, SHOTS[index])
 
 
-@pytest.mark.parametrize("preset", sorted(presets.PRESETS))
+@pytest.mark.parametrize("preset", sorted(shutters.PRESETS))
 def test_presets(device, preset):
-    bars = np.stack([presets.bars(preset, 12), presets.bars("STILL", 12)])
+    bars = np.stack([shutters.preset_bars(preset, 12), shutters.preset_bars("STILL", 12)])
     moment = FrameState(Options(12, edges="shorten"), bars, state(np.random.default_rng(42)).shapes[:1])
     check(device, shots_of(np.uint8), moment, 4, 1, SHOTS[4])
 
@@ -114,7 +114,7 @@ def test_within_a_shot_every_frame_is_decoded_once(device):
         renderer.picture(Request(index, moment))
     assert sorted(source.reads) == list(range(max(source.reads) + 1))
     assert max(source.reads) <= 11 + 5 + NEIGHBOURS  # and those that have a say in a cut
-    still = FrameState(Options(6), presets.bars("STILL", 6)[None])
+    still = FrameState(Options(6), shutters.preset_bars("STILL", 6)[None])
     source.reads.clear()
     Renderer(device, ShotSource(source)).picture(Request(9, still))
     assert source.reads == [9]

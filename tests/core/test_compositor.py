@@ -192,7 +192,7 @@ def test_weighted_exposure_is_relative_to_the_default_shutter():
     result = compositor.compose(moment, pictures, np.ones(4, bool), everywhere([0, 1]))
     assert result[..., :3] == pytest.approx(pictures[0][..., :3] / 4)
     assert result[..., 3] == pytest.approx(1)
-    alone = moment.alone(1)
+    alone = moment.of([1])
     assert compositor.compose(alone, pictures, np.ones(4, bool), everywhere([1])) == pytest.approx(result)
 
 

@@ -8,7 +8,7 @@ import pytest
 from made_recipes import made
 from test_shutters import light
 
-from shutter_addon.core.model import presets, windows
+from shutter_addon.core.model import shutters, windows
 from shutter_addon.core.model.clip import Clip
 from shutter_addon.core.model.state_at import state_at
 from shutter_addon.core.pixels import combined
@@ -41,7 +41,7 @@ def exposed(shutters, steps, direction=1, **more):
 @pytest.mark.parametrize("steps", STEPS)
 @pytest.mark.parametrize("window", [1, 4, 7])
 def test_a_still_frame_is_the_filmed_one(window, steps, position, direction):
-    still = {"bars": presets.bars("STILL", window, position).tolist()}
+    still = {"bars": shutters.preset_bars("STILL", window, position).tolist()}
     assert exposed([still], steps, direction, position=position) == {19 * steps: 1}
 
 

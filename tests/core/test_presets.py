@@ -1,59 +1,59 @@
 import numpy as np
 import pytest
 
-from shutter_addon.core.model import presets, shutters
+from shutter_addon.core.model import shutters
 from shutter_addon.core.model.frame_state import Options
 
 
-@pytest.mark.parametrize("name", presets.PRESETS)
+@pytest.mark.parametrize("name", shutters.PRESETS)
 @pytest.mark.parametrize("window", [1, 2, 3, 8, 64, 256])
 def test_every_preset_is_a_shutter(name, window):
-    bars = shutters.check_bars(presets.bars(name, window))
+    bars = shutters.check_bars(shutters.preset_bars(name, window))
     assert len(bars) == window
     assert bars.max() <= 1
 
 
 def test_shapes():
-    assert presets.still(4, 2).tolist() == [0, 0, 1, 0]
-    assert presets.still(4, 9).tolist() == [0, 0, 0, 1]
-    assert presets.angle(8, 180).tolist() == [1, 1, 1, 1, 0, 0, 0, 0]
-    assert presets.angle(8, 45).tolist() == [1, 0, 0, 0, 0, 0, 0, 0]
-    assert presets.angle(6, 45).tolist() == [0.75, 0, 0, 0, 0, 0]
-    assert presets.angle(8, 360).tolist() == [1] * 8
-    assert presets.cuts(8, 2).tolist() == [1, 0, 0, 0, 1, 0, 0, 0]
-    assert presets.cuts(9, 3, 2).tolist() == [1, 1, 0, 1, 1, 0, 1, 1, 0]
-    assert presets.ramp_up(4).tolist() == [0.25, 0.5, 0.75, 1]
-    assert presets.ramp_down(4).tolist() == [1, 0.75, 0.5, 0.25]
-    assert presets.triangle(5) == pytest.approx([0.2, 0.6, 1, 0.6, 0.2])
-    assert presets.stutter(8, 3).tolist() == [1, 0, 0, 1, 0, 0, 1, 0]
+    assert shutters.still(4, 2).tolist() == [0, 0, 1, 0]
+    assert shutters.still(4, 9).tolist() == [0, 0, 0, 1]
+    assert shutters.angle(8, 180).tolist() == [1, 1, 1, 1, 0, 0, 0, 0]
+    assert shutters.angle(8, 45).tolist() == [1, 0, 0, 0, 0, 0, 0, 0]
+    assert shutters.angle(6, 45).tolist() == [0.75, 0, 0, 0, 0, 0]
+    assert shutters.angle(8, 360).tolist() == [1] * 8
+    assert shutters.cuts(8, 2).tolist() == [1, 0, 0, 0, 1, 0, 0, 0]
+    assert shutters.cuts(9, 3, 2).tolist() == [1, 1, 0, 1, 1, 0, 1, 1, 0]
+    assert shutters.ramp_up(4).tolist() == [0.25, 0.5, 0.75, 1]
+    assert shutters.ramp_down(4).tolist() == [1, 0.75, 0.5, 0.25]
+    assert shutters.triangle(5) == pytest.approx([0.2, 0.6, 1, 0.6, 0.2])
+    assert shutters.stutter(8, 3).tolist() == [1, 0, 0, 1, 0, 0, 1, 0]
 
 
 def test_gaussian_and_trail_by_their_definitions():
-    g = presets.gaussian(101, 0.1)
+    g = shutters.gaussian(101, 0.1)
     assert g.argmax() == 50
     assert g[60] / g[50] == pytest.approx(np.exp(-0.5 * (10 / 10.1) ** 2))
-    t = presets.trail(100, 0.25)
+    t = shutters.trail(100, 0.25)
     assert t[0] == 1
     assert t[25] == pytest.approx(np.exp(-1))
 
 
 def test_presets_have_parameters_of_their_own():
-    assert presets.bars("STUTTER", 6).tolist() == [1, 0, 0, 0, 1, 0]
-    assert presets.bars("CUTS", 8).tolist() == [1, 0, 1, 0, 1, 0, 1, 0]
-    assert presets.bars("ANGLE_90", 8).tolist() == [1, 1, 0, 0, 0, 0, 0, 0]
-    assert presets.bars("FIRST", 3).tolist() == [1, 0, 0]
-    assert presets.bars("LAST", 3).tolist() == [0, 0, 1]
+    assert shutters.preset_bars("STUTTER", 6).tolist() == [1, 0, 0, 0, 1, 0]
+    assert shutters.preset_bars("CUTS", 8).tolist() == [1, 0, 1, 0, 1, 0, 1, 0]
+    assert shutters.preset_bars("ANGLE_90", 8).tolist() == [1, 1, 0, 0, 0, 0, 0, 0]
+    assert shutters.preset_bars("FIRST", 3).tolist() == [1, 0, 0]
+    assert shutters.preset_bars("LAST", 3).tolist() == [0, 0, 1]
     with pytest.raises(KeyError):
-        presets.bars("NOPE", 6)
+        shutters.preset_bars("NOPE", 6)
 
 
 @pytest.mark.parametrize("position", ["start", "center", "end"])
 @pytest.mark.parametrize("window", [1, 2, 3, 8, 10, 32, 256])
 def test_a_still_frame_is_the_shown_one(position, window):
-    bars = presets.bars("STILL", window, position)
+    bars = shutters.preset_bars("STILL", window, position)
     assert bars.tolist() == [float(k == Options(window, position).before) for k in range(window)]
 
 
-@pytest.mark.parametrize("name", [name for name in presets.PRESETS if name != "STILL"])
+@pytest.mark.parametrize("name", [name for name in shutters.PRESETS if name != "STILL"])
 def test_all_others_count_the_frames_of_the_window(name):
-    assert presets.bars(name, 9, "end").tolist() == presets.bars(name, 9).tolist()
+    assert shutters.preset_bars(name, 9, "end").tolist() == shutters.preset_bars(name, 9).tolist()

@@ -37,9 +37,9 @@ def effect_strip():
 
 def on_preview(*points):
     """Pixels of the preview's region, of points in fractions of the picture."""
-    geometry, annotations = part("blender.data.geometry"), part("blender.data.annotations")
+    annotations = part("blender.data.annotations")
     size = annotations.picture_size(story.effect())
-    matrix = geometry.picture_to_region(effect_strip(), size, story.preview())
+    matrix = annotations.picture_to_region(effect_strip(), size, story.preview())
     return part("core.model.scribbles").mapped(matrix, points).tolist()
 
 

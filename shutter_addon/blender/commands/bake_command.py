@@ -11,7 +11,7 @@ from bpy.types import PropertyGroup, Scene, Strip
 
 from ...core.messages import sentence
 from ..data import strips
-from ..editing import saved_edit
+from ..editing import whole_edits
 from ..output import baked_film, film_output
 from . import command_line
 from .command_line import place
@@ -31,7 +31,7 @@ def add(commands: argparse._SubParsersAction) -> None:
 
 
 def run(arguments: Namespace) -> None:
-    scene = saved_edit.open_edit(arguments.source, arguments.scene)
+    scene = whole_edits.open_edit(arguments.source, arguments.scene)
     scene.frame_set(scene.frame_current)  # what drivers and keys say, once
     if arguments.attached:
         arguments.source.unlink(missing_ok=True)

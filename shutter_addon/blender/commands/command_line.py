@@ -14,7 +14,7 @@ from bpy.types import Scene
 
 from ...core.farm.job_file import EditVersion
 from ...core.frames.frame_source import FrameSource
-from ...core.messages import sentence
+from ...core.messages import UserError, sentence
 from ...core.model.effect import Effect
 from ...core.model.fields import fields_of
 from ...core.model.frame_state import Options
@@ -24,7 +24,7 @@ from ...media.files import stamp
 from ...media.sequence import by_number
 from ..data import versions
 from ..devices import available
-from ..editing import saved_edit
+from ..editing import whole_edits
 from ..output import film_output
 from ..rendering import render_job, render_settings
 
@@ -113,19 +113,19 @@ class Edit(NamedTuple):
         """Give the version of the edit as it was opened.
 
         Raises:
-            SavedEditError: It was saved over since, so that its key would be that of another edit.
+            UserError: It was saved over since, so that its key would be that of another edit.
             OSError: It is gone.
         """
         current = versions.of_edit(self.scene)
         if stamp(self.path) != self.opened:
-            raise saved_edit.SavedEditError(f"{self.path}: was saved over while it was opened; start again")
+            raise UserError(f"{self.path}: was saved over while it was opened; start again")
         return current
 
 
 def open_edit(path: Path, asked: str | None) -> Edit:
-    """Opens a saved edit; asked: as for `frames`. SavedEditError, OutputError: there is no such edit, or frame."""
+    """Opens a saved edit; asked: as for `frames`. UserError, OutputError: there is no such edit, or frame."""
     opened = stamp(path)
-    scene = saved_edit.open_edit(path)
+    scene = whole_edits.open_edit(path)
     whole = range(scene.frame_start, scene.frame_end + 1)
     return Edit(path, scene, frames(asked, whole, "edit"), whole, opened)
 

@@ -19,7 +19,7 @@ from ...media.opening import MatteFile
 from ...media.rendered_pictures import is_whole_blend, why_short
 from ..data import external_files, preferences, versions
 from ..devices import available
-from ..editing import new_edit, saved_edit
+from ..editing import whole_edits
 from ..output import film_output, shared_frames
 from ..rendering import render_settings
 from . import command_line
@@ -43,7 +43,7 @@ def add(commands: argparse._SubParsersAction) -> None:
 
 
 def run(arguments: Namespace) -> None:
-    if saved_edit.is_saved(arguments.source):
+    if whole_edits.is_saved(arguments.source):
         _render_edit(arguments)
     else:
         _render_source(arguments)
@@ -85,10 +85,10 @@ def _render_source(arguments: Namespace) -> None:
             film_output.check(output, arguments.format, (medium.width, medium.height))
             if arguments.save and film_output.is_movie(output) and "#" in output.name:
                 raise film_output.OutputError(f"{output}: in a saved edit, Blender takes # for the frames' numbers")
-        frames = command_line.frames(arguments.frames, range(1, new_edit.length(medium, source_recipe) + 1))
+        frames = command_line.frames(arguments.frames, range(1, whole_edits.length(medium, source_recipe) + 1))
         read = path, *command_line.files(medium), arguments.recipe, *_mattes(source_recipe, arguments.recipe.parent)
         film_output.spare(_written(arguments, file_format, frames), read)
-        scene = new_edit.make_edit(path, medium, source_recipe, arguments.recipe.parent)
+        scene = whole_edits.make_edit(path, medium, source_recipe, arguments.recipe.parent)
     scene.frame_start, scene.frame_end = frames[0], frames[-1]
     if output:
         _check_device(arguments)
@@ -144,7 +144,7 @@ def _save(scene: Scene, path: Path) -> None:
     try:
         film_output.prepare(path.parent)
         with atomic_write.writing(path) as part:
-            with film_output.quiet(), new_edit.paths_relative(scene, path.parent):
+            with film_output.quiet(), whole_edits.paths_relative(scene, path.parent):
                 bpy.ops.wm.save_as_mainfile(filepath=str(part), compress=True, copy=True, relative_remap=False)
             if not is_whole_blend(part):
                 raise film_output.OutputError(f"{path}: could not be saved whole; {why_short(part.parent)}")

@@ -12,16 +12,15 @@ from typing import Any
 from ...core import atomic_write
 from ...core.frames.frame_source import FrameSource
 from ...core.model import outlines, presence
-from ...core.model.clip import nearest
-from ...core.model.effect import Effect, OutlineRegion, Region
+from ...core.model.clip import Clip
+from ...core.model.effect import Camera, Effect, OutlineRegion, Region
 from ...core.recipes import recipe, recipe_file, region_keys
 from ...media import PrefetchSource, camera_tracking, matte_tracking, registration, tracking
 from ...media.carried_mattes import CarriedMattes
 from ...media.cuts import ShotSource
 from ...media.footage import Footage
 from ...media.smooth import SmoothSource, steps_for
-from ...media.tracking import Tracked
-from ..editing import new_edit
+from ..editing import whole_edits
 from ..output import film_output
 from ..rendering import render_job
 from . import command_line
@@ -58,7 +57,7 @@ def run(arguments: Namespace) -> None:
             filter(None, (arguments.output, arguments.report)),
             [arguments.source, *command_line.files(medium), arguments.recipe],
         )
-        frames = command_line.frames(arguments.frames, range(1, new_edit.length(medium, source_recipe) + 1))
+        frames = command_line.frames(arguments.frames, range(1, whole_edits.length(medium, source_recipe) + 1))
         if arguments.frame not in frames:
             fault = f"{arguments.frame} is not within the frames {frames[0]}:{frames[-1]}"
             raise film_output.OutputError(f"--frame: {fault}")
@@ -67,9 +66,13 @@ def run(arguments: Namespace) -> None:
         except tracking.TrackingError as error:
             raise tracking.TrackingError(f"{subject}: {error}") from None
         size = medium.width, medium.height
-    keyed = _keyed(arguments, source_recipe, index, tracked, size)
+    old: Any = source_recipe.camera if index is None else source_recipe.regions[index]
+    placements = {frame: step.placement for frame, step in tracked.items()}
+    new: Any = region_keys.with_placements(old, placements, {arguments.frame}, size, thin=not arguments.all_keys)
     if not arguments.hold:
-        keyed = _ended(keyed, index, tracked, stops, arguments.frame, frames)
+        new = _ended(new, source_recipe.options.at(1).reach, tracked, stops, arguments.frame, frames)
+    regions = [new if region is old else region for region in source_recipe.regions]
+    keyed = source_recipe.with_parts(regions, new if index is None else None)
     _write_track(arguments, keyed, tracked, stops)
     for stop in stops:
         if stop.fault == tracking.SHOT_ENDS:
@@ -98,23 +101,23 @@ def _followed(
     TrackingError: at once."""
     effect = source_recipe.for_picture(medium.width / medium.height)
     subject: Any = effect.camera if index is None else effect.regions[index]
-    step = _steps(source_recipe, medium)
-    shown = {frame: _shown(source_recipe, frame, medium.count, step) for frame in frames}
+    options = source_recipe.options.at(1)
+    step = steps_for(medium, options.step, options.window, skip_repeats=options.skip_repeats)
     with ExitStack() as ends:
         moments = medium if step == 1 else SmoothSource(medium, step)
         shots = ends.enter_context(ShotSource(PrefetchSource(moments), step))
         moved = ends.enter_context(film_output.progress(len(frames), "frame"))
-        what = Footage(shots, shown.__getitem__), arguments.frame, frames
+        clip = Clip.of(shots, source_recipe.time)
+        footage = Footage(shots, lambda frame: clip.shown(frame).source_frame)
         if index is None:
             regions = [region for region in effect.regions if isinstance(region, Region)]
             track: tracking.Track = camera_tracking.CameraTrack(subject, regions)
         elif isinstance(subject, OutlineRegion):
-            cover = _cover(arguments, source_recipe, subject, shown, step, ends)
-            track = matte_tracking.MatteTrack(subject, cover)
+            track = matte_tracking.MatteTrack(subject, _cover(arguments, subject, clip, ends))
         else:
             track = tracking.RegionTrack(subject)
         tracked = []
-        for each in track.follow(*what, motion=arguments.motion):
+        for each in track.follow(footage, arguments.frame, frames, motion=arguments.motion):
             tracked.append(each)
             moved()
     stops = [each for each in tracked if each.fault]
@@ -123,64 +126,32 @@ def _followed(
     return {each.frame: each for each in tracked if not each.fault}, stops
 
 
-def _cover(
-    arguments: Namespace,
-    source_recipe: Effect,
-    region: OutlineRegion,
-    shown: dict[int, int],
-    step: int,
-    ends: ExitStack,
-) -> matte_tracking.Cover:
-    """What an outline covers; shown: by timeline frame, the source's moment; ends: what closes its mattes."""
+def _cover(arguments: Namespace, region: OutlineRegion, clip: Clip, ends: ExitStack) -> matte_tracking.Cover:
+    """What an outline covers; clip: says what is shown at timeline frames; ends: what closes its mattes."""
     if region.between == "straight":
         return matte_tracking.cover_within(region.drawings.at)
+
+    def filmed(frame: float) -> int:
+        return clip.shown(frame).source_frame // clip.step
+
     medium = ends.enter_context(command_line.opened(arguments.source))
-    drawn = {}
-    for strokes, frame in zip(region.drawings.strokes, region.drawings.frames, strict=True):
-        drawn[_shown(source_recipe, frame, medium.count, step) // step] = outlines.curves(strokes)
-    mattes = ends.enter_context(closing(CarriedMattes(medium, tuple(sorted(drawn.items())))))
-    return matte_tracking.cover_of(mattes, lambda frame: shown[frame] // step)
+    drawn = zip(region.drawings.frames, region.drawings.strokes, strict=True)
+    curves = {filmed(frame): outlines.curves(strokes) for frame, strokes in drawn}
+    mattes = ends.enter_context(closing(CarriedMattes(medium, tuple(sorted(curves.items())))))
+    return matte_tracking.cover_of(mattes, filmed)
 
 
-def _keyed(
-    arguments: Namespace, source_recipe: Effect, index: int | None, tracked: dict[int, Tracked], size: tuple[int, int]
-) -> Effect:
-    """The recipe with what was tracked as keys of a region, or of the camera."""
-    placements = {frame: step.placement for frame, step in tracked.items()}
-    what, thin = (placements, {arguments.frame}, size), not arguments.all_keys
-    if index is None:
-        return region_keys.with_camera(source_recipe, *what, thin=thin)
-    regions: list[Any] = list(source_recipe.regions)
-    regions[index] = region_keys.with_placements(regions[index], *what, thin=thin)
-    return source_recipe.with_parts(regions)
-
-
-def _ended(source_recipe: Effect, index: int | None, tracked: dict, stops: list, start: int, frames: range) -> Effect:
-    """The recipe whose region, or camera, counts only where it was tracked."""
+def _ended(moving: Any, reach: int, tracked: dict, stops: list, start: int, frames: range) -> Any:
+    """A region, or the camera, that counts only where it was tracked."""
     seen = [frame for frame, step in tracked.items() if step.confidence > 0]
     ends = [presence.Stop(stop.frame, stop.frame > start, stop.fault == tracking.SHOT_ENDS) for stop in stops]
-    if index is None:
-        reach, camera = source_recipe.options.at(1).reach, source_recipe.camera
+    if isinstance(moving, Camera):
         keys = presence.keys(seen, ends, (), max(reach, presence.FADE), beside=1)
-        camera = replace(camera, influence=region_keys.with_ends(camera.influence, keys, frames))
-        return source_recipe.with_parts(source_recipe.regions, camera)
-    regions, keys = list(source_recipe.regions), presence.keys(seen, ends, {start})
-    if isinstance(regions[index], OutlineRegion):  # a matte says itself where it is
-        return source_recipe
-    regions[index] = replace(regions[index], opacity=region_keys.with_ends(regions[index].opacity, keys, frames))
-    return source_recipe.with_parts(regions)
-
-
-def _steps(source_recipe: Effect, medium: FrameSource) -> int:
-    """How many moments a recipe has from a filmed frame to the next."""
-    options = source_recipe.options.at(1)
-    return steps_for(medium, options.step, options.window, skip_repeats=options.skip_repeats)
-
-
-def _shown(source_recipe: Effect, frame: float, count: int, step: int) -> int:
-    """Which of a source's moments, from 0 on, a recipe shows at a timeline frame."""
-    filmed = (source_recipe.time.at(frame)[0] if source_recipe.time else frame) - 1
-    return nearest(filmed, step, (count - 1) * step + 1)
+        return replace(moving, influence=region_keys.with_ends(moving.influence, keys, frames))
+    if isinstance(moving, OutlineRegion):  # a matte says itself where it is
+        return moving
+    keys = presence.keys(seen, ends, {start})
+    return replace(moving, opacity=region_keys.with_ends(moving.opacity, keys, frames))
 
 
 def _write_track(arguments: Namespace, result: Effect, tracked: dict, stops: list) -> None:

@@ -9,7 +9,7 @@ from bpy.app.translations import pgettext_rpt as rpt_
 from bpy.types import Context, FCurve, PropertyGroup
 
 from ...core.messages import EffectError
-from ...core.model import keyframes, limits, presets, shutters
+from ...core.model import keyframes, limits, shutters
 from ...core.model.effect import OTHER_MOMENTS, STILL_CAMERA, Shutter
 from . import fcurves, strips, validation
 from .annotations import layer_of
@@ -127,12 +127,12 @@ def _count_bars(effect: PropertyGroup, index: int, steps: int) -> EffectError | 
 
 
 def preset_of(effect: PropertyGroup, index: int) -> str:
-    """The preset that a shutter keeps to, a key of presets.PRESETS: the one that it was given last, as long as its bars
-    are just those. "": none, as they were edited, or are keyed."""
+    """The preset that a shutter keeps to, a key of shutters.PRESETS: the one that it was given last, as long as its
+    bars are just those. "": none, as they were edited, or are keyed."""
     shutter, weights = effect.shutters[index], bars(effect.shutters[index])
-    if shutter.preset not in presets.PRESETS or not weights.size:
+    if shutter.preset not in shutters.PRESETS or not weights.size:
         return ""
-    made = presets.bars(shutter.preset, len(weights), shutter.preset_position.lower()).astype(np.float32)
+    made = shutters.preset_bars(shutter.preset, len(weights), shutter.preset_position.lower()).astype(np.float32)
     path = f"{effect.path_from_id()}.shutters[{index}].bars["
     is_kept = np.array_equal(weights, made) and not fcurves.curves_under(effect.id_data, path)
     return shutter.preset if is_kept else ""
@@ -145,7 +145,7 @@ def _made_again(effect: PropertyGroup, index: int) -> bool:
     shutter.preset = preset_of(effect, index)
     if shutter.preset:
         shutter.preset_position = effect.position
-        made = presets.bars(shutter.preset, effect.window, effect.position.lower())
+        made = shutters.preset_bars(shutter.preset, effect.window, effect.position.lower())
         _change_bars(effect, index, lambda _old: made)
     return bool(shutter.preset)
 

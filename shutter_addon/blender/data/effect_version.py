@@ -20,7 +20,6 @@ from ...media import MediaError
 from . import (
     external_files,
     fcurves,
-    geometry,
     mask_reading,
     matte_content,
     property_copy,
@@ -29,7 +28,7 @@ from . import (
     strips,
     versions,
 )
-from .annotations import layer_of, picture_size
+from .annotations import TRANSFORM, layer_of, picture_size
 from .fcurves import numbers
 
 # What stands for the files of a strip, or of a region whose matte is an image.
@@ -97,7 +96,7 @@ def parts(
     yield from _curves(placed, start)
     keyed = {name for name, _index, curve in placed if _drives(curve)}
     # As words: "not a number" is never the same again.
-    yield repr([getattr(strip.transform, name) for name in geometry.TRANSFORM if name not in keyed])
+    yield repr([getattr(strip.transform, name) for name in TRANSFORM if name not in keyed])
     yield repr(tuple(strip.transform.origin)), strip.use_flip_x, strip.use_flip_y  # scribbles lie mirrored with it
 
 

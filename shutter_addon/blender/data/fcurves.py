@@ -4,13 +4,13 @@ The engine is called with the effect scene's depsgraph, which knows nothing of o
 """
 
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from itertools import pairwise
 from typing import Any
 
 import bpy
 import numpy as np
-from bpy.types import bpy_prop_collection
+from bpy.types import PropertyGroup, bpy_prop_collection
 from bpy_extras import anim_utils
 
 from ...core.model.keyframes import Ease
@@ -210,11 +210,29 @@ def copy_curves(scene, path: str, new_scene, new_path: str) -> None:
         copy.array_index = curve.array_index
 
 
-def reindex(scene, path: str, places: dict[int, int | None]) -> None:
-    """Keeps F-curves with the items of the collection at `path` whose places changed: old index → new, None: removed.
+def remove_item(owner: PropertyGroup, collection: str, index: int) -> None:
+    """Removes an item of a collection together with its F-curves; owner: a scene's property group that has it."""
+    items = getattr(owner, collection)
+    places = {index: None} | {i: i - 1 for i in range(index + 1, len(items))}
+    items.remove(index)
+    _reindex(owner, collection, places)
+
+
+def move_item(owner: PropertyGroup, collection: str, index: int, to: int) -> None:
+    """Moves an item of a collection together with its F-curves; owner: as in remove_item."""
+    items = getattr(owner, collection)
+    order = list(range(len(items)))
+    order.insert(to, order.pop(index))
+    items.move(index, to)
+    _reindex(owner, collection, {old: new for new, old in enumerate(order)})
+
+
+def _reindex(owner: PropertyGroup, collection: str, places: Mapping[int, int | None]) -> None:
+    """Keeps F-curves with the items of a collection whose places changed: old index → new, None: removed.
 
     Blender finds properties by index, and knows nothing of items that move.
     """
+    scene, path = owner.id_data, f"{owner.path_from_id()}.{collection}"
     item = re.compile(re.escape(path) + r"\[(\d+)\]")
     for curve in curves_under(scene, f"{path}["):
         if (match := item.match(curve.data_path)) is None:  # a script's: it goes by the item's name

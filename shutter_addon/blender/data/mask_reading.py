@@ -52,15 +52,10 @@ def motion(mask: bpy.types.Mask) -> Iterator[tuple]:
 
 
 def key_frames(mask: bpy.types.Mask) -> list[float]:
-    """The frames of a mask at which something is said of it: shape keys, and keys of its F-curves. EffectError: they
-    cannot be read."""
+    """The frames of a mask at which something is said of it: shape keys, and keys of its F-curves; without any it never
+    changes. EffectError: they cannot be read."""
     keyed = {float(frame) for layer in mask.layers for frame in _shapes(mask, layer)}
     return sorted(keyed.union(fcurves.key_frames(fcurves.curves_under(mask, ""))))
-
-
-def moves(mask: bpy.types.Mask) -> bool:
-    """Whether a mask may differ from frame to frame. EffectError: nobody knows."""
-    return bool(key_frames(mask))
 
 
 def _layer_at(mask: bpy.types.Mask, layer: bpy.types.MaskLayer, frame: float) -> MaskLayer:

@@ -108,7 +108,7 @@ def _mask_shapes(
     mask = region.mask
     if mask is None:
         raise EffectError(rpt_("{place}: it has no mask").format(place=validation.place(region)))
-    if not mask_reading.moves(mask):
+    if not mask_reading.key_frames(mask):
         return over(None, lambda _frame: mask_reading.mask_at(mask, mask.frame_start))
     filmed = shown_frame(effect.id_data, effect, strip, time)
     return over(frames, lambda frame: mask_reading.mask_at(mask, mask.frame_start + filmed(frame)))

@@ -9,7 +9,7 @@ import bpy
 import numpy as np
 from bpy.types import Area, Context, PropertyGroup, Scene, Space, Strip
 
-from . import annotations, geometry, seen_alone, selection, source_media, strips
+from . import annotations, seen_alone, selection, source_media, strips
 
 _PERCENT = {"PROXY_25": 25, "PROXY_50": 50, "PROXY_75": 75, "PROXY_100": 100}
 _PLAIN_STRIP = {"blend_alpha": 1.0, "color_saturation": 1.0, "scene_input": "CAMERA"}
@@ -128,13 +128,13 @@ def _scale(context: Context, scene: Scene, strip: Strip, area: Area) -> float:
     space = area.spaces.active
     percent = _PERCENT.get(space.proxy_render_size, scene.render.resolution_percentage)
     size = strip.scene.render.resolution_x, strip.scene.render.resolution_y
-    scale = percent / 100 * _pixel(geometry.picture_to_image(strip, size), size)
+    scale = percent / 100 * _pixel(annotations.picture_to_image(strip, size), size)
     if not context.window_manager.virtual_shutter.live:
         return percent / 100
     region = preview_region(area)
     if space.display_mode != "IMAGE" or min(region.width, region.height) < 2:
         return scale
-    return min(scale, _pixel(geometry.picture_to_region(strip, size, region), size))
+    return min(scale, _pixel(annotations.picture_to_region(strip, size, region), size))
 
 
 def _pixel(matrix: np.ndarray, size: tuple[int, int]) -> float:

@@ -21,8 +21,8 @@ from ...media import MediaError
 from ...media.files import check_name
 from ...media.opening import MatteFile
 from ...media.sequence import IMAGE_SUFFIXES
-from . import fcurves, geometry, strips
-from .annotations import add_stroke, annotation, picture_size
+from . import fcurves, strips
+from .annotations import add_stroke, annotation, picture_size, picture_to_image
 
 
 def apply(scene, effect, strip, source: model.Effect, folder: Path = Path()) -> None:
@@ -210,7 +210,7 @@ def _draw(
     """Draws a region's strokes on an annotation layer of its own, a frame per drawing; the layer's name."""
     layer = annotation(effect).layers.new(source.name or data_("Region"), set_active=False)
     layer.color = color
-    to_image = geometry.picture_to_image(strip, picture_size(effect))
+    to_image = picture_to_image(strip, picture_size(effect))
     is_keyed = isinstance(source.moves.location, keyframes.Keys)
     for frame, strokes in zip(drawings.frames, drawings.strokes, strict=True):
         drawing = layer.frames.new(int((frame if is_keyed else 1) + first))

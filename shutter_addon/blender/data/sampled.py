@@ -11,7 +11,7 @@ from ...core.model import effect as model
 from ...core.model import keyframes
 from ...core.model.fields import Field, fields_of
 from ...core.model.motions import Placement
-from . import annotations, geometry, strips, validation
+from . import annotations, strips, validation
 from .fcurves import Curves
 
 Frames = Collection[float]  # of the timeline
@@ -134,7 +134,7 @@ def drawings(
 def placement(curves: Curves, effect: PropertyGroup, strip: Strip, frames: Frames) -> keyframes.Channel:
     """The matrix from the sequencer's image to the strip's picture, which may be keyed."""
     size, path = annotations.picture_size(effect), f"{strip.path_from_id()}.transform"
-    keyed = {name: curve for name in geometry.TRANSFORM if (curve := tried(curves.find, f"{path}.{name}"))}
+    keyed = {name: curve for name in annotations.TRANSFORM if (curve := tried(curves.find, f"{path}.{name}"))}
 
     def at(frame: float) -> np.ndarray | None:
         moved = {name: curve.evaluate(frame) for name, curve in keyed.items() if not isinstance(curve, EffectError)}

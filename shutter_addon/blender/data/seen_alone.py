@@ -4,7 +4,6 @@ that are known beforehand."""
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import NamedTuple
 
 import bpy
 from bpy.types import Scene, Strip, bpy_struct
@@ -54,18 +53,9 @@ def hides(scene: Scene, strip: Strip) -> bool:
     )
 
 
-class Alone(NamedTuple):
-    """An effect strip that is all that is seen of a scene at a frame.
-
-    is_blended: whether Blender lays it over something, which makes other bits of it"""
-
-    strip: Strip
-    is_blended: bool
-
-
-def alone(scene: Scene, frame: int, but: str | None = None) -> Alone | None:
-    """What is seen of a scene at a frame, if it is an effect strip alone, by `hides`. but: the name of a strip that
-    does not count."""
+def alone(scene: Scene, frame: int, but: str | None = None) -> tuple[Strip, bool] | None:
+    """What is seen of a scene at a frame, if it is an effect strip alone, by `hides`; and whether Blender lays it over
+    something, which makes other bits of it. but: the name of a strip that does not count."""
     editor = scene.sequence_editor
     if has_animation(scene, ".mute"):
         return None  # what is muted now may not be then
@@ -89,7 +79,7 @@ def alone(scene: Scene, frame: int, but: str | None = None) -> Alone | None:
     # Others may give nothing to be laid over.
     if is_blended and (effect is None or strips.nearest_source(scene, effect, top) not in seen):
         return None
-    return Alone(top, is_blended)
+    return top, is_blended
 
 
 def makes_levels(scene: Scene) -> bool:

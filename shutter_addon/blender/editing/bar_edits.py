@@ -2,7 +2,6 @@
 
 from collections.abc import Sequence
 from contextlib import suppress
-from typing import NamedTuple
 
 import bpy
 import numpy as np
@@ -99,22 +98,14 @@ def unkey_bars(effect: PropertyGroup, index: int) -> bool:
     return is_deleted
 
 
-class BarsShown(NamedTuple):
-    """A shutter's bars (L,) float64 as the picture at the current frame is made with them, and for each of them, as
-    Blender colours its fields: "", "animated", "keyed" here, or "changed" since."""
-
-    bars: np.ndarray
-    states: list[str]
-
-
-def shown(effect: PropertyGroup, index: int) -> BarsShown:
+def shown(effect: PropertyGroup, index: int) -> tuple[np.ndarray, list[str]]:
     """What bars_now and key_state say, for what is drawn: worked out once until something changes."""
     key = effect.scene.session_uid, index, effect.id_data.frame_float
     return revision.until_change("bars", key, lambda: _read(effect, index))
 
 
 def key_state(effect: PropertyGroup, index: int) -> list[str]:
-    """See BarsShown.states."""
+    """For each of a shutter's bars, as Blender colours its fields: "", "animated", "keyed" here, or "changed" since."""
     scene = effect.id_data
     curves = fcurves.Curves(scene)
     bars_and_paths = zip(effect.shutters[index].bars, _paths(effect, index), strict=True)
@@ -135,11 +126,11 @@ def bars_now(effect: PropertyGroup, index: int) -> np.ndarray:
 
     Bars that were changed since, and not keyed yet, count as they stand. EffectError: the picture cannot be made.
     """
-    return _read(effect, index).bars
+    return _read(effect, index)[0]
 
 
-def _read(effect: PropertyGroup, index: int) -> BarsShown:
+def _read(effect: PropertyGroup, index: int) -> tuple[np.ndarray, list[str]]:
     scene, states = effect.id_data, key_state(effect, index)
     if "changed" in states:
-        return BarsShown(bars(effect.shutters[index]), states)
-    return BarsShown(snapshot.bars_at(scene, effect, index, scene.frame_float), states)
+        return bars(effect.shutters[index]), states
+    return snapshot.bars_at(scene, effect, index, scene.frame_float), states

@@ -24,7 +24,7 @@ from ...core.messages import EffectError, translated
 from ...core.model import motions
 from ...core.model.effect import Camera, Region
 from ...core.model.motions import Placement, Similarity
-from ...core.model.stabilization import Settings, Stabilization, Track, laid
+from ...core.model.stabilization import Stabilization, Track, laid
 from ...media import registration
 from ..data import annotations, external_files, fcurves, selection, snapshot, source_media, strips, validation
 from ..rendering import effect_source
@@ -308,10 +308,9 @@ def unstabilized(clip: MovieClip, size: tuple[int, int]) -> Callable[[float], Si
         taken = {name: value(settings, f"influence_{name}", frame) for name in ("location", "rotation", "scale")}
         target = complex(x * size[0] / size[1], y)
         angle, scale = value(settings, "target_rotation", frame), value(settings, "target_scale", frame)
-        wanted = Settings(**taken, target=target, target_angle=angle, target_scale=scale)
         measured = stabilization.at(frame)
         assert measured is not None  # as there are frames
-        return _in_pixels(laid(measured, wanted), size).inverse()
+        return _in_pixels(laid(measured, target, angle, scale, **taken), size).inverse()
 
     def between(time: float) -> Similarity:
         first, second, share = at(math.floor(time)), at(math.ceil(time)), time - math.floor(time)

@@ -22,7 +22,7 @@ from ...core.model.keyframes import Ease
 from ...core.model.scribbles import mapped
 from ...media import flow, outlining
 from ...media.carried_mattes import CarriedFile, CarriedMattes
-from ..data import annotations, fcurves, geometry, mask_reading, snapshot, strips
+from ..data import annotations, fcurves, mask_reading, snapshot, strips
 from ..data.annotations import layer_of
 from ..data.property_copy import for_a_while
 from ..rendering import effect_source
@@ -74,8 +74,8 @@ def draw(
 ) -> None:
     """Makes curves the drawing of a region at a timeline frame; in place of one that is there, unless it adds to it.
     EffectError: the strip is scaled to nothing."""
-    to_image = geometry.picture_to_image(strip, annotations.picture_size(effect))
-    if not geometry.is_invertible(to_image):
+    to_image = annotations.picture_to_image(strip, annotations.picture_size(effect))
+    if not annotations.is_invertible(to_image):
         raise EffectError(rpt_('strip "{strip}" is scaled to nothing').format(strip=strip.name))
     layer = layer_of(effect, region) or region_edits.new_layer(effect, region)
     there = [drawing for drawing in layer.frames if drawing.frame_number == frame]

@@ -26,7 +26,7 @@ from ..data import data_format, fcurves, requirements, seen_alone, source_media,
 from ..data.annotations import USERS, picture_size
 from ..data.property_copy import copy_properties
 from ..rendering import invalidation, render_job, sessions
-from . import add_effect, collection_edits, match_source, shown_annotations, undelete
+from . import add_effect, match_source, shown_annotations, undelete
 
 # What an effect scene has as its edit; Blender crashes where one in stereo shows a scene that is not.
 _OF_EDIT = "fps", "fps_base", "use_multiview"
@@ -217,7 +217,7 @@ def _remove_effects(scene: Scene) -> None:
         _renew_action(scene)
     for i in reversed(gone):
         undelete.keep(group.effects[i])
-        collection_edits.remove(group, "effects", i)
+        fcurves.remove_item(group, "effects", i)
 
 
 def _renew_action(scene: Scene) -> None:

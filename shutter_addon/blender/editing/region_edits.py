@@ -1,12 +1,23 @@
 """An effect's regions and their annotation layers: added, removed, moved, keyed."""
 
 import numpy as np
+from bpy.app.translations import pgettext_rpt as rpt_
 from bpy.types import Annotation, AnnotationLayer, PropertyGroup
 
-from ..data import selection, strips
+from ...core.model import limits
+from ..data import fcurves, selection, strips
 from ..data.annotations import add_stroke, annotation, layer_of, strokes_of
 from ..data.consistency import bars, choose_region, color_layers, forget_followed, unique
-from . import collection_edits, motion_keys
+from . import motion_keys
+
+
+def why_full(effect: PropertyGroup, *, regions: int = 0, shutters: int = 0) -> str | None:
+    """Why an effect cannot have so many more regions and shutters, in a sentence; None if it can."""
+    if regions and len(effect.regions) + regions > limits.MAX_REGIONS:
+        return rpt_("An effect has {most} regions at most").format(most=limits.MAX_REGIONS)
+    if shutters and len(effect.shutters) + shutters > limits.MAX_SHUTTERS:
+        return rpt_("An effect has {most} shutters at most").format(most=limits.MAX_SHUTTERS)
+    return None
 
 
 def add_region(
@@ -64,7 +75,7 @@ def remove_region(effect: PropertyGroup, index: int) -> None:
     if layer is not None:
         effect.scene.annotation.layers.remove(layer)
     name = effect.regions[index].name
-    collection_edits.remove(effect, "regions", index)
+    fcurves.remove_item(effect, "regions", index)
     forget_followed(effect, name)
     effect.active_region = min(effect.active_region, max(len(effect.regions) - 1, 0))
     choose_region(effect)
@@ -72,7 +83,7 @@ def remove_region(effect: PropertyGroup, index: int) -> None:
 
 def move_region(effect: PropertyGroup, index: int, to: int) -> None:
     """Moves a region in the list; later ones lie over earlier ones."""
-    collection_edits.move(effect, "regions", index, to)
+    fcurves.move_item(effect, "regions", index, to)
     effect.active_region = to
 
 

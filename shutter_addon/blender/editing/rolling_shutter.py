@@ -22,7 +22,7 @@ from ...media.cuts import ShotSource
 from ..data import sampled, snapshot, source_media, strips, validation
 from ..data.consistency import bars
 from ..data.fcurves import Curves
-from . import bar_edits, collection_edits, shutter_edits
+from . import bar_edits, region_edits, shutter_edits
 
 SMOOTH = "8"  # of effects that were not smooth
 FRAMES = 3  # of the window, at least: the shown one and those beside it
@@ -77,7 +77,7 @@ def repair(scene: Scene, effect: PropertyGroup, strip: Strip, share: float, side
     changed then."""
     backward = _is_backward(scene, effect, strip)
     known = of(effect)
-    if known is None and (sentence := collection_edits.why_full(effect, regions=1, shutters=2)):
+    if known is None and (sentence := region_edits.why_full(effect, regions=1, shutters=2)):
         raise EffectError(sentence)
     flow.check()
     effect.window = max(validation.number(effect, "window"), FRAMES)

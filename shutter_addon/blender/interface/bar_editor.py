@@ -81,18 +81,18 @@ def bar_under(context: Context, x: float, y: float) -> int | None:
     """The bar of the active shutter at a point of the preview's region, or None."""
     if context.region is None or context.region.type != "PREVIEW" or (seen := _seen(context)) is None:
         return None
-    place = _layout(context, seen[-1].bars)
+    place = _layout(context, seen[3])
     return place.bar_at(x) if place.contains(x, y) else None
 
 
-def _seen(context: Context) -> tuple[Scene, PropertyGroup, Strip, bar_edits.BarsShown] | None:
-    """Scene, effect and strip that are seen, and the bars that the editor shows; None: there is no shutter, or none
-    that a picture can be made with."""
+def _seen(context: Context) -> tuple[Scene, PropertyGroup, Strip, np.ndarray, list[str]] | None:
+    """Scene, effect and strip that are seen, and the bars that the editor shows, with their states; None: there is no
+    shutter, or none that a picture can be made with."""
     seen = selection.in_picture(context)
     if seen is None or selection.active_shutter(effect := seen[1]) is None:
         return None
     try:
-        return (*seen, bar_edits.shown(effect, effect.active_shutter))
+        return (*seen, *bar_edits.shown(effect, effect.active_shutter))
     except EffectError:  # panels and the live preview tell it
         return None
 
@@ -107,16 +107,16 @@ class SHUTTER_GT_bars(Dragged, Gizmo):
     seen = staticmethod(_seen)
 
     def show(self, context: Context, seen: tuple) -> None:
-        scene, effect, strip, shown = seen
+        scene, effect, strip, bars, states = seen
         shutter = selection.active_shutter(effect)
         words = bar_edits.open_for(scene, effect, strip, effect.active_shutter)
-        words = words or bar_edits.summary(shown.bars, shutter.combine)
-        place = _layout(context, shown.bars)
-        _draw(place, shutter, *shown)
+        words = words or bar_edits.summary(bars, shutter.combine)
+        place = _layout(context, bars)
+        _draw(place, shutter, bars, states)
         _draw_header(place, shutter, effect.active_shutter, f"{shutter.name}   {words}")
 
     def is_at(self, context: Context, seen: tuple, location: tuple[int, int]) -> bool:
-        return _layout(context, seen[-1].bars).contains(*location)
+        return _layout(context, seen[3]).contains(*location)
 
     def grab(self, context: Context, event: Event, seen: tuple) -> None:
         effect = seen[1]

@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike
 from ...core.model.scribbles import mapped
 from ...core.pixels import patterns
 from ...devices.passes import read_pass
-from ..data import annotations, geometry
+from ..data import annotations
 from ..data.preview_areas import Shown
 from ..devices import blender_gpu
 from .gizmo_groups import view
@@ -161,7 +161,7 @@ class Quad:
         self.view = view(shown.effect, shown.strip, region)
         strip, render = shown.strip, shown.scene.render
         half = np.array([render.resolution_x, render.resolution_y]) / 2
-        self._image = mapped(geometry.image_to_region(region), np.array([-half, half]))
+        self._image = mapped(annotations.image_to_region(region), np.array([-half, half]))
         crop, (width, height) = strip.crop, annotations.picture_size(shown.effect)
         self._low = np.array([crop.min_x / width, crop.min_y / height])
         self._high = 1 - np.array([crop.max_x / width, crop.max_y / height])

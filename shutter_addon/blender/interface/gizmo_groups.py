@@ -8,7 +8,7 @@ from bpy.types import Context, Event, Gizmo, KeyConfig, KeyMap, PropertyGroup, R
 from numpy.typing import ArrayLike
 
 from ...core.model.scribbles import mapped
-from ..data import annotations, geometry, preview_areas
+from ..data import annotations, preview_areas
 from .operator_bases import Mixin
 
 TWEAK = ("gizmogroup.gizmo_tweak", "LEFTMOUSE", "PRESS", {"any": True})
@@ -108,7 +108,7 @@ class View(NamedTuple):
 def view(effect: PropertyGroup, strip: Strip, region: Region) -> View:
     """The view of an effect's picture in a preview's region."""
     width, height = size = annotations.picture_size(effect)
-    return View(geometry.picture_to_region(strip, size, region), width / height)
+    return View(annotations.picture_to_region(strip, size, region), width / height)
 
 
 def unregister() -> None:

@@ -16,7 +16,7 @@ from ...core.messages import EffectError, UserError
 from ...core.model.choices import CONTEXT, RAMPS, READOUT_UNITS, READS, SIDES
 from ...core.model.limits import MAX_CHANNEL
 from ..data import matte_content, recipe_import, selection, strips
-from ..editing import collection_edits, outline_drawings, region_edits, rolling_shutter, shutter_edits
+from ..editing import outline_drawings, region_edits, rolling_shutter, shutter_edits
 from ..output import matte_export
 from . import needs
 from .operator_bases import OfEffect, chosen_file, kept, operator
@@ -133,7 +133,7 @@ def ramp_add(self: Operator, _context: Context, effect: PropertyGroup) -> None:
 
 
 def _why_no_time_map(effect: PropertyGroup) -> str | None:
-    return collection_edits.why_full(effect, regions=1, shutters=2)
+    return region_edits.why_full(effect, regions=1, shutters=2)
 
 
 @operator("Time Map", needs.a_shutter, _why_no_time_map, ramp=_RAMP)
@@ -147,7 +147,7 @@ def _why_no_repair(effect: PropertyGroup) -> str | None:
         has_repair = rolling_shutter.of(effect) is not None
     except EffectError as error:
         return str(error)
-    return None if has_repair else collection_edits.why_full(effect, regions=1, shutters=2)
+    return None if has_repair else region_edits.why_full(effect, regions=1, shutters=2)
 
 
 class SHUTTER_OT_rolling_shutter(OfEffect, Operator):

@@ -4,7 +4,7 @@ from bpy.app.translations import pgettext_rpt as rpt_
 from bpy.types import PropertyGroup
 
 from ..data import selection, strips
-from ..editing import collection_edits
+from ..editing import region_edits
 
 
 def a_shutter(effect: PropertyGroup) -> str | None:
@@ -29,8 +29,8 @@ def an_outline(effect: PropertyGroup) -> str | None:
 
 
 def room_for_a_region(effect: PropertyGroup) -> str | None:
-    return a_shutter(effect) or collection_edits.why_full(effect, regions=1)
+    return a_shutter(effect) or region_edits.why_full(effect, regions=1)
 
 
 def room_for_a_shutter(effect: PropertyGroup) -> str | None:
-    return collection_edits.why_full(effect, shutters=1)
+    return region_edits.why_full(effect, shutters=1)

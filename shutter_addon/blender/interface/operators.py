@@ -14,7 +14,7 @@ from bpy.types import Annotation, Context, Event, Operator, PropertyGroup
 from bpy_extras.io_utils import ExportHelper, ImportHelper
 
 from ...core.messages import EffectError, UserError
-from ...core.model import presets
+from ...core.model import shutters
 from ...core.model.choices import CONTEXT, DRAWN
 from ...core.recipes import recipe_file
 from ..data import annotations, consistency, data_format, preview_areas, recipe_import, selection, strips
@@ -22,7 +22,6 @@ from ..devices import main_thread
 from ..editing import (
     add_effect,
     bar_edits,
-    collection_edits,
     drawn_places,
     region_edits,
     shown_annotations,
@@ -198,7 +197,7 @@ def _presets(_context: Context) -> list[tuple]:
     """With icons, which exist only once the extension is registered."""
     return [
         (name, label, description, icon_of(name), i)
-        for i, (name, (label, description, _make)) in enumerate(presets.PRESETS.items())
+        for i, (name, (label, description, _make)) in enumerate(shutters.PRESETS.items())
     ]
 
 
@@ -268,7 +267,7 @@ class SHUTTER_OT_bar_set(OfEffect, Operator):
 
 
 def _why_no_room(effect: PropertyGroup) -> str | None:
-    return collection_edits.why_full(effect, regions=1 if selection.active_region(effect) is None else 0)
+    return region_edits.why_full(effect, regions=1 if selection.active_region(effect) is None else 0)
 
 
 class SHUTTER_OT_draw(MakesEffect, OfEffect, Operator):
@@ -295,7 +294,7 @@ class SHUTTER_OT_draw(MakesEffect, OfEffect, Operator):
     def change(self, context: Context, effect: PropertyGroup) -> None:
         region = selection.active_region(effect)
         if self.new or region is None or region.kind in strips.MATTES:
-            if sentence := collection_edits.why_full(effect, regions=1):  # poll() does not know what `new` is
+            if sentence := region_edits.why_full(effect, regions=1):  # poll() does not know what `new` is
                 raise EffectError(sentence)
             region = region_edits.first_drawn(effect, selection.active_shutter(effect), self.kind)
         drawn_places.begin(effect, self.effect_strip, effect.active_region)

@@ -13,7 +13,7 @@ from bpy.types import Context, PropertyGroup, Scene, Strip, UILayout
 from bpy.utils.previews import ImagePreviewCollection
 
 from ...core import told
-from ...core.model import presets
+from ...core.model import shutters
 from ...core.model.fields import fields_of
 from ...core.pixels import patterns
 from ..data import selection
@@ -165,7 +165,7 @@ def _painted(index: int) -> np.ndarray:
 
 def register() -> None:
     _icons.append(bpy.utils.previews.new())
-    pictures = {name: _drawn(presets.bars(name, _WINDOW)) for name in presets.PRESETS}
+    pictures = {name: _drawn(shutters.preset_bars(name, _WINDOW)) for name in shutters.PRESETS}
     pictures |= {str(index): _painted(index) for index in range(patterns.COUNT)}
     for name, picture in pictures.items():
         icon = _icons[0].new(name)

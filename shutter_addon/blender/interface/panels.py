@@ -7,7 +7,7 @@ from bpy.app.translations import pgettext_iface as iface_
 from bpy.types import Context, Menu, Panel, PropertyGroup, Scene, Strip, UILayout, UIList
 
 from ...core.messages import EffectError
-from ...core.model import presets
+from ...core.model import shutters
 from ...core.model.choices import CONTEXT
 from ...core.model.effect import Shutter
 from ..data import annotations, consistency, data_format, selection, strips
@@ -148,7 +148,7 @@ def _draw_exposure(layout: UILayout, scene: Scene, effect: PropertyGroup, strip:
     shutter = selection.active_shutter(effect)
     row = layout.row(align=True)
     preset = consistency.preset_of(effect, effect.active_shutter)
-    label = iface_(presets.PRESETS[preset][0], CONTEXT) if preset else None
+    label = iface_(shutters.PRESETS[preset][0], CONTEXT) if preset else None
     row.menu("SHUTTER_MT_presets", text=label, icon="PRESET", translate=False)
     row.operator("shutter.bars_key", text="", icon="KEY_HLT")
     row.operator("shutter.bars_unkey", text="", icon="KEY_DEHLT")
@@ -185,7 +185,7 @@ def _draw_combine(layout: UILayout, shutter: PropertyGroup) -> None:
 def _draw_bars(layout: UILayout, scene: Scene, effect: PropertyGroup, strip: Strip) -> None:
     """What the active shutter's bars come to."""
     try:
-        bars = bar_edits.shown(effect, effect.active_shutter).bars
+        bars, _states = bar_edits.shown(effect, effect.active_shutter)
     except EffectError as error:
         sentence(layout, str(error), "ERROR")
         return

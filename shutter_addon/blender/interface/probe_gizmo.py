@@ -16,7 +16,7 @@ from ...compute.renderer import Renderer
 from ...compute.request import Request
 from ...core.messages import EffectError
 from ...core.pixels import compositor
-from ..data import annotations, geometry, preview_areas, selection
+from ..data import annotations, preview_areas, selection
 from ..devices import blender_gpu
 from ..rendering import effect_source, previews, sessions
 from . import drawing
@@ -94,7 +94,7 @@ def _view(context: Context) -> View | None:
     if (shown := preview_areas.shown(context)) is None:
         return None
     seen = view(shown.effect, shown.strip, context.region)
-    return seen if geometry.is_invertible(seen.matrix) else None
+    return seen if annotations.is_invertible(seen.matrix) else None
 
 
 def _is_cropped(strip: Strip, size: tuple[int, int], point: Sequence[float]) -> bool:

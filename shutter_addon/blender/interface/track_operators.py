@@ -10,7 +10,7 @@ from bpy.types import Context, Operator, PropertyGroup, Scene, Strip
 
 from ...core.model.choices import CONTEXT
 from ..data import selection, validation
-from ..editing import bar_edits, follow_track, layer_presets, track_region
+from ..editing import bar_edits, follow_track, shutter_edits, track_region
 from ..rendering.effect_source import FAULTS
 from . import needs
 from .operator_bases import Beside, OfEffect, operator, redraw, report_warning, show_status
@@ -177,10 +177,10 @@ class SHUTTER_OT_panning_shot(_Tracks, OfEffect, Operator):
     direction = "BOTH"
 
     def is_ready(self, scene: Scene, effect: PropertyGroup, strip: Strip) -> bool:
-        return layer_presets.can_pan(scene, effect, strip, effect.active_region)
+        return shutter_edits.can_pan(scene, effect, strip, effect.active_region)
 
     def ended(self, context: Context) -> None:
-        layer_presets.panning_shot(self._target.effect(), self._target.index, bar_edits.auto_key(context))
+        shutter_edits.panning_shot(self._target.effect(), self._target.index, bar_edits.auto_key(context))
 
 
 class SHUTTER_OT_tripod(_Tracks, OfEffect, Operator):
@@ -192,10 +192,10 @@ class SHUTTER_OT_tripod(_Tracks, OfEffect, Operator):
     direction = "BOTH"
 
     def is_ready(self, _edit: Scene, effect: PropertyGroup, _strip: Strip) -> bool:
-        return layer_presets.can_stand(effect)
+        return shutter_edits.can_stand(effect)
 
     def ended(self, context: Context) -> None:
-        layer_presets.tripod(self._target.effect(), bar_edits.auto_key(context))
+        shutter_edits.tripod(self._target.effect(), bar_edits.auto_key(context))
 
 
 _FRAME = IntProperty(
@@ -262,10 +262,10 @@ def follow_stabilization(self: Operator, _context: Context, effect: PropertyGrou
 @operator("Sharp Subject", needs.a_region)
 def sharp_subject(_self: Operator, context: Context, effect: PropertyGroup) -> None:
     """Keep the active region sharp before all else, which is exposed for long and without it"""
-    layer_presets.sharp_subject(effect, effect.active_region, bar_edits.auto_key(context))
+    shutter_edits.sharp_subject(effect, effect.active_region, bar_edits.auto_key(context))
 
 
 @operator("Trail", needs.a_region)
 def clean_trail(_self: Operator, context: Context, effect: PropertyGroup) -> None:
     """Have the active region leave a trail before all else, which stays sharp"""
-    layer_presets.clean_trail(effect, effect.active_region, bar_edits.auto_key(context))
+    shutter_edits.clean_trail(effect, effect.active_region, bar_edits.auto_key(context))

@@ -16,7 +16,7 @@ from contextlib import AbstractContextManager, ExitStack
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from bpy.types import Scene
+from bpy.types import Scene, Strip
 
 from ...core import stopping
 from ...core.pixels.shown_levels import Display
@@ -51,7 +51,7 @@ class _Film:
 
 @dataclass
 class _Feed:
-    """film: that renders; is_own: whether renders are movies of new_edit.make_edit"""
+    """film: that renders; is_own: whether renders are movies of whole_edits.make_edit"""
 
     film: _Film | None = None
     is_own: bool = False
@@ -61,7 +61,7 @@ _data = _Feed()
 
 
 def feeding() -> AbstractContextManager[None]:
-    """Inside, renders are movies of edits of new_edit.make_edit, from their first frame on."""
+    """Inside, renders are movies of edits of whole_edits.make_edit, from their first frame on."""
     return for_a_while([(_data, "is_own", True)])
 
 
@@ -88,29 +88,28 @@ def before_frame(scene: Scene) -> None:
         film.has_begun = True
         return
     seen = None if film.has_failed else _seen(film, scene)
-    is_fed = seen is not None and _feed(film, scene, seen)
+    is_fed = seen is not None and _feed(film, scene, *seen)
     shown = film.strip and scene.sequence_editor.strips_all.get(film.strip)
     if shown and shown.mute == is_fed:  # each change costs
         shown.mute = not is_fed
 
 
-def _seen(film: _Film, scene: Scene) -> seen_alone.Alone | None:
-    """The effect that is all that is seen at the current frame, where Blender makes known levels of it."""
+def _seen(film: _Film, scene: Scene) -> tuple[Strip, bool] | None:
+    """As seen_alone.alone, at the current frame, where Blender makes known levels of it."""
     if _data.is_own:
         is_known = not versions.colours()
-        return seen_alone.Alone(strips.effect_strips(scene)[0], is_blended=False) if is_known else None
+        return (strips.effect_strips(scene)[0], False) if is_known else None
     if film.makes_levels is None or render_job.scripts_act():
         film.makes_levels = seen_alone.makes_levels(scene)
     return seen_alone.alone(scene, scene.frame_current, film.strip) if film.makes_levels else None
 
 
-def _feed(film: _Film, scene: Scene, seen: seen_alone.Alone) -> bool:
+def _feed(film: _Film, scene: Scene, strip: Strip, is_blended: bool) -> bool:
     """Fills the file with the effect's levels. False: the engine has to render the frame, and to say what is wrong."""
-    strip = seen.strip
     try:
         shown = scene.frame_current - strips.origin(strip) + strip.scene.frame_start
         snapshot, frame = job_snapshots.of(strip.scene, int(shown))
-        transfer = color.blended if seen.is_blended else color.shown
+        transfer = color.blended if is_blended else color.shown
         display = None if _data.is_own else Display(scene.render.dither_intensity, transfer)
         context = sessions.of_render(render_job.say, levels=_data.is_own, display=display)
         with stopping.once(render_job.stopping):

@@ -201,7 +201,7 @@ def _stamp_nothing(render: RenderSettings) -> None:
 
 
 def film(scene: Scene, output: Path) -> None:
-    """Renders an edit of new_edit.make_edit to a movie or a folder.
+    """Renders an edit of whole_edits.make_edit to a movie or a folder.
 
     OutputError: it cannot be rendered or written; finished pictures stay, and of a movie what was finished, under a
     name of its own. InterruptedRenderError: the same, by Ctrl-C or a farm's TERM."""

@@ -331,10 +331,6 @@ class FrameState:
             layers = replace(layers, scribbles=drawn)
         return replace(self, options=replace(self.options, aggregate=aggregate), layers=layers)
 
-    def alone(self, chosen: int) -> FrameState:
-        """The state of a picture in which one shutter, `chosen`, is everywhere."""
-        return self.of([chosen])
-
     def of(self, chosen: Sequence[int]) -> FrameState:
         """What composes a picture of some of its shutters alone; nothing is left to diffuse."""
         return FrameState(

@@ -22,6 +22,8 @@ _LINES = 128  # rows of the picture in which that is measured
 _STEP, _POINTS = 0.008, (12, 256)  # parts of the picture's height from point to point; how many these may be
 
 Curves = tuple[tuple[tuple[float, float], ...], ...]  # hashable strokes: fractions of the picture, y up
+# What a curve encloses: its middle (2,) in heights of the picture, and (rows, columns) 0 to 1, moved to the picture's.
+_Shape = tuple[np.ndarray, np.ndarray]
 
 
 def curves(strokes: Sequence[np.ndarray]) -> Curves:
@@ -130,8 +132,8 @@ def chains(drawn: Sequence[tuple[int, Curves]], aspect: float) -> list[Chain]:
 
 def _pairs(before: list[np.ndarray], after: list[np.ndarray], aspect: float) -> dict[int, int]:
     """Which curve goes into which, those first that have most in common."""
-    shapes = [[_Shape.of(curve, aspect) for curve in curves] for curves in (before, after)]
-    alike = {(i, j): a.alike(b) for i, a in enumerate(shapes[0]) for j, b in enumerate(shapes[1])}
+    shapes = [[_shape(curve, aspect) for curve in curves] for curves in (before, after)]
+    alike = {(i, j): _alike(a, b) for i, a in enumerate(shapes[0]) for j, b in enumerate(shapes[1])}
     pairs: dict[int, int] = {}
     for (i, j), share in sorted(alike.items(), key=lambda entry: -entry[1]):
         if share >= ALIKE and i not in pairs and j not in pairs.values():
@@ -139,27 +141,20 @@ def _pairs(before: list[np.ndarray], after: list[np.ndarray], aspect: float) -> 
     return pairs
 
 
-class _Shape(NamedTuple):
-    """What a curve encloses.
+def _shape(curve: np.ndarray, aspect: float) -> _Shape:
+    middle = (curve.min(axis=0) + curve.max(axis=0)) / 2
+    inside = coverage([curve - middle + 0.5], max(1, round(_LINES * aspect)), _LINES)
+    return middle * (aspect, 1), inside
 
-    middle: (2,) heights of the picture; inside: (rows, columns) 0 to 1, moved to the middle of the picture"""
 
-    middle: np.ndarray
-    inside: np.ndarray
-
-    @staticmethod
-    def of(curve: np.ndarray, aspect: float) -> _Shape:
-        middle = (curve.min(axis=0) + curve.max(axis=0)) / 2
-        inside = coverage([curve - middle + 0.5], max(1, round(_LINES * aspect)), _LINES)
-        return _Shape(middle * (aspect, 1), inside)
-
-    def alike(self, other: _Shape) -> float:
-        """How much both have in common, from 0 to 1: of what they enclose, and of where."""
-        reach = sum(np.sqrt(shape.inside.sum() / np.pi) / _LINES for shape in (self, other)) * FAR
-        if reach == 0:
-            return 0.0
-        common = np.minimum(self.inside, other.inside).sum() / np.maximum(self.inside, other.inside).sum()
-        return float(common * max(0.0, 1 - np.hypot(*(self.middle - other.middle)) / reach))
+def _alike(one: _Shape, other: _Shape) -> float:
+    """How much two shapes have in common, from 0 to 1: of what they enclose, and of where."""
+    (middle, inside), (other_middle, other_inside) = one, other
+    reach = sum(np.sqrt(each.sum() / np.pi) / _LINES for each in (inside, other_inside)) * FAR
+    if reach == 0:
+        return 0.0
+    common = np.minimum(inside, other_inside).sum() / np.maximum(inside, other_inside).sum()
+    return float(common * max(0.0, 1 - np.hypot(*(middle - other_middle)) / reach))
 
 
 def _turned(curve: np.ndarray) -> np.ndarray:

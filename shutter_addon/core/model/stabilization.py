@@ -110,21 +110,22 @@ def _mean(tracks: list[Track], frame: int) -> complex | None:
     return sum(weight * place for weight, place in seen) / total if total > _LEAST_WEIGHT else None
 
 
-class Settings(NamedTuple):
-    """How much is taken back, 0 to 1 each, and where the picture is to lie then."""
+def laid(
+    measured: Measured,
+    target: complex,
+    target_angle: float,
+    target_scale: float,
+    *,
+    location: float,
+    rotation: float,
+    scale: float,
+) -> Similarity:
+    """How the stabilized picture is laid, y up.
 
-    location: float = 1.0
-    rotation: float = 1.0
-    scale: float = 1.0
-    target: complex = 0j
-    target_angle: float = 0.0
-    target_scale: float = 1.0
-
-
-def laid(measured: Measured, settings: Settings) -> Similarity:
-    """How the stabilized picture is laid, y up."""
-    shift = settings.target - settings.location * measured.shift
-    angle = settings.target_angle - settings.rotation * measured.angle
-    scale = (settings.target_scale or 1.0) * math.exp(-settings.scale * measured.log_scale)
-    turn = cmath.rect(scale, angle)
+    target, target_angle, target_scale: where it is to lie; location, rotation, scale: how much of each is taken back, 0
+    to 1"""
+    shift = target - location * measured.shift
+    angle = target_angle - rotation * measured.angle
+    size = (target_scale or 1.0) * math.exp(-scale * measured.log_scale)
+    turn = cmath.rect(size, angle)
     return Similarity(turn, shift + measured.pivot - turn * measured.pivot)

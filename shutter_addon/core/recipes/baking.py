@@ -154,7 +154,7 @@ def _bars(effect: Effect, index: int, interpolation: Interpolation, shown: range
             apart = abs(sampled.share.at(frame) - share) * np.ptp(ends, axis=0).max()
         return bool(apart <= TOLERANCE * ends.max())
 
-    eased = _keys(fits, lambda *_: True, sampled.keys, [frame for frame, _ in sampled.keys], {}, shown)
+    eased = _keys(fits, sampled.keys, [frame for frame, _ in sampled.keys], {}, shown)
     return Bars(_keyed(eased, short, shown))
 
 
@@ -183,7 +183,7 @@ def _number_keys(at: Callable[[float], float], channel: Channel, shown: range) -
     keys: _Eased = [(shown.start, "linear")]
     if isinstance(channel, Samples):
         frames = [frame for frame, _ in channel.keys]
-        keys = _keys(fits, lambda frame, held: fits(held, held, frame, 0), channel.keys, frames, {}, shown)
+        keys = _keys(fits, channel.keys, frames, {}, shown)
     return _keyed(keys, lambda frame: _short(at(frame)), shown)
 
 
@@ -249,10 +249,7 @@ def _move_keys(moving: Subject, words: Mapping[float, Ease], shown: range) -> _E
 
     fits = _straight(place, lambda largest: TOLERANCE * np.maximum(1, largest))
 
-    def still(frame: float, held: float) -> bool:
-        return fits(held, held, frame, 0)
-
-    return _keys(fits, still, eases.items(), sorted(frames), words, shown) if frames or sampled else []
+    return _keys(fits, eases.items(), sorted(frames), words, shown) if frames or sampled else []
 
 
 def _place(moving: Subject, frame: float) -> np.ndarray:
@@ -272,7 +269,6 @@ def _drawings(region: Region | OutlineRegion, frame: float) -> dict[float, list[
 
 def _keys(
     fits: _Fits,
-    still: Callable[[float, float], bool],
     keys: Collection[tuple[float, Ease]],
     frames: Sequence[float],
     words: Mapping[float, Ease],
@@ -280,13 +276,13 @@ def _keys(
 ) -> _Eased:
     """Frames and eases of the keys that give the effect at every whole frame of the strip.
 
-    fits: whether at a frame a share is right between two keys; still: whether a frame shows what another does;
-    keys: those of the channels; frames: where there has to be a key; words: the ease that a key has to have."""
+    fits: whether at a frame a share is right between two keys; keys: those of the channels
+    frames: where there has to be a key; words: the ease that a key has to have."""
     if not frames:
         return [(frame, "linear") for frame in shown]
 
     def baked(outside: list[int], held: float) -> list[tuple[float, Ease]]:
-        return [] if all(still(frame, held) for frame in outside) else [(frame, "linear") for frame in outside]
+        return [] if all(fits(held, held, frame, 0) for frame in outside) else [(frame, "linear") for frame in outside]
 
     eases = dict(keys)
     kept = baked([frame for frame in shown if frame < frames[0]], frames[0])

@@ -254,7 +254,7 @@ def _converter() -> Converter:
         lambda kind: kind in (records.Keyable, records.Keyable | None), partial(_number_or_keys, converter)
     )
     converter.register_structure_hook_func(
-        lambda kind: kind is records.AnyRegionRecord, partial(_one_region, converter)
+        lambda kind: kind == records.AnyRegionRecord, partial(_one_region, converter)
     )
     converter.register_structure_hook_factory(_made_of(tuple), _tuple)
     converter.register_structure_hook_func(_made_of(list), partial(_list, converter))

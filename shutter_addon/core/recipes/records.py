@@ -129,10 +129,8 @@ MODELS = {
 }
 
 
-class AnyRegionRecord:
-    """A region of a recipe: by its field `kind`, one of KINDS."""
-
-
+# Of a recipe: by its field `kind`, one of KINDS.
+AnyRegionRecord: Any = RegionRecord | OutlineRecord | MatteRecord | RampRecord
 RecipeRecord: Any = _record(
     "RecipeRecord",
     (Options, model.Effect, model.Camera),

@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 
 from ..model import motions, presence
-from ..model.effect import Effect, Moves, OutlineRegion, Region, Subject
+from ..model.effect import Camera, Moves, OutlineRegion, Region, Subject
 from ..model.keyframes import Channel, Ease, Keys
 from ..model.motions import Placement, Placements, Size
 
@@ -21,13 +21,30 @@ CORNERS = motions.offsets([motions.PICTURE])
 
 
 def with_placements(
-    region: Region | OutlineRegion, placements: Placements, exact: Collection[int], size: Size, *, thin: bool = True
-) -> Region | OutlineRegion:
-    """The region with these placements as its keys, in place of those that it has from the first of these frames to the
-    last. At whole frames beyond these it stays where its keys put it, and its drawings stay where and as they are.
+    moving: Camera | Region | OutlineRegion,
+    placements: Placements,
+    exact: Collection[int],
+    size: Size,
+    *,
+    thin: bool = True,
+) -> Camera | Region | OutlineRegion:
+    """The region, or the camera, with these placements as its keys, in place of those that it has from the first of
+    these frames to the last. At whole frames beyond these it stays where its keys put it, and its drawings stay where
+    and as they are.
 
     exact: those frames among them whose keys are kept in any case, and as they are given
-    size: of the picture; thin: no more keys than the motion needs within a pixel"""
+    size: of the picture; thin: no more keys than the motion needs within a pixel, within a quarter of one everywhere in
+    the picture for a camera"""
+    if isinstance(moving, Camera):
+        chosen = motions.thinned(placements, CORNERS, size, exact, STEADY) if thin else sorted(placements)
+        return replace(moving, moves=_moves(moving, placements, exact, chosen, {}))
+    return _drawn_with(moving, placements, exact, size, thin)
+
+
+def _drawn_with(
+    region: Region | OutlineRegion, placements: Placements, exact: Collection[int], size: Size, thin: bool
+) -> Region | OutlineRegion:
+    """As with_placements, of a region."""
     drawings = replace(region.drawings, aspect=size[0] / size[1])
     keyed = _eases(region)
     # A drawing at no key is there from the first on.
@@ -45,16 +62,6 @@ def with_placements(
         frames = moves.location.frames[0], *drawings.frames[1:]
         drawings = replace(drawings, frames=frames)
     return replace(region, moves=moves, drawings=replace(drawings, aspect=region.drawings.aspect))
-
-
-def with_camera(
-    source: Effect, placements: Placements, exact: Collection[int], size: Size, *, thin: bool = True
-) -> Effect:
-    """The recipe whose camera has these placements as its keys; arguments like those of with_placements. Thinned keys
-    are within a quarter of a pixel of the placements, everywhere in the picture."""
-    chosen = motions.thinned(placements, CORNERS, size, exact, STEADY) if thin else sorted(placements)
-    camera = replace(source.camera, moves=_moves(source.camera, placements, exact, chosen, {}))
-    return source.with_parts(source.regions, camera)
 
 
 def _eases(moving: Subject) -> dict[float, Ease]:
