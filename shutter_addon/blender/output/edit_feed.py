@@ -12,13 +12,18 @@ the GPU alone, and those where rounding decides may be others than Blender's.
 
 from __future__ import annotations
 
-from contextlib import AbstractContextManager, ExitStack
+import os
+import tempfile
+from collections.abc import Iterator
+from contextlib import AbstractContextManager, ExitStack, closing, contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 
+import numpy as np
+import OpenImageIO
 from bpy.types import Scene
 
-from ...core import stopping
+from ...core import atomic_write, stopping
 from ...core.pixels.shown_levels import Display
 from ...media import color
 from ..data import seen_alone, strips, versions
@@ -26,8 +31,10 @@ from ..data.property_copy import for_a_while
 from ..rendering import job_snapshots, pictures, render_job, sessions
 from ..rendering.effect_source import FULL, in_words
 from ..rendering.render_job import Where
-from . import levels_file
-from .levels_file import LevelsFile
+
+# Rows of a tile of the file; its columns are a multiple of 16. A TIFF without tiles takes twice the time: Blender reads
+# rows upwards, for which OpenImageIO then allocates 64 MB for each picture.
+_ROWS, _COLUMNS = 64, 16
 
 
 @dataclass
@@ -135,7 +142,7 @@ def _file(film: _Film, scene: Scene) -> LevelsFile:
     """The file of the film, with a strip that shows it. OSError: it cannot be written. ValueError: there is no channel
     for the strip."""
     if film.file is None:
-        film.file = film.changed.enter_context(levels_file.temporary(scene))
+        film.file = film.changed.enter_context(_temporary(scene))
         film.strip = _add_strip(film, scene, film.file.path)
     return film.file
 
@@ -162,3 +169,45 @@ def _add_strip(film: _Film, scene: Scene, path: Path) -> str:
 
     film.changed.callback(remove)
     return name
+
+
+@contextmanager
+def _temporary(scene: Scene) -> Iterator[LevelsFile]:
+    """A file for the pictures of a scene. OSError: there is no room for it."""
+    atomic_write.clear_up(place := Path(tempfile.gettempdir()))
+    with atomic_write.part_folder(place) as folder:
+        file = LevelsFile(folder / "picture.tif", scene.render.resolution_x, scene.render.resolution_y)
+        with closing(file):
+            yield file
+
+
+class LevelsFile:
+    """An uncompressed TIFF of RGBA levels, whose pixels are replaced in place."""
+
+    def __init__(self, path: Path, width: int, height: int) -> None:
+        """OSError: it cannot be written. After this there is room for all that is written to it."""
+        self.path, self._padding = path, -width % _COLUMNS
+        columns = width + self._padding
+        spec = OpenImageIO.ImageSpec(width, height, 4, "uint8")
+        spec.tile_width, spec.tile_height = columns, _ROWS
+        spec.attribute("compression", "none")
+        spec.attribute("oiio:UnassociatedAlpha", 1)
+        white = np.full((height, width, 4), 255, np.uint8)
+        file = OpenImageIO.ImageOutput.create(str(path))
+        if not (file and file.open(str(path), spec) and file.write_image(white) and file.close()):
+            raise OSError(f"{path}: cannot be written")
+        # The tiles are one below the other, and nothing lies between.
+        self._start = path.read_bytes().index(b"\xff" * (4 * width))
+        self._file = path.open("r+b", buffering=0)
+
+    def write(self, levels: np.ndarray) -> None:
+        """levels: uint8 (H, W, 4), top row first. OSError: there is no such file any more, which Blender would show as
+        a picture of one colour."""
+        if self._padding:
+            levels = np.pad(levels, ((0, 0), (0, self._padding), (0, 0)))
+        self._file.seek(self._start)
+        self._file.write(levels)
+        os.utime(self.path)
+
+    def close(self) -> None:
+        self._file.close()
