@@ -18,6 +18,7 @@ from collections.abc import Iterator
 from contextlib import AbstractContextManager, ExitStack, closing, contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import ClassVar
 
 import numpy as np
 import OpenImageIO
@@ -41,12 +42,14 @@ _ROWS, _COLUMNS = 64, 16
 class _Film:
     """What a render has changed.
 
+    is_own: whether renders are movies of new_edit.make_edit
     scene: session_uid of the edit; changed: what puts it back
     strip: of the file, by name; None: there is none yet
     file: of levels; None: as above
     makes_levels: as seen_alone.makes_levels; None: nobody has asked; has_failed: it was not possible
     has_begun: whether a frame is rendered"""
 
+    is_own: ClassVar[bool] = False
     scene: int
     changed: ExitStack = field(default_factory=ExitStack)
     strip: str | None = None
@@ -56,42 +59,33 @@ class _Film:
     has_begun: bool = False
 
 
-@dataclass
-class _Feed:
-    """film: that renders; is_own: whether renders are movies of new_edit.make_edit"""
-
-    film: _Film | None = None
-    is_own: bool = False
-
-
-_data = _Feed()
+_running: list[_Film] = []  # one at most
 
 
 def feeding() -> AbstractContextManager[None]:
     """Inside, renders are movies of edits of new_edit.make_edit, from their first frame on."""
-    return for_a_while([(_data, "is_own", True)])
+    return for_a_while([(_Film, "is_own", True)])
 
 
 def begin(scene: Scene) -> None:
     """The render of an edit begins, on the main thread."""
     end()
     if render_job.where() is Where.BACKGROUND and scene.sequence_editor is not None:
-        _data.film = _Film(scene.session_uid)
+        _running.append(_Film(scene.session_uid))
 
 
 def end() -> None:
     """Puts the edit back."""
-    film, _data.film = _data.film, None
-    if film is not None:
-        film.changed.close()
+    while _running:
+        _running.pop().changed.close()
 
 
 def before_frame(scene: Scene) -> None:
     """Prepares the edit for its current frame."""
-    film = _data.film
-    if film is None or film.scene != scene.session_uid:
+    film = next((film for film in _running if film.scene == scene.session_uid), None)
+    if film is None:
         return
-    if not (film.has_begun or _data.is_own):  # a picture by itself may be saved as floats afterwards
+    if not (film.has_begun or film.is_own):  # a picture by itself may be saved as floats afterwards
         film.has_begun = True
         return
     seen = None if film.has_failed else _seen(film, scene)
@@ -103,7 +97,7 @@ def before_frame(scene: Scene) -> None:
 
 def _seen(film: _Film, scene: Scene) -> seen_alone.Alone | None:
     """The effect that is all that is seen at the current frame, where Blender makes known levels of it."""
-    if _data.is_own:
+    if film.is_own:
         is_known = not versions.colours()
         return seen_alone.Alone(strips.effect_strips(scene)[0], is_blended=False) if is_known else None
     if film.makes_levels is None or render_job.scripts_act():
@@ -118,12 +112,12 @@ def _feed(film: _Film, scene: Scene, seen: seen_alone.Alone) -> bool:
         shown = scene.frame_current - strips.origin(strip) + strip.scene.frame_start
         snapshot, frame = job_snapshots.of(strip.scene, int(shown))
         transfer = color.blended if seen.is_blended else color.shown
-        display = None if _data.is_own else Display(scene.render.dither_intensity, transfer)
-        context = sessions.of_render(render_job.say, levels=_data.is_own, display=display)
+        display = None if film.is_own else Display(scene.render.dither_intensity, transfer)
+        context = sessions.of_render(render_job.say, levels=film.is_own, display=display)
         with stopping.once(render_job.stopping):
             source = context.renderer(context.request(snapshot, frame, FULL)).source
             size = scene.render.resolution_x, scene.render.resolution_y
-            is_known = _data.is_own or source.alpha == "opaque"  # over black, what shines through is known
+            is_known = film.is_own or source.alpha == "opaque"  # over black, what shines through is known
             if not is_known or (source.width, source.height) != size:
                 return False
             levels = pictures.picture(context, snapshot, frame)
