@@ -1,8 +1,6 @@
 """What a report of an error should have in it, as short Markdown: versions, the device, what the edit is made of, and
 the last errors and warnings. Nothing in it names what is the user's: no strip, no scene, no file, no folder."""
 
-from __future__ import annotations
-
 import importlib
 import os
 import platform
