@@ -223,10 +223,10 @@ def _notes(context: Context) -> Iterator[tuple[str, Button | None]]:
     if (shown := match_source.shown(effect)) is not None:
         if shown.differences:
             what = ", ".join(iface_(word) for word in shown.differences)
-            yield iface_("Differs from its source: {what}").format(what=what), Button("shutter.match_source", "")
+            yield iface_("Differs from its source: {what}").format(what=what), ("shutter.match_source", "")
         if shown.lacks_modifiers:
             words = iface_("Modifiers of the source do not reach the effect")
-            yield words, Button("shutter.copy_modifiers", "")
+            yield words, ("shutter.copy_modifiers", "")
         if shown.has_effects:
             words = iface_("Effect strips on the source do not reach the effect: make the Shutter strip their input")
             yield words, None
@@ -259,8 +259,8 @@ class SHUTTER_PT_notes(Panel):
             column = layout.column(align=True)
             sentence(column, words, "INFO")
             if button is not None:
-                text = {"text": button.label, "translate": False} if button.label else {}
-                column.operator(button.operator, **text)
+                operator, label = button
+                column.operator(operator, **({"text": label, "translate": False} if label else {}))
         for index in _tracked(effect):
             region_panels.draw_tracked(layout, effect, index)
 
