@@ -65,7 +65,7 @@ def test_every_operator_is_in_the_menu_of_strips_which_blenders_search_reads(bpy
     recorder = Recorder()
     entry = bpy.types.SEQUENCER_MT_strip.draw._draw_funcs[-1]  # Blender tells of what was appended nowhere else
     entry(SimpleNamespace(layout=recorder), bpy.context)
-    assert recorder.menus == [menus.SHUTTER_MT_strip.__name__]
+    assert recorder.menus == [menus.strip_menu.__name__]
 
 
 def test_a_region_is_moved_by_numbers_and_keyed_where_blender_keys_by_itself(bpy, effect, edit):

@@ -13,7 +13,7 @@ from support import noise_film, picture_of, read_picture, sequencer
 
 from shutter_addon.blender.data import effect_version, selection, strips
 from shutter_addon.blender.editing import add_effect, baked_strips, reconcile
-from shutter_addon.blender.output import bake_job, baked_film, edit_check, film_output
+from shutter_addon.blender.output import baked_film, edit_check, film_output
 from shutter_addon.blender.rendering import sessions
 from shutter_addon.core import revision
 from shutter_addon.core.frames import light
@@ -550,7 +550,7 @@ def test_a_copy_of_a_killed_bake_goes(bpy, film, tmp_path):
     for path in (left, own, *(path for log in logs for path in (log / "copy", log))):
         path.touch()
         os.utime(path, (0, 0))
-    job = bake_job.start(scene, effect, strip, baked_film.film_of(scene, effect, strip, "OPEN_EXR"))
+    job = baked_film.start(scene, effect, strip, baked_film.film_of(scene, effect, strip, "OPEN_EXR"))
     try:
         assert not left.exists()
         assert not any(log.exists() for log in logs)
@@ -571,7 +571,7 @@ def test_a_job_tells_why_it_failed(bpy, film, tmp_path):
     film_ = baked_film.film_of(scene, effect, strip, "OPEN_EXR")
     film_.place.parent.mkdir()
     film_.place.write_bytes(b"")
-    job = bake_job.start(scene, effect, strip, film_)
+    job = baked_film.start(scene, effect, strip, film_)
     try:
         assert job.process.wait(60) == 2
         assert baked_film.FOLDER in job.failure()
@@ -583,7 +583,7 @@ def test_a_job_tells_why_it_failed(bpy, film, tmp_path):
 def test_a_bake_ends_with_the_blender_that_began_it(bpy, film):
     scene, effect, strip = film()
     strip.right_handle = 3000  # it takes long
-    job = bake_job.start(scene, effect, strip, baked_film.film_of(scene, effect, strip, "OPEN_EXR"))
+    job = baked_film.start(scene, effect, strip, baked_film.film_of(scene, effect, strip, "OPEN_EXR"))
     try:
         while not job.done():
             assert not job.is_over(), job.failure()

@@ -88,7 +88,7 @@ def test_the_preference_chooses(effect, preferred):
     for wanted, found in (("CPU", CPUCompositor), ("AUTO", GPUCompositor), ("OPENGL", GPUCompositor)):
         preferred.device = wanted
         assert composed_by() is found, wanted
-        with render_settings.using(render_settings.RenderSettings(device="cpu")):
+        with render_settings.using(device="cpu"):
             assert composed_by() is CPUCompositor, wanted
     assert {item[0].lower() for item in preferences.DEVICES} == set(available.CHOICES)
     sessions.forget()

@@ -9,8 +9,8 @@ import pytest
 from support import EXTENSION, noise_film
 
 from shutter_addon.blender.editing import add_effect, shutter_edits
-from shutter_addon.blender.output import edit_feed, levels_file
-from shutter_addon.blender.output.levels_file import LevelsFile
+from shutter_addon.blender.output import edit_feed
+from shutter_addon.blender.output.edit_feed import LevelsFile
 from shutter_addon.blender.rendering import render_job
 from shutter_addon.media import open_source
 
@@ -414,7 +414,7 @@ def test_what_cannot_be_written_is_left_to_the_engine(edit, made, compared, monk
     def no_room(*_):
         raise OSError(28, "No space left on device", "picture.tif")
 
-    monkeypatch.setattr(levels_file, "LevelsFile", no_room)
+    monkeypatch.setattr(edit_feed, "LevelsFile", no_room)
     assert compared() == []
 
 

@@ -18,7 +18,7 @@ from shutter_addon.blender.data import recipe_import, selection, versions
 from shutter_addon.blender.devices import available
 from shutter_addon.blender.editing import add_effect, bar_edits
 from shutter_addon.blender.interface import panel_parts
-from shutter_addon.blender.output import edit_structure, error_report
+from shutter_addon.blender.output import error_report
 from shutter_addon.blender.output.error_report import without_paths
 from shutter_addon.core.recipes import recipe_file
 
@@ -198,10 +198,10 @@ def test_an_edit_that_is_broken_beyond_all_that_is_foreseen_has_a_report(named, 
     def surprised(*_arguments):
         raise KeyError(NAME)
 
-    monkeypatch.setattr(edit_structure, "_of_region", surprised)  # private: whatever of it fails
+    monkeypatch.setattr(error_report, "_of_region", surprised)  # private: whatever of it fails
     text = report(named[0])
     assert "- the rest cannot be told: see the last error" in text
-    assert re.search(r"KeyError \[blender/output/edit_structure\.py:\d+ \S+ < ", text)
+    assert re.search(r"KeyError \[blender/output/error_report\.py:\d+ \S+ < ", text)
 
 
 def test_names_of_another_colour_configuration_are_somebodys(edit, monkeypatch):

@@ -56,14 +56,14 @@ def test_a_limit_is_a_number_of_megabytes(bpy, capsys, given):
 
 def test_a_session_gives_back_what_it_took_and_settles_for_another_limit(bpy, edit, effect):
     sessions.forget()
-    with render_settings.using(render_settings.RenderSettings(gpu_memory=ROOMY)):
+    with render_settings.using(gpu_memory=ROOMY):
         sessions.settle()
         picture = picture_of(effect.scene, 1)
         budget = render_settings.memory()
         assert (budget.limit, budget.used > 0) == (ROOMY << 20, True)
         sessions.OFFSCREEN.free()
         assert np.array_equal(picture_of(effect.scene, 1), picture)
-    with render_settings.using(render_settings.RenderSettings(gpu_memory=SMALL)):
+    with render_settings.using(gpu_memory=SMALL):
         sessions.settle()
         assert budget.used == 0
         assert np.abs(picture_of(effect.scene, 1) - picture).max() <= 2**-14

@@ -11,7 +11,7 @@ import pytest
 from support import noise_film
 
 from shutter_addon.blender.output import edit_feed
-from shutter_addon.blender.output.levels_file import LevelsFile
+from shutter_addon.blender.output.edit_feed import LevelsFile
 from shutter_addon.core import atomic_write
 
 

@@ -48,7 +48,7 @@ def effect(bpy, edit, tmp_path):
     edit.keyframe_insert(f"{effect.path_from_id()}.source_time")
     selection.choose(edit, strip)
     edit.frame_set(4)
-    with render_settings.using(render_settings.RenderSettings(device="cpu")):
+    with render_settings.using(device="cpu"):
         yield effect
     sessions.forget()
 

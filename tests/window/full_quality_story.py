@@ -28,7 +28,7 @@ def button(operator="shutter.full_quality"):
 def label(operator):
     """What a note's button says; None: there is none."""
     found = interface("note_buttons").places.get((story.preview().as_pointer(), operator))
-    return found and found[1].label
+    return found and found[1][1]
 
 
 def clicked():

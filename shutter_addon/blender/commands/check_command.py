@@ -26,6 +26,8 @@ from ..rendering import render_job, render_settings
 from . import command_line
 from .command_line import place
 
+_OF_EFFECT = "strip", "source", "size", "window", "shutters", "inbetween"  # what is told of an EffectCheck
+
 
 def add(commands: argparse._SubParsersAction) -> None:
     parser = commands.add_parser("check", help="find out whether an edit can be rendered here")
@@ -73,8 +75,8 @@ def _report(arguments: Namespace, scene: Scene, frames: range, version: EditVers
     notes: list[str] = []
     device, checks = _on_device(scene, frames, faults, notes)
     for check in checks:
-        faults += [f'"{check.name}": {fault}' for fault in check.faults]
-        notes += [f'"{check.name}": {note}' for note in check.notes]
+        faults += [f'"{check.strip}": {fault}' for fault in check.faults]
+        notes += [f'"{check.strip}": {note}' for note in check.notes]
     faults += edit_check.left_out(scene, frames)
     notes += edit_check.stale_films(scene, frames)
     faults += external_files.faults(scene, frames, sources=False)  # of these the effects' own say more
@@ -89,7 +91,7 @@ def _report(arguments: Namespace, scene: Scene, frames: range, version: EditVers
         "extension": {"here": version.extension, "saved": scene.virtual_shutter.version or None},
         "blender": {"here": version.blender, "saved": _file_version()},
         "device": device,
-        "effects": [_effect(each) for each in checks],
+        "effects": [{name: getattr(check, name) for name in _OF_EFFECT} for check in checks],
         "notes": notes,
         "faults": faults,
     }
@@ -164,17 +166,6 @@ def _written_folders(arguments: Namespace, checks: list[EffectCheck]) -> Iterato
         yield arguments.movie.parent
     for check in checks:
         yield from (folder for folder, count in check.mattes.items() if count)
-
-
-def _effect(check: EffectCheck) -> dict:
-    return {
-        "strip": check.name,
-        "source": check.source,
-        "size": list(check.size),
-        "window": check.window,
-        "shutters": check.shutters,
-        "inbetween": check.steps,
-    }
 
 
 def _lines(report: dict) -> list[str]:

@@ -64,7 +64,7 @@ def add_device(parser: argparse.ArgumentParser) -> None:
 
 def rendered_by(arguments: Namespace) -> AbstractContextManager[None]:
     """Inside, renders are composed as these options say."""
-    return render_settings.using(render_settings.RenderSettings(arguments.device, gpu_memory=arguments.gpu_memory))
+    return render_settings.using(arguments.device, gpu_memory=arguments.gpu_memory)
 
 
 def refuse(arguments: Namespace, names: Iterable[str], why: str) -> None:

@@ -96,7 +96,7 @@ def _render_source(arguments: Namespace) -> None:
     if arguments.save:
         _save(scene, arguments.save)
     weights = arguments.weights if output else None
-    with render_settings.using(render_settings.RenderSettings(arguments.device, weights, arguments.gpu_memory)):
+    with render_settings.using(arguments.device, weights, arguments.gpu_memory):
         if output and arguments.weights:
             film_output.prepare(arguments.weights)
         if output:

@@ -13,6 +13,7 @@ from collections.abc import Callable, Mapping
 from contextlib import AbstractContextManager, nullcontext
 from functools import cache
 from itertools import pairwise
+from typing import Any
 
 import bpy
 import gpu
@@ -163,19 +164,8 @@ class BlenderDevice(Device):
             array = np.rint(array * np.float32(np.iinfo(dtype).max))
         return array.astype(dtype, copy=False)
 
-    def _read(
-        self,
-        texture: gpu.types.GPUTexture,
-        layer: int,
-        box: tuple[int, int, int, int],
-        components: int,
-        kind: str,
-        pixels: np.ndarray,
-    ) -> None:
-        """By a framebuffer, for GPUTexture.read() gives a first layer alone."""
-        framebuffer = gpu.types.GPUFrameBuffer(color_slots={"texture": texture, "layer": layer})
-        with framebuffer.bind():
-            framebuffer.read_color(*box, components, 0, kind, data=_buffer(kind, pixels))
+    def _read(self, texture: gpu.types.GPUTexture, *arguments: Any) -> None:
+        _read_layer(texture, *arguments)
 
     def _dispatch(self, program: Pass, groups: tuple[int, ...], textures: dict, images: dict, *given: Mapping) -> None:
         blocks, constants = given
@@ -205,10 +195,17 @@ def texel(texture: Texture, x: int, y: int) -> np.ndarray:
     layers = texture.size[2]
     values = np.empty((layers, 4), np.float32)
     for layer, pixel in enumerate(values):
-        framebuffer = gpu.types.GPUFrameBuffer(color_slots={"texture": texture.gpu, "layer": layer})
-        with framebuffer.bind():
-            framebuffer.read_color(x, y, 1, 1, 4, 0, "FLOAT", data=_buffer("FLOAT", pixel))
+        _read_layer(texture.gpu, layer, (x, y, 1, 1), 4, "FLOAT", pixel)
     return values.reshape(-1)
+
+
+def _read_layer(
+    texture: gpu.types.GPUTexture, layer: int, box: tuple, components: int, kind: str, pixels: np.ndarray
+) -> None:
+    """By a framebuffer, for GPUTexture.read() gives a first layer alone. box: left, bottom, width and height"""
+    framebuffer = gpu.types.GPUFrameBuffer(color_slots={"texture": texture, "layer": layer})
+    with framebuffer.bind():
+        framebuffer.read_color(*box, components, 0, kind, data=_buffer(kind, pixels))
 
 
 @cache

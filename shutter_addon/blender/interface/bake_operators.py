@@ -11,7 +11,7 @@ from ...core.messages import EffectError, UserError
 from ..data import selection, strips
 from ..devices import main_thread
 from ..editing import baked_strips
-from ..output import bake_job, baked_film, film_output
+from ..output import baked_film, film_output
 from .operator_bases import Named, operator, redraw
 from .panel_parts import draw_progress, sentence
 
@@ -21,8 +21,8 @@ FORMATS = (
     ("MOVIE", "Movie", "H.264, for playing: levels are off by little, and there is no transparency"),
     ("OPEN_EXR", "OpenEXR", "A folder of pictures in full precision, which play more slowly"),
 )
-_running: list[bake_job.BakeJob] = []  # one at most
-_stopped: list[bake_job.BakeJob] = []  # that finish the frame they are at
+_running: list[baked_film.BakeJob] = []  # one at most
+_stopped: list[baked_film.BakeJob] = []  # that finish the frame they are at
 _failures: dict[str, str] = {}  # by the effect's identity: why its last bake failed
 
 
@@ -43,7 +43,7 @@ def bake(self: Operator, _context: Context, effect: PropertyGroup) -> set[str] |
         if film.is_finished():
             baked_strips.lay(self.edit, self.effect_strip, film)
             return None
-        _running.append(bake_job.start(self.edit, effect, self.effect_strip, film))
+        _running.append(baked_film.start(self.edit, effect, self.effect_strip, film))
     except (film_output.OutputError, OSError) as error:
         raise UserError(film_output.in_words(error, film.place)) from None
     main_thread.later(_look, TICK)
@@ -96,7 +96,7 @@ def _look() -> float | None:
     return None
 
 
-def _lay(job: bake_job.BakeJob) -> str | None:
+def _lay(job: baked_film.BakeJob) -> str | None:
     """Puts a finished film where its effect strip is by now. A sentence: there is none any more, or no room."""
     scene = strips.scene_of_uid(job.scene)
     parts = [s for s in strips.effect_strips(scene) if s.scene.virtual_shutter.identity == job.effect] if scene else []

@@ -119,23 +119,17 @@ def lines(points: ArrayLike, color: Sequence[float], closed: bool = False, width
     gpu.state.blend_set("NONE")
 
 
-def text(
-    x: float,
-    y: float,
-    words: str,
-    size: float = SIZE,
-    color: Sequence[float] = (1, 1, 1, 0.9),
-    until: float | None = None,
-) -> None:
+def text(x: float, y: float, words: str, color: Sequence[float] = (1, 1, 1, 0.9), until: float | None = None) -> None:
     """Words with their lower left corner at a point; until: the x where they are cut off."""
-    blf.size(0, size * ui_scale())
+    size = SIZE * ui_scale()
+    blf.size(0, size)
     blf.color(0, *color)
     blf.position(0, x, y, 0)
     blf.enable(0, blf.SHADOW)
     blf.shadow(0, 3, 0, 0, 0, 0.8)
     if until is not None:
         blf.enable(0, blf.CLIPPING)
-        blf.clipping(0, x, y - size * ui_scale(), until, y + 2 * size * ui_scale())
+        blf.clipping(0, x, y - size, until, y + 2 * size)
     blf.draw(0, words)
     blf.disable(0, blf.SHADOW)
     blf.disable(0, blf.CLIPPING)

@@ -1,7 +1,8 @@
 """One look at the shown frame as it will be rendered: composed in full, exactly, and a pixel of the picture to one of
 the screen. It ends with a second click, with the frame, and with a change of the effect; then the view is as before."""
 
-from typing import NamedTuple
+from collections.abc import Callable
+from functools import partial
 
 import bpy
 from bpy.app.translations import pgettext_rpt as rpt_
@@ -15,17 +16,7 @@ from .operator_bases import Named
 _TICK = 0.1  # seconds between two looks at whether it has ended
 
 
-class _View(NamedTuple):
-    """How a preview was before; area: its address; rows, centre: see _view_of."""
-
-    area: int
-    size: str
-    proxies: bool
-    rows: float
-    centre: tuple[float, float]
-
-
-_before: _View | None = None  # Full Quality ends by itself, and then brings that back
+_back: Callable[[], None] | None = None  # Full Quality ends by itself, and then brings back how a preview was before
 
 
 class SHUTTER_OT_full_quality(Named, Operator):
@@ -61,9 +52,9 @@ def _shown(context: Context) -> tuple[Window, Area, preview_areas.Shown] | None:
 
 
 def _begin(window: Window, area: Area) -> None:
-    global _before
+    global _back
     space, region = area.spaces.active, preview_areas.preview_region(area)
-    _before = _View(area.as_pointer(), space.proxy_render_size, space.use_proxies, *_view_of(region))
+    _back = partial(_bring_back, area.as_pointer(), (space.proxy_render_size, space.use_proxies), *_view_of(region))
     space.proxy_render_size, space.use_proxies = "SCENE", False
     _zoom(window, area, region.height)
     main_thread.later(_end_when_over, _TICK)
@@ -71,27 +62,30 @@ def _begin(window: Window, area: Area) -> None:
 
 
 def _end_when_over() -> float | None:
-    if _before is not None and previews.looking.whole is not None:
+    if _back is not None and previews.looking.whole is not None:
         return _TICK
     _end()
     return None
 
 
 def _end() -> None:
-    """Has the view as before: what of it the user has not changed since."""
-    global _before
-    if (before := _before) is None:
-        return
-    _before = None
+    global _back
+    back, _back = _back, None
+    if back is not None:
+        back()
+
+
+def _bring_back(address: int, proxies: tuple[str, bool], rows: float, centre: tuple[float, float]) -> None:
+    """Has the view of an area as before: what of it the user has not changed since. rows, centre: see _view_of"""
     for window, area in list(preview_areas.previews(bpy.context)):
-        if area.as_pointer() != before.area:
+        if area.as_pointer() != address:
             continue
         space, region = area.spaces.active, preview_areas.preview_region(area)
         if (space.proxy_render_size, space.use_proxies) == ("SCENE", False):
-            space.proxy_render_size, space.use_proxies = before.size, before.proxies
+            space.proxy_render_size, space.use_proxies = proxies
         if abs(_view_of(region)[0] - region.height) < 1:
-            _zoom(window, area, before.rows)
-            _centre(window, area, before.centre)
+            _zoom(window, area, rows)
+            _centre(window, area, centre)
     preview_areas.redraw()
 
 
@@ -119,8 +113,8 @@ def _centre(window: Window, area: Area, centre: tuple[float, float]) -> None:
 
 def forget() -> None:
     """Ends it, and leaves the view as it is."""
-    global _before
-    _before = previews.looking.whole = None
+    global _back
+    _back = previews.looking.whole = None
 
 
 unregister = forget

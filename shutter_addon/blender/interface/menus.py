@@ -2,47 +2,38 @@
 Blender's own menus have of ours."""
 
 import bpy
-from bpy.types import Context, Menu
+from bpy.types import Context, Menu, UILayout
 
 from ..data import selection, strips
-from .panel_parts import draw_moves, draw_operators
+from .panel_parts import draw_moves, draw_operators, menu
 
 
-class SHUTTER_MT_strip(Menu):
-    bl_label = "Shutter"
-
-    def draw(self, _context: Context) -> None:
-        layout = self.layout
-        draw_operators(layout, ("add_effect", "ADD"), ("draw", "GREASEPENCIL"), ("erase",))
-        layout.separator()
-        draw_operators(layout, ("effect_copy", "COPYDOWN"), ("effect_paste", "PASTEDOWN"))
-        for end in ("shutter", "bars", "region", "outline", "track", "camera", "footage", "bake", "preview"):
-            layout.menu(f"SHUTTER_MT_of_{end}")
-        layout.separator()
-        draw_operators(layout, ("copy_report", "COPYDOWN"))
+@menu("strip", "Shutter")
+def strip_menu(layout: UILayout, _context: Context) -> None:
+    draw_operators(layout, ("add_effect", "ADD"), ("draw", "GREASEPENCIL"), ("erase",))
+    layout.separator()
+    draw_operators(layout, ("effect_copy", "COPYDOWN"), ("effect_paste", "PASTEDOWN"))
+    for end in ("shutter", "bars", "region", "outline", "track", "camera", "footage", "bake", "preview"):
+        layout.menu(f"SHUTTER_MT_of_{end}")
+    layout.separator()
+    draw_operators(layout, ("copy_report", "COPYDOWN"))
 
 
-class SHUTTER_MT_of_shutter(Menu):
-    bl_label = "Shutters"
-
-    def draw(self, _context: Context) -> None:
-        layout = self.layout
-        draw_operators(layout, ("shutter_add", "ADD"), ("shutter_remove", "REMOVE"))
-        layout.menu_contents("SHUTTER_MT_shutters")
+@menu("of_shutter", "Shutters")
+def shutter_menu(layout: UILayout, _context: Context) -> None:
+    draw_operators(layout, ("shutter_add", "ADD"), ("shutter_remove", "REMOVE"))
+    layout.menu_contents("SHUTTER_MT_shutters")
 
 
-class SHUTTER_MT_of_region(Menu):
-    bl_label = "Regions"
-
-    def draw(self, _context: Context) -> None:
-        layout = self.layout
-        layout.menu_contents("SHUTTER_MT_regions")
-        layout.separator()
-        draw_operators(layout, ("region_transform",), ("region_key", "KEY_HLT"), ("region_assign", "NONE", "shutter"))
-        draw_moves(layout, "region")
-        draw_operators(layout, ("region_remove", "REMOVE"), ("matte_export", "EXPORT"))
-        layout.separator()
-        draw_operators(layout, ("sharp_subject", "RENDERLAYERS"), ("clean_trail", "CURVE_PATH"))
+@menu("of_region", "Regions")
+def region_menu(layout: UILayout, _context: Context) -> None:
+    layout.menu_contents("SHUTTER_MT_regions")
+    layout.separator()
+    draw_operators(layout, ("region_transform",), ("region_key", "KEY_HLT"), ("region_assign", "NONE", "shutter"))
+    draw_moves(layout, "region")
+    draw_operators(layout, ("region_remove", "REMOVE"), ("matte_export", "EXPORT"))
+    layout.separator()
+    draw_operators(layout, ("sharp_subject", "RENDERLAYERS"), ("clean_trail", "CURVE_PATH"))
 
 
 # Of operators alone: by the end of its name, what a menu is called, and its groups (panel_parts.draw_operators).
@@ -76,29 +67,28 @@ _GROUPS: dict[str, tuple] = {
 }
 
 
-def _menu(end: str, label: str, *groups: list[tuple[str, ...]]) -> type[Menu]:
-    def draw(self: Menu, _context: Context) -> None:
+def _of_groups(end: str, label: str, *groups: list[tuple[str, ...]]) -> type[Menu]:
+    @menu(f"of_{end}", label)
+    def made(layout: UILayout, _context: Context) -> None:
         for i, group in enumerate(groups):
             if i:
-                self.layout.separator()
-            draw_operators(self.layout, *group)
+                layout.separator()
+            draw_operators(layout, *group)
 
-    return type(f"SHUTTER_MT_of_{end}", (Menu,), {"bl_label": label, "draw": draw})
+    return made
 
 
-class SHUTTER_MT_of_preview(Menu):
-    bl_label = "Preview"
-
-    def draw(self, context: Context) -> None:
-        layout, live = self.layout, context.window_manager.virtual_shutter
-        layout.operator("shutter.full_quality")
-        layout.separator()
-        layout.prop(live, "live")
-        layout.prop_menu_enum(live, "view")
-        layout.prop(live, "split")
-        layout.separator()
-        layout.prop(live, "probe")
-        layout.operator("shutter.probe_pixel")
+@menu("of_preview", "Preview")
+def preview_menu(layout: UILayout, context: Context) -> None:
+    live = context.window_manager.virtual_shutter
+    layout.operator("shutter.full_quality")
+    layout.separator()
+    layout.prop(live, "live")
+    layout.prop_menu_enum(live, "view")
+    layout.prop(live, "split")
+    layout.separator()
+    layout.prop(live, "probe")
+    layout.operator("shutter.probe_pixel")
 
 
 def _add_entry(self, _context: Context) -> None:
@@ -119,7 +109,7 @@ def _strip_entry(self, context: Context) -> None:
 
 def _entry(self, _context: Context) -> None:
     self.layout.separator()
-    self.layout.menu(SHUTTER_MT_strip.__name__)
+    self.layout.menu(strip_menu.__name__)
 
 
 _ENTRIES = (
@@ -129,14 +119,14 @@ _ENTRIES = (
     ("SEQUENCER_MT_strip", _entry),
 )
 
-classes = tuple(_menu(end, *what) for end, what in _GROUPS.items())
+classes = tuple(_of_groups(end, *what) for end, what in _GROUPS.items())
 
 
 def register() -> None:
-    for menu, entry in _ENTRIES:
-        getattr(bpy.types, menu).append(entry)
+    for name, entry in _ENTRIES:
+        getattr(bpy.types, name).append(entry)
 
 
 def unregister() -> None:
-    for menu, entry in _ENTRIES:
-        getattr(bpy.types, menu).remove(entry)
+    for name, entry in _ENTRIES:
+        getattr(bpy.types, name).remove(entry)

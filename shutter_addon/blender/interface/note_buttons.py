@@ -1,7 +1,5 @@
 """Buttons at the ends of the preview's notes, each of which calls an operator."""
 
-from dataclasses import dataclass
-
 from bpy.app.translations import pgettext_iface as iface_
 from bpy.app.translations import pgettext_rpt as rpt_
 from bpy.types import Context, Gizmo, GizmoGroup, Region
@@ -14,18 +12,13 @@ _PAD = 8
 OPERATORS = "shutter.full_quality", "shutter.smooth_streaks"
 
 
-@dataclass(frozen=True)
-class Button:
-    """operator: in previews one of OPERATORS; label: in panels, empty for the operator's"""
-
-    operator: str
-    label: str
+Button = tuple[str, str]  # an operator, in previews one of OPERATORS; and a label: in panels, empty for the operator's
 
 
 def of_strobing(step: float) -> tuple[str, Button]:
     """That an exposure has too few frames, and what helps against that. step: pixels from one to the next"""
     words = rpt_("Too few frames: steps of {pixels} pixels").format(pixels=f"{step:.0f}")
-    return words, Button("shutter.smooth_streaks", iface_("Smooth"))
+    return words, ("shutter.smooth_streaks", iface_("Smooth"))
 
 
 places: dict[tuple[int, str], tuple[drawing.Box, Button]] = {}  # by region and operator: a handler puts them there
@@ -39,13 +32,13 @@ def clear(region: Region) -> None:
 
 def width(button: Button) -> float:
     """In pixels of a region."""
-    return drawing.text_width(button.label) + 2 * _PAD * drawing.ui_scale()
+    return drawing.text_width(button[1]) + 2 * _PAD * drawing.ui_scale()
 
 
 def place(region: Region, left: float, bottom: float, button: Button) -> None:
     """Puts a button into a region: its gizmo draws it."""
     box = left, bottom, left + width(button), bottom + HEIGHT * drawing.ui_scale()
-    places[region.as_pointer(), button.operator] = box, button
+    places[region.as_pointer(), button[0]] = box, button
 
 
 class SHUTTER_GT_note_button(Seen, Gizmo):
@@ -53,7 +46,7 @@ class SHUTTER_GT_note_button(Seen, Gizmo):
         return places.get((context.region.as_pointer(), self.operator))
 
     def show(self, context: Context, seen: tuple[drawing.Box, Button]) -> None:
-        (left, bottom, right, top), button = seen
+        (left, bottom, right, top), (_operator, label) = seen
         look = context.preferences.themes[0].user_interface.wcol_tool
         unit, thin = drawing.ui_scale(), drawing.line_width()
         with drawing.pixel_space(context.region):
@@ -61,7 +54,7 @@ class SHUTTER_GT_note_button(Seen, Gizmo):
             inner = (left + thin, bottom + thin, right - thin, top - thin)
             drawing.rectangles([inner], [(*(look.inner_sel if self.is_highlight else look.inner)[:3], 1.0)])
             color = look.text_sel if self.is_highlight else look.text
-            drawing.text(left + _PAD * unit, bottom + 6 * unit, button.label, color=(*color, 1.0))
+            drawing.text(left + _PAD * unit, bottom + 6 * unit, label, color=(*color, 1.0))
 
     def is_at(self, _context: Context, seen: tuple[drawing.Box, Button], location: tuple[int, int]) -> bool:
         (left, bottom, right, top), _button = seen

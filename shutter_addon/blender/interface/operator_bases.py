@@ -140,22 +140,14 @@ def operator(
 class Beside(Named):
     """Goes on beside Blender, step by step; or at once, in the background and for scripts.
 
+    Each has `begin(context, waits)`, which does all of it, or goes on, and has to do all if it `waits`;
+    `goes_on(context)`, which does a step, and says whether there are more; and `end(context, is_stopped)`, called once
+    all steps are done, or once Esc has stopped them. What `begin` and `end` give is for `tried`.
+
     tick: seconds from step to step; blocks: whether Blender waits meanwhile"""
 
     tick = 0.1
     blocks = False
-
-    def begin(self, context: Context, waits: bool) -> set[str] | None:
-        """Does all of it, or goes on; waits: whether it has to do all."""
-        raise NotImplementedError
-
-    def goes_on(self, context: Context) -> bool:
-        """Does a step; whether there are more."""
-        raise NotImplementedError
-
-    def end(self, context: Context, is_stopped: bool) -> set[str] | None:
-        """What is done once all steps are, or once Esc has stopped them."""
-        raise NotImplementedError
 
     def leave(self, context: Context) -> None:
         """Lets go of what steps need."""

@@ -173,8 +173,7 @@ class SHUTTER_OT_outline_points(OfEffect, Operator):
         scene, effect, strip = selection.active(context)
         areas = [area for window, area in preview_areas.previews(context) if window == context.window]
         if not areas:
-            report_warning(self, rpt_("Open a sequencer with a preview to draw"))
-            return {"CANCELLED"}
+            return self.execute(context)
         self._area = context.area if context.area in areas else areas[0]
         if self.tried(self._read, scene, effect, strip) == {"CANCELLED"}:
             return {"CANCELLED"}
@@ -196,7 +195,8 @@ class SHUTTER_OT_outline_points(OfEffect, Operator):
         outlining.along_edges(self._picture, np.zeros(2), np.zeros(2))  # that it can, before anything is drawn
 
     def execute(self, _context: Context) -> set[str]:
-        report_warning(self, rpt_("Open a sequencer with a preview to draw"))  # it is drawn in a window alone
+        """Without a preview: it is drawn in one alone."""
+        report_warning(self, rpt_("Open a sequencer with a preview to draw"))
         return {"CANCELLED"}
 
     def modal(self, context: Context, event: Event) -> set[str]:

@@ -9,7 +9,7 @@ import numpy as np
 from bpy.app.translations import contexts
 from bpy.app.translations import pgettext_iface as iface_
 from bpy.app.translations import pgettext_n as n_
-from bpy.types import Context, PropertyGroup, Scene, Strip, UILayout
+from bpy.types import Context, Menu, PropertyGroup, Scene, Strip, UILayout
 from bpy.utils.previews import ImagePreviewCollection
 
 from ...core import told
@@ -133,6 +133,19 @@ def of_effect(label: str, draws: Draws, shows: Callable[[PropertyGroup], Any] | 
             draws(self.layout, *selection.active(context))
 
     return type("Drawn", (Drawn,), {"bl_label": label, "bl_options": {"DEFAULT_CLOSED"}} | look)
+
+
+def menu(name: str, label: str) -> Callable[[Callable[[UILayout, Context], None]], type[Menu]]:
+    """Makes a menu, SHUTTER_MT_ and its name, of a function that draws it."""
+
+    def made(draws: Callable[[UILayout, Context], None]) -> type[Menu]:
+        def draw(self: Menu, context: Context) -> None:
+            draws(self.layout, context)
+
+        content = {"__module__": draws.__module__, "bl_label": label, "draw": draw}
+        return type(f"SHUTTER_MT_{name}", (Menu,), content)
+
+    return made
 
 
 def icon_of(name: str) -> int:

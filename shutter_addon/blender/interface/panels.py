@@ -4,7 +4,7 @@ from collections.abc import Iterator
 
 import bpy
 from bpy.app.translations import pgettext_iface as iface_
-from bpy.types import Context, Menu, Panel, PropertyGroup, Scene, Strip, UILayout, UIList
+from bpy.types import Context, Panel, PropertyGroup, Scene, Strip, UILayout, UIList
 
 from ...core.messages import EffectError
 from ...core.model import shutters
@@ -23,6 +23,7 @@ from .panel_parts import (
     draw_moves,
     draw_operators,
     draw_properties,
+    menu,
     of_effect,
     pattern_icon,
     sentence,
@@ -75,45 +76,37 @@ class SHUTTER_UL_regions(UIList):
         return [self.bitflag_filter_item if is_own else 0 for is_own in own], []
 
 
-class SHUTTER_MT_presets(Menu):
-    bl_label = "Presets"
-
-    def draw(self, _context: Context) -> None:
-        self.layout.operator_enum("shutter.preset", "preset")
+@menu("presets", "Presets")
+def preset_menu(layout: UILayout, _context: Context) -> None:
+    layout.operator_enum("shutter.preset", "preset")
 
 
-class SHUTTER_MT_regions(Menu):
-    bl_label = "Region Specials"
-
-    def draw(self, _context: Context) -> None:
-        layout = self.layout
-        outline = layout.operator("shutter.draw", text="Draw Outline", icon=_ICONS["OUTLINE"])
-        outline.new, outline.kind = True, "OUTLINE"
-        layout.separator()
-        draw_operators(layout, ("matte_add", "FILE_MOVIE"), ("matte_strip", "SEQUENCE", "strip"))
-        # Without a mask they are greyed out; their tooltips say why.
-        mask = ("mask",) if bpy.data.masks else ()
-        draw_operators(layout, ("matte_mask", "MOD_MASK", *mask), ("outline_from_mask", _ICONS["OUTLINE"], *mask))
-        draw_operators(layout, ("ramp_add", "IPO_EASE_IN_OUT", "ramp"))
-        layout.separator()
-        draw_operators(layout, ("time_map", "TIME", "ramp"), ("rolling_shutter", "CAMERA_DATA", "side"))
-        draw_operators(layout, ("find_readout", "VIEWZOOM", "reads"))
-        layout.separator()
-        draw_operators(layout, ("region_take", "GREASEPENCIL", "layer"))
+@menu("regions", "Region Specials")
+def region_menu(layout: UILayout, _context: Context) -> None:
+    outline = layout.operator("shutter.draw", text="Draw Outline", icon=_ICONS["OUTLINE"])
+    outline.new, outline.kind = True, "OUTLINE"
+    layout.separator()
+    draw_operators(layout, ("matte_add", "FILE_MOVIE"), ("matte_strip", "SEQUENCE", "strip"))
+    # Without a mask they are greyed out; their tooltips say why.
+    mask = ("mask",) if bpy.data.masks else ()
+    draw_operators(layout, ("matte_mask", "MOD_MASK", *mask), ("outline_from_mask", _ICONS["OUTLINE"], *mask))
+    draw_operators(layout, ("ramp_add", "IPO_EASE_IN_OUT", "ramp"))
+    layout.separator()
+    draw_operators(layout, ("time_map", "TIME", "ramp"), ("rolling_shutter", "CAMERA_DATA", "side"))
+    draw_operators(layout, ("find_readout", "VIEWZOOM", "reads"))
+    layout.separator()
+    draw_operators(layout, ("region_take", "GREASEPENCIL", "layer"))
 
 
-class SHUTTER_MT_shutters(Menu):
-    bl_label = "Shutter Specials"
-
-    def draw(self, _context: Context) -> None:
-        layout = self.layout
-        layout.menu("SHUTTER_MT_presets", icon="PRESET")
-        layout.separator()
-        draw_operators(layout, ("shutter_duplicate", "DUPLICATE"))
-        draw_moves(layout, "shutter")
-        layout.separator()
-        draw_operators(layout, ("effect_copy", "COPYDOWN"), ("effect_paste", "PASTEDOWN"))
-        draw_operators(layout, ("recipe_import", "IMPORT"), ("recipe_export", "EXPORT"))
+@menu("shutters", "Shutter Specials")
+def shutter_menu(layout: UILayout, _context: Context) -> None:
+    layout.menu("SHUTTER_MT_presets", icon="PRESET")
+    layout.separator()
+    draw_operators(layout, ("shutter_duplicate", "DUPLICATE"))
+    draw_moves(layout, "shutter")
+    layout.separator()
+    draw_operators(layout, ("effect_copy", "COPYDOWN"), ("effect_paste", "PASTEDOWN"))
+    draw_operators(layout, ("recipe_import", "IMPORT"), ("recipe_export", "EXPORT"))
 
 
 class _Shutters(Mixin):
@@ -230,10 +223,10 @@ def _notes(context: Context) -> Iterator[tuple[str, Button | None]]:
     if (shown := match_source.shown(effect)) is not None:
         if shown.differences:
             what = ", ".join(iface_(word) for word in shown.differences)
-            yield iface_("Differs from its source: {what}").format(what=what), Button("shutter.match_source", "")
+            yield iface_("Differs from its source: {what}").format(what=what), ("shutter.match_source", "")
         if shown.lacks_modifiers:
             words = iface_("Modifiers of the source do not reach the effect")
-            yield words, Button("shutter.copy_modifiers", "")
+            yield words, ("shutter.copy_modifiers", "")
         if shown.has_effects:
             words = iface_("Effect strips on the source do not reach the effect: make the Shutter strip their input")
             yield words, None
@@ -266,8 +259,8 @@ class SHUTTER_PT_notes(Panel):
             column = layout.column(align=True)
             sentence(column, words, "INFO")
             if button is not None:
-                text = {"text": button.label, "translate": False} if button.label else {}
-                column.operator(button.operator, **text)
+                operator, label = button
+                column.operator(operator, **({"text": label, "translate": False} if label else {}))
         for index in _tracked(effect):
             region_panels.draw_tracked(layout, effect, index)
 

@@ -234,7 +234,7 @@ def _tell_detail(wanted: Drawing, size: tuple[int, int], is_still: bool, say: "_
     """Says in what the picture is less than a render's; size: of that. And gives the way to see that one, and back."""
     source = wanted.renderer.source
     if previews.looking.whole is not None:
-        say(rpt_("Full quality, as it will be rendered"), Button("shutter.full_quality", iface_("Back")))
+        say(rpt_("Full quality, as it will be rendered"), ("shutter.full_quality", iface_("Back")))
         return
     less = []
     if source.width < size[0]:
@@ -244,7 +244,7 @@ def _tell_detail(wanted: Drawing, size: tuple[int, int], is_still: bool, say: "_
     if wanted.request is not wanted.decision.request:
         less.append(rpt_("a draft of the edges"))
     if less:
-        button = Button("shutter.full_quality", iface_("Full Quality")) if is_still else None
+        button = ("shutter.full_quality", iface_("Full Quality")) if is_still else None
         say(rpt_("Preview: {what}").format(what=", ".join(less)), button)
 
 
@@ -330,8 +330,9 @@ def _show_source(quad: Quad, shown: Shown, renderer: Renderer, request: Request,
 def _show_scribbles(quad: Quad, colors: Colors, drawn: tuple[object, int], renderer: Renderer) -> None:
     """Labels of a picture in their colours."""
     labels, block = drawn
+    size = renderer.source.width, renderer.source.height
     textures = {"labels": labels, "palette": _palette(colors)}
-    quad.draw("SCRIBBLES", textures, opacity=0.7, block=block, size=_size(renderer))
+    quad.draw("SCRIBBLES", textures, opacity=0.7, block=block, size=size)
 
 
 def _show_coefficients(
@@ -340,11 +341,8 @@ def _show_coefficients(
     coefficients, block = renderer.drawn_with_layers(replace(request, quick=True))
     textures = {"coefficients": coefficients, "palette": _palette(colors)}
     count, unit = len(request.state.bars), float(drawing.ui_scale())
-    quad.draw(step, textures, opacity=opacity, block=block, count=count, size=_size(renderer), unit=unit)
-
-
-def _size(renderer: Renderer) -> tuple[int, int]:
-    return renderer.source.width, renderer.source.height
+    size = renderer.source.width, renderer.source.height
+    quad.draw(step, textures, opacity=opacity, block=block, count=count, size=size, unit=unit)
 
 
 def _palette(palette: Colors) -> Texture:

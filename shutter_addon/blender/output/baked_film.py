@@ -1,12 +1,17 @@
 """The film of an effect by itself, as files that an ordinary strip shows: a movie, or a folder of EXR pictures.
 
 The pictures are those that the engine gives to Blender. They are written past the sequencer, which would put them
-through its own colour space and back: an EXR has their very bits.
+through its own colour space and back: an EXR has their very bits. They are made at once (`render`), or by a Blender of
+their own, while the editor goes on working (`start`).
 """
 
 from __future__ import annotations
 
+import re
+import secrets
 import shutil
+import subprocess
+import sys
 from collections.abc import Callable, Iterator
 from contextlib import suppress
 from dataclasses import dataclass
@@ -21,14 +26,14 @@ from bpy.types import PropertyGroup, Scene, Strip
 
 from ...core import atomic_write, stopping
 from ...core.farm import job_file
-from ...core.messages import EffectError
+from ...core.messages import EffectError, signed
 from ...core.stopping import StoppedError
 from ...media import files, film_parts, image_writing, rendered_pictures
 from ...media.blender_movie import frame_rate
 from ...media.derived import own_folder, refuse_link
 from ...media.errors import MediaError
 from ...media.rendered_pictures import is_whole_movie, is_whole_picture
-from ..data import effect_version, snapshot, source_media, strips, versions
+from ..data import effect_version, preferences, snapshot, source_media, strips, versions
 from ..rendering import pictures, sessions
 from . import film_output
 
@@ -36,6 +41,10 @@ FOLDER = "virtual_shutter_baked"  # beside the .blend file
 Kind = Literal["MOVIE", "OPEN_EXR"]
 KINDS: dict[str, Kind] = {"movie": "MOVIE", "exr": "OPEN_EXR"}  # as the command calls them
 _CHANNELS = ["R", "G", "B", "A"]
+_ZSTD = b"\x28\xb5\x2f\xfd"  # how a compressed file begins
+_ROOT = Path(__file__).parents[3]  # of the extension, or of the checkout
+_COPY = re.compile(r"[^/\\]+\.bake-[0-9a-f]{8}\.blend")
+_MANIFEST = "copy"  # the file of a log that has the name of the copy
 Picture = Callable[[int], np.ndarray]  # that of a frame
 
 
@@ -196,3 +205,117 @@ def _counted(shown: Iterator[np.ndarray], done: int, told: Callable[[int], objec
     for number, picture in enumerate(shown, start=done + 1):
         yield picture
         told(number)
+
+
+@dataclass
+class BakeJob:
+    """A bake that runs in a Blender of its own, which reads a copy of the edit as it was then.
+
+    scene: session_uid of the edit's; effect: identity of the effect, strip: name of its strip
+    copy: of the edit, which the process removes once it has read it
+    log: part folder beside the film with what the process says, and the name of the copy"""
+
+    scene: int
+    effect: str
+    strip: str
+    film: Film
+    copy: Path
+    log: Path
+    process: subprocess.Popen
+
+    def done(self) -> int:
+        """How many frames are finished."""
+        lines = self._said("out").split("\n")[:-1]
+        counts = [line.split()[0] for line in lines[-2:] if line.endswith(f" of {len(self.film.frames)}")]
+        return int(counts[-1]) if counts else 0
+
+    def is_over(self) -> bool:
+        return self.process.poll() is not None
+
+    def failure(self) -> str | None:
+        """Why it failed, as a sentence, once it is over; None: the film is there."""
+        if self.film.is_finished():
+            return None
+        said = [line for line in self._said("err").splitlines() if line.startswith(signed(""))]
+        return said[-1].removeprefix(signed("")).strip() if said else rpt_("the bake ended without a word")
+
+    def _said(self, stream: str) -> str:
+        return (self.log / stream).read_text(encoding="utf-8", errors="replace")
+
+    def end(self) -> None:
+        """Stops it, if it runs, and removes what it needed alone. Frames that are finished stay."""
+        if not self.is_over():
+            self.process.terminate()
+        with suppress(OSError):  # Windows keeps what is open
+            self.copy.unlink(missing_ok=True)
+        shutil.rmtree(self.log, ignore_errors=True)
+
+
+def start(scene: Scene, effect: PropertyGroup, strip: Strip, film: Film) -> BakeJob:
+    """Begins to bake a film. EffectError, OSError: it cannot be begun."""
+    edit = Path(bpy.data.filepath)
+    film.place.parent.mkdir(parents=True, exist_ok=True)
+    _clear_up(film.place.parent, edit)
+    log = atomic_write.new_part(film.place.parent)
+    copy = edit.with_name(f"{edit.stem}.bake-{secrets.token_hex(4)}.blend")  # where the paths in it lead to the same
+    try:
+        (log / _MANIFEST).write_text(copy.name, encoding="utf-8")
+        bpy.ops.wm.save_as_mainfile(filepath=str(copy), copy=True, compress=_is_compressed(edit), relative_remap=False)
+        words = _words(scene, strip, film)
+        with open(log / "out", "wb") as out, open(log / "err", "wb") as err:
+            process = subprocess.Popen(
+                [*_command(), "bake", str(copy), *words],
+                cwd=_ROOT,
+                stdin=subprocess.PIPE,  # which ends with this process, and with that the other one
+                stdout=out,
+                stderr=err,
+            )
+    except (RuntimeError, OSError) as error:
+        copy.unlink(missing_ok=True)
+        shutil.rmtree(log, ignore_errors=True)
+        raise EffectError(rpt_("the bake cannot begin: {reason}").format(reason=" ".join(str(error).split()))) from None
+    return BakeJob(
+        scene=scene.session_uid,
+        effect=effect.identity,
+        strip=strip.name,
+        film=film,
+        copy=copy,
+        log=log,
+        process=process,
+    )
+
+
+def _clear_up(folder: Path, edit: Path) -> None:
+    """Removes what bakes left behind that were killed: logs, and the copies of an edit that these name."""
+    for left in atomic_write.left_behind(folder):
+        with suppress(OSError):
+            manifest = left / _MANIFEST
+            name = manifest.read_text(encoding="utf-8", errors="replace") if manifest.is_file() else ""
+            if _COPY.fullmatch(name):
+                edit.with_name(name).unlink(missing_ok=True)
+    atomic_write.clear_up(folder)
+
+
+def _words(scene: Scene, strip: Strip, film: Film) -> list[str]:
+    """The command's options. Names may begin with a dash."""
+    kind = next(name for name, kind in KINDS.items() if kind == film.kind)
+    names = [f"--scene={scene.name}", f"--strip={strip.name}", f"--format={kind}", f"--output={film.place.parent}"]
+    return [*names, f"--device={preferences.device()}", f"--gpu-memory={preferences.gpu_memory()}", "--attached"]
+
+
+def _is_compressed(edit: Path) -> bool:
+    """Whether a .blend file is: Blender writes the user's own as it was last told to, by a copy as well."""
+    try:
+        with edit.open("rb") as file:
+            return file.read(4) == _ZSTD
+    except OSError:
+        return False
+
+
+def _command() -> list[str]:
+    """What runs the command `shutter` in a process of its own."""
+    if not bpy.app.binary_path:  # Blender as a library
+        return [sys.executable, "-m", "shutter_addon"]
+    package = __package__.rpartition(".shutter_addon")[0]
+    enabled = ["--addons", package] if package else []  # as here, whatever the preferences that are saved say
+    return [bpy.app.binary_path, "--background", *enabled, "--command", "shutter"]

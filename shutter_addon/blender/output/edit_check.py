@@ -10,7 +10,6 @@ from contextlib import closing
 from dataclasses import dataclass, field
 from pathlib import Path
 
-import bpy
 from bpy.types import PropertyGroup, Scene, Strip
 
 from ...compute.renderer import Renderer
@@ -31,20 +30,19 @@ from ..rendering.session import RenderContext, RenderSession
 class EffectCheck:
     """What was found of an effect.
 
-    scene: that its strip is in; name: of that strip; source: the footage's first file, "": it cannot be read
+    strip: its name; source: the footage's first file, "": it cannot be read
     size: of its pictures, width and height in pixels; window: filmed frames of the longest
     shutters: how many
-    steps: moments for a filmed frame, 1: it is not smooth
+    inbetween: moments for a filmed frame, 1: it is not smooth
     mattes: how many mattes of outlines are to be carried first, by the folder that they are kept in
     faults, notes: sentences; notes are of what can be rendered, but otherwise than one may think"""
 
-    scene: bpy.types.Scene
-    name: str
+    strip: str
     shutters: int
     source: str = ""
     size: tuple[int, int] = (0, 0)
     window: int = 0
-    steps: int = 1
+    inbetween: int = 1
     mattes: dict[Path, int] = field(default_factory=dict)
     faults: list[str] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
@@ -77,8 +75,8 @@ def _shown_effects(film: Scene, frames: range) -> Iterator[tuple]:
 def _effect(session: RenderSession, shown: tuple) -> EffectCheck:
     """shown: of _shown_effects"""
     scene, effect, strip, frames = shown
-    check = EffectCheck(scene=scene, name=strip.name, shutters=len(effect.shutters))
-    if not _look_at_footage(check, effect, strip):
+    check = EffectCheck(strip=strip.name, shutters=len(effect.shutters))
+    if not _look_at_footage(check, scene, effect, strip):
         return check
     try:
         taken = snapshot.take(scene, effect, strip, frames)
@@ -89,11 +87,11 @@ def _effect(session: RenderSession, shown: tuple) -> EffectCheck:
     if requests:
         renderer = session.renderer(next(iter(requests.values())).source)
         source = renderer.source
-        check.steps = source.step
+        check.inbetween = source.step
         check.window = max(request.state.options.window for request in requests.values()) // source.step
         _look_at_frames(check, renderer, requests)
         _look_at_mattes(check, source, requests)
-        check.notes += _notes(check, taken, requests, renderer.source)
+        check.notes += _notes(check, taken, requests, source)
     return check
 
 
@@ -113,11 +111,11 @@ def _requests(session: RenderSession, taken: snapshot.Snapshot, check: EffectChe
     return requests
 
 
-def _look_at_footage(check: EffectCheck, effect: PropertyGroup, strip: Strip) -> bool:
+def _look_at_footage(check: EffectCheck, scene: Scene, effect: PropertyGroup, strip: Strip) -> bool:
     """Whether the footage can be opened; and whether it is what it was when the edit was saved: the effect's scene has
     the size of it."""
     try:
-        source = strips.source_of(check.scene, effect, strip)
+        source = strips.source_of(scene, effect, strip)
         medium = source_media.open_media(source)
     except UserError as error:
         check.faults.append(str(error))

@@ -12,13 +12,19 @@ the GPU alone, and those where rounding decides may be others than Blender's.
 
 from __future__ import annotations
 
-from contextlib import AbstractContextManager, ExitStack
+import os
+import tempfile
+from collections.abc import Iterator
+from contextlib import AbstractContextManager, ExitStack, closing, contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import ClassVar
 
+import numpy as np
+import OpenImageIO
 from bpy.types import Scene, Strip
 
-from ...core import stopping
+from ...core import atomic_write, stopping
 from ...core.pixels.shown_levels import Display
 from ...media import color
 from ..data import seen_alone, strips, versions
@@ -26,20 +32,24 @@ from ..data.property_copy import for_a_while
 from ..rendering import job_snapshots, pictures, render_job, sessions
 from ..rendering.effect_source import FULL, in_words
 from ..rendering.render_job import Where
-from . import levels_file
-from .levels_file import LevelsFile
+
+# Rows of a tile of the file; its columns are a multiple of 16. A TIFF without tiles takes twice the time: Blender reads
+# rows upwards, for which OpenImageIO then allocates 64 MB for each picture.
+_ROWS, _COLUMNS = 64, 16
 
 
 @dataclass
 class _Film:
     """What a render has changed.
 
+    is_own: whether renders are movies of new_edit.make_edit
     scene: session_uid of the edit; changed: what puts it back
     strip: of the file, by name; None: there is none yet
     file: of levels; None: as above
     makes_levels: as seen_alone.makes_levels; None: nobody has asked; has_failed: it was not possible
     has_begun: whether a frame is rendered"""
 
+    is_own: ClassVar[bool] = False
     scene: int
     changed: ExitStack = field(default_factory=ExitStack)
     strip: str | None = None
@@ -49,42 +59,33 @@ class _Film:
     has_begun: bool = False
 
 
-@dataclass
-class _Feed:
-    """film: that renders; is_own: whether renders are movies of whole_edits.make_edit"""
-
-    film: _Film | None = None
-    is_own: bool = False
-
-
-_data = _Feed()
+_running: list[_Film] = []  # one at most
 
 
 def feeding() -> AbstractContextManager[None]:
     """Inside, renders are movies of edits of whole_edits.make_edit, from their first frame on."""
-    return for_a_while([(_data, "is_own", True)])
+    return for_a_while([(_Film, "is_own", True)])
 
 
 def begin(scene: Scene) -> None:
     """The render of an edit begins, on the main thread."""
     end()
     if render_job.where() is Where.BACKGROUND and scene.sequence_editor is not None:
-        _data.film = _Film(scene.session_uid)
+        _running.append(_Film(scene.session_uid))
 
 
 def end() -> None:
     """Puts the edit back."""
-    film, _data.film = _data.film, None
-    if film is not None:
-        film.changed.close()
+    while _running:
+        _running.pop().changed.close()
 
 
 def before_frame(scene: Scene) -> None:
     """Prepares the edit for its current frame."""
-    film = _data.film
-    if film is None or film.scene != scene.session_uid:
+    film = next((film for film in _running if film.scene == scene.session_uid), None)
+    if film is None:
         return
-    if not (film.has_begun or _data.is_own):  # a picture by itself may be saved as floats afterwards
+    if not (film.has_begun or film.is_own):  # a picture by itself may be saved as floats afterwards
         film.has_begun = True
         return
     seen = None if film.has_failed else _seen(film, scene)
@@ -96,7 +97,7 @@ def before_frame(scene: Scene) -> None:
 
 def _seen(film: _Film, scene: Scene) -> tuple[Strip, bool] | None:
     """As seen_alone.alone, at the current frame, where Blender makes known levels of it."""
-    if _data.is_own:
+    if film.is_own:
         is_known = not versions.colours()
         return (strips.effect_strips(scene)[0], False) if is_known else None
     if film.makes_levels is None or render_job.scripts_act():
@@ -110,12 +111,12 @@ def _feed(film: _Film, scene: Scene, strip: Strip, is_blended: bool) -> bool:
         shown = scene.frame_current - strips.origin(strip) + strip.scene.frame_start
         snapshot, frame = job_snapshots.of(strip.scene, int(shown))
         transfer = color.blended if is_blended else color.shown
-        display = None if _data.is_own else Display(scene.render.dither_intensity, transfer)
-        context = sessions.of_render(render_job.say, levels=_data.is_own, display=display)
+        display = None if film.is_own else Display(scene.render.dither_intensity, transfer)
+        context = sessions.of_render(render_job.say, levels=film.is_own, display=display)
         with stopping.once(render_job.stopping):
             source = context.renderer(context.request(snapshot, frame, FULL)).source
             size = scene.render.resolution_x, scene.render.resolution_y
-            is_known = _data.is_own or source.alpha == "opaque"  # over black, what shines through is known
+            is_known = film.is_own or source.alpha == "opaque"  # over black, what shines through is known
             if not is_known or (source.width, source.height) != size:
                 return False
             levels = pictures.picture(context, snapshot, frame)
@@ -134,7 +135,7 @@ def _file(film: _Film, scene: Scene) -> LevelsFile:
     """The file of the film, with a strip that shows it. OSError: it cannot be written. ValueError: there is no channel
     for the strip."""
     if film.file is None:
-        film.file = film.changed.enter_context(levels_file.temporary(scene))
+        film.file = film.changed.enter_context(_temporary(scene))
         film.strip = _add_strip(film, scene, film.file.path)
     return film.file
 
@@ -161,3 +162,45 @@ def _add_strip(film: _Film, scene: Scene, path: Path) -> str:
 
     film.changed.callback(remove)
     return name
+
+
+@contextmanager
+def _temporary(scene: Scene) -> Iterator[LevelsFile]:
+    """A file for the pictures of a scene. OSError: there is no room for it."""
+    atomic_write.clear_up(place := Path(tempfile.gettempdir()))
+    with atomic_write.part_folder(place) as folder:
+        file = LevelsFile(folder / "picture.tif", scene.render.resolution_x, scene.render.resolution_y)
+        with closing(file):
+            yield file
+
+
+class LevelsFile:
+    """An uncompressed TIFF of RGBA levels, whose pixels are replaced in place."""
+
+    def __init__(self, path: Path, width: int, height: int) -> None:
+        """OSError: it cannot be written. After this there is room for all that is written to it."""
+        self.path, self._padding = path, -width % _COLUMNS
+        columns = width + self._padding
+        spec = OpenImageIO.ImageSpec(width, height, 4, "uint8")
+        spec.tile_width, spec.tile_height = columns, _ROWS
+        spec.attribute("compression", "none")
+        spec.attribute("oiio:UnassociatedAlpha", 1)
+        white = np.full((height, width, 4), 255, np.uint8)
+        file = OpenImageIO.ImageOutput.create(str(path))
+        if not (file and file.open(str(path), spec) and file.write_image(white) and file.close()):
+            raise OSError(f"{path}: cannot be written")
+        # The tiles are one below the other, and nothing lies between.
+        self._start = path.read_bytes().index(b"\xff" * (4 * width))
+        self._file = path.open("r+b", buffering=0)
+
+    def write(self, levels: np.ndarray) -> None:
+        """levels: uint8 (H, W, 4), top row first. OSError: there is no such file any more, which Blender would show as
+        a picture of one colour."""
+        if self._padding:
+            levels = np.pad(levels, ((0, 0), (0, self._padding), (0, 0)))
+        self._file.seek(self._start)
+        self._file.write(levels)
+        os.utime(self.path)
+
+    def close(self) -> None:
+        self._file.close()

@@ -1,26 +1,26 @@
 """What a report of an error should have in it, as short Markdown: versions, the device, what the edit is made of, and
 the last errors and warnings. Nothing in it names what is the user's: no strip, no scene, no file, no folder."""
 
-from __future__ import annotations
-
 import importlib
 import os
 import platform
 import re
 import tomllib
+from collections import Counter
 from collections.abc import Callable, Iterable, Iterator
-from contextlib import suppress
+from contextlib import closing, suppress
 
 import bpy
 import gpu
-from bpy.types import Scene
+from bpy.types import PropertyGroup, Scene, Strip
 
 from ...core import told
+from ...core.messages import UserError
 from ...devices.device import MEGABYTE, NoDeviceError, machine_memory
-from ..data import preferences, versions
+from ..data import annotations, fcurves, preferences, snapshot, source_media, strips, versions
+from ..data.validation import word
 from ..devices import available
 from ..rendering import render_settings
-from . import edit_structure
 
 # What the extension uses, by the names that it is imported by.
 PACKAGES = {
@@ -36,7 +36,7 @@ BACKENDS = {"OPENGL": "OpenGL", "VULKAN": "Vulkan", "METAL": "Metal", "NONE": "n
 def text(scene: Scene | None) -> str:
     """The report; scene: whose sequencer is shown, or None. On the main thread."""
     lines = ["### Virtual Shutter: report of an error", "", *_told(_versions), *_told(_device)]
-    lines += ["", "Edit", "", *_told(lambda: edit_structure.lines(scene) if scene else ["- none"])]
+    lines += ["", "Edit", "", *_told(lambda: _edit(scene) if scene else ["- none"])]
     return "\n".join([*lines, "", "Last errors and warnings", "", *(_sentences() or ["- none"]), ""])
 
 
@@ -111,3 +111,137 @@ def _sentences() -> list[str]:
     return [
         f"- {each.seconds:.0f} s: {each.words}" + (f" × {each.times}" if each.times > 1 else "") for each in told.last()
     ]
+
+
+def _edit(scene: Scene) -> list[str]:
+    """What an edit is made of, in kinds and numbers: of a scene and its effects."""
+    found = list(_of_scene(scene))
+    for number, strip in enumerate(strips.effect_strips(scene), 1):
+        effect = strips.effect_of(scene, strip.scene)
+        found += ["", f"Effect {number}", ""]
+        found += _of_effect(scene, effect, strip) if effect else ["- its data are gone"]
+    return found
+
+
+def _of_scene(scene: Scene) -> Iterator[str]:
+    render, view = scene.render, scene.view_settings
+    size = f"{render.resolution_x}×{render.resolution_y} at {render.resolution_percentage} %"
+    rate = f"{render.fps / render.fps_base:g} fps"
+    yield f"- Frames: {scene.frame_start} to {scene.frame_end}, at {scene.frame_current}; {size}, {rate}"
+    saved = scene.virtual_shutter.version
+    by = saved if re.fullmatch(r"[\d.]{1,20}", saved) else "none"  # a script may have written anything there
+    yield f"- Saved: by Blender {'.'.join(map(str, bpy.data.version))}, version {by} of the extension"
+    yield f"- Output: {render.image_settings.file_format}, {render.image_settings.color_depth} bits"
+    colours = {
+        "display": scene.display_settings.display_device,
+        "view": view.view_transform,
+        "look": view.look,
+        "sequencer": scene.sequencer_colorspace_settings.name,
+        "working space": bpy.data.colorspace.working_space,
+    }
+    yield f"- Colors: {', '.join(f'{what} {_standard(name)}' for what, name in colours.items())}"
+    all_strips = scene.sequence_editor.strips_all if scene.sequence_editor else ()
+    counts = sorted(Counter(strip.type for strip in all_strips).items())
+    yield f"- Strips: {', '.join(f'{count} {kind}' for kind, count in counts) or 'none'}"
+    others = sum(bool(other.virtual_shutter.effects) for other in bpy.data.scenes if other != scene)
+    yield f"- Effects: {len(scene.virtual_shutter.effects)}; other scenes with effects: {others}"
+
+
+def _of_effect(scene: Scene, effect: PropertyGroup, strip: Strip) -> Iterator[str]:
+    options = [f"window {effect.window}", f"follow edges {effect.edge_aware:g}", *_chosen(effect)]
+    yield f"- Options: {', '.join(dict.fromkeys(options))}"
+    yield f"- Strip: {', '.join(_of_strip(strip))}"
+    yield from _of_source(scene, effect, strip)
+    yield f"- Keys: {_keys(scene, effect)} of the effect, {_keys(scene, effect.camera)} of the camera"
+    yield from _listed(scene, "Shutter", [(shutter, [f"{len(shutter.bars)} bars"]) for shutter in effect.shutters])
+    yield from _listed(scene, "Region", [(region, _of_region(effect, region)) for region in effect.regions])
+    frame = min(max(scene.frame_current, strip.left_handle), strip.right_handle - 1)
+    try:
+        snapshot.take(scene, effect, strip, (frame,)).effect.at(frame)
+    except UserError as error:
+        yield f"- Cannot be shown at frame {frame}: {told.described(error)}"
+
+
+def _of_strip(strip: Strip) -> Iterator[str]:
+    yield f"{strip.type} in channel {strip.channel}, frames {strip.left_handle} to {strip.right_handle - 1}"
+    yield f"content of {strip.content_duration} from {strip.content_start:g}, blend {strip.blend_type}"
+    if strip.parent_meta():
+        yield "in a meta strip"
+    retimed = len(getattr(strip, "retiming_keys", ()))
+    changes = {
+        "muted": strip.mute,
+        "reversed": getattr(strip, "use_reverse_frames", False),
+        f"strobe {getattr(strip, 'strobe', 1):g}": getattr(strip, "strobe", 1) > 1,
+        f"{retimed} retiming keys": retimed > 0,
+        f"{len(strip.modifiers)} modifiers": len(strip.modifiers) > 0,
+        "baked": bool(strip.virtual_shutter_bake.identity),
+        "proxy": getattr(strip, "use_proxy", False),
+        "deinterlaced": getattr(strip, "use_deinterlace", False),
+    }
+    yield from (word for word, is_so in changes.items() if is_so)
+
+
+def _of_source(scene: Scene, effect: PropertyGroup, strip: Strip) -> Iterator[str]:
+    source = strips.nearest_source(scene, effect, strip)
+    if source is None:
+        yield "- Source: none"
+        return
+    parts = sum(other.virtual_shutter_source == effect.source for other in scene.sequence_editor.strips_all)
+    yield f"- Source: {', '.join(_of_strip(source))}; parts: {parts}"
+    try:
+        spec = source_media.spec(source)
+        with closing(spec.open()) as medium:
+            space = spec.options["colorspace"]
+            rate = f"{float(medium.fps):g} fps" if medium.fps else "no rate"
+            yield (
+                f"- Footage: {medium.file_kind}, {medium.width}×{medium.height}, {rate},"
+                f" {medium.count} frames, read as {medium.dtype}, alpha {medium.alpha}, color space {_standard(space)}"
+            )
+    except UserError as error:
+        yield f"- Footage: {told.described(error)}"
+
+
+def _of_region(effect: PropertyGroup, region: PropertyGroup) -> list[str]:
+    """Whose it is as a number: shutters are named."""
+    names = [shutter.name for shutter in effect.shutters]
+    words = [f"shutter {names.index(region.shutter) + 1 if region.shutter in names else 'none'}"]
+    if layer := annotations.layer_of(effect, region):
+        words += [f"{len(layer.frames)} drawings", f"{sum(len(drawing.strokes) for drawing in layer.frames)} strokes"]
+    return words + (["follows a clip"] if region.follow_clip else [])
+
+
+def _chosen(group: PropertyGroup) -> Iterator[str]:
+    """What is otherwise in a property group than in a new one: enums, switches and whole numbers."""
+    for prop in group.bl_rna.properties:
+        name = prop.identifier
+        if prop.type in ("ENUM", "BOOLEAN", "INT") and not (prop.is_hidden or name.startswith("active_")):
+            value = _word(group, name) if prop.type == "ENUM" else getattr(group, name)
+            if value != prop.default:
+                yield f"{name} {value}"
+
+
+def _listed(scene: Scene, what: str, found: list[tuple]) -> Iterator[str]:
+    """Property groups with words that tell of each; equal ones in one line."""
+    yield f"- {what}s: {len(found)}"
+    lines = (", ".join([*words, *_chosen(group), f"{_keys(scene, group)} keys"]) for group, words in found)
+    yield from (f"  - {times} × {line}" for line, times in Counter(lines).items())
+
+
+def _keys(scene: Scene, group: PropertyGroup) -> int:
+    """How many keyframes there are of a property group and of all in it."""
+    curves = fcurves.curves_under(scene, f"{group.path_from_id()}.")
+    return sum(len(curve.keyframe_points) for curve in curves)
+
+
+def _word(owner: PropertyGroup, name: str) -> str:
+    """An enum's identifier; files can hold numbers that stand for none."""
+    try:
+        return word(owner, name)
+    except UserError:
+        return "unknown"
+
+
+def _standard(name: str) -> str:
+    """A name of Blender's own OpenColorIO configuration, or of one that OpenColorIO brings; others are somebody's."""
+    configuration = versions.colours()
+    return name if not configuration or configuration.startswith("ocio://") else "(of another configuration)"

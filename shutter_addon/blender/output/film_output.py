@@ -135,9 +135,8 @@ def pictures_of(folder: Path, ending: str, frames: range) -> list[Path]:
 
 def for_blender(path: str) -> str:
     """The path as Blender takes it for a name: it has templates in braces. OutputError: no name of Blender's."""
-    for sign in "\\" if os.sep == "/" else "":
-        if sign in path:
-            raise OutputError(f"{path}: Blender cannot write to a path with {sign}")
+    if os.sep == "/" and "\\" in path:
+        raise OutputError(f"{path}: Blender cannot write to a path with \\")
     if len(os.fsencode(path)) > _LONGEST:
         raise OutputError(f"{path}: Blender cannot write to a path of more than {_LONGEST} bytes")
     return path.replace("{", "{{").replace("}", "}}")

@@ -35,7 +35,7 @@ def picture(context: RenderContext, snapshot: Snapshot, frame: float, detail: De
     stopping.check()
     session, request = context.session, context.request(snapshot, frame, detail)
     renderer = context.renderer(request)  # meanwhile the window may close it: it would be opened again
-    if (weights := render_settings.settings().weights) is not None:
+    if (weights := render_settings.weights()) is not None:
         place = weights / f"{round(frame - snapshot.first + 1):04d}.exr"
         _write_weights(place, snapshot, frame, session.weights(request))
     if renderer.source.by_blender:
@@ -64,9 +64,18 @@ def _say_once(sentence: str, say: Callable[[str], None]) -> None:
         say(sentence)
 
 
-def shortages(renderer: Renderer, snapshot: Snapshot, request: Request) -> list[str]:
+def shortages(renderer: Renderer, snapshot: Snapshot, request: Request) -> Iterator[str]:
     """Sentences about what pictures as requested lack: see `unread`; and, where the GPU has no room, speed."""
-    return [*unread(snapshot, request), *_slow(renderer, request)]
+    yield from unread(snapshot, request)
+    if renderer.is_short:
+        source = renderer.source
+        words = {"width": source.width, "height": source.height, "frames": request.state.options.window}
+        words["limit"] = render_settings.memory().limit // MEGABYTE
+        sentence = rpt_(
+            "the {limit} MB that may be taken of the GPU are too few for {frames} frames of {width}×{height}: all are"
+            " sent for every picture, which is slow"
+        )
+        yield sentence.format(**words)
 
 
 def unread(snapshot: Snapshot, request: Request) -> Iterator[str]:
@@ -86,19 +95,6 @@ def unread(snapshot: Snapshot, request: Request) -> Iterator[str]:
             " blend mode of the Shutter strip to Replace"
         )
         yield sentence.format(space=snapshot.blended)
-
-
-def _slow(renderer: Renderer, request: Request) -> list[str]:
-    if not renderer.is_short:
-        return []
-    source = renderer.source
-    words = {"width": source.width, "height": source.height, "frames": request.state.options.window}
-    words["limit"] = render_settings.memory().limit // MEGABYTE
-    sentence = rpt_(
-        "the {limit} MB that may be taken of the GPU are too few for {frames} frames of {width}×{height}: all are"
-        " sent for every picture, which is slow"
-    )
-    return [sentence.format(**words)]
 
 
 def resized(picture: np.ndarray, width: int, height: int, divisor: int = 1) -> np.ndarray:
