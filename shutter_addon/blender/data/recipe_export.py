@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 
+import numpy as np
 from bpy.app.translations import pgettext_rpt as rpt_
 
 from ...core.messages import EffectError, translated
@@ -36,7 +37,8 @@ def recipe_of(scene, effect, strip, contents: Sequence = ()) -> Effect:
 def _keyed(scene, effect) -> set[float]:
     """The timeline frames of the effect's keys and drawings."""
     curves, pace = fcurves.curves_under(scene, effect.path_from_id() + "."), fcurves.stretched(scene)
-    frames = {frame / pace for frame in fcurves.key_frames(curves)}
+    # In float32, as the keys of Curves are.
+    frames = set((np.array(fcurves.key_frames(curves), np.float32) / pace).tolist())
     layers = (annotations.layer_of(effect, region) for region in effect.regions)
     return frames.union(float(drawing.frame_number) for layer in layers if layer for drawing in layer.frames)
 
