@@ -284,6 +284,8 @@ def _render(bpy, folder, frame: int) -> int:
     settings.file_format = "PNG"
     edit.frame_set(frame)
     edit.render.filepath = str(folder / "picture.png")
+    for scene in bpy.data.scenes:
+        scene.render.use_render_cache = False  # OpenEXR writes it by threads that are not there after a fork
     try:
         bpy.ops.render.render(write_still=True, scene=edit.name)
     except RuntimeError as error:

@@ -73,15 +73,18 @@ def _solved(labels: np.ndarray, shutters: np.ndarray, across: np.ndarray, down: 
     while grids[-1].ground.shape != (1, 1):
         grids.append(_coarser(grids[-1]))
     solution = (labels == shutters[:, None, None] + 1).astype(np.float32)
-    direction, before = np.zeros_like(solution), np.zeros((len(solution), 1, 1), np.float32)
+    direction, residual = np.zeros_like(solution), np.zeros_like(solution)
+    power = np.zeros((len(solution), 1, 1), np.float32)
     for _ in range(ITERATIONS):
+        last, before = residual, power
         residual = _inflow(across, down, solution) * free
         guess = _cycle(grids, residual)
         power = _dot(residual, guess)
-        direction = guess + _ratio(power, before) * direction
-        step = _ratio(power, -_dot(direction, _inflow(across, down, direction) * free)) * direction
+        # By how the residual has changed (Polak and Ribière): of what is solved already, directions of rounding's noise
+        # would grow without end.
+        direction = guess + _ratio(np.maximum(_dot(residual - last, guess), 0), before) * direction
+        step = _ratio(_dot(residual, direction), -_dot(direction, _inflow(across, down, direction) * free)) * direction
         solution += step
-        before = power
         if np.abs(step).max() < ENOUGH:
             break
     return solution

@@ -381,6 +381,20 @@ def check(instant, wanted):
             assert points == pytest.approx(others, abs=3e-4)
 
 
+def test_keys_of_stretched_time_lie_between_frames(effect_on):
+    """At thirds, which float32 has others of than Python."""
+    edit, effect, _ = effect_on
+    shutter_edits.add_shutter(effect)
+    for frame, value in ((100, 0.2), (200, 0.8)):
+        effect.edge_aware = value
+        edit.keyframe_insert(f"{effect.path_from_id()}.edge_aware", frame=frame)
+    edit.render.frame_map_old, edit.render.frame_map_new = 300, 100
+    plain = records.effect_of(export(effect_on)).for_picture(ASPECT)
+    for frame in range(FIRST, LAST + 1):
+        wanted = state(*effect_on, frame).options.edge_aware
+        assert plain.at(frame - FIRST + 1).options.edge_aware == pytest.approx(wanted, abs=1e-4)
+
+
 def test_a_plain_ease_stays_a_key_and_no_more(effect_on):
     apply(effect_on, BASE)
     found = export(effect_on)

@@ -366,6 +366,12 @@ def test_a_scribble_around_everything(solve):
     np.testing.assert_array_equal(got, np.broadcast_to(np.eye(5)[2][:, None, None], got.shape))
 
 
+def test_what_is_solved_at_once_stays_so(solve):
+    """In one iteration, for some of the shutters; others need more."""
+    labels = np.array([[5, 5, 5, 5, 5], [1, 0, 0, 6, 5], [1, 1, 1, 1, 5]])
+    assert np.abs(solve(labels, 6) - exact(labels, 6)).max() <= LEVEL
+
+
 def test_touching_scribbles_do_not_bleed(solve):
     labels = blank(200, 120)
     labels[:, 127], labels[:, 128] = 1, 2

@@ -85,7 +85,7 @@ def seen(name):
     yield 1.0
     driver.shot(name)
     left, top = driver.screen(sidebar, sidebar.width - right, sidebar.height - down)
-    driver.saw(step=name, crop=[round(left - 190 * unit), round(top + 30 * unit), round(340 * unit), round(100 * unit)])
+    driver.saw(step=name, crop=[round(left - 190 * unit), round(top + 30 * unit), round(340 * unit), round(90 * unit)])
     driver.saw(buttons=found, scale=unit)
     driver.key("Escape")
     driver.move(story.preview(), 100, story.preview().height + 12)

@@ -41,7 +41,7 @@ def shown(name, length):
 def told():
     yield from one_stroke_story.begun(range(1, 81), nothing_drawn)
     effect = story.effect()
-    effect.window, effect.position, effect.border = WINDOW, "START", True
+    effect.inbetween, effect.window, effect.position, effect.border = "1", WINDOW, "START", True
     while len(effect.shutters) > 1:
         effect.active_shutter = 1
         with driver.override("PREVIEW"):

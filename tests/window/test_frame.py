@@ -20,4 +20,5 @@ def test_a_preview_goes_the_way_of_the_page(tmp_path):
     assert [stop for stop in made if stop in told] == told
     for stops in ways.values():
         back = [(path, function) for path, function, comes_back in stops if comes_back]
-        assert len(back) <= 11, back  # one of them for Slide, which asks for the shot before it composes
+        # One of them for Slide, which asks for the shot before it composes; two for smooth pictures behind plain ones.
+        assert len(back) <= 13, "\n".join(map(str, stops))

@@ -146,9 +146,10 @@ def _draw_exposure(layout: UILayout, scene: Scene, effect: PropertyGroup, strip:
     row.operator("shutter.bars_key", text="", icon="KEY_HLT")
     row.operator("shutter.bars_unkey", text="", icon="KEY_DEHLT")
     layout.prop(effect, "window")
-    layout.prop(effect, "inbetween")
+    row = layout.row(align=True)
+    row.prop(effect, "inbetween")
     if effect.inbetween != "1":
-        layout.prop(effect, "skip_repeats")
+        row.prop(effect, "skip_repeats", text="", icon="FRAME_NEXT")
         if strobing.repeats(effect):
             sentence(layout, iface_("Frames of the source repeat: motion goes on across them"), "INFO")
     layout.prop(shutter, "length")
