@@ -448,7 +448,8 @@ def recipe_of(scene: Scene, effect: PropertyGroup, strip: Strip, contents: Seque
 def _keyed(scene: Scene, effect: PropertyGroup) -> set[float]:
     """The timeline frames of the effect's keys and drawings."""
     curves, pace = curves_under(scene, effect.path_from_id() + "."), stretched(scene)
-    frames = {frame / pace for frame in key_frames(curves)}
+    # In float32, as the keys of Curves are.
+    frames = set((np.array(key_frames(curves), np.float32) / pace).tolist())
     layers = (layer_of(effect, region) for region in effect.regions)
     return frames.union(float(drawing.frame_number) for layer in layers if layer for drawing in layer.frames)
 
