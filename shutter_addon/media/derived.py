@@ -1,4 +1,4 @@
-"""Frames that are made from footage and kept as files: mattes of outlines.
+"""Frames that are made from footage and kept as files: mattes of outlines, and vectors of moments.
 
 One rule holds for their folders: we choose the names, no link is followed, and nothing else is opened or removed. What
 a frame is made of is in the name of its file, or of the folder; so what changes gets another one.
