@@ -184,7 +184,8 @@ def plain_seen():
     yield 1.0
 
 
-def rendered():
+def picture_rendered():
+    """By F12, into final.png."""
     done = []
     # The preview's pictures of the effect are renders of its own scene.
     bpy.app.handlers.render_complete.append(lambda scene, *_: scene.name == "Edit" and done.append(True))
@@ -193,8 +194,12 @@ def rendered():
     driver.key("F12")
     acted("F12")
     yield from driver.until(lambda: done and not bpy.app.is_job_running("RENDER"), "the render ends", 60)
-    driver.saw(actions=_actions, stroke=one_stroke_story.stroke_at(story.edit().frame_current))
     bpy.data.images["Render Result"].save_render(str(driver.OUT / "final.png"), scene=story.edit())
+
+
+def rendered():
+    yield from picture_rendered()
+    driver.saw(actions=_actions, stroke=one_stroke_story.stroke_at(story.edit().frame_current))
 
 
 def film_rendered(name="final"):
@@ -213,14 +218,19 @@ def film_rendered(name="final"):
     yield from driver.until(lambda: done and not bpy.app.is_job_running("RENDER"), "the render ends", 600)
 
 
-def told():
+def edit_opened(width, height):
+    """An empty edit of the footage's size, whose renders can be compared with that."""
     yield from driver.video_editing_opened()
     edit = bpy.data.scenes[0]
     edit.name = "Edit"
-    edit.render.resolution_x, edit.render.resolution_y = 768, 576  # the footage's, to compare with
+    edit.render.resolution_x, edit.render.resolution_y = width, height
     edit.render.dither_intensity = 0
     edit.view_settings.view_transform = "Standard"
     bpy.context.preferences.view.smooth_view = 0
+
+
+def told():
+    yield from edit_opened(768, 576)
     yield from footage_chosen()
     yield from movie_dragged()
     yield from gone_to(FRAME)

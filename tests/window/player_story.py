@@ -93,14 +93,8 @@ def lengthened(frames=24):
 
 
 def told():
-    yield from driver.video_editing_opened()
-    edit = bpy.data.scenes[0]
-    edit.name = "Edit"
-    edit.render.resolution_x, edit.render.resolution_y = SIZE
-    edit.render.dither_intensity = 0
-    edit.frame_end, edit.frame_step = len(TRUTH), STEP
-    edit.view_settings.view_transform = "Standard"
-    bpy.context.preferences.view.smooth_view = 0
+    yield from first_stroke_story.edit_opened(*SIZE)
+    story.edit().frame_end, story.edit().frame_step = len(TRUTH), STEP
     yield from first_stroke_story.footage_chosen()
     yield from first_stroke_story.movie_dragged()
     yield from gone_to(DRAWN)

@@ -9,7 +9,6 @@ from pathlib import Path
 sys.path[:0] = [str(Path(__file__).parent), str(Path(__file__).parents[1] / "blender")]
 sys.path.append(os.environ["SHUTTER_PACKAGES"])
 
-import bpy
 import driver
 import first_stroke_story
 import story
@@ -33,35 +32,18 @@ def stroke_drawn():
     yield 1.0
 
 
-def rendered():
-    done = []
-    bpy.app.handlers.render_complete.append(lambda scene, *_: scene.name == "Edit" and done.append(True))
-    driver.move(story.preview(), 100, story.preview().height - 60)
-    yield
-    driver.key("F12")
-    yield from driver.until(lambda: done and not bpy.app.is_job_running("RENDER"), "the render ends", 60)
-    bpy.data.images["Render Result"].save_render(str(driver.OUT / "final.png"), scene=story.edit())
-
-
 def told():
-    yield from driver.video_editing_opened()
-    edit = bpy.data.scenes[0]
-    edit.name = "Edit"
-    edit.render.resolution_x, edit.render.resolution_y = SIZE
-    edit.render.dither_intensity = 0
-    edit.view_settings.view_transform = "Standard"
-    bpy.context.preferences.view.smooth_view = 0
+    yield from first_stroke_story.edit_opened(*SIZE)
     yield from first_stroke_story.footage_chosen()
     yield from first_stroke_story.movie_dragged()
     yield from first_stroke_story.gone_to(FRAME)
     yield from first_stroke_story.drawing_begun()
-    story.effect().inbetween = "AUTO"
     yield from stroke_drawn()
     driver.saw(clicks=first_stroke_story.actions(), smooth=story.effect().inbetween)
     yield from story.seen("2_smooth")
     movie = next(strip for strip in story.edit().sequence_editor.strips_all if strip.type == "MOVIE")
     driver.saw(frame=round(story.edit().frame_current - movie.content_start))
-    yield from rendered()
+    yield from first_stroke_story.picture_rendered()
     story.effect().inbetween = "1"
     yield from story.seen("3_plain")
 
