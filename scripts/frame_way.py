@@ -35,7 +35,7 @@ def ways() -> dict[str, list[Stop]]:
     """The stops of the page's tables, by the picture's name."""
     page = (DOCS / "developers.md").read_text(encoding="utf-8")
     section = page.partition("\n## How a frame is made\n")[2].partition("\n## ")[0]
-    tables = section.split("| file | function |")[1:]
+    tables = section.split("| File | Function |")[1:]
     rows = (re.findall(r"(?m)^\| `(.+?)` \| `(.+?)` \| (.*)\|$", table) for table in tables)
     return {name: [Stop(p, f, what.strip()) for p, f, what in row] for name, row in zip(NAMES, rows, strict=True)}
 

@@ -125,8 +125,8 @@ def test_one_module_starts_threads():
 
 
 def test_the_page_has_every_use_of_threads():
-    """The table of docs/developers.md, by its first column."""
-    page = (PACKAGE.parent / "docs" / "developers.md").read_text(encoding="utf-8")
+    """The table of docs/internals.md, by its first column."""
+    page = (PACKAGE.parent / "docs" / "internals.md").read_text(encoding="utf-8")
     section = page.partition("\n## Threads\n")[2].partition("\n## ")[0]
     rows = [line.split("|")[1] for line in section.splitlines() if line.startswith("| `")]
     told = {place for row in rows for place in re.findall(r"`([\w/]+\.py)`", row)}

@@ -1,4 +1,4 @@
-"""The one place that starts threads. docs/developers.md (Threads) lists what runs on them, and why none of it touches
+"""The one place that starts threads. docs/internals.md (Threads) lists what runs on them, and why none of it touches
 Blender's data, which belongs to Blender's main thread.
 """
 
