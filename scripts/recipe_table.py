@@ -1,10 +1,12 @@
-"""Writes the table of a recipe's fields in docs/command.md, from the fields of the model.
+"""Write the tables of properties from the fields of the model: in docs/command.md those of a recipe, in docs/manual.md
+those of Blender's panels.
 
 python scripts/recipe_table.py
 """
 
 import re
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
@@ -13,10 +15,12 @@ from shutter_addon.core.model import effect
 from shutter_addon.core.model.fields import MISSING, Field, fields_of
 from shutter_addon.core.model.frame_state import Options
 
-PAGE = Path(__file__).resolve().parents[1] / "docs" / "command.md"
-HEAD = "| field | of | in Blender | values | default |\n|---|---|---|---|---|\n"
+DOCS = Path(__file__).resolve().parents[1] / "docs"
+COMMAND, MANUAL = DOCS / "command.md", DOCS / "manual.md"
+RECIPE_HEAD = "| Field | Of | In Blender | Values | Default |\n|---|---|---|---|---|\n"
+PANEL_HEAD = "| Property | Of | Keys | What it is |\n|---|---|---|---|\n"
 PARTS = {
-    "the recipe": (Options, effect.Effect, effect.Camera),
+    "the effect": (Options, effect.Effect, effect.Camera),
     "a shutter": (effect.Shutter,),
     "a region": (effect.AnyRegion,),
     "a line, a lasso": (effect.Region,),
@@ -27,18 +31,38 @@ PARTS = {
 }
 
 
-def table() -> str:
-    """The table as Markdown: each field once, with the first part that has it."""
-    rows, known = [], set()
+def own_fields() -> Iterator[tuple[str, Field]]:
+    """Give each field once, with the first part that has it."""
+    known: set[tuple[str, str]] = set()
     for part, kinds in PARTS.items():
         if part == "a region":  # its name is not a shutter's
             known.clear()
         for name, field in fields_of(*kinds).items():
-            if field.recipe and (name, field.recipe) not in known:
+            if (name, field.recipe) not in known:
                 known.add((name, field.recipe))
-                default = "it has to be there" if field.absent is MISSING else _shown(field.absent)
-                rows.append(f"| `{field.recipe}` | {part} | *{field.label}* | {_values(field)} | {default} |")
-    return HEAD + "\n".join(rows) + "\n"
+                yield part, field
+
+
+def recipe_table() -> str:
+    """Make the table of a recipe's fields as Markdown."""
+    rows = []
+    for part, field in own_fields():
+        if field.recipe:
+            default = "required" if field.absent is MISSING else _shown(field.absent)
+            rows.append(f"| `{field.recipe}` | {part} | *{field.label}* | {_values(field)} | {default} |")
+    return RECIPE_HEAD + "\n".join(rows) + "\n"
+
+
+def panel_table() -> str:
+    """Make the table of what Blender's panels show as Markdown."""
+    rows = []
+    for part, field in own_fields():
+        if field.label in ("Name", "Color"):  # they explain themselves
+            continue
+        keys = " •" if field.keyed else ""
+        choices = f" ({'; '.join(label for _, label, _ in field.choices)})" if field.choices else ""
+        rows.append(f"| *{field.label}* | {part} |{keys} | {field.description}{choices} |")
+    return PANEL_HEAD + "\n".join(rows) + "\n"
 
 
 def _values(field: Field) -> str:
@@ -47,7 +71,7 @@ def _values(field: Field) -> str:
     if isinstance(field.default, bool):
         return "`true`, `false`"
     if isinstance(field.default, str):
-        return f"a text of {field.most:g} characters at most"
+        return f"text, at most {field.most:g} characters"
     if isinstance(field.default, tuple):
         return "red, green, blue: 0 to 1"
     number = "a whole number" if isinstance(field.default, int) else "a number"
@@ -61,10 +85,17 @@ def _shown(value) -> str:
     return f"`{list(value)}`" if isinstance(value, tuple) else f"`{value}`" if value != "" else "empty"
 
 
-def written(page: str) -> str:
-    """A page with the table in its place."""
-    return re.sub(re.escape(HEAD) + r"(\|.*\n)*", lambda _match: table(), page)
+def written(page: str, head: str, table: str) -> str:
+    """Put a table into a page, in place of the one with the same head."""
+    return re.sub(re.escape(head) + r"(\|.*\n)*", lambda _match: table, page)
+
+
+def pages() -> Iterator[tuple[Path, str]]:
+    """Give each page with a table, and its text as it should be."""
+    for page, head, table in ((COMMAND, RECIPE_HEAD, recipe_table()), (MANUAL, PANEL_HEAD, panel_table())):
+        yield page, written(page.read_text(encoding="utf-8"), head, table)
 
 
 if __name__ == "__main__":
-    PAGE.write_text(written(PAGE.read_text(encoding="utf-8")), encoding="utf-8")
+    for path, text in pages():
+        path.write_text(text, encoding="utf-8")

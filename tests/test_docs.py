@@ -49,7 +49,7 @@ def test_every_page_and_picture_is_linked():
 def test_what_the_page_of_developers_says_where_to_look_is_there():
     """Each file, and each name that stands in brackets behind one."""
     page = (ROOT / "docs" / "developers.md").read_text(encoding="utf-8")
-    rows = page.partition("| looking for | open |")[2].partition("\n\n")[0].splitlines()[2:]
+    rows = page.partition("| Looking for | Open |")[2].partition("\n\n")[0].splitlines()[2:]
     assert len(rows) > 30
     for row in rows:
         folder, text = ROOT / "shutter_addon", ""
@@ -63,7 +63,8 @@ def test_what_the_page_of_developers_says_where_to_look_is_there():
                 assert re.search(rf"\b(def|class|void) {word.rpartition('.')[2]}\b", text), f"{word} in {file.name}"
 
 
-def test_the_table_of_a_recipes_fields_is_that_of_the_model():
-    page = recipe_table.PAGE.read_text(encoding="utf-8")
-    assert "| `softness` |" in page
-    assert recipe_table.written(page) == page, "run scripts/recipe_table.py"
+def test_the_tables_of_properties_are_those_of_the_model():
+    for page, text in recipe_table.pages():
+        assert page.read_text(encoding="utf-8") == text, "run scripts/recipe_table.py"
+    assert "| `softness` |" in recipe_table.COMMAND.read_text(encoding="utf-8")
+    assert "| *Softness* |" in recipe_table.MANUAL.read_text(encoding="utf-8")
