@@ -212,7 +212,7 @@ def write(args, rows: list[dict], sheet: np.ndarray) -> None:
 
 def parse(arguments=None):
     parser = parser_of(__doc__, "truth", (640, 360), 1024)
-    parser.add_argument("--docs", action="store_true", help="renew the picture of docs/developers.md, docs/truth.jpg")
+    parser.add_argument("--docs", action="store_true", help="renew the picture of docs/quality.md, docs/truth.jpg")
     args = parser.parse_args(arguments)
     if args.samples < 1 or args.samples % SUBFRAMES:
         parser.error(f"--samples: {args.samples} is not a multiple of {SUBFRAMES}: each sub-frame has as many")
