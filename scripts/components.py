@@ -177,35 +177,37 @@ def _place(place: str, systems: list[str]) -> str:
 
 
 _HEAD = """\
-# Licences of what the zips bring
+# Licences of what the zips contain
 
-Virtual Shutter is under the GNU General Public License, version 3 or later. The zips with wheels also bring what is
-listed here; the one without brings nothing. Each zip has the licences' texts in its folder `licenses`, and the holders
-of copyright in its manifest. This page is written by `scripts/components.py` from `third_party/components.toml`, which
-a test compares with what the wheels hold; do not change it by hand.
+Virtual Shutter is under the GNU General Public License, version 3 or later. The zips with wheels also contain what this
+page lists. The zip without wheels contains nothing else. Each zip has the texts of the licences in its folder
+`licenses`, and the copyright holders in its manifest.
+
+`scripts/components.py` writes this page from `third_party/components.toml`, and a test compares it with the wheels. Do
+not edit it by hand.
 
 ## What is not resolved
 
-- **Intel IPP** is built into OpenCV's modules for Linux and Windows. Intel's terms allow to pass it on, but forbid
-  reverse engineering and changes, which the GPL does not allow to forbid. It cannot be taken out of the modules. All
-  OpenCV packages on PyPI for these systems have it; a build without it (`WITH_IPP=OFF`) would have to be made and
-  published for each system. The zip for macOS and the one without wheels do not have it.
-- **Sources** of the libraries within the wheels are named by the wheels' makers, not by a version each; who passes the
-  zips on has to be able to give those of what is under the GPL and LGPL.
+- **Intel IPP** is built into OpenCV for Linux and Windows. Intel's terms allow passing it on, but forbid reverse
+  engineering and changes. The GPL does not allow such a restriction. IPP cannot be removed from the modules, and all
+  OpenCV packages on PyPI for these systems contain it. A build without it (`WITH_IPP=OFF`) would have to be made and
+  published for each system. The zip for macOS and the one without wheels do not contain it.
+- **Sources** of the libraries in the wheels are named by the makers of the wheels, without a version for each. If you
+  pass the zips on, you have to be able to provide the sources of what is under the GPL and LGPL.
 
 ## What is taken out
 
 - **OpenSSL 1.1.1k** comes with OpenCV's wheel for Linux, for the network protocols of that wheel's own FFmpeg. Its old
-  licence has an advertising clause, with which the GPL is incompatible. So `scripts/build` takes it out
-  (`scripts/without_openssl.py`): in the zips that wheel has the build tag `1noopenssl`, and its FFmpeg opens no
-  `https`, `rtmps` or `rtmpe` addresses. All other wheels are as PyPI has them.
+  licence has an advertising clause, which the GPL does not allow. So `scripts/build` removes it
+  (`scripts/without_openssl.py`). The changed wheel has the build tag `1noopenssl`, and its FFmpeg opens no `https`,
+  `rtmps` or `rtmpe` addresses. All other wheels are unmodified.
 
 ## What is in the zips
 
-Versions are what the names of files and the builds say; one that is read from a file's name is often that of the
-library's interface (ABI). Where no system is named, it is in the zips for all three.
-A wheel's version is in `scripts/build.py`. Licences and holders of libraries whose texts the wheels lack are as their
-makers' projects say, and were not read out of the very sources that the wheels were built of.
+Versions come from file names and builds. A version in a file name is often that of the library's interface (ABI). A
+component without a system is in the zips for all three. `scripts/build.py` has the versions of the wheels. If a wheel
+lacks a library's licence text, its licence and holders come from the project's own pages, and not from the sources of
+the wheel.
 
 | component | version | where | licence | may be combined with GPL-3.0-or-later |
 |---|---|---|---|---|
