@@ -18,7 +18,7 @@ from shutter_addon.core.model.frame_state import Options
 DOCS = Path(__file__).resolve().parents[1] / "docs"
 COMMAND, MANUAL = DOCS / "command.md", DOCS / "manual.md"
 RECIPE_HEAD = "| Field | Of | In Blender | Values | Default |\n|---|---|---|---|---|\n"
-PANEL_HEAD = "| Property | Of | Keys | What it is |\n|---|---|---|---|\n"
+PANEL_HEAD = "| Property | Of | Values | Keys |\n|---|---|---|---|\n"
 PARTS = {
     "the effect": (Options, effect.Effect, effect.Camera),
     "a shutter": (effect.Shutter,),
@@ -57,12 +57,19 @@ def panel_table() -> str:
     """Make the table of what Blender's panels show as Markdown."""
     rows = []
     for part, field in own_fields():
-        if field.label in ("Name", "Color"):  # they explain themselves
-            continue
-        keys = " •" if field.keyed else ""
-        choices = f" ({'; '.join(label for _, label, _ in field.choices)})" if field.choices else ""
-        rows.append(f"| *{field.label}* | {part} |{keys} | {field.description}{choices} |")
+        if field.label not in ("Name", "Color"):  # they explain themselves
+            keys = " •" if field.keyed else ""
+            rows.append(f"| *{field.label}* | {part} | {_choices(field)} |{keys} |")
     return PANEL_HEAD + "\n".join(rows) + "\n"
+
+
+def _choices(field: Field) -> str:
+    """What one can set in Blender."""
+    if field.choices:
+        return "; ".join(label for _word, label, _description in field.choices)
+    if isinstance(field.default, bool):
+        return "on, off"
+    return f"{field.least:,.10g} to {field.most:,.10g}"
 
 
 def _values(field: Field) -> str:
