@@ -74,7 +74,7 @@ class Shot:
 
     def everywhere(self, frame: int, shutter: str) -> np.ndarray:
         """The picture if one shutter held everywhere, as in a camera."""
-        picture = self._renderer.picture(Request(frame - 1, self._at(frame).alone(self._index(shutter))))
+        picture = self._renderer.picture(Request(frame - 1, self._at(frame).of([self._index(shutter)])))
         return np.clip(light.to_encoded(picture[..., :3]), 0, 1)
 
     def scribbles(self, frame: int, dim: float = 0.6) -> np.ndarray:

@@ -221,7 +221,7 @@ class LayerCase:
 
     def __init__(self, compositor, source, state: FrameState, shutter: int):
         self._compositor, self._source, self._state = compositor, source, state
-        self._own, self._laying = state.alone(shutter), compositor.stages()
+        self._own, self._laying = state.of([shutter]), compositor.stages()
         window, shutters = state.options.window, len(state.bars)
         behind = WeightedFrames(source, lambda index: 1 - self.matte(index), rest=True)
         self.windows = [

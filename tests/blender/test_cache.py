@@ -196,7 +196,7 @@ def test_what_is_known_of_effects_goes_with_them(edit, effect):
     edit.sequence_editor.strips.remove(next(strip for strip in edit.sequence_editor.strips if strip.type == "SCENE"))
     reconcile.update()
     invalidation.invalidate_changed(edit)
-    assert remembering(scene) == set()
+    assert remembering(scene) <= {"invalidation"}  # a number for each scene of the session
 
 
 def test_a_file_replaced_in_the_middle_is_rendered(bpy, edit, effect, render, images):

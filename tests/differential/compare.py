@@ -132,12 +132,14 @@ def check_mixed(case: Case, devices: dict, folder: Path) -> dict:
     from shutter_addon.media.matte_values import MatteValues
     from shutter_addon.media.smooth import steps_for
 
-    found = check(case, devices, folder) if is_referable(case) else {}
     recipe = json.loads(case.recipe)
     with tempfile.TemporaryDirectory() as files, open_source(write(case, Path(files))) as medium:
         # Its frames are as many moments for each filmed one.
         source = ShotSource(medium, steps_for(medium, recipe.get("inbetween", 1), recipe["window"]))
         asked = asked_of(case, source, Path(files))
+        # Of packed light the reference would have to know what ties.
+        exact_ones = {"cpu": devices["cpu"]} if is_packed(asked, source) and "cpu" in devices else devices
+        found = check(case, exact_ones, folder) if is_referable(case) else {}
 
         @contextmanager
         def rendering(compositor):
@@ -224,12 +226,17 @@ def lent_picture(device, rendering, asked, nudge: int | None = None) -> np.ndarr
         return renderer.picture(asked)
 
 
+def is_packed(asked, source) -> bool:
+    """Whether GPUs keep the square root of the light that follows something, in 10 or 11 bits."""
+    is_plain = source.dtype == np.uint8 and source.alpha == "opaque"
+    return asked.state.following is not None and is_plain and asked.state.options.light == "linear"
+
+
 def nudged_light(frame, asked, source, random):
     """A frame (H, W, 4) of linear light, with what a device may lose of it."""
     noise = random.uniform(-1, 1, frame[..., :3].shape)
-    is_packed = asked.state.following is not None and source.dtype == np.uint8 and source.alpha == "opaque"
     found, nudged_ = frame.copy(), frame[..., :3] * (1 + NUDGE * noise)
-    if is_packed and asked.state.options.light == "linear":
+    if is_packed(asked, source):
         nudged_ = (np.sqrt(np.maximum(nudged_, 0)) + noise * PACKED) ** 2
     found[..., :3] = nudged_
     return found

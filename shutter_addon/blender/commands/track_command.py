@@ -70,7 +70,8 @@ def run(arguments: Namespace) -> None:
     placements = {frame: step.placement for frame, step in tracked.items()}
     new: Any = region_keys.with_placements(old, placements, {arguments.frame}, size, thin=not arguments.all_keys)
     if not arguments.hold:
-        new = _ended(new, source_recipe.options.at(1).reach, tracked, stops, arguments.frame, frames)
+        reach = replace(source_recipe.options.at(1), step=1).reach  # a recipe's bars count filmed frames
+        new = _ended(new, reach, tracked, stops, arguments.frame, frames)
     regions = [new if region is old else region for region in source_recipe.regions]
     keyed = source_recipe.with_parts(regions, new if index is None else None)
     _write_track(arguments, keyed, tracked, stops)
