@@ -30,14 +30,6 @@ void widen_reach(int quad) {
   reach = max(reach, max(max(apart.x, apart.y), max(apart.z, apart.w)));
 }
 
-void find_middle() {
-  for (int g = 0; g < GROUPS; g++) {
-    middle[g] = vec4(0.0);
-  }
-  EACH(add_to_middle);
-  EACH(widen_reach);
-}
-
 #if MOVED
 // When the block's pixels are exposed. A frame seen elsewhere costs too much for those that none of them exposes.
 float from = 1e9;
@@ -80,11 +72,12 @@ void add_frame(int quad) {
   before[quad] = after[quad];
 }
 
-void main() {
-  if (!start_block()) {
-    return;
+void expose_frames() {
+  for (int g = 0; g < GROUPS; g++) {
+    middle[g] = vec4(0.0);
   }
-  find_middle();
+  EACH(add_to_middle);
+  EACH(widen_reach);
 #define CLEAR(quad) before[quad] = vec4(0.0)
   EACH(CLEAR);
   float passed = 0.0;
@@ -121,5 +114,5 @@ void main() {
     }
     EACH(add_frame);
   }
-  EACH(finish_quad);
 }
+#include "blocks.glsl"

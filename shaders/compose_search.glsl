@@ -48,11 +48,4 @@ void expose_frames() {
     before = after;
   }
 }
-
-void main() {
-  if (!start_block()) {
-    return;
-  }
-  GO_THROUGH(expose_frames)
-  finish_quad(0);
-}
+#include "blocks.glsl"

@@ -1,7 +1,6 @@
 // A frame as exposures that follow something read it: a whole number a pixel, with that of the pixel below beside it, and
 // a rim of two pixels before and three behind that repeat the frame's edges. Linear light is kept as its square root, so
 // that dark steps are small; encoded light as it is.
-layout(local_size_x = 64) in;
 uniform sampler2DArray frame;
 layout(rgba16ui) uniform writeonly uimage2DArray packed_frames;
 uniform ivec2 size;

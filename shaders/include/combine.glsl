@@ -29,33 +29,23 @@ vec3 lower[4];
 vec3 upper[4];
 vec4 covered = vec4(0.0);  // Σ qₖ aₖ of each pixel
 
-// What is compared: it rises with a sample.
-vec3 level_of(vec3 value) {
+// A sample of a frame, whose light rises with it, and its alpha; what of it is compared, and its light.
 #  if LEVELS_OF == 2
-  vec3 root = sign(value) * sqrt(sqrt(abs(value)));  // light of wide gamuts may be below 0
-  return 0.5 + 0.5 * root / (1.0 + abs(root));
-#  else
-  return value;
-#  endif
-}
-
-// A sample of a frame, whose light rises with it, and its alpha.
 vec4 sample_at(ivec2 place, int slot) {
-#  if LEVELS_OF == 2
   vec4 light = frame_light(place, slot);
   return vec4(light.rgb / (light.a > 0.0 ? light.a : 1.0), light.a);
-#  else
-  return texelFetch(frames, ivec3(place, slot), 0);
-#  endif
 }
 
-vec3 light_of(vec3 value) {
-#  if LEVELS_OF == 2
-  return value;
-#  else
-  return decoded(value);
-#  endif
+vec3 level_of(vec3 value) {
+  vec3 root = sign(value) * sqrt(sqrt(abs(value)));  // light of wide gamuts may be below 0
+  return 0.5 + 0.5 * root / (1.0 + abs(root));
 }
+#    define light_of(value) (value)
+#  else
+#    define sample_at(place, slot) texelFetch(frames, ivec3(place, slot), 0)
+#    define level_of(value) (value)
+#    define light_of(value) decoded(value)
+#  endif
 
 void start_median() {
   for (int pixel = 0; pixel < 4; pixel++) {

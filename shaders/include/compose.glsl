@@ -10,7 +10,6 @@
 // COMBINE: frames are not averaged (combine.glsl); 0: they are. VALUE: bars are mixed by value (compose_value.glsl).
 // GROUPS of four shutters, TILED, EDGES, DECODE, PREMULTIPLIED, ENCODED: see compute/composition_passes.py. Software renderers run both
 // sides of every branch: what is costly stands in loops or behind these definitions.
-layout(local_size_x = 64) in;
 layout(rgba32f) uniform readonly image2DArray table;
 uniform ivec2 size;
 uniform int top, block_bits;
@@ -47,13 +46,6 @@ layout(rgba32f) uniform writeonly image2DArray picture;
 #  define EACH(does) does(0); does(1); does(2); does(3)
 #else
 #  define EACH(does) does(0)
-#endif
-
-// Goes through the frames by a function: of a median, once a scan (combine.glsl).
-#if COMBINE == 3
-#  define GO_THROUGH(does) start_median(); for (scan = 0; scan <= SCANS; scan++) { start_scan(); does(); end_scan(); }
-#else
-#  define GO_THROUGH(does) does();
 #endif
 
 ivec2 corner;
@@ -230,47 +222,20 @@ void fold_sight(int quad, int frame) {}
 
 #if MOVED
 #  include "moved.glsl"
-#elif COMBINE
+#else
+// Frames one after another: with SUMS, at each the sum at its end is looked up, and that at its start is known.
 void expose(int quad, int frame, vec4 weight) {
 #if EDGES == 2  // shorten
 #  if COMBINE == 3
   centre[quad] += scan == 0 ? weight * (float(frame) + 0.5) : vec4(0.0);
-#  elif !VALUE
+#  elif !COMBINE || !VALUE
   centre[quad] += weight * (float(frame) + 0.5);
 #  endif
   int index = origin + direction * frame;
   weight = index >= 0 && index < count ? weight : vec4(0.0);
 #endif
-  int layer = layer_of(frame);
-#if COMBINE == 3
-  for (int pixel = 0; pixel < 4; pixel++) {
-    count_sample(pixel, sample_at(pixel_at(quad, pixel), layer), weight[pixel]);
-  }
-#else
-  weight *= gain[quad];
-  for (int pixel = 0; pixel < 4; pixel++) {
-    vec4 light = frame_light(pixel_at(quad, pixel), layer);
-    fold(quad, pixel, light, weight[pixel] * passed(light));
-#if THRESHOLD
-    fold(quad, pixel, light, frame == shown ? 1.0 : 0.0);
-#endif
-  }
-#if THRESHOLD
-  share[quad] = frame == shown ? vec4(1.0) : share[quad];
-#endif
-  share[quad] = max(share[quad], weight);
-#endif
-}
-#else
-// Frames one after another: at each, the sum at its end is looked up, and that at its start is known.
-void expose(int quad, int frame, vec4 weight) {
-#if EDGES == 2  // shorten
-  centre[quad] += weight * (float(frame) + 0.5);
-  int index = origin + direction * frame;
-  weight = index >= 0 && index < count ? weight : vec4(0.0);
-#endif
-  share[quad] += weight;
 #if SUMS
+  share[quad] += weight;
   int end = start_of(frame + 1);
   for (int pixel = 0; pixel < 4; pixel++) {
     SUM sum = sum_at(place_of_light(quad, pixel), end);
@@ -279,13 +244,32 @@ void expose(int quad, int frame, vec4 weight) {
   }
 #else
   int layer = layer_of(frame);
+#  if COMBINE == 3
+  for (int pixel = 0; pixel < 4; pixel++) {
+    count_sample(pixel, sample_at(pixel_at(quad, pixel), layer), weight[pixel]);
+  }
+#  elif COMBINE
+  weight *= gain[quad];
+  for (int pixel = 0; pixel < 4; pixel++) {
+    vec4 light = frame_light(pixel_at(quad, pixel), layer);
+    fold(quad, pixel, light, weight[pixel] * passed(light));
+#    if THRESHOLD
+    fold(quad, pixel, light, frame == shown ? 1.0 : 0.0);
+#    endif
+  }
+#    if THRESHOLD
+  share[quad] = frame == shown ? vec4(1.0) : share[quad];
+#    endif
+  share[quad] = max(share[quad], weight);
+#  else
+  share[quad] += weight;
   total[quad] += mat4(weight.x * frame_light(pixel_at(quad, 0), layer),
                       weight.y * frame_light(pixel_at(quad, 1), layer),
                       weight.z * frame_light(pixel_at(quad, 2), layer),
                       weight.w * frame_light(pixel_at(quad, 3), layer));
+#  endif
 #endif
 }
-
 #endif
 
 #if !MOVED && EDGES == 2

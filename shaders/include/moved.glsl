@@ -75,7 +75,7 @@ vec4 seen_light(ivec2 pixel, vec2 away, int layer) {
   vec3 light = x.x * column_light(column_at(place, layer), y) + x.y * column_light(left, y) +
                x.z * column_light(right, y) + x.w * column_light(column_at(place + ivec2(3, 0), layer), y);
   light = clamp(light, min(min(left.b, left.c), min(right.b, right.c)), max(max(left.b, left.c), max(right.b, right.c)));
-  return vec4(light * packed_unit(), 1.0);
+  return vec4(light * PACKED_UNIT, 1.0);
 }
 #else
 // The light of a frame at a pixel and a distance from it.

@@ -19,7 +19,7 @@ MODES = {"average": 0, "lightest": 1, "darkest": 2, "median": 3}
 EDGES = {"hold": 0, "mirror": 1, "shorten": 2}
 # What a picture is stored as, by whether it is levels.
 PICTURE = {False: "rgba32f", True: "rgba8"}
-LEVELS = read_pass("levels")
+LEVELS = read_pass("display", "OVER_BLACK")
 # Rows of pixels that one invocation composes, by the pass; BLOCK for all others.
 _LINES = {"sums": PAIR, "search": 4}
 # The numbers of pieces for which compose_sums is compiled. A table with another number is filled up with empty pieces.
