@@ -1,7 +1,6 @@
-// Solves the coarsest grid, of SOLVED × SOLVED cells at most, by elimination (LDLᵀ): in one invocation, for shaders of
-// Blender's Python have no memory that a workgroup shares.
-// Cells are numbered along the shorter side, so that none is tied to one more than BAND − 1 before it. The matrix is
-// symmetric, its lower half is all of it: rows[BAND · i + d] ties cell i to cell i − d; d = 0 turns into 1 / pivot.
+// Solves the coarsest grid, of SOLVED × SOLVED cells at most, by elimination (LDLᵀ), in one invocation: Blender's Python
+// has no memory that a workgroup shares. Cells are numbered along the shorter side, so that none is tied to one more than
+// BAND − 1 before it. Of the symmetric matrix, rows[BAND · i + d] ties cell i to cell i − d; d = 0 turns into 1 / pivot.
 layout(local_size_x = 1) in;
 layout(rgba32f) uniform readonly image2DArray stencil, right;  // as in multigrid.glsl
 layout(rgba32f) uniform writeonly image2DArray solution;

@@ -1,7 +1,6 @@
-// A pixel's own shutter by displacement interpolation, exact (paper §3.4.1): its quantile is Σ cᵢ Sᵢ⁻¹, linear
-// between the knots of the table. A frame's weight is Q at its end less Q at its start.
-// For many pieces: every frame is fetched once. Pieces that end before in every pixel of the block are summed for all of
-// them; only those that a pixel may be inside of are looked at pixel by pixel, about one to a frame.
+// As compose_pieces.glsl, for many pieces: every frame is fetched once. Its weight is Q at its end less Q at its start.
+// Pieces that end before in every pixel of the block are summed for all of them; only those that a pixel may be inside of
+// are looked at pixel by pixel, about one to a frame.
 uniform int rows, first, last;
 #include "compose.glsl"
 

@@ -1,5 +1,4 @@
-// The values that compute/diffusion_gpu.py begins with, those that go from a coarser grid to the finer one, and the
-// coefficients that become of them.
+// What compute/diffusion_gpu.py begins with, what goes from a coarser grid to the finer one, and coefficients.
 #include "tiles.glsl"
 
 #ifdef START
@@ -85,8 +84,7 @@ void at(ivec3 p) {
 }
 
 #elif defined(EXPAND_RIM)
-// The same at the frame's last columns and rows: beyond the coarser grid's last cells a parabola that is level at the
-// frame's edge.
+// The same at the frame's last columns and rows: beyond the coarser grid's last cells a parabola, level at the edge.
 uniform int layers;
 uniform vec2 beyond;
 

@@ -16,10 +16,9 @@ void at(ivec3 block) {
   imageStore(least, block, vec4(lowest));
 }
 #else
-// BEGINS: `under` has Σ qₖ hₖ Vₖ, and `clear` in its alpha Σ qₖ hₖ; else it is a picture that a layer is laid over.
-// PLAIN: `plain` is the picture without layers, which stays where none is. PLATE: what lies behind.
-// exposed, share: a layer's F, and in its alpha A. ENDS: the picture is finished; else another layer follows.
-// OPAQUE: the alphas of `under` and `exposed` are these shares.
+// BEGINS: `under` has Σ qₖ hₖ Vₖ, and `clear` in its alpha Σ qₖ hₖ; else it is a picture that a layer is laid over. PLAIN:
+// the picture without layers, which stays where none is. PLATE: what lies behind. exposed, share: a layer's F, and in its
+// alpha A. OPAQUE: the alphas of `under` and `exposed` are these shares. ENDS: no other layer follows.
 layout(rgba32f) uniform readonly image2DArray under, exposed;
 #if !OPAQUE
 uniform sampler2DArray share;

@@ -1,15 +1,12 @@
-// What both compositions share: the coefficients of a block's pixels, the sums over their frames, the finished picture.
-// An invocation composes QUADS of four pixels above one another, so that what it looks up in the table serves all of
-// them. A quad is a matrix: a column each, of coefficients or of light. EACH calls a function for every quad: a compiler
-// that did not unroll a loop over them would keep their arrays in memory.
+// What ways to compose share: the coefficients of a block's pixels, the sums over their frames, the finished picture. An
+// invocation composes QUADS of four pixels above one another, whose look-ups in the table serve all of them. A quad is a
+// matrix: a column each, of coefficients or of light. EACH calls a function for every quad: arrays that a loop indexes go
+// through memory. Software renderers run both sides of a branch: what is costly stands in loops or behind definitions.
 // coefficients: four shutters per layer; table: row 0 the gains, then the knots or the bars, four shutters per texel.
 // The window's frame k is frame `origin` + k · `direction` of the shot, which has `count`. frames: source frame i in layer
-// i mod `layers`; or with SUMS the running sums instead, from position `lowest` on, the shot's ends extended: position
-// i's in that layer.
-// With MOVED shutters follow something: see moved.glsl.
-// COMBINE: frames are not averaged (combine.glsl); 0: they are. VALUE: bars are mixed by value (compose_value.glsl).
-// GROUPS of four shutters, TILED, EDGES, DECODE, PREMULTIPLIED, ENCODED: see compute/composition_passes.py. Software renderers run both
-// sides of every branch: what is costly stands in loops or behind these definitions.
+// i mod `layers`; or with SUMS the running sums instead, from position `lowest` on, the shot's ends extended: position i's.
+// MOVED: shutters follow something (moved.glsl). COMBINE: frames are not averaged (combine.glsl). VALUE: bars are mixed by
+// value. GROUPS of four shutters, TILED, EDGES, DECODE, PREMULTIPLIED, ENCODED: see compute/composition_passes.py.
 layout(rgba32f) uniform readonly image2DArray table;
 uniform ivec2 size;
 uniform int top, block_bits;
@@ -30,12 +27,10 @@ uniform float unit;
 uniform sampler2DArray frames;
 #endif
 
+#include "light.glsl"
 #if UNFINISHED
 layout(rgba32f) uniform writeonly image2DArray picture;
-#endif
-
-#include "light.glsl"
-#if !UNFINISHED
+#else
 #  include "finish.glsl"
 #endif
 #if SUMS
@@ -304,13 +299,9 @@ void store(int quad, int pixel, float brightness) {
 #endif
 #if EDGES == 2
   // Where nothing of the shutter is left, the nearest frame that there is (core/pixels/compositor.py has the 1e-3).
-#  if MOVED
   for (int once = share[quad][pixel] > 1e-6 ? 1 : 0; once < 1; once++) {
     color = nearest_light(quad, pixel, int(centre[quad][pixel] - 1e-3));
   }
-#  else
-  color = share[quad][pixel] > 1e-6 ? color : nearest_light(quad, pixel, int(centre[quad][pixel] - 1e-3));
-#  endif
 #endif
 #if CONTINUED && COMBINE
   color = share[quad][pixel] > 1e-6 ? with_others(color, texelFetch(summed, ivec3(at, 0), 0))

@@ -42,15 +42,13 @@ vec3 straight(vec4 color) {
   return color.rgb / cover(color);
 }
 
-#ifdef DECODE
 // Samples as the light that is summed: 0 as they are, 1 made linear, 2 made encoded.
 vec3 decoded(vec3 color) {
-#  if DECODE == 1
+#if DECODE == 1
   return to_linear(color);
-#  elif DECODE == 2
+#elif DECODE == 2
   return to_encoded(color);
-#  else
+#else
   return color;
-#  endif
-}
 #endif
+}

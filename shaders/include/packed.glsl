@@ -1,9 +1,8 @@
-// Light in 32 bits: 11 of red and of green, 10 of blue. SQUARED: its square root, of which 1 is 2047 and 1023; else the
-// light itself, of which 1 is 2040 and 1020, so that every level of 8 bits is exact.
+// Light in 32 bits: 11 of red and of green, 10 of blue. SQUARED: linear, its square root, so that dark steps are small;
+// else encoded, so that every level of 8 bits is exact.
 #include "halves.glsl"
 
 const int BEFORE = 2;
-const int RIM = 5;
 
 #if SQUARED
 const vec3 PACKED_WHITE = vec3(2047.0, 2047.0, 1023.0);

@@ -267,7 +267,7 @@ class GPUCompositor:
         first, last = state.open_span
         origin, (low, high) = windows.origin(options, index, direction), windows.reach(state, index, direction)
         shortened = options.edges == "shorten" and (low < window.shot.start or high >= window.shot.stop)
-        way = way_of(window, options, values, (first, last), shortened, combine)
+        way = way_of(window, state, values, shortened)
         is_search = combine.mode == "median" and way == "search"
         if is_search and median_iterations(len(values) - 1, last - first, window.kind) > MOST_ITERATIONS:
             return self._draw_on_host(window, request, coefficients)
@@ -341,7 +341,7 @@ class GPUCompositor:
         shortened, packed = bool((frames[first:last] < 0).any()), isinstance(window, PackedFrames)
         mixed, parts = moves.shape[1] - 1, len(values) - motions
         most = BLOCK // 4 if packed and not shortened else 1
-        way, quads = moved_way(options, values[:parts], (first, last), motions, mixed, most)
+        way, quads = moved_way(state, values[:parts], motions, mixed, most)
         given: Given = {"size": size, "top": 0, "height": size[1], "block_bits": _bits(coefficients)}
         given |= {"first": first, "last": last, "rows": parts - 1, "motions": motions, "parts": parts}
         given |= {"seen_first": int(there[0]), "seen_last": int(there[-1])}

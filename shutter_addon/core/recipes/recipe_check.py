@@ -11,16 +11,7 @@ from ..model import limits, shutters
 from ..model.fields import Field, fields_of
 from ..model.frame_state import Options
 from .recipe import CAMERA, RecipeError
-from .records import (
-    MODELS,
-    MatteRecord,
-    MoveKey,
-    OutlineRecord,
-    RampRecord,
-    RegionRecord,
-    Stroke,
-    drawings_of,
-)
+from .records import MatteRecord, MoveKey, OutlineRecord, RampRecord, RegionRecord, Stroke, drawings_of
 
 _COMBINED = "lightest", "darkest"
 
@@ -155,7 +146,7 @@ def _check_follow(follow: str | None, regions: list, place: str) -> None:
 
 
 def _check_region(region: Any, place: str) -> None:
-    _check_fields(MODELS[type(region)], region, f"{place}.")
+    _check_fields(region.model, region, f"{place}.")
     _check_moves(region.keys, f"{place}.keys")
     if isinstance(region, MatteRecord):
         _check_fields(model.FileContent, region, f"{place}.")
