@@ -88,7 +88,6 @@ void at(ivec3 p) {
 uniform int layers;
 uniform vec2 beyond;
 
-// The four cells' values.
 mat4 values(ivec2 a, ivec2 b, vec2 bend, int layer) {
   vec4 value = imageLoad(coarser, ivec3(a, layer));
   vec4 beside = mix(value, imageLoad(coarser, ivec3(b.x, a.y, layer)), bend.x);

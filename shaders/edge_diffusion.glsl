@@ -85,8 +85,7 @@ void at(ivec3 part) {
 layout(local_size_x = 1) in;
 layout(rgba32f) uniform readonly image2DArray result;
 layout(rgba32f) uniform image2DArray sums;
-uniform int parts;
-uniform int place;  // which of `sums` it becomes; the one before it moves to place + 1
+uniform int parts, place;  // place: which of `sums` it becomes; the one before it moves to place + 1
 
 void main() {
   int layer = int(gl_GlobalInvocationID.z);

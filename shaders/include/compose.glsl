@@ -194,7 +194,7 @@ int layer_of(int frame) {
   index = (index + 512 * period) % period;  // of a negative number, % is undefined
   index = min(index, period - index);
 #endif
-  // Source frame i lies in layer i mod layers; a division costs more than the fetch.
+  // A division costs more than the fetch.
   int layer = clamp(index, 0, count - 1) - lowest + lowest_layer;
   return layer < layers ? layer : layer - layers;
 }
@@ -205,7 +205,6 @@ int layer_of(int frame) {
 #  include "combine.glsl"
 #endif
 
-// What moved.glsl has for frames that are seen elsewhere.
 #if !MOVED
 const int motions = 1;
 int motion = 0;

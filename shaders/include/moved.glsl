@@ -174,7 +174,6 @@ void expose(int quad, int frame, vec4 weight) {
   share[quad] += weight;
 #endif
 #if SEVERAL
-  // A loop, for software renderers run both sides of a branch; and it is dear to them as well.
 #  if THRESHOLD
   int layer = frame == shown || any(greaterThan(weight, vec4(0.0))) ? int(place.x) : -1;
 #  else
