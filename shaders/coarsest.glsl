@@ -30,10 +30,9 @@ void load_row(int i, int layer) {
   rows[BAND * i] = imageLoad(stencil, ivec3(p, 2)).y;
   vec4 before = imageLoad(stencil, ivec3(p, 0));
   vec4 after = imageLoad(stencil, ivec3(p, 1));
-  tie(i, p + ivec2(-1, -1), before.x);
-  tie(i, p + ivec2(0, -1), before.y);
-  tie(i, p + ivec2(1, -1), before.z);
-  tie(i, p + ivec2(-1, 0), before.w);
+  for (int k = 0; k < 4; k++) {
+    tie(i, p + ivec2(k % 3 - 1, k / 3 - 1), before[k]);
+  }
   tie(i, p + ivec2(-1, 1), after.y);
   x[i] = imageLoad(right, ivec3(p, layer));
 }

@@ -1,4 +1,4 @@
-// What ways to compose share: the coefficients of a block's pixels, the sums over their frames, the finished picture. An
+// What ways to compose share: a block's coefficients, the sums over its frames, the finished picture. An
 // invocation composes QUADS of four pixels above one another, whose look-ups in the table serve all of them. A quad is a
 // matrix: a column each, of coefficients or of light. EACH calls a function for every quad: arrays that a loop indexes go
 // through memory. Software renderers run both sides of a branch: what is costly stands in loops or behind definitions.

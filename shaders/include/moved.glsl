@@ -65,10 +65,10 @@ vec4 seen_light(ivec2 pixel, vec2 away, int layer) {
   return vec4(light * PACKED_UNIT, 1.0);
 }
 #else
-// Four pixels of a row, weighted.
-vec4 row_light(ivec4 columns, int row, vec4 x, int layer) {
-  return x.x * frame_light(ivec2(columns.x, row), layer) + x.y * frame_light(ivec2(columns.y, row), layer) +
-         x.z * frame_light(ivec2(columns.z, row), layer) + x.w * frame_light(ivec2(columns.w, row), layer);
+// Four pixels of a row, weighted; second, third: of these two the light.
+vec4 row_light(vec4 x, ivec4 columns, int row, vec4 second, vec4 third, int layer) {
+  return x.x * frame_light(ivec2(columns.x, row), layer) + x.y * second + x.z * third +
+         x.w * frame_light(ivec2(columns.w, row), layer);
 }
 
 vec4 seen_light(ivec2 pixel, vec2 away, int layer) {
@@ -83,8 +83,10 @@ vec4 seen_light(ivec2 pixel, vec2 away, int layer) {
 #if SHARP
   vec4 x = moved_weights(t.x);
   vec4 y = moved_weights(t.y);
-  vec4 light = y.x * row_light(across, down.x, x, layer) + y.y * row_light(across, down.y, x, layer) +
-               y.z * row_light(across, down.z, x, layer) + y.w * row_light(across, down.w, x, layer);
+  vec4 ba = frame_light(ivec2(across.y, down.x), layer), ca = frame_light(ivec2(across.z, down.x), layer);
+  vec4 bd = frame_light(ivec2(across.y, down.w), layer), cd = frame_light(ivec2(across.z, down.w), layer);
+  vec4 light = y.x * row_light(x, across, down.x, ba, ca, layer) + y.y * row_light(x, across, down.y, bb, cb, layer) +
+               y.z * row_light(x, across, down.z, bc, cc, layer) + y.w * row_light(x, across, down.w, bd, cd, layer);
   return clamp(light, min(min(bb, cb), min(bc, cc)), max(max(bb, cb), max(bc, cc)));
 #else
   return mix(mix(bb, cb, t.x), mix(bc, cc, t.x), t.y);
