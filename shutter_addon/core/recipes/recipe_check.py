@@ -103,11 +103,8 @@ def _check_field(each: Field, value: Any, place: str) -> None:
 def _check_bars(shutter: Any, window: int, place: str) -> None:
     _require((shutter.bars is None) != (not shutter.keys), place, "either bars or keys, one of the two")
     _check_keys(shutter.keys, f"{place}.keys")
-    for where, bars in (
-        [(f"{place}.bars", shutter.bars)]
-        if shutter.bars is not None
-        else [(f"{place}.keys[{k}].bars", key.bars) for k, key in enumerate(shutter.keys)]
-    ):
+    said = {f"{place}.keys[{k}].bars": key.bars for k, key in enumerate(shutter.keys)}
+    for where, bars in (said or {f"{place}.bars": shutter.bars}).items():
         _require(len(bars) == window, where, f"{len(bars)} values, window is {window}")
         try:
             shutters.check_bars(bars)
