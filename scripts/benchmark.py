@@ -419,7 +419,7 @@ class Case:
             return None
         values, span = table_of(self.state), shutters.open_span(self.state.bars)
         rows, open_frames = len(values) - 1, np.ptp(span)
-        way = composition_passes.way_of(self.window, options, values, span, False)
+        way = composition_passes.way_of(self.window, self.state, values, False)
         read = {"sums": 32 * rows, "pieces": 4 * open_frames}.get(way, 8 * (open_frames + 1))
         if isinstance(self.window, Frames):
             read = 4 * open_frames

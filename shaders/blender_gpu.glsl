@@ -4,7 +4,6 @@
 // Fills rows of a layer, from `top` on, from the floats that were sent.
 // PACKING: 0 as they are, 1 as whole numbers, 2 opaque bytes (R + 256 G + 65536 B), 3 pairs of bytes (R + 256 G,
 // B + 256 A), 4 16-bit samples.
-layout(local_size_x = 64) in;
 uniform sampler2DArray sent;
 #  if PACKING == 1
 layout(r32ui) uniform writeonly uimage2DArray stored;

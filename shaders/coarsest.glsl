@@ -1,7 +1,6 @@
-// Solves the coarsest grid, of SOLVED × SOLVED cells at most, by elimination (LDLᵀ): in one invocation, for shaders of
-// Blender's Python have no memory that a workgroup shares.
-// Cells are numbered along the shorter side, so that none is tied to one more than BAND − 1 before it. The matrix is
-// symmetric, its lower half is all of it: rows[BAND · i + d] ties cell i to cell i − d; d = 0 turns into 1 / pivot.
+// Solves the coarsest grid, of SOLVED × SOLVED cells at most, by elimination (LDLᵀ), in one invocation: Blender's Python
+// has no memory that a workgroup shares. Cells are numbered along the shorter side, so that none is tied to one more than
+// BAND − 1 before it. Of the symmetric matrix, rows[BAND · i + d] ties cell i to cell i − d; d = 0 turns into 1 / pivot.
 layout(local_size_x = 1) in;
 layout(rgba32f) uniform readonly image2DArray stencil, right;  // as in multigrid.glsl
 layout(rgba32f) uniform writeonly image2DArray solution;
@@ -31,10 +30,9 @@ void load_row(int i, int layer) {
   rows[BAND * i] = imageLoad(stencil, ivec3(p, 2)).y;
   vec4 before = imageLoad(stencil, ivec3(p, 0));
   vec4 after = imageLoad(stencil, ivec3(p, 1));
-  tie(i, p + ivec2(-1, -1), before.x);
-  tie(i, p + ivec2(0, -1), before.y);
-  tie(i, p + ivec2(1, -1), before.z);
-  tie(i, p + ivec2(-1, 0), before.w);
+  for (int k = 0; k < 4; k++) {
+    tie(i, p + ivec2(k % 3 - 1, k / 3 - 1), before[k]);
+  }
   tie(i, p + ivec2(-1, 1), after.y);
   x[i] = imageLoad(right, ivec3(p, layer));
 }

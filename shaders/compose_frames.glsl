@@ -1,7 +1,6 @@
-// A pixel's own shutter by displacement interpolation, exact (paper §3.4.1): its quantile is Σ cᵢ Sᵢ⁻¹, linear
-// between the knots of the table. A frame's weight is Q at its end less Q at its start.
-// For many pieces: every frame is fetched once. Pieces that end before in every pixel of the block are summed for all of
-// them; only those that a pixel may be inside of are looked at pixel by pixel, about one to a frame.
+// As compose_pieces.glsl, for many pieces: every frame is fetched once. Its weight is Q at its end less Q at its start.
+// Pieces that end before in every pixel of the block are summed for all of them; only those that a pixel may be inside of
+// are looked at pixel by pixel, about one to a frame.
 uniform int rows, first, last;
 #include "compose.glsl"
 
@@ -28,14 +27,6 @@ void widen_reach(int quad) {
                   dot(abs(own[3] - middle[g]), vec4(0.5)));
   }
   reach = max(reach, max(max(apart.x, apart.y), max(apart.z, apart.w)));
-}
-
-void find_middle() {
-  for (int g = 0; g < GROUPS; g++) {
-    middle[g] = vec4(0.0);
-  }
-  EACH(add_to_middle);
-  EACH(widen_reach);
 }
 
 #if MOVED
@@ -80,11 +71,12 @@ void add_frame(int quad) {
   before[quad] = after[quad];
 }
 
-void main() {
-  if (!start_block()) {
-    return;
+void expose_frames() {
+  for (int g = 0; g < GROUPS; g++) {
+    middle[g] = vec4(0.0);
   }
-  find_middle();
+  EACH(add_to_middle);
+  EACH(widen_reach);
 #define CLEAR(quad) before[quad] = vec4(0.0)
   EACH(CLEAR);
   float passed = 0.0;
@@ -121,5 +113,5 @@ void main() {
     }
     EACH(add_frame);
   }
-  EACH(finish_quad);
 }
+#include "blocks.glsl"

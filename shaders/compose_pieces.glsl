@@ -25,10 +25,7 @@ void add_frame(int quad) {
   expose(quad, frame, max(open, 0.0) * density[quad]);
 }
 
-void main() {
-  if (!start_block()) {
-    return;
-  }
+void expose_frames() {
   for (int row = 1; row <= rows; row++) {
     from = 1e9;
     until = 0.0;
@@ -38,5 +35,5 @@ void main() {
       EACH(add_frame);
     }
   }
-  EACH(finish_quad);
 }
+#include "blocks.glsl"

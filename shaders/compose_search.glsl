@@ -1,6 +1,5 @@
-// As compose_frames.glsl, every pixel for itself: for each frame it looks up its own piece, by bisection.
-// For many pieces between shutters that lie far apart in time, which neighbours do not share: there, looking at pieces
-// for a whole block takes pieces times frames, and more loops than software renderers go through.
+// As compose_frames.glsl, every pixel for itself: for each frame it looks up its own piece, by bisection. For many pieces
+// that neighbours do not share: for a whole block, these would take more loops than software renderers go through.
 uniform int rows, first, last;
 #include "compose.glsl"
 
@@ -48,11 +47,4 @@ void expose_frames() {
     before = after;
   }
 }
-
-void main() {
-  if (!start_block()) {
-    return;
-  }
-  GO_THROUGH(expose_frames)
-  finish_quad(0);
-}
+#include "blocks.glsl"

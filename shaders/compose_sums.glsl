@@ -1,9 +1,8 @@
-// A pixel's own shutter by displacement interpolation, exact (paper §3.4.1): its quantile is Σ cᵢ Sᵢ⁻¹, linear
-// between the knots of the table; what a piece exposes is the difference of the running sums at its ends, evenly
-// spread. So an exposure of any length costs four look-ups a piece.
-// table: a row of 2 · GROUPS + 1 vectors for the gains, then one a piece, as in include/compose.glsl; ROWS pieces, in a
-// loop that a compiler unrolls. The window's time 0 lies `origin` positions from the first of the sums, and time runs
-// backwards with BACK. (Of time nothing but whole frames depends on where the sums begin: pictures must not.)
+// A pixel's own shutter by displacement interpolation, exact (paper §3.4.1), as in compose_pieces.glsl: what a piece
+// exposes is the difference of the running sums at its ends, evenly spread, at four look-ups whatever its length.
+// table: a row of 2 · GROUPS + 1 vectors for the gains, then ROWS pieces, as in include/compose.glsl. The window's time 0
+// lies `origin` positions from the first of the sums, and time runs backwards with BACK. (Of time nothing but whole frames
+// depends on where the sums begin: pictures must not.)
 layout(local_size_x = 64, local_size_y = 2) in;
 layout(rgba32f) uniform readonly image2DArray coefficients;
 layout(STORED) uniform readonly uimage2DArray sums;
@@ -16,8 +15,7 @@ uniform float unit;
 #include "sums.glsl"
 #define COLUMNS (2 * GROUPS + 1)
 
-// Above one another in an invocation: to a software renderer the table is as dear as the sums, but four pixels are
-// slower than one.
+// Above one another in an invocation: to a software renderer the table is as dear as the sums; four are slower than one.
 #define PIXELS 2
 #define EACH(does) does(0); does(1)
 

@@ -24,11 +24,4 @@ void expose_frames() {
     EACH(fold_frame);
   }
 }
-
-void main() {
-  if (!start_block()) {
-    return;
-  }
-  GO_THROUGH(expose_frames)
-  EACH(finish_quad);
-}
+#include "blocks.glsl"

@@ -1,5 +1,4 @@
-// The values that compute/diffusion_gpu.py begins with, those that go from a coarser grid to the finer one, and the
-// coefficients that become of them.
+// What compute/diffusion_gpu.py begins with, what goes from a coarser grid to the finer one, and coefficients.
 #include "tiles.glsl"
 
 #ifdef START
@@ -85,12 +84,10 @@ void at(ivec3 p) {
 }
 
 #elif defined(EXPAND_RIM)
-// The same at the frame's last columns and rows: beyond the coarser grid's last cells a parabola that is level at the
-// frame's edge.
+// The same at the frame's last columns and rows: beyond the coarser grid's last cells a parabola, level at the edge.
 uniform int layers;
 uniform vec2 beyond;
 
-// The four cells' values.
 mat4 values(ivec2 a, ivec2 b, vec2 bend, int layer) {
   vec4 value = imageLoad(coarser, ivec3(a, layer));
   vec4 beside = mix(value, imageLoad(coarser, ivec3(b.x, a.y, layer)), bend.x);

@@ -1,14 +1,13 @@
-// Levels of 8 bits as Blender makes them of light (compute/gpu.py).
+// Levels of 8 bits of a picture, whose bottom row is first (compute/gpu.py).
+layout(rgba32f) uniform readonly image2DArray picture;
+uniform ivec2 size;
 
 #ifdef SHOW
-// A picture as its levels, top row first, their alpha full; 0 where rounding is too near for the curve to tell.
-layout(local_size_x = 64) in;
-layout(rgba32f) uniform readonly image2DArray picture;
+// As Blender makes them, top row first, their alpha full; 0 where rounding is too near for the curve to tell.
 layout(r32f) uniform readonly image2DArray grain;
 // A parabola for each 32nd of an octave from 2^-9 on, in levels, and how far off it may be.
 layout(rgba32f) uniform readonly image2DArray curve;
 layout(rgba8) uniform writeonly image2DArray levels;
-uniform ivec2 size;
 uniform float slope;  // below, in levels
 
 bool is_sure;
@@ -35,16 +34,23 @@ void at(ivec3 p) {
 
 #elif defined(PICK)
 // The light of some pixels. places: their numbers, row by row from the bottom.
-layout(local_size_x = 64) in;
-layout(rgba32f) uniform readonly image2DArray picture;
 layout(r32ui) uniform readonly uimage2DArray places;
 layout(rgba32f) uniform writeonly image2DArray picked;
-uniform ivec2 size;
 uniform int width;
 
 void at(ivec3 p) {
   int place = int(imageLoad(places, p).r);
   imageStore(picked, p, imageLoad(picture, ivec3(place % width, place / width, 0)));
+}
+
+#elif defined(OVER_BLACK)
+// Those of a file, top row first: display code values (view transform Standard) over black.
+layout(rgba8) uniform writeonly image2DArray levels;
+#  include "light.glsl"
+
+void at(ivec3 p) {
+  vec3 linear = imageLoad(picture, ivec3(p.x, size.y - 1 - p.y, 0)).rgb;
+  imageStore(levels, p, vec4(to_level(clamp(linear, 0.0, 1.0)), 1.0));
 }
 #endif
 

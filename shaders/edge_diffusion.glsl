@@ -45,20 +45,16 @@ void at(ivec3 p) {
 
 #elif defined(ZERO)
 // Zeros in all cells of a grid.
-layout(local_size_x = 8, local_size_y = 8) in;
 layout(rgba32f) uniform writeonly image2DArray values;
 uniform ivec2 size;
 
-void main() {
-  ivec3 p = ivec3(gl_GlobalInvocationID);
-  if (all(lessThan(p.xy, size))) {
-    imageStore(values, p, vec4(0.0));
-  }
+void at(ivec3 p) {
+  imageStore(values, p, vec4(0.0));
 }
+#  include "pixels.glsl"
 
 #elif defined(DOT) || defined(CHANGE)
 // Parts of a sum of products; or of the largest difference from noted values, in whose place the new ones are noted.
-layout(local_size_x = 64) in;
 layout(rgba32f) uniform readonly image2DArray values;
 #  ifdef DOT
 layout(rgba32f) uniform readonly image2DArray right;
@@ -66,18 +62,12 @@ layout(rgba32f) uniform readonly image2DArray right;
 layout(rgba32f) uniform image2DArray noted;
 #  endif
 layout(rgba32f) uniform writeonly image2DArray result;
-uniform ivec2 size;
-uniform int parts;
+uniform ivec2 size, grid;  // of the parts, and of all cells
 
-void main() {
-  int n = int(gl_GlobalInvocationID.x);
-  int layer = int(gl_GlobalInvocationID.z);
-  if (n >= parts) {
-    return;
-  }
+void at(ivec3 part) {
   vec4 total = vec4(0.0);
-  for (int k = n; k < size.x * size.y; k += parts) {
-    ivec3 p = ivec3(k % size.x, k / size.x, layer);
+  for (int k = part.x; k < grid.x * grid.y; k += size.x) {
+    ivec3 p = ivec3(k % grid.x, k / grid.x, part.z);
     vec4 value = imageLoad(values, p);
 #  ifdef DOT
     total += value * imageLoad(right, p);
@@ -86,16 +76,16 @@ void main() {
     imageStore(noted, p, value);
 #  endif
   }
-  imageStore(result, ivec3(n, 0, layer), total);
+  imageStore(result, part, total);
 }
+#  include "pixels.glsl"
 
 #elif defined(SUM)
 // The sum of the parts, in one invocation.
 layout(local_size_x = 1) in;
 layout(rgba32f) uniform readonly image2DArray result;
 layout(rgba32f) uniform image2DArray sums;
-uniform int parts;
-uniform int place;  // which of `sums` it becomes; the one before it moves to place + 1
+uniform int parts, place;  // place: which of `sums` it becomes; the one before it moves to place + 1
 
 void main() {
   int layer = int(gl_GlobalInvocationID.z);

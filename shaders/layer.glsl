@@ -2,30 +2,23 @@
 // first, as the passes that compose leave them.
 #ifdef LEAST
 // The least alpha of a block of 16 × 16 pixels: how much of what lies behind was seen.
-layout(local_size_x = 8, local_size_y = 8) in;
 layout(r32f) uniform writeonly image2DArray least;
 layout(rgba32f) uniform readonly image2DArray clear;  // a software renderer's texelFetch takes longer
-uniform ivec2 size;
+uniform ivec2 size, whole;  // in blocks, and in pixels
 
-void main() {
-  ivec2 block = ivec2(gl_GlobalInvocationID.xy);
-  if (any(greaterThanEqual(block, (size + 15) / 16))) {
-    return;
-  }
+void at(ivec3 block) {
   float lowest = 1.0;
-  for (int y = 16 * block.y; y < min(16 * block.y + 16, size.y); y++) {
-    for (int x = 16 * block.x; x < min(16 * block.x + 16, size.x); x++) {
+  for (int y = 16 * block.y; y < min(16 * block.y + 16, whole.y); y++) {
+    for (int x = 16 * block.x; x < min(16 * block.x + 16, whole.x); x++) {
       lowest = min(lowest, imageLoad(clear, ivec3(x, y, 0)).a);
     }
   }
-  imageStore(least, ivec3(block, 0), vec4(lowest));
+  imageStore(least, block, vec4(lowest));
 }
 #else
-// BEGINS: `under` has Σ qₖ hₖ Vₖ, and `clear` in its alpha Σ qₖ hₖ; else it is a picture that a layer is laid over.
-// PLAIN: `plain` is the picture without layers, which stays where none is. PLATE: what lies behind.
-// exposed, share: a layer's F, and in its alpha A. ENDS: the picture is finished; else another layer follows.
-// OPAQUE: the alphas of `under` and `exposed` are these shares.
-layout(local_size_x = 64) in;
+// BEGINS: `under` has Σ qₖ hₖ Vₖ, and `clear` in its alpha Σ qₖ hₖ; else it is a picture that a layer is laid over. PLAIN:
+// the picture without layers, which stays where none is. PLATE: what lies behind. exposed, share: a layer's F, and in its
+// alpha A. OPAQUE: the alphas of `under` and `exposed` are these shares. ENDS: no other layer follows.
 layout(rgba32f) uniform readonly image2DArray under, exposed;
 #if !OPAQUE
 uniform sampler2DArray share;
@@ -86,5 +79,5 @@ void at(ivec3 p) {
   imageStore(picture, p, light);
 #endif
 }
-#  include "pixels.glsl"
 #endif
+#include "pixels.glsl"

@@ -1,5 +1,4 @@
 // Lays COUNT mattes over coefficients, four shutters of a pixel: core/model/mattes.py's `blended`.
-layout(local_size_x = 64) in;
 layout(rgba32f) uniform readonly image2DArray under;
 layout(r32f) uniform readonly image2DArray values;  // a matte in each layer
 layout(rgba32f) uniform image2DArray over;

@@ -1,11 +1,9 @@
-// The operators of the multigrid of compute/diffusion_gpu.py, by what ties a grid's cells: those of coarser grids their
-// STENCIL, pixels to the four beside them the LINKS that follow edges, or else links of 1.
-// Weights are what each cell takes of the four coarse cells around it.
+// The operators of compute/diffusion_gpu.py, by what ties a grid's cells: those of coarser grids their STENCIL, pixels the
+// LINKS that follow edges, or links of 1. Weights are what each cell takes of the four coarse cells around it.
 #include "tiles.glsl"
 
 #ifdef STENCIL
-// The entries for the four cells before one, for the four behind it, and then 1 / its own and its own. Those of cells
-// beyond the edge are zero.
+// The entries for the four cells before one, for the four behind it, then 1 / its own and its own; beyond the edge, zeros.
 layout(rgba32f) uniform readonly image2DArray stencil;
 
 bool is_free(ivec2 i) {
@@ -34,10 +32,9 @@ vec4 links_of(ivec2 i) {
 #endif
 
 #ifdef WEIGHTS
-// How much every cell takes of the coarse cells around it: along a line of coarse cells by what it is coupled to on
-// either side, between four of them by its own equation.
-// Where a dot lies on a coarse cell, that cell stands for those around the dot: they take a little of it, or coarser
-// grids would know of nothing as near. Beyond the last coarse cell, up to the frame's edge, a cell has that one alone.
+// How much every cell takes of the coarse cells around it: along a line of these by what it is coupled to on either side,
+// between four of them by its own equation. A coarse cell with a dot on it stands for those around the dot: they take a
+// little of it, or coarser grids would know of nothing as near. Beyond the last coarse cell, a cell has that one alone.
 layout(rgba32f) uniform writeonly image2DArray weights;
 uniform float hold;
 
@@ -97,8 +94,7 @@ vec2 between(ivec2 i, bool in_row) {
     return follows * mix(vec2(is_free(before), is_free(after)) * 2.0 / 3.0, vec2(1.0 / 6.0), dots);
   }
   vec2 ends = in_row ? vec2(c[0] + c[3] + c[6], c[2] + c[5] + c[8]) : vec2(c[0] + c[1] + c[2], c[6] + c[7] + c[8]);
-  // What holds the cell is taken to lie on the side that pulls less, and for the rest beside the line, where it holds
-  // the coarse cells as well.
+  // What holds the cell lies on the side that pulls less, and the rest beside the line: it holds the coarse cells as well.
   float pull = ends.x + ends.y;
   float held = max(0.0, diagonal - pull - (in_row ? c[1] + c[7] : c[3] + c[5]));
   float aside = max(0.0, held - abs(ends.x - ends.y));
@@ -148,8 +144,7 @@ uniform ivec2 coarse;  // its size
 // Which of a cell's four weights is for the coarse cell p, where the cell is OFFSET(k) from 2p.
 #  define TAKES(k) (((k) % 3 == 0 ? 1 : 0) + ((k) / 3 == 0 ? 2 : 0))
 
-// Calls a function for every cell of 3 × 3, or of 5 × 5: where a compiler leaves a loop, arrays that it indexes go through
-// memory, and a software renderer takes many times as long.
+// Calls a function for every cell of 3 × 3, or of 5 × 5: arrays that a loop indexes go through memory.
 #  define EACH_OF_9(does) \
     does(0); does(1); does(2); does(3); does(4); does(5); does(6); does(7); does(8)
 #  define EACH_OF_25(does) \
@@ -278,11 +273,7 @@ void main() {
 #endif
 
 #if defined(SMOOTH) || defined(MISSING)
-#  ifdef SMOOTH
 layout(rgba32f) uniform image2DArray values;
-#  else
-layout(rgba32f) uniform readonly image2DArray values;
-#  endif
 #  define NEAR(x, y) imageLoad(values, ivec3(clamp(p.xy + ivec2(x, y), ivec2(0), size - 1), p.z))
 #  ifdef STENCIL
 layout(rgba32f) uniform readonly image2DArray right;
@@ -306,17 +297,11 @@ void at(ivec3 p) {
   imageStore(values, p, (imageLoad(right, p) - taken_around(p)) * imageLoad(stencil, ivec3(p.xy, 2)).x);
 }
 #    define PLACE 2 * IN_FOURS + colour
-#    include "cells.glsl"
 #  else
 // Half a red-black Gauss-Seidel sweep. Invocations run over the pixels of one colour.
 uniform int colour;
 
-void main() {
-  ivec3 p = ivec3(corner(size) + IN_FOURS * ivec2(2, 1), gl_GlobalInvocationID.z);
-  p.x += (p.y + colour) & 1;
-  if (!inside(p.xy, size)) {
-    return;
-  }
+void at(ivec3 p) {
   vec4 tied = links_of(p.xy);
   float diagonal = dot(tied, vec4(1.0));
   if (diagonal > 0.0) {
@@ -324,7 +309,9 @@ void main() {
     imageStore(values, p, total / diagonal);
   }
 }
+#    define PLACE IN_FOURS * ivec2(2, 1) + ivec2((IN_FOURS.y + colour) & 1, 0)
 #  endif
+#  include "cells.glsl"
 #endif
 
 #ifdef MISSING

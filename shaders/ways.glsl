@@ -1,13 +1,12 @@
 // Shutters that combine frames in several ways: of each way a picture is made with its own, then these are mixed.
+uniform ivec2 size;
 #ifdef SELECT
 // The coefficients of some shutters alone, for Σ = 1, and how much all of them have. `chosen`: their numbers, four to a
 // vector; −1: none. GROUPS of four; ALL shutters.
-layout(local_size_x = 64) in;
 layout(rgba32f) uniform readonly image2DArray coefficients;
 layout(rgba32f) uniform writeonly image2DArray selected;
 layout(r32f) uniform writeonly image2DArray share;
 layout(std140) uniform Chosen { vec4 chosen[GROUPS]; };
-uniform ivec2 size;
 uniform int count;
 
 void at(ivec3 p) {
@@ -36,17 +35,9 @@ void at(ivec3 p) {
 #else
 // Adds a way's picture, as much as its shutters have, to `mixed`. Both are scene-linear, bottom row first. BEGINS: it is
 // the first. LEVELS: it is the last, and the sum becomes a picture of levels.
-layout(local_size_x = 64) in;
 layout(rgba32f) uniform readonly image2DArray part;
 layout(r32f) uniform readonly image2DArray share;
-#if BEGINS
-layout(rgba32f) uniform writeonly image2DArray mixed;
-#elif LEVELS
-layout(rgba32f) uniform readonly image2DArray mixed;
-#else
 layout(rgba32f) uniform image2DArray mixed;
-#endif
-uniform ivec2 size;
 uniform int block_bits;
 #include "light.glsl"
 #if LEVELS

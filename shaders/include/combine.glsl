@@ -1,21 +1,14 @@
-// What is made of the frames where they are not averaged; core/pixels/combined.py is the reference.
-// COMBINE: 1 lightest, 2 darkest, 3 median. Of the first two, `total` has the best light by now and the most of wₖ aₖ, and
-// `share` the most of wₖ, a frame's weight times `gain`. BY_LUMINANCE: a pixel's light is that of one frame. THRESHOLD:
-// what is darker (or lighter) than `threshold`, give or take half of the softness behind it, leaves no trail beside the
-// window's frame `shown`.
+// What is made of frames that are not averaged; core/pixels/combined.py is the reference. COMBINE: 1 lightest, 2 darkest:
+// `total` has the best light by now and the most of wₖ aₖ, and `share` the most of wₖ, a frame's weight times `gain`; 3
+// median. BY_LUMINANCE: a pixel's light is one frame's. THRESHOLD: what is darker (or lighter) than `threshold`, give or
+// take half of the softness behind it, leaves no trail beside the window's frame `shown`.
 #if COMBINE == 3
-// The median is looked for by its level, a whole number that rises with a sample: in each scan through the frames a
-// quarter of those is chosen in which it may still lie, by the weight of what is below three thresholds. The last scan
-// finds the samples at that level, and the next above. LEVELS_OF: 0 samples of 8 bits, 1 of 16, 2 light of any.
-#  if LEVELS_OF == 0
-#    define SCANS 4
-#    define WIDEST 64.0
-#    define HIGHEST 255.0
-#  else
-#    define SCANS 9
-#    define WIDEST 65536.0
-#    define HIGHEST (LEVELS_OF == 1 ? 65535.0 : 262143.0)
-#  endif
+// By a level that rises with a sample: each scan through the frames chooses a quarter of the levels where the median may
+// still lie, by the weight of what is below three thresholds; the last one finds the samples at that level, and the next
+// above. LEVELS_OF: 0 samples of 8 bits, 1 of 16, 2 light of any.
+#  define SCANS (LEVELS_OF == 0 ? 4 : 9)
+#  define WIDEST (LEVELS_OF == 0 ? 64.0 : 65536.0)
+#  define HIGHEST (LEVELS_OF == 0 ? 255.0 : LEVELS_OF == 1 ? 65535.0 : 262143.0)
 #  define STEPS 3
 // Around the middle, where both neighbours count: MIDDLE of core/pixels/combined.py.
 const float NEAR_MIDDLE = 1.0 / 8192.0;
@@ -29,33 +22,23 @@ vec3 lower[4];
 vec3 upper[4];
 vec4 covered = vec4(0.0);  // Σ qₖ aₖ of each pixel
 
-// What is compared: it rises with a sample.
-vec3 level_of(vec3 value) {
+// A sample of a frame, whose light rises with it, and its alpha; what of it is compared, and its light.
 #  if LEVELS_OF == 2
-  vec3 root = sign(value) * sqrt(sqrt(abs(value)));  // light of wide gamuts may be below 0
-  return 0.5 + 0.5 * root / (1.0 + abs(root));
-#  else
-  return value;
-#  endif
-}
-
-// A sample of a frame, whose light rises with it, and its alpha.
 vec4 sample_at(ivec2 place, int slot) {
-#  if LEVELS_OF == 2
   vec4 light = frame_light(place, slot);
   return vec4(light.rgb / (light.a > 0.0 ? light.a : 1.0), light.a);
-#  else
-  return texelFetch(frames, ivec3(place, slot), 0);
-#  endif
 }
 
-vec3 light_of(vec3 value) {
-#  if LEVELS_OF == 2
-  return value;
-#  else
-  return decoded(value);
-#  endif
+vec3 level_of(vec3 value) {
+  vec3 root = sign(value) * sqrt(sqrt(abs(value)));  // light of wide gamuts may be below 0
+  return 0.5 + 0.5 * root / (1.0 + abs(root));
 }
+#    define light_of(value) (value)
+#  else
+#    define sample_at(place, slot) texelFetch(frames, ivec3(place, slot), 0)
+#    define level_of(value) (value)
+#    define light_of(value) decoded(value)
+#  endif
 
 void start_median() {
   for (int pixel = 0; pixel < 4; pixel++) {
@@ -124,28 +107,28 @@ vec4 median_of(int pixel) {
   return vec4(covered[pixel] > 0.0 ? middle * cover : vec3(0.0), cover);
 }
 #else
+const vec3 LUMINANCE = vec3(0.2126, 0.7152, 0.0722);
+// How much of a light leaves a trail.
 #  if THRESHOLD
 uniform vec2 threshold;
 uniform int shown;
-#  endif
-const vec3 LUMINANCE = vec3(0.2126, 0.7152, 0.0722);
-// How much of a light leaves a trail.
+
 float passed(vec4 light) {
-#  if THRESHOLD
-#    if ENCODED
-  float luminance = dot(to_linear_exact(straight(light)), LUMINANCE);
-#    else
-  float luminance = dot(straight(light), LUMINANCE);
-#    endif
+  vec3 own = straight(light);
+  float luminance = dot(ENCODED != 0 ? to_linear_exact(own) : own, LUMINANCE);
   float t = clamp((luminance - threshold.x + threshold.y) / (2.0 * threshold.y), 0.0, 1.0);
   t = t * t * (3.0 - 2.0 * t);
-#    if COMBINE == 2
-  return 1.0 - t;
-#    else
-  return t;
-#    endif
+  return COMBINE == 2 ? 1.0 - t : t;
+}
 #  else
-  return 1.0;
+#    define passed(light) 1.0
+#  endif
+
+vec3 better(vec3 best, vec3 other) {
+#  if BY_LUMINANCE
+  return dot(other, LUMINANCE) > dot(best, LUMINANCE) ? other : best;
+#  else
+  return max(best, other);
 #  endif
 }
 
@@ -158,13 +141,8 @@ void fold(int quad, int pixel, vec4 light, float weight) {
   vec4 value = weight * light;
 #  endif
   value.rgb = weight > 0.0 ? value.rgb : vec3(-1e30);
-#  if BY_LUMINANCE
   vec4 best = total[quad][pixel];
-  best.rgb = dot(value.rgb, LUMINANCE) > dot(best.rgb, LUMINANCE) ? value.rgb : best.rgb;
-  total[quad][pixel] = vec4(best.rgb, max(best.a, value.a));
-#  else
-  total[quad][pixel] = max(total[quad][pixel], value);
-#  endif
+  total[quad][pixel] = vec4(better(best.rgb, value.rgb), max(best.a, value.a));
 }
 
 // What was folded, to be folded with what other passes have.
@@ -174,20 +152,11 @@ vec4 folded(int quad, int pixel) {
 }
 
 vec4 with_others(vec4 color, vec4 other) {
-#  if BY_LUMINANCE
-  vec3 best = dot(other.rgb, LUMINANCE) > dot(color.rgb, LUMINANCE) ? other.rgb : color.rgb;
-#  else
-  vec3 best = max(color.rgb, other.rgb);
-#  endif
-  return vec4(best, max(color.a, other.a));
+  return vec4(better(color.rgb, other.rgb), max(color.a, other.a));
 }
 
 vec4 finished_fold(vec4 color) {
   vec3 best = mix(color.rgb, vec3(0.0), lessThan(color.rgb, vec3(-1e29)));
-#  if COMBINE == 2
-  return vec4(color.a - best, color.a);
-#  else
-  return vec4(best, color.a);
-#  endif
+  return vec4(COMBINE == 2 ? color.a - best : best, color.a);
 }
 #endif

@@ -1,16 +1,12 @@
-// What both compositions share: the coefficients of a block's pixels, the sums over their frames, the finished picture.
-// An invocation composes QUADS of four pixels above one another, so that what it looks up in the table serves all of
-// them. A quad is a matrix: a column each, of coefficients or of light. EACH calls a function for every quad: a compiler
-// that did not unroll a loop over them would keep their arrays in memory.
+// What ways to compose share: a block's coefficients, the sums over its frames, the finished picture. An
+// invocation composes QUADS of four pixels above one another, whose look-ups in the table serve all of them. A quad is a
+// matrix: a column each, of coefficients or of light. EACH calls a function for every quad: arrays that a loop indexes go
+// through memory. Software renderers run both sides of a branch: what is costly stands in loops or behind definitions.
 // coefficients: four shutters per layer; table: row 0 the gains, then the knots or the bars, four shutters per texel.
 // The window's frame k is frame `origin` + k · `direction` of the shot, which has `count`. frames: source frame i in layer
-// i mod `layers`; or with SUMS the running sums instead, from position `lowest` on, the shot's ends extended: position
-// i's in that layer.
-// With MOVED shutters follow something: see moved.glsl.
-// COMBINE: frames are not averaged (combine.glsl); 0: they are. VALUE: bars are mixed by value (compose_value.glsl).
-// GROUPS of four shutters, TILED, EDGES, DECODE, PREMULTIPLIED, ENCODED: see compute/composition_passes.py. Software renderers run both
-// sides of every branch: what is costly stands in loops or behind these definitions.
-layout(local_size_x = 64) in;
+// i mod `layers`; or with SUMS the running sums instead, from position `lowest` on, the shot's ends extended: position i's.
+// MOVED: shutters follow something (moved.glsl). COMBINE: frames are not averaged (combine.glsl). VALUE: bars are mixed by
+// value. GROUPS of four shutters, TILED, EDGES, DECODE, PREMULTIPLIED, ENCODED: see compute/composition_passes.py.
 layout(rgba32f) uniform readonly image2DArray table;
 uniform ivec2 size;
 uniform int top, block_bits;
@@ -31,12 +27,10 @@ uniform float unit;
 uniform sampler2DArray frames;
 #endif
 
+#include "light.glsl"
 #if UNFINISHED
 layout(rgba32f) uniform writeonly image2DArray picture;
-#endif
-
-#include "light.glsl"
-#if !UNFINISHED
+#else
 #  include "finish.glsl"
 #endif
 #if SUMS
@@ -47,13 +41,6 @@ layout(rgba32f) uniform writeonly image2DArray picture;
 #  define EACH(does) does(0); does(1); does(2); does(3)
 #else
 #  define EACH(does) does(0)
-#endif
-
-// Goes through the frames by a function: of a median, once a scan (combine.glsl).
-#if COMBINE == 3
-#  define GO_THROUGH(does) start_median(); for (scan = 0; scan <= SCANS; scan++) { start_scan(); does(); end_scan(); }
-#else
-#  define GO_THROUGH(does) does();
 #endif
 
 ivec2 corner;
@@ -207,7 +194,7 @@ int layer_of(int frame) {
   index = (index + 512 * period) % period;  // of a negative number, % is undefined
   index = min(index, period - index);
 #endif
-  // Source frame i lies in layer i mod layers; a division costs more than the fetch.
+  // A division costs more than the fetch.
   int layer = clamp(index, 0, count - 1) - lowest + lowest_layer;
   return layer < layers ? layer : layer - layers;
 }
@@ -218,7 +205,6 @@ int layer_of(int frame) {
 #  include "combine.glsl"
 #endif
 
-// What moved.glsl has for frames that are seen elsewhere.
 #if !MOVED
 const int motions = 1;
 int motion = 0;
@@ -230,47 +216,20 @@ void fold_sight(int quad, int frame) {}
 
 #if MOVED
 #  include "moved.glsl"
-#elif COMBINE
+#else
+// Frames one after another: with SUMS, at each the sum at its end is looked up, and that at its start is known.
 void expose(int quad, int frame, vec4 weight) {
 #if EDGES == 2  // shorten
 #  if COMBINE == 3
   centre[quad] += scan == 0 ? weight * (float(frame) + 0.5) : vec4(0.0);
-#  elif !VALUE
+#  elif !COMBINE || !VALUE
   centre[quad] += weight * (float(frame) + 0.5);
 #  endif
   int index = origin + direction * frame;
   weight = index >= 0 && index < count ? weight : vec4(0.0);
 #endif
-  int layer = layer_of(frame);
-#if COMBINE == 3
-  for (int pixel = 0; pixel < 4; pixel++) {
-    count_sample(pixel, sample_at(pixel_at(quad, pixel), layer), weight[pixel]);
-  }
-#else
-  weight *= gain[quad];
-  for (int pixel = 0; pixel < 4; pixel++) {
-    vec4 light = frame_light(pixel_at(quad, pixel), layer);
-    fold(quad, pixel, light, weight[pixel] * passed(light));
-#if THRESHOLD
-    fold(quad, pixel, light, frame == shown ? 1.0 : 0.0);
-#endif
-  }
-#if THRESHOLD
-  share[quad] = frame == shown ? vec4(1.0) : share[quad];
-#endif
-  share[quad] = max(share[quad], weight);
-#endif
-}
-#else
-// Frames one after another: at each, the sum at its end is looked up, and that at its start is known.
-void expose(int quad, int frame, vec4 weight) {
-#if EDGES == 2  // shorten
-  centre[quad] += weight * (float(frame) + 0.5);
-  int index = origin + direction * frame;
-  weight = index >= 0 && index < count ? weight : vec4(0.0);
-#endif
-  share[quad] += weight;
 #if SUMS
+  share[quad] += weight;
   int end = start_of(frame + 1);
   for (int pixel = 0; pixel < 4; pixel++) {
     SUM sum = sum_at(place_of_light(quad, pixel), end);
@@ -279,13 +238,32 @@ void expose(int quad, int frame, vec4 weight) {
   }
 #else
   int layer = layer_of(frame);
+#  if COMBINE == 3
+  for (int pixel = 0; pixel < 4; pixel++) {
+    count_sample(pixel, sample_at(pixel_at(quad, pixel), layer), weight[pixel]);
+  }
+#  elif COMBINE
+  weight *= gain[quad];
+  for (int pixel = 0; pixel < 4; pixel++) {
+    vec4 light = frame_light(pixel_at(quad, pixel), layer);
+    fold(quad, pixel, light, weight[pixel] * passed(light));
+#    if THRESHOLD
+    fold(quad, pixel, light, frame == shown ? 1.0 : 0.0);
+#    endif
+  }
+#    if THRESHOLD
+  share[quad] = frame == shown ? vec4(1.0) : share[quad];
+#    endif
+  share[quad] = max(share[quad], weight);
+#  else
+  share[quad] += weight;
   total[quad] += mat4(weight.x * frame_light(pixel_at(quad, 0), layer),
                       weight.y * frame_light(pixel_at(quad, 1), layer),
                       weight.z * frame_light(pixel_at(quad, 2), layer),
                       weight.w * frame_light(pixel_at(quad, 3), layer));
+#  endif
 #endif
 }
-
 #endif
 
 #if !MOVED && EDGES == 2
@@ -320,13 +298,9 @@ void store(int quad, int pixel, float brightness) {
 #endif
 #if EDGES == 2
   // Where nothing of the shutter is left, the nearest frame that there is (core/pixels/compositor.py has the 1e-3).
-#  if MOVED
   for (int once = share[quad][pixel] > 1e-6 ? 1 : 0; once < 1; once++) {
     color = nearest_light(quad, pixel, int(centre[quad][pixel] - 1e-3));
   }
-#  else
-  color = share[quad][pixel] > 1e-6 ? color : nearest_light(quad, pixel, int(centre[quad][pixel] - 1e-3));
-#  endif
 #endif
 #if CONTINUED && COMBINE
   color = share[quad][pixel] > 1e-6 ? with_others(color, texelFetch(summed, ivec3(at, 0), 0))

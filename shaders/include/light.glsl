@@ -1,8 +1,7 @@
 // The sRGB transfer; core/frames/light.py is the reference.
 
 // For code values in [0, 1] a polynomial within 0.03 of an 8-bit level: three powers cost more than a frame's fetch.
-vec3 to_linear(vec3 encoded) {
-  vec3 x = encoded;
+vec3 to_linear(vec3 x) {
   vec3 curve =
       ((((((-0.05115455 * x + 0.21591497) * x - 0.42194232) * x + 0.71005759) * x + 0.51325115) * x + 0.03294947) * x) +
       0.00091973;
@@ -42,15 +41,13 @@ vec3 straight(vec4 color) {
   return color.rgb / cover(color);
 }
 
-#ifdef DECODE
 // Samples as the light that is summed: 0 as they are, 1 made linear, 2 made encoded.
 vec3 decoded(vec3 color) {
-#  if DECODE == 1
+#if DECODE == 1
   return to_linear(color);
-#  elif DECODE == 2
+#elif DECODE == 2
   return to_encoded(color);
-#  else
+#else
   return color;
-#  endif
-}
 #endif
+}

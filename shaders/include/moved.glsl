@@ -1,11 +1,9 @@
-// Frames that are not seen where a pixel lies, but where what its shutters follow was: one resampling a frame.
-// frames: some of the window's, in layers; or with PACKED packed_frames, as shaders/pack.glsl makes them.
-// moves: a row for each of the window's frames and of `motions`, of which there are several where pictures are mixed: the
-// frame's layer (−1: it is not among these) and whether it is there at all; then a texel for each motion that is mixed, one
-// per shutter, MIXED of them: turn − 1 and shift, real and imaginary parts. seen_first to seen_last: the window's frames that are there.
-// table: as for compose.glsl, a row for each frame and motion; from row `parts` on, one for each motion: 1 for its shutters.
-// SEVERAL: other passes have other frames. CONTINUED: what those before have summed is in `summed`; UNFINISHED: another
-// one follows. SHARP: as in core.pixels.compositor.seen.
+// Frames that are seen where what a pixel's shutters follow was: one resampling a frame, SHARP as compositor.seen has it.
+// frames: some of the window's, in layers; or with PACKED packed_frames, as shaders/pack.glsl makes them. moves: a row for
+// each of the window's frames, seen_first to seen_last of which are there, and of `motions`, several where pictures are
+// mixed: the frame's layer (−1: it is not among these), whether it is there; then turn − 1 and shift of each shutter, MIXED
+// of them. table: a row for each frame and motion; from row `parts` on, one for each motion: 1 for its shutters.
+// SEVERAL: other passes have other frames. CONTINUED: those before have made `summed`; UNFINISHED: another one follows.
 layout(rgba32f) uniform readonly image2DArray moves;
 uniform int motions;
 #if PACKED
@@ -28,15 +26,6 @@ vec4 moved_weights(float t) {
               (1.5 * t - 2.5) * t * t + 1.0,
               ((2.0 - 1.5 * t) * t + 0.5) * t,
               (0.5 * t - 0.5) * t * t);
-}
-
-// The distance from a pixel to the place that is seen there, its whole and its broken part. Beyond the frame's last
-// pixels all is the same, and large numbers have no fractions.
-void part(ivec2 pixel, vec2 away, out ivec2 whole, out vec2 broken) {
-  away = clamp(away, vec2(-1 - pixel), vec2(size - pixel));
-  vec2 below = floor(away);
-  whole = ivec2(below);
-  broken = away - below;
 }
 
 #if PACKED
@@ -64,10 +53,8 @@ vec3 column_light(Column column, vec4 y) {
 
 // The light of a frame at a pixel and a distance from it.
 vec4 seen_light(ivec2 pixel, vec2 away, int layer) {
-  ivec2 whole;
-  vec2 t;
-  part(pixel, away, whole, t);
-  ivec2 place = pixel + whole + BEFORE - 1;
+  ivec2 place = pixel + ivec2(floor(away)) + BEFORE - 1;
+  vec2 t = away - floor(away);
   vec4 x = moved_weights(t.x);
   vec4 y = moved_weights(t.y);
   Column left = column_at(place + ivec2(1, 0), layer);
@@ -75,47 +62,44 @@ vec4 seen_light(ivec2 pixel, vec2 away, int layer) {
   vec3 light = x.x * column_light(column_at(place, layer), y) + x.y * column_light(left, y) +
                x.z * column_light(right, y) + x.w * column_light(column_at(place + ivec2(3, 0), layer), y);
   light = clamp(light, min(min(left.b, left.c), min(right.b, right.c)), max(max(left.b, left.c), max(right.b, right.c)));
-  return vec4(light * packed_unit(), 1.0);
+  return vec4(light * PACKED_UNIT, 1.0);
 }
 #else
-// The light of a frame at a pixel and a distance from it.
+// Four pixels of a row, weighted; second, third: of these two the light.
+vec4 row_light(vec4 x, ivec4 columns, int row, vec4 second, vec4 third, int layer) {
+  return x.x * frame_light(ivec2(columns.x, row), layer) + x.y * second + x.z * third +
+         x.w * frame_light(ivec2(columns.w, row), layer);
+}
+
 vec4 seen_light(ivec2 pixel, vec2 away, int layer) {
-  ivec2 whole;
-  vec2 t;
-  part(pixel, away, whole, t);
-  ivec2 b = pixel + whole;
-  ivec2 last_pixel = size - 1;
-  ivec2 c_ = clamp(b + 1, ivec2(0), last_pixel);
-  ivec2 a = clamp(b - 1, ivec2(0), last_pixel);
-  ivec2 d = clamp(b + 2, ivec2(0), last_pixel);
-  b = clamp(b, ivec2(0), last_pixel);
-  vec4 bb = frame_light(b, layer);
-  vec4 cb = frame_light(ivec2(c_.x, b.y), layer);
-  vec4 bc = frame_light(ivec2(b.x, c_.y), layer);
-  vec4 cc = frame_light(c_, layer);
+  ivec2 place = pixel + ivec2(floor(away));
+  vec2 t = away - floor(away);
+  ivec4 across = clamp(place.x + ivec4(-1, 0, 1, 2), 0, size.x - 1);
+  ivec4 down = clamp(place.y + ivec4(-1, 0, 1, 2), 0, size.y - 1);
+  vec4 bb = frame_light(ivec2(across.y, down.y), layer);
+  vec4 cb = frame_light(ivec2(across.z, down.y), layer);
+  vec4 bc = frame_light(ivec2(across.y, down.z), layer);
+  vec4 cc = frame_light(ivec2(across.z, down.z), layer);
 #if SHARP
   vec4 x = moved_weights(t.x);
   vec4 y = moved_weights(t.y);
-  vec4 light = y.x * (x.x * frame_light(a, layer) + x.y * frame_light(ivec2(b.x, a.y), layer) +
-                      x.z * frame_light(ivec2(c_.x, a.y), layer) + x.w * frame_light(ivec2(d.x, a.y), layer));
-  light += y.y * (x.x * frame_light(ivec2(a.x, b.y), layer) + x.y * bb + x.z * cb +
-                  x.w * frame_light(ivec2(d.x, b.y), layer));
-  light += y.z * (x.x * frame_light(ivec2(a.x, c_.y), layer) + x.y * bc + x.z * cc +
-                  x.w * frame_light(ivec2(d.x, c_.y), layer));
-  light += y.w * (x.x * frame_light(ivec2(a.x, d.y), layer) + x.y * frame_light(ivec2(b.x, d.y), layer) +
-                  x.z * frame_light(ivec2(c_.x, d.y), layer) + x.w * frame_light(d, layer));
+  vec4 ba = frame_light(ivec2(across.y, down.x), layer), ca = frame_light(ivec2(across.z, down.x), layer);
+  vec4 bd = frame_light(ivec2(across.y, down.w), layer), cd = frame_light(ivec2(across.z, down.w), layer);
+  vec4 light = y.x * row_light(x, across, down.x, ba, ca, layer) + y.y * row_light(x, across, down.y, bb, cb, layer) +
+               y.z * row_light(x, across, down.z, bc, cc, layer) + y.w * row_light(x, across, down.w, bd, cd, layer);
   return clamp(light, min(min(bb, cb), min(bc, cc)), max(max(bb, cb), max(bc, cc)));
 #else
   return mix(mix(bb, cb, t.x), mix(bc, cc, t.x), t.y);
 #endif
 }
-
 #endif
 
-// turn · z + shift − z, where a pixel's (turn − 1, shift) is `move`.
+// turn · z + shift − z, where a pixel's (turn − 1, shift) is `move`. Beyond the frame's last pixels all is the same, and
+// large numbers have no fractions.
 vec2 moved_by(vec4 move, ivec2 pixel) {
   vec2 z = vec2(pixel);
-  return vec2(move.x * z.x - move.y * z.y, move.y * z.x + move.x * z.y) + move.zw;
+  vec2 away = vec2(move.x * z.x - move.y * z.y, move.y * z.x + move.x * z.y) + move.zw;
+  return clamp(away, vec2(-1 - pixel), vec2(size - pixel));
 }
 
 // (turn − 1, shift) of a quad's pixels, a column each.
@@ -135,6 +119,17 @@ mat4 moves_of(int quad, int row) {
 #endif
 }
 
+#if EDGES == 2 || THRESHOLD
+// How much of a pixel's coefficients is that of the motion's shutters.
+float share_of_motion(int quad, int pixel) {
+  float sum = 0.0;
+  for (int g = 0; g < GROUPS; g++) {
+    sum += dot(c[quad * GROUPS + g][pixel], imageLoad(table, ivec3(g, parts + motion, 0)));
+  }
+  return sum;
+}
+#endif
+
 #if COMBINE
 // A frame as it is seen by all motions: its light, weighted, how much it counts, and whether it is among these frames.
 mat4 sight[QUADS];
@@ -152,30 +147,15 @@ void start_sight(int quad) {
 #  endif
 }
 
-void add_sight(int quad, int pixel, vec4 light, float weight) {
-  sight[quad][pixel] += weight * light;
-#  if THRESHOLD
-  // How much of the pixel's coefficients is that of the motion's shutters.
-  float part = 0.0;
-  for (int g = 0; g < GROUPS; g++) {
-    part += dot(c[quad * GROUPS + g][pixel], imageLoad(table, ivec3(g, parts + motion, 0)));
-  }
-  shown_sight[quad][pixel] += part * light;
-#  endif
-}
-
 void fold_sight(int quad, int frame) {
   for (int pixel = 0; pixel < 4; pixel++) {
     float weight = sight_weight[quad][pixel];
     vec4 light = sight[quad][pixel] / max(weight, 1e-30);
     share[quad][pixel] = max(share[quad][pixel], weight);
-    weight = is_here ? weight : 0.0;
+    fold(quad, pixel, light, is_here ? weight * passed(light) : 0.0);
 #  if THRESHOLD
-    fold(quad, pixel, light, weight * passed(light));
     fold(quad, pixel, shown_sight[quad][pixel], is_here && frame == shown ? 1.0 : 0.0);
     share[quad][pixel] = frame == shown ? 1.0 : share[quad][pixel];
-#  else
-    fold(quad, pixel, light, weight);
 #  endif
   }
 }
@@ -196,7 +176,6 @@ void expose(int quad, int frame, vec4 weight) {
   share[quad] += weight;
 #endif
 #if SEVERAL
-  // A loop, for software renderers run both sides of a branch; and it is dear to them as well.
 #  if THRESHOLD
   int layer = frame == shown || any(greaterThan(weight, vec4(0.0))) ? int(place.x) : -1;
 #  else
@@ -211,7 +190,11 @@ void expose(int quad, int frame, vec4 weight) {
 #if COMBINE
     for (int pixel = 0; pixel < 4; pixel++) {
       ivec2 own = pixel_at(quad, pixel);
-      add_sight(quad, pixel, seen_light(own, moved_by(move[pixel], own), layer), weight[pixel]);
+      vec4 light = seen_light(own, moved_by(move[pixel], own), layer);
+      sight[quad][pixel] += weight[pixel] * light;
+#  if THRESHOLD
+      shown_sight[quad][pixel] += share_of_motion(quad, pixel) * light;
+#  endif
     }
 #else
     mat4 light;
@@ -231,14 +214,10 @@ vec4 nearest_light(int quad, int pixel, int frame) {
   vec4 light = vec4(0.0);
   for (motion = 0; motion < motions; motion++) {
     int row = nearest * motions + motion;
-    float part = 0.0;
-    for (int g = 0; g < GROUPS; g++) {
-      part += dot(c[quad * GROUPS + g][pixel], imageLoad(table, ivec3(g, parts + motion, 0)));
-    }
     int layer = int(imageLoad(moves, ivec3(0, row, 0)).x);
     ivec2 own_pixel = pixel_at(quad, pixel);
     vec4 found = seen_light(own_pixel, moved_by(moves_of(quad, row)[pixel], own_pixel), max(layer, 0));
-    light += layer < 0 ? vec4(0.0) : part * found;
+    light += layer < 0 ? vec4(0.0) : share_of_motion(quad, pixel) * found;
   }
   return light;
 }

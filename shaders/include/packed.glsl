@@ -1,14 +1,15 @@
-// Light in 32 bits: 11 of red and of green, 10 of blue. SQUARED: its square root, of which 1 is 2047 and 1023; else the
-// light itself, of which 1 is 2040 and 1020, so that every level of 8 bits is exact.
+// Light in 32 bits: 11 of red and of green, 10 of blue. SQUARED: linear, its square root, so that dark steps are small;
+// else encoded, so that every level of 8 bits is exact.
 #include "halves.glsl"
 
 const int BEFORE = 2;
-const int RIM = 5;
 
 #if SQUARED
 const vec3 PACKED_WHITE = vec3(2047.0, 2047.0, 1023.0);
+const vec3 PACKED_UNIT = 1.0 / (PACKED_WHITE * PACKED_WHITE);
 #else
 const vec3 PACKED_WHITE = vec3(2040.0, 2040.0, 1020.0);
+const vec3 PACKED_UNIT = 1.0 / PACKED_WHITE;
 #endif
 
 uint packed_color(vec3 light) {
@@ -19,20 +20,12 @@ uint packed_color(vec3 light) {
   return whole.r | (whole.g << 11) | (whole.b << 22);
 }
 
-// In units of packed_unit().
+// In units of PACKED_UNIT.
 vec3 unpacked_color(uint color) {
   vec3 light = vec3(ivec3(color & 2047u, (color >> 11) & 2047u, color >> 22));
 #if SQUARED
   return light * light;
 #else
   return light;
-#endif
-}
-
-vec3 packed_unit() {
-#if SQUARED
-  return 1.0 / (PACKED_WHITE * PACKED_WHITE);
-#else
-  return 1.0 / PACKED_WHITE;
 #endif
 }

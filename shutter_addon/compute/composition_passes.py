@@ -6,7 +6,7 @@ from functools import lru_cache
 import numpy as np
 
 from ..core.model import shutters
-from ..core.model.frame_state import AVERAGE, Combine, FrameState, Options
+from ..core.model.frame_state import FrameState
 from ..devices.llvmpipe import MOST_ITERATIONS, frames_iterations
 from ..devices.passes import Pass, read_pass
 from .running_sums import Sums
@@ -19,7 +19,7 @@ MODES = {"average": 0, "lightest": 1, "darkest": 2, "median": 3}
 EDGES = {"hold": 0, "mirror": 1, "shorten": 2}
 # What a picture is stored as, by whether it is levels.
 PICTURE = {False: "rgba32f", True: "rgba8"}
-LEVELS = read_pass("levels")
+LEVELS = read_pass("display", "OVER_BLACK")
 # Rows of pixels that one invocation composes, by the pass; BLOCK for all others.
 _LINES = {"sums": PAIR, "search": 4}
 # The numbers of pieces for which compose_sums is compiled. A table with another number is filled up with empty pieces.
@@ -39,27 +39,20 @@ def lines_of(way: str, *, is_median: bool) -> int:
     return 4 if is_median else _LINES.get(way, BLOCK)
 
 
-def way_of(
-    window: Window,
-    options: Options,
-    values: np.ndarray,
-    span: tuple[int, int],
-    shortened: bool,
-    combine: Combine = AVERAGE,
-) -> str:
+def way_of(window: Window, state: FrameState, values: np.ndarray, shortened: bool) -> str:
     """The fastest way to compose: the name of a pass, without compose_.
 
     values: the table of `table`, a row of gains and a row per piece
-    span: the first frame of the window that any shutter exposes, and the one after the last
-    shortened: whether frames of that span are left out (edges "shorten")
+    shortened: whether frames that a shutter exposes are left out (edges "shorten")
 
     The bounds come from times at 1080p, for 2 to 8 shutters and windows of 16 to 64 frames. From running sums, in
     multiples of the time of a plain average of 16 frames: "sums" 0.3 + 0.23 · pieces, "frames" 1 + 0.1 · frames. From
     frames, in multiples of the time of the window's own plain average: "pieces" 1.5 + 1.4 · pieces / frames, "frames"
     2.1 to 2.8.
     """
-    if options.interpolation == "value":
+    if state.options.interpolation == "value":
         return "value"
+    (combine,), span = state.groups, state.open_span
     rows, frames = len(values) - 1, span[1] - span[0]
     if combine.mode == "median":
         return "search"
@@ -72,16 +65,15 @@ def way_of(
     return "frames" if frames_iterations(values, span) <= MOST_ITERATIONS else "search"
 
 
-def moved_way(
-    options: Options, values: np.ndarray, span: tuple[int, int], motions: int, mixed: int, quads: int
-) -> tuple[str, int]:
+def moved_way(state: FrameState, values: np.ndarray, motions: int, mixed: int, quads: int) -> tuple[str, int]:
     """The way to compose where shutters follow something, and how many quads of pixels, `quads` at most, an invocation
     can compose by it; arguments as for way_of and composition_of_moved.
 
     motions: those that a frame is seen by"""
+    span = state.open_span
     frames = span[1] - span[0]
     mixing = frames * motions * (mixed if mixed > 1 else 0)
-    if options.interpolation == "value":
+    if state.options.interpolation == "value":
         return "value", quads if frames * (1 + motions) + quads * mixing <= MOST_ITERATIONS else 1
     loops = frames_iterations(values, span) + frames
     if loops + mixing > MOST_ITERATIONS:

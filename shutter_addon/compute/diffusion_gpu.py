@@ -66,6 +66,11 @@ _EXPAND = read_pass("diffusion", "EXPAND")
 _EXPAND_RIM = read_pass("diffusion", "EXPAND_RIM")
 
 
+# Of each list for the passes, the first of the lists of tiles that it is made of, and the one behind the last.
+_RANGES = {"near": (0, 1), "reached": (0, 2), "far": (1, 3), "rim": (3, 4)}
+_RANGES |= {"anew": (4, 5), "feeding": (5, 6), "changed": (6, 7)}
+
+
 class _Grid:
     """The textures of a grid, and what is known of its tiles.
 
@@ -190,16 +195,8 @@ class Diffusion:
             eights, fours = grid.codes
             lists = [eights[tiles] for tiles in (near, around & ~near, live & ~around, rim, unsolved)]
             lists += [eights[feeding] / 2, fours[changed]]  # a tile is four cells wide on the next grid
-            ends = (end + np.cumsum([len(tiles) for tiles in lists])).tolist()
-            grid.ranges = {
-                "near": (end, ends[0]),
-                "reached": (end, ends[1]),
-                "far": (ends[0], ends[2]),
-                "rim": (ends[2], ends[3]),
-                "anew": (ends[3], ends[4]),
-                "feeding": (ends[4], ends[5]),
-                "changed": (ends[5], ends[6]),
-            }
+            ends = (end + np.cumsum([0, *map(len, lists)])).tolist()
+            grid.ranges = {name: (ends[first], ends[last]) for name, (first, last) in _RANGES.items()}
             listed += lists
             end = ends[-1]
             grid.touched, grid.solid, grid.reached = touched, solid, reached

@@ -173,13 +173,13 @@ class EdgeDiffusion(Diffusion):
         parts = min(PARTS, grid.size[0] * grid.size[1])
         own = {"values": grid.textures["solution"], "noted": grid.textures["own"]}
         images = {**own, "result": self._more["parts"]}
-        self._device.run(_CHANGE, (parts, 1, grid.layers), images=images, size=grid.size, parts=parts)
+        self._device.run(_CHANGE, (parts, 1, grid.layers), images=images, size=(parts, 1), grid=grid.size)
         return self._device.read(self._more["parts"])[:, :, :parts].max()
 
     def _dot(self, grid: _Grid, one: Texture, other: Texture, place: int) -> None:
         parts = min(PARTS, grid.size[0] * grid.size[1])
         images = {"values": one, "right": other, "result": self._more["parts"]}
-        self._device.run(_DOT, (parts, 1, grid.layers), images=images, size=grid.size, parts=parts)
+        self._device.run(_DOT, (parts, 1, grid.layers), images=images, size=(parts, 1), grid=grid.size)
         images = {"result": self._more["parts"], "sums": self._more["sums"]}
         self._device.run(_SUM, (1, 1, grid.layers), images=images, parts=parts, place=place)
 

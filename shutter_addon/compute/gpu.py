@@ -50,7 +50,7 @@ _PIECES = _OCTAVES << (23 - _SHIFT)
 _PROBED = 128  # values of each piece, of which the parabola is made
 # How far off a device's own arithmetic may be, in levels; and how much worse than at the probed values it may be.
 _ROUNDING, _DOUBT = 1.2e-4, 2.0
-_AT_ONCE = 256, 64  # pixels that are asked for, columns and rows
+_COLUMNS = 4096  # of pixels that are asked for
 
 _LIMITS = {"FIRST": f"{_FIRST}u", "LOWEST": repr(2.0**_LOWEST), "HIGHEST": repr(2.0 - 2**-23)}
 SHOW = read_pass("display", "SHOW", **_LIMITS)
@@ -168,20 +168,16 @@ class Displaying:
 
     def _picked(self, picture: Texture, places: np.ndarray) -> np.ndarray:
         """The light (n, 3) of pixels, by their numbers."""
-        columns, most = _AT_ONCE
-        found = []
-        for start in range(0, len(places), columns * most):
-            part = places[start : start + columns * most]
-            rows = -(-len(part) // columns)
-            numbers = np.zeros((rows, columns, 1), np.uint32)
-            numbers.ravel()[: len(part)] = part
-            sent = self._textures.of("places", (*_AT_ONCE, 1), "r32ui")
-            picked = self._textures.of("picked", (*_AT_ONCE, 1), "rgba32f")
-            self._device.write(sent, numbers)
-            images, size = {"picture": picture, "places": sent, "picked": picked}, (columns, rows)
-            self._device.run(PICK, size, images=images, size=size, width=picture.size[0])
-            found.append(self._device.read(picked)[0].reshape(-1, 4)[: len(part), :3])
-        return np.concatenate(found)
+        size = _COLUMNS, -(-len(places) // _COLUMNS)
+        numbers = np.zeros((size[1], _COLUMNS), np.uint32)
+        numbers.ravel()[: len(places)] = places
+        sent, picked = (
+            self._textures.filled("places", [numbers], "r32ui"),
+            self._textures.of("picked", (*size, 1), "rgba32f"),
+        )
+        images = {"picture": picture, "places": sent, "picked": picked}
+        self._device.run(PICK, size, images=images, size=size, width=picture.size[0])
+        return self._device.read(picked)[0].reshape(-1, 4)[: len(places), :3]
 
     def _send(self, display: Display, noise: np.ndarray) -> tuple[dict[str, Texture], float]:
         """The textures of the noise and the curve; and OpenColorIO's slope below that, which is no 12.92."""
@@ -267,7 +263,7 @@ class GPUCompositor:
         first, last = state.open_span
         origin, (low, high) = windows.origin(options, index, direction), windows.reach(state, index, direction)
         shortened = options.edges == "shorten" and (low < window.shot.start or high >= window.shot.stop)
-        way = way_of(window, options, values, (first, last), shortened, combine)
+        way = way_of(window, state, values, shortened)
         is_search = combine.mode == "median" and way == "search"
         if is_search and median_iterations(len(values) - 1, last - first, window.kind) > MOST_ITERATIONS:
             return self._draw_on_host(window, request, coefficients)
@@ -341,7 +337,7 @@ class GPUCompositor:
         shortened, packed = bool((frames[first:last] < 0).any()), isinstance(window, PackedFrames)
         mixed, parts = moves.shape[1] - 1, len(values) - motions
         most = BLOCK // 4 if packed and not shortened else 1
-        way, quads = moved_way(options, values[:parts], (first, last), motions, mixed, most)
+        way, quads = moved_way(state, values[:parts], motions, mixed, most)
         given: Given = {"size": size, "top": 0, "height": size[1], "block_bits": _bits(coefficients)}
         given |= {"first": first, "last": last, "rows": parts - 1, "motions": motions, "parts": parts}
         given |= {"seen_first": int(there[0]), "seen_last": int(there[-1])}

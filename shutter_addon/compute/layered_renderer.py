@@ -3,7 +3,6 @@ another (core.pixels.layering)."""
 
 from collections.abc import Callable, Collection
 from dataclasses import replace
-from functools import partial
 
 import numpy as np
 
@@ -17,6 +16,8 @@ from .layer_frames import LayerMattes, RecentFrames, WeightedFrames
 from .request import Behind, Coefficients, Compositor, Exposure, Handle, Request, Stages
 from .window import summable
 
+# What is composed, by layer, −1 for what lies behind, and whether it is of the weights alone.
+Parts = dict[tuple[int, bool], Request]
 # How much of what lies behind layers has to be seen for a plate to be looked for.
 _SEEN = 1 / 1024
 
@@ -86,25 +87,19 @@ class LayeredRenderer:
         self._forget_changed(layers, parts)
         self._layers = layers
 
-        composed = partial(self._composed, request, parts, coefficients, shot, plain)
         for crowd in (2, 8, 1 << 16):
             try:
-                return composed()
+                return self._composed(request, parts, coefficients, shot, plain)
             except ValueError:
                 if all(window.is_open for window in self._windows.values()):
                     raise
             # They were freed to make room for one another: smaller ones, or frames that are sent, have room.
             self.release_windows()
             self._crowd = max(self._crowd, crowd)
-        return composed()
+        return self._composed(request, parts, coefficients, shot, plain)
 
     def _composed(
-        self,
-        request: Request,
-        parts: dict[tuple[int, bool], Request],
-        coefficients: Coefficients,
-        shot: range,
-        plain: Callable[[], Handle],
+        self, request: Request, parts: Parts, coefficients: Coefficients, shot: range, plain: Callable[[], Handle]
     ) -> Handle:
         count = max(layer for layer, _ in parts) + 1
         moves = any(part.state.following is not None for part in parts.values())
@@ -113,12 +108,10 @@ class LayeredRenderer:
         windows = {name: self._window(name, part, len(request.state.bars)) for name, part in parts.items()}
         self._load(windows, request, shot)
         whole = Coefficients(self._stages.upload(np.ones((1, 1, 1))), max(self._source.width, self._source.height))
-        drawn = {
-            name: self._compositor.draw(
-                windows[name], replace(part, levels=False), whole if name[0] >= 0 else coefficients
-            )
-            for name, part in parts.items()
-        }
+        drawn = {}
+        for name, part in parts.items():
+            own = whole if name[0] >= 0 else coefficients
+            drawn[name] = self._compositor.draw(windows[name], replace(part, levels=False), own)
         exposed = [Exposure(drawn[i, False], drawn.get((i, True), drawn[i, False])) for i in range(-1, count)]
         # Running sums have the bits of the picture without layers where none is.
         same = getattr(windows[-1, False], "cover", 0)
@@ -127,8 +120,7 @@ class LayeredRenderer:
         bottom = Behind(exposed[0], None if same else plain(), plate)
         return self._stages.lay(bottom, exposed[1:], request.levels)
 
-    def _parts(self, request: Request, behind: Request) -> dict[tuple[int, bool], Request]:
-        """What is composed, by layer, −1 for what lies behind, and whether it is of the weights alone."""
+    def _parts(self, request: Request, behind: Request) -> Parts:
         layers = request.state.layers
         states = [behind.state, *(request.state.of([shutter]) for shutter in (layers.shutters if layers else ()))]
         parts = {(i, False): replace(behind, state=state) for i, state in enumerate(states, -1)}

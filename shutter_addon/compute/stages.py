@@ -100,7 +100,7 @@ class Stages:
         width, height, _ = exposed.share.size
         least = self._textures.of("least", (-(-width // BLOCK), -(-height // BLOCK), 1), "r32f")
         images = {"clear": exposed.share, "least": least}
-        self._device.run(LEAST, least.size[:2], images=images, size=(width, height))
+        self._device.run(LEAST, least.size[:2], images=images, size=least.size[:2], whole=(width, height))
         return self._device.read(least).min()
 
     def lay(self, behind: Behind, layers: Sequence[Exposure], levels: bool) -> Texture:

@@ -268,12 +268,12 @@ class PackedFrames(WholeFrames):
         return 0
 
     def _write(self, texture: Texture, rows: np.ndarray, layer: int) -> None:
-        size, sent = (self.source.width, self.source.height), self._own("sent", "rgba8")
+        sent = self._own("sent", "rgba8")
         self.device.write(sent, rows, opaque=True)
         program = packing(decoding(self.source.transfer, self._light), self._light == "linear")
         textures, images = {"frame": sent}, {"packed_frames": texture}
-        extent = self._texels(*size)
-        self.device.run(program, extent, textures=textures, images=images, size=size, layer=layer)
+        size, last = texture.size[:2], (self.source.width - 1, self.source.height - 1)
+        self.device.run(program, size, textures=textures, images=images, size=size, last=last, layer=layer)
 
 
 def packing(decode: int, squared: bool) -> Pass:

@@ -3,7 +3,7 @@
 A file is GLSL that declares what each of its steps binds, between `#ifdef STEP` and `#endif` where it has several. That
 is read here: Blender's `gpu` module has to be told what is declared, and moderngl where it is bound. So #include and
 conditions are resolved here: of steps, and of macros whose values Python gives, 0 where it gives none. A condition is
-NAME, !NAME, NAME == number or defined(STEP), or several of these joined by && and ||.
+NAME, !NAME, NAME == number or defined(STEP), or several of these joined by && and ||; others are refused.
 """
 
 import re
@@ -14,7 +14,8 @@ from pathlib import Path
 
 SHADERS = Path(__file__).resolve().parents[2] / "shaders"
 
-_DIRECTIVE = re.compile(r"#\s*(include|ifdef|if|elif|else|endif)\b\s*(.*)")
+_DIRECTIVE = re.compile(r"#\s*(\w+)\s*(.*)")
+_TERM = re.compile(r"(!?)(?:defined\((\w+)\)|(\w+)(?: == (\d+))?)")
 _LOCAL_SIZE = re.compile(r"layout\(local_size_x = (\d+)(?:, local_size_y = (\d+))?\) in;")
 _SAMPLERS = re.compile(r"uniform (u?sampler2DArray) ([\w, ]+);")
 _IMAGES = re.compile(r"layout\((\w+)\) (uniform (?:(readonly|writeonly) )?u?image2DArray) ([\w, ]+);")
@@ -46,7 +47,7 @@ class Pass:
     constants: {name: GLSL type} of its uniforms
     blocks: {name: length} of its uniform blocks, each an array of vec4
     ins, outs: {name: GLSL type} of what a stage that draws gets and gives
-    local_size: invocations of a workgroup (x, y, z)
+    local_size: invocations of a workgroup (x, y, z), where the file says no other
     """
 
     file: str
@@ -60,7 +61,7 @@ class Pass:
     blocks: dict[str, int] = field(default_factory=dict)
     ins: dict[str, str] = field(default_factory=dict)
     outs: dict[str, str] = field(default_factory=dict)
-    local_size: tuple[int, int, int] = (1, 1, 1)
+    local_size: tuple[int, int, int] = (64, 1, 1)
 
     def groups(self, extent: tuple[int, ...]) -> tuple[int, ...]:
         """The workgroups that cover `extent` invocations (x, y[, z])."""
@@ -71,14 +72,15 @@ class Pass:
 def read_pass(file: str, step: str = "", **defines: int | str) -> Pass:
     """The pass of a step of shaders/FILE.glsl, compiled with these macros; the same one for the same arguments."""
     program = Pass(file, step, defines)
-    source = ["#version 430", *(f"#define {name} {value}" for name, value in defines.items())]
-    body = []
+    source, body = [], []
     for line in _live(SHADERS / f"{file}.glsl", {step: 1, **defines}):
         declared = _declared(program, line.partition("  //")[0])
         source.append(declared or line)
         if not declared and not line.startswith("#line"):
             body.append(line)
-    program.source, program.body = "\n".join(source), "\n".join(body)
+    local_size = "layout(local_size_x = {}, local_size_y = {}) in;".format(*program.local_size)
+    macros = [f"#define {name} {value}" for name, value in defines.items()]
+    program.source, program.body = "\n".join(["#version 430", *macros, local_size, *source]), "\n".join(body)
     return program
 
 
@@ -130,12 +132,14 @@ def _live(path: Path, macros: Mapping[str, int | str]) -> Iterator[str]:
                 around[-1] = _LIVE
         elif word == "endif":
             around.pop()
+        elif word not in ("", "include", "define"):
+            raise ValueError(f"{path.name}, line {number}: #{word} is not read here")
         live = all(state == _LIVE for state in around)
         if live and word == "include":
             yield from _live(SHADERS / "include" / rest.strip('"'), macros)
             yield f"#line {number + 1}"
         else:
-            yield line if live and not word else ""
+            yield line if live and word in ("", "define") else ""
 
 
 def _holds(condition: str, macros: Mapping[str, int | str]) -> bool:
@@ -143,9 +147,8 @@ def _holds(condition: str, macros: Mapping[str, int | str]) -> bool:
 
 
 def _is(term: str, macros: Mapping[str, int | str]) -> bool:
-    name, _, number = term.removeprefix("!").partition(" == ")
-    if name.startswith("defined("):
-        found = name[8:-1] in macros
-    else:
-        found = macros.get(name, 0) == int(number) if number else macros.get(name, 0) != 0
-    return found != term.startswith("!")
+    if not (found := _TERM.fullmatch(term)):
+        raise ValueError(f"#if {term}: such a condition is not read here")
+    negated, step, name, number = found.groups()
+    holds = step in macros if step else macros.get(name, 0) == int(number) if number else macros.get(name, 0) != 0
+    return holds != bool(negated)

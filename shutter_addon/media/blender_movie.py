@@ -76,16 +76,12 @@ class BlenderMovie(FrameSource):
 
 
 def frame_rate(number: float) -> Fraction:
-    """The frame rate that Blender has as a float: a whole number, a thousand of 1001ths of one, or what has the
-    smallest denominator."""
+    """The frame rate that Blender has as a float: a whole number, a thousand of 1001ths of one, or the fraction that is
+    nearest."""
     for rate in (Fraction(round(number)), Fraction(round(number * 1.001) * 1000, 1001)):
         if rate and abs(float(rate) / number - 1) <= _FLOAT_ERROR:
             return rate
-    return next(
-        rate
-        for digits in range(1, 64)
-        if (rate := Fraction(number).limit_denominator(1 << digits)) and abs(float(rate) / number - 1) <= _FLOAT_ERROR
-    )
+    return Fraction(number).limit_denominator(1000) or Fraction(1, 1000)
 
 
 def lend(command: list[str] | None) -> None:

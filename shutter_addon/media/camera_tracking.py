@@ -81,7 +81,7 @@ class CameraTrack(tracking.Track):
                 continue
             if after is None or self._cut(frame, after):
                 return frame
-            if self._pursuit(frame)[1].next(after) is not None:
+            if self._pursuit(frame)[0].next(after) is not None:
                 return frame
         return None
 
@@ -102,9 +102,9 @@ class CameraTrack(tracking.Track):
             raise TrackingError(BARE)
         return part, 1.0
 
-    def _pursuit(self, start: int) -> tuple[int, _Pursuit, float]:
+    def _pursuit(self, start: int) -> tuple[_Pursuit, float]:
         worth = pursuit.distinctness(self.part(start)[0], self._footage.size[0])
-        return start, _Pursuit(lambda frame: self._part(frame)[0], self._footage, start, self._motion), worth
+        return _Pursuit(lambda frame: self._part(frame)[0], self._footage, start, self._motion), worth
 
 
 class _Pursuit:

@@ -9,7 +9,7 @@ import tempfile
 import time
 from collections.abc import Hashable, Iterator
 from contextlib import closing, contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Protocol
@@ -55,15 +55,9 @@ class CarriedFile:
     folder: where mattes are kept; for as long as this program runs where that cannot be written to, or is None"""
 
     footage: Footage
-    drawings: tuple[tuple[int, outlines.Curves], ...]
+    # asked for the hash for every frame of a window, of what may be thousands of points
+    drawings: tuple[tuple[int, outlines.Curves], ...] = field(hash=False)
     folder: Path | None = None
-
-    def __hash__(self) -> int:
-        return self._hash
-
-    @cached_property
-    def _hash(self) -> int:  # asked for every frame of a window, of what may be thousands of points
-        return hash((self.footage, self.drawings, self.folder))
 
     def open(self) -> CarriedMattes:
         """MediaError: the footage cannot be read, or OpenCV is missing."""

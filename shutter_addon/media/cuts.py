@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from functools import lru_cache
-from itertools import pairwise, product
+from itertools import pairwise, product, takewhile
 
 import numpy as np
 
@@ -317,9 +317,4 @@ class ShotSource(SourceWrapper):
 
 def _known(signatures: Iterable[Signature | None]) -> list[Signature]:
     """Those before the first that is missing."""
-    known: list[Signature] = []
-    for picture in signatures:
-        if picture is None:
-            break
-        known.append(picture)
-    return known
+    return [each for each in takewhile(lambda each: each is not None, signatures) if each is not None]

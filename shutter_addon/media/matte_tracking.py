@@ -67,8 +67,8 @@ class MatteTrack(tracking.Track):
         if not (self._cover(frame) > _INSIDE).any():
             raise TrackingError(EMPTY)
 
-    def _pursuit(self, start: int) -> tuple[int, _Pursuit, float]:
-        return start, _Pursuit(self._cover, self._footage, start, self._motion), 1.0
+    def _pursuit(self, start: int) -> tuple[_Pursuit, float]:
+        return _Pursuit(self._cover, self._footage, start, self._motion), 1.0
 
 
 class _Pursuit:

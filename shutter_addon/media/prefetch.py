@@ -108,24 +108,18 @@ class PrefetchSource(SourceWrapper):
                 self._changed.wait_for(lambda: self._thread is not mine or self._next() is not None)
                 if self._thread is not mine or (index := self._next()) is None:
                     return
+            frame: Decoded | Exception
             try:
                 with stopping.once(partial(self._is_unwanted, index)):
-                    frame = self._frame(index)
-            except stopping.StoppedError:
+                    frame = self._fetch(index)
+                if isinstance(frame, np.ndarray):
+                    frame.flags.writeable = False
+            except stopping.StoppedError:  # it is not wanted any longer
                 continue
+            except Exception as error:  # raised to whoever reads the frame
+                frame = error
             with self._changed:
                 if self._thread is mine:
                     self._done[index] = frame
                     self._drop()
                     self._changed.notify_all()
-
-    def _frame(self, index: int) -> Decoded | Exception:
-        try:
-            frame = self._fetch(index)
-            if isinstance(frame, np.ndarray):
-                frame.flags.writeable = False
-            return frame
-        except stopping.StoppedError:  # it is not wanted any longer
-            raise
-        except Exception as error:  # raised to whoever reads the frame
-            return error

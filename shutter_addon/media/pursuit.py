@@ -48,15 +48,12 @@ class PartPursuit:
 
     reason: why it was not found in the last one"""
 
-    def __init__(
-        self, part: Part, footage: Footage, frame: int, motion: Motion, known: Similarity | None = None
-    ) -> None:
-        """frame: the part's; known: the motion up to a frame in which the part is, but cannot be seen; the next one
-        comes after that. None: it comes after the part's."""
+    def __init__(self, part: Part, footage: Footage, frame: int, motion: Motion) -> None:
+        """frame: the part's"""
         self._first, self._footage, self._motion, self.reason = part, footage, motion, COVERED
         # the motion up to the last picture in which it was found, and its last step
-        self._known, self._speed = known or Similarity(), Similarity()
-        self._missed = 0 if known is None else 1  # for how many pictures it was not found
+        self._known = self._speed = Similarity()
+        self._missed = 0  # for how many pictures it was not found
         self._look = _Look(part, Similarity(), 1.0)  # how it looked later, if it is no longer like the first
         # the last pictures in which it was found, the motion, its confidence
         self._seen = deque([(footage.picture(frame), Similarity(), 1.0)], _BACK)

@@ -92,7 +92,6 @@ class _Edge:
     rows: np.ndarray
     polarity: float
     places: list[tuple[float, float]] = field(default_factory=list)
-    is_lost: bool = False
 
     def samples(self) -> tuple[np.ndarray, np.ndarray] | None:
         """Speeds and leans (n,), in pixels a frame and from row to row; None: there are too few."""
@@ -118,15 +117,16 @@ def _speeds(x: np.ndarray) -> np.ndarray:
 def _followed(pictures: Sequence[np.ndarray]) -> list[_Edge]:
     """The edges of pictures, as long as each is seen."""
     edges: list[_Edge] = []
-    steepness = _steepness(pictures[0])
+    seen: list[_Edge] = []  # up to the last picture
     for index, picture in enumerate(pictures):
         stopping.check()
+        steepness = _steepness(picture)
         if index:
-            vectors, steepness = flow.vectors(pictures[index - 1], picture), _steepness(picture)
-            for edge in (edge for edge in edges if not edge.is_lost):
-                _follow(edge, vectors[..., 0], steepness)
+            vectors = flow.vectors(pictures[index - 1], picture)
+            seen = [edge for edge in seen if _follow(edge, vectors[..., 0], steepness)]
         if index % _ANEW == 0:
-            _add_new(edges, picture, steepness)
+            new = _new(seen, picture, steepness)
+            edges, seen = edges + new, seen + new
     return edges
 
 
@@ -136,33 +136,32 @@ def _steepness(picture: np.ndarray) -> np.ndarray:
     return cv2.filter2D(smooth, -1, np.array([[-0.5, 0, 0.5]], np.float32), borderType=cv2.BORDER_REPLICATE)
 
 
-def _follow(edge: _Edge, vectors: np.ndarray, steepness: np.ndarray) -> None:
+def _follow(edge: _Edge, vectors: np.ndarray, steepness: np.ndarray) -> bool:
+    """Notes where an edge is in the next picture; whether it is seen there."""
     x, lean = edge.places[-1]
     columns = np.clip(np.rint(edge.at(x, lean)).astype(int), 0, vectors.shape[1] - 1)
     moved = float(np.median(vectors[edge.rows, columns]))
-    place = _placed(edge, (x + moved, lean), steepness)
-    if place is None:
-        edge.is_lost = True
-    else:
+    if (place := _placed(edge, (x + moved, lean), steepness)) is not None:
         edge.places.append(place)
+    return place is not None
 
 
-def _add_new(edges: list[_Edge], picture: np.ndarray, steepness: np.ndarray) -> None:
-    """Adds the longest edges of a picture that are none of those already."""
-    there = [edge for edge in edges if not edge.is_lost]
+def _new(seen: list[_Edge], picture: np.ndarray, steepness: np.ndarray) -> list[_Edge]:
+    """The longest edges of a picture that are none of those already."""
+    new: list[_Edge] = []
     for x0, y0, x1, y1 in _segments(picture):
-        if len(there) >= MOST:
-            return
+        if len(seen) + len(new) >= MOST:
+            break
         rows = np.arange(max(int(np.ceil(y0)), 0), min(int(y1), len(picture) - 1) + 1)
         edge, lean = _Edge(rows, 1.0), (x1 - x0) / (y1 - y0)
         x = x0 + lean * (rows.mean() - y0)
         columns = np.clip(np.rint(edge.at(x, lean)).astype(int), 0, picture.shape[1] - 1)
         edge.polarity = 1.0 if np.median(steepness[rows, columns]) > 0 else -1.0
         place = _placed(edge, (x, lean), steepness)
-        if place is not None and not any(_is_same(edge, place, other) for other in there):
+        if place is not None and not any(_is_same(edge, place, other) for other in seen + new):
             edge.places.append(place)
-            edges.append(edge)
-            there.append(edge)
+            new.append(edge)
+    return new
 
 
 def _is_same(edge: _Edge, place: tuple[float, float], other: _Edge) -> bool:

@@ -109,15 +109,12 @@ class SequenceSource(_Sequence):
         """MediaError: the file is missing, damaged or unlike the first."""
         path = self._file(index)
         with _opened(path) as (image, spec, layer):
-            self._check_like_first(path, spec)
+            size, dtype = (spec.width, spec.height), _dtype(spec)
+            whole = size == (spec.full_width, spec.full_height)
+            self._check_size(path, size, "" if whole else " (its data window)")
+            if dtype != self.dtype:
+                raise MediaError(f"{path.name}: has {dtype} samples, but {self.path.name} has {self.dtype}")
             return expanded(_samples(image, spec, layer, path))
-
-    def _check_like_first(self, path: Path, spec: ImageSpec) -> None:
-        size, dtype = (spec.width, spec.height), _dtype(spec)
-        whole = size == (spec.full_width, spec.full_height)
-        self._check_size(path, size, "" if whole else " (its data window)")
-        if dtype != self.dtype:
-            raise MediaError(f"{path.name}: has {dtype} samples, but {self.path.name} has {self.dtype}")
 
     def _usual_alpha(self) -> str:
         """What Blender assumes, whatever a TIFF says of itself."""

@@ -7,7 +7,6 @@ fails, with the last one in which the subject was surely seen. No bpy.
 from abc import ABC, abstractmethod
 from collections.abc import Collection, Iterator
 from dataclasses import dataclass, replace
-from itertools import pairwise, takewhile
 from typing import Protocol
 
 import numpy as np
@@ -18,7 +17,7 @@ from ..core.model.motions import Motion, Placement, Similarity
 from . import registration
 from .errors import MediaError
 from .footage import Footage
-from .pursuit import DOUBTFUL, SURE, PartPursuit, Sighting, confidence, distinctness
+from .pursuit import PartPursuit, Sighting, distinctness
 from .registration import Part
 
 PATIENCE = 25  # frames for which a lost subject is looked for
@@ -31,8 +30,6 @@ OUTSIDE = "the region lies outside the picture"
 ALONE = "there is no other frame to track"
 NOT_SHOWN = "the frame lies outside what can be tracked"
 
-_UNLIKE = 0.4  # what a look is worth that an anchor's contradicts, where nothing tells which one is the subject's
-_ASKED = 4  # anchors on each side that are asked
 # Heights of the picture around a region within which corners are looked for, as far as there are not enough of them.
 _REACHES = {"line": (0.015, 0.03, 0.06, 0.12, 0.24), "lasso": (0.0, 0.015, 0.03, 0.06, 0.12)}
 _ENOUGH = 14
@@ -90,14 +87,12 @@ class Track(ABC):
         frames: all that may be tracked, `start` among them
         motion: what changes beside the location: "rotation", or "scale" and rotation
         anchors: frames whose placement is right as it is. Tracking ends at the nearest one on each side; what lies
-        between comes a second time then, blended with what is tracked back from there. What a region covers is compared
-        with what it covers there, so that a frame in which something lies over the subject does not count as its look:
-        anchors beyond `frames` are of use, too.
+        between comes a second time then, blended with what is tracked back from there.
         A direction that ends early ends with a Tracked that has a fault; where a gap is left on the way to an anchor,
         there is one on each side of it. TrackingError, at once: nothing can be tracked from there.
         MediaError, while it goes on: a frame cannot be read."""
         self._footage, self._motion = footage, motion
-        centres = {frame: self._subject.centre(frame) for frame in {*frames, *anchors}}
+        centres = {frame: self._subject.centre(frame) for frame in frames}
         self._centres = {frame: centre for frame, centre in centres.items() if centre is not None}
         if len(self._centres) < len(centres):
             raise TrackingError(EMPTY)
@@ -124,8 +119,8 @@ class Track(ABC):
         self.part(frame)
 
     @abstractmethod
-    def _pursuit(self, start: int) -> tuple[int, Pursuit, float]:
-        """The frame whose look is searched for from `start` on, the pursuit of it, and what that is worth."""
+    def _pursuit(self, start: int) -> tuple[Pursuit, float]:
+        """The pursuit of what is seen at `start`, and what that is worth."""
 
     def _both_ways(self, start: int, frames: range, anchors: set[int]) -> Iterator[Tracked]:
         yield Tracked(frame=start, placement=self._subject.placement(start), confidence=1.0)
@@ -168,7 +163,7 @@ class Track(ABC):
     def _from(self, start: int, frames: range) -> Iterator[Tracked]:
         """Frames one after another, away from `start`."""
         self._footage.want(frames)
-        origin, pursuit, worth = self._pursuit(start)
+        pursuit, worth = self._pursuit(start)
         last, shown = Tracked(frame=start, placement=self._placement(start), confidence=1.0), start
         lost: list[int] = []
         for frame in frames:
@@ -183,7 +178,7 @@ class Track(ABC):
                 if len(lost) > PATIENCE:
                     break
                 continue
-            placement = self._carried(origin, frame, sighting.motion, last.placement)
+            placement = self._carried(start, frame, sighting.motion, last.placement)
             seen = Tracked(frame=frame, placement=placement, confidence=worth * sighting.confidence)
             yield from self._bridged(last, seen, lost)
             last, lost = seen, []
@@ -235,75 +230,9 @@ class RegionTrack(Track):
         near = _falloff(away[part.points.imag.astype(int), part.points.real.astype(int)], _NEAR * height).sum()
         return part, min(float(np.clip(near / _ENOUGH_NEAR, _FAR, 1)), distinctness(part, width))
 
-    def _both_ways(self, start: int, frames: range, anchors: set[int]) -> Iterator[Tracked]:
-        self._doubted: dict[int, int | None] = self._doubts(start, sorted(anchors), {*frames, *anchors})
-        yield from super()._both_ways(start, frames, anchors)
-
-    def _pursuit(self, start: int) -> tuple[int, PartPursuit, float]:
-        origin = self._doubted.get(start, start)
-        if origin is None:
-            part, worth = self.part(start)
-            return start, PartPursuit(part, self._footage, start, self._motion), _UNLIKE * worth
-        part, worth = self.part(origin)
-        known = None if origin == start else self._known(origin, start)
-        return origin, PartPursuit(part, self._footage, origin, self._motion, known), worth
-
-    def _doubts(self, start: int, anchors: list[int], shown: set[int]) -> dict[int, int | None]:
-        """Of `start` and the anchors beside it those where something else may lie over the subject, each with a frame
-        whose look is surely the subject's, or None. shown: the frames that can be looked at."""
-        alike, rivals = [start], []
-        for side in ([a for a in anchors if a > start], [a for a in reversed(anchors) if a < start]):
-            before = start
-            for anchor in filter(self._has_part, side[:_ASKED]):
-                if not self._alike(before, anchor):
-                    rivals += [] if self._cut(start, anchor) else [anchor]
-                    break
-                alike.append(anchor)
-                before = anchor
-        surer = {rival: self._surer(start, rival, shown) for rival in rivals}
-        if all(look == start for look in surer.values()):
-            return dict.fromkeys(rivals, start)
-        sure = [rival for rival in rivals if surer[rival] == rival]
-        unsure = [rival for rival in rivals if surer[rival] != rival]
-        return dict.fromkeys(alike, next(iter(sure), None)) | dict.fromkeys(unsure)
-
-    def _alike(self, frame: int, other: int) -> bool:
-        """Whether the region covers at one frame what it covers at another, as far as corners tell."""
-        return self._is_seen_at(frame, other) or self._is_seen_at(other, frame)
-
-    def _is_seen_at(self, frame: int, other: int) -> bool:
-        """Whether the look of a frame may be seen where the region is at another one."""
-        picture = self._footage.picture(other)
-        match = self.part(frame)[0].find(picture, self._known(frame, other), self._motion)
-        return confidence(match, picture) >= DOUBTFUL
-
-    def _surer(self, frame: int, other: int, shown: set[int]) -> int | None:
-        """Of two frames the one whose look is the subject's: it is seen again behind the other one, but not the other's
-        behind this one. None: that does not tell."""
-        first, second = self._is_seen_behind(frame, other, shown), self._is_seen_behind(other, frame, shown)
-        return None if first == second else frame if first else other
-
-    def _is_seen_behind(self, frame: int, other: int, shown: set[int]) -> bool:
-        """Whether the look of a frame is surely seen soon behind another one."""
-        step = 1 if other > frame else -1
-        behind = list(takewhile(shown.__contains__, range(other + step, other + step * (PATIENCE + 1), step)))
-        self._footage.want(behind)
-        pursuit = PartPursuit(self.part(frame)[0], self._footage, frame, self._motion, self._known(frame, other))
-        for each in behind:
-            if self._footage.cut(each - step, each):
-                break
-            sighting = pursuit.next(each)
-            if sighting and sighting.confidence >= SURE:
-                return True
-        return False
-
-    def _cut(self, frame: int, other: int) -> bool:
-        return any(self._footage.cut(*pair) for pair in pairwise(range(min(frame, other), max(frame, other) + 1)))
-
-    def _known(self, frame: int, other: int) -> Similarity:
-        """The motion from one frame to another, both of which have a right placement."""
-        first, second = self._subject.placement(frame), self._subject.placement(other)
-        return motions.motion_between(first, second, self._centres[frame], self._centres[other], self._footage.size)
+    def _pursuit(self, start: int) -> tuple[PartPursuit, float]:
+        part, worth = self.part(start)
+        return PartPursuit(part, self._footage, start, self._motion), worth
 
 
 def _falloff(away: np.ndarray, reach: float) -> np.ndarray:

@@ -10,7 +10,7 @@ from shutter_addon.core import stopping, threads
 def test_a_render_works_on_threads_that_touch_no_data(bpy, edit, render, effect):
     thread_guard.seen.clear()
     render(edit, [1, 2])
-    assert {"media/prefetch.py: PrefetchSource._frame", "compute/renderer.py: Renderer.picture"} <= thread_guard.seen
+    assert {"media/prefetch.py: PrefetchSource._next", "compute/renderer.py: Renderer.picture"} <= thread_guard.seen
     assert not thread_guard.faults()
 
 

@@ -192,40 +192,6 @@ def passing(subject, ground):
     return film(subject, ground, lambda t: (2.5 * t, 0.5 * t), 24, 4, covered=range(10, 15))
 
 
-@pytest.mark.parametrize("kind", EVERY)
-@pytest.mark.parametrize(
-    ("start", "anchors", "frames", "expected"),
-    [
-        (12, {4}, range(24), range(4, 24)),
-        (12, {4}, range(12, 24), range(12, 24)),
-        (13, {4, 12}, range(24), range(12, 24)),
-        (12, {4, 20}, range(24), range(4, 21)),
-        (4, {12}, range(24), range(13)),
-    ],
-)
-def test_a_frame_mended_under_a_cover_misleads_nobody(passing, kind, start, anchors, frames, expected):
-    source, truth = passing
-    keyed = sorted({start, *anchors})
-    ways = [(2.5 * (n - 4) / WIDTH, -0.5 * (n - 4) / HEIGHT) for n in keyed]
-    given = region(kind, location=Keys(tuple(keyed), tuple(ways), ("linear",) * len(keyed)))
-    tracked, faults = followed(source, kind, start, frames, region=given, anchors=anchors)
-    assert not faults
-    assert set(tracked) == set(expected)
-    off, free = errors(tracked, truth, kind), set(tracked) - set(range(10, 15))
-    assert sure(tracked) == free | {*keyed} & set(tracked)
-    assert max(off[frame] for frame in sure(tracked)) <= 1
-    assert max(off.values()) <= 3
-
-
-def test_where_nothing_tells_the_subject_from_its_cover_no_frame_is_sure(passing):
-    """What comes behind the mended frame is not to be tracked, so nobody knows whether the subject is seen there."""
-    source, _ = passing
-    keys = Keys((4.0, 12.0), ((0.0, 0.0), (20 / WIDTH, -4 / HEIGHT)), ("linear",) * 2)
-    tracked, _ = followed(source, "lasso", 12, range(4, 13), region=region("lasso", location=keys), anchors={4})
-    assert set(tracked) == set(range(4, 13))
-    assert sure(tracked) == {4, 12}
-
-
 def test_a_subject_that_stays_covered_ends_it(subject, ground, monkeypatch):
     monkeypatch.setattr(tracking, "PATIENCE", 6)
     source, truth = film(subject, ground, lambda t: (2.0 * t,), 24, 2, covered=range(8, 24))

@@ -3,13 +3,10 @@
 Markers lie at frames of the clip, 1 is its first, in fractions of its picture. A region is moved as they are, from
 where it is at one frame of the timeline, and from the editor's other keys; it gets keys as tracking makes them.
 
-And the camera, that follows the 2D stabilization of a clip: what that takes back, shutters can follow. Blender's Python
-does not tell how it lays the picture; core/model/stabilization.py computes that from the clip's tracks and settings, as
-Blender does.
+And the camera, that follows the tracks of a clip's 2D stabilization: what that takes back, shutters can follow.
 """
 
 import hashlib
-import math
 from bisect import bisect_left, bisect_right
 from collections.abc import Callable
 from functools import partial
@@ -23,8 +20,7 @@ from ...core import revision
 from ...core.messages import EffectError, translated
 from ...core.model import motions
 from ...core.model.effect import Camera, Region
-from ...core.model.motions import Placement, Similarity
-from ...core.model.stabilization import Stabilization, Track, laid
+from ...core.model.motions import Motion, Placement, Similarity
 from ...media import registration
 from ..data import annotations, external_files, fcurves, selection, snapshot, source_media, strips, validation
 from ..rendering import effect_source
@@ -33,6 +29,7 @@ from .motion_keys import MotionKeys
 
 Motions = dict[int, Similarity]  # of the picture, by the frame to which it moves
 Points = dict[str, complex]  # where markers are in the picture, in pixels as motions.Similarity counts them
+Markers = list[tuple[str, np.ndarray, np.ndarray]]  # see _markers
 
 
 def follow(scene: Scene, effect: PropertyGroup, strip: Strip, index: int) -> None:
@@ -103,7 +100,7 @@ def stamp(region: PropertyGroup) -> str:
     return digest.hexdigest()
 
 
-def _markers(region: PropertyGroup) -> list[tuple[str, np.ndarray, np.ndarray]]:
+def _markers(region: PropertyGroup) -> Markers:
     """Of each point that a region follows its name, the clip's frames (n,) at which it has a marker, ascending, and
     where that is (n, 2), in fractions of the picture. EffectError: the clip has nothing of that name."""
     clip = region.follow_clip
@@ -125,17 +122,12 @@ def _missing(clip: MovieClip, name: str) -> EffectError:
 
 
 def _track_markers(track: MovieTrackingTrack) -> tuple[str, np.ndarray, np.ndarray]:
-    frames, places = markers_of(track)
-    return track.name, frames, places + np.array(track.offset, np.float32)
-
-
-def markers_of(track: MovieTrackingTrack) -> tuple[np.ndarray, np.ndarray]:
-    """The frames (n,) of a track's markers that are not muted, ascending, and where these are (n, 2)."""
     frames, shown = _marker_frames(track.markers)
-    return frames[shown], fcurves.numbers(track.markers, "co", size=2)[shown]
+    places = fcurves.numbers(track.markers, "co", size=2)[shown]
+    return track.name, frames[shown], places + np.array(track.offset, np.float32)
 
 
-def _corners(plane: bpy.types.MovieTrackingPlaneTrack) -> list[tuple[str, np.ndarray, np.ndarray]]:
+def _corners(plane: bpy.types.MovieTrackingPlaneTrack) -> Markers:
     frames, shown = _marker_frames(plane.markers)
     places = np.array([[tuple(corner) for corner in marker.corners] for marker in plane.markers], np.float32)
     return [(str(k), frames[shown], places[shown, k]) for k in range(4)]
@@ -155,17 +147,20 @@ def _points(scene: Scene, effect: PropertyGroup, strip: Strip, index: int, start
     validation.word(region, "motion")
     tracks, size = _markers(region), annotations.picture_size(effect)
     times = clip_times(scene, effect, strip, region.follow_clip)
-    by_frame = {frame: _points_at(tracks, time, size) for frame, time in times.items()}
-    by_frame = {frame: points for frame, points in by_frame.items() if points}
+    by_frame = _points_by_frame(tracks, times, size)
     if start not in by_frame:
-        sentence = rpt_('"{track}" of clip "{clip}" has no marker at frame {frame}')
         name = region.follow_object if region.follow_kind == "OBJECT" else region.follow_track
-        raise EffectError(sentence.format(track=name, clip=region.follow_clip.name, frame=start))
+        raise _unmarked(name, region.follow_clip, start)
     with translated(rpt_):
         shape = snapshot.region_at(scene, effect, strip, index, by_frame)
         if not all(shape.drawings.at(frame) for frame in by_frame):
             raise EffectError(rpt_('region "{name}" has no strokes').format(name=region.name))
     return by_frame
+
+
+def _unmarked(name: str, clip: MovieClip, frame: int) -> EffectError:
+    sentence = rpt_('"{track}" of clip "{clip}" has no marker at frame {frame}')
+    return EffectError(sentence.format(track=name, clip=clip.name, frame=frame))
 
 
 def clip_times(scene: Scene, effect: PropertyGroup, strip: Strip, clip: MovieClip) -> dict[int, float]:
@@ -180,10 +175,14 @@ def clip_times(scene: Scene, effect: PropertyGroup, strip: Strip, clip: MovieCli
         return {frame: clip.shown(frame).source_frame / clip.step + first for frame in frames}
 
 
-def _points_at(tracks: list, time: float, size: tuple[int, int]) -> Points:
-    """Of the markers (see _markers) those that there are at a time in the clip's frames."""
-    at_time = {name: _place_at(frames, places, time) for name, frames, places in tracks}
-    return {name: motions.pixel(place, size) for name, place in at_time.items() if place is not None}
+def _points_by_frame(tracks: Markers, times: dict[int, float], size: tuple[int, int]) -> dict[int, Points]:
+    """By frame, of the markers those that there are at its time in the clip's frames; frames without any are left
+    out."""
+    by_frame = {}
+    for frame, time in times.items():
+        at_time = {name: _place_at(frames, places, time) for name, frames, places in tracks}
+        by_frame[frame] = {name: motions.pixel(place, size) for name, place in at_time.items() if place is not None}
+    return {frame: points for frame, points in by_frame.items() if points}
 
 
 def _check_footage(source: Strip, clip: MovieClip) -> None:
@@ -248,7 +247,7 @@ def _ways(frames: list[int], start: int) -> tuple[list[int], list[int]]:
     return [frame for frame in frames if frame > start], [frame for frame in reversed(frames) if frame < start]
 
 
-def _motions(points: dict[int, Points], origin: int) -> Motions:
+def _motions(points: dict[int, Points], origin: int, motion: Motion = "scale") -> Motions:
     """By frame the motion from the points of one frame; where too few of these are left, by way of the frame before."""
     by_frame = {origin: Similarity()}
     enough = min(2, len(points[origin]))
@@ -259,15 +258,15 @@ def _motions(points: dict[int, Points], origin: int) -> Motions:
                 shared = sorted(points[base].keys() & points[frame].keys())
                 if len(shared) >= enough:
                     there, here = (np.array([points[end][name] for name in shared]) for end in (base, frame))
-                    motion = registration.least_squares(there, here, np.ones(len(shared)), "scale")
-                    by_frame[frame] = motion.after(by_frame[base])
+                    moved = registration.least_squares(there, here, np.ones(len(shared)), motion)
+                    by_frame[frame] = moved.after(by_frame[base])
                     before = frame
                     break
     return by_frame
 
 
 def follow_stabilization(scene: Scene, effect: PropertyGroup, strip: Strip) -> None:
-    """Keys the camera by the stabilization of its clip, from where it is now, at the current frame. EffectError,
+    """Keys the camera by the tracks that stabilize its clip, from where it is now, at the current frame. EffectError,
     MediaError: there is nothing to follow, and nothing has changed."""
     camera, start, size = effect.camera, scene.frame_current, annotations.picture_size(effect)
     validation.check_moving(camera)
@@ -277,77 +276,25 @@ def follow_stabilization(scene: Scene, effect: PropertyGroup, strip: Strip) -> N
     times = clip_times(scene, effect, strip, camera.follow_clip)
     if start not in times:
         raise EffectError(rpt_("the current frame is outside of the Shutter strip"))
-    shifted = unstabilized(camera.follow_clip, size)
-    seen = {frame: shifted(time) for frame, time in times.items()}
-    keys = MotionKeys(effect, None, _stabilized_motion(camera.follow_clip.tracking.stabilization))
+    tracks, motion = _stabilizing(camera.follow_clip)
+    points = _points_by_frame(tracks, times, size)
+    if start not in points:
+        raise _unmarked("2D Stabilization", camera.follow_clip, start)
+    keys = MotionKeys(effect, None, motion.upper())
     keys.begin(start)
-
-    def motions_from(origin: int) -> Motions:
-        return {frame: there.after(seen[origin].inverse()) for frame, there in seen.items()}
-
-    carry(keys, snapshot.camera_at(scene, effect, times), start, sorted(times), motions_from)
+    motions_from = partial(_motions, points, motion=motion)
+    carry(keys, snapshot.camera_at(scene, effect, points), start, sorted(points), motions_from)
 
 
-def _stabilized_motion(settings: bpy.types.MovieTrackingStabilization) -> str:
-    if not settings.use_stabilize_rotation:
-        return "LOCATION"
-    return "SCALE" if settings.use_stabilize_scale else "ROTATION"
-
-
-def unstabilized(clip: MovieClip, size: tuple[int, int]) -> Callable[[float], Similarity]:
-    """The motion of the picture from where stabilization lays it to where the clip has it, at a time in the clip's
-    frames. EffectError: the clip is not stabilized."""
+def _stabilizing(clip: MovieClip) -> tuple[Markers, Motion]:
+    """The markers of the tracks that stabilize a clip, and which motion these take back. EffectError: the clip is not
+    stabilized."""
     settings = clip.tracking.stabilization
-    stabilization = _stabilization(clip, size[0] / size[1])
-    if not settings.use_2d_stabilization or not stabilization.frames:
+    motion: Motion = "location"
+    names = {track.name for track in settings.tracks}
+    if settings.use_stabilize_rotation:
+        motion = "scale" if settings.use_stabilize_scale else "rotation"
+        names |= {track.name for track in settings.rotation_tracks}
+    if not settings.use_2d_stabilization or not names:
         raise EffectError(rpt_('clip "{clip}" has no 2D stabilization').format(clip=clip.name))
-    value = _values(clip)
-
-    def at(frame: int) -> Similarity:
-        x, y = (value(settings, "target_position", frame, axis) for axis in (0, 1))
-        taken = {name: value(settings, f"influence_{name}", frame) for name in ("location", "rotation", "scale")}
-        target = complex(x * size[0] / size[1], y)
-        angle, scale = value(settings, "target_rotation", frame), value(settings, "target_scale", frame)
-        measured = stabilization.at(frame)
-        assert measured is not None  # as there are frames
-        return _in_pixels(laid(measured, target, angle, scale, **taken), size).inverse()
-
-    def between(time: float) -> Similarity:
-        first, second, share = at(math.floor(time)), at(math.ceil(time)), time - math.floor(time)
-        turn = (1 - share) * first.turn + share * second.turn
-        return Similarity(turn, (1 - share) * first.shift + share * second.shift)
-
-    return between
-
-
-def _stabilization(clip: MovieClip, aspect: float) -> Stabilization:
-    settings, value, tracks = clip.tracking.stabilization, _values(clip), []
-    used = [{track.name for track in each} for each in (settings.tracks, settings.rotation_tracks)]
-    for track in clip.tracking.objects[0].tracks:
-        frames, places = markers_of(track)
-        markers = dict(zip(frames.tolist(), (places * (aspect, 1) @ (1, 1j)).tolist(), strict=True))
-        location, turn = (track.name in names for names in used)
-        if location or turn:
-            weight = partial(value, track, "weight_stab")
-            tracks.append(Track(markers=markers, weight=weight, location=location, turn=turn))
-    turned = settings.use_stabilize_rotation
-    return Stabilization(tracks, settings.anchor_frame, turned=turned, scaled=turned and settings.use_stabilize_scale)
-
-
-def _values(clip: MovieClip) -> Callable:
-    """What a number of a clip is at one of its frames."""
-    curves = fcurves.Curves(clip)
-
-    def at(owner: bpy.types.bpy_struct, name: str, frame: int, axis: int | None = None) -> float:
-        curve = curves.find(f"{owner.path_from_id()}.{name}", axis or 0)
-        if curve is not None:
-            return curve.evaluate(frame + clip.frame_start - 1)
-        return getattr(owner, name) if axis is None else getattr(owner, name)[axis]
-
-    return at
-
-
-def _in_pixels(motion: Similarity, size: tuple[int, int]) -> Similarity:
-    """A motion in heights of the picture, y up, as one in pixels, y down."""
-    turn, origin = motion.turn.conjugate(), motions.pixel((0, 0), size)
-    return Similarity(turn, origin - turn * origin + size[1] * motion.shift.conjugate())
+    return [_track_markers(track) for track in clip.tracking.objects[0].tracks if track.name in names], motion

@@ -106,16 +106,15 @@ def track(
     validation.check_moving(moving)
     motion_keys.check_curves(effect, index)
     start, keys = scene.frame_current, MotionKeys(effect, index, motion)
-    # Those beyond the frames that are tracked tell how the subject looks as well.
-    anchors = [frame for frame in keys.edited(range(strip.left_handle, strip.right_handle)) if frame != start]
-    here, known = Tracked(frame=start, placement=placement_now(moving), confidence=1.0), sorted({*frames, *anchors})
-    shape, follow = _subject(scene, effect, strip, index, known, here)
+    anchors = [frame for frame in keys.edited(frames) if frame != start]
+    here = Tracked(frame=start, placement=placement_now(moving), confidence=1.0)
+    shape, follow = _subject(scene, effect, strip, index, frames, here)
     tracked, stops = {start: here}, []
     reach = (
-        max((a for a in anchors if frames[0] <= a < start), default=frames[0]),
-        min((a for a in anchors if start < a <= frames[-1]), default=frames[-1]),
+        max((a for a in anchors if a < start), default=frames[0]),
+        min((a for a in anchors if a > start), default=frames[-1]),
     )
-    shown, target = snapshot.take(scene, effect, strip, known), Target.of(effect, index)
+    shown, target = snapshot.take(scene, effect, strip, frames), Target.of(effect, index)
     del scene, effect, strip, keys, moving  # which may not outlive the first step
     with effect_source.open_source(shown) as source:
         try:

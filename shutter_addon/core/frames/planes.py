@@ -41,15 +41,8 @@ def matrix(space: int, full: bool) -> Matrix | None:
     factors = [red, -green[0], -green[1], blue]
     if full:
         factors = [int(factor * 224 / 255) for factor in factors]
-    red_of_cr, green_of_cb, green_of_cr, blue_of_cb = map(_rounded, factors)
-    return Matrix(
-        offset=0 if full else 16 << 9,
-        luma=1 << 13 if full else _rounded((255 << 16) // 219),
-        red_of_cr=red_of_cr,
-        green_of_cb=green_of_cb,
-        green_of_cr=green_of_cr,
-        blue_of_cb=blue_of_cb,
-    )
+    offset, luma = (0, 1 << 13) if full else (16 << 9, _rounded((255 << 16) // 219))
+    return Matrix(offset, luma, *map(_rounded, factors))
 
 
 def _rounded(factor: int) -> int:

@@ -3,7 +3,7 @@ chains of curves whose number of points stays, which splines with shape keys are
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -34,14 +34,11 @@ def curves(strokes: Sequence[np.ndarray]) -> Curves:
 def coverage(strokes: Sequence, width: int, height: int) -> np.ndarray:
     """The share (height, width) float32, 0 to 1, of each pixel that closed curves enclose, the top row first; what two
     of them enclose lies outside (even-odd). strokes: (n, 2) in fractions of the picture, y up"""
-    rows = max(_CROSSINGS // (LINES * max(sum(map(len, strokes)), 1)), 1)
-    return np.concatenate([_covered(strokes, width, height, band) for band in _bands(height, rows)])
-
-
-def _bands(height: int, rows: int) -> Iterator[range]:
+    rows, bands = max(_CROSSINGS // (LINES * max(sum(map(len, strokes)), 1)), 1), []
     for top in range(0, height, rows):
         stopping.check()
-        yield range(top, min(top + rows, height))
+        bands.append(_covered(strokes, width, height, range(top, min(top + rows, height))))
+    return np.concatenate(bands)
 
 
 def _covered(strokes: Sequence, width: int, height: int, band: range) -> np.ndarray:

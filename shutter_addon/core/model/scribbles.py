@@ -134,12 +134,10 @@ class Drawings:
 
     def at(self, frame: float) -> list[np.ndarray]:
         """Strokes (n, 2) in fractions of the picture. EffectError: a point is nowhere near it (limits.MAX_DISTANCE)."""
-        placement = self.placement.at(frame) if self.placement else None
-        if not self.frames or (self.placement and placement is None):
+        if not self.frames:
             return []
         before, after, share = keyframes.eased_span(self.frames, self.eases, frame)
-        first, second = (self._on_picture(index, placement) for index in (before, after))
-        return between_strokes(first, second, share, self.aspect)
+        return between_strokes(self.drawing(before, frame), self.drawing(after, frame), share, self.aspect)
 
     def moved(self, frame: float, placed: Placement) -> tuple[np.ndarray, ...]:
         """As `at`, moved about the centre of what is drawn."""
@@ -157,12 +155,10 @@ class Drawings:
 
     def drawing(self, index: int, frame: float) -> list[np.ndarray]:
         """The strokes of a drawing as they lie on the picture at a frame; raises as `at`."""
-        placement = self.placement.at(frame) if self.placement else None
-        return [] if self.placement and placement is None else self._on_picture(index, placement)
-
-    def _on_picture(self, index: int, placement: np.ndarray | None) -> list[np.ndarray]:
-        if placement is None:
+        if self.placement is None:
             return self.strokes[index]
+        if (placement := self.placement.at(frame)) is None:
+            return []
         placed = [mapped(placement, points) for points in self.strokes[index]]
         if not all((np.abs(points) <= limits.MAX_DISTANCE).all() for points in placed):
             raise EffectError(_FAR, name=self.name)

@@ -61,32 +61,20 @@ def compose(
     if sharp is None:
         sharp = all((frame[..., 3] == 1).all() for frame in frames)
     coefficients, present = np.asarray(coefficients, dtype=np.float64), np.asarray(present)
-    if len(state.groups) == 1:
-        return _composed(state, frames, present, coefficients, moves, sharp)
-    total = np.zeros((*coefficients.shape[1:], 4))
-    for chosen, share, own in ways(state, coefficients):
-        moved = None if moves is None else (moves[0][:, chosen], moves[1][:, chosen])
-        total += share[..., None] * _composed(state.of(chosen), frames, present, own, moved, sharp)
-    return total
-
-
-def _composed(
-    state: FrameState,
-    frames: Sequence[np.ndarray],
-    present: np.ndarray,
-    coefficients: np.ndarray,
-    moves: Moves | None,
-    sharp: bool,
-) -> np.ndarray:
-    """As `compose`, of shutters that combine alike."""
+    if len(state.groups) > 1:
+        mixed = np.zeros((*coefficients.shape[1:], 4))
+        for chosen, share, own in ways(state, coefficients):
+            moved = None if moves is None else (moves[0][:, chosen], moves[1][:, chosen])
+            mixed += share[..., None] * compose(state.of(chosen), frames, present, own, moved, sharp)
+        return mixed
     (combine,) = state.groups
     encoded = state.options.light == "encoded"
     frames = [_encode(frame) if encoded else frame for frame in frames]
     y, x = np.indices(coefficients.shape[1:])
-    own = x + 1j * y
+    pixels = x + 1j * y
 
     def look(k: int, motion: Moves | None) -> np.ndarray:
-        return frames[k] if motion is None else seen(frames[k], motion[0][k] * own + motion[1][k], sharp=sharp)
+        return frames[k] if motion is None else seen(frames[k], motion[0][k] * pixels + motion[1][k], sharp=sharp)
 
     motions = _motions(state, coefficients, moves)
     total = np.zeros((*x.shape, 4))

@@ -11,16 +11,7 @@ from ..model import limits, shutters
 from ..model.fields import Field, fields_of
 from ..model.frame_state import Options
 from .recipe import CAMERA, RecipeError
-from .records import (
-    MODELS,
-    MatteRecord,
-    MoveKey,
-    OutlineRecord,
-    RampRecord,
-    RegionRecord,
-    Stroke,
-    drawings_of,
-)
+from .records import MatteRecord, MoveKey, OutlineRecord, RampRecord, RegionRecord, Stroke, drawings_of
 
 _COMBINED = "lightest", "darkest"
 
@@ -112,11 +103,8 @@ def _check_field(each: Field, value: Any, place: str) -> None:
 def _check_bars(shutter: Any, window: int, place: str) -> None:
     _require((shutter.bars is None) != (not shutter.keys), place, "either bars or keys, one of the two")
     _check_keys(shutter.keys, f"{place}.keys")
-    for where, bars in (
-        [(f"{place}.bars", shutter.bars)]
-        if shutter.bars is not None
-        else [(f"{place}.keys[{k}].bars", key.bars) for k, key in enumerate(shutter.keys)]
-    ):
+    said = {f"{place}.keys[{k}].bars": key.bars for k, key in enumerate(shutter.keys)}
+    for where, bars in (said or {f"{place}.bars": shutter.bars}).items():
         _require(len(bars) == window, where, f"{len(bars)} values, window is {window}")
         try:
             shutters.check_bars(bars)
@@ -155,7 +143,7 @@ def _check_follow(follow: str | None, regions: list, place: str) -> None:
 
 
 def _check_region(region: Any, place: str) -> None:
-    _check_fields(MODELS[type(region)], region, f"{place}.")
+    _check_fields(region.model, region, f"{place}.")
     _check_moves(region.keys, f"{place}.keys")
     if isinstance(region, MatteRecord):
         _check_fields(model.FileContent, region, f"{place}.")

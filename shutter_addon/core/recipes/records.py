@@ -72,7 +72,8 @@ def _type_of(each: Field) -> Any:
 
 
 def _record(name: str, kinds: tuple[type, ...], **special: tuple[Any, Any]) -> type:
-    """Build a class of what a recipe says: fields of the model, and special ones, by name their type and default."""
+    """Build a class of what a recipe says: fields of the model, the first of whose kinds is its `model`, and special
+    ones, by name their type and default."""
     said: dict[str, Any] = {name: special[name] for name in ("version", "kind") if name in special}
     said |= {each.recipe: (_type_of(each), each.absent) for each in fields_of(*kinds).values() if each.recipe} | special
     columns: list[Any] = []
@@ -81,7 +82,7 @@ def _record(name: str, kinds: tuple[type, ...], **special: tuple[Any, Any]) -> t
             columns.append((word, kind))
         else:
             columns.append((word, kind, field(default_factory=partial(_new, default))))
-    return make_dataclass(name, columns, frozen=True, kw_only=True)
+    return make_dataclass(name, columns, namespace={"model": kinds[0]}, frozen=True, kw_only=True)
 
 
 def _new(default: Any) -> Any:
@@ -121,14 +122,6 @@ KINDS = {
     "matte": MatteRecord,
     "ramp": RampRecord,
 }
-MODELS = {
-    RegionRecord: model.Region,
-    OutlineRecord: model.OutlineRegion,
-    MatteRecord: model.MatteRegion,
-    RampRecord: model.MatteRegion,
-}
-
-
 # Of a recipe: by its field `kind`, one of KINDS.
 AnyRegionRecord: Any = RegionRecord | OutlineRecord | MatteRecord | RampRecord
 RecipeRecord: Any = _record(
@@ -218,8 +211,7 @@ def _moves(keys: list) -> model.Moves:
 
 
 def _region(record: Any, shutter: int) -> model.Region | model.MatteRegion:
-    kind: Any = MODELS[type(record)]
-    values: dict[str, Any] = _values(kind, record) | {"shutter": shutter, "moves": _moves(record.keys)}
+    values: dict[str, Any] = _values(record.model, record) | {"shutter": shutter, "moves": _moves(record.keys)}
     if isinstance(record, RegionRecord | OutlineRecord):
         values["drawings"] = _drawings(record)
     if isinstance(record, RegionRecord):
@@ -231,7 +223,7 @@ def _region(record: Any, shutter: int) -> model.Region | model.MatteRegion:
         values["content"] = model.FileContent(path=record.path, channel=record.channel, **said)
     else:
         values["content"] = model.RampContent(ramp=record.ramp)
-    return kind(**values)
+    return record.model(**values)
 
 
 def drawings_of(record: Any) -> list[tuple[RegionKey | None, list[Stroke]]]:

@@ -38,15 +38,8 @@ def with_placements(
     if isinstance(moving, Camera):
         chosen = motions.thinned(placements, CORNERS, size, exact, STEADY) if thin else sorted(placements)
         return replace(moving, moves=_moves(moving, placements, exact, chosen, {}))
-    return _drawn_with(moving, placements, exact, size, thin)
-
-
-def _drawn_with(
-    region: Region | OutlineRegion, placements: Placements, exact: Collection[int], size: Size, thin: bool
-) -> Region | OutlineRegion:
-    """As with_placements, of a region."""
-    drawings = replace(region.drawings, aspect=size[0] / size[1])
-    keyed = _eases(region)
+    drawings = replace(moving.drawings, aspect=size[0] / size[1])
+    keyed = _eases(moving)
     # A drawing at no key is there from the first on.
     drawn = [frame for frame in drawings.frames if frame in keyed]
     eases = {frame: keyed[frame] for frame in drawn if len(drawings.frames) > 1}
@@ -56,12 +49,12 @@ def _drawn_with(
         straight: set[float] = {frame + 1 for frame, ease in eases.items() if ease != "linear"}
         shape = np.concatenate([motions.offsets(strokes) for strokes in drawings.strokes])
         chosen = motions.thinned(placements, shape, size, {*exact, *drawn, *straight})
-    moves = _moves(replace(region, drawings=drawings), placements, exact, chosen, eases)
+    moves = _moves(replace(moving, drawings=drawings), placements, exact, chosen, eases)
     assert isinstance(moves.location, Keys)
     if len(drawings.frames) == 1 or drawings.frames[0] not in keyed:
         frames = moves.location.frames[0], *drawings.frames[1:]
         drawings = replace(drawings, frames=frames)
-    return replace(region, moves=moves, drawings=replace(drawings, aspect=region.drawings.aspect))
+    return replace(moving, moves=moves, drawings=replace(drawings, aspect=moving.drawings.aspect))
 
 
 def _eases(moving: Subject) -> dict[float, Ease]:
