@@ -7,11 +7,10 @@ import math
 import re
 from collections import Counter
 from collections.abc import Callable
-from dataclasses import MISSING, fields, is_dataclass
+from dataclasses import fields, is_dataclass
 from functools import cache, partial
 from pathlib import Path
-from types import NoneType
-from typing import Any, get_args, get_origin, get_type_hints
+from typing import TYPE_CHECKING, Any, Literal, get_args, get_origin
 
 from .. import atomic_write
 from ..model import effect as model
@@ -21,6 +20,9 @@ from ..model.frame_state import Options
 from . import recipe_check, records
 from .recipe import RecipeError
 from .recipe_check import cut, shown
+
+if TYPE_CHECKING:
+    from cattrs import Converter
 
 # Longer numbers are read as floats, which need no time for it; a whole number that counts anything is far shorter.
 _MAX_DIGITS = 300
@@ -71,10 +73,11 @@ def parse(text: str) -> model.Effect:
         data.pop("inbetween_method", None)  # there is one way by now
         if data.get("inbetween", 1) != 1:
             data.setdefault("skip_repeats", False)  # as it was
+    converter = _converter()
     try:
-        recipe: Any = _reader(records.RecipeRecord)(data)
-    except _FaultError as fault:
-        raise RecipeError(f"{fault.place.lstrip('.') or 'recipe'}: {fault}") from None
+        recipe: Any = converter.structure(data, records.RecipeRecord)
+    except Exception as error:
+        raise RecipeError(_first_fault(error)) from None
     recipe_check.check(recipe)
     return records.effect_of(recipe)
 
@@ -135,110 +138,143 @@ def _whole(digits: str) -> int | float:
     return int(digits) if len(digits) <= _MAX_DIGITS else float(digits)
 
 
-class _FaultError(ValueError):
-    """What is wrong with a value of JSON; place: where in it, as `.bars[3]`."""
-
-    def __init__(self, message: str, place: str = "") -> None:
-        super().__init__(message)
-        self.place = place
-
-
-@cache
-def _reader(kind: Any) -> Callable[[Any], Any]:
-    """What makes of a value of JSON one of the records' types. It raises _FaultError."""
-    inner = get_args(kind)
-    if kind in _SPECIAL:
-        return _SPECIAL[kind]
-    if is_dataclass(kind):
-        return partial(_record, kind, {name: _reader(each) for name, each in get_type_hints(kind).items()})
-    if NoneType in inner:
-        read = _reader(inner[0] if len(inner) == 2 else records.Keyable)
-        return lambda value: None if value is None else read(value)
-    if get_origin(kind) is list:
-        return partial(_list, _reader(*inner))
-    if get_origin(kind) is tuple:
-        return partial(_tuple, [_reader(each) for each in inner])
-    return partial(_choice, inner)
-
-
-def _number(value: Any) -> float:
+def _number(value: Any, _kind: Any) -> float:
     if isinstance(value, bool) or not isinstance(value, int | float):
-        raise _FaultError(f"{shown(value)} is not a number")
+        raise ValueError(f"{shown(value)} is not a number")
     if not math.isfinite(value):
-        raise _FaultError(f"{value} is not a finite number")
+        raise ValueError(f"{value} is not a finite number")
     return float(value)
 
 
-def _number_or_keys(value: Any) -> Any:
+def _number_or_keys(converter: Converter, value: Any, kind: Any) -> float | list[records.ValueKey] | None:
+    if value is None and kind != records.Keyable:
+        return None
     if isinstance(value, list):
-        return _reader(list[records.ValueKey])(value)
+        return converter.structure(value, list[records.ValueKey])
     try:
-        return _number(value)
-    except _FaultError as fault:
-        raise _FaultError(f"{fault}, nor a list of keys") from None
+        return _number(value, kind)
+    except ValueError as error:
+        raise ValueError(f"{error}, nor a list of keys") from None
 
 
-def _exactly(kind: type, name: str, value: Any) -> Any:
-    if type(value) is not kind:
-        raise _FaultError(f"{shown(value)} is not {name}")
-    return value
+def _exactly(wanted: type, name: str) -> Callable[[Any, Any], Any]:
+    def structure(value: Any, _kind: Any) -> Any:
+        if type(value) is not wanted:
+            raise ValueError(f"{shown(value)} is not {name}")
+        return value
+
+    return structure
 
 
-def _choice(allowed: tuple, value: Any) -> Any:
+def _choice(value: Any, kind: Any) -> Any:
+    allowed = get_args(kind)
     if not any(type(value) is type(option) and value == option for option in allowed):
-        raise _FaultError(f"{shown(value)} is none of {', '.join(map(str, allowed))}")
+        raise ValueError(f"{shown(value)} is none of {', '.join(map(str, allowed))}")
     return value
 
 
-def _list(read: Callable[[Any], Any], value: Any) -> list:
-    items, found = _exactly(list, "a list", value), []
+def _tuple(kind: Any, converter: Converter) -> Callable[[Any, Any], Any]:
+    inner = get_args(kind)
+
+    def structure(value: Any, _kind: Any) -> Any:
+        if not isinstance(value, list):
+            raise ValueError(f"{shown(value)} is not a list")
+        if len(value) != len(inner):
+            raise ValueError(f"{len(value)} values, not {len(inner)}")
+        return tuple(converter.structure(v, t) for v, t in zip(value, inner, strict=True))
+
+    return structure
+
+
+def _list(converter: Converter, value: Any, kind: Any) -> list:
+    (inner,) = get_args(kind)
+    if not isinstance(value, list):
+        raise ValueError(f"{shown(value)} is not a list")
+    structure, structured = converter.get_structure_hook(inner), []
     try:
-        for each in items:
-            found.append(read(each))
-    except _FaultError as fault:
-        raise _FaultError(str(fault), f"[{len(found)}]{fault.place}") from None
-    return found
+        for each in value:
+            structured.append(structure(each, inner))
+    except Exception as error:  # the first one is enough; cattrs' own lists gather millions
+        from cattrs.errors import IterableValidationError, IterableValidationNote
+
+        index = len(structured)
+        error.add_note(IterableValidationNote(f"index {index}", index, inner))
+        raise IterableValidationError("in a list", [error], kind) from None
+    return structured
 
 
-def _tuple(reads: list[Callable[[Any], Any]], value: Any) -> tuple:
-    if len(_exactly(list, "a list", value)) != len(reads):
-        raise _FaultError(f"{len(value)} values, not {len(reads)}")
-    return tuple(read(each) for read, each in zip(reads, value, strict=True))
+def _dataclass(kind: Any, converter: Converter) -> Callable[[Any, Any], Any]:
+    from cattrs.gen import make_dict_structure_fn
+
+    structure_fields = make_dict_structure_fn(kind, converter, _cattrs_forbid_extra_keys=True)
+
+    def structure(value: Any, kind: Any) -> Any:
+        if not isinstance(value, dict):
+            raise ValueError(f"{shown(value)} is not an object")
+        if isinstance(value, _Doubled):
+            raise ValueError(f"field {shown(value.field)} stands there twice")
+        return structure_fields(value, kind)
+
+    return structure
 
 
-def _record(kind: Any, reads: dict[str, Callable[[Any], Any]], value: Any) -> Any:
-    if not isinstance(value, dict):
-        raise _FaultError(f"{shown(value)} is not an object")
-    if isinstance(value, _Doubled):
-        raise _FaultError(f"field {shown(value.field)} stands there twice")
-    found = {}
-    for each in fields(kind):
-        try:
-            if each.name in value:
-                found[each.name] = reads[each.name](value[each.name])
-            elif each.default is each.default_factory is MISSING:
-                raise _FaultError("missing")
-        except _FaultError as fault:
-            raise _FaultError(str(fault), f".{each.name}{fault.place}") from None
-    if names := sorted(value.keys() - reads.keys()):
-        more = f" and {len(names) - 3} more" if len(names) > 3 else ""
-        raise _FaultError(f"unknown field {', '.join(map(cut, names[:3]))}{more}")
-    return kind(**found)
-
-
-def _one_region(value: Any) -> Any:
+def _one_region(converter: Converter, value: Any, _kind: Any) -> Any:
     """Which of the kinds of regions it is, its field `kind` says."""
     word = value.get("kind", "line") if isinstance(value, dict) else "line"
-    if not isinstance(word, str) or word not in records.KINDS:
-        raise _FaultError(f"{shown(word)} is none of {', '.join(records.KINDS)}", ".kind")
-    return _reader(records.KINDS[word])(value)
+    if isinstance(word, str) and word in records.KINDS:
+        return converter.structure(value, records.KINDS[word])
+    from cattrs.errors import AttributeValidationNote, ClassValidationError
+
+    error = ValueError(f"{shown(word)} is none of {', '.join(records.KINDS)}")
+    error.add_note(AttributeValidationNote("in a region", "kind", str))
+    raise ClassValidationError("in a region", [error], records.RegionRecord)
 
 
-_SPECIAL: dict[Any, Callable[[Any], Any]] = {
-    float: _number,
-    records.Keyable: _number_or_keys,
-    records.AnyRegionRecord: _one_region,
-    int: partial(_exactly, int, "a whole number"),
-    str: partial(_exactly, str, "a text"),
-    bool: partial(_exactly, bool, "true or false"),
-}
+def _made_of(origin: Any) -> Callable[[Any], bool]:
+    return lambda kind: get_origin(kind) is origin
+
+
+@cache
+def _converter() -> Converter:
+    """RecipeError: cattrs is missing. Blender brings it; a Linux distribution's Blender may not, and effects render
+    without it."""
+    try:
+        import cattrs
+    except ImportError as error:
+        raise RecipeError(
+            f"recipes need the Python package cattrs ({error}); install it for Blender's Python"
+        ) from None
+    converter = cattrs.Converter()
+    converter.register_structure_hook(float, _number)
+    converter.register_structure_hook(int, _exactly(int, "a whole number"))
+    converter.register_structure_hook(str, _exactly(str, "a text"))
+    converter.register_structure_hook(bool, _exactly(bool, "true or false"))
+    converter.register_structure_hook_func(_made_of(Literal), _choice)
+    converter.register_structure_hook_func(
+        lambda kind: kind in (records.Keyable, records.Keyable | None), partial(_number_or_keys, converter)
+    )
+    converter.register_structure_hook_func(
+        lambda kind: kind == records.AnyRegionRecord, partial(_one_region, converter)
+    )
+    converter.register_structure_hook_factory(_made_of(tuple), _tuple)
+    converter.register_structure_hook_func(_made_of(list), partial(_list, converter))
+    converter.register_structure_hook_factory(is_dataclass, _dataclass)
+    return converter
+
+
+def _first_fault(error: Exception) -> str:
+    """`place: what is wrong`, of the first fault."""
+    import cattrs
+    from cattrs.errors import ForbiddenExtraKeysError
+
+    def described(error: BaseException, kind: Any) -> str:
+        if isinstance(error, KeyError):
+            return "missing"
+        if isinstance(error, ForbiddenExtraKeysError):
+            names = sorted(error.extra_fields)
+            more = f" and {len(names) - 3} more" if len(names) > 3 else ""
+            return f"unknown field {', '.join(map(cut, names[:3]))}{more}"
+        return str(error)
+
+    message, _, place = cattrs.transform_error(error, "$", described)[0].rpartition(" @ $")
+    return f"{place.lstrip('.') or 'recipe'}: {message}"
