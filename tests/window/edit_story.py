@@ -231,14 +231,9 @@ def rendered_without_a_window():
 
 
 def told():
-    yield from driver.video_editing_opened()
-    edit = bpy.data.scenes[0]
-    edit.name = "Edit"
-    edit.render.resolution_x, edit.render.resolution_y = SIZE
-    edit.frame_end = LAST - 1  # each frame: what Blender reads of a retimed movie depends on the frame before
-    edit.render.dither_intensity = 0
-    edit.view_settings.view_transform = "Standard"
-    bpy.context.preferences.view.smooth_view = 0
+    yield from first_stroke_story.edit_opened(*SIZE)
+    # Each frame is rendered: what Blender reads of a retimed movie depends on the frame before.
+    story.edit().frame_end = LAST - 1
     bpy.ops.wm.save_as_mainfile(filepath=str(driver.OUT / "edit.blend"))
     yield from added()
     yield from sped_up()

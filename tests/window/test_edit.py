@@ -1,9 +1,6 @@
 """What an editor makes of clips within minutes, by mouse and keys: each a story in a real window."""
 
-import json
 import os
-from itertools import pairwise
-from pathlib import Path
 
 import cv2
 import numpy as np
@@ -17,9 +14,7 @@ from shutter_addon.media import open_source
 IS_RELEASE = os.environ.get("SHUTTER_BACKENDS") == "both"
 LONG = pytest.mark.skipif(not IS_RELEASE, reason="A LONG STORY: set SHUTTER_BACKENDS=both")
 pytestmark = [needs_window, LONG]
-SUBJECTS = os.environ.get("SUBJECTS", "")
 CUTS = "final", "headless", "plain"
-STEPS = "tracked", "mended", "layer", "longer"
 CLIPS = {  # of the assets: the first of forty frames, and their size
     "bunny.mp4": ("bigbuckbunny.mp4", 30, (320, 180)),
     "street.mp4": ("pedestrians.avi", 10, (240, 180)),
@@ -72,53 +67,3 @@ def assert_beside_plain(final, plain, facts, folder):
             moves.append(np.abs(picture - final[f"{int(number) - 2:04d}"])[line].max())
     assert dissolve_from < dissolve_to
     assert np.mean(np.array(moves) > 20) > 0.5, "people walk there"
-
-
-@pytest.mark.skipif(not SUBJECTS, reason="NO FOOTAGE: set SUBJECTS to a folder with tennis/ and tennis_mask/ of DAVIS")
-def test_a_players_first_minute(tmp_path):
-    """One stroke, tracked; dragged right where the track is wrong, and tracked again; Sharp Subject; 24 frames. What of
-    him was sharp stays so at each step."""
-    names = sorted((Path(SUBJECTS) / "tennis").glob("*.jpg"))
-    pictures = [cv2.imread(str(name))[..., ::-1] for name in names]
-    masks = [cv2.imread(str(Path(SUBJECTS) / "tennis_mask" / f"{name.stem}.png"), 0) > 0 for name in names]
-    (tmp_path / "footage").mkdir()
-    footage = write_film(tmp_path / "footage" / "player.mp4", pictures, 4)
-    truth = tmp_path / "truth.json"
-    places = map(shirt, pictures, masks)
-    truth.write_text(json.dumps(dict(enumerate(places, 1))))
-    given = {"footage": footage, "packages": packages(tmp_path / "packages"), "truth": truth}
-    seen, console = tell("player_story.py", "opengl", linked(tmp_path), **given)
-    assert "Traceback" not in console
-    facts = {name: entry[name] for entry in seen for name in entry}
-    assert facts["window"] == 24
-    sharp = {name: sharp_parts(tmp_path, name, footage, masks) for name in STEPS}
-    for before, after in pairwise(STEPS):
-        parts = [(part, sharp[after][number]) for number, (part, share) in sharp[before].items() if share > 0.2]
-        kept = [(part & later).sum() / part.sum() for part, (later, _share) in parts]
-        print(f"{before} to {after}: {np.mean(kept):.3f} kept in {len(kept)} frames, {min(kept):.3f} at least")
-        assert len(kept) >= 8
-        assert np.mean(kept) >= 0.9
-        assert min(kept) >= 0.75
-    shares = {name: np.mean([share for _part, share in parts.values()]) for name, parts in sharp.items()}
-    print(shares)
-    assert shares["mended"] > shares["tracked"]
-
-
-def sharp_parts(folder, name, footage, masks):
-    """Where he is as in the footage, within his mask without its edge, and which share of that it is, by frame."""
-    parts = {}
-    with open_source(footage) as source:
-        for path in sorted(folder.glob(f"{name}_*.png")):
-            number = int(path.stem[-4:])
-            apart = np.abs(pixels(path) - source.read(number - 1)[..., :3]).max(axis=2)
-            him = cv2.erode(masks[number - 1].astype(np.uint8), np.ones((5, 5))) > 0
-            parts[number] = (apart <= 8) & him, (apart <= 8)[him].mean()
-    return parts
-
-
-def shirt(picture, mask):
-    """The middle of his white shirt, in fractions of the picture."""
-    top = np.flatnonzero(mask.any(axis=1))[0]
-    rows, columns = np.nonzero((picture.min(axis=2) > 130) & mask & (np.arange(len(mask)) < top + 60)[:, None])
-    height, width = mask.shape
-    return [(np.median(columns) + 0.5) / width, 1 - (np.median(rows) + 0.5) / height]
