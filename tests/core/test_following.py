@@ -141,11 +141,6 @@ def test_a_smooth_motion_has_less_jitter_and_the_same_way():
     assert np.mean(steps[6]) == pytest.approx(0.64, abs=0.1)
 
 
-def test_a_straight_way_is_smooth_already():
-    found = shifts(with_way(made(STRAIGHT), follow_smooth=6), [10, 11, 15], frame=31, index=10)
-    assert found == pytest.approx(np.array([0, 1, 5]) * STEP)
-
-
 def test_smoothing_is_the_weighted_mean_of_the_frames_around():
     jump = [key(10, ease="constant"), key(20, (0.5, 0))]
     found = shifts(

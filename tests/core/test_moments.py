@@ -56,13 +56,6 @@ def test_light_lies_between_frames_that_are_both_open(steps, position, before, d
     assert found == pytest.approx(wanted)
 
 
-def test_without_moments_no_bit_changes():
-    bars = np.random.default_rng(3).random(9).tolist()
-    _index, found = state([{"bars": bars}], 1)
-    assert found.bars.tolist() == [bars]
-    assert (found.options.window, found.options.step) == (9, 1)
-
-
 def test_bars_are_interpolated_before_they_are_spread():
     """Half the way from a first frame to a third, by displacement, is the second: sharp, and no streak."""
     keys = [{"frame": 10, "bars": [1, 0, 0]}, {"frame": 30, "bars": [0, 0, 1]}]
@@ -91,14 +84,6 @@ def test_on_the_timeline_a_shape_has_the_same_time(steps, direction):
     found = state_at(replace(effect, time=way), CLIP.stepped(steps), 20).state
     assert found.bars[0] == pytest.approx(np.repeat([1, 1, 0, 0], steps) / steps)
     assert found.open_for == {0: pytest.approx(2 * steps)}
-
-
-@pytest.mark.parametrize("steps", STEPS)
-def test_each_shutter_has_as_much_light_as_its_bars(steps):
-    bars = [{"bars": [1, 0, 2, 1]}, {"bars": [0, 0, 0, 3]}, {"bars": [2, 2, 2, 2], "length": "timeline"}]
-    _index, found = state(bars, steps)
-    assert found.bars.sum(axis=1) == pytest.approx([4, 3, 8])
-    assert found.options.window == 4 * steps
 
 
 @pytest.mark.parametrize("direction", [1, -1])

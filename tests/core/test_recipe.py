@@ -12,7 +12,6 @@ from test_shutters import light
 
 from shutter_addon.core.model import limits, mattes, scribbles, windows
 from shutter_addon.core.model.clip import Clip
-from shutter_addon.core.model.frame_state import Options
 from shutter_addon.core.model.keyframes import between_bars, eased_span
 from shutter_addon.core.model.motions import Placement
 from shutter_addon.core.model.state_at import state_at
@@ -88,13 +87,6 @@ def test_the_contracts_example():
     later = parsed.for_picture(16 / 9).at(20.5)
     assert later.bars[1] == pytest.approx([0, 0, 0, 0.5, 0.5, 0, 0, 0])
     assert parsed.for_picture(1).at(99).bars[1].tolist() == [0, 0, 0, 0, 0, 0, 0, 1]
-
-
-def test_defaults():
-    small = recipe_file.parse('{"version": 2, "window": 2, "shutters": [{"name": "A", "bars": [1, 1]}]}')
-    assert small.options.at(1) == Options(2)
-    assert small.options.at(1).aggregate == 1
-    assert small.regions == ()
 
 
 def name_both(data, name):
@@ -468,46 +460,12 @@ def test_redrawn_strokes_follow_one_another():
     assert drawn.at(5).strokes[0] == pytest.approx(np.array([[0, 1], [0.1, 1], [0.2, 1]]))
 
 
-@given(st.floats(-5, 100))
-def test_any_frame_gives_an_instant(frame):
-    moment = recipe_file.parse(json.dumps(EXAMPLE)).for_picture(1.5).at(frame)
-    assert np.isfinite(moment.bars).all()
-    assert np.isfinite(moment.shapes[0].strokes[0]).all()
-
-
-def test_position():
-    assert [Options(8, position=p).before for p in ("start", "center", "end")] == [0, 3, 7]
-    assert [Options(5, position=p).before for p in ("start", "center", "end")] == [0, 2, 4]
-
-
 # Recipes of version 1, whose bars counted the moments between filmed frames
 
 
 def first(window, shutters, **more):
     """The effect of a recipe of version 1."""
     return recipe_file.parse(json.dumps({"version": 1, "window": window, "shutters": shutters} | more))
-
-
-@pytest.mark.parametrize("direction", [1, -1])
-@pytest.mark.parametrize("position", ["start", "center", "end"])
-@pytest.mark.parametrize("factor", [1, 2, 4, 8, 16])
-@pytest.mark.parametrize("window", [1, 3, 5, 8, 12, 48, 256])
-def test_each_filmed_frame_keeps_its_light(window, factor, position, direction):
-    """Shown is the filmed frame 100: of the bars that lay within each, the mean is its own now."""
-    bars = np.random.default_rng(1).random(window)
-    found = first(window, [{"name": "A", "bars": bars.tolist()}], inbetween=factor, position=position)
-    options = found.options.at(1)
-    assert (options.window, options.step) == (-(-window // factor), factor)
-
-    def of_frames(weights, options):
-        frames = np.zeros(400)
-        places = windows.positions(options, 100 * options.step, direction) // options.step
-        np.add.at(frames, places, weights)
-        return frames
-
-    before = of_frames(bars, Options(window, position, step=factor))
-    now = of_frames(found.bars_at(0, 1), Options(options.window, position))
-    np.testing.assert_allclose(now * factor, before, atol=1e-12)
 
 
 def test_a_first_recipe_comes_back_as_a_second():
@@ -628,14 +586,6 @@ def test_frames_of_a_first_recipe_that_repeat_stay(version, smooth, skips):
         found = first(4, shutters, version=version, inbetween=smooth, **said)
         assert found.options.at(1).skip_repeats == wanted
         assert comes_back(found)
-
-
-@pytest.mark.parametrize("smooth", [1, 2, 4, 8, 16, "auto"])
-def test_a_second_recipe_counts_filmed_frames(smooth):
-    found = made(3, [{"name": "A", "bars": [0, 1, 2]}], inbetween=smooth)
-    assert (found.options.at(1).window, found.options.at(1).step) == (3, smooth)
-    assert found.bars_at(0, 1).tolist() == [0, 1, 2]
-    assert comes_back(found)
 
 
 def test_time_between_its_keys():

@@ -51,27 +51,6 @@ def brute_displace(bars, c, samples=200_000):
     return counts / samples
 
 
-@given(bars_lists(most=1))
-def test_accumulation_rises_from_0_to_1(bars):
-    total = shutters.accumulation(bars[0])
-    assert len(total) == bars.shape[1] + 1
-    assert total[0] == 0
-    assert total[-1] == 1
-    assert (np.diff(total) >= 0).all()
-    assert np.allclose(np.diff(total) * shutters.exposure(bars[0]), bars[0], atol=1e-12)
-
-
-@given(bars_lists(most=1), st.floats(0, 1))
-def test_quantile_inverts_the_accumulation(bars, z):
-    q = shutters.quantile(bars[0])
-    piece = min(np.searchsorted(q.z, z, side="right") - 1, len(q.start) - 1)
-    time = q.start[piece] + (z - q.z[piece]) / (q.z[piece + 1] - q.z[piece]) * (q.end[piece] - q.start[piece])
-    back = np.interp(time, np.arange(bars.shape[1] + 1), shutters.accumulation(bars[0]))
-    assert abs(back - z) < 1e-9
-    if z < 1:
-        assert time == pytest.approx(brute_quantile(bars[0], z), abs=1e-6)
-
-
 @given(bars_lists(), st.floats(0, 0.999))
 def test_knots_hold_every_quantile(bars, z):
     knots = shutters.knots(bars)
@@ -94,16 +73,6 @@ def test_displacement_keeps_exposure_and_is_a_shutter(mix):
     assert (q >= 0).all()
     assert q.sum() == pytest.approx(c @ bars.sum(axis=1))
     assert shutters.mix_exposure(bars, c) == pytest.approx(q.sum())
-
-
-@given(mixes())
-def test_displacement_moves_the_centre_in_proportion(mix):
-    """∫ Q⁻¹ is linear in c: the mean time of the mix is the mix of the mean times, frames taken as spans of time."""
-    bars, _ = mix
-    knots = shutters.knots(bars)
-    mean = ((knots.start + knots.end) / 2 * np.diff(knots.z)[:, None]).sum(axis=0)
-    own = [(b / b.sum()) @ (np.arange(len(b)) + 0.5) for b in bars]
-    assert mean == pytest.approx(own, abs=1e-9)
 
 
 @pytest.mark.parametrize("seed", range(6))
@@ -191,14 +160,6 @@ def test_another_window_keeps_the_shape(bars, window):
     old = shutters.accumulation(bars[0])
     at = np.linspace(0, 1, window + 1)
     assert new == pytest.approx(np.interp(at, np.linspace(0, 1, len(old)), old), abs=1e-9)
-
-
-@given(bars_lists(most=1), st.integers(1, 6))
-def test_a_window_times_longer_splits_each_bar_and_comes_back(bars, times):
-    longer = shutters.resample(bars[0], len(bars[0]) * times)
-    assert longer == pytest.approx(np.repeat(bars[0], times), abs=1e-9)
-    assert shutters.resample(longer, len(bars[0])) == pytest.approx(bars[0], abs=1e-9)
-    assert shutters.open_angle(longer) == pytest.approx(shutters.open_angle(bars[0]))
 
 
 @given(bars_lists(most=1), st.floats(0.01, 100))

@@ -61,19 +61,6 @@ def open_frames(bars):
     return bars.sum() / bars.max()
 
 
-def test_half_the_length_is_half_the_span():
-    box, way = np.ones(WINDOW), np.linspace(0, 1, WINDOW + 1)
-    spans = [open_frames(with_length(box, way, length, 11.5)) for length in (0.1, 0.2, 0.4, 0.8)]
-    assert spans == pytest.approx([0.1 * WINDOW, 0.2 * WINDOW, 0.4 * WINDOW, 0.8 * WINDOW])
-
-
-def test_the_shape_stays():
-    """A shutter that is twice as long in half the frames."""
-    bars = np.repeat([1.0, 0, 2, 3], 4)
-    found = with_length(bars, np.linspace(0, 1, 17), 0.5, 0)
-    assert found == pytest.approx(np.repeat([2.0, 0, 4, 6, 0, 0, 0, 0], 2))
-
-
 def test_limits():
     box, way = np.ones(WINDOW), np.linspace(0, 1, WINDOW + 1)
     still = np.zeros(WINDOW + 1)
@@ -95,13 +82,6 @@ def test_what_rounding_leaves_does_not_open_a_bar():
     bars, way = np.r_[np.ones(4), np.zeros(4)], np.linspace(0, 1, 9)
     noisy = bars + np.r_[np.zeros(4), 1e-15, np.zeros(3)]
     assert with_length(noisy, way, 0.25, 0.5) == pytest.approx(with_length(bars, way, 0.25, 0.5))
-
-
-def test_no_jumps():
-    """A span grows past frames little by little."""
-    box, way = np.ones(WINDOW), np.cumsum([0, *np.linspace(0.01, 0.1, WINDOW)])
-    found = np.array([with_length(box, way, length, 0.5) / WINDOW for length in np.linspace(0.05, 1.3, 2000)])
-    assert np.abs(np.diff(found, axis=0)).max() < 0.02
 
 
 def test_the_fastest_of_the_points_counts():
