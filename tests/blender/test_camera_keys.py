@@ -8,7 +8,6 @@ import pytest
 from support import image_strip, request, write_frames
 
 from shutter_addon.blender.data import annotations, consistency, fcurves, selection, snapshot, strips, validation
-from shutter_addon.blender.data.property_copy import copy_properties
 from shutter_addon.blender.editing import (
     add_effect,
     follow_track,
@@ -153,14 +152,6 @@ def test_without_the_region_it_goes_with_the_subject(bpy, effect):
     assert apart(placements(bpy), TRUTH, 16) > 5
 
 
-def test_closed_early_it_keeps_what_it_has(bpy, effect):
-    edit, effect, strip = active(bpy)
-    steps = track_region.track(edit, effect, strip, None, range(16, 23), "SCALE", all_keys=True)
-    assert [next(steps), next(steps)] == [17, 18]
-    steps.close()
-    assert [frame for frame, *_ in keys(bpy)[0]] == [16, 17, 18]
-
-
 @pytest.mark.parametrize("name", ["track_camera", "tripod"])
 def test_the_buttons_are_one_step_of_undo(bpy, effect, name):
     effect.camera.track_until = 18
@@ -272,14 +263,6 @@ def test_a_button_goes_to_the_frames_that_need_a_look(bpy, edit, effect):
     assert edit.frame_current == 13
 
 
-def test_a_copy_of_the_effect_has_the_cameras_keys_and_stops(bpy, edit, effect):
-    effect.camera.location, effect.camera.track_all_keys = (0.25, 0), True
-    effect.camera.stops.add().frame = 7
-    new = edit.virtual_shutter.effects.add()
-    copy_properties(edit.virtual_shutter.effects[0], new)
-    assert (new.camera.location[0], new.camera.track_all_keys, new.camera.stops[0].frame) == (0.25, True, 7)
-
-
 # From a movie clip
 
 
@@ -318,7 +301,7 @@ def clip(bpy, frames):
     return clip
 
 
-@pytest.mark.parametrize("kind", ["plain", "partly", "scaled", "shifted"])
+@pytest.mark.parametrize("kind", ["partly", "scaled", "shifted"])
 def test_it_lays_the_picture_as_blender_does(bpy, edit, render, clip, kind):
     """Blender's own stabilized strip beside a warp of its frames, and the anchor's where there are no markers."""
     settings = clip.tracking.stabilization

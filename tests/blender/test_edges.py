@@ -68,16 +68,6 @@ def test_a_render_equals_the_reference(command, film, tmp_path, same_pixels, agg
         same_pixels(read_picture(tmp_path / "out" / f"{frame:04d}.png"), picture, 1, f"aggregate{aggregate}-{frame}")
 
 
-def test_chunks_are_the_whole(command, film, tmp_path):
-    """Bit for bit, with keys of its strength."""
-    data = effect_recipe(edge_aware=KEYS, position="center")
-    command(film, "--output", tmp_path / "whole", recipe=data)
-    for chunk in ("6:9", "3:4"):
-        command(film, "--output", tmp_path / "parts", "--frames", chunk, recipe=data)
-    for k in (3, 4, 6, 7, 8, 9):
-        assert np.array_equal(*(read_picture(tmp_path / way / f"{k:04d}.png") for way in ("whole", "parts")))
-
-
 @pytest.fixture
 def add(bpy, edit):
     """Puts an effect of a recipe on the film; gives edit, effect and strip."""

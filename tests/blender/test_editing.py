@@ -65,11 +65,6 @@ def picture_bars(effect, index, frame):
 # Finding
 
 
-def test_what_belongs_to_an_effect_finds_it(effect):
-    region = region_edits.add_region(effect, effect.shutters[1])
-    assert selection.effect_of_item(region) == selection.effect_of_item(effect.shutters[1]) == effect
-
-
 def test_the_active_shutter_and_its_active_region(effect):
     effect.active_shutter = 1
     assert selection.active_shutter(effect) == effect.shutters[1]
@@ -164,15 +159,6 @@ def test_a_removed_shutter_takes_its_keys_regions_and_layers_along(three):
     assert layers(three) == []
 
 
-def test_a_curve_that_goes_by_a_name_stays(three):
-    """Scripts make such curves, which are in the way of no shutter that goes."""
-    path = f'{three.path_from_id()}.shutters["C"].trail'
-    fcurves.new_curve(three.id_data, path)
-    shutter_edits.remove_shutter(three, 0)
-    assert [shutter.name for shutter in three.shutters] == ["B", "C"]
-    assert fcurves.find_curve(three.id_data, path) is not None
-
-
 @pytest.mark.parametrize(("index", "to", "order"), [(0, 2, "BCA"), (2, 0, "CAB"), (1, 1, "ABC"), (1, 2, "ACB")])
 def test_a_moved_shutter_keeps_its_keys(three, index, to, order):
     before = shutters_of(three)
@@ -190,14 +176,6 @@ def test_regions_follow_a_renamed_shutter(three):
     assert [region.shutter for region in three.regions] == ["B.001", "B"]
     three.shutters[0].name = "B.001"
     assert three.shutters[0].name == "B.001"
-
-
-def test_a_copy_with_the_same_name_takes_no_regions_along(three):
-    """As in old files, or of a recipe: the regions are those of the first."""
-    region_edits.add_region(three, three.shutters[0])
-    three.shutters[1]["name"] = "A"  # past the property's own check
-    assert consistency.rename(three, "A", "Z") == "Z"
-    assert three.regions[0].shutter == "A"
 
 
 def test_scribbles_have_the_color_of_their_shutter(effect):
@@ -219,15 +197,6 @@ def test_set_bars(effect):
     assert consistency.bars(effect.shutters[0]) == pytest.approx(values, abs=1e-7)
     with pytest.raises(ValueError, match="shorter"):
         bar_edits.set_bars(effect.shutters[0], values[:5])
-
-
-def test_bars_that_stay_keep_the_sequencers_frames(effect, monkeypatch):
-    dropped = []
-    monkeypatch.setattr(strips, "invalidate", dropped.append)
-    bar_edits.set_bars(effect.shutters[0], np.ones(8))
-    assert not dropped
-    bar_edits.set_bars(effect.shutters[0], [0.5, *np.ones(7)])
-    assert len(dropped) == 1
 
 
 def test_painted_bars_are_keyed_if_asked(effect):
@@ -490,10 +459,6 @@ def test_a_layer_of_another_annotation_is_copied(bpy, effect):
             assert [tuple(p.co[:2]) for p in a.points] == [tuple(p.co[:2]) for p in b.points]  # they are flat
             assert b.display_mode == "2DSPACE"
     assert len(other.layers) == 1
-
-
-def test_no_annotation_has_no_free_layers(effect):
-    assert region_edits.free_layers(effect, None) == []
 
 
 # What can be keyed
