@@ -83,26 +83,6 @@ def test_a_strip_whose_folder_is_not_utf8(edit, frames, tmp_path):
     assert str(caught.value).endswith("its path is not UTF-8; rename the file, or the folder that is not")
 
 
-def test_audio_only(command, tmp_path):
-    with av.open(str(tmp_path / "sound.mp4"), "w") as container:
-        stream = container.add_stream("aac", rate=48000)
-        sound = av.AudioFrame.from_ndarray(np.zeros((1, 1024), dtype=np.float32), format="fltp", layout="mono")
-        sound.sample_rate = 48000
-        container.mux(stream.encode(sound))
-        container.mux(stream.encode())
-    done = command(tmp_path / "sound.mp4", "--output", tmp_path / "out", recipe=STILL, check=False)
-    refused(done, "sound.mp4", "no video")
-    assert not (tmp_path / "out").exists()
-
-
-def test_a_movie_without_its_index(command, bunny, tmp_path):
-    data = bunny.read_bytes()
-    assert data.find(b"moov") > data.find(b"mdat")
-    (tmp_path / "half.mp4").write_bytes(data[: len(data) // 2])
-    refused(command(tmp_path / "half.mp4", "--output", tmp_path / "out", recipe=STILL, check=False), "half.mp4")
-    assert not (tmp_path / "out").exists()
-
-
 def test_a_movie_cut_off_in_the_middle(command, tmp_path):
     """Frames before the end are good; a frame that is not there is said, and stops the render."""
     pictures = np.random.default_rng(0).integers(0, 256, (40, 32, 48, 3), dtype=np.uint8)
