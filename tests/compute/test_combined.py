@@ -4,9 +4,9 @@ import dataclasses
 
 import numpy as np
 import pytest
-from test_composition import SHAPES, check, composed, footage, state
+from test_composition import SHAPES, check, footage, state
 
-from shutter_addon.core.model.frame_state import AVERAGE, Combine, Following
+from shutter_addon.core.model.frame_state import Combine, Following
 from shutter_addon.core.pixels import combined
 
 LIGHTEST, DARKEST, MEDIAN = (Combine.of(mode) for mode in ("lightest", "darkest", "median"))
@@ -35,18 +35,6 @@ def test_windows_of_any_length(device, mode, window):
     check(device, footage(rng, count=window + 3, size=(9, 7)), moment, 1)
 
 
-@pytest.mark.parametrize("edges", ["hold", "shorten"])
-@pytest.mark.parametrize("index", [9, 19])
-@pytest.mark.parametrize("kind", [{}, {"dtype": np.uint16}, {"alpha": "straight"}], ids=["8 bits", "16 bits", "alpha"])
-def test_ways_of_which_one_follows(device, edges, index, kind):
-    """The others are seen in the same window of whole frames."""
-    rng = np.random.default_rng(4)
-    moment = combining(rng, AVERAGE, DARKEST, MEDIAN, MODES["threshold"], edges=edges)
-    turns, shifts = np.ones((20, 4), complex), np.zeros((20, 4), complex)
-    shifts[:, 1] = np.arange(20) * (0.7 - 0.3j)
-    check(device, footage(rng, **kind), dataclasses.replace(moment, following=Following(0, turns, shifts)), index)
-
-
 @pytest.mark.parametrize("follows", [False, True])
 def test_the_shown_frame_may_be_left_out(device, follows):
     """Played in reverse, a filmed frame begins with its last moment, which the clip's end does not have."""
@@ -65,19 +53,6 @@ def test_a_long_median_of_any_light(device):
     rng = np.random.default_rng(8)
     source = footage(rng, count=230, size=(9, 7), dtype=np.float32, transfer="linear")
     check(device, source, combining(rng, *[MEDIAN] * 3, window=220), 1)
-
-
-@pytest.mark.parametrize(
-    ("mode", "first"), [("lightest", 0), ("darkest", 0), ("by luminance", 0), ("threshold", 2), ("dark threshold", 2)]
-)
-def test_light_below_black(device, mode, first):
-    """With a threshold, blue alone: what is shown may be below what leaves a trail."""
-    rng = np.random.default_rng(10)
-    source = footage(rng, dtype=np.float32, transfer="linear")
-    source.frames[..., first:3] -= 5
-    picture, expected = composed(device, source, combining(rng, MODES[mode], shapes=()), 2)
-    assert expected.min() < -0.03
-    np.testing.assert_allclose(picture, expected, atol=1e-4)
 
 
 # What the reference has to be

@@ -8,7 +8,6 @@ from hypothesis import strategies as st
 from shutter_addon.core.frames import light
 from shutter_addon.core.model import shutters, windows
 from shutter_addon.core.model.frame_state import FrameState, Options
-from shutter_addon.core.pixels import compositor
 
 
 def state(bars, **options):
@@ -20,37 +19,6 @@ def frames(count, seed=0, size=(3, 4)):
     pictures = np.random.default_rng(seed).random((count, *size, 4))
     pictures[..., 3] = 1
     return pictures
-
-
-def everywhere(c, size=(3, 4)):
-    return np.broadcast_to(np.asarray(c, dtype=float)[:, None, None], (len(c), *size))
-
-
-@pytest.mark.parametrize(
-    ("edges", "index", "expected"),
-    [
-        ("hold", 8, [8, 9, 9, 9, 9]),
-        ("hold", -3, [0, 0, 0, 0, 1]),
-        ("mirror", 8, [8, 9, 8, 7, 6]),
-        ("mirror", -2, [2, 1, 0, 1, 2]),
-        ("shorten", 8, [8, 9, -1, -1, -1]),
-        ("shorten", -3, [-1, -1, -1, 0, 1]),
-        ("shorten", 20, [9, 9, 9, 9, 9]),
-    ],
-)
-def test_edges(edges, index, expected):
-    assert windows.indices(Options(5, edges=edges), index, range(10)).tolist() == expected
-
-
-def test_positions():
-    for position, expected in [("start", [5, 6, 7, 8]), ("center", [4, 5, 6, 7]), ("end", [2, 3, 4, 5])]:
-        assert windows.indices(Options(4, position=position), 5, range(10)).tolist() == expected
-
-
-def test_backward():
-    assert windows.indices(Options(4), 5, range(10), -1).tolist() == [5, 4, 3, 2]
-    assert windows.indices(Options(4, edges="mirror"), 1, range(10), -1).tolist() == [1, 0, 1, 2]
-    assert windows.indices(Options(4, position="end"), 5, range(10), -1).tolist() == [8, 7, 6, 5]
 
 
 def exposed(moment, index, direction, shot):
@@ -140,18 +108,3 @@ def test_light_round_trip():
     codes = np.linspace(-0.5, 3, 1000)
     assert light.to_encoded(light.to_linear(codes)) == pytest.approx(codes, abs=1e-7)
     assert light.to_linear(np.float64(0.5)) == pytest.approx(0.21404114, abs=1e-7)
-
-
-@pytest.mark.parametrize("interpolation", ["displacement", "value"])
-def test_a_pixels_shutter_is_the_share_of_each_frame(interpolation):
-    """Each frame of the window alone in white shows how much of it the picture takes."""
-    bars = np.random.default_rng(5).random((3, 6))
-    shutter_state, c = state(bars, interpolation=interpolation), [0.2, 0.5, 0.3]
-    taken = []
-    for k in range(6):
-        pictures = np.zeros((6, 1, 1, 4))
-        pictures[k] = 1
-        taken.append(compositor.compose(shutter_state, pictures, np.ones(6, bool), everywhere(c, (1, 1)))[0, 0, 0])
-    shutter = compositor.mixed_shutter(shutter_state, c)
-    assert shutter / shutter.sum() == pytest.approx(taken)
-    assert shutter.sum() == pytest.approx(c @ bars.sum(axis=1))

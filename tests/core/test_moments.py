@@ -6,7 +6,6 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from made_recipes import made
-from test_shutters import light
 
 from shutter_addon.core.model import shutters, windows
 from shutter_addon.core.model.clip import Clip
@@ -43,17 +42,6 @@ def exposed(shutters, steps, direction=1, **more):
 def test_a_still_frame_is_the_filmed_one(window, steps, position, direction):
     still = {"bars": shutters.preset_bars("STILL", window, position).tolist()}
     assert exposed([still], steps, direction, position=position) == {19 * steps: 1}
-
-
-@pytest.mark.parametrize("direction", [1, -1])
-@pytest.mark.parametrize(("position", "before"), [("start", 0), ("center", 3), ("end", 7)])
-@pytest.mark.parametrize("steps", STEPS)
-def test_light_lies_between_frames_that_are_both_open(steps, position, before, direction):
-    bars = [1, 2, 0, 4, 0, 0.5, 1, 3]
-    lit = {19 + direction * (k - before): bar for k, bar in enumerate(bars) if bar}
-    wanted, found = light(lit, steps), exposed([{"bars": bars}], steps, direction, position=position)
-    assert found.keys() == wanted.keys()
-    assert found == pytest.approx(wanted)
 
 
 def test_bars_are_interpolated_before_they_are_spread():

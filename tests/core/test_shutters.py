@@ -39,18 +39,6 @@ def brute_quantile(bars, z):
     return float(np.flatnonzero(bars)[-1] + 1)
 
 
-def brute_displace(bars, c, samples=200_000):
-    """The interpolated shutter from many samples of the mixed quantile."""
-    z = (np.arange(samples) + 0.5) / samples
-    times = np.zeros(samples)
-    for weight, shutter in zip(c, bars, strict=True):
-        total = shutters.accumulation(shutter)
-        k = np.searchsorted(total, z, side="right") - 1
-        times += weight * (k + (z - total[k]) / (total[k + 1] - total[k]))
-    counts = np.bincount(np.minimum(times.astype(int), bars.shape[1] - 1), minlength=bars.shape[1])
-    return counts / samples
-
-
 @given(bars_lists(), st.floats(0, 0.999))
 def test_knots_hold_every_quantile(bars, z):
     knots = shutters.knots(bars)
@@ -75,22 +63,6 @@ def test_displacement_keeps_exposure_and_is_a_shutter(mix):
     assert shutters.mix_exposure(bars, c) == pytest.approx(q.sum())
 
 
-@pytest.mark.parametrize("seed", range(6))
-def test_displacement_equals_brute_force(seed):
-    rng = np.random.default_rng(seed)
-    bars = rng.random((3, 24)) * (rng.random((3, 24)) > 0.4) + np.eye(3, 24) * 0.01
-    c = rng.dirichlet(np.ones(3))
-    q = shutters.displace(bars, c)
-    assert q / q.sum() == pytest.approx(brute_displace(bars, c), abs=1e-4)
-
-
-@given(bars_lists())
-def test_a_pure_coefficient_gives_that_shutter(bars):
-    for i, c in enumerate(np.eye(len(bars))):
-        assert shutters.displace(bars, c) == pytest.approx(bars[i], abs=1e-9)
-        assert shutters.mix(bars, c) == pytest.approx(bars[i], abs=1e-9)
-
-
 @given(st.integers(2, 200), st.floats(0, 1))
 def test_between_two_deltas_lies_a_delta_of_width_one(window, u):
     bars = np.zeros((2, window))
@@ -100,15 +72,6 @@ def test_between_two_deltas_lies_a_delta_of_width_one(window, u):
     expected = np.maximum(0, 1 - np.abs(np.arange(window) - time))
     assert q == pytest.approx(expected, abs=1e-9)
     assert shutters.mix(bars, [1 - u, u]) == pytest.approx([1 - u, *np.zeros(window - 2), u])
-
-
-def test_many_coefficients_at_once():
-    rng = np.random.default_rng(0)
-    bars, c = rng.random((3, 10)), rng.dirichlet(np.ones(3), (4, 5))
-    for function in (shutters.displace, shutters.mix):
-        q = function(bars, c)
-        assert q.shape == (4, 5, 10)
-        assert q[2, 3] == pytest.approx(function(bars, c[2, 3]))
 
 
 @pytest.mark.parametrize(
@@ -183,44 +146,6 @@ def test_a_closed_shutter_has_no_angle():
 STEPS = st.sampled_from([1, 2, 4, 8, 16])
 
 
-def overlap(first, second):
-    """How long two spans of time are open together."""
-    return max(min(first[1], second[1]) - max(first[0], second[0]), 0.0)
-
-
-def light(lit, steps):
-    """{moment: weight}, by {filmed frame: bar}. A bar is spread evenly over the half intervals from its frame to those
-    beside it that are open; a moment gets what lies nearer to it than to any other."""
-    found = {}
-    for frame, bar in lit.items():
-        spans = [(min(end, frame), max(end, frame)) for end in (frame - 0.5, frame + 0.5) if lit.get(2 * end - frame)]
-        if steps == 1 or not spans:
-            found[frame * steps] = found.get(frame * steps, 0) + bar
-            continue
-        for moment in range((frame - 1) * steps, (frame + 1) * steps + 1):
-            own = (moment - 0.5) / steps, (moment + 0.5) / steps
-            part = sum(overlap(own, span) for span in spans) / (0.5 * len(spans))
-            found[moment] = found.get(moment, 0) + bar * part
-    return {moment: weight for moment, weight in found.items() if weight}
-
-
-def exposed(weights, steps, index=10, direction=1):
-    """{moment: weight} of a window's weights, around a filmed frame."""
-    positions = windows.positions(Options(len(weights), step=steps), index * steps, direction)
-    return {int(at): weight for at, weight in zip(positions, weights, strict=True) if weight}
-
-
-@given(bars_lists(most=1), STEPS, st.sampled_from([1, -1]))
-def test_a_bar_is_spread_towards_its_open_neighbours(bars, steps, direction):
-    found = shutters.smoothed(bars[0], steps, backward=direction < 0)
-    assert found.shape == (len(bars[0]) * steps,)
-    assert found.sum() == pytest.approx(bars[0].sum())
-    wanted = light({10 + direction * k: bar for k, bar in enumerate(bars[0]) if bar}, steps)
-    there = exposed(found, steps, direction=direction)
-    assert there.keys() == wanted.keys()
-    assert there == pytest.approx(wanted)
-
-
 @given(bars_lists(most=1))
 def test_in_one_step_bars_are_what_they_are(bars):
     assert shutters.smoothed(bars[0], 1).tolist() == bars[0].tolist()
@@ -243,15 +168,6 @@ def test_what_rounding_leaves_opens_no_bar():
     for level in (False, True):
         moments = shutters.smoothed([1e-12, 1.0, 0.0, 1e-13], 8, level=level)
         assert moments == pytest.approx(np.eye(32)[8], abs=1e-9)
-
-
-def test_what_is_sharp_stays_so_and_a_box_is_one_streak():
-    assert exposed(shutters.smoothed([0, 0, 3, 0], 8), 8) == {96: 3}
-    assert exposed(shutters.smoothed([0, 0, 3, 0], 8, backward=True), 8, direction=-1) == {64: 3}
-    assert exposed(shutters.smoothed([1, 0, 1, 0], 4), 4) == {40: 1, 48: 1}
-    box = exposed(shutters.smoothed([1, 1, 1], 4), 4)
-    assert sorted(box) == list(range(40, 49))  # from its first frame to its last
-    assert [box[at] for at in range(40, 49)] == pytest.approx([1 / 4, 1 / 2, 3 / 8, *[1 / 4] * 3, 3 / 8, 1 / 2, 1 / 4])
 
 
 @given(bars_lists(most=1), STEPS)
