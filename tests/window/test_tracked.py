@@ -61,38 +61,6 @@ def test_the_first_stroke(backend, tmp_path):
     assert apart.max() > 60
 
 
-def between_notes_and_bars(folder, seen):
-    """The preview of each step, above the bar editor and below notes, which come when they are known."""
-    shown = {entry["step"]: crop(folder, entry) for entry in seen if "step" in entry}
-    return {name: picture[len(picture) // 6 : len(picture) * 3 // 4] for name, picture in shown.items()}
-
-
-@pytest.mark.parametrize("backend", backends("opengl"))
-def test_a_panning_shot(tmp_path, backend):
-    """A walker before a still camera: she is sharp, and the street, which stands still, streaks. A dragged bar shows at
-    once."""
-    footage = ROOT / "assets" / "walkers.mp4"
-    given = {"footage": shutil.copy(footage, tmp_path), "packages": packages(tmp_path / "packages")}
-    seen, console = tell("panning_story.py", backend, linked(tmp_path), **given)
-    assert "Traceback" not in console
-    facts = {name: entry[name] for entry in seen for name in entry}
-    still = [0, 0, 0, 1, 0, 0, 0, 0]
-    assert facts["panned"] == [["Long", "REGION", "Sharp", [1] * 8], ["Sharp", "NOTHING", "", still]]
-    assert facts["way"] == ["LOCATION", 6]
-    steps = between_notes_and_bars(tmp_path, seen)
-    tracked, panned, back, bars = (steps[name] for name in sorted(steps))
-    assert np.abs(tracked - panned).max() > 100
-    # On a slow machine some pixels beside her, of what she covered before, have come out 16 levels apart.
-    assert_alike(back, panned, tmp_path / "back_difference.png", tolerance=20)
-    assert np.abs(bars - back).max() > 30
-    with open_source(footage) as source:
-        apart = np.abs(pixels(tmp_path / "final_0070.png") - source.read(69)[..., :3])
-    x, y = facts["stroke"]
-    row, column = round((1 - y) * apart.shape[0]), round(x * apart.shape[1])
-    assert apart[row - 2 : row + 3, column - 2 : column + 3].max() <= 40
-    assert apart[:60].max() > 120
-
-
 def test_an_outline(tmp_path):
     """Drawn at two frames, carried beside Blender to those between, shown, rendered: she is sharp at one of these, in
     the preview as in what is rendered, without a ghost."""

@@ -4,9 +4,7 @@ import cv2
 import numpy as np
 import pytest
 from screens import TOLERANCE, assert_alike, crop, pixels
-from telling import ROOT, backends, linked, needs_window, packages, tell
-
-from shutter_addon.media import open_source
+from telling import backends, linked, needs_window, packages, tell
 
 pytestmark = needs_window
 
@@ -31,42 +29,6 @@ def test_an_effect_without_a_mouse(tmp_path):
     assert 100 < width < 300
     assert 100 < height < 300
     assert next(entry["probed"] for entry in seen if "probed" in entry) == pytest.approx([319.5, 179.5], abs=0.01)
-
-
-def test_a_mask_as_a_matte(tmp_path):
-    """Drawn in Blender's mask editor, with two shape keys: shown at once, moved by a new shape key, and the same in the
-    preview, in a render and by a Blender without a window. Sharp within it, long exposed without."""
-    seen, console = tell("mask_story.py", "vulkan", linked(tmp_path))
-    assert "Traceback" not in console
-    assert "Error" not in next(entry["background"] for entry in seen if "background" in entry)
-    steps = {entry["step"]: crop(tmp_path, entry) for entry in seen if "step" in entry}
-    effect, matte, redo, earlier, dragged = (steps[name] for name in sorted(steps))
-    assert_alike(redo, matte, tmp_path / "redo_difference.png")
-    for before, after in ((effect, matte), (matte, earlier), (matte, dragged)):
-        assert (np.abs(before - after).max(axis=2) > 30).mean() > 0.01
-    final = pixels(tmp_path / "final.png")
-    boxes = {entry["picture"]: entry.get("box") for entry in seen if "picture" in entry}
-    for name, box in (("live", boxes["live"]), ("background_0055", None)):
-        assert_alike(pixels(tmp_path / f"{name}.png", box), final, tmp_path / f"{name}_difference.png")
-    light = film_light(54)
-    height, width = final.shape[:2]
-    inside = np.s_[int(0.35 * height) : int(0.65 * height), int(0.3 * width) : int(0.5 * width)]
-    outside = np.s_[:, int(0.75 * width) :]
-    for place, expected in ((inside, light[0]), (outside, light.mean(axis=0))):
-        assert_alike(final[place], levels(expected[place]), tmp_path / "expected_difference.png")
-
-
-def film_light(first):
-    """Eight frames of the film from one on, in linear light (8, H, W, 3)."""
-    with open_source(ROOT / "assets" / "bigbuckbunny.mp4") as source:
-        frames = np.stack([source.read(first + k)[..., :3] for k in range(8)]) / 255
-    return np.where(frames <= 0.04045, frames / 12.92, ((frames + 0.055) / 1.055) ** 2.4)
-
-
-def levels(light):
-    """Linear light in 8-bit sRGB."""
-    encoded = np.where(light <= 0.0031308, light * 12.92, 1.055 * light ** (1 / 2.4) - 0.055)
-    return np.round(encoded * 255).astype(int)
 
 
 def test_no_exception_reaches_the_console(told):
