@@ -1,7 +1,6 @@
 """Baking: an effect as files that an ordinary strip shows, and the effect again."""
 
 import os
-import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -11,7 +10,7 @@ import pytest
 from support import noise_film, picture_of, read_picture, sequencer
 
 from shutter_addon.blender.data import selection, strips
-from shutter_addon.blender.editing import add_effect, baked_strips, reconcile
+from shutter_addon.blender.editing import baked_strips, reconcile
 from shutter_addon.blender.output import baked_film, edit_check, film_output
 from shutter_addon.blender.rendering import sessions
 from shutter_addon.core import revision
@@ -214,37 +213,6 @@ def test_the_command_goes_on_where_it_was_broken_off(bpy, film, tmp_path, kind):
     assert pictures[0].stat().st_mtime_ns == kept
 
 
-def test_parts_of_a_movie_are_kept(film, tmp_path, monkeypatch):
-    monkeypatch.setattr(film_parts, "LENGTH", 4)
-    scene, effect, strip = film(smooth=True)
-    film_of = baked_film.film_of(scene, effect, strip, "MOVIE")
-    assert [len(frames) for _path, frames in film_of.parts] == [4, 4, 1]
-
-    class KilledError(Exception):
-        pass
-
-    def killed(done):
-        if done == 6:
-            raise KilledError
-
-    with pytest.raises(KilledError):
-        baked_film.render(scene, effect, strip, film_of, killed)
-    first = film_of.parts[0][0]
-    assert [path.is_file() for path, _ in film_of.parts] == [True, False, False]
-    assert not film_of.is_finished()
-    written, told = first.stat().st_mtime_ns, []
-
-    def tell(done):
-        told.append(done)
-        if done == 4 and len(told) == 1:
-            assert first.stat().st_mtime_ns == written
-
-    baked_film.render(scene, effect, strip, film_of, tell)
-    assert told[0] == 4
-    assert told[-1] == COUNT
-    assert film_of.is_finished()
-
-
 @pytest.mark.parametrize(
     ("words", "sentence"),
     [
@@ -258,19 +226,6 @@ def test_what_cannot_be_baked_is_one_sentence(film, tmp_path, words, sentence):
     assert said.returncode == 2
     assert sentence in said.stderr
     assert len(said.stderr.splitlines()) == 1
-
-
-def test_a_copy_in_another_place_is_of_the_same_version(bpy, film, tmp_path):
-    scene, effect, strip = film()
-    here = baked_film.film_of(scene, effect, strip, "OPEN_EXR").version
-    away = tmp_path / "away"
-    shutil.copytree(tmp_path / "in", away / "in")
-    source = strips.source_of(scene, effect, strip)
-    source.directory = str(away / "in")
-    assert baked_film.film_of(scene, effect, strip, "OPEN_EXR").version == here
-    (away / "in" / "f0002.png").write_bytes((away / "in" / "f0003.png").read_bytes())
-    revision.changed()
-    assert baked_film.film_of(scene, effect, strip, "OPEN_EXR").version != here
 
 
 def test_it_plays_without_the_extension(bpy, film, tmp_path):
@@ -353,20 +308,6 @@ def test_keys_that_moved_along_are_no_change_and_others_are(bpy, film, change):
     assert states(scene, strip) == [False]
     point = scene.animation_data.action.layers[0].strips[0].channelbags[0].fcurves[0].keyframe_points[1]
     point.handle_right[0] += 0.5
-    assert states(scene, strip) == [True]
-
-
-@pytest.mark.parametrize("keyed", ["one axis", "muted"])
-def test_a_value_that_no_curve_drives_is_a_change(bpy, film, keyed):
-    """Another component of what is keyed, and what a muted curve leaves alone."""
-    scene, effect, strip = film()
-    region = effect.regions[0]
-    region.keyframe_insert("location", index=0, frame=1)
-    if keyed == "muted":
-        scene.animation_data.action.layers[0].strips[0].channelbags[0].fcurves[0].mute = True
-    bake(bpy)
-    assert states(scene, strip) == [False]
-    region.location[0 if keyed == "muted" else 1] += 0.25
     assert states(scene, strip) == [True]
 
 
@@ -487,19 +428,6 @@ def test_a_bake_ends_with_the_blender_that_began_it(bpy, film):
         job.end()
 
 
-def test_a_transparent_source_beside_another_bake_is_shown(bpy, film, tmp_path):
-    scene, _effect, _strip = film(4)
-    bake(bpy)
-    first = str(tmp_path / "in" / "f0001.png")
-    source = scene.sequence_editor.strips.new_image("other", first, 1, 1)
-    source.channel, source.right_handle = 1, COUNT + 1
-    other, _effect = add_effect.add_effect(scene, source)
-    assert source.mute
-    scene.sequence_editor.strips.remove(other)
-    reconcile.update()
-    assert not source.mute
-
-
 @pytest.mark.skipif(os.name != "posix", reason="links need no rights there alone")
 @pytest.mark.parametrize(("kind", "name"), [("OPEN_EXR", "0001.exr"), ("MOVIE", "0001.mp4")])
 def test_nothing_is_baked_or_removed_behind_a_link(bpy, film, tmp_path, kind, name):
@@ -517,12 +445,3 @@ def test_nothing_is_baked_or_removed_behind_a_link(bpy, film, tmp_path, kind, na
         link.symlink_to(outside)
     bake(bpy, kind)
     assert [(path.name, path.read_bytes()) for path in outside.iterdir()] == [(name, b"mine")]
-
-
-def test_nothing_of_a_killed_bake_is_left(bpy, film):
-    scene, effect, strip = film()
-    parts = baked_film.film_of(scene, effect, strip, "MOVIE").place.with_suffix(".parts")
-    (half := parts / f".part-{1:016x}").mkdir(parents=True)
-    (half / "0001.mp4").write_bytes(b"half")
-    bake(bpy, "MOVIE")
-    assert not parts.exists()

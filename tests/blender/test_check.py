@@ -174,18 +174,6 @@ def test_a_shutter_that_never_opens(noise, check):
     assert found[0].endswith("(and at 7 more frames)")
 
 
-def test_several_faults_are_all_told(noise, check, tmp_path):
-    edit, effect, _ = now()
-    for bar in effect.shutters[0].bars:
-        bar.weight = 0
-    edit.sequence_editor.strips.new_movie("gone", str(tmp_path / "gone.mp4"), 6, 1)
-    _, found, _ = check(change=lambda: _replace(tmp_path, (24, 32)))
-    assert len(found) == 3
-    assert "f0001.png: is 32×24" in found[0]
-    assert 'shutter "S0" at frame 1' in found[1]
-    assert found[2].startswith('strip "gone": gone.mp4: no such file')
-
-
 def _matte(tmp_path):
     edit, effect, strip = now()
     write_frames(tmp_path / "matte", np.full((FRAMES, 48, 64, 3), 128, np.uint8), "m")
@@ -224,14 +212,6 @@ def test_outlines(noise, check, tmp_path, monkeypatch):
     assert f"{FRAMES} mattes of outlines are not tracked yet" in " ".join(report["notes"])
 
 
-def test_a_mask_and_a_strip_that_are_gone(noise, check, tmp_path):
-    _matte(tmp_path)
-    now()[1].regions[0].matte = "MASK"
-    assert "it has no mask" in check()[1][0]
-    now()[1].regions[0].matte = "STRIP"
-    assert "it has no matte strip" in check()[1][0]
-
-
 @pytest.mark.parametrize("smooth", ["2", "8"])
 def test_a_smooth_effect(noise, check, bpy, tmp_path, capsys, smooth):
     """It needs nothing that is not there; exposures are told in filmed frames."""
@@ -260,14 +240,6 @@ def test_a_frame_that_a_moment_needs_is_missing(noise, check, tmp_path):
     assert check("--frames", "1")[1] == []
     (fault,) = check("--frames", "1", change=lambda: (tmp_path / "in" / "f0004.png").unlink())[1]
     assert "f0004.png" in fault
-
-
-def test_a_fault_of_the_system_that_names_no_file(noise, check, monkeypatch, tmp_path):
-    def no_more(_edit):
-        raise OSError(24, "Too many open files")
-
-    monkeypatch.setattr(versions, "of_edit", no_more)
-    assert check()[1] == [f"{tmp_path / 'edit.blend'}: Too many open files"]
 
 
 def test_plain_strips(noise, check, tmp_path):
@@ -321,15 +293,6 @@ def test_a_newer_extension_and_blender(noise, check, bpy, tmp_path, monkeypatch)
     assert found[0] == f"the edit was saved by version 99.1.0 of the extension, this machine has {here}"
     major, minor, _ = bpy.app.version_file
     assert found[1].startswith(f"the edit was saved by Blender {major}.{minor + 1}, this machine has {major}.{minor}")
-
-
-def test_output(noise, check, tmp_path):
-    (tmp_path / "file").write_bytes(b"")
-    assert check("--output", tmp_path / "file" / "out")[1] == [f"{tmp_path / 'file'}: is a file, and no folder"]
-    edit = now()[0]
-    edit.render.resolution_x = 65
-    edit.render.image_settings.media_type = "VIDEO"
-    assert "a movie has even sizes, not 65×48" in check()[1][0]
 
 
 @pytest.mark.parametrize(

@@ -147,15 +147,6 @@ def test_alpha_is_carried(command, tmp_path, same_pixels):
     assert np.abs(picture[..., :3] - expected)[solid].max() <= 1.5
 
 
-def test_a_gap_in_the_numbering_holds(command, noise, tmp_path, same_pixels):
-    _, frames = noise
-    first = write_frames(tmp_path / "in", frames[:6])
-    (tmp_path / "in" / "f0003.png").unlink()
-    command(first, "--output", tmp_path / "out", recipe=recipe(1, [1]))
-    for frame, source in zip(range(1, 7), (0, 1, 1, 3, 4, 5), strict=True):
-        same_pixels(read_picture(tmp_path / "out" / f"{frame:04d}.png"), frames[source], 1)
-
-
 @pytest.mark.parametrize("suffix", [".png", ".jp2"])
 def test_files_that_a_gap_would_show_are_the_sources_own(noise, tmp_path, suffix):
     """The number in a suffix is none of theirs."""
@@ -164,13 +155,3 @@ def test_files_that_a_gap_would_show_are_the_sources_own(noise, tmp_path, suffix
     (tmp_path / f"f0003{suffix}").unlink()
     with open_source(tmp_path / f"f0001{suffix}") as source:
         assert tmp_path / f"f0003{suffix}" in command_line.files(source)
-
-
-def test_a_number_far_off_is_left_out(command, noise, tmp_path):
-    first = write_frames(tmp_path / "in", noise[1][:2])
-    (tmp_path / "in" / "f20261121.png").write_bytes(first.read_bytes())
-    done = command(first, "--output", tmp_path / "out", recipe=recipe(1, [1]))
-    assert done.stderr.splitlines()[0] == (
-        "Virtual Shutter: f0001.png: the sequence ends with f0002.png; too many numbers lie before f20261121.png"
-    )
-    assert len(list((tmp_path / "out").iterdir())) == 2

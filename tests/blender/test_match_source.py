@@ -352,15 +352,6 @@ def test_a_film_keeps_its_size(bpy, edit, made, large_movie, monkeypatch):
     assert annotations.picture_size(edit.virtual_shutter.effects[0]) == (40, 40)
 
 
-def test_headers_are_read_once_and_never_for_a_panel(bpy, made, monkeypatch):
-    made()
-    monkeypatch.setattr(reconcile.source_media, "open_media", lambda _strip: pytest.fail("a file was opened"))
-    bpy.context.view_layer.update()
-    reconcile.follow_sources(reconcile.gather())
-    reconcile.forget()
-    assert words() == []
-
-
 def test_a_missing_file_leaves_the_size(bpy, edit, made, tmp_path):
     _strip, source = made()
     source.filepath = str(tmp_path / "gone.mkv")

@@ -10,8 +10,7 @@ import pytest
 from support import effect_of, image_strip, read_picture, recipe, request, sequencer, write_frames
 
 from shutter_addon.blender import command
-from shutter_addon.blender.data import annotations, matte_look, recipe_import, selection, snapshot, source_media, strips
-from shutter_addon.blender.editing import reconcile, shutter_edits
+from shutter_addon.blender.data import annotations, matte_look, recipe_import, selection, source_media, strips
 from shutter_addon.blender.interface import region_gizmo
 from shutter_addon.blender.output import matte_export
 from shutter_addon.blender.rendering import invalidation, sessions
@@ -115,21 +114,6 @@ def test_the_timeline_and_an_offset(shown, matte):
     _strip, _effect, coefficients = shown(content, change)
     assert close(coefficients(6), values(6 - 4 + 2) / 255)
     assert close(coefficients(11), values(9) / 255)
-
-
-def test_a_cut_of_the_effect_changes_nothing(shown, matte, tmp_path):
-    """Neither with the timeline's frames nor with the footage's."""
-    regions = region(matte, timing="timeline", offset=1, opacity=0.5), region(matte, opacity=0.5, name="n")
-    strip, effect, _coefficients = shown(data(*regions))
-    before = request(strip.id_data, effect, strip, 9).coefficients()
-    right = strip.split(frame=7, split_method="SOFT")
-    reconcile.update()
-    effect = strips.effect_of(strip.id_data, right.scene)
-    assert close(request(strip.id_data, effect, right, 9).coefficients(), before)
-    saved = matte_export.recipe_for(strip.id_data, effect, right, tmp_path / "r.json")
-    assert saved.regions[0].content.offset == 1 + 6  # frame 1 of this recipe is the seventh of the strip as it was
-    recipe_import.apply(strip.id_data, effect, right, saved, tmp_path)
-    assert close(request(strip.id_data, effect, right, 9).coefficients(), before)
 
 
 def test_a_file_without_colours_has_a_channel_by_name(bpy, edit, shown, tmp_path):
@@ -282,27 +266,6 @@ def test_the_stream_of_a_movie_strip(edit, shown, tmp_path):
     assert close(coefficients(1), 0.4)
 
 
-def test_a_recipe_whose_matte_is_missing_changes_nothing(shown, matte):
-    strip, effect, coefficients = shown(data(region(matte)))
-    gone = recipe_file.parse(json.dumps(data(region(matte.with_name("gone.png")))))
-    with pytest.raises(MediaError, match=r"gone\.png: no such file"):
-        recipe_import.apply(strip.id_data, effect, strip, gone)
-    assert close(coefficients(3), values(2) / 255)
-
-
-def test_copies_have_mattes_of_their_own(bpy, edit, shown, matte):
-    _strip, effect, coefficients = shown(data(region(matte)))
-    own = strip_of(edit, matte, 3)
-    effect.regions[0].matte, effect.regions[0].strip_name = "STRIP", own.name
-    copy = edit.copy()
-    reconcile.update()
-    (other,) = copy.virtual_shutter.effects
-    assert other.regions[0].strip_name == own.name
-    own.name = "renamed"
-    assert other.regions[0].strip_name == "matte"
-    assert close(coefficients(5), values(2) / 255)
-
-
 def test_export_writes_strips_and_points_to_files(edit, shown, matte, tmp_path):
     content = data(
         region(matte, offset=1, channel="green", opacity=0.25),
@@ -406,17 +369,6 @@ def test_a_mask_is_exported_as_pictures(shown, mask, tmp_path):
     assert effect.regions[0].matte == "IMAGE"
     assert close(coefficients(7), expected)
     assert close(coefficients(7), np.full((HEIGHT, WIDTH), 0.5 * 6 / 11))
-
-
-def test_a_time_map_shows_each_column_at_its_moment(bpy, edit, shown):
-    content = data(light="encoded", interpolation="value")
-    _strip, effect, coefficients = shown(content | {"window": 9, "shutters": [{"name": "A", "bars": [1] * 9}]})
-    region_ = shutter_edits.add_time_map(effect, "LINEAR")
-    assert next(shutter.name for shutter in effect.shutters) == "First"
-    assert region_.shutter == "Last"
-    found = coefficients(2)
-    # a column at x shows 8x frames later, between two frames both in proportion
-    assert close(found, np.broadcast_to(8 * (np.arange(WIDTH) + 0.5) / WIDTH, found.shape))
 
 
 def test_handles_of_a_ramp(bpy, edit, shown, monkeypatch):
@@ -570,14 +522,3 @@ def test_a_copy_of_a_matte_strip_is_no_part_of_it(edit, shown, matte):
     assert close(coefficients(11), values(3) / 255)  # its last one holds
     edit.sequence_editor.strips.remove(own)
     assert close(coefficients(11), values(4) / 255)
-
-
-def test_a_pasted_effect_has_the_matte_strip_beside_it(bpy, edit, shown, matte):
-    strip, effect, _coefficients = shown(data(region(matte)))
-    own = strip_of(edit, matte, 3)
-    effect.regions[0].matte, effect.regions[0].strip_name = "STRIP", own.name
-    copy = strip_of(edit, matte, 19, name="copy")
-    copy.virtual_shutter_matte = own.virtual_shutter_matte
-    strip.content_start += 16  # nearer to the copy than to its own
-    content = snapshot.region_at(edit, effect, strip, 0, (18.0,)).content
-    assert content.timing.content_start == copy.content_start

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from support import read_picture, recipe, small_disk, write_frames
+from support import read_picture, recipe, write_frames
 
 from shutter_addon.media import open_source
 from shutter_addon.media.rendered_pictures import whole_pictures
@@ -166,42 +166,6 @@ def test_equal_pixels_are_equal_files(command, frames, tmp_path, ending):
     assert everything(tmp_path / "a") == everything(tmp_path / "b")
     assert everything(tmp_path / "wa") == everything(tmp_path / "wb")
     assert b"Time" not in (tmp_path / "a" / f"0002.{ending}").read_bytes()
-
-
-@pytest.mark.skipif(os.geteuid() != 0, reason="only root mounts a small disk")
-@pytest.mark.parametrize("free", [0, 16384])
-def test_a_saved_edit_on_a_full_disk(command, frames, tmp_path, free):
-    """What stood there stays, and the sentence names the reason, as far as Blender tells it."""
-    import bpy
-
-    reason = "no space left" if bpy.app.version < (5, 3) else "failed to write blendfile"
-    with small_disk(tmp_path / "disk", 2 << 20) as disk:
-        edit = disk / "edit.blend"
-        edit.write_bytes(b"mine")
-        (disk / "filler").write_bytes(bytes((2 << 20) - 8192 - free))
-        refused(command(frames, "--save", edit, recipe=STILL, check=False), "edit.blend", reason)
-        assert edit.read_bytes() == b"mine"
-        assert sorted(path.name for path in disk.iterdir()) == ["edit.blend", "filler"]
-        (disk / "filler").unlink()
-        command(frames, "--save", edit, recipe=STILL)
-        assert edit.read_bytes() != b"mine"
-        assert (disk / "edit.blend1").read_bytes() == b"mine"  # as Blender has it
-        assert len(list(disk.iterdir())) == 2
-
-
-@pytest.mark.skipif(os.geteuid() != 0, reason="only root mounts a small disk")
-@pytest.mark.parametrize("output", ["out", "film.mp4"])
-def test_a_film_on_a_full_disk(command, movie, tmp_path, output):
-    with small_disk(tmp_path / "disk", 8 << 20) as disk:
-        (disk / "filler").write_bytes(bytes((8 << 20) - (3 << 20 if output == "out" else 1 << 16)))
-        done = command(movie, "--output", disk / output, "--frames", "1:20", recipe=STILL, check=False)
-        assert done.returncode == 2
-        assert "no space left" in done.stderr.lower()
-        left = everything(disk)
-        assert left.pop("filler")
-        assert all(name.endswith(".png") for name in left)
-        for name in left:
-            assert read_picture(disk / name).shape == (720, 1280, 3)
 
 
 def test_what_was_finished_of_a_movie_is_kept(command, frames, tmp_path):

@@ -4,11 +4,10 @@ import numpy as np
 import pytest
 from support import image_strip, write_frames
 
-from shutter_addon.blender.data import annotations, fcurves, selection, snapshot, strips, validation
+from shutter_addon.blender.data import annotations, fcurves, selection, snapshot, strips
 from shutter_addon.blender.editing import add_effect, bar_edits, follow_track, region_edits, shutter_edits, track_region
 from shutter_addon.blender.editing.motion_keys import MotionKeys
 from shutter_addon.core.model.motions import Placement
-from shutter_addon.media import pursuit
 
 SIZE = np.array([240, 160])
 COUNT = 20
@@ -153,22 +152,6 @@ def test_the_motion_says_what_is_keyed(bpy, region, motion, channels):
     assert all(any(key[2] == "GENERATED" for key in keys(bpy, channel)[0]) for channel in channels)
 
 
-def test_only_what_was_asked_for_is_tracked(bpy, edit, region):
-    move(bpy, 20, 9)
-    _edit, _effect, strip = active(bpy)
-    assert track_region.frames_to_track(edit, strip, "FORWARD") == range(20, 31)
-    assert track_region.frames_to_track(edit, strip, "BACKWARD") == range(11, 21)
-    assert track_region.frames_to_track(edit, strip, "BOTH") == range(11, 31)
-    assert track_region.frames_to_track(edit, strip, "BOTH", 25) == range(11, 26)
-    assert track_region.frames_to_track(edit, strip, "BACKWARD", 15) == range(15, 21)
-    assert track_region.frames_to_track(edit, strip, "FORWARD", 99) == range(20, 31)
-    for direction, until in (("FORWARD", 15), ("BACKWARD", 25), ("FORWARD", 20), ("BOTH", 20)):
-        with pytest.raises(validation.EffectError, match=f"Until is frame {until}, which does not lie"):
-            track_region.frames_to_track(edit, strip, direction, until)
-    assert track(bpy, "FORWARD") == list(range(21, 31))
-    assert min(types(bpy)) == 20
-
-
 def test_a_wrong_frame_is_mended_by_a_key_and_tracking_again(bpy, edit, region):
     """The editor's keys stay as they are, and the track goes through them."""
     track(bpy)
@@ -248,14 +231,6 @@ def test_tracks_of_a_stretched_timeline(bpy, edit, region):
     assert apart(bpy, 24, 13) == pytest.approx(12, abs=0.1)
 
 
-def test_a_gap_that_was_never_tracked_is_not_sure(bpy, edit, region):
-    effect = active(bpy)[1]
-    found = dict.fromkeys((11, 12, 20), Placement((0.0, 0.5), 0.0, 1.0))
-    MotionKeys(effect, 0, "SCALE").write(found, dict.fromkeys(found, 1.0))
-    assert [track_region.confidence_at(effect, 0, frame) for frame in (12, 13, 19, 20)] == [1, 0, 0, 1]
-    assert track_region.next_unsure(effect, 0, 11) == 13
-
-
 def test_a_made_key_that_the_editor_has_dragged_is_the_editors(bpy, edit, region):
     """In the Graph Editor, which leaves its type."""
     track(bpy)
@@ -294,20 +269,6 @@ def test_a_region_that_was_moved_and_not_keyed_is_tracked_from_where_it_is(bpy, 
     track(bpy, "FORWARD")
     assert apart(bpy, 20, 9) < 0.01
     assert apart(bpy, 22, 11) < 2
-
-
-def test_closed_early_it_keeps_what_it_has(bpy, edit, region):
-    _edit, effect, strip = active(bpy)
-    steps = track_region.track(edit, effect, strip, 0, range(11, 31), "SCALE")
-    for frame in steps:
-        if frame == 20:
-            break
-    steps.close()
-    assert max(types(bpy)) == 20
-    assert len(types(bpy)) < 8, "they are thinned"
-    assert max(apart(bpy, frame, frame - 11) for frame in range(11, 21)) < 1.5
-    assert track_region.confidence_at(effect, 0, 20) > 0.5
-    assert track_region.confidence_at(effect, 0, 21) is None
 
 
 def begun(bpy, until):
@@ -375,48 +336,6 @@ def test_it_tracks_what_a_retimed_strip_shows(bpy, edit, frames):
     shown = {frame: request(*active(bpy), frame).index for frame in range(11, 49)}
     assert set(shown.values()) == set(range(COUNT))
     assert max(apart(bpy, frame, index) for frame, index in shown.items()) < 2
-
-
-def test_where_the_subject_is_covered_it_stops_and_says_why(bpy, edit, tmp_path):
-    first = write_frames(tmp_path / "c", [picture(min(i, COUNT - 1), range(5, COUNT)) for i in range(COUNT + 15)])
-    region = drawn(edit, new_source(edit, first))
-    effect = active(bpy)[1]
-    track(bpy)
-    ((frame, fault, is_fault),) = track_region.stops(effect, 0)
-    assert max(types(bpy)) < frame <= 16
-    assert is_fault
-    assert fault == "the subject is covered, or looks too different"
-    edit.frame_set(12)
-    track(bpy, "BACKWARD")
-    assert len(region.stops) == 1, "that way it has gone nowhere"
-    track(bpy, "FORWARD")
-    assert len(region.stops) == 1, "it is the same one"
-
-
-def test_forward_from_a_covered_frame_is_never_surely_wrong(bpy, edit, tmp_path):
-    """The cover would be followed, but for the key behind, at which the subject is seen."""
-    pictures, cover = [picture(i) for i in range(COUNT)], texture(*SIZE[::-1])
-    for i in range(5, 9):
-        pictures[i][:, 60:] = cover[:, 60:]
-    first = write_frames(tmp_path / "c", pictures)
-    drawn(edit, new_source(edit, first))
-    track(bpy)
-    move(bpy, 17, 6)
-    track(bpy, "FORWARD")
-    effect = active(bpy)[1]
-    wrong = {frame for frame in range(11, 11 + COUNT) if apart(bpy, frame, frame - 11) > 2}
-    sure = {frame for frame in wrong if (track_region.confidence_at(effect, 0, frame) or 0) > pursuit.SURE}
-    assert not sure
-
-
-def test_the_next_unsure_frame(bpy, region):
-    _edit, effect, _strip = active(bpy)
-    confidence = {11: 1.0, 12: 0.9, 13: 0.4, 14: 0.2, 15: 0.3, 16: 0.6, 17: 0.0}
-    MotionKeys(effect, 0, "SCALE").write({11: Placement(), 17: Placement()}, confidence)
-    assert track_region.next_unsure(effect, 0, 11) == 14, "the worst of its stretch"
-    assert track_region.next_unsure(effect, 0, 14) == 17
-    assert track_region.next_unsure(effect, 0, 17) is None
-    assert track_region.lost(effect, 0) is None, "it lasts for a moment"
 
 
 def test_what_the_editor_keys_is_sure(bpy, edit, region):
@@ -501,24 +420,6 @@ def test_what_cannot_be_tracked_is_said(bpy, edit, region):
     refuses(bpy, "track", "the region has no strokes to follow")
     strips.source_of(*active(bpy)).directory = "/nowhere/"
     refuses(bpy, "track", "no such file")
-
-
-def test_a_flat_wall_cannot_be_tracked(bpy, edit, tmp_path):
-    first = write_frames(tmp_path / "wall", np.full((4, *SIZE[::-1], 3), 90, np.uint8))
-    drawn(edit, new_source(edit, first))
-    refuses(bpy, "track", "there are too few corners to follow")
-
-
-def test_it_stops_at_a_cut(bpy, edit, tmp_path):
-    """Where the next frame is another shot already, there is nothing to track."""
-    other = texture(*SIZE[::-1]) // 4
-    shots = [*(picture(i) for i in range(10)), *(np.roll(other, i, axis=1) for i in range(10))]
-    drawn(edit, new_source(edit, write_frames(tmp_path / "cut", shots)))
-    assert call(bpy, "track") == {"FINISHED"}
-    assert max(types(bpy)) == 20
-    assert track_region.stops(active(bpy)[1], 0) == [(21, "the shot ends here", False)]
-    edit.frame_set(20)
-    refuses(bpy, "track", "the shot ends here", direction="FORWARD")
 
 
 def test_a_button_goes_to_the_frames_that_need_a_look(bpy, edit, region):

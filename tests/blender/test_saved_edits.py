@@ -2,9 +2,7 @@
 
 import os
 import random
-import resource
 import shutil
-import signal
 import subprocess
 import sys
 from contextlib import contextmanager
@@ -13,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from support import noise_film, read_picture, small_disk
+from support import noise_film, read_picture
 
 from shutter_addon.blender import command
 from shutter_addon.blender.data import versions
@@ -187,29 +185,6 @@ def worker(*arguments):
             process.kill()
 
 
-def test_a_killed_worker_and_two_at_once_render_each_frame_once(saved, run, tmp_path):
-    out = tmp_path / "out"
-    assert run("render", saved, "--output", tmp_path / "whole")[0] == 0
-    with worker("render", saved, "--output", out, "--resume") as killed:
-        said = [killed.stderr.readline(), killed.stderr.readline()]
-        os.kill(killed.pid, signal.SIGKILL)
-        assert killed.wait() == -signal.SIGKILL
-    assert said == ["wrote 1\n", "wrote 2\n"]
-    assert [name for name in os.listdir(out) if name.startswith(".claim-")]
-    finished = {int(path.stem) for path in out.glob("*.png")}
-    assert 1 in finished
-    assert len(finished) < COUNT
-    again = "render", saved, "--output", out, "--resume"
-    with worker(*again) as one, worker(*again) as two:
-        said = "\n".join(each.communicate()[1] for each in (one, two))  # the last line of one may have no end
-        assert (one.returncode, two.returncode) == (0, 0)
-    assert "which other workers have claimed\n" in said  # it looks as if nothing went on
-    wrote = [int(line.removeprefix("wrote ")) for line in said.splitlines() if line.startswith("wrote ")]
-    assert sorted(wrote) == [frame for frame in range(1, COUNT + 1) if frame not in finished]
-    assert bits(out) == bits(tmp_path / "whole")
-    assert not [name for name in os.listdir(out) if name.startswith(".claim-")]
-
-
 @pytest.fixture
 def at_frame(bpy):
     """Has something done after a frame was rendered, before its picture is moved to its place."""
@@ -247,47 +222,6 @@ def test_a_job_of_a_newer_version_ends_an_older_ones_render(bpy, saved, run, at_
     at_frame(3, lambda: job_file.write(out, newer))
     refused(run("render", saved, "--output", out, *resume), job_file.NAME, "another version of the .blend file")
     assert sorted(os.listdir(out)) == ["0001.png", "0002.png", job_file.NAME]
-
-
-def test_footage_that_is_written_to_costs_only_what_was_rendered_of_it(saved, run, at_frame, tmp_path):
-    out = tmp_path / "out"
-    assert run("render", saved, "--output", out)[0] == 0
-    whole = places(out)
-
-    def write():
-        footage = tmp_path / "in" / "f0014.png"
-        footage.write_bytes(footage.read_bytes() + b"newer")
-        os.kill(os.getpid(), signal.SIGTERM)
-
-    at_frame(2, write)
-    refused(run("render", saved, "--output", out), "f0014.png: was written to while frames were rendered")
-    assert places(out) == {name: place for name, place in whole.items() if name > "0002.png"}
-
-
-@pytest.mark.skipif(os.geteuid() != 0, reason="only root mounts a small disk")
-def test_a_full_disk_and_one_that_cannot_be_written(saved, run, tmp_path):
-    assert run("render", saved, "--output", tmp_path / "whole")[0] == 0
-    size = (tmp_path / "whole" / "0001.png").stat().st_size
-    page = resource.getpagesize()
-    with small_disk(tmp_path / "disk", 1 << 20) as disk:
-        out = disk / "out"
-        out.mkdir()
-        (disk / "filler").write_bytes(bytes((1 << 20) - 5 * (-(-size // page)) * page - 8 * page))
-        refused(run("render", saved, "--output", out, "--resume"), "no space left")
-        left = bits(out)
-        assert 0 < len(left) < COUNT
-        assert sorted(os.listdir(out)) == sorted(left)
-        taken = sum(-(-path.stat().st_size // page) for path in out.iterdir())
-        (disk / "filler").write_bytes(bytes((1 << 20) - taken * page))
-        refused(run("render", saved, "--output", out, "--resume"), "o space left")
-        (disk / "filler").unlink()
-        subprocess.run(["mount", "-o", "remount,ro", str(disk)], check=True)
-        refused(run("render", saved, "--output", out, "--resume"), str(out), "Read-only")
-        refused(run("render", saved, "--output", out), str(out), "Read-only")
-        subprocess.run(["mount", "-o", "remount,rw", str(disk)], check=True)
-        assert run("render", saved, "--output", out, "--resume") == (0, "")
-        assert bits(out) == bits(tmp_path / "whole")
-        assert sorted(os.listdir(disk)) == ["out"]
 
 
 @pytest.mark.parametrize("name", ["f0001.png", "f0003.png", "title.png"])
@@ -429,14 +363,3 @@ def test_pictures_are_not_written_over_footage(edit, noise, run, save, tmp_path)
     before = bits(tmp_path / "in")
     refused(run("render", saved, "--output", tmp_path / "in"), "0001.png", "which is read")
     assert bits(tmp_path / "in") == before
-
-
-def test_a_stopped_worker_leaves_finished_frames_alone(saved, tmp_path):
-    out = tmp_path / "out"
-    with worker("render", saved, "--output", out, "--resume") as stopped:
-        stopped.stderr.readline()
-        stopped.send_signal(signal.SIGTERM)
-        assert "stopped" in stopped.communicate()[1]
-        assert stopped.returncode == 130
-    assert 0 < len(bits(out)) < COUNT
-    assert sorted(os.listdir(out)) == sorted(bits(out))

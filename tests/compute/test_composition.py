@@ -1,7 +1,5 @@
 """Both devices against the float64 reference: random footage, random shutters, every option."""
 
-import dataclasses
-
 import numpy as np
 import pytest
 
@@ -18,7 +16,6 @@ from shutter_addon.core.model.scribbles import Shape
 from shutter_addon.core.pixels import compositor
 
 LEVEL = 1 / 255
-ROUNDED = 0.6  # levels: half of one, and what a GPU's pow adds to its argument (0.062 on an NVIDIA H100)
 
 
 class Footage(FrameSource):
@@ -123,50 +120,6 @@ def test_of_two_frames_that_are_as_near_the_windows_earlier_is_shown(device, bar
     index = {1: 0, -1: 1}[direction]
     picture, _ = check(device, source, moment, index, direction)
     assert np.abs(picture - source.linear()[index]).max() < 2e-5
-
-
-def soft_edges(rng, dtype, **kind):
-    """Premultiplied footage whose colours lie far above their alpha: all of a whole type's range; of floats HDR and
-    negative ones, small and large."""
-    source = footage(rng, dtype=dtype, size=(9, 7), alpha="premultiplied", **kind)
-    if source.dtype.kind == "f":
-        signs = rng.choice([1, 1, 1, -1], source.frames.shape)
-        source.frames[:] = signs * 10 ** rng.uniform(-4, 2.2, source.frames.shape)
-    alpha = rng.choice([0.004, 0.055, 0.5, 1], source.frames.shape[:3])
-    source.frames[..., 3] = alpha * (np.iinfo(dtype).max if source.dtype.kind == "u" else 1)
-    return source
-
-
-@pytest.mark.parametrize("dtype", [np.uint8, np.uint16, np.float16, np.float32])
-@pytest.mark.parametrize("transfer", ["srgb", "linear"])
-@pytest.mark.parametrize("light_", ["linear", "encoded"])
-def test_colours_of_any_range(device, dtype, transfer, light_):
-    rng = np.random.default_rng(31)
-    source = soft_edges(rng, dtype, transfer=transfer)
-    ways = [state(rng, window=3, light=light_), few_pieces(rng, 8, light=light_)]
-    ways += [state(rng, light=light_, interpolation="value"), state(rng, light=light_, edges="shorten")]
-    for moment in ways:
-        picture, expected = composed(device, source, moment, 17)
-        # A weight is as exact as float32: what is far brighter in one frame than in the others differs by that.
-        brightest = np.abs(source.linear()).max(axis=0)
-        assert (np.abs(picture - expected) <= 0.002 * np.abs(expected) + 1e-5 * brightest).all()
-
-
-@pytest.mark.parametrize("alpha", ["opaque", "premultiplied"])
-def test_levels(device, alpha):
-    """Those of the picture over black, of lamps and of light below none too: a level apart where rounding decides."""
-    rng = np.random.default_rng(31)
-    source, moment = footage(rng, dtype=np.float32, transfer="linear", alpha=alpha), state(rng, window=1)
-    source.frames[..., :3] -= 0.1
-    renderer = Renderer(device, source)
-    picture, levels = renderer.picture(Request(5, moment)), renderer.picture(Request(5, moment, levels=True))
-    renderer.release_window()
-    expected = 255 * light.to_encoded(picture[..., :3].astype(np.float64).clip(0, 1))
-    assert expected.min() == 0
-    assert expected.max() > 254.9
-    assert levels.dtype == np.uint8
-    assert np.abs(levels[..., :3] - expected).max() <= ROUNDED
-    assert (levels[..., 3] == 255).all()
 
 
 @pytest.mark.parametrize("tile", [4, 12])
@@ -295,27 +248,6 @@ def test_coefficients_stay_on_the_device(gpu_device, shapes, block):
     assert np.array_equal(values[:, y // size, x // size], expected)
 
 
-@pytest.mark.parametrize("options", [{}, {"border": True}, {"edge_aware": 1.0}, {"aggregate": 2}])
-def test_what_is_half_there_is_halfway(device, options):
-    """Coefficients go straight from those with a shape to those without it, whatever lies around it."""
-    rng = np.random.default_rng(22)
-    source, renderer = footage(rng), Renderer(device, footage(rng))
-    moment = state(rng, **options)
-
-    def found(*opacities):
-        shapes = tuple(dataclasses.replace(s, opacity=o) for s, o in zip(SHAPES, opacities, strict=True))
-        return renderer.coefficients(Request(3, dataclasses.replace(moment, shapes=shapes)))
-
-    both, one, none = found(1, 1, 1), found(0, 1, 1), found(0, 0, 1)
-    assert np.abs(found(0.25, 1, 1) - (0.25 * both + 0.75 * one)).max() < 1e-5
-    assert np.abs(found(0.25, 0.75, 1) - (0.25 * both + 0.5 * one + 0.25 * none)).max() < 1e-5
-    assert np.array_equal(
-        found(0, 1, 1), renderer.coefficients(Request(3, dataclasses.replace(moment, shapes=SHAPES[1:])))
-    )
-    fading = tuple(dataclasses.replace(s, opacity=0.3) for s in SHAPES[:1])
-    check(device, source, dataclasses.replace(moment, shapes=fading), 3)
-
-
 def test_what_is_missing_is_what_is_read(device):
     rng = np.random.default_rng(21)
     for edges in ("hold", "mirror", "shorten"):
@@ -405,15 +337,6 @@ def test_frames_that_are_seen_again_are_not_read_again(device, edges, last):
     for index in range(4, last):
         renderer.picture(Request(index, moment))
     assert source.reads == list(range(4, 20))
-
-
-def test_a_window_that_goes_back_reads_one_frame(device):
-    rng = np.random.default_rng(27)
-    source = footage(rng)
-    renderer, moment = Renderer(device, source), few_pieces(rng)
-    for index in (3, 2, 1):
-        renderer.picture(Request(index, moment))
-    assert source.reads == [*range(3, 19), 2, 1]
 
 
 def test_a_frame_that_cannot_be_read_spoils_no_other(device):

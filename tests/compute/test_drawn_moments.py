@@ -1,24 +1,18 @@
 """Moments between filmed frames, which devices make of the two frames and their vectors, beside the reference."""
 
 import dataclasses
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
-import test_shots
-from made_recipes import made
-from test_composition import LEVEL, ROUNDED, Footage, few_pieces, state
+from test_composition import LEVEL, ROUNDED, Footage, few_pieces
 
 from shutter_addon.compute import running_sums
 from shutter_addon.compute.renderer import Renderer
 from shutter_addon.compute.request import Request
 from shutter_addon.core.frames import light
 from shutter_addon.core.model import shutters, windows
-from shutter_addon.core.model.clip import Clip
 from shutter_addon.core.model.frame_state import FrameState, Options
-from shutter_addon.core.model.state_at import state_at
 from shutter_addon.core.pixels import compositor
-from shutter_addon.media.cuts import ShotSource
 from shutter_addon.media.smooth import SmoothSource
 
 STEPS = 4
@@ -83,32 +77,6 @@ def test_a_moment_alone(device, size, steps):
         assert (apart > ROUNDED * LEVEL).mean() < 0.1  # OpenCV rounds what lies halfway by weights of its own
 
 
-@pytest.mark.parametrize("light_", ["linear", "encoded"])
-@pytest.mark.parametrize("direction", [1, -1])
-@pytest.mark.parametrize("edges", ["hold", "mirror", "shorten", "slide"])
-def test_smooth_bars(device, edges, direction, light_):
-    rng = np.random.default_rng(2)
-    source = SmoothSource(film(rng), STEPS)
-    moment = smooth(few_pieces(rng, 4, edges=edges, light=light_, position="center"), direction=direction)
-    for index in (0, 2 * STEPS, 2 * STEPS + 1, source.count - 1):
-        check(device, source, moment, index, direction)
-
-
-@pytest.mark.parametrize("interpolation", ["displacement", "value"])
-def test_bars_of_many_pieces(device, interpolation):
-    rng = np.random.default_rng(3)
-    source = SmoothSource(film(rng), STEPS)
-    check(device, source, smooth(state(rng, 5, interpolation=interpolation)), STEPS)
-
-
-@pytest.mark.parametrize("dtype", [np.uint16, np.float16, np.float32])
-def test_samples_of_other_types(device, dtype):
-    """Which are sent as they are read."""
-    rng = np.random.default_rng(4)
-    source = SmoothSource(film(rng, dtype=dtype), STEPS)
-    check(device, source, smooth(few_pieces(rng, 4)), STEPS)
-
-
 def test_a_window_that_slides_is_one_that_was_just_opened(device):
     """Onwards, back and far away: whatever is left on the device of other pairs of frames."""
     rng = np.random.default_rng(6)
@@ -163,28 +131,3 @@ def test_filmed_frames_of_a_pair_are_sent_once(gpu_device, monkeypatch):
     moment = smooth(FrameState(Options(4), np.ones((1, 4))), 8)
     Renderer(GPUCompositor(gpu_device), source).picture(Request(0, moment))
     assert sent == [0, 1, 2, 3]
-
-
-@pytest.mark.parametrize("edges", ["hold", "mirror", "shorten", "slide"])
-@pytest.mark.parametrize("position", ["start", "center", "end"])
-@pytest.mark.parametrize("steps", [1, 4, 16])
-def test_a_still_frame_is_the_filmed_one(device, steps, position, edges):
-    """Bit for bit, forward and backward, at the clip's ends and on both sides of a cut."""
-    plain = test_shots.film()
-    plain.fps, plain.options = None, {}
-    source = ShotSource(SmoothSource(plain, steps) if steps > 1 else plain, steps)
-    last, cut = plain.count - 1, test_shots.LENGTHS[0]
-    bars = {"Still": "STILL", "Long": "ANGLE_360"}
-    shutters_ = [
-        {"name": name, "bars": shutters.preset_bars(each, 5, position).tolist()} for name, each in bars.items()
-    ]
-    effect = made(5, shutters_, position=position, edges=edges, inbetween=steps).for_picture(37 / 23)
-    renderer = Renderer(device, source)
-    for backward in (False, True):
-        moving = dataclasses.replace(effect, time=SimpleNamespace(at=lambda frame, way=backward: (frame, way)))
-        for frame in (0, 1, cut - 1, cut, last):
-            asked = Request(*state_at(moving, Clip.of(source), frame + 1))
-            assert asked.index == frame * steps
-            assert np.array_equal(renderer.picture(dataclasses.replace(asked, levels=True)), plain.read(frame))
-    assert source.around(cut * steps, 0, source.count - 1).start > (cut - 1) * steps  # there is a cut
-    renderer.release_window()

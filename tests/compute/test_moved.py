@@ -4,14 +4,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from test_composition import ROUNDED, check, few_pieces, footage, state
+from test_composition import check, few_pieces, footage, state
 from test_shots import SHOTS, shots_of
 
 from shutter_addon.compute import window
 from shutter_addon.compute.gpu import GPUCompositor
 from shutter_addon.compute.renderer import Renderer
 from shutter_addon.compute.request import Request
-from shutter_addon.core.frames import light
 from shutter_addon.core.model.frame_state import Following
 from shutter_addon.core.model.scribbles import Shape
 
@@ -65,19 +64,6 @@ def test_frames_in_several_textures(device, monkeypatch, resident):
         moment.bars[2, :6] = 0
         for index in (2, 14):
             check(device, source, moment, index)
-
-
-def test_levels(device, monkeypatch):
-    """By one pass, and by several of which the last one alone makes levels."""
-    rng = np.random.default_rng(41)
-    source = footage(rng)
-    moment = following(rng, source, state(rng), (0, 2))
-    for most in (window.BAND_BYTES, 7 * (source.width + window.RIM) * (source.height + window.RIM) * 8):
-        monkeypatch.setattr(window, "BAND_BYTES", most)
-        renderer = Renderer(device, source)
-        picture, levels = renderer.picture(Request(5, moment)), renderer.picture(Request(5, moment, levels=True))
-        renderer.release_window()
-        assert np.abs(levels - 255 * light.to_encoded(picture.astype(np.float64))).max() <= ROUNDED
 
 
 def test_following_nothing_changes_no_bit(device):
