@@ -81,27 +81,6 @@ def test_what_moves_by_keys_stays_sharp(shown, velocity, most):
     assert levels_off(found.with_state(replace(found.state, following=None)), velocity) > 30
 
 
-@pytest.mark.parametrize("position", ["start", "center", "end"])
-def test_a_reversed_strip(shown, position):
-    velocity = 2, 1
-    keys = {frame: place(COUNT - frame, velocity) for frame in (1, COUNT)}
-    data = following(keys, position=position)
-    *_, found = shown(data, velocity, 12, lambda source: setattr(source, "use_reverse_frames", True))
-    assert found.direction == -1
-    assert levels_off(found, velocity) <= 0.6
-
-
-@pytest.mark.parametrize("speed", [0.5, -1])
-def test_keyed_time(shown, speed):
-    """Keys as tracking makes them: at every frame of the timeline, where what is shown has the subject."""
-    velocity, start = (1, -1), 1 if speed > 0 else COUNT
-    values = {frame: start + speed * (frame - 1) for frame in range(1, int((COUNT - 1) / abs(speed)) + 2)}
-    time = [{"frame": frame, "value": value} for frame, value in values.items()]
-    keys = {frame: place(np.floor(value - 0.5), velocity) for frame, value in values.items()}
-    *_, found = shown(following(keys, time=time), velocity, 5)
-    assert levels_off(found, velocity) <= 0.6
-
-
 CUT = 12
 
 

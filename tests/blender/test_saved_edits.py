@@ -3,11 +3,7 @@
 import os
 import random
 import shutil
-import subprocess
-import sys
-from contextlib import contextmanager
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -18,26 +14,7 @@ from shutter_addon.blender.data import versions
 from shutter_addon.blender.editing import whole_edits
 from shutter_addon.core.farm import job_file
 
-ROOT = Path(__file__).parents[2]
 COUNT = 14  # frames
-# A worker whose patience is short: it says which frames Blender has written.
-WORKER = """
-import sys
-import bpy
-from bpy.app.handlers import persistent
-from shutter_addon import blender
-from shutter_addon.blender.command import main
-from shutter_addon.core.farm import claims
-
-@persistent
-def wrote(scene, *_):
-    print("wrote", scene.frame_current, file=sys.stderr, flush=True)
-
-blender.register()
-bpy.app.handlers.render_write.append(wrote)
-claims.PATIENCE, claims.BEAT = 5.0, 0.2
-sys.exit(main(sys.argv[1:]))
-"""
 
 
 @pytest.fixture
@@ -175,16 +152,6 @@ def test_a_damaged_exr_is_rendered_again(bpy, saved, run, save, tmp_path, codec)
     assert bits(tmp_path / "out", "exr") == whole
 
 
-@contextmanager
-def worker(*arguments):
-    command = [sys.executable, "-c", WORKER, *map(str, arguments)]
-    with subprocess.Popen(command, cwd=ROOT, stderr=subprocess.PIPE, text=True) as process:
-        try:
-            yield process
-        finally:
-            process.kill()
-
-
 @pytest.fixture
 def at_frame(bpy):
     """Has something done after a frame was rendered, before its picture is moved to its place."""
@@ -222,19 +189,6 @@ def test_a_job_of_a_newer_version_ends_an_older_ones_render(bpy, saved, run, at_
     at_frame(3, lambda: job_file.write(out, newer))
     refused(run("render", saved, "--output", out, *resume), job_file.NAME, "another version of the .blend file")
     assert sorted(os.listdir(out)) == ["0001.png", "0002.png", job_file.NAME]
-
-
-@pytest.mark.parametrize("name", ["f0001.png", "f0003.png", "title.png"])
-def test_missing_footage_is_named(bpy, saved, run, save, tmp_path, name):
-    """Blender would render on without it."""
-    bpy.ops.wm.open_mainfile(filepath=str(saved))
-    shutil.copy(tmp_path / "in" / "f0001.png", tmp_path / "in" / "title.png")
-    bpy.context.scene.sequence_editor.strips.new_image("title", str(tmp_path / "in" / "title.png"), 7, 2)
-    saved = save()
-    (tmp_path / "in" / name).unlink()
-    done = run("render", saved, "--output", tmp_path / "out", "--frames", "2:3")
-    refused(done, f"{name}: no such file in {tmp_path / 'in'}")
-    assert not (tmp_path / "out" / "0003.png").exists()  # which needs each of them
 
 
 def test_missing_media_are_those_of_the_frames(bpy, edit, run, save, tmp_path):
@@ -281,21 +235,6 @@ def test_an_edit_without_an_effect_renders(bpy, edit, run, save, tmp_path):
     edit.render.resolution_x, edit.render.resolution_y = 16, 8
     assert run("render", save(), "--output", tmp_path / "out") == (0, "")
     assert np.abs(read_picture(tmp_path / "out" / "0002.png")[0, 0, :3] - [127.5, 63.75, 31.875]).max() <= 0.5
-
-
-def test_chunks_of_a_smooth_edit_are_the_whole(bpy, edit, run, save, tmp_path):
-    """Bit for bit, wherever they begin; beside the edit vectors are kept, and nothing else."""
-    noise = np.random.default_rng(4).integers(0, 256, (6, 10, 3), dtype=np.uint8).repeat(4, 0).repeat(4, 1)
-    _source, effect, _strip = noise_film(edit, np.stack([np.roll(noise, k, axis=1) for k in range(COUNT)]), tmp_path)
-    effect.inbetween = "4"
-    saved = save()
-    before = {path.name for path in tmp_path.iterdir()}
-    assert run("render", saved, "--output", tmp_path / "whole") == (0, "")
-    for chunk in ("9:14", "1:3", "4:8"):
-        assert run("render", saved, "--output", tmp_path / "parts", "--frames", chunk) == (0, "")
-    assert bits(tmp_path / "parts") == bits(tmp_path / "whole")
-    assert len(bits(tmp_path / "whole")) == COUNT
-    assert {path.name for path in tmp_path.iterdir()} == before | {"whole", "parts", "virtual_shutter_vectors"}
 
 
 def test_what_cannot_be_done_is_one_sentence(bpy, saved, run, save, tmp_path):
@@ -352,14 +291,3 @@ def test_a_driver_that_needs_scripts_is_named(bpy, edit, run, save, tmp_path, pl
     code, said = run("render", save(), "--output", tmp_path / "out")
     assert code == 2
     assert f'"{name}" needs scripts, which are not run (bpy.context' in said.splitlines()[-1]  # Blender tells it, too
-
-
-def test_pictures_are_not_written_over_footage(edit, noise, run, save, tmp_path):
-    source, _effect, _strip = noise_film(edit, noise, tmp_path)
-    for index, element in enumerate(source.elements, start=1):
-        (tmp_path / "in" / element.filename).rename(tmp_path / "in" / f"{index:04d}.png")
-        element.filename = f"{index:04d}.png"
-    saved = save()
-    before = bits(tmp_path / "in")
-    refused(run("render", saved, "--output", tmp_path / "in"), "0001.png", "which is read")
-    assert bits(tmp_path / "in") == before

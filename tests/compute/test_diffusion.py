@@ -1,15 +1,11 @@
 """Diffusion against the exact solution: a sparse direct solve of the 5-point Laplacian with Neumann edges."""
 
-from itertools import pairwise
-
 import numpy as np
 import pytest
-from all_passes import PASSES
 from exact_diffusion import solve as exact
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from shutter_addon.compute import diffusion_gpu
 from shutter_addon.compute.diffusion import diffuse
 from shutter_addon.compute.diffusion_gpu import Diffusion
 from shutter_addon.core.model.scribbles import Shape, rasterise
@@ -348,79 +344,9 @@ def test_moved_scribbles_start_from_the_last_solution(on_device):
         np.testing.assert_allclose(got, exact(labels, count), rtol=0, atol=LEVEL)
 
 
-@pytest.mark.parametrize("scene", FEW)
-def test_what_has_not_moved_stays_exact(scene, on_device):
-    labels, count = SCENES[scene]
-    on_device(labels, count)
-    got = on_device(labels, count, warm=True)
-    assert_coefficients(got, count, labels.shape)
-    np.testing.assert_allclose(got, exact(labels, count), rtol=0, atol=LEVEL)
-
-
 def test_a_start_from_anything_comes_to_the_same(on_device):
     labels, count = SCENES["random, 9"]
     on_device(labels[::-1], count)
     for _ in range(3):
         got = on_device(labels, count, warm=True)
     np.testing.assert_allclose(got, exact(labels, count), rtol=0, atol=LEVEL)
-
-
-def test_textures_stay_while_size_and_shutters_do(device):
-    solver = Diffusion(device)
-    labels, count = dots()
-    with device.current():
-        texture = solver.solve(labels, count)
-        assert solver.solve(labels[::-1], count) is texture
-        assert solver.solve(labels[:90], count) is not texture
-        assert texture.size[2] == 2
-        solver.release()
-
-
-def test_more_cycles_come_closer(monkeypatch, on_device):
-    labels, count = touching_lines()
-    want = exact(labels, count)
-    errors = []
-    monkeypatch.setattr(diffusion_gpu, "NOTHING", 0.0)
-    monkeypatch.setattr(diffusion_gpu, "WHOLE", 1000)
-    for cycles in (1, 2, 3, 4):
-        monkeypatch.setattr(diffusion_gpu, "CYCLES", cycles)
-        errors.append(abs(on_device(labels, count) - want).max())
-    assert all(after < before / 3 for before, after in pairwise(errors)), errors
-
-
-@pytest.mark.parametrize("size", [(8, 5), (5, 8), (8, 8), (1, 7), (7, 1), (1, 1), (4, 3)])
-def test_the_coarsest_grid_is_solved_exactly(gpu_device, size):
-    """Against NumPy: a symmetric nine-point operator, right sides of two layers, and a cell with no equation."""
-    (width, height), solve = size, next(each for each in PASSES if each.file == "coarsest")
-    rng = np.random.default_rng(width + 10 * height)
-    cells = np.arange(width * height).reshape(height, width)
-    matrix = np.zeros((width * height,) * 2)
-    for y, x in np.ndindex(height, width):
-        for down, across in ((0, 1), (1, -1), (1, 0), (1, 1)):
-            if y + down < height and 0 <= x + across < width:
-                i, j = cells[y, x], cells[y + down, x + across]
-                matrix[i, j] = matrix[j, i] = -rng.random()
-    matrix += np.diag(0.1 - matrix.sum(axis=1))
-    dead = width * height // 2 if width * height > 1 else None
-    right = rng.random((2, height, width, 4))
-    if dead is not None:
-        matrix[dead] = matrix[:, dead] = 0
-        right.reshape(2, -1, 4)[:, dead] = 0
-    ties = np.pad(cells, 1, constant_values=-1)
-    stencil = np.zeros((3, height, width, 4))
-    for y, x in np.ndindex(height, width):
-        around = ties[y : y + 3, x : x + 3].ravel()
-        row = np.where(around >= 0, matrix[cells[y, x], around], 0)
-        stencil[0, y, x], stencil[1, y, x], stencil[2, y, x, 1] = row[:4], row[5:], row[4]
-    with gpu_device.current():
-        images = {}
-        for name, values in (("stencil", stencil), ("right", right), ("solution", np.ones_like(right))):
-            images[name] = gpu_device.texture(width, height, len(values), "rgba32f")
-            for layer, part in enumerate(values.astype(np.float32)):
-                gpu_device.write(images[name], part, layer)
-        gpu_device.run(solve, (1, 1, 2), images=images, size=size)
-        solution = gpu_device.read(images["solution"])
-    if dead is not None:
-        matrix[dead, dead] = 1
-    expected = np.linalg.solve(matrix, right.reshape(2, -1, 4))
-    assert np.abs(solution.reshape(2, -1, 4) - expected).max() < 1e-3 * np.abs(expected).max()

@@ -10,7 +10,6 @@ from shutter_addon.compute import guide
 from shutter_addon.compute.cpu import CPUCompositor
 from shutter_addon.compute.renderer import Renderer
 from shutter_addon.compute.request import Request
-from shutter_addon.core.frames import light
 from shutter_addon.core.model.frame_state import FrameState, Options
 from shutter_addon.core.model.scribbles import Shape
 from shutter_addon.media.cuts import ShotSource
@@ -61,35 +60,6 @@ def test_it_is_the_smoothed_frame(size, block):
     scale = min(size) / (240 * block)
     assert np.abs(found - expected).max() <= (4 if min(size) > 720 else 1) * LEVEL * scale
     assert np.abs(found - expected).mean() <= 0.5 * LEVEL * scale
-
-
-def test_differences_are_those_of_a_picture_of_240_rows():
-    """Whatever the size, and the blocks."""
-
-    def steepest(height, block):
-        found = guide_of(source_of(texture(height, height)), block=block)
-        return np.quantile(np.abs(np.diff(found, axis=1)), 0.9)
-
-    wanted = steepest(240, 1)
-    for height, block in ((480, 1), (720, 1), (960, 2), (960, 4), (960, 8)):
-        assert steepest(height, block) == pytest.approx(wanted, rel=0.08)
-
-
-@pytest.mark.parametrize("dtype", [np.uint8, np.uint16, np.float16, np.float32])
-@pytest.mark.parametrize("transfer", ["srgb", "linear"])
-def test_of_every_kind_of_samples(dtype, transfer):
-    """Without what is beyond white."""
-    picture = 0.4 + 0.6 * texture(90, 120)
-    shown = guide_of(source_of(picture, dtype=np.uint16))
-    stored = light.to_linear(picture) if transfer == "linear" else picture
-    assert np.abs(guide_of(source_of(stored, dtype=dtype, transfer=transfer)) - shown).max() <= LEVEL
-    if np.dtype(dtype).kind == "f":
-        bright = np.where(picture > 0.7, 1000 * picture, stored)
-        expected = guide_of(source_of(np.where(picture > 0.7, 1, picture), dtype=np.uint16))
-        found = guide_of(source_of(bright, dtype=dtype, transfer=transfer))
-        assert np.abs(found - expected).max() <= LEVEL
-        bright[3, 4], bright[50, 60] = np.nan, np.inf
-        assert np.isfinite(guide_of(source_of(bright, dtype=dtype, transfer=transfer))).all()
 
 
 @pytest.mark.parametrize("transfer", ["srgb", "linear"])
