@@ -190,24 +190,13 @@ def measure(args, folder: Path) -> tuple[list[dict], np.ndarray]:
         for name, pair in (("ours", (truth, ours)), ("noise", (one, other)), ("wrong", (truth, wrong))):
             rows.append({"case": case, "picture": name} | compare(*pair))
             print("| {case} | {picture} | {similarity:.5f} | {largest} | {mean:.3f} |".format(**rows[-1]), flush=True)
-        strips.append(side_by_side(case, truth, ours, amplified(truth, ours), amplified(one, other)))
+        texts = f"{case}: Cycles", "virtual shutter", f"difference × {AMPLIFIED}", f"noise × {AMPLIFIED}"
+        strips.append(labelled((truth, ours, amplified(truth, ours), amplified(one, other)), texts))
     return rows, stills.sheet(*strips)
-
-
-def side_by_side(case: str, *pictures: np.ndarray) -> np.ndarray:
-    return labelled(
-        pictures, [f"{case}: Cycles", "virtual shutter", f"difference × {AMPLIFIED}", f"noise × {AMPLIFIED}"]
-    )
 
 
 def amplified(picture: np.ndarray, other: np.ndarray) -> np.ndarray:
     return np.clip(apart(picture, other) * AMPLIFIED, 0, 255).astype(np.uint8)
-
-
-def write(args, rows: list[dict], sheet: np.ndarray) -> None:
-    if args.docs:
-        stills.save(stills.scaled(sheet, sheet.shape[1] // 2), ROOT / "docs" / "truth.jpg")
-    saved(args, "truth", rows, sheet)
 
 
 def parse(arguments=None):
@@ -226,7 +215,9 @@ def main(arguments=None) -> None:
     with tempfile.TemporaryDirectory() as folder:
         rows, sheet = measure(args, Path(folder))
     try:
-        write(args, rows, sheet)
+        if args.docs:
+            stills.save(stills.scaled(sheet, sheet.shape[1] // 2), ROOT / "docs" / "truth.jpg")
+        saved(args, "truth", rows, sheet)
     except OSError as error:
         fail(f"truth: {error}")
 

@@ -57,10 +57,6 @@ def test_a_folder_that_cannot_be_made_is_one_sentence(tmp_path):
     assert done.stderr == f"gallery: {tmp_path}/file/bunny: Not a directory\n"
 
 
-def test_help_says_where_a_relative_folder_lies():
-    assert "scripts/gallery takes it from the project's folder" in " ".join(listed("--help").stdout.split())
-
-
 @pytest.mark.parametrize("path", sorted(HERE.glob("*.json")), ids=lambda path: path.stem)
 def test_recipes_load(path):
     assert path.stem.split("-")[0] in NAMES

@@ -206,32 +206,3 @@ def test_all_that_is_incompatible_is_said_to_be_unresolved():
 
 def test_the_page_is_of_the_data():
     assert components.PAGE.read_text(encoding="utf-8") == components.page(), "run scripts/components.py"
-
-
-@pytest.mark.parametrize(
-    ("path", "name"),
-    [
-        ("av.libs/libavcodec-d61378e8.so.63.1.102", "libavcodec.so.63.1.102"),
-        ("av.libs/avcodec-63-2756d4fffb772585dcdece87427716a4.dll", "avcodec-63.dll"),
-        ("cv2/.dylibs/libglib-2.0.0.dylib", "libglib-2.0.0.dylib"),
-        ("x.libs/libopenblasp-r0-59ffcd50.3.15.so", "libopenblasp-r0.3.15.so"),
-    ],
-)
-def test_names_of_libraries(path, name):
-    assert components.libraries([path, "av/_core.abi3.so", "x/mgl.cpython-313-x86_64-linux-gnu.so"]) == {path: name}
-
-
-@pytest.mark.parametrize(
-    ("name", "version"),
-    [
-        ("libavcodec.so.63.1.102", "63.1.102"),
-        ("avcodec-63.dll", "63"),
-        ("libglib-2.0.0.dylib", "2.0.0"),
-        ("libopenblasp-r0.3.15.so", "0.3.15"),
-        ("libprotobuf 3.19.1", "3.19.1"),
-        ("zlib1.dll", ""),
-        ("ade", ""),
-    ],
-)
-def test_versions_of_libraries(name, version):
-    assert components.version(name) == version

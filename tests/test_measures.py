@@ -4,7 +4,6 @@ import json
 import subprocess
 import sys
 
-import numpy as np
 import pytest
 
 from gallery.item import ROOT
@@ -92,26 +91,6 @@ def test_blocks_that_share_a_shutter_look_like_full_resolution(tmp_path):
     for row in rows:
         assert 0.9982 <= row["mean"] < 1, row
         assert 0.9777 <= row["worst"] < 1, row
-
-
-def test_coefficients_that_follow_edges_change_by_less_than_a_level(tmp_path):
-    """Where the film stands still."""
-    options = "--frames", "2", "--aggregate", "4", "--noise", "8", "--films", "pedestrians.avi"
-    rows = {row["guide"]: row for row in rows_of("edge_flicker", tmp_path, *options)}
-    assert rows["steadied"]["still"] > 0.5
-    assert 0 < rows["steadied"]["mean"] < min(rows["alone"]["mean"], 1)
-
-
-def test_a_pixel_stands_still_where_all_around_it_does():
-    import edge_flicker
-
-    first = np.full((60, 80, 4), 100, np.uint8)
-    second = first.copy()
-    second[30, 40, 1] = 255  # 155 levels, 0.69 on average around it
-    second[:15, :15, 2] = 102
-    found = edge_flicker.still(first, second, 1)
-    assert not found[:7, :7].any()
-    assert found[30:, 30:].all()
 
 
 LAYERS = """

@@ -205,10 +205,6 @@ def test_a_repository_is_no_output_folder(tmp_path):
     assert not list(tmp_path.iterdir())
 
 
-def test_help_says_where_a_relative_folder_lies():
-    assert "takes a relative DIR from the project's folder" in " ".join(build("--help").split())
-
-
 def test_the_version_is_the_same_everywhere():
     version = tomllib.loads((ROOT / "blender_manifest.toml").read_text())["version"]
     assert tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["version"] == version

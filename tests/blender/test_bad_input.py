@@ -58,19 +58,15 @@ def test_no_medium(command, tmp_path, name, content, words):
 
 
 @pytest.mark.skipif(os.name != "posix", reason="names are bytes on POSIX systems only")
-@pytest.mark.parametrize("option", ["source", "--output", "--save", "--weights", "--recipe"])
+@pytest.mark.parametrize("option", ["source", "--save"])
 def test_names_that_are_not_utf8(command, frames, tmp_path, option):
     odd = tmp_path / os.fsdecode(b"caf\xe9")
     odd.mkdir()
     shutil.copy(frames, odd / "f0001.png")
-    (odd / "recipe.json").write_text(json.dumps(STILL))
     source = odd / "f0001.png" if option == "source" else frames
-    given = {"--output": odd / "out", "--save": odd / "a.blend", "--recipe": odd / "recipe.json"}
-    more = () if option == "source" else (option, given.get(option, odd))
-    output = () if option == "--output" else ("--output", tmp_path / "out")
-    known = None if option == "--recipe" else STILL
-    refused(command(source, *output, *more, recipe=known, check=False), "caf\\udce9", "not UTF-8")
-    assert sorted(path.name for path in odd.iterdir()) == ["f0001.png", "recipe.json"]
+    more = () if option == "source" else (option, odd / "a.blend")
+    refused(command(source, "--output", tmp_path / "out", *more, recipe=STILL, check=False), "caf\\udce9", "not UTF-8")
+    assert sorted(path.name for path in odd.iterdir()) == ["f0001.png"]
     assert not (tmp_path / "out").exists()
 
 
@@ -85,26 +81,6 @@ def test_a_strip_whose_folder_is_not_utf8(edit, frames, tmp_path):
         add_effect.add_effect(edit, source)
     assert str(caught.value).isprintable()
     assert str(caught.value).endswith("its path is not UTF-8; rename the file, or the folder that is not")
-
-
-def test_audio_only(command, tmp_path):
-    with av.open(str(tmp_path / "sound.mp4"), "w") as container:
-        stream = container.add_stream("aac", rate=48000)
-        sound = av.AudioFrame.from_ndarray(np.zeros((1, 1024), dtype=np.float32), format="fltp", layout="mono")
-        sound.sample_rate = 48000
-        container.mux(stream.encode(sound))
-        container.mux(stream.encode())
-    done = command(tmp_path / "sound.mp4", "--output", tmp_path / "out", recipe=STILL, check=False)
-    refused(done, "sound.mp4", "no video")
-    assert not (tmp_path / "out").exists()
-
-
-def test_a_movie_without_its_index(command, bunny, tmp_path):
-    data = bunny.read_bytes()
-    assert data.find(b"moov") > data.find(b"mdat")
-    (tmp_path / "half.mp4").write_bytes(data[: len(data) // 2])
-    refused(command(tmp_path / "half.mp4", "--output", tmp_path / "out", recipe=STILL, check=False), "half.mp4")
-    assert not (tmp_path / "out").exists()
 
 
 def test_a_movie_cut_off_in_the_middle(command, tmp_path):
@@ -142,23 +118,10 @@ def test_damaged_in_the_middle(command, frames, tmp_path):
         assert np.array_equal(np.rint(read_picture(path)), read_picture(frames.parent / f"f{path.name}"))
 
 
-@pytest.mark.parametrize(
-    ("change", "words"),
-    [
-        ({"shutters": [{"name": "A", "bars": [0, 0, 0, 0]}]}, ["shutters[0].bars", "all bars are zero"]),
-        ({"shutters": [{"name": "A", "bars": [1, float("nan"), 0, 0]}]}, ["shutters[0].bars[1]", "nan"]),
-        ({"shutters": [{"name": "A", "bars": [1, 1, 1]}]}, ["shutters[0].bars: 3 values, window is 4"]),
-        ({"surprise": 1}, ["unknown field surprise"]),
-        ({"regions": [{"shutter": "A", "strokes": [[]]}]}, ["regions[0]"]),
-        ({"regions": [{"shutter": "S0", "strokes": [[[-1e7, 0], [1e7, 1]]]}]}, ["regions[0].strokes[0][0][0]: -1"]),
-        ({"time": [{"frame": 1e12, "value": 1}]}, ["time[0].frame: 1e+12 is not"]),
-        ({"shutters": [{"name": "\ud800\0", "bars": [1, 0, 0, 0]}]}, ["shutters[0].name: U+D800"]),
-        ({"\ud800\x1b": 1}, ["unknown field \\ud800\\x1b"]),
-    ],
-)
-def test_wrong_recipe(command, frames, tmp_path, change, words):
-    done = command(frames, "--output", tmp_path / "out", recipe=STILL | change, check=False)
-    refused(done, "recipe.json", *words)
+def test_wrong_recipe(command, frames, tmp_path):
+    """Its sentence is that of core; here, it is the only one, with the file's name, and nothing is written."""
+    done = command(frames, "--output", tmp_path / "out", recipe=STILL | {"\ud800\x1b": 1}, check=False)
+    refused(done, "recipe.json", "unknown field \\ud800\\x1b")
     assert not (tmp_path / "out").exists()
 
 
@@ -170,7 +133,7 @@ def test_no_recipe(command, frames, tmp_path):
         refused(done, path.name)
 
 
-@pytest.mark.parametrize("text", ["0:3", "3:2", "1:7", "a:b", "7", "-1:2", "9" * 39, "1:" + "9" * 5000])
+@pytest.mark.parametrize("text", ["0:3", "a:b", "1:" + "9" * 5000])
 def test_frames_outside_the_clip(command, frames, tmp_path, text):
     refused(
         command(frames, "--output", tmp_path / "out", f"--frames={text}", recipe=STILL, check=False),
@@ -180,14 +143,7 @@ def test_frames_outside_the_clip(command, frames, tmp_path, text):
     assert not (tmp_path / "out").exists()
 
 
-def test_a_window_longer_than_the_clip(command, frames, tmp_path):
-    for edges in ("hold", "mirror", "shorten", "slide"):
-        data = recipe(200, np.ones(200), edges=edges)
-        command(frames, "--output", tmp_path / edges, recipe=data)
-        assert len(list((tmp_path / edges).iterdir())) == 6
-
-
-@pytest.mark.parametrize(("width", "height"), [(33, 17), (5, 4), (4, 129)])
+@pytest.mark.parametrize(("width", "height"), [(33, 17), (4, 129)])
 def test_odd_sizes(command, tmp_path, width, height):
     pictures = np.random.default_rng(0).integers(0, 256, (2, height, width, 3), dtype=np.uint8)
     first = write_frames(tmp_path / "in", pictures)
@@ -242,8 +198,7 @@ def test_a_full_disk(command, frames, tmp_path, output):
     assert not left
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-@pytest.mark.parametrize("output", ["out", "film.mp4"])
+@pytest.mark.parametrize(("number", "output"), [(signal.SIGINT, "out"), (signal.SIGTERM, "film.mp4")])
 def test_stopped_halfway(bunny, tmp_path, number, output):
     """Finished frames stay, whole, and those of a movie under a name that says so; nothing else does."""
     (tmp_path / "r.json").write_text(json.dumps(recipe(8, np.ones(8))))

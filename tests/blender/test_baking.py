@@ -1,18 +1,16 @@
 """Baking: an effect as files that an ordinary strip shows, and the effect again."""
 
 import os
-import shutil
 import subprocess
 import sys
 from pathlib import Path
 
 import numpy as np
-import OpenImageIO
 import pytest
 from support import noise_film, picture_of, read_picture, sequencer
 
-from shutter_addon.blender.data import effect_version, selection, strips
-from shutter_addon.blender.editing import add_effect, baked_strips, reconcile
+from shutter_addon.blender.data import selection, strips
+from shutter_addon.blender.editing import baked_strips, reconcile
 from shutter_addon.blender.output import baked_film, edit_check, film_output
 from shutter_addon.blender.rendering import sessions
 from shutter_addon.core import revision
@@ -100,19 +98,6 @@ def test_a_movie_is_off_by_little(bpy, film, tmp_path):
     assert off.mean() <= 1
 
 
-@pytest.mark.parametrize(("fps", "base", "rate"), [(1, 0.0004, 2500), (24, 1.001, 24000 / 1001), (32767, 1e-5, None)])
-def test_any_rate(bpy, film, fps, base, rate):
-    """Whatever Blender takes for one is baked; what no movie has is a sentence."""
-    scene, _effect, _strip = film()
-    scene.render.fps, scene.render.fps_base = fps, base
-    if rate is None:
-        with pytest.raises(RuntimeError, match="cannot be written"):
-            bpy.ops.shutter.bake(file_format="MOVIE")
-        return
-    baked = bake(bpy, "MOVIE")
-    assert baked.elements[0].orig_fps == pytest.approx(rate)
-
-
 def test_a_movie_has_no_transparency(bpy, film):
     film(4)
     with pytest.raises(RuntimeError, match="a movie has no transparency: bake to OpenEXR"):
@@ -157,6 +142,8 @@ def test_it_says_that_it_is_stale(bpy, film):
     effect.regions[0].location[0] = 0.1
     assert stale() == [True]
     effect.regions[0].location[0] = 0
+    effect.shutters[1].name = effect.regions[0].shutter = "another"  # names are no change
+    assert stale() == [False]
     for each in scene.sequence_editor.strips:  # a ripple edit: all of it moves
         each.content_start += 7
     bpy.context.view_layer.update()
@@ -226,68 +213,6 @@ def test_the_command_goes_on_where_it_was_broken_off(bpy, film, tmp_path, kind):
     assert pictures[0].stat().st_mtime_ns == kept
 
 
-def test_the_command_bakes_without_tqdm(film, tmp_path):
-    film()
-    script = (
-        "import sys; sys.modules['tqdm'] = None; sys.argv[1:] = "
-        f"['bake', {str(tmp_path / 'edit.blend')!r}, '--strip=Shutter']; import runpy;"
-        " runpy.run_module('shutter_addon', run_name='__main__')"
-    )
-    said = subprocess.run([sys.executable, "-c", script], cwd=ROOT, capture_output=True, text=True)
-    assert said.returncode == 0, said.stderr
-
-
-def test_parts_of_a_movie_are_kept(film, tmp_path, monkeypatch):
-    monkeypatch.setattr(film_parts, "LENGTH", 4)
-    scene, effect, strip = film(smooth=True)
-    film_of = baked_film.film_of(scene, effect, strip, "MOVIE")
-    assert [len(frames) for _path, frames in film_of.parts] == [4, 4, 1]
-
-    class KilledError(Exception):
-        pass
-
-    def killed(done):
-        if done == 6:
-            raise KilledError
-
-    with pytest.raises(KilledError):
-        baked_film.render(scene, effect, strip, film_of, killed)
-    first = film_of.parts[0][0]
-    assert [path.is_file() for path, _ in film_of.parts] == [True, False, False]
-    assert not film_of.is_finished()
-    written, told = first.stat().st_mtime_ns, []
-
-    def tell(done):
-        told.append(done)
-        if done == 4 and len(told) == 1:
-            assert first.stat().st_mtime_ns == written
-
-    baked_film.render(scene, effect, strip, film_of, tell)
-    assert told[0] == 4
-    assert told[-1] == COUNT
-    assert film_of.is_finished()
-
-
-def test_a_movie_that_another_process_finishes_meanwhile_is_there(film, tmp_path, monkeypatch):
-    monkeypatch.setattr(film_parts, "LENGTH", 4)
-    scene, effect, strip = film(smooth=True)
-    film_of = baked_film.film_of(scene, effect, strip, "MOVIE")
-    baked_film.render(scene, effect, strip, film_of, lambda _done: None)
-    film_of.place.rename(tmp_path / "whole")
-    told = []
-
-    def tell(done):
-        told.append(done)
-        if done == 6:
-            (tmp_path / "whole").rename(film_of.place)
-            baked_film._remove_parts(film_of)  # as the other process does at its end
-
-    baked_film.render(scene, effect, strip, film_of, tell)
-    assert told[-1] == COUNT
-    assert film_of.is_finished()
-    assert not film_of.place.with_suffix(".parts").exists()
-
-
 @pytest.mark.parametrize(
     ("words", "sentence"),
     [
@@ -301,19 +226,6 @@ def test_what_cannot_be_baked_is_one_sentence(film, tmp_path, words, sentence):
     assert said.returncode == 2
     assert sentence in said.stderr
     assert len(said.stderr.splitlines()) == 1
-
-
-def test_a_copy_in_another_place_is_of_the_same_version(bpy, film, tmp_path):
-    scene, effect, strip = film()
-    here = baked_film.film_of(scene, effect, strip, "OPEN_EXR").version
-    away = tmp_path / "away"
-    shutil.copytree(tmp_path / "in", away / "in")
-    source = strips.source_of(scene, effect, strip)
-    source.directory = str(away / "in")
-    assert baked_film.film_of(scene, effect, strip, "OPEN_EXR").version == here
-    (away / "in" / "f0002.png").write_bytes((away / "in" / "f0003.png").read_bytes())
-    revision.changed()
-    assert baked_film.film_of(scene, effect, strip, "OPEN_EXR").version != here
 
 
 def test_it_plays_without_the_extension(bpy, film, tmp_path):
@@ -352,10 +264,11 @@ def test_a_copy_of_all_of_it_is_unbaked_alone(bpy, film):
 
 
 def test_the_baked_strip_looks_as_the_effect_strip(bpy, film, tmp_path):
-    """Transform, crop, flip and opacity, keys included, and in a meta strip."""
+    """Transform, crop, flip, opacity and modifiers, keys included, and in a meta strip."""
     scene, _effect, strip = film(4)
     strip.transform.offset_x, strip.transform.rotation, strip.crop.min_y = 3, 0.2, 4
     strip.transform.scale_x, strip.use_flip_x, strip.color_saturation = 0.5, True, 0.4
+    strip.modifiers.new("bright", "BRIGHT_CONTRAST").bright = 20
     for frame, opacity in ((1, 1.0), (9, 0.2)):
         strip.blend_alpha = opacity
         strip.keyframe_insert("blend_alpha", frame=frame)
@@ -398,20 +311,6 @@ def test_keys_that_moved_along_are_no_change_and_others_are(bpy, film, change):
     assert states(scene, strip) == [True]
 
 
-@pytest.mark.parametrize("keyed", ["one axis", "muted"])
-def test_a_value_that_no_curve_drives_is_a_change(bpy, film, keyed):
-    """Another component of what is keyed, and what a muted curve leaves alone."""
-    scene, effect, strip = film()
-    region = effect.regions[0]
-    region.keyframe_insert("location", index=0, frame=1)
-    if keyed == "muted":
-        scene.animation_data.action.layers[0].strips[0].channelbags[0].fcurves[0].mute = True
-    bake(bpy)
-    assert states(scene, strip) == [False]
-    region.location[0 if keyed == "muted" else 1] += 0.25
-    assert states(scene, strip) == [True]
-
-
 def test_check_tells_of_a_stale_film_that_is_shown(bpy, film):
     scene, effect, strip = film()
     baked = bake(bpy)
@@ -424,42 +323,12 @@ def test_check_tells_of_a_stale_film_that_is_shown(bpy, film):
     assert edit_check.stale_films(scene, range(1, COUNT + 1)) == []
 
 
-def test_names_are_no_change(bpy, film):
-    scene, effect, strip = film()
-    bake(bpy)
-    effect.shutters[1].name, effect.shutters[0].color = "another", (1, 0, 0)
-    effect.regions[0].shutter = "another"
-    effect.regions[0].name = strip.name = "name"
-    assert states(scene, strip) == [False]
-
-
 def test_a_longer_strip_is_stale(bpy, film):
     scene, _effect, strip = film()
     strip.right_handle = 6
     baked = bake(bpy)
     strip.right_handle = baked.right_handle = 10
     assert states(scene, strip) == [True]
-
-
-def test_any_retouched_frame_is_a_change(bpy, film, tmp_path):
-    """Of a file that is read in blocks where there are many."""
-    scene, effect, strip = film()
-    before = baked_film.film_of(scene, effect, strip, "OPEN_EXR").version
-    rows = np.random.default_rng(5).integers(0, 256, (180, 320, 3), dtype=np.uint8)
-    path = tmp_path / "in" / "f0004.png"
-    output = OpenImageIO.ImageOutput.create("png")
-
-    def write(picture):
-        output.open(str(path), OpenImageIO.ImageSpec(320, 180, 3, "uint8"))
-        output.write_image(picture)
-        output.close()
-
-    write(rows)
-    revision.changed()
-    first = effect_version.key(scene, effect, strip, effect_version.frames_of(strip))
-    rows[90, 160] ^= 128
-    write(rows)
-    assert first not in (before, effect_version.key(scene, effect, strip, effect_version.frames_of(strip)))
 
 
 @pytest.mark.parametrize("is_deleted", [False, True])
@@ -482,28 +351,6 @@ def test_what_lies_above_stays_above(bpy, film, tmp_path, is_deleted):
     assert (rendered(bpy, scene, tmp_path / "again", (4,)) == before).all()
 
 
-def test_half_of_a_cut_effect_is_baked_again(bpy, film, tmp_path):
-    scene, _effect, strip = film()
-    before = rendered(bpy, scene, tmp_path / "effect", (3, 7))
-    baked = bake(bpy)
-    source = next(each for each in scene.sequence_editor.strips if each.name == "images")
-    for each in (baked, strip, source):
-        each.split(5, "SOFT")
-    part = next(each for each in scene.sequence_editor.strips if each.type == "SCENE" and each != strip)
-    selection.choose(scene, part)
-    bake(bpy)
-    assert len(baked_in(scene)) == 2
-    assert np.abs(rendered(bpy, scene, tmp_path / "baked", (3, 7)) - before).max() < 1e-4
-
-
-def test_modifiers_go_along(bpy, film, tmp_path):
-    scene, _effect, strip = film()
-    strip.modifiers.new("bright", "BRIGHT_CONTRAST").bright = 20
-    before = rendered(bpy, scene, tmp_path / "effect", (4,))
-    bake(bpy)
-    assert np.abs(rendered(bpy, scene, tmp_path / "baked", (4,)) - before).max() < 1e-4
-
-
 @pytest.mark.parametrize("owner", ["strobe", "input"])
 def test_what_cannot_stand_in_is_refused(bpy, film, owner):
     scene, _effect, strip = film()
@@ -515,19 +362,6 @@ def test_what_cannot_stand_in_is_refused(bpy, film, owner):
         said = "is the input of another strip"
     with pytest.raises(RuntimeError, match=said):
         bpy.ops.shutter.bake(file_format="OPEN_EXR")
-    assert not strip.mute
-
-
-def test_an_effect_beside_a_visible_one_is_unbaked(bpy, film):
-    scene, effect, strip = film()
-    bake(bpy)
-    source = scene.sequence_editor.strips.new_image("other", str(Path(bpy.data.filepath).parent / "in/f0001.png"), 8, 1)
-    source.right_handle = COUNT + 1
-    _strip, other = add_effect.add_effect(scene, source)
-    other_name = other.name
-    selection.choose(scene, baked_in(scene)[0])
-    assert selection.active(bpy.context)[1].name == effect.name != other_name
-    assert bpy.ops.shutter.unbake() == {"FINISHED"}
     assert not strip.mute
 
 
@@ -594,29 +428,6 @@ def test_a_bake_ends_with_the_blender_that_began_it(bpy, film):
         job.end()
 
 
-def test_nothing_is_rendered_for_a_blender_that_has_ended_before(film, tmp_path):
-    film()
-    words = ["bake", str(tmp_path / "edit.blend"), "--strip=Shutter", "--attached"]
-    command = [sys.executable, "-m", "shutter_addon", *words]
-    said = subprocess.run(command, cwd=ROOT, stdin=subprocess.DEVNULL, capture_output=True, text=True)
-    assert said.returncode == film_output.INTERRUPTED, said.stderr
-    assert " of " not in said.stdout
-    assert not list(tmp_path.rglob("*.mp4"))
-
-
-def test_a_transparent_source_beside_another_bake_is_shown(bpy, film, tmp_path):
-    scene, _effect, _strip = film(4)
-    bake(bpy)
-    first = str(tmp_path / "in" / "f0001.png")
-    source = scene.sequence_editor.strips.new_image("other", first, 1, 1)
-    source.channel, source.right_handle = 1, COUNT + 1
-    other, _effect = add_effect.add_effect(scene, source)
-    assert source.mute
-    scene.sequence_editor.strips.remove(other)
-    reconcile.update()
-    assert not source.mute
-
-
 @pytest.mark.skipif(os.name != "posix", reason="links need no rights there alone")
 @pytest.mark.parametrize(("kind", "name"), [("OPEN_EXR", "0001.exr"), ("MOVIE", "0001.mp4")])
 def test_nothing_is_baked_or_removed_behind_a_link(bpy, film, tmp_path, kind, name):
@@ -634,12 +445,3 @@ def test_nothing_is_baked_or_removed_behind_a_link(bpy, film, tmp_path, kind, na
         link.symlink_to(outside)
     bake(bpy, kind)
     assert [(path.name, path.read_bytes()) for path in outside.iterdir()] == [(name, b"mine")]
-
-
-def test_nothing_of_a_killed_bake_is_left(bpy, film):
-    scene, effect, strip = film()
-    parts = baked_film.film_of(scene, effect, strip, "MOVIE").place.with_suffix(".parts")
-    (half := parts / f".part-{1:016x}").mkdir(parents=True)
-    (half / "0001.mp4").write_bytes(b"half")
-    bake(bpy, "MOVIE")
-    assert not parts.exists()

@@ -8,7 +8,6 @@ import pytest
 from support import image_strip, request, write_frames
 
 from shutter_addon.blender.data import annotations, consistency, fcurves, selection, snapshot, strips, validation
-from shutter_addon.blender.data.property_copy import copy_properties
 from shutter_addon.blender.editing import (
     add_effect,
     follow_track,
@@ -19,7 +18,7 @@ from shutter_addon.blender.editing import (
 )
 from shutter_addon.core.model import motions
 from shutter_addon.core.model.motions import Similarity
-from shutter_addon.media import camera_tracking, registration, tracking
+from shutter_addon.media import camera_tracking, registration
 
 SIZE = WIDTH, HEIGHT = 240, 160
 COUNT = 12
@@ -146,21 +145,6 @@ def test_the_camera_is_tracked_behind_what_regions_cover(bpy, effect):
     assert keys(bpy)[0][0][0] == 11
 
 
-def test_without_the_region_it_goes_with_the_subject(bpy, effect):
-    region_edits.remove_region(effect, 0)
-    edit, effect, strip = active(bpy)
-    list(track_region.track(edit, effect, strip, None, range(11, 23), "SCALE"))
-    assert apart(placements(bpy), TRUTH, 16) > 5
-
-
-def test_closed_early_it_keeps_what_it_has(bpy, effect):
-    edit, effect, strip = active(bpy)
-    steps = track_region.track(edit, effect, strip, None, range(16, 23), "SCALE", all_keys=True)
-    assert [next(steps), next(steps)] == [17, 18]
-    steps.close()
-    assert [frame for frame, *_ in keys(bpy)[0]] == [16, 17, 18]
-
-
 @pytest.mark.parametrize("name", ["track_camera", "tripod"])
 def test_the_buttons_are_one_step_of_undo(bpy, effect, name):
     effect.camera.track_until = 18
@@ -210,13 +194,6 @@ def test_what_cannot_be_tracked_is_said_and_changes_nothing(bpy, edit, effect, t
     refuses(bpy, name, "no such file")
 
 
-@pytest.mark.parametrize(("count", "sentence"), [(3, camera_tracking.BARE), (1, tracking.ALONE)])
-def test_a_flat_wall_and_a_single_frame(bpy, edit, tmp_path, count, sentence):
-    new_effect(edit, new_source(edit, write_frames(tmp_path / "wall", np.full((count, *SIZE[::-1], 3), 90, np.uint8))))
-    edit.frame_set(11)
-    refuses(bpy, "track_camera", sentence)
-
-
 DARK = texture(WIDTH, HEIGHT) // 4
 
 
@@ -262,22 +239,6 @@ def test_where_the_cameras_motion_is_unknown_exposures_become_short(bpy, edit, t
     for curve in fcurves.curves_under(edit, f"{effect.camera.path_from_id()}.influence"):
         curve.mute = True
     assert len(np.flatnonzero(request(*active(bpy), 40).state.bars[0])) == 8
-
-
-def test_a_button_goes_to_the_frames_that_need_a_look(bpy, edit, effect):
-    track = motion_keys.MotionKeys(effect, None, "SCALE")
-    track.write({11: motions.Placement(), 15: motions.Placement()}, {11: 1.0, 12: 0.4, 13: 0.2, 14: 0.9, 15: 1.0})
-    edit.frame_set(11)
-    call(bpy, "track_camera_look")
-    assert edit.frame_current == 13
-
-
-def test_a_copy_of_the_effect_has_the_cameras_keys_and_stops(bpy, edit, effect):
-    effect.camera.location, effect.camera.track_all_keys = (0.25, 0), True
-    effect.camera.stops.add().frame = 7
-    new = edit.virtual_shutter.effects.add()
-    copy_properties(edit.virtual_shutter.effects[0], new)
-    assert (new.camera.location[0], new.camera.track_all_keys, new.camera.stops[0].frame) == (0.25, True, 7)
 
 
 # From a movie clip

@@ -75,12 +75,6 @@ def test_a_movie(edit, render, clip_strip, movie):
     check(edit, render, clip_strip(movie), range(1, 21, 2))
 
 
-def test_start_and_offset_of_a_movie(edit, render, clip_strip, movie):
-    source = clip_strip(movie, 40)
-    source.clip.frame_start, source.clip.frame_offset = 7, 5
-    check(edit, render, source, range(40, 54, 3))
-
-
 def test_trimmed_cut_and_reversed(edit, render, clip_strip, movie):
     source = clip_strip(movie, 40)
     source.left_handle, source.right_handle = 43, 55
@@ -89,18 +83,9 @@ def test_trimmed_cut_and_reversed(edit, render, clip_strip, movie):
     check(edit, render, right, range(48, 55))
 
 
-def test_a_real_film(edit, render, clip_strip, bunny):
-    edit.render.resolution_x, edit.render.resolution_y = 1280, 720
-    check(edit, render, clip_strip(bunny), [1, 50, 132], levels=0)
-
-
 @pytest.mark.parametrize("channels", [3, 4])
 def test_images(edit, render, tmp_path, clip_strip, channels):
     check(edit, render, clip_strip(pngs(tmp_path / "in", channels)), range(1, 13, 2))
-
-
-def test_deep_images(edit, render, tmp_path, clip_strip):
-    check(edit, render, clip_strip(pngs(tmp_path / "in", 4, samples=np.uint16)), [1, 5], depth="16")
 
 
 def test_start_and_offset_of_images(bpy, edit, render, tmp_path, clip_strip):
@@ -123,7 +108,7 @@ def test_images_some_of_which_have_alpha(edit, render, tmp_path, clip_strip):
     check(edit, render, clip_strip(first), [1, 3, 4, 7], depth="16")
 
 
-@pytest.mark.parametrize("space", ["Non-Color", "Linear Rec.709", "Rec.2020", "AgX Log"])
+@pytest.mark.parametrize("space", ["Non-Color", "AgX Log"])
 def test_colour_spaces(edit, render, tmp_path, clip_strip, movie, space):
     source = clip_strip(pngs(tmp_path / "in"))
     spaces = source.clip.colorspace_settings.bl_rna.properties["name"].enum_items.keys()

@@ -58,16 +58,6 @@ def test_a_median_is_the_empty_street(edited):
     assert 10 * np.log10(255**2 / noise) >= 38
 
 
-@pytest.mark.parametrize("length", [3, 9])
-def test_trails_are_as_bright_as_what_leaves_them(edited, length):
-    bars = [0] * ((WINDOW - length) // 2) + [1] * length + [0] * ((WINDOW - length) // 2)
-    found = picture(*edited(combine="lightest", bars=bars), 8)
-    frames = np.stack([frame(7 + k) for k in range(-(length // 2), length // 2 + 1)])
-    assert np.abs(found - frames.max(axis=0)).max() <= 1
-    dark = picture(*edited(combine="darkest", bars=bars), 8)
-    assert np.abs(dark - frames.min(axis=0)).max() <= 1
-
-
 def test_a_threshold_is_keyed(edited):
     """From where on the bright walker alone leaves a trail; behind it the shown frame stays."""
     keys = [{"frame": 4, "value": 2.0, "ease": "constant"}, {"frame": 8, "value": 0.8}]

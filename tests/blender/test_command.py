@@ -7,8 +7,6 @@ from support import read_picture, recipe, write_frames
 
 from shutter_addon.blender.commands import command_line
 from shutter_addon.core.frames import light
-from shutter_addon.core.pixels import compositor
-from shutter_addon.core.recipes import recipe_file
 from shutter_addon.media import open_source
 
 
@@ -18,10 +16,6 @@ def still(window, k=0):
 
 def line(shutter, *points, **fields):
     return {"shutter": shutter, "strokes": [[list(p) for p in points]], **fields}
-
-
-TOP = line("S0", (-0.1, 1.0), (1.1, 1.0), width=0.0)
-BOTTOM = line("S1", (-0.1, 0.0), (1.1, 0.0), width=0.0)
 
 
 @pytest.fixture(scope="module")
@@ -48,33 +42,6 @@ def test_a_still_frame_gives_the_sequence_back(command, noise, tmp_path, same_pi
         same_pixels(read_picture(tmp_path / "out" / name), frames[i], 1)
 
 
-@pytest.mark.parametrize("light_", ["linear", "encoded"])
-def test_equal_bars_are_the_mean(command, noise, tmp_path, same_pixels, light_):
-    first, frames = noise
-    command(first, "--output", tmp_path / "out", "--frames", "2:3", recipe=recipe(8, np.ones(8), light=light_))
-    for frame in (2, 3):
-        window = frames[frame - 1 : frame + 7]
-        expected = levels(linear(window).mean(axis=0)) if light_ == "linear" else window.mean(axis=0)
-        same_pixels(read_picture(tmp_path / "out" / f"{frame:04d}.png"), expected, 1)
-
-
-def test_two_edges_are_a_slit_scan(command, bunny, tmp_path):
-    window = 16
-    data = recipe(window, still(window), still(window, window - 1), regions=[TOP, BOTTOM])
-    command(bunny, "--output", tmp_path / "out", "--frames", "40", recipe=data)
-    with open_source(bunny) as source:
-        frames = linear(np.stack([source.read(39 + k)[..., :3] for k in range(window)]))
-    height = frames.shape[1]
-    times = np.clip((np.arange(height) - 0.5) / (height - 2), 0, 1) * (window - 1)
-    rows = np.arange(height)
-    low = np.minimum(times.astype(int), window - 2)
-    part = (times - low)[:, None, None]
-    expected = levels((1 - part) * frames[low, rows] + part * frames[low + 1, rows])
-    difference = np.abs(read_picture(tmp_path / "out" / "0040.png") - expected)
-    assert difference.mean() <= 1
-    assert difference.max() <= 8
-
-
 def test_a_window_stops_at_a_cut(command, tmp_path, same_pixels):
     """In chunks as in one go, and not where the recipe says so."""
     rng = np.random.default_rng(3)
@@ -92,43 +59,6 @@ def test_a_window_stops_at_a_cut(command, tmp_path, same_pixels):
         assert np.array_equal(whole, part)
     command(first, "--output", tmp_path / "off", "--frames", "5", recipe=data | {"stop_at_cuts": False})
     same_pixels(read_picture(tmp_path / "off" / "0005.png"), levels(linear(frames[4:8]).mean(axis=0)), 1)
-
-
-def test_a_keyed_delta_stays_one_sharp_frame(command, noise, tmp_path, same_pixels):
-    first, frames = noise
-    data = recipe(9, {1: still(9), 9: still(9, 8)})
-    command(first, "--output", tmp_path / "out", "--frames", "1:5", recipe=data | {"edges": "hold"})
-    for frame in range(1, 6):
-        source = min(2 * (frame - 1), 11)
-        same_pixels(read_picture(tmp_path / "out" / f"{frame:04d}.png"), frames[source], 1)
-
-
-@pytest.mark.parametrize("interpolation", ["displacement", "value"])
-def test_random_bars_equal_the_reference(command, noise, tmp_path, same_pixels, interpolation):
-    rng = np.random.default_rng(1)
-    data = recipe(
-        8,
-        *rng.random((3, 8)),
-        interpolation=interpolation,
-        regions=[
-            line("S0", (0.1, 0.1), (0.2, 0.8), width=0.1),
-            line("S1", (0.5, 0.9), (0.9, 0.7), (0.8, 0.2), width=0.05),
-            line("S2", (0.4, 0.3), (0.6, 0.3), (0.5, 0.6), kind="lasso"),
-        ],
-    )
-    first, frames = noise
-    command(first, "--output", tmp_path / "out", "--weights", tmp_path / "w", "--frames", "2", recipe=data)
-    coefficients = read_picture(tmp_path / "w" / "0002.exr")
-    assert coefficients.shape == (48, 64, 3)
-    assert np.abs(coefficients.sum(axis=-1) - 1).max() < 1e-5
-    image = OpenImageIO.ImageInput.open(str(tmp_path / "w" / "0002.exr"))
-    assert image.spec().channelnames == ("S0", "S1", "S2")
-    image.close()
-    moment = recipe_file.parse((tmp_path / "recipe.json").read_text()).for_picture(64 / 48).at(2)
-    window = np.dstack([linear(frames[1:9]).transpose(1, 2, 3, 0)]).transpose(3, 0, 1, 2)
-    opaque = np.concatenate([window, np.ones((*window.shape[:3], 1))], axis=-1)
-    expected = compositor.compose(moment, opaque, np.ones(8, bool), np.moveaxis(coefficients, -1, 0))
-    same_pixels(read_picture(tmp_path / "out" / "0002.png"), levels(expected[..., :3]), 1)
 
 
 def test_weights_have_a_channel_for_each_layer(command, noise, tmp_path):
@@ -165,17 +95,6 @@ def test_chunks_and_order_change_no_bit(command, noise, tmp_path, layer):
     for frame in range(1, 13):
         whole, part = (tmp_path / f / f"{frame:04d}.png" for f in ("whole", "parts"))
         assert np.array_equal(read_picture(whole), read_picture(part))
-
-
-def test_both_devices_agree(command, noise, tmp_path, same_pixels):
-    first, _ = noise
-    rng = np.random.default_rng(3)
-    data = recipe(
-        8, *rng.random((2, 8)), regions=[line("S0", (0.1, 0.1), (0.9, 0.2)), line("S1", (0.5, 0.7), (0.6, 0.9))]
-    )
-    for device in ("gpu", "cpu"):
-        command(first, "--output", tmp_path / device, "--frames", "3", "--device", device, recipe=data)
-    same_pixels(read_picture(tmp_path / "cpu" / "0003.png"), read_picture(tmp_path / "gpu" / "0003.png"), 1)
 
 
 def test_exr_is_scene_linear(command, noise, tmp_path):
@@ -228,15 +147,6 @@ def test_alpha_is_carried(command, tmp_path, same_pixels):
     assert np.abs(picture[..., :3] - expected)[solid].max() <= 1.5
 
 
-def test_a_gap_in_the_numbering_holds(command, noise, tmp_path, same_pixels):
-    _, frames = noise
-    first = write_frames(tmp_path / "in", frames[:6])
-    (tmp_path / "in" / "f0003.png").unlink()
-    command(first, "--output", tmp_path / "out", recipe=recipe(1, [1]))
-    for frame, source in zip(range(1, 7), (0, 1, 1, 3, 4, 5), strict=True):
-        same_pixels(read_picture(tmp_path / "out" / f"{frame:04d}.png"), frames[source], 1)
-
-
 @pytest.mark.parametrize("suffix", [".png", ".jp2"])
 def test_files_that_a_gap_would_show_are_the_sources_own(noise, tmp_path, suffix):
     """The number in a suffix is none of theirs."""
@@ -245,13 +155,3 @@ def test_files_that_a_gap_would_show_are_the_sources_own(noise, tmp_path, suffix
     (tmp_path / f"f0003{suffix}").unlink()
     with open_source(tmp_path / f"f0001{suffix}") as source:
         assert tmp_path / f"f0003{suffix}" in command_line.files(source)
-
-
-def test_a_number_far_off_is_left_out(command, noise, tmp_path):
-    first = write_frames(tmp_path / "in", noise[1][:2])
-    (tmp_path / "in" / "f20261121.png").write_bytes(first.read_bytes())
-    done = command(first, "--output", tmp_path / "out", recipe=recipe(1, [1]))
-    assert done.stderr.splitlines()[0] == (
-        "Virtual Shutter: f0001.png: the sequence ends with f0002.png; too many numbers lie before f20261121.png"
-    )
-    assert len(list((tmp_path / "out").iterdir())) == 2

@@ -2,8 +2,6 @@
 
 import ast
 import re
-import subprocess
-import sys
 from pathlib import Path
 
 ROOT = Path(__file__).parents[2]
@@ -53,17 +51,6 @@ def test_nothing_deprecated_of_strips(bpy):
     assert not [use for path in files() for use in uses(path, strips - shared, shared)]
 
 
-def test_uses_are_found(bpy, tmp_path):
-    strips, shared = deprecated(bpy)
-    path = tmp_path / "code.py"
-    for name in strips:
-        path.write_text(f"strip.{name} = 1")
-        assert list(uses(path, strips - shared, shared)), name
-    for name in shared:
-        path.write_text(f"edit.{name} = item.clip.{name}")
-        assert not list(uses(path, strips - shared, shared)), name
-
-
 # Uses what Blender deprecates of a strip, and then what Python does.
 USES = """
 import warnings, bpy
@@ -81,11 +68,6 @@ REFUSED = "REFUSED\nREFUSED\n"
 def test_what_is_deprecated_fails(bpy, edit, capsys):
     exec(USES, {})
     assert capsys.readouterr().out == REFUSED
-
-
-def test_what_is_deprecated_fails_in_children():
-    done = subprocess.run([sys.executable, "-c", USES], capture_output=True, text=True, check=True)
-    assert done.stdout.endswith(REFUSED)
 
 
 def test_what_is_deprecated_fails_in_a_real_blender(blender):

@@ -6,7 +6,7 @@ import cv2
 import exact_diffusion
 import numpy as np
 import pytest
-from support import image_strip, picture_of, read_picture, recipe, request, state, write_frames
+from support import image_strip, picture_of, recipe, request, state, write_frames
 
 from shutter_addon.blender.data import recipe_import
 from shutter_addon.blender.editing import add_effect
@@ -20,7 +20,6 @@ from shutter_addon.media import open_source
 
 SIZE, COUNT = (128, 72), 9
 STROKE = {"name": "Belly", "shutter": "S1", "width": 0.03, "strokes": [[[0.36, 0.6], [0.36, 0.3]]]}
-KEYS = [{"frame": 1, "value": 0.2}, {"frame": 9, "value": 1}]
 
 
 @pytest.fixture(scope="module")
@@ -51,31 +50,6 @@ def expected(first, moment, index: int):
     frames = light.premultiplied(samples / 255, light.to_linear)[np.maximum(indices, 0)]
     picture = compositor.compose(moment, frames, indices >= 0, pixels)
     return c, light.to_encoded(picture[..., :3]) * 255
-
-
-@pytest.mark.parametrize("aggregate", [1, 2])
-def test_a_render_equals_the_reference(command, film, tmp_path, same_pixels, aggregate):
-    """With keys of its strength, and so do the coefficients that are written."""
-    data = effect_recipe(aggregate=aggregate, edge_aware=KEYS)
-    command(film, "--output", tmp_path / "out", "--weights", tmp_path / "w", "--frames", "4:9", recipe=data)
-    found = recipe_file.parse((tmp_path / "recipe.json").read_text())
-    for frame in (4, 9):
-        moment = found.for_picture(SIZE[0] / SIZE[1]).at(frame)
-        assert moment.options.edge_aware == pytest.approx(0.2 + 0.1 * (frame - 1))
-        c, picture = expected(film, moment, frame - 1)
-        written = np.moveaxis(read_picture(tmp_path / "w" / f"{frame:04d}.exr"), -1, 0)
-        assert np.abs(written - c).max() <= 1 / 255
-        same_pixels(read_picture(tmp_path / "out" / f"{frame:04d}.png"), picture, 1, f"aggregate{aggregate}-{frame}")
-
-
-def test_chunks_are_the_whole(command, film, tmp_path):
-    """Bit for bit, with keys of its strength."""
-    data = effect_recipe(edge_aware=KEYS, position="center")
-    command(film, "--output", tmp_path / "whole", recipe=data)
-    for chunk in ("6:9", "3:4"):
-        command(film, "--output", tmp_path / "parts", "--frames", chunk, recipe=data)
-    for k in (3, 4, 6, 7, 8, 9):
-        assert np.array_equal(*(read_picture(tmp_path / way / f"{k:04d}.png") for way in ("whole", "parts")))
 
 
 @pytest.fixture

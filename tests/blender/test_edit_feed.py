@@ -12,7 +12,6 @@ from shutter_addon.blender.editing import add_effect, shutter_edits
 from shutter_addon.blender.output import edit_feed
 from shutter_addon.blender.output.edit_feed import LevelsFile
 from shutter_addon.blender.rendering import render_job
-from shutter_addon.media import open_source
 
 COUNT, HEIGHT, WIDTH = 8, 24, 40
 
@@ -89,11 +88,6 @@ def plain(edit, source, strip, folder):
 
 def without_dither(edit, source, strip, folder):
     edit.render.dither_intensity = 0
-    return ALL
-
-
-def much_dither(edit, source, strip, folder):
-    edit.render.dither_intensity = 1.7
     return ALL
 
 
@@ -299,17 +293,7 @@ def keyed_effect(edit, source, strip, folder):
 
 
 EDITS = [
-    *(
-        plain,
-        without_dither,
-        much_dither,
-        with_alpha_channel,
-        jpeg,
-        black_and_white,
-        sixteen_bits,
-        another_view,
-        brighter_view,
-    ),
+    *(plain, without_dither, with_alpha_channel, jpeg, black_and_white, sixteen_bits, another_view, brighter_view),
     *(replacing, blended, half_shown, fading, modified, moved, cropped, smaller, larger_edit, cut, muted, ends_early),
     *(marked, with_metadata_of_strips, deinterlaced),
     *(titled, title_is_muted, title_comes, adjusted, in_a_transition, in_a_meta, two_effects, keyed_effect),
@@ -358,23 +342,6 @@ def test_a_single_picture_keeps_its_floats(bpy, edit, made, tmp_path):
     bpy.data.images["Render Result"].save_render(str(tmp_path / "still.exr"), scene=edit)
     values = OpenImageIO.ImageBuf(str(tmp_path / "still.exr")).get_pixels("float")[..., :3]
     assert len(np.unique(values)) > 256
-
-
-def test_a_movie_has_the_engines_bits(bpy, edit, made, tmp_path, monkeypatch):
-    made()
-    edit.render.image_settings.media_type = "VIDEO"
-    edit.render.ffmpeg.format, edit.render.ffmpeg.codec = "MKV", "FFV1"
-
-    def film(name):
-        edit.render.filepath, edit.render.use_file_extension = str(tmp_path / name), False
-        assert bpy.ops.render.render(animation=True) == {"FINISHED"}
-        with open_source(tmp_path / name) as source:
-            return np.stack([source.read(index) for index in range(source.count)])
-
-    found = film("fed.mkv")
-    monkeypatch.setattr(edit_feed, "begin", lambda _scene: None)
-    assert len(found) == COUNT
-    assert np.array_equal(found, film("engine.mkv"))
 
 
 @pytest.mark.parametrize("how", ["stopped", "saved"])

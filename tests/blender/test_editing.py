@@ -50,12 +50,6 @@ def layers(effect):
     return [layer.info for layer in effect.scene.annotation.layers]
 
 
-def draw(effect, index, points=((0, 0), (5, 5)), frame=1):
-    stroke = annotations.layer_of(effect, effect.regions[index]).frames.new(frame).strokes.new()
-    stroke.points.add(len(points))
-    stroke.points.foreach_set("co", np.ravel([(*p, 0) for p in points]))
-
-
 def picture_bars(effect, index, frame):
     """What a picture at a frame is made with."""
     edit, _, strip = strips.find_effect(effect.scene)
@@ -63,11 +57,6 @@ def picture_bars(effect, index, frame):
 
 
 # Finding
-
-
-def test_what_belongs_to_an_effect_finds_it(effect):
-    region = region_edits.add_region(effect, effect.shutters[1])
-    assert selection.effect_of_item(region) == selection.effect_of_item(effect.shutters[1]) == effect
 
 
 def test_the_active_shutter_and_its_active_region(effect):
@@ -109,14 +98,6 @@ def test_a_unique_name_is_the_wish_or_begins_with_it(name, taken):
 
 
 # Shutters
-
-
-def test_a_new_effect_has_a_long_and_a_sharp_shutter(effect):
-    assert [shutter.name for shutter in effect.shutters] == ["Long", "Sharp"]
-    assert consistency.bars(effect.shutters[0]).tolist() == [1] * 8
-    assert consistency.bars(effect.shutters[1]).tolist() == [1] + [0] * 7
-    assert effect.border
-    assert effect.active_shutter == 1
 
 
 def test_an_added_shutter_is_open_has_a_name_and_a_color_and_is_active(effect):
@@ -164,15 +145,6 @@ def test_a_removed_shutter_takes_its_keys_regions_and_layers_along(three):
     assert layers(three) == []
 
 
-def test_a_curve_that_goes_by_a_name_stays(three):
-    """Scripts make such curves, which are in the way of no shutter that goes."""
-    path = f'{three.path_from_id()}.shutters["C"].trail'
-    fcurves.new_curve(three.id_data, path)
-    shutter_edits.remove_shutter(three, 0)
-    assert [shutter.name for shutter in three.shutters] == ["B", "C"]
-    assert fcurves.find_curve(three.id_data, path) is not None
-
-
 @pytest.mark.parametrize(("index", "to", "order"), [(0, 2, "BCA"), (2, 0, "CAB"), (1, 1, "ABC"), (1, 2, "ACB")])
 def test_a_moved_shutter_keeps_its_keys(three, index, to, order):
     before = shutters_of(three)
@@ -192,14 +164,6 @@ def test_regions_follow_a_renamed_shutter(three):
     assert three.shutters[0].name == "B.001"
 
 
-def test_a_copy_with_the_same_name_takes_no_regions_along(three):
-    """As in old files, or of a recipe: the regions are those of the first."""
-    region_edits.add_region(three, three.shutters[0])
-    three.shutters[1]["name"] = "A"  # past the property's own check
-    assert consistency.rename(three, "A", "Z") == "Z"
-    assert three.regions[0].shutter == "A"
-
-
 def test_scribbles_have_the_color_of_their_shutter(effect):
     for shutter in (0, 1):
         region_edits.add_region(effect, effect.shutters[shutter])
@@ -211,31 +175,6 @@ def test_scribbles_have_the_color_of_their_shutter(effect):
 
 
 # Bars
-
-
-def test_set_bars(effect):
-    values = RNG.random(8)
-    bar_edits.set_bars(effect.shutters[0], values)
-    assert consistency.bars(effect.shutters[0]) == pytest.approx(values, abs=1e-7)
-    with pytest.raises(ValueError, match="shorter"):
-        bar_edits.set_bars(effect.shutters[0], values[:5])
-
-
-def test_bars_that_stay_keep_the_sequencers_frames(effect, monkeypatch):
-    dropped = []
-    monkeypatch.setattr(strips, "invalidate", dropped.append)
-    bar_edits.set_bars(effect.shutters[0], np.ones(8))
-    assert not dropped
-    bar_edits.set_bars(effect.shutters[0], [0.5, *np.ones(7)])
-    assert len(dropped) == 1
-
-
-def test_painted_bars_are_keyed_if_asked(effect):
-    bar_edits.paint(effect, 0, np.full(8, 0.5))
-    assert bar_edits.key_state(effect, 0) == [""] * 8
-    bar_edits.paint(effect, 0, np.full(8, 0.25), key=True)
-    assert consistency.bars(effect.shutters[0]).tolist() == [0.25] * 8
-    assert bar_edits.key_state(effect, 0) == ["keyed"] * 8
 
 
 def test_a_summary_in_words():
@@ -345,16 +284,6 @@ def test_bars_now_are_those_of_the_picture(three):
     assert np.abs(bar_edits.bars_now(three, 0) - consistency.bars(three.shutters[0])).max() > 0.01
 
 
-def test_bars_now_are_the_changed_ones_until_the_frame_changes(three):
-    edit = three.id_data
-    edit.frame_set(5)
-    shown = bar_edits.bars_now(three, 0)
-    bar_edits.set_bars(three.shutters[0], np.full(8, 0.5))
-    assert bar_edits.bars_now(three, 0).tolist() == [0.5] * 8
-    edit.frame_set(5)
-    assert bar_edits.bars_now(three, 0) == pytest.approx(shown)
-
-
 def test_a_key_between_keys_keeps_the_picture(effect):
     """Between two sharp frames lies a sharp frame: the F-curves, a cross-fade, would key two half ones."""
     edit = effect.id_data
@@ -368,13 +297,6 @@ def test_a_key_between_keys_keeps_the_picture(effect):
     assert bar_edits.key_state(effect, 0) == ["keyed"] * 8
     assert bar_edits.bars_now(effect, 0) == pytest.approx(shown, abs=1e-6)
     assert picture_bars(effect, 0, 5) == pytest.approx(shown, abs=1e-6)
-
-
-def test_changed_bars_are_keyed_as_they_stand(three):
-    three.id_data.frame_set(5)
-    values = RNG.random(8)
-    bar_edits.paint(three, 0, values, key=True)
-    assert picture_bars(three, 0, 5) == pytest.approx(values, abs=1e-6)
 
 
 # Regions
@@ -392,18 +314,6 @@ def test_a_region_has_a_layer_of_its_own(effect):
     assert effect.scene.annotation.layers.active_note == "Sharp.001"
 
 
-def test_the_pen_draws_for_the_chosen_shutter(effect):
-    shutter_edits.start(effect)
-    effect.inbetween = "1"
-    for shutter in effect.shutters:
-        region_edits.add_region(effect, shutter)
-    layers = effect.scene.annotation.layers
-    for index, shutter in enumerate(effect.shutters):
-        effect.active_shutter = index
-        assert selection.active_region(effect).shutter == shutter.name
-        assert layers[layers.active_index] == annotations.layer_of(effect, selection.active_region(effect))
-
-
 def test_a_region_without_annotation_has_no_layer(effect):
     region = region_edits.add_region(effect, effect.shutters[1])
     effect.scene.annotation.layers.remove(effect.scene.annotation.layers[0])
@@ -412,64 +322,6 @@ def test_a_region_without_annotation_has_no_layer(effect):
     assert annotations.layer_of(effect, region) is None
     region_edits.remove_region(effect, 0)
     assert len(effect.regions) == 0
-
-
-def test_a_removed_region_takes_its_keys_and_its_layer_along(effect):
-    for _ in range(3):
-        region_edits.add_region(effect, effect.shutters[1])
-        region_edits.key_region(effect, len(effect.regions) - 1)
-    before = regions_of(effect)
-    region_edits.remove_region(effect, 1)
-    del before["Sharp.001"]
-    assert regions_of(effect) == before
-    assert layers(effect) == ["Sharp", "Sharp.002"]
-
-
-@pytest.mark.parametrize(("index", "to"), [(0, 2), (2, 0), (1, 2)])
-def test_a_moved_region_keeps_its_keys(effect, index, to):
-    for i in range(3):
-        region = region_edits.add_region(effect, effect.shutters[1])
-        region.location = (i / 10, 0.5)
-        region_edits.key_region(effect, i)
-    before, names = regions_of(effect), [region.name for region in effect.regions]
-    region_edits.move_region(effect, index, to)
-    names.insert(to, names.pop(index))
-    assert [region.name for region in effect.regions] == names
-    assert regions_of(effect) == before
-    assert effect.active_region == to
-
-
-def test_keys_of_a_region(effect):
-    region_edits.add_region(effect, effect.shutters[1])
-    region = effect.regions[0]
-    region.location, region.rotation, region.scale = (0.25, 0.5), 1.5, 2.0
-    effect.id_data.frame_set(7)
-    region_edits.key_region(effect, 0)
-    keys = {place: [key[:2] for key in keys] for place, keys in curves(effect, "regions[0].").items()}
-    assert keys == {
-        ("location", 0): [(7, 0.25)],
-        ("location", 1): [(7, 0.5)],
-        ("rotation", 0): [(7, 1.5)],
-        ("scale", 0): [(7, 2.0)],
-    }
-
-
-def test_a_layer_of_the_effect_becomes_a_region(effect):
-    region_edits.add_region(effect, effect.shutters[0])
-    draw(effect, 0)
-    own = effect.scene.annotation.layers.new("Mine", set_active=False)
-    stroke = own.frames.new(3).strokes.new()
-    stroke.points.add(1)
-    stroke.points[0].co = (7, 8, 0)
-    free = region_edits.free_layers(effect, effect.scene.annotation)
-    assert [layer.info for layer in free] == ["Mine"]
-    region = region_edits.take_layer(effect, effect.shutters[1], own)
-    assert (region.name, region.shutter) == ("Mine", "Sharp")
-    (drawing,) = annotations.layer_of(effect, region).frames
-    assert drawing.frame_number == 3
-    assert [tuple(point.co) for point in drawing.strokes[0].points] == [(7, 8, 0)]
-    assert len(layers(effect)) == 2
-    assert region_edits.free_layers(effect, effect.scene.annotation) == []
 
 
 def test_a_layer_of_another_annotation_is_copied(bpy, effect):
@@ -490,10 +342,6 @@ def test_a_layer_of_another_annotation_is_copied(bpy, effect):
             assert [tuple(p.co[:2]) for p in a.points] == [tuple(p.co[:2]) for p in b.points]  # they are flat
             assert b.display_mode == "2DSPACE"
     assert len(other.layers) == 1
-
-
-def test_no_annotation_has_no_free_layers(effect):
-    assert region_edits.free_layers(effect, None) == []
 
 
 # What can be keyed

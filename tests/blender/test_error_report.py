@@ -14,7 +14,7 @@ import pytest
 from support import recipe, sequencer, write_frames
 
 from shutter_addon.blender import command
-from shutter_addon.blender.data import recipe_import, selection, versions
+from shutter_addon.blender.data import recipe_import, selection
 from shutter_addon.blender.devices import available
 from shutter_addon.blender.editing import add_effect, bar_edits
 from shutter_addon.blender.interface import panel_parts
@@ -116,14 +116,6 @@ def test_a_package_that_is_missing_and_one_that_is_broken(edit, tmp_path, monkey
     )
 
 
-def test_the_zip_with_wheels_says_so(edit, tmp_path, monkeypatch):
-    manifest = tmp_path / "blender_manifest.toml"
-    words = 'version = "1.2.3"\nplatforms = ["linux-x64"]\nwheels = ["./wheels/a.whl", "./wheels/b.whl"]\n'
-    manifest.write_text(words)
-    monkeypatch.setattr(versions, "MANIFEST", manifest)
-    assert line(report(edit), "- Virtual Shutter") == "- Virtual Shutter: 1.2.3, zip for linux-x64 with 2 wheels"
-
-
 def test_what_the_edit_is_made_of(bpy, named):
     edit, effect, strip = named
     text = report(edit)
@@ -152,15 +144,6 @@ def test_what_the_edit_is_made_of(bpy, named):
     assert "  - 1 × shutter 2, 1 drawings, 1 strokes, is_layer True, 0 keys" in text
     assert line(text, "- Strip:").endswith(", muted")
     assert "reversed, strobe 3; parts: 1" in line(text, "- Source:")
-
-
-def test_a_movie(bpy, edit):
-    film = ROOT / "assets" / "bigbuckbunny.mp4"
-    add_effect.add_effect(edit, edit.sequence_editor.strips.new_movie("film", str(film), 1, 1))
-    found = line(report(edit), "- Footage:")
-    assert re.search(
-        r"mp4.*, h264 \(\w+\), yuv420p, 1280×720, 2[45] fps, 132 frames, read as uint8, alpha opaque", found
-    )
 
 
 def test_after_several_errors_it_names_nothing(bpy, named, tmp_path):
@@ -202,11 +185,6 @@ def test_an_edit_that_is_broken_beyond_all_that_is_foreseen_has_a_report(named, 
     text = report(named[0])
     assert "- the rest cannot be told: see the last error" in text
     assert re.search(r"KeyError \[blender/output/error_report\.py:\d+ \S+ < ", text)
-
-
-def test_names_of_another_colour_configuration_are_somebodys(edit, monkeypatch):
-    monkeypatch.setattr(versions, "colours", lambda: "0123abcd")
-    assert "view (of another configuration), look (of another" in line(report(edit), "- Colors:")
 
 
 def test_paths_are_taken_from_what_drivers_say():

@@ -222,21 +222,6 @@ def test_on_a_moved_turned_and_scaled_strip(effect_on, source, rotation, scale, 
     assert dataclasses.replace(again, regions=[]) == dataclasses.replace(found, regions=[])
 
 
-@settings(max_examples=60, suppress_health_check=list(HealthCheck))
-@given(st.floats(1e-3, 1e3), st.floats(-1000, 1000), st.floats(0, 1e3))
-def test_numbers_that_float32_cannot_hold(effect_on, weight, degrees, width):
-    """The nearest that it can; and from then on the same."""
-    region = {"shutter": "A", "width": width, "strokes": [[[0.1, 0.2]]], "keys": [{"frame": 1, "rotation": degrees}]}
-    shutter = {"name": "A", "bars": [weight]}
-    apply(effect_on, {"version": 2, "window": 1, "shutters": [shutter], "regions": [region]})
-    found = export(effect_on)
-    assert np.float32(found.shutters[0].bars[0]) == np.float32(weight)
-    assert np.float32(found.regions[0].width) == np.float32(width)
-    assert np.float32(np.radians(found.regions[0].keys[0].rotation)) == np.float32(np.radians(degrees))
-    apply(effect_on, found)
-    assert export(effect_on) == found
-
-
 BASE = {
     "version": 2,
     "window": 4,
@@ -395,19 +380,6 @@ def test_keys_of_stretched_time_lie_between_frames(effect_on):
         assert plain.at(frame - FIRST + 1).options.edge_aware == pytest.approx(wanted, abs=1e-4)
 
 
-def test_a_plain_ease_stays_a_key_and_no_more(effect_on):
-    apply(effect_on, BASE)
-    found = export(effect_on)
-    assert [key.frame for key in found.shutters[1].keys] == [3, 17, 30]
-    assert [key.ease for key in found.regions[0].keys] == ["linear", "bezier", "linear"]
-    assert found == records.recipe_of(recipe_file.parse(json.dumps(BASE)))
-
-
-def test_keys_of_the_source_time_lie_in_a_group_of_the_effect(effect_on):
-    apply(effect_on, BASE)
-    assert curve(effect_on[0], "source_time").group.name == effect_on[1].name
-
-
 @pytest.mark.parametrize("ease", ["linear", "bezier"])
 def test_a_source_time_that_stands_still_keeps_its_direction(effect_on, ease):
     """At the last key of a ramp, and in a freeze behind it; a jump has none."""
@@ -442,7 +414,7 @@ def test_a_source_time_without_keys_holds_a_frame(effect_on):
     assert not effect_on[1].use_source_time
 
 
-@pytest.mark.parametrize("letter", ["a", "ä", "字", "𝄞"])
+@pytest.mark.parametrize("letter", ["a", "𝄞"])
 def test_names_are_as_long_as_recipes_have_them(effect_on, letter):
     """In characters; whoever types more gets as many as there may be."""
     _, effect, _ = effect_on
@@ -516,41 +488,3 @@ def test_keys_that_cannot_lie_there_leave_the_effect_as_it_was(effect_on, part, 
     with pytest.raises(EffectError, match=sentence):
         apply(effect_on, data)
     assert export(effect_on) == before
-
-
-def test_what_a_recipe_may_hold_at_most(effect_on):
-    """It is put into Blender's data, comes back as it was, and is drawn; in seconds."""
-
-    far = {"location": [-1000, 1000], "rotation": -360_000, "scale": -1000}
-    first, last = -1_048_574 - FIRST + 1 + 2 * (FIRST - 1), 1_048_574 - FIRST + 1
-    keys = [{"frame": first, "bars": [1e6] * 256}, {"frame": last, "bars": [1e-6, *[0] * 255]}]
-    moves = [{"frame": first, **far}, {"frame": last, "strokes": [[[-900, 900]] * 90]}]
-    region = {"shutter": "0", "name": "é" * 63, "width": 1000, "strokes": [[[-900, 900]] * 95]}
-    data = {
-        "version": 2,
-        "window": 256,
-        "shutters": [{"name": str(i), "keys": keys} for i in range(32)],
-        "regions": [region | {"keys": moves if i < 20 else []} for i in range(1000)],
-        "time": [{"frame": first, "value": -1_048_574}, {"frame": last, "value": 1_048_574}],
-    }
-    apply(effect_on, data)
-    assert state(*effect_on, 40).bars.shape == (32, 256)
-    found = export(effect_on)
-    assert found == records.recipe_of(recipe_file.parse(json.dumps(data)))
-
-
-def test_a_key_at_every_frame_is_soon_written(effect_on):
-    """As a baked speed ramp has them, and baked bars."""
-    frames = range(1, 4001)
-    ramp = [{"frame": frame, "value": frame % 7 + 1} for frame in frames]
-    keys = [{"frame": frame, "bars": [1, frame % 3, 0]} for frame in frames]
-    apply(effect_on, {"version": 2, "window": 3, "shutters": [{"name": "A", "keys": keys}], "time": ramp})
-    found = export(effect_on)
-    assert (len(found.time), len(found.shutters[0].keys)) == (4000, 4000)
-
-
-def test_a_written_recipe_reads_the_same(effect_on, tmp_path):
-    apply(effect_on, BASE)
-    found = export(effect_on)
-    recipe_file.save(records.effect_of(found), tmp_path / "r.json")
-    assert records.recipe_of(recipe_file.load(tmp_path / "r.json")) == found

@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from support import effect_of, image_strip, read_picture, recipe, request, write_frames
+from support import effect_of, image_strip, recipe, request, write_frames
 
 from shutter_addon.blender.data import recipe_import, snapshot
 from shutter_addon.blender.editing import bar_edits, region_edits
@@ -81,27 +81,6 @@ def test_what_moves_by_keys_stays_sharp(shown, velocity, most):
     assert levels_off(found.with_state(replace(found.state, following=None)), velocity) > 30
 
 
-@pytest.mark.parametrize("position", ["start", "center", "end"])
-def test_a_reversed_strip(shown, position):
-    velocity = 2, 1
-    keys = {frame: place(COUNT - frame, velocity) for frame in (1, COUNT)}
-    data = following(keys, position=position)
-    *_, found = shown(data, velocity, 12, lambda source: setattr(source, "use_reverse_frames", True))
-    assert found.direction == -1
-    assert levels_off(found, velocity) <= 0.6
-
-
-@pytest.mark.parametrize("speed", [0.5, 1.5, 2, -1])
-def test_keyed_time(shown, speed):
-    """Keys as tracking makes them: at every frame of the timeline, where what is shown has the subject."""
-    velocity, start = (1, -1), 1 if speed > 0 else COUNT
-    values = {frame: start + speed * (frame - 1) for frame in range(1, int((COUNT - 1) / abs(speed)) + 2)}
-    time = [{"frame": frame, "value": value} for frame, value in values.items()]
-    keys = {frame: place(np.floor(value - 0.5), velocity) for frame, value in values.items()}
-    *_, found = shown(following(keys, time=time), velocity, 5)
-    assert levels_off(found, velocity) <= 0.6
-
-
 CUT = 12
 
 
@@ -132,15 +111,6 @@ def test_the_camera_and_nothing_left_behind(shown):
     recipe_import.apply(edit, effect, strip, recipe_file.parse(json.dumps(following({}, "camera"))))
     assert tuple(effect.camera.location) == (0, 0)
     assert request(edit, effect, strip, 9).state.following is None
-
-
-def test_a_region_called_as_new_ones_are_is_followed(shown):
-    """Regions that are named after it once had its name as well."""
-    data = following({1: (0, 0)}, follow="Region")
-    data["regions"] = [region({1: (0, 0)}), region({1: (0, 0)}) | {"name": "Region"}]
-    _edit, effect, _strip, _request = shown(data, (4, 0), 10)
-    assert [each.name for each in effect.regions] == ["car", "Region"]
-    assert effect.shutters[0].follow_region == "Region"
 
 
 def test_a_region_that_is_renamed_or_removed(shown):
@@ -186,18 +156,3 @@ def test_the_trails_length_is_keyed(shown):
 def core_bars(data, frame):
     effect = recipe_file.parse(json.dumps(data)).for_picture(WIDTH / HEIGHT)
     return state_at(effect, Clip(width=WIDTH, height=HEIGHT, count=COUNT), frame).state.bars
-
-
-def test_the_command_follows(command, tmp_path):
-    """Through the sequencer; chunks have the same bits as the film."""
-    velocity = 2, -1
-    first = write_frames(tmp_path / "in", [codes(index, velocity) for index in range(COUNT)])
-    data = following({frame: place(frame - 1, velocity) for frame in (1, COUNT)})
-    data["shutters"][0]["trail"] = 0.1
-    command(first, "--output", tmp_path / "film", "--frames", "8:10", recipe=data)
-    command(first, "--output", tmp_path / "chunk", "--frames", "10:10", recipe=data)
-    for number in (8, 9, 10):
-        picture = read_picture(tmp_path / "film" / f"{number:04d}.png")[..., :3]
-        assert np.abs(picture - codes(number - 1, velocity))[INSIDE].max() <= 0.6
-    chunk, film = ((tmp_path / name / "0010.png").read_bytes() for name in ("chunk", "film"))
-    assert chunk == film

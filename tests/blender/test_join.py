@@ -2,7 +2,6 @@
 
 import shutil
 import wave
-from dataclasses import replace
 from pathlib import Path
 
 import av
@@ -12,10 +11,7 @@ import pytest
 from support import noise_film
 
 from shutter_addon.blender import command
-from shutter_addon.blender.data import versions
-from shutter_addon.blender.output import film_join
 from shutter_addon.blender.rendering import render_job
-from shutter_addon.core.farm import job_file
 
 FRAMES = 8
 
@@ -132,13 +128,6 @@ def test_an_edit_that_renders_pictures_becomes_a_film_by_its_ending(saved, join,
         assert len(container.streams.audio) == 1
 
 
-def test_a_codec_that_the_container_cannot_have(saved, join):
-    code, said, output = join(saved / "png", ending=".webm")
-    assert code == 2
-    assert "unsupported codec" in said
-    assert not output.exists()
-
-
 def _flip(path):
     content = bytearray(path.read_bytes())
     content[len(content) // 2] ^= 4
@@ -205,12 +194,6 @@ def test_a_frame_that_is_removed_meanwhile(bpy, frames, join):
     assert not output.exists()
 
 
-def test_another_format_among_the_frames(saved, frames, join):
-    (frames / "0003.png").unlink()
-    shutil.copy(saved / "exr" / "0003.exr", frames)
-    assert "0003.exr: is another format than 0001.png" in join(frames)[1]
-
-
 def _flip_smooth(path):
     """Of noise, which no codec makes smaller, EXR keeps the pixels as they are, without checksums."""
     _write(path, kind=np.float32, shades=np.linspace(0, 1, 64 * 48 * 3, dtype=np.float32))
@@ -268,12 +251,6 @@ def test_sound_that_cannot_be_had(saved, join, change, words):
     assert not output.exists()
 
 
-def test_more_pictures_than_a_strip_is_given(saved, join, monkeypatch):
-    monkeypatch.setattr(film_join, "AT_ONCE", 3)
-    _, _, output = join(saved / "exr")
-    assert np.array_equal(_pictures(output), _pictures(saved / "film.mkv"))
-
-
 def test_frames_of_another_version_of_the_edit(saved, tmp_path, join):
     code, said, output = join(saved / "ours", edit="pictures")
     assert code == 2
@@ -288,15 +265,3 @@ def test_a_frame_among_those_of_the_edit_that_may_be_of_any(saved, tmp_path, joi
     code, said, _ = join(folder)
     assert code == 2
     assert f"0004.png: {words} of which version of the edit it is, unlike 0001.png" in said
-
-
-def test_frames_of_a_job_of_another_version(bpy, saved, frames, join):
-    """Plain Blender's frames do not say it, but the file beside them does."""
-    bpy.ops.wm.open_mainfile(filepath=str(saved / "edit.blend"))
-    version = versions.of_edit(bpy.context.scene)
-    job_file.write(frames, version)
-    assert join(frames)[0] == 0
-    job_file.write(frames, replace(version, extension="0.0.1"))
-    code, said, _ = join(frames)
-    assert code == 2
-    assert f"is of version 0.0.1 of the extension, this machine has {version.extension}" in said

@@ -6,7 +6,7 @@ import made_recipes
 import numpy as np
 import pytest
 
-from shutter_addon.blender.data import consistency, recipe_import, selection, strips
+from shutter_addon.blender.data import consistency, recipe_import, strips
 from shutter_addon.blender.editing import bar_edits, reconcile, region_edits, shutter_edits
 from shutter_addon.core.model import shutters
 from shutter_addon.core.model.frame_state import Options
@@ -52,14 +52,6 @@ def test_the_still_frame_is_the_shown_one(effect, smooth):
         effect.window = int(rng.choice(WINDOWS))
         effect.position = rng.choice(["START", "CENTER", "END"])
         assert opened(effect) == [Options(effect.window, effect.position.lower()).before]
-
-
-def test_shutters_of_one_frame_stay_so(bpy, effect):
-    shutter_edits.add_time_map(effect, "LINEAR")
-    for window in (32, 2, 1, 256):
-        effect.window = window
-        by_name = {shutter.name: opened(effect, i) for i, shutter in enumerate(effect.shutters)}
-        assert by_name == {"First": [0], "Long": list(range(window)), "Sharp": [0], "Last": [window - 1]}
 
 
 def test_still_frame_after_sharp_subject_opens_the_shown_one(bpy, effect):
@@ -110,26 +102,6 @@ def test_what_was_edited_keeps_its_shape(effect, edited):
         before = shutters.resample(bars(effect), window)
         effect.window = window
         assert bars(effect) == pytest.approx(before, abs=1e-6)
-
-
-def test_a_box_by_hand_is_no_still_frame_after_a_window_of_one(effect):
-    bar_edits.paint(effect, 1, np.ones(8))
-    effect.window = 1
-    effect.window = 8
-    assert bars(effect).tolist() == [1] * 8
-
-
-def test_undone_edits_are_none(bpy, effect):
-    bpy.ops.ed.undo_push(message="before")
-    by_hand(effect)
-    bpy.ops.ed.undo_push(message="painted")
-    effect.window = 24
-    bpy.ops.ed.undo_push(message="Frames")
-    bpy.ops.ed.undo()
-    bpy.ops.ed.undo()
-    effect = selection.active(bpy.context)[1]
-    effect.window = 24
-    assert opened(effect) == [0]
 
 
 def test_copies_keep_to_it_too(edit, effect):

@@ -41,12 +41,6 @@ def update(bpy):
     bpy.context.view_layer.update()
 
 
-def drawings(edit):
-    """Per effect, its layers' frames that have drawings."""
-    scenes = [effect.scene for effect in edit.virtual_shutter.effects]
-    return [[[f.frame_number for f in layer.frames] for layer in s.annotation.layers] for s in scenes if s.annotation]
-
-
 def census(bpy):
     """How many there are of all that an effect needs."""
     return {name: len(getattr(bpy.data, name)) for name in ("scenes", "cameras", "objects", "annotations", "actions")}
@@ -118,19 +112,6 @@ def test_a_deleted_edit_takes_its_effects_along(bpy, edit, add):
     assert not bpy.data.annotations
 
 
-def test_a_scene_that_the_window_shows_stays(bpy, edit, add):
-    strip = add()
-    scene = strip.scene
-    bpy.context.window.scene = scene
-    edit.sequence_editor.strips.remove(strip)
-    update(bpy)
-    assert bpy.context.window.scene == scene
-    bpy.context.window.scene = edit
-    edit.frame_end += 1
-    update(bpy)
-    assert list(bpy.data.scenes) == [edit]
-
-
 @pytest.mark.parametrize("late", [True, False])
 def test_undo_brings_an_effect_back_and_redo_removes_it_again(bpy, edit, add, render, late):
     """late: in a window, the handler comes after the undo push."""
@@ -158,96 +139,6 @@ def test_undo_brings_an_effect_back_and_redo_removes_it_again(bpy, edit, add, re
         update(bpy)
         assert [effect.start for effect in edit.virtual_shutter.effects] == [101]
         assert census(bpy) == {"scenes": 2, "cameras": 1, "objects": 1, "annotations": 1, "actions": 1}
-
-
-def _delete(edit):
-    edit.sequence_editor.strips.remove(scene_strips(edit)[0])
-
-
-def _move(edit):
-    for strip in [s for s in edit.sequence_editor.strips if s.left_handle < 50]:
-        strip.content_start += 7
-
-
-def _copy(edit):
-    strip = scene_strips(edit)[0]
-    edit.sequence_editor.strips.new_scene("Copy", strip.scene, 9, 300)
-
-
-@pytest.mark.parametrize("change", [_delete, _move, _copy])
-def test_undo_takes_back_what_handlers_did_after_the_step_before(bpy, edit, add, change):
-    """Blender's undo keeps data that is equal in both steps as it is now: keys and drawings that a handler changed."""
-    add(1), add(101, recipe(4, {101: [0, 1, 0, 0], 111: [0, 0, 1, 0]}))
-    update(bpy)
-    known = curves(edit), drawings(edit), [effect.start for effect in edit.virtual_shutter.effects]
-    for frame_end in (400, 401):  # steps that leave keys alone
-        edit.frame_end = frame_end
-        bpy.context.view_layer.update()
-        bpy.ops.ed.undo_push(message="other")
-    handler = handlers.HANDLERS["depsgraph_update_post"]
-    bpy.app.handlers.depsgraph_update_post.remove(handler)
-    change(edit)
-    bpy.ops.ed.undo_push(message="change")
-    bpy.app.handlers.depsgraph_update_post.append(handler)
-    handler()
-    done = curves(edit), drawings(edit), [effect.start for effect in edit.virtual_shutter.effects]
-    assert done != known
-    for _ in range(2):
-        bpy.ops.ed.undo()
-        edit = bpy.context.scene
-        update(bpy)
-        assert (curves(edit), drawings(edit), [effect.start for effect in edit.virtual_shutter.effects]) == known
-        bpy.ops.ed.redo()
-        edit = bpy.context.scene
-        update(bpy)
-        assert (curves(edit), drawings(edit), [effect.start for effect in edit.virtual_shutter.effects]) == done
-
-
-def test_scenes_and_keys_are_found_again_that_undo_loses(bpy, edit, add, tmp_path):
-    """Blender loses pointers now and then, by chance, to what the step had removed."""
-    add(1, recipe(4, {1: [0, 1, 0, 0], 11: [0, 0, 1, 0]}))
-    update(bpy)
-    known = curves(edit)
-    path = str(tmp_path / "edit.blend")
-    for _ in range(40):
-        bpy.ops.wm.save_as_mainfile(filepath=path)
-        bpy.ops.wm.open_mainfile(filepath=path)
-        update(bpy)
-        bpy.ops.ed.undo_push(message="before")
-        edit = bpy.context.scene
-        edit.sequence_editor.strips.remove(scene_strips(edit)[0])
-        update(bpy)
-        bpy.ops.ed.undo_push(message="delete")
-        assert not edit.virtual_shutter.effects
-        bpy.ops.ed.undo()
-        update(bpy)
-        edit = bpy.context.scene
-        assert [effect.scene for effect in edit.virtual_shutter.effects] == [scene_strips(edit)[0].scene]
-        assert curves(edit) == known != {}
-
-
-def test_a_renamed_drawing_stays_its_regions_when_steps_are_undone(bpy, edit, add):
-    """Blender comes to handlers after the undo push: the step of the rename has the region's old name for it."""
-    add(1)
-    update(bpy)
-    layer = edit.virtual_shutter.effects[0].scene.annotation.layers[0]
-    old = layer.info
-    bpy.ops.ed.undo_push(message="add")
-    handler = handlers.HANDLERS["depsgraph_update_post"]
-    bpy.app.handlers.depsgraph_update_post.remove(handler)
-    layer.info = "Renamed"
-    bpy.ops.ed.undo_push(message="rename")
-    bpy.app.handlers.depsgraph_update_post.append(handler)
-    handler()
-    edit.frame_end = 400
-    bpy.context.view_layer.update()
-    bpy.ops.ed.undo_push(message="other")
-    new = "Renamed"
-    for step, name in [("undo", new), ("undo", old), ("redo", new), ("redo", new), ("undo", new)]:
-        getattr(bpy.ops.ed, step)()
-        update(bpy)
-        effect = bpy.context.scene.virtual_shutter.effects[0]
-        assert (effect.regions[0].layer, effect.scene.annotation.layers[0].info) == (name, name), step
 
 
 @pytest.mark.parametrize("cut", [True, False])
@@ -284,27 +175,6 @@ def test_pasted_strips_have_their_effect(bpy, edit, add, images, render, cut):
         assert np.array_equal(shown[frame + 200], picture)
     identities = [strip.scene.virtual_shutter.identity for strip in scene_strips(edit)]
     assert len(set(identities)) == len(identities)
-
-
-def test_a_shared_camera_goes_with_the_last_effect(bpy, edit, add):
-    """Parts of a cut strip share it, even where the first has gone and come back with a camera of its own."""
-    first = add()
-    second = first.split(11, "SOFT")
-    update(bpy)
-    assert first.scene.camera == second.scene.camera
-    for s in edit.sequence_editor.strips:
-        s.select = s == first
-    with sequencer(bpy) as area, bpy.context.temp_override(region=area.regions[-1]):
-        bpy.ops.sequencer.copy()
-        bpy.ops.sequencer.delete()
-        update(bpy)
-        edit.frame_set(101)
-        bpy.ops.sequencer.paste()
-    update(bpy)
-    assert census(bpy)["cameras"] == 2
-    edit.sequence_editor.strips.remove(second)
-    update(bpy)
-    assert census(bpy) == {"scenes": 2, "cameras": 1, "objects": 1, "annotations": 1, "actions": 1}
 
 
 def test_a_cut_strip_pasted_into_another_edit(bpy, edit, add, render):
@@ -369,15 +239,6 @@ def test_effect_and_source_are_connected_as_the_source_was(edit, add, images):
     assert edit.render.sequencer_gl_preview == "RENDERED"
 
 
-def test_an_effect_made_longer_goes_on(edit, add, render):
-    """Keys after the end that the source had when the effect was made."""
-    data = recipe(4, {100: [1, 0, 0, 0], 120: [0, 0, 0, 1]}, edges="mirror")
-    strip = add(1, data)
-    edit.sequence_editor.strips["images"].right_handle = strip.right_handle = 200
-    shown = render(edit, [60, 150])
-    assert not np.array_equal(shown[60], shown[150])
-
-
 @pytest.fixture
 def library(bpy, edit, add, render, tmp_path):
     """A saved edit with an effect, and a frame of it."""
@@ -416,23 +277,6 @@ def edit_that_shows(bpy, film):
     strip.scene_input = "SEQUENCER"
     bpy.context.window.scene = edit
     return edit
-
-
-def test_an_edit_appended_twice_has_two_effects_of_its_own(bpy, library, render):
-    path, pictures = library
-    for _ in range(2):
-        with bpy.data.libraries.load(str(path), link=False) as (_, wanted):
-            wanted.scenes = ["Film"]
-        update(bpy)
-    films = [scene for scene in bpy.data.scenes if scene.virtual_shutter.effects]
-    assert len(films) == 2
-    films[0].virtual_shutter.effects[0].shutters[0].bars[0].weight = 0.5
-    films[0].sequence_editor.strips.remove(scene_strips(films[0])[0])
-    update(bpy)
-    assert [len(film.virtual_shutter.effects) for film in films] == [1, 2]
-    bpy.context.window.scene = films[1]  # an operator renders at the frame of the window's scene
-    shown = render(films[1], list(pictures))
-    assert all(np.array_equal(shown[frame], picture) for frame, picture in pictures.items())
 
 
 def test_nothing_is_remembered_of_what_is_gone(bpy, edit, add):

@@ -3,11 +3,11 @@
 import av
 import numpy as np
 import pytest
-from support import effect_of, recipe, sequencer
+from support import effect_of, recipe
 
 from shutter_addon.blender import handlers
 from shutter_addon.blender.data import annotations, fcurves, selection
-from shutter_addon.blender.editing import add_effect, match_source, reconcile, shutter_edits
+from shutter_addon.blender.editing import match_source, reconcile
 from shutter_addon.blender.rendering import render_job
 from shutter_addon.core.model.scribbles import mapped
 
@@ -179,28 +179,6 @@ def test_a_strip_is_mixed_as_its_source_once_it_is_placed(bpy, made):
     assert strip.color_multiply == 0.5
 
 
-def test_undone_in_one_step(bpy, made):
-    _strip, source = made(SCRIBBLED)
-    transform(source), lengthen(source)
-    bpy.context.view_layer.update()
-    bpy.ops.ed.undo_push(message="before")
-    before = state(bpy)
-    match(bpy)
-    after = state(bpy)
-    assert after != before
-    bpy.ops.ed.undo()
-    assert state(bpy) == before
-    bpy.ops.ed.redo()
-    assert state(bpy) == after
-
-
-def state(bpy):
-    edit = bpy.context.scene
-    effect = edit.virtual_shutter.effects[0]
-    strip, _source = match_source.strip_and_source(effect)
-    return match_source.differences(effect), strip.left_handle, strip.right_handle, strokes(effect)
-
-
 def strokes(effect) -> list:
     layer = annotations.layer_of(effect, effect.regions[0])
     return [tuple(point.co) for drawing in layer.frames for stroke in drawing.strokes for point in stroke.points]
@@ -302,19 +280,6 @@ def test_parts_of_a_cut_effect_match_their_own_part(bpy, edit, made, shown, capf
     assert len(edit.virtual_shutter.effects) == 2
 
 
-def test_a_cut_source_is_matched_as_a_whole_or_part_by_part(bpy, edit, made):
-    strip, source = made()
-    disconnect(bpy, edit, source)
-    end = source.split(21, "HARD")
-    assert words() == []
-    right = strip.split(21, "SOFT")
-    assert words() == []
-    source.right_handle, end.left_handle = 16, 26
-    assert words() == ["range"]
-    match_both(bpy, edit, strip, right)
-    assert [(s.left_handle, s.right_handle) for s in (strip, right)] == [(1, 16), (26, 41)]
-
-
 DRAWN_TWICE = SCRIBBLED | {
     "regions": [SCRIBBLED["regions"][0] | {"keys": [{"frame": f, "strokes": TRIANGLE} for f in (1, 31)]}]
 }
@@ -387,15 +352,6 @@ def test_a_film_keeps_its_size(bpy, edit, made, large_movie, monkeypatch):
     assert annotations.picture_size(edit.virtual_shutter.effects[0]) == (40, 40)
 
 
-def test_headers_are_read_once_and_never_for_a_panel(bpy, made, monkeypatch):
-    made()
-    monkeypatch.setattr(reconcile.source_media, "open_media", lambda _strip: pytest.fail("a file was opened"))
-    bpy.context.view_layer.update()
-    reconcile.follow_sources(reconcile.gather())
-    reconcile.forget()
-    assert words() == []
-
-
 def test_a_missing_file_leaves_the_size(bpy, edit, made, tmp_path):
     _strip, source = made()
     source.filepath = str(tmp_path / "gone.mkv")
@@ -410,30 +366,6 @@ def test_another_rate_of_the_edit(bpy, edit, made, shown):
     assert (strip.scene.render.fps, strip.scene.render.fps_base) == (edit.render.fps, edit.render.fps_base)
     assert words() == []
     assert apart(shown(strip, [1, 20, 40]), shown(source, [1, 20, 40])) <= LEVELS
-
-
-def test_another_rate_of_the_edit_where_the_source_keeps_its_speed(bpy, edit, movie, shown):
-    """Blender makes the source longer."""
-    edit.render.resolution_x = edit.render.resolution_y = 48
-    with sequencer(bpy):
-        bpy.ops.sequencer.movie_strip_add(
-            filepath=str(movie), frame_start=1, channel=1, sound=False, adjust_playback_rate=True, use_framerate=False
-        )
-    (source,) = edit.sequence_editor.strips
-    source.transform.filter = "NEAREST"
-    strip, effect = add_effect.add_effect(edit, source)
-    shutter_edits.start(effect)
-    effect.inbetween = "1"
-    for i, bar in enumerate(effect.shutters[0].bars):
-        bar.weight = float(i == 0)
-    selection.choose(edit, strip)
-    edit.render.fps = 48
-    bpy.context.view_layer.update()
-    assert source.right_handle == 81
-    assert words() == ["range"]
-    match(bpy)
-    frames = range(1, 81)
-    assert apart(shown(strip, frames), shown(source, frames)) <= LEVELS
 
 
 def test_another_size_of_the_edit(bpy, edit, made, shown):
@@ -474,12 +406,3 @@ def test_modifiers_of_the_source_are_copied_where_they_lack(bpy, edit, made, sho
     strip.modifiers[1].mute = True
     assert apart(shown(strip, frames), plain) > 20
     assert effect == edit.virtual_shutter.effects[0]
-
-
-def test_effects_on_the_source_are_found(edit, made):
-    strip, source = made()
-    assert match_source.effects_on(edit, source) == []
-    speed = edit.sequence_editor.strips.new_effect("Speed", "SPEED", 5, 1, input1=source)
-    assert match_source.effects_on(edit, source) == [speed]
-    speed.input_1 = strip
-    assert match_source.effects_on(edit, source) == []

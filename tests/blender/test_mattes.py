@@ -2,7 +2,6 @@
 
 import dataclasses
 import json
-import os
 import shutil
 
 import av
@@ -11,8 +10,7 @@ import pytest
 from support import effect_of, image_strip, read_picture, recipe, request, sequencer, write_frames
 
 from shutter_addon.blender import command
-from shutter_addon.blender.data import annotations, matte_look, recipe_import, selection, snapshot, source_media, strips
-from shutter_addon.blender.editing import reconcile, shutter_edits
+from shutter_addon.blender.data import annotations, matte_look, recipe_import, selection, source_media, strips
 from shutter_addon.blender.interface import region_gizmo
 from shutter_addon.blender.output import matte_export
 from shutter_addon.blender.rendering import invalidation, sessions
@@ -118,21 +116,6 @@ def test_the_timeline_and_an_offset(shown, matte):
     assert close(coefficients(11), values(9) / 255)
 
 
-def test_a_cut_of_the_effect_changes_nothing(shown, matte, tmp_path):
-    """Neither with the timeline's frames nor with the footage's."""
-    regions = region(matte, timing="timeline", offset=1, opacity=0.5), region(matte, opacity=0.5, name="n")
-    strip, effect, _coefficients = shown(data(*regions))
-    before = request(strip.id_data, effect, strip, 9).coefficients()
-    right = strip.split(frame=7, split_method="SOFT")
-    reconcile.update()
-    effect = strips.effect_of(strip.id_data, right.scene)
-    assert close(request(strip.id_data, effect, right, 9).coefficients(), before)
-    saved = matte_export.recipe_for(strip.id_data, effect, right, tmp_path / "r.json")
-    assert saved.regions[0].content.offset == 1 + 6  # frame 1 of this recipe is the seventh of the strip as it was
-    recipe_import.apply(strip.id_data, effect, right, saved, tmp_path)
-    assert close(request(strip.id_data, effect, right, 9).coefficients(), before)
-
-
 def test_a_file_without_colours_has_a_channel_by_name(bpy, edit, shown, tmp_path):
     """As the files of `--weights`."""
     write_exr(tmp_path / "0001.exr", np.full((HEIGHT, WIDTH, 1), 0.25, np.float32), ["S1"])
@@ -143,43 +126,6 @@ def test_a_file_without_colours_has_a_channel_by_name(bpy, edit, shown, tmp_path
             bpy.ops.shutter.matte_add(filepath=str(tmp_path / "0001.exr"))
         bpy.ops.shutter.matte_add(filepath=str(tmp_path / "0001.exr"), channel_name="S1")
     assert close(coefficients(2), 0.25)
-
-
-def test_before_and_behind_its_frames_a_matte_holds(shown, matte):
-    _strip, _effect, coefficients = shown(data(region(matte, offset=8)))
-    assert close(coefficients(9), values(COUNT - 1) / 255)
-    _strip.id_data.virtual_shutter.effects[0].regions[0].offset = -3
-    assert close(coefficients(2), values(0) / 255)
-
-
-def test_one_picture_holds_for_the_film(shown, matte):
-    (matte.parent / "m0002.png").unlink()
-    still = matte.rename(matte.with_name("still.png"))
-    _strip, effect, coefficients = shown(data(region(still)))
-    assert effect.regions[0].image.source == "FILE"
-    for frame in (1, 8):
-        assert close(coefficients(frame), values(0) / 255)
-
-
-@pytest.mark.parametrize("channel", ["red", "green", "blue", "alpha", "luminance"])
-def test_channels(shown, tmp_path, channel):
-    rng = np.random.default_rng(1)
-    picture = rng.integers(0, 256, (HEIGHT, WIDTH, 4)).astype(np.uint8)
-    path = write_frames(tmp_path / "c", [picture], "c")
-    _strip, _effect, coefficients = shown(data(region(path, channel=channel)))
-    samples = dict(zip(("red", "green", "blue", "alpha"), np.moveaxis(picture / 255, -1, 0), strict=True))
-    samples["luminance"] = picture[..., :3] @ [0.2126, 0.7152, 0.0722] / 255
-    assert close(coefficients(3), samples[channel])
-
-
-def test_keyed_opacity_invert_and_order(shown, matte):
-    keys = [{"frame": 2, "value": 0}, {"frame": 10, "value": 1}]
-    regions = region(matte, opacity=keys), region(matte, invert=True, opacity=0.5, offset=3, name="n")
-    _strip, effect, coefficients = shown(data(*regions))
-    first, second = values(5) / 255 * 0.5, (1 - values(8) / 255) * 0.5
-    assert close(coefficients(6), first * (1 - second) + second)
-    effect.regions[1].blend = "ADD"
-    assert close(coefficients(6), np.minimum(first + second, 1))
 
 
 def test_a_strip_is_read_as_it_is_trimmed_muted_and_retimed(edit, shown, matte):
@@ -320,36 +266,6 @@ def test_the_stream_of_a_movie_strip(edit, shown, tmp_path):
     assert close(coefficients(1), 0.4)
 
 
-def test_a_recipe_whose_matte_is_missing_changes_nothing(shown, matte):
-    strip, effect, coefficients = shown(data(region(matte)))
-    gone = recipe_file.parse(json.dumps(data(region(matte.with_name("gone.png")))))
-    with pytest.raises(MediaError, match=r"gone\.png: no such file"):
-        recipe_import.apply(strip.id_data, effect, strip, gone)
-    assert close(coefficients(3), values(2) / 255)
-
-
-def test_drawn_regions_stay_beside_mattes(shown, matte):
-    stroke = {"shutter": "S1", "strokes": [[[0.5, 0], [0.5, 1]]], "width": 0.2, "name": "s"}
-    content = data(region(matte, opacity=0.5), stroke, border=True)
-    _strip, _effect, coefficients = shown(content)
-    found, m = coefficients(3), values(2) / 255 * 0.5
-    assert close(found[:, WIDTH // 2], (m + (1 - m))[:, WIDTH // 2])
-    assert close(found[:, 0], m[:, 0])
-
-
-def test_copies_have_mattes_of_their_own(bpy, edit, shown, matte):
-    _strip, effect, coefficients = shown(data(region(matte)))
-    own = strip_of(edit, matte, 3)
-    effect.regions[0].matte, effect.regions[0].strip_name = "STRIP", own.name
-    copy = edit.copy()
-    reconcile.update()
-    (other,) = copy.virtual_shutter.effects
-    assert other.regions[0].strip_name == own.name
-    own.name = "renamed"
-    assert other.regions[0].strip_name == "matte"
-    assert close(coefficients(5), values(2) / 255)
-
-
 def test_export_writes_strips_and_points_to_files(edit, shown, matte, tmp_path):
     content = data(
         region(matte, offset=1, channel="green", opacity=0.25),
@@ -378,23 +294,6 @@ def test_export_writes_strips_and_points_to_files(edit, shown, matte, tmp_path):
     assert records.recipe_of(recipe_file.load(again)) == records.recipe_of(saved)
 
 
-def test_a_still_strip_is_exported_as_one_picture(edit, shown, matte, tmp_path):
-    strip, effect, _coefficients = shown(data(region(matte)))
-    own = edit.sequence_editor.strips.new_image("still", str(matte), 4, 1)
-    effect.regions[0].matte, effect.regions[0].strip_name = "STRIP", own.name
-    recipe_file.save(matte_export.recipe_for(edit, effect, strip, tmp_path / "r.json"), tmp_path / "r.json")
-    assert [path.name for path in (tmp_path / "r mattes" / "1 m").iterdir()] == ["0001.png"]
-    assert np.abs(read_picture(tmp_path / "r mattes" / "1 m" / "0001.png")[..., 0] - values(0)).max() < 0.01
-
-
-def test_a_single_picture_among_numbered_ones_is_exported_as_one(shown, matte, tmp_path):
-    strip, effect, coefficients = shown(data(region(matte)))
-    effect.regions[0].image.source = "FILE"
-    saved = matte_export.recipe_for(strip.id_data, effect, strip, tmp_path / "r.json")
-    recipe_import.apply(strip.id_data, effect, strip, saved, tmp_path)
-    assert close(coefficients(5), values(0) / 255)
-
-
 def test_an_export_spares_what_it_reads(edit, shown, matte, tmp_path):
     """A strip of the pictures that an export has written."""
     strip, effect, _coefficients = shown(data(region(matte)))
@@ -406,22 +305,6 @@ def test_an_export_spares_what_it_reads(edit, shown, matte, tmp_path):
     with pytest.raises(Exception, match="1 m: its pictures are read by the effect"):
         matte_export.recipe_for(edit, effect, strip, tmp_path / "r.json")
     assert matte_export.recipe_for(edit, effect, strip, tmp_path / "other.json").regions
-
-
-def test_an_export_through_a_linked_folder(shown, matte, tmp_path):
-    (tmp_path / "there" / "deep").mkdir(parents=True)
-    (tmp_path / "link").symlink_to(tmp_path / "there" / "deep")
-    strip, effect, coefficients = shown(data(region(matte)))
-    saved = matte_export.recipe_for(strip.id_data, effect, strip, tmp_path / "link" / "r.json")
-    recipe_import.apply(strip.id_data, effect, strip, saved, tmp_path / "link")
-    assert close(coefficients(3), values(2) / 255)
-
-
-@pytest.mark.skipif(os.name != "posix", reason="elsewhere it is the name of a server")
-def test_two_slashes_before_a_path(shown, matte):
-    """Which Blender takes for the folder of its file."""
-    _strip, _effect, coefficients = shown(data(region(f"/{matte}")))
-    assert close(coefficients(3), values(2) / 255)
 
 
 def test_a_path_longer_than_blenders(shown, matte, tmp_path):
@@ -486,17 +369,6 @@ def test_a_mask_is_exported_as_pictures(shown, mask, tmp_path):
     assert effect.regions[0].matte == "IMAGE"
     assert close(coefficients(7), expected)
     assert close(coefficients(7), np.full((HEIGHT, WIDTH), 0.5 * 6 / 11))
-
-
-def test_a_time_map_shows_each_column_at_its_moment(bpy, edit, shown):
-    content = data(light="encoded", interpolation="value")
-    _strip, effect, coefficients = shown(content | {"window": 9, "shutters": [{"name": "A", "bars": [1] * 9}]})
-    region_ = shutter_edits.add_time_map(effect, "LINEAR")
-    assert next(shutter.name for shutter in effect.shutters) == "First"
-    assert region_.shutter == "Last"
-    found = coefficients(2)
-    # a column at x shows 8x frames later, between two frames both in proportion
-    assert close(found, np.broadcast_to(8 * (np.arange(WIDTH) + 0.5) / WIDTH, found.shape))
 
 
 def test_handles_of_a_ramp(bpy, edit, shown, monkeypatch):
@@ -566,25 +438,6 @@ def test_weights_are_read_back(bpy, tmp_path, footage):
         first, second = (read_picture(tmp_path / folder / f"{frame:04d}.png") for folder in "ab")
         assert np.abs(first - second).max() <= 1
         assert np.ptp(first) > 15
-
-
-@pytest.mark.parametrize(("kind", "short"), [("fast", True), ("trimmed", False), ("keyed", True), ("timeline", False)])
-def test_a_panel_tells_of_a_matte_shorter_than_what_is_shown(bpy, edit, shown, matte, kind, short):
-    """A matte of 7 frames, and 6 of the film: at twice its speed, as it is, or backward by keys, from the eleventh."""
-
-    def change(source):
-        if kind == "fast":
-            doubled(bpy, edit, source)
-
-    for path in list(matte.parent.iterdir()):
-        if int(path.stem[1:]) > 7:
-            path.unlink()
-    keys = {"time": [{"frame": 1, "value": 11}, {"frame": 11, "value": 1}]} if kind == "keyed" else {}
-    timing = "timeline" if kind == "timeline" else "source"
-    strip, effect, _coefficients = shown(data(region(matte, timing=timing), **keys), change)
-    strip.right_handle = 7
-    note = matte_look.look(edit, effect, strip, effect.regions[0]).note
-    assert note == ("Shorter than the film: its last frame holds" if short else "")
 
 
 @pytest.fixture
@@ -669,35 +522,3 @@ def test_a_copy_of_a_matte_strip_is_no_part_of_it(edit, shown, matte):
     assert close(coefficients(11), values(3) / 255)  # its last one holds
     edit.sequence_editor.strips.remove(own)
     assert close(coefficients(11), values(4) / 255)
-
-
-def test_a_pasted_effect_has_the_matte_strip_beside_it(bpy, edit, shown, matte):
-    strip, effect, _coefficients = shown(data(region(matte)))
-    own = strip_of(edit, matte, 3)
-    effect.regions[0].matte, effect.regions[0].strip_name = "STRIP", own.name
-    copy = strip_of(edit, matte, 19, name="copy")
-    copy.virtual_shutter_matte = own.virtual_shutter_matte
-    strip.content_start += 16  # nearer to the copy than to its own
-    content = snapshot.region_at(edit, effect, strip, 0, (18.0,)).content
-    assert content.timing.content_start == copy.content_start
-
-
-def test_a_sequence_is_one_image_however_often_it_is_imported(bpy, shown, matte):
-    strip, effect, _coefficients = shown(data(region(matte)))
-    images = len(bpy.data.images)
-    recipe_import.apply(strip.id_data, effect, strip, recipe_file.parse(json.dumps(data(region(matte), region(matte)))))
-    assert len(bpy.data.images) == images
-
-
-def test_between_filmed_frames_a_matte_is_that_of_the_one_before(bpy, tmp_path, footage, matte):
-    """At half the speed, with two moments for a filmed frame; an exposure is a filmed frame later."""
-    content = recipe(2, [1, 0], [0, 1], regions=[region(matte)], inbetween=2, **OPTIONS)
-    content["time"] = [{"frame": 1, "value": 1}, {"frame": 21, "value": 11}]
-    (tmp_path / "r.json").write_text(json.dumps(content))
-    where = "--recipe", str(tmp_path / "r.json"), "--output", str(tmp_path / "out")
-    run("render", str(footage), "--frames", "5:8", *where)
-    for frame in range(5, 9):
-        shown = (frame - 1) / 2
-        expected = 20 + 10 * (shown + values(int(shown)) / 255)
-        found = read_picture(tmp_path / "out" / f"{frame:04d}.png")[..., 0]
-        assert np.abs(found - expected).max() < 0.5

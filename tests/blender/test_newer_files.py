@@ -8,14 +8,13 @@ from pathlib import Path
 
 import pytest
 import stored
-from support import picture_of, recipe, sequencer
+from support import picture_of, sequencer
 
 from shutter_addon.blender import command
 from shutter_addon.blender.data import data_format, preferences, property_copy
 from shutter_addon.blender.editing import reconcile, undelete
 from shutter_addon.core.messages import EffectError
 from shutter_addon.core.recipes import recipe_file
-from shutter_addon.core.recipes.recipe import RecipeError
 
 ROOT = Path(__file__).parents[2]
 NEWER = Path(__file__).with_name("newer_version.py")
@@ -166,11 +165,6 @@ def test_an_older_file_is_migrated_once(bpy, edit, effect, tmp_path, monkeypatch
         bpy.ops.wm.save_mainfile()
 
 
-def test_an_effect_has_its_format_from_the_start(bpy, edit, effect):
-    """Autosave tells nobody."""
-    assert edit.virtual_shutter.format == data_format.FORMAT
-
-
 def test_what_is_made_of_older_effects_is_older(bpy, edit, effect):
     """Pasted into another edit, deleted and brought back: and saving makes nothing newer."""
     edit.virtual_shutter.format = 0
@@ -197,15 +191,6 @@ def test_an_effect_that_is_added_makes_nothing_older_or_newer(newer):
     edit.virtual_shutter.format = 0
     data_format.new_effect(edit, data_format.FORMAT)
     assert edit.virtual_shutter.format == 0
-
-
-def test_a_recipe_of_a_newer_version(tmp_path):
-    """It is not read, whatever else it holds, and nothing is written."""
-    newer = recipe(2, [1, 1]) | {"version": 3, "glow": [1], "shutters": "elsewhere"}
-    with pytest.raises(RecipeError, match=r"^version: 3 is of a newer version of Virtual Shutter"):
-        recipe_file.parse(json.dumps(newer))
-    with pytest.raises(RecipeError, match=r"^recipe: unknown field glow$"):
-        recipe_file.parse(json.dumps(recipe(2, [1, 1]) | {"glow": 1}))
 
 
 def test_a_device_that_a_newer_version_has_chosen(bpy):

@@ -12,7 +12,7 @@ from shutter_addon.blender.editing import add_effect, outline_drawings
 from shutter_addon.blender.rendering import outline_carrying, sessions
 from shutter_addon.core.frames import light
 from shutter_addon.core.model import outlines
-from shutter_addon.core.recipes import recipe_file, records
+from shutter_addon.core.recipes import recipe_file
 from shutter_addon.media.carried_mattes import CarriedFile, CarriedMattes
 
 WIDTH, HEIGHT, COUNT = 96, 64, 12
@@ -71,12 +71,6 @@ def covered(index):
     return outlines.coverage(square(index), WIDTH, HEIGHT)
 
 
-def test_straight(edited):
-    strip, effect = edited(region(1, 9, between="straight"))
-    for frame in (1, 4, 9, 11):
-        np.testing.assert_allclose(coefficients(strip, effect, frame), covered(min(frame, 9) - 1), atol=1e-6)
-
-
 def test_carried(edited):
     """In between and beyond; with the feather, turned inside out."""
     strip, effect = edited(region(1, 9))
@@ -97,20 +91,6 @@ def test_drawings_stay_with_the_footage(edited):
     strip, effect = edited(region(1, 8, shown=lambda frame: COUNT - 2 - frame), change=change)
     for frame in (3, 6, 10):
         assert np.abs(coefficients(strip, effect, frame) - covered(COUNT - frame)).mean() < 0.01, frame
-
-
-@pytest.mark.parametrize("layer", [False, True])
-def test_out_and_in_again(edited, layer):
-    said = region(1, 9, between="straight", layer=layer, invert=True, blend="add", opacity=0.5, width=0.125)
-    strip, effect = edited(said)
-    (back,) = records.recipe_of(snapshot.recipe_of(strip.id_data, effect, strip)).regions
-    parsed = recipe_file.parse(json.dumps(recipe(2, [1, 0], [0, 1], regions=[said], **OPTIONS)))
-    expected = records.recipe_of(parsed).regions[0]
-    assert (back.between, back.layer, back.invert, back.blend) == ("straight", layer, True, "add")
-    assert (back.opacity, back.width) == (0.5, 0.125)
-    assert [key.frame for key in back.keys] == [1, 9]
-    shapes = [np.array([strokes for _, strokes in records.drawings_of(each)]) for each in (back, expected)]
-    np.testing.assert_allclose(*shapes, atol=1e-5)
 
 
 def test_as_a_layer_it_leaves_no_ghost(edited):
@@ -241,14 +221,6 @@ def test_outline_it(bpy, edited, kind, strokes):
     assert np.count_nonzero(found & expected) > 0.9 * np.count_nonzero(found | expected)
 
 
-def test_nothing_to_outline(bpy, edited):
-    strip, effect = edited({"name": "o", "shutter": "S1", "kind": "line", "strokes": [[[3, 3]]]})
-    selection.choose(strip.id_data, strip)
-    effect.active_shutter = 1
-    assert bpy.ops.shutter.outline_it() == {"CANCELLED"}
-    assert effect.regions[0].kind == "LINE"
-
-
 @pytest.mark.parametrize(("word", "levels"), [("PNG", 65535), ("EXR", 1)])
 def test_export(bpy, chosen, tmp_path, word, levels):
     """A picture for each frame of the strip, by its number, with what the matte shows there; or none."""
@@ -291,14 +263,6 @@ def test_to_a_mask_and_back(bpy, chosen):
         assert np.abs(coefficients(strip, effect, frame) - covered(frame - 1)).mean() < 0.015, frame
 
 
-def test_a_straight_outline_to_a_mask(bpy, chosen):
-    chosen(1, 9, between="straight")
-    assert bpy.ops.shutter.outline_mask() == {"FINISHED"}
-    mask = bpy.data.masks["o"]
-    assert mask_reading.key_frames(mask) == [1, 9]
-    assert np.abs(mask_reading.mask_at(mask, 5).values(WIDTH, HEIGHT) - covered(4)).mean() < 0.005
-
-
 def test_masks_that_give_no_outline(bpy, chosen):
     """Neither does an outline in which nothing is drawn give a mask; nothing is left behind."""
     _strip, effect = chosen(1, 9)
@@ -312,21 +276,6 @@ def test_masks_that_give_no_outline(bpy, chosen):
     with pytest.raises(RuntimeError, match="Nothing is drawn in the outline"):
         bpy.ops.shutter.outline_mask()
     assert [mask.name for mask in bpy.data.masks] == ["empty"]
-
-
-def test_a_mask_of_a_strip_that_runs_backward(bpy, edited):
-    """Its frames are the source's, and drawings lie where the strip shows these."""
-
-    def change(source):
-        source.left_handle = 3
-        source.use_reverse_frames = True
-
-    said = region(1, 4, shown=lambda frame: COUNT - 2 - frame, between="straight")
-    strip, effect = edited(said, change=change)
-    mask = outline_drawings.to_mask(bpy.context, (strip.id_data, effect, strip), 0, 0)
-    assert mask_reading.key_frames(mask)[-2:] == [COUNT - 5, COUNT - 2]
-    outline_drawings.from_mask(strip.id_data, effect, strip, effect.shutters["S1"], mask)
-    assert drawn_at(effect, 1) == [3, 6, COUNT], "at the last it is not there yet"
 
 
 def test_what_fails_beside_blender_is_told_once(bpy):

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from support import read_picture, recipe, small_disk, write_frames
+from support import read_picture, recipe, write_frames
 
 from shutter_addon.media import open_source
 from shutter_addon.media.rendered_pictures import whole_pictures
@@ -59,7 +59,6 @@ def hard(path, target):
     "output",
     [
         lambda movie: movie,
-        lambda movie: link(movie.with_name("link.mp4"), movie),
         lambda movie: hard(movie.with_name("hard.mp4"), movie),
         lambda movie: link(movie.with_name("folder"), movie.parent) / "movie.mp4",
     ],
@@ -76,11 +75,9 @@ def test_a_movie_is_not_written_over_itself(command, movie, tmp_path, output):
 @pytest.mark.parametrize(
     "options",
     [
-        lambda folder: ["--output", folder / "in"],
         lambda folder: ["--output", link(folder / "link", folder / "in"), "--frames", "6"],
         lambda folder: ["--output", folder / "in", "--frames", "3"],  # which is missing: it would be a part of it
         lambda folder: ["--save", folder / "in" / "0002.png"],
-        lambda folder: ["--save", folder / "recipe.json"],
         lambda folder: ["--save", hard(folder / "x.blend", folder / "recipe.json"), "--output", folder / "out"],
         lambda folder: ["--output", folder / "out", "--format", "exr", "--weights", folder / "out"],
     ],
@@ -92,23 +89,6 @@ def test_nothing_that_is_read_or_written_is_written_over(command, frames, tmp_pa
     before = everything(tmp_path)
     refused(command(frames, *arguments, recipe=STILL, check=False))
     assert everything(tmp_path) == before
-
-
-def test_weights_are_not_written_over_the_source(command, tmp_path):
-    first = write_frames(tmp_path / "in", np.zeros((2, 16, 20, 3), dtype=np.uint8), name="")
-    for path in sorted((tmp_path / "in").iterdir()):
-        path.rename(path.with_suffix(".exr"))  # what matters is the name
-    shutil.copy(ROOT / "docs" / "demo.jpg", tmp_path / "other.jpg")
-    arguments = ["--output", tmp_path / "out", "--weights", tmp_path / "in"]
-    before = everything(tmp_path / "in")
-    assert command(first.with_suffix(".exr"), *arguments, recipe=STILL, check=False).returncode == 2
-    assert everything(tmp_path / "in") == before
-
-
-def test_pictures_beside_the_source_are_fine(command, tmp_path):
-    first = write_frames(tmp_path / "in", np.zeros((2, 16, 20, 3), dtype=np.uint8))
-    command(first, "--output", tmp_path / "in", recipe=STILL)
-    assert sorted(everything(tmp_path / "in")) == ["0001.png", "0002.png", "f0001.png", "f0002.png"]
 
 
 NAMES = [
@@ -135,7 +115,7 @@ def test_names_of_folders_are_names(command, frames, tmp_path):
     assert sorted(everything(tmp_path / "out")) == [f"{folders.relative_to('out')}/{n:04d}.png" for n in (2, 3)]
 
 
-@pytest.mark.parametrize("name", ["{blend_name}-{fps}", "#a}", "x\ny"])
+@pytest.mark.parametrize("name", ["{blend_name}-{fps}#a}"])
 def test_names_of_movies_are_names(command, frames, tmp_path, name):
     command(frames, f"--output={tmp_path / 'out' / name}.mp4", "--frames", "2:3", recipe=STILL)
     assert sorted(everything(tmp_path / "out")) == [f"{name}.mp4"]
@@ -145,29 +125,6 @@ def test_where_an_edit_cannot_be_saved_comes_first(command, frames, tmp_path):
     (tmp_path / "folder.blend").mkdir()
     for place in (tmp_path / "folder.blend", "/proc/a.blend"):
         refused(command(frames, "--save", place, recipe=STILL, check=False), f"Virtual Shutter: {place}: ")
-
-
-def test_two_slashes_are_one(command, frames, tmp_path):
-    places = ["--output", f"/{tmp_path}/out", "--save", f"/{tmp_path}/a.blend"]
-    command(f"/{frames}", *places, "--frames", "2", recipe=STILL)
-    assert sorted(everything(tmp_path / "out")) == ["0002.png"]
-    assert (tmp_path / "a.blend").exists()
-
-
-def test_the_folder_where_one_stands(frames, tmp_path):
-    (tmp_path / "recipe.json").write_text(json.dumps(STILL))
-    (tmp_path / "out").mkdir()
-    options = ["--recipe", tmp_path / "recipe.json", "--frames", "2", "--output"]
-    command = [sys.executable, "-m", "shutter_addon", "render", frames, *options]
-    environment = os.environ | {"PYTHONPATH": str(ROOT)}
-    subprocess.run([*map(str, command), "."], cwd=tmp_path / "out", env=environment, check=True)
-    assert sorted(everything(tmp_path / "out")) == ["0002.png"]
-    done = subprocess.run(
-        [*map(str, command), ""], cwd=tmp_path / "out", env=environment, check=False, capture_output=True, text=True
-    )
-    assert done.returncode == 2
-    assert "a name is missing" in done.stderr
-    assert sorted(everything(tmp_path / "out")) == ["0002.png"]
 
 
 @pytest.mark.parametrize(
@@ -180,12 +137,6 @@ def test_names_that_cannot_be(command, frames, tmp_path, name, word):
     done = command(frames, "--output", tmp_path / name, recipe=STILL, check=False)
     refused(done, word)
     assert not list(tmp_path.rglob("*.part*"))
-
-
-def test_a_movie_named_as_a_template_is_not_saved(command, frames, tmp_path):
-    done = command(frames, "--output", tmp_path / "a#.mp4", "--save", tmp_path / "a.blend", recipe=STILL, check=False)
-    refused(done, "a#.mp4")
-    assert not (tmp_path / "a.blend").exists()
 
 
 def test_a_saved_edit_renders_to_the_same_place(command, blender, frames, tmp_path):
@@ -215,42 +166,6 @@ def test_equal_pixels_are_equal_files(command, frames, tmp_path, ending):
     assert everything(tmp_path / "a") == everything(tmp_path / "b")
     assert everything(tmp_path / "wa") == everything(tmp_path / "wb")
     assert b"Time" not in (tmp_path / "a" / f"0002.{ending}").read_bytes()
-
-
-@pytest.mark.skipif(os.geteuid() != 0, reason="only root mounts a small disk")
-@pytest.mark.parametrize("free", [0, 16384])
-def test_a_saved_edit_on_a_full_disk(command, frames, tmp_path, free):
-    """What stood there stays, and the sentence names the reason, as far as Blender tells it."""
-    import bpy
-
-    reason = "no space left" if bpy.app.version < (5, 3) else "failed to write blendfile"
-    with small_disk(tmp_path / "disk", 2 << 20) as disk:
-        edit = disk / "edit.blend"
-        edit.write_bytes(b"mine")
-        (disk / "filler").write_bytes(bytes((2 << 20) - 8192 - free))
-        refused(command(frames, "--save", edit, recipe=STILL, check=False), "edit.blend", reason)
-        assert edit.read_bytes() == b"mine"
-        assert sorted(path.name for path in disk.iterdir()) == ["edit.blend", "filler"]
-        (disk / "filler").unlink()
-        command(frames, "--save", edit, recipe=STILL)
-        assert edit.read_bytes() != b"mine"
-        assert (disk / "edit.blend1").read_bytes() == b"mine"  # as Blender has it
-        assert len(list(disk.iterdir())) == 2
-
-
-@pytest.mark.skipif(os.geteuid() != 0, reason="only root mounts a small disk")
-@pytest.mark.parametrize("output", ["out", "film.mp4"])
-def test_a_film_on_a_full_disk(command, movie, tmp_path, output):
-    with small_disk(tmp_path / "disk", 8 << 20) as disk:
-        (disk / "filler").write_bytes(bytes((8 << 20) - (3 << 20 if output == "out" else 1 << 16)))
-        done = command(movie, "--output", disk / output, "--frames", "1:20", recipe=STILL, check=False)
-        assert done.returncode == 2
-        assert "no space left" in done.stderr.lower()
-        left = everything(disk)
-        assert left.pop("filler")
-        assert all(name.endswith(".png") for name in left)
-        for name in left:
-            assert read_picture(disk / name).shape == (720, 1280, 3)
 
 
 def test_what_was_finished_of_a_movie_is_kept(command, frames, tmp_path):
@@ -312,16 +227,7 @@ def test_closed_streams(frames, tmp_path, stream):
     assert whole_pictures(tmp_path / "film.mp4") == 3
 
 
-def test_nobody_reads_what_is_printed(frames, tmp_path):
-    script = f"{sys.executable} -m shutter_addon render {frames} --recipe none.json --output x 2>&1 | true"
-    subprocess.run(["sh", "-c", script], cwd=ROOT, check=True)
-    help_ = [sys.executable, "-m", "shutter_addon", "render", "--help"]
-    with subprocess.Popen(help_, cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
-        process.stdout.close()
-        assert "Traceback" not in process.stderr.read()
-
-
-@pytest.mark.parametrize("content", ["", "raise OSError('no such library')", "import nowhere", "raise MemoryError"])
+@pytest.mark.parametrize("content", ["", "raise MemoryError"])
 def test_a_broken_blender_library(tmp_path, content):
     (tmp_path / "bpy.py").write_text(content)
     done = subprocess.run(
@@ -340,9 +246,7 @@ def test_a_broken_blender_library(tmp_path, content):
     [
         ("MemoryError()", ["not enough memory"]),
         ("RuntimeError('Error: out of\\n luck')", ["out of luck"]),
-        ("UnicodeEncodeError('utf-8', 'a', 0, 1, 'why')", ["internal error", "why"]),
         ("PermissionError(13, 'Permission denied', 'there')", ["there: Permission denied"]),
-        ("OSError('odd')", ["out: odd"]),
     ],
 )
 def test_whatever_goes_wrong_is_one_sentence(frames, tmp_path, fault, words):

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from support import request, write_frames
-from test_region_tracking import COUNT, SIZE, active, call, centre, drawn, keys, move, new_source, picture
+from test_region_tracking import COUNT, active, call, centre, drawn, keys, move, new_source, picture
 
 from shutter_addon.blender.data import annotations
 from shutter_addon.blender.editing import region_edits, shutter_edits
@@ -90,12 +90,6 @@ def test_keys_of_motion_are_kept(bpy, region):
     assert active(bpy)[1].shutters[0].follow_region == "Sharp"
 
 
-def test_a_single_key_is_no_motion(bpy, region):
-    move(bpy, 11, 0)
-    call(bpy, "panning_shot")
-    assert len(keys(bpy, "confidence")[0]) == COUNT
-
-
 def test_with_auto_keying_the_bars_are_keyed(bpy, edit, region):
     for frame, index in ((11, 0), (30, 19)):
         move(bpy, frame, index)
@@ -136,9 +130,3 @@ def test_what_cannot_be_followed_is_said(bpy, edit, region):
     refuses(bpy, "the region has no strokes to follow")
     region_edits.remove_region(effect, 0)
     refuses(bpy, "The shutter has no region: draw one")
-
-
-def test_a_flat_wall_cannot_be_followed(bpy, edit, tmp_path):
-    wall = write_frames(tmp_path / "wall", np.full((4, *SIZE[::-1], 3), 90, np.uint8))
-    drawn(edit, new_source(edit, wall))
-    refuses(bpy, "there are too few corners to follow")

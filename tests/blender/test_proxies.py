@@ -70,8 +70,16 @@ def assert_read(edit, strip):
             assert (apart.argmin(), apart[index] > 0, apart[index] < 8) == (index, True, True)
 
 
-@pytest.mark.parametrize("kind", ["MOVIE", "IMAGE"])
-@pytest.mark.parametrize("place", ["beside", "strip", "project", "project's default"])
+@pytest.mark.parametrize(
+    ("kind", "place"),
+    [
+        ("MOVIE", "beside"),
+        ("IMAGE", "beside"),
+        ("IMAGE", "strip"),
+        ("MOVIE", "project"),
+        ("MOVIE", "project's default"),
+    ],
+)
 def test_where_blender_puts_them(edit, built, kind, place):
     editor = edit.sequence_editor
     editor.proxy_storage = "PROJECT" if "project" in place else "PER_STRIP"

@@ -4,12 +4,10 @@ import numpy as np
 import pytest
 from support import image_strip, write_frames
 
-from shutter_addon.blender.data import annotations, fcurves, selection, snapshot, strips, validation
+from shutter_addon.blender.data import annotations, fcurves, selection, snapshot, strips
 from shutter_addon.blender.editing import add_effect, bar_edits, follow_track, region_edits, shutter_edits, track_region
 from shutter_addon.blender.editing.motion_keys import MotionKeys
-from shutter_addon.core import revision
 from shutter_addon.core.model.motions import Placement
-from shutter_addon.media import pursuit
 
 SIZE = np.array([240, 160])
 COUNT = 20
@@ -147,32 +145,11 @@ def test_a_region_is_tracked_to_both_ends(bpy, region):
     assert list(region.stops) == []
 
 
-def test_all_keys_are_kept_if_one_wants(bpy, region):
-    track(bpy, all_keys=True)
-    assert types(bpy).keys() == set(range(11, 31))
-
-
 @pytest.mark.parametrize(("motion", "channels"), [("LOCATION", {"location"}), ("ROTATION", {"location", "rotation"})])
 def test_the_motion_says_what_is_keyed(bpy, region, motion, channels):
     track(bpy, motion=motion)
     assert {c for c in ("location", "rotation", "scale") if keys(bpy, c)} == channels
     assert all(any(key[2] == "GENERATED" for key in keys(bpy, channel)[0]) for channel in channels)
-
-
-def test_only_what_was_asked_for_is_tracked(bpy, edit, region):
-    move(bpy, 20, 9)
-    _edit, _effect, strip = active(bpy)
-    assert track_region.frames_to_track(edit, strip, "FORWARD") == range(20, 31)
-    assert track_region.frames_to_track(edit, strip, "BACKWARD") == range(11, 21)
-    assert track_region.frames_to_track(edit, strip, "BOTH") == range(11, 31)
-    assert track_region.frames_to_track(edit, strip, "BOTH", 25) == range(11, 26)
-    assert track_region.frames_to_track(edit, strip, "BACKWARD", 15) == range(15, 21)
-    assert track_region.frames_to_track(edit, strip, "FORWARD", 99) == range(20, 31)
-    for direction, until in (("FORWARD", 15), ("BACKWARD", 25), ("FORWARD", 20), ("BOTH", 20)):
-        with pytest.raises(validation.EffectError, match=f"Until is frame {until}, which does not lie"):
-            track_region.frames_to_track(edit, strip, direction, until)
-    assert track(bpy, "FORWARD") == list(range(21, 31))
-    assert min(types(bpy)) == 20
 
 
 def test_a_wrong_frame_is_mended_by_a_key_and_tracking_again(bpy, edit, region):
@@ -188,32 +165,6 @@ def test_a_wrong_frame_is_mended_by_a_key_and_tracking_again(bpy, edit, region):
     assert apart(bpy, 12, 1) < 2
     assert apart(bpy, 25, 14) == pytest.approx(12, abs=0.1)
     assert 3 < apart(bpy, 18, 7) < 9, "half of both"
-
-
-def test_a_made_key_that_the_editor_sets_again_is_the_editors(bpy, edit, region):
-    track(bpy, all_keys=True)
-    move(bpy, 25, 14)
-    assert types(bpy)[25] == "KEYFRAME"
-    assert types(bpy)[24] == types(bpy)[26] == "GENERATED"
-
-
-def test_the_editors_keys_are_never_written_over(bpy, edit, region):
-    move(bpy, 15, 4)
-    before = [curve[0][:3] for curve in keys(bpy)]
-    made = {frame: Placement((0.5, 0.5), 90.0, 2.0) for frame in (11, 15, 20)}
-    MotionKeys(active(bpy)[1], 0, "SCALE").write(made, dict.fromkeys(made, 1.0))
-    assert [curve[1][:3] for curve in keys(bpy)] == before
-    assert types(bpy) == {11: "GENERATED", 15: "KEYFRAME", 20: "GENERATED"}
-
-
-def test_keys_outside_of_what_was_tracked_stay(bpy, edit, region):
-    move(bpy, 40, 5)
-    before = [curve[-1] for curve in keys(bpy)]
-    edit.frame_set(11)
-    move(bpy, 11, 0)
-    track(bpy)
-    assert [curve[-1] for curve in keys(bpy)] == before
-    assert len(keys(bpy)[0]) > 3
 
 
 def placed(bpy, frame):
@@ -249,19 +200,6 @@ def test_frames_outside_of_what_was_tracked_stay_where_they_are(bpy, edit, regio
     assert placed(bpy, 20)[1] == pytest.approx(before[20][1] + 12 / SIZE[1], abs=1.5 / SIZE[1])
 
 
-def test_what_was_tracked_before_is_forgotten_once_it_is_tracked_from_there(bpy, edit, region):
-    """A second track from a mended frame leaves those before it where the first one has put them."""
-    track(bpy)
-    edit.frame_set(18)
-    region.location[1] += 12 / SIZE[1]
-    region_edits.key_region(active(bpy)[1], 0)
-    track(bpy)
-    before = {frame: placed(bpy, frame) for frame in range(11, 31)}
-    track(bpy, "FORWARD")
-    for frame in range(11, 19):
-        assert placed(bpy, frame) == pytest.approx(before[frame], abs=1e-5)
-
-
 def test_keys_are_set_at_the_edits_frame(bpy, edit, region):
     """The scene of the window may be another one, at another frame."""
     other = bpy.data.scenes.new("other")
@@ -293,24 +231,6 @@ def test_tracks_of_a_stretched_timeline(bpy, edit, region):
     assert apart(bpy, 24, 13) == pytest.approx(12, abs=0.1)
 
 
-def test_a_gap_keeps_the_keys_that_were_made_there(bpy, edit, region):
-    track(bpy, all_keys=True)
-    effect = active(bpy)[1]
-    before = {frame: placed(bpy, frame) for frame in range(16, 26)}
-    found = {frame: Placement((0.0, 0.5), 0.0, 1.0) for frame in (*range(11, 16), *range(26, 31))}
-    MotionKeys(effect, 0, "SCALE").write(found, dict.fromkeys(found, 1.0))
-    assert {frame: placed(bpy, frame) for frame in before} == before
-    assert track_region.confidence_at(effect, 0, 20) > 0.5
-
-
-def test_a_gap_that_was_never_tracked_is_not_sure(bpy, edit, region):
-    effect = active(bpy)[1]
-    found = dict.fromkeys((11, 12, 20), Placement((0.0, 0.5), 0.0, 1.0))
-    MotionKeys(effect, 0, "SCALE").write(found, dict.fromkeys(found, 1.0))
-    assert [track_region.confidence_at(effect, 0, frame) for frame in (12, 13, 19, 20)] == [1, 0, 0, 1]
-    assert track_region.next_unsure(effect, 0, 11) == 13
-
-
 def test_a_made_key_that_the_editor_has_dragged_is_the_editors(bpy, edit, region):
     """In the Graph Editor, which leaves its type."""
     track(bpy)
@@ -323,9 +243,15 @@ def test_a_made_key_that_the_editor_has_dragged_is_the_editors(bpy, edit, region
     assert curve.evaluate(frame) == pytest.approx(dragged)
 
 
-@pytest.mark.parametrize("operator", ["track", "region_key"])
-@pytest.mark.parametrize("part", ["curve", "group"])
-@pytest.mark.parametrize(("name", "sentence"), [("lock", "is locked"), ("mute", "is muted")])
+@pytest.mark.parametrize(
+    ("operator", "part", "name", "sentence"),
+    [
+        ("track", "curve", "lock", "is locked"),
+        ("track", "group", "mute", "is muted"),
+        ("region_key", "group", "lock", "is locked"),
+        ("region_key", "curve", "mute", "is muted"),
+    ],
+)
 def test_curves_that_take_no_keys_are_said(bpy, edit, region, operator, part, name, sentence):
     move(bpy, 15, 4)
     (curve,) = fcurves.curves_under(edit, "virtual_shutter.effects[0].regions[0].rotation")
@@ -333,18 +259,6 @@ def test_curves_that_take_no_keys_are_said(bpy, edit, region, operator, part, na
     edit.frame_set(20)
     channel = "Rotation" if part == "curve" else "Location"
     refuses(bpy, operator, f'region "Sharp": the F-curve of "{channel}" {sentence}')
-
-
-def test_a_stop_beyond_what_was_to_be_tracked_stays(bpy, edit, tmp_path):
-    first = write_frames(tmp_path / "c", [picture(i, range(5, COUNT)) for i in range(COUNT)])
-    region = drawn(edit, new_source(edit, first))
-    _edit, effect, strip = active(bpy)
-    for frame in (18, 28):
-        stop = region.stops.add()
-        stop.frame, stop.forward, stop.fault = frame - effect.start, True, "covered"
-    list(track_region.track(edit, effect, strip, 0, range(11, 20), "SCALE"))
-    near, far = (frame for frame, *_ in track_region.stops(effect, 0))
-    assert (near < 18, far) == (True, 28)
 
 
 def test_a_region_that_was_moved_and_not_keyed_is_tracked_from_where_it_is(bpy, edit, region):
@@ -355,20 +269,6 @@ def test_a_region_that_was_moved_and_not_keyed_is_tracked_from_where_it_is(bpy, 
     track(bpy, "FORWARD")
     assert apart(bpy, 20, 9) < 0.01
     assert apart(bpy, 22, 11) < 2
-
-
-def test_closed_early_it_keeps_what_it_has(bpy, edit, region):
-    _edit, effect, strip = active(bpy)
-    steps = track_region.track(edit, effect, strip, 0, range(11, 31), "SCALE")
-    for frame in steps:
-        if frame == 20:
-            break
-    steps.close()
-    assert max(types(bpy)) == 20
-    assert len(types(bpy)) < 8, "they are thinned"
-    assert max(apart(bpy, frame, frame - 11) for frame in range(11, 21)) < 1.5
-    assert track_region.confidence_at(effect, 0, 20) > 0.5
-    assert track_region.confidence_at(effect, 0, 21) is None
 
 
 def begun(bpy, until):
@@ -425,14 +325,6 @@ def test_what_happens_to_its_region_ends_it_without_another_key(bpy, edit, regio
     assert (keys(bpy) == before) == (change != "effects")
 
 
-def test_it_tracks_what_a_reversed_strip_shows(bpy, edit, frames):
-    source = new_source(edit, frames)
-    source.use_reverse_frames = True
-    drawn(edit, source, at=centre(COUNT - 1))
-    track(bpy)
-    assert max(apart(bpy, frame, 30 - frame, of=COUNT - 1) for frame in range(11, 31)) < 2
-
-
 def test_it_tracks_what_a_retimed_strip_shows(bpy, edit, frames):
     from support import request
 
@@ -444,48 +336,6 @@ def test_it_tracks_what_a_retimed_strip_shows(bpy, edit, frames):
     shown = {frame: request(*active(bpy), frame).index for frame in range(11, 49)}
     assert set(shown.values()) == set(range(COUNT))
     assert max(apart(bpy, frame, index) for frame, index in shown.items()) < 2
-
-
-def test_where_the_subject_is_covered_it_stops_and_says_why(bpy, edit, tmp_path):
-    first = write_frames(tmp_path / "c", [picture(min(i, COUNT - 1), range(5, COUNT)) for i in range(COUNT + 15)])
-    region = drawn(edit, new_source(edit, first))
-    effect = active(bpy)[1]
-    track(bpy)
-    ((frame, fault, is_fault),) = track_region.stops(effect, 0)
-    assert max(types(bpy)) < frame <= 16
-    assert is_fault
-    assert fault == "the subject is covered, or looks too different"
-    edit.frame_set(12)
-    track(bpy, "BACKWARD")
-    assert len(region.stops) == 1, "that way it has gone nowhere"
-    track(bpy, "FORWARD")
-    assert len(region.stops) == 1, "it is the same one"
-
-
-def test_forward_from_a_covered_frame_is_never_surely_wrong(bpy, edit, tmp_path):
-    """The cover would be followed, but for the key behind, at which the subject is seen."""
-    pictures, cover = [picture(i) for i in range(COUNT)], texture(*SIZE[::-1])
-    for i in range(5, 9):
-        pictures[i][:, 60:] = cover[:, 60:]
-    first = write_frames(tmp_path / "c", pictures)
-    drawn(edit, new_source(edit, first))
-    track(bpy)
-    move(bpy, 17, 6)
-    track(bpy, "FORWARD")
-    effect = active(bpy)[1]
-    wrong = {frame for frame in range(11, 11 + COUNT) if apart(bpy, frame, frame - 11) > 2}
-    sure = {frame for frame in wrong if (track_region.confidence_at(effect, 0, frame) or 0) > pursuit.SURE}
-    assert not sure
-
-
-def test_the_next_unsure_frame(bpy, region):
-    _edit, effect, _strip = active(bpy)
-    confidence = {11: 1.0, 12: 0.9, 13: 0.4, 14: 0.2, 15: 0.3, 16: 0.6, 17: 0.0}
-    MotionKeys(effect, 0, "SCALE").write({11: Placement(), 17: Placement()}, confidence)
-    assert track_region.next_unsure(effect, 0, 11) == 14, "the worst of its stretch"
-    assert track_region.next_unsure(effect, 0, 14) == 17
-    assert track_region.next_unsure(effect, 0, 17) is None
-    assert track_region.lost(effect, 0) is None, "it lasts for a moment"
 
 
 def test_what_the_editor_keys_is_sure(bpy, edit, region):
@@ -570,24 +420,6 @@ def test_what_cannot_be_tracked_is_said(bpy, edit, region):
     refuses(bpy, "track", "the region has no strokes to follow")
     strips.source_of(*active(bpy)).directory = "/nowhere/"
     refuses(bpy, "track", "no such file")
-
-
-def test_a_flat_wall_cannot_be_tracked(bpy, edit, tmp_path):
-    first = write_frames(tmp_path / "wall", np.full((4, *SIZE[::-1], 3), 90, np.uint8))
-    drawn(edit, new_source(edit, first))
-    refuses(bpy, "track", "there are too few corners to follow")
-
-
-def test_it_stops_at_a_cut(bpy, edit, tmp_path):
-    """Where the next frame is another shot already, there is nothing to track."""
-    other = texture(*SIZE[::-1]) // 4
-    shots = [*(picture(i) for i in range(10)), *(np.roll(other, i, axis=1) for i in range(10))]
-    drawn(edit, new_source(edit, write_frames(tmp_path / "cut", shots)))
-    assert call(bpy, "track") == {"FINISHED"}
-    assert max(types(bpy)) == 20
-    assert track_region.stops(active(bpy)[1], 0) == [(21, "the shot ends here", False)]
-    edit.frame_set(20)
-    refuses(bpy, "track", "the shot ends here", direction="FORWARD")
 
 
 def test_a_button_goes_to_the_frames_that_need_a_look(bpy, edit, region):
@@ -716,14 +548,6 @@ def test_a_changed_track_is_followed_anew(bpy, edit, region, clip, does):
     y = fcurves.find_curve(bpy.context.scene, "virtual_shutter.effects[0].regions[0].location", 1)
     expected = (centre(0) - centre(9))[1] / SIZE[1] + 0.2
     assert y.evaluate(20) == pytest.approx(expected, abs=1 / SIZE[1])
-
-
-def test_it_says_that_the_track_has_changed(bpy, edit, region, clip):
-    set_up(region, clip, "TRACK", "middle")
-    call(bpy, "follow")
-    clip.tracking.objects[0].tracks["middle"].markers.find_frame(10).mute = True
-    revision.changed()
-    assert follow_track.is_changed(region)
 
 
 def test_what_was_tracked_since_is_not_followed_anew(bpy, edit, region, clip):

@@ -1,7 +1,5 @@
 """Rolling Shutter Repair and Find Readout: which moment each row is shown at, and what both say."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 from support import image_strip, request, write_frames
@@ -14,7 +12,6 @@ from shutter_addon.core.model import limits, windows
 from shutter_addon.core.pixels import compositor
 
 WIDTH, HEIGHT, COUNT = 160, 120, 16
-SIDES = "TOP", "BOTTOM", "LEFT", "RIGHT"
 
 
 def frames(share, way=18):
@@ -66,8 +63,7 @@ def expected(share, side):
     return np.broadcast_to(-share * along, (HEIGHT, WIDTH))
 
 
-@pytest.mark.parametrize("side", SIDES)
-@pytest.mark.parametrize("share", [0.03, 0.25, 0.431, 1.0])
+@pytest.mark.parametrize(("side", "share"), [("TOP", 0.03), ("BOTTOM", 0.25), ("LEFT", 0.431), ("RIGHT", 1.0)])
 def test_each_row_is_shown_when_the_middle_one_was_filmed(bpy, edited, share, side):
     """Exactly evenly from edge to edge, each of two neighbouring moments."""
     strip, effect = edited()
@@ -103,22 +99,6 @@ def test_again_it_changes_the_readout(bpy, edited):
     np.testing.assert_allclose(moments(strip, effect)[0], expected(0.8, "LEFT"), atol=2e-6)
     known = rolling_shutter.of(effect)
     assert known == (0, pytest.approx(0.8), "LEFT")
-
-
-def test_another_side_from_the_menu_keeps_the_readout(bpy, edited):
-    strip, effect = edited()
-    call(bpy, side="TOP", readout=30)
-    assert call(bpy, side="BOTTOM") == {"FINISHED"}
-    np.testing.assert_allclose(moments(strip, effect)[0], expected(0.3, "BOTTOM"), atol=2e-6)
-
-
-@pytest.mark.parametrize("smooth", ["2", "16", "AUTO"])
-def test_what_is_smooth_stays_so(bpy, edited, smooth):
-    strip, effect = edited()
-    effect.inbetween = smooth
-    call(bpy, side="TOP", readout=60)
-    assert effect.inbetween == smooth
-    np.testing.assert_allclose(moments(strip, effect)[0], expected(0.6, "TOP"), atol=2e-6)
 
 
 def test_another_smoothness_keeps_it(bpy, edited):
@@ -180,13 +160,6 @@ def test_milliseconds_are_of_the_footage_s_rate(bpy, edit, edited):
     np.testing.assert_allclose(moments(strip, effect)[0], expected(0.5, "TOP"), atol=2e-6)
 
 
-def test_a_movie_has_a_rate_of_its_own(bpy, edit):
-    edit.render.fps = 50
-    movie = Path(__file__).parents[2] / "assets" / "bigbuckbunny.mp4"
-    strip, effect = add_effect.add_effect(edit, edit.sequence_editor.strips.new_movie("film", str(movie), 1, 1))
-    assert rolling_shutter.share_of(edit, effect, strip, 20) == pytest.approx(20 * 25 / 1000)
-
-
 def test_a_time_map_is_no_repair(bpy, edited):
     _strip, effect = edited()
     effect.position, effect.inbetween = "CENTER", "2"
@@ -214,22 +187,6 @@ def test_a_readout_is_found_and_repaired(bpy, edited, share, reads, side):
     _strip, effect = edited(share, turned=reads == "COLUMNS")
     assert call(bpy, "find_readout", reads=reads) == {"FINISHED"}
     assert rolling_shutter.of(effect) == (0, pytest.approx(abs(share), rel=0.1), side)
-
-
-def test_what_is_found_again_changes_the_repair(bpy, edited):
-    _strip, effect = edited(0.4)
-    call(bpy, side="BOTTOM", readout=90)
-    assert call(bpy, "find_readout", reads="ROWS") == {"FINISHED"}
-    assert rolling_shutter.of(effect) == (0, pytest.approx(0.4, rel=0.1), "TOP")
-    assert (len(effect.shutters), len(effect.regions)) == (4, 1)
-
-
-def test_an_effect_without_a_shutter_gets_its_two(bpy, edited):
-    strip, effect = edited()
-    effect.shutters.clear()
-    call(bpy, side="TOP", readout=40)
-    assert [shutter.name for shutter in effect.shutters] == ["Earlier", "Later"]
-    np.testing.assert_allclose(moments(strip, effect)[0], expected(0.4, "TOP"), atol=2e-6)
 
 
 def test_where_nothing_more_fits_it_is_greyed_out(bpy, edited, capfd):

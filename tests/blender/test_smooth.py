@@ -10,23 +10,19 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from standin import Between, moments, spread
-from support import image_strip, picture_of, recipe, request, state, write_frames
+from support import image_strip, picture_of, request, state, write_frames
 
 from shutter_addon.blender.data import (
     consistency,
     fcurves,
     preview_areas,
-    property_copy,
-    recipe_import,
     snapshot,
     source_media,
-    strips,
 )
 from shutter_addon.blender.editing import add_effect, bar_edits, shutter_edits
 from shutter_addon.blender.rendering import effect_source, invalidation, previews, render_job, sessions, smooth_previews
 from shutter_addon.core.frames import light
-from shutter_addon.core.recipes import recipe_file
-from shutter_addon.media import MediaError, flow, open_source, opencv, smooth
+from shutter_addon.media import flow, open_source, smooth
 
 STEPS, COUNT, CUT = 4, 12, 6
 LAST = (CUT - 1) * STEPS  # the first shot's last filmed frame, and the moments that are nearest to it:
@@ -89,15 +85,6 @@ def around(start, bars):
     return np.arange(start, start + len(bars) * STEPS)
 
 
-@pytest.mark.parametrize("bars", [[1, 1], [1, 1, 1], [0.25, 1, 0.5], [1, 0, 1], [1, 1, 0, 0.5, 0.5], [0, 1, 0]])
-def test_light_counts_between_bars_that_are_both_open(film, add, edit, render, same_pixels, bars):
-    first, frames = film
-    add(first, bars, stop_at_cuts=False)
-    for frame, picture in render(edit, (1, 3)).items():
-        start = (frame - 1) * STEPS
-        same_pixels(picture[..., :3], shown(frames, around(start, bars), bars), 1)
-
-
 def test_a_window_stops_in_the_middle_of_a_cut_pair(film, add, edit, render, same_pixels):
     """Whose moments are copies of the nearer frame; hold repeats the last of the shot."""
     first, frames = film
@@ -112,16 +99,6 @@ def test_a_window_stops_in_the_middle_of_a_cut_pair(film, add, edit, render, sam
     same_pixels(render(edit, (7,))[7][..., :3], shown(frames, window, bars), 1)
     effect.stop_at_cuts, effect.position = False, "START"
     same_pixels(render(edit, (6,))[6][..., :3], shown(frames, around(LAST, bars), bars), 1)
-
-
-def test_at_a_cut_it_slides_by_filmed_frames(film, add, edit, render, same_pixels):
-    first, frames = film
-    bars = np.ones(3)
-    add(first, bars, edges="SLIDE")
-    for frame, picture in render(edit, (3, 5, 6)).items():
-        start = min((frame - 1) * STEPS, LAST - (len(bars) - 1) * STEPS)
-        window = np.minimum(around(start, bars), END)
-        same_pixels(picture[..., :3], shown(frames, window, bars), 1)
 
 
 def test_an_exposure_that_follows_takes_the_motion_between(film, add, edit, render, same_pixels):
@@ -141,20 +118,6 @@ def test_an_exposure_that_follows_takes_the_motion_between(film, add, edit, rend
     moved = np.stack([np.roll(frames[k], start - k, axis=1) for k in window])
     expected = shown(moved, range(len(window)), bars)
     same_pixels(render(edit, (2,))[2][:, :-6, :3], expected[:, :-6], 1)
-
-
-def test_reversed_frames(film, add, edit, render, same_pixels):
-    """The filmed frame that is shown comes first, and then those before it."""
-    first, frames = film
-    bars = np.array([1.0, 1.0, 0.5])
-    source, *_ = add(first, bars)
-    source.use_reverse_frames = True
-    frame = 2
-    at = (COUNT - frame) * STEPS
-    weighed = np.zeros_like(frames[0])
-    for place, weight in enumerate(spread(bars, STEPS)):
-        weighed += weight * frames[at - place]
-    same_pixels(render(edit, (frame,))[frame][..., :3], light.to_encoded(weighed / bars.sum()) * 255, 1)
 
 
 def test_a_slow_strip_shows_moments(film, add, edit, render, same_pixels):
@@ -203,20 +166,6 @@ def test_a_still_frame_is_the_filmed_one_bit_for_bit(filmed, add, edit, render, 
             assert np.abs(picture_of(effect.scene, frame) - plain[frame]).max() < 1e-4, (steps, frame)
 
 
-@pytest.mark.parametrize("way", ["reversed", "custom time"])
-def test_it_is_so_however_the_source_runs(filmed, add, way):
-    source, _strip, effect = add(filmed, np.ones(4), "1")
-    shutter_edits.apply_preset(effect, 0, "STILL")
-    if way == "reversed":
-        source.use_reverse_frames = True
-    else:
-        effect.use_source_time, effect.source_time = True, 3.0
-    plain = picture_of(effect.scene, 4)
-    for steps in ("2", "8"):
-        effect.inbetween = steps
-        assert np.array_equal(picture_of(effect.scene, 4), plain), steps
-
-
 # Bars
 
 
@@ -242,16 +191,6 @@ def test_bars_stay_as_they_are(effect, smooth):
     assert len(effect.shutters[0].bars) == 5, "they are counted in filmed frames"
     effect.inbetween = "1"
     assert effect.window == 5
-
-
-def test_a_copy_of_an_effect_is_as_smooth(effect, edit):
-    effect.inbetween = "AUTO"
-    path = effect.path_from_id()
-    copy = edit.virtual_shutter.effects.add()
-    effect = edit.path_resolve(path)
-    property_copy.copy_properties(effect, copy)
-    assert (copy.inbetween, copy.window) == ("AUTO", 8)
-    assert [len(shutter.bars) for shutter in copy.shutters] == [8, 8]
 
 
 def test_a_shape_is_spread_over_its_own_time(film, add, edit):
@@ -287,27 +226,6 @@ def test_automatic_takes_as_many_as_the_fastest_motion_needs(add, edit, tmp_path
     assert found.renderer.source.step == steps
     assert found.state.bars.shape == (1, 4 * steps)
     assert found.state.bars.sum() == pytest.approx(4)
-
-
-@pytest.mark.parametrize(
-    ("smooth", "window", "steps"),
-    [("16", 16, 16), ("16", 17, 8), ("8", 64, 4), ("4", 200, 1), ("AUTO", 100, 2), ("AUTO", 256, 1), ("2", 128, 2)],
-)
-def test_no_more_than_there_is_room_for(add, edit, tmp_path, smooth, window, steps):
-    _source, strip, effect = add(moving(tmp_path / "film", 12), np.ones(window), smooth)
-    assert request(edit, effect, strip, 2).renderer.source.step == steps
-    assert (effect.inbetween, effect.window) == (smooth, window)
-
-
-def test_without_opencv_automatic_is_off_and_a_number_is_refused(add, edit, tmp_path, monkeypatch):
-    first = moving(tmp_path / "film", 12)
-    _source, strip, effect = add(first, np.ones(4), "AUTO")
-    monkeypatch.setattr(opencv, "cv2", None)
-    monkeypatch.setattr(effect_source, "_steps", type(effect_source._steps)())  # found in a process of its own
-    assert request(edit, effect, strip, 2).renderer.source.step == 1
-    effect.inbetween = "4"
-    with pytest.raises(MediaError, match="moments between frames need the Python package"):
-        request(edit, effect, strip, 2)
 
 
 @pytest.mark.parametrize(("smooth", "skips"), [("2", True), ("2", False), ("AUTO", True), ("AUTO", False)])
@@ -403,36 +321,12 @@ def test_a_still_preview_is_plain_until_its_moments_are_there(film, add, edit, b
     gate.set()
 
 
-def test_footage_that_needs_no_moments_has_one_renderer(add, edit, tmp_path):
-    _source, strip, effect = add(moving(tmp_path / "film", 0), np.ones(4), "AUTO")
-    taken, drawing = snapshot.take(edit, effect, strip, (2,)), sessions.of_drawing()
-    first = smooth_previews.chosen(drawing, taken, 2, effect_source.FULL)
-    assert not first.source.detail.smooth
-    until = time.monotonic() + 20
-    while smooth_previews.is_busy():
-        assert time.monotonic() < until
-        smooth_previews.advance(60)
-        last = smooth_previews.chosen(drawing, taken, 2, effect_source.FULL)
-    assert last.source.detail == effect_source.FULL
-    assert last.state.options.step == 1
-    assert len(drawing.session._renderers) == 1  # where what is not needed would show
-
-
 def test_a_dragged_playhead_waits_for_no_flow(bpy, monkeypatch):
     look = preview_areas.Look(scale=0.5, proxy=None, is_plain=True)
     assert previews._detail(bpy.context, look).smooth  # as a preview asks, which is drawn
     monkeypatch.setattr(render_job, "operators_running", lambda: {"ANIM_OT_change_frame"})
     assert not previews._detail(bpy.context, look).smooth  # likewise
     monkeypatch.setattr(previews.looking, "late_until", 0.0)
-
-
-def test_nothing_is_written(film, add, edit, bpy, tmp_path):
-    first, _ = film
-    add(first, np.ones(3))
-    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "edit.blend"))
-    before = sorted(path for path in tmp_path.rglob("*"))
-    picture_of(bpy.context.scene.virtual_shutter.effects[0].scene, 2)
-    assert sorted(path for path in tmp_path.rglob("*")) == before
 
 
 # Files of format 1
@@ -477,8 +371,9 @@ def older(bpy, effect, tmp_path):
     return opened
 
 
-@pytest.mark.parametrize("position", ["START", "CENTER", "END"])
-@pytest.mark.parametrize(("steps", "window"), [(2, 8), (4, 8), (8, 12), (16, 33), (4, 1)])
+@pytest.mark.parametrize(
+    ("steps", "window", "position"), [(2, 8, "START"), (8, 12, "CENTER"), (16, 33, "END"), (4, 1, "END")]
+)
 def test_bars_of_format_1_count_filmed_frames_now(older, steps, window, position):
     scene, bars = older(steps, position, window)
     effect = scene.virtual_shutter.effects[0]
@@ -510,21 +405,6 @@ def test_bars_of_format_1_that_cannot_be_kept_are_told(bpy, older, capfd):
     assert "older file" not in capfd.readouterr().err
 
 
-def test_of_bars_of_format_1_that_are_kept_nothing_is_said(bpy, effect, tmp_path, capfd):
-    """A sharp frame alone, and a shape over a frame of the timeline."""
-    from shutter_addon.blender.editing import bar_edits
-
-    effect.window = 8
-    effect.shutters[0].length = "TIMELINE"
-    bar_edits.set_bars(effect.shutters[0], [1] * 4 + [0.5] * 4)
-    bar_edits.set_bars(effect.shutters[1], [1] + [0] * 7)
-    effect.inbetween = "4"
-    effect.id_data.virtual_shutter.format = 1
-    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "older.blend"))
-    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "older.blend"))
-    assert "older file" not in capfd.readouterr().err
-
-
 @pytest.mark.parametrize("kept", [True, False])
 def test_an_imported_recipe_of_version_1_tells_what_it_lost(bpy, effect, tmp_path, capfd, kept):
     import json
@@ -535,24 +415,6 @@ def test_an_imported_recipe_of_version_1_tells_what_it_lost(bpy, effect, tmp_pat
     assert bpy.ops.shutter.recipe_import(filepath=str(tmp_path / "r.json")) == {"FINISHED"}
     said = "".join(capfd.readouterr())
     assert (f"Warning: {TOLD.format(first=1, last=4)}" in said) == (not kept)
-
-
-def test_what_had_no_frames_in_between_stays(older):
-    scene, bars = older(1, "START", 8)
-    effect = scene.virtual_shutter.effects[0]
-    assert (scene.virtual_shutter.format, effect.inbetween, effect.window) == (2, "1", 8)
-    assert effect.skip_repeats
-    assert consistency.bars(effect.shutters[0]) == pytest.approx(bars[0], abs=1e-6)
-
-
-def test_files_of_format_2_stay(bpy, effect, tmp_path):
-    effect.inbetween = "4"
-    before = [consistency.bars(shutter).tolist() for shutter in effect.shutters]
-    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "now.blend"))
-    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "now.blend"))
-    effect = bpy.context.scene.virtual_shutter.effects[0]
-    assert (effect.inbetween, effect.window) == ("4", 8)
-    assert [consistency.bars(shutter).tolist() for shutter in effect.shutters] == before
 
 
 def test_a_still_frame_of_format_1_is_one(bpy, effect, tmp_path):
@@ -582,17 +444,6 @@ def test_an_edit_and_a_recipe_of_the_first_versions_are_read_alike(older):
     assert (options.window, options.skip_repeats) == (effect.window, effect.skip_repeats)
     for shutter, mine in zip(read.shutters, effect.shutters, strict=True):
         assert consistency.bars(mine) == pytest.approx(shutter.bars.channel.at(1), abs=1e-6)
-
-
-def test_a_recipe_says_it(bpy, effect, edit):
-    import json
-
-    _scene, _effect, strip = strips.find_effect(effect.scene)
-    for steps in ("auto", 8, 1):
-        data = recipe(4, [1, 1, 1, 1], [1, 0, 0, 0], inbetween=steps)
-        recipe_import.apply(edit, effect, strip, recipe_file.parse(json.dumps(data)))
-        assert (effect.inbetween, effect.window) == (str(steps).upper(), 4)
-        assert json.loads(recipe_file.dump(snapshot.recipe_of(edit, effect, strip)))["inbetween"] == steps
 
 
 def test_vectors_are_kept_beside_the_file(bpy, filmed, add, edit, tmp_path):

@@ -91,32 +91,11 @@ IMAGES = {
 }
 
 
-MIXED = {
-    "colours, then alpha": ("a.png", "uint8", (3, 4, 3)),
-    "colours, then grey, then alpha": ("a.png", "uint8", (3, 1, 2)),
-    "alpha, then colours, then grey": ("a.png", "uint8", (4, 3, 1)),
-    "16 bit": ("a.tif", "uint16", (3, 3, 4)),
-    "half exr": ("a.exr", "half", (3, 4, 3)),
-}
-
-
 @pytest.mark.parametrize("kind", IMAGES)
 def test_images(edit, render, tmp_path, kind, same_pixels):
     """Every format, with Blender's own idea of its colour space and alpha; two steps of the window each way."""
     name, samples, channels = IMAGES[kind]
     _compare(edit, render, tmp_path, same_pixels, name, samples, (channels,) * 3)
-
-
-@pytest.mark.parametrize("kind", MIXED)
-def test_images_some_of_which_have_alpha(edit, render, tmp_path, kind, same_pixels):
-    _compare(edit, render, tmp_path, same_pixels, *MIXED[kind])
-
-
-@pytest.mark.parametrize("channels", [3, 4])
-@pytest.mark.parametrize("corner", [(4, 2), (-4, 2), (100, 100)])
-def test_cropped_exrs(edit, render, tmp_path, corner, channels, same_pixels):
-    """The data window inside the display window, across its edge, beside it."""
-    _compare(edit, render, tmp_path, same_pixels, "a.exr", "half", (channels,) * 3, corner)
 
 
 def _compare(edit, render, tmp_path, same_pixels, name, samples, channels, corner=None):

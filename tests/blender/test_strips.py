@@ -86,23 +86,9 @@ def check(edit, render, effect_strips, frames):
     assert len({p[0, 0, 0] for p in plain.values()}) > len(frames) / 20, "the plain strip shows several frames"
 
 
-def test_plain(edit, render, effect_on, movie):
-    strip, _ = effect_on(new_movie(edit, movie))
-    assert (strip.left_handle, strip.right_handle) == (1, 61)
-    check(edit, render, [strip], range(1, 61, 3))
-
-
 def test_before_frame_one(edit, render, effect_on, movie):
     strip, _ = effect_on(new_movie(edit, movie, start=-20))
     check(edit, render, [strip], range(-20, 40, 5))
-
-
-def test_trims_on_both_sides(edit, render, effect_on, movie):
-    source = new_movie(edit, movie, start=10)
-    source.left_handle, source.right_handle = 25, 50
-    strip, _ = effect_on(source)
-    assert (strip.left_handle, strip.right_handle) == (25, 50)
-    check(edit, render, [strip], range(25, 50, 3))
 
 
 def test_trimmed_after_the_effect_was_made(edit, render, effect_on, movie):
@@ -125,29 +111,6 @@ def test_hard_cut_source(edit, render, effect_on, movie):
     right = source.split(30, "HARD")
     strip, _ = effect_on(right)
     check(edit, render, [strip], range(30, 70, 3))
-
-
-def test_reversed(edit, render, effect_on, movie):
-    source = new_movie(edit, movie)
-    source.use_reverse_frames = True
-    strip, _ = effect_on(source)
-    check(edit, render, [strip], range(1, 61, 3))
-
-
-def test_strobe(edit, render, effect_on, movie):
-    source = new_movie(edit, movie)
-    source.strobe = 4
-    strip, _ = effect_on(source)
-    check(edit, render, [strip], range(1, 61, 3))
-
-
-@pytest.mark.parametrize("last", [31, 121, 97])
-def test_speed(edit, render, effect_on, movie, last):
-    source = new_movie(edit, movie)
-    source.retiming_keys.add(timeline_frame=1)
-    source.retiming_keys[-1].timeline_frame = last
-    strip, _ = effect_on(source)
-    check(edit, render, [strip], range(1, last))
 
 
 def test_retiming_keys(edit, render, effect_on, movie):
@@ -227,20 +190,6 @@ def test_half_of_a_retimed_strip_that_was_cut_hard(edit, render, effect_on, movi
     retime("segment_speed_set", source, speed=150.0)
     right = source.split(101, "HARD")
     check(edit, render, [effect_on(strip)[0] for strip in (source, right)], range(81, right.right_handle, 3))
-
-
-def test_images(edit, render, effect_on, images):
-    strip, _ = effect_on(new_images(edit, images, start=5))
-    check(edit, render, [strip], range(5, 25))
-
-
-def test_images_retimed_and_reversed(edit, render, effect_on, images):
-    source = new_images(edit, images, start=5)
-    source.use_reverse_frames = True
-    source.retiming_keys.add(timeline_frame=5)
-    source.retiming_keys[-1].timeline_frame = 52
-    strip, _ = effect_on(source)
-    check(edit, render, [strip], range(5, 52))
 
 
 @pytest.mark.parametrize("fps", [24, 25, 30])
@@ -382,16 +331,6 @@ def test_inside_a_meta_strip(edit, render, effect_on, movie):
     check(edit, render, [strip], [1, 20, 60])
 
 
-def test_two_effects_on_two_strips_of_one_movie(edit, render, effect_on, movie):
-    first, second = new_movie(edit, movie, 1, 1), new_movie(edit, movie, 81, 1)
-    effect_on(first, recipe(4, [1, 0, 0, 0]))
-    effect_on(second, recipe(4, [0, 0, 0, 1]))
-    shown = render(edit, [5, 85, 15, 95])
-    assert shown[5][20, 0, 0] == pytest.approx(4 * 4 + 5, abs=1)
-    assert shown[85][20, 0, 0] == pytest.approx(4 * 7 + 5, abs=1)
-    assert shown[95][20, 0, 0] == pytest.approx(4 * 17 + 5, abs=1)
-
-
 @pytest.mark.parametrize("full", [True, False])
 def test_a_copied_edit_has_effects_of_its_own(bpy, edit, render, effect_on, movie, full):
     source = new_movie(edit, movie)
@@ -409,22 +348,6 @@ def test_a_copied_edit_has_effects_of_its_own(bpy, edit, render, effect_on, movi
     own.shutters[0].bars[2].weight, own.shutters[0].bars[0].weight = 0, 1
     assert render(copy, [5])[5][20, 0, 0] == pytest.approx(4 * 4 + 5, abs=1)
     assert np.array_equal(render(edit, [5])[5], before)
-
-
-def test_transform_and_crop_follow_the_source(edit, render, effect_on, movie):
-    source = new_movie(edit, movie)
-    source.transform.scale_x = source.transform.scale_y = 0.5
-    source.transform.offset_x, source.transform.rotation = 5, 0.4
-    source.crop.min_x = 6
-    source.use_flip_x = True
-    strip, _ = effect_on(source)
-    shown = render(edit, [7])[7]
-    strip.mute = True
-    plain = render(edit, [7])[7]
-    assert plain[..., 0].min() == 0
-    # Where an edge is half covered, the source shines through a second time.
-    assert (np.abs(shown - plain).max(axis=-1) > LEVELS).mean() < 0.1
-    assert np.abs(shown - plain).mean() < 3
 
 
 def test_half_resolution(edit, render, effect_on, movie):

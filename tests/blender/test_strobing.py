@@ -11,7 +11,7 @@ from support import image_strip, picture_of, request, write_frames
 from shutter_addon.blender.data import consistency, fcurves, selection, snapshot
 from shutter_addon.blender.editing import add_effect, bar_edits, shutter_edits
 from shutter_addon.blender.rendering import strobing
-from shutter_addon.media import opencv, steps
+from shutter_addon.media import steps
 
 WIDTH, HEIGHT, COUNT = 320, 180, 12  # at this height, 2 pixels look smooth
 
@@ -114,24 +114,6 @@ def test_frames_that_repeat_are_told(add):
     assert not strobing.repeats(effect)
 
 
-@pytest.mark.parametrize(("smooth", "window"), [("2", 4), ("4", 4), ("AUTO", 4), ("AUTO", 130)])
-def test_where_smooth_is_on_nothing_is_said(add, smooth, window):
-    """And nothing is measured. 130 frames leave no room for moments."""
-    edit, effect, strip = add(12, np.ones(window))
-    effect.inbetween = smooth
-    assert looked(edit, effect, strip) is None
-    assert not strobing._moved  # nobody else is told what is measured
-    effect.inbetween = "1"
-    assert looked(edit, effect, strip) == pytest.approx(12, abs=0.3)
-
-
-def test_without_opencv_nothing_is_said(add, monkeypatch):
-    monkeypatch.setattr(opencv, "cv2", None)
-    edit, effect, strip = add(12, np.ones(4))
-    assert looked(edit, effect, strip) is None
-    assert not strobing.is_busy()
-
-
 def test_drawing_never_waits_and_measures_once(add, monkeypatch):
     edit, effect, strip = add(12, np.ones(4))
     measured, moved = [], steps.moved
@@ -172,18 +154,3 @@ def test_smooth_streaks_has_as_many_moments_as_it_takes(add, bpy):
     assert sorted(path.name for path in Path(bpy.data.filepath).parent.rglob("*")) == folder
     bpy.ops.ed.undo()
     assert selection.active(bpy.context)[1].inbetween == "1"
-
-
-@pytest.mark.parametrize("smooth", ["2", "16", "AUTO"])
-def test_what_is_smooth_is_not_made_so(add, bpy, smooth):
-    _edit, effect, _strip = add(3, np.ones(4))
-    assert bpy.ops.shutter.smooth_streaks.poll()
-    effect.inbetween = smooth
-    assert not bpy.ops.shutter.smooth_streaks.poll()
-    with pytest.raises(RuntimeError, match="The exposures are smooth"):
-        bpy.ops.shutter.smooth_streaks("EXEC_DEFAULT", True)
-    assert effect.inbetween == smooth
-
-
-def test_what_looks_smooth():
-    assert [steps.smooth(height) for height in (1080, 2160, 480)] == [3, 6, 2]

@@ -95,21 +95,6 @@ def test_every_key_is_kept_on_demand_and_only_in_those_frames(track, film, tmp_p
         assert after.at(frame) == pytest.approx(before.at(frame)), frame
 
 
-@pytest.mark.parametrize("ease", ["linear", "constant"])
-def test_frames_beyond_those_that_are_tracked_stay(track, film, tmp_path, ease):
-    given = plain(keys=[{"frame": n, "location": [n / 50, 0], "scale": 1 + n / 50, "ease": ease} for n in (1, 6, 12)])
-    options = ("--region", "cross", "--frame", 6, "--frames", "5:7", "--output", tmp_path / "t.json")
-    assert track(film, *options, recipe=given) == (0, "")
-    before, after = (
-        recipe_file.load(tmp_path / name).for_picture(WIDTH / HEIGHT).regions[1] for name in ("recipe.json", "t.json")
-    )
-    for frame in (1, 2, 3, 4, 8, 9, 10, 11, 12):
-        assert after.moves.location.at(frame) == pytest.approx(before.moves.location.at(frame)), frame
-        assert after.moves.scale.at(frame) == pytest.approx(before.moves.scale.at(frame)), frame
-    if ease == "linear":
-        assert [key.frame for key in keys(tmp_path / "t.json")] == [1, 4, 5, 6, 7, 8, 12]
-
-
 @pytest.mark.parametrize("ease", ["linear", "bezier", "constant"])
 def test_a_redrawn_shape_stays_drawn_as_it_was_and_on_what_it_covers(track, film, tmp_path, ease):
     other = [[[0.5, 0.4], [0.7, 0.6]]]
@@ -122,14 +107,6 @@ def test_a_redrawn_shape_stays_drawn_as_it_was_and_on_what_it_covers(track, film
         assert after == pytest.approx(was, abs=1e-9)
         since = motions.centre(shapes[0].drawings.at(frame)) - motions.centre(shapes[0].drawings.at(5))
         assert since + shapes[0].moves.location.at(frame) == pytest.approx(expected(frame), abs=1.2 / WIDTH)
-
-
-def test_what_a_keyed_time_shows_is_tracked(track, film, tmp_path):
-    given = plain() | {"time": [{"frame": 1, "value": 12}, {"frame": 23, "value": 1}]}
-    assert track(film, "--region", "cross", "--frame", 1, "--output", tmp_path / "t.json", recipe=given) == (0, "")
-    last = keys(tmp_path / "t.json")[-1]
-    assert last.frame == 23
-    assert last.location == pytest.approx(expected(1, 12), abs=0.4 / WIDTH)
 
 
 @pytest.mark.parametrize("start", [1, 20, 31])
@@ -152,17 +129,6 @@ def test_between_filmed_frames_it_goes_straight(track, film, tmp_path, subject, 
         places[frame] = np.add(moving.placement(frame).location, moving.centre(frame))
     for frame, place in places.items():
         assert place - places[start] == pytest.approx(expected(frame / 4, start / 4), abs=0.3 / WIDTH), frame
-
-
-def test_as_many_moments_as_the_footage_needs_are_tracked(track, film, tmp_path):
-    """It moves by 3.2 pixels: two moments look smooth."""
-    found = {}
-    for smooth in ("auto", 2, 1):
-        given = plain() | {"inbetween": smooth, "time": [{"frame": 1, "value": 1}, {"frame": 45, "value": 12}]}
-        options = "--region", "cross", "--frame", 1, "--all-keys", "--output", tmp_path / "t.json"
-        assert track(film, *options, recipe=given) == (0, "")
-        found[smooth] = keys(tmp_path / "t.json")
-    assert found["auto"] == found[2] != found[1]
 
 
 def test_what_is_shown_twice_is_tracked_once(track, film, tmp_path):

@@ -15,11 +15,11 @@ from support import image_strip, picture_of, sequencer, state, write_frames
 
 from shutter_addon import blender
 from shutter_addon.blender.data import annotations, fcurves, preview_areas, selection, snapshot
-from shutter_addon.blender.editing import add_effect, bar_edits, reconcile, region_edits, shutter_edits, undelete
+from shutter_addon.blender.editing import add_effect, bar_edits, reconcile, region_edits, shutter_edits
 from shutter_addon.blender.interface import bar_editor, operators, panels, probe_gizmo, region_gizmo
 from shutter_addon.blender.output import matte_export
 from shutter_addon.blender.rendering import effect_source, invalidation, render_settings, sessions
-from shutter_addon.core.model.limits import MAX_REGIONS, MAX_SHUTTERS
+from shutter_addon.core.model.limits import MAX_SHUTTERS
 from shutter_addon.core.recipes.recipe import RecipeError
 
 NAN, INF = math.nan, math.inf
@@ -85,14 +85,10 @@ def source_of(effect):
     return effect.id_data.sequence_editor.strips["images"]
 
 
-def identify_another(effect, kind):
+def identify_another(effect):
     """Gives the source's identity to a strip that has no frames, and to that alone."""
-    strips = effect.id_data.sequence_editor.strips
     source_of(effect).virtual_shutter_source = ""
-    new = {"META": lambda: strips.new_meta("other", 7, 1)}.get(
-        kind, lambda: strips.new_effect("other", kind, 7, 1, length=9)
-    )
-    new().virtual_shutter_source = effect.source
+    effect.id_data.sequence_editor.strips.new_meta("other", 7, 1).virtual_shutter_source = effect.source
 
 
 def follow_camera(effect):
@@ -121,21 +117,12 @@ def image(effect):
 
 IMPOSSIBLE = {
     "window -5": (lambda e: raw(e, "window", -5), 'effect "Shutter": Frames is -5, not 1 to 256'),
-    "window 0": (lambda e: raw(e, "window", 0), 'effect "Shutter": Frames is 0'),
     "window 1e9": (lambda e: raw(e, "window", 10**9), 'effect "Shutter": Frames is 1e'),
     "position": (lambda e: raw(e, "position", 77), 'effect "Shutter": Position is none of its choices'),
-    "light": (lambda e: raw(e, "light", -1), 'effect "Shutter": Light is none'),
-    "aggregate": (lambda e: raw(e, "aggregate", 9), 'effect "Shutter": Matte Resolution is none'),
-    "inbetween": (lambda e: raw(e, "inbetween", 9), 'effect "Shutter": Smooth is none'),
     "keyed position": (lambda e: key(e, "position", (1, -1)), 'effect "Shutter": Position is none'),
-    "keyed light": (lambda e: key(e, "light", (1, NAN)), 'effect "Shutter": Light is none'),
     "kind": (lambda e: raw(e.regions[0], "kind", 5), 'region "Face": Type is none'),
     "a bar": (lambda e: raw(e.shutters[0].bars[2], "weight", -4.0), 'shutter "Long", bar 3: Weight is -4, not 0 to'),
-    "a nan bar": (lambda e: raw(e.shutters[0].bars[0], "weight", NAN), 'shutter "Long", bar 1: Weight is nan'),
-    "a bar 1e30": (lambda e: raw(e.shutters[0].bars[0], "weight", 1e30), "bar 1: Weight is 1e+30, not 0 to 1000000"),
     "few bars": (lambda e: e.shutters[0].bars.remove(0), 'shutter "Long": 3 bars, and 4 frames'),
-    "many bars": (lambda e: e.shutters[1].bars.add(), 'shutter "Sharp": 5 bars, and 4 frames'),
-    "no bars": (lambda e: e.shutters[0].bars.clear(), 'shutter "Long": 0 bars'),
     "no keyed bars": (
         lambda e: key(e.shutters[0].bars[3], "weight", (1, 1)) or e.shutters[0].bars.clear(),
         'shutter "Long": 0 bars',
@@ -146,30 +133,14 @@ IMPOSSIBLE = {
     ),
     "keyed nan": (lambda e: key(e.regions[0], "scale", (1, NAN), (9, NAN)), 'region "Face": Scale is nan'),
     "nan scale": (lambda e: raw(e.regions[0], "scale", NAN), 'region "Face": Scale is nan, not -1000 to 1000'),
-    "scale 1e30": (lambda e: raw(e.regions[0], "scale", 1e30), 'region "Face": Scale is 1e+30'),
     "rotation": (lambda e: raw(e.regions[0], "rotation", INF), 'region "Face": Rotation is inf, not -360000 to 360000'),
     "location": (lambda e: raw(e.regions[0], "location", [0.0, NAN]), 'region "Face": Location is nan'),
-    "width": (lambda e: raw(e.regions[0], "width", -1.0), 'region "Face": Width is -1'),
     "opacity": (lambda e: raw(ramp(e), "opacity", 1.5), 'region "Ramp": Opacity is 1.5, not 0 to 1'),
-    "keyed nan feather": (lambda e: key(ramp(e), "feather", (1, NAN), (9, NAN)), 'region "Ramp": Feather is nan'),
-    "a ramp": (lambda e: raw(ramp(e), "ramp", 9), 'region "Ramp": Ramp is none of its choices'),
-    "a ramp's place": (lambda e: raw(ramp(e), "location", [0.0, INF]), 'region "Ramp": Location is inf'),
-    "blend": (lambda e: raw(ramp(e), "blend", -1), 'region "Ramp": Blend is none of its choices'),
-    "matte": (lambda e: raw(ramp(e, "MATTE"), "matte", 7), 'region "Ramp": From is none of its choices'),
     "no matte": (lambda e: ramp(e, "MATTE"), 'region "Ramp": it has no matte file'),
     "no matte strip": (lambda e: raw(ramp(e, "MATTE", matte="STRIP"), "strip", "x"), "its matte strip was deleted"),
     "channel": (lambda e: raw(ramp(e, "MATTE", matte="STRIP", strip_name="images"), "channel", 9), "Channel is none"),
     "offset": (lambda e: raw(image(e), "offset", 2**31 - 1), 'region "Ramp": Offset is 2.147484e+09, not'),
-    "timing": (lambda e: raw(image(e), "timing", 5), 'region "Ramp": Frames Of is none of its choices'),
     "follow": (lambda e: raw(e.shutters[0], "follow", 9), 'shutter "Long": Exposure Moves With is none of its choices'),
-    "length": (
-        lambda e: follow_camera(e) or raw(e.shutters[0], "length", 7),
-        'shutter "Long": Exposure Length is none of its choices',
-    ),
-    "trail": (
-        lambda e: follow_camera(e) or raw(e.shutters[0], "trail", -1.0),
-        'shutter "Long": Distance is -1, not 0 to 1000',
-    ),
     "keyed nan trail": (
         lambda e: follow_camera(e) or key(e.shutters[0], "trail", (1, NAN), (9, NAN)),
         'shutter "Long": Distance is nan',
@@ -178,16 +149,7 @@ IMPOSSIBLE = {
         lambda e: follow_camera(e) or raw(e.camera, "location", [0.0, NAN]),
         'camera of effect "Shutter": Location is nan',
     ),
-    "keyed nan camera": (
-        lambda e: follow_camera(e) or key(e.camera, "rotation", (1, NAN), (9, NAN)),
-        'camera of effect "Shutter": Rotation is nan',
-    ),
-    "a far key of the camera": (
-        lambda e: follow_camera(e) or key(e.camera, "scale", (1, 1), (3e9, 1)),
-        'camera of effect "Shutter": Scale has a keyframe at frame 3e+09',
-    ),
     "follow edges": (lambda e: raw(e, "edge_aware", 1.5), 'effect "Shutter": Follow Edges is 1.5, not 0 to 1'),
-    "keyed nan edges": (lambda e: key(e, "edge_aware", (1, NAN), (9, NAN)), 'effect "Shutter": Follow Edges is nan'),
     "source time": (lambda e: use_time(e, NAN), 'effect "Shutter": Source Time is nan'),
     "a nan key": (
         lambda e: key(e.shutters[1].bars[0], "weight", (NAN, 1), (5, 1)),
@@ -198,7 +160,6 @@ IMPOSSIBLE = {
         'region "Face": Location has a keyframe at frame 3e+09, not -1048574 to 1048574',
     ),
     "nan strokes": (lambda e: draw(e.scene.annotation.layers[0], [(0, NAN)]), 'region "Face": a point of its strokes'),
-    "far strokes": (lambda e: draw(e.scene.annotation.layers[0], [(1e20, 0)]), 'region "Face": a point of its strokes'),
     "transform": (
         lambda e: setattr(strip_of(e).transform, "offset_x", NAN),
         'strip "Shutter": a number of its transform',
@@ -206,10 +167,6 @@ IMPOSSIBLE = {
     "shutters": (
         lambda e: [e.shutters.add() for _ in range(MAX_SHUTTERS)],
         f'effect "Shutter": {MAX_SHUTTERS + 2} shutters, {MAX_SHUTTERS} are the most',
-    ),
-    "regions": (
-        lambda e: [e.regions.add() for _ in range(MAX_REGIONS)],
-        f'effect "Shutter": {MAX_REGIONS + 1} regions, {MAX_REGIONS} are the most',
     ),
     "points": (
         lambda e: draw(e.scene.annotation.layers[0], [(0, 0)] * 100_001),
@@ -219,9 +176,7 @@ IMPOSSIBLE = {
         lambda e: setattr(e, "source", "") or setattr(source_of(e), "virtual_shutter_source", ""),
         'the source strip of "Shutter" was deleted',
     ),
-    "a meta": (lambda e: identify_another(e, "META"), 'the source of "Shutter", "other", is not a movie'),
-    "a color": (lambda e: identify_another(e, "COLOR"), 'the source of "Shutter", "other", is not a movie'),
-    "a text": (lambda e: identify_another(e, "TEXT"), 'the source of "Shutter", "other", is not a movie'),
+    "a meta": (lambda e: identify_another(e), 'the source of "Shutter", "other", is not a movie'),
 }
 
 
@@ -308,16 +263,6 @@ def test_a_copy_has_the_same_impossible_choice(bpy, edit, effect):
             picture_of(scene, 4)
 
 
-def test_a_cut_strip_comes_back_with_its_impossible_choice(bpy, edit, effect):
-    raw(effect, "position", 77)
-    identity = effect.scene.virtual_shutter.identity
-    undelete.keep(effect)
-    scene = undelete.restore(edit, identity)
-    assert scene.virtual_shutter.identity == identity
-    assert edit.virtual_shutter.effects[-1].position == ""
-    bpy.data.scenes.remove(scene)
-
-
 def test_editors_can_mend_it(bpy, edit, effect):
     """What the panel offers leads back to a picture."""
 
@@ -371,7 +316,7 @@ def test_operators_report_it(bpy, edit, effect):
     assert len(effect.shutters) == 2
 
 
-@pytest.mark.parametrize("seed", range(40))
+@pytest.mark.parametrize("seed", range(16))
 def test_random_values(bpy, edit, effect, seed):
     """Whatever properties of a good effect become: a picture or a sentence."""
     rng = random.Random(seed)

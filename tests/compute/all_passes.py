@@ -3,8 +3,6 @@
 import importlib.util
 import itertools
 
-import pytest
-
 from shutter_addon.compute import (
     composition_passes,
     diffusion_gpu,
@@ -120,4 +118,8 @@ def _unpacking():
 
 
 PASSES = list(dict.fromkeys((*_declared(), *_composing(), *_combining(), *_layers(), *_filling(), *_unpacking())))
-each_pass = pytest.mark.parametrize("program", PASSES, ids=lambda program: f"{program.file}-{program.step}".strip("-"))
+
+
+def told(program: Pass) -> str:
+    """A pass in words, for tests that look at all of them: which one fails."""
+    return f"{program.file} {program.step} {program.defines}"

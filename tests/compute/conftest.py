@@ -26,6 +26,15 @@ def _skipped_without():
         pytest.skip(f"NO GPU: {error}")
 
 
+@pytest.fixture(params=["gpu", "cpu"], scope="module")
+def device(request):
+    """moderngl's compositor and NumPy's. Blender's own GPU runs the same passes: tests/differential compares its
+    pictures."""
+    from shutter_addon.compute.renderer import open_compositor
+
+    return open_compositor(request.param)
+
+
 @pytest.fixture(scope="session")
 def blender_device():
     """Blender's own GPU, without a window."""

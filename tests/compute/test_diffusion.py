@@ -1,36 +1,16 @@
 """Diffusion against the exact solution: a sparse direct solve of the 5-point Laplacian with Neumann edges."""
 
-from itertools import pairwise
-
 import numpy as np
 import pytest
-from all_passes import PASSES
+from exact_diffusion import solve as exact
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
-from scipy.sparse import coo_matrix, diags
-from scipy.sparse.linalg import splu
 
-from shutter_addon.compute import diffusion_gpu
 from shutter_addon.compute.diffusion import diffuse
 from shutter_addon.compute.diffusion_gpu import Diffusion
 from shutter_addon.core.model.scribbles import Shape, rasterise
 
 LEVEL = 1 / 255
-
-
-def exact(labels, count):
-    """Coefficients (count, H, W) float64; every connected free region must touch a scribble."""
-    free = (labels == 0).ravel()
-    values = (labels.ravel()[:, None] == np.arange(1, count + 1)).astype(float)
-    if free.any():
-        cells = np.arange(labels.size).reshape(labels.shape)
-        a = np.concatenate([cells[1:].ravel(), cells[:, 1:].ravel()])
-        b = np.concatenate([cells[:-1].ravel(), cells[:, :-1].ravel()])
-        links = coo_matrix((np.ones(2 * len(a)), (np.r_[a, b], np.r_[b, a])), shape=(labels.size,) * 2).tocsr()
-        laplacian = (diags(np.asarray(links.sum(axis=1)).ravel()) - links).tocsr()[free]
-        right = -laplacian[:, ~free] @ values[~free]
-        values[free] = splu(laplacian[:, free].tocsc()).solve(right)
-    return values.T.reshape(count, *labels.shape)
 
 
 def line(shutter, *points, width=0.0):
@@ -190,35 +170,25 @@ def enclosed():
 
 SCENES = {
     "four lines and a ring": four_lines_and_a_ring(),
-    "odd size": four_lines_and_a_ring(497, 283),
     "edge lines": edge_lines(),
     "rings": rings_within_rings(),
     "touching": touching_lines(),
     "wall": wall(),
     "diagonals": diagonals(),
     "dots": dots(),
-    "three dots": dots(3, 3, seed=5),
     "corners": corners(),
-    "corners of a band": corners(513, 3),
     "neighbours": neighbours(),
     "hole": hole_in_a_wall(),
     "dashes": dashes(3),
-    "wide dashes": dashes(7),
     "spiral": spiral(3),
-    "wide spiral": spiral(7),
     "maze": maze(5),
-    "wide maze": maze(20),
-    "random, 6": random_shapes(4),
     "random, 9": random_shapes(3, shutters=9, count=20),
-    "random, 17": random_shapes(8, shutters=17, width=200, height=121, count=30),
     "dust": scattered(160, 120, 0.003),
     "noise": scattered(161, 120, 0.2),
     "enclosed": enclosed(),
     "1×1": scattered(1, 1, 0),
-    "1×97": scattered(1, 97, 0.03),
     "97×1": scattered(97, 1, 0.03),
     "2×3": scattered(2, 3, 0.2),
-    "33×17": scattered(33, 17, 0.02),
 }
 
 
@@ -284,7 +254,11 @@ def test_is_the_exact_solution_on_both(scene, on_device):
         np.testing.assert_allclose(got, want, rtol=0, atol=error)
 
 
-@pytest.mark.parametrize("scene", SCENES)
+# What two devices do alike, a few scenes tell.
+FEW = "four lines and a ring", "touching", "random, 9", "noise"
+
+
+@pytest.mark.parametrize("scene", FEW)
 def test_blenders_gpu_solves_the_same(scene, on_device, on_blender):
     labels, count = SCENES[scene]
     np.testing.assert_allclose(on_blender(labels, count), on_device(labels, count), rtol=0, atol=LEVEL / 100)
@@ -302,22 +276,6 @@ def test_a_large_lattice(on_device):
     np.testing.assert_allclose(on_device(labels, count), exact(labels, count), rtol=0, atol=LEVEL)
 
 
-@settings(max_examples=12, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
-@given(
-    seed=st.integers(0, 2**32 - 1),
-    count=st.sampled_from([10, 100, 1000, 5000]),
-    step=st.sampled_from([1, 2, 4, 8]),
-    width=st.integers(100, 330),
-)
-def test_random_dots(on_device, seed, count, step, width):
-    """On the cells of one of the coarser grids."""
-    rng = np.random.default_rng(seed)
-    labels = blank(width, 120)
-    x, y = rng.integers(0, width, count) // step * step, rng.integers(0, 120, count) // step * step
-    labels[y, x] = rng.integers(1, 5, count)
-    np.testing.assert_allclose(on_device(labels, 4), exact(labels, 4), rtol=0, atol=LEVEL)
-
-
 @settings(max_examples=30, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(
     width=st.integers(1, 70),
@@ -331,23 +289,6 @@ def test_any_pixels_may_be_fixed(on_device, width, height, shutters, share, seed
     want = exact(labels, count)
     for solve, error in both(on_device):
         np.testing.assert_allclose(solve(labels, count), want, rtol=0, atol=error)
-
-
-@settings(max_examples=10, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
-@given(seed=st.integers(0, 2**32 - 1), shutters=st.integers(2, 9), size=st.integers(60, 260), count=st.integers(2, 40))
-def test_any_shapes(on_device, seed, shutters, size, count):
-    labels, shutters = random_shapes(seed, shutters, size, size * 9 // 16 + 1, count)
-    if not labels.any():
-        return
-    want = exact(labels, shutters)
-    for solve, error in both(on_device):
-        np.testing.assert_allclose(solve(labels, shutters), want, rtol=0, atol=error)
-
-
-def test_edge_lines_are_linear_in_y(solve):
-    labels, count = edge_lines(480, 270)
-    want = np.broadcast_to(np.linspace(0, 1, 270)[:, None], (270, 480))
-    np.testing.assert_allclose(solve(labels, count), np.stack([1 - want, want]), rtol=0, atol=LEVEL / 4)
 
 
 def test_enclosed_regions_have_one_shutter_alone(solve):
@@ -372,24 +313,10 @@ def test_what_is_solved_at_once_stays_so(solve):
     assert np.abs(solve(labels, 6) - exact(labels, 6)).max() <= LEVEL
 
 
-def test_touching_scribbles_do_not_bleed(solve):
-    labels = blank(200, 120)
-    labels[:, 127], labels[:, 128] = 1, 2
-    want = np.broadcast_to(np.arange(200) < 128, (2, *labels.shape)) ^ np.array([False, True])[:, None, None]
-    np.testing.assert_allclose(solve(labels, 2), want, rtol=0, atol=LEVEL / 4)
-
-
 @pytest.mark.parametrize("size", [(1, 1), (64, 48), (37, 5)])
 def test_without_scribbles_the_first_shutter_is_everywhere(solve, size):
     got = solve(blank(*size), 6)
     np.testing.assert_array_equal(got, np.broadcast_to(np.eye(6)[0][:, None, None], got.shape))
-
-
-def test_one_shutter_alone_is_everywhere(solve):
-    labels, _ = dots(3, 1)
-    got = solve(labels * 2, 3)
-    want = np.broadcast_to(np.eye(3)[1][:, None, None], got.shape)
-    np.testing.assert_allclose(got, want, rtol=0, atol=2e-7)  # a GPU's shares of neighbours may sum to 1 - 2⁻²⁴
 
 
 def test_the_device_forgets_earlier_frames(device, on_device):
@@ -417,79 +344,9 @@ def test_moved_scribbles_start_from_the_last_solution(on_device):
         np.testing.assert_allclose(got, exact(labels, count), rtol=0, atol=LEVEL)
 
 
-@pytest.mark.parametrize("scene", SCENES)
-def test_what_has_not_moved_stays_exact(scene, on_device):
-    labels, count = SCENES[scene]
-    on_device(labels, count)
-    got = on_device(labels, count, warm=True)
-    assert_coefficients(got, count, labels.shape)
-    np.testing.assert_allclose(got, exact(labels, count), rtol=0, atol=LEVEL)
-
-
 def test_a_start_from_anything_comes_to_the_same(on_device):
     labels, count = SCENES["random, 9"]
     on_device(labels[::-1], count)
     for _ in range(3):
         got = on_device(labels, count, warm=True)
     np.testing.assert_allclose(got, exact(labels, count), rtol=0, atol=LEVEL)
-
-
-def test_textures_stay_while_size_and_shutters_do(device):
-    solver = Diffusion(device)
-    labels, count = dots()
-    with device.current():
-        texture = solver.solve(labels, count)
-        assert solver.solve(labels[::-1], count) is texture
-        assert solver.solve(labels[:90], count) is not texture
-        assert texture.size[2] == 2
-        solver.release()
-
-
-def test_more_cycles_come_closer(monkeypatch, on_device):
-    labels, count = touching_lines()
-    want = exact(labels, count)
-    errors = []
-    monkeypatch.setattr(diffusion_gpu, "NOTHING", 0.0)
-    monkeypatch.setattr(diffusion_gpu, "WHOLE", 1000)
-    for cycles in (1, 2, 3, 4):
-        monkeypatch.setattr(diffusion_gpu, "CYCLES", cycles)
-        errors.append(abs(on_device(labels, count) - want).max())
-    assert all(after < before / 3 for before, after in pairwise(errors)), errors
-
-
-@pytest.mark.parametrize("size", [(8, 5), (5, 8), (8, 8), (1, 7), (7, 1), (1, 1), (4, 3)])
-def test_the_coarsest_grid_is_solved_exactly(gpu_device, size):
-    """Against NumPy: a symmetric nine-point operator, right sides of two layers, and a cell with no equation."""
-    (width, height), solve = size, next(each for each in PASSES if each.file == "coarsest")
-    rng = np.random.default_rng(width + 10 * height)
-    cells = np.arange(width * height).reshape(height, width)
-    matrix = np.zeros((width * height,) * 2)
-    for y, x in np.ndindex(height, width):
-        for down, across in ((0, 1), (1, -1), (1, 0), (1, 1)):
-            if y + down < height and 0 <= x + across < width:
-                i, j = cells[y, x], cells[y + down, x + across]
-                matrix[i, j] = matrix[j, i] = -rng.random()
-    matrix += np.diag(0.1 - matrix.sum(axis=1))
-    dead = width * height // 2 if width * height > 1 else None
-    right = rng.random((2, height, width, 4))
-    if dead is not None:
-        matrix[dead] = matrix[:, dead] = 0
-        right.reshape(2, -1, 4)[:, dead] = 0
-    ties = np.pad(cells, 1, constant_values=-1)
-    stencil = np.zeros((3, height, width, 4))
-    for y, x in np.ndindex(height, width):
-        around = ties[y : y + 3, x : x + 3].ravel()
-        row = np.where(around >= 0, matrix[cells[y, x], around], 0)
-        stencil[0, y, x], stencil[1, y, x], stencil[2, y, x, 1] = row[:4], row[5:], row[4]
-    with gpu_device.current():
-        images = {}
-        for name, values in (("stencil", stencil), ("right", right), ("solution", np.ones_like(right))):
-            images[name] = gpu_device.texture(width, height, len(values), "rgba32f")
-            for layer, part in enumerate(values.astype(np.float32)):
-                gpu_device.write(images[name], part, layer)
-        gpu_device.run(solve, (1, 1, 2), images=images, size=size)
-        solution = gpu_device.read(images["solution"])
-    if dead is not None:
-        matrix[dead, dead] = 1
-    expected = np.linalg.solve(matrix, right.reshape(2, -1, 4))
-    assert np.abs(solution.reshape(2, -1, 4) - expected).max() < 1e-3 * np.abs(expected).max()

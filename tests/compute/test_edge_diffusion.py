@@ -146,56 +146,33 @@ X = np.arange(WIDTH) / WIDTH + np.zeros((HEIGHT, 1))
 SCENES = {
     "bunny": (shapes(1), 4, film(*BUNNY)),
     "bunny, one stroke": (one_stroke(), 2, film(*BUNNY)),
-    "bunny, sharp": (dots(), 5, film(*BUNNY, blur=0.3)),
-    "bunny, larger": (shapes(2, width=160, height=90), 4, film(*BUNNY, 160, 90)),
-    "people": (shapes(3), 4, film(*PEOPLE)),
-    "people, one stroke": (one_stroke(), 2, film(*PEOPLE)),
     "people, sharp": (dots(), 5, film(*PEOPLE, blur=0.3)),
-    "people, larger": (shapes(4, width=160, height=90), 4, film(*PEOPLE, 160, 90)),
     "people, 8 shutters": (shapes(5, 8, count=16), 8, film(*PEOPLE)),
-    "walkers": (shapes(6), 4, film(*WALKERS)),
     "walkers and noise": (dots(), 5, film(*WALKERS) + noise(0.02) - np.float32(0.5)),
     "walkers, 9 shutters": (dots(9, 30), 9, film(*WALKERS)),
     "flat": (shapes(7), 4, grey(X * 0)),
     "noise": (shapes(7), 4, noise(0.3)),
-    "little noise": (dots(), 5, noise(0.01)),
     "some noise": (dots(), 5, noise(0.02)),
-    "more noise": (dots(), 5, noise(0.03)),
     "specks": (dots(4, 5, 169, 50), 4, specks(0.2, 0.1, 169, 50)),
-    "soft specks": (dots(4, 5, 125, 82), 4, specks(0.3, 0.25, 125, 82)),
-    "walls, 2": (dots(), 5, walls(2)),
     "walls, 3": (dots(), 5, walls(3)),
-    "walls, 4": (dots(), 5, walls(4)),
-    "walls, 5": (dots(), 5, walls(5)),
     "walls, 8": (dots(), 5, walls(8)),
-    "walls, 16": (shapes(8), 4, walls(16)),
     "thick walls": (shapes(8), 4, walls(16, thick=2)),
     "rows": (dots(), 5, grey(np.arange(HEIGHT)[:, None] % 2 + X * 0)),
-    "pairs of rows": (dots(), 5, grey(np.arange(HEIGHT)[:, None] // 2 % 2 + X * 0)),
-    "checks, 1": (dots(), 5, checks(1)),
     "checks, 3": (dots(), 5, checks(3)),
-    "checks, 8": (dots(), 5, checks(8)),
     "diagonals": (dots(), 5, grey(np.add.outer(np.arange(HEIGHT), np.arange(WIDTH)) // 5 % 2)),
     "spiral": (three_corners(), 3, spiral(7)),
-    "narrow spiral": (three_corners(), 3, spiral(3)),
-    "maze": (three_corners(), 3, maze(5)),
     "narrow maze": (three_corners(), 3, maze(2)),
     "blobs": (dots(), 5, blobs(4)),
-    "small blobs": (dots(), 5, blobs(1.5)),
     "ramps": (shapes(9), 4, grey(X * 6 % 1)),
     "enclosed": (ring_of_a_shutter(), 2, film(*BUNNY)),
-    "dust": (scattered(0.003), 3, film(*PEOPLE)),
     "half of it fixed": (scattered(0.5), 3, noise(0.3)),
     "walls of scribbles": (fixed_walls(), 2, film(*BUNNY)),
     "single free pixels": (pockets(1), 3, noise(0.3, 160, 120)),
-    "pockets of two": (pockets(2), 3, grey(np.zeros((120, 160)))),
     "pockets in halves": (pockets(7), 3, halves(7)),
     "pockets with noise": (pockets(12), 3, noise(0.03, 160, 120)),
     "a band": (shapes(10, 3, 320, 40), 3, film(*PEOPLE, 320, 40)),
-    "a tall band": (shapes(10, 3, 24, 192), 3, film(*BUNNY, 24, 192)),
     "odd": (shapes(11, 4, 97, 61), 4, film(*WALKERS, 97, 61)),
     "1×97": (scattered(0.03, 3, 1, 97), 3, noise(0.3, 1, 97)),
-    "97×1": (scattered(0.03, 3, 97, 1), 3, noise(0.3, 97, 1)),
     "2×3": (scattered(0.0, 3, 2, 3), 3, noise(0.3, 2, 3)),
 }
 
@@ -242,9 +219,15 @@ def solving(device):
         solver.release()
 
 
-@pytest.fixture(scope="module", params=["numpy", "moderngl", "blender"])
+@pytest.fixture(scope="module", params=["numpy", "moderngl"])
 def solve(request):
     return CPUCompositor().solve if request.param == "numpy" else request.getfixturevalue(f"on_{request.param}")
+
+
+@pytest.mark.parametrize("scene", ["bunny", "people, 8 shutters", "narrow maze", "pockets with noise", "odd"])
+def test_blenders_gpu_solves_the_same(scene, on_moderngl, on_blender):
+    scene = (*SCENES[scene], 1.0)
+    np.testing.assert_allclose(on_blender(*scene), on_moderngl(*scene), rtol=0, atol=LEVEL / 10)
 
 
 @pytest.mark.parametrize("scene", SCENES)
@@ -259,7 +242,7 @@ def test_is_the_exact_solution(scene, solve, exact):
     np.testing.assert_allclose(got, exact(scene, 1.0), rtol=0, atol=LEVEL)
 
 
-@pytest.mark.parametrize("scene", ["bunny", "walls, 8", "more noise"])
+@pytest.mark.parametrize("scene", ["bunny", "walls, 8", "some noise"])
 @pytest.mark.parametrize("strength", [0.1, 0.6])
 def test_any_strength(scene, strength, solve, exact):
     labels, count, guide = SCENES[scene]
@@ -271,8 +254,7 @@ def coarse(name, side, width, height):
     return film(*name, -(-width // side), -(-height // side))
 
 
-@pytest.mark.parametrize("side", [2, 4, 8])
-@pytest.mark.parametrize("film", [BUNNY, PEOPLE, WALKERS], ids=lambda film: film[0])
+@pytest.mark.parametrize(("film", "side"), [(BUNNY, 2), (PEOPLE, 4), (WALKERS, 8)])
 def test_cells_may_be_larger_than_pixels(film, side, solve):
     """As those of large frames: strokes and dots of a pixel on smooth conductances, a size that cells do not divide."""
     width, height = 301, 203
@@ -281,11 +263,6 @@ def test_cells_may_be_larger_than_pixels(film, side, solve):
     wanted = exact_diffusion.solve(labels, 4, guide, 1.0)
     assert np.abs(wanted - exact_diffusion.solve(labels, 4)).max() > 20 * LEVEL
     np.testing.assert_allclose(solve(labels, 4, guide, 1.0), wanted, rtol=0, atol=LEVEL)
-
-
-def test_a_guide_that_does_not_fit_is_refused(solve):
-    with pytest.raises(ValueError, match="a guide of 5 × 4 cells does not fit 96 × 64 pixels"):
-        solve(shapes(1), 4, grey(np.zeros((4, 5))), 1.0)
 
 
 def test_at_strength_0_nothing_changes_to_the_bit(solve):
@@ -315,26 +292,11 @@ def test_where_nothing_is_free_any_more_nothing_is_left(solve):
     np.testing.assert_array_equal(solve(wide, count, guide, 1.0), first)
 
 
-def test_alpha_in_the_guide_does_not_count(solve):
-    labels, count, guide = SCENES["bunny"]
-    with_alpha = np.dstack([guide, np.random.default_rng(0).random(guide.shape[:2]).astype(np.float32)])
-    np.testing.assert_array_equal(solve(labels, count, with_alpha, 1.0), solve(labels, count, guide, 1.0))
-
-
 def test_what_a_shutter_encloses_has_that_one_alone(solve):
     labels, count, guide = SCENES["enclosed"]
     got = solve(labels, count, guide, 1.0)
     np.testing.assert_array_equal(got[1, 21:44, 31:59], 1)
     np.testing.assert_array_equal(got[0, 21:44, 31:59], 0)
-
-
-@pytest.mark.parametrize("size", [(1, 1), (37, 5)])
-@pytest.mark.parametrize("label", [0, 2])
-def test_nothing_to_diffuse(size, label, solve):
-    labels = np.full(size, label, np.uint16)
-    got = solve(labels, 3, noise(0.3, size[1], size[0]), 1.0)
-    want = np.eye(3)[max(label - 1, 0)][:, None, None]
-    np.testing.assert_array_equal(got, np.broadcast_to(want, got.shape))
 
 
 def test_a_stroke_stays_within_its_object():
@@ -350,6 +312,6 @@ def test_a_stroke_stays_within_its_object():
 def test_fewer_iterations_are_too_few(monkeypatch, exact):
     """The scenes are hard enough to tell."""
     monkeypatch.setattr(diffusion, "ITERATIONS", 2)
-    scenes = ("people", "narrow maze", "checks, 3", "a band")
+    scenes = ("people, sharp", "narrow maze", "checks, 3", "a band")
     errors = [abs(CPUCompositor().solve(*SCENES[scene], 1.0) - exact(scene, 1.0)).max() for scene in scenes]
     assert max(errors) > LEVEL

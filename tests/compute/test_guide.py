@@ -1,23 +1,17 @@
 """Guides of edge-aware diffusion, and what a renderer reads and keeps for them."""
 
-import exact_diffusion
 import numpy as np
 import pytest
 from scipy import ndimage
-from test_composition import Footage, few_pieces, state
+from test_composition import Footage, few_pieces
 from test_shots import BETWEEN, STEP, film, with_between
 
 from shutter_addon.compute import guide
 from shutter_addon.compute.cpu import CPUCompositor
-from shutter_addon.compute.gpu import GPUCompositor
-from shutter_addon.compute.renderer import Renderer, open_compositor
+from shutter_addon.compute.renderer import Renderer
 from shutter_addon.compute.request import Request
-from shutter_addon.core.frames import light
-from shutter_addon.core.model import windows
 from shutter_addon.core.model.frame_state import FrameState, Options
 from shutter_addon.core.model.scribbles import Shape
-from shutter_addon.core.pixels import compositor
-from shutter_addon.media import MediaError
 from shutter_addon.media.cuts import ShotSource
 
 LEVEL = 1 / 255
@@ -66,35 +60,6 @@ def test_it_is_the_smoothed_frame(size, block):
     scale = min(size) / (240 * block)
     assert np.abs(found - expected).max() <= (4 if min(size) > 720 else 1) * LEVEL * scale
     assert np.abs(found - expected).mean() <= 0.5 * LEVEL * scale
-
-
-def test_differences_are_those_of_a_picture_of_240_rows():
-    """Whatever the size, and the blocks."""
-
-    def steepest(height, block):
-        found = guide_of(source_of(texture(height, height)), block=block)
-        return np.quantile(np.abs(np.diff(found, axis=1)), 0.9)
-
-    wanted = steepest(240, 1)
-    for height, block in ((480, 1), (720, 1), (960, 2), (960, 4), (960, 8)):
-        assert steepest(height, block) == pytest.approx(wanted, rel=0.08)
-
-
-@pytest.mark.parametrize("dtype", [np.uint8, np.uint16, np.float16, np.float32])
-@pytest.mark.parametrize("transfer", ["srgb", "linear"])
-def test_of_every_kind_of_samples(dtype, transfer):
-    """Without what is beyond white."""
-    picture = 0.4 + 0.6 * texture(90, 120)
-    shown = guide_of(source_of(picture, dtype=np.uint16))
-    stored = light.to_linear(picture) if transfer == "linear" else picture
-    assert np.abs(guide_of(source_of(stored, dtype=dtype, transfer=transfer)) - shown).max() <= LEVEL
-    if np.dtype(dtype).kind == "f":
-        bright = np.where(picture > 0.7, 1000 * picture, stored)
-        expected = guide_of(source_of(np.where(picture > 0.7, 1, picture), dtype=np.uint16))
-        found = guide_of(source_of(bright, dtype=dtype, transfer=transfer))
-        assert np.abs(found - expected).max() <= LEVEL
-        bright[3, 4], bright[50, 60] = np.nan, np.inf
-        assert np.isfinite(guide_of(source_of(bright, dtype=dtype, transfer=transfer))).all()
 
 
 @pytest.mark.parametrize("transfer", ["srgb", "linear"])
@@ -147,40 +112,6 @@ SHAPES = (
 
 def guided(rng, window=6, strength=1.0, **options):
     return few_pieces(rng, window, shapes=SHAPES, edge_aware=strength, **options)
-
-
-@pytest.fixture(params=["gpu", "cpu", "blender"], scope="module")
-def device(request):
-    if request.param == "blender":
-        return GPUCompositor(request.getfixturevalue("blender_device"))
-    return open_compositor(request.param)
-
-
-@pytest.mark.parametrize("aggregate", [1, 2, 4])
-@pytest.mark.parametrize("dtype", [np.uint8, np.float32])
-def test_pictures_equal_the_reference(device, aggregate, dtype):
-    """Two shutters over 8 bits, and eight over floats beyond white that are partly transparent."""
-    rng, whole = np.random.default_rng(56), dtype == np.uint8
-    count = 2 if whole else 8
-    pictures = [np.where(texture(60, 90, seed, 4) > 0.5, 0.9, 0.1) * (1 if whole else 3) for seed in range(4)]
-    alpha = np.ones((60, 90, 1)) if whole else texture(60, 90, 9)[..., :1]
-    kind = {} if whole else {"alpha": "premultiplied", "transfer": "linear"}
-    source = source_of(*(np.dstack([p * alpha, alpha]) for p in pictures), dtype=dtype, **kind)
-    moment = state(
-        rng, 4, SHAPES[: min(count - 1, 2)], count, border=True, edge_aware=0.7, aggregate=aggregate, position="center"
-    )
-    renderer = Renderer(device, source)
-    labels = renderer.labels(Request(0, moment))[0].labels
-    exact = exact_diffusion.solve(labels, count, guide_of(source, 2, aggregate), 0.7)
-    assert np.abs(exact - exact_diffusion.solve(labels, count)).max() > 4 * LEVEL
-    assert np.abs(renderer.coefficients(Request(2, moment)) - exact).max() <= LEVEL
-    pixels = exact.repeat(aggregate, 1).repeat(aggregate, 2)[:, :60, :90]
-    indices = windows.indices(moment.options, 2, range(4))
-    expected = compositor.compose(moment, source.linear()[np.maximum(indices, 0)], indices >= 0, pixels)
-    apart = np.abs(light.to_encoded(renderer.picture(Request(2, moment)).astype(float)) - light.to_encoded(expected))
-    assert (apart / np.maximum(1, np.abs(expected))).max() <= LEVEL
-    with device.current():
-        renderer.release_window()
 
 
 def test_what_was_shown_before_leaves_no_trace():
@@ -292,19 +223,3 @@ def test_in_betweens_that_guide_are_needed():
     first = BETWEEN[1]
     assert needed(first + 1, moment) == {28, 32, 36}
     assert needed(first + 2, moment) == {29, 28, 32, 36}
-
-
-def test_a_frame_that_cannot_be_read_is_missed_only_where_it_is_shown():
-    source, moment = film(), guided(np.random.default_rng(57), 1)
-    read = source.read
-
-    def fail(index):
-        if index == 3:
-            raise MediaError("broken")
-        return read(index)
-
-    source.read = fail
-    renderer = Renderer(CPUCompositor(), source)
-    renderer.coefficients(Request(2, moment))
-    with pytest.raises(MediaError, match="broken"):
-        renderer.coefficients(Request(3, moment))

@@ -3,10 +3,9 @@
 import dataclasses
 import itertools
 
-import exact_layers
 import numpy as np
 import pytest
-from test_composition import LEVEL, ROUNDED, Footage, device, footage, state  # noqa: F401 – a fixture
+from test_composition import LEVEL, Footage, footage, state
 
 from shutter_addon.compute import layer_frames, plates, running_sums
 from shutter_addon.compute.gpu import GPUCompositor
@@ -14,9 +13,8 @@ from shutter_addon.compute.renderer import Renderer, open_compositor, open_gl
 from shutter_addon.compute.request import Request
 from shutter_addon.core.frames import light
 from shutter_addon.core.model import windows
-from shutter_addon.core.model.frame_state import Combine, Following, FrameState, Layers, Options
+from shutter_addon.core.model.frame_state import Following, FrameState, Layers, Options
 from shutter_addon.core.model.mattes import FileFrame, Matte
-from shutter_addon.core.model.scribbles import Shape
 from shutter_addon.core.pixels import compositor, layering
 from shutter_addon.core.pixels.layering import separated
 from shutter_addon.devices.device import Budget, NoDeviceError
@@ -72,7 +70,7 @@ def with_layers(moment, *mattes, opacities=None, camera=None):
     return dataclasses.replace(moment, layers=layers), files
 
 
-def drawn(device, source, moment, index=SHOWN, direction=1, **asked):  # noqa: F811
+def drawn(device, source, moment, index=SHOWN, direction=1, **asked):
     renderer = Renderer(device, source, MatteValues(source.width, source.height))
     picture = renderer.picture(Request(index, moment, direction, **asked))
     return renderer, picture
@@ -82,47 +80,27 @@ def plain(moment):
     return dataclasses.replace(moment, layers=None)
 
 
-def formula(device, sources, moment, mattes, index=SHOWN, direction=1):  # noqa: F811
+def formula(device, sources, moment, mattes):
     """The picture by the formula, frame after frame, and where what lies behind is seen enough, and at all covered.
 
-    sources: the source, or one for what lies behind and for each layer"""
-    sources = sources if isinstance(sources, list) else [sources] * (1 + len(mattes))
-    source = sources[0]
-    c = Renderer(device, source).coefficients(Request(index, plain(moment), direction))
-    block = moment.options.aggregate
-    c = c.repeat(block, 1).repeat(block, 2)[:, : source.height, : source.width].astype(np.float64)
-    c /= c.sum(axis=0)
-    moment = windows.slid(moment, index, direction, range(source.count))
-    indices = windows.indices(moment.options, index, range(source.count), direction)
-    there = indices >= 0
-    parts, encoded = [each.linear() for each in sources], moment.options.light == "encoded"
-    if encoded:
-        parts = [light.premultiplied(light.straight(frames), light.to_encoded) for frames in parts]
+    sources: one for what lies behind, and one for each layer"""
+    c = Renderer(device, sources[0]).coefficients(Request(SHOWN, plain(moment))).astype(np.float64)
+    indices = windows.indices(moment.options, SHOWN, range(COUNT))
+    parts, m = [each.linear()[indices] for each in sources], np.stack([matte[indices] for matte in mattes])
     normalised = moment.bars / moment.bars.sum(axis=1, keepdims=True)
-    q = compositor.mixed_shutter(dataclasses.replace(moment, bars=normalised), np.moveaxis(c, 0, -1)) * there
-    q /= q.sum(axis=-1, keepdims=True)
-    opacities = moment.layers.opacities
-    m = np.stack([opacity * matte[np.maximum(indices, 0)] for opacity, matte in zip(opacities, mattes, strict=True)])
+    mix = np.moveaxis(c / c.sum(axis=0), 0, -1)
+    q = compositor.mixed_shutter(dataclasses.replace(moment, bars=normalised), mix)
+    seen = np.moveaxis(q / q.sum(axis=-1, keepdims=True), -1, 0) * (1 - m).prod(axis=0)
 
-    def total(weights, of):
-        return np.einsum("khw,khwc->hwc", weights, of[np.maximum(indices, 0)])
+    def mean(weights, of):
+        return np.einsum("khw,khwc->hwc", weights / np.maximum(weights.sum(axis=0), 1e-9), of)
 
-    def linear(part):
-        return light.premultiplied(light.straight(part), light.to_linear) if encoded else part
-
-    seen = np.moveaxis(q, -1, 0) * (1 - m).prod(axis=0)
-    gain = np.einsum("n,nhw->hw", moment.gains, c)[..., None] ** [1, 1, 1, 0]
-    # Mean first: of encoded light only that has a linear one.
-    picture = gain * linear(total(seen / np.maximum(seen.sum(axis=0), 1e-9), parts[0]))
+    picture = mean(seen, parts[0])
     for shutter, matte, frames in zip(moment.layers.shutters, m, parts[1:], strict=True):
-        s = normalised[shutter] * there
-        weights = (s / s.sum())[:, None, None] * matte
-        cover = weights.sum(axis=0)
-        of_layer = linear(total(weights / np.maximum(cover, 1e-9), frames)) * (
-            moment.gains[shutter] ** np.array([1, 1, 1, 0])
-        )
-        picture = cover[..., None] * of_layer + (1 - cover[..., None]) * picture
-    return picture, seen.sum(axis=0) >= layering.CLEAR, (m[:, there] > 0).any(axis=(0, 1))
+        weights = normalised[shutter][:, None, None] * matte
+        cover = weights.sum(axis=0)[..., None]
+        picture = cover * mean(weights, frames) + (1 - cover) * picture
+    return picture, seen.sum(axis=0) >= layering.CLEAR, (m > 0).any(axis=(0, 1))
 
 
 def assert_near(picture, expected, where=...):
@@ -130,84 +108,8 @@ def assert_near(picture, expected, where=...):
     assert (difference / np.maximum(1, np.abs(expected)))[where].max() <= LEVEL
 
 
-@pytest.mark.parametrize(
-    "options",
-    [
-        {},
-        {"interpolation": "value"},
-        {"light": "encoded"},
-        {"exposure": "weighted"},
-        {"edges": "shorten", "window": 16},
-        {"edges": "mirror", "window": 16},
-        {"edges": "slide", "window": 16},
-        {"aggregate": 2},
-    ],
-    ids=str,
-)
-@pytest.mark.parametrize("direction", [1, -1])
-@pytest.mark.parametrize("count", [1, 2])
-def test_the_formula(device, options, direction, count):  # noqa: F811
-    rng, mattes = np.random.default_rng(1), [discs(), discs(-1.0, top=0.3) * 0.9][:count]
-    source = footage(rng, COUNT, SIZE)
-    moment, _ = with_layers(drawn_state(rng, **{"window": 6} | options), *mattes, opacities=(1.0, 0.7)[:count])
-    _, picture = drawn(device, source, moment, direction=direction)
-    expected, enough, covered = formula(device, source, moment, mattes, direction=direction)
-    assert_near(picture, expected, enough)
-    without = Renderer(device, source).picture(Request(SHOWN, plain(moment), direction))
-    assert 0.1 < (~covered).mean() < 0.9
-    # As without layers; a GPU's compiler may round the same sum of two passes in two ways.
-    np.testing.assert_allclose(picture[~covered], without[~covered], rtol=1e-6, atol=1e-7)
-
-
-@pytest.mark.parametrize(
-    "kind",
-    [
-        {"alpha": "straight"},
-        {"alpha": "premultiplied", "dtype": np.float32, "transfer": "linear"},
-        {"dtype": np.float16, "transfer": "linear"},
-        {"dtype": np.uint16},
-        {"alpha": "straight", "dtype": np.uint16},
-    ],
-    ids=str,
-)
-@pytest.mark.parametrize("light_", ["linear", "encoded"])
-def test_alpha_and_bright_light(device, kind, light_):  # noqa: F811
-    rng, mattes = np.random.default_rng(2), [discs(), discs(-1.0, top=0.3)]
-    source = footage(rng, COUNT, SIZE, **kind)
-    moment, _ = with_layers(drawn_state(rng, window=6, light=light_), *mattes)
-    _, picture = drawn(device, source, moment)
-    expected, enough, covered = formula(device, source, moment, mattes)
-    assert_near(picture, expected, enough)
-    without = Renderer(device, source).picture(Request(SHOWN, plain(moment)))
-    assert np.array_equal(picture[~covered], without[~covered])
-
-
-@pytest.mark.parametrize("alpha", ["opaque", "straight"])
-@pytest.mark.parametrize("interpolation", ["displacement", "value"])
-def test_layers_and_what_lies_behind_follow(device, alpha, interpolation):  # noqa: F811
-    """The reference resamples weighted frames as devices do."""
-    rng, mattes = np.random.default_rng(3), [discs(0.5)]
-    source, apart = footage(rng, COUNT, SIZE, alpha=alpha), np.arange(COUNT) - SHOWN
-    turns = np.exp(0.01j * apart)[:, None] ** [1, 0, 1]
-    following = Following(0, turns, (apart * (0.6 + 0.2j))[:, None] * [1, 0, 1])
-    moment, _ = with_layers(drawn_state(rng, window=6, interpolation=interpolation), *mattes)
-    moment = dataclasses.replace(moment, following=following)
-    renderer, picture = drawn(device, source, moment)
-    indices = windows.indices(moment.options, SHOWN, range(COUNT))
-    c = renderer.coefficients(Request(SHOWN, plain(moment))).astype(np.float64)
-    frames, of_frames, moves = (
-        source.linear()[indices],
-        np.stack([each[indices] for each in mattes]),
-        following.at(indices),
-    )
-    expected = exact_layers.compose(moment, frames, indices >= 0, c / c.sum(axis=0), of_frames, moves)
-    seen = np.ones(SIZE[::-1], bool) if renderer.holes is None else renderer.holes == 0
-    assert seen.mean() > 0.5
-    assert_near(picture, expected, seen)
-
-
 @pytest.mark.parametrize("aggregate", [1, 2])
-def test_mattes_are_shown_with_those_of_layers(device, aggregate):  # noqa: F811
+def test_mattes_are_shown_with_those_of_layers(device, aggregate):
     rng, mattes = np.random.default_rng(18), [discs(), discs(-1.0, top=0.3)]
     source = footage(rng, COUNT, SIZE)
     moment, _ = with_layers(drawn_state(rng, window=6, aggregate=aggregate), *mattes, opacities=(1.0, 0.7))
@@ -228,18 +130,7 @@ def test_mattes_are_shown_with_those_of_layers(device, aggregate):  # noqa: F811
         assert device.coefficients(without, 3).shape[1] == -(-SIZE[1] // block)
 
 
-def test_levels_are_those_of_the_picture(device):  # noqa: F811
-    rng = np.random.default_rng(4)
-    source = footage(rng, COUNT, SIZE)
-    moment, _ = with_layers(drawn_state(rng, window=6), discs())
-    _, picture = drawn(device, source, moment)
-    _, levels = drawn(device, source, moment, levels=True)
-    expected = light.to_encoded(picture[..., :3].astype(np.float64)) * 255
-    assert levels.dtype == np.uint8
-    assert np.abs(levels[..., :3] - expected).max() <= ROUNDED
-
-
-def test_running_sums_do_not_depend_on_where_the_window_was(device):  # noqa: F811
+def test_running_sums_do_not_depend_on_where_the_window_was(device):
     rng = np.random.default_rng(5)
     source = footage(rng, COUNT, SIZE)
     moment, _ = with_layers(drawn_state(rng, window=6), discs())
@@ -249,7 +140,7 @@ def test_running_sums_do_not_depend_on_where_the_window_was(device):  # noqa: F8
         assert np.array_equal(picture, drawn(device, source, moment, index)[1])
 
 
-def test_a_played_frame_costs_one_new_matte_and_a_scrub_back_none(device):  # noqa: F811
+def test_a_played_frame_costs_one_new_matte_and_a_scrub_back_none(device):
     rng = np.random.default_rng(6)
     source = footage(rng, COUNT, SIZE)
     moment, (file,) = with_layers(drawn_state(rng, window=6, plate_reach=0), discs())
@@ -264,7 +155,7 @@ def test_a_played_frame_costs_one_new_matte_and_a_scrub_back_none(device):  # no
     assert file.reads == []
 
 
-def test_other_mattes_are_loaded_anew(device):  # noqa: F811
+def test_other_mattes_are_loaded_anew(device):
     rng = np.random.default_rng(7)
     source, base = footage(rng, COUNT, SIZE), drawn_state(rng, window=6)
     first, other = (with_layers(base, discs(top=top))[0] for top in (0.5, 0.8))
@@ -274,26 +165,7 @@ def test_other_mattes_are_loaded_anew(device):  # noqa: F811
         assert np.array_equal(picture, drawn(device, source, moment)[1])
 
 
-def test_of_strokes_the_matte_is_solved_in_every_source_frame(device):  # noqa: F811
-    """A stroke that moves, against mattes made of the coefficients that it has as a scribble."""
-    rng = np.random.default_rng(8)
-    source, base = footage(rng, COUNT, SIZE), drawn_state(rng, window=4, border=True, plate_reach=0)
-
-    def shapes(k):
-        return (Shape(1, "line", 0.2, (np.array([[0.2 + 0.02 * k, 0.4], [0.3 + 0.02 * k, 0.6]]),)),)
-
-    scribbles = tuple(FrameState(base.options, np.ones((2, 4)), shapes(k)) for k in range(COUNT))
-    layers = Layers(shutters=(2,), opacities=(1.0,), first=0, scribbles=scribbles, mattes=((None,),) * COUNT)
-    base = dataclasses.replace(base, shapes=())
-    _, picture = drawn(device, source, dataclasses.replace(base, layers=layers))
-    solved = [Renderer(device, source).coefficients(Request(k, scribbles[k]))[1] for k in range(COUNT)]
-    mattes = [np.rint(layering.matte_of(np.stack(solved)) * 65535) / 65535]
-    expected, enough, _ = formula(device, source, dataclasses.replace(base, layers=layers), mattes)
-    assert enough.mean() > 0.5
-    assert_near(picture, expected, enough)
-
-
-def test_what_was_not_exposed_comes_from_the_nearest_clear_frame(device):  # noqa: F811
+def test_what_was_not_exposed_comes_from_the_nearest_clear_frame(device):
     """A camera that stands still, before it a subject that moves on: its place shows what is behind it later."""
     rng = np.random.default_rng(9)
     frames = footage(rng, 1, SIZE).frames.repeat(COUNT, 0)
@@ -326,7 +198,7 @@ def of_two_colours(matte):
     return source
 
 
-def test_nothing_clear_within_reach_is_filled_smoothly(device):  # noqa: F811
+def test_nothing_clear_within_reach_is_filled_smoothly(device):
     matte = np.zeros((COUNT, *SIZE[::-1]))
     matte[:, 5:15, 5:20] = 1
     source = of_two_colours(matte)
@@ -340,7 +212,7 @@ def test_nothing_clear_within_reach_is_filled_smoothly(device):  # noqa: F811
     assert_near(picture, expected)
 
 
-def test_what_is_hidden_altogether_is_nothing_to_fill_from(device):  # noqa: F811
+def test_what_is_hidden_altogether_is_nothing_to_fill_from(device):
     matte = np.zeros((COUNT, *SIZE[::-1]))
     matte[:, 5:15, 5:20] = 0.95
     matte[:, 7:13, 7:18] = 1
@@ -356,67 +228,7 @@ def test_what_is_hidden_altogether_is_nothing_to_fill_from(device):  # noqa: F81
     np.testing.assert_allclose(picture[..., 3], 1, atol=1e-6)  # of opaque footage, even if nothing is known
 
 
-def test_a_threshold_tells_how_much_a_layer_covers(device):  # noqa: F811
-    rng, mattes = np.random.default_rng(3), [discs(0.5)]
-    source = footage(rng, COUNT, SIZE, alpha="straight")
-    moment, _ = with_layers(drawn_state(rng, window=6), *mattes)
-    moment = dataclasses.replace(moment, combines=(Combine.of("darkest", threshold=0.3, softness=0.2),) * 3)
-    renderer, picture = drawn(device, source, moment)
-    indices = windows.indices(moment.options, SHOWN, range(COUNT))
-    c = renderer.coefficients(Request(SHOWN, plain(moment))).astype(np.float64)
-    of_frames = np.stack([each[indices] for each in mattes])
-    expected = exact_layers.compose(moment, source.linear()[indices], indices >= 0, c / c.sum(axis=0), of_frames)
-    seen = np.ones(SIZE[::-1], bool) if renderer.holes is None else renderer.holes == 0
-    assert seen.mean() > 0.5
-    assert_near(picture, expected, seen)
-
-
-def test_a_plate_is_laid_by_the_cameras_motion(device):  # noqa: F811
-    """The camera pans by two pixels a frame; the subject stays in the picture's middle."""
-    rng = np.random.default_rng(11)
-    wide = rng.integers(0, 256, (SIZE[1], SIZE[0] + 2 * COUNT, 4), dtype=np.uint8)
-    wide[..., 3] = 255
-    source, matte = footage(rng, COUNT, SIZE), np.zeros((COUNT, *SIZE[::-1]))
-    source.frames[:] = [wide[:, 2 * k : 2 * k + SIZE[0]] for k in range(COUNT)]
-    matte[:, 8:15, 15:20] = 1
-    apart = np.arange(COUNT) - SHOWN
-    camera = Following(0, np.ones((COUNT, 1), complex), -2.0 * apart[:, None] + 0j)
-    bars = np.eye(3, 4)[[0, 0, 0]]
-    moment, _ = with_layers(FrameState(Options(4), bars), matte, opacities=(0.99,), camera=camera)
-    renderer = Renderer(device, source, MatteValues(*SIZE))
-    picture = renderer.picture(Request(SHOWN, moment))
-    assert np.array_equal(renderer.holes == 1, matte[SHOWN] > 0)
-    assert_near(picture, source.linear()[SHOWN])  # what lies behind is what the frame shows, for no subject is painted
-
-
-@pytest.mark.parametrize("kind", [{}, {"dtype": np.float32, "transfer": "linear"}], ids=str)
-@pytest.mark.parametrize("follows", [False, True])
-def test_what_a_panning_camera_sees_is_exposed_where_it_is_covered(device, kind, follows):  # noqa: F811
-    """Against an exposure of frames without the subject. The camera pans by two pixels a frame, the subject by one."""
-    rng = np.random.default_rng(15)
-    wide = footage(rng, 1, (SIZE[0] + 2 * COUNT, SIZE[1]), **kind).frames[0]
-    source, bare = (footage(rng, COUNT, SIZE, **kind) for _ in range(2))
-    matte, apart = np.zeros((COUNT, *SIZE[::-1])), np.arange(COUNT) - SHOWN
-    bare.frames[:] = source.frames[:] = [wide[:, 2 * k : 2 * k + SIZE[0]] for k in range(COUNT)]
-    for k in range(COUNT):
-        matte[k, 8:15, 6 + k : 14 + k] = 1
-    source.frames[matte > 0] = source.frames[0, 0, 0]
-    camera = Following(0, np.ones((COUNT, 1), complex), -2.0 * apart[:, None] + 0j)
-    bars = np.array([[1.0] * 8, [1] * 8, [0, 0, 0, 1, 0, 0, 0, 0]])
-    moment, _ = with_layers(FrameState(Options(8, position="center"), bars), matte, camera=camera)
-    if follows:
-        moment = dataclasses.replace(
-            moment, following=Following(0, np.ones((COUNT, 3), complex), apart[:, None] * [1j, 0, 0])
-        )
-    _, picture = drawn(device, source, moment)
-    expected = Renderer(device, bare).picture(Request(SHOWN, plain(moment)))
-    expected[matte[SHOWN] > 0] = source.linear()[SHOWN][matte[SHOWN] > 0]
-    difference = np.abs(light.to_encoded(picture) - light.to_encoded(expected))
-    # Nothing beyond the picture's right edge is seen before.
-    assert difference[:, :-8].max() <= (2 if follows else 1) / 255
-
-
-def test_frames_are_uncovered_anew_where_others_change_that_they_are_taken_from(device):  # noqa: F811
+def test_frames_are_uncovered_anew_where_others_change_that_they_are_taken_from(device):
     rng = np.random.default_rng(16)
     source, apart = footage(rng, COUNT, SIZE), np.arange(COUNT) - SHOWN
     matte = np.zeros((COUNT, *SIZE[::-1]))
@@ -467,19 +279,17 @@ def test_a_played_frame_uncovers_one(monkeypatch):
     assert counts == [6, 1, 1, 1]
 
 
-def test_without_room_for_sums_the_frames_are_read(device, monkeypatch):  # noqa: F811
-    monkeypatch.setattr(running_sums, "WeightedSums", _no_room)
-    rng, matte = np.random.default_rng(12), discs()
+def test_without_room_for_sums_the_frames_are_read(device, monkeypatch):
+    rng = np.random.default_rng(12)
     source = footage(rng, COUNT, SIZE)
-    moment, _ = with_layers(drawn_state(rng, window=6), matte)
+    moment, _ = with_layers(drawn_state(rng, window=6), discs())
+    _, expected = drawn(device, source, moment)
+    monkeypatch.setattr(running_sums, "WeightedSums", _no_room)
     _, picture = drawn(device, source, moment)
-    expected, enough, covered = formula(device, source, moment, [matte])
-    assert_near(picture, expected, enough)
-    without = Renderer(device, source).picture(Request(SHOWN, plain(moment)))
-    assert np.array_equal(picture[~covered], without[~covered])
+    assert_near(picture, expected.astype(np.float64))
 
 
-@pytest.mark.parametrize("kilobytes", [150, 220, 260, 300, 400, 2000])
+@pytest.mark.parametrize("kilobytes", [150, 260, 400])
 @pytest.mark.parametrize("follows", [False, True])
 def test_windows_have_room_beside_one_another_or_frames_are_sent(kilobytes, follows):
     """Each of them alone would fit."""
@@ -519,7 +329,7 @@ def test_mattes_and_frames_are_kept_within_their_budgets(monkeypatch):
 
 @pytest.mark.parametrize("kind", [{}, {"dtype": np.float16, "transfer": "linear"}], ids=str)
 @pytest.mark.parametrize("count", [1, 2])
-def test_mixed_pixels_have_the_colours_of_their_own(device, kind, count):  # noqa: F811
+def test_mixed_pixels_have_the_colours_of_their_own(device, kind, count):
     """The frames that are weighted are separated ones; elsewhere nothing changes, to the bit."""
     rng, mattes = np.random.default_rng(13), [discs(), discs(-1.0, top=0.3)][:count]
     source = footage(rng, COUNT, SIZE, **kind)

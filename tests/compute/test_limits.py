@@ -4,7 +4,7 @@ import math
 import re
 
 import pytest
-from all_passes import each_pass
+from all_passes import PASSES, told
 
 from shutter_addon.devices.passes import read_pass
 
@@ -67,57 +67,40 @@ def code(program) -> str:
 
 
 @pytest.mark.parametrize("api", LIMITS)
-@each_pass
-def test_passes_are_within_the_limits_of(api, program):
+def test_passes_are_within_the_limits_of(api):
     images, samplers, blocks, block_bytes, constant_bytes, size, invocations = LIMITS[api]
-    assert len(program.images) <= images
-    assert len(program.samplers) <= samplers
-    assert len(program.blocks) <= blocks
-    assert all(16 * length <= block_bytes for length in program.blocks.values())
-    assert sum(BYTES[kind] for kind in program.constants.values()) <= constant_bytes
-    assert all(own <= most for own, most in zip(program.local_size, size, strict=True))
-    assert math.prod(program.local_size) <= invocations
+    for program in PASSES:
+        assert len(program.images) <= images, told(program)
+        assert len(program.samplers) <= samplers, told(program)
+        assert len(program.blocks) <= blocks, told(program)
+        assert all(16 * length <= block_bytes for length in program.blocks.values()), told(program)
+        assert sum(BYTES[kind] for kind in program.constants.values()) <= constant_bytes, told(program)
+        assert all(own <= most for own, most in zip(program.local_size, size, strict=True)), told(program)
+        assert math.prod(program.local_size) <= invocations, told(program)
 
 
-@each_pass
-def test_images_that_are_loaded_and_stored_are_of_a_format_that_metal_has_so(program):
-    for name, image in program.images.items():
-        assert not (image.reads and image.writes) or image.format in METAL_LOADS_AND_STORES, name
+def test_images_have_formats_that_every_vulkan_stores_and_metal_changes():
+    for program in PASSES:
+        assert {image.format for image in program.images.values()} <= VULKAN_STORES, told(program)
+        for name, image in program.images.items():
+            assert not (image.reads and image.writes) or image.format in METAL_LOADS_AND_STORES, (told(program), name)
 
 
-@each_pass
-def test_images_have_a_format_that_every_vulkan_has(program):
-    assert {image.format for image in program.images.values()} <= VULKAN_STORES
-
-
-@each_pass
-def test_a_source_has_nothing_that_some_device_lacks(program):
-    assert not MISSING.findall(code(program))
-
-
-@each_pass
-def test_no_name_is_a_word_of_metal(program):
-    named = {
-        *NAMED.findall(code(program)),
-        *program.constants,
-        *program.samplers,
-        *program.images,
-        *program.blocks,
-    }
-    assert named
-    assert not named & WORDS_OF_METAL
-
-
-@pytest.mark.parametrize("step", ["QUAD", "PICTURE", "COEFFICIENTS", "SCRIBBLES"])
-def test_what_draws_in_previews_has_no_name_that_is_a_word_of_metal(step):
-    program = read_pass("show", step)
-    assert not {*NAMED.findall(code(program)), *program.constants, *program.samplers} & WORDS_OF_METAL
-    assert not MISSING.findall(code(program))
-
-
-@each_pass
-def test_a_source_is_as_cpp_takes_it(program):
+def test_a_source_has_nothing_that_some_device_lacks():
     """Blender makes C++ of it by macros: there, arrays are no values, and a struct without a constructor has none."""
-    text = code(program)
-    assert not re.findall(r"[(,]\s*(?:in\s+)?(?!out|inout)\w+\s+\w+\[", text)
-    assert not [name for name in re.findall(r"\bstruct\s+(\w+)", text) if re.search(rf"\b{name}\(", text)]
+    for program in PASSES:
+        text = code(program)
+        assert not MISSING.findall(text), told(program)
+        assert not re.findall(r"[(,]\s*(?:in\s+)?(?!out|inout)\w+\s+\w+\[", text), told(program)
+        structs = re.findall(r"\bstruct\s+(\w+)", text)
+        assert not [name for name in structs if re.search(rf"\b{name}\(", text)], told(program)
+
+
+def test_no_name_is_a_word_of_metal():
+    previews = [read_pass("show", step) for step in ("QUAD", "PICTURE", "COEFFICIENTS", "SCRIBBLES")]
+    for program in (*PASSES, *previews):
+        named = {*NAMED.findall(code(program)), *program.constants, *program.samplers}
+        named |= {*program.images, *program.blocks}
+        assert named, told(program)
+        assert not named & WORDS_OF_METAL, told(program)
+        assert not MISSING.findall(code(program)), told(program)

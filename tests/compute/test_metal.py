@@ -2,7 +2,7 @@
 
 import re
 
-from all_passes import each_pass
+from all_passes import PASSES, told
 
 
 def completed(program) -> str:
@@ -23,11 +23,12 @@ def completed(program) -> str:
     return "\n".join([*lines, "#line 1", program.body])
 
 
-@each_pass
-def test_a_pass_translates(program, to_metal):
-    text = to_metal(completed(program), "comp")
-    assert "kernel void" in text
-    bound = re.findall(r"(\w+) \[\[texture\(\d+\)\]\]", text)
-    assert set(bound) == {*program.images, *program.samplers}
-    changed = re.findall(r"access::read_write> (\w+) \[\[", text)
-    assert set(changed) == {name for name, image in program.images.items() if image.reads and image.writes}
+def test_passes_translate(to_metal):
+    for program in PASSES:
+        text = to_metal(completed(program), "comp")
+        assert "kernel void" in text, told(program)
+        bound = re.findall(r"(\w+) \[\[texture\(\d+\)\]\]", text)
+        assert set(bound) == {*program.images, *program.samplers}, told(program)
+        changed = re.findall(r"access::read_write> (\w+) \[\[", text)
+        expected = {name for name, image in program.images.items() if image.reads and image.writes}
+        assert set(changed) == expected, told(program)

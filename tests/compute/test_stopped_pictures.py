@@ -4,7 +4,7 @@ import dataclasses
 
 import numpy as np
 import pytest
-from test_composition import SHAPES, device, few_pieces, footage, state  # noqa: F401
+from test_composition import SHAPES, few_pieces, footage, state
 from test_matting import Values, mattes
 from test_moved import following
 
@@ -59,7 +59,7 @@ def counted(most=None):
 
 @pytest.mark.parametrize("kind", [plain, along_edges, followed, with_mattes, layered])
 @pytest.mark.parametrize("dtype", [np.uint8, np.float16])
-def test_what_comes_after_is_whole(device, kind, dtype, monkeypatch):  # noqa: F811
+def test_what_comes_after_is_whole(device, kind, dtype, monkeypatch):
     monkeypatch.setattr(window, "BAND_BYTES", 60_000)  # pictures take several passes
     rng = np.random.default_rng(50)
     source = footage(rng, count=40, dtype=dtype, size=(61, 47))

@@ -8,7 +8,6 @@ from hypothesis import strategies as st
 from shutter_addon.core.frames import light
 from shutter_addon.core.model import shutters, windows
 from shutter_addon.core.model.frame_state import FrameState, Options
-from shutter_addon.core.pixels import compositor
 
 
 def state(bars, **options):
@@ -20,37 +19,6 @@ def frames(count, seed=0, size=(3, 4)):
     pictures = np.random.default_rng(seed).random((count, *size, 4))
     pictures[..., 3] = 1
     return pictures
-
-
-def everywhere(c, size=(3, 4)):
-    return np.broadcast_to(np.asarray(c, dtype=float)[:, None, None], (len(c), *size))
-
-
-@pytest.mark.parametrize(
-    ("edges", "index", "expected"),
-    [
-        ("hold", 8, [8, 9, 9, 9, 9]),
-        ("hold", -3, [0, 0, 0, 0, 1]),
-        ("mirror", 8, [8, 9, 8, 7, 6]),
-        ("mirror", -2, [2, 1, 0, 1, 2]),
-        ("shorten", 8, [8, 9, -1, -1, -1]),
-        ("shorten", -3, [-1, -1, -1, 0, 1]),
-        ("shorten", 20, [9, 9, 9, 9, 9]),
-    ],
-)
-def test_edges(edges, index, expected):
-    assert windows.indices(Options(5, edges=edges), index, range(10)).tolist() == expected
-
-
-def test_positions():
-    for position, expected in [("start", [5, 6, 7, 8]), ("center", [4, 5, 6, 7]), ("end", [2, 3, 4, 5])]:
-        assert windows.indices(Options(4, position=position), 5, range(10)).tolist() == expected
-
-
-def test_backward():
-    assert windows.indices(Options(4), 5, range(10), -1).tolist() == [5, 4, 3, 2]
-    assert windows.indices(Options(4, edges="mirror"), 1, range(10), -1).tolist() == [1, 0, 1, 2]
-    assert windows.indices(Options(4, position="end"), 5, range(10), -1).tolist() == [8, 7, 6, 5]
 
 
 def exposed(moment, index, direction, shot):
@@ -66,27 +34,7 @@ def sliding(bars, **options):
     return FrameState(Options(np.shape(bars)[1], edges="slide", position="center", **options), np.array(bars, float))
 
 
-LONG, SHARP, LATE = [1, 2, 3, 4, 5], [0, 0, 1, 0, 0], [0, 0, 0, 1, 1]
-
-
-@pytest.mark.parametrize("direction", [1, -1])
-def test_what_slides_keeps_its_length_and_what_lies_in_the_shot_its_place(direction):
-    """In a shot from frame 10 to 19, which the middle one of five frames shows."""
-    moment, shot = sliding([LONG, SHARP, LATE]), range(10, 20)
-    for index in range(12, 18):
-        assert windows.slid(moment, index, direction, shot) is moment
-    last = windows.slid(moment, 19 if direction > 0 else 10, direction, shot)
-    there = [
-        {f if direction > 0 else 29 - f: weight for f, weight in each.items()}
-        for each in exposed(last, 19 if direction > 0 else 10, direction, shot)
-    ]
-    assert there == [{15: 1, 16: 2, 17: 3, 18: 4, 19: 5}, {19: 1}, {18: 1, 19: 1}]
-    early = windows.slid(moment, 11 if direction > 0 else 18, direction, shot)
-    there = [
-        {f if direction > 0 else 29 - f: weight for f, weight in each.items()}
-        for each in exposed(early, 11 if direction > 0 else 18, direction, shot)
-    ]
-    assert there == [{10: 1, 11: 2, 12: 3, 13: 4, 14: 5}, {11: 1}, {12: 1, 13: 1}]
+LONG, SHARP = [1, 2, 3, 4, 5], [0, 0, 1, 0, 0]
 
 
 def test_what_is_longer_than_the_shot_covers_it_and_holds_its_end():
@@ -156,79 +104,7 @@ def test_what_a_window_reaches_is_what_its_shutters_expose(exposed, position, st
     assert windows.reach(state, 20, direction) == (shown.min(), shown.max())
 
 
-def test_a_clip_of_one_frame():
-    for edges in ("hold", "mirror", "shorten"):
-        indices = windows.indices(Options(3, edges=edges), 0, range(1))
-        assert set(indices.tolist()) <= {0, -1}
-
-
-def test_equal_bars_are_the_mean_of_light():
-    pictures = frames(8)
-    result = compositor.compose(state(np.ones((1, 8))), pictures, np.ones(8, bool), everywhere([1]))
-    assert result == pytest.approx(pictures.mean(axis=0))
-
-
-def test_encoded_is_the_mean_of_code_values():
-    pictures = frames(8)
-    moment = state(np.ones((1, 8)), light="encoded")
-    result = compositor.compose(moment, pictures, np.ones(8, bool), everywhere([1]))
-    assert light.to_encoded(result[..., :3]) == pytest.approx(light.to_encoded(pictures[..., :3]).mean(axis=0))
-
-
-def test_each_pixel_has_its_own_shutter():
-    rng = np.random.default_rng(1)
-    pictures, bars = frames(6), rng.random((3, 6))
-    c = rng.dirichlet(np.ones(3), (3, 4))
-    for interpolation, between in shutters.INTERPOLATIONS.items():
-        moment = state(bars / bars.sum(axis=1, keepdims=True), interpolation=interpolation)
-        result = compositor.compose(moment, pictures, np.ones(6, bool), np.moveaxis(c, -1, 0))
-        q = between(moment.bars, c[1, 2])
-        assert result[1, 2] == pytest.approx(sum(w * p[1, 2] for w, p in zip(q, pictures, strict=True)))
-
-
-def test_weighted_exposure_is_relative_to_the_default_shutter():
-    pictures, bars = frames(4), np.array([[1.0, 1, 1, 1], [1, 0, 0, 0]])
-    moment = state(bars, exposure="weighted")
-    result = compositor.compose(moment, pictures, np.ones(4, bool), everywhere([0, 1]))
-    assert result[..., :3] == pytest.approx(pictures[0][..., :3] / 4)
-    assert result[..., 3] == pytest.approx(1)
-    alone = moment.of([1])
-    assert compositor.compose(alone, pictures, np.ones(4, bool), everywhere([1])) == pytest.approx(result)
-
-
-def test_alpha_is_premultiplied():
-    clear, solid = np.zeros((1, 1, 4)), np.array([[[0.8, 0.2, 0.1, 1.0]]])
-    moment = state([[1, 1]])
-    result = compositor.compose(moment, [clear, solid], np.ones(2, bool), np.ones((1, 1, 1)))
-    assert result[0, 0] == pytest.approx([0.4, 0.1, 0.05, 0.5])
-
-
-def test_what_is_left_out_goes_to_the_others():
-    pictures = frames(4)
-    present = np.array([True, True, False, False])
-    moment = state([[1, 3, 2, 2]], edges="shorten")
-    result = compositor.compose(moment, pictures, present, everywhere([1]))
-    assert result == pytest.approx((pictures[0] + 3 * pictures[1]) / 4)
-    late = state([[0, 0, 0, 1]], edges="shorten")
-    assert compositor.compose(late, pictures, present, everywhere([1])) == pytest.approx(pictures[1])
-
-
 def test_light_round_trip():
     codes = np.linspace(-0.5, 3, 1000)
     assert light.to_encoded(light.to_linear(codes)) == pytest.approx(codes, abs=1e-7)
     assert light.to_linear(np.float64(0.5)) == pytest.approx(0.21404114, abs=1e-7)
-
-
-@pytest.mark.parametrize("interpolation", ["displacement", "value"])
-def test_a_pixels_shutter_is_the_share_of_each_frame(interpolation):
-    """Each frame of the window alone in white shows how much of it the picture takes."""
-    bars = np.random.default_rng(5).random((3, 6))
-    shutter_state, c = state(bars, interpolation=interpolation), [0.2, 0.5, 0.3]
-    taken = []
-    for k in range(6):
-        pictures = np.zeros((6, 1, 1, 4))
-        pictures[k] = 1
-        taken.append(compositor.compose(shutter_state, pictures, np.ones(6, bool), everywhere(c, (1, 1)))[0, 0, 0])
-    shutter = compositor.mixed_shutter(shutter_state, c)
-    assert shutter / shutter.sum() == pytest.approx(taken)
-    assert shutter.sum() == pytest.approx(c @ bars.sum(axis=1))

@@ -89,17 +89,6 @@ def test_what_changes_over_time_changes_the_state(channels):
     assert found.at(1).key == found.at(1).key == changed(**channels).at(1).key
 
 
-def test_bars_move_between_keys_by_their_share():
-    keys = ((1.0, "linear"), (4.0, "constant"))
-    by_eases = Bars(Keys((1.0, 4.0), (FIRST, LAST), ("linear", "constant")), keys)
-    assert by_eases.at(2, "displacement").tolist() == [0, 1, 0, 0]
-    assert by_eases.at(2, "value") == pytest.approx([2 / 3, 0, 0, 1 / 3])
-    sampled = Bars(by_eases.channel, keys, Samples({2: 2 / 3}))
-    assert sampled.at(2, "displacement").tolist() == [0, 0, 1, 0]
-    assert sampled.at(-5, "displacement").tolist() == FIRST.tolist()
-    assert sampled.at(9, "displacement").tolist() == LAST.tolist()
-
-
 def test_the_way_to_a_closed_shutter_is_no_displacement():
     keys = ((1.0, "linear"), (5.0, "linear"))
     closing = Bars(Keys((1.0, 5.0), (FIRST, 0 * FIRST), ("linear", "linear")), keys)
@@ -119,13 +108,6 @@ def test_time_that_stands_still_runs_as_it_came():
     assert jump.at(20) == (5, False)
     still = dataclasses.replace(time, numbers=Keys(frames, (2.8467, 2.8467, 7.0), eases))
     assert {still.at(frame / 2) for frame in range(2, 22)} == {(2.8467, False)}
-
-
-def test_strokes_lie_where_their_placement_has_them():
-    matrix = np.array([[0.5, 0, 0.1], [0, 0.5, 0.2], [0, 0, 1]])
-    (stroke,) = made(Bars(Constant(FIRST)), [region([np.ones((2, 2))], Constant(matrix))]).at(1).shapes[0].strokes
-    assert stroke == pytest.approx(np.array([[0.6, 0.7]] * 2))
-    assert made(Bars(Constant(FIRST)), [region([np.ones((2, 2))], Constant(None))]).at(1).shapes[0].strokes == ()
 
 
 def test_strokes_far_off_and_too_many_points_are_refused():

@@ -45,71 +45,6 @@ def shifts(source, frames, **given):
     return followed(source, **given).at(frames)[1][:, 0]
 
 
-def test_a_straight_way():
-    assert shifts(made(STRAIGHT), [10, 11, 15], frame=11, index=10) == pytest.approx(np.array([0, 1, 5]) * STEP)
-
-
-def test_frames_that_are_shown_backward_come_before():
-    found = shifts(made(STRAIGHT), [10, 9, 5], frame=11, index=10, direction=-1, shown=lambda other: 21 - int(other))
-    assert found == pytest.approx(np.array([0, 1, 5]) * STEP)
-
-
-@pytest.mark.parametrize(("speed", "frames_of_time"), [(2, 0.5), (0.5, 2), (0.25, 4)])
-def test_a_strip_of_another_speed(speed, frames_of_time):
-    """Of two timeline frames that show a source frame, the nearest counts; between two there are the frames between."""
-    shown = lambda other: 10 + int(np.floor((other - 12) * speed))  # noqa: E731
-    found = shifts(made(STRAIGHT), range(10, 16), frame=12, index=10, shown=shown)
-    assert found == pytest.approx(np.arange(6) * frames_of_time * STEP)
-
-
-def test_time_that_turns_back():
-    """The nearest time at which a frame is shown is the one that counts."""
-    shown = lambda other: 20 - abs(int(other) - 20)  # noqa: E731
-    found = shifts(made(STRAIGHT, "center"), [17, 18, 19, 20], frame=18, index=18, shown=shown)
-    assert found == pytest.approx(np.array([-1, 0, 1, 2]) * STEP)
-    found = shifts(made(STRAIGHT, "center"), [19], frame=20, index=20, shown=shown)
-    assert found == pytest.approx(np.array([STEP]))  # before and after as near: after
-
-
-def test_of_frames_passed_over_the_nearest_time_counts():
-    """It is passed over a quarter of a frame before, and shown a frame after."""
-    shown = lambda other: {11: 14, 12: 10}.get(other, 11)  # noqa: E731
-    found = shifts(made(STRAIGHT, "center"), [11], frame=12, index=10, shown=shown)
-    assert found == pytest.approx(np.array([-0.25]) * STEP)
-
-
-def test_what_is_never_shown_lies_as_the_nearest_that_is():
-    found = shifts(made(STRAIGHT), range(10, 16), frame=11, index=10, shown=lambda other: min(int(other) - 1, 12))
-    assert found == pytest.approx(np.array([0, 1, 2, 2, 2, 2]) * STEP)
-
-
-def test_mirrored_frames_have_the_motion_of_what_they_are():
-    found = followed(made(STRAIGHT, edges="mirror"), 39, 38)
-    assert found.at([39, 35])[1][:, 0] == pytest.approx(np.array([1, -3]) * STEP)
-
-
-def test_turned_and_scaled_about_the_shapes_centre():
-    keys = [key(1), key(2, (0.1, 0), 90, 2)]
-    source = made(keys, strokes=[((0.25, 0.25), (0.5, 0.25))])
-    motion = motions.Similarity(*(part[0, 0] for part in followed(source, 1, 0).at([1])))
-    size = SOURCE.width, SOURCE.height
-    centre, moved = (motions.pixel(place, size) for place in ((0.375, 0.25), (0.475, 0.25)))
-    assert motion(centre) == pytest.approx(moved)
-    assert motion(centre + 3) - moved == pytest.approx(-6j)  # counter-clockwise, where y points down
-
-
-def test_a_redrawn_shape_moves_as_its_centre_does():
-    keys = [key(1), key(3, strokes=[[(0.5, 0.4), (0.7, 0.6)]])]
-    assert shifts(made(keys), [0, 1, 2], frame=1, index=0) == pytest.approx([0, 0.05 * 64, 0.1 * 64])
-
-
-def test_the_camera_turns_about_the_pictures_centre():
-    keys = [key(1), key(2, (0, 0.25), 0, 1.5)]
-    motion = motions.Similarity(*(part[0, 0] for part in followed(made(follow="camera", camera=keys), 1, 0).at([1])))
-    assert motion(31.5 + 23.5j) == pytest.approx(31.5 + 11.5j)
-    assert motion.turn == pytest.approx(1.5)
-
-
 WHIRL = [key(1), key(2, (0.1, 0), 90, 2)]
 
 
@@ -124,26 +59,6 @@ def test_the_location_alone_is_followed():
     assert found[1][1, 0] == pytest.approx(6.4)
     turned = followed(with_way(made(WHIRL), follow_motion="rotation"), 1, 0).at([1])[0][0, 0]
     assert turned == pytest.approx(-1j)
-
-
-def jittered(rng):
-    return [key(n, (0.01 * n + rng.normal(0, 0.01), 0)) for n in range(60)]
-
-
-def test_a_smooth_motion_has_less_jitter_and_the_same_way():
-    """Of a steady pan whose subject jitters."""
-    source, steps = made(jittered(np.random.default_rng(1)), "center"), {}
-    for smooth in (0, 6):
-        way = with_way(source, follow_smooth=smooth)
-        found = (shifts(way, range(f - 2, f + 3), frame=f, index=f - 1).real for f in range(20, 35))
-        steps[smooth] = np.concatenate([np.diff(each) for each in found])
-    assert np.std(steps[6]) < np.std(steps[0]) / 5
-    assert np.mean(steps[6]) == pytest.approx(0.64, abs=0.1)
-
-
-def test_a_straight_way_is_smooth_already():
-    found = shifts(with_way(made(STRAIGHT), follow_smooth=6), [10, 11, 15], frame=31, index=10)
-    assert found == pytest.approx(np.array([0, 1, 5]) * STEP)
 
 
 def test_smoothing_is_the_weighted_mean_of_the_frames_around():

@@ -16,7 +16,6 @@ from shutter_addon.core.recipes import recipe_file
 
 LINE = {"shutter": "S1", "name": "Cup", "strokes": [[[0.2, 0.4], [0.3, 0.6]]], "width": 0.1}
 MOVED = LINE | {"keys": [{"frame": 1}, {"frame": 101, "location": [1.0, 0.0]}]}
-RAMP = {"shutter": "S0", "name": "Ramp", "kind": "ramp", "ramp": "linear"}
 SOURCE = Clip(width=64, height=36, count=60)
 
 
@@ -33,37 +32,12 @@ def layers(found, frame=21.0, shown=lambda frame: int(frame) - 1):
     return state, state.layers
 
 
-def test_a_layer_is_no_scribble_of_what_lies_behind_it():
-    state, found = layers(effect(LINE | {"layer": True}, LINE | {"name": "Other", "shutter": "S0"}))
-    assert [shape.shutter for shape in state.shapes] == [0]
-    assert found.shutters == (1,)
-    # It is drawn over all others, which hold what is none of it.
-    assert [shape.shutter for shape in found.scribbles[0].shapes] == [0, 1]
-
-
-def test_a_matte_that_is_a_layer_is_laid_over_nothing():
-    state, found = layers(effect(RAMP | {"layer": True}))
-    assert state.mattes == ()
-    assert found.shutters == (0,)
-    assert {found.mattes[0][0].content.kind for _ in found.frames} == {"linear"}
-    assert set(found.scribbles) == {None}
-
-
-def test_there_are_none_without_one():
-    assert layers(effect(LINE, RAMP))[1] is None
-
-
 def test_its_mattes_are_known_in_the_window_and_as_far_as_plates_reach():
     _, found = layers(effect(MOVED | {"layer": True}))
     assert found.frames == range(18, 26)
     # A hundredth of the picture to the right with each frame.
     at = [state.shapes[0].strokes[0][0, 0] for state in found.scribbles]
     assert at == pytest.approx([0.2 + 0.01 * k for k in found.frames])
-
-
-def test_the_frames_of_a_clip_that_is_short():
-    found = layers(effect(MOVED | {"layer": True}), 60.0)[1]
-    assert found.frames == range(57, 60)
 
 
 def test_in_a_slow_source_between_two_timeline_frames():
@@ -79,20 +53,6 @@ def test_it_begins_and_ends_with_its_opacity():
     assert layers(found, 19.0)[1] is None
     assert layers(found, 20.0)[1].opacities == (0.5,)
     assert layers(found)[1].scribbles[-1].shapes[0].opacity == 1  # it is weighed afterwards
-
-
-def test_edges_are_followed_as_far_as_they_are_then():
-    edges = [{"frame": 1, "value": 0}, {"frame": 101, "value": 1}]
-    _, found = layers(effect(LINE | {"layer": True}, edge_aware=edges))
-    assert [state.options.edge_aware for state in found.scribbles] == pytest.approx([0.01 * k for k in found.frames])
-
-
-def test_the_cameras_motion_is_known_where_it_has_keys():
-    assert layers(effect(LINE | {"layer": True}))[1].camera is None
-    _, found = layers(effect(LINE | {"layer": True}, camera=[{"frame": 1}, {"frame": 101, "location": [1, 0]}]))
-    turns, shifts = found.camera.at([20, 22])
-    assert turns == pytest.approx(np.ones((2, 1)))
-    assert shifts[:, 0] == pytest.approx([0, 0.02 * SOURCE.width])
 
 
 def test_keys_are_equal_for_equal_layers_alone():

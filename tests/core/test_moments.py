@@ -6,7 +6,6 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from made_recipes import made
-from test_shutters import light
 
 from shutter_addon.core.model import shutters, windows
 from shutter_addon.core.model.clip import Clip
@@ -45,24 +44,6 @@ def test_a_still_frame_is_the_filmed_one(window, steps, position, direction):
     assert exposed([still], steps, direction, position=position) == {19 * steps: 1}
 
 
-@pytest.mark.parametrize("direction", [1, -1])
-@pytest.mark.parametrize(("position", "before"), [("start", 0), ("center", 3), ("end", 7)])
-@pytest.mark.parametrize("steps", STEPS)
-def test_light_lies_between_frames_that_are_both_open(steps, position, before, direction):
-    bars = [1, 2, 0, 4, 0, 0.5, 1, 3]
-    lit = {19 + direction * (k - before): bar for k, bar in enumerate(bars) if bar}
-    wanted, found = light(lit, steps), exposed([{"bars": bars}], steps, direction, position=position)
-    assert found.keys() == wanted.keys()
-    assert found == pytest.approx(wanted)
-
-
-def test_without_moments_no_bit_changes():
-    bars = np.random.default_rng(3).random(9).tolist()
-    _index, found = state([{"bars": bars}], 1)
-    assert found.bars.tolist() == [bars]
-    assert (found.options.window, found.options.step) == (9, 1)
-
-
 def test_bars_are_interpolated_before_they_are_spread():
     """Half the way from a first frame to a third, by displacement, is the second: sharp, and no streak."""
     keys = [{"frame": 10, "bars": [1, 0, 0]}, {"frame": 30, "bars": [0, 0, 1]}]
@@ -91,14 +72,6 @@ def test_on_the_timeline_a_shape_has_the_same_time(steps, direction):
     found = state_at(replace(effect, time=way), CLIP.stepped(steps), 20).state
     assert found.bars[0] == pytest.approx(np.repeat([1, 1, 0, 0], steps) / steps)
     assert found.open_for == {0: pytest.approx(2 * steps)}
-
-
-@pytest.mark.parametrize("steps", STEPS)
-def test_each_shutter_has_as_much_light_as_its_bars(steps):
-    bars = [{"bars": [1, 0, 2, 1]}, {"bars": [0, 0, 0, 3]}, {"bars": [2, 2, 2, 2], "length": "timeline"}]
-    _index, found = state(bars, steps)
-    assert found.bars.sum(axis=1) == pytest.approx([4, 3, 8])
-    assert found.options.window == 4 * steps
 
 
 @pytest.mark.parametrize("direction", [1, -1])

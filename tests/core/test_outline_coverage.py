@@ -37,30 +37,9 @@ def test_any_curves(strokes):
     assert np.abs(found - asked(strokes, 12, 7)).mean() <= 0.5 / FINE
 
 
-@pytest.mark.parametrize("size", [(8, 4), (9, 5), (1, 1), (640, 3)])
-def test_a_square_covers_its_area(size):
-    _width, height = size
-    found = outlines.coverage(SQUARE, *size)
-    lines = (np.arange(height * outlines.LINES) + 0.5) / outlines.LINES / height
-    share = ((lines > 0.25) & (lines < 0.75)).mean()
-    assert found.mean() == pytest.approx(0.5 * share, abs=1e-6)
-
-
-def test_a_curve_within_a_curve_is_a_hole():
-    hole = [[(x / 2 + 0.25, y / 2 + 0.25) for x, y in SQUARE[0]]]
-    both = outlines.coverage(SQUARE + hole, 32, 32)
-    np.testing.assert_allclose(both, outlines.coverage(SQUARE, 32, 32) - outlines.coverage(hole, 32, 32), atol=1e-6)
-    assert both[16, 16] == 0
-    assert both[9, 16] == 1
-
-
 @pytest.mark.parametrize("strokes", [[], [[]], [[(0.5, 0.5)]], [[(0.1, 0.1), (0.9, 0.9)]], [[(2, 2), (3, 2), (3, 3)]]])
 def test_what_encloses_nothing(strokes):
     assert not outlines.coverage(strokes, 16, 9).any()
-
-
-def test_what_is_all_around_the_picture():
-    assert outlines.coverage([[(-5, -5), (5, -5), (5, 5), (-5, 5)]], 16, 9).min() == 1
 
 
 ASPECT = 2.0

@@ -10,63 +10,6 @@ from shutter_addon.core.model.mattes import FileFrames, Ramp
 WIDTH, HEIGHT = 64, 36
 
 
-def at(values, x, y):
-    """The value at a place in pixels, y down, between four centres of pixels."""
-    column, row = int(x - 0.5), int(y - 0.5)
-    across, down = x - 0.5 - column, y - 0.5 - row
-    box = values[row : row + 2, column : column + 2].astype(float)
-    return (box[0] * (1 - down) + box[1] * down) @ [1 - across, across]
-
-
-def test_a_linear_ramp_goes_from_edge_to_edge():
-    columns = (np.arange(WIDTH) + 0.5) / WIDTH
-    rows = (HEIGHT - np.arange(HEIGHT) - 0.5)[:, None] / HEIGHT  # y is up
-    expected = {0: columns, 180: 1 - columns, 90: rows, -90: 1 - rows}
-    for rotation, values in expected.items():
-        found = Ramp("linear", rotation=rotation).values(WIDTH, HEIGHT)
-        assert found.shape == (HEIGHT, WIDTH)
-        assert np.abs(found - values).max() < 1e-6
-
-
-@pytest.mark.parametrize("rotation", [20, 45, 110, 200])
-def test_a_turned_ramp_goes_from_corner_to_corner(rotation):
-    found = Ramp("linear", rotation=rotation).values(WIDTH, HEIGHT)
-    turn = np.radians(rotation)
-    gradient = -np.gradient(found.astype(float))[0][5, 5], np.gradient(found.astype(float))[1][5, 5]  # up, right
-    assert np.arctan2(*gradient) % (2 * np.pi) == pytest.approx(turn % (2 * np.pi), abs=1e-3)
-    half = np.hypot(*gradient) / 2  # the outermost pixels' centres lie within half a pixel's diagonal
-    assert 0 <= found.min() <= 2 * half
-    assert 1 - 2 * half <= found.max() <= 1
-
-
-def test_a_ramp_is_placed_about_the_pictures_centre():
-    moved = Ramp("linear", location=(0.25, 0), scale=0.5).values(WIDTH, HEIGHT)
-    x = (np.arange(WIDTH) + 0.5) / WIDTH
-    assert np.abs(moved - np.clip((x - 0.75) / 0.5 + 0.5, 0, 1)).max() < 1e-6
-    assert (Ramp("linear", scale=0).values(WIDTH, HEIGHT) > 0.5).tolist() == [[x > 0.5 for x in x]] * HEIGHT
-    assert np.allclose(Ramp("linear", scale=-1).values(WIDTH, HEIGHT), (1 - x)[None], atol=1e-6)
-
-
-def test_a_radial_ramp_ends_in_the_farthest_corner():
-    found = Ramp("radial", location=(0, 0.25), scale=0.5).values(WIDTH, HEIGHT)
-    y, x = np.indices((HEIGHT, WIDTH)) + 0.5
-    far = np.hypot(WIDTH, HEIGHT) / 2
-    expected = np.hypot(x - WIDTH / 2, y - HEIGHT / 4) / (far / 2)
-    assert np.abs(found - np.minimum(expected, 1)).max() < 1e-5
-
-
-def test_an_angle_goes_round_clockwise_from_the_top():
-    found = Ramp("angle").values(WIDTH, HEIGHT)
-    centre = WIDTH / 2, HEIGHT / 2
-    assert at(found, centre[0] + 10, centre[1]) == pytest.approx(0.25, abs=1e-3)
-    assert at(found, centre[0], centre[1] + 10) == pytest.approx(0.5, abs=1e-3)
-    assert at(found, centre[0] - 10, centre[1]) == pytest.approx(0.75, abs=1e-3)
-    assert found[3, WIDTH // 2] < 0.02
-    assert found[3, WIDTH // 2 - 1] > 0.98
-    turned = Ramp("angle", rotation=90).values(WIDTH, HEIGHT)  # counter-clockwise: it starts on the left
-    assert at(turned, centre[0], centre[1] - 10) == pytest.approx(0.25, abs=1e-3)
-
-
 @pytest.mark.parametrize("kind", ["linear", "radial", "angle"])
 def test_a_negative_scale_turns_a_ramp_round(kind):
     place = {"location": (0.1, 0.05), "rotation": 20.0}

@@ -101,17 +101,6 @@ def test_a_lasso_that_crosses_itself_has_no_hole():
     assert scribbles.rasterise([Shape(0, "lasso", 0, (spiral,))], 50, 50)[25, 25] == 1
 
 
-def test_later_shapes_win_and_the_border_lies_below():
-    low = Shape(1, "lasso", 0, (np.array([[0, 0], [0.6, 0], [0.6, 0.6], [0, 0.6]]),))
-    high = Shape(2, "lasso", 0, (np.array([[0.4, 0.4], [1, 0.4], [1, 1], [0.4, 1]]),))
-    labels = scribbles.rasterise([low, high], 10, 10, border=True)
-    assert labels[4, 5] == 3
-    assert labels[9, 0] == 2
-    assert labels[0, 0] == 1
-    assert labels[0, 9] == 3
-    assert scribbles.rasterise([high, low], 10, 10)[4, 5] == 2
-
-
 def test_the_thinnest_line_is_tight_for_a_diffusion():
     """No path of side-by-side pixels crosses it."""
     line = np.array([[-0.1, 0.13], [1.1, 0.92]])
@@ -129,21 +118,6 @@ def test_the_thinnest_line_is_tight_for_a_diffusion():
     assert not reached[-1, -30:].any()
 
 
-def test_a_turn_keeps_circles_round():
-    angles = np.linspace(0, 2 * np.pi, 40, endpoint=False)
-    circle = np.stack([0.5 + 0.1 * np.cos(angles), 0.5 + 0.2 * np.sin(angles)], axis=1)  # round at 2:1
-    (turned,) = scribbles.transform([circle], (0, 0), 33, 1, 2.0)
-    radii = np.hypot((turned[:, 0] - 0.5) * 2, turned[:, 1] - 0.5)
-    assert radii == pytest.approx(np.full(40, 0.2))
-
-
-def test_transform_turns_counter_clockwise_about_the_common_centre():
-    a, b = np.array([[0.2, 0.5], [0.4, 0.5]]), np.array([[0.8, 0.5]])
-    first, second = scribbles.transform([a, b], (0.1, -0.2), 90, 0.5, 1.0)
-    assert first == pytest.approx(np.array([[0.6, 0.15], [0.6, 0.25]]))
-    assert second == pytest.approx(np.array([[0.6, 0.45]]))
-
-
 @given(strokes, st.integers(2, 20))
 def test_resampling_keeps_the_ends_and_the_spacing(stroke, count):
     points = scribbles.resample(stroke, count)
@@ -151,23 +125,3 @@ def test_resampling_keeps_the_ends_and_the_spacing(stroke, count):
     assert np.allclose(points[0], stroke[0])
     if len(stroke) > 1 and not np.allclose(stroke, stroke[0]):
         assert np.allclose(points[-1], stroke[-1])
-
-
-def test_resampling_goes_by_length_not_by_points():
-    stroke = np.array([[0, 0], [0.01, 0], [0.02, 0], [1.0, 0]])
-    assert scribbles.resample(stroke, 5)[:, 0] == pytest.approx([0, 0.25, 0.5, 0.75, 1])
-
-
-def test_lengths_are_those_on_the_picture():
-    corner = np.array([[0, 0], [0.5, 0], [0.5, 1.0]])  # two equal arms on a picture twice as wide as high
-    assert scribbles.resample(corner, 3, 2.0)[1] == pytest.approx([0.5, 0])
-
-
-def test_between_drawings_of_other_point_counts():
-    (half,) = scribbles.between_strokes([[[0, 0], [1, 0]]], [[[0, 1], [0.5, 1], [1, 1]]], 0.5)
-    assert half == pytest.approx(np.array([[0, 0.5], [0.5, 0.5], [1, 0.5]]))
-    (same,) = scribbles.between_strokes([[[0, 0], [0.1, 0], [1, 0]]], [[[0, 1], [0.1, 1], [1, 1]]], 0.5)
-    assert same[1] == pytest.approx([0.1, 0.5])
-    first, alone = scribbles.between_strokes([[[0, 0]], [[0.3, 0.3]]], [[[1, 1]]], 0.25)
-    assert first[0] == pytest.approx([0.25, 0.25])
-    assert alone[0] == pytest.approx([0.3, 0.3])

@@ -39,39 +39,6 @@ def brute_quantile(bars, z):
     return float(np.flatnonzero(bars)[-1] + 1)
 
 
-def brute_displace(bars, c, samples=200_000):
-    """The interpolated shutter from many samples of the mixed quantile."""
-    z = (np.arange(samples) + 0.5) / samples
-    times = np.zeros(samples)
-    for weight, shutter in zip(c, bars, strict=True):
-        total = shutters.accumulation(shutter)
-        k = np.searchsorted(total, z, side="right") - 1
-        times += weight * (k + (z - total[k]) / (total[k + 1] - total[k]))
-    counts = np.bincount(np.minimum(times.astype(int), bars.shape[1] - 1), minlength=bars.shape[1])
-    return counts / samples
-
-
-@given(bars_lists(most=1))
-def test_accumulation_rises_from_0_to_1(bars):
-    total = shutters.accumulation(bars[0])
-    assert len(total) == bars.shape[1] + 1
-    assert total[0] == 0
-    assert total[-1] == 1
-    assert (np.diff(total) >= 0).all()
-    assert np.allclose(np.diff(total) * shutters.exposure(bars[0]), bars[0], atol=1e-12)
-
-
-@given(bars_lists(most=1), st.floats(0, 1))
-def test_quantile_inverts_the_accumulation(bars, z):
-    q = shutters.quantile(bars[0])
-    piece = min(np.searchsorted(q.z, z, side="right") - 1, len(q.start) - 1)
-    time = q.start[piece] + (z - q.z[piece]) / (q.z[piece + 1] - q.z[piece]) * (q.end[piece] - q.start[piece])
-    back = np.interp(time, np.arange(bars.shape[1] + 1), shutters.accumulation(bars[0]))
-    assert abs(back - z) < 1e-9
-    if z < 1:
-        assert time == pytest.approx(brute_quantile(bars[0], z), abs=1e-6)
-
-
 @given(bars_lists(), st.floats(0, 0.999))
 def test_knots_hold_every_quantile(bars, z):
     knots = shutters.knots(bars)
@@ -96,32 +63,6 @@ def test_displacement_keeps_exposure_and_is_a_shutter(mix):
     assert shutters.mix_exposure(bars, c) == pytest.approx(q.sum())
 
 
-@given(mixes())
-def test_displacement_moves_the_centre_in_proportion(mix):
-    """∫ Q⁻¹ is linear in c: the mean time of the mix is the mix of the mean times, frames taken as spans of time."""
-    bars, _ = mix
-    knots = shutters.knots(bars)
-    mean = ((knots.start + knots.end) / 2 * np.diff(knots.z)[:, None]).sum(axis=0)
-    own = [(b / b.sum()) @ (np.arange(len(b)) + 0.5) for b in bars]
-    assert mean == pytest.approx(own, abs=1e-9)
-
-
-@pytest.mark.parametrize("seed", range(6))
-def test_displacement_equals_brute_force(seed):
-    rng = np.random.default_rng(seed)
-    bars = rng.random((3, 24)) * (rng.random((3, 24)) > 0.4) + np.eye(3, 24) * 0.01
-    c = rng.dirichlet(np.ones(3))
-    q = shutters.displace(bars, c)
-    assert q / q.sum() == pytest.approx(brute_displace(bars, c), abs=1e-4)
-
-
-@given(bars_lists())
-def test_a_pure_coefficient_gives_that_shutter(bars):
-    for i, c in enumerate(np.eye(len(bars))):
-        assert shutters.displace(bars, c) == pytest.approx(bars[i], abs=1e-9)
-        assert shutters.mix(bars, c) == pytest.approx(bars[i], abs=1e-9)
-
-
 @given(st.integers(2, 200), st.floats(0, 1))
 def test_between_two_deltas_lies_a_delta_of_width_one(window, u):
     bars = np.zeros((2, window))
@@ -131,15 +72,6 @@ def test_between_two_deltas_lies_a_delta_of_width_one(window, u):
     expected = np.maximum(0, 1 - np.abs(np.arange(window) - time))
     assert q == pytest.approx(expected, abs=1e-9)
     assert shutters.mix(bars, [1 - u, u]) == pytest.approx([1 - u, *np.zeros(window - 2), u])
-
-
-def test_many_coefficients_at_once():
-    rng = np.random.default_rng(0)
-    bars, c = rng.random((3, 10)), rng.dirichlet(np.ones(3), (4, 5))
-    for function in (shutters.displace, shutters.mix):
-        q = function(bars, c)
-        assert q.shape == (4, 5, 10)
-        assert q[2, 3] == pytest.approx(function(bars, c[2, 3]))
 
 
 @pytest.mark.parametrize(
@@ -193,14 +125,6 @@ def test_another_window_keeps_the_shape(bars, window):
     assert new == pytest.approx(np.interp(at, np.linspace(0, 1, len(old)), old), abs=1e-9)
 
 
-@given(bars_lists(most=1), st.integers(1, 6))
-def test_a_window_times_longer_splits_each_bar_and_comes_back(bars, times):
-    longer = shutters.resample(bars[0], len(bars[0]) * times)
-    assert longer == pytest.approx(np.repeat(bars[0], times), abs=1e-9)
-    assert shutters.resample(longer, len(bars[0])) == pytest.approx(bars[0], abs=1e-9)
-    assert shutters.open_angle(longer) == pytest.approx(shutters.open_angle(bars[0]))
-
-
 @given(bars_lists(most=1), st.floats(0.01, 100))
 def test_an_angle_is_that_of_the_shape_however_bright(bars, gain):
     angle = shutters.open_angle(bars[0])
@@ -220,44 +144,6 @@ def test_a_closed_shutter_has_no_angle():
 
 
 STEPS = st.sampled_from([1, 2, 4, 8, 16])
-
-
-def overlap(first, second):
-    """How long two spans of time are open together."""
-    return max(min(first[1], second[1]) - max(first[0], second[0]), 0.0)
-
-
-def light(lit, steps):
-    """{moment: weight}, by {filmed frame: bar}. A bar is spread evenly over the half intervals from its frame to those
-    beside it that are open; a moment gets what lies nearer to it than to any other."""
-    found = {}
-    for frame, bar in lit.items():
-        spans = [(min(end, frame), max(end, frame)) for end in (frame - 0.5, frame + 0.5) if lit.get(2 * end - frame)]
-        if steps == 1 or not spans:
-            found[frame * steps] = found.get(frame * steps, 0) + bar
-            continue
-        for moment in range((frame - 1) * steps, (frame + 1) * steps + 1):
-            own = (moment - 0.5) / steps, (moment + 0.5) / steps
-            part = sum(overlap(own, span) for span in spans) / (0.5 * len(spans))
-            found[moment] = found.get(moment, 0) + bar * part
-    return {moment: weight for moment, weight in found.items() if weight}
-
-
-def exposed(weights, steps, index=10, direction=1):
-    """{moment: weight} of a window's weights, around a filmed frame."""
-    positions = windows.positions(Options(len(weights), step=steps), index * steps, direction)
-    return {int(at): weight for at, weight in zip(positions, weights, strict=True) if weight}
-
-
-@given(bars_lists(most=1), STEPS, st.sampled_from([1, -1]))
-def test_a_bar_is_spread_towards_its_open_neighbours(bars, steps, direction):
-    found = shutters.smoothed(bars[0], steps, backward=direction < 0)
-    assert found.shape == (len(bars[0]) * steps,)
-    assert found.sum() == pytest.approx(bars[0].sum())
-    wanted = light({10 + direction * k: bar for k, bar in enumerate(bars[0]) if bar}, steps)
-    there = exposed(found, steps, direction=direction)
-    assert there.keys() == wanted.keys()
-    assert there == pytest.approx(wanted)
 
 
 @given(bars_lists(most=1))
@@ -282,15 +168,6 @@ def test_what_rounding_leaves_opens_no_bar():
     for level in (False, True):
         moments = shutters.smoothed([1e-12, 1.0, 0.0, 1e-13], 8, level=level)
         assert moments == pytest.approx(np.eye(32)[8], abs=1e-9)
-
-
-def test_what_is_sharp_stays_so_and_a_box_is_one_streak():
-    assert exposed(shutters.smoothed([0, 0, 3, 0], 8), 8) == {96: 3}
-    assert exposed(shutters.smoothed([0, 0, 3, 0], 8, backward=True), 8, direction=-1) == {64: 3}
-    assert exposed(shutters.smoothed([1, 0, 1, 0], 4), 4) == {40: 1, 48: 1}
-    box = exposed(shutters.smoothed([1, 1, 1], 4), 4)
-    assert sorted(box) == list(range(40, 49))  # from its first frame to its last
-    assert [box[at] for at in range(40, 49)] == pytest.approx([1 / 4, 1 / 2, 3 / 8, *[1 / 4] * 3, 3 / 8, 1 / 2, 1 / 4])
 
 
 @given(bars_lists(most=1), STEPS)

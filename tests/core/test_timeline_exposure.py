@@ -20,13 +20,6 @@ def exposed(bars, speed=1.0, direction=1, here=100.0, after=None, before=None, *
     return trails.on_timeline(np.array(bars, float), options, np.array([before, here, after]))
 
 
-def test_half_open_at_eight_times_the_speed_is_four_frames():
-    bars, length = exposed(HALF, 8)
-    np.testing.assert_allclose(bars, [1, 1, 1, 1, 0, 0, 0, 0])
-    assert length == pytest.approx(4)
-    np.testing.assert_allclose(exposed(OPEN, 8)[0], OPEN)
-
-
 def test_as_it_was_filmed_and_slower_it_is_the_shown_frame():
     for speed in (1, 0.3, 0):
         bars, length = exposed(OPEN, speed)
@@ -38,19 +31,6 @@ def test_moments_between_frames_have_their_part():
     """Half the speed is two of four; a quarter more speed than filmed goes into the next frame."""
     np.testing.assert_allclose(exposed(OPEN, 2, step=4)[0], [4, 4, 0, 0, 0, 0, 0, 0])
     np.testing.assert_allclose(exposed(OPEN, 5, step=4)[0], [1.6] * 5 + [0, 0, 0])
-
-
-@pytest.mark.parametrize(
-    ("position", "expected"),
-    [("start", [1, 1, 1, 1, 0, 0, 0]), ("center", [0, 0.5, 1, 1, 1, 0.5, 0]), ("end", [0, 0, 0, 1, 1, 1, 1])],
-)
-def test_around_the_shown_frame(position, expected):
-    bars, _length = exposed([1] * 7, 4, position=position)
-    np.testing.assert_allclose(bars, np.array(expected) * 7 / 4, atol=1e-9)
-
-
-def test_backward_it_goes_the_windows_way():
-    np.testing.assert_allclose(exposed(HALF, 8, direction=-1)[0], HALF)
 
 
 def test_along_a_ramp_it_is_as_long_as_the_way_goes():
@@ -83,12 +63,6 @@ def test_a_freeze_in_a_window_that_is_shorter_than_a_filmed_frame():
     for window in (1, 2, 3):
         bars, _length = exposed([1] * window, 0, -1, step=4)
         assert bars.tolist() == [0] * (window - 1) + [window]
-
-
-def test_where_it_turns_around_it_goes_there_and_back():
-    bars, length = exposed(OPEN, before=104.0, after=104.0, position="center")
-    assert length == pytest.approx(2)
-    np.testing.assert_allclose(bars, [0, 0, 0, 2, 4, 2, 0, 0])
 
 
 @given(

@@ -1,23 +1,18 @@
 """Exposures that are open while what they follow moves by a set length."""
 
-import json
 from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
-from hypothesis.extra.numpy import arrays
-from made_recipes import comes_back, key, made
+from made_recipes import key, made
 
-from shutter_addon.core.model import shutters, trails, windows
+from shutter_addon.core.model import trails, windows
 from shutter_addon.core.model.clip import Clip
 from shutter_addon.core.model.effect import Moves
 from shutter_addon.core.model.keyframes import Constant
 from shutter_addon.core.model.state_at import state_at
 from shutter_addon.core.pixels import compositor
-from shutter_addon.core.recipes import recipe_file
 
 WINDOW = 24
 SOURCE = Clip(width=160, height=100, count=60)
@@ -27,51 +22,9 @@ def with_length(*arguments):
     return trails.with_length(*arguments)[0]
 
 
-def brute(bars, way, length, shown):
-    """The bars by growing the span bit by bit, and by sampling the accumulation."""
-    first, last = shutters.open_span(bars)
-    window, shown = len(bars), min(max(shown, first), last)
-    widths = np.linspace(1e-3, window, 20_001)
-    starts = np.clip(shown - (shown - first) / (last - first) * widths, 0, window - widths)
-    moved = np.interp(starts + widths, range(window + 1), way) - np.interp(starts, range(window + 1), way)
-    width = np.interp(length, moved, widths)
-    start = np.interp(length, moved, starts)
-    times = start + width * (np.arange(100_000) + 0.5) / 100_000
-    own = bars[(first + (times - start) * (last - first) / width).astype(int)]
-    return np.bincount(times.astype(int), own, window) * bars.sum() / own.sum()
-
-
-weights = arrays(np.float64, st.integers(1, 12), elements=st.floats(0, 1)).map(lambda bars: bars * (bars > 0.2))
-
-
-@settings(max_examples=60, deadline=None)
-@given(weights.filter(np.any), st.floats(0, 1), st.integers(0, 2**32))
-def test_any_bars(bars, length, seed):
-    rng = np.random.default_rng(seed)
-    way = np.cumsum([0, *rng.uniform(0.01, 0.2, len(bars))])
-    shown = rng.integers(len(bars)) + 0.5
-    found = with_length(bars, way, length, shown)
-    assert (found >= 0).all()
-    assert found.sum() == pytest.approx(bars.sum())
-    assert found == pytest.approx(brute(bars, way, length, shown), abs=2e-3 * bars.sum())
-
-
 def open_frames(bars):
     """The length of a box."""
     return bars.sum() / bars.max()
-
-
-def test_half_the_length_is_half_the_span():
-    box, way = np.ones(WINDOW), np.linspace(0, 1, WINDOW + 1)
-    spans = [open_frames(with_length(box, way, length, 11.5)) for length in (0.1, 0.2, 0.4, 0.8)]
-    assert spans == pytest.approx([0.1 * WINDOW, 0.2 * WINDOW, 0.4 * WINDOW, 0.8 * WINDOW])
-
-
-def test_the_shape_stays():
-    """A shutter that is twice as long in half the frames."""
-    bars = np.repeat([1.0, 0, 2, 3], 4)
-    found = with_length(bars, np.linspace(0, 1, 17), 0.5, 0)
-    assert found == pytest.approx(np.repeat([2.0, 0, 4, 6, 0, 0, 0, 0], 2))
 
 
 def test_limits():
@@ -95,21 +48,6 @@ def test_what_rounding_leaves_does_not_open_a_bar():
     bars, way = np.r_[np.ones(4), np.zeros(4)], np.linspace(0, 1, 9)
     noisy = bars + np.r_[np.zeros(4), 1e-15, np.zeros(3)]
     assert with_length(noisy, way, 0.25, 0.5) == pytest.approx(with_length(bars, way, 0.25, 0.5))
-
-
-def test_no_jumps():
-    """A span grows past frames little by little."""
-    box, way = np.ones(WINDOW), np.cumsum([0, *np.linspace(0.01, 0.1, WINDOW)])
-    found = np.array([with_length(box, way, length, 0.5) / WINDOW for length in np.linspace(0.05, 1.3, 2000)])
-    assert np.abs(np.diff(found, axis=0)).max() < 0.02
-
-
-def test_the_fastest_of_the_points_counts():
-    centre, turn = 5 + 5j, np.exp(0.1j * np.arange(5))
-    places = centre + turn[:, None] * (np.array([0, 1, 3 + 4j]))
-    chord = 5 * abs(np.exp(0.1j) - 1)
-    assert trails.travelled(places) == pytest.approx(chord * np.arange(6))
-    assert trails.travelled(places[:1]).tolist() == [0, 0]
 
 
 # Of a subject that grows faster and faster, by its keys; a border that stands still behind it streaks.
@@ -190,38 +128,9 @@ def test_for_how_long_a_shutter_is_open_is_told():
     assert followed(accelerating(None), 30)[0].open_for == {}
 
 
-def test_keys_of_the_length():
-    keyed = accelerating([{"frame": 20, "value": 0.1}, {"frame": 40, "value": 0.3}])
-    for frame, length in ((20, 0.1), (30, 0.2), (40, 0.3)):
-        assert np.array_equal(followed(keyed, frame)[0].bars, followed(accelerating(length), frame)[0].bars)
-
-
-def test_a_reversed_source():
-    """The same moments are exposed, whichever way they run."""
-    bars = (1.0,) * 23  # as many before the shown frame as after it
-    forward, index = followed(accelerating(0.2, bars=bars), 30)
-    keys = [key(frame, (x / SOURCE.width, 0)) for frame, x in enumerate(WAY[::-1], 1)]
-    shutter = {"name": "S", "bars": list(bars), "follow": "camera", "trail": 0.2}
-    backward, same = followed(made(23, [shutter], position="center", camera=keys), 31, direction=-1)
-    assert same == index
-    assert backward.bars[0] == pytest.approx(forward.bars[0, ::-1])
-
-
 def test_moments_count_as_the_parts_of_a_frame():
     plain, _ = followed(accelerating(0.2), 40)
     state = state_at(accelerating(0.2).for_picture(1.6), SOURCE.stepped(4), 40).state
     assert len(state.bars[0]) == 4 * WINDOW
     assert open_frames(state.bars[0]) == pytest.approx(4 * open_frames(plain.bars[0]), rel=0.03)
     assert state.bars[0].sum() == pytest.approx(plain.bars[0].sum())
-
-
-def test_frames_change_no_bit():
-    state, _ = followed(accelerating(None), 30)
-    assert np.array_equal(state.bars, accelerating(None).for_picture(1.6).at(30).bars)
-
-
-def test_a_recipe_of_it_comes_back():
-    for trail in (0.25, [{"frame": 1, "value": 0.1}, {"frame": 9, "value": 0.3, "ease": "bezier"}]):
-        source = accelerating(trail)
-        assert comes_back(source)
-    assert json.loads(recipe_file.dump(accelerating(None)))["shutters"][0].get("trail") is None

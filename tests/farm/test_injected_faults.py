@@ -288,17 +288,6 @@ def _seeing_read_only(folder):
 
 
 @pytest.mark.skipif(os.geteuid() != 0, reason="only root mounts")
-@pytest.mark.parametrize(("command", "place"), [(Node.render, "pictures"), (Node.join, "films")])
-def test_a_read_only_output(whole, node, submit, command, place):
-    _put(node, whole, range(1, FRAMES + 1) if place == "films" else range(1, 10))
-    folder = node.folder.parent / place
-    _refused(_run(*command(node), before=_seeing_read_only(folder)), folder, "read-only file system")
-    assert _all_are_right(node, whole)
-    assert node.movie.read_bytes() == OLD
-    submit(node)
-
-
-@pytest.mark.skipif(os.geteuid() != 0, reason="only root mounts")
 def test_a_read_only_edit_with_all_that_it_needs(whole, node, submit):
     """Footage and edit lie on a drive that a node may only read."""
     before = _seeing_read_only(node.folder)
@@ -369,18 +358,8 @@ def _rewrite(path, size=(WIDTH, HEIGHT), key="0123456789abcdef"):
     output.close()
 
 
-def _remove(node, *frames):
-    for frame in frames:
-        (node.pictures / f"{frame:04d}.png").unlink()
-
-
 # What is planted among finished frames, and words of the sentence of the join that meets it.
 FOUND_BY_JOIN = {
-    "gap": (lambda node: _remove(node, 3, 7, 8, 9), ["frames 3, 7 to 9 are missing"]),
-    "truncated": (lambda node: _cut(node.pictures / "0007.png"), ["0007.png: is damaged or cut off"]),
-    "flipped bit": (lambda node: _flip(node.pictures / "0007.png"), ["0007.png: is damaged or cut off"]),
-    "empty": (lambda node: (node.pictures / "0007.png").write_bytes(b""), ["0007.png: is damaged or cut off"]),
-    "other size": (lambda node: _rewrite(node.pictures / "0007.png", (64, 36)), ["0007.png: is 64×36"]),
     "other edit": (
         lambda node: _rewrite(node.pictures / "0007.png"),
         ["0007.png: is of another version of the edit (0123456789abcdef) than 0001.png"],
@@ -396,14 +375,6 @@ def test_a_fault_among_finished_frames(whole, node, worker, submit, fault):
     _refused(worker(*node.join()), *words)
     assert node.movie.read_bytes() == OLD
     submit(node)
-
-
-@pytest.mark.parametrize("frames", ["20:30", "0", "9:3", "all", ""])
-def test_frames_that_the_edit_has_not(node, worker, frames):
-    for command in (node.look(), node.render(), node.join()):
-        _refused(worker(*command, "--frames", frames), "--frames: ")
-    assert not list(node.folder.parent.glob("pictures/*.png"))
-    assert node.movie.read_bytes() == OLD
 
 
 def test_an_edit_that_is_saved_anew_amid_its_job(whole, node, worker, submit):

@@ -13,7 +13,7 @@ import pytest
 from shutter_addon.core.frames.light import to_encoded, to_linear
 from shutter_addon.core.model import outlines
 from shutter_addon.core.model.mattes import FileFrame, Matte
-from shutter_addon.media import carried_mattes, carrying, image_writing, matte_tracking, opencv, outlining
+from shutter_addon.media import carried_mattes, carrying, image_writing, matte_tracking, outlining
 from shutter_addon.media.errors import MediaError
 from shutter_addon.media.matte_values import MatteValues
 
@@ -127,14 +127,6 @@ def by_flow(first, last):
     for k in range(first + 1, last):
         share = (k - first) / (last - first)
         yield k, (1 - share) * forth[k] + share * back[k]
-
-
-def test_beyond_a_drawing(carried):
-    """Before the first and behind the last drawing it goes on, one way. What the subject uncovers was never seen, so
-    some of that is taken along."""
-    mattes = carried(6)
-    assert min(iou(mattes.read(frame), frame) for frame in (5, 7)) > 0.85
-    assert min((mattes.read(frame) * truth(frame)).sum() / truth(frame).sum() for frame in (0, 3, 9, 13)) > 0.9
 
 
 def test_it_ends_at_a_cut(tmp_path):
@@ -345,15 +337,3 @@ def test_nothing_is_kept_behind_a_link(carried, tmp_path):
     with pytest.raises(MediaError, match="it is a link, and none is followed"):
         carried(0, 6).read(3)
     assert (sorted(outside.iterdir()), outside.stat().st_mtime_ns) == before
-
-
-def test_no_drawing_is_no_matte(footage):
-    mattes = carried_mattes.CarriedFile(footage, ()).open()
-    assert mattes.read(5).shape == (HEIGHT, WIDTH)
-    assert not mattes.read(5).any()
-
-
-def test_without_opencv(footage, monkeypatch):
-    monkeypatch.setattr(opencv, "cv2", None)
-    with pytest.raises(MediaError, match="opencv-contrib-python-headless"):
-        carried_mattes.CarriedFile(footage, drawings(0)).open()

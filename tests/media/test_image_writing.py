@@ -16,14 +16,6 @@ def listed(folder):
     return sorted(path.name for path in folder.iterdir())
 
 
-def test_values_and_names_come_back(tmp_path):
-    write_exr(tmp_path / "0001.exr", VALUES, ["S1", "S2"])
-    image = OpenImageIO.ImageBuf(str(tmp_path / "0001.exr"))
-    assert image.spec().channelnames == ("S1", "S2")
-    assert np.array_equal(image.get_pixels(OpenImageIO.FLOAT), VALUES)
-    assert listed(tmp_path) == ["0001.exr"]
-
-
 def test_several_write_the_same_file(tmp_path):
     """Two renders with one folder of coefficients."""
     with ThreadPoolExecutor(8) as pool:

@@ -28,14 +28,6 @@ def scene(frame, turn=0.0, blur=0.0):
     return (cv2.GaussianBlur(picture, (0, 0), blur) if blur else picture).astype(np.uint8), matte
 
 
-@pytest.mark.parametrize("blur", [0, 2])
-def test_a_step(blur):
-    (first, before), (second, after) = scene(0, blur=blur), scene(1, blur=blur)
-    step = matte_tracking.moved(first, second, before, after)
-    assert abs(step.motion.shift - (3 - 1j)) < 0.25
-    assert step.confidence > 0.8
-
-
 @pytest.mark.parametrize("motion", ["location", "rotation", "scale"])
 def test_a_turn_is_found_where_it_is_asked_for(motion):
     (first, before), (second, after) = scene(0, turn=4), scene(1, turn=4)
@@ -44,11 +36,6 @@ def test_a_turn_is_found_where_it_is_asked_for(motion):
     turn = np.degrees(np.angle(found.turn))
     assert turn == (0 if motion == "location" else pytest.approx(-4, abs=0.4))
     assert abs(found.turn) == pytest.approx(1, abs=0.01)
-
-
-def test_what_shows_nothing_is_not_known():
-    (first, before), (second, _after) = scene(0), scene(1)
-    assert matte_tracking.moved(first, second, before, np.zeros_like(before)) is None
 
 
 class Footage:

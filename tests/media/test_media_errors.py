@@ -53,22 +53,6 @@ def sound_frames(path):
     return [frame for frame in frames if not frame.is_corrupt]
 
 
-@pytest.mark.parametrize("name", ["clip.mp4", "frame_01.png"])
-def test_missing(tmp_path, name):
-    assert sentence(tmp_path / name) == f"{name}: no such file in {tmp_path}"
-
-
-@pytest.mark.parametrize("name", ["clip.mp4", "frame_01.png"])
-def test_empty(tmp_path, name):
-    (tmp_path / name).touch()
-    assert sentence(tmp_path / name) == f"{name}: file is empty"
-
-
-def test_folder(tmp_path):
-    (tmp_path / "clip.mp4").mkdir()
-    assert sentence(tmp_path / "clip.mp4") == "clip.mp4: is a folder, not a file"
-
-
 @pytest.fixture
 def in_time():
     """A hang is a failure. It ends all tests: libraries that wait for a pipe wait on after a signal."""
@@ -89,19 +73,6 @@ def test_a_pipe_or_a_device(tmp_path, name):
     (tmp_path / name).unlink()
     (tmp_path / name).symlink_to("/dev/zero")
     assert sentence(tmp_path / name) == f"{name}: {OTHER}"
-
-
-@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="no pipes by name")
-@pytest.mark.usefixtures("in_time")
-def test_a_pipe_among_the_files_of_a_sequence(tmp_path):
-    for n in range(3):
-        save_image(tmp_path / f"a_{n}.png", picture(n))
-    (tmp_path / "a_1.png").unlink()
-    os.mkfifo(tmp_path / "a_1.png")
-    for files in (None, [f"a_{n}.png" for n in range(3)]):
-        good, bad = readable(open_source(tmp_path / "a_0.png", files=files))
-        assert good == {0: 0, 2: 2}
-        assert bad == {1: f"a_1.png: {OTHER}"}
 
 
 @pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="no pipes by name")
@@ -356,14 +327,6 @@ def test_names_that_are_not_utf8(tmp_path):
             assert text.endswith("its path is not UTF-8; rename the file, or the folder that is not")
     with pytest.raises(MediaError, match="its path is not UTF-8"):
         write_exr(folder / "a.exr", np.zeros((4, 4, 1), np.float32), ["Y"])
-
-
-@pytest.mark.parametrize("suffix", ["jpg", "tif", "exr", "dpx"])
-def test_cut_off_image(tmp_path, suffix):
-    path = save_image(tmp_path / f"a.{suffix}", picture(5))
-    cut_file(path, path, 0.6)
-    with pytest.raises(MediaError, match=rf"^a\.{suffix}: cannot be (decoded|read as an image) \(.+\)$"):
-        open_source(path).read(0)
 
 
 def test_image_without_colours(tmp_path):

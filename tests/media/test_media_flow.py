@@ -12,7 +12,7 @@ import pytest
 
 from shutter_addon.core.frames import light
 from shutter_addon.core.frames.planes import as_rgba
-from shutter_addon.media import MediaError, flow, open_source, opencv
+from shutter_addon.media import flow, open_source
 
 HEIGHT, WIDTH = 96, 160
 
@@ -242,12 +242,6 @@ def test_the_same_bits_whatever_the_number_of_threads():
     assert digest(1) == digest(7) == here
 
 
-def test_without_opencv_it_is_one_sentence(monkeypatch):
-    monkeypatch.setattr(opencv, "cv2", None)
-    with pytest.raises(MediaError, match=r"^moments between frames need the Python package opencv-contrib-python"):
-        flow.check()
-
-
 def test_what_is_kept_of_pictures_of_other_sizes_is_let_go():
     def make(width):
         first = frame(noise(1, 32, width))
@@ -262,12 +256,6 @@ def test_what_is_kept_of_pictures_of_other_sizes_is_let_go():
     finally:
         tracemalloc.stop()
     assert sum(trace.size for trace in arrays.traces) <= 32 * 39 * 2 * 4  # one place for each pixel
-
-
-def test_a_moment_of_a_time_is_the_same_of_any_number_of_steps():
-    pair = flow.Between(pan(0), pan(8))
-    for number, steps in ((1, 2), (1, 4), (3, 4), (5, 8)):
-        np.testing.assert_array_equal(at(pair, number, steps), at(pair, 16 // steps * number, 16))
 
 
 @pytest.mark.parametrize(("move", "dtype"), [((8, 0), np.uint8), ((-6, 3), np.uint16), ((5, -4), np.float32)])

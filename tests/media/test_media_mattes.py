@@ -1,12 +1,11 @@
 """Mattes in files: the values of every kind of channel, against what was written; one sentence where there are none."""
 
 import os
-import re
 import struct
 
 import numpy as np
 import pytest
-from footage import cut_file, damage_frame, make_movie, rotate_movie, save_image
+from footage import make_movie, save_image
 from OpenImageIO import ImageOutput, ImageSpec
 
 from shutter_addon.media import MediaError, open_source
@@ -83,13 +82,6 @@ def test_the_channels_of_colours(tmp_path, suffix, kind, alpha):
     assert np.abs(values_of(path, "alpha") - (expected[..., 3] if alpha else 1)).max() < 1e-7
 
 
-def test_grey_with_alpha(tmp_path):
-    samples, expected = stored(noise(2), "uint8")
-    path = save_image(tmp_path / "a.png", samples, **STRAIGHT)
-    assert np.abs(values_of(path) - expected[..., 0]).max() < 1e-7
-    assert np.abs(values_of(path, "alpha") - expected[..., 1]).max() < 1e-7
-
-
 @pytest.mark.parametrize("kind", ["half", "float"])
 def test_values_are_clamped_and_numbers(tmp_path, kind):
     odd = np.array([-3, -np.inf, np.nan, np.inf, 7, 0.25, 1, -0.0])
@@ -110,13 +102,6 @@ def test_a_channel_by_its_name(tmp_path, name):
     path = save_image(tmp_path / "a.exr", values.astype(np.float32), "float", names=NAMES)
     assert np.abs(values_of(path, name) - values[..., NAMES.index(name)]).max() < 1e-7
     assert np.abs(values_of(path, "red") - values[..., 3]).max() < 1e-7
-
-
-def test_coefficients_that_were_written(tmp_path):
-    values = noise(3).astype(np.float32)
-    write_exr(tmp_path / "0001.exr", values, ["Long", "Sharp", "Röhre"])
-    for i, name in enumerate(["Long", "Sharp", "Röhre"]):
-        assert np.array_equal(values_of(tmp_path / "0001.exr", name), values[..., i])
 
 
 @pytest.mark.parametrize("names", [["red", "alpha"], ["R", "G", "B", "red", "alpha"]])
@@ -205,19 +190,6 @@ def test_frames_of_a_sequence(tmp_path):
     with MatteFile(numbered(tmp_path, [3, 4, 7, 8])).open() as matte:
         assert (matte.width, matte.height, matte.count) == (8, 8, 6)
         assert places(matte, [-100, -1, 0, 1, 2, 3, 4, 5, 6, 100]) == [0, 0, 0, 1, 1, 1, 2, 3, 3, 3]
-
-
-def test_listed_files(tmp_path):
-    numbered(tmp_path, [3, 4, 7])
-    with MatteFile(tmp_path, files=("m_007.png", "m_003.png")).open() as matte:
-        assert places(matte, range(3)) == [2, 0, 0]
-
-
-def test_a_still_picture(tmp_path):
-    save_image(tmp_path / "matte.png", np.full((8, 8, 1), 9, np.uint8))
-    with MatteFile(tmp_path / "matte.png").open() as matte:
-        assert matte.count == 1
-        assert places(matte, [-1, 0, 50]) == [9, 9, 9]
 
 
 def test_a_matte_is_its_file_its_channel_and_its_stamp(tmp_path):
@@ -310,45 +282,6 @@ def test_the_alpha_of_a_movie(tmp_path, codec, pix_fmt):
     assert np.abs(values_of(path, "red", 1) - frames[1][..., 0] / top).max() < 1e-4
 
 
-def test_frames_of_a_movie(movies):
-    path, _ = movies["b_frames.mp4"]
-    with MatteFile(path).open() as matte:
-        first, last = matte.read(0), matte.read(matte.count - 1)
-        assert np.array_equal(matte.read(-7), first)
-        assert np.array_equal(matte.read(10_000), last)
-        assert not np.array_equal(first, last)
-
-
-def test_onwards_every_frame_is_decoded_once(tmp_path, read_through):
-    frames = [luma(8, True)[0].astype(np.uint8)] * 80
-    path = make_movie(tmp_path / "a.mp4", "libx264", pictures=frames, array_format="gray", size=SIZE)
-    with MatteFile(path).open() as matte:
-        for index in range(30):
-            matte.read(index)
-            matte.read(index)
-        read_through(30)
-        for index in range(30, 82):
-            matte.read(index)
-            matte.read(index)
-    read_through(80)
-
-
-def test_a_turned_movie(tmp_path):
-    frames = [luma(8, True)[0].astype(np.uint8)] * 3
-    path = make_movie(
-        tmp_path / "a.mp4",
-        "libx264",
-        pictures=frames,
-        array_format="gray",
-        size=SIZE,
-        options={"qp": "0"},
-    )
-    upright = values_of(path)
-    with MatteFile(rotate_movie(path, tmp_path / "b.mp4", 90)).open() as matte:
-        assert (matte.width, matte.height) == SIZE[::-1]
-        assert np.array_equal(matte.read(0), np.rot90(upright, -1))
-
-
 @pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="no pipes by name")
 def test_a_pipe(tmp_path):
     """In the place of the first file, of another one, and of a movie."""
@@ -360,36 +293,6 @@ def test_a_pipe(tmp_path):
     with MatteFile(first).open() as matte, pytest.raises(MediaError, match=rf"^m_002\.png: {other}$"):
         matte.read(1)
     assert sentence(tmp_path / "m.mp4") == f"m.mp4: {other}"
-
-
-def test_frames_that_cannot_be_read(tmp_path):
-    first = numbered(tmp_path, [0, 1, 2, 3, 4])
-    save_image(tmp_path / "m_001.png", np.zeros((8, 9, 1), np.uint8))
-    cut_file(tmp_path / "m_002.png", tmp_path / "m_002.png", 0.5)
-    with MatteFile(first).open() as matte:
-        (tmp_path / "m_003.png").unlink()
-        told = []
-        for index in (1, 2, 3):
-            with pytest.raises(MediaError) as caught:
-                matte.read(index)
-            told.append(str(caught.value))
-        assert places(matte, [0, 4]) == [0, 4]
-    assert told[0] == "m_001.png: is 9×8, but m_000.png is 8×8"
-    assert re.match(r"m_002\.png: cannot be (decoded|read as an image) \(.+\)$", told[1])
-    assert told[2] == f"m_003.png: no such file in {tmp_path}"
-
-
-def test_a_damaged_movie(tmp_path):
-    codes, _ = luma(8, True)
-    frames = [np.roll(codes, n).astype(np.uint8) for n in range(6)]
-    options = {"g": "1", "slicecrc": "1"}
-    whole = make_movie(
-        tmp_path / "w.mkv", "ffv1", pictures=frames, pix_fmt="gray", array_format="gray", size=SIZE, options=options
-    )
-    with MatteFile(damage_frame(whole, tmp_path / "m.mkv", 3)).open() as matte:
-        with pytest.raises(MediaError, match=r"^frame 3 of m\.mkv cannot be decoded: its data are damaged"):
-            matte.read(3)
-        assert np.abs(matte.read(4) * 255 - frames[4]).max() < 1e-4
 
 
 def test_a_channel_of_another_name(tmp_path, movies):

@@ -8,7 +8,7 @@ from pathlib import Path
 import av
 import numpy as np
 import pytest
-from footage import COUNT, HEIGHT, WIDTH, cut_file, damage_frame, make_movie, number, picture, see_through
+from footage import COUNT, HEIGHT, WIDTH, cut_file, damage_frame, make_movie, number, picture
 
 from shutter_addon.media import open_source
 
@@ -129,34 +129,6 @@ def test_odd_sizes(tmp_path, size, pix_fmt):
         assert frame.shape == (height, width, 4)
         assert np.abs(frame[..., :3] / top - array / 255).max() < 2 / 255
         assert (frame[..., 3] == top).all()
-
-
-@pytest.mark.parametrize(
-    ("codec", "suffix", "pix_fmt", "dtype", "alpha"),
-    [
-        ("qtrle", "mov", "argb", np.uint8, "straight"),
-        ("png", "mov", "rgba", np.uint8, "straight"),
-        ("libvpx-vp9", "webm", "yuva420p", np.uint8, "straight"),
-        ("png", "mov", "rgba64be", np.uint16, "premultiplied"),
-    ],
-)
-def test_alpha(tmp_path, codec, suffix, pix_fmt, dtype, alpha):
-    arrays = [see_through(n) for n in range(3)]
-    path = make_movie(tmp_path / f"a.{suffix}", codec, pix_fmt=pix_fmt, pictures=arrays, array_format="rgba")
-    with open_source(path) as source:
-        assert (source.dtype, source.alpha) == (dtype, alpha)
-        frame = source.read(1) / np.iinfo(dtype).max
-    assert np.abs(frame[..., 3] - arrays[1][..., 3] / 255).max() < 2.5 / 255
-
-
-def test_alpha_decoder_gives_the_same_frames_in_any_order(tmp_path):
-    arrays = [see_through(n) for n in range(60)]
-    more = {"pix_fmt": "yuva420p", "pictures": arrays, "array_format": "rgba", "options": {"g": "15"}}
-    with open_source(make_movie(tmp_path / "a.webm", "libvpx-vp9", **more)) as source:
-        frames = all_frames(source)
-        assert [number(frame) for frame in frames] == list(range(60))
-        order = random.Random(1).sample(range(60), 60)
-        assert [i for i in order if not np.array_equal(source.read(i), frames[i])] == []
 
 
 def test_deep_movies_keep_their_depth(tmp_path):

@@ -101,22 +101,6 @@ def test_other_frames_are_as_they_are_read(tmp_path, pixels, space, given):
         assert np.array_equal(source.decoded(1), source.read(1))
 
 
-@pytest.mark.parametrize("pixels", ["yuv420p", "yuv422p", "yuv444p", "yuv411p", "yuv410p"])
-@pytest.mark.parametrize("given", [{}, {"divisor": 2}, {"deinterlace": True}], ids=str)
-def test_conversion_by_way_of_planes_has_the_same_bits(tmp_path, monkeypatch, pixels, given):
-    path = film(tmp_path / "noise.mkv", (64, 48), BT709, LIMITED, pixels)
-    assert movie._is_opaque_yuv(av.VideoFormat(pixels))  # what the next lines do without
-    with open_source(path, **given) as by_planes, open_source(path, **given) as directly:
-        found = by_planes.read(1)
-        monkeypatch.setattr(movie, "_is_opaque_yuv", lambda _: False)  # nothing else decides which way is taken
-        assert np.array_equal(found, directly.read(1))
-
-
-@pytest.mark.parametrize("pixels", ["yuva420p", "gray", "rgb24", "gbrp", "rgba", "pal8"])
-def test_what_has_no_planes_of_chroma_alone(pixels):
-    assert not movie._is_opaque_yuv(av.VideoFormat(pixels))  # no codec stores frames of some of these
-
-
 def test_a_conversion_that_fails_is_said_of_its_frame(bunny, monkeypatch):
     class Failing:
         def reformat(self, *_):
@@ -138,12 +122,6 @@ def test_through_wrappers(bunny, planes):
         for index in range(4):
             assert isinstance(source.decoded(index), Planes) == planes
             assert np.array_equal(source.read(index), direct.read(index))
-
-
-@pytest.mark.parametrize("planes", [True, False])
-def test_what_is_read_ahead_is_read_only(bunny, planes):
-    with PrefetchSource(open_source(bunny), planes=planes) as source:
-        assert not source.read(3).flags.writeable
 
 
 def test_a_signature_of_planes_is_that_of_the_frame(bunny):

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from shutter_addon.core import stopping
-from shutter_addon.media import MediaError, PrefetchSource, open_source
+from shutter_addon.media import MediaError, PrefetchSource
 
 
 class Footage:
@@ -179,15 +179,6 @@ def test_closing_ends_a_read_that_waits(ahead, source):
     threading.Timer(0.1, source.gate.set).start()
     with pytest.raises(MediaError, match=r"footage\.mp4: closed"):
         ahead.read(1)
-
-
-def test_it_is_a_source_of_the_same_kind(bunny):
-    with open_source(bunny) as plain, PrefetchSource(open_source(bunny)) as ahead:
-        for name in ("path", "width", "height", "count", "fps", "dtype", "transfer", "alpha"):
-            assert getattr(ahead, name) == getattr(plain, name)
-        ahead.want(range(30, 34))
-        for index in (33, 30, 3):
-            assert np.array_equal(ahead.read(index), plain.read(index))
 
 
 def test_a_read_that_may_not_wait(ahead, source):

@@ -6,7 +6,7 @@ import pytest
 
 from shutter_addon.core.frames import light
 from shutter_addon.media import open_source
-from shutter_addon.media.reduced import reduced, smaller
+from shutter_addon.media.reduced import reduced
 
 
 def means(frame, divisor):
@@ -61,34 +61,6 @@ def test_straight_colours_count_by_their_cover():
     frame[0, 1] = 9, 9, 9, 0
     assert reduced(frame, 2, "straight").tolist() == [[[200, 100, 50, 64]]]
     assert reduced(frame, 2, "premultiplied").tolist() == [[[52, 27, 15, 64]]]
-
-
-def test_a_uniform_picture_stays_what_it_is():
-    for dtype in (np.uint8, np.uint16, np.float16, np.float32):
-        frame = np.full((7, 9, 4), 3.0 if np.dtype(dtype).kind == "f" else np.iinfo(dtype).max, dtype)
-        for alpha in ("opaque", "straight", "premultiplied"):
-            small = reduced(frame, 4, alpha)
-            assert small.shape == (2, 3, 4)
-            assert (small == frame[0, 0]).all()
-            assert small.dtype == dtype
-
-
-def test_it_is_made_smaller_before_its_colours_are_converted(tmp_path, blender_config):
-    path = tmp_path / "grey.png"
-    image = OpenImageIO.ImageBuf(OpenImageIO.ImageSpec(8, 8, 3, "uint8"))
-    image.set_pixels(OpenImageIO.ROI(), np.full((8, 8, 3), 0.5, np.float32))
-    assert image.write(str(path))
-    options = {"colorspace": "Filmic sRGB", "config": blender_config, "divisor": 2}
-    with open_source(path, **options) as small, open_source(path, **options | {"divisor": 1}) as full:
-        assert small.read(0).shape == (4, 4, 4)
-        assert np.allclose(small.read(0)[0, 0], full.read(0)[0, 0])
-
-
-def test_it_wraps_any_source(bunny):
-    with smaller(open_source(bunny), 4) as small:
-        assert (small.width, small.height) == (320, 180)
-        assert small.read(5).shape == (180, 320, 4)
-        assert small.options == {"stream": 0, "deinterlace": False}
 
 
 def test_light(bunny):

@@ -84,14 +84,6 @@ def test_moments_go_evenly_across_repeats(shown, noise):
     assert (source.repeats, plain.repeats) == (True, False)
 
 
-def test_what_does_not_repeat_has_the_footages_bits():
-    film = Film(PULLDOWN)
-    source = skipping(film)
-    for k in range(1, film.count):
-        is_alike = np.array_equal(source.read(k * STEP), film.read(k))
-        assert is_alike == (PULLDOWN[k] != PULLDOWN[k - 1])
-
-
 def still(_number):
     return disc(100)
 
@@ -183,20 +175,6 @@ def test_each_frame_is_decoded_once(shown):
     for moment in range(source.count):
         source.read(moment)
     assert film.asked == list(range(film.count))
-
-
-@pytest.mark.parametrize("moment", [5 * STEP, 5 * STEP + 1])
-def test_elsewhere_neighbours_alone_are_read(moment):
-    film = Film(range(12))
-    skipping(film).read(moment)
-    assert sorted(film.asked) == [4, 5, 6]
-
-
-def test_nothing_is_looked_for_where_it_is_off(monkeypatch):
-    monkeypatch.setattr(Repeats, "_change", None)  # the only way to look
-    film = Film(TWOS)
-    np.testing.assert_array_equal(SmoothSource(film, STEP).read(STEP), film.read(1))
-    assert steps_for(film, "auto", 8) == 2
 
 
 @pytest.mark.parametrize("sky", [False, True])

@@ -179,37 +179,6 @@ def test_colours_are_not_multiplied_by_alpha(tmp_path, name, samples, alpha):
     assert np.abs(frame.astype(float) / scale - stored).max() < 0.0005
 
 
-@pytest.mark.parametrize("channels", [1, 2, 3, 4])
-def test_any_channels_become_rgba(tmp_path, channels):
-    rgba = see_through(5)
-    array = rgba[..., [[0], [0, 3], [0, 1, 2], [0, 1, 2, 3]][channels - 1]]
-    with open_source(save_image(tmp_path / "a.png", array, **STRAIGHT)) as source:
-        frame = source.read(0)
-        assert source.alpha == ("straight" if channels in (2, 4) else "opaque")
-    expected = rgba.copy() if channels > 2 else rgba[..., [0, 0, 0, 3]]
-    if channels in (1, 3):
-        expected[..., 3] = 255
-    assert np.array_equal(frame, expected)
-
-
-@pytest.mark.parametrize(
-    ("at", "display"),
-    [
-        ((0, 0), (-10, -6, 160, 90)),
-        ((0, 0), (10, 6, 64, 32)),
-        ((5, 7), (0, 0, 100, 100)),
-        ((300, 0), (0, 0, 20, 20)),
-        ((-90, -20), (-30, -10, 150, 40)),
-    ],
-)
-def test_data_window_is_the_picture(tmp_path, at, display):
-    stored = (see_through(5) / np.float32(255)).astype(np.float16)
-    path = save_image(tmp_path / "a.exr", stored, "half", at=at, display=display)
-    with open_source(path) as source:
-        assert (source.width, source.height) == (WIDTH, HEIGHT)
-        assert np.array_equal(source.read(0), stored)
-
-
 def test_data_windows_that_differ(tmp_path):
     for n, size in enumerate([(128, 64), (100, 40)]):
         save_image(tmp_path / f"a_{n}.exr", picture(n, *size) / 255, "half", at=(n, n), display=(0, 0, 160, 90))
@@ -314,14 +283,6 @@ def test_palette_becomes_rgba(tmp_path):
     (tmp_path / "a.png").write_bytes(b"\x89PNG\r\n\x1a\n" + data)
     with open_source(tmp_path / "a.png") as source:
         assert source.read(0).tolist() == [[[255, 0, 0, 255], [0, 255, 0, 128]]]
-
-
-def test_colour_spaces_that_are_only_names(tmp_path):
-    path = save_image(tmp_path / "a.png", picture(5))
-    for name, transfer in (("sRGB", "srgb"), ("Linear Rec.709", "linear"), ("Non-Color", "linear")):
-        with open_source(path, colorspace=name) as source:
-            assert source.transfer == transfer
-            assert np.array_equal(source.read(0)[..., :3], picture(5))
 
 
 def test_other_colour_spaces_become_scene_linear(tmp_path, blender_config):

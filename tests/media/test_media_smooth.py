@@ -13,7 +13,7 @@ from test_media_steps import Film, shift
 from shutter_addon.core.frames.frame_source import FrameSource
 from shutter_addon.core.frames.planes import as_rgba
 from shutter_addon.core.model.shutters import MAX_WINDOW
-from shutter_addon.media import MediaError, PrefetchSource, flow, open_source, opencv, smooth
+from shutter_addon.media import MediaError, PrefetchSource, open_source, opencv, smooth
 from shutter_addon.media.cuts import ShotSource
 from shutter_addon.media.smooth import SmoothSource, steps_for
 
@@ -84,14 +84,6 @@ def test_at_a_cut_moments_are_the_nearer_frame():
     assert not np.array_equal(source.read(13), film.picture(3))
 
 
-def test_between_equal_frames_is_that_frame(monkeypatch):
-    film = Panned(2)
-    film.picture = lambda _index: pan(5)
-    monkeypatch.setattr(flow, "_dis", None)  # no flow is needed
-    for moment in range(9):
-        np.testing.assert_array_equal(SmoothSource(film, 8).read(moment), pan(5))
-
-
 @pytest.mark.parametrize("kind", [{}, {"cut": 4}, {"dtype": np.float16}])
 def test_the_order_of_reading_changes_no_bit(kind):
     first = SmoothSource(Panned(**kind), 4)
@@ -124,23 +116,6 @@ def test_memory_has_a_bound_and_film_is_decoded_once():
     gc.collect()
     assert film.living == 0
     assert off(source.read(2), pan(1)) < 1  # a later read begins anew
-
-
-def test_without_moments_nothing_is_looked_for(monkeypatch):
-    monkeypatch.setattr(flow, "Between", None)
-    film = Panned()
-    source = SmoothSource(film, 8)
-    for index in range(8):
-        np.testing.assert_array_equal(source.read(8 * index), film.picture(index))
-
-
-def test_flow_of_a_pair_is_found_once(monkeypatch):
-    found, own = [], flow.Between
-    monkeypatch.setattr(flow, "Between", lambda *given: found.append(1) or own(*given))
-    source = SmoothSource(Panned(4), 8)
-    for moment in range(source.count):
-        source.read(moment)
-    assert len(found) == 3
 
 
 def test_a_lost_frame_is_one_sentence_until_it_is_back():
@@ -210,10 +185,6 @@ def test_as_many_as_are_asked_for_if_a_window_has_room(asked, window):
     assert found == asked or 2 * found * window > MAX_WINDOW
 
 
-def test_a_longer_window_has_none():
-    assert steps_for(SimpleNamespace(count=9), 16, MAX_WINDOW + 40) == 1
-
-
 @pytest.mark.parametrize(("x", "wanted"), [(0, 1), (1.5, 1), (3, 2), (7, 4), (14, 8), (25, 16), (40, 16)])
 def test_as_many_as_the_fastest_motion_needs(x, wanted):
     """In a picture of 270 rows, copies may be two pixels apart."""
@@ -255,10 +226,6 @@ def test_what_cannot_be_read_or_told_does_not_count():
     assert steps_for(film, "auto", 8) == 4
     film.read = lambda index: frame(blocks(index, (270, 480)))  # cuts alone
     assert steps_for(film, "auto", 8) == 1
-
-
-def test_one_frame_has_none():
-    assert steps_for(speeding(7, count=1), "auto", 8) == 1
 
 
 def test_without_opencv(monkeypatch):

@@ -193,11 +193,6 @@ def test_footage_that_became_a_pipe_is_one_sentence(tmp_path):
         derived.content_digest(tmp_path / "film.mov")
 
 
-def test_footage_that_is_gone_is_one_sentence(tmp_path):
-    with pytest.raises(MediaError, match=r"^film\.mov: cannot be read \(No such file"):
-        derived.content_digest(tmp_path / "film.mov")
-
-
 def test_a_change_of_footage_is_another_folder(tmp_path):
     """Of a small file any byte counts, its time stamp none."""
     footage = Footage(tmp_path)

@@ -4,7 +4,7 @@ import os
 
 import numpy as np
 import pytest
-from test_media_flow import off, pan
+from test_media_flow import pan
 from test_media_smooth import Panned
 
 from shutter_addon.core.frames.planes import as_rgba
@@ -50,14 +50,6 @@ def test_stored_or_not_gives_the_same_bits(folder, nothing_found, kind):
     nothing_found()
     np.testing.assert_array_equal(read(folder, **kind), wanted)
     assert [path.stat().st_mtime_ns for path in files(folder)] == before
-
-
-def test_a_pair_is_read_once(folder, monkeypatch):
-    read(folder)
-    asked, own = [], StoredVectors.found
-    monkeypatch.setattr(StoredVectors, "found", lambda *given: asked.append(1) or own(*given))
-    read(folder)
-    assert len(asked) == 3
 
 
 def test_who_does_not_write_reads(folder, nothing_found):
@@ -157,9 +149,3 @@ def test_what_changes_is_found_anew(folder, monkeypatch):
     monkeypatch.setattr(flow, "VERSION", flow.VERSION + 1)
     vectors.found(pictures[0], pictures[1])
     assert len(files(folder)) == 4
-
-
-def test_moments_are_those_of_the_film(folder):
-    read(folder)
-    source = SmoothSource(Panned(4), STEPS, StoredVectors(folder, writes=False))
-    assert off(source.read(2), pan(4)) < 1

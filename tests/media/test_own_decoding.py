@@ -1,7 +1,6 @@
 """Movies that a second Blender decodes, beside the same ones by PyAV; and that Blender's life."""
 
 import os
-import random
 import select
 import signal
 import struct
@@ -15,12 +14,11 @@ from pathlib import Path
 import av
 import numpy as np
 import pytest
-from footage import COUNT, cut_file, damage_frame, make_movie, number, picture, save_image
+from footage import cut_file, damage_frame, make_movie, number, picture, save_image
 
 from shutter_addon.media import MediaError, blender_movie, files, open_source
 from shutter_addon.media.blender_movie import BlenderMovie, frame_rate
 from shutter_addon.media.opening import movie_channel, open_channel
-from shutter_addon.media.smooth import SmoothSource
 
 ROOT = Path(__file__).parents[2]
 FOLDER = ROOT / "shutter_addon" / "blender" / "data"
@@ -77,13 +75,6 @@ def test_deinterlaced_movies_are_those_that_pyav_decodes(deinterlaced):
         assert_same(path, deinterlace=True)
 
 
-def test_any_order_gives_the_same_frames(movies):
-    path, numbers = movies["open.mkv"]
-    order = random.Random(4).choices(range(COUNT), k=80)
-    with BlenderMovie(path) as source:
-        assert [number(source.read(index)) for index in order] == [numbers[index] for index in order]
-
-
 def test_many_movies_at_a_time_and_names_of_all_kinds(tmp_path):
     names = ["a b.mp4", "Größe.mp4", "映画 ().mp4", "-x.mp4", "'q'.mp4", "%04d#1.mp4", "10.mp4", "11.mp4", "12.mp4"]
     with ExitStack() as opened:
@@ -131,23 +122,6 @@ def test_another_file_in_its_place_is_one_sentence(tmp_path):
             source.read(3)
 
 
-def test_what_is_no_movie_is_one_sentence(movies, tmp_path):
-    text, empty = tmp_path / "text.mp4", tmp_path / "empty.mp4"
-    text.write_text("Hello.\n" * 50)
-    empty.touch()
-    cut = cut_file(movies["b_frames.mp4"][0], tmp_path / "cut.mp4", 0.5)
-    for path, reason in [
-        (text, r"cannot be read as a movie \(Blender "),
-        (cut, r"cannot be read as a movie \(Blender "),
-        (empty, "file is empty"),
-        (tmp_path / "none.mp4", "no such file"),
-        (tmp_path, "is a folder"),
-    ]:
-        with pytest.raises(MediaError, match=rf"^{path.name}: {reason}"):
-            BlenderMovie(path)
-    assert_same(movies["b_frames.mp4"][0])
-
-
 def hostile(folder, movies):
     """Files that are no movies, or hardly. Blender may read some of them, as PyAV does."""
     sound, still = folder / "sound.mp4", folder / "still.mp4"
@@ -184,17 +158,6 @@ def test_hostile_files_are_pictures_or_one_sentence_and_all_else_goes_on(movies,
         begins = f"{name}: cannot be read as a movie (Blender ", f"{name}: its length is unknown"
         assert sentence.startswith(begins), sentence
     assert_same(movies["b_frames.mp4"][0])
-
-
-@linux
-def test_a_pipe_in_the_place_of_a_movie_that_was_read(tmp_path):
-    path = make_movie(tmp_path / "a.mp4", "libx264", 3)
-    with BlenderMovie(path) as source:
-        source.close()
-        path.unlink()
-        os.mkfifo(path)
-        with pytest.raises(MediaError, match=r"^frame 1 of a\.mp4 cannot be decoded: is no file, but a pipe"):
-            source.read(1)
 
 
 def test_frame_rates_are_those_of_films():
@@ -366,14 +329,6 @@ def test_an_answer_that_nobody_waited_for_is_not_the_next_one(movies, tmp_path):
             assert number(source.read(7)) == numbers[7]
     finally:
         signal.signal(signal.SIGUSR1, before)
-
-
-def test_moments_between_its_frames_are_those_of_pyav(coloured):
-    path = coloured["bt709.mp4"]
-    with open_source(path) as by_pyav, BlenderMovie(path) as source:
-        assert source.by_blender
-        for index in range(5):
-            assert np.array_equal(SmoothSource(source, 2).read(index), SmoothSource(by_pyav, 2).read(index))
 
 
 @linux

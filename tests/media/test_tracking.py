@@ -1,10 +1,8 @@
 """Tracking against films whose motion is known: a part of one picture moves over another one."""
 
 from dataclasses import replace
-from fractions import Fraction
 from pathlib import Path
 
-import av
 import cv2
 import numpy as np
 import pytest
@@ -199,16 +197,6 @@ def test_a_subject_that_stays_covered_ends_it(subject, ground, monkeypatch):
     assert faults == {8: pursuit.COVERED}
     assert sorted(tracked) == list(range(8))
     assert max(errors(tracked, truth, "lasso").values()) <= 1
-
-
-def test_a_gap_between_two_keys_has_a_fault_on_each_side(passing, monkeypatch):
-    monkeypatch.setattr(tracking, "PATIENCE", 3)
-    source, _ = passing
-    keys = Keys((4.0, 20.0), ((0.0, 0.0), (40 / WIDTH, -8 / HEIGHT)), ("linear",) * 2)
-    given = region("lasso", location=keys)
-    tracked, faults = followed(source, "lasso", 4, range(4, 24), region=given, anchors={20})
-    assert faults == {10: pursuit.COVERED, 14: pursuit.COVERED}
-    assert set(tracked) == {*range(4, 10), *range(15, 21)}
 
 
 def test_a_subject_that_leaves_the_picture_and_comes_back(subject, ground):
@@ -449,20 +437,3 @@ def test_what_cannot_be_tracked_is_one_sentence(subject, given, start, frames, f
     with pytest.raises(tracking.TrackingError) as raised:
         tracking.RegionTrack(region("line", **given)).follow(Footage(source, lambda frame: frame), start, frames)
     assert str(raised.value) == fault
-
-
-def test_a_movie_is_tracked_as_its_frames_are(subject, ground, tmp_path):
-    source, _ = film(subject, ground, lambda t: (2 * t, t), 12, 11)
-    path = tmp_path / "film.mkv"
-    with av.open(str(path), "w") as out:
-        stream = out.add_stream("ffv1", rate=Fraction(25))
-        stream.width, stream.height, stream.pix_fmt = WIDTH, HEIGHT, "bgr0"
-        for n, frame in enumerate(source.frames):
-            shown = av.VideoFrame.from_ndarray(np.ascontiguousarray(frame), format="rgb24").reformat(format="bgr0")
-            shown.pts, shown.time_base = n, Fraction(1, 25)
-            out.mux(stream.encode(shown))
-        out.mux(stream.encode())
-    with ShotSource(open_source(path)) as movie:
-        tracked, faults = followed(movie, "line", 11)
-    assert not faults
-    assert (tracked, faults) == followed(source, "line", 11)

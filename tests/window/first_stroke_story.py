@@ -23,10 +23,6 @@ def acted(what, in_tab=False):
     _actions.append((what, in_tab))
 
 
-def actions():
-    return list(_actions)
-
-
 def timeline():
     return driver.region_of(driver.area_of("SEQUENCE_EDITOR", "SEQUENCER"))
 

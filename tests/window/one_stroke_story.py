@@ -20,7 +20,7 @@ FRAME, STROKE = 70, ((0.462, 0.65), (0.465, 0.62), (0.467, 0.59), (0.468, 0.565)
 MENDED, REDRAWN = 85, 78
 SHOWN = range(55, 96)
 RENDERED = range(65, 86, 20)
-FOLLOW_EDGES, TRACK, PRESETS = 355, 193, 219  # where they stand in the sidebar, in pixels below its upper edge
+FOLLOW_EDGES, TRACK = 355, 193  # where they stand in the sidebar, in pixels below its upper edge
 
 
 def part(name):

@@ -1,22 +1,14 @@
 """Films as jobs of the window on Blender's own GPU, moderngl hidden: a whole one, while a second window opens and
 closes; one that Esc ends; ten short ones; two that the window waits for; one during which the file is loaded again, and
-one more. Run inside Blender, by test_rendered.py.
-
-SHUTTER_BESIDE=1 measures in place of that: films on Blender's GPU and on moderngl's in turn, and the longest wait
-between two redraws of the window. SHUTTER_FOOTAGE has the source, SHUTTER_RECIPE the effect."""
+one more. Run inside Blender, by test_rendered.py. SHUTTER_FOOTAGE has the source, SHUTTER_RECIPE the effect."""
 
 # ruff: noqa: E402 (Blender finds the helpers once it knows their folders)
-import json
-import os
 import sys
-import time
 from functools import partial
 from pathlib import Path
 
 sys.path[:0] = [str(Path(__file__).parent), str(Path(__file__).parents[1] / "blender")]
-BESIDE = bool(os.environ.get("SHUTTER_BESIDE"))
-if not BESIDE:
-    sys.modules["moderngl"] = None  # there is no such module
+sys.modules["moderngl"] = None  # there is no such module
 
 import bpy
 import traces
@@ -113,36 +105,4 @@ def second_window_closed():
         bpy.ops.wm.window_close()
 
 
-class Redraws:
-    """When the timeline was drawn, again and again."""
-
-    def __init__(self):
-        self.times = []
-        self._handler = bpy.types.SpaceSequenceEditor.draw_handler_add(self._drawn, (), "WINDOW", "POST_PIXEL")
-
-    def _drawn(self):
-        self.times.append(time.perf_counter())
-
-    def tag(self):
-        area_of("SEQUENCE_EDITOR", "SEQUENCER").tag_redraw()
-
-    def longest(self):
-        bpy.types.SpaceSequenceEditor.draw_handler_remove(self._handler, "WINDOW")
-        return max(b - a for a, b in zip(self.times, self.times[1:], strict=False))
-
-
-def measured():
-    yield from opened()
-    for device in json.loads(os.environ.get("SHUTTER_ROUNDS", '["blender", "opengl", "blender", "opengl"]')):
-        bpy.context.preferences.addons[traces.NAME].preferences.device = device.upper()
-        redraws, start = Redraws(), time.perf_counter()
-        begun(device)
-        yield 0.1
-        while rendering():
-            redraws.tag()
-            yield 0.02
-        seconds = time.perf_counter() - start
-        saw(device=held(), seconds=seconds, redraws=len(redraws.times), longest=redraws.longest())
-
-
-play(measured if BESIDE else story)
+play(story)

@@ -4,6 +4,7 @@ Renders of one frame go to SHUTTER_PICTURES, whatever was shown before; what the
 
 # ruff: noqa: E402 (Blender finds the helpers once it knows their folder)
 import json
+import subprocess
 import sys
 import time
 from pathlib import Path
@@ -12,7 +13,6 @@ sys.path[:0] = [str(Path(__file__).parent)]
 
 import bpy
 import driver
-import mask_story
 import story
 
 FRAME = 50
@@ -230,6 +230,19 @@ def tricked():
     yield from in_a_job("job_after")
 
 
+def in_background(frame):
+    """The same frame of the saved file, by a Blender without a window."""
+    path = driver.OUT / "edit.blend"
+    bpy.ops.wm.save_as_mainfile(filepath=str(path), copy=True)
+    name = "bl_ext.user_default.virtual_shutter"
+    output = str(driver.OUT / "background_")
+    command = [bpy.app.binary_path, "--factory-startup", "--addons", name, "-b", path, "-o", output, "-f", str(frame)]
+    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
+    yield from driver.until(lambda: process.poll() is not None, "the render without a window ends", 60)
+    assert process.returncode == 0
+    driver.saw(background=process.stdout.read())
+
+
 def told():
     yield from story.opened()
     yield from story.movie_added()
@@ -240,7 +253,7 @@ def told():
     yield from sizes()
     yield from proxies()
     yield from tricked()
-    yield from mask_story.in_background(FRAME)
+    yield from in_background(FRAME)
 
 
 if __name__ == "__main__":

@@ -78,18 +78,3 @@ def packages(folder):
     for name in ("cv2", "tqdm", *(p.name for p in site.glob("opencv*.libs"))):
         (folder / name).symlink_to(site / name)
     return folder
-
-
-def write_film(path, pictures, crf):
-    """The path of an H.264 film of pictures (H, W, 3) uint8."""
-    import av
-    import numpy as np
-
-    with av.open(str(path), "w") as film:
-        stream = film.add_stream("libx264", rate=25, options={"crf": str(crf)})
-        stream.height, stream.width, _ = pictures[0].shape
-        stream.pix_fmt = "yuv420p"
-        for picture in pictures:
-            film.mux(stream.encode(av.VideoFrame.from_ndarray(np.ascontiguousarray(picture), "rgb24")))
-        film.mux(stream.encode())
-    return path
