@@ -43,7 +43,7 @@ vec3 level_of(vec3 value) {
 vec4 sample_at(ivec2 place, int slot) {
 #  if LEVELS_OF == 2
   vec4 light = frame_light(place, slot);
-  return vec4(light.rgb / (light.a > 0.0 ? light.a : 1.0), light.a);
+  return vec4(straight(light), light.a);
 #  else
   return texelFetch(frames, ivec3(place, slot), 0);
 #  endif
