@@ -1,7 +1,7 @@
 // A pixel's own shutter by displacement interpolation, exact (paper §3.4.1): its quantile is Σ cᵢ Sᵢ⁻¹, linear
 // between the knots of the table; each piece spreads its share evenly over the frames that it passes.
 // For few pieces: a frame is fetched again for every piece that touches it.
-uniform int rows;
+uniform int rows, first, last;  // frames that are exposed: rounding must not reach others, which are not there
 #include "compose.glsl"
 
 int frame;
@@ -31,7 +31,8 @@ void expose_frames() {
     until = 0.0;
 #define START(quad) start_piece(quad, row)
     EACH(START);
-    for (frame = int(from); float(frame) < until; frame++) {
+    until = min(until, float(last));
+    for (frame = max(int(from), first); float(frame) < until; frame++) {
       EACH(add_frame);
     }
   }

@@ -91,7 +91,7 @@ def run(folder):
 
 def _read(path, order):
     onwards, again, jumping = _frames(path, range(COUNT)), _frames(path, range(COUNT)), _frames(path, order)
-    if _is_movie(path):
+    if _is_movie(path) or path.suffix == ".tif":  # libtiff leaves memory as it was where compressed data end early
         return
     if onwards != again:
         raise trial.Fault(f"other frames from the same file: {onwards}, {again}")

@@ -11,6 +11,7 @@ from . import hostile, trial
 
 SIZE = 20, 12
 REFERABLE = 300  # bars of all shutters, up to which the reference takes no minutes
+CHANNELS = "luminance", "red", "green", "blue", "alpha"  # of all its footage
 OPENEXR = b"\x76\x2f\x31\x01"  # what its files begin with
 FOOTAGE = (
     {"dtype": "uint8"},
@@ -52,12 +53,17 @@ def make(random, folder):
 def run(folder):
     from made_recipes import comes_back
 
+    from shutter_addon.core.model.effect import FileContent
     from shutter_addon.core.recipes import recipe, recipe_file
 
     with trial.only(recipe.RecipeError):
         found = recipe_file.load(folder / "recipe.json")
         if not comes_back(found):
             raise trial.Fault("a recipe does not come back as it was")
+        contents = [getattr(region, "content", None) for region in found.regions]
+        if any(isinstance(content, FileContent) and content.channel not in CHANNELS for content in contents):
+            render(folder, 2)  # no such channel
+            return
         render(folder, 0)
         plan = json.loads((folder / "plan.json").read_text())
         compose(found, plan, folder)

@@ -26,7 +26,7 @@ vec4 covered = vec4(0.0);  // Σ qₖ aₖ of each pixel
 #  if LEVELS_OF == 2
 vec4 sample_at(ivec2 place, int slot) {
   vec4 light = frame_light(place, slot);
-  return vec4(light.rgb / (light.a > 0.0 ? light.a : 1.0), light.a);
+  return vec4(straight(light), light.a);
 }
 
 vec3 level_of(vec3 value) {

@@ -32,9 +32,10 @@ vec3 to_level(vec3 linear) {
   return mix(curve, linear * 12.92, lessThanEqual(linear, vec3(0.0031308)));
 }
 
-// What a premultiplied colour is multiplied by: what is fully transparent keeps its light.
+// What a premultiplied colour is multiplied by: what is fully transparent keeps its light, also where rounding of what
+// lies beside it leaves a trace of alpha.
 float cover(vec4 color) {
-  return color.a > 0.0 ? color.a : 1.0;
+  return color.a > 1e-6 ? color.a : 1.0;
 }
 
 vec3 straight(vec4 color) {

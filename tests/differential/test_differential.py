@@ -27,7 +27,7 @@ BATCH = 20
 IN_BLENDER = SEEDS[::8]  # which goes around the kinds of footage
 # All passes that compose are run for these. In the last ones a threshold leaves pixels without light, time stands
 # still, and all that a shutter exposes is left out.
-MIXED = *range(13, 30), 10269, 20264, 20279
+MIXED = *range(13, 30), 10269, 20264, 20279, 51655, 51908, 52493, 52835
 
 
 @pytest.fixture(scope="module")

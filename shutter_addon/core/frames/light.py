@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 REC709 = np.array([0.2126, 0.7152, 0.0722], np.float32)  # luminance of linear light
+TRACE = 1e-6  # of alpha, as rounding leaves it of what lies beside: no cover
 
 
 def to_linear(encoded: ArrayLike) -> np.ndarray:
@@ -54,4 +55,4 @@ def linearised(rgba: np.ndarray) -> np.ndarray:
 
 def _cover(rgba: np.ndarray) -> np.ndarray:
     alpha = rgba[..., 3:]
-    return np.where(alpha > 0, alpha, 1)
+    return np.where(alpha > TRACE, alpha, 1)

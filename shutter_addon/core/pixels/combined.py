@@ -107,9 +107,8 @@ def passes(combine: Combine, luminance: np.ndarray) -> np.ndarray:
 
 def median(samples: Sequence[Sample]) -> np.ndarray:
     """The median (H, W, 4) of each channel."""
-    lights, weights = np.stack([s.light for s in samples]), np.stack([s.weight for s in samples])
-    alphas = weights * lights[..., 3]
-    straight = lights[..., :3] / np.maximum(lights[..., 3:], 1e-30)
+    straight, weights = light.straight(np.stack([s.light for s in samples])), np.stack([s.weight for s in samples])
+    alphas = weights * straight[..., 3]
     cover = (alphas.sum(axis=0) / np.maximum(weights.sum(axis=0), 1e-30))[..., None]
     middle = np.stack([weighted_median(straight[..., k], alphas) for k in range(3)], axis=-1)
     return np.concatenate([middle * cover, cover], axis=-1)
