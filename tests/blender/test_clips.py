@@ -2,7 +2,6 @@
 
 import av
 import numpy as np
-import OpenImageIO
 import pytest
 from support import effect_of, picture_of, recipe, sequencer, write_frames
 
@@ -28,23 +27,6 @@ def movie(tmp_path_factory):
 def pngs(folder, channels=3, count=12, samples=np.uint8):
     top = np.iinfo(samples).max
     return write_frames(folder, RNG.integers(0, top, (count, 32, 48, channels), dtype=samples))
-
-
-def exrs(folder, count=4, corner=None):
-    """corner: where the data window begins in a larger display window."""
-    folder.mkdir()
-    for i in range(1, count + 1):
-        pixels = RNG.random((32, 48, 4), dtype=np.float32)
-        pixels[..., :3] *= pixels[..., 3:]
-        spec = OpenImageIO.ImageSpec(48, 32, 4, "half")
-        if corner:
-            spec.x, spec.y = corner
-            spec.full_width, spec.full_height = 60, 40
-        output = OpenImageIO.ImageOutput.create("exr")
-        output.open(str(folder / f"f{i:04d}.exr"), spec)
-        output.write_image(pixels)
-        output.close()
-    return folder / "f0001.exr"
 
 
 @pytest.fixture
@@ -93,11 +75,6 @@ def test_start_and_offset_of_images(bpy, edit, render, tmp_path, clip_strip):
     source = clip_strip(first.with_name("f0003.png"))
     source.clip.frame_start, source.clip.frame_offset = 30, 2
     check(edit, render, source, range(1, 8))
-
-
-@pytest.mark.parametrize("corner", [None, (5, 3), (-5, 20)])
-def test_float_images(edit, render, tmp_path, clip_strip, corner):
-    check(edit, render, clip_strip(exrs(tmp_path / "in", corner=corner)), [1, 2, 4], depth="16")
 
 
 def test_images_some_of_which_have_alpha(edit, render, tmp_path, clip_strip):

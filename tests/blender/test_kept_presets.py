@@ -7,9 +7,8 @@ import numpy as np
 import pytest
 
 from shutter_addon.blender.data import consistency, recipe_import, strips
-from shutter_addon.blender.editing import bar_edits, reconcile, region_edits, shutter_edits
+from shutter_addon.blender.editing import bar_edits, region_edits, shutter_edits
 from shutter_addon.core.model import shutters
-from shutter_addon.core.model.frame_state import Options
 
 WINDOWS = 1, 2, 8, 32, 256
 
@@ -41,17 +40,6 @@ def test_it_is_what_the_preset_makes_however_it_came_there(effect, name, positio
         effect.window = window
         assert bars(effect) == made(name, effect)
         assert consistency.preset_of(effect, 1) == name
-
-
-@pytest.mark.parametrize("smooth", ["1", "2", "16", "AUTO"])
-def test_the_still_frame_is_the_shown_one(effect, smooth):
-    """Whatever changes, in whatever order."""
-    rng = np.random.default_rng(len(smooth))
-    effect.inbetween = smooth
-    for _ in range(40):
-        effect.window = int(rng.choice(WINDOWS))
-        effect.position = rng.choice(["START", "CENTER", "END"])
-        assert opened(effect) == [Options(effect.window, effect.position.lower()).before]
 
 
 def test_still_frame_after_sharp_subject_opens_the_shown_one(bpy, effect):
@@ -102,18 +90,6 @@ def test_what_was_edited_keeps_its_shape(effect, edited):
         before = shutters.resample(bars(effect), window)
         effect.window = window
         assert bars(effect) == pytest.approx(before, abs=1e-6)
-
-
-def test_copies_keep_to_it_too(edit, effect):
-    shutter_edits.duplicate_shutter(effect, 1)
-    effect.window = 24
-    assert opened(effect, 2) == [0]
-    edit.sequence_editor.strips.new_scene("copy", effect.scene, 5, 200)
-    reconcile.tidy()
-    copy = edit.virtual_shutter.effects[1]
-    copy.position = "END"
-    assert opened(copy) == opened(copy, 2) == [23]
-    assert opened(edit.virtual_shutter.effects[0]) == [0]
 
 
 def test_where_the_position_is_keyed_it_is_that_of_the_frame(edit, effect):

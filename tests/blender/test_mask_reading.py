@@ -264,20 +264,6 @@ def assert_unreadable(mask):
             read(mask)
 
 
-def test_a_blender_that_tells_nothing_is_asked_once(moving, other_blender, monkeypatch):
-    """What it tells is written to a file, and masks are read at every frame."""
-    asked = []
-
-    def none(blend):
-        asked.append(blend)
-        raise ValueError
-
-    other_blender("MaskLayer")
-    monkeypatch.setattr(struct_dna, "parsed", none)
-    assert_unreadable(moving)
-    assert len(asked) == 1
-
-
 def test_a_layer_that_is_not_what_the_api_says(moving):
     """Nothing of it is followed."""
     layer = moving.layers[0]

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from shutter_addon.compute import composition_passes, cpu, running_sums, window
+from shutter_addon.compute import cpu, running_sums, window
 from shutter_addon.compute.cpu import CPUCompositor
 from shutter_addon.compute.gpu import GPUCompositor
 from shutter_addon.compute.renderer import Renderer, open_compositor
@@ -154,15 +154,6 @@ def test_long_windows_of_shutters_far_apart(device, count):
     """More turns of loops than a software renderer goes through, were pieces looked at for blocks of pixels."""
     rng = np.random.default_rng(18)
     check(device, footage(rng, count=40), far_apart(rng, count, 256), 0)
-
-
-@pytest.mark.parametrize("edges", ["hold", "shorten"])
-@pytest.mark.parametrize("stored", ["uint8", "float32"])
-def test_each_pixel_looks_up_its_pieces(gpu_device, monkeypatch, edges, stored):
-    monkeypatch.setattr(composition_passes, "frames_iterations", lambda *_: np.inf)
-    rng = np.random.default_rng(19)
-    source = footage(rng, dtype=np.dtype(stored), transfer="linear" if stored == "float32" else "srgb")
-    check(GPUCompositor(gpu_device), source, far_apart(rng, 5, 16, edges=edges), 15)
 
 
 @pytest.mark.parametrize("size", [(1, 1), (2, 100)])

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from test_composition import LEVEL, Footage, footage, state
 
-from shutter_addon.compute import layer_frames, plates, running_sums
+from shutter_addon.compute import plates
 from shutter_addon.compute.gpu import GPUCompositor
 from shutter_addon.compute.renderer import Renderer, open_compositor, open_gl
 from shutter_addon.compute.request import Request
@@ -17,7 +17,7 @@ from shutter_addon.core.model.frame_state import Following, FrameState, Layers, 
 from shutter_addon.core.model.mattes import FileFrame, Matte
 from shutter_addon.core.pixels import compositor, layering
 from shutter_addon.core.pixels.layering import separated
-from shutter_addon.devices.device import Budget, NoDeviceError
+from shutter_addon.devices.device import Budget
 from shutter_addon.media.matte_values import MatteValues
 
 SIZE, COUNT, SHOWN = (37, 23), 20, 9
@@ -279,16 +279,6 @@ def test_a_played_frame_uncovers_one(monkeypatch):
     assert counts == [6, 1, 1, 1]
 
 
-def test_without_room_for_sums_the_frames_are_read(device, monkeypatch):
-    rng = np.random.default_rng(12)
-    source = footage(rng, COUNT, SIZE)
-    moment, _ = with_layers(drawn_state(rng, window=6), discs())
-    _, expected = drawn(device, source, moment)
-    monkeypatch.setattr(running_sums, "WeightedSums", _no_room)
-    _, picture = drawn(device, source, moment)
-    assert_near(picture, expected.astype(np.float64))
-
-
 @pytest.mark.parametrize("kilobytes", [150, 260, 400])
 @pytest.mark.parametrize("follows", [False, True])
 def test_windows_have_room_beside_one_another_or_frames_are_sent(kilobytes, follows):
@@ -308,23 +298,6 @@ def test_windows_have_room_beside_one_another_or_frames_are_sent(kilobytes, foll
     renderer.close()
     roomy.close()
     compositor.release()
-
-
-def _no_room(*_):
-    raise NoDeviceError("no room")
-
-
-def test_mattes_and_frames_are_kept_within_their_budgets(monkeypatch):
-    monkeypatch.setattr(layer_frames, "KEPT_BYTES", 0)
-    monkeypatch.setattr(layer_frames, "RECENT_BYTES", 0)
-    kept = layer_frames.LayerMattes(SIZE, lambda state_, frame: np.zeros((2, *SIZE[::-1])), MatteValues(*SIZE))
-    moment, _ = with_layers(FrameState(Options(4), np.ones((3, 4))), discs())
-    source = layer_frames.RecentFrames(footage(np.random.default_rng(0), COUNT, SIZE))
-    for frame in range(COUNT):
-        kept.of(moment.layers, frame)
-        source.read(frame)
-    assert len(kept._kept) == 16  # what is left cannot be seen from outside
-    assert len(source._kept) == 8  # likewise
 
 
 @pytest.mark.parametrize("kind", [{}, {"dtype": np.float16, "transfer": "linear"}], ids=str)

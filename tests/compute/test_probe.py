@@ -42,31 +42,11 @@ def test_a_point_shows_its_pixels_coefficients_and_shutter(request_of, interpola
         assert probed.bars == pytest.approx(between(request.state.bars, probed.coefficients))
 
 
-def test_one_shutter_is_everywhere(request_of):
-    from shutter_addon.blender.interface.probe_gizmo import probed_at
-
-    renderer, request = request_of(state(np.random.default_rng(0), shapes=()))
-    probed = probed_at(renderer, request, (0.7, 0.2))
-    assert probed.coefficients.tolist() == [1, 0, 0]
-    assert probed.bars == pytest.approx(request.state.bars[0])
-
-
 @pytest.mark.parametrize("point", [(-1, -1), (1.0, 0.5), (0.5, 0.0), (0.5, 1.01)])
 def test_beside_the_picture_there_is_nothing(request_of, point):
     from shutter_addon.blender.interface.probe_gizmo import probed_at
 
     assert probed_at(*request_of(state(np.random.default_rng(0))), point) is None
-
-
-def test_a_texel_is_that_of_the_whole_texture(blender_device):
-    from shutter_addon.blender.devices.blender_gpu import texel
-
-    values = np.random.default_rng(1).random((2, 5, 7, 4), dtype=np.float32)
-    texture = blender_device.texture(7, 5, 2, "rgba32f")
-    for layer in range(2):
-        blender_device.write(texture, values[layer], layer)
-    for x, y in ((0, 0), (6, 4), (2, 3)):
-        assert texel(texture, x, y).tolist() == values[:, y, x].reshape(-1).tolist()
 
 
 def test_layers_and_what_takes_the_place_of_what_lies_behind(blender_device):

@@ -61,13 +61,6 @@ def test_numpy_makes_the_bits_of_libswscale(tmp_path, size, space, range_):
             assert np.array_equal(planes.samples(*chosen), whole[chosen][..., :3])
 
 
-def test_of_a_film(bunny):
-    with open_source(bunny) as source:
-        planes = source.decoded(5)
-        assert isinstance(planes, Planes)
-        assert np.array_equal(planes.samples(*ALL), source.read(5)[..., :3])
-
-
 @pytest.mark.parametrize("size", SIZES, ids="{0[0]}x{0[1]}".format)
 @pytest.mark.parametrize(("space", "range_"), [(BT709, LIMITED), (BT601, FULL)])
 @pytest.mark.parametrize("light", ["linear", "encoded"])
