@@ -93,6 +93,14 @@ def test_blocks_that_share_a_shutter_look_like_full_resolution(tmp_path):
         assert 0.9777 <= row["worst"] < 1, row
 
 
+def test_coefficients_that_follow_edges_change_by_less_than_a_level(tmp_path):
+    """Where the film stands still."""
+    options = "--frames", "2", "--aggregate", "4", "--noise", "8", "--films", "pedestrians.avi"
+    rows = {row["guide"]: row for row in rows_of("edge_flicker", tmp_path, *options)}
+    assert rows["steadied"]["still"] > 0.5
+    assert 0 < rows["steadied"]["mean"] < min(rows["alone"]["mean"], 1)
+
+
 LAYERS = """
 import layer_truth as truth
 scene = truth.SCENES[0]
