@@ -264,11 +264,10 @@ def test_a_copy_of_all_of_it_is_unbaked_alone(bpy, film):
 
 
 def test_the_baked_strip_looks_as_the_effect_strip(bpy, film, tmp_path):
-    """Transform, crop, flip, opacity and modifiers, keys included, and in a meta strip."""
+    """Transform, crop, flip and opacity, keys included, and in a meta strip."""
     scene, _effect, strip = film(4)
     strip.transform.offset_x, strip.transform.rotation, strip.crop.min_y = 3, 0.2, 4
     strip.transform.scale_x, strip.use_flip_x, strip.color_saturation = 0.5, True, 0.4
-    strip.modifiers.new("bright", "BRIGHT_CONTRAST").bright = 20
     for frame, opacity in ((1, 1.0), (9, 0.2)):
         strip.blend_alpha = opacity
         strip.keyframe_insert("blend_alpha", frame=frame)
