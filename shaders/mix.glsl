@@ -1,6 +1,10 @@
 // Adds a share of coefficients to a sum of them, four shutters of a pixel.
 layout(rgba32f) uniform readonly image2DArray added;
+#if BEGINS
+layout(rgba32f) uniform writeonly image2DArray mixed;
+#else
 layout(rgba32f) uniform image2DArray mixed;
+#endif
 uniform ivec2 size, given;
 uniform float share;
 

@@ -273,7 +273,11 @@ void main() {
 #endif
 
 #if defined(SMOOTH) || defined(MISSING)
+#  ifdef SMOOTH
 layout(rgba32f) uniform image2DArray values;
+#  else
+layout(rgba32f) uniform readonly image2DArray values;
+#  endif
 #  define NEAR(x, y) imageLoad(values, ivec3(clamp(p.xy + ivec2(x, y), ivec2(0), size - 1), p.z))
 #  ifdef STENCIL
 layout(rgba32f) uniform readonly image2DArray right;

@@ -37,7 +37,13 @@ void at(ivec3 p) {
 // the first. LEVELS: it is the last, and the sum becomes a picture of levels.
 layout(rgba32f) uniform readonly image2DArray part;
 layout(r32f) uniform readonly image2DArray share;
+#if BEGINS
+layout(rgba32f) uniform writeonly image2DArray mixed;
+#elif LEVELS
+layout(rgba32f) uniform readonly image2DArray mixed;
+#else
 layout(rgba32f) uniform image2DArray mixed;
+#endif
 uniform int block_bits;
 #include "light.glsl"
 #if LEVELS

@@ -78,9 +78,10 @@ def read_pass(file: str, step: str = "", **defines: int | str) -> Pass:
         source.append(declared or line)
         if not declared and not line.startswith("#line"):
             body.append(line)
-    local_size = "layout(local_size_x = {}, local_size_y = {}) in;".format(*program.local_size)
-    macros = [f"#define {name} {value}" for name, value in defines.items()]
-    program.source, program.body = "\n".join(["#version 430", *macros, local_size, *source]), "\n".join(body)
+    head = ["#version 430", *(f"#define {name} {value}" for name, value in defines.items())]
+    if not program.outs:  # a stage that draws has some
+        head.append("layout(local_size_x = {}, local_size_y = {}) in;".format(*program.local_size))
+    program.source, program.body = "\n".join([*head, *source]), "\n".join(body)
     return program
 
 
