@@ -24,7 +24,7 @@ MAX_WINDOW = 256
 # Levels of z closer than this are one: float rounding of equal sums, far below any visible weight.
 _SAME = 1e-12
 # Of an exposure: where bars go from key to key, rounding may leave as much in a bar that is closed.
-CLOSED = 1e-9
+_CLOSED = 1e-9
 _SEEN = 1 / 255  # of the largest bar: less light in other moments is not seen
 
 
@@ -172,6 +172,11 @@ def open_span(shutters: ArrayLike) -> tuple[int, int]:
     return int(used[0]), int(used[-1]) + 1
 
 
+def are_open(bars: np.ndarray) -> np.ndarray:
+    """Return which bars (L,) are open: bool (L,). What rounding leaves in a closed one does not count."""
+    return bars > _CLOSED * bars.sum()
+
+
 def resample(bars: ArrayLike, window: int) -> np.ndarray:
     """Bars (window,) of the same shutter over a window of another length. Its shape stays, and its share of
     the window's light; its angle where no bar is averaged with others."""
@@ -228,8 +233,8 @@ def smoothed(bars: ArrayLike, steps: int, *, backward: bool = False, level: bool
 
 def _open_beside(bars: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Which bars (L,) are open and have an open neighbour before them, and which one behind them."""
-    is_open = bars > CLOSED * bars.sum()
-    after = is_open & np.append(is_open[1:], False)
+    open_ones = are_open(bars)
+    after = open_ones & np.append(open_ones[1:], False)
     return np.append(False, after[:-1]), after
 
 

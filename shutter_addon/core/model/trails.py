@@ -46,7 +46,7 @@ def shortened(bars: np.ndarray, share: float, shown: float) -> tuple[np.ndarray,
     frame at least. And for how many frames that is.
 
     shown: the middle of the shown frame's bar, in 0 … L; of bars that are closed there, the nearest that is open"""
-    bars = np.where(bars > shutters.CLOSED * bars.sum(), bars, 0)
+    bars = np.where(shutters.are_open(bars), bars, 0)
     first, last = shutters.open_span(bars)
     own = min(max(shown - 0.5, first), last - 1)
     start, end = own + share * (first - own), own + 1 + share * (last - own - 1)
@@ -60,7 +60,7 @@ def with_length(bars: np.ndarray, way: np.ndarray, length: float, shown: float) 
     way: of `travelled`, in the unit of the length
     shown: the time in 0 … L that keeps its place; of bars that are closed there, the nearest that is open. Where an end
     of the span reaches the window's, only the other one goes on"""
-    bars = np.where(bars > shutters.CLOSED * bars.sum(), bars, 0)
+    bars = np.where(shutters.are_open(bars), bars, 0)
     first, last = shutters.open_span(bars)
     about = min(max(shown, first), last)
     before = (about - first) / (last - first)

@@ -45,7 +45,7 @@ def slid(state: FrameState, index: int, direction: int, shot: range, *, whole: b
     def way(start: int, stop: int) -> int:
         return sorted((0, low - start, high + 1 - stop))[1]
 
-    spans = [_filmed(shutters.open_span(bars > shutters.CLOSED * bars.sum()), options) for bars in state.bars]
+    spans = [_filmed(shutters.open_span(shutters.are_open(bars)), options) for bars in state.bars]
     if options.edges != "slide" or not (whole or any(way(*span) for span in spans)):
         return state
     moved, by = np.zeros_like(state.bars), way(0, options.window)
