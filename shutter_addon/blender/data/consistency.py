@@ -12,7 +12,7 @@ from ...core.messages import EffectError
 from ...core.model import keyframes, limits, shutters
 from ...core.model.effect import OTHER_MOMENTS, STILL_CAMERA, Shutter
 from . import fcurves, strips, validation
-from .annotations import layer_of
+from .annotations import layer_of, layers_of
 from .fcurves import numbers
 from .selection import active_region, active_shutter
 
@@ -178,5 +178,6 @@ def _bars_keyed(old: np.ndarray, keyed: dict[int, FCurve], frame: float) -> np.n
 def color_layers(effect: PropertyGroup, shutter: PropertyGroup) -> None:
     """Scribbles have the colour of their shutter."""
     for region in effect.regions:
-        if region.shutter == shutter.name and (layer := layer_of(effect, region)) is not None:
-            layer.color = shutter.color
+        for layer in layers_of(effect, region) if region.shutter == shutter.name else ():
+            if layer.info != region.not_layer:
+                layer.color = shutter.color

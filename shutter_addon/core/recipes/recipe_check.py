@@ -11,7 +11,17 @@ from ..model import limits, shutters
 from ..model.fields import Field, fields_of
 from ..model.frame_state import Options
 from .recipe import CAMERA, RecipeError
-from .records import MatteRecord, MoveKey, OutlineRecord, RampRecord, RegionRecord, Stroke, SubjectRecord, drawings_of, strokes_at
+from .records import (
+    MatteRecord,
+    MoveKey,
+    OutlineRecord,
+    RampRecord,
+    RegionRecord,
+    Stroke,
+    SubjectRecord,
+    drawings_of,
+    strokes_at,
+)
 
 _COMBINED = "lightest", "darkest"
 
