@@ -32,10 +32,10 @@ def choose_region(effect: PropertyGroup) -> None:
         effect.active_region = min(own, key=lambda i: abs(i - effect.active_region))
 
 
-def aim_pen(effect: PropertyGroup) -> None:
-    """Strokes are drawn on the active region's layer from now on."""
+def aim_pen(effect: PropertyGroup, name: str = "layer") -> None:
+    """Strokes are drawn on a layer of the active region from now on. name: one of annotations.LAYERS"""
     region = active_region(effect)
-    layer = layer_of(effect, region) if region else None
+    layer = layer_of(effect, region, name) if region else None
     if layer is not None:
         layers = effect.scene.annotation.layers
         layers.active_index = next(i for i, other in enumerate(layers) if other == layer)
