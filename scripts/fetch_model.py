@@ -14,7 +14,7 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
 MODEL = tomllib.loads((ROOT / "third_party" / "components.toml").read_text(encoding="utf-8"))["model"]["u2netp"]
-PATH = ROOT / "models" / "u2netp.onnx"
+PATH = ROOT / MODEL["path"]
 NOTICE = """\
 {name} is the network that finds subjects.
 Copyright {copyright}
