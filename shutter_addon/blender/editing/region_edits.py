@@ -39,15 +39,15 @@ def add_region(
 def first_drawn(effect: PropertyGroup, shutter: PropertyGroup, kind: str) -> PropertyGroup:
     """Appends a region for strokes, as add_region does; the active one of that shutter becomes it while it has none.
     The first of an effect, of a shutter that is sharp, follows edges, unless the editor has said how much: a subject is
-    meant, and no spot of it."""
+    meant, and no spot of it. It becomes one, if the model finds one under its first stroke."""
     is_sharp = np.count_nonzero(bars(shutter)) <= 1
     is_scribble = kind not in strips.LAID
-    is_first = is_sharp and not effect.regions
-    if is_scribble and is_first and not effect.is_property_set("edge_aware"):
+    is_first = is_scribble and is_sharp and not effect.regions and not effect.is_property_set("edge_aware")
+    if is_first:
         effect.edge_aware = 1.0
     if (region := _undrawn(effect, shutter)) is None:
         region = add_region(effect, shutter, kind)
-    region.kind, region.finds_subject = kind, kind == "LINE" and is_first
+    region.kind, region.finds_subject = kind, is_first
     if not is_scribble:
         region.motion = "LOCATION"  # limbs turn, and the subject does not
     return region
