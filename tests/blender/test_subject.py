@@ -1,4 +1,4 @@
-"""Subjects in Blender: drawn, undone, saved, as recipes, rendered, turned into outlines, and what is told of bad input."""
+"""Subjects in Blender: drawn, saved, as recipes, rendered, turned into outlines, and what is said of bad input."""
 
 import json
 
@@ -8,7 +8,7 @@ from support import image_strip, recipe, request, write_frames
 
 from shutter_addon.blender.data import annotations, preferences, recipe_import, selection, snapshot
 from shutter_addon.blender.editing import add_effect, outline_drawings
-from shutter_addon.blender.output import edit_check, matte_export
+from shutter_addon.blender.output import matte_export
 from shutter_addon.blender.rendering import outline_carrying, sessions
 from shutter_addon.core.recipes import recipe_file, records
 

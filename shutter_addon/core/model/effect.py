@@ -461,7 +461,7 @@ class Effect:
 
     def for_picture(self, aspect: float, files: MatteFiles = lambda _region: mattes.NoFile()) -> Effect:
         """The effect of a recipe for a picture of width / height = aspect. files: gives the file of a matte, for a ramp
-        the source's luminance, and for an outline or a subject its mattes; without it, nobody may ask for their values"""
+        the source's luminance, for an outline or a subject its mattes; without it, nobody may ask for their values"""
         return self.with_parts([_placed(region, aspect, files) for region in self.regions])
 
     def layers_at(self, frame: float) -> list[Region | MatteRegion]:
