@@ -1,7 +1,7 @@
 """A software bill of materials of a zip, as CycloneDX: `python scripts/sbom.py ZIP OUTPUT.cdx.json`.
 
-It lists the extension, its model, each wheel, the libraries in the wheels, and every file of the zip and of its wheels with its
-hash. The same zip gives the same bytes.
+It lists the extension, its model, each wheel, the libraries in the wheels, and every file of the zip and of its wheels
+with its hash. The same zip gives the same bytes.
 """
 
 import argparse
