@@ -1,5 +1,5 @@
-"""From an empty Video Editing file to a rendered Sharp Subject, by mouse and keyboard, in eight actions: one stroke finds
-the subject. Then it becomes an outline and a scribble, by one click each. Run inside Blender, by test_tracked.py."""
+"""From an empty Video Editing file to a rendered Sharp Subject, by mouse and keyboard, in eight actions: one stroke
+finds the subject. Then it becomes an outline and a scribble. Run inside Blender, by test_tracked.py."""
 
 # ruff: noqa: E402 (Blender finds the helpers once it knows their folder)
 import os
@@ -17,15 +17,13 @@ from one_stroke_story import part, sidebar
 
 # Of the footage's frame 90, in fractions of the picture: down the bunny.
 FRAME, STROKE = 90, ((0.37, 0.78), (0.372, 0.65), (0.378, 0.5), (0.385, 0.38))
-SHARP, AS_SCRIBBLE = (0.2, 216), (0.6, 0)  # buttons: a share of the sidebar's width, pixels below its upper edge
+SHARP = 0.2, 216  # the button: a share of the sidebar's width, pixels below its upper edge
 
 
 def folder_shown():
     """The file browser opens where it was last."""
     area = driver.area_of("FILE_BROWSER")
     area.spaces.active.params.directory = os.fsencode(Path(story.FOOTAGE).parent)
-    with driver.override("FILE_BROWSER"):
-        bpy.ops.file.refresh()
     yield 2.0
 
 

@@ -150,7 +150,8 @@ def _cover(
     mattes: CarriedMattes
     if isinstance(region, SubjectRegion):
         subject = Subject(strokes=curves(region.drawings), nots=curves(region.nots), width=WIDTH)
-        mattes = SubjectMattes(medium, subject, tuple(sorted(curves(region.outlines).items())), model=preferences.model())
+        drawn = tuple(sorted(curves(region.outlines).items()))
+        mattes = SubjectMattes(medium, subject, drawn, model=preferences.model())
     else:
         mattes = CarriedMattes(medium, tuple(sorted(curves(region.drawings).items())))
     ends.enter_context(closing(mattes))
