@@ -131,6 +131,9 @@ def test_as_an_outline(bpy, edited):
     region = effect.regions[0]
     assert (region.kind, len(annotations.layers_of(effect, region))) == ("OUTLINE", 1)
     assert overlap(coefficients(strip, effect, 1), 0) > 0.9
+    assert bpy.ops.shutter.subject_find() == {"FINISHED"}
+    assert (region.kind, region.layer, region.outline_layer) == ("SUBJECT", "", "o")
+    assert overlap(coefficients(strip, effect, 1), 0) > 0.9
     bpy.ops.shutter.region_remove()
     assert not effect.scene.annotation.layers
 

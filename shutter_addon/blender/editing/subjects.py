@@ -12,7 +12,8 @@ from . import outline_drawings, region_edits
 
 
 def find(scene: Scene, effect: PropertyGroup, strip: Strip, index: int) -> bool:
-    """Make a region a subject if the model finds one under its last stroke at the current frame.
+    """Make a region a subject if the model finds one under its last stroke at the current frame; an outline becomes
+    one by its drawings, which stay.
 
     Returns:
         Whether it has found one.
@@ -22,6 +23,9 @@ def find(scene: Scene, effect: PropertyGroup, strip: Strip, index: int) -> bool:
         MediaError: There is no picture or no model.
     """
     region = effect.regions[index]
+    if region.kind == "OUTLINE":
+        region.kind, region.layer, region.outline_layer = "SUBJECT", "", region.layer
+        return True
     strokes = snapshot.region_at(scene, effect, strip, index, (scene.frame_current,)).at(scene.frame_current).strokes
     if not strokes:
         raise EffectError(rpt_("The region has no strokes at the current frame"))
