@@ -28,7 +28,7 @@ from ...core.recipes import baking
 from ...media.carried_mattes import CarriedFile
 from ...media.subject_mattes import SubjectFile
 from . import matte_content, sampled, source_media, strips, validation
-from .annotations import LAYERS, image_to_picture, layers_of, picture_size
+from .annotations import LAYERS, image_to_picture, layer_of, layers_of, picture_size
 from .fcurves import Curves, curves_under, key_frames, leading, progress, stretched
 from .sampled import Frames
 
@@ -423,10 +423,13 @@ def _marks(sampling: _Sampling, index: int) -> dict[str, model.Drawings]:
 def _region(sampling: _Sampling, index: int, shutter: int) -> model.Region:
     effect, curves, frames = sampling.effect, sampling.curves, sampling.frames
     region, path = effect.regions[index], f"{effect.path_from_id()}.regions[{index}]"
+    layer = layer_of(effect, region)
+    has_outlines_alone = region.kind == "SUBJECT" and not (layer and layer.frames)
+    name = "outline_layer" if has_outlines_alone else "layer"
     return model.Region(
         shutter=shutter,
         kind=keyframes.Constant(sampled.tried(_word_of_kind, region)),
-        drawings=sampled.drawings(curves, path, effect, region, sampling.placement, frames),
+        drawings=sampled.drawings(curves, path, effect, region, sampling.placement, frames, name),
         moves=sampled.moves(curves, region, path, frames),
         **sampled.sampled_fields(curves, region, path, model.Region, frames),
     )

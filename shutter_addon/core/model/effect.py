@@ -193,7 +193,8 @@ class OutlineRegion(MatteRegion):
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class SubjectRegion(MatteRegion):
-    """A region whose matte is a subject that a model finds under strokes. It moves about the strokes' centre.
+    """A region whose matte is a subject that a model finds under strokes. It moves about the centre of these, or without
+    any, of its outlines.
 
     drawings: strokes on the subject; nots: strokes on what it is not; outlines: closed curves, which overrule the model
     content: a channel of mattes.FileFrame"""
@@ -201,6 +202,16 @@ class SubjectRegion(MatteRegion):
     drawings: Drawings
     nots: Drawings
     outlines: Drawings
+
+    def centre(self, frame: float) -> np.ndarray | None:
+        return self._placed.centre(frame)
+
+    def corners(self, frame: float) -> np.ndarray:
+        return self._placed.corners(frame, self.placement(frame))
+
+    @property
+    def _placed(self) -> Drawings:
+        return self.drawings if self.drawings.frames else self.outlines
 
     def drawn_at(self, frame: float) -> scribbles.Shape:
         """The strokes that are drawn at a frame, as lines. EffectError: they are nowhere near the picture."""
