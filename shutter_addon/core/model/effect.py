@@ -193,8 +193,8 @@ class OutlineRegion(MatteRegion):
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class SubjectRegion(MatteRegion):
-    """A region whose matte is a subject that a model finds under strokes. It moves about the centre of these, or without
-    any, of its outlines.
+    """A region whose matte is a subject that a model finds under strokes. It moves about the centre of these or,
+    without any, of its outlines.
 
     drawings: strokes on the subject; nots: strokes on what it is not; outlines: closed curves, which overrule the model
     content: a channel of mattes.FileFrame"""
