@@ -6,14 +6,13 @@ from bpy.app.translations import pgettext_rpt as rpt_
 from bpy.types import PropertyGroup, Scene, Strip
 
 from ...core.messages import EffectError
-from ...media.subject import Network, found_under
-from ..data import annotations, preferences, snapshot
+from ..data import annotations, snapshot
 from . import outline_drawings, region_edits
 
 
 def find(scene: Scene, effect: PropertyGroup, strip: Strip, index: int) -> bool:
-    """Make a region a subject if the model finds one under its last stroke at the current frame; an outline becomes
-    one by its drawings, which stay.
+    """Make a region a subject if the model finds one under the strokes that are nearest to the current frame; an
+    outline becomes one by its drawings, which stay.
 
     Returns:
         Whether it has found one.
@@ -22,18 +21,25 @@ def find(scene: Scene, effect: PropertyGroup, strip: Strip, index: int) -> bool:
         EffectError: There are no strokes.
         MediaError: There is no picture or no model.
     """
-    region = effect.regions[index]
-    if region.kind == "OUTLINE":
+    region, before = effect.regions[index], effect.regions[index].kind
+    if before == "OUTLINE":
         region.kind, region.layer, region.outline_layer = "SUBJECT", "", region.layer
         return True
-    strokes = snapshot.region_at(scene, effect, strip, index, (scene.frame_current,)).at(scene.frame_current).strokes
-    if not strokes:
+    frame = outline_drawings.nearest(effect, index, scene.frame_current)
+    if not snapshot.strokes_at(scene, effect, strip, index, frame):
         raise EffectError(rpt_("The region has no strokes at the current frame"))
-    network = Network(preferences.model())
-    if found_under(network, outline_drawings.picture_now(scene, effect, strip), strokes[-1]) is None:
-        return False
-    region.kind, region.motion = "SUBJECT", "LOCATION"
-    return True
+    region.kind, is_found = "SUBJECT", False
+    try:
+        file, shown = snapshot.carried_outline(scene, effect, strip, index, (frame,))
+        with closing(file.open()) as mattes:  # its first matte is kept, and shown at once
+            mattes.read(shown[frame])
+            is_found = bool(mattes.confidence(shown[frame]))
+    finally:
+        if not is_found:
+            region.kind = before
+    if is_found:
+        region.motion = "LOCATION"
+    return is_found
 
 
 def is_first_stroke(effect: PropertyGroup, region: PropertyGroup) -> bool:
