@@ -31,8 +31,10 @@ SOFT = 3  # pixels of the working picture by which soft edges go beyond the cont
 WIDTH = 0.01  # of a stroke, in parts of the picture's height
 SHARED = 0.2  # share of a part that the carried matte has to cover
 # How far the network and the carried matte agree: below that the network is not believed, and above it is.
-DOUBTED, BELIEVED, MOST = 0.5, 0.7, 0.7
-ASTRAY = 1.0  # pixels of the working picture by which flow there and back may miss
+BELIEVED, MOST = (0.5, 0.7), 0.7
+# Of the confidence: how sure the network is, how far it agrees, from none to full; the pixels of the working picture
+# below which a subject is small; and how much it may rise from frame to frame, as what was lost seldom comes back.
+UNSURE, UNLIKE, SMALL, RISES = (0.85, 0.95), (0.5, 0.8), 3000, 0.05
 _INPUT = re.compile(r"// <Input> CV_32FC1 \[1 x 3 x (\d+) x (\d+)\]")  # of OpenCV's description
 
 Box = tuple[slice, slice]  # rows and columns
@@ -186,11 +188,11 @@ def found(network: Network, picture: np.ndarray, on: np.ndarray, off: np.ndarray
             sure = min(other, _sure(share, on, near))
     if sure <= 0:
         return None
-    return without(Found(share, np.zeros_like(share), _confidence(sure, 1.0)), picture, on, off)
+    return without(Found(share, np.zeros_like(share), _confidence(share, sure)), picture, on, off)
 
 
 def _sure(share: np.ndarray, on: np.ndarray, box: Box) -> float:
-    """Return how sure the network is of a part, 0 to 1; 0 if it is no subject under strokes, less if the box cuts it."""
+    """Return how sure the network is of a part, 0 to 1; 0 if no subject is under strokes, less if the box cuts it."""
     inside = share > INSIDE
     if inside[on].mean() < TOUCHED or inside.mean() > LARGEST:
         return 0.0
@@ -201,8 +203,16 @@ def _sure(share: np.ndarray, on: np.ndarray, box: Box) -> float:
     return max(float(share[inside].mean()) - cut / sum(part.shape), 0.0)
 
 
-def _confidence(sure: float, agrees: float) -> float:
-    return sure * agrees
+def _confidence(share: np.ndarray, sure: float, agrees: float = 1.0) -> float:
+    """Return how far a subject can be trusted: less where the network is unsure of it, or motion led elsewhere, or it
+    is small."""
+    size = np.count_nonzero(share > INSIDE) / SMALL
+    return float(_from(sure, UNSURE) * _from(agrees, UNLIKE) * min(size, 1.0) ** 0.5)
+
+
+def _from(value: float, ends: tuple[float, float]) -> float:
+    """Return how far a value is from one end to the other, 0 to 1."""
+    return min(max((value - ends[0]) / (ends[1] - ends[0]), 0.0), 1.0)
 
 
 def without(subject: Found, picture: np.ndarray, on: np.ndarray, off: np.ndarray) -> Found:
@@ -270,27 +280,14 @@ def followed(
     sizes = np.bincount(parts.ravel())
     keep = np.bincount(parts.ravel(), weights=(carried > INSIDE).ravel()) >= SHARED * sizes
     keep[0] = False
-    others = sizes[1:][~keep[1:]].sum()
     answer = _alone(answer, keep[parts])
     agrees = _agreed(answer, carried)
     sure = float(answer[answer > INSIDE].mean()) if (answer > INSIDE).any() else 0.0
-    LOG.append(
-        (
-            sure,
-            subject.confidence,
-            agrees,
-            others / max((answer > INSIDE).sum(), 1),
-            (carried > INSIDE).sum(),
-            carried.max(),
-        )
-    )
-    trust = MOST * min(max((agrees - DOUBTED) / (BELIEVED - DOUBTED), 0.0), 1.0)
+    trust = MOST * _from(agrees, BELIEVED)
     share = carried + np.float32(trust) * (answer - carried)
     still = carrying.stillness(np.hypot(back[..., 0], back[..., 1]), carrying.lab(picture), carrying.lab(before))
-    return Found(share, excluded, agrees), still
-
-
-LOG = []
+    confidence = min(_confidence(share, sure, agrees), subject.confidence + RISES)
+    return Found(share, excluded, confidence), still
 
 
 def around(where: np.ndarray, room: float) -> Box:
