@@ -22,15 +22,19 @@ MEAN, DEVIATION = (0.485, 0.456, 0.406), (0.229, 0.224, 0.225)  # of the colors 
 MULTIPLE, LEAST = 32, 5  # the network halves its picture five times: sides are multiples of that, five at least
 QUICK = 0.8  # share of the network's own size that is enough where it is known how the subject looked a frame before
 INSIDE = 0.5
-ROOM = 0.4  # share of its size by which the box around a subject is enlarged
+# Shares of their size: the room on each side of a subject that the network sees, and of strokes; and pixels at least.
+ROOM, CLOSE, LEAST_ROOM = 0.2, 1.5, 8
+SURE = 0.9  # how sure the network has to be of what lies near strokes: else it looks at the whole picture
 TOUCHED = 0.5  # share of a stroke that a subject has to cover
 LARGEST = 0.9  # share of the picture from which on a mask is no subject
 SOFT = 3  # pixels of the working picture by which soft edges go beyond the contour of a part
 WIDTH = 0.01  # of a stroke, in parts of the picture's height
 SHARED = 0.2  # share of a part that the carried matte has to cover
 # How far the network and the carried matte agree: below that the network is not believed, and above it is.
-DOUBTED, BELIEVED, MOST = 0.5, 0.7, 0.7
-ASTRAY = 1.0  # pixels of the working picture by which flow there and back may miss
+BELIEVED, MOST = (0.5, 0.7), 0.7
+# Of the confidence: how sure the network is, how far it agrees, from none to full; the pixels of the working picture
+# below which a subject is small; and how much it may rise from frame to frame, as what was lost seldom comes back.
+UNSURE, UNLIKE, SMALL, RISES = (0.85, 0.95), (0.5, 0.8), 3000, 0.05
 _INPUT = re.compile(r"// <Input> CV_32FC1 \[1 x 3 x (\d+) x (\d+)\]")  # of OpenCV's description
 
 Box = tuple[slice, slice]  # rows and columns
@@ -171,19 +175,44 @@ def found(network: Network, picture: np.ndarray, on: np.ndarray, off: np.ndarray
         picture: (h, w, 3) uint8.
         on, off: (h, w) bool, what strokes on the subject cover, and strokes on what it is not.
     """
-    whole = _parts_on(network.answer(picture, QUICK), on)
-    start = whole if _fits(whole, on) else on.astype(np.float32)
-    near = _parts_on(network.within(picture, roomy(start)), on)
-    if not _fits(near, on):
-        if not _fits(whole, on):
-            return None
-        near = whole
-    return without(Found(near, np.zeros_like(near), _agreed(near, whole)), picture, on, off)
+    if not on.any():
+        return None
+    box = around(on, CLOSE)
+    share = _parts_on(network.within(picture, box), on)
+    if (sure := _sure(share, on, box)) < SURE:  # the stroke is short beside the subject, or there is none
+        whole = _parts_on(network.answer(picture, QUICK), on)
+        everywhere = slice(0, on.shape[0]), slice(0, on.shape[1])
+        if (other := _sure(whole, on, everywhere)) > sure:
+            near = around(whole > INSIDE, ROOM)
+            share, sure = _parts_on(network.within(picture, near), on), other
+            sure = min(other, _sure(share, on, near))
+    if sure <= 0:
+        return None
+    return without(Found(share, np.zeros_like(share), _confidence(share, sure)), picture, on, off)
 
 
-def _fits(share: np.ndarray, on: np.ndarray) -> bool:
+def _sure(share: np.ndarray, on: np.ndarray, box: Box) -> float:
+    """Return how sure the network is of a part, 0 to 1; 0 if no subject is under strokes, less if the box cuts it."""
     inside = share > INSIDE
-    return bool(inside[on].mean() >= TOUCHED and inside.mean() < LARGEST)
+    if inside[on].mean() < TOUCHED or inside.mean() > LARGEST:
+        return 0.0
+    part, (rows, columns) = inside[box], box
+    ends = (rows.start > 0, part[0]), (rows.stop < len(share), part[-1])
+    sides = (columns.start > 0, part[:, 0]), (columns.stop < share.shape[1], part[:, -1])
+    cut = sum(int(edge.sum()) for is_cut, edge in (*ends, *sides) if is_cut)
+    return max(float(share[inside].mean()) - cut / sum(part.shape), 0.0)
+
+
+def _confidence(share: np.ndarray, sure: float, agrees: float = 1.0) -> float:
+    """Return how far a subject can be trusted: less where the network is unsure of it, or motion led elsewhere, or it
+    is small."""
+    size = np.count_nonzero(share > INSIDE) / SMALL
+    return float(_from(sure, UNSURE) * _from(agrees, UNLIKE) * min(size, 1.0) ** 0.5)
+
+
+def _from(value: float, ends: tuple[float, float]) -> float:
+    """Return how far a value is from one end to the other, 0 to 1."""
+    return min(max((value - ends[0]) / (ends[1] - ends[0]), 0.0), 1.0)
 
 
 def without(subject: Found, picture: np.ndarray, on: np.ndarray, off: np.ndarray) -> Found:
@@ -246,30 +275,25 @@ def followed(
     carried, excluded = (flow.look(each, grid + back) for each in (subject.share, subject.excluded))
     if not (carried > INSIDE).any():
         return Found(carried, excluded, 0.0), 0.0
-    answer = network.within(picture, roomy(carried), QUICK) * (1 - excluded)
+    answer = network.within(picture, around(carried > INSIDE, ROOM), QUICK) * (1 - excluded)
     _, parts = cv2.connectedComponents((answer > INSIDE).astype(np.uint8))
     sizes = np.bincount(parts.ravel())
     keep = np.bincount(parts.ravel(), weights=(carried > INSIDE).ravel()) >= SHARED * sizes
     keep[0] = False
-    others = sizes[1:][~keep[1:]].sum()
     answer = _alone(answer, keep[parts])
     agrees = _agreed(answer, carried)
-    LOG.append((agrees, others / max((answer > INSIDE).sum(), 1), (carried > INSIDE).sum(), carried.max()))
-    trust = MOST * min(max((agrees - DOUBTED) / (BELIEVED - DOUBTED), 0.0), 1.0)
+    sure = float(answer[answer > INSIDE].mean()) if (answer > INSIDE).any() else 0.0
+    trust = MOST * _from(agrees, BELIEVED)
     share = carried + np.float32(trust) * (answer - carried)
     still = carrying.stillness(np.hypot(back[..., 0], back[..., 1]), carrying.lab(picture), carrying.lab(before))
-    return Found(share, excluded, agrees), still
+    confidence = min(_confidence(share, sure, agrees), subject.confidence + RISES)
+    return Found(share, excluded, confidence), still
 
 
-LOG = []
-
-
-def roomy(share: np.ndarray) -> Box:
-    """Return the box around what is covered by more than half, with room around it."""
-    tight = carrying.box_around((share > INSIDE).astype(np.float32), reach=0)
-    if tight is None:
-        return slice(0, share.shape[0]), slice(0, share.shape[1])
-    reach = round(ROOM / 2 * max(part.stop - part.start for part in tight))
-    box = carrying.box_around((share > INSIDE).astype(np.float32), reach)
-    assert box is not None
-    return box
+def around(where: np.ndarray, room: float) -> Box:
+    """Return the box around an area (h, w), with room on each side: a share of its longest one."""
+    area = where.astype(np.float32)
+    tight = carrying.box_around(area, reach=0)
+    assert tight is not None
+    reach = max(round(room * max(part.stop - part.start for part in tight)), LEAST_ROOM)
+    return carrying.box_around(area, reach) or tight

@@ -1,0 +1,168 @@
+"""Mattes of a subject from strokes: figures that walk over a ground that the camera passes, found by the network that
+Virtual Shutter brings."""
+
+import shutil
+from concurrent.futures import ThreadPoolExecutor
+from itertools import pairwise
+
+import cv2
+import numpy as np
+import pytest
+
+from shutter_addon.core.model import outlines
+from shutter_addon.media import subject_mattes
+from shutter_addon.media.errors import MediaError
+from shutter_addon.media.subject import MODEL, Network, found_under
+from shutter_addon.media.subject_mattes import Subject, SubjectFile
+
+WIDTH, HEIGHT, COUNT = 240, 160, 8
+GROUND = cv2.resize(np.random.default_rng(1).integers(90, 130, (12, 40, 3), np.uint8), (2 * WIDTH, HEIGHT))
+
+
+def figures(frame):
+    """The masks (H, W) of two figures side by side: a round one with a head, and a box."""
+    one, other = np.zeros((2, HEIGHT, WIDTH), np.uint8)
+    cv2.ellipse(one, (70 + 3 * frame, 95), (22, 40), 0, 0, 360, 1, -1)
+    cv2.circle(one, (70 + 3 * frame, 45), 14, 1, -1)
+    cv2.rectangle(other, (165 + 3 * frame, 50), (205 + 3 * frame, 130), 1, -1)
+    return one > 0, other > 0
+
+
+def picture(frame, noise=0):
+    shown = GROUND[:, 2 * frame : 2 * frame + WIDTH].copy()
+    for mask, color in zip(figures(frame), ((225, 60, 40), (240, 235, 90)), strict=True):
+        shown[mask] = color
+    shown = cv2.GaussianBlur(shown, (0, 0), 0.8).astype(np.float64)
+    shown += noise * np.random.default_rng(frame + noise).standard_normal(shown.shape)
+    return np.rint(np.clip(shown, 0, 255)).astype(np.uint8)
+
+
+class Footage:
+    """The scene as a source; from a cut on, another one. asked: the frames that were read."""
+
+    transfer, alpha, dtype, fps, step = "srgb", "opaque", np.dtype(np.uint8), None, 1
+    width, height, options = WIDTH, HEIGHT, ()
+
+    def __init__(self, folder, count=COUNT, cut=None, shows=picture):
+        self.path = folder / "scene.png"
+        self.path.write_bytes(b"the files of frames")
+        self.files, self.count, self.cut, self.shows, self.asked = (self.path,), count, cut, shows, []
+
+    def open(self):
+        return self
+
+    def read(self, index):
+        self.asked.append(index)
+        shown = self.shows(index) if self.cut is None or index < self.cut else 255 - self.shows(index)[:, ::-1] // 3
+        return np.dstack([shown, np.full(shown.shape[:2], 255, np.uint8)])
+
+    decoded = read
+
+    def want(self, _indices):
+        pass
+
+    def close(self):
+        pass
+
+
+def stroke(x, top, bottom):
+    return np.array([(x, HEIGHT - top), (x, HEIGHT - bottom)]) / (WIDTH, HEIGHT)
+
+
+def on_first(frame):
+    return stroke(70 + 3 * frame, 45, 115)
+
+
+def on_second(frame):
+    return stroke(185 + 3 * frame, 65, 115)
+
+
+def iou(matte, mask):
+    return ((matte > 0.5) & mask).sum() / ((matte > 0.5) | mask).sum()
+
+
+@pytest.fixture
+def opened(tmp_path):
+    def made(strokes, nots=None, drawings=(), **what):
+        footage = Footage(tmp_path, **what)
+        return SubjectFile(footage, Subject(strokes, nots or {}, 0.02), drawings, tmp_path / "mattes").open()
+
+    return made
+
+
+def test_one_stroke_gives_the_subject_in_all_frames(opened):
+    mattes = opened({2: [on_first(2)]})
+    assert not mattes.has(COUNT - 1)
+    assert mattes.confidence(COUNT - 1) is None
+    for frame in (COUNT - 1, 0):
+        assert iou(mattes.read(frame), figures(frame)[0]) > 0.9
+    assert all(mattes.confidence(frame) > 0.5 for frame in range(COUNT))
+    assert iou(outlines.coverage(mattes.curves(5), WIDTH, HEIGHT), figures(5)[0]) > 0.9
+
+
+def test_not_this_takes_a_part_away_from_there_on(opened):
+    """Even at a frame that has no other stroke, and not where it does not reach."""
+    both = {0: [on_first(0), on_second(0)]}
+    mattes = opened(both, {3: [on_second(3)]})
+    first, second = figures(5)
+    assert iou(mattes.read(0), figures(0)[0] | figures(0)[1]) > 0.9
+    assert iou(mattes.read(5), first) > 0.85
+    assert mattes.read(5)[second].mean() < 0.02
+
+
+def test_a_drawing_overrules_the_network(opened):
+    square = np.array([(0.3, 0.3), (0.5, 0.3), (0.5, 0.7), (0.3, 0.7)])
+    mattes = opened({0: [on_first(0)], 4: [on_first(4)]}, drawings=((4, outlines.curves([square])),))
+    drawn = outlines.coverage([square], WIDTH, HEIGHT) > 0.5
+    assert iou(mattes.read(4), drawn) > 0.9
+    assert iou(mattes.read(0), figures(0)[0]) > 0.9
+    assert mattes.confidence(4) == 1
+
+
+def test_processes_make_the_same_mattes_and_nothing_twice(opened, tmp_path):
+    """Each begins where it is asked. A further keyframe leaves the chains of others."""
+    strokes = {0: [on_first(0)]}
+    with ThreadPoolExecutor(6) as pool:
+        found = list(pool.map(lambda frame: opened(strokes).read(frame), (5, 1, 3, 0, 4, 2)))
+    shutil.move(tmp_path / "mattes", tmp_path / "others")
+    alone = opened(strokes)
+    for frame, matte in zip((5, 1, 3, 0, 4, 2), found, strict=True):
+        assert np.array_equal(alone.read(frame), matte)
+    more = opened(strokes | {7: [on_first(7)]})
+    assert np.array_equal(more.read(1), alone.read(1))
+    assert not more._source.asked
+    assert not np.array_equal(more.read(5), alone.read(5))
+
+
+def test_it_ends_at_a_cut(opened):
+    mattes = opened({1: [on_first(1)]}, count=30, cut=4)
+    assert iou(mattes.read(3), figures(3)[0]) > 0.9
+    assert not mattes.read(4).any()
+    assert mattes.confidence(4) == 1
+
+
+def test_it_is_quiet_where_nothing_moves(opened):
+    """Noise alone changes the pictures: mean levels from frame to frame beside the subject's edge and in it."""
+    mattes = opened({0: [on_first(0)]}, shows=lambda frame: picture(0, noise=3 + frame))
+    shown = [255 * mattes.read(frame) for frame in range(3, 7)]
+    around = cv2.dilate(figures(0)[0].astype(np.uint8), np.ones((9, 9))) > 0
+    assert max(np.abs(b - a)[around].mean() for a, b in pairwise(shown)) <= 1.5
+
+
+def test_no_subject_under_a_stroke():
+    network, flat = Network(MODEL), np.full((HEIGHT, WIDTH, 4), 128, np.uint8)
+    assert found_under(network, flat, on_first(0)) is None
+    assert iou(found_under(network, picture(0), on_first(0)), figures(0)[0]) > 0.9
+    assert found_under(network, picture(0), stroke(20, 20, 25)) is None
+
+
+def test_models_that_cannot_be_used(tmp_path):
+    damaged, foreign = tmp_path / "damaged.onnx", tmp_path / "foreign.onnx"
+    damaged.write_bytes(MODEL.read_bytes()[:100_000])
+    foreign.write_bytes(b"no model at all" * 100)
+    for path in (damaged, foreign):
+        with pytest.raises(MediaError, match=f"{path.name}: is damaged, or no ONNX model that OpenCV can run"):
+            Network(path)
+    with pytest.raises(MediaError, match="the model that finds subjects cannot be read"):
+        SubjectFile(Footage(tmp_path), Subject({}, {}, 0.02), model=tmp_path / "missing.onnx").open()
+    assert subject_mattes.MODEL == MODEL
