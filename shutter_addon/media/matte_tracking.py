@@ -18,6 +18,7 @@ from .carrying import box_around
 from .footage import Footage
 from .opencv import cv2
 from .pursuit import COVERED, LEFT, Sighting
+from .subject_mattes import SubjectFile
 from .tracking import Tracked, TrackingError
 
 EMPTY = "the outline encloses nothing here"
@@ -47,7 +48,7 @@ def cover_within(drawn: Callable[[int], Sequence]) -> Cover:
 
 
 def follow_carried(
-    region: Subject, file: CarriedFile, shown: Mapping[float, int], *what: Any, **how: Any
+    region: Subject, file: CarriedFile | SubjectFile, shown: Mapping[float, int], *what: Any, **how: Any
 ) -> Iterator[Tracked]:
     """As MatteTrack.follow, of what a carried outline encloses; shown: the filmed frames that timeline frames show.
     MediaError, too: a matte cannot be carried."""

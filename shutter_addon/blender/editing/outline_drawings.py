@@ -55,7 +55,7 @@ def curves_now(scene: Scene, effect: PropertyGroup, strip: Strip, index: int) ->
 
 
 @lru_cache(1)  # to open a movie at each frame that is passed would be slow; it is opened again where it is read
-def _opened(file: CarriedFile) -> CarriedMattes:
+def _opened(file: CarriedFile | SubjectFile) -> CarriedMattes:
     return file.open()
 
 
@@ -133,8 +133,10 @@ def outline_it(scene: Scene, effect: PropertyGroup, strip: Strip, index: int) ->
     return True
 
 
-def carried_frames(scene: Scene, effect: PropertyGroup, strip: Strip, index: int) -> tuple[CarriedFile, dict[int, int]]:
-    """What gives the mattes of an outline (media.carried_mattes.CarriedFile), and which frames of the source the frames
+def carried_frames(
+    scene: Scene, effect: PropertyGroup, strip: Strip, index: int
+) -> tuple[CarriedFile | SubjectFile, dict[int, int]]:
+    """What gives the mattes of an outline or a subject, and which frames of the source the frames
     of its strip show, by timeline frame. EffectError, MediaError: nothing is carried."""
     frames = range(strip.left_handle, strip.right_handle)
     file, shown = snapshot.carried_outline(scene, effect, strip, index, frames)
@@ -163,13 +165,14 @@ def next_needed(scene: Scene, effect: PropertyGroup, strip: Strip, index: int) -
     return Needed(frame=frame, confidence=sure)
 
 
-def _least_sure(file: SubjectFile, shown: dict[int, int]) -> Needed:
+def _least_sure(file: CarriedFile | SubjectFile, shown: dict[int, int]) -> Needed:
     """The frame of a subject that is least sure of those whose mattes are made."""
     with closing(file.open()) as mattes:
         sure = {frame: sure for frame, number in shown.items() if (sure := mattes.confidence(number)) is not None}
     frame = min(sure, key=sure.__getitem__, default=None)
-    is_sure = frame is None or sure[frame] >= SURE_SUBJECT
-    return Needed(frame=None, confidence=SURE_SUBJECT) if is_sure else Needed(frame=frame, confidence=sure[frame])
+    if frame is None or sure[frame] >= SURE_SUBJECT:
+        return Needed(frame=None, confidence=SURE_SUBJECT)
+    return Needed(frame=frame, confidence=sure[frame])
 
 
 def to_mask(context: Context, of: tuple[Scene, PropertyGroup, Strip], index: int, step: int) -> Mask:

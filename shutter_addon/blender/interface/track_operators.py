@@ -208,10 +208,10 @@ _FRAME = IntProperty(
 def _look(looking: Operator, effect: PropertyGroup, index: int | None) -> set[str] | None:
     """Goes to a frame at which tracking of what has an `index` (selection.moving) is not sure."""
     frame: int | None = looking.frame
-    is_subject = index is not None and effect.regions[index].kind == "SUBJECT"
-    if is_subject and not looking.properties.is_property_set("frame"):
+    is_asked = looking.properties.is_property_set("frame")
+    if index is not None and effect.regions[index].kind == "SUBJECT" and not is_asked:
         frame = outline_drawings.next_needed(looking.edit, effect, looking.effect_strip, index).frame
-    elif not looking.properties.is_property_set("frame"):
+    elif not is_asked:
         frame = track_region.next_unsure(effect, index, looking.edit.frame_current)
     if frame is None:
         looking.report({"INFO"}, "No other stretch of unsure frames lies ahead")

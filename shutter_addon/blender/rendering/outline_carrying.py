@@ -13,6 +13,7 @@ import bpy
 
 from ...core import stopping, threads
 from ...media.carried_mattes import CarriedFile
+from ...media.subject_mattes import SubjectFile
 from ..data import preview_areas
 from ..devices import main_thread
 from .effect_source import in_words
@@ -28,7 +29,7 @@ class _Carrying:
     done: how many are there by now
     arrived: called on Blender's main thread when what is drawn is there, and when all is"""
 
-    file: CarriedFile
+    file: CarriedFile | SubjectFile
     frames: list[int]
     arrived: Callable[[], None]
     middle: int | None = None  # None: that of the frames
@@ -52,12 +53,12 @@ class _Carrying:
                 self.done += 1
 
 
-_wanted: dict[CarriedFile, set[int]] = {}  # what was lacking since the last look
-_failed: dict[CarriedFile, str] = {}  # why they cannot be carried
+_wanted: dict[CarriedFile | SubjectFile, set[int]] = {}  # what was lacking since the last look
+_failed: dict[CarriedFile | SubjectFile, str] = {}  # why they cannot be carried
 _running: list[_Carrying] = []  # one at most
 
 
-def want(file: CarriedFile, frame: int) -> None:
+def want(file: CarriedFile | SubjectFile, frame: int) -> None:
     """Notes a matte that a preview lacks, by its source frame."""
     if file not in _failed:
         _wanted.setdefault(file, set()).add(frame)
@@ -76,7 +77,9 @@ def begin(arrived: Callable[[], None]) -> str | None:
     return next(iter(_failed.values()), None)
 
 
-def carry(file: CarriedFile, frames: list[int], arrived: Callable[[], None], middle: int | None = None) -> None:
+def carry(
+    file: CarriedFile | SubjectFile, frames: list[int], arrived: Callable[[], None], middle: int | None = None
+) -> None:
     """Carries the mattes of source frames, in place of what is on its way, from a middle outwards; arrived: as for
     `begin`."""
     stop()
@@ -85,7 +88,7 @@ def carry(file: CarriedFile, frames: list[int], arrived: Callable[[], None], mid
     main_thread.later(_look, TICK)
 
 
-def failure(file: CarriedFile) -> str | None:
+def failure(file: CarriedFile | SubjectFile) -> str | None:
     """Why the mattes of a file could not be carried."""
     return _failed.get(file)
 

@@ -287,7 +287,8 @@ def _marks(name: str, drawn: list[tuple[float, list[Stroke]]]) -> model.Drawings
     """Drawings that stay for themselves: nothing goes from one to the next."""
     frames = tuple(frame for frame, _strokes in drawn)
     arrays = tuple([np.asarray(stroke, float) for stroke in strokes] for _frame, strokes in drawn)
-    return model.Drawings(name=name, frames=frames, strokes=arrays, eases=("linear",) * len(drawn), aspect=1.0)
+    eases: tuple[Ease, ...] = ("linear",) * len(drawn)
+    return model.Drawings(name=name, frames=frames, strokes=arrays, eases=eases, aspect=1.0)
 
 
 def recipe_of(effect: model.Effect) -> Any:
