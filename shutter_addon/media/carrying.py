@@ -152,12 +152,12 @@ class _Footage:
         picture = self.colors[frame]
         cover = _at(end.cover, joined)
         others = [self.to(frame, end.frame), *(_affine(joined, where) for where in (cover < 0.5, cover >= 0.5))]
-        places, apart = joined, _apart(picture, _at(self.colors[end.frame], joined))
+        places, least = joined, apart(picture, _at(self.colors[end.frame], joined))
         for other in others:
-            differs = _apart(picture, _at(self.colors[end.frame], other))
-            better = differs < np.float32(BETTER) * apart
+            differs = apart(picture, _at(self.colors[end.frame], other))
+            better = differs < np.float32(BETTER) * least
             places = np.where(better[..., None], other, places)
-            apart = np.where(better, differs, apart)
+            least = np.where(better, differs, least)
         return places
 
 
@@ -167,12 +167,12 @@ def stillness(moved: np.ndarray, colors: np.ndarray, before: np.ndarray) -> np.n
 
     moved: by how many pixels; colors, before: (3, h, w) its colours and those of the frame before"""
     still = np.clip(1.5 - moved / np.float32(STILL), 0, 1)
-    apart = _apart(colors, before)
-    noise = float(np.median(apart[still > 0])) if still.any() else 0.0
-    return QUIET * still * np.exp(-np.square(apart / np.float32(CHANGED + 2 * noise)))
+    differ = apart(colors, before)
+    noise = float(np.median(differ[still > 0])) if still.any() else 0.0
+    return QUIET * still * np.exp(-np.square(differ / np.float32(CHANGED + 2 * noise)))
 
 
-def _apart(picture: np.ndarray, other: np.ndarray) -> np.ndarray:
+def apart(picture: np.ndarray, other: np.ndarray) -> np.ndarray:
     """How much colours (3, h, w) differ around each pixel."""
     return cv2.blur(np.abs(picture - other).sum(axis=0), (5, 5))
 

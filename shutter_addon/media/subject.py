@@ -35,6 +35,7 @@ BELIEVED, MOST = (0.5, 0.7), 0.7
 # Of the confidence: how sure the network is, how far it agrees, from none to full; the pixels of the working picture
 # below which a subject is small; and how much it may rise from frame to frame, as what was lost seldom comes back.
 UNSURE, UNLIKE, SMALL, RISES = (0.85, 0.95), (0.5, 0.8), 3000, 0.05
+REST = 1.25  # how much more a pixel may differ from its place before than from where flow leads, to count as at rest
 _INPUT = re.compile(r"// <Input> CV_32FC1 \[1 x 3 x (\d+) x (\d+)\]")  # of OpenCV's description
 
 Box = tuple[slice, slice]  # rows and columns
@@ -285,7 +286,11 @@ def followed(
     sure = float(answer[answer > INSIDE].mean()) if (answer > INSIDE).any() else 0.0
     trust = MOST * _from(agrees, BELIEVED)
     share = carried + np.float32(trust) * (answer - carried)
-    still = carrying.stillness(np.hypot(back[..., 0], back[..., 1]), carrying.lab(picture), carrying.lab(before))
+    colors, old = carrying.lab(picture), carrying.lab(before)
+    moved = np.hypot(back[..., 0], back[..., 1])
+    differ, rest = (carrying.apart(colors, each) for each in (old, np.stack([flow.look(p, grid + back) for p in old])))
+    moved[differ <= REST * rest] = 0  # without structure, noise alone makes flow
+    still = carrying.stillness(moved, colors, old)
     confidence = min(_confidence(share, sure, agrees), subject.confidence + RISES)
     return Found(share, excluded, confidence), still
 

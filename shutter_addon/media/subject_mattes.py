@@ -116,7 +116,9 @@ class SubjectMattes(CarriedMattes):
         sides = self._sides(index, self._sure)
         if sides is None:
             return None
-        return sum(share * max(sure, 0.0) for _path, share, sure in sides) if sides else 1.0
+        if all(sure == GONE for _path, _share, sure in sides):  # nothing is there, surely
+            return 1.0
+        return sum(share * sure for _path, share, sure in sides)
 
     def curves(self, index: int) -> outlines.Curves:
         if index in self._drawings:
