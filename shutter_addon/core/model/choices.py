@@ -1,10 +1,12 @@
-"""What an effect's properties can be chosen from: identifier, name, description, icon, number."""
+"""The choices of an effect's properties, as (identifier, name, description).
 
-# Of labels that Blender translates in another sense ("Frames" is one on the screen). Operators have a context anyway.
+Identifiers are the recipe's words in capitals.
+"""
+
+# The translation context of labels that Blender's own catalog translates differently, such as "Frames".
 CONTEXT = "Virtual Shutter"
 
 
-# Enum identifiers are the recipe's words in capitals.
 POSITIONS = (
     ("START", "Start", "The shown frame is the first of them"),
     ("CENTER", "Center", "The shown frame lies in their middle"),
@@ -49,7 +51,7 @@ AGGREGATES = (
 )
 
 
-# Files keep the number of an item: the first five are those of format 1.
+# Files store an item by its position: the first five are those of format 1.
 SMOOTH = (
     ("1", "Off", "Expose filmed frames alone"),
     ("2", "2×", "2 moments from a filmed frame to the next"),
@@ -176,5 +178,5 @@ READOUT_UNITS = (
 )
 
 
-# The renderer asks the F-curves itself: keys on these would show, and not render.
+# Properties whose F-curves the renderer would not read.
 UNKEYED: set[str] = set()

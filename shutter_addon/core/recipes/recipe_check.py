@@ -1,4 +1,4 @@
-"""What a recipe has to be beyond its types: ranges, names that are known, keys in order."""
+"""Checks of a recipe beyond its types: ranges, references, and the order of keys."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ _COMBINED = "lightest", "darkest"
 
 
 def shown(value: Any) -> str:
-    """A value as JSON, or its first 40 characters; of large ones the rest is not looked at."""
+    """Return a value as JSON, cut to 40 characters without formatting the rest."""
     text = ""
     for part in json.JSONEncoder(ensure_ascii=False).iterencode(value):
         text += part
@@ -40,13 +40,17 @@ def _require(condition: object, place: str, message: str) -> None:
 
 
 def _require_within(value: float, most: float, place: str, least: float | None = None) -> None:
-    """least: −most, where it is not given."""
+    """Check least ≤ value ≤ most; `least` is −most by default."""
     least = -most if least is None else least
     _require(least <= value <= most, place, f"{_plain(value)} is not {_plain(least)} to {_plain(most)}")
 
 
 def check(recipe: Any) -> None:
-    """Check a record of a recipe. RecipeError: it is none that an effect can have."""
+    """Check the record of a recipe.
+
+    Raises:
+        RecipeError: It does not describe a valid effect.
+    """
     for kind in (Options, model.Effect, model.Camera):
         _check_fields(kind, recipe, "")
     _require(recipe.version > 1 or recipe.inbetween != "auto", "inbetween", 'recipes have "auto" from version 2 on')
@@ -71,20 +75,20 @@ def check(recipe: Any) -> None:
         _require(region.shutter in places, f"regions[{i}].shutter", there_is_none)
         _check_region(region, f"regions[{i}]")
     drawn = [drawings_of(region) for region in recipe.regions if isinstance(region, RegionRecord | OutlineRecord)]
-    # Of each region, those of the drawing that has the most.
+    # Each region counts with its largest drawing.
     points = sum(max(sum(map(len, strokes)) for _, strokes in drawings) for drawings in drawn)
     _require(points <= limits.MAX_POINTS, "regions", f"{points} points at once, the most are {limits.MAX_POINTS}")
 
 
 def _check_fields(kind: type, record: Any, place: str) -> None:
-    """Check what a record says of the fields of a class by their ranges."""
+    """Check the fields of a class against their ranges."""
     for each in fields_of(kind).values():
         if each.recipe:
             _check_field(each, getattr(record, each.recipe), f"{place}{each.recipe}")
 
 
 def _check_field(each: Field, value: Any, place: str) -> None:
-    """A value, or keys of a number."""
+    """Check a value, or the keys of a number."""
     if each.choices or isinstance(value, bool):
         return
     if isinstance(value, str):
@@ -113,7 +117,7 @@ def _check_bars(shutter: Any, window: int, place: str) -> None:
 
 
 def _check_exposure(shutter: Any, place: str) -> None:
-    """What of a shutter goes with what else."""
+    """Check settings of a shutter that depend on each other."""
     ranges = fields_of(model.Shutter)
     if shutter.trail is not None:
         _require(shutter.follow, f"{place}.trail", "the shutter follows nothing that could move so far")
@@ -130,7 +134,7 @@ def _check_exposure(shutter: Any, place: str) -> None:
 
 
 def _check_follow(follow: str | None, regions: list, place: str) -> None:
-    """A name that two of them have says nothing."""
+    """Check that a shutter follows one region, or the camera."""
     if follow is None:
         return
     called = [f"regions[{i}]" for i, region in enumerate(regions) if region.name == follow]
