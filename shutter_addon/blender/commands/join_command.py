@@ -1,4 +1,4 @@
-"""The command `join`: rendered frames, and the sound of their edit, as a movie."""
+"""The command `join`: a movie of rendered frames, with the edit's sound."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ def add(commands: argparse._SubParsersAction) -> None:
     parser = commands.add_parser("join", help="make a movie of rendered frames, with the edit's sound and settings")
     option = parser.add_argument
     option("folder", metavar="FRAMES", type=place, help="the folder of the frames")
-    option("--edit", type=place, required=True, metavar="FILE.blend", help="what they were rendered from")
+    option("--edit", type=place, required=True, metavar="FILE.blend", help="the edit that they were rendered from")
     option("--output", type=place, required=True, help=f"a movie ({', '.join(film_output.MOVIES)})")
     option("--frames", metavar="A:B", help="timeline frames A to B (default: all of the edit)")
     parser.set_defaults(run=run)
