@@ -30,7 +30,7 @@ _CLOSED = 'shutter "{name}" at frame {frame}: {fault}'
 OTHER_MOMENTS = (
     'shutter "{name}": bars {first} to {last} of the older file are one filmed frame now, and expose other moments'
 )
-_TOO_MANY_POINTS = 'region "{name}": more than {most} points with those before it'
+_TOO_MANY_POINTS = 'region "{name}": more than {most} points together with the regions before it'
 
 
 @dataclass(frozen=True)
@@ -114,14 +114,14 @@ class AnyRegion(Subject):
     shutter: int
     opacity: Channel = number(
         "Opacity",
-        "How much of the region counts: at 0 the picture is as without it",
+        "Influence of the region: 0 is like no region",
         default=1.0,
         subtype="FACTOR",
         told=False,
     )
     layer: bool = switch(
         "Layer",
-        "Expose the region by itself, before all else, which is exposed without it: it leaves no ghost",
+        "Expose the region separately, in front of everything else, so that it leaves no ghost",
         blender="is_layer",
     )
     drawings: Drawings | None = None
@@ -173,12 +173,12 @@ class MatteRegion(AnyRegion):
 
     content: Channel
     blend: mattes.Blend = choice(
-        "Blend", "How the matte lies over other regions", BLENDS, default="over", context=CONTEXT
+        "Blend", "How the matte combines with other regions", BLENDS, default="over", context=CONTEXT
     )
-    invert: bool = switch("Invert", "The shutter gets what the matte leaves")
+    invert: bool = switch("Invert", "Give the shutter the pixels outside of the matte")
     feather: Channel = number(
         "Feather",
-        "How wide a hard edge of the matte becomes, as a fraction of the picture's height",
+        "Width of the matte's soft edges, as a fraction of the picture's height",
         default=0.0,
         most=limits.MAX_DISTANCE,
         soft_most=0.2,
@@ -214,7 +214,7 @@ class OutlineRegion(MatteRegion):
 
     drawings: Drawings
     between: mattes.Between = choice(
-        "In Between", "What gives the matte between two drawings", BETWEEN, default="carried"
+        "In Between", "How the outline changes between two drawings", BETWEEN, default="carried"
     )
 
     def drawn_at(self, frame: float) -> scribbles.Shape:
@@ -247,20 +247,20 @@ class FileContent:
     path: str
     channel: str = choice(
         "Channel",
-        "What of the matte says how much of the shutter a pixel gets",
+        "Channel of the matte that sets the amount of the shutter",
         CHANNELS,
         default="luminance",
         recipe="",
     )
     offset: int = fixed(
         "Offset",
-        "Frames by which the matte is ahead",
+        "Number of frames by which the matte plays ahead",
         default=0,
         least=-limits.MAX_FRAME,
         most=limits.MAX_FRAME,
     )
     timing: Literal["source", "timeline"] = choice(
-        "Frames Of", "What the matte's frames belong to", TIMINGS, default="source"
+        "Frames Of", "What the matte's frames are synchronized with", TIMINGS, default="source"
     )
 
     def at(self, _frame: float) -> mattes.FileFrame:
@@ -272,7 +272,7 @@ class RampContent:
     """A ramp as a recipe names it. `Effect.for_picture` replaces it by a channel that can be read."""
 
     ramp: Literal["linear", "radial", "angle", "luminance"] = choice(
-        "Ramp", "How the ramp runs", RAMPS, default="linear", absent=MISSING
+        "Ramp", "Shape of the ramp", RAMPS, default="linear", absent=MISSING
     )
 
     def at(self, _frame: float) -> mattes.Ramp:
@@ -299,7 +299,7 @@ class Camera(Subject):
 
     influence: Channel = number(
         "Influence",
-        "How much is left of exposures that follow the camera: at 0 the shown frame alone",
+        "Length of exposures that follow the camera: 0 exposes only the shown frame",
         default=1.0,
         subtype="FACTOR",
         recipe="camera_influence",
@@ -325,45 +325,42 @@ class Shutter:
     bars: Bars
     follow: Subject | None = None
     follow_motion: motions.Motion = choice(
-        "Motion", "What of its motion is followed", MOTIONS, default="scale", context=CONTEXT, told=False
+        "Motion", "Part of the motion that the exposure follows", MOTIONS, default="scale", context=CONTEXT, told=False
     )
     follow_smooth: int = fixed(
         "Smoothness",
-        "Frames before and after each over which the motion is averaged, as the mass of a camera does: "
-        "at 0 it is followed as it is",
+        "Frames on each side over which the motion is averaged, like that of a heavy camera",
         default=0,
         most=limits.MAX_SMOOTH,
         soft_most=24,
         told=False,
     )
     length: Length = choice(
-        "Exposure Length", "What says how long the exposure is", LENGTHS, default="frames", context=CONTEXT, recipe=""
+        "Exposure Length", "What sets the length of the exposure", LENGTHS, default="frames", context=CONTEXT, recipe=""
     )
     trail: Channel = number(
         "Distance",
-        "How far what is followed moves while the shutter is open, as a fraction of the picture's height",
+        "Distance of the motion while the shutter is open, as a fraction of the picture's height",
         default=0.1,
         most=limits.MAX_DISTANCE,
         soft_most=1.0,
         precision=3,
         recipe="",
     )
-    combine: Mode = choice(
-        "Combine", "What the frames that are exposed become", COMBINES, default="average", told=False
-    )
+    combine: Mode = choice("Combine", "How exposed frames are combined", COMBINES, default="average", told=False)
     by_luminance: bool = switch(
         "By Luminance",
-        "Choose a frame for each pixel, by how light it is there, and not one for each color channel",
+        "Choose one frame per pixel by its luminance, not one per color channel",
         told=False,
     )
     use_threshold: bool = switch(
         "Use Threshold",
-        "Let only what is lighter, or of the darkest darker, leave a trail beside what is shown",
+        "Let only light above the threshold leave trails, or with Darkest, below it",
         recipe="",
     )
     threshold: Channel = number(
         "Threshold",
-        "Luminance of linear light from which on it leaves a trail; white is 1",
+        "Luminance in linear light from which light leaves a trail; white is 1",
         default=0.5,
         most=limits.MAX_THRESHOLD,
         soft_most=1.0,
@@ -372,7 +369,7 @@ class Shutter:
     )
     softness: Channel = number(
         "Softness",
-        "Range of luminance, around the threshold, over which a trail fades in",
+        "Range of luminance around the threshold in which trails fade in",
         default=0.1,
         absent=0.0,
         most=limits.MAX_THRESHOLD,
@@ -461,7 +458,7 @@ class Effect:
     time: Channel | None = None
     edge_aware: Channel = number(
         "Follow Edges",
-        "How much shutters keep to the edges of the shown frame: at 1 a scribble fills what it lies in",
+        "How strictly scribbles stop at edges of the shown frame: at 1 they fill the object that they are on",
         default=0.0,
         subtype="FACTOR",
     )

@@ -72,7 +72,7 @@ class Options:
         context=CONTEXT,
     )
     position: Position = choice(
-        "Position", "Where the frames that are exposed lie around the shown one", POSITIONS, default="start", keyed=True
+        "Position", "Position of the exposed frames relative to the shown frame", POSITIONS, default="start", keyed=True
     )
     interpolation: Interpolation = choice(
         "Interpolation",
@@ -81,10 +81,10 @@ class Options:
         default="displacement",
         keyed=True,
     )
-    light: Light = choice("Light", "How the frames that are exposed are summed", LIGHTS, default="linear", keyed=True)
+    light: Light = choice("Light", "How exposed frames are summed", LIGHTS, default="linear", keyed=True)
     exposure: Exposure = choice(
         "Exposure",
-        "How bright shutters are that are open for different times",
+        "Brightness of shutters that are open for different times",
         EXPOSURES,
         default="normalized",
         keyed=True,
@@ -92,7 +92,7 @@ class Options:
     )
     edges: Edges = choice(
         "Clip Ends",
-        "What an exposure gets that reaches beyond the ends of the clip, or of the shot",
+        "How exposures continue beyond the ends of the clip or the shot",
         EDGES,
         default="hold",
         keyed=True,
@@ -103,34 +103,32 @@ class Options:
     )
     border: bool = switch(
         "Keep Edges Default",
-        "Make the picture's edge a scribble of the default shutter, so that a stroke alone acts locally",
+        "Give the picture's edge to the default shutter, so that a single stroke acts locally",
         keyed=True,
     )
     stop_at_cuts: bool = switch(
         "Stop at Cuts",
-        "Exposures end at the source's cuts as they do at the clip's ends",
+        "End exposures at cuts of the source, like at the clip's ends",
         default=True,
         keyed=True,
     )
     edge_aware: float = 0.0
     plate_reach: int = fixed(
         "Background Search",
-        "Frames before and after the shown one in which what lies behind layers is looked for, "
-        "where no exposed frame shows it",
+        "Frames on each side that are searched for the background of layers, where no exposed frame shows it",
         default=48,
         most=limits.MAX_PLATE_REACH,
         soft_most=120,
     )
     decontaminate: bool = switch(
         "Clean Edges",
-        "Give layers, and what lies behind them, their own colors in the mixed pixels at their edges",
+        "Separate the colors of layers and their background in the mixed pixels at edges",
         default=True,
         keyed=True,
     )
     step: int = choice(
         "Smooth",
-        "Expose moments between filmed frames as well, which optical flow finds: light counts between two frames "
-        "whose bars are both open",
+        "Also expose moments between filmed frames, found by optical flow, where both bars are open",
         SMOOTH,
         default=1,
         blender="inbetween",
@@ -138,8 +136,7 @@ class Options:
     )
     skip_repeats: bool = switch(
         "Skip Repeated Frames",
-        "Where Smooth is on, show moments between their neighbors in place of frames that repeat the one before, "
-        "as in 24 frames per second that play at 30",
+        "With Smooth, replace repeated frames by moments between their neighbors, as in 24 fps played at 30",
         default=True,
     )
     slid: int = 0

@@ -358,7 +358,7 @@ def stutter(window: int, every: int = 4) -> np.ndarray:
 
 # name: (label, description, bars of a window). "Custom" is not a preset: it stands for any other bars.
 PRESETS: dict[str, tuple[str, str, Callable[[int], np.ndarray]]] = {
-    "STILL": ("Still Frame", "The shown frame alone", still),
+    "STILL": ("Still Frame", "Only the shown frame", still),
     "ANGLE_45": ("45°", "Open for an eighth of the frames", partial(angle, degrees=45.0)),
     "ANGLE_90": ("90°", "Open for a quarter of the frames", partial(angle, degrees=90.0)),
     "ANGLE_180": ("180°", "Open for half of the frames, as film cameras are", angle),
@@ -373,8 +373,8 @@ PRESETS: dict[str, tuple[str, str, Callable[[int], np.ndarray]]] = {
     "TRAIL": ("Exponential Trail", "Fades quickly at first and slowly later on", trail),
     "STUTTER": ("Stutter", "Every fourth frame, as a strobe lights them", stutter),
     # Along two edges, these two make a rolling shutter (paper Figure 11).
-    "FIRST": ("First Frame", "The first of the frames alone", still),
-    "LAST": ("Last Frame", "The last of the frames alone", lambda window: still(window, window - 1)),
+    "FIRST": ("First Frame", "Only the first of the frames", still),
+    "LAST": ("Last Frame", "Only the last of the frames", lambda window: still(window, window - 1)),
 }
 
 
