@@ -22,18 +22,18 @@ class Revision:
         self.number += 1
 
 
-_data = Revision()
+_changes = Revision()
 _kept: Kept[tuple, tuple[bool, Any]] = Kept()  # by number, subject and key: whether `make` succeeded, and its outcome
 
 
 def number() -> int:
     """Return the counter of changes. While it is equal, only the current frame can have changed."""
-    return _data.number
+    return _changes.number
 
 
 def changed() -> None:
     """Count a change, or a possible change."""
-    _data.changed()
+    _changes.changed()
 
 
 def until_change(what: str, key: Hashable, make: Callable[[], T]) -> T:

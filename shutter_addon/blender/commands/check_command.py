@@ -69,7 +69,15 @@ def _report(arguments: Namespace, scene: Scene, frames: range, version: EditVers
     """Return the result as JSON data (docs/command.md)."""
     faults = [*_version_faults(scene), *_setting_faults(arguments, scene, frames)]
     notes: list[str] = []
-    device, checks = _on_device(scene, frames, faults, notes)
+    device: str | None = None
+    checks: list[EffectCheck] = []
+    try:
+        kind, lesser = available.choose(render_settings.wanted())
+    except NoDeviceError as error:
+        faults.append(str(error))
+    else:
+        notes += [lesser] if lesser else []
+        device, checks = available.name(kind), edit_check.effects(scene, frames)
     for check in checks:
         faults += [f'"{check.strip}": {fault}' for fault in check.faults]
         notes += [f'"{check.strip}": {note}' for note in check.notes]
@@ -138,19 +146,6 @@ def _fault(check: Callable, *arguments) -> list[str]:
     except (UserError, OSError) as error:
         return [film_output.in_words(error, arguments[0])]
     return []
-
-
-def _on_device(
-    scene: Scene, frames: range, faults: list[str], notes: list[str]
-) -> tuple[str | None, list[EffectCheck]]:
-    """Return the name of the device that will render, and the checks of the effects, which need one."""
-    try:
-        kind, lesser = available.choose(render_settings.wanted())
-    except NoDeviceError as error:
-        faults.append(str(error))
-        return None, []
-    notes += [lesser] if lesser else []
-    return available.name(kind), edit_check.effects(scene, frames)
 
 
 def _written_folders(arguments: Namespace, checks: list[EffectCheck]) -> Iterator[Path]:

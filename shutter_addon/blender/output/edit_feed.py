@@ -14,8 +14,7 @@ from __future__ import annotations
 
 import os
 import tempfile
-from collections.abc import Iterator
-from contextlib import AbstractContextManager, ExitStack, closing, contextmanager
+from contextlib import AbstractContextManager, ExitStack
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import ClassVar
@@ -143,7 +142,10 @@ def _file(film: _Film, scene: Scene) -> LevelsFile:
         ValueError: There is no channel for the strip.
     """
     if film.file is None:
-        film.file = film.changed.enter_context(_temporary(scene))
+        atomic_write.clear_up(place := Path(tempfile.gettempdir()))
+        folder = film.changed.enter_context(atomic_write.part_folder(place))
+        film.file = LevelsFile(folder / "picture.tif", scene.render.resolution_x, scene.render.resolution_y)
+        film.changed.callback(film.file.close)
         film.strip = _add_strip(film, scene, film.file.path)
     return film.file
 
@@ -170,16 +172,6 @@ def _add_strip(film: _Film, scene: Scene, path: Path) -> str:
 
     film.changed.callback(remove)
     return name
-
-
-@contextmanager
-def _temporary(scene: Scene) -> Iterator[LevelsFile]:
-    """Yield a file for the pictures of a scene. OSError: there is no room for it."""
-    atomic_write.clear_up(place := Path(tempfile.gettempdir()))
-    with atomic_write.part_folder(place) as folder:
-        file = LevelsFile(folder / "picture.tif", scene.render.resolution_x, scene.render.resolution_y)
-        with closing(file):
-            yield file
 
 
 class LevelsFile:

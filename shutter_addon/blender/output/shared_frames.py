@@ -120,9 +120,13 @@ def _render_missing(
             if stopped:
                 raise film_output.InterruptedRenderError(f"{folder}: stopped")
             if run := _claim_run(claims, missing, is_finished):
-                _render_run(scene, claims, run, write)
-                for frame in run:
-                    del missing[frame]
+                scene.frame_start, scene.frame_end = min(run), max(run)
+                try:
+                    write()
+                finally:
+                    for picture in run.values():
+                        claims.release(_name(picture))
+                missing = {frame: picture for frame, picture in missing.items() if frame not in run}
             else:
                 if not waits:
                     awaited = frame_ranges.in_words(list(missing))
@@ -147,15 +151,6 @@ def _claim_run(claims: Claims, missing: dict[int, Path], is_finished: Callable) 
         if run:
             break
     return run
-
-
-def _render_run(scene: Scene, claims: Claims, run: dict[int, Path], write: Callable) -> None:
-    scene.frame_start, scene.frame_end = min(run), max(run)
-    try:
-        write()
-    finally:
-        for picture in run.values():
-            claims.release(_name(picture))
 
 
 def _name(picture: Path) -> str:

@@ -6,7 +6,6 @@ from __future__ import annotations
 import hashlib
 import json
 import re
-import stat
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
@@ -15,7 +14,6 @@ from ..messages import UserError
 
 NAME = "virtual_shutter_job.json"
 _VERSION = 1  # of the file format
-_LARGEST = 1 << 26  # bytes
 _NOTE = "virtual_shutter edit "  # prefix of the key in a picture's metadata
 
 
@@ -123,26 +121,20 @@ def read(folder: Path) -> EditVersion | None:
     """Return the version of the job in a folder, or None without a job.
 
     Raises:
-        JobError: The file is damaged, or not a regular file.
+        JobError: The file is damaged, or of a newer version.
         OSError: It cannot be read.
     """
     path = folder / NAME
     try:
-        status = path.stat()
-        if not stat.S_ISREG(status.st_mode):  # a pipe would never open
-            raise JobError(f"{path}: is no file")
-        if status.st_size > _LARGEST:
-            raise ValueError
         data = json.loads(path.read_bytes())
-        if data["version"] != _VERSION:
-            raise JobError(f"{path}: is of a newer version of the extension")
-        return EditVersion.from_data(data["edit"])
+        version = EditVersion.from_data(data["edit"]) if data["version"] == _VERSION else None
     except FileNotFoundError:
         return None
-    except JobError:
-        raise
     except (ValueError, TypeError, KeyError, AttributeError, RecursionError):
         raise JobError(f"{path}: is damaged; check the edit again") from None
+    if version is None:
+        raise JobError(f"{path}: is of a newer version of the extension")
+    return version
 
 
 def guard(folder: Path, here: EditVersion) -> None:
