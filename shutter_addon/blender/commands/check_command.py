@@ -178,5 +178,5 @@ def _lines(report: dict) -> list[str]:
 
 
 def _saved_by(name: str, version: dict) -> str:
-    saved = f"was saved by {version['saved']}" if version["saved"] else "does not say which saved it"
+    saved = f"was saved by {version['saved']}" if version["saved"] else "does not name the version that saved it"
     return f"{name}: {version['here']}, the edit {saved}"

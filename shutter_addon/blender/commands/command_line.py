@@ -40,7 +40,7 @@ def place(text: str) -> Path:
 def megabytes(text: str) -> int | None:
     """Parse a number of megabytes. 0 is None, as without the option."""
     if not text.isdecimal():
-        raise argparse.ArgumentTypeError(f"{text!r} is no number of megabytes")
+        raise argparse.ArgumentTypeError(f"{text!r} is not a number of megabytes")
     return int(text) or None
 
 

@@ -101,7 +101,7 @@ def film_of(scene: Scene, effect: PropertyGroup, strip: Strip, kind: Kind, folde
 def default_folder() -> Path:
     """Return the folder for films beside the .blend file. EffectError: the file is not saved."""
     if not bpy.data.filepath:
-        raise EffectError(rpt_("baked frames lie beside the .blend file: save it first"))
+        raise EffectError(rpt_("baked frames are stored beside the .blend file: save it first"))
     return Path(bpy.data.filepath).parent / FOLDER
 
 
@@ -109,7 +109,7 @@ def _check(scene: Scene, effect: PropertyGroup, strip: Strip, kind: Kind) -> Non
     """Raise EffectError if a film would not show what the strip shows."""
     if getattr(strip, "retiming_keys", ()) or strip.strobe > 1 or strip.use_reverse_frames:
         raise EffectError(
-            rpt_('"{strip}" is retimed, strobed or reversed itself: do that to its source').format(strip=strip.name)
+            rpt_('"{strip}" is retimed, strobed or reversed: do that to its source instead').format(strip=strip.name)
         )
     if kind != "MOVIE":
         return
@@ -250,7 +250,7 @@ class BakeJob:
         if self.film.is_finished():
             return None
         said = [line for line in self._said("err").splitlines() if line.startswith(signed(""))]
-        return said[-1].removeprefix(signed("")).strip() if said else rpt_("the bake ended without a word")
+        return said[-1].removeprefix(signed("")).strip() if said else rpt_("the bake ended without a message")
 
     def _said(self, stream: str) -> str:
         return (self.log / stream).read_text(encoding="utf-8", errors="replace")

@@ -98,7 +98,7 @@ def check_writable(folder: Path) -> None:
     """Raise OutputError if a folder, or the first existing one above, cannot be written to."""
     place = next(path for path in (folder, *folder.parents) if path.exists())
     if not place.is_dir():
-        raise OutputError(f"{place}: is a file, and no folder")
+        raise OutputError(f"{place}: is a file, not a folder")
     try:
         with atomic_write.part_folder(place):  # permissions and mounts do not always tell
             pass

@@ -26,7 +26,7 @@ _MAX_SEGMENT = 128.0
 # In pixels, far beyond the limits of limits.py: float64 cannot locate a line's crossing with the picture from there on.
 _FARTHEST = 1e12
 FREE = 0
-_FAR = 'region "{name}": a point of its strokes is nowhere near the picture'
+_FAR = 'region "{name}": a point of its strokes is too far from the picture'
 
 
 @dataclass(frozen=True)
@@ -157,12 +157,12 @@ class Drawings:
         return transform(self.at(frame), placed.location, placed.rotation, placed.scale, self.aspect)
 
     def centre(self, frame: float) -> np.ndarray | None:
-        """See Subject."""
+        """Return what Subject.centre returns."""
         strokes = self.at(frame)
         return motions.centre(strokes) if strokes else None
 
     def corners(self, frame: float, placed: Placement) -> np.ndarray:
-        """See Subject; placed: where it lies at the frame."""
+        """Return what Subject.corners returns, for a placement at the frame."""
         strokes = self.moved(frame, placed)
         return motions.corners(strokes) if strokes else np.empty((0, 2))
 

@@ -295,12 +295,12 @@ def _keys(
     if not frames:
         return [(frame, "linear") for frame in shown]
 
-    def each(outside: range, held: float) -> list[tuple[float, Ease]]:
+    def per_frame(outside: range, held: float) -> list[tuple[float, Ease]]:
         """Return a key for every frame outside all keys, unless the value at `held` fits."""
         return [] if all(fits(held, held, frame, 0) for frame in outside) else [(frame, "linear") for frame in outside]
 
     eases = dict(keys)
-    kept = each(range(shown.start, min(math.ceil(frames[0]), shown.stop)), frames[0])
+    kept = per_frame(range(shown.start, min(math.ceil(frames[0]), shown.stop)), frames[0])
     for first, second in pairwise(frames):
         # Keys may lie a million frames outside the strip.
         between = range(max(math.floor(first) + 1, shown.start), min(math.ceil(second), shown.stop))
@@ -315,7 +315,7 @@ def _keys(
             kept += [(frame, "linear") for frame in shares]
     last = frames[-1]
     kept.append((last, words.get(last) or eases.get(last, "linear")))
-    return kept + each(range(max(math.floor(last) + 1, shown.start), shown.stop), last)
+    return kept + per_frame(range(max(math.floor(last) + 1, shown.start), shown.stop), last)
 
 
 def _short(value: float) -> float:

@@ -54,7 +54,7 @@ def check(recipe: Any) -> None:
     for kind in (Options, model.Effect, model.Camera):
         _check_fields(kind, recipe, "")
     _require(recipe.version > 1 or recipe.inbetween != "auto", "inbetween", 'recipes have "auto" from version 2 on')
-    _require(recipe.shutters, "shutters", "there is none; the first is the default")
+    _require(recipe.shutters, "shutters", "empty: the first shutter is the default")
     _check_count(recipe.shutters, limits.MAX_SHUTTERS, "shutters")
     _check_count(recipe.regions, limits.MAX_REGIONS, "regions")
     _check_keys(recipe.time, "time")
@@ -120,17 +120,17 @@ def _check_exposure(shutter: Any, place: str) -> None:
     """Check settings of a shutter that depend on each other."""
     ranges = fields_of(model.Shutter)
     if shutter.trail is not None:
-        _require(shutter.follow, f"{place}.trail", "the shutter follows nothing that could move so far")
+        _require(shutter.follow, f"{place}.trail", "the shutter follows nothing that moves")
         _require(shutter.length == "bars", f"{place}.trail", "a shutter has one length")
         _check_field(ranges["trail"], shutter.trail, f"{place}.trail")
     chooses = shutter.combine in _COMBINED
     if shutter.threshold is not None:
-        _require(chooses, f"{place}.threshold", "the lightest and the darkest alone have a threshold")
+        _require(chooses, f"{place}.threshold", "only lightest and darkest have a threshold")
         _check_field(ranges["threshold"], shutter.threshold, f"{place}.threshold")
     is_soft = isinstance(shutter.softness, list) or shutter.softness != 0
     _require(shutter.threshold is not None or not is_soft, f"{place}.softness", "it has no threshold")
     ways = chooses or not shutter.by_luminance
-    _require(ways, f"{place}.by_luminance", "the lightest and the darkest alone go by it")
+    _require(ways, f"{place}.by_luminance", "only lightest and darkest use it")
 
 
 def _check_follow(follow: str | None, regions: list, place: str) -> None:
@@ -164,7 +164,7 @@ def _check_drawings(region: Any, place: str) -> None:
     for k, key in enumerate(region.keys):
         where = f"{place}.keys[{k}]"
         whole = not (redrawn if k == 0 else key.strokes is not None) or key.frame == int(key.frame)
-        _require(whole, f"{where}.frame", f"{_plain(key.frame)} is no whole frame, but redrawn")
+        _require(whole, f"{where}.frame", f"{_plain(key.frame)} is not a whole frame, but has strokes")
         if key.strokes is not None:
             _check_strokes(key.strokes, f"{where}.strokes")
     _check_strokes(region.strokes, f"{place}.strokes")
@@ -195,7 +195,7 @@ def _check_count(items: list, most: int, place: str) -> None:
 def _check_name(name: str, place: str, most: int = limits.MAX_NAME) -> None:
     _require(len(name) <= most, place, f"{len(name)} characters, the most are {most}")
     wrong = next((c for c in name if c == "\0" or "\ud800" <= c <= "\udfff"), "")
-    _require(not wrong, place, f"U+{ord(wrong or ' '):04X} is no character of a name")
+    _require(not wrong, place, f"U+{ord(wrong or ' '):04X} is not allowed in a name")
 
 
 def _check_keys(keys: list, place: str) -> None:

@@ -66,7 +66,7 @@ def parse(text: str) -> model.Effect:
     except json.JSONDecodeError as error:
         raise RecipeError(f"line {error.lineno}, column {error.colno}: not JSON ({error.msg})") from None
     except RecursionError:
-        raise RecipeError("recipe: lists or objects within one another, too many") from None
+        raise RecipeError("recipe: too many lists or objects within each other") from None
     if isinstance(data, dict) and type(version := data.get("version")) is int and version > records.VERSION:
         newer = f"version: {shown(version)} is of a newer version of Virtual Shutter, this one reads {records.VERSION}"
         raise RecipeError(newer)
@@ -224,7 +224,7 @@ def _record(kind: type, columns: dict[str, tuple[Reader, bool]], value: Any, pla
     if not isinstance(value, dict):
         _refuse(place, f"{shown(value)} is not an object")
     if isinstance(value, _Doubled):
-        _refuse(place, f"field {shown(value.field)} stands there twice")
+        _refuse(place, f"field {shown(value.field)} is given twice")
     said = {}
     for name, (read, is_required) in columns.items():
         where = f"{place}.{name}" if place else name

@@ -148,7 +148,7 @@ MESSAGES = {
     ): "Region „{name}“: mehr als {most} Punkte mit denen davor",
     (
         "*",
-        'region "{name}": a point of its strokes is nowhere near the picture',
+        'region "{name}": a point of its strokes is too far from the picture',
     ): "Region „{name}“: ein Punkt ihrer Striche liegt weit weg vom Bild",
     (
         "*",
@@ -1422,11 +1422,11 @@ MESSAGES = {
     ("*", "Baked, and up to date"): "Gebacken und aktuell",
     (
         "*",
-        "baked frames lie beside the .blend file: save it first",
+        "baked frames are stored beside the .blend file: save it first",
     ): "gebackene Bilder liegen neben der .blend-Datei: zuerst speichern",
     (
         "*",
-        '"{strip}" is retimed, strobed or reversed itself: do that to its source',
+        '"{strip}" is retimed, strobed or reversed: do that to its source instead',
     ): "„{strip}“ ist selbst umgezeitet, stroboskopiert oder umgekehrt: das gehört an die Quelle",
     (
         "*",
@@ -1446,7 +1446,7 @@ MESSAGES = {
         "movies are baked in Blender's own colours: with another configuration, bake to OpenEXR",
     ): "Filme haben Blenders eigene Farben: mit einer anderen Konfiguration zu OpenEXR backen",
     ("*", "a movie has no transparency: bake to OpenEXR"): "ein Film hat keine Transparenz: zu OpenEXR backen",
-    ("*", "the bake ended without a word"): "das Backen endete ohne ein Wort",
+    ("*", "the bake ended without a message"): "das Backen endete ohne ein Wort",
     ("*", "the bake cannot begin: {reason}"): "das Backen kann nicht beginnen: {reason}",
     (
         "*",
