@@ -28,11 +28,7 @@ LIGHTS = (
 
 EXPOSURES = (
     ("NORMALIZED", "Normalized", "Every shutter gives the same brightness"),
-    (
-        "WEIGHTED",
-        "Weighted",
-        "A shutter that is open for less time than the default is darker, always in linear light",
-    ),
+    ("WEIGHTED", "Weighted", "A shutter that is open for less time than the default is darker, always in linear light"),
 )
 
 
@@ -68,10 +64,7 @@ STROKES = (
 )
 
 
-DRAWN = (
-    *STROKES,
-    ("OUTLINE", "Outline", "A drawn matte: everything inside closed curves, exact to the pixel"),
-)
+DRAWN = (*STROKES, ("OUTLINE", "Outline", "A drawn matte: everything inside closed curves, exact to the pixel"))
 
 
 KINDS = (
@@ -155,11 +148,7 @@ COMBINES = (
 LENGTHS = (
     ("FRAMES", "Frames", "The bars set for how many frames the shutter is open"),
     ("TIMELINE", "Timeline", "The bars are the exposure during one timeline frame, at any speed of the footage"),
-    (
-        "MOTION",
-        "Distance",
-        "The shutter is open while what it follows moves by a distance; bars only set the shape",
-    ),
+    ("MOTION", "Distance", "The shutter is open while what it follows moves by a distance; bars only set the shape"),
 )
 
 SIDES = (

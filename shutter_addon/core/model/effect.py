@@ -113,11 +113,7 @@ class AnyRegion(Subject):
     name: str = fixed("Name", "Name of the region", default="Region", absent="", most=limits.MAX_NAME)
     shutter: int
     opacity: Channel = number(
-        "Opacity",
-        "Influence of the region: 0 is like no region",
-        default=1.0,
-        subtype="FACTOR",
-        told=False,
+        "Opacity", "Influence of the region: 0 is like no region", default=1.0, subtype="FACTOR", told=False
     )
     layer: bool = switch(
         "Layer",
@@ -246,11 +242,7 @@ class FileContent:
 
     path: str
     channel: str = choice(
-        "Channel",
-        "Channel of the matte that sets the amount of the shutter",
-        CHANNELS,
-        default="luminance",
-        recipe="",
+        "Channel", "Channel of the matte that sets the amount of the shutter", CHANNELS, default="luminance", recipe=""
     )
     offset: int = fixed(
         "Offset",
@@ -349,14 +341,10 @@ class Shutter:
     )
     combine: Mode = choice("Combine", "How exposed frames are combined", COMBINES, default="average", told=False)
     by_luminance: bool = switch(
-        "By Luminance",
-        "Choose one frame per pixel by its luminance, not one per color channel",
-        told=False,
+        "By Luminance", "Choose one frame per pixel by its luminance, not one per color channel", told=False
     )
     use_threshold: bool = switch(
-        "Use Threshold",
-        "Let only light above the threshold leave trails, or with Darkest, below it",
-        recipe="",
+        "Use Threshold", "Let only light above the threshold leave trails, or with Darkest, below it", recipe=""
     )
     threshold: Channel = number(
         "Threshold",

@@ -107,10 +107,7 @@ class Options:
         keyed=True,
     )
     stop_at_cuts: bool = switch(
-        "Stop at Cuts",
-        "End exposures at cuts of the source, like at the clip's ends",
-        default=True,
-        keyed=True,
+        "Stop at Cuts", "End exposures at cuts of the source, like at the clip's ends", default=True, keyed=True
     )
     edge_aware: float = 0.0
     plate_reach: int = fixed(
