@@ -287,15 +287,7 @@ def start(scene: Scene, effect: PropertyGroup, strip: Strip, film: Film) -> Bake
         copy.unlink(missing_ok=True)
         shutil.rmtree(log, ignore_errors=True)
         raise EffectError(rpt_("the bake cannot begin: {reason}").format(reason=" ".join(str(error).split()))) from None
-    return BakeJob(
-        scene=scene.session_uid,
-        effect=effect.identity,
-        strip=strip.name,
-        film=film,
-        copy=copy,
-        log=log,
-        process=process,
-    )
+    return BakeJob(scene.session_uid, effect.identity, strip.name, film, copy, log, process)
 
 
 def _clear_up(folder: Path, edit: Path) -> None:

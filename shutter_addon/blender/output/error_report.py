@@ -25,13 +25,7 @@ from ..devices import available
 from ..rendering import render_settings
 
 # The packages that the extension uses, by module.
-PACKAGES = {
-    "NumPy": "numpy",
-    "OpenImageIO": "OpenImageIO",
-    "PyAV": "av",
-    "OpenCV": "cv2",
-    "moderngl": "moderngl",
-}
+PACKAGES = {"NumPy": "numpy", "OpenImageIO": "OpenImageIO", "PyAV": "av", "OpenCV": "cv2", "moderngl": "moderngl"}
 BACKENDS = {"OPENGL": "OpenGL", "VULKAN": "Vulkan", "METAL": "Metal", "NONE": "nothing", "UNKNOWN": "unknown"}
 
 
