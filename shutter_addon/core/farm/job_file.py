@@ -78,17 +78,6 @@ class EditVersion:
                 return f"is of other footage: {name} has other content on this machine"
         return "is of other footage"
 
-    def as_data(self) -> dict:
-        """Return data for JSON."""
-        return {**asdict(self), "key": self.key}
-
-    @classmethod
-    def from_data(cls, data: dict) -> EditVersion:
-        """Return the version from `as_data`. KeyError, TypeError, ValueError: the data is invalid."""
-        footage = tuple(Footage(**one) for one in data["footage"])
-        texts = {name: str(data[name]) for name in ("blend", "extension", "blender", "colours")}
-        return cls(footage=footage, **texts)
-
 
 def _configuration(version: EditVersion) -> str:
     which = version.colours[:16] or "of Blender"
@@ -112,7 +101,7 @@ class JobError(UserError, ValueError):
 
 def write(folder: Path, version: EditVersion) -> None:
     """Write the job file into the pictures' folder, whole or not at all. OSError: it cannot be written."""
-    data = {"version": _VERSION, "edit": version.as_data()}
+    data = {"version": _VERSION, "edit": {**asdict(version), "key": version.key}}
     with atomic_write.writing(folder / NAME) as part:
         part.write_text(json.dumps(data, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
 
@@ -127,14 +116,17 @@ def read(folder: Path) -> EditVersion | None:
     path = folder / NAME
     try:
         data = json.loads(path.read_bytes())
-        version = EditVersion.from_data(data["edit"]) if data["version"] == _VERSION else None
+        if data["version"] != _VERSION:
+            raise JobError(f"{path}: is of a newer version of the extension")
+        edit = data["edit"]
+        texts = {name: str(edit[name]) for name in ("blend", "extension", "blender", "colours")}
+        return EditVersion(footage=tuple(Footage(**each) for each in edit["footage"]), **texts)
     except FileNotFoundError:
         return None
+    except JobError:
+        raise
     except (ValueError, TypeError, KeyError, AttributeError, RecursionError):
         raise JobError(f"{path}: is damaged; check the edit again") from None
-    if version is None:
-        raise JobError(f"{path}: is of a newer version of the extension")
-    return version
 
 
 def guard(folder: Path, here: EditVersion) -> None:
