@@ -101,9 +101,13 @@ def fixed(label: str, description: str, *, default: Any, made: Callable[[], Any]
     return dataclasses.field(default_factory=made or (lambda: default), metadata=metadata)
 
 
-@cache
 def fields_of(*kinds: type) -> dict[str, Field]:
     """Return the Fields of classes, by attribute name."""
+    return _fields_of(kinds)
+
+
+@cache
+def _fields_of(kinds: tuple[type, ...]) -> dict[str, Field]:
     found: dict[str, Field] = {}
     for kind in kinds:
         for each in dataclasses.fields(kind):

@@ -142,7 +142,7 @@ Reader = Callable[[Any, str], Any]
 @cache
 def _reader(kind: Any) -> Reader:
     """Return the reader of a field's type."""
-    if is_dataclass(kind):
+    if isinstance(kind, type) and is_dataclass(kind):
         return partial(_record, kind, _columns(kind))
     if kind in (float, int, str, bool):
         return _number if kind is float else partial(_exactly, kind)
