@@ -14,17 +14,17 @@ from ..data import strips
 from ..editing import whole_edits
 from ..output import baked_film, film_output
 from . import command_line
-from .command_line import place
+from .command_line import to_path
 
 
 def add(commands: argparse._SubParsersAction) -> None:
     parser = commands.add_parser("bake", help="render one effect of a saved edit, for a strip to show")
     option = parser.add_argument
-    option("source", type=place, help="a saved edit (.blend)")
+    option("source", type=to_path, help="a saved edit (.blend)")
     option("--strip", required=True, metavar="NAME", help="its effect strip")
     option("--scene", metavar="NAME", help="the strip's scene (default: the active one)")
     option("--format", choices=tuple(baked_film.KINDS), default="movie", help="H.264, or float EXR (default: movie)")
-    option("--output", type=place, metavar="DIR", help="folder of the film (default: beside the edit)")
+    option("--output", type=to_path, metavar="DIR", help="folder of the film (default: beside the edit)")
     command_line.add_device(parser)
     option("--attached", action="store_true", help=argparse.SUPPRESS)  # to the Blender whose copy of an edit it reads
     parser.set_defaults(run=run)
@@ -41,19 +41,19 @@ def run(arguments: Namespace) -> None:
     if arguments.attached:
         _check_parent(film)
     total = len(film.frames)
-    with command_line.rendered_by(arguments), film_output.progress(total, "frame") as moved:
+    with command_line.using_device(arguments), film_output.progress(total, "frame") as moved:
         finished = 0
 
         def told(done: int) -> None:
             nonlocal finished
             moved(done - finished)
             finished = done
-            command_line.tell(f"{done} of {total}")
+            command_line.print_line(f"{done} of {total}")
             if arguments.attached:
                 _check_parent(film)
 
         baked_film.render(scene, effect, strip, film, told)
-    command_line.tell(str(film.place))
+    command_line.print_line(str(film.place))
 
 
 def _check_parent(film: baked_film.Film) -> None:

@@ -24,7 +24,7 @@ from ..output import edit_check, error_report, film_join, film_output, shared_fr
 from ..output.edit_check import EffectCheck
 from ..rendering import render_job, render_settings
 from . import command_line
-from .command_line import place
+from .command_line import to_path
 
 _OF_EFFECT = "strip", "source", "size", "window", "shutters", "inbetween"  # reported fields of an EffectCheck
 
@@ -32,13 +32,13 @@ _OF_EFFECT = "strip", "source", "size", "window", "shutters", "inbetween"  # rep
 def add(commands: argparse._SubParsersAction) -> None:
     parser = commands.add_parser("check", help="find out whether an edit can be rendered here")
     option = parser.add_argument
-    option("edit", metavar="FILE.blend", type=place, help="a saved edit")
+    option("edit", metavar="FILE.blend", type=to_path, help="a saved edit")
     option("--frames", metavar="A:B", help="timeline frames A to B (default: all of the edit)")
-    option("--output", type=place, metavar="DIR", help="folder for the frames; it gets the job's file")
+    option("--output", type=to_path, metavar="DIR", help="folder for the frames; it gets the job's file")
     option("--format", choices=tuple(film_output.FORMATS), help="of the frames (default: png)")
     option("--resume", action="store_true", help="the frames will be rendered with --resume")
     movies = ", ".join(film_output.MOVIES)
-    option("--movie", type=place, metavar="FILE", help=f"the movie that the frames will be joined to ({movies})")
+    option("--movie", type=to_path, metavar="FILE", help=f"the movie that the frames will be joined to ({movies})")
     command_line.add_device(parser)
     printed = parser.add_mutually_exclusive_group()
     printed.add_argument("--json", action="store_true", help="print one JSON object")
@@ -49,16 +49,16 @@ def add(commands: argparse._SubParsersAction) -> None:
 def run(arguments: Namespace) -> None:
     edit = command_line.open_edit(arguments.edit, arguments.frames)
     scene = edit.scene
-    with command_line.rendered_by(arguments):
+    with command_line.using_device(arguments):
         report = _report(arguments, scene, edit.frames, edit.version())
         if arguments.report:
             for found in (*report["notes"], *report["faults"]):
                 told.record(found)
-            command_line.tell(error_report.text(scene))
+            command_line.print_line(error_report.text(scene))
         elif arguments.json:
-            command_line.tell(json.dumps(report, indent=1))
+            command_line.print_line(json.dumps(report, indent=1))
         else:
-            command_line.tell("\n".join(_lines(report)))
+            command_line.print_line("\n".join(_lines(report)))
     for fault in report["faults"]:
         render_job.say(fault)
     if report["faults"]:
@@ -102,7 +102,7 @@ def _report(arguments: Namespace, scene: Scene, frames: range, version: EditVers
     if arguments.movie and film_output.is_movie(arguments.movie):  # last: it changes the scene
         faults += _fault(film_join.rehearse, scene, arguments.movie, arguments.format or "png", frames)
     if arguments.output and not faults:
-        faults += _fault(film_output.prepare, arguments.output) or _fault(job_file.write, arguments.output, version)
+        faults += _fault(film_output.make_folder, arguments.output) or _fault(job_file.write, arguments.output, version)
     return report
 
 

@@ -30,7 +30,7 @@ from ..rendering import render_job, render_settings
 SMOOTH = tuple(map(str, fields_of(Options)["step"].words))  # 1 is off
 
 
-def place(text: str) -> Path:
+def to_path(text: str) -> Path:
     """Parse a path. Leading slashes become one, since Blender takes two for the .blend file's folder."""
     if not text:
         raise argparse.ArgumentTypeError("a name is missing")
@@ -61,7 +61,7 @@ def add_device(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def rendered_by(arguments: Namespace) -> AbstractContextManager[None]:
+def using_device(arguments: Namespace) -> AbstractContextManager[None]:
     """In this context, render with the device that the options choose."""
     return render_settings.using(arguments.device, gpu_memory=arguments.gpu_memory)
 
@@ -75,7 +75,7 @@ def recipe(path: Path) -> Effect:
     return found
 
 
-def opened(path: Path) -> FrameSource:
+def open_footage(path: Path) -> FrameSource:
     """Open a source. Print a warning about files that were left out."""
     medium = open_source(path)
     if left_out := medium.left_out:
@@ -143,7 +143,7 @@ def frames(text: str | None, whole: range, what: str = "clip") -> range:
     return range(first, last + 1)
 
 
-def tell(text: str) -> None:
+def print_line(text: str) -> None:
     """Print to stdout, with "?" for characters that the terminal lacks. OutputError: it cannot be written there."""
     encoding = sys.stdout.encoding or "utf-8"
     try:

@@ -25,21 +25,21 @@ from ..editing import whole_edits
 from ..output import film_output, shared_frames
 from ..rendering import render_settings
 from . import command_line
-from .command_line import place
+from .command_line import to_path
 
 
 def add(commands: argparse._SubParsersAction) -> None:
     parser = commands.add_parser("render", help="render a source through a recipe, or a saved edit")
     option = parser.add_argument
-    option("source", type=place, help="a movie, the first file of an image sequence, or a saved edit (.blend)")
-    option("--recipe", type=place, help="the effect, a JSON file; not for a saved edit")
-    option("--output", type=place, help=f"a folder, or a movie ({', '.join(film_output.MOVIES)})")
+    option("source", type=to_path, help="a movie, the first file of an image sequence, or a saved edit (.blend)")
+    option("--recipe", type=to_path, help="the effect, a JSON file; not for a saved edit")
+    option("--output", type=to_path, help=f"a folder, or a movie ({', '.join(film_output.MOVIES)})")
     option("--format", choices=tuple(film_output.FORMATS), help="of pictures in a folder: 16-bit png, float exr")
     option("--frames", metavar="A:B", help="timeline frames A to B; 1 is the strip's first")
     option("--resume", action="store_true", help="of a saved edit: only missing frames, shared with other machines")
     command_line.add_device(parser)
-    option("--weights", type=place, metavar="DIR", help="also write the mattes of the shutters, as float EXR")
-    option("--save", type=place, metavar="FILE.blend", help="keep the edit")
+    option("--weights", type=to_path, metavar="DIR", help="also write the mattes of the shutters, as float EXR")
+    option("--save", type=to_path, metavar="FILE.blend", help="keep the edit")
     option("--inbetween", choices=command_line.SMOOTH, help="moments per filmed frame, in place of the recipe's")
     parser.set_defaults(run=run)
 
@@ -65,7 +65,7 @@ def _render_edit(arguments: Namespace) -> None:
     scene.frame_start, scene.frame_end = frames[0], frames[-1]
     for fault in external_files.faults(scene, frames, sources=True):
         raise film_output.OutputError(fault)  # Blender would render without it
-    with command_line.rendered_by(arguments), shared_frames.of_same_footage(scene) as rendered:
+    with command_line.using_device(arguments), shared_frames.refuse_changed_footage(scene) as rendered:
         version = edit.version()
         job_file.guard(output, version)
         shared_frames.check(output, arguments.format, frames, [edit.path, *versions.read_files(scene)])
@@ -83,7 +83,7 @@ def _render_source(arguments: Namespace) -> None:
         raise film_output.OutputError("nothing to do: give --output, --save or both")
     source_recipe = _recipe(arguments)
     path = arguments.source
-    with command_line.opened(path) as medium:
+    with command_line.open_footage(path) as medium:
         output, file_format = arguments.output, arguments.format or "png"
         if output:
             film_output.check(output, arguments.format, (medium.width, medium.height))
@@ -91,7 +91,7 @@ def _render_source(arguments: Namespace) -> None:
                 raise film_output.OutputError(f"{output}: in a saved edit, Blender takes # for the frames' numbers")
         frames = command_line.frames(arguments.frames, range(1, whole_edits.length(medium, source_recipe) + 1))
         read = path, *command_line.files(medium), arguments.recipe, *_mattes(source_recipe, arguments.recipe.parent)
-        film_output.spare(_written(arguments, file_format, frames), read)
+        film_output.refuse_overwriting(_written(arguments, file_format, frames), read)
         scene = whole_edits.make_edit(path, medium, source_recipe, arguments.recipe.parent)
     scene.frame_start, scene.frame_end = frames[0], frames[-1]
     if output:
@@ -102,9 +102,9 @@ def _render_source(arguments: Namespace) -> None:
     weights = arguments.weights if output else None
     with render_settings.using(arguments.device, weights, arguments.gpu_memory):
         if output and arguments.weights:
-            film_output.prepare(arguments.weights)
+            film_output.make_folder(arguments.weights)
         if output:
-            film_output.film(scene, output)
+            film_output.render_made_edit(scene, output)
 
 
 def _check_device(arguments: Namespace) -> None:
@@ -149,7 +149,7 @@ def _save(scene: Scene, path: Path) -> None:
         OutputError: It cannot be saved whole; an older file stays.
     """
     try:
-        film_output.prepare(path.parent)
+        film_output.make_folder(path.parent)
         with atomic_write.writing(path) as part:
             with film_output.quiet(), whole_edits.paths_relative(scene, path.parent):
                 bpy.ops.wm.save_as_mainfile(filepath=str(part), compress=True, copy=True, relative_remap=False)

@@ -24,14 +24,14 @@ from ..editing import whole_edits
 from ..output import film_output
 from ..rendering import render_job
 from . import command_line
-from .command_line import place
+from .command_line import to_path
 
 
 def add(commands: argparse._SubParsersAction) -> None:
     parser = commands.add_parser("track", help="follow what a region covers, or the camera")
     option = parser.add_argument
-    option("source", type=place, help="a movie, or the first file of an image sequence")
-    option("--recipe", type=place, required=True, help="the effect, a JSON file")
+    option("source", type=to_path, help="a movie, or the first file of an image sequence")
+    option("--recipe", type=to_path, required=True, help="the effect, a JSON file")
     option("--region", metavar="NAME", help="the region to track")
     option("--camera", action="store_true", help="track the camera instead, by everything outside of regions")
     option("--frame", type=int, required=True, metavar="F", help="the frame at which it is in place")
@@ -39,8 +39,13 @@ def add(commands: argparse._SubParsersAction) -> None:
     option("--motion", choices=registration.MOTIONS, default="scale", help="location; rotation too; or scale as well")
     option("--all-keys", action="store_true", help="a key at every frame, needed or not")
     option("--hold", action="store_true", help="stay opaque where the track has ended: no keys of opacity")
-    option("--output", type=place, required=True, metavar="R2.json", help="the recipe with the keys")
-    option("--report", type=place, metavar="FILE.json", help="the confidence of each frame, and where tracking ended")
+    option("--output", type=to_path, required=True, metavar="R2.json", help="the recipe with the keys")
+    option(
+        "--report",
+        type=to_path,
+        metavar="FILE.json",
+        help="the confidence of each frame, and where tracking ended",
+    )
     parser.set_defaults(run=run)
 
 
@@ -50,8 +55,8 @@ def run(arguments: Namespace) -> None:
     source_recipe = command_line.recipe(arguments.recipe)
     index = None if arguments.camera else _region_index(arguments, source_recipe)
     subject = recipe.CAMERA if arguments.camera else arguments.region
-    with command_line.opened(arguments.source) as medium:
-        film_output.spare(
+    with command_line.open_footage(arguments.source) as medium:
+        film_output.refuse_overwriting(
             filter(None, (arguments.output, arguments.report)),
             [arguments.source, *command_line.files(medium), arguments.recipe],
         )
@@ -136,7 +141,7 @@ def _cover(arguments: Namespace, region: OutlineRegion, clip: Clip, ends: ExitSt
     def filmed(frame: float) -> int:
         return clip.shown(frame).source_frame // clip.step
 
-    medium = ends.enter_context(command_line.opened(arguments.source))
+    medium = ends.enter_context(command_line.open_footage(arguments.source))
     drawn = zip(region.drawings.frames, region.drawings.strokes, strict=True)
     curves = {filmed(frame): outlines.curves(strokes) for frame, strokes in drawn}
     mattes = ends.enter_context(closing(CarriedMattes(medium, tuple(sorted(curves.items())))))
@@ -166,7 +171,7 @@ def _write_track(arguments: Namespace, result: Effect, tracked: dict, stops: lis
         "stops": [{"frame": stop.frame, "reason": stop.fault} for stop in stops],
     }
     for path in filter(None, (arguments.output, arguments.report)):
-        film_output.prepare(path.parent)
+        film_output.make_folder(path.parent)
     with atomic_write.writing(arguments.output) as part:
         moved = recipe.moved(result, arguments.recipe.parent, arguments.output.parent)
         part.write_text(recipe_file.dump(moved), encoding="utf-8")

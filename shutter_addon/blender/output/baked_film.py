@@ -127,11 +127,11 @@ def _check(scene: Scene, effect: PropertyGroup, strip: Strip, kind: Kind) -> Non
             raise EffectError(rpt_("a movie has no light above white: bake to OpenEXR"))
 
 
-def render(scene: Scene, effect: PropertyGroup, strip: Strip, film: Film, told: Callable[[int], object]) -> None:
+def render(scene: Scene, effect: PropertyGroup, strip: Strip, film: Film, report: Callable[[int], object]) -> None:
     """Render what is missing of a film. Finished frames stay when it is stopped or fails.
 
     Args:
-        told: Called with the number of finished frames. It may raise to stop.
+        report: Called with the number of finished frames. It may raise to stop.
 
     Raises:
         effect_source.FAULTS, OutputError, OSError: The film cannot be made.
@@ -139,7 +139,7 @@ def render(scene: Scene, effect: PropertyGroup, strip: Strip, film: Film, told: 
     """
     if film.kind == "MOVIE" and film.is_finished():
         _remove_parts(film)
-        told(len(film.frames))
+        report(len(film.frames))
         return
     start = round(strips.origin(strip))
     taken = snapshot.take(scene, effect, strip, [start + frame for frame in film.frames])
@@ -153,18 +153,18 @@ def render(scene: Scene, effect: PropertyGroup, strip: Strip, film: Film, told: 
 
         try:
             if film.kind == "MOVIE":
-                _make_movie(film, picture, frame_rate(scene.render.fps / scene.render.fps_base), told)
+                _make_movie(film, picture, frame_rate(scene.render.fps / scene.render.fps_base), report)
             else:
-                _make_pictures(film, picture, film_output.size(effect.scene), told)
+                _make_pictures(film, picture, film_output.size(effect.scene), report)
         except StoppedError:
             raise film_output.InterruptedRenderError(f"{film.place}: stopped") from None
         except (MediaError, OSError):
             if not film.is_finished():  # another process may have finished it and removed the parts
                 raise
-            told(len(film.frames))
+            report(len(film.frames))
 
 
-def _make_pictures(film: Film, picture: Picture, size: tuple[int, int], told: Callable[[int], object]) -> None:
+def _make_pictures(film: Film, picture: Picture, size: tuple[int, int], report: Callable[[int], object]) -> None:
     _prepare(film.place)
     note = job_file.note(film.version)
     for number, (path, frame) in enumerate(zip(film.pictures, film.frames, strict=True), start=1):
@@ -173,17 +173,17 @@ def _make_pictures(film: Film, picture: Picture, size: tuple[int, int], told: Ca
             made = pictures.resized(picture(frame), *size)
             channels = 3 if (made[..., 3] == 1).all() else 4
             image_writing.write_exr(path, made[..., :channels], _CHANNELS[:channels], note)
-        told(number)
+        report(number)
 
 
-def _make_movie(film: Film, picture: Picture, fps: Fraction, told: Callable[[int], object]) -> None:
+def _make_movie(film: Film, picture: Picture, fps: Fraction, report: Callable[[int], object]) -> None:
     done = 0
     for path, frames in film.parts:
         if path.is_file() and is_whole_movie(path, len(frames)):
-            told(done + len(frames))
+            report(done + len(frames))
         else:
             _prepare(path.parent)
-            film_parts.write_part(path, _counted(map(picture, frames), done, told), fps)
+            film_parts.write_part(path, _counted(map(picture, frames), done, report), fps)
         done += len(frames)
     if not film.is_finished():  # another process may have finished it
         film_parts.join([path for path, _frames in film.parts], film.place, fps)
@@ -210,10 +210,10 @@ def _remove_parts(film: Film) -> None:
         place.rmdir()
 
 
-def _counted(shown: Iterator[np.ndarray], done: int, told: Callable[[int], object]) -> Iterator[np.ndarray]:
+def _counted(shown: Iterator[np.ndarray], done: int, report: Callable[[int], object]) -> Iterator[np.ndarray]:
     for number, picture in enumerate(shown, start=done + 1):
         yield picture
-        told(number)
+        report(number)
 
 
 @dataclass
@@ -274,10 +274,10 @@ def start(scene: Scene, effect: PropertyGroup, strip: Strip, film: Film) -> Bake
     try:
         (log / _MANIFEST).write_text(copy.name, encoding="utf-8")
         bpy.ops.wm.save_as_mainfile(filepath=str(copy), copy=True, compress=_is_compressed(edit), relative_remap=False)
-        words = _words(scene, strip, film)
+        options = _options(scene, strip, film)
         with open(log / "out", "wb") as out, open(log / "err", "wb") as err:
             process = subprocess.Popen(
-                [*_command(), "bake", str(copy), *words],
+                [*_command(), "bake", str(copy), *options],
                 cwd=_ROOT,
                 stdin=subprocess.PIPE,  # closes with this process, which ends the other one
                 stdout=out,
@@ -301,7 +301,7 @@ def _clear_up(folder: Path, edit: Path) -> None:
     atomic_write.clear_up(folder)
 
 
-def _words(scene: Scene, strip: Strip, film: Film) -> list[str]:
+def _options(scene: Scene, strip: Strip, film: Film) -> list[str]:
     """Return the command's options. Names can begin with a dash."""
     kind = next(name for name, kind in KINDS.items() if kind == film.kind)
     names = [f"--scene={scene.name}", f"--strip={strip.name}", f"--format={kind}", f"--output={film.place.parent}"]

@@ -82,7 +82,7 @@ def _effect(session: RenderSession, shown: tuple) -> EffectCheck:
     """Check an effect of `_shown_effects`."""
     scene, effect, strip, frames = shown
     check = EffectCheck(strip=strip.name, shutters=len(effect.shutters))
-    if not _look_at_footage(check, scene, effect, strip):
+    if not _check_footage(check, scene, effect, strip):
         return check
     try:
         taken = snapshot.take(scene, effect, strip, frames)
@@ -95,8 +95,8 @@ def _effect(session: RenderSession, shown: tuple) -> EffectCheck:
         source = renderer.source
         check.inbetween = source.step
         check.window = max(request.state.options.window for request in requests.values()) // source.step
-        _look_at_frames(check, renderer, requests)
-        _look_at_mattes(check, source, requests)
+        _check_frames(check, renderer, requests)
+        _check_mattes(check, source, requests)
         check.notes += _notes(check, taken, requests, source)
     return check
 
@@ -117,7 +117,7 @@ def _requests(session: RenderSession, taken: snapshot.Snapshot, check: EffectChe
     return requests
 
 
-def _look_at_footage(check: EffectCheck, scene: Scene, effect: PropertyGroup, strip: Strip) -> bool:
+def _check_footage(check: EffectCheck, scene: Scene, effect: PropertyGroup, strip: Strip) -> bool:
     """Return whether the footage can be opened. Note if it has changed since the edit was saved.
 
     The effect's scene has the size of the footage then.
@@ -142,7 +142,7 @@ def _look_at_footage(check: EffectCheck, scene: Scene, effect: PropertyGroup, st
     return True
 
 
-def _look_at_frames(check: EffectCheck, renderer: Renderer, requests: dict[float, Request]) -> None:
+def _check_frames(check: EffectCheck, renderer: Renderer, requests: dict[float, Request]) -> None:
     """Check the files that windows need: all of image sequences, and the first and last frame of a movie."""
     step = renderer.source.step
     needed: set[int] = set().union(*map(renderer.missing, requests.values()))
@@ -171,7 +171,7 @@ def _unreadable(source: FrameSource, indices: set[int], step: int = 1) -> list[s
     return faults
 
 
-def _look_at_mattes(check: EffectCheck, source: FrameSource, requests: dict[float, Request]) -> None:
+def _check_mattes(check: EffectCheck, source: FrameSource, requests: dict[float, Request]) -> None:
     shown: dict = {}
     for request in requests.values():
         layers = request.state.layers

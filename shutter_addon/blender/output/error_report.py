@@ -31,12 +31,12 @@ BACKENDS = {"OPENGL": "OpenGL", "VULKAN": "Vulkan", "METAL": "Metal", "NONE": "n
 
 def text(scene: Scene | None) -> str:
     """Return the report, on the main thread; `scene` is the sequencer's, or None."""
-    lines = ["### Virtual Shutter: report of an error", "", *_told(_versions), *_told(_device)]
-    lines += ["", "Edit", "", *_told(lambda: _edit(scene) if scene else ["- none"])]
+    lines = ["### Virtual Shutter: report of an error", "", *_lines_of(_versions), *_lines_of(_device)]
+    lines += ["", "Edit", "", *_lines_of(lambda: _edit(scene) if scene else ["- none"])]
     return "\n".join([*lines, "", "Last errors and warnings", "", *(_sentences() or ["- none"]), ""])
 
 
-def _told(part: Callable[[], Iterable[str]]) -> list[str]:
+def _lines_of(part: Callable[[], Iterable[str]]) -> list[str]:
     """Return the lines of a part, as far as nothing fails: the edit or a driver can be broken in any way."""
     lines: list[str] = []
     try:

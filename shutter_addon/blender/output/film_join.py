@@ -27,8 +27,8 @@ def check(output: Path, read: list[Path]) -> None:
     """Raise OutputError if the movie cannot be there; `read` are files that must not be overwritten."""
     if not film_output.is_movie(output):
         raise OutputError(f"{output}: none of {', '.join(film_output.MOVIES)}")
-    film_output.for_blender(str(output))
-    film_output.spare([output], read)
+    film_output.blender_path(str(output))
+    film_output.refuse_overwriting([output], read)
 
 
 def rehearse(scene: Scene, output: Path, file_format: str, frames: range) -> None:
@@ -87,9 +87,9 @@ def join(
     with progress(len(paths), "picture") as looked:
         first = _common(paths, looked, size, key)
     _refuse_transparency(scene, paths, first)
-    _lay_over(scene, paths, first)
+    _cover_edit(scene, paths, first)
     _set_output(scene, output, size)
-    film_output.prepare(output.parent)
+    film_output.make_folder(output.parent)
     left = iter(paths[1:])
     with progress(len(paths), "frame") as moved:
 
@@ -99,7 +99,7 @@ def join(
             if (path := next(left, None)) and not path.is_file():
                 raise OutputError(f"{path}: no such file")
 
-        film_output.write(scene, output, rendered)
+        film_output.render_frames(scene, output, rendered)
 
 
 def _pictures(folder: Path, frames: range) -> list[Path]:
@@ -132,7 +132,7 @@ def _are(frames: list[int]) -> str:
     return f"{frame_ranges.in_words(frames)} {'is' if len(frames) == 1 else 'are'}"
 
 
-def say_what_is_left_out(folder: Path, frames: range) -> None:
+def warn_of_other_pictures(folder: Path, frames: range) -> None:
     """Print a warning about pictures that are not frames of the edit."""
     if others := [frame for frame in _numbered(folder) if frame not in frames]:
         words = f"{folder}: {_are(others)} not of the edit, and left out"
@@ -209,7 +209,7 @@ def _shown(scene: Scene) -> Scene | ImageFormatSettings:
     return settings if settings.color_management == "OVERRIDE" else scene
 
 
-def _lay_over(scene: Scene, paths: list[Path], first: RenderedPicture) -> None:
+def _cover_edit(scene: Scene, paths: list[Path], first: RenderedPicture) -> None:
     """Cover everything that the edit shows with the pictures. Sounds stay."""
     editor = scene.sequence_editor
     editor.display_stack(None)  # Blender renders the meta strip that was open when the file was saved

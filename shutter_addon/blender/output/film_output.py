@@ -106,7 +106,7 @@ def check_writable(folder: Path) -> None:
         raise OutputError(f"{place}: {error.strerror or error}") from None
 
 
-def spare(written: Iterable[Path], read: Collection[Path]) -> None:
+def refuse_overwriting(written: Iterable[Path], read: Collection[Path]) -> None:
     """Raise OutputError if a file to write is one that is read, also through links, or is written twice."""
     taken = {_identity(path): path for path in read}
     places = set()
@@ -133,7 +133,7 @@ def pictures_of(folder: Path, ending: str, frames: range) -> list[Path]:
     return [folder / f"{frame:04d}.{ending}" for frame in frames]
 
 
-def for_blender(path: str) -> str:
+def blender_path(path: str) -> str:
     """Return the path with braces escaped, which Blender uses for templates. OutputError: Blender cannot use it."""
     if os.sep == "/" and "\\" in path:
         raise OutputError(f"{path}: Blender cannot write to a path with \\")
@@ -169,7 +169,7 @@ def set_place(render: RenderSettings, path: Path) -> None:
     """Set the output's path, without metadata about the render. OutputError: Blender cannot write there."""
     render.use_file_extension = not is_movie(path)
     _stamp_nothing(render)
-    render.filepath = for_blender(str(path) if is_movie(path) else f"{path}{os.sep}")
+    render.filepath = blender_path(str(path) if is_movie(path) else f"{path}{os.sep}")
 
 
 def _has_sound(scene: Scene) -> bool:
@@ -203,7 +203,7 @@ def _stamp_nothing(render: RenderSettings) -> None:
         setattr(render, name, False)
 
 
-def film(scene: Scene, output: Path) -> None:
+def render_made_edit(scene: Scene, output: Path) -> None:
     """Render an edit of whole_edits.make_edit to a movie or a folder.
 
     Raises:
@@ -211,13 +211,13 @@ def film(scene: Scene, output: Path) -> None:
             another name.
         InterruptedRenderError: The same, by Ctrl-C or a farm's TERM.
     """
-    prepare(output.parent if is_movie(output) else output)
+    make_folder(output.parent if is_movie(output) else output)
     feed = edit_feed.feeding() if is_movie(output) and strips.effect_strips(scene) else nullcontext()
     with progress(scene.frame_end - scene.frame_start + 1, "frame") as moved, _without_sources(scene), feed:
-        write(scene, output, moved)
+        render_frames(scene, output, moved)
 
 
-def write(scene: Scene, output: Path, moved: Callable[[], None], move: Move = Path.replace) -> None:
+def render_frames(scene: Scene, output: Path, moved: Callable[[], None], move: Move = Path.replace) -> None:
     """Render the frames of an edit to a movie, or to pictures in a prepared folder by the edit's settings.
 
     Blender writes into a folder beside the output, from which finished files are moved.
@@ -227,14 +227,14 @@ def write(scene: Scene, output: Path, moved: Callable[[], None], move: Move = Pa
         move: Moves a picture to its place. It may raise to end the render.
 
     Raises:
-        OutputError, InterruptedRenderError: See `film`.
+        OutputError, InterruptedRenderError: See `render_made_edit`.
     """
     kept = scene.render.filepath
     faults: list[str] = []
     with atomic_write.part_folder(output.parent if is_movie(output) else output) as part:
         part_film = part / f"film{output.suffix}"
         try:
-            scene.render.filepath = for_blender(str(part_film) if is_movie(output) else f"{part}{os.sep}")
+            scene.render.filepath = blender_path(str(part_film) if is_movie(output) else f"{part}{os.sep}")
             with (
                 render_job.telling(faults.append),
                 stoppable() as stopped,
@@ -261,7 +261,7 @@ def write(scene: Scene, output: Path, moved: Callable[[], None], move: Move = Pa
             raise InterruptedRenderError(f"{output}: stopped{rescued}")
 
 
-def prepare(folder: Path) -> None:
+def make_folder(folder: Path) -> None:
     """Make a folder and remove abandoned parts in it. OSError: it cannot be made."""
     folder.mkdir(parents=True, exist_ok=True)
     atomic_write.clear_up(folder)

@@ -36,12 +36,12 @@ def recipe_for(scene: Scene, effect: PropertyGroup, strip: Strip, path: Path) ->
     # Find faults before anything is written.
     snapshot.recipe_of(scene, effect, strip, [_ramp(region) for region in regions])
     folders = [_folder(region, path, number) for number, region in enumerate(regions, 1)]
-    _spare(folders, _read(scene, effect, strip, regions))
-    words = [_words(scene, effect, strip, *both, path) for both in zip(regions, folders, strict=True)]
-    return snapshot.recipe_of(scene, effect, strip, words)
+    _refuse_overwriting(folders, _read_files(scene, effect, strip, regions))
+    contents = [_content(scene, effect, strip, *both, path) for both in zip(regions, folders, strict=True)]
+    return snapshot.recipe_of(scene, effect, strip, contents)
 
 
-def save(scene: Scene, effect: PropertyGroup, strip: Strip, region: PropertyGroup, folder: Path, word: str) -> int:
+def save(scene: Scene, effect: PropertyGroup, strip: Strip, region: PropertyGroup, folder: Path, suffix: str) -> int:
     """Write a matte, ramp or outline at each timeline frame of the effect strip, all or none, and return their number.
 
     Files are FRAME.png, 16-bit grey, or FRAME.exr, float, with the channel Y.
@@ -51,11 +51,11 @@ def save(scene: Scene, effect: PropertyGroup, strip: Strip, region: PropertyGrou
         OSError: Their folder cannot be written to.
     """
     folder.mkdir(parents=True, exist_ok=True)
-    _spare([folder], _read(scene, effect, strip, strips.matte_regions(effect)))
+    _refuse_overwriting([folder], _read_files(scene, effect, strip, strips.matte_regions(effect)))
     with atomic_write.part_folder(folder) as part:
-        frames = [frame for frame, _key in _write_frames(scene, effect, strip, region, part, word)]
+        frames = [frame for frame, _key in _write_frames(scene, effect, strip, region, part, suffix)]
         for frame in frames:
-            os.replace(part / _name(frame, word), folder / _name(frame, word))
+            os.replace(part / _name(frame, suffix), folder / _name(frame, suffix))
     return len(frames)
 
 
@@ -78,7 +78,7 @@ def _is_one_of_many(region: PropertyGroup) -> bool:
     return region.image.source == "FILE" and path.exists() and len(sequence_files(path)) > 1
 
 
-def _read(scene: Scene, effect: PropertyGroup, strip: Strip, regions: list) -> Iterator[Path]:
+def _read_files(scene: Scene, effect: PropertyGroup, strip: Strip, regions: list) -> Iterator[Path]:
     """Yield a file of each medium that the effect's mattes and source read."""
     yield source_media.spec(strips.source_of(scene, effect, strip)).path
     for region in regions:
@@ -88,7 +88,7 @@ def _read(scene: Scene, effect: PropertyGroup, strip: Strip, regions: list) -> I
             yield from (source_media.spec(part).path for part in matte_content.parts_for(region, strip))
 
 
-def _spare(folders: list[Path | None], read: Iterator[Path]) -> None:
+def _refuse_overwriting(folders: list[Path | None], read: Iterator[Path]) -> None:
     """Raise EffectError if pictures would be written where others are read."""
     taken = {file.parent.resolve() for file in read}
     for folder in folders:
@@ -97,7 +97,7 @@ def _spare(folders: list[Path | None], read: Iterator[Path]) -> None:
             raise EffectError(sentence.format(folder=folder))
 
 
-def _words(
+def _content(
     scene: Scene, effect: PropertyGroup, strip: Strip, region: PropertyGroup, folder: Path | None, path: Path
 ) -> FileContent | RampContent:
     if region.kind == "RAMP":
@@ -126,12 +126,12 @@ def _write(scene: Scene, effect: PropertyGroup, strip: Strip, region: PropertyGr
     return folder / _name(1)
 
 
-def _name(number: int, word: str = "png") -> str:
-    return f"{number:04d}.{word}"
+def _name(number: int, suffix: str = "png") -> str:
+    return f"{number:04d}.{suffix}"
 
 
 def _write_frames(
-    scene: Scene, effect: PropertyGroup, strip: Strip, region: PropertyGroup, folder: Path, word: str = "png"
+    scene: Scene, effect: PropertyGroup, strip: Strip, region: PropertyGroup, folder: Path, suffix: str = "png"
 ) -> Iterator[tuple[int, Hashable]]:
     """Write a matte at each timeline frame of the effect strip. Yield the frame, and a key of the values."""
     frames = range(strip.left_handle, strip.right_handle)
@@ -143,8 +143,8 @@ def _write_frames(
             with translated(rpt_):
                 matte = mattes.Matte(shutter=0, content=content.at(frame))
             ((key, array),) = values.values((matte,), clip.shown(frame).source_frame, 1)
-            if word == "exr":
-                write_exr(folder / _name(frame, word), array[..., None], ["Y"])
+            if suffix == "exr":
+                write_exr(folder / _name(frame, suffix), array[..., None], ["Y"])
             else:
-                write_grey(folder / _name(frame, word), array)
+                write_grey(folder / _name(frame, suffix), array)
             yield frame, key

@@ -35,8 +35,8 @@ def check(folder: Path, file_format: str | None, frames: range, read: list[Path]
         words = "a saved edit is rendered to a folder of pictures, not to a movie"
         raise film_output.OutputError(f"{folder}: {words}")
     film_output.check_folder(folder, file_format)
-    film_output.for_blender(str(folder))
-    film_output.spare(film_output.pictures_of(folder, file_format or "png", frames), read)
+    film_output.blender_path(str(folder))
+    film_output.refuse_overwriting(film_output.pictures_of(folder, file_format or "png", frames), read)
 
 
 def check_resumable(scene: Scene) -> None:
@@ -47,7 +47,7 @@ def check_resumable(scene: Scene) -> None:
 
 
 @contextmanager
-def of_same_footage(scene: Scene) -> Iterator[Stamps]:
+def refuse_changed_footage(scene: Scene) -> Iterator[Stamps]:
     """Remove pictures that are rendered in this context if the footage changes meanwhile.
 
     They carry the key of the earlier footage and would count as finished. Pictures of other processes stay.
@@ -80,13 +80,13 @@ def render(
         resume: Skip finished frames, and wait for frames that other processes render, until these finish or give up.
 
     Raises:
-        OutputError, InterruptedRenderError: See film_output.film, or the folder's job has changed.
+        OutputError, InterruptedRenderError: See film_output.render_made_edit, or the folder's job has changed.
         OSError: The folder cannot be written to.
     """
     if resume:
         check_resumable(scene)
     film_output.set_pictures(scene, file_format, job_file.note(version.key))
-    film_output.prepare(folder)
+    film_output.make_folder(folder)
     samples = film_output.FORMATS[file_format].samples
     is_finished = partial(_is_finished, film_output.size(scene), samples, version.key, {})
     frames = range(scene.frame_start, scene.frame_end + 1)
@@ -99,7 +99,7 @@ def render(
         rendered[picture] = stamp
 
     with film_output.progress(len(pictures), "frame") as moved:
-        write = partial(film_output.write, scene, folder, moved, move)
+        write = partial(film_output.render_frames, scene, folder, moved, move)
         if resume:
             _render_missing(scene, folder, pictures, is_finished, write, moved)
         else:
