@@ -27,6 +27,7 @@ LACKING = [
     ("line", "find_readout", {}, f"the readout is found by {OUTLINE}"),
     ("line", "rolling_shutter", {}, MOMENTS),
     ("line", "outline_it", {}, f"outlines are proposed by {OUTLINE}"),
+    ("line", "subject_find", {}, f"subjects are found by {OUTLINE}"),
     ("line", "bake", {"file_format": "MOVIE"}, BAKE),
     ("outline", "track", {}, TRACKING),
     ("outline", "outline_carry", {}, f"outlines are tracked by {OUTLINE}"),

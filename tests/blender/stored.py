@@ -25,6 +25,8 @@ RECORDS = {
     "RegionKey": records.RegionKey,
     "Shutter": records.ShutterRecord,
     "ShutterKey": records.BarsKey,
+    "StrokesKey": records.StrokesKey,
+    "SubjectRegion": records.SubjectRecord,
     "ValueKey": records.ValueKey,
 }
 

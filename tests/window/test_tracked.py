@@ -2,6 +2,7 @@
 
 import shutil
 
+import av
 import numpy as np
 import pytest
 from screens import apart_on_screen, assert_alike, crop, pixels
@@ -59,6 +60,38 @@ def test_the_first_stroke(backend, tmp_path):
     row, column = round((1 - y) * apart.shape[0]), round(x * apart.shape[1])
     assert apart[row - 2 : row + 3, column - 2 : column + 3].max() <= 6
     assert apart.max() > 60
+
+
+def excerpt(movie, frames, to):
+    """Some frames of a movie, small, without its sound, which would be a strip of its own."""
+    with av.open(movie) as read, av.open(to, "w") as written:
+        stream = written.add_stream("libx264", rate=24, options={"qp": "10"})
+        stream.width, stream.height, stream.pix_fmt = 640, 360, "yuv420p"
+        for number, frame in enumerate(read.decode(video=0)):
+            if number in frames:
+                smaller = frame.to_ndarray(width=640, height=360, format="rgb24")
+                written.mux(stream.encode(av.VideoFrame.from_ndarray(smaller)))
+        written.mux(stream.encode())
+    return to
+
+
+def test_a_subject(tmp_path):
+    """One stroke is enough, without Track: from an empty file to a rendered Sharp Subject in eight actions. The bunny
+    is sharp, from head to foot, and leaves no ghost of the frames around."""
+    (tmp_path / "footage").mkdir()
+    footage = excerpt(ROOT / "assets" / "bigbuckbunny.mp4", range(82, 98), tmp_path / "footage" / "bunny.mp4")
+    given = {"footage": footage, "packages": packages(tmp_path / "packages")}
+    seen, console = tell("subject_story.py", "opengl", linked(tmp_path), **given)
+    assert "Traceback" not in console
+    facts = {name: entry[name] for entry in seen for name in entry}
+    assert len(facts["actions"]) <= 8
+    final = pixels(tmp_path / "final.png")
+    with open_source(footage) as source:
+        plain = source.read(7)[..., :3]
+    apart = np.abs(final - plain).max(axis=2)
+    for row, column in ((90, 235), (150, 240), (240, 245), (95, 110)):  # chin, belly, arm
+        assert apart[row - 4 : row + 5, column - 4 : column + 5].mean() <= 3, (row, column)
+    assert apart.max() > 40, "the ground is exposed for long"
 
 
 def test_an_outline(tmp_path):

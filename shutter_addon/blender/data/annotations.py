@@ -17,6 +17,9 @@ from .fcurves import numbers
 # Pixels of a strip's side on the image, below which nobody sees where its scribbles are.
 _SMALLEST = 4
 USERS = "user"  # in place of an effect's identity: the annotation is the user's own, whatever its name
+# Properties of a region: its strokes; of a subject, strokes on what that is not, and outlines that overrule the model.
+LAYERS = "layer", "not_layer", "outline_layer"
+NOT_THIS = (0.9, 0.1, 0.1)  # color of strokes on what a subject is not
 # The numbers of a strip's transform that can be keyed.
 TRANSFORM = ("offset_x", "offset_y", "scale_x", "scale_y", "rotation")
 
@@ -96,10 +99,15 @@ def add_stroke(drawing: AnnotationFrame, points: np.ndarray) -> None:
     stroke.points.foreach_set("co", places.ravel())
 
 
-def layer_of(effect: PropertyGroup, region: PropertyGroup) -> Any:
-    """The annotation layer of a region, or None."""
+def layer_of(effect: PropertyGroup, region: PropertyGroup, name: str = "layer") -> Any:
+    """The annotation layer that a property of a region, one of LAYERS, has the name of, or None."""
     annotation = effect.scene and effect.scene.annotation
-    return annotation.layers.get(region.layer) if annotation else None
+    return annotation.layers.get(getattr(region, name)) if annotation else None
+
+
+def layers_of(effect: PropertyGroup, region: PropertyGroup) -> list:
+    """All annotation layers of a region."""
+    return [layer for name in LAYERS if (layer := layer_of(effect, region, name)) is not None]
 
 
 def is_hidden(effect: PropertyGroup, region: PropertyGroup) -> bool:

@@ -24,7 +24,9 @@ from ...media.carried_mattes import FOLDER, CarriedFile
 from ...media.files import stamp
 from ...media.opening import MatteFile
 from ...media.sequence import sequence_files
-from . import mask_reading, source_media, strips, validation
+from ...media.subject import WIDTH
+from ...media.subject_mattes import Subject, SubjectFile
+from . import mask_reading, preferences, source_media, strips, validation
 from .external_files import absolute
 from .sampled import Frames, over
 
@@ -55,8 +57,26 @@ def carried_file(effect: PropertyGroup, strip: Strip, drawn: dict[int, outlines.
     """What gives the mattes of an outline in the frames of the source, by the curves at some of them. EffectError,
     MediaError: there is no source."""
     spec = source_media.spec(strips.source_of(effect.id_data, effect, strip))
-    place = Path(bpy.data.filepath).parent if bpy.data.filepath else Path(bpy.app.tempdir)  # which Blender clears up
-    return CarriedFile(footage=spec, drawings=tuple(sorted(drawn.items())), folder=place / FOLDER)
+    return CarriedFile(footage=spec, drawings=tuple(sorted(drawn.items())), folder=_folder())
+
+
+def subject_file(
+    effect: PropertyGroup,
+    strip: Strip,
+    strokes: dict[int, outlines.Curves],
+    nots: dict[int, outlines.Curves],
+    drawn: dict[int, outlines.Curves],
+) -> SubjectFile:
+    """As carried_file, of a subject under strokes, by the source's frame."""
+    spec = source_media.spec(strips.source_of(effect.id_data, effect, strip))
+    subject = Subject(strokes=strokes, nots=nots, width=WIDTH)
+    drawings, model = tuple(sorted(drawn.items())), preferences.model()
+    return SubjectFile(footage=spec, subject=subject, drawings=drawings, folder=_folder(), model=model)
+
+
+def _folder() -> Path:
+    """Where mattes are kept: beside the file, until that is saved where Blender clears up."""
+    return (Path(bpy.data.filepath).parent if bpy.data.filepath else Path(bpy.app.tempdir)) / FOLDER
 
 
 def channel(region: PropertyGroup) -> str:

@@ -108,11 +108,12 @@ def drawings(
     region: PropertyGroup,
     placement: keyframes.Channel | None,
     frames: Frames | None,
+    layer_name: str = "layer",
 ) -> model.Drawings:
     """A region's drawings: between two of them with the ease of its location's keys. Only those that the frames need
-    are read; None: all."""
+    are read; None: all. layer_name: one of annotations.LAYERS"""
     width, height = annotations.picture_size(effect)
-    layer = annotations.layer_of(effect, region)
+    layer = annotations.layer_of(effect, region, layer_name)
     drawings = sorted(layer.frames, key=lambda drawing: drawing.frame_number) if layer else []
     numbers = tuple(drawing.frame_number for drawing in drawings)
     frames = numbers if frames is None else frames

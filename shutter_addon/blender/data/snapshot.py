@@ -26,8 +26,9 @@ from ...core.model.fields import fields_of
 from ...core.model.frame_state import Options
 from ...core.recipes import baking
 from ...media.carried_mattes import CarriedFile
+from ...media.subject_mattes import SubjectFile
 from . import matte_content, sampled, source_media, strips, validation
-from .annotations import image_to_picture, layer_of, picture_size
+from .annotations import LAYERS, image_to_picture, layer_of, layers_of, picture_size
 from .fcurves import Curves, curves_under, key_frames, leading, progress, stretched
 from .sampled import Frames
 
@@ -167,8 +168,9 @@ def strokes_at(scene: Scene, effect: PropertyGroup, strip: Strip, index: int, fr
 
 def region_at(scene: Scene, effect: PropertyGroup, strip: Strip, index: int, frames: Frames) -> Any:
     """A region as plain data, by its kind a Region or a MatteRegion, its channels sampled at timeline frames; an
-    outline is the Region that its curves would be as a lasso. What is wrong at one frame is told at that frame."""
-    read_region = _region if effect.regions[index].kind == "OUTLINE" else _any_region
+    outline is the Region that its curves would be as a lasso, and a subject that of its strokes as lines. What is wrong
+    at one frame is told at that frame."""
+    read_region = _region if effect.regions[index].kind in strips.OUTLINED else _any_region
     return read_region(_Sampling.of(Curves(scene), effect, strip, frames), index, 0)
 
 
@@ -182,14 +184,17 @@ def matte_content_at(
 
 def carried_outline(
     scene: Scene, effect: PropertyGroup, strip: Strip, index: int, frames: Frames
-) -> tuple[CarriedFile, dict[float, int]]:
-    """What gives the mattes of an outline (a media.carried_mattes.CarriedFile), and which of the source's filmed frames
-    timeline frames show. EffectError, MediaError: it is straight, or has no source."""
+) -> tuple[CarriedFile | SubjectFile, dict[float, int]]:
+    """What gives the mattes of an outline or a subject, and which of the source's filmed frames timeline frames show.
+    EffectError, MediaError: it is straight, or has no source."""
     region = effect.regions[index]
+    sampling = _Sampling.of(Curves(scene), effect, strip, frames)
+    shown = source_frames(scene, effect, strip, frames)
+    if region.kind == "SUBJECT":
+        return _subject_file(sampling, *_marks(sampling, index).values()), shown
     if validation.word(region, "between") == "STRAIGHT":
         raise EffectError(rpt_("{place}: a linear outline is not tracked").format(place=validation.place(region)))
-    sampling = _Sampling.of(Curves(scene), effect, strip, frames)
-    return _carried(sampling, _drawings(sampling, index)), source_frames(scene, effect, strip, frames)
+    return _carried(sampling, _drawings(sampling, index)), shown
 
 
 def drawn_outline(scene: Scene, effect: PropertyGroup, strip: Strip, index: int) -> dict[int, outlines.Curves]:
@@ -362,6 +367,9 @@ def _any_region(sampling: _Sampling, index: int, shutter: int) -> model.Region |
         drawings = _drawings(sampling, index)
         kind, drawn = model.OutlineRegion, {"drawings": drawings}
         content = sampled.tried(_outlines, sampling, region, drawings)
+    elif region.kind == "SUBJECT":
+        kind, drawn = model.SubjectRegion, _marks(sampling, index)
+        content = sampled.tried(lambda: mattes.FileFrames(file=_subject_file(sampling, *drawn.values())))
     else:
         content = sampled.tried(matte_content.content, effect, sampling.strip, region, moves, frames, sampling.time)
     fields = sampled.tried(sampled.sampled_fields, curves, region, path, kind, frames)
@@ -386,6 +394,12 @@ def _carried(sampling: _Sampling, drawings: model.Drawings) -> CarriedFile:
     return matte_content.carried_file(sampling.effect, sampling.strip, drawn)
 
 
+def _subject_file(sampling: _Sampling, *marks: model.Drawings) -> SubjectFile:
+    """marks: of _marks."""
+    strokes, nots, drawn = (_by_source_frame(sampling, each) for each in marks)
+    return matte_content.subject_file(sampling.effect, sampling.strip, strokes, nots, drawn)
+
+
 def _by_source_frame(sampling: _Sampling, drawings: model.Drawings) -> dict[int, outlines.Curves]:
     """The curves of drawings by the source's filmed frame. EffectError, MediaError: there is no source."""
     numbers, effect, strip = drawings.frames, sampling.effect, sampling.strip
@@ -395,18 +409,27 @@ def _by_source_frame(sampling: _Sampling, drawings: model.Drawings) -> dict[int,
     return {int(shown(frame)): outlines.curves(placed.drawing(i, frame)) for i, frame in enumerate(numbers)}
 
 
-def _drawings(sampling: _Sampling, index: int) -> model.Drawings:
+def _drawings(sampling: _Sampling, index: int, layer: str = "layer") -> model.Drawings:
     effect, path = sampling.effect, f"{sampling.effect.path_from_id()}.regions[{index}]"
-    return sampled.drawings(sampling.curves, path, effect, effect.regions[index], sampling.placement, None)
+    return sampled.drawings(sampling.curves, path, effect, effect.regions[index], sampling.placement, None, layer)
+
+
+def _marks(sampling: _Sampling, index: int) -> dict[str, model.Drawings]:
+    """What is drawn in a subject, by the names of model.SubjectRegion."""
+    names = "drawings", "nots", "outlines"
+    return {name: _drawings(sampling, index, layer) for name, layer in zip(names, LAYERS, strict=True)}
 
 
 def _region(sampling: _Sampling, index: int, shutter: int) -> model.Region:
     effect, curves, frames = sampling.effect, sampling.curves, sampling.frames
     region, path = effect.regions[index], f"{effect.path_from_id()}.regions[{index}]"
+    layer = layer_of(effect, region)
+    has_outlines_alone = region.kind == "SUBJECT" and not (layer and layer.frames)
+    name = "outline_layer" if has_outlines_alone else "layer"
     return model.Region(
         shutter=shutter,
         kind=keyframes.Constant(sampled.tried(_word_of_kind, region)),
-        drawings=sampled.drawings(curves, path, effect, region, sampling.placement, frames),
+        drawings=sampled.drawings(curves, path, effect, region, sampling.placement, frames, name),
         moves=sampled.moves(curves, region, path, frames),
         **sampled.sampled_fields(curves, region, path, model.Region, frames),
     )
@@ -414,7 +437,7 @@ def _region(sampling: _Sampling, index: int, shutter: int) -> model.Region:
 
 def _word_of_kind(region: PropertyGroup) -> str:
     word = validation.word(region, "kind").lower()
-    return "lasso" if word == "outline" else word
+    return {"outline": "lasso", "subject": "line"}.get(word, word)
 
 
 def _camera(curves: Curves, effect: PropertyGroup, frames: Frames) -> model.Camera:
@@ -431,7 +454,7 @@ def recipe_of(scene: Scene, effect: PropertyGroup, strip: Strip, contents: Seque
     if not -limits.MAX_FRAME <= shown.start <= shown.stop <= limits.MAX_FRAME:
         sentence = rpt_('strip "{strip}" lies at frames {first} to {last}, where no timeline is')
         raise EffectError(sentence.format(strip=strip.name, first=shown.start, last=shown.stop - 1))
-    drawn = [region for region in strips.drawn_regions(effect) if layer_of(effect, region)]
+    drawn = [region for region in strips.drawn_regions(effect) if layers_of(effect, region)]
     for item in (*effect.shutters, *drawn, *strips.matte_regions(effect)):
         _check_name(item)
     for shutter in effect.shutters:
@@ -450,8 +473,8 @@ def _keyed(scene: Scene, effect: PropertyGroup) -> set[float]:
     curves, pace = curves_under(scene, effect.path_from_id() + "."), stretched(scene)
     # In float32, as the keys of Curves are.
     frames = set((np.array(key_frames(curves), np.float32) / pace).tolist())
-    layers = (layer_of(effect, region) for region in effect.regions)
-    return frames.union(float(drawing.frame_number) for layer in layers if layer for drawing in layer.frames)
+    layers = (layer for region in effect.regions for layer in layers_of(effect, region))
+    return frames.union(float(drawing.frame_number) for layer in layers for drawing in layer.frames)
 
 
 def _check_name(item: PropertyGroup) -> None:

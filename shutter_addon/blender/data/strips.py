@@ -17,15 +17,16 @@ ENGINE = "VIRTUAL_SHUTTER"
 CHANNELS = 128  # of Blender's sequencer
 SOURCES = ("MOVIE", "IMAGE", "MOVIECLIP")
 MATTES = ("MATTE", "RAMP")  # kinds of regions that have no strokes
-LAID = ("OUTLINE", *MATTES)  # kinds of mattes, which are laid over what scribbles give
+OUTLINED = ("OUTLINE", "SUBJECT")  # kinds that have outlines, drawn or carried
+LAID = (*OUTLINED, *MATTES)  # kinds of mattes, which are laid over what scribbles give
 # Where Blender scales or turns a Scene strip, it mixes the light of pixels, and of movies and 8-bit pictures their code
 # values. It makes code values first where a strip's colours are multiplied: by this, nothing else changes.
 IN_CODE_VALUES = 1 + 2**-23
 
 
 def is_carried(region: PropertyGroup) -> bool:
-    """Whether a region is an outline that the footage's own motion carries from drawing to drawing."""
-    return region.kind == "OUTLINE" and region.between != "STRAIGHT"
+    """Whether a region is a subject, or an outline that the footage's own motion carries from drawing to drawing."""
+    return region.kind == "SUBJECT" or (region.kind == "OUTLINE" and region.between != "STRAIGHT")
 
 
 def all_strips(scene: Scene) -> Iterable[Strip]:

@@ -16,6 +16,7 @@ from ...compute.renderer import Renderer
 from ...compute.request import Request
 from ...core import stopping, told
 from ...core.model.choices import CONTEXT
+from ...core.model.effect import SubjectRegion
 from ...core.model.frame_state import FrameState
 from ...devices.device import Texture
 from ..data import annotations, preview_areas, selection
@@ -305,13 +306,18 @@ def _show_strokes(context: Context, quad: Quad, shown: Shown, snapshot: Snapshot
     """The scribbles where they are by now."""
     if not context.space_data.show_overlays:
         return
-    shapes = snapshot.effect.drawn_at(shown.scene.frame_current)
+    frame = shown.scene.frame_current
+    shapes = snapshot.effect.drawn_at(frame)
     for is_hidden, shape in zip(shown.hides_strokes, shapes, strict=True):
         if is_hidden:
             continue
         color = (*shown.effect.shutters[shape.shutter].color, shape.opacity)
         for points in shape.strokes:
             drawing.lines(quad.view.on_region(points), color, closed=shape.kind == "lasso", width=2)
+    for region in snapshot.effect.regions:
+        nots = region.nots if isinstance(region, SubjectRegion) else None
+        for points in nots.at(frame) if nots is not None and frame in nots.frames else ():
+            drawing.lines(quad.view.on_region(points), (*annotations.NOT_THIS, 1.0), width=2)
 
 
 def _show_source(quad: Quad, shown: Shown, renderer: Renderer, request: Request, right: float) -> None:

@@ -24,12 +24,14 @@ TICK = 0.25  # seconds from one look at the thread to the next
 class _Carrying:
     """The mattes that a thread carries: it touches no bpy.
 
-    frames: what is to come, the source frames of a file, those first that are drawn; done: how many are there by now
+    frames: what is to come, the source frames of a file, those first that are drawn, then those nearest to a middle
+    done: how many are there by now
     arrived: called on Blender's main thread when what is drawn is there, and when all is"""
 
     file: CarriedFile
     frames: list[int]
     arrived: Callable[[], None]
+    middle: int | None = None  # None: that of the frames
     done: int = 0
     told: int = 0  # how many were there when `arrived` was called
     ended: threading.Event = field(default_factory=threading.Event)
@@ -38,8 +40,9 @@ class _Carrying:
 
     def __post_init__(self) -> None:
         drawn = {frame for frame, _curves in self.file.drawings}
-        self.frames.sort(key=lambda frame: (frame not in drawn, frame))
-        self.soon = len(drawn & set(self.frames))
+        middle = sorted(self.frames)[len(self.frames) // 2] if self.middle is None else self.middle
+        self.frames.sort(key=lambda frame: (frame not in drawn, abs(frame - middle)))
+        self.soon = len(drawn & set(self.frames)) or 1
         self.future = threads.start(self._carry)
 
     def _carry(self) -> None:
@@ -73,11 +76,12 @@ def begin(arrived: Callable[[], None]) -> str | None:
     return next(iter(_failed.values()), None)
 
 
-def carry(file: CarriedFile, frames: list[int], arrived: Callable[[], None]) -> None:
-    """Carries the mattes of source frames, in place of what is on its way; arrived: as for `begin`."""
+def carry(file: CarriedFile, frames: list[int], arrived: Callable[[], None], middle: int | None = None) -> None:
+    """Carries the mattes of source frames, in place of what is on its way, from a middle outwards; arrived: as for
+    `begin`."""
     stop()
     _failed.pop(file, None)
-    _running.append(_Carrying(file=file, frames=frames, arrived=arrived))
+    _running.append(_Carrying(file=file, frames=frames, arrived=arrived, middle=middle))
     main_thread.later(_look, TICK)
 
 

@@ -64,13 +64,19 @@ STROKES = (
 )
 
 
-DRAWN = (*STROKES, ("OUTLINE", "Outline", "A drawn matte: everything inside closed curves, exact to the pixel"))
+DRAWN = (
+    *STROKES,
+    ("OUTLINE", "Outline", "A drawn matte: everything inside closed curves, exact to the pixel"),
+    ("SUBJECT", "Subject", "What a model finds under strokes, and follows: outlines that are drawn overrule it"),
+)
 
 
+# Files keep the number of an item.
 KINDS = (
-    *DRAWN,
+    *DRAWN[:-1],
     ("MATTE", "Matte", "A value per pixel from a file, a strip or a mask"),
     ("RAMP", "Ramp", "A gradient across the picture, from none of the shutter to all of it"),
+    DRAWN[-1],
 )
 
 

@@ -226,6 +226,34 @@ class OutlineRegion(MatteRegion):
         return scribbles.Shape(shutter=self.shutter, kind="lasso", width=0.0, strokes=strokes)
 
 
+@dataclass(frozen=True, eq=False, kw_only=True)
+class SubjectRegion(MatteRegion):
+    """A region whose matte is a subject that a model finds under strokes. It moves about the centre of these, or without
+    any, of its outlines.
+
+    drawings: strokes on the subject; nots: strokes on what it is not; outlines: closed curves, which overrule the model
+    content: a channel of mattes.FileFrame"""
+
+    drawings: Drawings
+    nots: Drawings
+    outlines: Drawings
+
+    def centre(self, frame: float) -> np.ndarray | None:
+        return self._placed.centre(frame)
+
+    def corners(self, frame: float) -> np.ndarray:
+        return self._placed.corners(frame, self.placement(frame))
+
+    @property
+    def _placed(self) -> Drawings:
+        return self.drawings if self.drawings.frames else self.outlines
+
+    def drawn_at(self, frame: float) -> scribbles.Shape:
+        """The strokes that are drawn at a frame, as lines. EffectError: they are nowhere near the picture."""
+        strokes = tuple(self.drawings.at(frame)) if frame in self.drawings.frames else ()
+        return scribbles.Shape(shutter=self.shutter, kind="line", width=0.0, strokes=strokes)
+
+
 def drawn_outlines(drawings: Drawings) -> Channel:
     """Return a channel of mattes.Outline that moves linearly from one drawing to the next."""
     return keyframes.Computed(lambda frame: mattes.Outline(outlines.curves(drawings.at(frame))))
@@ -487,8 +515,8 @@ class Effect:
 
         Args:
             aspect: The picture's width / height.
-            files: Gives the file of a matte, the source's luminance for a ramp, and the carried mattes of an outline.
-                Without it, values of these cannot be read.
+            files: Gives the file of a matte, the source's luminance for a ramp, and the mattes of an outline or a
+                subject. Without it, values of these cannot be read.
         """
         return self.with_parts([_placed(region, aspect, files) for region in self.regions])
 
@@ -502,7 +530,7 @@ class Effect:
         Raises:
             EffectError: A shape is too far outside the picture.
         """
-        drawn = [region for region in self.regions if isinstance(region, Region | OutlineRegion)]
+        drawn = [region for region in self.regions if isinstance(region, Region | OutlineRegion | SubjectRegion)]
         return [region.at(frame) if isinstance(region, Region) else region.drawn_at(frame) for region in drawn]
 
     @cached_property

@@ -104,7 +104,7 @@ _UNTOLD = {
         Options, model.Effect, model.Camera, model.Shutter, model.Region, model.OutlineRegion
     ).values()
     if each.recipe and not each.told
-} | {"length": "bars", "keys": [], "time": [], "camera": []}
+} | {"length": "bars", "keys": [], "not_strokes": [], "time": [], "camera": []}
 
 
 def _said(value: Any) -> Any:
@@ -155,6 +155,8 @@ def _reader(kind: Any) -> Reader:
         return partial(_tuple, [_reader(each) for each in inner])
     if kind == records.AnyRegionRecord:
         return _region
+    if kind == records.Strokes:
+        return _strokes
     read = _number_or_keys if float in inner else _reader(inner[0])
     return read if type(None) not in inner else lambda value, place: None if value is None else read(value, place)
 
@@ -209,6 +211,12 @@ def _region(value: Any, place: str) -> Any:
     if not isinstance(kind, str) or kind not in records.KINDS:
         _refuse(f"{place}.kind", f"{shown(kind)} is none of {', '.join(records.KINDS)}")
     return _reader(records.KINDS[kind])(value, place)
+
+
+def _strokes(value: Any, place: str) -> list:
+    """Read strokes of the first frame, or of several frames."""
+    is_keyed = isinstance(value, list) and value and isinstance(value[0], dict)
+    return _reader(list[records.StrokesKey] if is_keyed else list[records.Stroke])(value, place)
 
 
 def _columns(kind: type) -> dict[str, tuple[Reader, bool]]:
