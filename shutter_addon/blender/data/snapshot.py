@@ -35,8 +35,8 @@ from .sampled import Frames
 # Sentences of core/model/effect.py, which are looked up where they are passed on.
 _CORE = (
     n_('shutter "{name}" at frame {frame}: {fault}'),
-    n_('region "{name}": a point of its strokes is nowhere near the picture'),
-    n_('region "{name}": more than {most} points with those before it'),
+    n_('region "{name}": a point of its strokes is too far from the picture'),
+    n_('region "{name}": more than {most} points together with the regions before it'),
     n_('shutter "{name}": bars {first} to {last} of the older file are one filmed frame now, and expose other moments'),
 )
 

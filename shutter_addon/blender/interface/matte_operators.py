@@ -123,7 +123,7 @@ class SHUTTER_OT_matte_export(OfEffect, ImportHelper, Operator):
         self.report({"INFO"}, rpt_('Saved {count} pictures in "{folder}"').format(count=count, folder=folder))
 
 
-_RAMP = EnumProperty(name="Ramp", description="How the ramp runs", items=RAMPS)
+_RAMP = EnumProperty(name="Ramp", description="Shape of the ramp", items=RAMPS)
 
 
 @operator("Ramp", needs.room_for_a_region, ramp=_RAMP)

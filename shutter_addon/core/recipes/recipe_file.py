@@ -1,4 +1,4 @@
-"""Recipes as files: JSON text that is read into an effect, checked, and written."""
+"""Reading, checking and writing recipes as JSON files."""
 
 from __future__ import annotations
 
@@ -7,10 +7,10 @@ import math
 import re
 from collections import Counter
 from collections.abc import Callable
-from dataclasses import fields, is_dataclass
+from dataclasses import MISSING, fields, is_dataclass
 from functools import cache, partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal, get_args, get_origin
+from typing import Any, Literal, NoReturn, get_args, get_origin, get_type_hints
 
 from .. import atomic_write
 from ..model import effect as model
@@ -21,11 +21,9 @@ from . import recipe_check, records
 from .recipe import RecipeError
 from .recipe_check import cut, shown
 
-if TYPE_CHECKING:
-    from cattrs import Converter
-
-# Longer numbers are read as floats, which need no time for it; a whole number that counts anything is far shorter.
+# Longer numbers are read as floats, since parsing huge integers takes long. No count needs as many digits.
 _MAX_DIGITS = 300
+_PLAIN = {int: "a whole number", str: "a text", bool: "true or false"}
 
 
 def load(path: str | Path) -> model.Effect:
@@ -41,10 +39,13 @@ def load(path: str | Path) -> model.Effect:
 
 
 def _read(path: Path) -> str:
-    """The text of a file, a little more at most than a recipe may have. RecipeError, OSError, ValueError: there is
-    none."""
+    """Return a file's text.
+
+    Raises:
+        RecipeError, OSError, ValueError: It cannot be read, or is too large.
+    """
     if path.exists() and not (path.is_file() or path.is_dir()):
-        # opening a pipe would wait for ever, and a device has no end
+        # Opening a pipe would wait forever, and a device has no end.
         raise RecipeError("a pipe or a device, not a file")
     with path.open("rb") as file:
         data = file.read(limits.MAX_BYTES + 1)
@@ -58,34 +59,30 @@ def _check_size(text: str | bytes) -> None:
 
 
 def parse(text: str) -> model.Effect:
-    """Read the recipe in a JSON text. RecipeError: one sentence that names the place, as `shutters[1].bars: …`."""
+    """Read the recipe in a JSON text. RecipeError: one sentence that begins with the place, like `shutters[1].bars`."""
     _check_size(text)
     try:
         data = json.loads(text.removeprefix("\ufeff"), object_pairs_hook=_object, parse_int=_whole)
     except json.JSONDecodeError as error:
         raise RecipeError(f"line {error.lineno}, column {error.colno}: not JSON ({error.msg})") from None
     except RecursionError:
-        raise RecipeError("recipe: lists or objects within one another, too many") from None
+        raise RecipeError("recipe: too many lists or objects within each other") from None
     if isinstance(data, dict) and type(version := data.get("version")) is int and version > records.VERSION:
         newer = f"version: {shown(version)} is of a newer version of Virtual Shutter, this one reads {records.VERSION}"
         raise RecipeError(newer)
     if isinstance(data, dict) and data.get("version") == 1:
-        data.pop("inbetween_method", None)  # there is one way by now
+        data.pop("inbetween_method", None)  # only one method is left
         if data.get("inbetween", 1) != 1:
-            data.setdefault("skip_repeats", False)  # as it was
-    converter = _converter()
-    try:
-        recipe: Any = converter.structure(data, records.RecipeRecord)
-    except Exception as error:
-        raise RecipeError(_first_fault(error)) from None
+            data.setdefault("skip_repeats", False)  # the behaviour of version 1
+    recipe = _reader(records.RecipeRecord)(data, "")
     recipe_check.check(recipe)
     return records.effect_of(recipe)
 
 
 def dump(effect: model.Effect) -> str:
-    """Write a recipe as JSON text, which `parse` reads. Fields that carry nothing are left out."""
+    """Return a recipe as JSON text that `parse` reads. Fields without meaning are left out."""
     text = json.dumps(_said(records.recipe_of(effect)), indent=1, ensure_ascii=False)
-    # People read and edit these files: a list of numbers stays on one line. Texts are found as well, to be passed over.
+    # People edit these files: keep a list of numbers on one line. The pattern also matches strings, to skip them.
     return re.sub(r'"(?:[^"\\]|\\.)*"|\[[-+.\de,\s]+\]', _on_one_line, text) + "\n"
 
 
@@ -95,12 +92,12 @@ def _on_one_line(match: re.Match) -> str:
 
 
 def save(effect: model.Effect, path: str | Path) -> None:
-    """Write a recipe whole or not at all. OSError: it cannot be written."""
+    """Write a recipe, whole or not at all. OSError: it cannot be written."""
     with atomic_write.writing(Path(path)) as part:
         part.write_text(dump(effect), encoding="utf-8")
 
 
-# What few recipes need is said where it says something.
+# Defaults of fields that few recipes need; they are written only with another value.
 _UNTOLD = {
     each.recipe: each.absent
     for each in fields_of(
@@ -111,7 +108,7 @@ _UNTOLD = {
 
 
 def _said(value: Any) -> Any:
-    """Records as JSON has them."""
+    """Return records as JSON data."""
     if is_dataclass(value):
         columns = {each.name: getattr(value, each.name) for each in fields(value)}
         told = {k: v for k, v in columns.items() if v is not None and (k not in _UNTOLD or v != _UNTOLD[k])}
@@ -120,7 +117,7 @@ def _said(value: Any) -> Any:
 
 
 class _Doubled(dict):
-    """An object of JSON that has a field twice, its name in `field`: which one is meant, nobody knows."""
+    """A JSON object with a duplicate field, whose name is in `field`."""
 
     field: str
 
@@ -138,150 +135,112 @@ def _whole(digits: str) -> int | float:
     return int(digits) if len(digits) <= _MAX_DIGITS else float(digits)
 
 
-def _number(value: Any, _kind: Any) -> float:
-    if isinstance(value, bool) or not isinstance(value, int | float):
-        raise ValueError(f"{shown(value)} is not a number")
-    if not math.isfinite(value):
-        raise ValueError(f"{value} is not a finite number")
-    return float(value)
-
-
-def _number_or_keys(converter: Converter, value: Any, kind: Any) -> float | list[records.ValueKey] | None:
-    if value is None and kind != records.Keyable:
-        return None
-    if isinstance(value, list):
-        return converter.structure(value, list[records.ValueKey])
-    try:
-        return _number(value, kind)
-    except ValueError as error:
-        raise ValueError(f"{error}, nor a list of keys") from None
-
-
-def _strokes(converter: Converter, value: Any, _kind: Any) -> list:
-    """Strokes of the first frame, or of several."""
-    is_keyed = isinstance(value, list) and value and isinstance(value[0], dict)
-    return converter.structure(value, list[records.StrokesKey] if is_keyed else list[records.Stroke])
-
-
-def _exactly(wanted: type, name: str) -> Callable[[Any, Any], Any]:
-    def structure(value: Any, _kind: Any) -> Any:
-        if type(value) is not wanted:
-            raise ValueError(f"{shown(value)} is not {name}")
-        return value
-
-    return structure
-
-
-def _choice(value: Any, kind: Any) -> Any:
-    allowed = get_args(kind)
-    if not any(type(value) is type(option) and value == option for option in allowed):
-        raise ValueError(f"{shown(value)} is none of {', '.join(map(str, allowed))}")
-    return value
-
-
-def _tuple(kind: Any, converter: Converter) -> Callable[[Any, Any], Any]:
-    inner = get_args(kind)
-
-    def structure(value: Any, _kind: Any) -> Any:
-        if not isinstance(value, list):
-            raise ValueError(f"{shown(value)} is not a list")
-        if len(value) != len(inner):
-            raise ValueError(f"{len(value)} values, not {len(inner)}")
-        return tuple(converter.structure(v, t) for v, t in zip(value, inner, strict=True))
-
-    return structure
-
-
-def _list(converter: Converter, value: Any, kind: Any) -> list:
-    (inner,) = get_args(kind)
-    if not isinstance(value, list):
-        raise ValueError(f"{shown(value)} is not a list")
-    structure, structured = converter.get_structure_hook(inner), []
-    try:
-        for each in value:
-            structured.append(structure(each, inner))
-    except Exception as error:  # the first one is enough; cattrs' own lists gather millions
-        from cattrs.errors import IterableValidationError, IterableValidationNote
-
-        index = len(structured)
-        error.add_note(IterableValidationNote(f"index {index}", index, inner))
-        raise IterableValidationError("in a list", [error], kind) from None
-    return structured
-
-
-def _dataclass(kind: Any, converter: Converter) -> Callable[[Any, Any], Any]:
-    from cattrs.gen import make_dict_structure_fn
-
-    structure_fields = make_dict_structure_fn(kind, converter, _cattrs_forbid_extra_keys=True)
-
-    def structure(value: Any, kind: Any) -> Any:
-        if not isinstance(value, dict):
-            raise ValueError(f"{shown(value)} is not an object")
-        if isinstance(value, _Doubled):
-            raise ValueError(f"field {shown(value.field)} stands there twice")
-        return structure_fields(value, kind)
-
-    return structure
-
-
-def _one_region(converter: Converter, value: Any, _kind: Any) -> Any:
-    """Which of the kinds of regions it is, its field `kind` says."""
-    word = value.get("kind", "line") if isinstance(value, dict) else "line"
-    if isinstance(word, str) and word in records.KINDS:
-        return converter.structure(value, records.KINDS[word])
-    from cattrs.errors import AttributeValidationNote, ClassValidationError
-
-    error = ValueError(f"{shown(word)} is none of {', '.join(records.KINDS)}")
-    error.add_note(AttributeValidationNote("in a region", "kind", str))
-    raise ClassValidationError("in a region", [error], records.RegionRecord)
-
-
-def _made_of(origin: Any) -> Callable[[Any], bool]:
-    return lambda kind: get_origin(kind) is origin
+# Checks a JSON value at a place in the recipe, and converts it to the type of a record's field.
+Reader = Callable[[Any, str], Any]
 
 
 @cache
-def _converter() -> Converter:
-    """RecipeError: cattrs is missing. Blender brings it; a Linux distribution's Blender may not, and effects render
-    without it."""
-    try:
-        import cattrs
-    except ImportError as error:
-        raise RecipeError(
-            f"recipes need the Python package cattrs ({error}); install it for Blender's Python"
-        ) from None
-    converter = cattrs.Converter()
-    converter.register_structure_hook(float, _number)
-    converter.register_structure_hook(int, _exactly(int, "a whole number"))
-    converter.register_structure_hook(str, _exactly(str, "a text"))
-    converter.register_structure_hook(bool, _exactly(bool, "true or false"))
-    converter.register_structure_hook_func(_made_of(Literal), _choice)
-    converter.register_structure_hook_func(
-        lambda kind: kind in (records.Keyable, records.Keyable | None), partial(_number_or_keys, converter)
-    )
-    converter.register_structure_hook_func(lambda kind: kind == records.Strokes, partial(_strokes, converter))
-    converter.register_structure_hook_func(
-        lambda kind: kind == records.AnyRegionRecord, partial(_one_region, converter)
-    )
-    converter.register_structure_hook_factory(_made_of(tuple), _tuple)
-    converter.register_structure_hook_func(_made_of(list), partial(_list, converter))
-    converter.register_structure_hook_factory(is_dataclass, _dataclass)
-    return converter
+def _reader(kind: Any) -> Reader:
+    """Return the reader of a field's type."""
+    if isinstance(kind, type) and is_dataclass(kind):
+        return partial(_record, kind, _columns(kind))
+    if kind in (float, int, str, bool):
+        return _number if kind is float else partial(_exactly, kind)
+    inner = get_args(kind)
+    if get_origin(kind) is Literal:
+        return partial(_choice, inner)
+    if get_origin(kind) is list:
+        return partial(_list, _reader(inner[0]))
+    if get_origin(kind) is tuple:
+        return partial(_tuple, [_reader(each) for each in inner])
+    if kind == records.AnyRegionRecord:
+        return _region
+    if kind == records.Strokes:
+        return _strokes
+    read = _number_or_keys if float in inner else _reader(inner[0])
+    return read if type(None) not in inner else lambda value, place: None if value is None else read(value, place)
 
 
-def _first_fault(error: Exception) -> str:
-    """`place: what is wrong`, of the first fault."""
-    import cattrs
-    from cattrs.errors import ForbiddenExtraKeysError
+def _refuse(place: str, fault: str) -> NoReturn:
+    raise RecipeError(f"{place or 'recipe'}: {fault}")
 
-    def described(error: BaseException, kind: Any) -> str:
-        if isinstance(error, KeyError):
-            return "missing"
-        if isinstance(error, ForbiddenExtraKeysError):
-            names = sorted(error.extra_fields)
-            more = f" and {len(names) - 3} more" if len(names) > 3 else ""
-            return f"unknown field {', '.join(map(cut, names[:3]))}{more}"
-        return str(error)
 
-    message, _, place = cattrs.transform_error(error, "$", described)[0].rpartition(" @ $")
-    return f"{place.lstrip('.') or 'recipe'}: {message}"
+def _exactly(kind: type, value: Any, place: str) -> Any:
+    if type(value) is not kind:
+        _refuse(place, f"{shown(value)} is not {_PLAIN[kind]}")
+    return value
+
+
+def _number(value: Any, place: str, otherwise: str = "") -> float:
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        _refuse(place, f"{shown(value)} is not a number{otherwise}")
+    if not math.isfinite(value):
+        _refuse(place, f"{value} is not a finite number{otherwise}")
+    return float(value)
+
+
+def _number_or_keys(value: Any, place: str) -> float | list[records.ValueKey]:
+    if isinstance(value, list):
+        return _reader(list[records.ValueKey])(value, place)
+    return _number(value, place, ", nor a list of keys")
+
+
+def _choice(allowed: tuple, value: Any, place: str) -> Any:
+    if not any(type(value) is type(option) and value == option for option in allowed):
+        _refuse(place, f"{shown(value)} is none of {', '.join(map(str, allowed))}")
+    return value
+
+
+def _list(read: Reader, value: Any, place: str) -> list:
+    if not isinstance(value, list):
+        _refuse(place, f"{shown(value)} is not a list")
+    return [read(each, f"{place}[{index}]") for index, each in enumerate(value)]
+
+
+def _tuple(readers: list[Reader], value: Any, place: str) -> tuple:
+    if not isinstance(value, list):
+        _refuse(place, f"{shown(value)} is not a list")
+    if len(value) != len(readers):
+        _refuse(place, f"{len(value)} values, not {len(readers)}")
+    return tuple(read(each, place) for read, each in zip(readers, value, strict=True))
+
+
+def _region(value: Any, place: str) -> Any:
+    """Read a region by its field `kind`."""
+    kind = value.get("kind", "line") if isinstance(value, dict) else "line"
+    if not isinstance(kind, str) or kind not in records.KINDS:
+        _refuse(f"{place}.kind", f"{shown(kind)} is none of {', '.join(records.KINDS)}")
+    return _reader(records.KINDS[kind])(value, place)
+
+
+def _strokes(value: Any, place: str) -> list:
+    """Read strokes of the first frame, or of several frames."""
+    is_keyed = isinstance(value, list) and value and isinstance(value[0], dict)
+    return _reader(list[records.StrokesKey] if is_keyed else list[records.Stroke])(value, place)
+
+
+def _columns(kind: type) -> dict[str, tuple[Reader, bool]]:
+    """Return the readers of a record's fields, and whether a field is required."""
+    types = get_type_hints(kind)
+    return {
+        each.name: (_reader(types[each.name]), each.default is MISSING and each.default_factory is MISSING)
+        for each in fields(kind)
+    }
+
+
+def _record(kind: type, columns: dict[str, tuple[Reader, bool]], value: Any, place: str) -> Any:
+    if not isinstance(value, dict):
+        _refuse(place, f"{shown(value)} is not an object")
+    if isinstance(value, _Doubled):
+        _refuse(place, f"field {shown(value.field)} is given twice")
+    said = {}
+    for name, (read, is_required) in columns.items():
+        where = f"{place}.{name}" if place else name
+        if name in value:
+            said[name] = read(value[name], where)
+        elif is_required:
+            _refuse(where, "missing")
+    if unknown := sorted(value.keys() - columns.keys()):
+        more = f" and {len(unknown) - 3} more" if len(unknown) > 3 else ""
+        _refuse(place, f"unknown field {', '.join(map(cut, unknown[:3]))}{more}")
+    return kind(**said)

@@ -144,11 +144,11 @@ MESSAGES = {
     "andere Momente",
     (
         "*",
-        'region "{name}": more than {most} points with those before it',
+        'region "{name}": more than {most} points together with the regions before it',
     ): "Region „{name}“: mehr als {most} Punkte mit denen davor",
     (
         "*",
-        'region "{name}": a point of its strokes is nowhere near the picture',
+        'region "{name}": a point of its strokes is too far from the picture',
     ): "Region „{name}“: ein Punkt ihrer Striche liegt weit weg vom Bild",
     (
         "*",
@@ -274,7 +274,7 @@ MESSAGES = {
     ): "Dem aktiven Verschluss die Balken einer Voreinstellung geben",
     ("Virtual Shutter", "Preset"): "Voreinstellung",
     ("Virtual Shutter", "Still Frame"): "Standbild",
-    ("*", "The shown frame alone"): "Nur das gezeigte Bild",
+    ("*", "Only the shown frame"): "Nur das gezeigte Bild",
     ("Virtual Shutter", "45°"): "45°",
     ("*", "Open for an eighth of the frames"): "Ein Achtel der Bilder lang offen",
     ("Virtual Shutter", "90°"): "90°",
@@ -314,9 +314,9 @@ MESSAGES = {
     ("Virtual Shutter", "Stutter"): "Stottern",
     ("*", "Every fourth frame, as a strobe lights them"): "Jedes vierte Bild, wie von einem Stroboskop beleuchtet",
     ("Virtual Shutter", "First Frame"): "Erstes Bild",
-    ("*", "The first of the frames alone"): "Nur das erste der Bilder",
+    ("*", "Only the first of the frames"): "Nur das erste der Bilder",
     ("Virtual Shutter", "Last Frame"): "Letztes Bild",
-    ("*", "The last of the frames alone"): "Nur das letzte der Bilder",
+    ("*", "Only the last of the frames"): "Nur das letzte der Bilder",
     # Bars
     ("Operator", "Insert Bar Keyframes"): "Schlüsselbilder der Balken einfügen",
     (
@@ -342,40 +342,40 @@ MESSAGES = {
     ("*", "{combine} of 1 frame"): "{combine} von 1 Bild",
     ("*", "{combine} of {count} frames"): "{combine} von {count} Bildern",
     ("*", "Combine"): "Verrechnen",
-    ("*", "What the frames that are exposed become"): "Was aus den belichteten Bildern wird",
+    ("*", "How exposed frames are combined"): "Was aus den belichteten Bildern wird",
     ("*", "Average"): "Mittelwert",
-    ("*", "The average of the frames, as a camera makes it"): "Der Mittelwert der Bilder, wie ihn eine Kamera macht",
+    ("*", "The average of the frames, like that of a camera"): "Der Mittelwert der Bilder, wie ihn eine Kamera macht",
     ("*", "Lightest"): "Hellstes",
     (
         "*",
-        "What is lightest in any of them: a trail of light, as bright however long it is",
+        "The lightest value in any frame: trails of light keep their brightness at any length",
     ): "Was in einem von ihnen am hellsten ist: eine Lichtspur, gleich hell, so lang sie auch ist",
     ("*", "Darkest"): "Dunkelstes",
-    ("*", "What is darkest in any of them"): "Was in einem von ihnen am dunkelsten ist",
+    ("*", "The darkest value in any frame"): "Was in einem von ihnen am dunkelsten ist",
     ("*", "Median"): "Median",
     (
         "*",
-        "What most of them show: who passes by is gone",
+        "What most frames show: people who pass by disappear",
     ): "Was die meisten von ihnen zeigen: Wer vorbeigeht, ist weg",
     ("*", "By Luminance"): "Nach Luminanz",
     (
         "*",
-        "Choose a frame for each pixel, by how light it is there, and not one for each color channel",
+        "Choose one frame per pixel by its luminance, not one per color channel",
     ): "Für jedes Pixel ein Bild wählen, danach, wie hell es dort ist, und nicht für jeden Farbkanal eines",
     ("*", "Use Threshold"): "Schwelle verwenden",
     (
         "*",
-        "Let only what is lighter, or of the darkest darker, leave a trail beside what is shown",
+        "Let only light above the threshold leave trails, or with Darkest, below it",
     ): "Nur was heller ist, oder beim Dunkelsten dunkler, neben dem Gezeigten eine Spur hinterlassen lassen",
     ("*", "Threshold"): "Schwelle",
     (
         "*",
-        "Luminance of linear light from which on it leaves a trail; white is 1",
+        "Luminance in linear light from which light leaves a trail; white is 1",
     ): "Luminanz linearen Lichts, von der an es eine Spur hinterlässt; Weiß ist 1",
     ("*", "Softness"): "Weichheit",
     (
         "*",
-        "Range of luminance, around the threshold, over which a trail fades in",
+        "Range of luminance around the threshold in which trails fade in",
     ): "Bereich der Luminanz um die Schwelle, über den eine Spur einblendet",
     ("Operator", "Draw"): "Zeichnen",
     ("Operator", "Draw Outline"): "Umriss zeichnen",
@@ -438,7 +438,7 @@ MESSAGES = {
         "The strokes themselves, as wide as the region's width",
     ): "Die Striche selbst, so breit wie die Breite der Region",
     ("Virtual Shutter", "Lasso"): "Lasso",
-    ("*", "All that the strokes enclose"): "Alles, was die Striche umschließen",
+    ("*", "Everything that the strokes enclose"): "Alles, was die Striche umschließen",
     (
         "*",
         "Tracking the outline: {done} of {total} frames",
@@ -446,10 +446,10 @@ MESSAGES = {
     ("Virtual Shutter", "Outline"): "Umriss",
     (
         "*",
-        "What closed curves enclose, to the pixel: a matte that is drawn",
+        "A drawn matte: everything inside closed curves, exact to the pixel",
     ): "Was geschlossene Kurven umschließen, auf den Pixel genau: eine gezeichnete Matte",
     ("*", "In Between"): "Dazwischen",
-    ("*", "What gives the matte between two drawings"): "Woraus die Matte zwischen zwei Zeichnungen entsteht",
+    ("*", "How the outline changes between two drawings"): "Woraus die Matte zwischen zwei Zeichnungen entsteht",
     ("*", "Tracked"): "Verfolgt",
     (
         "*",
@@ -668,17 +668,17 @@ MESSAGES = {
     ("Virtual Shutter", "Bottom"): "Unten",
     (
         "*",
-        "Rows are read upward, as by a camera that hung upside down",
+        "Rows are read upward, like those of a camera upside down",
     ): "Zeilen werden aufwärts gelesen, wie von einer Kamera, die kopfüber hing",
     ("Virtual Shutter", "Left"): "Links",
     (
         "*",
-        "Columns are read, from the left, as by a camera that was turned",
+        "Columns are read from the left, like those of a rotated camera",
     ): "Spalten werden von links gelesen, wie von einer Kamera, die gedreht war",
     ("Virtual Shutter", "Right"): "Rechts",
     (
         "*",
-        "Columns are read, from the right, as by a camera that was turned",
+        "Columns are read from the right, like those of a rotated camera",
     ): "Spalten werden von rechts gelesen, wie von einer Kamera, die gedreht war",
     ("Virtual Shutter", "Unit"): "Einheit",
     ("*", "What the readout is counted in"): "Worin die Auslesezeit gezählt wird",
@@ -711,7 +711,7 @@ MESSAGES = {
     ("Virtual Shutter", "Columns"): "Spalten",
     (
         "*",
-        "Level lines lean as they move up and down: of a camera that was turned",
+        "Level lines lean as they move up and down, with a rotated camera",
     ): "Waagrechte Linien neigen sich, wenn sie sich auf und ab bewegen: bei einer gedrehten Kamera",
     (
         "*",
@@ -745,12 +745,12 @@ MESSAGES = {
     ("Virtual Shutter", "Matte"): "Matte",
     (
         "*",
-        "What a file, a strip or a mask says for every pixel",
+        "A value per pixel from a file, a strip or a mask",
     ): "Was eine Datei, ein Streifen oder eine Maske für jeden Pixel sagt",
     ("Virtual Shutter", "Ramp"): "Verlauf",
     (
         "*",
-        "From none of the shutter to all of it, across the picture",
+        "A gradient across the picture, from none of the shutter to all of it",
     ): "Über das Bild von nichts vom Verschluss bis zum ganzen",
     ("*", "From"): "Von",
     ("*", "What the matte is"): "Was die Matte ist",
@@ -773,7 +773,7 @@ MESSAGES = {
     ("*", "Channel"): "Kanal",
     (
         "*",
-        "What of the matte says how much of the shutter a pixel gets",
+        "Channel of the matte that sets the amount of the shutter",
     ): "Was an der Matte sagt, wie viel vom Verschluss ein Pixel bekommt",
     ("*", "Luminance"): "Leuchtdichte",
     ("*", "How bright the matte is"): "Wie hell die Matte ist",
@@ -794,13 +794,13 @@ MESSAGES = {
     ): "Name eines Kanals einer EXR-Datei; leer für die Leuchtdichte",
     ("*", "Name of the channel in the EXR file"): "Name des Kanals in der EXR-Datei",
     ("*", "Invert"): "Invertieren",
-    ("*", "The shutter gets what the matte leaves"): "Der Verschluss bekommt, was die Matte übrig lässt",
+    ("*", "Give the shutter the pixels outside of the matte"): "Der Verschluss bekommt, was die Matte übrig lässt",
     ("*", "Frames Of"): "Bilder von",
-    ("*", "What the matte's frames belong to"): "Wozu die Bilder der Matte gehören",
+    ("*", "What the matte's frames are synchronized with"): "Wozu die Bilder der Matte gehören",
     ("*", "Footage"): "Filmmaterial",
     (
         "*",
-        "The matte's frames belong to those of the footage, however that is trimmed and retimed",
+        "The matte follows the frames of the footage, even if that is trimmed or retimed",
     ): "Die Bilder der Matte gehören zu denen des Filmmaterials, auch wenn es getrimmt oder seine Zeit geändert ist",
     ("*", "Timeline"): "Zeitleiste",
     (
@@ -808,28 +808,28 @@ MESSAGES = {
         "The matte plays along the timeline, from where the Shutter strip starts untrimmed",
     ): "Die Matte läuft mit der Zeitleiste, vom ungetrimmten Anfang des Verschlussstreifens an",
     ("*", "Offset"): "Versatz",
-    ("*", "Frames by which the matte is ahead"): "Bilder, um die die Matte voraus ist",
+    ("*", "Number of frames by which the matte plays ahead"): "Bilder, um die die Matte voraus ist",
     ("Virtual Shutter", "Blend"): "Mischmodus",
-    ("*", "How the matte lies over other regions"): "Wie die Matte über anderen Regionen liegt",
+    ("*", "How the matte combines with other regions"): "Wie die Matte über anderen Regionen liegt",
     ("Virtual Shutter", "Over"): "Über",
-    ("*", "What is beneath shares what the matte leaves"): "Was darunter liegt, teilt sich, was die Matte übrig lässt",
+    ("*", "Regions below share what the matte leaves"): "Was darunter liegt, teilt sich, was die Matte übrig lässt",
     ("Virtual Shutter", "Add"): "Addieren",
     (
         "*",
-        "What the matte takes comes from the default shutter alone, so that mattes stand side by side",
+        "The matte replaces only the default shutter, so that mattes can be side by side",
     ): "Was die Matte nimmt, kommt allein vom Standardverschluss, sodass Matten nebeneinander stehen",
     ("*", "Opacity"): "Deckkraft",
     (
         "*",
-        "How much of the region counts: at 0 the picture is as without it",
+        "Influence of the region: 0 is like no region",
     ): "Wie viel von der Region zählt: Bei 0 ist das Bild wie ohne sie",
     ("Virtual Shutter", "Feather"): "Weiche Kante",
     (
         "*",
-        "How wide a hard edge of the matte becomes, as a fraction of the picture's height",
+        "Width of the matte's soft edges, as a fraction of the picture's height",
     ): "Wie breit eine harte Kante der Matte wird, als Bruchteil der Bildhöhe",
     ("*", "Ramp"): "Verlauf",
-    ("*", "How the ramp runs"): "Wie der Verlauf läuft",
+    ("*", "Shape of the ramp"): "Wie der Verlauf läuft",
     ("*", "From the left to the right; its rotation turns it"): "Von links nach rechts; seine Rotation dreht ihn",
     ("*", "Radial"): "Radial",
     ("*", "From the center to the farthest corner"): "Von der Mitte zur entferntesten Ecke",
@@ -867,11 +867,11 @@ MESSAGES = {
     ("*", "Position"): "Position",
     (
         "*",
-        "Where the frames that are exposed lie around the shown one",
+        "Position of the exposed frames relative to the shown frame",
     ): "Wo die belichteten Bilder um das gezeigte liegen",
     ("*", "The shown frame is the first of them"): "Das gezeigte Bild ist ihr erstes",
     ("*", "Center"): "Zentrum",
-    ("*", "The shown frame lies in their middle"): "Das gezeigte Bild liegt in ihrer Mitte",
+    ("*", "The shown frame is in their middle"): "Das gezeigte Bild liegt in ihrer Mitte",
     ("*", "End"): "Ende",
     ("*", "The shown frame is the last of them"): "Das gezeigte Bild ist ihr letztes",
     ("*", "Interpolation"): "Interpolation",
@@ -890,7 +890,7 @@ MESSAGES = {
         "Cross-fade pictures between shutters, and fade every bar by itself between keyframes",
     ): "Bilder zwischen Verschlüssen und jeden Balken für sich zwischen Schlüsselbildern überblenden",
     ("*", "Light"): "Licht",
-    ("*", "How the frames that are exposed are summed"): "Wie die belichteten Bilder summiert werden",
+    ("*", "How exposed frames are summed"): "Wie die belichteten Bilder summiert werden",
     ("*", "Linear"): "Linear",
     (
         "*",
@@ -904,19 +904,19 @@ MESSAGES = {
     ("Virtual Shutter", "Exposure"): "Belichtung",
     (
         "*",
-        "How bright shutters are that are open for different times",
+        "Brightness of shutters that are open for different times",
     ): "Wie hell Verschlüsse sind, die verschieden lange offen sind",
     ("Virtual Shutter", "Normalized"): "Normalisiert",
     ("*", "Every shutter gives the same brightness"): "Jeder Verschluss ergibt die gleiche Helligkeit",
     ("Virtual Shutter", "Weighted"): "Gewichtet",
     (
         "*",
-        "A shutter that is open for less time than the default is darker, in linear light whatever is summed",
+        "A shutter that is open for less time than the default is darker, always in linear light",
     ): "Ein Verschluss, der kürzer als der Standard offen ist, ist dunkler, in linearem Licht, was auch summiert wird",
     ("Virtual Shutter", "Clip Ends"): "Clip-Enden",
     (
         "*",
-        "What an exposure gets that reaches beyond the ends of the clip, or of the shot",
+        "How exposures continue beyond the ends of the clip or the shot",
     ): "Was eine Belichtung erhält, die über die Enden des Clips oder der Einstellung hinausreicht",
     ("Virtual Shutter", "Hold"): "Halten",
     (
@@ -930,7 +930,7 @@ MESSAGES = {
     ("Virtual Shutter", "Slide"): "Verschieben",
     (
         "*",
-        "Move an exposure into the clip, by as many frames as it reaches beyond its ends",
+        "Move exposures into the clip, by the number of frames that they reach beyond its ends",
     ): "Eine Belichtung in den Clip schieben, um so viele Bilder, wie sie über seine Enden hinausreicht",
     ("*", "Matte Resolution"): "Mattenauflösung",
     (
@@ -945,51 +945,49 @@ MESSAGES = {
     ("*", "Blocks of 4×4 pixels share a shutter"): "Blöcke von 4×4 Pixeln teilen sich einen Verschluss",
     (
         "*",
-        "Expose the region by itself, before all else, which is exposed without it: it leaves no ghost",
+        "Expose the region separately, in front of everything else, so that it leaves no ghost",
     ): "Die Region für sich belichten, vor allem anderen, das ohne sie belichtet wird: kein Geisterbild bleibt",
     ("*", "Clean Edges"): "Saubere Kanten",
     (
         "*",
-        "Give layers, and what lies behind them, their own colors in the mixed pixels at their edges",
+        "Separate the colors of layers and their background in the mixed pixels at edges",
     ): "Ebenen und was hinter ihnen liegt behalten in den gemischten Pixeln an ihren Rändern ihre eigenen Farben",
     ("*", "Background Search"): "Hintergrundsuche",
     (
         "*",
-        "Frames before and after the shown one in which what lies behind layers is looked for, "
-        "where no exposed frame shows it",
+        "Frames on each side that are searched for the background of layers, where no exposed frame shows it",
     ): "Frames vor und nach dem gezeigten, die nach dem abgesucht werden, was Ebenen verdecken",
     ("*", "Stop at Cuts"): "An Schnitten enden",
     (
         "*",
-        "Exposures end at the source's cuts as they do at the clip's ends",
+        "End exposures at cuts of the source, like at the clip's ends",
     ): "Belichtungen enden an den Schnitten der Quelle wie an den Enden des Clips",
     ("*", "Keep Edges Default"): "Rand bleibt Standard",
     (
         "*",
-        "Make the picture's edge a scribble of the default shutter, so that a stroke alone acts locally",
+        "Give the picture's edge to the default shutter, so that a single stroke acts locally",
     ): "Den Bildrand zu einer Markierung des Standardverschlusses machen, so dass ein einzelner Strich örtlich wirkt",
     ("*", "Follow Edges"): "Kanten folgen",
     (
         "*",
-        "How much shutters keep to the edges of the shown frame: at 1 a scribble fills what it lies in",
+        "How strictly scribbles stop at edges of the shown frame: at 1 they fill the object that they are on",
     ): "Wie sehr Verschlüsse den Kanten des gezeigten Bildes folgen: bei 1 füllt eine Markierung, worin sie liegt",
     # Smooth exposures
     ("*", "Smooth"): "Glätten",
     (
         "*",
-        "Expose moments between filmed frames as well, which optical flow finds: light counts between two frames "
-        "whose bars are both open",
+        "Also expose moments between filmed frames, found by optical flow, where both bars are open",
     ): "Auch Zeitpunkte zwischen gefilmten Bildern belichten, die optischer Fluss findet: Licht zählt zwischen zwei "
     "Bildern, deren Balken beide offen sind",
-    ("*", "Expose filmed frames alone"): "Nur gefilmte Bilder belichten",
-    ("*", "2 moments from a filmed frame to the next"): "2 Zeitpunkte von einem gefilmten Bild zum nächsten",
-    ("*", "4 moments from a filmed frame to the next"): "4 Zeitpunkte von einem gefilmten Bild zum nächsten",
-    ("*", "8 moments from a filmed frame to the next"): "8 Zeitpunkte von einem gefilmten Bild zum nächsten",
-    ("*", "16 moments from a filmed frame to the next"): "16 Zeitpunkte von einem gefilmten Bild zum nächsten",
+    ("*", "Expose only filmed frames"): "Nur gefilmte Bilder belichten",
+    ("*", "2 moments per filmed frame"): "2 Zeitpunkte von einem gefilmten Bild zum nächsten",
+    ("*", "4 moments per filmed frame"): "4 Zeitpunkte von einem gefilmten Bild zum nächsten",
+    ("*", "8 moments per filmed frame"): "8 Zeitpunkte von einem gefilmten Bild zum nächsten",
+    ("*", "16 moments per filmed frame"): "16 Zeitpunkte von einem gefilmten Bild zum nächsten",
     ("*", "Automatic"): "Automatisch",
     (
         "*",
-        "As many moments as the fastest motion in the footage needs, 16 at most",
+        "As many moments as the fastest motion in the footage needs, at most 16",
     ): "So viele Zeitpunkte, wie die schnellste Bewegung im Filmmaterial braucht, höchstens 16",
     (
         "*",
@@ -999,8 +997,7 @@ MESSAGES = {
     ("*", "Skip Repeated Frames"): "Wiederholte Bilder überspringen",
     (
         "*",
-        "Where Smooth is on, show moments between their neighbors in place of frames that repeat the one before, "
-        "as in 24 frames per second that play at 30",
+        "With Smooth, replace repeated frames by moments between their neighbors, as in 24 fps played at 30",
     ): "Wo Glätten an ist, statt Bildern, die das vorige wiederholen, Zeitpunkte zwischen ihren Nachbarn zeigen, etwa "
     "bei 24 Bildern pro Sekunde, die mit 30 laufen",
     (
@@ -1115,11 +1112,11 @@ MESSAGES = {
     ("Virtual Shutter", "Motion"): "Bewegung",
     ("*", "Which channels Track and Follow key"): "Welchen Kanälen Verfolgen und Folgen Schlüsselbilder geben",
     ("Virtual Shutter", "Location"): "Position",
-    ("*", "It is moved"): "Es wird bewegt",
+    ("*", "Follow the location"): "Es wird bewegt",
     ("Virtual Shutter", "Location, Rotation"): "Position, Rotation",
-    ("*", "It is moved and turned"): "Es wird bewegt und gedreht",
+    ("*", "Follow location and rotation"): "Es wird bewegt und gedreht",
     ("Virtual Shutter", "Location, Rotation, Scale"): "Position, Rotation, Skalierung",
-    ("*", "It is moved, turned and scaled"): "Es wird bewegt, gedreht und skaliert",
+    ("*", "Follow location, rotation and scale"): "Es wird bewegt, gedreht und skaliert",
     ("Virtual Shutter", "Until"): "Bis",
     (
         "*",
@@ -1212,18 +1209,17 @@ MESSAGES = {
         "a region ends with its shot",
     ): "Verfolgen gibt der Deckkraft einer Region, oder dem Einfluss der Kamera, Schlüsselbilder: Sie klingt aus, "
     "wo die Verfolgung endet; eine Region endet mit ihrer Einstellung",
-    ("*", "What of its motion is followed"): "Was von der Bewegung gilt",
+    ("*", "Part of the motion that the exposure follows"): "Was von der Bewegung gilt",
     ("*", "Smoothness"): "Glätte",
     (
         "*",
-        "Frames before and after each over which the motion is averaged, as the mass of a camera does: "
-        "at 0 it is followed as it is",
+        "Frames on each side over which the motion is averaged, like that of a heavy camera",
     ): "Bilder vor und nach jedem, über die die Bewegung gemittelt wird, wie es die Masse einer Kamera tut: "
     "Bei 0 gilt sie, wie sie ist",
     ("*", "Influence"): "Einfluss",
     (
         "*",
-        "How much is left of exposures that follow the camera: at 0 the shown frame alone",
+        "Length of exposures that follow the camera: 0 exposes only the shown frame",
     ): "Wie viel von Belichtungen bleibt, die der Kamera folgen: bei 0 das gezeigte Bild allein",
     ("Operator", "Track Camera"): "Kamera verfolgen",
     (
@@ -1280,11 +1276,11 @@ MESSAGES = {
     ): "Die Belichtung bleibt, wo sie im Bild ist",
     (
         "*",
-        "The exposure moves with a region: what the region moves with stays sharp",
+        "The exposure moves with a region, so that what the region covers stays sharp",
     ): "Die Belichtung bewegt sich mit einer Region: Was sich mit der Region bewegt, bleibt scharf",
     (
         "*",
-        "The exposure moves with what the camera sees, as if the camera had stood still",
+        "The exposure moves with the camera's view, as if the camera stood still",
     ): "Die Belichtung bewegt sich mit dem, was die Kamera sieht, als hätte die Kamera still gestanden",
     ("*", "Moved With"): "Bewegt mit",
     (
@@ -1296,22 +1292,22 @@ MESSAGES = {
     ("Virtual Shutter", "Distance"): "Strecke",
     (
         "*",
-        "The bars are the exposure of one frame of the timeline, however fast the footage runs",
+        "The bars are the exposure during one timeline frame, at any speed of the footage",
     ): "Die Balken sind die Belichtung eines Bildes der Zeitleiste, wie schnell das Material auch läuft",
-    ("*", "What says how long the exposure is"): "Was sagt, wie lang die Belichtung ist",
+    ("*", "What sets the length of the exposure"): "Was sagt, wie lang die Belichtung ist",
     (
         "*",
-        "The bars say for how many frames the shutter is open",
+        "The bars set for how many frames the shutter is open",
     ): "Die Balken sagen, wie viele Bilder lang der Verschluss offen ist",
     (
         "*",
-        "The shutter is open while what it follows moves by a set distance; the bars are the shape",
+        "The shutter is open while what it follows moves by a distance; bars only set the shape",
     ): "Der Verschluss ist offen, während sich das, womit er sich mitbewegt, um eine gegebene Strecke bewegt; "
     "die Balken sind die Form",
     ("*", "Distance"): "Strecke",
     (
         "*",
-        "How far what is followed moves while the shutter is open, as a fraction of the picture's height",
+        "Distance of the motion while the shutter is open, as a fraction of the picture's height",
     ): "Wie weit sich bei offenem Verschluss bewegt, was verfolgt wird, als Bruchteil der Bildhöhe",
     (
         "*",
@@ -1475,11 +1471,11 @@ MESSAGES = {
     ("*", "Baked, and up to date"): "Gebacken und aktuell",
     (
         "*",
-        "baked frames lie beside the .blend file: save it first",
+        "baked frames are stored beside the .blend file: save it first",
     ): "gebackene Bilder liegen neben der .blend-Datei: zuerst speichern",
     (
         "*",
-        '"{strip}" is retimed, strobed or reversed itself: do that to its source',
+        '"{strip}" is retimed, strobed or reversed: do that to its source instead',
     ): "„{strip}“ ist selbst umgezeitet, stroboskopiert oder umgekehrt: das gehört an die Quelle",
     (
         "*",
@@ -1499,7 +1495,7 @@ MESSAGES = {
         "movies are baked in Blender's own colours: with another configuration, bake to OpenEXR",
     ): "Filme haben Blenders eigene Farben: mit einer anderen Konfiguration zu OpenEXR backen",
     ("*", "a movie has no transparency: bake to OpenEXR"): "ein Film hat keine Transparenz: zu OpenEXR backen",
-    ("*", "the bake ended without a word"): "das Backen endete ohne ein Wort",
+    ("*", "the bake ended without a message"): "das Backen endete ohne ein Wort",
     ("*", "the bake cannot begin: {reason}"): "das Backen kann nicht beginnen: {reason}",
     (
         "*",
