@@ -1,5 +1,8 @@
-"""What an effect's pictures depend on: one list for previews, which drop finished frames where it changes, and for
-bakes, whose version is a key of it that is the same wherever the strips lie on the timeline and their files on disk."""
+"""What an effect's pictures depend on, in one list for previews and bakes.
+
+Previews drop finished frames when it changes. A bake stores a hash of it, which is the same wherever the strips lie on
+the timeline and the files on disk.
+"""
 
 from __future__ import annotations
 
@@ -31,24 +34,27 @@ from . import (
 from .annotations import TRANSFORM, layer_of, picture_size
 from .fcurves import numbers
 
-# What stands for the files of a strip, or of a region whose matte is an image.
+# Identifies the files of a strip, or of a region whose matte is an image.
 Files = Callable[[Strip | PropertyGroup], Hashable]
 
-_Curve = tuple[str, int, FCurve]  # with its path and index
+_Curve = tuple[str, int, FCurve]  # data path, array index, curve
 
 _MOVES = "location", "rotation", "scale"
-# Keyframe.interpolation as a number: constant, linear, bezier, then the others.
-_BEZIER = 2
+_BEZIER = 2  # of Keyframe.interpolation as a number; those above have parameters
 
 
 def frames_of(strip: Strip) -> range:
-    """The frames that an effect strip shows, counted from its origin: the same for all parts of a cut strip."""
+    """Return the frames that an effect strip shows, from its origin: comparable between parts of a cut strip."""
     start = round(strips.origin(strip))
     return range(strip.left_handle - start, strip.right_handle - start)
 
 
 def key(scene: Scene, effect: PropertyGroup, strip: Strip, frames: range) -> str:
-    """16 hexadecimal digits; frames: as frames_of. EffectError, MediaError: the effect cannot be shown."""
+    """Return 16 hexadecimal digits that identify an effect's pictures at frames as in frames_of.
+
+    Raises:
+        EffectError, MediaError: The effect cannot be shown.
+    """
     start = round(strips.origin(strip))
     snapshot.check_counts(effect)
     source = strips.source_of(scene, effect, strip)
@@ -65,10 +71,10 @@ def key(scene: Scene, effect: PropertyGroup, strip: Strip, frames: range) -> str
 
 
 def is_changed(scene: Scene, effect: PropertyGroup, strip: Strip) -> bool:
-    """Whether an effect is another than when its strip was baked, or cannot be shown any more."""
+    """Tell whether an effect has changed since its strip was baked, or cannot be shown any more."""
     bake, frames = strip.virtual_shutter_bake, frames_of(strip)
     if frames.start < bake.first or frames.stop > bake.first + bake.count:
-        return True  # it has become longer
+        return True  # the strip is longer now
     try:
         return key(scene, effect, strip, range(bake.first, bake.first + bake.count)) != bake.version
     except (UserError, MemoryError):
@@ -78,10 +84,13 @@ def is_changed(scene: Scene, effect: PropertyGroup, strip: Strip) -> bool:
 def parts(
     scene: Scene, effect: PropertyGroup, strip: Strip, files: Files, start: int | None = None
 ) -> Iterator[Hashable]:
-    """All that an effect's pictures depend on, but for its source and for properties with an update callback.
+    """Yield what an effect's pictures depend on, except the source and properties with an update callback.
 
-    The values of keyed properties do not count: they change with every frame that plays. start: the timeline frame that
-    frames count from, so that the parts are the same wherever the strips lie; None: that counts as well"""
+    Values of keyed properties do not count, as they change with every frame that plays.
+
+    Args:
+        start: Timeline frame that frames count from, so that moved strips give the same. None: they do not.
+    """
     names = [shutter.name for shutter in effect.shutters]
     yield tuple(len(shutter.bars) for shutter in effect.shutters)
     for region in effect.regions:
@@ -95,13 +104,13 @@ def parts(
     placed = _below(f"{strip.path_from_id()}.transform.", found)
     yield from _curves(placed, start)
     keyed = {name for name, _index, curve in placed if _drives(curve)}
-    # As words: "not a number" is never the same again.
+    # As text, because NaN never equals NaN.
     yield repr([getattr(strip.transform, name) for name in TRANSFORM if name not in keyed])
-    yield repr(tuple(strip.transform.origin)), strip.use_flip_x, strip.use_flip_y  # scribbles lie mirrored with it
+    yield repr(tuple(strip.transform.origin)), strip.use_flip_x, strip.use_flip_y
 
 
 def _settings(effect: PropertyGroup) -> Iterator[Hashable]:
-    """The properties of an effect that are not keyed, but for names and colors."""
+    """Yield an effect's properties that are not keyed, except names and colors."""
     path, followed = effect.path_from_id(), [region.name for region in effect.regions]
     curves = filter(_drives, fcurves.curves_under(effect.id_data, path + "."))
     keyed = {(curve.data_path, curve.array_index) for curve in curves}
@@ -127,18 +136,18 @@ def _settings(effect: PropertyGroup) -> Iterator[Hashable]:
 
 
 def _drives(curve: FCurve) -> bool:
-    """Whether it has any say in its property."""
+    """Tell whether an F-curve drives its property."""
     return not (curve.mute or curve.is_empty)
 
 
 def _told(*kinds: type) -> list[str]:
-    """The properties that the fields of the model's classes define, but for names and colors."""
+    """Return the properties of the model's fields, except names and colors."""
     fields = fields_of(*kinds).values()
     return [field.blender for field in fields if field.choices or not isinstance(field.default, str | tuple)]
 
 
 def _below(path: str, curves: Iterable[_Curve]) -> list[_Curve]:
-    """Those of F-curves whose path begins so, the rest of it, in an order that does not change."""
+    """Return the F-curves below a path, with the rest of their path, sorted."""
     found = [(name.removeprefix(path), index, curve) for name, index, curve in curves if name.startswith(path)]
     return sorted(found, key=lambda each: each[:2])
 
@@ -149,12 +158,12 @@ def _curves(curves: Iterable[_Curve], start: int | None) -> Iterator[Hashable]:
         points = curve.keyframe_points
         for name in ("handle_left", "co", "handle_right"):
             places = numbers(points, name, size=2)
-            if start is not None:  # floats of other frames are others
+            if start is not None:  # rounded, because float32 errors differ between frames
                 places[:, 0] = np.round(places[:, 0] - start, 2) + 0.0
             yield places.tobytes()
         interpolations = numbers(points, "interpolation", np.int32)
         yield interpolations.tobytes()
-        if max(interpolations.tolist(), default=0) > _BEZIER:  # one of those that have parameters
+        if max(interpolations.tolist(), default=0) > _BEZIER:
             yield numbers(points, "easing", np.int32).tobytes()
             yield tuple(numbers(points, name).tobytes() for name in ("back", "amplitude", "period"))
         for modifier in curve.modifiers:
@@ -170,7 +179,7 @@ def _strokes(effect: PropertyGroup, region: PropertyGroup, start: int | None) ->
 
 
 def _matte(region: PropertyGroup, files: Files, start: int | None) -> Iterator[Hashable]:
-    """What a matte shows, but for properties of the region."""
+    """Yield what a matte shows, except properties of the region."""
     try:
         if region.matte == "IMAGE":
             yield files(region)
@@ -185,7 +194,7 @@ def _matte(region: PropertyGroup, files: Files, start: int | None) -> Iterator[H
 
 
 def _mask(mask: Mask) -> Iterator[Hashable]:
-    # Blender tells of these; many points take long to read.
+    # Blender reports changes of a mask, and many points take long to read.
     key = mask.session_uid
     yield mask.frame_start
     yield revision.until_change("mask", key, lambda: repr(mask_reading.mask_at(mask, mask.frame_start)))
@@ -194,15 +203,18 @@ def _mask(mask: Mask) -> Iterator[Hashable]:
 
 
 def timing(strip: Strip, start: int = 0) -> StripTiming:
-    """How a movie, image or clip strip lies on the timeline, whatever it is called and wherever it was cut."""
+    """Return how a movie, image or clip strip lies on the timeline, without its name and cuts."""
     lies = source_media.timing_of(strip)
     begins, ends = lies.content_start - start, lies.content_end - start
     return replace(lies, name="", left_handle=0, content_start=begins, content_end=ends)
 
 
 def _contents(owner: Strip | PropertyGroup) -> Hashable:
-    """How the files of a strip, or of a region's matte, are read, and digests of what is in them. EffectError,
-    MediaError: it has none."""
+    """Return how the files of a strip or of a region's matte are read, and digests of their contents.
+
+    Raises:
+        EffectError, MediaError: It has no files.
+    """
     if isinstance(owner, Strip):
         spec = source_media.spec(owner)
         read = repr(sorted(item for item in spec.options.items() if item[0] != "config"))
