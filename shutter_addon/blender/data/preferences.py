@@ -42,14 +42,14 @@ class ShutterPreferences(bpy.types.AddonPreferences):
 
 
 def device() -> str:
-    """The device that renders are wanted on, one of devices.available.CHOICES."""
+    """Return the render device that the user wants, one of devices.available.CHOICES."""
     preferences = _preferences()
-    known = preferences.device if preferences else ""  # nor is one that a newer version has chosen
+    known = preferences.device if preferences else ""  # "" also for a device of a newer version
     return known.lower() or "auto"
 
 
 def gpu_memory() -> int:
-    """Megabytes of the GPU that textures may take; 0: as devices.device allows."""
+    """Return the megabytes of the GPU that textures may take; 0: as devices.device allows."""
     preferences = _preferences()
     return preferences.gpu_memory if preferences else 0
 
