@@ -147,8 +147,11 @@ def preset_of(effect: PropertyGroup, index: int) -> str:
 
 
 def _made_again(effect: PropertyGroup, index: int) -> bool:
-    """Make the bars of a shutter that keeps to a preset for the window. Return whether it does; if not, forget its
-    preset."""
+    """Make the bars of a shutter that keeps to a preset again, for the window.
+
+    Returns:
+        Whether it keeps to one. If not, it forgets which it had.
+    """
     shutter = effect.shutters[index]
     shutter.preset = preset_of(effect, index)
     if shutter.preset:

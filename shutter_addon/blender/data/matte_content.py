@@ -170,8 +170,10 @@ def strip_name(region: PropertyGroup) -> str:
 
 
 def choose_strip(region: PropertyGroup, name: str) -> None:
-    """Make the strip of a name a region's matte, with the other parts where it was cut. Without such a strip, clear it.
-    Make the strip of a name a region's matte, with the other parts where it was cut. Without such a strip, clear it."""
+    """Make the strip of a name a region's matte, with the other parts where it was cut.
+
+    Without such a strip, the region has none.
+    """
     editor = region.id_data.sequence_editor
     strip = editor and editor.strips_all.get(name)
     if strip is None:
