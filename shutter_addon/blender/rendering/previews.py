@@ -229,8 +229,8 @@ def _best(
 def _detail(context: Context, look: Look) -> effect_source.Detail:
     """Return the detail of pictures for all previews of a scene.
 
-    The divisor is the one of reduced.DIVISORS that is nearest to the largest preview, which decides about the proxy, too.
-    During playback and in other views pictures are not smooth, as optical flow takes long.
+    The divisor is the one of reduced.DIVISORS that is nearest to the largest preview, whose proxy counts, too. During
+    playback and in other views pictures are not smooth, as optical flow takes long.
     """
     if (scale := look.scale) is None:
         return effect_source.FULL
@@ -267,8 +267,8 @@ def _drafted(context: Context, shown: Shown, request: Request) -> Request:
 
 
 def draft(request: Request, source: FrameSource) -> Request:
-    """Return the request as a draft: where shutters follow edges, of at most DRAFT_ROWS blocks along the shorter side.
-    Return the request as a draft: where shutters follow edges, of at most DRAFT_ROWS blocks along the shorter side."""
+    """Return the request as a draft: if shutters follow edges, with DRAFT_ROWS blocks at most along the shorter side.
+    Return the request as a draft: if shutters follow edges, with DRAFT_ROWS blocks at most along the shorter side."""
     options = request.state.options
     if not options.edge_aware:
         return request

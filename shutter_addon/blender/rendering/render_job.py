@@ -45,8 +45,8 @@ class Where(Enum):
     """Where Blender calls the extension.
 
     BACKGROUND is without a window, WINDOW on a window's main thread. JOB is a job's thread, while the window goes on.
-    WAITED_FOR is such a thread while the window waits for every picture (View ▸ Render Sequencer Animation). It may read
-    Blender's data itself, and must not wait for the main thread.
+    WAITED_FOR is such a thread while the window waits for every picture (View ▸ Render Sequencer Animation): this thread
+    may read Blender's data itself, and must not wait for the main thread.
     """
 
     BACKGROUND = "background"
@@ -165,8 +165,7 @@ def operators_running() -> set[str]:
 
 
 def telling(to: Callable[[str], None]) -> AbstractContextManager[None]:
-    """Pass the sentence that ends a render in the background to a function in place of stderr, inside a `with` block.
-    Pass the sentence that ends a render in the background to a function in place of stderr, inside a `with` block."""
+    """Inside a `with` block, pass the sentence that ends a render in the background to a function, not to stderr."""
     return for_a_while([(_job, "tell", to)])
 
 
