@@ -18,8 +18,7 @@ _MADE = "GENERATED", "VIEWER"  # sources of images without a file
 
 
 def named(item: ID) -> list[Path]:
-    """Return the file of a data-block: several of a tiled image, a sequence's first, none of a packed or generated one.
-    Return the file of a data-block: several of a tiled image, a sequence's first, none of a packed or generated one."""
+    """Return a data-block's file: several of a tiled image, a sequence's first, none of a packed or generated one."""
     source = getattr(item, "source", "FILE")
     if source in _MADE or item.filepath in ("", "<builtin>") or getattr(item, "packed_file", None):
         return []

@@ -267,8 +267,8 @@ def _drafted(context: Context, shown: Shown, request: Request) -> Request:
 
 
 def draft(request: Request, source: FrameSource) -> Request:
-    """Return the request as a draft: if shutters follow edges, with DRAFT_ROWS blocks at most along the shorter side.
-    Return the request as a draft: if shutters follow edges, with DRAFT_ROWS blocks at most along the shorter side."""
+    """Return the request as a draft: where shutters follow edges, in blocks, DRAFT_ROWS at most along the shorter side.
+    Return the request as a draft: where shutters follow edges, in blocks, DRAFT_ROWS at most along the shorter side."""
     options = request.state.options
     if not options.edge_aware:
         return request

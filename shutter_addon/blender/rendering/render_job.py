@@ -45,8 +45,8 @@ class Where(Enum):
     """Where Blender calls the extension.
 
     BACKGROUND is without a window, WINDOW on a window's main thread. JOB is a job's thread, while the window goes on.
-    WAITED_FOR is such a thread while the window waits for every picture (View ▸ Render Sequencer Animation): this thread
-    may read Blender's data itself, and must not wait for the main thread.
+    WAITED_FOR is such a thread while the window waits for every picture (View ▸ Render Sequencer Animation): it reads
+    Blender's data itself, and must not wait for the main thread.
     """
 
     BACKGROUND = "background"
