@@ -23,7 +23,7 @@ from .rendering import invalidation, job_snapshots, render_job, sessions, strobi
 from .rendering.render_job import Where
 
 
-def _before_load(*_) -> None:
+def _forget_file(*_) -> None:
     edit_feed.end()
     sharp_frame.forget()
     operator_bases.end_all()
@@ -163,7 +163,7 @@ def _uncaught(kind: type[BaseException], error: BaseException, trace: TracebackT
 
 
 HANDLERS = {
-    "load_pre": _before_load,
+    "load_pre": _forget_file,
     "load_post": _after_load,
     "blend_import_post": _after_import,
     "save_pre": _before_save,
@@ -194,9 +194,5 @@ def unregister() -> None:
         getattr(bpy.app.handlers, name).remove(function)
     if sys.excepthook is _uncaught:  # otherwise a hook that was installed later still calls it
         sys.excepthook = _hooks.pop()
-    operator_bases.end_all()
-    edit_feed.end()
-    sessions.forget()
-    source_media.forget()
-    reconciling.forget()
+    _forget_file()
     undelete.forget()

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from bisect import bisect_right
 from collections.abc import Iterator
-from itertools import chain
+from itertools import accumulate, chain
 
 import bpy
 import numpy as np
@@ -18,7 +18,6 @@ from numpy.typing import ArrayLike
 from ...core.messages import EffectError
 from ...core.model.masks import MaskLayer, MaskShape, MaskSpline
 from . import fcurves
-from .fcurves import numbers
 from .struct_dna import LayoutError, memory, read, record, text
 
 _FARTHEST = 1e4  # of coordinates, in pictures
@@ -61,14 +60,13 @@ def key_frames(mask: bpy.types.Mask) -> list[float]:
 
 
 def _layer_at(mask: bpy.types.Mask, layer: bpy.types.MaskLayer, frame: float) -> MaskLayer:
-    keyed = _keyed_points(layer, _shapes(mask, layer), frame)
-    splines, at = [], 0
-    for spline in layer.splines:
-        count = len(spline.points)
-        splines.append(_spline_at(mask, spline, None if keyed is None else keyed[at : at + count]))
-        at += count
+    points = _keyed_points(layer, _shapes(mask, layer), frame)
+    if points is None:
+        points = np.concatenate([np.empty((0, 7)), *map(_points, layer.splines)])
+    ends = accumulate(len(spline.points) for spline in layer.splines)
+    splines = zip(layer.splines, np.split(points, list(ends)), strict=False)
     return MaskLayer(
-        splines=tuple(splines),
+        splines=tuple(_spline(mask, spline, own) for spline, own in splines),
         alpha=float(_checked(mask, _alpha_at(mask, layer, frame))),
         holes=layer.use_fill_holes,
         **{name: getattr(layer, name) for name in ("blend", "invert", "falloff", "fill_solver")},
@@ -81,14 +79,14 @@ def _alpha_at(mask: bpy.types.Mask, layer: bpy.types.MaskLayer, frame: float) ->
     return layer.alpha if curve is None or curve.mute or curve.is_empty else curve.evaluate(frame)
 
 
-def _spline_at(mask: bpy.types.Mask, spline: bpy.types.MaskSpline, keyed: np.ndarray | None) -> MaskSpline:
-    """Return a spline. `keyed` has its points by shape keys, as _keyed_points; None: as they are in Blender."""
+def _spline(mask: bpy.types.Mask, spline: bpy.types.MaskSpline, numbers: np.ndarray) -> MaskSpline:
+    """Return a spline with these points (n, 7 or more): left handle, point, right handle, weight."""
     if any(point.parent.id is not None for point in spline.points):
         sentence = rpt_(
             'mask "{mask}": parents of its points are not followed, but a film of its Mask strip can be the matte'
         )
         raise EffectError(sentence.format(mask=mask.name))
-    points, weights = _points(spline) if keyed is None else (keyed[:, :6].reshape(-1, 3, 2), keyed[:, 6])
+    points, weights = numbers[:, :6].reshape(-1, 3, 2), numbers[:, 6]
     feathers = tuple(tuple((f.u, f.weight) for f in point.feather_points) for point in spline.points)
     _checked(mask, [*points.flat, *weights, *chain(*chain(*feathers))])
     return MaskSpline(
@@ -101,9 +99,9 @@ def _spline_at(mask: bpy.types.Mask, spline: bpy.types.MaskSpline, keyed: np.nda
     )
 
 
-def _points(spline: bpy.types.MaskSpline) -> tuple[np.ndarray, np.ndarray]:
-    places = [numbers(spline.points, name, size=2) for name in ("handle_left", "co", "handle_right")]
-    return np.stack(places, axis=1).astype(np.float64), numbers(spline.points, "weight").astype(np.float64)
+def _points(spline: bpy.types.MaskSpline) -> np.ndarray:
+    places = [fcurves.numbers(spline.points, name, size=2) for name in ("handle_left", "co", "handle_right")]
+    return np.column_stack([*places, fcurves.numbers(spline.points, "weight")]).astype(np.float64)
 
 
 def _checked(mask: bpy.types.Mask, values: ArrayLike) -> np.ndarray:

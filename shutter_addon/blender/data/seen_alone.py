@@ -7,7 +7,7 @@ from collections.abc import Mapping
 import bpy
 from bpy.types import Scene, Strip, bpy_struct
 
-from . import fcurves, strips, versions
+from . import fcurves, requirements, strips, versions
 
 _KNOWN_TO = (5, 4)  # versions before this have the dither and colors that are known to the bit
 _PLAIN_STRIP = {
@@ -65,10 +65,7 @@ def alone(scene: Scene, frame: int, but: str | None = None) -> tuple[Strip, bool
     seen = [
         strip
         for strip in editor.strips
-        if strip.type != "SOUND"
-        and strip.name != but
-        and strips.is_at(strip, frame)
-        and not (strip.mute or editor.channels[strip.channel].mute)
+        if strip.type != "SOUND" and strip.name != but and frame in requirements.shown_frames(scene, strip)
     ]
     top = max(seen, key=lambda strip: strip.channel, default=None)
     if top is None or top not in strips.effect_strips(scene) or not hides(scene, top):

@@ -105,7 +105,6 @@ def _signature(scene: Scene, effect: PropertyGroup, strip: Strip) -> Iterator[Ha
     yield from effect_version.parts(scene, effect, strip, _files_of)
     if (source := strips.nearest_source(scene, effect, strip)) is not None:
         yield effect_version.timing(source), source.left_handle
-        yield source_media.reading(source)
         try:
             yield source_media.media_key(source)
         except (MediaError, EffectError) as error:

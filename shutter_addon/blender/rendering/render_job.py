@@ -125,7 +125,7 @@ def end(scene: Scene, alone: bool) -> None:
         if bpy.app.background:
             _remove_spent()
         else:  # Blender's data belongs to the main thread
-            main_thread.soon(lambda: bpy.app.timers.register(_remove_spent_then))
+            main_thread.soon(lambda: bpy.app.timers.register(_remove_spent))
         if _job.failure is not None and alone and bpy.app.background:
             leave(BAD_INPUT)
 
@@ -287,23 +287,18 @@ def _cancel() -> None:
         _job.cancelling = False
 
 
-def _remove_spent_then() -> float | None:
-    """Remove what small renders used, as a timer, once the job has ended."""
+def _remove_spent() -> float | None:
+    """Remove what small renders used, once the job has ended; also a timer.
+
+    During the film, Blender would free data of other effects in the same frame along with it, and crash.
+    """
     if bpy.app.is_job_running("RENDER"):
         return _PATIENCE
-    _remove_spent()
-    return None
-
-
-def _remove_spent() -> None:
-    """Remove what small renders used.
-
-    Not before the film has ended: Blender would free data of other effects in the same frame along with it, and crash.
-    """
     while _spent:
         scene, camera = _spent.pop()
         items = (bpy.data.scenes.get(scene), bpy.data.objects.get(camera))
         bpy.data.batch_remove([item for item in items if item is not None])
+    return None
 
 
 def cancelling() -> bool:

@@ -299,9 +299,8 @@ class RenderSession:
     def keep(self, scenes: set[int]) -> None:
         """Close the renderers of scenes other than these session_uids. A render job may remove some meanwhile."""
         self._drop_begun(set(self._begun) - scenes)
-        for place in [place for place in list(self._requests) if place[0] not in scenes]:
+        for place in [place for place in (*self._requests, *self._renderers) if place[0] not in scenes]:
             self._requests.pop(place, None)
-        for place in [place for place in list(self._renderers) if place[0] not in scenes]:
             _key, renderer = self._renderers.pop(place, (None, None))
             if renderer is not None:
                 self._submit(renderer.close)
