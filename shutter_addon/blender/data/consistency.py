@@ -91,7 +91,7 @@ def fit_bars(effect: PropertyGroup) -> None:
     Shutters that keep to a preset get its bars. Others, and keys, keep their shape and share of light.
     """
     for index, shutter in enumerate(effect.shutters):
-        is_made = _made_again(effect, index)
+        is_made = _remade(effect, index)
         if not is_made and len(shutter.bars) not in (0, effect.window):
             _change_bars(effect, index, lambda old: shutters.resample(old, effect.window))
 
@@ -146,7 +146,7 @@ def preset_of(effect: PropertyGroup, index: int) -> str:
     return shutter.preset if is_kept else ""
 
 
-def _made_again(effect: PropertyGroup, index: int) -> bool:
+def _remade(effect: PropertyGroup, index: int) -> bool:
     """Make the bars of a shutter that keeps to a preset again, for the window.
 
     Returns:

@@ -13,7 +13,7 @@ from . import consistency, strips
 
 def _count_filmed() -> Iterator[str | None]:
     """Migrate to format 2: bars count filmed frames, no moments between them; repeated frames still count."""
-    for scene in _holding():
+    for scene in _scenes_with_effects():
         for effect in scene.virtual_shutter.effects if scene.virtual_shutter.format < 2 else ():
             if effect.inbetween not in ("1", "AUTO"):
                 effect.skip_repeats = False
@@ -30,7 +30,7 @@ MIGRATIONS: tuple[tuple[int, Callable[[], Iterable[str | None]]], ...] = ((2, _c
 
 def of_file() -> int:
     """Return the oldest format of the effects that can be changed; 0 is from before formats had numbers."""
-    return min((scene.virtual_shutter.format for scene in _holding()), default=FORMAT)
+    return min((scene.virtual_shutter.format for scene in _scenes_with_effects()), default=FORMAT)
 
 
 def is_newer(scene) -> bool:
@@ -65,7 +65,7 @@ def migrate() -> str | None:
     """
     stored = of_file()
     lost = [sentence for number, change in MIGRATIONS if stored < number for sentence in change()]
-    for scene in _holding():
+    for scene in _scenes_with_effects():
         if scene.virtual_shutter.format != FORMAT:
             scene.virtual_shutter.format = FORMAT
     return next(filter(None, lost), None)
@@ -76,7 +76,7 @@ def stamp_saved(version: str) -> None:
 
     Their format stays: a scene that was appended from an older file migrates when the file is loaded.
     """
-    for scene in _holding():
+    for scene in _scenes_with_effects():
         scene.virtual_shutter.version = version
 
 
@@ -99,5 +99,5 @@ def note(scenes: Iterable) -> str | None:
     return sentence.format(scene=scene.name, version=scene.virtual_shutter.version)
 
 
-def _holding() -> list:
+def _scenes_with_effects() -> list:
     return [scene for scene in strips.local_scenes() if scene.virtual_shutter.effects]

@@ -121,17 +121,17 @@ def _settings(effect: PropertyGroup) -> Iterator[Hashable]:
             numbers = (value,) if isinstance(value, str | float | int) else tuple(value)
             yield name, tuple(number for i, number in enumerate(numbers) if (where, i) not in keyed)
 
-    yield from values(effect, "", *_told(model.Effect, Options), "use_source_time", "source_time")
-    yield from values(effect.camera, ".camera", *_told(model.Camera), *_MOVES)
+    yield from values(effect, "", *_setting_names(model.Effect, Options), "use_source_time", "source_time")
+    yield from values(effect.camera, ".camera", *_setting_names(model.Camera), *_MOVES)
     for i, shutter in enumerate(effect.shutters):
-        yield from values(shutter, f".shutters[{i}]", *_told(model.Shutter), "follow")
+        yield from values(shutter, f".shutters[{i}]", *_setting_names(model.Shutter), "follow")
         is_followed = shutter.follow == "REGION" and shutter.follow_region in followed
         yield followed.index(shutter.follow_region) if is_followed else None
         for k, bar in enumerate(shutter.bars):
             yield from values(bar, f".shutters[{i}].bars[{k}]", "weight")
-    told = _told(model.Region, model.OutlineRegion, model.FileContent, model.RampContent)
+    names = _setting_names(model.Region, model.OutlineRegion, model.FileContent, model.RampContent)
     for i, region in enumerate(effect.regions):
-        yield from values(region, f".regions[{i}]", *told, "kind", "matte", "channel_name", *_MOVES)
+        yield from values(region, f".regions[{i}]", *names, "kind", "matte", "channel_name", *_MOVES)
         yield tuple((noted.frame, tuple(noted.location), noted.rotation, noted.scale) for noted in region.drawn)
 
 
@@ -140,7 +140,7 @@ def _drives(curve: FCurve) -> bool:
     return not (curve.mute or curve.is_empty)
 
 
-def _told(*kinds: type) -> list[str]:
+def _setting_names(*kinds: type) -> list[str]:
     """Return the properties of the model's fields, except names and colors."""
     fields = fields_of(*kinds).values()
     return [field.blender for field in fields if field.choices or not isinstance(field.default, str | tuple)]

@@ -71,7 +71,7 @@ def _property(field: Field, **more: Any) -> object:
     return FloatProperty(**said, precision=field.precision, step=1 if field.precision > 2 else 3)
 
 
-def _shortened(region: PropertyGroup, new: str, old: str, is_set: bool) -> str:
+def _region_renamed(region: PropertyGroup, new: str, old: str, is_set: bool) -> str:
     """Return a region's name, cut as in recipes. Blender's own `maxlen` counts bytes instead of characters."""
     new = new[:MAX_NAME]
     # Finding an item's effect is slow among many, so only where a shutter follows the old name. A region that is not
@@ -186,7 +186,7 @@ def scale_property(description: str, **more: Any) -> object:
     model.OutlineRegion,
     model.FileContent,
     model.RampContent,
-    name={"set_transform": _shortened},
+    name={"set_transform": _region_renamed},
 )
 class ShutterRegion(_Tracked, PropertyGroup):
     shutter: StringProperty(name="Shutter", description="Name of the shutter that holds in the region", update=changed)
@@ -236,12 +236,12 @@ class ShutterCamera(_Tracked, PropertyGroup):
     scale: scale_property("Scale of what the camera sees, about the picture's center", update=changed)
 
 
-def _renamed(shutter: PropertyGroup, new: str, old: str, _is_set: bool) -> str:
+def _shutter_renamed(shutter: PropertyGroup, new: str, old: str, _is_set: bool) -> str:
     revision.changed()
     return consistency.rename(selection.effect_of_item(shutter), old, new)
 
 
-def _recolored(shutter: PropertyGroup, _context: Context) -> None:
+def _shutter_recolored(shutter: PropertyGroup, _context: Context) -> None:
     revision.changed()
     consistency.color_layers(selection.effect_of_item(shutter), shutter)
 
@@ -284,8 +284,8 @@ class ShutterBar(PropertyGroup):
 
 @with_fields(
     model.Shutter,
-    name={"set_transform": _renamed},
-    color={"update": _recolored},
+    name={"set_transform": _shutter_renamed},
+    color={"update": _shutter_recolored},
 )
 class Shutter(PropertyGroup):
     bars: CollectionProperty(type=ShutterBar)

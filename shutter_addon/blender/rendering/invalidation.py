@@ -19,8 +19,8 @@ from ..data.snapshot import Snapshot
 from ..devices import main_thread
 
 _signatures: dict[int, int] = {}  # by session_uid of the effect scene
-_spoilt: set[int] = set()  # session_uids of effect scenes of which the sequencer may keep a frame that failed
-_lesser: set[int] = set()  # likewise, a frame of reduced quality for a preview
+_failed: set[int] = set()  # session_uids of effect scenes of which the sequencer may keep a frame that failed
+_reduced: set[int] = set()  # likewise, a frame of reduced quality for a preview
 
 
 def current(scene: Scene, effect: PropertyGroup, strip: Strip, frame: float) -> Snapshot:
@@ -41,12 +41,12 @@ def forget() -> None:
 
 def spoil(scene: int) -> None:
     """Note that a picture of an effect scene failed."""
-    _spoilt.add(scene)
+    _failed.add(scene)
 
 
 def drop_spoilt() -> None:
     """Drop frames that failed: the sequencer would show them again without calling the engine."""
-    _drop(_spoilt)
+    _drop(_failed)
 
 
 def keep_until_drawn(scene: int) -> None:
@@ -54,13 +54,13 @@ def keep_until_drawn(scene: int) -> None:
 
     Blender would share it with renders, scopes and the color picker, so the draw handler drops it.
     """
-    _lesser.add(scene)
+    _reduced.add(scene)
     main_thread.later(drop_lesser)  # in case the handler is not called
 
 
 def drop_lesser() -> None:
     """Drop reduced frames for previews."""
-    _drop(_lesser)
+    _drop(_reduced)
 
 
 def drop_frames() -> None:

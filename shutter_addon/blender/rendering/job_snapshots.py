@@ -103,9 +103,6 @@ def of(effect_scene: Scene, scene_frame: float, ended: Callable[[], bool] | None
     frame = strips.timeline_frame(strip, scene_frame)
     if not bpy.app.background:
         return invalidation.current(scene, effect, strip, frame), frame
-    known = _films.get((effect_scene.session_uid, strip.name))
-    if known is not None and frame in known.frames and not render_job.scripts_act():
-        return known, frame
     return _of_film(scene, effect, strip, frame), frame
 
 
@@ -113,6 +110,8 @@ def _of_film(scene: Scene, effect: PropertyGroup, strip: Strip, frame: float) ->
     """Return the snapshot of an effect in the background."""
     key, frames = (effect.scene.session_uid, strip.name), {frame, frame + scene.frame_step}
     is_again = key in _films and not render_job.scripts_act()
+    if is_again and (known := _films[key]) is not None and frame in known.frames:
+        return known
     if is_again:
         parts = [part for part in strips.effect_strips(scene) if part.scene == effect.scene]
         frames |= asked_frames(scene, parts, scene.session_uid == render_job.film())

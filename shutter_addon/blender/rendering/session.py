@@ -124,7 +124,7 @@ class RenderSession:
             late: As in MatteValues.
         """
         self._choose, self._ask_others, self._late = choose, ask_others, late
-        self._asks = False  # whether others free memory, in the middle of a picture
+        self._frees_others = False  # whether others free memory, in the middle of a picture
         self._chosen: tuple[str, str | None] | None = None
         self._executor: Executor | None = None
         self._compositor: Future | None = None
@@ -267,15 +267,15 @@ class RenderSession:
 
     def _ask(self) -> None:
         """Let other sessions free their memory; this one's is in use."""
-        self._asks = True
+        self._frees_others = True
         try:
             self._ask_others()
         finally:
-            self._asks = False
+            self._frees_others = False
 
     def free(self) -> None:
         """Free the renderers' memory on the device, unless this session asks for room itself. They load it again."""
-        if self._asks:
+        if self._frees_others:
             return
         for _key, renderer in list(self._renderers.values()):
             self.run(renderer.release)
