@@ -62,12 +62,20 @@ def key(scene: Scene, effect: PropertyGroup, strip: Strip, frames: range) -> str
     digest = hashlib.sha256()
     for part in (
         (versions.extension(), versions.colours(), rate, frames, picture_size(effect)),
-        (None if effect.use_source_time else timing(source, start), _contents(source)),
+        _source(effect, source, _contents, start),
         *_settings(effect),
         *parts(scene, effect, strip, _contents, start),
     ):
         digest.update(repr(part).encode() + b"\0")
     return digest.hexdigest()[:16]
+
+
+def preview_key(scene: Scene, effect: PropertyGroup, strip: Strip) -> int:
+    """Return a number that changes with an effect's pictures, except by properties with an update callback."""
+    source = strips.nearest_source(scene, effect, strip)
+    lies = None if source is None else (source.left_handle, _source(effect, source, _stamps, 0))
+    names = tuple(shutter.name for shutter in effect.shutters)
+    return hash((names, lies, *parts(scene, effect, strip, _stamps)))
 
 
 def is_changed(scene: Scene, effect: PropertyGroup, strip: Strip) -> bool:
@@ -107,6 +115,11 @@ def parts(
     # As text, because NaN never equals NaN.
     yield repr([getattr(strip.transform, name) for name in TRANSFORM if name not in keyed])
     yield repr(tuple(strip.transform.origin)), strip.use_flip_x, strip.use_flip_y
+
+
+def _source(effect: PropertyGroup, source: Strip, files: Files, start: int) -> Hashable:
+    """Return what an effect's source shows, and when."""
+    return None if effect.use_source_time else timing(source, start), files(source)
 
 
 def _settings(effect: PropertyGroup) -> Iterator[Hashable]:
@@ -207,6 +220,14 @@ def timing(strip: Strip, start: int = 0) -> StripTiming:
     lies = source_media.timing_of(strip)
     begins, ends = lies.content_start - start, lies.content_end - start
     return replace(lies, name="", left_handle=0, content_start=begins, content_end=ends)
+
+
+def _stamps(owner: Strip | PropertyGroup) -> Hashable:
+    """Return a key of the files of a strip or an image matte, as they are on disk now, or why there is none."""
+    try:
+        return source_media.media_key(owner) if isinstance(owner, Strip) else matte_content.image_file(owner)
+    except (MediaError, EffectError) as error:
+        return str(error)
 
 
 def _contents(owner: Strip | PropertyGroup) -> Hashable:

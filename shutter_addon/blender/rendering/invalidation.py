@@ -6,15 +6,11 @@ sources are compared with what they were, because no callback reports them.
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Iterator
-
 import bpy
 from bpy.types import PropertyGroup, Scene, Strip
 
 from ...core import revision
-from ...core.messages import EffectError
-from ...media import MediaError
-from ..data import effect_version, matte_content, snapshot, source_media, strips
+from ..data import effect_version, snapshot, strips
 from ..data.snapshot import Snapshot
 from ..devices import main_thread
 
@@ -91,26 +87,9 @@ def invalidate_changed(scene: Scene) -> bool:
         if (strip := shown.get(effect.scene)) is None:
             continue
         uid = effect.scene.session_uid
-        signature = hash(tuple(_signature(scene, effect, strip)))
+        signature = effect_version.preview_key(scene, effect, strip)
         if _signatures.setdefault(uid, signature) != signature:
             _signatures[uid] = signature
             strips.invalidate(scene, effect.scene)
             changed = True
     return changed
-
-
-def _signature(scene: Scene, effect: PropertyGroup, strip: Strip) -> Iterator[Hashable]:
-    """Yield what the effect's pictures depend on, except properties with an update callback."""
-    yield tuple(shutter.name for shutter in effect.shutters)
-    yield from effect_version.parts(scene, effect, strip, _files_of)
-    if (source := strips.nearest_source(scene, effect, strip)) is not None:
-        yield effect_version.timing(source), source.left_handle
-        try:
-            yield source_media.media_key(source)
-        except (MediaError, EffectError) as error:
-            yield str(error)  # a missing file may come back
-
-
-def _files_of(owner: Strip | PropertyGroup) -> Hashable:
-    """Return a key of the files of a strip or an image matte, as they are on disk now."""
-    return source_media.media_key(owner) if isinstance(owner, Strip) else matte_content.image_file(owner)
