@@ -7,7 +7,7 @@ the timeline and the files on disk.
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable, Hashable, Iterable, Iterator
+from collections.abc import Callable, Hashable, Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -36,8 +36,6 @@ from .fcurves import numbers
 
 # Identifies the files of a strip, or of a region whose matte is an image.
 Files = Callable[[Strip | PropertyGroup], Hashable]
-
-_Curve = tuple[str, int, FCurve]  # data path, array index, curve
 
 _MOVES = "location", "rotation", "scale"
 _BEZIER = 2  # of Keyframe.interpolation as a number; those above have parameters
@@ -107,11 +105,10 @@ def parts(
         if region.kind == "MATTE":
             yield from _matte(region, files, start)
     yield fcurves.stretched(scene)
-    found = [(curve.data_path, curve.array_index, curve) for curve in fcurves.curves_under(scene, "")]
-    yield from _curves(_below(effect.path_from_id() + ".", found), start)
-    placed = _below(f"{strip.path_from_id()}.transform.", found)
-    yield from _curves(placed, start)
-    keyed = {name for name, _index, curve in placed if _drives(curve)}
+    transform = f"{strip.path_from_id()}.transform."
+    yield from _curves(scene, effect.path_from_id() + ".", start)
+    yield from _curves(scene, transform, start)
+    keyed = {c.data_path.removeprefix(transform) for c in fcurves.curves_under(scene, transform) if _drives(c)}
     # As text, because NaN never equals NaN.
     yield repr([getattr(strip.transform, name) for name in TRANSFORM if name not in keyed])
     yield repr(tuple(strip.transform.origin)), strip.use_flip_x, strip.use_flip_y
@@ -159,15 +156,11 @@ def _setting_names(*kinds: type) -> list[str]:
     return [field.blender for field in fields if field.choices or not isinstance(field.default, str | tuple)]
 
 
-def _below(path: str, curves: Iterable[_Curve]) -> list[_Curve]:
-    """Return the F-curves below a path, with the rest of their path, sorted."""
-    found = [(name.removeprefix(path), index, curve) for name, index, curve in curves if name.startswith(path)]
-    return sorted(found, key=lambda each: each[:2])
-
-
-def _curves(curves: Iterable[_Curve], start: int | None) -> Iterator[Hashable]:
-    for path, index, curve in curves:
-        yield path, index, curve.mute, curve.extrapolation
+def _curves(owner: Scene | Mask, path: str, start: int | None) -> Iterator[Hashable]:
+    """Yield what the F-curves say whose path starts with `path`, in the order of their paths."""
+    found = fcurves.curves_under(owner, path)
+    for curve in sorted(found, key=lambda curve: (curve.data_path, curve.array_index)):
+        yield curve.data_path.removeprefix(path), curve.array_index, curve.mute, curve.extrapolation
         points = curve.keyframe_points
         for name in ("handle_left", "co", "handle_right"):
             places = numbers(points, name, size=2)
@@ -212,7 +205,7 @@ def _mask(mask: Mask) -> Iterator[Hashable]:
     yield mask.frame_start
     yield revision.until_change("mask", key, lambda: repr(mask_reading.mask_at(mask, mask.frame_start)))
     yield from mask_reading.motion(mask)
-    yield from _curves([(c.data_path, c.array_index, c) for c in fcurves.curves_under(mask, "")], None)
+    yield from _curves(mask, "", None)
 
 
 def timing(strip: Strip, start: int = 0) -> StripTiming:

@@ -129,11 +129,11 @@ class Sampling:
         )
 
     @cached_property
-    def placement(self) -> keyframes.Channel | None:
+    def placement(self) -> keyframes.Channel:
         """The matrix from the sequencer's image to the strip's picture, which may be keyed."""
         strip = self.strip
         if strip is None:
-            return None
+            return keyframes.Constant(None)
         size, path = annotations.picture_size(self.effect), f"{strip.path_from_id()}.transform"
         found = {name: tried(self.curves.find, f"{path}.{name}") for name in annotations.TRANSFORM}
         keyed = {name: curve for name, curve in found.items() if curve and not isinstance(curve, EffectError)}
