@@ -3,7 +3,7 @@
 Run by scripts/build. The manifest in the source tree has no wheels: so Blender builds, validates and links the checkout
 as it is, without a download. The zip made of it is unpacked, gets wheels and the lines that list them, and is packed
 again for each system; what belongs into a zip is said once, in the manifest. The wheels' holders of copyright and texts
-of licences come from third_party/components.toml.
+of licences come from third_party/components.toml. All zips contain the model that finds subjects.
 """
 
 import argparse
@@ -20,6 +20,7 @@ import zipfile
 from pathlib import Path
 
 import components
+import fetch_model
 import without_openssl
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -52,6 +53,7 @@ def name(suffix: str) -> str:
 
 def build_without_wheels(output: Path, source: Path = ROOT) -> Path:
     """Makes the zip that works with what Blender brings."""
+    fetch_model.fetch(source / fetch_model.PATH.relative_to(ROOT))
     path = output / name("-no_wheels")
     extension("build", "--source-dir", source, "--output-filepath", path)
     extension("validate", path)

@@ -158,6 +158,8 @@ def page() -> str:
             for part in (own, *parts(wheel, system)):
                 rows.setdefault((part.name, part.licence), []).append(part)
     lines = [_row(*key, found) for key, found in sorted(rows.items(), key=lambda row: (row[0][0].lower(), row[0][1]))]
+    for its in DATA["model"].values():
+        lines.append(f"| {its['name']} |  | all zips | {its['licence']} | yes: {why(its['licence'])} |")
     return _HEAD + "\n".join(lines) + "\n"
 
 
@@ -180,7 +182,8 @@ _HEAD = """\
 # Licences of what the zips contain
 
 Virtual Shutter is under the GNU General Public License, version 3 or later. The zips with wheels also contain what this
-page lists. The zip without wheels contains nothing else. Each zip has the texts of the licences in its folder
+page lists. The zip without wheels contains nothing of it but the model that finds subjects, which lies with its licence
+in the folder `models`. Each other zip has the texts of the licences in its folder
 `licenses`, and the copyright holders in its manifest.
 
 `scripts/components.py` writes this page from `third_party/components.toml`, and a test compares it with the wheels. Do

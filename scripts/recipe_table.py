@@ -24,7 +24,7 @@ PARTS = {
     "a shutter": (effect.Shutter,),
     "a region": (effect.AnyRegion,),
     "a line, a lasso": (effect.Region,),
-    "a matte, a ramp, an outline": (effect.MatteRegion,),
+    "a matte, a ramp, an outline, a subject": (effect.MatteRegion,),
     "an outline": (effect.OutlineRegion,),
     "a matte": (effect.FileContent,),
     "a ramp": (effect.RampContent,),

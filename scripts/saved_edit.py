@@ -126,13 +126,15 @@ def combined() -> dict:
 def _carried() -> dict:
     """A recipe of what needs optical flow, whose pictures differ from machine to machine by more than a level."""
     outline = {"name": "carried", "shutter": "Long", "kind": "outline", "strokes": [_SQUARE]}
+    subject = {"name": "subject", "shutter": "Long", "kind": "subject", "strokes": [_SQUARE], "not_strokes": [_SQUARE]}
+    subject["keys"] = [{"frame": 2, "strokes": [_SQUARE]}]
     shutters = [{"name": "Long", "bars": [1, 1, 1, 1]}, {"name": "Sharp", "bars": [1, 0, 0, 0]}]
     return {
         "version": 2,
         "window": 4,
         "inbetween": 2,
         "shutters": shutters,
-        "regions": [outline],
+        "regions": [outline, subject],
     }
 
 
@@ -171,6 +173,7 @@ def make(path: Path) -> None:
         recipe = recipe_file.parse(recipe_file.json.dumps(data or combined() | {"time": [], "edges": "shorten"}))
         recipe_import.apply(scene, effect, strip, recipe, path.parent)
         first += count
+    effect.regions[-1].finds_subject = True
     scene.frame_start, scene.frame_end = 1, first - 1
     _bake(scene, scene.sequence_editor.strips["baked effect"])
     _add_other_regions(scene, scene.virtual_shutter.effects[3], footage)

@@ -1,7 +1,7 @@
 """A software bill of materials of a zip, as CycloneDX: `python scripts/sbom.py ZIP OUTPUT.cdx.json`.
 
-It lists the extension, each wheel, the libraries in the wheels, and every file of the zip and of its wheels with its
-hash. The same zip gives the same bytes.
+It lists the extension, its model, each wheel, the libraries in the wheels, and every file of the zip and of its wheels
+with its hash. The same zip gives the same bytes.
 """
 
 import argparse
@@ -54,11 +54,13 @@ def _bom(zip_path: Path) -> Bom:
             metadata=BomMetaData(component=extension, timestamp=datetime(*newest, tzinfo=UTC)),
         )
         bom.components.update(_files(packed))
+        models = [_model(its, packed.read(its["path"])) for its in components.DATA["model"].values()]
+        bom.components.update(models)
         wheels = [_wheel(path.removeprefix("./"), packed, manifest["platforms"][0]) for path in _wheels(manifest)]
     for wheel, bundled in wheels:
         bom.components.update((wheel, *bundled))
         bom.register_dependency(wheel, bundled)
-    bom.register_dependency(extension, [wheel for wheel, _ in wheels])
+    bom.register_dependency(extension, [*models, *(wheel for wheel, _ in wheels)])
     return bom
 
 
@@ -76,6 +78,18 @@ def _extension(manifest: dict, digest: str) -> Component:
         licenses=[LicenseExpression(licence.removeprefix("SPDX:")) for licence in manifest["license"]],
         copyright="\n".join(manifest["copyright"]),
         hashes=[_hash(digest)],
+    )
+
+
+def _model(its: dict, content: bytes) -> Component:
+    """A neural network."""
+    return Component(
+        name=its["name"],
+        type=ComponentType.MACHINE_LEARNING_MODEL,
+        bom_ref=its["path"],
+        licenses=[LicenseExpression(its["licence"])],
+        copyright="\n".join(its["copyright"]),
+        hashes=[_hash(_sha256(content))],
     )
 
 

@@ -67,7 +67,8 @@ def sources():
     """What every zip has to hold: the extension's own files, and no other."""
     package = ROOT / "shutter_addon"
     code = [*package.rglob("*.py"), *package.rglob("*.clf"), *(ROOT / "shaders").rglob("*.glsl")]
-    return {"blender_manifest.toml", "__init__.py", "LICENSE", *(path.relative_to(ROOT).as_posix() for path in code)}
+    files = {"blender_manifest.toml", "__init__.py", "LICENSE", *(path.relative_to(ROOT).as_posix() for path in code)}
+    return files | {f"models/{name}" for name in ("u2netp.onnx", "README.txt", "LICENSE-Apache-2.0.txt")}
 
 
 def test_a_zip_for_each_system_and_one_without_wheels(dist):
@@ -86,7 +87,7 @@ def test_the_zip_without_wheels_holds_the_extension_alone(dist):
     assert names == sources()
     assert "wheels" not in manifest
     assert "platforms" not in manifest
-    assert len(manifest["copyright"]) == 1
+    assert len(manifest["copyright"]) == 2  # ours, and the model's
 
 
 @pytest.mark.parametrize(

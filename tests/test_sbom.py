@@ -104,7 +104,8 @@ def test_a_bill_lists_wheels_and_what_they_bundle(system, zips, bills):
         listed["metadata"]["component"]["hashes"][0]["content"] == hashlib.sha256(zips[system].read_bytes()).hexdigest()
     )
     depends = {each["ref"]: each.get("dependsOn", []) for each in listed["dependencies"]}
-    assert set(depends["virtual_shutter"]) == set(wheels)
+    assert set(depends["virtual_shutter"]) == {*wheels, "models/u2netp.onnx"}
+    assert by_reference["models/u2netp.onnx"]["licenses"]
     assert {reference.split("!/")[1] for name in wheels for reference in depends[name]} >= {"FFmpeg", "x264", "x265"}
 
 

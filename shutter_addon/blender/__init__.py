@@ -28,6 +28,7 @@ _MODULES = (
     "interface.bar_editor",
     "interface.region_gizmo",
     "interface.outline_operators",
+    "interface.subject_operators",
     "interface.probe_gizmo",
     "handlers",
 )

@@ -102,8 +102,11 @@ class CarriedMattes(SourceWrapper):
     def confidence(self, index: int) -> float | None:
         """How sure a frame's matte is (carrying.Carried); None: it is not kept yet."""
         near = self._near(index)
-        image = None if near == (None, None) else derived.opened(self._path(index, *near), self._spec)
-        if image is None:
+        return None if near == (None, None) else self._described(self._path(index, *near))
+
+    def _described(self, path: Path) -> float | None:
+        """The confidence that a file's description has; None: it is not kept, or not ours."""
+        if (image := derived.opened(path, self._spec)) is None:
             return None
         with closing(image):
             said = image.spec().get_string_attribute("ImageDescription")
@@ -153,7 +156,7 @@ class CarriedMattes(SourceWrapper):
             with Claims(path.parent, _PATIENCE, _BEAT) as claims:
                 try:
                     derived.own_folder(path.parent)
-                    while not claims.take(name):
+                    while not claims.take(name) and not derived.is_kept(path):
                         stopping.check()
                         time.sleep(_PAUSE)
                 except OSError as error:

@@ -110,20 +110,21 @@ def carried(frames: Frames, first: Drawing | None, last: Drawing | None, span: r
         share = _mixed(sides, _weights(frame, ends))
         matte = refined(frames(frame), share)
         if before is not None:
-            matte += cv2.resize(footage.stillness(frame), matte.shape[::-1]) * (before - matte)
+            still = stillness(footage.moved[frame], footage.colors[frame], footage.colors[frame - 1])
+            matte += cv2.resize(still, matte.shape[::-1]) * (before - matte)
         before = matte
-        yield Carried(frame, _levels(matte), _confidence(share, sides))
+        yield Carried(frame, levels(matte), _confidence(share, sides))
 
 
 def drawn(picture: np.ndarray, cover: np.ndarray) -> np.ndarray:
     """The matte (H, W) uint8 of a drawing in its own frame, refined as those that are carried.
 
     picture: (H, W, 3) uint8; cover: see Drawing"""
-    shown = _lab(flow.resized(picture, cover.shape[::-1]))
-    return _levels(refined(picture, _mixed([_votes(shown, shown, cover, box_around(cover))], [1.0])))
+    shown = lab(flow.resized(picture, cover.shape[::-1]))
+    return levels(refined(picture, _mixed([_votes(shown, shown, cover, box_around(cover))], [1.0])))
 
 
-def _levels(matte: np.ndarray) -> np.ndarray:
+def levels(matte: np.ndarray) -> np.ndarray:
     return np.rint(255 * matte).astype(np.uint8)
 
 
@@ -138,20 +139,12 @@ class _Footage:
     moved: dict[int, np.ndarray] = field(default_factory=dict)
 
     def add(self, frame: int, picture: np.ndarray) -> None:
-        self.colors[frame], self.greys[frame] = _lab(picture), cv2.cvtColor(picture, cv2.COLOR_RGB2GRAY)
+        self.colors[frame], self.greys[frame] = lab(picture), cv2.cvtColor(picture, cv2.COLOR_RGB2GRAY)
 
     def to(self, frame: int, other: int) -> Places:
         """Where in another frame lies what a frame shows."""
         grey = self.greys[frame]
         return flow.grid(*grey.shape) + flow.fine_vectors(grey, self.greys[other])
-
-    def stillness(self, frame: int) -> np.ndarray:
-        """The share (h, w) of the matte of the frame before that a frame keeps: where nothing moves, and nothing looks
-        different, what differs is noise."""
-        still = np.clip(1.5 - self.moved[frame] / np.float32(STILL), 0, 1)
-        apart = _apart(self.colors[frame], self.colors[frame - 1])
-        noise = float(np.median(apart[still > 0])) if still.any() else 0.0
-        return QUIET * still * np.exp(-np.square(apart / np.float32(CHANGED + 2 * noise)))
 
     def best(self, joined: Places, frame: int, end: Drawing) -> Places:
         """Where in a drawing's frame lies what a frame shows: for each pixel, of all ways to know the one that leads to
@@ -166,6 +159,17 @@ class _Footage:
             places = np.where(better[..., None], other, places)
             apart = np.where(better, differs, apart)
         return places
+
+
+def stillness(moved: np.ndarray, colors: np.ndarray, before: np.ndarray) -> np.ndarray:
+    """The share (h, w) of the matte of the frame before that a frame keeps: where nothing moves, and nothing looks
+    different, what differs is noise.
+
+    moved: by how many pixels; colors, before: (3, h, w) its colours and those of the frame before"""
+    still = np.clip(1.5 - moved / np.float32(STILL), 0, 1)
+    apart = _apart(colors, before)
+    noise = float(np.median(apart[still > 0])) if still.any() else 0.0
+    return QUIET * still * np.exp(-np.square(apart / np.float32(CHANGED + 2 * noise)))
 
 
 def _apart(picture: np.ndarray, other: np.ndarray) -> np.ndarray:
@@ -317,7 +321,7 @@ def _explained(light: np.ndarray, values: np.ndarray, radius: int, coarse: int) 
     return values + believed * (np.clip((found - 0.5) * STEEPER + 0.5, 0, 1) - values)
 
 
-def _lab(picture: np.ndarray) -> np.ndarray:
+def lab(picture: np.ndarray) -> np.ndarray:
     """Colours (3, h, w) float32 of a picture (h, w, 3) uint8."""
     lab = cv2.cvtColor(picture.astype(np.float32) / 255, cv2.COLOR_RGB2LAB)
     lab[..., 0] /= 2

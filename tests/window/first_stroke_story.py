@@ -104,7 +104,8 @@ def gone_to(frame):
     yield 0.5
 
 
-def drawing_begun():
+def drawing_begun(finds_subject=False):
+    """finds_subject: whether the stroke may become a subject; else it stays a scribble, which is tracked"""
     movie = story.edit().sequence_editor.strips_all[0]
     x, y = timeline().view2d.view_to_region(story.edit().frame_current + 5, movie.channel + 0.5, clip=False)
     driver.move(timeline(), x, y)
@@ -123,6 +124,7 @@ def drawing_begun():
     yield from driver.until(lambda: sidebar.active_panel_category == "Shutter", "the Shutter tab opens")
     assert len(story.effect().regions) == 1
     assert channel() == 1
+    story.effect().regions[0].finds_subject = finds_subject
 
 
 def stroke_drawn():

@@ -64,6 +64,7 @@ def drawn():
     with driver.override("PREVIEW"):
         bpy.ops.shutter.draw("INVOKE_DEFAULT", True, new=True)
     yield 0.5
+    region().finds_subject = False  # it stays a scribble, which is tracked
     yield from driver.drag(story.preview(), [on_preview(*point) for point in STROKE])
     assert len(story.effect().regions) == 1
     yield

@@ -61,6 +61,25 @@ def test_the_first_stroke(backend, tmp_path):
     assert apart.max() > 60
 
 
+def test_a_subject(tmp_path):
+    """One stroke is enough, without Track: from an empty file to a rendered Sharp Subject in eight actions. The bunny is
+    sharp, from head to foot, and leaves no ghost of the frames around."""
+    (tmp_path / "footage").mkdir()
+    footage = shutil.copy(ROOT / "assets" / "bigbuckbunny.mp4", tmp_path / "footage")
+    given = {"footage": footage, "packages": packages(tmp_path / "packages")}
+    seen, console = tell("subject_story.py", "opengl", linked(tmp_path), **given)
+    assert "Traceback" not in console
+    facts = {name: entry[name] for entry in seen for name in entry}
+    assert len(facts["actions"]) <= 8
+    final = pixels(tmp_path / "final.png")
+    with open_source(footage) as source:
+        plain = source.read(89)[..., :3]
+    apart = np.abs(final - plain).max(axis=2)
+    for row, column in ((180, 470), (300, 480), (480, 490), (200, 300), (560, 540)):  # face, belly, arm, foot
+        assert apart[row - 4 : row + 5, column - 4 : column + 5].mean() <= 3, (row, column)
+    assert apart.max() > 40, "the ground is exposed for long"
+
+
 def test_an_outline(tmp_path):
     """Drawn at two frames, carried beside Blender to those between, shown, rendered: she is sharp at one of these, in
     the preview as in what is rendered, without a ghost."""

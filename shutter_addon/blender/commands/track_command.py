@@ -13,13 +13,17 @@ from ...core import atomic_write
 from ...core.frames.frame_source import FrameSource
 from ...core.model import outlines, presence
 from ...core.model.clip import Clip
-from ...core.model.effect import Camera, Effect, OutlineRegion, Region
+from ...core.model.effect import Camera, Effect, OutlineRegion, Region, SubjectRegion
+from ...core.model.scribbles import Drawings
 from ...core.recipes import recipe, recipe_file, region_keys
 from ...media import PrefetchSource, camera_tracking, matte_tracking, registration, tracking
 from ...media.carried_mattes import CarriedMattes
 from ...media.cuts import ShotSource
 from ...media.footage import Footage
 from ...media.smooth import SmoothSource, steps_for
+from ...media.subject import WIDTH
+from ...media.subject_mattes import Subject, SubjectMattes
+from ..data import preferences
 from ..editing import whole_edits
 from ..output import film_output
 from ..rendering import render_job
@@ -89,7 +93,7 @@ def _region_index(arguments: Namespace, source_recipe: Effect) -> int:
     if arguments.region not in names:
         raise film_output.OutputError(f'{arguments.recipe}: there is no region "{arguments.region}"')
     index = names.index(arguments.region)
-    if not isinstance(source_recipe.regions[index], Region | OutlineRegion):
+    if not isinstance(source_recipe.regions[index], Region | OutlineRegion | SubjectRegion):
         sentence = f'region "{arguments.region}" is a matte or a ramp, and has no strokes to track'
         raise film_output.OutputError(f"{arguments.recipe}: {sentence}")
     return index
@@ -113,7 +117,7 @@ def _followed(
         if index is None:
             regions = [region for region in effect.regions if isinstance(region, Region)]
             track: tracking.Track = camera_tracking.CameraTrack(subject, regions)
-        elif isinstance(subject, OutlineRegion):
+        elif isinstance(subject, OutlineRegion | SubjectRegion):
             track = matte_tracking.MatteTrack(subject, _cover(arguments, subject, clip, ends))
         else:
             track = tracking.RegionTrack(subject)
@@ -127,18 +131,30 @@ def _followed(
     return {each.frame: each for each in tracked if not each.fault}, stops
 
 
-def _cover(arguments: Namespace, region: OutlineRegion, clip: Clip, ends: ExitStack) -> matte_tracking.Cover:
-    """What an outline covers; clip: says what is shown at timeline frames; ends: what closes its mattes."""
-    if region.between == "straight":
+def _cover(
+    arguments: Namespace, region: OutlineRegion | SubjectRegion, clip: Clip, ends: ExitStack
+) -> matte_tracking.Cover:
+    """What an outline or a subject covers; clip: says what is shown at timeline frames; ends: what closes its
+    mattes."""
+    if isinstance(region, OutlineRegion) and region.between == "straight":
         return matte_tracking.cover_within(region.drawings.at)
 
     def filmed(frame: float) -> int:
         return clip.shown(frame).source_frame // clip.step
 
+    def curves(drawn: Drawings) -> dict[int, outlines.Curves]:
+        pairs = zip(drawn.frames, drawn.strokes, strict=True)
+        return {filmed(frame): outlines.curves(strokes) for frame, strokes in pairs}
+
     medium = ends.enter_context(command_line.opened(arguments.source))
-    drawn = zip(region.drawings.frames, region.drawings.strokes, strict=True)
-    curves = {filmed(frame): outlines.curves(strokes) for frame, strokes in drawn}
-    mattes = ends.enter_context(closing(CarriedMattes(medium, tuple(sorted(curves.items())))))
+    mattes: CarriedMattes
+    if isinstance(region, SubjectRegion):
+        subject = Subject(strokes=curves(region.drawings), nots=curves(region.nots), width=WIDTH)
+        drawn = tuple(sorted(curves(region.outlines).items()))
+        mattes = SubjectMattes(medium, subject, drawn, model=preferences.model())
+    else:
+        mattes = CarriedMattes(medium, tuple(sorted(curves(region.drawings).items())))
+    ends.enter_context(closing(mattes))
     return matte_tracking.cover_of(mattes, filmed)
 
 
@@ -149,7 +165,7 @@ def _ended(moving: Any, reach: int, tracked: dict, stops: list, start: int, fram
     if isinstance(moving, Camera):
         keys = presence.keys(seen, ends, (), max(reach, presence.FADE), beside=1)
         return replace(moving, influence=region_keys.with_ends(moving.influence, keys, frames))
-    if isinstance(moving, OutlineRegion):  # a matte says itself where it is
+    if isinstance(moving, OutlineRegion | SubjectRegion):  # a matte says itself where it is
         return moving
     keys = presence.keys(seen, ends, {start})
     return replace(moving, opacity=region_keys.with_ends(moving.opacity, keys, frames))

@@ -15,6 +15,9 @@ from .fcurves import numbers
 
 _SMALLEST = 4  # pixels: smaller sides are too small for scribbles
 USERS = "user"  # in place of an effect's identity: the annotation is the user's own
+# Properties of a region with a layer's name: its strokes; for a subject, strokes on what it is not, and corrections.
+LAYERS = "layer", "not_layer", "outline_layer"
+NOT_THIS = (0.9, 0.1, 0.1)  # color of strokes on what a subject is not
 # The properties of a strip's transform that can be keyed.
 TRANSFORM = ("offset_x", "offset_y", "scale_x", "scale_y", "rotation")
 
@@ -102,10 +105,15 @@ def add_stroke(drawing: AnnotationFrame, points: np.ndarray) -> None:
     stroke.points.foreach_set("co", places.ravel())
 
 
-def layer_of(effect: PropertyGroup, region: PropertyGroup) -> Any:
-    """Return the annotation layer of a region, or None."""
+def layer_of(effect: PropertyGroup, region: PropertyGroup, name: str = "layer") -> Any:
+    """Return the annotation layer that a region names in a property, one of LAYERS, or None."""
     annotation = effect.scene and effect.scene.annotation
-    return annotation.layers.get(region.layer) if annotation else None
+    return annotation.layers.get(getattr(region, name)) if annotation else None
+
+
+def layers_of(effect: PropertyGroup, region: PropertyGroup) -> list:
+    """Return all annotation layers of a region."""
+    return [layer for name in LAYERS if (layer := layer_of(effect, region, name)) is not None]
 
 
 def is_hidden(effect: PropertyGroup, region: PropertyGroup) -> bool:

@@ -12,7 +12,7 @@ from ...core.messages import EffectError
 from ...core.model import keyframes, limits, shutters
 from ...core.model.effect import OTHER_MOMENTS, STILL_CAMERA, Shutter
 from . import fcurves, strips, validation
-from .annotations import layer_of
+from .annotations import layer_of, layers_of
 from .fcurves import numbers
 from .selection import active_region, active_shutter
 
@@ -30,10 +30,10 @@ def choose_region(effect: PropertyGroup) -> None:
         effect.active_region = min(own, key=lambda i: abs(i - effect.active_region))
 
 
-def aim_pen(effect: PropertyGroup) -> None:
-    """Make strokes go to the active region's layer."""
+def aim_pen(effect: PropertyGroup, name: str = "layer") -> None:
+    """Make strokes go to a layer of the active region. `name` is one of annotations.LAYERS."""
     region = active_region(effect)
-    layer = layer_of(effect, region) if region else None
+    layer = layer_of(effect, region, name) if region else None
     if layer is not None:
         layers = effect.scene.annotation.layers
         layers.active_index = next(i for i, other in enumerate(layers) if other == layer)
@@ -189,5 +189,6 @@ def _bars_keyed(old: np.ndarray, keyed: dict[int, FCurve], frame: float) -> np.n
 def color_layers(effect: PropertyGroup, shutter: PropertyGroup) -> None:
     """Give scribbles the color of their shutter."""
     for region in effect.regions:
-        if region.shutter == shutter.name and (layer := layer_of(effect, region)) is not None:
-            layer.color = shutter.color
+        for layer in layers_of(effect, region) if region.shutter == shutter.name else ():
+            if layer.info != region.not_layer:
+                layer.color = shutter.color

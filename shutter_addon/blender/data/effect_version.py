@@ -25,13 +25,14 @@ from . import (
     fcurves,
     mask_reading,
     matte_content,
+    preferences,
     property_copy,
     snapshot,
     source_media,
     strips,
     versions,
 )
-from .annotations import TRANSFORM, layer_of, picture_size
+from .annotations import LAYERS, TRANSFORM, layer_of, picture_size
 from .fcurves import numbers
 
 # Identifies the files of a strip, or of a region whose matte is an image.
@@ -139,6 +140,8 @@ def _settings(effect: PropertyGroup) -> Iterator[Hashable]:
         yield followed.index(shutter.follow_region) if is_followed else None
         for k, bar in enumerate(shutter.bars):
             yield from values(bar, f".shutters[{i}].bars[{k}]", "weight")
+    if any(region.kind == "SUBJECT" for region in effect.regions):
+        yield tuple(versions.digests([preferences.model()]))
     names = _setting_names(model.Region, model.OutlineRegion, model.FileContent, model.RampContent)
     for i, region in enumerate(effect.regions):
         yield from values(region, f".regions[{i}]", *names, "kind", "matte", "channel_name", *_MOVES)
@@ -177,11 +180,12 @@ def _curves(owner: Scene | Mask, path: str, start: int | None) -> Iterator[Hasha
 
 
 def _strokes(effect: PropertyGroup, region: PropertyGroup, start: int | None) -> Iterator[Hashable]:
-    layer = layer_of(effect, region)
-    for drawing in layer.frames if layer else ():
-        yield drawing.frame_number - (start or 0)
-        for stroke in drawing.strokes:
-            yield numbers(stroke.points, "co", size=3).tobytes()
+    for name in LAYERS if region.kind == "SUBJECT" else LAYERS[:1]:
+        layer = layer_of(effect, region, name)
+        for drawing in layer.frames if layer else ():
+            yield drawing.frame_number - (start or 0)
+            for stroke in drawing.strokes:
+                yield numbers(stroke.points, "co", size=3).tobytes()
 
 
 def _matte(region: PropertyGroup, files: Files, start: int | None) -> Iterator[Hashable]:

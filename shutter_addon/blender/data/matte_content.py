@@ -26,7 +26,9 @@ from ...media.carried_mattes import FOLDER, CarriedFile
 from ...media.files import stamp
 from ...media.opening import MatteFile
 from ...media.sequence import sequence_files
-from . import mask_reading, source_media, strips, validation
+from ...media.subject import WIDTH
+from ...media.subject_mattes import Subject, SubjectFile
+from . import mask_reading, preferences, source_media, strips, validation
 from .external_files import absolute
 from .sampled import Sampling
 
@@ -64,9 +66,26 @@ def carried_file(effect: PropertyGroup, strip: Strip, drawn: dict[int, outlines.
         EffectError, MediaError: There is no source.
     """
     spec = source_media.spec(strips.source_of(effect.id_data, effect, strip))
-    # Blender clears its temporary folder.
-    place = Path(bpy.data.filepath).parent if bpy.data.filepath else Path(bpy.app.tempdir)
-    return CarriedFile(footage=spec, drawings=tuple(sorted(drawn.items())), folder=place / FOLDER)
+    return CarriedFile(footage=spec, drawings=tuple(sorted(drawn.items())), folder=_folder())
+
+
+def subject_file(
+    effect: PropertyGroup,
+    strip: Strip,
+    strokes: dict[int, outlines.Curves],
+    nots: dict[int, outlines.Curves],
+    drawn: dict[int, outlines.Curves],
+) -> SubjectFile:
+    """Return the file that gives the mattes of a subject under strokes, as carried_file."""
+    spec = source_media.spec(strips.source_of(effect.id_data, effect, strip))
+    subject = Subject(strokes=strokes, nots=nots, width=WIDTH)
+    drawings, model = tuple(sorted(drawn.items())), preferences.model()
+    return SubjectFile(footage=spec, subject=subject, drawings=drawings, folder=_folder(), model=model)
+
+
+def _folder() -> Path:
+    """Return the folder of mattes: beside the saved file, else in Blender's temporary folder, which it clears."""
+    return (Path(bpy.data.filepath).parent if bpy.data.filepath else Path(bpy.app.tempdir)) / FOLDER
 
 
 def channel(region: PropertyGroup) -> str:

@@ -1,10 +1,14 @@
 """The extension's preferences."""
 
+from pathlib import Path
+
 import bpy
-from bpy.props import EnumProperty, IntProperty
+from bpy.props import EnumProperty, IntProperty, StringProperty
 from bpy.types import Context
 
 from ...core.model.choices import CONTEXT
+from ...media.subject import model_path
+from . import strips
 
 ADDON = __package__.rpartition(".shutter_addon")[0] or "shutter_addon"
 
@@ -15,6 +19,11 @@ DEVICES = (
     ("BLENDER", "Blender's GPU", "The GPU that Blender draws with"),
     ("CPU", "NumPy", "The processor, which is slow"),
 )
+
+
+def _model_changed(_preferences: bpy.types.AddonPreferences, _context: Context) -> None:
+    for scene in bpy.data.scenes:
+        strips.invalidate(scene)
 
 
 class ShutterPreferences(bpy.types.AddonPreferences):
@@ -35,9 +44,18 @@ class ShutterPreferences(bpy.types.AddonPreferences):
         translation_context=CONTEXT,
     )
 
+    model: StringProperty(
+        name="Subject Model",
+        description="ONNX file of another model that finds subjects: one picture in, one mask out."
+        " Empty: the one that Virtual Shutter brings",
+        subtype="FILE_PATH",
+        update=_model_changed,
+    )
+
     def draw(self, _context: Context) -> None:
         self.layout.prop(self, "device")
         self.layout.prop(self, "gpu_memory")
+        self.layout.prop(self, "model")
         self.layout.operator("shutter.copy_report", icon="COPYDOWN")
 
 
@@ -52,6 +70,12 @@ def gpu_memory() -> int:
     """Return the megabytes of the GPU that textures may take; 0: as devices.device allows."""
     preferences = _preferences()
     return preferences.gpu_memory if preferences else 0
+
+
+def model() -> Path:
+    """The file of the model that finds subjects."""
+    preferences = _preferences()
+    return model_path(bpy.path.abspath(preferences.model) if preferences else "")
 
 
 def _preferences() -> ShutterPreferences | None:

@@ -191,6 +191,14 @@ def scale_property(description: str, **more: Any) -> object:
 class ShutterRegion(_Tracked, PropertyGroup):
     shutter: StringProperty(name="Shutter", description="Name of the shutter that holds in the region", update=changed)
     layer: StringProperty(name="Layer", description="Annotation layer that holds the strokes", update=changed)
+    not_layer: StringProperty(
+        name="Not This", description="Annotation layer of strokes on what the subject is not", update=changed
+    )
+    outline_layer: StringProperty(
+        name="Outlines", description="Annotation layer of outlines that overrule the model", update=changed
+    )
+    # The first stroke makes it a subject, if a model finds one there.
+    finds_subject: BoolProperty(options={"HIDDEN"})
     # Empty: drawings lie where the region has not moved. Otherwise, each lies where it was drawn.
     drawn: CollectionProperty(type=DrawnPlace)
     kind: choice("Type", "What says where the shutter holds", KINDS, translation_context=CONTEXT)

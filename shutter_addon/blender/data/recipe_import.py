@@ -22,7 +22,7 @@ from ...media.files import check_name
 from ...media.opening import MatteFile
 from ...media.sequence import IMAGE_SUFFIXES
 from . import fcurves, strips
-from .annotations import add_stroke, annotation, picture_size, picture_to_image
+from .annotations import LAYERS, NOT_THIS, add_stroke, annotation, picture_size, picture_to_image
 
 
 def apply(scene, effect, strip, source: model.Effect, folder: Path = Path()) -> None:
@@ -185,12 +185,19 @@ def _add_region(
         region.kind = source.kind.at(1).upper()
     elif isinstance(source, model.OutlineRegion):
         region.kind = "OUTLINE"
+    elif isinstance(source, model.SubjectRegion):
+        region.kind = "SUBJECT"
     else:
         region.kind = "RAMP" if isinstance(source.content, model.RampContent) else "MATTE"
         if region.kind == "RAMP":
             _set_fields(scene, region, path, source.content, first)
     _set_fields(scene, region, path, source, first)
-    if source.drawings:
+    if isinstance(source, model.SubjectRegion):
+        for layer, drawings in zip(LAYERS, (source.drawings, source.nots, source.outlines), strict=True):
+            color = NOT_THIS if layer == "not_layer" else shutter.color
+            if drawings.frames:
+                setattr(region, layer, _draw(effect, strip, source, drawings, color, first))
+    elif source.drawings:
         region.layer = _draw(effect, strip, source, source.drawings, shutter.color, first)
     _set_moves(scene, region, path, source.moves, first)
 
@@ -219,7 +226,7 @@ def _draw(
     layer = annotation(effect).layers.new(source.name or data_("Region"), set_active=False)
     layer.color = color
     to_image = picture_to_image(strip, picture_size(effect))
-    is_keyed = isinstance(source.moves.location, keyframes.Keys)
+    is_keyed = isinstance(source.moves.location, keyframes.Keys) or isinstance(source, model.SubjectRegion)
     for frame, strokes in zip(drawings.frames, drawings.strokes, strict=True):
         drawing = layer.frames.new(int((frame if is_keyed else 1) + first))
         for points in strokes:

@@ -162,15 +162,16 @@ class Sampling:
         keys = self.curves.keys(keyed)
         return sampling.over(keyed, keyframes.SourceTime(numbers, keys).at, keys)
 
-    def drawings(self, index: int, every: bool = False) -> model.Drawings:
+    def drawings(self, index: int, every: bool = False, layer_name: str = "layer") -> model.Drawings:
         """Return a region's drawings, eased by the keys of its location.
 
         Args:
             every: Read the strokes of all drawings, not only of those that the frames need.
+            layer_name: One of annotations.LAYERS.
         """
         region, path = self.effect.regions[index], f"{self.path}.regions[{index}]"
         width, height = annotations.picture_size(self.effect)
-        layer = annotations.layer_of(self.effect, region)
+        layer = annotations.layer_of(self.effect, region, layer_name)
         drawn = sorted(layer.frames, key=lambda drawing: drawing.frame_number) if layer else []
         numbers = tuple(drawing.frame_number for drawing in drawn)
         frames = numbers if every else self.frames

@@ -26,8 +26,9 @@ from ...core.model.fields import fields_of
 from ...core.model.frame_state import Options
 from ...core.recipes import baking
 from ...media.carried_mattes import CarriedFile
+from ...media.subject_mattes import SubjectFile
 from . import matte_content, sampled, source_media, strips, validation
-from .annotations import image_to_picture, layer_of, picture_size
+from .annotations import LAYERS, image_to_picture, layers_of, picture_size
 from .fcurves import curves_under, key_frames, leading, progress, stretched
 from .sampled import Frames, Sampling
 
@@ -182,10 +183,10 @@ def strokes_at(scene: Scene, effect: PropertyGroup, strip: Strip, index: int, fr
 def region_at(scene: Scene, effect: PropertyGroup, strip: Strip, index: int, frames: Frames) -> Any:
     """Return a region as plain data, sampled at timeline frames: a Region or a MatteRegion.
 
-    An outline becomes the Region of its curves as a lasso. What is wrong at one frame is raised when that frame is
-    asked for.
+    An outline becomes the Region of its curves as a lasso, a subject that of its strokes as lines. What is wrong at
+    one frame is raised when that frame is asked for.
     """
-    read_region = _region if effect.regions[index].kind == "OUTLINE" else _any_region
+    read_region = _region if effect.regions[index].kind in strips.OUTLINED else _any_region
     return read_region(Sampling.of(scene, effect, strip, frames), index, 0)
 
 
@@ -199,17 +200,19 @@ def matte_content_at(
 
 def carried_outline(
     scene: Scene, effect: PropertyGroup, strip: Strip, index: int, frames: Frames
-) -> tuple[CarriedFile, dict[float, int]]:
-    """Return the file of a tracked outline's mattes, and the filmed frames that timeline frames show.
+) -> tuple[CarriedFile | SubjectFile, dict[float, int]]:
+    """Return the file of a tracked outline's or a subject's mattes, and the filmed frames that timeline frames show.
 
     Raises:
         EffectError, MediaError: The outline is linear, or has no source.
     """
-    if validation.word(effect.regions[index], "between") == "STRAIGHT":
-        place = validation.place(effect.regions[index])
-        raise EffectError(rpt_("{place}: a linear outline is not tracked").format(place=place))
-    sampling = Sampling.of(scene, effect, strip, frames)
-    return _carried(sampling, sampling.drawings(index, every=True)), source_frames(scene, effect, strip, frames)
+    region, sampling = effect.regions[index], Sampling.of(scene, effect, strip, frames)
+    shown = source_frames(scene, effect, strip, frames)
+    if region.kind == "SUBJECT":
+        return _subject_file(sampling, *_marks(sampling, index).values()), shown
+    if validation.word(region, "between") == "STRAIGHT":
+        raise EffectError(rpt_("{place}: a linear outline is not tracked").format(place=validation.place(region)))
+    return _carried(sampling, sampling.drawings(index, every=True)), shown
 
 
 def drawn_outline(scene: Scene, effect: PropertyGroup, strip: Strip, index: int) -> dict[int, outlines.Curves]:
@@ -353,6 +356,9 @@ def _any_region(sampling: Sampling, index: int, shutter: int) -> model.Region | 
         drawings = sampling.drawings(index, every=True)
         kind, drawn = model.OutlineRegion, {"drawings": drawings}
         content = sampled.tried(_outlines, sampling, region, drawings)
+    elif region.kind == "SUBJECT":
+        kind, drawn = model.SubjectRegion, _marks(sampling, index)
+        content = sampled.tried(lambda: mattes.FileFrames(file=_subject_file(sampling, *drawn.values())))
     else:
         content = sampled.tried(matte_content.content, sampling, region, moves)
     fields = sampled.tried(sampling.fields, region, path, kind)
@@ -377,6 +383,18 @@ def _carried(sampling: Sampling, drawings: model.Drawings) -> CarriedFile:
     return matte_content.carried_file(sampling.effect, sampling.strip, drawn)
 
 
+def _subject_file(sampling: Sampling, *marks: model.Drawings) -> SubjectFile:
+    """Return the file that gives a subject's mattes. `marks` are from _marks."""
+    strokes, nots, drawn = (_by_source_frame(sampling, each) for each in marks)
+    return matte_content.subject_file(sampling.effect, sampling.strip, strokes, nots, drawn)
+
+
+def _marks(sampling: Sampling, index: int) -> dict[str, model.Drawings]:
+    """Return what is drawn in a subject, by names of model.SubjectRegion."""
+    names = "drawings", "nots", "outlines"
+    return {name: sampling.drawings(index, True, layer) for name, layer in zip(names, LAYERS, strict=True)}
+
+
 def _by_source_frame(sampling: Sampling, drawings: model.Drawings) -> dict[int, outlines.Curves]:
     """Return the curves of drawings by filmed frame of the source. EffectError, MediaError: there is no source."""
     there = replace(sampling, frames=drawings.frames)
@@ -397,9 +415,9 @@ def _region(sampling: Sampling, index: int, shutter: int) -> model.Region:
 
 
 def _scribble(region: PropertyGroup) -> str:
-    """Return the kind of the region's strokes: an outline's curves are a lasso."""
+    """Return the kind of the region's strokes: an outline has lassos, a subject lines."""
     word = validation.word(region, "kind").lower()
-    return "lasso" if word == "outline" else word
+    return {"outline": "lasso", "subject": "line"}.get(word, word)
 
 
 def _camera(sampling: Sampling) -> model.Camera:
@@ -423,7 +441,7 @@ def recipe_of(scene: Scene, effect: PropertyGroup, strip: Strip, contents: Seque
     if not -limits.MAX_FRAME <= shown.start <= shown.stop <= limits.MAX_FRAME:
         sentence = rpt_('strip "{strip}" lies at frames {first} to {last}, where no timeline is')
         raise EffectError(sentence.format(strip=strip.name, first=shown.start, last=shown.stop - 1))
-    drawn = [region for region in strips.drawn_regions(effect) if layer_of(effect, region)]
+    drawn = [region for region in strips.drawn_regions(effect) if layers_of(effect, region)]
     for item in (*effect.shutters, *drawn, *strips.matte_regions(effect)):
         _check_name(item)
     for shutter in effect.shutters:
@@ -442,8 +460,8 @@ def _keyed(scene: Scene, effect: PropertyGroup) -> set[float]:
     curves, pace = curves_under(scene, effect.path_from_id() + "."), stretched(scene)
     # Curves has float32 keys, too.
     frames = set((np.array(key_frames(curves), np.float32) / pace).tolist())
-    layers = (layer_of(effect, region) for region in effect.regions)
-    return frames.union(float(drawing.frame_number) for layer in layers if layer for drawing in layer.frames)
+    layers = (layer for region in effect.regions for layer in layers_of(effect, region))
+    return frames.union(float(drawing.frame_number) for layer in layers for drawing in layer.frames)
 
 
 def _check_name(item: PropertyGroup) -> None:

@@ -17,15 +17,16 @@ ENGINE = "VIRTUAL_SHUTTER"
 CHANNELS = 128  # of Blender's sequencer
 SOURCES = ("MOVIE", "IMAGE", "MOVIECLIP")
 MATTES = ("MATTE", "RAMP")  # kinds of regions without strokes
-LAID = ("OUTLINE", *MATTES)  # kinds of regions that are mattes, laid over what scribbles give
+OUTLINED = ("OUTLINE", "SUBJECT")  # kinds of regions with outlines, drawn or tracked
+LAID = (*OUTLINED, *MATTES)  # kinds of regions that are mattes, laid over what scribbles give
 # Where Blender scales or turns a Scene strip, it mixes light; in movies and 8-bit pictures, it mixes code values. It
 # makes code values first where a strip's colors are multiplied. This factor causes that, and changes no color.
 IN_CODE_VALUES = 1 + 2**-23
 
 
 def is_carried(region: PropertyGroup) -> bool:
-    """Tell whether a region is an outline that is tracked from drawing to drawing."""
-    return region.kind == "OUTLINE" and region.between != "STRAIGHT"
+    """Tell whether a region is a subject, or an outline that is tracked from drawing to drawing."""
+    return region.kind == "SUBJECT" or (region.kind == "OUTLINE" and region.between != "STRAIGHT")
 
 
 def all_strips(scene: Scene) -> Iterable[Strip]:

@@ -19,7 +19,7 @@ from bpy.types import AnnotationFrame, FCurve, PropertyGroup, Scene, Strip, Stri
 from ...core import revision
 from ...core.model.scribbles import mapped
 from ..data import fcurves, sampled, strips
-from ..data.annotations import layer_of
+from ..data.annotations import layers_of
 from ..data.property_copy import for_a_while
 from . import add_effect
 
@@ -161,8 +161,8 @@ def put_back(effect: PropertyGroup, strip: Strip, before: list[np.ndarray | None
 
 
 def _drawings(effect: PropertyGroup) -> list[AnnotationFrame]:
-    layers = {region.layer: layer_of(effect, region) for region in effect.regions}
-    return [drawing for layer in layers.values() if layer for drawing in layer.frames]
+    layers = {layer.info: layer for region in effect.regions for layer in layers_of(effect, region)}
+    return [drawing for layer in layers.values() for drawing in layer.frames]
 
 
 def _move(drawing: AnnotationFrame, change: np.ndarray) -> None:

@@ -22,6 +22,7 @@ from ...core.model.keyframes import Ease
 from ...core.model.scribbles import mapped
 from ...media import flow, outlining
 from ...media.carried_mattes import CarriedFile, CarriedMattes
+from ...media.subject_mattes import SubjectFile
 from ..data import annotations, fcurves, mask_reading, snapshot, strips
 from ..data.annotations import layer_of
 from ..data.property_copy import for_a_while
@@ -29,6 +30,7 @@ from ..rendering import effect_source
 from . import region_edits
 
 Strokes = outlines.Curves | list[np.ndarray]  # (n, 2) in fractions of the picture
+SURE_SUBJECT = 0.5  # confidence from which on a subject needs no correction
 SURE = 0.75  # confidence from which on no drawing is needed: an overlap of nine tenths, as a rule
 
 
@@ -77,7 +79,8 @@ def draw(
     to_image = annotations.picture_to_image(strip, annotations.picture_size(effect))
     if not annotations.is_invertible(to_image):
         raise EffectError(rpt_('strip "{strip}" is scaled to nothing').format(strip=strip.name))
-    layer = layer_of(effect, region) or region_edits.new_layer(effect, region)
+    name = "outline_layer" if region.kind == "SUBJECT" else "layer"
+    layer = layer_of(effect, region, name) or region_edits.new_layer(effect, region, name)
     there = [drawing for drawing in layer.frames if drawing.frame_number == frame]
     while there and not adds:
         layer.frames.remove(there.pop())
@@ -143,6 +146,8 @@ def next_needed(scene: Scene, effect: PropertyGroup, strip: Strip, index: int) -
     beyond the first and the last, in the one that is least sure altogether; there, where as much of the doubt lies
     before it as behind it. EffectError, MediaError: nothing is carried."""
     file, shown = carried_frames(scene, effect, strip, index)
+    if effect.regions[index].kind == "SUBJECT":
+        return _least_sure(file, shown)
     drawn = [number for number, _curves in file.drawings]
     stretches: dict[int, list[tuple[int, int, float]]] = {}
     with closing(file.open()) as mattes:
@@ -156,6 +161,15 @@ def next_needed(scene: Scene, effect: PropertyGroup, strip: Strip, index: int) -
     doubts = np.cumsum([1 - sure for *_, sure in worst])
     _number, frame, sure = worst[int(np.searchsorted(doubts, doubts[-1] / 2))]
     return Needed(frame=frame, confidence=sure)
+
+
+def _least_sure(file: SubjectFile, shown: dict[int, int]) -> Needed:
+    """The frame of a subject that is least sure of those whose mattes are made."""
+    with closing(file.open()) as mattes:
+        sure = {frame: sure for frame, number in shown.items() if (sure := mattes.confidence(number)) is not None}
+    frame = min(sure, key=sure.__getitem__, default=None)
+    is_sure = frame is None or sure[frame] >= SURE_SUBJECT
+    return Needed(frame=None, confidence=SURE_SUBJECT) if is_sure else Needed(frame=frame, confidence=sure[frame])
 
 
 def to_mask(context: Context, of: tuple[Scene, PropertyGroup, Strip], index: int, step: int) -> Mask:
@@ -210,7 +224,9 @@ def _keys(
         return sorted(snapshot.drawn_outline(scene, effect, strip, index).items())
     file, _shown = snapshot.carried_outline(scene, effect, strip, index, ())
     drawn = [frame for frame, _curves in file.drawings]
-    frames = sorted({*drawn, *range(drawn[0], drawn[-1], step)}) if drawn else []
+    if effect.regions[index].kind == "SUBJECT":
+        drawn += snapshot.source_frames(scene, effect, strip, (strip.left_handle, strip.right_handle - 1)).values()
+    frames = sorted({*drawn, *range(min(drawn), max(drawn), step)}) if drawn else []
     with closing(file.open()) as mattes:
         return [(frame, mattes.curves(frame)) for frame in frames]
 

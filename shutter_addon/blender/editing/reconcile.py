@@ -23,7 +23,7 @@ from bpy.types import PropertyGroup, Scene, Strip, bpy_struct
 from ...core.model.limits import MAX_FRAME
 from ...media import MediaError, open_source
 from ..data import data_format, fcurves, requirements, seen_alone, source_media, strips
-from ..data.annotations import USERS, picture_size
+from ..data.annotations import LAYERS, USERS, picture_size
 from ..data.property_copy import copy_properties
 from ..rendering import invalidation, render_job, sessions
 from . import add_effect, match_source, shown_annotations, undelete
@@ -338,8 +338,9 @@ def _rename(effect: PropertyGroup, before: list[str], names: list[str]) -> None:
     changed = [(old, new) for old, new in zip(before, names, strict=False) if old != new]
     if len(before) == len(names) and len(changed) == 1:
         for region in effect.regions:
-            if region.layer == changed[0][0]:
-                region.layer = changed[0][1]
+            for name in LAYERS:
+                if getattr(region, name) == changed[0][0]:
+                    setattr(region, name, changed[0][1])
 
 
 def _remove_scenes(updated: Scene | None) -> None:

@@ -6,7 +6,7 @@ from bpy.types import Annotation, AnnotationLayer, PropertyGroup
 
 from ...core.model import limits
 from ..data import fcurves, selection, strips
-from ..data.annotations import add_stroke, annotation, layer_of, strokes_of
+from ..data.annotations import LAYERS, NOT_THIS, add_stroke, annotation, layer_of, layers_of, strokes_of
 from ..data.consistency import bars, choose_region, color_layers, forget_followed, unique
 from . import motion_keys
 
@@ -39,14 +39,15 @@ def add_region(
 def first_drawn(effect: PropertyGroup, shutter: PropertyGroup, kind: str) -> PropertyGroup:
     """Appends a region for strokes, as add_region does; the active one of that shutter becomes it while it has none.
     The first of an effect, of a shutter that is sharp, follows edges, unless the editor has said how much: a subject is
-    meant, and no spot of it."""
+    meant, and no spot of it. It becomes one, if the model finds one under its first stroke."""
     is_sharp = np.count_nonzero(bars(shutter)) <= 1
     is_scribble = kind not in strips.LAID
-    if is_scribble and is_sharp and not effect.regions and not effect.is_property_set("edge_aware"):
+    is_first = is_scribble and is_sharp and not effect.regions and not effect.is_property_set("edge_aware")
+    if is_first:
         effect.edge_aware = 1.0
     if (region := _undrawn(effect, shutter)) is None:
         region = add_region(effect, shutter, kind)
-    region.kind = kind
+    region.kind, region.finds_subject = kind, is_first
     if not is_scribble:
         region.motion = "LOCATION"  # limbs turn, and the subject does not
     return region
@@ -61,19 +62,26 @@ def _undrawn(effect: PropertyGroup, shutter: PropertyGroup) -> PropertyGroup | N
     return None if layer is not None and any(drawing.strokes for drawing in layer.frames) else region
 
 
-def new_layer(effect: PropertyGroup, region: PropertyGroup) -> AnnotationLayer:
-    """Gives a region an empty annotation layer, named after it and in its shutter's colour."""
-    layer = annotation(effect).layers.new(region.name, set_active=True)
-    layer.color = effect.shutters[region.shutter].color
-    region.layer = layer.info
+def new_layer(effect: PropertyGroup, region: PropertyGroup, name: str = "layer") -> AnnotationLayer:
+    """Gives a region an empty annotation layer, named after it and in its shutter's colour. name: one of
+    annotations.LAYERS"""
+    layer = annotation(effect).layers.new(region.name, set_active=name == "layer")
+    layer.color = NOT_THIS if name == "not_layer" else effect.shutters[region.shutter].color
+    setattr(region, name, layer.info)
     return layer
 
 
-def remove_region(effect: PropertyGroup, index: int) -> None:
-    """Removes a region, its keys and its annotation layer."""
-    layer = layer_of(effect, effect.regions[index])
-    if layer is not None:
+def remove_layers(effect: PropertyGroup, region: PropertyGroup) -> None:
+    """Removes a region's annotation layers."""
+    for layer in layers_of(effect, region):
         effect.scene.annotation.layers.remove(layer)
+    for name in LAYERS:
+        setattr(region, name, "")
+
+
+def remove_region(effect: PropertyGroup, index: int) -> None:
+    """Removes a region, its keys and its annotation layers."""
+    remove_layers(effect, effect.regions[index])
     name = effect.regions[index].name
     fcurves.remove_item(effect, "regions", index)
     forget_followed(effect, name)
@@ -111,7 +119,8 @@ def take_layer(effect: PropertyGroup, shutter: PropertyGroup, layer: AnnotationL
 
 def free_layers(effect: PropertyGroup, annotation: Annotation | None) -> list:
     """Layers of an annotation that are no region yet."""
-    taken = {region.layer for region in effect.regions} if annotation == effect.scene.annotation else set()
+    own = effect.regions if annotation == effect.scene.annotation else ()
+    taken = {getattr(region, name) for region in own for name in LAYERS}
     return [layer for layer in annotation.layers if layer.info not in taken] if annotation else []
 
 

@@ -95,7 +95,7 @@ def outline_from_mask(self: Operator, _context: Context, effect: PropertyGroup) 
 
 def _why_not_laid(effect: PropertyGroup) -> str | None:
     is_laid = selection.active_region(effect).kind in strips.LAID
-    return None if is_laid else rpt_("The region is no matte, ramp or outline")
+    return None if is_laid else rpt_("The region is no matte, ramp, outline or subject")
 
 
 class SHUTTER_OT_matte_export(OfEffect, ImportHelper, Operator):

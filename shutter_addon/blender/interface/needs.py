@@ -25,7 +25,14 @@ def strokes(effect: PropertyGroup) -> str | None:
 def an_outline(effect: PropertyGroup) -> str | None:
     if sentence := a_region(effect):
         return sentence
-    return None if selection.active_region(effect).kind == "OUTLINE" else rpt_("The region is no outline")
+    is_outlined = selection.active_region(effect).kind in strips.OUTLINED
+    return None if is_outlined else rpt_("The region is no outline and no subject")
+
+
+def a_subject(effect: PropertyGroup) -> str | None:
+    if sentence := a_region(effect):
+        return sentence
+    return None if selection.active_region(effect).kind == "SUBJECT" else rpt_("The region is no subject")
 
 
 def room_for_a_region(effect: PropertyGroup) -> str | None:

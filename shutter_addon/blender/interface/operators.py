@@ -291,14 +291,23 @@ class SHUTTER_OT_draw(MakesEffect, OfEffect, Operator):
         options={"SKIP_SAVE"},
     )
 
+    not_this: BoolProperty(
+        name="Not This",
+        description="Draw on what the active subject is not",
+        options={"SKIP_SAVE"},
+    )
+
     def change(self, context: Context, effect: PropertyGroup) -> None:
         region = selection.active_region(effect)
+        if self.not_this and (sentence := needs.a_subject(effect)):
+            raise EffectError(sentence)
         if self.new or region is None or region.kind in strips.MATTES:
             if sentence := region_edits.why_full(effect, regions=1):  # poll() does not know what `new` is
                 raise EffectError(sentence)
             region = region_edits.first_drawn(effect, selection.active_shutter(effect), self.kind)
         drawn_places.begin(effect, self.effect_strip, effect.active_region)
-        if not drawing_tool(context, effect, region, "builtin.annotate"):
+        layer = "not_layer" if self.not_this else "layer"
+        if not drawing_tool(context, effect, region, "builtin.annotate", layer):
             self.report({"INFO"}, "Open a sequencer with a preview to draw")
         sharp_frame.show(context)
 
@@ -311,11 +320,14 @@ def erase(self: Operator, context: Context, effect: PropertyGroup) -> None:
         self.report({"INFO"}, "Open a sequencer with a preview to erase")
 
 
-def drawing_tool(context: Context, effect: PropertyGroup, region: PropertyGroup, tool: str) -> bool:
-    """Makes the region's layer the active annotation of every preview, and the tool theirs; whether there is one."""
-    if annotations.layer_of(effect, region) is None:
-        region_edits.new_layer(effect, region)
-    consistency.aim_pen(effect)
+def drawing_tool(
+    context: Context, effect: PropertyGroup, region: PropertyGroup, tool: str, layer: str = "layer"
+) -> bool:
+    """Makes a layer of the region the active annotation of every preview, and the tool theirs; whether there is one.
+    layer: one of annotations.LAYERS"""
+    if annotations.layer_of(effect, region, layer) is None:
+        region_edits.new_layer(effect, region, layer)
+    consistency.aim_pen(effect, layer)
     _show_annotation(context, effect)
     return sharp_frame.take_up(context, tool)
 

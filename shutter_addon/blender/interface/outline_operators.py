@@ -61,7 +61,7 @@ class _Carries(Beside, OfEffect):
         if waits or not frames:
             return self.carried(context)
         self._file = file
-        outline_carrying.carry(file, frames, show_carried)
+        outline_carrying.carry(file, frames, show_carried, shown.get(scene.frame_current))
         return self.go_on(context)
 
     def goes_on(self, _context: Context) -> bool:
@@ -96,7 +96,8 @@ class SHUTTER_OT_outline_needed(_Carries, Operator):
         scene, effect, strip = selection.active(context)
         needed = outline_drawings.next_needed(scene, effect, strip, self._target.index)
         if needed.frame is None:
-            self.report({"INFO"}, rpt_("The outline is sure by 75 % or more at all frames"))
+            sentence = rpt_("The outline is sure by {share:.0f} % or more at all frames")
+            self.report({"INFO"}, sentence.format(share=100 * needed.confidence))
             return {"CANCELLED"}
         scene.frame_set(needed.frame)
         sentence = rpt_("Frame {frame}: the outline is sure by {share:.0f} %")
@@ -383,4 +384,4 @@ class SHUTTER_GGT_outline(WithKeys, GizmoGroup):
     def poll(cls, context: Context) -> bool:
         if not SHUTTER_GGT_region.poll(context):
             return False
-        return selection.active_region(selection.in_picture(context)[1]).kind == "OUTLINE"
+        return selection.active_region(selection.in_picture(context)[1]).kind in strips.OUTLINED

@@ -50,6 +50,7 @@ _ICONS = {
     "OUTLINE": "CURVE_BEZCIRCLE",
     "MATTE": "MOD_MASK",
     "RAMP": "IPO_EASE_IN_OUT",
+    "SUBJECT": "OUTLINER_OB_ARMATURE",
 }
 
 
@@ -83,8 +84,9 @@ def preset_menu(layout: UILayout, _context: Context) -> None:
 
 @menu("regions", "Region Specials")
 def region_menu(layout: UILayout, _context: Context) -> None:
-    outline = layout.operator("shutter.draw", text="Draw Outline", icon=_ICONS["OUTLINE"])
-    outline.new, outline.kind = True, "OUTLINE"
+    for kind, text in (("SUBJECT", "Draw Subject"), ("OUTLINE", "Draw Outline")):
+        button = layout.operator("shutter.draw", text=text, icon=_ICONS[kind])
+        button.new, button.kind = True, kind
     layout.separator()
     draw_operators(layout, ("matte_add", "FILE_MOVIE"), ("matte_strip", "SEQUENCE", "strip"))
     # Without a mask they are greyed out; their tooltips say why.
@@ -125,9 +127,13 @@ class _Shutters(Mixin):
         _draw_source(layout, effect)
         draw_list(layout, effect, "shutter", effect.shutters, "SHUTTER_MT_shutters")
         row = layout.row(align=True)
-        draw_operators(row, ("draw", "GREASEPENCIL"), ("erase",))
+        draw_operators(row, ("draw", "GREASEPENCIL"))
+        region = selection.active_region(effect)
+        if is_subject := region is not None and region.kind == "SUBJECT":
+            row.operator("shutter.draw", text="Not This", icon="X").not_this = True
+        draw_operators(row, ("erase",))
         row.menu("SHUTTER_MT_regions", text="", icon="DOWNARROW_HLT")
-        region_panels.draw_tracking(layout, effect.active_region)
+        region_panels.draw_tracking(layout, effect.active_region, is_subject)
         draw_operators(layout.row(align=True), ("sharp_subject",), ("panning_shot",), ("clean_trail",))
 
 

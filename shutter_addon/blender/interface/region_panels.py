@@ -10,10 +10,15 @@ from ...media.pursuit import SURE
 from ..data import matte_look, selection, strips, validation
 from ..editing import follow_track, outline_drawings, track_region
 from . import needs, track_operators
-from .panel_parts import draw_list, draw_properties, sentence
+from .panel_parts import draw_list, draw_operators, draw_properties, sentence
 
 _PLACEMENT = "location", "rotation", "scale"
 _TRACKING = "motion", "track_until", "track_all_keys", "track_ends"
+_BUTTONS = {  # that each kind of drawn regions has
+    "LINE": (("subject_find",), ("outline_it",)),
+    "OUTLINE": (("outline_it",), ("outline_needed",)),
+    "SUBJECT": (("subject_outline", "CURVE_BEZCIRCLE"), ("subject_scribble", "IPO_LINEAR")),
+}
 _OF_KIND = {"LINE": "width", "OUTLINE": "between", "RAMP": "ramp"}  # the property that each kind adds
 
 
@@ -40,8 +45,7 @@ def draw_regions(layout: UILayout, scene: Scene, effect: PropertyGroup, strip: S
         layout.prop(region, "opacity")
     if region.kind not in strips.MATTES:
         row = layout.row(align=True)
-        row.operator("shutter.outline_it")
-        row.operator("shutter.outline_needed")
+        draw_operators(row, *_BUTTONS.get(region.kind, _BUTTONS["LINE"]))
         row.menu("SHUTTER_MT_of_outline", text="", icon="DOWNARROW_HLT")
     if region.kind in strips.LAID:
         _draw_blend(layout, region)
@@ -81,7 +85,7 @@ def _draw_blend(layout: UILayout, region: PropertyGroup) -> None:
     layout.operator("shutter.matte_export")
 
 
-def draw_tracking(layout: UILayout, index: int | None) -> None:
+def draw_tracking(layout: UILayout, index: int | None, is_subject: bool = False) -> None:
     """The buttons that track a region or the camera (selection.moving)."""
     row = layout.row(align=True)
     track = "shutter.track_camera" if index is None else "shutter.track"
@@ -90,7 +94,7 @@ def draw_tracking(layout: UILayout, index: int | None) -> None:
             track, text=("Track Camera" if index is None else "Track") if direction == "BOTH" else "", icon=icon
         )
         button.direction = direction
-    row.operator(f"{track}_look", text="", icon="VIEWZOOM")
+    row.operator("shutter.outline_needed" if is_subject else f"{track}_look", text="", icon="VIEWZOOM")
 
 
 def tracking_icon(effect: PropertyGroup, index: int | None) -> str | None:

@@ -12,6 +12,7 @@ from bpy.types import Context, SpaceSequenceEditor
 from ..data import preview_areas, selection, strips
 from ..devices import main_thread
 from ..rendering.previews import pen_is_down
+from . import subject_operators
 
 _TOOLS = "builtin.annotate"  # how the tools' names begin
 
@@ -106,6 +107,7 @@ def _lay_down() -> None:
         give_back(bpy.context)
         if _pen.tool:
             _choose(bpy.context, _pen.tool)
+        subject_operators.pen_is_up(bpy.context)
 
 
 _OWNER = object()  # of what Blender tells of tools

@@ -10,7 +10,7 @@ from bpy.types import Context, Operator, PropertyGroup, Scene, Strip
 
 from ...core.model.choices import CONTEXT
 from ..data import selection, validation
-from ..editing import bar_edits, follow_track, shutter_edits, track_region
+from ..editing import bar_edits, follow_track, outline_drawings, shutter_edits, track_region
 from ..rendering.effect_source import FAULTS
 from . import needs
 from .operator_bases import Beside, OfEffect, operator, redraw, report_warning, show_status
@@ -208,7 +208,10 @@ _FRAME = IntProperty(
 def _look(looking: Operator, effect: PropertyGroup, index: int | None) -> set[str] | None:
     """Goes to a frame at which tracking of what has an `index` (selection.moving) is not sure."""
     frame: int | None = looking.frame
-    if not looking.properties.is_property_set("frame"):
+    is_subject = index is not None and effect.regions[index].kind == "SUBJECT"
+    if is_subject and not looking.properties.is_property_set("frame"):
+        frame = outline_drawings.next_needed(looking.edit, effect, looking.effect_strip, index).frame
+    elif not looking.properties.is_property_set("frame"):
         frame = track_region.next_unsure(effect, index, looking.edit.frame_current)
     if frame is None:
         looking.report({"INFO"}, "No other stretch of unsure frames lies ahead")

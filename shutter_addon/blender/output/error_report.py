@@ -205,8 +205,9 @@ def _of_region(effect: PropertyGroup, region: PropertyGroup) -> list[str]:
     """Whose it is as a number: shutters are named."""
     names = [shutter.name for shutter in effect.shutters]
     words = [f"shutter {names.index(region.shutter) + 1 if region.shutter in names else 'none'}"]
-    if layer := annotations.layer_of(effect, region):
-        words += [f"{len(layer.frames)} drawings", f"{sum(len(drawing.strokes) for drawing in layer.frames)} strokes"]
+    if layers := annotations.layers_of(effect, region):
+        drawings = [drawing for layer in layers for drawing in layer.frames]
+        words += [f"{len(drawings)} drawings", f"{sum(len(drawing.strokes) for drawing in drawings)} strokes"]
     return words + (["follows a clip"] if region.follow_clip else [])
 
 

@@ -24,8 +24,9 @@ class _Carrying:
     """The mattes that a thread makes. It touches no bpy.
 
     Attributes:
-        frames: Source frames to make, drawn ones first.
+        frames: Source frames to make: drawn ones first, then those nearest to the middle.
         arrived: Called on the main thread when the drawn ones are done, and at the end.
+        middle: A source frame; None: the middle of the frames.
         done: How many are made.
         told: How many were made when `arrived` was called.
         soon: How many of the frames are drawn.
@@ -34,6 +35,7 @@ class _Carrying:
     file: CarriedFile
     frames: list[int]
     arrived: Callable[[], None]
+    middle: int | None = None
     done: int = 0
     told: int = 0
     ended: threading.Event = field(default_factory=threading.Event)
@@ -42,8 +44,9 @@ class _Carrying:
 
     def __post_init__(self) -> None:
         drawn = {frame for frame, _curves in self.file.drawings}
-        self.frames.sort(key=lambda frame: (frame not in drawn, frame))
-        self.soon = len(drawn & set(self.frames))
+        middle = sorted(self.frames)[len(self.frames) // 2] if self.middle is None else self.middle
+        self.frames.sort(key=lambda frame: (frame not in drawn, abs(frame - middle)))
+        self.soon = len(drawn & set(self.frames)) or 1
         self.future = threads.start(self._carry)
 
     def _carry(self) -> None:
@@ -83,11 +86,14 @@ def begin(arrived: Callable[[], None]) -> str | None:
     return next(iter(_failed.values()), None)
 
 
-def carry(file: CarriedFile, frames: list[int], arrived: Callable[[], None]) -> None:
-    """Make the mattes of source frames, in place of those being made. `arrived` is as in `begin`."""
+def carry(file: CarriedFile, frames: list[int], arrived: Callable[[], None], middle: int | None = None) -> None:
+    """Make the mattes of source frames, from a middle outwards, in place of those being made.
+
+    `arrived` is as in `begin`.
+    """
     stop()
     _failed.pop(file, None)
-    _running.append(_Carrying(file=file, frames=frames, arrived=arrived))
+    _running.append(_Carrying(file=file, frames=frames, arrived=arrived, middle=middle))
     main_thread.later(_look, TICK)
 
 

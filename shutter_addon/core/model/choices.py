@@ -69,13 +69,16 @@ STROKES = (
 DRAWN = (
     *STROKES,
     ("OUTLINE", "Outline", "What closed curves enclose, to the pixel: a matte that is drawn"),
+    ("SUBJECT", "Subject", "What a model finds under strokes, and follows: outlines that are drawn overrule it"),
 )
 
 
+# Files keep the number of an item.
 KINDS = (
-    *DRAWN,
+    *DRAWN[:-1],
     ("MATTE", "Matte", "What a file, a strip or a mask says for every pixel"),
     ("RAMP", "Ramp", "From none of the shutter to all of it, across the picture"),
+    DRAWN[-1],
 )
 
 

@@ -191,6 +191,23 @@ class OutlineRegion(MatteRegion):
         return scribbles.Shape(shutter=self.shutter, kind="lasso", width=0.0, strokes=strokes)
 
 
+@dataclass(frozen=True, eq=False, kw_only=True)
+class SubjectRegion(MatteRegion):
+    """A region whose matte is a subject that a model finds under strokes. It moves about the strokes' centre.
+
+    drawings: strokes on the subject; nots: strokes on what it is not; outlines: closed curves, which overrule the model
+    content: a channel of mattes.FileFrame"""
+
+    drawings: Drawings
+    nots: Drawings
+    outlines: Drawings
+
+    def drawn_at(self, frame: float) -> scribbles.Shape:
+        """The strokes that are drawn at a frame, as lines. EffectError: they are nowhere near the picture."""
+        strokes = tuple(self.drawings.at(frame)) if frame in self.drawings.frames else ()
+        return scribbles.Shape(shutter=self.shutter, kind="line", width=0.0, strokes=strokes)
+
+
 def drawn_outlines(drawings: Drawings) -> Channel:
     """Channel of outlines (mattes.Outline) that go straight from one drawing to the next."""
     return keyframes.Computed(lambda frame: mattes.Outline(outlines.curves(drawings.at(frame))))
@@ -377,6 +394,8 @@ def _placed(region: Region | MatteRegion, aspect: float, files: MatteFiles) -> R
         if region.between == "straight":
             return replace(region, content=drawn_outlines(region.drawings))
         return replace(region, content=mattes.FileFrames(file=files(region)))
+    if isinstance(region, SubjectRegion):
+        return replace(region, content=mattes.FileFrames(file=files(region)))
     if isinstance(region, MatteRegion) and isinstance(said := region.content, FileContent):
         first = None if said.timing == "source" else 1
         return replace(region, content=mattes.FileFrames(file=files(region), offset=said.offset, first=first))
@@ -442,7 +461,7 @@ class Effect:
 
     def for_picture(self, aspect: float, files: MatteFiles = lambda _region: mattes.NoFile()) -> Effect:
         """The effect of a recipe for a picture of width / height = aspect. files: gives the file of a matte, for a ramp
-        the source's luminance, and for an outline its carried mattes; without it, nobody may ask for values of these"""
+        the source's luminance, for an outline or a subject its mattes; without it, nobody may ask for their values"""
         return self.with_parts([_placed(region, aspect, files) for region in self.regions])
 
     def layers_at(self, frame: float) -> list[Region | MatteRegion]:
@@ -452,7 +471,7 @@ class Effect:
     def drawn_at(self, frame: float) -> list[scribbles.Shape]:
         """All that is drawn, layers as well, where it is at a frame, in the order of its regions. EffectError: it lies
         nowhere."""
-        drawn = [region for region in self.regions if isinstance(region, Region | OutlineRegion)]
+        drawn = [region for region in self.regions if isinstance(region, Region | OutlineRegion | SubjectRegion)]
         return [region.at(frame) if isinstance(region, Region) else region.drawn_at(frame) for region in drawn]
 
     @cached_property

@@ -31,6 +31,7 @@ from ..model.effect import (
     Region,
     Shutter,
     Subject,
+    SubjectRegion,
 )
 from ..model.fields import fields_of
 from ..model.frame_state import Interpolation
@@ -206,10 +207,12 @@ def _region(
     said = _said(region, (), shown) | {"name": name}
     if isinstance(region, Region):
         said["kind"] = Constant(region.kind.at(shown.start))
+    if isinstance(region, SubjectRegion):
+        return _subject(region, said, shown)
     if isinstance(region, MatteRegion) and not isinstance(region, OutlineRegion):
         return replace(region, content=next(contents), moves=_moves(region, {}, shown), **said)
     assert isinstance(region, Region | OutlineRegion)
-    drawn = _drawings(region, shown.start)
+    drawn = _drawings(region.drawings, shown.start)
     if not drawn:
         return None
     # The ease from a drawing to the next is its own.
@@ -257,11 +260,24 @@ def _place(moving: Subject, frame: float) -> np.ndarray:
     return np.array([*placed.location, placed.rotation, placed.scale])
 
 
-def _drawings(region: Region | OutlineRegion, frame: float) -> dict[float, list[np.ndarray]]:
+def _subject(region: SubjectRegion, said: dict[str, Any], shown: range) -> SubjectRegion | None:
+    """As _region."""
+    marks = {name: _drawings(getattr(region, name), shown.start) for name in ("drawings", "nots", "outlines")}
+    if not (marks["drawings"] or marks["outlines"]):
+        return None
+    words: dict[float, Ease] = dict.fromkeys(marks["outlines"], "linear") if region.moves.are_keyed else {}
+    for name, drawn in marks.items():
+        kept = {number: strokes for number, strokes in drawn.items() if strokes}
+        frames = tuple(_frame(number, shown) for number in kept)
+        said[name] = Drawings(region.name, frames, tuple(kept.values()), ("linear",) * len(kept), 1.0)
+    return replace(region, moves=_moves(region, words, shown), **said)
+
+
+def _drawings(drawings: Drawings, frame: float) -> dict[float, list[np.ndarray]]:
     """A region's strokes by the frames they were drawn at, from the first that has any, as they lie at a frame."""
     result: dict[float, list[np.ndarray]] = {}
-    for index, number in enumerate(region.drawings.frames):
-        strokes = region.drawings.drawing(index, frame)
+    for index, number in enumerate(drawings.frames):
+        strokes = drawings.drawing(index, frame)
         if strokes or result:
             result[number] = [np.round(points, 6) for points in strokes]
     return result

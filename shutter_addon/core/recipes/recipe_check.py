@@ -11,7 +11,17 @@ from ..model import limits, shutters
 from ..model.fields import Field, fields_of
 from ..model.frame_state import Options
 from .recipe import CAMERA, RecipeError
-from .records import MatteRecord, MoveKey, OutlineRecord, RampRecord, RegionRecord, Stroke, drawings_of
+from .records import (
+    MatteRecord,
+    MoveKey,
+    OutlineRecord,
+    RampRecord,
+    RegionRecord,
+    Stroke,
+    SubjectRecord,
+    drawings_of,
+    strokes_at,
+)
 
 _COMBINED = "lightest", "darkest"
 
@@ -70,9 +80,10 @@ def check(recipe: Any) -> None:
         there_is_none = f"there is no shutter {shown(region.shutter)}"
         _require(region.shutter in places, f"regions[{i}].shutter", there_is_none)
         _check_region(region, f"regions[{i}]")
-    drawn = [drawings_of(region) for region in recipe.regions if isinstance(region, RegionRecord | OutlineRecord)]
+    drawn: list = [drawings_of(region) for region in recipe.regions if isinstance(region, RegionRecord | OutlineRecord)]
+    drawn += [_marks(region) for region in recipe.regions if isinstance(region, SubjectRecord)]
     # Of each region, those of the drawing that has the most.
-    points = sum(max(sum(map(len, strokes)) for _, strokes in drawings) for drawings in drawn)
+    points = sum(max((sum(map(len, strokes)) for _, strokes in drawings), default=0) for drawings in drawn)
     _require(points <= limits.MAX_POINTS, "regions", f"{points} points at once, the most are {limits.MAX_POINTS}")
 
 
@@ -150,8 +161,27 @@ def _check_region(region: Any, place: str) -> None:
         for name, most in (("path", limits.MAX_PATH), ("channel", limits.MAX_CHANNEL)):
             _require(getattr(region, name), f"{place}.{name}", "empty")
             _check_name(getattr(region, name), f"{place}.{name}", most)
+    elif isinstance(region, SubjectRecord):
+        _check_subject(region, place)
     elif not isinstance(region, RampRecord):
         _check_drawings(region, place)
+
+
+def _marks(region: Any) -> list[tuple[float, list[Stroke]]]:
+    """All that is drawn in a subject, by frame."""
+    outlined = [(key.frame, key.strokes) for key in region.keys if key.strokes]
+    return [*strokes_at(region.strokes), *strokes_at(region.not_strokes), *outlined]
+
+
+def _check_subject(region: Any, place: str) -> None:
+    marks = _marks(region)
+    _require(len(marks) > len(strokes_at(region.not_strokes)), f"{place}.strokes", "empty: nothing is drawn")
+    for name in ("strokes", "not_strokes"):
+        keys = [key for key in getattr(region, name) if not isinstance(key, list)]
+        _check_keys(keys, f"{place}.{name}")
+    for frame, strokes in marks:
+        _require(frame == int(frame), place, f"{_plain(frame)} is no whole frame, but drawn at")
+        _check_strokes(strokes, f"{place}.strokes")
 
 
 def _check_drawings(region: Any, place: str) -> None:

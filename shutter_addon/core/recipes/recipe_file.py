@@ -107,7 +107,7 @@ _UNTOLD = {
         Options, model.Effect, model.Camera, model.Shutter, model.Region, model.OutlineRegion
     ).values()
     if each.recipe and not each.told
-} | {"length": "bars", "keys": [], "time": [], "camera": []}
+} | {"length": "bars", "keys": [], "not_strokes": [], "time": [], "camera": []}
 
 
 def _said(value: Any) -> Any:
@@ -155,6 +155,12 @@ def _number_or_keys(converter: Converter, value: Any, kind: Any) -> float | list
         return _number(value, kind)
     except ValueError as error:
         raise ValueError(f"{error}, nor a list of keys") from None
+
+
+def _strokes(converter: Converter, value: Any, _kind: Any) -> list:
+    """Strokes of the first frame, or of several."""
+    is_keyed = isinstance(value, list) and value and isinstance(value[0], dict)
+    return converter.structure(value, list[records.StrokesKey] if is_keyed else list[records.Stroke])
 
 
 def _exactly(wanted: type, name: str) -> Callable[[Any, Any], Any]:
@@ -253,6 +259,7 @@ def _converter() -> Converter:
     converter.register_structure_hook_func(
         lambda kind: kind in (records.Keyable, records.Keyable | None), partial(_number_or_keys, converter)
     )
+    converter.register_structure_hook_func(lambda kind: kind == records.Strokes, partial(_strokes, converter))
     converter.register_structure_hook_func(
         lambda kind: kind == records.AnyRegionRecord, partial(_one_region, converter)
     )

@@ -56,6 +56,17 @@ class MoveKey:
 
 
 @dataclass(frozen=True)
+class StrokesKey:
+    """Strokes at a frame."""
+
+    frame: float
+    strokes: list[Stroke]
+
+
+Strokes = list[Stroke] | list[StrokesKey]  # of frame 1, or of several frames
+
+
+@dataclass(frozen=True)
 class RegionKey(MoveKey):
     """And perhaps a redrawn shape."""
 
@@ -104,6 +115,15 @@ _DRAWN: dict[str, Any] = _OF_REGION | {"strokes": (list[Stroke], []), "keys": (l
 _LAID: dict[str, Any] = _OF_REGION | {"keys": (list[MoveKey], [])}
 RegionRecord: Any = _record("RegionRecord", (model.Region,), kind=(Literal["line", "lasso"], "line"), **_DRAWN)
 OutlineRecord: Any = _record("OutlineRecord", (model.OutlineRegion,), kind=(Literal["outline"], MISSING), **_DRAWN)
+SubjectRecord: Any = _record(
+    "SubjectRecord",
+    (model.SubjectRegion,),
+    kind=(Literal["subject"], MISSING),
+    **_OF_REGION,
+    strokes=(Strokes, []),
+    not_strokes=(Strokes, []),
+    keys=(list[RegionKey], []),
+)
 MatteRecord: Any = _record(
     "MatteRecord",
     (model.MatteRegion, model.FileContent),
@@ -121,9 +141,10 @@ KINDS = {
     "outline": OutlineRecord,
     "matte": MatteRecord,
     "ramp": RampRecord,
+    "subject": SubjectRecord,
 }
 # Of a recipe: by its field `kind`, one of KINDS.
-AnyRegionRecord: Any = RegionRecord | OutlineRecord | MatteRecord | RampRecord
+AnyRegionRecord: Any = RegionRecord | OutlineRecord | MatteRecord | RampRecord | SubjectRecord
 RecipeRecord: Any = _record(
     "RecipeRecord",
     (Options, model.Effect, model.Camera),
@@ -205,19 +226,28 @@ def _shutter(record: Any, follow: model.Subject | None) -> model.Shutter:
     return model.Shutter(bars=exposed, follow=follow, **values)
 
 
-def _moves(keys: list) -> model.Moves:
+def _moves(keys: list, *, drawn: bool = False) -> model.Moves:
+    """drawn: keys that hold drawings alone are no motion."""
     placed = [(key.frame, Placement(key.location, key.rotation, key.scale), key.ease) for key in keys]
+    if drawn and all(placement == Placement() for _frame, placement, _ease in placed):
+        return model.Moves()
     return model.Moves.keyed(placed)
 
 
 def _region(record: Any, shutter: int) -> model.Region | model.MatteRegion:
-    values: dict[str, Any] = _values(record.model, record) | {"shutter": shutter, "moves": _moves(record.keys)}
+    values: dict[str, Any] = _values(record.model, record) | {"shutter": shutter}
+    values["moves"] = _moves(record.keys, drawn=isinstance(record, SubjectRecord))
     if isinstance(record, RegionRecord | OutlineRecord):
         values["drawings"] = _drawings(record)
     if isinstance(record, RegionRecord):
         values["kind"] = Constant(record.kind)
     elif isinstance(record, OutlineRecord):
         values["content"] = mattes.FileFrames(file=mattes.NoFile())  # see Effect.for_picture
+    elif isinstance(record, SubjectRecord):
+        values["content"] = mattes.FileFrames(file=mattes.NoFile())  # as an outline's
+        marks = {"drawings": strokes_at(record.strokes), "nots": strokes_at(record.not_strokes)}
+        marks["outlines"] = [(key.frame, key.strokes) for key in record.keys if key.strokes is not None]
+        values |= {name: _marks(record.name, drawn) for name, drawn in marks.items()}
     elif isinstance(record, MatteRecord):
         said = _values(model.FileContent, record)
         values["content"] = model.FileContent(path=record.path, channel=record.channel, **said)
@@ -244,6 +274,20 @@ def _drawings(record: Any) -> model.Drawings:
         eases=tuple(key.ease if key else "linear" for key, _ in drawn),
         aspect=1.0,
     )
+
+
+def strokes_at(strokes: Any) -> list[tuple[float, list[Stroke]]]:
+    """The frames of a subject's strokes, each with what is drawn there."""
+    if strokes and isinstance(strokes[0], StrokesKey):
+        return [(key.frame, key.strokes) for key in strokes]
+    return [(1.0, strokes)] if strokes else []
+
+
+def _marks(name: str, drawn: list[tuple[float, list[Stroke]]]) -> model.Drawings:
+    """Drawings that stay for themselves: nothing goes from one to the next."""
+    frames = tuple(frame for frame, _strokes in drawn)
+    arrays = tuple([np.asarray(stroke, float) for stroke in strokes] for _frame, strokes in drawn)
+    return model.Drawings(name=name, frames=frames, strokes=arrays, eases=("linear",) * len(drawn), aspect=1.0)
 
 
 def recipe_of(effect: model.Effect) -> Any:
@@ -309,9 +353,26 @@ def _points(stroke: np.ndarray) -> Stroke:
     return [(x, y) for x, y in stroke.tolist()]
 
 
+def _subject_record(region: model.SubjectRegion, said: dict[str, Any], keys: list[dict[str, Any]]) -> Any:
+    marks = [
+        [(frame, [_points(stroke) for stroke in strokes]) for frame, strokes in zip(d.frames, d.strokes, strict=True)]
+        for d in (region.drawings, region.nots, region.outlines)
+    ]
+    on, off = (
+        drawn[0][1] if [frame for frame, _ in drawn] == [1] else [StrokesKey(*each) for each in drawn]
+        for drawn in marks[:2]
+    )
+    outlines = dict(marks[2])
+    placed = {frame: {"frame": frame} for frame in outlines} | {key["frame"]: key for key in keys}
+    made = [RegionKey(strokes=outlines.get(frame), **placed[frame]) for frame in sorted(placed)]
+    return SubjectRecord(kind="subject", strokes=on, not_strokes=off, keys=made, **said)
+
+
 def _region_record(region: Any, shutter: str) -> Any:
     said = _words(type(region), region) | {"shutter": shutter}
     keys = _move_keys(region.moves)
+    if isinstance(region, model.SubjectRegion):
+        return _subject_record(region, said, keys)
     if isinstance(region, model.Region | model.OutlineRegion):
         frames = region.drawings.frames
         drawings = [[_points(stroke) for stroke in drawing] for drawing in region.drawings.strokes]

@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 
 from ..model import motions, presence
-from ..model.effect import Camera, Moves, OutlineRegion, Region, Subject
+from ..model.effect import Camera, Moves, OutlineRegion, Region, Subject, SubjectRegion
 from ..model.keyframes import Channel, Ease, Keys
 from ..model.motions import Placement, Placements, Size
 
@@ -21,13 +21,13 @@ CORNERS = motions.offsets([motions.PICTURE])
 
 
 def with_placements(
-    moving: Camera | Region | OutlineRegion,
+    moving: Camera | Region | OutlineRegion | SubjectRegion,
     placements: Placements,
     exact: Collection[int],
     size: Size,
     *,
     thin: bool = True,
-) -> Camera | Region | OutlineRegion:
+) -> Camera | Region | OutlineRegion | SubjectRegion:
     """The region, or the camera, with these placements as its keys, in place of those that it has from the first of
     these frames to the last. At whole frames beyond these it stays where its keys put it, and its drawings stay where
     and as they are.
@@ -39,6 +39,10 @@ def with_placements(
         chosen = motions.thinned(placements, CORNERS, size, exact, STEADY) if thin else sorted(placements)
         return replace(moving, moves=_moves(moving, placements, exact, chosen, {}))
     drawings = replace(moving.drawings, aspect=size[0] / size[1])
+    if isinstance(moving, SubjectRegion):
+        shape = np.concatenate([motions.offsets(strokes) for strokes in (*drawings.strokes, *moving.outlines.strokes)])
+        chosen = motions.thinned(placements, shape, size, exact) if thin else sorted(placements)
+        return replace(moving, moves=_moves(moving, placements, exact, chosen, {}))
     keyed = _eases(moving)
     # A drawing at no key is there from the first on.
     drawn = [frame for frame in drawings.frames if frame in keyed]

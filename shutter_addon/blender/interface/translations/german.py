@@ -485,10 +485,56 @@ MESSAGES = {
     ): "Frame {frame}: Der Umriss ist zu {share:.0f} % sicher",
     (
         "*",
-        "The outline is sure by 75 % or more at all frames",
-    ): "Der Umriss ist in allen Frames zu 75 % oder mehr sicher",
+        "The outline is sure by {share:.0f} % or more at all frames",
+    ): "Der Umriss ist in allen Frames zu {share:.0f} % oder mehr sicher",
     ("*", "The outline encloses nothing at the current frame"): "Der Umriss umschließt im aktuellen Frame nichts",
-    ("*", "The region is no outline"): "Die Region ist kein Umriss",
+    ("*", "The region is no outline and no subject"): "Die Region ist kein Umriss und kein Motiv",
+    ("*", "The region is no subject"): "Die Region ist kein Motiv",
+    ("Virtual Shutter", "Subject"): "Motiv",
+    (
+        "*",
+        "What a model finds under strokes, and follows: outlines that are drawn overrule it",
+    ): "Was ein Modell unter Strichen findet und verfolgt; gezeichnete Umrisse gehen ihm vor",
+    ("*", "Not This"): "Das nicht",
+    ("Operator", "Not This"): "Das nicht",
+    ("Operator", "Draw Subject"): "Motiv zeichnen",
+    ("*", "Draw on what the active subject is not"): "Auf das zeichnen, was nicht zum aktiven Motiv gehört",
+    (
+        "*",
+        "Annotation layer of strokes on what the subject is not",
+    ): "Anmerkungsebene mit Strichen auf dem, was nicht zum Motiv gehört",
+    ("*", "Outlines"): "Umrisse",
+    (
+        "*",
+        "Annotation layer of outlines that overrule the model",
+    ): "Anmerkungsebene mit Umrissen, die dem Modell vorgehen",
+    ("*", "Subject Model"): "Motivmodell",
+    (
+        "*",
+        "ONNX file of another model that finds subjects: one picture in, one mask out."
+        " Empty: the one that Virtual Shutter brings",
+    ): "ONNX-Datei eines anderen Modells, das Motive findet: ein Bild hinein, eine Maske heraus."
+    " Leer: das mitgelieferte",
+    ("Operator", "Find Subject"): "Motiv finden",
+    (
+        "*",
+        "Make the active region a subject, which a model finds under its strokes at this frame and follows",
+    ): "Die aktive Region zum Motiv machen, das ein Modell in diesem Frame unter ihren Strichen findet und verfolgt",
+    (
+        "*",
+        "The model finds no subject under the stroke: draw along its middle, or outline it",
+    ): "Das Modell findet unter dem Strich kein Motiv: durch dessen Mitte zeichnen oder es umreißen",
+    ("Operator", "Scribble"): "Strich",
+    (
+        "*",
+        "Make the active subject a scribble: its strokes, as wide as the region's width",
+    ): "Das aktive Motiv zu Strichen machen, so breit wie die Breite der Region",
+    ("Operator", "Outline"): "Umriss",
+    (
+        "*",
+        "Make the active subject an outline, which is drawn where the subject has strokes",
+    ): "Das aktive Motiv zum Umriss machen, der dort gezeichnet ist, wo das Motiv Striche hat",
+    ("*", "The subject has no outline there"): "Das Motiv hat dort keinen Umriss",
     ("*", 'strip "{strip}" is scaled to nothing'): "Streifen „{strip}“ ist zu nichts skaliert",
     ("*", "{place}: a linear outline is not tracked"): "{place}: Ein linearer Umriss wird nicht verfolgt",
     ("Operator", "Mend Outline"): "Umriss ausbessern",
@@ -504,7 +550,10 @@ MESSAGES = {
     ("*", "What the pictures are"): "Was die Bilder sind",
     ("*", "Grey, 16 bits"): "Grau, 16 Bit",
     ("*", "Float, in the channel Y"): "Fließkomma, im Kanal Y",
-    ("*", "The region is no matte, ramp or outline"): "Die Region ist keine Matte, keine Rampe und kein Umriss",
+    (
+        "*",
+        "The region is no matte, ramp, outline or subject",
+    ): "Die Region ist keine Matte, keine Rampe, kein Umriss und kein Motiv",
     ("*", 'Saved {count} pictures in "{folder}"'): "{count} Bilder in „{folder}“ gespeichert",
     ("Operator", "Find Outline"): "Umriss finden",
     ("Operator", "Draw by Points"): "Punktweise zeichnen",

@@ -1,0 +1,100 @@
+"""From an empty Video Editing file to a rendered Sharp Subject, by mouse and keyboard, in eight actions: one stroke
+finds the subject. Then it becomes an outline and a scribble. Run inside Blender, by test_tracked.py."""
+
+# ruff: noqa: E402 (Blender finds the helpers once it knows their folder)
+import os
+import sys
+import time
+from pathlib import Path
+
+sys.path[:0] = [str(Path(__file__).parent)]
+
+import bpy
+import driver
+import first_stroke_story as first
+import story
+from one_stroke_story import part, sidebar
+
+# Of the footage's frame 90, in fractions of the picture: down the bunny.
+FRAME, STROKE = 90, ((0.37, 0.78), (0.372, 0.65), (0.378, 0.5), (0.385, 0.38))
+SHARP = 0.2, 216  # the button: a share of the sidebar's width, pixels below its upper edge
+
+
+def folder_shown():
+    """The file browser opens where it was last."""
+    area = driver.area_of("FILE_BROWSER")
+    area.spaces.active.params.directory = os.fsencode(Path(story.FOOTAGE).parent)
+    yield 2.0
+
+
+def region():
+    return story.effect().regions[0]
+
+
+def is_carrying():
+    return part("blender.rendering.outline_carrying").progress() is not None
+
+
+def curves():
+    with driver.override("PREVIEW"):
+        scene, effect, strip = part("blender.data.selection").active(bpy.context)
+        return part("blender.editing.outline_drawings").shown_curves(scene, effect, strip, effect.active_region)
+
+
+def stroke_drawn():
+    yield from story.seen("1_sharp")
+    points, preview = first.on_preview(*STROKE), story.preview()
+    driver.move(preview, *points[0])
+    yield
+    driver.xdotool("mousedown", 1)
+    yield
+    for point in points[1:]:
+        driver.move(preview, *point)
+        yield 0.1
+    driver.xdotool("mouseup", 1)
+    first.acted("the stroke is drawn")
+    began = time.monotonic()
+    yield from driver.until(lambda: region().kind == "SUBJECT", "the stroke finds a subject", 60, wait=0.05)
+    yield from driver.until(lambda: curves(), "its outline is shown", 60, wait=0.05)
+    driver.saw(seconds=time.monotonic() - began)
+    yield from story.seen("2_found")
+
+
+def made_sharp():
+    bar = sidebar()
+    driver.shot("3_tab")
+    driver.click(bar, bar.width * SHARP[0], bar.height - SHARP[1])
+    first.acted("click on Sharp Subject", in_tab=True)
+    yield from driver.until(lambda: region().is_layer, "it is a layer")
+    yield 1.0
+    yield from driver.until(lambda: not is_carrying(), "its mattes are there", 120)
+    yield from story.seen("4_result")
+
+
+def turned():
+    """By the operators of the buttons, and undone."""
+    for name, kind in (("subject_outline", "OUTLINE"), ("subject_scribble", "LINE")):
+        with driver.override("PREVIEW"):
+            getattr(bpy.ops.shutter, name)("INVOKE_DEFAULT", True)
+        yield from driver.until(lambda kind=kind: region().kind == kind, f"it is of the kind {kind}")
+        yield from story.seen(f"5_{kind.lower()}")
+        driver.key("ctrl+z")
+        yield from driver.until(lambda: region().kind == "SUBJECT", "it is a subject again")
+        yield 1.0
+
+
+def told():
+    yield from first.edit_opened(1280, 720)
+    yield from folder_shown()
+    yield from first.movie_dragged()
+    yield from first.gone_to(FRAME)
+    yield from first.drawing_begun(finds_subject=True)
+    yield from stroke_drawn()
+    yield from made_sharp()
+    yield from first.picture_rendered()
+    driver.saw(actions=first._actions)
+    yield from turned()
+
+
+if __name__ == "__main__":
+    driver.play(told)
