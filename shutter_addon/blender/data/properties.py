@@ -162,13 +162,7 @@ class _Tracked:
 
 def location_property(description: str, **more: Any) -> object:
     return FloatVectorProperty(
-        name="Location",
-        description=description,
-        subtype="XYZ",
-        size=2,
-        min=-MAX_DISTANCE,
-        max=MAX_DISTANCE,
-        **more,
+        name="Location", description=description, subtype="XYZ", size=2, min=-MAX_DISTANCE, max=MAX_DISTANCE, **more
     )
 
 
@@ -182,11 +176,7 @@ def scale_property(description: str, **more: Any) -> object:
 
 
 @with_fields(
-    model.Region,
-    model.OutlineRegion,
-    model.FileContent,
-    model.RampContent,
-    name={"set_transform": _region_renamed},
+    model.Region, model.OutlineRegion, model.FileContent, model.RampContent, name={"set_transform": _region_renamed}
 )
 class ShutterRegion(_Tracked, PropertyGroup):
     shutter: StringProperty(name="Shutter", description="Name of the shutter that holds in the region", update=changed)
@@ -282,11 +272,7 @@ class ShutterBar(PropertyGroup):
     )
 
 
-@with_fields(
-    model.Shutter,
-    name={"set_transform": _shutter_renamed},
-    color={"update": _shutter_recolored},
-)
+@with_fields(model.Shutter, name={"set_transform": _shutter_renamed}, color={"update": _shutter_recolored})
 class Shutter(PropertyGroup):
     bars: CollectionProperty(type=ShutterBar)
     follow: choice("Exposure Moves With", "What the exposure moves with", FOLLOWS)
@@ -298,12 +284,7 @@ class Shutter(PropertyGroup):
     preset_position: StringProperty(options={"HIDDEN"})
 
 
-@with_fields(
-    model.Effect,
-    Options,
-    window={"update": _window_changed},
-    position={"update": _window_changed},
-)
+@with_fields(model.Effect, Options, window={"update": _window_changed}, position={"update": _window_changed})
 class _Settings:
     """An effect without its shutters and regions. Copies set these first, so that bars fit."""
 
