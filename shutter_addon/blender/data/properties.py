@@ -120,7 +120,7 @@ class _Tracked:
 
     confidence: FloatProperty(
         name="Confidence",
-        description="How sure tracking was of where it is",
+        description="How certain the tracked position is",
         subtype="PERCENTAGE",
         default=100.0,
         min=0.0,
@@ -221,7 +221,7 @@ class ShutterRegion(_Tracked, PropertyGroup):
 @with_fields(model.Camera)
 class ShutterCamera(_Tracked, PropertyGroup):
     name: StringProperty(name="Name", description="Name of the camera's animation channels", default="Camera")
-    location: location_property("Where what the camera sees has moved to, as a fraction of the picture", update=changed)
+    location: location_property("Movement of what the camera sees, as a fraction of the picture", update=changed)
     rotation: rotation_property("Rotation of what the camera sees, about the picture's center", update=changed)
     scale: scale_property("Scale of what the camera sees, about the picture's center", update=changed)
 
@@ -294,7 +294,7 @@ class _Settings:
     identity: StringProperty(options={"HIDDEN"})
     source: StringProperty(name="Source", description="Identity of the source strip")
     start: FloatProperty(name="Start", description="Timeline frame where the effect's content starts", options=UNKEYED)
-    camera: PointerProperty(name="Camera", description="How what the camera sees moves", type=ShutterCamera)
+    camera: PointerProperty(name="Camera", description="Motion of what the camera sees", type=ShutterCamera)
     use_source_time: BoolProperty(
         name="Custom Time",
         description="Show the source at the time that is set here, in place of the strip's own timing",
