@@ -120,7 +120,7 @@ class _Tracked:
 
     confidence: FloatProperty(
         name="Confidence",
-        description="How sure tracking was of where it is",
+        description="How certain the tracked position is",
         subtype="PERCENTAGE",
         default=100.0,
         min=0.0,
@@ -162,13 +162,7 @@ class _Tracked:
 
 def location_property(description: str, **more: Any) -> object:
     return FloatVectorProperty(
-        name="Location",
-        description=description,
-        subtype="XYZ",
-        size=2,
-        min=-MAX_DISTANCE,
-        max=MAX_DISTANCE,
-        **more,
+        name="Location", description=description, subtype="XYZ", size=2, min=-MAX_DISTANCE, max=MAX_DISTANCE, **more
     )
 
 
@@ -182,11 +176,7 @@ def scale_property(description: str, **more: Any) -> object:
 
 
 @with_fields(
-    model.Region,
-    model.OutlineRegion,
-    model.FileContent,
-    model.RampContent,
-    name={"set_transform": _region_renamed},
+    model.Region, model.OutlineRegion, model.FileContent, model.RampContent, name={"set_transform": _region_renamed}
 )
 class ShutterRegion(_Tracked, PropertyGroup):
     shutter: StringProperty(name="Shutter", description="Name of the shutter that holds in the region", update=changed)
@@ -239,7 +229,7 @@ class ShutterRegion(_Tracked, PropertyGroup):
 @with_fields(model.Camera)
 class ShutterCamera(_Tracked, PropertyGroup):
     name: StringProperty(name="Name", description="Name of the camera's animation channels", default="Camera")
-    location: location_property("Where what the camera sees has moved to, as a fraction of the picture", update=changed)
+    location: location_property("Movement of what the camera sees, as a fraction of the picture", update=changed)
     rotation: rotation_property("Rotation of what the camera sees, about the picture's center", update=changed)
     scale: scale_property("Scale of what the camera sees, about the picture's center", update=changed)
 
@@ -290,11 +280,7 @@ class ShutterBar(PropertyGroup):
     )
 
 
-@with_fields(
-    model.Shutter,
-    name={"set_transform": _shutter_renamed},
-    color={"update": _shutter_recolored},
-)
+@with_fields(model.Shutter, name={"set_transform": _shutter_renamed}, color={"update": _shutter_recolored})
 class Shutter(PropertyGroup):
     bars: CollectionProperty(type=ShutterBar)
     follow: choice("Exposure Moves With", "What the exposure moves with", FOLLOWS)
@@ -306,12 +292,7 @@ class Shutter(PropertyGroup):
     preset_position: StringProperty(options={"HIDDEN"})
 
 
-@with_fields(
-    model.Effect,
-    Options,
-    window={"update": _window_changed},
-    position={"update": _window_changed},
-)
+@with_fields(model.Effect, Options, window={"update": _window_changed}, position={"update": _window_changed})
 class _Settings:
     """An effect without its shutters and regions. Copies set these first, so that bars fit."""
 
@@ -321,7 +302,7 @@ class _Settings:
     identity: StringProperty(options={"HIDDEN"})
     source: StringProperty(name="Source", description="Identity of the source strip")
     start: FloatProperty(name="Start", description="Timeline frame where the effect's content starts", options=UNKEYED)
-    camera: PointerProperty(name="Camera", description="How what the camera sees moves", type=ShutterCamera)
+    camera: PointerProperty(name="Camera", description="Motion of what the camera sees", type=ShutterCamera)
     use_source_time: BoolProperty(
         name="Custom Time",
         description="Show the source at the time that is set here, in place of the strip's own timing",

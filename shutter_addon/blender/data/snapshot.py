@@ -259,8 +259,8 @@ def check_counts(effect: PropertyGroup) -> None:
     if not effect.shutters:
         raise EffectError(rpt_('"{effect}" has no shutter').format(effect=effect.name))
     for sentence, items, most in (
-        (rpt_("{place}: {count} shutters, {most} are the most"), effect.shutters, limits.MAX_SHUTTERS),
-        (rpt_("{place}: {count} regions, {most} are the most"), effect.regions, limits.MAX_REGIONS),
+        (rpt_("{place}: {count} shutters, but at most {most} are possible"), effect.shutters, limits.MAX_SHUTTERS),
+        (rpt_("{place}: {count} regions, but at most {most} are possible"), effect.regions, limits.MAX_REGIONS),
     ):
         if len(items) > most:
             raise EffectError(sentence.format(place=validation.place(effect), count=len(items), most=most))
@@ -439,7 +439,7 @@ def recipe_of(scene: Scene, effect: PropertyGroup, strip: Strip, contents: Seque
     check_counts(effect)
     shown = range(strip.left_handle, strip.right_handle)
     if not -limits.MAX_FRAME <= shown.start <= shown.stop <= limits.MAX_FRAME:
-        sentence = rpt_('strip "{strip}" lies at frames {first} to {last}, where no timeline is')
+        sentence = rpt_('strip "{strip}" lies at frames {first} to {last}, beyond the timeline')
         raise EffectError(sentence.format(strip=strip.name, first=shown.start, last=shown.stop - 1))
     drawn = [region for region in strips.drawn_regions(effect) if layers_of(effect, region)]
     for item in (*effect.shutters, *drawn, *strips.matte_regions(effect)):
@@ -467,6 +467,6 @@ def _keyed(scene: Scene, effect: PropertyGroup) -> set[float]:
 def _check_name(item: PropertyGroup) -> None:
     """Raise EffectError for a name that is too long for a recipe, from a script or a file of another version."""
     if len(item.name) > limits.MAX_NAME:
-        sentence = rpt_("{place}: its name has {count} characters, {most} are the most")
+        sentence = rpt_("{place}: its name has {count} characters, but at most {most} are possible")
         words = {"place": validation.place(item), "count": len(item.name), "most": limits.MAX_NAME}
         raise EffectError(sentence.format(**words))

@@ -79,8 +79,8 @@ def shortages(renderer: Renderer, snapshot: Snapshot, request: Request) -> Itera
         words = {"width": source.width, "height": source.height, "frames": request.state.options.window}
         words["limit"] = render_settings.memory().limit // MEGABYTE
         sentence = rpt_(
-            "the {limit} MB that may be taken of the GPU are too few for {frames} frames of {width}×{height}: all are"
-            " sent for every picture, which is slow"
+            "{limit} MB of GPU memory are too little for {frames} frames of {width}×{height}: every picture uploads all"
+            " of them, which is slow"
         )
         yield sentence.format(**words)
 

@@ -162,13 +162,7 @@ def for_drawing(context: Context, shown: Shown, decision: Decision | None) -> Dr
     # Otherwise Blender shows the engine's picture among the other strips.
     draws_result = has_result and left < 1 and (decision.is_drawn or not _is_rendered(shown))
     renderer = sessions.of_drawing().renderer(request)
-    return Drawing(
-        decision=decision,
-        request=request,
-        renderer=renderer,
-        left=left,
-        draws_result=draws_result,
-    )
+    return Drawing(decision=decision, request=request, renderer=renderer, left=left, draws_result=draws_result)
 
 
 def request_of(context: Context, shown: Shown) -> Request:

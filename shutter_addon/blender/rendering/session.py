@@ -111,10 +111,7 @@ class RenderSession:
     """A compositor, opened when it is first used, and the renderers of the effects that were shown last."""
 
     def __init__(
-        self,
-        choose: Callable[[], tuple[str, str | None]],
-        ask_others: Callable[[], None],
-        late: Late | None = None,
+        self, choose: Callable[[], tuple[str, str | None]], ask_others: Callable[[], None], late: Late | None = None
     ) -> None:
         """Make a session.
 

@@ -1,6 +1,6 @@
 """Whether an exposure of filmed frames has too few of them for a smooth streak.
 
-That depends on how far the picture moves from the shown frame to the next exposed one. A thread that touches no bpy
+That depends on how far the picture moves between the exposed frames next to the shown one. A thread that touches no bpy
 measures this when the interface calls `advance`; drawing only asks for what is known, and never waits.
 """
 
@@ -25,6 +25,7 @@ from ..data.snapshot import Snapshot
 from ..data.source_media import SourceSpec
 
 _KEPT = 64  # pairs of frames whose motion is kept, half a megabyte each
+_TRIED = 4  # pairs around the shown frame, until the motion of one can be found
 
 _moved: Kept[tuple, steps.Moved | None] = Kept()  # by a source's key and the first frame of a pair
 # By scene: the timeline frame of the last look, the step that it found, and whether the source repeats frames.
@@ -70,22 +71,17 @@ def _step(effect: PropertyGroup, snapshot: Snapshot, renderer: Renderer, request
         return None
     request = renderer.slid(request, known=True)
     exposed = _exposed_pairs(renderer, request)
-    if not any(exposed.values()):
-        return None
-    pair = min(set.union(*exposed.values()), key=lambda first: abs(first - request.index))
-    key = snapshot.source.key, pair
-    if key not in _moved:
-        _measuring.wanted = snapshot.source, pair
-    if (moved := _moved.get(key)) is None:
-        return None
-    height = effect.scene.render.resolution_y
-    ends = [
-        [_way(request.state, shutter, frame, renderer.source.height) for frame in (pair, pair + 1)]
-        for shutter, pairs in exposed.items()
-        if pair in pairs
-    ]
-    step = max(steps.step(moved, before, after) for before, after in ends) * height
-    return step if step > steps.smooth(height) else None
+    for pair in sorted(set().union(*exposed.values()), key=lambda first: abs(first - request.index))[:_TRIED]:
+        key = snapshot.source.key, pair
+        if key not in _moved:
+            _measuring.wanted = snapshot.source, pair
+            return None
+        if (moved := _moved[key]) is not None:
+            height, state = effect.scene.render.resolution_y, request.state
+            shutters = [shutter for shutter, pairs in exposed.items() if pair in pairs]
+            step = height * max(steps.step(moved, *_ways(state, i, pair, renderer.source.height)) for i in shutters)
+            return step if step > steps.smooth(height) else None
+    return None
 
 
 def _exposed_pairs(renderer: Renderer, request: Request) -> dict[int, set[int]]:
@@ -110,12 +106,13 @@ def _visible(state: FrameState) -> set[int]:
     return drawn | {matte.shutter for matte in state.mattes} | set(state.layers.shutters if state.layers else ())
 
 
-def _way(state: FrameState, shutter: int, frame: int, height: int) -> Similarity:
-    """Return where points of the shown picture lie in a frame, in heights of the picture."""
+def _ways(state: FrameState, shutter: int, pair: int, height: int) -> tuple[Similarity, Similarity]:
+    """Return where points of the shown picture lie in two frames, in heights of the picture."""
     if state.following is None:
-        return Similarity()
-    turns, shifts = state.following.at([frame])
-    return Similarity(complex(turns[0, shutter]), complex(shifts[0, shutter]) / height)
+        return Similarity(), Similarity()
+    turns, shifts = state.following.at([pair, pair + 1])
+    first, second = (Similarity(complex(turns[i, shutter]), complex(shifts[i, shutter]) / height) for i in range(2))
+    return first, second
 
 
 def is_busy() -> bool:
