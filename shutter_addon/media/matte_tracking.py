@@ -16,6 +16,7 @@ from . import flow, registration, tracking
 from .carried_mattes import CarriedFile, CarriedMattes
 from .carrying import box_around
 from .footage import Footage
+from .opencv import cv2
 from .pursuit import COVERED, LEFT, Sighting
 from .tracking import Tracked, TrackingError
 
@@ -30,6 +31,8 @@ _POINTS = 4000  # that tell a motion, at most; and so many at least
 _FEWEST = 24
 _BACK = 1.0  # pixels that flow forth and back may be off, of 640
 _ALIKE = 2.0  # pixels of 640 within which a point moves as the subject does
+_DRIFT = 12.0  # pixels of 640 by which steps may have drifted; farther off, something else is alike
+_SURELY = 0.5  # confidence from which on the first frame tells of a drift
 _AGREEING = 0.5  # share of the points that do, from which on a step is sure
 
 
@@ -58,7 +61,7 @@ class MatteTrack(tracking.Track):
     def __init__(self, region: Subject, cover: Cover) -> None:
         """region: says where its centre is"""
         super().__init__(region)
-        self._covers = lru_cache(2)(cover)  # a step looks at two frames, of which one was looked at before
+        self._covers = lru_cache(3)(cover)  # a step looks at two frames, one of them again, and at the first
 
     def _cover(self, frame: int) -> np.ndarray:
         return self._covers(frame, self._footage.size)
@@ -75,8 +78,10 @@ class _Pursuit:
     """The motion of what a matte covers, from one frame to those after it."""
 
     def __init__(self, cover: Callable[[int], np.ndarray], footage: Footage, frame: int, motion: Motion) -> None:
-        self._cover, self._footage, self._way = cover, footage, motion
-        self._last, self._motion, self.reason = frame, Similarity(), COVERED
+        self._cover, self._footage, self._asked = cover, footage, motion
+        # Where it turns as well, no location alone suits many points: that of its middle is told.
+        self._way: Motion = "scale" if motion == "location" else motion
+        self._start, self._last, self._motion, self.reason = frame, frame, Similarity(), COVERED
 
     def next(self, frame: int) -> Sighting | None:
         """Where it is in a frame; None: it is not there."""
@@ -89,12 +94,35 @@ class _Pursuit:
         if step is None:
             self.reason = COVERED
             return None
-        self._motion, self._last = step.motion.after(self._motion), frame
-        return Sighting(self._motion, step.confidence)
+        self._motion, self._last = self._refined(step.motion.after(self._motion), second, after), frame
+        return Sighting(self._at_middle() if self._asked == "location" else self._motion, step.confidence)
+
+    def _at_middle(self) -> Similarity:
+        """Return how the middle of what the first matte covers has moved."""
+        rows, columns = np.nonzero(self._cover(self._start) > _INSIDE)
+        middle = complex(columns.mean(), rows.mean())
+        return Similarity(1 + 0j, self._motion(middle) - middle)
+
+    def _refined(self, motion: Similarity, second: np.ndarray, after: np.ndarray) -> Similarity:
+        """Return a motion since the first frame, compared with that frame, so that steps do not add up to a drift.
+
+        second, after: the picture and the matte that the motion leads to
+        """
+        there = registration.matrix(motion)
+        size = second.shape[1], second.shape[0]
+        first, before = (
+            cv2.warpAffine(each, there, size) for each in (self._footage.picture(self._start), self._cover(self._start))
+        )
+        rest = moved(first, second, before, after, self._way)
+        middle = complex(size[0] / 2, size[1] / 2)
+        is_small = rest is not None and abs(rest.motion(middle) - middle) < _DRIFT * max(size) / 640
+        if rest is None or not is_small or rest.confidence < _SURELY:
+            return motion
+        return rest.motion.after(motion)
 
 
 def moved(
-    first: np.ndarray, second: np.ndarray, before: np.ndarray, after: np.ndarray, motion: Motion = "location"
+    first: np.ndarray, second: np.ndarray, before: np.ndarray, after: np.ndarray, motion: Motion
 ) -> Sighting | None:
     """How what a matte covers moves from one picture (H, W) uint8 to another, and how sure that is; None: nobody
     knows.
@@ -121,13 +149,8 @@ def moved(
     chosen = chosen[:: -(-chosen.size // _POINTS)]
     corner = complex(columns.start, rows.start)
     starts, ends = (registration.plane(each)[chosen] + corner for each in (grid, there))
-    # Where it turns as well, no location alone suits many points: that of its middle is asked for then.
-    way: Motion = "scale" if motion == "location" else motion
-    fitted = registration.fit(starts, ends, np.ones(len(chosen)), way, _ALIKE * unit)
+    fitted = registration.fit(starts, ends, np.ones(len(chosen)), motion, _ALIKE * unit)
     if fitted is None:
         return None
     found, agreeing = fitted
-    if motion == "location":
-        middle = complex(starts.mean())
-        found = Similarity(1 + 0j, found(middle) - middle)
     return Sighting(found, min(float(agreeing.mean()) / _AGREEING, 1.0) * min(share / _AGREEING, 1.0))

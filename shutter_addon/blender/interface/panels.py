@@ -84,9 +84,10 @@ def preset_menu(layout: UILayout, _context: Context) -> None:
 
 @menu("regions", "Region Specials")
 def region_menu(layout: UILayout, _context: Context) -> None:
-    for kind, text in (("SUBJECT", "Draw Subject"), ("OUTLINE", "Draw Outline")):
-        button = layout.operator("shutter.draw", text=text, icon=_ICONS[kind])
-        button.new, button.kind = True, kind
+    subject = layout.operator("shutter.draw", text="Draw Subject", icon=_ICONS["SUBJECT"])
+    subject.new, subject.kind = True, "SUBJECT"
+    outline = layout.operator("shutter.draw", text="Draw Outline", icon=_ICONS["OUTLINE"])
+    outline.new, outline.kind = True, "OUTLINE"
     layout.separator()
     draw_operators(layout, ("matte_add", "FILE_MOVIE"), ("matte_strip", "SEQUENCE", "strip"))
     # Without a mask they are greyed out; their tooltips say why.
