@@ -298,7 +298,7 @@ class GPUCompositor:
             if levels:
                 images["picture"] = window.picture(levels=True)
             program, bits = way_sum(not number, levels), _bits(coefficients)
-            self.device.run(program, size, images=images, size=size, block_bits=bits)
+            self.device.run(program, size, images=images, size=size, given=size, block_bits=bits)
         return window.picture(levels=True) if request.levels else window.mixed()
 
     def _selected(self, handle: Texture, chosen: tuple[int, ...], count: int) -> tuple[Texture, Texture]:

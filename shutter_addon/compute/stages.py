@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 
 from ..core.model.mattes import Matte
-from ..devices.device import Device, NamedTextures, Texture
+from ..devices.device import Device, Given, NamedTextures, Texture
 from ..devices.passes import read_pass
-from .composition_passes import padded
+from .composition_passes import padded, way_sum
 from .diffusion import follows_edges
 from .diffusion_gpu import Diffusion
 from .edge_diffusion_gpu import EdgeDiffusion
@@ -54,14 +54,10 @@ class Stages:
         """See request.Stages."""
         height, width = size
         result = self._textures.of("sum", (width, height, added.size[2]), "rgba32f")
-        self._device.run(
-            read_pass("mix", BEGINS=int(mixed is None)),
-            result.size,
-            images={"added": added, "mixed": result},
-            size=(width, height),
-            given=added.size[:2],
-            share=share,
-        )
+        whole = self._textures.filled("share", [np.full((1, 1, 1), share, np.float32)], "r32f")
+        images = {"part": added, "share": whole, "mixed": result}
+        given: Given = {"size": (width, height), "given": added.size[:2], "block_bits": max(size).bit_length()}
+        self._device.run(way_sum(mixed is None, levels=False), result.size, images=images, **given)
         return result
 
     def blend(
@@ -83,9 +79,8 @@ class Stages:
                     self._device.write(values, np.ascontiguousarray(array[..., None]), layer)
                     self._held[layer] = key
             over = self._textures.of(ends[0], (width, height, beneath.size[2]), "rgba32f")
-            adds = any(matte.blend == "add" for matte, _ in some)
             self._device.run(
-                read_pass("matte_blend", COUNT=len(some), ADDS=int(adds), MOST=MOST_MATTES),
+                read_pass("matte_blend", COUNT=len(some), MOST=MOST_MATTES),
                 over.size,
                 images={"under": beneath, "values": values, "over": over},
                 blocks={"table": table},

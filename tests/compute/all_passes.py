@@ -102,9 +102,7 @@ def _filling():
         yield running_sums.accumulation(1, sent, tiled, tiled)
     yield window.packing(1, True)
     yield window.packing(2, False)
-    for adds in (False, True):
-        yield read_pass("matte_blend", COUNT=2, ADDS=int(adds), MOST=stages.MOST_MATTES)
-        yield read_pass("mix", BEGINS=int(adds))
+    yield read_pass("matte_blend", COUNT=2, MOST=stages.MOST_MATTES)
 
 
 def _unpacking():
