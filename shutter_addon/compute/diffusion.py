@@ -58,8 +58,8 @@ def follows_edges(labels: np.ndarray, guide: np.ndarray | None, strength: float)
 
 
 class _Grid(NamedTuple):
-    """A grid's equations: conductances to the right (h, w − 1), down (h − 1, w) and to fixed cells (h, w); and 1 / their
-    sum, 0 for fixed cells."""
+    """A grid's equations: conductances to the right (h, w − 1), down (h − 1, w) and to fixed cells (h, w); and 1 /
+    their sum, 0 for fixed cells."""
 
     across: np.ndarray
     down: np.ndarray
@@ -113,7 +113,7 @@ def _coarser(grid: _Grid) -> _Grid:
 
 
 def _inflow(across: np.ndarray, down: np.ndarray, values: np.ndarray) -> np.ndarray:
-    """Return the flow into each cell (…, h, w) from its neighbours. It sums differences: a rounded diagonal would leak."""
+    """Return the flow into each cell (…, h, w). It sums differences: a rounded diagonal would leak."""
     stopping.check()
     flow = np.zeros_like(values)
     for passed, before, after in (

@@ -41,8 +41,8 @@ COLOURS = ((0, 0), (1, 1), (1, 0), (0, 1))
 WHOLE = 128
 # A grid with at most this many cells along its longer side is the coarsest, which one invocation solves.
 SOLVED = 8
-# A larger grid than WHOLE is solved in tiles with a scribble, and in this many tiles on each side of those. With two, the
-# error × 255 falls from 0.66 to 0.19, and a solve takes 1.7 times as long.
+# A larger grid than WHOLE is solved in tiles with a scribble, and in this many tiles on each side of those. With two,
+# the error × 255 falls from 0.66 to 0.19, and a solve takes 1.7 times as long.
 BAND = 1
 # How much fixed cells beside the line between two coarse cells keep a cell on that line from following the two, 0 … 1.
 HOLD = 0.3
@@ -194,8 +194,8 @@ class Diffusion:
             feeding = _grown(near)
             around = feeding & live
             stale = np.ones_like(live) if anew else (reached | grid.reached) & _grown(live)
-            # Passes read W in the tiles around near ones, so it must be 0 there. At full size, fixed tiles must have the
-            # values of their labels.
+            # Passes read W in the tiles around near ones, so it must be 0 there. At full size, fixed tiles must have
+            # the values of their labels.
             unsolved = stale | around | ~live if grid.finest else stale | around
             rim = ~near & live & _last_ones(grid)
             eights, fours = grid.codes

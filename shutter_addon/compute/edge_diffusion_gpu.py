@@ -23,8 +23,8 @@ CYCLES = (4,) * 48
 ENOUGH = 1 / 1024
 # As many grids after that of the conjugate gradients are visited twice for each visit of the one before.
 TWICE = 2
-# If the guide's cells are larger than pixels: iterations of conjugate gradients in each cycle, first near scribbles, then
-# everywhere. Largest error × 255 in frames of three films at 1920 × 1080: 0.6.
+# If the guide's cells are larger than pixels: iterations of conjugate gradients in each cycle, first near scribbles,
+# then everywhere. Largest error × 255 in frames of three films at 1920 × 1080: 0.6.
 NEAR_CYCLES = (4, 2)
 LAST_CYCLES = (1,)
 # Sweeps over a grid before and after its correction; the same in cycles over smooth conductances.
@@ -45,7 +45,7 @@ _SUM = read_pass("edge_diffusion", "SUM")
 
 
 class EdgeDiffusion(Diffusion):
-    """Diffusion along edges on a device: Diffusion with other passes for pixels, and conjugate gradients on one grid."""
+    """Diffusion along edges on a device. It has other passes for pixels, and conjugate gradients on one grid."""
 
     finest = operators("LINKS")
 

@@ -1,7 +1,7 @@
 """Guides of edge-aware diffusion: pictures whose edges make resistances (core.pixels.conductances).
 
-A guide has the shown frame's display values in cells of 1, 2, 4 … pixels, without the finest detail. Its differences are
-scaled to those of a picture of ROWS rows (or columns, if it is upright).
+A guide has the shown frame's display values in cells of 1, 2, 4 … pixels, without the finest detail. Its differences
+are scaled to those of a picture of ROWS rows (or columns, if it is upright).
 
 Where neighboring frames differ little, the guide is their mean. Otherwise noise would make coefficients flicker in a
 still picture. Moving things differ more, and stay as in the shown frame.

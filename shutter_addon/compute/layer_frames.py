@@ -1,5 +1,5 @@
-"""Frames for the windows of layers: weighted pixel by pixel with a layer's matte, or with what all mattes leave. And the
-mattes of layers in source frames, each made once and cached."""
+"""Frames for the windows of layers: weighted pixel by pixel with a layer's matte, or with what all mattes leave. And
+the mattes of layers in source frames, each made once and cached."""
 
 from collections.abc import Callable, Hashable, Iterable
 from functools import partial

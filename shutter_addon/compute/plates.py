@@ -217,8 +217,8 @@ def uncovered(colors: np.ndarray, seen: np.ndarray, plate: np.ndarray, kinds: np
 def filled(picture: np.ndarray, known: np.ndarray) -> np.ndarray:
     """Fill unknown pixels smoothly from their neighbors.
 
-    It uses a pyramid: each level is the mean of the known pixels of the finer one, which takes from it what it lacks. The
-    result resembles diffusion, with one pass for each level.
+    It uses a pyramid: each level is the mean of the known pixels of the finer one, which takes from it what it lacks.
+    The result resembles diffusion, with one pass for each level.
 
     Args:
         picture: (H, W, C) float32

@@ -349,7 +349,7 @@ class NamedTextures:
         self.device = device
         self._kept: dict[str, Texture] = {}
 
-    def of(self, name: str, size: tuple[int, int, int], kind: str) -> Texture:
+    def of(self, name: str, size: tuple[int, int, int], kind: str = "rgba32f") -> Texture:
         """Return the texture of a name, which always has the same kind. size: (width, height, layers)."""
         texture = self._kept.get(name)
         if texture is None or texture.size != size:

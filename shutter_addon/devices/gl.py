@@ -95,8 +95,8 @@ def _memory(context: moderngl.Context, renderer: str) -> int | None:
 class GLDevice(Device):
     """A Device on a new OpenGL 4.3 context. It tells the budget how much memory there is.
 
-    Do not use it on a thread with a current GLX context, such as Blender's main thread on X11: EGL does not replace that
-    context, which would get the calls.
+    Do not use it on a thread with a current GLX context, such as Blender's main thread on X11: EGL does not replace
+    that context, which would get the calls.
 
     Raises:
         NoDeviceError: there is no OpenGL 4.3

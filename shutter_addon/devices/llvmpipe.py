@@ -1,5 +1,5 @@
-"""Limits of Mesa's software renderer, llvmpipe. Two more things exist only for it: the pass compose_search, where another
-would take too many iterations, and TILED in shaders/include/sums.glsl, since it stores textures row by row."""
+"""Limits of Mesa's software renderer, llvmpipe. Two more things exist only for it: the pass compose_search, where
+another would take too many iterations, and TILED in shaders/include/sums.glsl, since it stores textures row by row."""
 
 import numpy as np
 

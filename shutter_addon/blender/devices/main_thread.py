@@ -2,8 +2,8 @@
 
 Functions wait in a queue for a timer, as Blender's manual recommends. Timers may be registered only on the main thread:
 Blender iterates over them without a lock. RelayedDevice is Blender's GPU for other threads: the main thread makes its
-calls, a few at a time between redraws. With an engine's bl_use_gpu_context, Blender would hold a lock while a picture is
-made, and draw no window meanwhile.
+calls, a few at a time between redraws. With an engine's bl_use_gpu_context, Blender would hold a lock while a picture
+is made, and draw no window meanwhile.
 """
 
 import queue
@@ -91,8 +91,8 @@ _main = _MainThread(queue.SimpleQueue())
 class RelayedDevice(BlenderDevice):
     """Blender's GPU as a Device for a thread other than the main one.
 
-    Errors of a pass are raised later, at the latest when something is made, sent or read. Its textures are lists of one,
-    which the main thread empties: on Vulkan, Blender crashes if another thread frees a texture.
+    Errors of a pass are raised later, at the latest when something is made, sent or read. Its textures are lists of
+    one, which the main thread empties: on Vulkan, Blender crashes if another thread frees a texture.
     """
 
     def __init__(self, *memory: Any) -> None:
