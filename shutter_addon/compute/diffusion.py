@@ -79,18 +79,18 @@ def _solved(labels: np.ndarray, shutters: np.ndarray, across: np.ndarray, down: 
     free = labels == 0
     ground = _inflow(across, down, (~free).astype(np.float32)) * free
     grids = [_grid(across * (free[:, 1:] & free[:, :-1]), down * (free[1:] & free[:-1]), ground)]
-    while grids[-1].ground.shape != (1, 1):
-        grids.append(_coarser(grids[-1]))
+    while (last := grids[-1]).ground.shape != (1, 1):
+        grids.append(_grid(_in_twos(last.across[:, 1::2], 0), _in_twos(last.down[1::2], 1), _in_fours(last.ground)))
     solution = (labels == shutters[:, None, None] + 1).astype(np.float32)
     direction, residual = np.zeros_like(solution), np.zeros_like(solution)
     power = np.zeros((len(solution), 1, 1), np.float32)
     for _ in range(ITERATIONS):
-        last, before = residual, power
+        last_residual, before = residual, power
         residual = _inflow(across, down, solution) * free
         guess = _cycle(grids, residual)
         power = _dot(residual, guess)
         # Polak and Ribière's formula: with others, rounding errors would grow where the solution is already exact.
-        direction = guess + _ratio(np.maximum(_dot(residual - last, guess), 0), before) * direction
+        direction = guess + _ratio(np.maximum(_dot(residual - last_residual, guess), 0), before) * direction
         step = _ratio(_dot(residual, direction), -_dot(direction, _inflow(across, down, direction) * free)) * direction
         solution += step
         if np.abs(step).max() < ENOUGH:
@@ -105,11 +105,6 @@ def _grid(across: np.ndarray, down: np.ndarray, ground: np.ndarray) -> _Grid:
         cells[:, 1:] += ties
     inverse = np.divide(1, diagonal, where=diagonal > 0, out=np.zeros_like(diagonal))
     return _Grid(across, down, ground, inverse)
-
-
-def _coarser(grid: _Grid) -> _Grid:
-    """Return the next coarser grid."""
-    return _grid(_in_twos(grid.across[:, 1::2], 0), _in_twos(grid.down[1::2], 1), _in_fours(grid.ground))
 
 
 def _inflow(across: np.ndarray, down: np.ndarray, values: np.ndarray) -> np.ndarray:

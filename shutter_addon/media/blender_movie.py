@@ -9,7 +9,9 @@ import json
 import math
 import subprocess
 import threading
+from collections.abc import Iterator
 from contextlib import suppress
+from dataclasses import dataclass, field
 from fractions import Fraction
 from pathlib import Path
 from typing import IO
@@ -27,11 +29,27 @@ ANSWERING = 120  # seconds after which it is killed if it does not answer; no fr
 ENDING = 5  # seconds after which it is killed if it does not end
 _PIPE = 1 << 20  # the pipe's bytes, if they can be set; with 64 KB a frame takes twice as long
 
-_command: list[str] | None = None  # starts the process that all movies share
-_process: subprocess.Popen[bytes] | None = None  # the running process
-_asking = threading.Lock()  # held during a question, from any thread
-_numbers = itertools.count()  # the movies' numbers in the process, which may have a file open several times
 _FLOAT_ERROR = 2**-23  # the relative error of Blender's floats
+
+
+@dataclass
+class _Decoder:
+    """The process that decodes movies.
+
+    Attributes:
+        command: starts it
+        process: the running one
+        asking: held during a question, from any thread
+        numbers: the movies' numbers in the process, which may have a file open several times
+    """
+
+    command: list[str] | None = None
+    process: subprocess.Popen[bytes] | None = None
+    asking: threading.Lock = field(default_factory=threading.Lock)
+    numbers: Iterator[int] = field(default_factory=itertools.count)
+
+
+_decoder = _Decoder()  # all movies share a process: starting one takes seconds
 
 
 class BlenderMovie(FrameSource):
@@ -48,7 +66,8 @@ class BlenderMovie(FrameSource):
         self.files = [self.path]
         check_name(self.path.absolute())
         self.options = {"stream": 0, "deinterlace": bool(deinterlace)}
-        self._known = {"number": next(_numbers), "path": str(self.path.absolute()), "deinterlace": bool(deinterlace)}
+        number = next(_decoder.numbers)
+        self._known = {"number": number, "path": str(self.path.absolute()), "deinterlace": bool(deinterlace)}
         try:
             about, _ = ask(self._known | {"wanted": "about"})
         except MediaError as error:
@@ -94,25 +113,24 @@ def lend(command: list[str] | None) -> None:
     Args:
         command: gets ANSWER as its last argument. None: movies cannot be decoded this way.
     """
-    global _command
-    _command = command
-    if _asking.acquire(timeout=ENDING):
+    _decoder.command = command
+    if _decoder.asking.acquire(timeout=ENDING):
         try:
             _end()
         finally:
-            _asking.release()
-    elif (process := _process) is not None:
+            _decoder.asking.release()
+    elif (process := _decoder.process) is not None:
         process.kill()  # the waiting thread notices the closed pipe and ends the process
 
 
 def is_lent() -> bool:
     """Return whether movies can be decoded this way."""
-    return _command is not None
+    return _decoder.command is not None
 
 
 def ask(wanted: dict) -> tuple[dict, np.ndarray | None]:
     """Return the process's answer, and a frame in new memory if there is one; raise MediaError with its message."""
-    with _asking:
+    with _decoder.asking:
         for _ in range(2):  # another movie may have ended it
             if (answer := _answer(wanted)) is not None:
                 return answer
@@ -121,16 +139,16 @@ def ask(wanted: dict) -> tuple[dict, np.ndarray | None]:
 
 def tell(wanted: dict) -> None:
     """Send a message to the process if it runs."""
-    with _asking, suppress(MediaError):
-        if _process is not None:
+    with _decoder.asking, suppress(MediaError):
+        if _decoder.process is not None:
             _answer(wanted)
 
 
 def _answer(wanted: dict) -> tuple[dict, np.ndarray | None] | None:
     """Return the answer, or None if the process has ended or was killed because it did not answer."""
-    is_new = _process is None
+    is_new = _decoder.process is None
     try:
-        asked = threads.start(_asked, _process or _started(), json.dumps(wanted).encode() + b"\n")
+        asked = threads.start(_asked, _decoder.process or _started(), json.dumps(wanted).encode() + b"\n")
         return asked.result(STARTING if is_new else ANSWERING)
     except MediaError:
         raise
@@ -170,12 +188,11 @@ def _line(stream: IO[bytes]) -> bytes:
 
 def _started() -> subprocess.Popen[bytes]:
     """Start the process; raise MediaError if that fails."""
-    global _process
-    if _command is None:
+    if _decoder.command is None:
         raise MediaError("no Blender decodes it any more")
     try:
-        _process = subprocess.Popen(
-            [*_command, ANSWER],
+        _decoder.process = subprocess.Popen(
+            [*_decoder.command, ANSWER],
             stdin=subprocess.PIPE,  # ends with this process, which ends the other one
             stdout=subprocess.PIPE,
             stderr=subprocess.DEVNULL,
@@ -189,13 +206,12 @@ def _started() -> subprocess.Popen[bytes]:
         # Some systems cannot do this, and Linux refuses it to users with many large pipes.
         import fcntl
 
-        fcntl.fcntl(_process.stdout, fcntl.F_SETPIPE_SZ, _PIPE)  # type: ignore[arg-type]
-    return _process
+        fcntl.fcntl(_decoder.process.stdout, fcntl.F_SETPIPE_SZ, _PIPE)  # type: ignore[arg-type]
+    return _decoder.process
 
 
 def _end() -> None:
-    global _process
-    process, _process = _process, None
+    process, _decoder.process = _decoder.process, None
     if process is None:
         return
     assert process.stdin is not None

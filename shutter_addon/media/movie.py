@@ -150,7 +150,8 @@ class MovieSource(FrameSource):
         return matrix(frame.colorspace, frame.format.name == "yuvj420p" or self._is_full)
 
     def _pixels(self, frame: av.VideoFrame) -> np.ndarray:
-        by_fields = self._deinterlace and _has_fields(frame)
+        has_fields = frame.format.name in _WITH_FIELDS and frame.width % 4 == 0 and frame.height % 4 == 0
+        by_fields = self._deinterlace and has_fields
         frame = _interpolate_fields(frame) if by_fields else frame
         picture = self._converted(frame, self._format)
         if self._deinterlace and not by_fields and self._divisor == 1:  # smaller frames average both fields
@@ -232,11 +233,6 @@ def _count(container: InputContainer, stream: VideoStream, fps: Fraction) -> int
 
 def _start(stream: Stream) -> float:
     return float((stream.start_time or 0) * fraction(stream.time_base))
-
-
-def _has_fields(frame: av.VideoFrame) -> bool:
-    """Return whether Blender interpolates the fields of such a frame. It blurs all others."""
-    return frame.format.name in _WITH_FIELDS and frame.width % 4 == 0 and frame.height % 4 == 0
 
 
 def _interpolate_fields(frame: av.VideoFrame) -> av.VideoFrame:

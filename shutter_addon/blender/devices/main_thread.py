@@ -31,30 +31,52 @@ _MOMENT = 0.01  # seconds that a batch of passes takes, before the main thread w
 _AHEAD = 4  # the most passes that wait for the main thread; they run even if the picture is no longer wanted
 _REST = 1.0  # seconds without a call, after which the main thread stops looking
 _TICK = 0.02  # seconds between two looks at the queue
-_calls: queue.SimpleQueue[Callable[[], object]] = queue.SimpleQueue()  # functions of any thread, for the timer
+
+
+@dataclass
+class _MainThread:
+    """What other threads ask of the main thread.
+
+    Attributes:
+        functions: of `soon`, for the timer
+        calls: of relayed devices, as (future, function). They also run while Blender draws, when no data may change.
+        timers: timers to remove when the extension is disabled
+        until: when it stops looking for more calls
+        looked: when it last looked
+        unfinished: passes that may still run
+        batch: the number of passes after which it waits for them
+    """
+
+    functions: queue.SimpleQueue[Callable[[], object]]
+    calls: queue.SimpleQueue[tuple[Future, Callable]]
+    timers: set[Callable[[], float | None]]
+    until: float = 0.0
+    looked: float = 0.0
+    unfinished: int = 0
+    batch: int = 8
+
+
+_main = _MainThread(queue.SimpleQueue(), queue.SimpleQueue(), set())  # Blender has one main thread
 
 
 def soon(function: Callable[[], object]) -> None:
     """Have the main thread of a window call a function, in the order of these calls. Usable on any thread."""
-    _calls.put(function)
+    _main.functions.put(function)
 
 
 def call_waiting() -> float:
     """Call the waiting functions, and those of relayed devices: a timer that runs as long as the extension."""
-    for _ in range(_calls.qsize()):
+    for _ in range(_main.functions.qsize()):
         try:
-            _calls.get_nowait()()
+            _main.functions.get_nowait()()
         except Exception:  # Blender would end the timer
             sys.excepthook(*sys.exc_info())  # as Blender does: prints the error, and ours are kept (handlers)
     return 0.0 if look() else _TICK
 
 
-_timers: set[Callable[[], float | None]] = set()  # timers to remove when the extension is disabled
-
-
 def later(timer: Callable[[], float | None], seconds: float = 0.0, *, persistent: bool = False) -> None:
     """Register a timer unless it is registered. Call it on the main thread."""
-    _timers.add(timer)
+    _main.timers.add(timer)
     if not bpy.app.timers.is_registered(timer):
         bpy.app.timers.register(timer, first_interval=seconds, persistent=persistent)
 
@@ -63,29 +85,6 @@ def drop(*timers: Callable[[], float | None]) -> None:
     """Unregister timers."""
     for timer in filter(bpy.app.timers.is_registered, timers):
         bpy.app.timers.unregister(timer)
-
-
-@dataclass
-class _MainThread:
-    """The main thread's calls for relayed devices.
-
-    Attributes:
-        calls: waiting calls, as (future, function)
-        until: when it stops looking for more
-        looked: when it last looked
-        unfinished: passes that may still run
-        batch: the number of passes after which it waits for them
-    """
-
-    calls: queue.SimpleQueue[tuple[Future, Callable]]
-    until: float = 0.0
-    looked: float = 0.0
-    unfinished: int = 0
-    batch: int = 8
-
-
-# These calls are separate from `soon`, because they also run while Blender draws, when no data may change.
-_main = _MainThread(queue.SimpleQueue())
 
 
 class RelayedDevice(BlenderDevice):
@@ -214,4 +213,4 @@ def register() -> None:
 
 
 def unregister() -> None:
-    drop(*_timers)
+    drop(*_main.timers)
