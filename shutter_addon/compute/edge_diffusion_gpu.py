@@ -73,7 +73,11 @@ class EdgeDiffusion(Diffusion):
         self._start(0)
         self._coarsen()
         if side > 1:
-            self._cycles_near()
+            for iterations in NEAR_CYCLES:
+                self._near_cycle(0, iterations)
+            # The pixels far from scribbles get their values from the grid that was solved.
+            for fine, coarse in reversed(list(pairwise(self._grids[: self._solved + 1]))):
+                self._take_up(fine, coarse, "far")
             self._list_tiles(labels, 0)
         last = 0.0
         for iterations in CYCLES if side == 1 else LAST_CYCLES:
@@ -97,13 +101,6 @@ class EdgeDiffusion(Diffusion):
             self._clear(grid, self._more[name])
         if "links" not in finest.textures:
             finest.textures["links"] = self._device.texture(*finest.size, 1, "rgba32f")
-
-    def _cycles_near(self) -> None:
-        """Run cycles near scribbles. Then interpolate the other pixels from the grid that was solved."""
-        for iterations in NEAR_CYCLES:
-            self._near_cycle(0, iterations)
-        for fine, coarse in reversed(list(pairwise(self._grids[: self._solved + 1]))):
-            self._take_up(fine, coarse, "far")
 
     def _near_cycle(self, index: int, iterations: int) -> None:
         """Run a V-cycle near scribbles, from this grid to that of the conjugate gradients."""

@@ -4,7 +4,7 @@ a rendered picture belongs to."""
 import os
 import struct
 import zlib
-from contextlib import suppress
+from contextlib import closing, suppress
 from pathlib import Path
 from typing import NamedTuple
 
@@ -81,12 +81,10 @@ def is_transparent(path: Path) -> bool:
     image = ImageInput.open(check_name(path))
     if image is None:
         return False
-    try:
+    with closing(image):
         last = image.spec().nchannels - 1
         alpha = image.read_image(0, 0, last, last + 1, "float")
         return alpha is not None and bool(alpha.min() < 1)
-    finally:
-        image.close()
 
 
 def _is_sound_png(path: Path) -> bool:

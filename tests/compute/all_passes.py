@@ -109,9 +109,8 @@ def _unpacking():
     if importlib.util.find_spec("bpy"):
         from shutter_addon.blender.devices import blender_gpu
 
-        for kind, sent in blender_gpu.FORMATS.items():
-            if sent is not None:
-                yield blender_gpu.unpacking(kind, sent[2])
+        for kind, (_, _, packing) in blender_gpu.FORMATS.items():
+            yield blender_gpu.unpacking(kind, packing)
         yield blender_gpu.LETTING_GO
 
 

@@ -26,7 +26,8 @@ from ...devices.passes import Pass, read_pass
 
 TYPES = {"sampler2DArray": "FLOAT_2D_ARRAY", "usampler2DArray": "UINT_2D_ARRAY"}
 _AS_IT_IS, _WHOLE, _OPAQUE_BYTES, _PAIRS_OF_BYTES, _SIXTEEN_BITS = range(5)
-# GLSL format: NumPy's type, the format that is sent, how it is unpacked (UNPACK).
+# GLSL format: NumPy's type, the format that is sent, how it is unpacked (UNPACK). Only passes use rgba16ui and
+# rgba32ui: floats cannot hold them, and Blender reads whole numbers only of one component.
 FORMATS = {
     "rgba8": (np.uint8, "RG32F", _PAIRS_OF_BYTES),
     "rgba16": (np.uint16, "RGBA32F", _SIXTEEN_BITS),
@@ -34,9 +35,6 @@ FORMATS = {
     "rgba32f": (np.float32, "RGBA32F", _AS_IT_IS),
     "r32f": (np.float32, "R32F", _AS_IT_IS),
     "r32ui": (np.uint32, "R32F", _WHOLE),
-    # Only passes use these: floats cannot hold them, and Blender reads whole numbers only of one component.
-    "rgba16ui": None,
-    "rgba32ui": None,
 }
 # The most bytes of the float texture that sends data. Larger arrays are sent in bands of rows.
 _SENT_BYTES = 16 << 20
@@ -241,9 +239,9 @@ def _exchanged(texture: Texture) -> tuple:
     Raises:
         TypeError: Blender neither sends nor reads such a texture. It would read nothing, without an error.
     """
-    if (entry := FORMATS[texture.kind]) is None:
+    if texture.kind not in FORMATS:
         raise TypeError(f"on Blender's GPU only passes read and write textures of {texture.kind}")
-    return entry
+    return FORMATS[texture.kind]
 
 
 def _of_numbers(size: tuple[int, int], kind: str, data: gpu.types.Buffer) -> gpu.types.GPUTexture:

@@ -162,7 +162,7 @@ def serve(seconds: float = _LEAST) -> bool:
             done, function = _main.calls.get(timeout=min(left, _GAP))
         except queue.Empty:
             return True
-        _keep_looking()
+        _main.until = time.monotonic() + _REST
         if threads.fulfil(done, function):
             with suppress(RuntimeError):  # the GPU is full: the next call that needs memory raises it
                 _finish_some()
@@ -182,13 +182,9 @@ def _finish_some() -> None:
 def _called(function: Callable[[], T]) -> Future[T]:
     """Queue a call for the main thread. Return its future."""
     done: Future[T] = Future()
-    _keep_looking()
+    _main.until = time.monotonic() + _REST
     _main.calls.put((done, function))
     return done
-
-
-def _keep_looking() -> None:
-    _main.until = time.monotonic() + _REST
 
 
 def look() -> bool:
