@@ -14,8 +14,7 @@ uniform float unit;
 #include "sums.glsl"
 #define COLUMNS (2 * GROUPS + 1)
 
-// Pixels above one another that an invocation composes. On a software renderer the table costs as much as the sums, and
-// four pixels are slower than one.
+// Pixels above one another that an invocation composes. On a software renderer, one and four are slower.
 #define PIXELS 2
 #define EACH(does) does(0); does(1)
 

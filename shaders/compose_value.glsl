@@ -3,7 +3,6 @@ uniform int first, last;
 #include "compose.glsl"
 
 int frame;
-
 #define ADD(quad) expose(quad, frame, mixed(quad, 0, 1 + (frame - first) * motions + motion))
 #define FOLD(quad) fold_sight(quad, frame)
 

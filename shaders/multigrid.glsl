@@ -94,8 +94,7 @@ vec2 between(ivec2 i, bool in_row) {
     return follows * mix(vec2(is_free(before), is_free(after)) * 2.0 / 3.0, vec2(1.0 / 6.0), dots);
   }
   vec2 ends = in_row ? vec2(c[0] + c[3] + c[6], c[2] + c[5] + c[8]) : vec2(c[0] + c[1] + c[2], c[6] + c[7] + c[8]);
-  // What holds the cell is first counted on the side that pulls less. The rest lies beside the line, where it holds the
-  // coarse cells as well.
+  // What holds the cell first counts on the side that pulls less. The rest, off the line, holds the coarse cells as well.
   float pull = ends.x + ends.y;
   float held = max(0.0, diagonal - pull - (in_row ? c[1] + c[7] : c[3] + c[5]));
   float aside = max(0.0, held - abs(ends.x - ends.y));

@@ -1,5 +1,4 @@
-// Draws pictures, coefficients and scribbles in the preview. Textures have the top row first; each texel is a block of
-// `block` × `block` pixels of `size`.
+// Draws in the preview. Textures have the top row first; a texel is a block of `block` × `block` pixels of `size`.
 #ifdef QUAD
 // Places a part of the picture in the region. corner: in pixels of the region; place: in the picture, y up.
 in vec2 corner;

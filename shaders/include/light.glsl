@@ -32,8 +32,7 @@ vec3 to_level(vec3 linear) {
   return mix(curve, linear * 12.92, lessThanEqual(linear, vec3(0.0031308)));
 }
 
-// The alpha that a premultiplied colour was multiplied by. Fully transparent pixels keep their light, even if rounding
-// left a trace of alpha.
+// The alpha that a premultiplied colour was multiplied by; 1 if it is transparent up to rounding, where light is kept.
 float cover(vec4 color) {
   return color.a > 1e-6 ? color.a : 1.0;
 }

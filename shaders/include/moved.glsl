@@ -87,8 +87,7 @@ vec4 seen_light(ivec2 pixel, vec2 away, int layer) {
 }
 #endif
 
-// turn · z + shift − z for a pixel z. move: (turn − 1, shift). It is clamped to the frame, whose edges go on outside, since
-// large floats have no fractions.
+// turn · z + shift − z for a pixel z; move: (turn − 1, shift). Clamped to the frame, since large floats have no fractions.
 vec2 moved_by(vec4 move, ivec2 pixel) {
   vec2 z = vec2(pixel);
   vec2 away = vec2(move.x * z.x - move.y * z.y, move.y * z.x + move.x * z.y) + move.zw;
