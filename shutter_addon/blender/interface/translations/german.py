@@ -1143,13 +1143,13 @@ MESSAGES = {
     ("*", "the frame lies outside what can be tracked"): "das Bild liegt außerhalb dessen, was verfolgt werden kann",
     (
         "*",
-        "what the regions leave of the picture has too few corners to follow",
-    ): "was die Regionen vom Bild übrig lassen, hat zu wenige Ecken, denen zu folgen wäre",
+        "the picture outside the regions has too few corners to follow",
+    ): "außerhalb der Regionen hat das Bild zu wenige Ecken zum Verfolgen",
     ("*", "the picture is too unlike those before"): "das Bild ist denen davor zu unähnlich",
     (
         "*",
-        "the picture is too unlike those before, and it goes on from here",
-    ): "das Bild ist denen davor zu unähnlich, und von hier aus geht es weiter",
+        "the picture is too unlike those before; tracking goes on from here",
+    ): "das Bild ist denen davor zu unähnlich; von hier aus geht die Verfolgung weiter",
     ("*", "Not tracked: from frame {first} on"): "Nicht verfolgt: ab Bild {first}",
     ("*", "Not tracked: up to frame {last}"): "Nicht verfolgt: bis Bild {last}",
     ("*", "Not tracked: frames {first} to {last}"): "Nicht verfolgt: Bilder {first} bis {last}",
