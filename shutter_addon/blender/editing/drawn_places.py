@@ -9,18 +9,17 @@ from bpy.types import PropertyGroup, Strip
 from ...core.messages import EffectError
 from ...core.model.effect import Drawings
 from ...core.model.motions import Placement
-from ..data import sampled, snapshot, strips
-from ..data.fcurves import Curves
+from ..data import snapshot, strips
+from ..data.sampled import Sampling
 from . import outline_drawings, region_edits
 from .motion_keys import MotionKeys
 
 
 def hold(effect: PropertyGroup, index: int) -> None:
     """Notes where a region was as its drawings were made, before it is moved: from then on they move with it."""
-    region, curves = effect.regions[index], Curves(effect.id_data)
+    region = effect.regions[index]
     if region.kind not in strips.LAID:
-        path = region.path_from_id()
-        _note(effect, region, _origins(sampled.drawings(curves, path, effect, region, None, ())))
+        _note(effect, region, _origins(Sampling.of(effect.id_data, effect, None, ()).drawings(index)))
 
 
 def begin(effect: PropertyGroup, strip: Strip, index: int, *, erases: bool = False) -> None:

@@ -148,7 +148,7 @@ def places(effect: PropertyGroup, strip: Strip) -> list[np.ndarray | None]:
     """What takes the image to the picture of an effect, at each of its drawings; None: it is too small to be seen, or
     nowhere."""
     frames = [drawing.frame_number for drawing in _drawings(effect)]
-    placement = sampled.placement(fcurves.Curves(effect.id_data), effect, strip, frames)
+    placement = sampled.Sampling.of(effect.id_data, effect, strip, frames).placement
     found = [sampled.tried(placement.at, frame) for frame in frames]
     return [place if isinstance(place, np.ndarray) else None for place in found]
 

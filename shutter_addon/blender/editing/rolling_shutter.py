@@ -19,9 +19,9 @@ from ...core.messages import EffectError
 from ...core.model.frame_state import Options
 from ...media import flow, readout
 from ...media.cuts import ShotSource
-from ..data import sampled, snapshot, source_media, strips, validation
+from ..data import snapshot, source_media, strips, validation
 from ..data.consistency import bars
-from ..data.fcurves import Curves
+from ..data.sampled import Sampling
 from . import bar_edits, region_edits, shutter_edits
 
 SMOOTH = "8"  # of effects that were not smooth
@@ -100,8 +100,7 @@ def repair(scene: Scene, effect: PropertyGroup, strip: Strip, share: float, side
 def _is_backward(scene: Scene, effect: PropertyGroup, strip: Strip) -> bool:
     """Whether the source runs backward at the current frame: its next frames are those that were filmed before."""
     frame = scene.frame_current
-    if effect.use_source_time:
-        time = sampled.source_time(Curves(scene), effect.path_from_id(), effect, (frame,))
+    if (time := Sampling.of(scene, effect, strip, (frame,)).time) is not None:
         return bool(time.at(frame)[1])
     return bool(source_media.timing_of(strips.source_of(scene, effect, strip)).use_reverse_frames)
 

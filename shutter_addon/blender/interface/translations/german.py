@@ -69,8 +69,8 @@ MESSAGES = {
     ("*", 'the source strip of "{strip}" was deleted'): "der Quellstreifen von „{strip}“ wurde gelöscht",
     (
         "*",
-        "the {limit} MB that may be taken of the GPU are too few for {frames} frames of {width}×{height}: all are sent"
-        " for every picture, which is slow",
+        "{limit} MB of GPU memory are too little for {frames} frames of {width}×{height}: every picture uploads all of"
+        " them, which is slow",
     ): "die {limit} MB, die von der GPU genommen werden dürfen, reichen nicht für {frames} Einzelbilder von"
     " {width}×{height}: für jedes Bild werden alle neu gesendet, und das ist langsam",
     (
@@ -125,15 +125,15 @@ MESSAGES = {
     ("*", "{place}: {count} bars, and {window} frames"): "{place}: {count} Balken und {window} Bilder",
     (
         "*",
-        "{place}: {count} shutters, {most} are the most",
+        "{place}: {count} shutters, but at most {most} are possible",
     ): "{place}: {count} Verschlüsse, höchstens {most} sind möglich",
     (
         "*",
-        "{place}: {count} regions, {most} are the most",
+        "{place}: {count} regions, but at most {most} are possible",
     ): "{place}: {count} Regionen, höchstens {most} sind möglich",
     (
         "*",
-        "{place}: its name has {count} characters, {most} are the most",
+        "{place}: its name has {count} characters, but at most {most} are possible",
     ): "{place}: der Name hat {count} Zeichen, höchstens {most} sind möglich",
     ("*", "An effect has {most} shutters at most"): "Ein Effekt hat höchstens {most} Verschlüsse",
     ("*", "An effect has {most} regions at most"): "Ein Effekt hat höchstens {most} Regionen",
@@ -160,7 +160,7 @@ MESSAGES = {
     ): "Streifen „{strip}“ ist zu klein, um seine Markierungen zu finden",
     (
         "*",
-        'strip "{strip}" lies at frames {first} to {last}, where no timeline is',
+        'strip "{strip}" lies at frames {first} to {last}, beyond the timeline',
     ): "Streifen „{strip}“ liegt bei den Bildern {first} bis {last}, wo keine Zeitleiste ist",
     (
         "*",
@@ -1100,7 +1100,7 @@ MESSAGES = {
     ): "Bild der Zeitleiste mit den Strichen; ohne eines das aktuelle",
     ("*", "Tracking stopped at frame {frame}: {fault}"): "Das Verfolgen hielt bei Bild {frame} an: {fault}",
     ("*", "Confidence"): "Sicherheit",
-    ("*", "How sure tracking was of where it is"): "Wie sicher das Verfolgen war, wo es ist",
+    ("*", "How certain the tracked position is"): "Wie sicher das Verfolgen war, wo es ist",
     ("*", "Confidence: {percent} %"): "Sicherheit: {percent} %",
     ("Operator", "Next Unsure Frame"): "Nächstes unsicheres Bild",
     ("Operator", "Next Unsure Camera Frame"): "Nächstes unsicheres Bild der Kamera",
@@ -1190,7 +1190,7 @@ MESSAGES = {
     ): "Der Kamera Schlüsselbilder nach der 2D-Stabilisierung eines Filmclips geben, von ihrem Ort in diesem Bild aus",
     ("*", 'clip "{clip}" has no 2D stabilization'): "Clip „{clip}“ hat keine 2D-Stabilisierung",
     ("*", 'camera of effect "{name}"'): "Kamera des Effekts „{name}“",
-    ("*", "How what the camera sees moves"): "Wie sich bewegt, was die Kamera sieht",
+    ("*", "Motion of what the camera sees"): "Wie sich bewegt, was die Kamera sieht",
     ("*", "Name of the camera's animation channels"): "Name der Animationskanäle der Kamera",
     ("Operator", "Panning Shot"): "Mitzieher",
     (
@@ -1262,7 +1262,7 @@ MESSAGES = {
     ): "Wie weit sich bei offenem Verschluss bewegt, was verfolgt wird, als Bruchteil der Bildhöhe",
     (
         "*",
-        "Where what the camera sees has moved to, as a fraction of the picture",
+        "Movement of what the camera sees, as a fraction of the picture",
     ): "Wohin sich bewegt hat, was die Kamera sieht, als Bruchteil des Bildes",
     (
         "*",
@@ -1468,7 +1468,7 @@ MESSAGES = {
     ("Virtual Shutter", "Render Device"): "Rendergerät",
     (
         "*",
-        "What composes renders; the preview is always composed on the GPU that Blender draws with",
+        "Device that composes renders. Previews always use the GPU that Blender draws with",
     ): "Was Renderbilder berechnet; die Vorschau berechnet immer die GPU, mit der Blender zeichnet",
     ("Virtual Shutter", "Automatic"): "Automatisch",
     (
@@ -1478,7 +1478,7 @@ MESSAGES = {
     ("Virtual Shutter", "GPU"): "GPU",
     ("*", "As Automatic, but never NumPy"): "Wie Automatisch, aber nie NumPy",
     ("Virtual Shutter", "OpenGL 4.3"): "OpenGL 4.3",
-    ("*", "An OpenGL context of its own, beside Blender's"): "Ein eigener OpenGL-Kontext neben dem von Blender",
+    ("*", "A separate OpenGL context beside Blender's"): "Ein eigener OpenGL-Kontext neben dem von Blender",
     ("Virtual Shutter", "Blender's GPU"): "Blenders GPU",
     ("*", "The GPU that Blender draws with"): "Die GPU, mit der Blender zeichnet",
     ("Virtual Shutter", "NumPy"): "NumPy",
