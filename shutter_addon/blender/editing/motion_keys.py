@@ -170,11 +170,7 @@ def check_curves(effect: PropertyGroup, index: int | None) -> None:
 
 
 def insert(
-    effect: PropertyGroup,
-    index: int | None,
-    channels: Sequence[str] = CHANNELS,
-    *,
-    begins: bool = False,
+    effect: PropertyGroup, index: int | None, channels: Sequence[str] = CHANNELS, *, begins: bool = False
 ) -> None:
     """Keys channels of a region or of the camera at the scene's current frame; where tracking has made a key, it is the
     editor's from now on, and sure. EffectError: as check_curves says.

@@ -25,7 +25,7 @@ def strokes(effect: PropertyGroup) -> str | None:
 def an_outline(effect: PropertyGroup) -> str | None:
     if sentence := a_region(effect):
         return sentence
-    return None if selection.active_region(effect).kind == "OUTLINE" else rpt_("The region is no outline")
+    return None if selection.active_region(effect).kind == "OUTLINE" else rpt_("The region is not an outline")
 
 
 def room_for_a_region(effect: PropertyGroup) -> str | None:

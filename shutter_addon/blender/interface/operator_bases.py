@@ -112,11 +112,7 @@ class OfEffect(Named):
 
 
 def operator(
-    label: str,
-    *needs: Need,
-    options: set[str] = UNDOABLE,
-    only_seen: bool = False,
-    **properties: object,
+    label: str, *needs: Need, options: set[str] = UNDOABLE, only_seen: bool = False, **properties: object
 ) -> Callable[[Change], type[Operator]]:
     """Makes an operator of a function that changes an effect, with its name and docstring; the rest as OfEffect has
     it."""

@@ -19,15 +19,7 @@ from ...core.model.choices import CONTEXT, DRAWN
 from ...core.recipes import recipe_file
 from ..data import annotations, consistency, data_format, preview_areas, recipe_import, selection, strips
 from ..devices import main_thread
-from ..editing import (
-    add_effect,
-    bar_edits,
-    drawn_places,
-    region_edits,
-    shown_annotations,
-    shutter_edits,
-    undelete,
-)
+from ..editing import add_effect, bar_edits, drawn_places, region_edits, shown_annotations, shutter_edits, undelete
 from ..editing import match_source as matching
 from ..output import error_report, matte_export
 from . import needs, sharp_frame

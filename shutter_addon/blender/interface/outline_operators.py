@@ -87,7 +87,7 @@ class SHUTTER_OT_outline_carry(_Carries, Operator):
 
 
 class SHUTTER_OT_outline_needed(_Carries, Operator):
-    """Go to the middle of the frames at which the outline is least sure, tracking it first"""
+    """Go to the frame that needs a drawing most, after tracking the outline"""
 
     bl_label = "Next Drawing Needed"
 
@@ -95,17 +95,17 @@ class SHUTTER_OT_outline_needed(_Carries, Operator):
         scene, effect, strip = selection.active(context)
         needed = outline_drawings.next_needed(scene, effect, strip, self._target.index)
         if needed.frame is None:
-            self.report({"INFO"}, rpt_("The outline is sure by 75 % or more at all frames"))
+            self.report({"INFO"}, rpt_("The confidence is 75 % or more at all frames"))
             return {"CANCELLED"}
         scene.frame_set(needed.frame)
-        sentence = rpt_("Frame {frame}: the outline is sure by {share:.0f} %")
+        sentence = rpt_("Frame {frame}: the confidence is {share:.0f} %")
         self.report({"INFO"}, sentence.format(frame=needed.frame, share=100 * needed.confidence))
         redraw(context)
         return None
 
 
 class SHUTTER_OT_outline_mask(_Carries, Operator):
-    """Make a Blender mask with shape keys of the active outline, tracking it first"""
+    """Make a Blender mask with shape keys of the active outline, after tracking it"""
 
     bl_label = "Outline to Mask"
     bl_options = UNDOABLE
@@ -125,30 +125,28 @@ class SHUTTER_OT_outline_mask(_Carries, Operator):
 
 @operator("Insert Outline Drawing", needs.an_outline, only_seen=True)
 def outline_draw(self: Operator, _context: Context, effect: PropertyGroup) -> set[str] | None:
-    """Make the outline that is tracked to the current frame a drawing of its own, to be mended"""
+    """Turn the tracked outline at the current frame into a drawing that can be edited"""
     scene, strip, index = self.edit, self.effect_strip, effect.active_region
     curves = outline_drawings.curves_now(scene, effect, strip, index)
     if not curves:
-        report_warning(self, rpt_("The outline encloses nothing at the current frame"))
+        report_warning(self, rpt_("The outline is empty at the current frame"))
         return {"CANCELLED"}
     outline_drawings.draw(effect, strip, effect.regions[index], curves, scene.frame_current)
     return None
 
 
 _FRAME = IntProperty(
-    name="Frame",
-    description="Timeline frame of the strokes; without one, the current frame",
-    options={"SKIP_SAVE"},
+    name="Frame", description="Timeline frame of the strokes; without one, the current frame", options={"SKIP_SAVE"}
 )
 
 
 @operator("Find Outline", needs.strokes, only_seen=True, frame=_FRAME)
 def outline_it(self: Operator, _context: Context, effect: PropertyGroup) -> set[str] | None:
-    """Make the active region an outline of the subject that its strokes run over, or go around, at this frame"""
+    """Make the active region an outline of the subject that its strokes mark or enclose at this frame"""
     if self.properties.is_property_set("frame"):
         self.edit.frame_set(self.frame)
     if not outline_drawings.outline_it(self.edit, effect, self.effect_strip, effect.active_region):
-        report_warning(self, rpt_("No subject is told from what is around it"))
+        report_warning(self, rpt_("No subject stands out from its surroundings"))
         return {"CANCELLED"}
     return None
 
@@ -182,8 +180,8 @@ class SHUTTER_OT_outline_points(OfEffect, Operator):
         sharp_frame.show(context)
         self._drawn = bpy.types.SpaceSequenceEditor.draw_handler_add(self._draw, (), "PREVIEW", "POST_PIXEL")
         sentence = rpt_(
-            "Click points around the subject (arrow keys, Space), Ctrl: straight, Backspace: one less, "
-            "Return: close, Esc: nothing"
+            "Click points around the subject (arrow keys, Space), Ctrl: straight, Backspace: undo point, "
+            "Return: close, Esc: cancel"
         )
         show_status(sentence)
         context.window_manager.modal_handler_add(self)
@@ -253,7 +251,7 @@ class SHUTTER_OT_outline_points(OfEffect, Operator):
     def _closed(self, context: Context) -> set[str]:
         """Close the curve and add it to the drawing of this frame."""
         if len(self._ways) < 3:
-            report_warning(self, rpt_("A curve has three points at least"))
+            report_warning(self, rpt_("A curve needs at least three points"))
             return {"RUNNING_MODAL"}
         _scene, effect, strip = _there(self)
         region = effect.regions[self.target.index]
@@ -362,7 +360,7 @@ class SHUTTER_GT_outline(Dragged, Gizmo):
         _scene, effect, strip = there
         outline_drawings.draw(effect, strip, effect.regions[self.target.index], self.mended(), self.frame)
         context.area.tag_redraw()
-        bpy.ops.ed.undo_push(message=iface_("Mend Outline", contexts.operator_default))
+        bpy.ops.ed.undo_push(message=iface_("Edit Outline", contexts.operator_default))
 
 
 class SHUTTER_GGT_outline(WithKeys, GizmoGroup):

@@ -351,7 +351,4 @@ def _panels(start: str, place: type) -> list[type]:
     ]
 
 
-classes = (
-    *_panels("STRIP_PT_shutter", _InProperties),
-    *_panels("SEQUENCER_PT_shutter", _InSidebar),
-)
+classes = (*_panels("STRIP_PT_shutter", _InProperties), *_panels("SEQUENCER_PT_shutter", _InSidebar))

@@ -240,7 +240,7 @@ def follow(self: Operator, _context: Context, effect: PropertyGroup) -> None:
 
 
 def _why_no_track(effect: PropertyGroup) -> str | None:
-    return None if selection.active_region(effect).follow_stamp else rpt_("The region follows no track yet")
+    return None if selection.active_region(effect).follow_stamp else rpt_("The region does not follow a track")
 
 
 @operator("Update Followed Track", needs.strokes, _why_no_track)

@@ -472,26 +472,26 @@ MESSAGES = {
     ("Operator", "Next Drawing Needed"): "Nächste nötige Zeichnung",
     (
         "*",
-        "Go to the middle of the frames at which the outline is least sure, tracking it first",
+        "Go to the frame that needs a drawing most, after tracking the outline",
     ): "Zur Mitte der Frames gehen, in denen der Umriss am unsichersten ist; er wird vorher verfolgt",
     ("Operator", "Insert Outline Drawing"): "Umrisszeichnung einfügen",
     (
         "*",
-        "Make the outline that is tracked to the current frame a drawing of its own, to be mended",
+        "Turn the tracked outline at the current frame into a drawing that can be edited",
     ): "Den Umriss, der zum aktuellen Frame verfolgt ist, zu einer eigenen Zeichnung machen, um ihn auszubessern",
     (
         "*",
-        "Frame {frame}: the outline is sure by {share:.0f} %",
+        "Frame {frame}: the confidence is {share:.0f} %",
     ): "Frame {frame}: Der Umriss ist zu {share:.0f} % sicher",
     (
         "*",
-        "The outline is sure by 75 % or more at all frames",
-    ): "Der Umriss ist in allen Frames zu 75 % oder mehr sicher",
-    ("*", "The outline encloses nothing at the current frame"): "Der Umriss umschließt im aktuellen Frame nichts",
-    ("*", "The region is no outline"): "Die Region ist kein Umriss",
+        "The confidence is 75 % or more at all frames",
+    ): "Die Sicherheit ist in allen Bildern 75 % oder mehr",
+    ("*", "The outline is empty at the current frame"): "Der Umriss umschließt im aktuellen Frame nichts",
+    ("*", "The region is not an outline"): "Die Region ist kein Umriss",
     ("*", 'strip "{strip}" is scaled to nothing'): "Streifen „{strip}“ ist zu nichts skaliert",
     ("*", "{place}: a linear outline is not tracked"): "{place}: Ein linearer Umriss wird nicht verfolgt",
-    ("Operator", "Mend Outline"): "Umriss ausbessern",
+    ("Operator", "Edit Outline"): "Umriss ausbessern",
     ("*", "Folder"): "Ordner",
     ("*", "Format"): "Format",
     ("*", "OpenEXR"): "OpenEXR",
@@ -499,12 +499,12 @@ MESSAGES = {
     ("Operator", "Export Matte"): "Matte exportieren",
     (
         "*",
-        "Write what the active matte or outline shows at each frame of its strip as pictures, for any other program",
+        "Write the active matte or outline as pictures, one for each frame of its strip, for other programs",
     ): "Was die aktive Matte oder der aktive Umriss in jedem Frame zeigt, für andere Programme als Bilder schreiben",
-    ("*", "What the pictures are"): "Was die Bilder sind",
+    ("*", "File format of the pictures"): "Was die Bilder sind",
     ("*", "Grey, 16 bits"): "Grau, 16 Bit",
     ("*", "Float, in the channel Y"): "Fließkomma, im Kanal Y",
-    ("*", "The region is no matte, ramp or outline"): "Die Region ist keine Matte, keine Rampe und kein Umriss",
+    ("*", "The region is not a matte, ramp or outline"): "Die Region ist keine Matte, keine Rampe und kein Umriss",
     ("*", 'Saved {count} pictures in "{folder}"'): "{count} Bilder in „{folder}“ gespeichert",
     ("Operator", "Find Outline"): "Umriss finden",
     ("Operator", "Draw by Points"): "Punktweise zeichnen",
@@ -515,20 +515,20 @@ MESSAGES = {
     " Linien)",
     (
         "*",
-        "Click points around the subject (arrow keys, Space), Ctrl: straight, Backspace: one less, "
-        "Return: close, Esc: nothing",
+        "Click points around the subject (arrow keys, Space), Ctrl: straight, Backspace: undo point, "
+        "Return: close, Esc: cancel",
     ): "Punkte um das Motiv klicken (Pfeiltasten, Leertaste), Strg: gerade, Rücktaste: einer weniger, "
     "Eingabe: schließen, Esc: nichts",
-    ("*", "A curve has three points at least"): "Eine Kurve hat mindestens drei Punkte",
+    ("*", "A curve needs at least three points"): "Eine Kurve hat mindestens drei Punkte",
     ("Operator", "Outline to Mask"): "Umriss zu Maske",
     ("Operator", "Outline from Mask"): "Umriss aus Maske",
     (
         "*",
-        "Make a Blender mask with shape keys of the active outline, tracking it first",
+        "Make a Blender mask with shape keys of the active outline, after tracking it",
     ): "Aus dem aktiven Umriss eine Blender-Maske mit Formschlüsseln machen; zuvor wird er verfolgt",
     (
         "*",
-        "Make an outline of the active shutter that is drawn at each key of a mask",
+        "Make an outline of the active shutter with a drawing at each key of a mask",
     ): "Einen Umriss des aktiven Verschlusses machen, der an jedem Schlüssel einer Maske gezeichnet ist",
     ("*", "Every"): "Jedes",
     (
@@ -548,10 +548,10 @@ MESSAGES = {
     ): "Eine Maske wird in einem Fenster von Blender geschrieben, und es gibt keines",
     (
         "*",
-        "Make the active region an outline of the subject that its strokes run over, or go around, at this frame",
+        "Make the active region an outline of the subject that its strokes mark or enclose at this frame",
     ): "Die aktive Region zum Umriss des Motivs machen, über das ihre Striche in diesem Frame laufen oder das sie"
     " umgeben",
-    ("*", "No subject is told from what is around it"): "Kein Motiv hebt sich von dem ab, was darum herum ist",
+    ("*", "No subject stands out from its surroundings"): "Kein Motiv hebt sich von dem ab, was darum herum ist",
     ("*", "The region has no strokes at the current frame"): "Die Region hat im aktuellen Frame keine Striche",
     ("*", "the outline encloses nothing here"): "der Umriss umschließt hier nichts",
     ("*", "Width"): "Breite",
@@ -612,7 +612,7 @@ MESSAGES = {
     ("Virtual Shutter", "Read First"): "Zuerst gelesen",
     (
         "*",
-        "Side of the filmed picture that the sensor reads first",
+        "The side of the picture that the sensor reads first",
     ): "Seite des gefilmten Bildes, die der Sensor zuerst ausliest",
     ("Virtual Shutter", "Top"): "Oben",
     ("*", "Rows are read downward, as most cameras do"): "Zeilen werden abwärts gelesen, wie von den meisten Kameras",
@@ -632,7 +632,7 @@ MESSAGES = {
         "Columns are read, from the right, as by a camera that was turned",
     ): "Spalten werden von rechts gelesen, wie von einer Kamera, die gedreht war",
     ("Virtual Shutter", "Unit"): "Einheit",
-    ("*", "What the readout is counted in"): "Worin die Auslesezeit gezählt wird",
+    ("*", "Unit of the readout"): "Worin die Auslesezeit gezählt wird",
     ("Virtual Shutter", "Percent"): "Prozent",
     (
         "*",
@@ -643,7 +643,7 @@ MESSAGES = {
     ("*", "Readout"): "Auslesezeit",
     (
         "*",
-        "Time from the first row to the last, of that from a filmed frame to the next",
+        "Time from reading the first row to the last, as a percentage of a frame",
     ): "Zeit von der ersten Zeile zur letzten, als Anteil der Zeit von einem gefilmten Bild zum nächsten",
     (
         "*",
@@ -652,11 +652,11 @@ MESSAGES = {
     ("Operator", "Find Readout"): "Auslesezeit finden",
     (
         "*",
-        "Find how long the sensor reads out, by lines that lean as they move around the current frame, and repair that",
+        "Find the sensor's readout time from lines that lean while they move around the current frame, and repair it",
     ): "Finden, wie lange der Sensor ausliest, an Linien, die sich um den aktuellen Frame beim Bewegen neigen, und das"
     " ausgleichen",
     ("Virtual Shutter", "Reads"): "Liest",
-    ("*", "What the sensor reads one after the other"): "Was der Sensor nacheinander ausliest",
+    ("*", "Whether the sensor reads row by row or column by column"): "Was der Sensor nacheinander ausliest",
     ("Virtual Shutter", "Rows"): "Zeilen",
     ("*", "Upright lines lean as they move sideways"): "Senkrechte Linien neigen sich, wenn sie sich seitwärts bewegen",
     ("Virtual Shutter", "Columns"): "Spalten",
@@ -1319,7 +1319,7 @@ MESSAGES = {
     ("*", "Follow From"): "Folgen ab",
     ("*", "The track has changed"): "Die Spur hat sich geändert",
     ("*", "Choose a clip first"): "Zuerst einen Clip wählen",
-    ("*", "The region follows no track yet"): "Die Region folgt noch keiner Spur",
+    ("*", "The region does not follow a track"): "Die Region folgt noch keiner Spur",
     ("*", 'clip "{clip}" has no track "{track}"'): "Clip „{clip}“ hat keine Spur „{track}“",
     (
         "*",
