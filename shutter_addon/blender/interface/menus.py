@@ -88,7 +88,7 @@ def preview_menu(layout: UILayout, context: Context) -> None:
     layout.prop(live, "split")
     layout.separator()
     layout.prop(live, "probe")
-    layout.operator("shutter.probe_pixel")
+    layout.prop(live, "probe_at")
 
 
 def _add_entry(self, _context: Context) -> None:

@@ -7,21 +7,17 @@ from dataclasses import dataclass, replace
 import bpy
 import numpy as np
 from bpy.app.translations import pgettext_iface as iface_
-from bpy.app.translations import pgettext_rpt as rpt_
-from bpy.props import IntProperty
-from bpy.types import Context, Event, Gizmo, GizmoGroup, Operator, PropertyGroup, Region, Strip
+from bpy.types import Context, Event, Gizmo, GizmoGroup, PropertyGroup, Region, Strip
 
 from ...compute import plates
 from ...compute.renderer import Renderer
 from ...compute.request import Request
-from ...core.messages import EffectError
 from ...core.pixels import compositor
-from ..data import annotations, preview_areas, selection
+from ..data import annotations, preview_areas
 from ..devices import blender_gpu
 from ..rendering import effect_source, previews, sessions
 from . import drawing
 from .gizmo_groups import Dragged, InPreview, View, view
-from .operator_bases import OfEffect
 
 _WIDTH, _HEIGHT, _LINE, _PAD, _APART = 180, 64, 17, 8, 14  # in units of the interface
 _REACH = 8  # of the pointer to the split's handle, in units of the interface
@@ -170,41 +166,6 @@ class SHUTTER_GGT_probe(InPreview, GizmoGroup):
     @classmethod
     def is_wanted(cls, live: PropertyGroup) -> bool:
         return live.probe and not bpy.app.is_job_running("RENDER")
-
-
-class SHUTTER_OT_probe_pixel(OfEffect, Operator):
-    """Probe a pixel that is named by its numbers, and not the one under the pointer"""
-
-    bl_label = "Probe Pixel"
-    bl_options = {"REGISTER"}
-    only_seen = True
-
-    column: IntProperty(name="Column", description="Number of the pixel from the left, from 1", default=1, min=1)
-    row: IntProperty(name="Row", description="Number of the pixel from below, from 1", default=1, min=1)
-
-    def invoke(self, context: Context, _event: Event) -> set[str]:
-        size = annotations.picture_size(selection.active(context)[1])
-        at = context.window_manager.virtual_shutter.probe_at
-        inside = all(0 <= place < 1 for place in at)
-        self.column, self.row = (
-            int(place * n) + 1 for place, n in zip(at if inside else (0.5, 0.5), size, strict=True)
-        )
-        return context.window_manager.invoke_props_dialog(self)
-
-    def draw(self, _context: Context) -> None:
-        self.layout.activate_init = True
-        self.layout.prop(self, "column")
-        self.layout.prop(self, "row")
-
-    def change(self, context: Context, effect: PropertyGroup) -> None:
-        width, height = annotations.picture_size(effect)
-        if self.column > width or self.row > height:
-            sentence = rpt_("The picture has {width} × {height} pixels")
-            raise EffectError(sentence.format(width=width, height=height))
-        live = context.window_manager.virtual_shutter
-        live.live = live.probe = True
-        live.probe_at = (self.column - 0.5) / width, (self.row - 0.5) / height
-        preview_areas.redraw()
 
 
 class SHUTTER_GT_split(Dragged, Gizmo):
