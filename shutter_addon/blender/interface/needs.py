@@ -1,4 +1,4 @@
-"""What operators need of an effect: each says in the user's language why it has it not; None: it has."""
+"""What operators need from an effect. Each function returns why it is missing, in the user's language, or None."""
 
 from bpy.app.translations import pgettext_rpt as rpt_
 from bpy.types import PropertyGroup

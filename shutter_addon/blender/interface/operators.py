@@ -1,5 +1,4 @@
-"""Operators: what the user can do with effects, shutters and regions, as thin calls of plain functions; what gives an
-effect to another clip, its shutters and regions to another effect or a recipe, and a report to whoever helps."""
+"""Operators of effects, shutters, regions and recipes. Each calls a function of `editing`."""
 
 from collections.abc import Callable, Iterator
 from functools import partial
@@ -39,22 +38,8 @@ from .operator_bases import (
 from .panel_parts import icon_of
 
 
-class SHUTTER_OT_add_effect(Named, Operator):
-    """Add a Shutter strip above the active strip, which gives every pixel an exposure of its own"""
-
-    bl_label = "Add Shutter Strip"
-    bl_options = UNDOABLE
-
-    @classmethod
-    def refusal(cls, context: Context) -> str | None:
-        return why_no_effect(context)
-
-    def execute(self, context: Context) -> set[str]:
-        return self.tried(give_effect, context)
-
-
 def why_no_effect(context: Context) -> str | None:
-    """Why the active strip cannot be given an effect; None: it can."""
+    """Return why the active strip cannot get an effect; None: it can."""
     scene, source = selection.scene_of(context), selection.active_strip(context)
     if scene is None or source is None:
         return rpt_("Select a movie, image or clip strip")
@@ -64,7 +49,11 @@ def why_no_effect(context: Context) -> str | None:
 
 
 def give_effect(context: Context) -> None:
-    """Gives the active strip an effect, and shows it. One of FAULTS: it cannot be."""
+    """Add an effect to the active strip and show its panel.
+
+    Raises:
+        FAULTS: it is impossible.
+    """
     scene = selection.scene_of(context)
     strip, effect = add_effect.add_effect(scene, selection.active_strip(context))
     shutter_edits.start(effect)
@@ -74,8 +63,19 @@ def give_effect(context: Context) -> None:
     redraw(context)
 
 
+class SHUTTER_OT_add_effect(Named, Operator):
+    """Add a Shutter strip above the active strip, which gives every pixel an exposure of its own"""
+
+    bl_label = "Add Shutter Strip"
+    bl_options = UNDOABLE
+    refusal = staticmethod(why_no_effect)
+
+    def execute(self, context: Context) -> set[str]:
+        return self.tried(give_effect, context)
+
+
 class MakesEffect(Mixin):
-    """Gives the active strip an effect first, if that has none."""
+    """A mix-in for operators that first add an effect if the active strip has none."""
 
     @classmethod
     def refusal(cls, context: Context) -> str | None:
@@ -124,10 +124,10 @@ def smooth_streaks(_self: Operator, _context: Context, effect: PropertyGroup) ->
 
 
 def show_panel(context: Context) -> None:
-    """Opens the sidebar's Shutter tab beside the picture: in the Properties editor it is below all other panels."""
+    """Open the sidebar's Shutter tab in all previews. In the Properties editor it is below all other panels."""
     for _window, area in preview_areas.previews(context):
         area.spaces.active.show_region_ui = True
-    # A sidebar has tabs once it has been drawn, which a slow window does late, and one without room never.
+    # A sidebar has no tabs before it is drawn. A slow window draws it late; one without room never does.
     main_thread.later(partial(_choose_tab, iter([0.1] * 30)), 0.1)
 
 
@@ -169,7 +169,7 @@ _DIRECTION = EnumProperty(name="Direction", items=(("UP", "Up", ""), ("DOWN", "D
 
 
 def _move(places: list[int], index: int, direction: str, move: Callable[[int, int], None]) -> set[str] | None:
-    """Moves an item to the place after or before it in a list, among the places that it shows."""
+    """Move an item one place up or down among the places that the list shows."""
     step = places.index(index) + (1 if direction == "DOWN" else -1)
     if not 0 <= step < len(places):
         return {"CANCELLED"}
@@ -186,11 +186,9 @@ def shutter_move(self: Operator, _context: Context, effect: PropertyGroup) -> se
 
 @kept
 def _presets(_context: Context) -> list[tuple]:
-    """With icons, which exist only once the extension is registered."""
-    return [
-        (name, label, description, icon_of(name), i)
-        for i, (name, (label, description, _make)) in enumerate(shutters.PRESETS.items())
-    ]
+    """Return the presets with their icons, which exist only while the extension is registered."""
+    presets = enumerate(shutters.PRESETS.items())
+    return [(name, label, description, icon_of(name), i) for i, (name, (label, description, _make)) in presets]
 
 
 _PRESET = EnumProperty(name="Preset", items=_presets, translation_context=CONTEXT)
@@ -230,7 +228,7 @@ class SHUTTER_OT_bar_set(OfEffect, Operator):
         from .bar_editor import bar_under
 
         effect = selection.active(context)[1]
-        is_clicked = event.value == "DOUBLE_CLICK"  # else it comes from a menu, wherever the pointer rests
+        is_clicked = event.value == "DOUBLE_CLICK"  # from a menu, the pointer is anywhere
         place = bar_under(context, event.mouse_region_x, event.mouse_region_y) if is_clicked else None
         self.is_pointed_at = place is not None
         if place is not None:
@@ -246,7 +244,7 @@ class SHUTTER_OT_bar_set(OfEffect, Operator):
 
     def draw(self, _context: Context) -> None:
         self.layout.activate_init = True
-        if not getattr(self, "is_pointed_at", False):  # from a menu, by keys
+        if not getattr(self, "is_pointed_at", False):  # from a menu
             self.layout.prop(self, "bar")
         self.layout.prop(self, "weight")
 
@@ -269,7 +267,7 @@ class SHUTTER_OT_draw(MakesEffect, OfEffect, Operator):
     only_seen = True
     needs = needs.a_shutter, _why_no_room
 
-    # Blender would use again what a button was pressed with before.
+    # SKIP_SAVE: Blender would otherwise reuse the values of the last button.
     new: BoolProperty(
         name="New Region",
         description="Start a new region instead of adding strokes to the active one",
@@ -286,7 +284,7 @@ class SHUTTER_OT_draw(MakesEffect, OfEffect, Operator):
     def change(self, context: Context, effect: PropertyGroup) -> None:
         region = selection.active_region(effect)
         if self.new or region is None or region.kind in strips.MATTES:
-            if sentence := region_edits.why_full(effect, regions=1):  # poll() does not know what `new` is
+            if sentence := region_edits.why_full(effect, regions=1):  # poll() does not know the value of `new`
                 raise EffectError(sentence)
             region = region_edits.first_drawn(effect, selection.active_shutter(effect), self.kind)
         drawn_places.begin(effect, self.effect_strip, effect.active_region)
@@ -304,7 +302,10 @@ def erase(self: Operator, context: Context, effect: PropertyGroup) -> None:
 
 
 def drawing_tool(context: Context, effect: PropertyGroup, region: PropertyGroup, tool: str) -> bool:
-    """Makes the region's layer the active annotation of every preview, and the tool theirs; whether there is one."""
+    """Make the region's layer the active annotation and activate a drawing tool in all previews.
+
+    Return whether there is a preview.
+    """
     if annotations.layer_of(effect, region) is None:
         region_edits.new_layer(effect, region)
     consistency.aim_pen(effect)
@@ -313,7 +314,7 @@ def drawing_tool(context: Context, effect: PropertyGroup, region: PropertyGroup,
 
 
 def _show_annotation(context: Context, effect: PropertyGroup) -> None:
-    """Has every preview show the effect's annotation."""
+    """Show the effect's annotation in all previews."""
     for _window, area in preview_areas.previews(context):
         shown_annotations.give(area.spaces.active, effect.scene.annotation)
 
@@ -326,7 +327,7 @@ def _layers(context: Context) -> list[tuple]:
 
 
 def annotation_of(context: Context) -> Annotation | None:
-    """The annotation that the first preview shows."""
+    """Return the annotation of the first preview."""
     return next((area.spaces.active.annotation for _window, area in preview_areas.previews(context)), None)
 
 

@@ -66,8 +66,8 @@ class _Carries(Beside, OfEffect):
     def goes_on(self, _context: Context) -> bool:
         if self._target.effect() is None or (progress := outline_carrying.progress()) is None:
             return False
-        sentence = rpt_("Tracking the outline: {done} of {total} frames, Esc to stop")
-        show_status(sentence.format(done=progress[0], total=progress[1]))
+        done, total = progress
+        show_status(rpt_("Tracking the outline: {done} of {total} frames, Esc to stop").format(done=done, total=total))
         return True
 
     def end(self, context: Context, is_stopped: bool) -> set[str] | None:
