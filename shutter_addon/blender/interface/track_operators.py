@@ -1,4 +1,4 @@
-"""Operators that track the region or the camera, follow movie clips, and use a track: layers, panning, stabilization."""
+"""Operators that track the region or the camera, follow movie clips, and use tracks for layers and exposures."""
 
 import math
 import time
