@@ -1,4 +1,4 @@
-"""The menu *Strip ▸ Shutter*, which has every operator for Blender's search and shortcuts, and entries in other menus."""
+"""The menu *Strip ▸ Shutter*, which has every operator for search and shortcuts, and entries in Blender's menus."""
 
 import bpy
 from bpy.types import Context, Menu, UILayout

@@ -25,9 +25,7 @@ def of_strobing(step: float) -> tuple[str, Button]:
     return words, ("shutter.smooth_streaks", iface_("Smooth"))
 
 
-places: dict[
-    tuple[int, str], tuple[drawing.Box, Button]
-] = {}  # by region and operator, for the gizmos
+places: dict[tuple[int, str], tuple[drawing.Box, Button]] = {}  # by region and operator, for the gizmos
 
 
 def clear(region: Region) -> None:

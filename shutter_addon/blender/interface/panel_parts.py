@@ -98,7 +98,7 @@ def draw_moves(layout: UILayout, kind: str, *, has_text: bool = True) -> None:
 
 
 def draw_operators(layout: UILayout, *entries: tuple[str, ...]) -> None:
-    """Draw operators of the extension, each as name, icon and, optionally, the property whose items become a submenu."""
+    """Draw operators of the extension. An entry has a name, an icon and a property whose items become a submenu."""
     for entry in entries:
         _draw_operator(layout, *entry)
 

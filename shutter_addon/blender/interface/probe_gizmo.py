@@ -133,7 +133,7 @@ class SHUTTER_GT_probe(Gizmo):
             _draw(context.region, point, shown.effect.shutters, probed, _of_layers(shown, probed))
 
     def test_select(self, context: Context, location: tuple[int, int]) -> int:
-        """Follow the pointer: Blender calls this whenever it moves, and no other callback leaves its events to others."""
+        """Follow the pointer: Blender calls this whenever it moves. No other callback leaves the events to others."""
         if (seen := _view(context)) is not None:
             x, y = location
             context.window_manager.virtual_shutter.probe_at = seen.on_picture(x + 0.5, y + 0.5)
