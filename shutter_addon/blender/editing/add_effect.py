@@ -59,9 +59,7 @@ def add_effect(scene: Scene, source: Strip) -> tuple[Strip, PropertyGroup]:
     scene.render.sequencer_gl_preview = "RENDERED"  # otherwise the preview shows the empty effect scene
     strip.color_tag = _COLOR
     connect(scene, [strip, source, *source.connections])
-    return strip, effect_of(
-        scene, effect_scene
-    )  # looked up again: operators may move it in memory
+    return strip, effect_of(scene, effect_scene)  # looked up again: operators may move it in memory
 
 
 def choose_source(effect: PropertyGroup, strip: Strip, source: Strip) -> None:
