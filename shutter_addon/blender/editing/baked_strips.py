@@ -87,7 +87,7 @@ def _channel(scene: Scene, strip: Strip) -> int:
     for channel in range(strip.channel + 1, strips.CHANNELS + 1):
         if _is_free(owner, strip, channel) and not owner.channels[channel].mute:
             return channel
-    sentence = rpt_('above "{strip}" there is no channel with room for the baked strip')
+    sentence = rpt_('no channel above "{strip}" has room for the baked strip')
     raise EffectError(sentence.format(strip=strip.name))
 
 

@@ -303,7 +303,7 @@ def follow_stabilization(scene: Scene, effect: PropertyGroup, strip: Strip) -> N
         raise EffectError(rpt_("Choose a clip first"))
     times = clip_times(scene, effect, strip, camera.follow_clip)
     if start not in times:
-        raise EffectError(rpt_("the current frame is outside of the Shutter strip"))
+        raise EffectError(rpt_("the current frame is outside the Shutter strip"))
     tracks, motion = _stabilizing(camera.follow_clip)
     points = _points_by_frame(tracks, times, size)
     if start not in points:

@@ -84,7 +84,7 @@ def draw(
     """
     to_image = annotations.picture_to_image(strip, annotations.picture_size(effect))
     if not annotations.is_invertible(to_image):
-        raise EffectError(rpt_('strip "{strip}" is scaled to nothing').format(strip=strip.name))
+        raise EffectError(rpt_('strip "{strip}" has a scale of 0').format(strip=strip.name))
     layer = layer_of(effect, region) or region_edits.new_layer(effect, region)
     there = [drawing for drawing in layer.frames if drawing.frame_number == frame]
     while there and not adds:
@@ -299,7 +299,7 @@ def _mask_editor(context: Context, mask: Mask) -> Iterator[None]:
     """
     window = context.window
     if window is None:
-        raise EffectError(rpt_("A mask is written in a window of Blender, and there is none"))
+        raise EffectError(rpt_("Making a mask needs an open Blender window"))
     area = context.area or window.screen.areas[0]
     with for_a_while([(area, "ui_type", "IMAGE_EDITOR")]):
         space = area.spaces.active

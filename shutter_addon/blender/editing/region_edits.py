@@ -14,9 +14,9 @@ from . import motion_keys
 def why_full(effect: PropertyGroup, *, regions: int = 0, shutters: int = 0) -> str | None:
     """Return why an effect cannot have this many more regions and shutters; None: it can."""
     if regions and len(effect.regions) + regions > limits.MAX_REGIONS:
-        return rpt_("An effect has {most} regions at most").format(most=limits.MAX_REGIONS)
+        return rpt_("An effect can have at most {most} regions").format(most=limits.MAX_REGIONS)
     if shutters and len(effect.shutters) + shutters > limits.MAX_SHUTTERS:
-        return rpt_("An effect has {most} shutters at most").format(most=limits.MAX_SHUTTERS)
+        return rpt_("An effect can have at most {most} shutters").format(most=limits.MAX_SHUTTERS)
     return None
 
 

@@ -159,6 +159,6 @@ def find(scene: Scene, effect: PropertyGroup, strip: Strip, side: str) -> tuple[
             sentence = rpt_("the readout cannot be found here: {why}")
             raise EffectError(sentence.format(why=rpt_(str(error)))) from None
     if abs(found.share) < LEAST:
-        raise EffectError(rpt_("lines stand upright however they move: there is no rolling shutter to repair"))
+        raise EffectError(rpt_("moving lines stay upright: there is no rolling shutter to repair"))
     first = "TOP" if side in ("TOP", "BOTTOM") else "LEFT"
     return found, first if found.share > 0 else _OPPOSITE[first]

@@ -83,7 +83,7 @@ def frames_to_track(scene: Scene, strip: Strip, direction: str, until: int = 0) 
     """
     current, first, last = scene.frame_current, strip.left_handle, strip.right_handle - 1
     if not first <= current <= last:
-        raise EffectError(rpt_("the current frame is outside of the Shutter strip"))
+        raise EffectError(rpt_("the current frame is outside the Shutter strip"))
     if until and (until == current or direction == ("BACKWARD" if until > current else "FORWARD")):
         sentence = rpt_("Until is frame {frame}, which does not lie in that direction; 0 is the end of the strip")
         raise EffectError(sentence.format(frame=until))
@@ -235,12 +235,11 @@ def lost(effect: PropertyGroup, index: int | None) -> tuple[int, str] | None:
     if frame is None:
         return None
     words = rpt_(
-        "Track lost the subject at frame {frame}: move the region back onto it, there or where it is seen again, or"
-        " outline it"
+        "Tracking lost the subject at frame {frame}: move the region back onto it, there or later, or outline it"
     )
     if index is None:
         words = rpt_(
-            "From frame {frame} on, near and far move differently, or too little is seen: not all can be held still"
+            "From frame {frame} on, near and far move differently or too little is visible: not all can be stabilized"
         )
     return frame, words.format(frame=frame)
 

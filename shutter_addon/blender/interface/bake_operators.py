@@ -18,8 +18,8 @@ from .panel_parts import draw_progress, sentence
 TICK = 0.5  # seconds between two looks at the job
 STILL = 1.0  # seconds before the panel asks again whether the bake is outdated
 FORMATS = (
-    ("MOVIE", "Movie", "H.264, for playing: levels are off by little, and there is no transparency"),
-    ("OPEN_EXR", "OpenEXR", "A folder of pictures in full precision, which play more slowly"),
+    ("MOVIE", "Movie", "H.264, for playback: small errors and no transparency"),
+    ("OPEN_EXR", "OpenEXR", "A folder of pictures in full precision; playback is slower"),
 )
 _running: list[baked_film.BakeJob] = []  # at most one
 _stopped: list[baked_film.BakeJob] = []  # still finishing a frame
@@ -33,7 +33,7 @@ def _why_baking(_effect: PropertyGroup) -> str | None:
 
 @operator("Bake to Strip", _why_baking, file_format=EnumProperty(name="Format", items=FORMATS))
 def bake(self: Operator, _context: Context, effect: PropertyGroup) -> set[str] | None:
-    """Render the effect beside Blender, and put the film above it as a strip. Frames that are finished are kept"""
+    """Render the effect in the background and add the film as a strip above it. Finished frames are kept"""
     _failures.pop(effect.identity, None)
     baked_strips.check(self.edit, self.effect_strip)
     film = baked_film.film_of(self.edit, effect, self.effect_strip, self.file_format)
@@ -51,7 +51,7 @@ def bake(self: Operator, _context: Context, effect: PropertyGroup) -> set[str] |
 
 
 class SHUTTER_OT_bake_stop(Named, Operator):
-    """Stop the bake that runs. Frames that are finished stay, and the next bake goes on from there"""
+    """Stop the bake. Finished frames are kept, and the next bake continues from there"""
 
     bl_label = "Stop Baking"
 
@@ -71,7 +71,7 @@ def _why_not_baked(_effect: PropertyGroup) -> str | None:
 
 @operator("Unbake", _why_not_baked)
 def unbake(self: Operator, _context: Context, _effect: PropertyGroup) -> None:
-    """Remove the baked strip, and show the effect again. The baked files stay"""
+    """Remove the baked strip and show the effect again. The baked files stay"""
     baked_strips.unbake(self.edit, self.effect_strip)
 
 
@@ -101,7 +101,7 @@ def _lay(job: baked_film.BakeJob) -> str | None:
     scene = strips.scene_of_uid(job.scene)
     parts = [s for s in strips.effect_strips(scene) if s.scene.virtual_shutter.identity == job.effect] if scene else []
     if not parts:
-        return rpt_('the strip that was baked is gone; its film is "{path}"').format(path=job.film.place)
+        return rpt_('the strip was removed during the bake; its film is "{path}"').format(path=job.film.place)
     try:
         baked_strips.lay(scene, next((part for part in parts if part.name == job.strip), parts[0]), job.film)
     except (EffectError, RuntimeError) as error:

@@ -22,7 +22,7 @@ _back: Callable[[], None] | None = None  # restores the view; it can end without
 
 
 class SHUTTER_OT_full_quality(Named, Operator):
-    """Show this frame as it will be rendered, each of its pixels on one of the screen's, or end that"""
+    """Show this frame exactly as it will be rendered, at one screen pixel per pixel; click again to end"""
 
     bl_label = "Full Quality"
     bl_options = {"REGISTER"}

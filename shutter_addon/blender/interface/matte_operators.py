@@ -58,7 +58,7 @@ STRIP = EnumProperty(name="Strip", items=_strips, translation_context=contexts.n
 
 @operator("Matte from Strip", needs.room_for_a_region, strip=STRIP)
 def matte_strip(self: Operator, _context: Context, effect: PropertyGroup) -> None:
-    """Make a movie, image or clip strip of the edit the matte of the active shutter, muted or not"""
+    """Make a movie, image or clip strip of the edit the matte of the active shutter, even if it is muted"""
     region = region_edits.add_region(effect, selection.active_shutter(effect), "MATTE", self.strip, matte="STRIP")
     matte_content.choose_strip(region, self.strip)
 
@@ -138,7 +138,7 @@ def _why_no_time_map(effect: PropertyGroup) -> str | None:
 
 @operator("Time Map", needs.a_shutter, _why_no_time_map, ramp=_RAMP)
 def time_map(self: Operator, _context: Context, effect: PropertyGroup) -> None:
-    """Show every pixel at its own moment: a ramp from the first of the frames to the last (slit-scan)"""
+    """Show every pixel at its own moment: a ramp from the first frame to the last (slit-scan)"""
     shutter_edits.add_time_map(effect, self.ramp)
 
 
@@ -151,7 +151,7 @@ def _why_no_repair(effect: PropertyGroup) -> str | None:
 
 
 class SHUTTER_OT_rolling_shutter(OfEffect, Operator):
-    """Show every row as it was when the middle one was filmed: straight, where a rolling shutter has skewed it"""
+    """Show every row as it was when the middle one was filmed, so that skewed lines become straight"""
 
     bl_label = "Rolling Shutter Repair"
     needs = (_why_no_repair,)

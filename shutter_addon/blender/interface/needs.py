@@ -19,7 +19,7 @@ def strokes(effect: PropertyGroup) -> str | None:
     if sentence := a_region(effect):
         return sentence
     is_matte = selection.active_region(effect).kind in strips.MATTES
-    return rpt_("The region is a matte or a ramp, and has no strokes") if is_matte else None
+    return rpt_("The region is a matte or a ramp without strokes") if is_matte else None
 
 
 def an_outline(effect: PropertyGroup) -> str | None:

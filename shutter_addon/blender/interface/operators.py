@@ -64,7 +64,7 @@ def give_effect(context: Context) -> None:
 
 
 class SHUTTER_OT_add_effect(Named, Operator):
-    """Add a Shutter strip above the active strip, which gives every pixel an exposure of its own"""
+    """Add a Shutter strip, which gives every pixel its own exposure, above the active strip"""
 
     bl_label = "Add Shutter Strip"
     bl_options = UNDOABLE
@@ -89,37 +89,37 @@ class MakesEffect(Mixin):
 
 def _why_alike(effect: PropertyGroup) -> str | None:
     if (shown := matching.shown(effect)) is None:
-        return rpt_("The Shutter strip has no source any more")
-    return None if shown.differences else rpt_("The Shutter strip is like its source")
+        return rpt_("The Shutter strip has no source")
+    return None if shown.differences else rpt_("The Shutter strip matches its source")
 
 
 @operator("Match Source", _why_alike)
 def match_source(self: Operator, _context: Context, effect: PropertyGroup) -> None:
-    """Give the Shutter strip transform, crop, flip, color and range of its source (scribbles stay on the picture)"""
+    """Copy transform, crop, flip, color and range of the source to the Shutter strip (strokes stay on the picture)"""
     if (neighbor := matching.match(effect)) is not None:
-        sentence = rpt_('"{neighbor}" is in the way: "{strip}" has not the whole range of its source')
+        sentence = rpt_('"{neighbor}" is in the way: "{strip}" does not have the whole range of its source')
         report_warning(self, sentence.format(neighbor=neighbor.name, strip=self.effect_strip.name))
 
 
 def _why_no_modifiers(effect: PropertyGroup) -> str | None:
     if (shown := matching.shown(effect)) is not None and shown.lacks_modifiers:
         return None
-    return rpt_("The Shutter strip has the modifiers of its source")
+    return rpt_("The Shutter strip already has the modifiers of its source")
 
 
 @operator("Copy Modifiers", _why_no_modifiers)
 def copy_modifiers(_self: Operator, _context: Context, effect: PropertyGroup) -> None:
-    """Copy the modifiers of the source to the Shutter strip, which shows the source's file as it is"""
+    """Copy the modifiers of the source to the Shutter strip, which otherwise shows the file without them"""
     matching.copy_modifiers(effect)
 
 
 def _why_smooth(effect: PropertyGroup) -> str | None:
-    return None if effect.inbetween == "1" else rpt_("The exposures are smooth")
+    return None if effect.inbetween == "1" else rpt_("The exposures are already smooth")
 
 
 @operator("Smooth Streaks", _why_smooth)
 def smooth_streaks(_self: Operator, _context: Context, effect: PropertyGroup) -> None:
-    """Expose moments between filmed frames as well, as many as the footage needs"""
+    """Expose as many moments between filmed frames as the footage needs"""
     effect.inbetween = "AUTO"
 
 
@@ -179,7 +179,7 @@ def _move(places: list[int], index: int, direction: str, move: Callable[[int, in
 
 @operator("Move Shutter", needs.a_shutter, direction=_DIRECTION)
 def shutter_move(self: Operator, _context: Context, effect: PropertyGroup) -> set[str] | None:
-    """Move the active shutter in the list (the first one is the default, which holds where nothing is scribbled)"""
+    """Move the active shutter in the list (the first one is the default, used where nothing is drawn)"""
     places = list(range(len(effect.shutters)))
     return _move(places, effect.active_shutter, self.direction, partial(shutter_edits.move_shutter, effect))
 
@@ -222,7 +222,7 @@ class SHUTTER_OT_bar_set(OfEffect, Operator):
     needs = (needs.a_shutter,)
 
     bar: IntProperty(name="Bar", description="Number of the bar, from 1", default=1, min=1)
-    weight: FloatProperty(name="Weight", description="How much the bar's frame contributes", min=0.0, soft_max=1.0)
+    weight: FloatProperty(name="Weight", description="Contribution of the bar's frame", min=0.0, soft_max=1.0)
 
     def invoke(self, context: Context, event: Event) -> set[str]:
         from .bar_editor import bar_under
@@ -261,7 +261,7 @@ def _why_no_room(effect: PropertyGroup) -> str | None:
 
 
 class SHUTTER_OT_draw(MakesEffect, OfEffect, Operator):
-    """Draw on the sharp frame where the active shutter holds (at another frame, this redraws the active region)"""
+    """Draw on the sharp frame where the active shutter is used (at another frame, this redraws the active region)"""
 
     bl_label = "Draw"
     only_seen = True
@@ -333,7 +333,7 @@ def annotation_of(context: Context) -> Annotation | None:
 
 def _why_no_layer(effect: PropertyGroup) -> str | None:
     has_some = region_edits.free_layers(effect, annotation_of(bpy.context))
-    return None if has_some else rpt_("The preview shows no annotation layer that is not a region yet")
+    return None if has_some else rpt_("Every annotation layer of the preview is a region already")
 
 
 _LAYER = EnumProperty(name="Layer", items=_layers, translation_context=contexts.no_translation)
@@ -371,7 +371,7 @@ def region_remove(_self: Operator, _context: Context, effect: PropertyGroup) -> 
 
 @operator("Move Region", needs.a_region, direction=_DIRECTION)
 def region_move(self: Operator, _context: Context, effect: PropertyGroup) -> set[str] | None:
-    """Move the active region in the list (later ones lie over earlier ones)"""
+    """Move the active region in the list (later ones cover earlier ones)"""
     name = selection.active_shutter(effect).name
     places = [i for i, region in enumerate(effect.regions) if region.shutter == name]
     return _move(places, effect.active_region, self.direction, partial(region_edits.move_region, effect))
@@ -385,7 +385,7 @@ def region_key(_self: Operator, _context: Context, effect: PropertyGroup) -> Non
 
 @operator("Choose Source", strip=STRIP)
 def source(self: Operator, _context: Context, effect: PropertyGroup) -> None:
-    """Give the effect another clip: the movie, image or clip strip whose frames it exposes"""
+    """Choose the movie, image or clip strip whose frames the effect exposes"""
     add_effect.choose_source(effect, self.effect_strip, self.edit.sequence_editor.strips_all[self.strip])
 
 
@@ -394,11 +394,11 @@ def effect_copy(self: Operator, _context: Context, effect: PropertyGroup) -> Non
     """Copy the shutters, regions, keyframes and options of the effect, for other strips and scenes of this file"""
     undelete.copy(effect, self.effect_strip)
     if data_format.is_newer(self.edit):
-        report_warning(self, rpt_("Copied, without what a newer version of Virtual Shutter has added"))
+        report_warning(self, rpt_("Copied without data of a newer version of Virtual Shutter"))
 
 
 class SHUTTER_OT_effect_paste(MakesEffect, OfEffect, Operator):
-    """Give the active strip the copied effect; where it has one, that is replaced"""
+    """Paste the copied effect to the active strip, replacing its effect"""
 
     bl_label = "Paste Effect"
 
@@ -440,14 +440,14 @@ class SHUTTER_OT_recipe_export(OfEffect, ExportHelper, Operator):
         except OSError as error:
             raise UserError(f"{path}: {error.strerror or error}") from None
         if data_format.is_newer(self.edit):
-            words = rpt_('Saved "{path}", without what a newer version of Virtual Shutter has added')
+            words = rpt_('Saved "{path}" without data of a newer version of Virtual Shutter')
             report_warning(self, words.format(path=path))
         else:
             self.report({"INFO"}, rpt_('Saved "{path}"').format(path=path))
 
 
 class SHUTTER_OT_copy_report(Named, Operator):
-    """Copy versions, device, kinds and numbers of the edit, and last errors: no names, no paths. Nothing is sent"""
+    """Copy versions, device, types and numbers of the edit, and last errors: no names, no paths. Nothing is sent"""
 
     bl_label = "Copy Report"
 
@@ -456,5 +456,5 @@ class SHUTTER_OT_copy_report(Named, Operator):
             report_error(self, rpt_("Without a window there is no clipboard: use the command check with --report"))
             return {"CANCELLED"}
         context.window_manager.clipboard = error_report.text(selection.scene_of(context))
-        self.report({"INFO"}, rpt_("Report copied: paste it into your message, and read it before you send it"))
+        self.report({"INFO"}, rpt_("Report copied: paste it into your message and read it before you send it"))
         return {"FINISHED"}

@@ -112,7 +112,7 @@ class SHUTTER_OT_outline_mask(_Carries, Operator):
 
     step: IntProperty(
         name="Every",
-        description="Frames from one shape key to the next between drawings of a tracked outline; 0 for drawings alone",
+        description="Frames between shape keys of a tracked outline; 0 for its drawings only",
         default=5,
         min=0,
         soft_max=50,

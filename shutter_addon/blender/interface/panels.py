@@ -151,7 +151,7 @@ def _draw_exposure(layout: UILayout, scene: Scene, effect: PropertyGroup, strip:
     if effect.inbetween != "1":
         row.prop(effect, "skip_repeats", text="", icon="FRAME_NEXT")
         if strobing.repeats(effect):
-            sentence(layout, iface_("Frames of the source repeat: motion goes on across them"), "INFO")
+            sentence(layout, iface_("The source repeats frames: motion continues across them"), "INFO")
     layout.prop(shutter, "length")
     if shutter.length == "MOTION" and shutter.follow != "NOTHING":
         layout.prop(shutter, "trail")
@@ -226,10 +226,10 @@ def _notes(context: Context) -> Iterator[tuple[str, Button | None]]:
             what = ", ".join(iface_(word) for word in shown.differences)
             yield iface_("Differs from its source: {what}").format(what=what), ("shutter.match_source", "")
         if shown.lacks_modifiers:
-            words = iface_("Modifiers of the source do not reach the effect")
+            words = iface_("The effect does not use the modifiers of the source")
             yield words, ("shutter.copy_modifiers", "")
         if shown.has_effects:
-            words = iface_("Effect strips on the source do not reach the effect: make the Shutter strip their input")
+            words = iface_("The effect does not use effect strips of the source: make the Shutter strip their input")
             yield words, None
     if (step := strobing.last(effect)) is not None:
         yield note_buttons.of_strobing(step)
@@ -288,7 +288,7 @@ def _draw_options(layout: UILayout, _scene: Scene, effect: PropertyGroup, _strip
     column.active = effect.use_source_time
     column.prop(effect, "source_time")
     if effect.use_source_time and effect.inbetween == "1":
-        sentence(column, iface_("Smooth is off: the nearest source frame is shown"), "INFO")
+        sentence(column, iface_("Smooth is off: the nearest source frame is used"), "INFO")
 
 
 class _Report(Mixin):

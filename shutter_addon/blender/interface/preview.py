@@ -41,14 +41,14 @@ from .note_buttons import Button
 VIEWS = (
     ("RESULT", "Result", "The finished picture"),
     ("SPLIT", "Split", "The source on the left of the handle, the result on its right"),
-    ("EDGES", "Edges", "The result, and a line around what a shutter gets more than half of"),
-    ("SCRIBBLES", "Scribbles", "The source, and where each shutter is scribbled"),
-    ("COEFFICIENTS", "Mattes", "How much of each shutter a pixel gets, in the shutters' colors and patterns"),
+    ("EDGES", "Edges", "The result with a line around the area of each shutter"),
+    ("SCRIBBLES", "Scribbles", "The source with the strokes of each shutter"),
+    ("COEFFICIENTS", "Mattes", "Each pixel's share of each shutter, in the shutters' colors and patterns"),
     (
         "HOLES",
         "Holes",
-        "The result, and where no exposed frame shows what lies behind layers: orange is taken from another frame, "
-        "purple is filled from what is around",
+        "The result and the holes behind layers: orange is taken from another frame, "
+        "purple is filled from its surroundings",
     ),
 )
 
@@ -79,7 +79,7 @@ class ShutterPreview(PropertyGroup):
 
     live: BoolProperty(
         name="Live",
-        description="Show scribbles and views of the effect in the preview",
+        description="Show strokes and views of the effect in the preview",
         default=True,
         update=_view_chosen,
     )
@@ -92,7 +92,7 @@ class ShutterPreview(PropertyGroup):
     )
     split: FloatProperty(
         name="Split Position",
-        description="Where the source ends and the result begins, as a fraction of the picture's width",
+        description="Border between source and result, as a fraction of the picture's width",
         subtype="FACTOR",
         default=0.5,
         min=0.0,
@@ -101,12 +101,12 @@ class ShutterPreview(PropertyGroup):
     )
     probe: BoolProperty(
         name="Probe",
-        description="Show the shutter of the pixel that the pointer was over last, and how much of each it gets",
+        description="Show the bars of the pixel under the pointer, and its share of each shutter",
         update=preview_areas.redraw,
     )
     probe_at: FloatVectorProperty(
         name="Probe Position",
-        description="The pixel that is probed, in fractions of the picture from its lower left corner",
+        description="Position of the probe, as fractions of the picture from its lower left corner",
         size=2,
         default=(-1.0, -1.0),
         update=preview_areas.redraw,
@@ -231,7 +231,7 @@ def _warn(shown: Shown, say: "_Notes") -> None:
     if shown.strips_above:
         say(rpt_("The strips above are hidden in this view"))
     if shown.scene.view_settings.view_transform != "Standard":
-        say(rpt_("This view has the view transform Standard"))
+        say(rpt_("This view uses the view transform Standard"))
 
 
 def _tell_detail(wanted: Drawing, size: tuple[int, int], is_still: bool, say: "_Notes") -> None:
@@ -242,7 +242,7 @@ def _tell_detail(wanted: Drawing, size: tuple[int, int], is_still: bool, say: "_
     """
     source = wanted.renderer.source
     if previews.looking.whole is not None:
-        say(rpt_("Full quality, as it will be rendered"), ("shutter.full_quality", iface_("Back")))
+        say(rpt_("Full quality: as it will be rendered"), ("shutter.full_quality", iface_("Back")))
         return
     less = []
     if source.width < size[0]:
@@ -250,7 +250,7 @@ def _tell_detail(wanted: Drawing, size: tuple[int, int], is_still: bool, say: "_
     if source.from_proxy:
         less.append(rpt_("from a proxy"))
     if wanted.request is not wanted.decision.request:
-        less.append(rpt_("a draft of the edges"))
+        less.append(rpt_("draft edges"))
     if less:
         button = ("shutter.full_quality", iface_("Full Quality")) if is_still else None
         say(rpt_("Preview: {what}").format(what=", ".join(less)), button)
@@ -277,7 +277,7 @@ def _measure() -> float | None:
 def _show_sharp(context: Context, shown: Shown | None) -> None:
     """Draw notes and strokes over the source frame."""
     say = _Notes(context.region)
-    say(rpt_("The sharp frame, to draw on: the result comes with the stroke"))
+    say(rpt_("Sharp frame to draw on: the result appears after the stroke"))
     with drawing.pixel_space(context.region), suppress(*effect_source.FAULTS):
         say.draw()
         if shown is not None and not previews.pen_is_down():

@@ -196,7 +196,7 @@ class SHUTTER_GGT_region(WithKeys, GizmoGroup):
 
 
 class SHUTTER_OT_region_transform(OfEffect, Operator):
-    """Move, turn and scale the active region by numbers, as its handles in the preview do"""
+    """Move, rotate and scale the active region by numbers, like its handles in the preview"""
 
     bl_label = "Transform Region"
     needs = (needs.a_region,)

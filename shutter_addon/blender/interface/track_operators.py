@@ -27,7 +27,7 @@ DIRECTIONS = (
 # SKIP_SAVE: Blender would otherwise reuse the direction of the last button.
 _DIRECTION = EnumProperty(
     name="Direction",
-    description="Where tracking goes from the current frame",
+    description="Direction of tracking from the current frame",
     items=DIRECTIONS,
     default="BOTH",
     options={"SKIP_SAVE"},
@@ -141,7 +141,7 @@ class _Tracks(Beside):
     def _tell(self) -> None:
         if (effect := self._target.effect()) is None or not self._done:
             return
-        sentence = rpt_("Frames {first} to {last} are tracked")
+        sentence = rpt_("Tracked frames {first} to {last}")
         first, last = min(self._done | {self._start}), max(self._done | {self._start})
         self.report({"INFO"}, sentence.format(first=first, last=last))
         lost = track_region.lost(effect, self._target.index)
@@ -158,7 +158,7 @@ class _Tracks(Beside):
 
 
 class SHUTTER_OT_track(_Tracks, OfEffect, Operator):
-    """Key the active region by what it covers here, up to your own keys (Esc stops and keeps the tracked frames)"""
+    """Track what the active region covers here, up to your own keyframes (Esc stops and keeps the tracked frames)"""
 
     bl_label = "Track Region"
     needs = (needs.strokes,)
@@ -167,7 +167,7 @@ class SHUTTER_OT_track(_Tracks, OfEffect, Operator):
 
 
 class SHUTTER_OT_track_camera(_Tracks, OfEffect, Operator):
-    """Key the camera by what the regions leave free, up to your own keys (Esc stops and keeps the tracked frames)"""
+    """Track the camera outside the regions, up to your own keyframes (Esc stops and keeps the tracked frames)"""
 
     bl_label = "Track Camera"
     is_camera = True
@@ -176,7 +176,7 @@ class SHUTTER_OT_track_camera(_Tracks, OfEffect, Operator):
 
 
 class SHUTTER_OT_panning_shot(_Tracks, OfEffect, Operator):
-    """Keep the active region sharp while all else streaks past it (tracks the region unless it has keys)"""
+    """Keep the active region sharp while all else streaks past it (tracks the region unless it has keyframes)"""
 
     bl_label = "Panning Shot"
     needs = (needs.strokes,)
@@ -190,7 +190,7 @@ class SHUTTER_OT_panning_shot(_Tracks, OfEffect, Operator):
 
 
 class SHUTTER_OT_tripod(_Tracks, OfEffect, Operator):
-    """Expose for long as if the camera had stood still (tracks the camera unless it has keys)"""
+    """Make a long exposure as if the camera stood still (tracks the camera unless it has keyframes)"""
 
     bl_label = "Stabilize Exposure"
     needs = (needs.a_shutter,)
@@ -206,7 +206,7 @@ class SHUTTER_OT_tripod(_Tracks, OfEffect, Operator):
 
 _FRAME = IntProperty(
     name="Frame",
-    description="Timeline frame; without one, the worst of the next that are unsure",
+    description="Timeline frame; without one, the least confident of the next unsure frames",
     options={"SKIP_SAVE"},
 )
 
@@ -224,13 +224,13 @@ def _look(looking: Operator, effect: PropertyGroup, index: int | None) -> set[st
 
 @operator("Next Unsure Frame", needs.a_region, options={"REGISTER"}, frame=_FRAME)
 def track_look(self: Operator, _context: Context, effect: PropertyGroup) -> set[str] | None:
-    """Go to a frame that tracking is not sure of"""
+    """Go to the next frames with low tracking confidence"""
     return _look(self, effect, effect.active_region)
 
 
 @operator("Next Unsure Camera Frame", options={"REGISTER"}, frame=_FRAME)
 def track_camera_look(self: Operator, _context: Context, effect: PropertyGroup) -> set[str] | None:
-    """Go to a frame that tracking of the camera is not sure of"""
+    """Go to the next frames with low tracking confidence of the camera"""
     return _look(self, effect, None)
 
 
@@ -240,7 +240,7 @@ def _why_no_clip(moving: PropertyGroup) -> str | None:
 
 @operator("Follow Track", needs.strokes, lambda effect: _why_no_clip(selection.active_region(effect)))
 def follow(self: Operator, _context: Context, effect: PropertyGroup) -> None:
-    """Key the active region by a track of a movie clip, from where the region is at this frame"""
+    """Key the active region by a track of a movie clip, from its place at this frame"""
     follow_track.follow(self.edit, effect, self.effect_strip, effect.active_region)
 
 
@@ -250,23 +250,23 @@ def _why_no_track(effect: PropertyGroup) -> str | None:
 
 @operator("Update Followed Track", needs.strokes, _why_no_track)
 def follow_update(self: Operator, _context: Context, effect: PropertyGroup) -> None:
-    """Key the active region anew by what it follows, after the track has changed"""
+    """Key the active region again after the track that it follows has changed"""
     follow_track.update(self.edit, effect, self.effect_strip, effect.active_region)
 
 
 @operator("Follow Stabilization", lambda effect: _why_no_clip(effect.camera))
 def follow_stabilization(self: Operator, _context: Context, effect: PropertyGroup) -> None:
-    """Key the camera by the 2D stabilization of a movie clip, from where the camera is at this frame"""
+    """Key the camera by the 2D stabilization of a movie clip, from its place at this frame"""
     follow_track.follow_stabilization(self.edit, effect, self.effect_strip)
 
 
 @operator("Sharp Subject", needs.a_region)
 def sharp_subject(_self: Operator, context: Context, effect: PropertyGroup) -> None:
-    """Keep the active region sharp before all else, which is exposed for long and without it"""
+    """Keep the active region sharp in front of a long exposure of everything else"""
     shutter_edits.sharp_subject(effect, effect.active_region, bar_edits.auto_key(context))
 
 
 @operator("Trail", needs.a_region)
 def clean_trail(_self: Operator, context: Context, effect: PropertyGroup) -> None:
-    """Have the active region leave a trail before all else, which stays sharp"""
+    """Make the active region leave a trail in front of everything else, which stays sharp"""
     shutter_edits.clean_trail(effect, effect.active_region, bar_edits.auto_key(context))
