@@ -95,7 +95,7 @@ def words():
 
     bpy.context.view_layer.update()
     effects = bpy.context.scene.virtual_shutter.effects
-    return sorted({word for effect in effects for word in match_source.differences(effect)})
+    return sorted({word for effect in effects for word in match_source.shown(effect).differences})
 
 
 def apart(some, others) -> float:

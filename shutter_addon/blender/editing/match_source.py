@@ -55,18 +55,13 @@ def shown(effect: PropertyGroup) -> Shown | None:
 def _compare(effect: PropertyGroup) -> Shown | None:
     if not (pair := strip_and_source(effect)):
         return None
-    lacks, has_effects = bool(missing_modifiers(*pair)), bool(effects_on(effect.id_data, pair[1]))
-    return Shown(pair[1].name, differences(effect), lacks, has_effects)
-
-
-def differences(effect: PropertyGroup) -> list[str]:
-    """Return the labels of what `match` would change."""
-    strip, source = strip_and_source(effect)
+    strip, source = pair
     look, wanted = _looks(strip), _looks(source)
     words = [word for word in add_effect.LOOK if look[word] != wanted[word]]
     if _goal(effect, strip, source)[:2] != (strip.left_handle, strip.right_handle):
         words.append(_RANGE)
-    return words
+    lacks_modifiers, has_effects = bool(missing_modifiers(strip, source)), bool(effects_on(effect.id_data, source))
+    return Shown(source.name, words, lacks_modifiers, has_effects)
 
 
 def match(effect: PropertyGroup) -> Strip | None:
@@ -214,10 +209,7 @@ def append_modifiers(scene: Scene, source: Strip, part: Strip, chosen: list[Stri
         return
     count = len(part.modifiers)
     active = scene.sequence_editor, "active_strip", source
-    with (
-        for_a_while([active]),
-        add_effect.selecting(scene, [part]),
-    ):  # it copies all of the active strip
+    with for_a_while([active]), add_effect.selecting(scene, [part]):  # it copies all of the active strip
         bpy.ops.sequencer.strip_modifier_copy(type="APPEND")
     for old, new in list(zip(source.modifiers, part.modifiers[count:], strict=True)):
         if chosen is None or old in chosen:

@@ -249,6 +249,10 @@ def _effect_scenes() -> list[Scene]:
     return [scene for scene in made if scene.render.engine == strips.ENGINE]
 
 
+def _effect_strips() -> list[Strip]:
+    return [strip for scene in strips.local_scenes() for strip in strips.effect_strips(scene)]
+
+
 def _identify(shown: list[strips.Shown]) -> None:
     """Give every effect scene a unique identity and its own annotation, and its strip and effect the same identity."""
     identities, drawn = set(), set()
@@ -263,7 +267,7 @@ def _identify(shown: list[strips.Shown]) -> None:
             drawn.add(scene.annotation)
             if shown_annotations.is_own(scene.annotation):
                 _give(scene.annotation, "virtual_shutter_made", group.identity)
-    for strip in [strip for scene in strips.local_scenes() for strip in strips.effect_strips(scene)]:
+    for strip in _effect_strips():
         _give(strip, "virtual_shutter_effect", strip.scene.virtual_shutter.identity)
     for effect, _strip, _source in shown:
         _give(effect, "identity", effect.scene.virtual_shutter.identity)
@@ -353,7 +357,7 @@ def _rename(effect: PropertyGroup, before: list[str], names: list[str]) -> None:
 
 def _remove_scenes(updated: Scene | None) -> None:
     """Remove effect scenes that no strip and no window shows."""
-    stay = {strip.scene for scene in strips.local_scenes() for strip in strips.effect_strips(scene)} | {updated}
+    stay = {strip.scene for strip in _effect_strips()} | {updated}
     for window in [window for manager in bpy.data.window_managers for window in manager.windows]:
         stay.update((window.scene, window.workspace.sequencer_scene))
     for scene in _effect_scenes():
@@ -382,7 +386,7 @@ def _remove_left() -> None:
 
 def follow_sources(shown: list[strips.Shown]) -> None:
     """Update effect scenes: rate and views of their edit, size of their source, and how Blender blends their strips."""
-    for strip in [strip for scene in strips.local_scenes() for strip in strips.effect_strips(scene)]:
+    for strip in _effect_strips():
         if strip.scene.library is None:
             for name in _OF_EDIT:
                 _give(strip.scene.render, name, getattr(strip.id_data.render, name))

@@ -162,8 +162,7 @@ def sharp_subject(effect: PropertyGroup, index: int, key: bool = False) -> None:
     Args:
         key: insert keyframes for the bars.
     """
-    place = _as_layer(effect, index)
-    apply_preset(effect, place, "STILL", key)
+    apply_preset(effect, _as_layer(effect, index), "STILL", key)
     apply_preset(effect, 0, "ANGLE_360", key)
 
 
@@ -173,8 +172,7 @@ def clean_trail(effect: PropertyGroup, index: int, key: bool = False) -> None:
     Args:
         key: insert keyframes for the bars.
     """
-    place = _as_layer(effect, index)
-    apply_preset(effect, place, "ANGLE_360", key)
+    apply_preset(effect, _as_layer(effect, index), "ANGLE_360", key)
     apply_preset(effect, 0, "STILL", key)
 
 

@@ -18,11 +18,7 @@ from ..data.property_copy import for_a_while
 from ..output import film_output
 from . import add_effect
 
-_PATHS = {
-    "MOVIE": "filepath",
-    "IMAGE": "directory",
-    "SOUND": "filepath",
-}  # path property of each type
+_PATHS = {"MOVIE": "filepath", "IMAGE": "directory", "SOUND": "filepath"}  # path property of each type
 
 
 def make_edit(path: Path, medium: FrameSource, source_recipe: Effect, folder: Path) -> Scene:

@@ -184,12 +184,7 @@ class Quad:
         low, high = np.maximum(self._low, (left, 0)), np.minimum(self._high, (right, 1))
         if (low >= high).any():
             return
-        corners = [
-            (low[0], low[1]),
-            (high[0], low[1]),
-            (low[0], high[1]),
-            (high[0], high[1]),
-        ]  # triangle strip
+        corners = [(low[0], low[1]), (high[0], low[1]), (low[0], high[1]), (high[0], high[1])]  # triangle strip
         shader = shader_of(name)
         shader.bind()
         for sampler, texture in textures.items():

@@ -9,7 +9,7 @@ from bpy.app.translations import contexts
 from bpy.app.translations import pgettext_iface as iface_
 from bpy.app.translations import pgettext_rpt as rpt_
 from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty, StringProperty
-from bpy.types import Annotation, Context, Event, Operator, PropertyGroup
+from bpy.types import Context, Event, Operator, PropertyGroup
 from bpy_extras.io_utils import ExportHelper, ImportHelper
 
 from ...core.messages import EffectError, UserError
@@ -322,18 +322,17 @@ def _show_annotation(context: Context, effect: PropertyGroup) -> None:
 @kept
 def _layers(context: Context) -> list[tuple]:
     active = selection.active(context)
-    layers = region_edits.free_layers(active[1], annotation_of(context)) if active else []
-    return [(layer.info, layer.info, "") for layer in layers]
+    return [(layer.info, layer.info, "") for layer in _free_layers(active[1])] if active else []
 
 
-def annotation_of(context: Context) -> Annotation | None:
-    """Return the annotation of the first preview."""
-    return next((area.spaces.active.annotation for _window, area in preview_areas.previews(context)), None)
+def _free_layers(effect: PropertyGroup) -> list:
+    """Return the layers of the first preview's annotation that are no regions."""
+    previews = preview_areas.previews(bpy.context)
+    return region_edits.free_layers(effect, next((area.spaces.active.annotation for _, area in previews), None))
 
 
 def _why_no_layer(effect: PropertyGroup) -> str | None:
-    has_some = region_edits.free_layers(effect, annotation_of(bpy.context))
-    return None if has_some else rpt_("Every annotation layer of the preview is a region already")
+    return None if _free_layers(effect) else rpt_("Every annotation layer of the preview is a region already")
 
 
 _LAYER = EnumProperty(name="Layer", items=_layers, translation_context=contexts.no_translation)
@@ -342,8 +341,7 @@ _LAYER = EnumProperty(name="Layer", items=_layers, translation_context=contexts.
 @operator("Add Region from Annotation Layer", needs.room_for_a_region, _why_no_layer, only_seen=True, layer=_LAYER)
 def region_take(self: Operator, context: Context, effect: PropertyGroup) -> None:
     """Make an annotation layer of the preview a region of the active shutter"""
-    free = region_edits.free_layers(effect, annotation_of(context))
-    layer = next(layer for layer in free if layer.info == self.layer)
+    layer = next(layer for layer in _free_layers(effect) if layer.info == self.layer)
     region_edits.take_layer(effect, selection.active_shutter(effect), layer)
     _show_annotation(context, effect)
 
