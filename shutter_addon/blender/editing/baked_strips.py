@@ -129,7 +129,7 @@ def baked_of(scene: Scene, strip: Strip) -> list:
 
 
 def effect_parts(scene: Scene, strip: Strip) -> list:
-    """Return the parts that a baked effect strip was cut into, with itself."""
+    """Return the parts that a baked effect strip was cut into, with itself; []: it is not baked."""
     start = round(strips.origin(strip))
     parts = (other for other in selection.of_bake(scene, strip) if round(strips.origin(other)) == start)
     return [part for part in parts if part.type == "SCENE"]

@@ -26,7 +26,8 @@ def hold(effect: PropertyGroup, index: int) -> None:
 def begin(effect: PropertyGroup, strip: Strip, index: int, *, erases: bool = False) -> None:
     """Prepare the current frame for the pen, so that strokes appear where they are drawn.
 
-    A drawing at this frame is first stored where it appears. For the eraser, so is one that another frame holds.
+    A drawing of this frame is first stored where it appears. The eraser also needs the strokes that another frame's
+    drawing shows here, so they are stored at this frame, too.
 
     Raises:
         EffectError: the region has no placement.

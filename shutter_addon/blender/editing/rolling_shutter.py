@@ -63,13 +63,13 @@ def of(effect: PropertyGroup) -> Repair | None:
 
 
 def _moment(shutter: PropertyGroup) -> float:
-    """The middle of a shutter's open time, in bars from the middle of the first; none: it is never open."""
+    """Return the middle of a shutter's open time, in bars from the middle of the first one; NaN: it is never open."""
     weights = bars(shutter)
     return float((weights * np.arange(len(weights))).sum() / weights.sum()) if weights.any() else math.nan
 
 
 def _shown(effect: PropertyGroup) -> int:
-    """The bar of the shown frame."""
+    """Return the bar of the shown frame."""
     return Options(validation.number(effect, "window"), position="center").before
 
 
@@ -93,7 +93,11 @@ def repair(scene: Scene, effect: PropertyGroup, strip: Strip, share: float, side
     if effect.inbetween == "1":
         effect.inbetween = SMOOTH
     shown = _shown(effect)
-    region = _begin(effect) if known is None else effect.regions[known.region]
+    if known is None:
+        names = [(data_("Earlier"), "ANGLE_360"), (data_("Later"), "ANGLE_360")]
+        region = shutter_edits.ramp_between(effect, *names, data_("Rolling Shutter"), "LINEAR")
+    else:
+        region = effect.regions[known.region]
     region.rotation, region.scale = math.radians(_TURNS[side]), 2 / share
     region.location, region.opacity, region.invert, region.blend = (0, 0), 1.0, False, "OVER"
     earlier, later = effect.shutters[0], effect.shutters[region.shutter]
@@ -112,12 +116,6 @@ def _is_backward(scene: Scene, effect: PropertyGroup, strip: Strip) -> bool:
         time = sampled.source_time(Curves(scene), effect.path_from_id(), effect, (frame,))
         return bool(time.at(frame)[1])
     return bool(source_media.timing_of(strips.source_of(scene, effect, strip)).use_reverse_frames)
-
-
-def _begin(effect: PropertyGroup) -> PropertyGroup:
-    """Add the two shutters and the ramp between them, and return the ramp."""
-    earlier, later = (data_("Earlier"), "ANGLE_360"), (data_("Later"), "ANGLE_360")
-    return shutter_edits.ramp_between(effect, earlier, later, data_("Rolling Shutter"), "LINEAR")
 
 
 def share_of(scene: Scene, effect: PropertyGroup, strip: Strip, milliseconds: float) -> float:
