@@ -94,8 +94,8 @@ def repair(scene: Scene, effect: PropertyGroup, strip: Strip, share: float, side
         effect.inbetween = SMOOTH
     shown = _shown(effect)
     if known is None:
-        names = [(data_("Earlier"), "ANGLE_360"), (data_("Later"), "ANGLE_360")]
-        region = shutter_edits.ramp_between(effect, *names, data_("Rolling Shutter"), "LINEAR")
+        names = (data_("Earlier"), "ANGLE_360"), (data_("Later"), "ANGLE_360")
+        region = shutter_edits.ramp_between(effect, *names, name=data_("Rolling Shutter"), ramp="LINEAR")
     else:
         region = effect.regions[known.region]
     region.rotation, region.scale = math.radians(_TURNS[side]), 2 / share
