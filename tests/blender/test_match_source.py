@@ -246,7 +246,7 @@ def test_never_over_a_neighbor(bpy, edit, made, capfd):
     match(bpy)
     assert (strip.left_handle, strip.right_handle) == (-4, 45)
     assert (neighbor.left_handle, neighbor.right_handle) == (45, 55)
-    assert '"Title" is in the way: "Shutter" has not the whole range of its source' in capfd.readouterr().out
+    assert '"Title" is in the way: "Shutter" does not have the whole range of its source' in capfd.readouterr().out
     assert words() == []
 
 

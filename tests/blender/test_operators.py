@@ -409,13 +409,13 @@ def test_what_cannot_be_used_says_why(bpy, operators, edit, effect, tmp_path, si
 def test_no_more_shutters_than_a_picture_has(bpy, effect, name):
     while len(effect.shutters) < limits.MAX_SHUTTERS:
         assert call(bpy, name) == {"FINISHED"}
-    with pytest.raises(RuntimeError, match=f"An effect has {limits.MAX_SHUTTERS} shutters at most"):
+    with pytest.raises(RuntimeError, match=f"An effect can have at most {limits.MAX_SHUTTERS} shutters"):
         call(bpy, name)
     assert len(effect.shutters) == limits.MAX_SHUTTERS
 
 
 def test_no_more_regions_than_a_picture_has(bpy, effect, preview):
-    full = f"An effect has {limits.MAX_REGIONS} regions at most"
+    full = f"An effect can have at most {limits.MAX_REGIONS} regions"
     preview.annotation = effect.scene.annotation
     preview.annotation.layers.new("Notes").frames.new(3)
     for number in range(limits.MAX_REGIONS):

@@ -332,7 +332,7 @@ def _free_layers(effect: PropertyGroup) -> list:
 
 
 def _why_no_layer(effect: PropertyGroup) -> str | None:
-    return None if _free_layers(effect) else rpt_("Every annotation layer of the preview is a region already")
+    return None if _free_layers(effect) else rpt_("The preview shows no annotation layer that could become a region")
 
 
 _LAYER = EnumProperty(name="Layer", items=_layers, translation_context=contexts.no_translation)

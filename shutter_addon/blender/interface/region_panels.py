@@ -85,10 +85,11 @@ def draw_tracking(layout: UILayout, index: int | None) -> None:
     """Draw the buttons that track a region or the camera (selection.moving)."""
     row = layout.row(align=True)
     track = "shutter.track_camera" if index is None else "shutter.track"
-    label = "Track Camera" if index is None else "Track"
     for direction, _name, _description, icon, _number in track_operators.DIRECTIONS:
-        text = label if direction == "BOTH" else ""
-        row.operator(track, text=text, icon=icon).direction = direction
+        button = row.operator(
+            track, text=("Track Camera" if index is None else "Track") if direction == "BOTH" else "", icon=icon
+        )
+        button.direction = direction
     row.operator(f"{track}_look", text="", icon="VIEWZOOM")
 
 

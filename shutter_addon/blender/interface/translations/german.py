@@ -408,7 +408,7 @@ MESSAGES = {
     ): "Eine Anmerkungsebene der Vorschau zu einer Region des aktiven Verschlusses machen",
     (
         "*",
-        "Every annotation layer of the preview is a region already",
+        "The preview shows no annotation layer that could become a region",
     ): "Die Vorschau zeigt keine Anmerkungsebene, die noch keine Region ist",
     ("Operator", "Assign Region to Shutter"): "Region einem Verschluss zuweisen",
     ("*", "Assign the active region to another shutter"): "Die aktive Region einem anderen Verschluss zuweisen",
