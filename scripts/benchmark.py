@@ -2,7 +2,7 @@
 
     python scripts/benchmark.py --json FILE [--sizes 1920x1080,3840x2160] [--shutters 2,3,4] …
 
-Needs Python 3.11, NumPy and moderngl; mattes need PyAV and OpenImageIO, or are left out. --device cpu measures NumPy.
+Needs Python 3.11, NumPy and moderngl; mattes need PyAV and OpenImageIO, or are left out.
 Passes:
 compose: a picture from a window on the device; accumulate: the next frame into the window (average: its upload alone);
 diffuse: coefficients from new labels; diffuse_moved: the same, from the solution for scribbles a few pixels away;
@@ -26,7 +26,6 @@ import statistics
 import sys
 import tempfile
 import time
-from contextlib import nullcontext
 from dataclasses import dataclass, replace
 from functools import cache, cached_property
 from pathlib import Path
@@ -39,13 +38,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests"))
 
 import exact_layers
 
-from shutter_addon.compute import (
-    cpu,
-    diffusion,
-    diffusion_gpu,
-    edge_diffusion_gpu,
-    guide,
-)
+from shutter_addon.compute import diffusion_gpu, edge_diffusion_gpu, guide
 from shutter_addon.compute.gpu import GPUCompositor
 from shutter_addon.compute.layer_frames import WeightedFrames
 from shutter_addon.compute.request import Behind, Coefficients, Exposure, Request
@@ -486,50 +479,6 @@ class Case:
             self.compositor.release()
 
 
-class Host:
-    """NumPy in place of a device."""
-
-    name = "NumPy"
-    current = staticmethod(nullcontext)
-
-    def finish(self) -> None:
-        pass
-
-
-class HostCase(Case):
-    """The same with NumPy."""
-
-    def _open(self, window: int) -> None:
-        self.compositor = cpu.CPUCompositor()
-        self.window = self.compositor.window(self.source, window)
-        self.whole = self.frames = cpu.HostWindow(self.source)
-
-    def compose(self, method: str) -> None:
-        if method in ("ours", "follow", "layer", *COMBINED):
-            self.drawn = self._drawn(method)
-            return
-        encoded = self.state.options.light == "encoded"
-        values = np.arange(256, dtype=np.float32) / np.float32(255)
-        curve = values if encoded else light.to_linear(values)
-        total = np.zeros((self.source.height, self.source.width, 3), dtype=np.float32)
-        for frame in self.frames.frames.values():
-            total += curve.take(frame[..., :3])
-        total /= len(self._wanted)
-        self.drawn = light.to_linear(total) if encoded else total
-
-    def readback(self, method: str) -> np.ndarray:
-        return self.drawn
-
-    def _diffusion_error(self) -> float:
-        with mock.patch.multiple(diffusion, ITERATIONS=30, ENOUGH=0):
-            expected = self.solver.solve(self.labels, len(self.state.bars))
-        return float(np.abs(self.handle - expected).max() * 255)
-
-    def release(self) -> None:
-        self.window.release()
-        self.frames.release()
-
-
 def _program(name: str, state: FrameState) -> Pass:
     common = {"LAST": state.options.window, "DECODE": int(state.options.light == "linear")}
     own = {"SHUTTERS": len(state.bars), "AGGREGATE": state.options.aggregate, "SHARED": 1}
@@ -548,8 +497,6 @@ def jobs(case: Case, passes, methods):
             **dict.fromkeys(COMBINED, ("compose",)),
             "follow": ("compose",) if case.state.options.light == "linear" else (),
         }
-        if isinstance(case, HostCase):
-            has |= {"ours": [p for p in PASSES if p not in ("diffuse_moved", "readback")], "paper": ()}
         if case.mattes is None and name in MATTES:
             continue
         if name in has[method] and (method != "average" or case.state.options.aggregate == 1):
@@ -593,7 +540,7 @@ def timed(case: Case, name: str, method: str) -> float:
 
 
 def run(args) -> list[dict]:
-    device, made_for = (Host(), HostCase) if args.device == "cpu" else (GLDevice(), Case)
+    device = GLDevice()
     has_matte = has_mattes() and "ours" in args.methods and not set(MATTES).isdisjoint(args.passes)
     with device.current(), tempfile.TemporaryDirectory() as folder:
         rows = []
@@ -607,7 +554,7 @@ def run(args) -> list[dict]:
                 state = FrameState(options, bars(kind, count, window), shapes(count))
                 follows = "follow" in args.methods and "compose" in args.passes
                 matte = files and MatteCase(files, (width, height))
-                case = made_for(device, source, state, kind, follows=follows, mattes=matte)
+                case = Case(device, source, state, kind, follows=follows, mattes=matte)
                 for row in measure(case, args):
                     error = "" if row["error"] is None else f"{row['error']:.3f}"
                     place = f"{width}×{height} N={count} L={window} {kind} {block}×"
@@ -643,7 +590,6 @@ def parse(arguments=None):
     add("--methods", type=listed(str, METHODS), default=",".join(METHODS))
     add("--passes", type=listed(str, PASSES), default=",".join(PASSES))
     add("--aggregates", type=listed(int, (1, 2, 4)), default="1,2")
-    add("--device", choices=("gpu", "cpu"), default="gpu")
     add("--light", choices=("linear", "encoded"), default="linear")
     add("--repeats", type=int, default=5)
     add("--patience", type=float, default=20.0, help="seconds after which a pass is not repeated")

@@ -51,24 +51,6 @@ def test_errors(ran):
             assert row["error"] <= 8, row
 
 
-def test_numpy(tmp_path):
-    file = tmp_path / "rows.json"
-    options = "--device cpu --sizes 45x27 --shutters 3 --windows 8 --repeats 1 --pixels 300"
-    subprocess.run(
-        [sys.executable, "-c", ALONE, "scripts/benchmark.py", "--json", str(file), *options.split()], cwd=ROOT
-    )
-    rows = json.loads(file.read_text())
-    assert {row["device"] for row in rows} == {"NumPy"}
-    assert {(row["pass"], row["method"]) for row in rows} == {
-        *((name, "ours") for name in ("compose", "accumulate", "diffuse", "frame")),
-        *((name, "layer") for name in ("compose", "accumulate", "frame")),
-        *((name, "average") for name in ("compose", "accumulate", "frame")),
-        ("diffuse", "edges"),
-        *(("compose", name) for name in ("follow", "lightest", "darkest", "median")),
-    }
-    assert all(row["error"] <= ALLOWED[row["method"]] for row in rows)
-
-
 def test_mattes(tmp_path):
     """Where they can be read; those above are left out."""
     file = tmp_path / "rows.json"
