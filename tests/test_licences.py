@@ -177,7 +177,7 @@ def test_every_requirement_of_every_wheel_is_met(wheels, system):
 
 
 def test_blender_brings_what_the_code_takes_from_it():
-    assert {"numpy", "requests"} <= blenders()
+    assert {"numpy", "cattrs", "attrs", "typing-extensions", "requests"} <= blenders()
     assert not {"colorama", "tqdm"} & blenders()
 
 

@@ -218,7 +218,7 @@ def test_the_wheels_are_what_the_code_needs_and_blender_lacks():
     """Of the requirements, all but what Blender brings."""
     project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
     needed = {requirement.split(">")[0].replace("-", "_") for requirement in project["dependencies"]}
-    assert needed - {"numpy", "OpenImageIO"} == WHEELS - {"glcontext"}  # moderngl's own requirement
+    assert needed - {"numpy", "OpenImageIO", "cattrs"} == WHEELS - {"glcontext"}  # moderngl's own requirement
 
 
 def without(packages, code):
@@ -241,6 +241,17 @@ for path in ({str(bunny)!r}, "none.mp4"):
     movie, none = without(["av"], code).splitlines()
     assert movie.startswith("bigbuckbunny.mp4: movies need the Python package PyAV")
     assert none.startswith("none.mp4: no such file")
+
+
+def test_a_recipe_without_cattrs_is_one_sentence():
+    code = """
+from shutter_addon.core.recipes import recipe_file
+try:
+    recipe_file.parse('{"version": 1, "window": 1, "shutters": [{"name": "S", "bars": [1]}]}')
+except recipe_file.RecipeError as error:
+    print(error)
+"""
+    assert "recipes need the Python package cattrs" in without(["cattrs"], code)
 
 
 def test_without_moderngl_there_is_no_opengl():

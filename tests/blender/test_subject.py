@@ -147,7 +147,7 @@ def test_not_this(bpy, edited):
     assert bpy.ops.shutter.draw() == {"FINISHED"}
     assert layers.active_note == effect.regions[0].layer
     bpy.ops.shutter.subject_scribble()
-    with pytest.raises(RuntimeError, match="The region is no subject"):
+    with pytest.raises(RuntimeError, match="The region is not a subject"):
         bpy.ops.shutter.draw(not_this=True)
 
 

@@ -271,7 +271,7 @@ def _region_selected(effect: PropertyGroup, _context: Context) -> None:
 class ShutterBar(PropertyGroup):
     weight: FloatProperty(
         name="Weight",
-        description="How much the bar's frame contributes",
+        description="Contribution of the bar's frame",
         default=1.0,
         min=0.0,
         max=MAX_BAR,

@@ -57,7 +57,7 @@ class _Carrying:
                 self.done += 1
 
 
-_wanted: dict[CarriedFile | SubjectFile, set[int]] = {}  # source frames that previews have missed since the last `begin`
+_wanted: dict[CarriedFile | SubjectFile, set[int]] = {}  # source frames that previews lack
 _failed: dict[CarriedFile | SubjectFile, str] = {}  # why mattes could not be made
 _running: list[_Carrying] = []  # one at most
 
@@ -87,7 +87,9 @@ def begin(arrived: Callable[[], None]) -> str | None:
     return next(iter(_failed.values()), None)
 
 
-def carry(file: CarriedFile | SubjectFile, frames: list[int], arrived: Callable[[], None], middle: int | None = None) -> None:
+def carry(
+    file: CarriedFile | SubjectFile, frames: list[int], arrived: Callable[[], None], middle: int | None = None
+) -> None:
     """Make the mattes of source frames, from a middle outwards, in place of those being made.
 
     `arrived` is as in `begin`.

@@ -7,10 +7,10 @@ import math
 import re
 from collections import Counter
 from collections.abc import Callable
-from dataclasses import MISSING, fields, is_dataclass
+from dataclasses import fields, is_dataclass
 from functools import cache, partial
 from pathlib import Path
-from typing import Any, Literal, NoReturn, get_args, get_origin, get_type_hints
+from typing import TYPE_CHECKING, Any, Literal, get_args, get_origin
 
 from .. import atomic_write
 from ..model import effect as model
@@ -21,9 +21,11 @@ from . import recipe_check, records
 from .recipe import RecipeError
 from .recipe_check import cut, shown
 
+if TYPE_CHECKING:
+    from cattrs import Converter
+
 # Longer numbers are read as floats, since parsing huge integers takes long. No count needs as many digits.
 _MAX_DIGITS = 300
-_PLAIN = {int: "a whole number", str: "a text", bool: "true or false"}
 
 
 def load(path: str | Path) -> model.Effect:
@@ -74,7 +76,11 @@ def parse(text: str) -> model.Effect:
         data.pop("inbetween_method", None)  # only one method is left
         if data.get("inbetween", 1) != 1:
             data.setdefault("skip_repeats", False)  # the behaviour of version 1
-    recipe = _reader(records.RecipeRecord)(data, "")
+    converter = _converter()
+    try:
+        recipe: Any = converter.structure(data, records.RecipeRecord)
+    except Exception as error:
+        raise RecipeError(_first_fault(error)) from None
     recipe_check.check(recipe)
     return records.effect_of(recipe)
 
@@ -135,112 +141,154 @@ def _whole(digits: str) -> int | float:
     return int(digits) if len(digits) <= _MAX_DIGITS else float(digits)
 
 
-# Checks a JSON value at a place in the recipe, and converts it to the type of a record's field.
-Reader = Callable[[Any, str], Any]
-
-
-@cache
-def _reader(kind: Any) -> Reader:
-    """Return the reader of a field's type."""
-    if isinstance(kind, type) and is_dataclass(kind):
-        return partial(_record, kind, _columns(kind))
-    if kind in (float, int, str, bool):
-        return _number if kind is float else partial(_exactly, kind)
-    inner = get_args(kind)
-    if get_origin(kind) is Literal:
-        return partial(_choice, inner)
-    if get_origin(kind) is list:
-        return partial(_list, _reader(inner[0]))
-    if get_origin(kind) is tuple:
-        return partial(_tuple, [_reader(each) for each in inner])
-    if kind == records.AnyRegionRecord:
-        return _region
-    if kind == records.Strokes:
-        return _strokes
-    read = _number_or_keys if float in inner else _reader(inner[0])
-    return read if type(None) not in inner else lambda value, place: None if value is None else read(value, place)
-
-
-def _refuse(place: str, fault: str) -> NoReturn:
-    raise RecipeError(f"{place or 'recipe'}: {fault}")
-
-
-def _exactly(kind: type, value: Any, place: str) -> Any:
-    if type(value) is not kind:
-        _refuse(place, f"{shown(value)} is not {_PLAIN[kind]}")
-    return value
-
-
-def _number(value: Any, place: str, otherwise: str = "") -> float:
+def _number(value: Any, _kind: Any) -> float:
     if isinstance(value, bool) or not isinstance(value, int | float):
-        _refuse(place, f"{shown(value)} is not a number{otherwise}")
+        raise ValueError(f"{shown(value)} is not a number")
     if not math.isfinite(value):
-        _refuse(place, f"{value} is not a finite number{otherwise}")
+        raise ValueError(f"{value} is not a finite number")
     return float(value)
 
 
-def _number_or_keys(value: Any, place: str) -> float | list[records.ValueKey]:
+def _number_or_keys(converter: Converter, value: Any, kind: Any) -> float | list[records.ValueKey] | None:
+    if value is None and kind != records.Keyable:
+        return None
     if isinstance(value, list):
-        return _reader(list[records.ValueKey])(value, place)
-    return _number(value, place, ", nor a list of keys")
+        return converter.structure(value, list[records.ValueKey])
+    try:
+        return _number(value, kind)
+    except ValueError as error:
+        raise ValueError(f"{error}, nor a list of keys") from None
 
 
-def _choice(allowed: tuple, value: Any, place: str) -> Any:
+def _strokes(converter: Converter, value: Any, _kind: Any) -> list:
+    """Structure strokes of the first frame, or of several frames."""
+    is_keyed = isinstance(value, list) and value and isinstance(value[0], dict)
+    return converter.structure(value, list[records.StrokesKey] if is_keyed else list[records.Stroke])
+
+
+def _exactly(wanted: type, name: str) -> Callable[[Any, Any], Any]:
+    def structure(value: Any, _kind: Any) -> Any:
+        if type(value) is not wanted:
+            raise ValueError(f"{shown(value)} is not {name}")
+        return value
+
+    return structure
+
+
+def _choice(value: Any, kind: Any) -> Any:
+    allowed = get_args(kind)
     if not any(type(value) is type(option) and value == option for option in allowed):
-        _refuse(place, f"{shown(value)} is none of {', '.join(map(str, allowed))}")
+        raise ValueError(f"{shown(value)} is none of {', '.join(map(str, allowed))}")
     return value
 
 
-def _list(read: Reader, value: Any, place: str) -> list:
+def _tuple(kind: Any, converter: Converter) -> Callable[[Any, Any], Any]:
+    inner = get_args(kind)
+
+    def structure(value: Any, _kind: Any) -> Any:
+        if not isinstance(value, list):
+            raise ValueError(f"{shown(value)} is not a list")
+        if len(value) != len(inner):
+            raise ValueError(f"{len(value)} values, not {len(inner)}")
+        return tuple(converter.structure(v, t) for v, t in zip(value, inner, strict=True))
+
+    return structure
+
+
+def _list(converter: Converter, value: Any, kind: Any) -> list:
+    (inner,) = get_args(kind)
     if not isinstance(value, list):
-        _refuse(place, f"{shown(value)} is not a list")
-    return [read(each, f"{place}[{index}]") for index, each in enumerate(value)]
+        raise ValueError(f"{shown(value)} is not a list")
+    structure, structured = converter.get_structure_hook(inner), []
+    try:
+        for each in value:
+            structured.append(structure(each, inner))
+    except Exception as error:  # stop at the first fault; cattrs would collect millions
+        from cattrs.errors import IterableValidationError, IterableValidationNote
+
+        index = len(structured)
+        error.add_note(IterableValidationNote(f"index {index}", index, inner))
+        raise IterableValidationError("in a list", [error], kind) from None
+    return structured
 
 
-def _tuple(readers: list[Reader], value: Any, place: str) -> tuple:
-    if not isinstance(value, list):
-        _refuse(place, f"{shown(value)} is not a list")
-    if len(value) != len(readers):
-        _refuse(place, f"{len(value)} values, not {len(readers)}")
-    return tuple(read(each, place) for read, each in zip(readers, value, strict=True))
+def _dataclass(kind: Any, converter: Converter) -> Callable[[Any, Any], Any]:
+    from cattrs.gen import make_dict_structure_fn
+
+    structure_fields = make_dict_structure_fn(kind, converter, _cattrs_forbid_extra_keys=True)
+
+    def structure(value: Any, kind: Any) -> Any:
+        if not isinstance(value, dict):
+            raise ValueError(f"{shown(value)} is not an object")
+        if isinstance(value, _Doubled):
+            raise ValueError(f"field {shown(value.field)} is given twice")
+        return structure_fields(value, kind)
+
+    return structure
 
 
-def _region(value: Any, place: str) -> Any:
-    """Read a region by its field `kind`."""
-    kind = value.get("kind", "line") if isinstance(value, dict) else "line"
-    if not isinstance(kind, str) or kind not in records.KINDS:
-        _refuse(f"{place}.kind", f"{shown(kind)} is none of {', '.join(records.KINDS)}")
-    return _reader(records.KINDS[kind])(value, place)
+def _one_region(converter: Converter, value: Any, _kind: Any) -> Any:
+    """Structure a region by its field `kind`."""
+    word = value.get("kind", "line") if isinstance(value, dict) else "line"
+    if isinstance(word, str) and word in records.KINDS:
+        return converter.structure(value, records.KINDS[word])
+    from cattrs.errors import AttributeValidationNote, ClassValidationError
+
+    error = ValueError(f"{shown(word)} is none of {', '.join(records.KINDS)}")
+    error.add_note(AttributeValidationNote("in a region", "kind", str))
+    raise ClassValidationError("in a region", [error], records.RegionRecord)
 
 
-def _strokes(value: Any, place: str) -> list:
-    """Read strokes of the first frame, or of several frames."""
-    is_keyed = isinstance(value, list) and value and isinstance(value[0], dict)
-    return _reader(list[records.StrokesKey] if is_keyed else list[records.Stroke])(value, place)
+def _made_of(origin: Any) -> Callable[[Any], bool]:
+    return lambda kind: get_origin(kind) is origin
 
 
-def _columns(kind: type) -> dict[str, tuple[Reader, bool]]:
-    """Return the readers of a record's fields, and whether a field is required."""
-    types = get_type_hints(kind)
-    return {
-        each.name: (_reader(types[each.name]), each.default is MISSING and each.default_factory is MISSING)
-        for each in fields(kind)
-    }
+@cache
+def _converter() -> Converter:
+    """Return the converter.
+
+    Raises:
+        RecipeError: cattrs is missing. Blender brings it, but a Linux distribution's Blender may not. Effects render
+            without it.
+    """
+    try:
+        import cattrs
+    except ImportError as error:
+        raise RecipeError(
+            f"recipes need the Python package cattrs ({error}); install it for Blender's Python"
+        ) from None
+    converter = cattrs.Converter()
+    converter.register_structure_hook(float, _number)
+    converter.register_structure_hook(int, _exactly(int, "a whole number"))
+    converter.register_structure_hook(str, _exactly(str, "a text"))
+    converter.register_structure_hook(bool, _exactly(bool, "true or false"))
+    converter.register_structure_hook_func(_made_of(Literal), _choice)
+    converter.register_structure_hook_func(
+        lambda kind: kind in (records.Keyable, records.Keyable | None), partial(_number_or_keys, converter)
+    )
+    converter.register_structure_hook_func(lambda kind: kind == records.Strokes, partial(_strokes, converter))
+    converter.register_structure_hook_func(
+        lambda kind: kind == records.AnyRegionRecord, partial(_one_region, converter)
+    )
+    converter.register_structure_hook_factory(_made_of(tuple), _tuple)
+    converter.register_structure_hook_func(_made_of(list), partial(_list, converter))
+    converter.register_structure_hook_factory(is_dataclass, _dataclass)
+    return converter
 
 
-def _record(kind: type, columns: dict[str, tuple[Reader, bool]], value: Any, place: str) -> Any:
-    if not isinstance(value, dict):
-        _refuse(place, f"{shown(value)} is not an object")
-    if isinstance(value, _Doubled):
-        _refuse(place, f"field {shown(value.field)} is given twice")
-    said = {}
-    for name, (read, is_required) in columns.items():
-        where = f"{place}.{name}" if place else name
-        if name in value:
-            said[name] = read(value[name], where)
-        elif is_required:
-            _refuse(where, "missing")
-    if unknown := sorted(value.keys() - columns.keys()):
-        more = f" and {len(unknown) - 3} more" if len(unknown) > 3 else ""
-        _refuse(place, f"unknown field {', '.join(map(cut, unknown[:3]))}{more}")
-    return kind(**said)
+def _first_fault(error: Exception) -> str:
+    """Return the first fault as `place: what is wrong`."""
+    import cattrs
+    from cattrs.errors import ForbiddenExtraKeysError
+
+    def described(error: BaseException, kind: Any) -> str:
+        if isinstance(error, KeyError):
+            return "missing"
+        if isinstance(error, ForbiddenExtraKeysError):
+            names = sorted(error.extra_fields)
+            more = f" and {len(names) - 3} more" if len(names) > 3 else ""
+            return f"unknown field {', '.join(map(cut, names[:3]))}{more}"
+        return str(error)
+
+    message, _, place = cattrs.transform_error(error, "$", described)[0].rpartition(" @ $")
+    return f"{place.lstrip('.') or 'recipe'}: {message}"
