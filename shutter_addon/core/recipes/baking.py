@@ -279,7 +279,7 @@ def _subject(region: SubjectRegion, said: dict[str, Any], shown: range) -> Subje
     for name, drawn in marks.items():
         kept = {number: strokes for number, strokes in drawn.items() if strokes}
         frames = tuple(_frame(number, shown) for number in kept)
-        eases: tuple[Ease, ...] = ("linear",) * len(kept)
+        eases: tuple[Ease, ...] = tuple("linear" for _ in kept)
         said[name] = Drawings(region.name, frames, tuple(kept.values()), eases, 1.0)
     return replace(region, moves=_moves(region, words, shown), **said)
 

@@ -292,7 +292,7 @@ def _marks(name: str, drawn: list[tuple[float, list[Stroke]]]) -> model.Drawings
     """Drawings that stay for themselves: nothing goes from one to the next."""
     frames = tuple(frame for frame, _strokes in drawn)
     arrays = tuple([np.asarray(stroke, float) for stroke in strokes] for _frame, strokes in drawn)
-    eases: tuple[Ease, ...] = ("linear",) * len(drawn)
+    eases: tuple[Ease, ...] = tuple("linear" for _ in drawn)
     return model.Drawings(name=name, frames=frames, strokes=arrays, eases=eases, aspect=1.0)
 
 
