@@ -85,11 +85,7 @@ def _render(folder: Path, turned) -> Path:
         _car(scenes, lane, height, start)
     eye = scenes.bpy.context.scene.camera
     tilt, roll, pan = eye.rotation_euler
-    scenes.animate(
-        eye,
-        COUNT,
-        rotation_euler=lambda frame: tuple(np.add((tilt, roll, pan), turned(frame))),
-    )
+    scenes.animate(eye, COUNT, rotation_euler=lambda frame: tuple(np.add((tilt, roll, pan), turned(frame))))
     return scenes.render_frames(folder, COUNT, "OPEN_EXR")
 
 

@@ -224,8 +224,7 @@ def still(shots):
             Panel(shot.everywhere(FRAME, "Panning"), f"{count}, as a still camera exposes them"),
         ),
         stills.row(
-            Panel(shot.result(FRAME), f"{count} that follow the stroke"),
-            Panel(panned, "The truth: a camera that pans"),
+            Panel(shot.result(FRAME), f"{count} that follow the stroke"), Panel(panned, "The truth: a camera that pans")
         ),
     )
 

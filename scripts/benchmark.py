@@ -1,24 +1,19 @@
-"""How long every pass takes beside the paper's method and a plain average, measured in one run, interleaved.
+"""Measure how long each pass takes, beside the paper's method and a plain average, in turns in one run.
 
-    python scripts/benchmark.py --json FILE [--sizes 1920x1080,3840x2160] [--shutters 2,3,4] … [--table]
+    python scripts/benchmark.py --json FILE [--sizes 1920x1080,3840x2160] [--shutters 2,3,4] …
 
-Needs Python 3.11, NumPy and moderngl alone, mattes PyAV and OpenImageIO as well, or they are left out; --device cpu
-measures what NumPy composes, beside the average. Passes:
+Needs Python 3.11, NumPy and moderngl; mattes need PyAV and OpenImageIO, or are left out.
+Passes:
 compose: a picture from a window on the device; accumulate: the next frame into the window (average: its upload alone);
 diffuse: coefficients from new labels; diffuse_moved: the same, from the solution for scribbles a few pixels away;
 readback: the picture to the host; frame: accumulate, compose and readback;
-matte: the next frame of a matte, an H.264 movie, from the file to the coefficients that the solver's become with it;
-matte_images: the same of an image sequence, PNG; matte_read, matte_images_read: what of these makes the values,
-matte_blend: and what lays them once they are on the device, so that the rest is their upload;
-copy: a gigabyte moved from one buffer of the device to another, read and written counting as half of it each.
+matte, matte_images: the next frame of a matte, an H.264 movie or PNG files, from the file to the coefficients;
+matte_read, matte_images_read: the part that makes the values; matte_blend: the part that lays them.
 Methods: ours; paper: its Appendix A with search bounds (scripts/benchmark/appendix_a.glsl); average: the plain mean of
-the window's frames in the same light; edges: coefficients that follow a guide's edges; follow: ours, where the last
-shutter follows a subject that moves, turns and grows; layer: ours with a layer, a soft disc that moves, of the second
-shutter; lightest, darkest, median: of the frames of all shutters. Times are medians in milliseconds.
-Frames are random noise. Errors are the largest over random pixels of the picture (--pixels) in 8-bit levels against
-the float64 reference; those of diffusion over all coefficients, times 255, against twelve cycles with cells
-everywhere on all grids; those along edges against eight more cycles; those of coefficients with a matte, times 255,
-against its formula in float64.
+the frames in the same light; edges: coefficients that follow edges; follow: the last shutter follows a subject that
+moves, turns and grows; layer: with a layer, a soft disc that moves; lightest, darkest, median: of all shutters.
+Times are medians in milliseconds. Frames are noise. Errors are the largest over random pixels in 8-bit levels against
+the float64 reference; those of diffusion are times 255, against more cycles; those of mattes against their formula.
 """
 
 from __future__ import annotations
@@ -31,7 +26,6 @@ import statistics
 import sys
 import tempfile
 import time
-from contextlib import nullcontext
 from dataclasses import dataclass, replace
 from functools import cache, cached_property
 from pathlib import Path
@@ -44,15 +38,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests"))
 
 import exact_layers
 
-from shutter_addon.compute import (
-    composition_passes,
-    cpu,
-    diffusion,
-    diffusion_gpu,
-    edge_diffusion_gpu,
-    guide,
-)
-from shutter_addon.compute.composition_passes import table as table_of
+from shutter_addon.compute import diffusion_gpu, edge_diffusion_gpu, guide
 from shutter_addon.compute.gpu import GPUCompositor
 from shutter_addon.compute.layer_frames import WeightedFrames
 from shutter_addon.compute.request import Behind, Coefficients, Exposure, Request
@@ -71,7 +57,6 @@ METHODS = ("ours", "layer", "paper", "average", "edges", "follow", *COMBINED)
 MATTES = ("matte", "matte_images", "matte_read", "matte_images_read", "matte_blend")
 PASSES = ("compose", "accumulate", "diffuse", "diffuse_moved", "readback", "frame", *MATTES)
 MATTE_FRAMES = 24
-COPIED = 1 << 28  # bytes, beyond any cache
 # Bars that are constant over spans, and bars that change from frame to frame.
 BARS = {
     "preset": ("ANGLE_360", "STILL", "TWO_CUTS", "ANGLE_180", "LAST", "CUTS", "ANGLE_90", "ANGLE_45"),
@@ -282,12 +267,11 @@ class MatteCase:
 class Case:
     """One configuration on the device. `index`: the source frame that is composed; what slides the window moves it."""
 
-    device: Device
+    device: GLDevice
     source: Noise
     state: FrameState
     kind: str
     index: int = 0
-    shared: bool = True
     follows: bool = True
     mattes: MatteCase | None = None
 
@@ -335,7 +319,7 @@ class Case:
             self.drawn = self._drawn(method)
             return
         self.drawn, block = self.window.picture(), self.state.options.aggregate if method == "paper" else 1
-        program = _appendix_a(self.state, self.shared) if method == "paper" else _average(self.state)
+        program = _program("appendix_a" if method == "paper" else "average", self.state)
         for part, frames in self.frames.stored():
             extent = (-(-self.source.width // block), -(-part.height // block))
             textures = {"frames": frames, "coefficients": self.handle, "sums": self.sums}
@@ -407,23 +391,6 @@ class Case:
         """Lays what was read last, whose values are on the device then."""
         self.layers = self.layers or self.mattes.read("matte", self.state.options.aggregate)
         self.laid = self.matting.blend(self.handle, *self.layers)
-
-    def must_move(self, name: str, method: str) -> int | None:
-        """Bytes that a pass must move: all it has to read or write, once each. None: what counts is computing."""
-        options, pixels = self.state.options, self.source.width * self.source.height
-        if name == "accumulate":
-            return pixels * (8 if isinstance(self.window, Frames) or method == "average" else 28)
-        if name == "compose" and method == "average":
-            return pixels * (4 * options.window + 16)
-        if name != "compose" or method != "ours":
-            return None
-        values, span = table_of(self.state), shutters.open_span(self.state.bars)
-        rows, open_frames = len(values) - 1, np.ptp(span)
-        way = composition_passes.way_of(self.window, self.state, values, False)
-        read = {"sums": 32 * rows, "pieces": 4 * open_frames}.get(way, 8 * (open_frames + 1))
-        if isinstance(self.window, Frames):
-            read = 4 * open_frames
-        return int(pixels * (read + 16 + 16 * -(-len(self.state.bars) // 4) / options.aggregate**2))
 
     def error(self, name: str, method: str, pixels: int) -> float | None:
         """The largest error of what a pass just made."""
@@ -512,97 +479,10 @@ class Case:
             self.compositor.release()
 
 
-class Device(GLDevice):
-    """A device that copies as well."""
-
-    def copier(self, data: bytes):
-        """What copies `data` on the device, and what reads the copy."""
-        source, target = self._context.buffer(data), self._context.buffer(reserve=len(data))
-        return lambda: self._context.copy_buffer(target, source), target.read
-
-
-class Host:
-    """NumPy in place of a device."""
-
-    name = "NumPy"
-    current = staticmethod(nullcontext)
-
-    def finish(self) -> None:
-        pass
-
-    def copier(self, data: bytes):
-        source, target = np.frombuffer(data, np.uint8), np.empty(len(data), np.uint8)
-        return lambda: np.copyto(target, source), lambda: target
-
-
-class HostCase(Case):
-    """The same with NumPy."""
-
-    def _open(self, window: int) -> None:
-        self.compositor = cpu.CPUCompositor()
-        self.window = self.compositor.window(self.source, window)
-        self.whole = self.frames = cpu.HostWindow(self.source)
-
-    def compose(self, method: str) -> None:
-        if method in ("ours", "follow", "layer", *COMBINED):
-            self.drawn = self._drawn(method)
-            return
-        encoded = self.state.options.light == "encoded"
-        values = np.arange(256, dtype=np.float32) / np.float32(255)
-        curve = values if encoded else light.to_linear(values)
-        total = np.zeros((self.source.height, self.source.width, 3), dtype=np.float32)
-        for frame in self.frames.frames.values():
-            total += curve.take(frame[..., :3])
-        total /= len(self._wanted)
-        self.drawn = light.to_linear(total) if encoded else total
-
-    def readback(self, method: str) -> np.ndarray:
-        return self.drawn
-
-    def must_move(self, name: str, method: str) -> None:
-        return None
-
-    def _diffusion_error(self) -> float:
-        with mock.patch.multiple(diffusion, ITERATIONS=30, ENOUGH=0):
-            expected = self.solver.solve(self.labels, len(self.state.bars))
-        return float(np.abs(self.handle - expected).max() * 255)
-
-    def release(self) -> None:
-        self.window.release()
-        self.frames.release()
-
-
-def copied(device) -> dict:
-    """The row of the copy."""
-    data = np.random.default_rng(0).bytes(COPIED)
-    copy, result = device.copier(data)
-    times = []
-    for _ in range(7):
-        device.finish()
-        start = time.perf_counter()
-        copy()
-        device.finish()
-        times.append(time.perf_counter() - start)
-    error = float(bytes(result()) != data)
-    nothing = dict.fromkeys(("width", "height", "shutters", "window", "aggregate"), 0)
-    ms = statistics.median(times[1:]) * 1e9 / (2 * COPIED) * 1000
-    return {"pass": "copy", "method": "ours", "bars": "", **nothing, "device": device.name, "ms": ms, "error": error}
-
-
-def _program(name: str, state: FrameState, **defines: int) -> Pass:
-    return read_pass(
-        str(HERE / name), LAST=state.options.window, DECODE=int(state.options.light == "linear"), **defines
-    )
-
-
-def _appendix_a(state: FrameState, shared: bool) -> Pass:
-    return _program(
-        "appendix_a", state, SHUTTERS=len(state.bars), AGGREGATE=state.options.aggregate, SHARED=int(shared)
-    )
-
-
-def _average(state: FrameState) -> Pass:
-    return _program("average", state)
+def _program(name: str, state: FrameState) -> Pass:
+    common = {"LAST": state.options.window, "DECODE": int(state.options.light == "linear")}
+    own = {"SHUTTERS": len(state.bars), "AGGREGATE": state.options.aggregate, "SHARED": 1}
+    return read_pass(str(HERE / name), **common | (own if name == "appendix_a" else {}))
 
 
 def jobs(case: Case, passes, methods):
@@ -617,16 +497,14 @@ def jobs(case: Case, passes, methods):
             **dict.fromkeys(COMBINED, ("compose",)),
             "follow": ("compose",) if case.state.options.light == "linear" else (),
         }
-        if isinstance(case, HostCase):
-            has |= {"ours": [p for p in PASSES if p not in ("diffuse_moved", "readback")], "paper": ()}
         if case.mattes is None and name in MATTES:
             continue
         if name in has[method] and (method != "average" or case.state.options.aggregate == 1):
             yield name, method
 
 
-def measure(case: Case, args) -> list[tuple[dict, int | None]]:
-    """The rows of a case, each with the bytes that must move. What took `patience` seconds is not repeated."""
+def measure(case: Case, args) -> list[dict]:
+    """Return the rows of a case. What took `patience` seconds is not repeated."""
     todo, errors, times = list(jobs(case, args.passes, args.methods)), {}, {}
     for name, method in todo:
         first = timed(case, name, method)
@@ -646,11 +524,10 @@ def measure(case: Case, args) -> list[tuple[dict, int | None]]:
         "aggregate": options.aggregate,
         "device": case.device.name,
     }
-    made = [
+    return [
         {"pass": name, "method": method, **common, "ms": statistics.median(times[name, method]) * 1000, "error": error}
         for (name, method), error in errors.items()
     ]
-    return [(row, case.must_move(row["pass"], row["method"])) for row in made]
 
 
 def timed(case: Case, name: str, method: str) -> float:
@@ -663,11 +540,10 @@ def timed(case: Case, name: str, method: str) -> float:
 
 
 def run(args) -> list[dict]:
-    device, made_for = (Host(), HostCase) if args.device == "cpu" else (Device(), Case)
+    device = GLDevice()
     has_matte = has_mattes() and "ours" in args.methods and not set(MATTES).isdisjoint(args.passes)
     with device.current(), tempfile.TemporaryDirectory() as folder:
-        rows = [copied(device)]
-        print(f"copy: {1e3 / rows[0]['ms']:.1f} GB/s", flush=True)
+        rows = []
         for width, height in args.sizes:
             source = Noise(width, height)
             files = write_mattes(Path(folder), width, height) if has_matte else None
@@ -678,45 +554,16 @@ def run(args) -> list[dict]:
                 state = FrameState(options, bars(kind, count, window), shapes(count))
                 follows = "follow" in args.methods and "compose" in args.passes
                 matte = files and MatteCase(files, (width, height))
-                shared = args.sums == "shared"
-                case = made_for(device, source, state, kind, shared=shared, follows=follows, mattes=matte)
-                made = measure(case, args)
+                case = Case(device, source, state, kind, follows=follows, mattes=matte)
+                for row in measure(case, args):
+                    error = "" if row["error"] is None else f"{row['error']:.3f}"
+                    place = f"{width}×{height} N={count} L={window} {kind} {block}×"
+                    print(f"{place:34s} {row['pass']:17s} {row['method']:8s} {row['ms']:10.2f} ms {error}", flush=True)
+                    rows.append(row)
                 case.release()
                 if matte:
                     matte.close()
-                for row, moved in made:
-                    print(_line(row, moved and moved / 1e9 * rows[0]["ms"]), flush=True)
-                rows += [row for row, _ in made]
     return rows
-
-
-def _line(row: dict, floor: float | None) -> str:
-    """floor: milliseconds that a copy of what must move would take."""
-    share = "" if floor is None else f"  floor {100 * floor / row['ms']:.0f} %"
-    error = "" if row["error"] is None else f"  error {row['error']:.3f}"
-    place = f"{row['width']}×{row['height']} N={row['shutters']} L={row['window']} {row['bars']} {row['aggregate']}×"
-    return f"{place:34s} {row['pass']:13s} {row['method']:8s} {row['ms']:10.2f} ms{error}{share}"
-
-
-def table(rows: list[dict]) -> str:
-    """The paper's Table 1: a column group per method and aggregation, N down and T (the window) across."""
-    lines = []
-    for width, height, kind in dict.fromkeys((r["width"], r["height"], r["bars"]) for r in rows if r["width"]):
-        mine = [r for r in rows if (r["width"], r["height"], r["bars"]) == (width, height, kind)]
-        columns = dict.fromkeys((r["method"], r["aggregate"]) for r in mine if r["pass"] == "compose")
-        windows = sorted({r["window"] for r in mine})
-        lines += [f"\n{width}×{height}, {kind} bars, {mine[0]['device']}; milliseconds"]
-        for name in ("diffuse", "diffuse_moved", "accumulate", "readback"):
-            times = [r["ms"] for r in mine if r["pass"] == name and r["method"] == "ours" and r["aggregate"] == 1]
-            lines += [f"{name}: {statistics.median(times):.2f}"] if times else []
-        heads = [f"{method} {a}×{a}" if a > 1 else method for method, a in columns]
-        lines.append("| N\\T |" + "|".join(f" {head} T={w} " for head in heads for w in windows) + "|")
-        lines.append("|---" * (1 + len(heads) * len(windows)) + "|")
-        found = {(r["method"], r["aggregate"], r["shutters"], r["window"]): r for r in mine if r["pass"] == "compose"}
-        for count in sorted({r["shutters"] for r in mine}):
-            cells = [f"{found[(*c, count, w)]['ms']:.2f}" for c in columns for w in windows]
-            lines.append(f"| {count} | " + " | ".join(cells) + " |")
-    return "\n".join(lines)
 
 
 def parse(arguments=None):
@@ -743,13 +590,10 @@ def parse(arguments=None):
     add("--methods", type=listed(str, METHODS), default=",".join(METHODS))
     add("--passes", type=listed(str, PASSES), default=",".join(PASSES))
     add("--aggregates", type=listed(int, (1, 2, 4)), default="1,2")
-    add("--device", choices=("gpu", "cpu"), default="gpu")
     add("--light", choices=("linear", "encoded"), default="linear")
-    add("--sums", choices=("shared", "texture"), default="shared", help="where Appendix A has its S")
     add("--repeats", type=int, default=5)
     add("--patience", type=float, default=20.0, help="seconds after which a pass is not repeated")
     add("--pixels", type=int, default=2048, help="how many are compared with the reference")
-    add("--table", action="store_true", help="print the paper's Table 1 of what was measured")
     return parser.parse_args(arguments)
 
 
@@ -758,8 +602,6 @@ def main(arguments=None) -> None:
     rows = run(args)
     if args.json:
         args.json.write_text(json.dumps(rows, indent=1) + "\n", encoding="utf-8")
-    if args.table:
-        print(table(rows))
 
 
 if __name__ == "__main__":

@@ -1,12 +1,10 @@
-"""How well outlines are carried: of footage with masks of all frames, what is carried from outlines of some of them,
-and what flow alone makes of these, beside the masks of the others.
+"""Measure how well outlines are carried, beside flow alone, on footage with masks of all frames.
 
 python scripts/carried_mattes.py [FIRST_FRAME FIRST_MASK]
 
-FIRST_FRAME: the first image of a sequence; FIRST_MASK: likewise, its subject white. Without them, the scenes of
-outline_scenes.py, whose true alpha is known. It prints the mean intersection over union of the drawings themselves, and
-by how many frames these are apart, of the frames between; how many levels of 255 a matte is off, within BAND pixels of
-the subject's edge; and the seconds that a frame takes. Outlines have POINTS points for each part of the subject.
+FIRST_FRAME and FIRST_MASK are the first images of sequences; the subject is white. Without them, the scenes are those
+of outline_scenes.py. Outlines have POINTS points for each part of the subject. It prints the mean intersection over
+union of the frames between drawings, how many levels of 255 a matte is off near the edge, and seconds a frame.
 """
 
 import sys

@@ -10,6 +10,7 @@ import json
 import re
 import subprocess
 import sys
+import tempfile
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -120,16 +121,20 @@ def parser_of(about: str, name: str, size: tuple[int, int], samples: int) -> arg
     return parser
 
 
-def make_folders(args: argparse.Namespace, parser: argparse.ArgumentParser) -> None:
-    """Make the folders that are written to, before anything is measured."""
+def measured(name: str, parser: argparse.ArgumentParser, args: argparse.Namespace, head: str, measure) -> np.ndarray:
+    """Print a table of what is measured, and write rows and pictures to where the options of `parser_of` say.
+
+    Args:
+        measure: is given the options and a folder; returns the rows and a sheet of pictures.
+    """
     try:
         for folder in (args.output, *([args.json.parent] if args.json else [])):
             folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         parser.error(f"{error.filename}: {error.strerror}")
-
-
-def saved(args: argparse.Namespace, name: str, rows: list[dict], sheet: np.ndarray) -> None:
-    """Write the sheet of pictures and the rows to where the options of `parser_of` say."""
+    print(head, flush=True)
+    with tempfile.TemporaryDirectory() as folder:
+        rows, sheet = measure(args, Path(folder))
     stills.save(sheet, args.output / f"{name}.png")
     write_rows(args.json, rows)
+    return sheet

@@ -1,13 +1,10 @@
-"""How quiet coefficients are that follow edges (Follow Edges at 1): by how much they change from a frame to the next
-where the footage stands still.
-
-One stroke per film lies still, and the border is the other shutter. A pixel stands still where the footage around it,
-15 × 15 pixels, changes by no more than a level on average, of 255: codecs leave as much of noise. Changes of
-coefficients are in 255ths. `steadied` is as it renders, with the frames beside the shown one; `alone` is without these.
+"""Measure how much coefficients along edges change between frames where the footage stands still.
 
     .venv/bin/python scripts/edge_flicker.py [--films …] [--frames 24] [--noise 0,8] [--aggregate 2] [--json OUT]
 
---noise: levels of noise, of every sample and frame anew, that are added to the footage after it was judged.
+One stroke per film lies still, and the border is the other shutter. A pixel stands still where 15 × 15 pixels around it
+change by no more than a level of 255 on average. Changes are in 255ths. "steadied" is as it renders, with the frames
+beside the shown one; "alone" is without them. --noise adds noise after the footage was judged.
 """
 
 import argparse

@@ -1,19 +1,14 @@
-"""How close exposures that follow come to what a camera takes that moves, or stands still, so itself.
+"""Compare exposures that follow with a camera that moves, or stands still, so itself.
 
     python scripts/following_truth.py [panning] [handheld] [--output DIR] [--json FILE]
 
-panning: the scene is gallery/panning.py's, rendered by Blender, once: the footage of a still camera, and one picture
-    that Cycles itself exposes for as long, through a camera that pans with the scooter and stands at the shown frame as
-    the still one does. A stroke is drawn on the scooter at that frame, and tracked by `shutter track`. SSIM is the mean
-    over the pixels that the scooter and its rider cover; detail is the mean gradient over these, as a share of the
-    still frame's.
-handheld: the scene is gallery/handheld.py's: the footage of a camera that shakes, and the same frames through one that
-    stands as the first does in the middle of the shown frame. The truth is the mean of these in linear light. The
-    camera is tracked by `shutter track --camera`. SSIM is over the pixels that every frame has seen, by the tracked
-    motion; at the picture's borders the frames that do not reach there go on as their last pixels.
+panning: gallery/panning.py's scene by a still camera, and one picture that Cycles exposes as long through a camera that
+    pans with the scooter. A stroke on the scooter is tracked by `shutter track`. SSIM is over the pixels of scooter and
+    rider; detail is the mean gradient over these, as a share of the still frame's.
+handheld: gallery/handheld.py's scene by a camera that shakes, and by one that stands; the truth is the mean of the
+    latter in linear light. SSIM is over the pixels that every frame has seen.
 
-The exposures are made by `shutter render`. Pictures are compared as 8-bit sRGB by their SSIM (Wang et al. 2004), over
-the whole picture as well. Needs Blender as a library (bpy).
+Needs Blender as a library (bpy).
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
-"""Tries hostile recipes, media and .blend data, each in a process of its own, and keeps what fails.
+"""Tries hostile recipes and media, each in a process of its own, and keeps what fails.
 
-python scripts/fuzz.py [--minutes M | --inputs N] [--seed S] [--kinds recipes,media,blends] [--output DIR]
+python scripts/fuzz.py [--minutes M | --inputs N] [--seed S] [--kinds recipes,media] [--output DIR]
 python scripts/fuzz.py --repeat DIR
 
 A failure is: an exception other than the sentences that are meant for users, a traceback, a signal, another exit code
@@ -21,7 +21,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parent))
 
 from fuzzing import ROOT, trial
 
-KINDS = {kind: f"fuzzing.{kind}" for kind in ("recipes", "media", "blends")}
+KINDS = {kind: f"fuzzing.{kind}" for kind in ("recipes", "media")}
 
 
 def main(argv=None) -> int:

@@ -1,15 +1,12 @@
-"""How close moments between frames come to frames that were left out, beside other ways, measured in one run.
+"""Compare moments between frames with frames that were left out, beside other ways.
 
     python scripts/inbetween_quality.py [--films A.mp4,B.avi] [--frames 121] [--scenes A,B] [--size 480x270]
-                                        [--parts films,scenes] [--table FILE] [--json FILE] [--docs]
+                                        [--parts films,scenes] [--json FILE] [--docs]
 
-films: every second frame is dropped and rebuilt. PSNR and SSIM are of 8-bit pictures.
-scenes: of footage of the gallery, rendered at 240 fps, every eighth frame is kept, the others are rebuilt; and a box
-    shutter over four of the kept frames is compared with the same over all 32.
-
+films: every second frame is dropped and rebuilt. scenes: of gallery footage at 240 fps, every eighth frame is kept; and
+    a box shutter over four kept frames is compared with the same over all 32.
 Ways: "flow" is shutter_addon.media.flow's, "blend" mixes both neighbours in linear light, "repeat" shows the earlier
-one, "minterpolate" is `ffmpeg -vf minterpolate=mi_mode=mci`, taken from PATH. Its frames are matched by those that it
-was given and returns. Footage that is not there yet is rendered, which needs Blender as a library (bpy).
+one, "minterpolate" is `ffmpeg -vf minterpolate=mi_mode=mci` from PATH. Rendering needs Blender as a library (bpy).
 """
 
 from __future__ import annotations
@@ -100,13 +97,9 @@ def compare(name, truth, factor) -> tuple[list[dict], dict]:
         noise, alike = [psnr(*pair) for pair in pairs], [similarity(*pair) for pair in pairs]
         row |= {"frames": len(pairs), "psnr": float(np.mean(noise)), "worst psnr": min(noise)}
         row |= {"ssim": float(np.mean(alike)), "worst ssim": min(alike)}
-        print(line(row), flush=True)
+        numbers = "{psnr:.2f} | {worst psnr:.2f} | {ssim:.4f} | {worst ssim:.4f} | {seconds:.2f}".format(**row)
+        print(f"| {row['footage']} | {row['way']} | {numbers} |", flush=True)
     return rows, rebuilt
-
-
-def line(row) -> str:
-    numbers = "{psnr:.2f} | {worst psnr:.2f} | {ssim:.4f} | {worst ssim:.4f} | {seconds:.2f}".format(**row)
-    return f"| {row['footage']} | {row['way']} | {numbers} |"
 
 
 def films(args) -> list[dict]:
@@ -183,7 +176,6 @@ def parse(arguments=None):
     add("--start", type=int, default=1, help="first frame at 30 fps (%(default)s)")
     add("--docs", action="store_true", help="renew the manual's picture, docs/smooth.jpg, and measure nothing")
     add("--json", type=Path, help="where the rows are written")
-    add("--table", type=Path, help="where the films' and scenes' table is written, as Markdown")
     return parser.parse_args(arguments)
 
 
@@ -198,9 +190,6 @@ def main(arguments=None) -> int:
         print(f"inbetween_quality: {error}", file=sys.stderr)
         return 2
     write_rows(args.json, rows)
-    if args.table:
-        head = "| footage | way | PSNR | worst | SSIM | worst | s/frame |\n|---|---|---|---|---|---|---|\n"
-        args.table.write_text(head + "".join(line(row) + "\n" for row in rows if "way" in row), encoding="utf-8")
     return 0
 
 

@@ -1,15 +1,12 @@
-"""How close pictures with layers come to the truth, beside pictures without the switch.
+"""Compare pictures with layers, and without, with the truth.
 
     python scripts/layer_truth.py [--output DIR] [--json FILE] [--size 320x180] [--samples 32]
 
-Blender renders a subject and what lies behind it apart, once: of these the footage is made, the subject over what lies
-behind, as 8-bit sRGB; and the truth, each exposed apart by its own shutter and laid over one another in linear light.
-The subject's matte is its alpha (16 bits), what Cryptomatte says of both rendered together, or comes from one stroke
-through it that moves as it does, along edges. Of two subjects that cross, a matte is what the nearer one leaves. The
-last scene is the moving one of one_stroke.py, and its stroke is tracked by the command.
-What is compared are 8-bit sRGB codes (PSNR, in decibels): in the ring, which is where the subject is in any exposed
-frame and eight pixels around that; and of what was not exposed, but is seen in a frame within reach. Elsewhere,
-pictures have to have the bits that they have without the switch. Needs Blender as a library (bpy).
+Blender renders a subject and its background apart. The footage is one over the other, as 8-bit sRGB; the truth is each
+exposed by its own shutter, and laid over one another in linear light. The subject's matte is its alpha (16 bits), what
+Cryptomatte says, or comes from one stroke that moves as it does. The last scene is one_stroke.py's moving one, tracked.
+PSNR is measured in the ring, where the subject is in any exposed frame and eight pixels around; "not exposed" is what
+only a frame within reach shows. Elsewhere, all bits equal those without the layer. Needs Blender as a library (bpy).
 """
 
 from __future__ import annotations

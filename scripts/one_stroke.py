@@ -1,16 +1,12 @@
-"""How well a single stroke, tracked and with Follow Edges, keeps to a subject whose true mask and motion are known.
+"""Measure how well one stroke, tracked and with Follow Edges, keeps to a subject whose mask and motion are known.
 
     python scripts/one_stroke.py [--output DIR] [--json FILE] [--docs] [SCENE ...]
 
-The scenes are rendered by Blender (one_stroke_scenes.py), 40 frames of 640×360 each, once. A stroke is drawn inside the
-subject at one frame, and `shutter track` follows it both ways, with the window's defaults: border, Follow Edges 1.
+Blender renders the scenes of one_stroke_scenes.py. `shutter track` follows a stroke inside the subject both ways.
 
-Masks: intersection over union of "coefficient > 0.5" with the true mask, the mean over all frames and the worst, and
-the mean coefficient inside the true mask; beside the same without edges, and without tracking, and beside OpenCV's
-GrabCut, which gets the same tracked stroke as its foreground and the frame's edge as its background.
-
-Motion: how far the stroke's ends lie from where they belong, in pixels of 640, where the subject is seen altogether,
-and at any other frame of a confidence above 0.5. With every key, as tracked, and with keys thinned, as written.
+Masks: intersection over union of "coefficient > 0.5" and the true mask, and the mean coefficient inside that; the same
+without edges, without tracking, and of OpenCV's GrabCut, which gets the tracked stroke and the frame's edge.
+Motion: how far the stroke's ends lie from where they belong, in pixels of 640, with every key and with thinned keys.
 
 DIR gets a picture for each scene of masks. Needs Blender as a library (bpy).
 """

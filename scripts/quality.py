@@ -1,10 +1,8 @@
-"""How close pictures come whose blocks of pixels share a shutter to those whose pixels each have their own.
+"""Compare pictures whose blocks of pixels share a shutter with pictures at full resolution.
 
     python scripts/quality.py [FILM …] [--aggregate 2] [--bars preset,random] [--windows 16] [--frames 12] [--json FILE]
 
-The measure is the structural similarity (Wang et al. 2004, Gaussian weights) of the 8-bit pictures, the mean over
-their colours: 1 for equal ones. Scribbles and shutters are those of scripts/benchmark.py, on frames spread over the
-film. Composes on a GPU where there is one. Needs no Blender.
+Scribbles and shutters are those of scripts/benchmark.py. Composes on a GPU where there is one. Needs no Blender.
 """
 
 from __future__ import annotations

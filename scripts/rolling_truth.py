@@ -1,27 +1,20 @@
-"""How close *Rolling Shutter Repair* comes to a camera that reads all rows at once.
+"""Compare *Rolling Shutter Repair* with a camera that reads all rows at once.
 
     python scripts/rolling_truth.py [--output DIR] [--json FILE] [--size 320x180] [--samples 64] [--readouts 25,50,95]
 
-Cycles films a flat scene through a camera that shakes from side to side, up to 8 pixels a frame, with its rolling
-shutter on, each row for the 50th part of the shutter's time; and the same with all rows at once. The first is repaired
-in Blender, by the operator's own function, with the readout that Cycles has. The edit goes to `shutter render` as a
-recipe, with eight moments for a filmed frame, and three of its frames are compared with those of the second.
-
-Printed are the PSNR of 8-bit sRGB with these, of the footage and of the repair; how far a red pole's middle is from
-straight, in any of its rows, in pixels; and the readout that *Find Readout* finds.
-
-Cycles lays the readout around the middle of the frame where the shutter is at CENTER, so that its middle row is filmed
-when the other camera films all. Needs Blender as a library (bpy).
+Cycles films a flat scene through a camera that shakes by up to 8 pixels a frame, with its rolling shutter, and with all
+rows at once. The operator's own function repairs the first with the readout that Cycles has, and `shutter render` makes
+three frames. Printed are the PSNR of footage and repair, how far a red pole's middle is from straight, in pixels, and
+the readout that *Find Readout* finds. Needs Blender as a library (bpy).
 """
 
 from __future__ import annotations
 
-import tempfile
 from pathlib import Path
 
 import bpy
 import numpy as np
-from comparing import codes, labelled, listed, make_folders, parser_of, psnr, read, rendered, saved
+from comparing import codes, labelled, listed, measured, parser_of, psnr, read, rendered
 from truth import place, stage
 
 from gallery import stills
@@ -118,18 +111,12 @@ def measure(args, folder: Path) -> tuple[list[dict], np.ndarray]:
         made = repaired(first, share / 100, work)
         plain = [read(first.with_name(f"{frame + 1:04d}.exr")) for frame in SHOWN]
         for frame, truth, own, before in zip(SHOWN, truths, made, plain, strict=True):
-            row = {"readout": share, "frame": frame, "found": words, "truth": bent(truth)}
-            row |= {
-                "psnr": psnr(codes(own), codes(truth)),
-                "unrepaired": psnr(codes(before), codes(truth)),
-                "bent": bent(own),
-                "skewed": bent(before),
-            }
-            rows.append(row)
-            print(WORDS.format(**row), flush=True)
-        strips.append(
-            labelled([codes(p) for p in (before, own, truth)], [f"Readout {share} %", "repaired", "all rows at once"])
-        )
+            row = {"readout": share, "frame": frame, "found": words, "truth": bent(truth), "bent": bent(own)}
+            row |= {"psnr": psnr(codes(own), codes(truth)), "unrepaired": psnr(codes(before), codes(truth))}
+            rows.append(row | {"skewed": bent(before)})
+            print(WORDS.format(**rows[-1]), flush=True)
+        texts = f"Readout {share} %", "repaired", "all rows at once"
+        strips.append(labelled([codes(p) for p in (before, own, truth)], texts))
     return rows, stills.sheet(*strips)
 
 
@@ -138,21 +125,12 @@ HEAD = """| readout | found | frame | unrepaired, dB | repaired, dB | pole, unre
 WORDS = "| {readout} % | {found} | {frame} | {unrepaired:.1f} | {psnr:.1f} | {skewed:.2f} | {bent:.2f} | {truth:.2f} |"
 
 
-def parse(arguments=None):
+def main() -> None:
     parser = parser_of(__doc__, "rolling_truth", (320, 180), 64)
     parser.add_argument("--readouts", type=listed(int), default=[25, 50, 95], help="per cent of a frame")
-    args = parser.parse_args(arguments)
-    make_folders(args, parser)
-    return args
-
-
-def main(arguments=None) -> None:
-    args = parse(arguments)
+    args = parser.parse_args()
     blender.register()
-    print(HEAD)
-    with tempfile.TemporaryDirectory() as folder:
-        rows, sheet = measure(args, Path(folder))
-    saved(args, "rolling_truth", rows, sheet)
+    measured("rolling_truth", parser, args, HEAD, measure)
 
 
 if __name__ == "__main__":

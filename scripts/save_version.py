@@ -1,14 +1,9 @@
-"""Keeps files of the version that is here, which every later one has to open: tests/saved/VERSION.
+"""Keep files of this version, which every later one has to open: tests/saved/VERSION.
 
     .venv/bin/python scripts/save_version.py
 
-It is run before each release. A folder that is there is never written again: it is what that version has
-saved. One whose version nobody has yet may be removed and made anew.
-
-    edit.blend      an edit with everything that the extension stores, its footage beside it
-    *.json          recipes with every kind of part
-    pictures/       frames of both as this version renders them
-    values.json     all that is stored in the edit; names.json: all that can be
+Run it before each release. It never writes over a folder. A folder has an edit with everything that the extension
+stores, recipes with every kind of part, frames of both as this version renders them, and all stored values and names.
 """
 
 from __future__ import annotations

@@ -35,10 +35,7 @@ def regions() -> dict:
     """A recipe with all kinds of regions."""
     shutters = [
         {"name": "Long", "color": [0.2, 0.5, 1.0], "bars": [1, 1, 0.5, 1]},
-        {
-            "name": "Keyed",
-            "keys": [{"frame": 1, "bars": [1, 0, 0, 0], **EASED}, {"frame": 12, "bars": [0, 0.5, 1, 0]}],
-        },
+        {"name": "Keyed", "keys": [{"frame": 1, "bars": [1, 0, 0, 0], **EASED}, {"frame": 12, "bars": [0, 0.5, 1, 0]}]},
         {
             "name": "Panned",
             "bars": [1, 1, 1, 1],
@@ -127,13 +124,7 @@ def _carried() -> dict:
     """A recipe of what needs optical flow, whose pictures differ from machine to machine by more than a level."""
     outline = {"name": "carried", "shutter": "Long", "kind": "outline", "strokes": [_SQUARE]}
     shutters = [{"name": "Long", "bars": [1, 1, 1, 1]}, {"name": "Sharp", "bars": [1, 0, 0, 0]}]
-    return {
-        "version": 2,
-        "window": 4,
-        "inbetween": 2,
-        "shutters": shutters,
-        "regions": [outline],
-    }
+    return {"version": 2, "window": 4, "inbetween": 2, "shutters": shutters, "regions": [outline]}
 
 
 def write_footage(folder: Path) -> None:

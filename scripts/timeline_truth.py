@@ -1,29 +1,23 @@
-"""How close sped-up footage with *Length: Timeline* comes to what a camera films whose scene runs as much faster.
+"""Compare sped-up footage with *Length: Timeline* with a camera whose scene runs as much faster.
 
-    python scripts/timeline_truth.py [--output DIR] [--json FILE] [--size 320x180] [--samples 128] [--frames 5,6 …]
+    python scripts/timeline_truth.py [--output DIR] [--json FILE] [--size 320x180] [--samples 256] [--frames 1,3,5]
 
-Cycles renders the scene of scripts/truth.py as sharp footage, a moment a frame, that moves by up to four pixels from
-frame to frame. It is sped up by the recipe's source time, eight times, and along a ramp from 1 to 8, and exposed by a
-shutter of 180° whose length is the timeline's: through the sequencer, by `shutter render`. The truth is Cycles' own
-exposure, motion blur with a shutter of 0.5, of the same scene whose clock runs as fast as the footage does.
+Cycles renders the scene of scripts/truth.py as sharp footage that moves by up to four pixels a frame. A recipe speeds
+it up, eight times and along a ramp from 1 to 8, and exposes it by a shutter of 180° whose length is the timeline's. The
+truth is Cycles' motion blur of half a frame, of the same scene whose clock runs as fast.
 
-Where both begin: *Position: Start* has the exposure begin with the shown frame, which is a moment, as Cycles' does with
-the shutter at START. Four frames of eight are open at full speed, which are four copies and no streak: *Smooth* at 8×
-makes 32 moments of them. The rows "not smooth" are without, "bars" with *Exposure Length: Frames*.
-
-A white rod runs over black along the bottom, 4 pixels a frame of 320. The light of its streak has a second moment, of
-which the length of an evenly lit one comes, once the still rod's is taken off. Printed are SSIM (Wang et al. 2004) of
-8-bit sRGB, the mean difference in levels, and the length beside Cycles'. Needs Blender as a library (bpy).
+"not smooth" is without *Smooth* at 8×, "bars" with *Exposure Length: Frames*. A white rod runs over black along the
+bottom; the length of its streak is that of an evenly lit one with the same second moment of light. Needs Blender as a
+library (bpy).
 """
 
 from __future__ import annotations
 
-import tempfile
 from pathlib import Path
 
 import bpy
 import numpy as np
-from comparing import codes, labelled, listed, make_folders, parser_of, read, rendered, saved
+from comparing import codes, labelled, listed, measured, parser_of, read, rendered
 from truth import compare, place, stage
 
 from gallery import stills
@@ -114,35 +108,22 @@ def measure(args, folder: Path) -> tuple[list[dict], np.ndarray]:
                 row = {"case": case, "frame": frame, "speed": speed, "picture": way, "length": own, "truth": pixels}
                 rows.append(row | compare(codes(truth), codes(pictures[at])))
                 print(WORDS.format(**rows[-1]), flush=True)
-            strips.append(
-                labelled(
-                    [codes(p) for p in (truth, made["timeline"][at], made["bars"][at])],
-                    [f"{case}, frame {frame}: Cycles", "Length: Timeline", "Length: Bars"],
-                )
-            )
+            shown = [codes(p) for p in (truth, made["timeline"][at], made["bars"][at])]
+            strips.append(labelled(shown, [f"{case}, frame {frame}: Cycles", "Length: Timeline", "Length: Bars"]))
     return rows, stills.sheet(*strips)
 
 
 WORDS = "| {case} | {frame} | {speed:.2f} | {picture} | {similarity:.4f} | {mean:.2f} | {length:.2f} | {truth:.2f} |"
 
 
-def parse(arguments=None):
+def main() -> None:
     parser = parser_of(__doc__, "timeline_truth", (320, 180), 256)
-    add = parser.add_argument
-    add("--frames", type=listed(int), default=[1, 3, 5], help="of the timeline, from 0")
-    args = parser.parse_args(arguments)
+    parser.add_argument("--frames", type=listed(int), default=[1, 3, 5], help="of the timeline, from 0")
+    args = parser.parse_args()
     if not all(0 <= frame < TIMELINE for frame in args.frames):
         parser.error(f"--frames: the timeline goes from 0 to {TIMELINE - 1}")
-    make_folders(args, parser)
-    return args
-
-
-def main(arguments=None) -> None:
-    args = parse(arguments)
-    print("| case | frame | speed | picture | SSIM | mean | length | Cycles' |\n|---|---|---|---|---|---|---|---|")
-    with tempfile.TemporaryDirectory() as folder:
-        rows, sheet = measure(args, Path(folder))
-    saved(args, "timeline_truth", rows, sheet)
+    head = "| case | frame | speed | picture | SSIM | mean | length | Cycles' |\n|---|---|---|---|---|---|---|---|"
+    measured("timeline_truth", parser, args, head, measure)
 
 
 if __name__ == "__main__":

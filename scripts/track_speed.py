@@ -1,11 +1,9 @@
-"""How quickly a region is tracked, beside decoding the same frames, measured in one run, interleaved.
+"""Measure how quickly a region is tracked, beside decoding the same frames, in turns in one run.
 
     .venv/bin/python scripts/track_speed.py [FOOTAGE] [--size 1920x1080] [--rounds 3] [--json FILE]
 
-FOOTAGE (the demo's film) is scaled to that size first. Regions: a line in the middle, 1/5 of the height long; a lasso
-around the middle half of the picture. Ways: "decode" reads every frame; "track" reads and tracks them, as the command
-does; "track alone" tracks pictures that were read before. Frames per second and milliseconds of CPU time per frame, of
-all threads, are medians. Needs no bpy.
+FOOTAGE is scaled to that size first. "decode" reads every frame; "track" reads and tracks them, as the command does;
+"track alone" tracks pictures that were read before. Figures are medians, of all threads. Needs no bpy.
 """
 
 from __future__ import annotations
@@ -31,10 +29,7 @@ from shutter_addon.media.cuts import ShotSource
 from shutter_addon.media.footage import AHEAD, KEPT, Footage
 
 ROOT = Path(__file__).resolve().parents[1]
-REGIONS = {
-    "line": [[0.5, 0.4], [0.5, 0.6]],
-    "lasso": [[0.25, 0.25], [0.75, 0.25], [0.75, 0.75], [0.25, 0.75]],
-}
+REGIONS = {"line": [[0.5, 0.4], [0.5, 0.6]], "lasso": [[0.25, 0.25], [0.75, 0.25], [0.75, 0.75], [0.25, 0.75]]}
 
 
 def scaled(footage: Path, size: tuple[int, int], folder: Path) -> Path:

@@ -1,29 +1,20 @@
-"""How close a virtual shutter over sub-frames comes to the exposure that Cycles computes itself.
+"""Compare a virtual shutter over sub-frames with the exposure that Cycles computes itself.
 
     python scripts/truth.py [--output DIR] [--json FILE] [--size 640x360] [--samples 1024] [--docs]
 
 Cycles exposes one frame of a moving scene with a shutter curve, or with its rolling shutter. The same scene is rendered
-as 64 sub-frames without motion blur, and these are exposed through the sequencer, by `shutter render` and a recipe with
-the same curve. Both pictures become 8-bit sRGB. The measures are their structural similarity (Wang et al. 2004), and
-the largest and the mean difference, in levels.
-
-Cycles' picture is the mean of two with different seeds; the row "noise" compares these two. The row "wrong" has a
-recipe that closes the shutter after half of its time. DIR gets truth.png, the pictures side by side. Needs Blender as a
-library (bpy).
-
-What differs beside noise is mostly this. Cycles looks times up in a table of 256 and does not reach its ends: its box
-goes from 0.2 % to 99.4 % of the time, its triangle from 3.3 % to 96.3 %. Its rolling shutter gives row r of H, 0 at
-the top, (r + 1) / H of the delay, where the diffusion between two lines gives r / (H − 1).
+as 64 sharp sub-frames, which `shutter render` exposes by a recipe with the same curve. Cycles' picture is the mean of
+two with different seeds; "noise" compares these two, and "wrong" has a recipe that closes the shutter after half of its
+time. DIR gets truth.png. Needs Blender as a library (bpy). docs/quality.md explains the rest.
 """
 
 from __future__ import annotations
 
-import tempfile
 from pathlib import Path
 
 import bpy
 import numpy as np
-from comparing import ROOT, codes, fail, labelled, make_folders, parser_of, read, rendered, saved, similarity
+from comparing import ROOT, codes, labelled, measured, parser_of, read, rendered, similarity
 
 from gallery import stills
 
@@ -199,27 +190,16 @@ def amplified(picture: np.ndarray, other: np.ndarray) -> np.ndarray:
     return np.clip(apart(picture, other) * AMPLIFIED, 0, 255).astype(np.uint8)
 
 
-def parse(arguments=None):
+def main() -> None:
     parser = parser_of(__doc__, "truth", (640, 360), 1024)
     parser.add_argument("--docs", action="store_true", help="renew the picture of docs/quality.md, docs/truth.jpg")
-    args = parser.parse_args(arguments)
+    args = parser.parse_args()
     if args.samples < 1 or args.samples % SUBFRAMES:
         parser.error(f"--samples: {args.samples} is not a multiple of {SUBFRAMES}: each sub-frame has as many")
-    make_folders(args, parser)
-    return args
-
-
-def main(arguments=None) -> None:
-    args = parse(arguments)
-    print("| case | compared with Cycles | SSIM | largest | mean |\n|---|---|---|---|---|", flush=True)
-    with tempfile.TemporaryDirectory() as folder:
-        rows, sheet = measure(args, Path(folder))
-    try:
-        if args.docs:
-            stills.save(stills.scaled(sheet, sheet.shape[1] // 2), ROOT / "docs" / "truth.jpg")
-        saved(args, "truth", rows, sheet)
-    except OSError as error:
-        fail(f"truth: {error}")
+    head = "| case | compared with Cycles | SSIM | largest | mean |\n|---|---|---|---|---|"
+    sheet = measured("truth", parser, args, head, measure)
+    if args.docs:
+        stills.save(stills.scaled(sheet, sheet.shape[1] // 2), ROOT / "docs" / "truth.jpg")
 
 
 if __name__ == "__main__":

@@ -1,15 +1,11 @@
-"""How quick the live preview is, measured in Blender's own window beside the plain strip, interleaved in one run.
+"""Measure how quick the live preview is in Blender's own window, beside the plain strip, in turns in one run.
 
     blender --factory-startup --python scripts/window_speed.py -- FOOTAGE.mp4 OUT.json \\
         [--size 1280x720] [--percent 100] [--zoom fit|full] [--ways plain,live] [--sync NONE|FRAME_DROP]
 
---percent: the preview's size in Blender's menu; --zoom full: a pixel of the picture to one of the screen, so that all
-of it is composed at 100 %. It tells frames per second, processor time per frame, by how much the timeline
-advanced beside the clock (1 keeps time), by how much the shown frame strayed from the clock, and the memory of the
-process.
-
-Any Blender 5.2 with the extension enabled, started with a window and `--python` this file, will do. Ways:
-plain: the movie strip alone; live: the effect strip with its live preview.
+--percent: the preview's size in Blender's menu; --zoom full: a pixel of the picture to one of the screen. It prints
+frames per second, processor time per frame, the timeline's advance beside the clock (1 keeps time), how far the shown
+frame strays from the clock, and memory. It takes any Blender 5.2 with the extension enabled and a window.
 """
 
 import argparse

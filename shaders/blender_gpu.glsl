@@ -1,9 +1,9 @@
-// What Blender's own GPU needs besides (blender/devices/blender_gpu.py).
+// Helper passes for Blender's own GPU (blender/devices/blender_gpu.py).
 
 #ifdef UNPACK
-// Fills rows of a layer, from `top` on, from the floats that were sent.
-// PACKING: 0 as they are, 1 as whole numbers, 2 opaque bytes (R + 256 G + 65536 B), 3 pairs of bytes (R + 256 G,
-// B + 256 A), 4 16-bit samples.
+// Unpacks floats into the rows of a layer, from `top` on.
+// PACKING: 0 floats, 1 whole numbers, 2 opaque bytes (R + 256 G + 65536 B), 3 pairs of bytes (R + 256 G, B + 256 A),
+// 4 16-bit samples.
 uniform sampler2DArray sent;
 #  if PACKING == 1
 layout(r32ui) uniform writeonly uimage2DArray stored;
@@ -33,7 +33,7 @@ void at(ivec3 p) {
 #  include "pixels.glsl"
 
 #elif defined(LET_GO)
-// Uses as many samplers and images as any pass, so that all of them are bound anew.
+// Binds as many samplers and images as any pass, so that OpenGL keeps no earlier texture bound.
 layout(local_size_x = 1) in;
 uniform sampler2DArray sampled_0, sampled_1, sampled_2, sampled_3;
 layout(rgba32f) uniform writeonly image2DArray stored_0, stored_1, stored_2, stored_3;

@@ -1,6 +1,6 @@
-// Solves the coarsest grid, of SOLVED × SOLVED cells at most, by elimination (LDLᵀ), in one invocation: Blender's Python
-// has no memory that a workgroup shares. Cells are numbered along the shorter side, so that none is tied to one more than
-// BAND − 1 before it. Of the symmetric matrix, rows[BAND · i + d] ties cell i to cell i − d; d = 0 turns into 1 / pivot.
+// Solves the coarsest grid (at most SOLVED × SOLVED cells) by elimination (LDLᵀ), in one invocation: Blender's Python API
+// has no shared memory. Cells are numbered along the shorter side, so that a cell is coupled to at most BAND − 1 before it.
+// rows[BAND · i + d] of the symmetric matrix couples cell i to cell i − d; d = 0 becomes 1 / pivot.
 layout(local_size_x = 1) in;
 layout(rgba32f) uniform readonly image2DArray stencil, right;  // as in multigrid.glsl
 layout(rgba32f) uniform writeonly image2DArray solution;
@@ -40,12 +40,12 @@ void load_row(int i, int layer) {
 void main() {
   int layer = int(gl_GlobalInvocationID.z);
   int count = size.x * size.y;
-  int reach = min(size.x, size.y) + 1;  // of the cells that one is tied to
+  int reach = min(size.x, size.y) + 1;  // the most that the numbers of coupled cells differ by
   for (int i = 0; i < count; i++) {
     load_row(i, layer);
   }
   for (int k = 0; k < count; k++) {
-    // Where nothing is to solve there is no pivot.
+    // A fixed cell has no pivot.
     float pivot = rows[BAND * k];
     rows[BAND * k] = pivot > 1e-6 ? 1.0 / pivot : 0.0;
     for (int i = 1; i <= min(reach, count - 1 - k); i++) {

@@ -1,6 +1,6 @@
-// As compose_pieces.glsl, for many pieces: every frame is fetched once. Its weight is Q at its end less Q at its start.
-// Pieces that end before in every pixel of the block are summed for all of them; only those that a pixel may be inside of
-// are looked at pixel by pixel, about one to a frame.
+// Composes like compose_pieces.glsl, but fetches every frame once, which suits many pieces. A frame's weight is Q at its
+// end less Q at its start. Pieces that have ended in every pixel of the block are summed once for all; only the others,
+// about one for each frame, are evaluated for each pixel.
 uniform int rows, first, last;
 #include "compose.glsl"
 
@@ -8,8 +8,8 @@ int frame;
 float boundary;  // the frame's end
 vec4 before[QUADS];  // Q at the frame's start
 vec4 after[QUADS];
-vec4 middle[GROUPS];  // of the block's coefficients
-float reach = 0.0;  // how far they lie from it at most: half the sum of what they differ by
+vec4 middle[GROUPS];  // the mean of the block's coefficients
+float reach = 0.0;  // the largest distance of any pixel's coefficients from it: half the sum of the differences
 
 void add_to_middle(int quad) {
   for (int g = 0; g < GROUPS; g++) {
@@ -30,7 +30,7 @@ void widen_reach(int quad) {
 }
 
 #if MOVED
-// When the block's pixels are exposed. A frame seen elsewhere costs too much for those that none of them exposes.
+// When the block's pixels are exposed. Resampling a frame costs too much where none of them exposes it.
 float from = 1e9;
 float until = 0.0;
 
@@ -44,7 +44,7 @@ void widen_exposure(int quad) {
 }
 #endif
 
-// The middle's quantile in the table's row, at the piece's start (column 0) or end (column GROUPS).
+// The quantile of `middle` in a row of the table, at the piece's start (column 0) or end (column GROUPS).
 float middle_time(int column, int row) {
   float time = 0.0;
   for (int g = 0; g < GROUPS; g++) {
@@ -53,7 +53,7 @@ float middle_time(int column, int row) {
   return time;
 }
 
-// dz, and the time by which the shutters differ at most: no pixel is further from the middle than `reach` times that.
+// dz, and the most by which the shutters' times differ: a pixel's time is at most `reach` times that from the middle's.
 vec2 extent_of(int row) {
   return imageLoad(table, ivec3(2 * GROUPS, row, 0)).rg;
 }

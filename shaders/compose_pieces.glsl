@@ -1,14 +1,14 @@
-// A pixel's own shutter by displacement interpolation, exact (paper §3.4.1): its quantile is Σ cᵢ Sᵢ⁻¹, linear
-// between the knots of the table; each piece spreads its share evenly over the frames that it passes.
-// For few pieces: a frame is fetched again for every piece that touches it.
-uniform int rows, first, last;  // frames that are exposed: rounding must not reach others, which are not there
+// Composes by displacement interpolation, exactly (paper §3.4.1). A pixel's quantile is Σ cᵢ Sᵢ⁻¹, linear between the
+// knots of the table. Each piece spreads its share evenly over its frames. Fast for few pieces: every piece fetches its
+// frames again.
+uniform int rows, first, last;  // first, last: the exposed frames; rounding must not reach others, which may be missing
 #include "compose.glsl"
 
 int frame;
-vec4 start[QUADS];  // of the piece's time in every pixel
+vec4 start[QUADS];  // when the piece starts in each pixel
 vec4 end[QUADS];
 vec4 density[QUADS];
-float from, until;  // the block's times
+float from, until;  // when the block's pixels are exposed
 
 void start_piece(int quad, int row) {
   start[quad] = mixed(quad, 0, row);

@@ -1,14 +1,14 @@
-// As compose_frames.glsl, every pixel for itself: for each frame it looks up its own piece, by bisection. For many pieces
-// that neighbours do not share: for a whole block, these would take more loops than software renderers go through.
+// Composes like compose_frames.glsl, but each pixel finds its own piece for each frame by bisection. Used where
+// neighbouring pixels share few pieces: compose_frames would take more loop iterations than software renderers allow.
 uniform int rows, first, last;
 #include "compose.glsl"
 
 int frame;
 float boundary;  // the frame's end
 vec4 before;  // Q at the frame's start
-ivec4 row;  // of each pixel: the first piece that does not end before the boundary
+ivec4 row;  // each pixel's first piece that does not end before the boundary
 
-// A pixel's quantile in the table's row, at the piece's start (column 0) or end (column GROUPS).
+// A pixel's quantile in a row of the table, at the piece's start (column 0) or end (column GROUPS).
 float time_at(int pixel, int column, int row) {
   float time = 0.0;
   for (int g = 0; g < GROUPS; g++) {
@@ -17,7 +17,7 @@ float time_at(int pixel, int column, int row) {
   return time;
 }
 
-// Q of a pixel at the boundary. row: from which on its piece is looked for, then that piece.
+// Q of a pixel at the boundary. row: where the search for its piece starts; becomes that piece.
 float searched(int pixel, inout int row) {
   int end = rows + 1;
   while (row < end) {

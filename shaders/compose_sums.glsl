@@ -1,8 +1,7 @@
-// A pixel's own shutter by displacement interpolation, exact (paper §3.4.1), as in compose_pieces.glsl: what a piece
-// exposes is the difference of the running sums at its ends, evenly spread, at four look-ups whatever its length.
-// table: a row of 2 · GROUPS + 1 vectors for the gains, then ROWS pieces, as in include/compose.glsl. The window's time 0
-// lies `origin` positions from the first of the sums, and time runs backwards with BACK. (Of time nothing but whole frames
-// depends on where the sums begin: pictures must not.)
+// Composes like compose_pieces.glsl, from running sums: a piece takes four look-ups, whatever its length.
+// table: 2 · GROUPS + 1 vectors of gains, then ROWS pieces, as in include/compose.glsl. Time 0 of the window lies `origin`
+// positions after the first sum. BACK: time runs backwards. Only whole frames are counted from the first sum: where sums
+// begin must not change a picture.
 layout(local_size_x = 64, local_size_y = 2) in;
 layout(rgba32f) uniform readonly image2DArray coefficients;
 layout(STORED) uniform readonly uimage2DArray sums;
@@ -15,19 +14,19 @@ uniform float unit;
 #include "sums.glsl"
 #define COLUMNS (2 * GROUPS + 1)
 
-// Above one another in an invocation: to a software renderer the table is as dear as the sums; four are slower than one.
+// Pixels above one another that an invocation composes. On a software renderer, one and four are slower.
 #define PIXELS 2
 #define EACH(does) does(0); does(1)
 
 vec4 c[PIXELS * GROUPS];
-ivec3 place[PIXELS];  // of a pixel's sums
+ivec3 place[PIXELS];  // where each pixel's sums are
 LIGHT total[PIXELS];
 vec4 starts[GROUPS];
 vec4 ends[GROUPS];
 float exposure;
 ivec2 corner;
 
-// Beyond the picture's edge the last pixel inside.
+// Pixels beyond the picture's edge repeat the last one.
 ivec2 pixel_at(int k) {
   return ivec2(corner.x, min(corner.y + k, size.y - 1));
 }

@@ -1,16 +1,10 @@
-// A pixel's own shutter by value interpolation: q = Σ cᵢ sᵢ/eᵢ, a row of the table per frame that any of them exposes.
+// Composes by value interpolation: q = Σ cᵢ sᵢ/eᵢ. The table has a row for each frame that any shutter exposes.
 uniform int first, last;
 #include "compose.glsl"
 
 int frame;
-
-void add_frame(int quad) {
-  expose(quad, frame, mixed(quad, 0, 1 + (frame - first) * motions + motion));
-}
-
-void fold_frame(int quad) {
-  fold_sight(quad, frame);
-}
+#define ADD(quad) expose(quad, frame, mixed(quad, 0, 1 + (frame - first) * motions + motion))
+#define FOLD(quad) fold_sight(quad, frame)
 
 void expose_frames() {
   for (frame = first; frame < last; frame++) {
@@ -19,9 +13,9 @@ void expose_frames() {
     for (motion = 0; motion < motions; motion++)
 #endif
     {
-      EACH(add_frame);
+      EACH(ADD);
     }
-    EACH(fold_frame);
+    EACH(FOLD);
   }
 }
 #include "blocks.glsl"

@@ -1,8 +1,8 @@
-// What compute/diffusion_gpu.py begins with, what goes from a coarser grid to the finer one, and coefficients.
+// Steps of compute/diffusion_gpu.py: starting values, prolongation from a coarser grid, and finished coefficients.
 #include "tiles.glsl"
 
 #ifdef START
-// Fixed pixels get their shutter; free ones nothing, or what they had.
+// Sets fixed pixels to their shutter, and free ones to 0, or leaves them as they were (warm).
 layout(r32ui) uniform readonly uimage2DArray labels;
 layout(rgba32f) uniform writeonly image2DArray solution, own;
 uniform int warm;
@@ -17,7 +17,7 @@ void at(ivec3 p) {
 }
 
 #elif defined(CLEAR)
-// A coarser grid starts from nothing, or from what the finer one has.
+// Starts a coarser grid from 0, or from the values of the finer one (warm).
 layout(rgba32f) uniform readonly image2DArray finer;
 layout(rgba32f) uniform writeonly image2DArray solution, own, right;
 uniform int warm;
@@ -32,7 +32,7 @@ void at(ivec3 p) {
 layout(rgba32f) uniform readonly image2DArray coarser;
 uniform ivec2 coarse;  // the coarser grid's size
 
-// Its four cells around the 2 × 2 cells from p on, row by row. Invocations run over such.
+// The four coarse cells around the 2 × 2 cells from p on, row by row. There is an invocation for each 2 × 2 cells.
 mat4 around(ivec3 p) {
   ivec2 a = p.xy / 2;
   ivec2 b = min(a + 1, coarse - 1);
@@ -42,7 +42,7 @@ mat4 around(ivec3 p) {
 #endif
 
 #ifdef PROLONG
-// Adds what a grid's cells take of the coarser grid, or takes it away.
+// Adds the prolongation of the coarser grid, times `amount`.
 #  if IN_PLACE
 layout(rgba32f) uniform readonly image2DArray weights;
 layout(rgba32f) uniform image2DArray to;
@@ -77,14 +77,14 @@ void store(ivec3 p, mat4 cells) {
 #endif
 
 #ifdef EXPAND
-// Coefficients far from all scribbles, smooth as they are, linear between the coarser grid's cells.
+// Interpolates linearly between the coarser grid's cells: far from scribbles, coefficients are smooth.
 void at(ivec3 p) {
   mat4 m = around(p);
   store(p, mat4(m[0], 0.5 * (m[0] + m[1]), 0.5 * (m[0] + m[2]), 0.25 * (m[0] + m[1] + m[2] + m[3])));
 }
 
 #elif defined(EXPAND_RIM)
-// The same at the frame's last columns and rows: beyond the coarser grid's last cells a parabola, level at the edge.
+// EXPAND at the frame's last columns and rows. Beyond the coarser grid's last cells: a parabola that is level at the edge.
 uniform int layers;
 uniform vec2 beyond;
 
@@ -106,7 +106,7 @@ void at(ivec3 p) {
     mat4 m = values(a, b, bend, layer);
     least = min(least, min(min(m[0], m[1]), min(m[2], m[3])));
   }
-  // No shutter gets less than nothing, and all of them together one.
+  // Where a coefficient would be negative, nothing is extrapolated: the sum stays 1.
   bend = any(lessThan(least, vec4(0.0))) ? mix(bend, vec2(0.0), ends) : bend;
   for (int layer = 0; layer < layers; layer++) {
     store(ivec3(p.xy, layer), values(a, b, bend, layer));
@@ -114,7 +114,7 @@ void at(ivec3 p) {
 }
 
 #elif defined(FINISH)
-// Coefficients of sum 1; shares that stand for nothing are dropped, so that an enclosed region gets one shutter alone.
+// Scales coefficients to a sum of 1. Those below `nothing` become 0, so that an enclosed region gets one shutter.
 layout(rgba32f) uniform image2DArray solution;
 uniform int layers;
 uniform float nothing;

@@ -1,14 +1,14 @@
-// Levels of 8 bits of a picture, whose bottom row is first (compute/gpu.py).
+// Makes 8-bit levels of a picture, whose bottom row is first (compute/gpu.py).
 layout(rgba32f) uniform readonly image2DArray picture;
 uniform ivec2 size;
 
 #ifdef SHOW
-// As Blender makes them, top row first, their alpha full; 0 where rounding is too near for the curve to tell.
+// Levels as Blender's display makes them, top row first. Alpha is 0 where the curve is too coarse to round by.
 layout(r32f) uniform readonly image2DArray grain;
-// A parabola for each 32nd of an octave from 2^-9 on, in levels, and how far off it may be.
+// A parabola in levels for each 32nd of an octave from 2^-9 on, and its largest error.
 layout(rgba32f) uniform readonly image2DArray curve;
 layout(rgba8) uniform writeonly image2DArray levels;
-uniform float slope;  // below, in levels
+uniform float slope;  // levels for light below the curve
 
 bool is_sure;
 
@@ -18,7 +18,7 @@ float level(float light, float added) {
   float along = float(bits & 0x3ffffu) / 262144.0 - 0.5;
   float value = light < LOWEST ? light * slope : (piece.x * along + piece.y) * along + piece.z;
   value += added * 255.0 + 0.5;
-  // Below and above all levels there is nothing to round; and what is no number is not sure.
+  // Outside the range of levels there is nothing to round.
   is_sure = is_sure && !isnan(light) && (value < 0.5 || value > 255.9 || abs(value - round(value)) > piece.w);
   return clamp(floor(value), 0.0, 255.0) / 255.0;
 }
@@ -33,7 +33,7 @@ void at(ivec3 p) {
 }
 
 #elif defined(PICK)
-// The light of some pixels. places: their numbers, row by row from the bottom.
+// Picks the light of some pixels. places: their numbers, row by row from the bottom.
 layout(r32ui) uniform readonly uimage2DArray places;
 layout(rgba32f) uniform writeonly image2DArray picked;
 uniform int width;
@@ -44,7 +44,7 @@ void at(ivec3 p) {
 }
 
 #elif defined(OVER_BLACK)
-// Those of a file, top row first: display code values (view transform Standard) over black.
+// Levels for a file, top row first: display code values (view transform Standard) over black.
 layout(rgba8) uniform writeonly image2DArray levels;
 #  include "light.glsl"
 

@@ -1,11 +1,11 @@
-// What compute/edge_diffusion_gpu.py has beside the multigrid: the pixels' links, and conjugate gradients.
-// Sums over all cells are made of `parts`, each of one invocation, in a fixed order.
+// Steps of compute/edge_diffusion_gpu.py besides the multigrid: the pixels' links, and conjugate gradients.
+// A sum over all cells is made of `parts`, one for each invocation, in a fixed order.
 #if defined(LINKS) || defined(TURN) || defined(STEP)
 #  include "tiles.glsl"
 #endif
 
 #ifdef LINKS
-// What ties every free pixel to its neighbours: above, left, right, below. Fixed pixels have no equation, and get zeros.
+// Makes the links of each free pixel to its neighbours: above, left, right, below. Fixed pixels get zeros.
 layout(r32ui) uniform readonly uimage2DArray labels;
 layout(r32f) uniform readonly image2DArray resistances;
 layout(rgba32f) uniform writeonly image2DArray links;
@@ -16,11 +16,8 @@ float resistance_of(ivec2 cell) {
   return imageLoad(resistances, ivec3(clamp(cell, ivec2(0), guided - 1), 0)).r;
 }
 
-// Of a pixel: linear between the middles of cells.
+// A pixel's resistance, linear between the centres of cells.
 float resistance(ivec2 p) {
-  if (side == 1) {
-    return resistance_of(p);
-  }
   vec2 place = (vec2(p) + 0.5) / float(side) - 0.5;
   ivec2 a = ivec2(floor(place));
   vec2 share = place - vec2(a);
@@ -44,7 +41,7 @@ void at(ivec3 p) {
 }
 
 #elif defined(ZERO)
-// Zeros in all cells of a grid.
+// Clears all cells of a grid.
 layout(rgba32f) uniform writeonly image2DArray values;
 uniform ivec2 size;
 
@@ -54,7 +51,7 @@ void at(ivec3 p) {
 #  include "pixels.glsl"
 
 #elif defined(DOT) || defined(CHANGE)
-// Parts of a sum of products; or of the largest difference from noted values, in whose place the new ones are noted.
+// DOT: parts of a sum of products. CHANGE: parts of the largest difference from `noted`, which becomes the new values.
 layout(rgba32f) uniform readonly image2DArray values;
 #  ifdef DOT
 layout(rgba32f) uniform readonly image2DArray right;
@@ -62,7 +59,7 @@ layout(rgba32f) uniform readonly image2DArray right;
 layout(rgba32f) uniform image2DArray noted;
 #  endif
 layout(rgba32f) uniform writeonly image2DArray result;
-uniform ivec2 size, grid;  // of the parts, and of all cells
+uniform ivec2 size, grid;  // the number of parts, and the grid's size in cells
 
 void at(ivec3 part) {
   vec4 total = vec4(0.0);
@@ -81,11 +78,11 @@ void at(ivec3 part) {
 #  include "pixels.glsl"
 
 #elif defined(SUM)
-// The sum of the parts, in one invocation.
+// Adds the parts, in one invocation.
 layout(local_size_x = 1) in;
 layout(rgba32f) uniform readonly image2DArray result;
 layout(rgba32f) uniform image2DArray sums;
-uniform int parts, place;  // place: which of `sums` it becomes; the one before it moves to place + 1
+uniform int parts, place;  // place: where the sum is stored in `sums`; the last one moves to place + 1
 
 void main() {
   int layer = int(gl_GlobalInvocationID.z);
@@ -98,7 +95,7 @@ void main() {
 }
 
 #elif defined(TURN)
-// The next direction, from the guess.
+// Makes the next direction from the guess.
 layout(rgba32f) uniform readonly image2DArray values;
 layout(rgba32f) uniform readonly image2DArray sums;  // residual · guess of this iteration and of the last
 layout(rgba32f) uniform image2DArray result;
@@ -116,8 +113,8 @@ void at(ivec3 p) {
 }
 
 #elif defined(STEP)
-// A step along the direction: the solution and the residual.
-uniform sampler2DArray sums;  // residual · guess, and direction · answer, its sign changed as multigrid.glsl's MISSING does
+// Steps along the direction: updates the solution and the residual.
+uniform sampler2DArray sums;  // residual · guess, and −direction · answer (MISSING in multigrid.glsl changes the sign)
 layout(rgba32f) uniform readonly image2DArray values, right;
 layout(rgba32f) uniform image2DArray solution, result;
 

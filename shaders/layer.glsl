@@ -1,9 +1,8 @@
-// Layers laid over what lies behind them; core/pixels/layering.py is the reference. All pictures are rgba32f, bottom row
-// first, as the passes that compose leave them.
+// Lays layers over what lies behind them, as core/pixels/layering.py does. All pictures are rgba32f, bottom row first.
 #ifdef LEAST
-// The least alpha of a block of 16 × 16 pixels: how much of what lies behind was seen.
+// The lowest alpha in a block of 16 × 16 pixels: how much of what lies behind was exposed.
 layout(r32f) uniform writeonly image2DArray least;
-layout(rgba32f) uniform readonly image2DArray clear;  // a software renderer's texelFetch takes longer
+layout(rgba32f) uniform readonly image2DArray clear;  // texelFetch is slower on a software renderer
 uniform ivec2 size, whole;  // in blocks, and in pixels
 
 void at(ivec3 block) {
@@ -16,23 +15,26 @@ void at(ivec3 block) {
   imageStore(least, block, vec4(lowest));
 }
 #else
-// BEGINS: `under` has Σ qₖ hₖ Vₖ, and `clear` in its alpha Σ qₖ hₖ; else it is a picture that a layer is laid over. PLAIN:
-// the picture without layers, which stays where none is. PLATE: what lies behind. exposed, share: a layer's F, and in its
-// alpha A. OPAQUE: the alphas of `under` and `exposed` are these shares. ENDS: no other layer follows.
+// under: the picture so far. With BEGINS it is Σ qₖ hₖ Vₖ, and the alpha of `clear` is Σ qₖ hₖ.
+// exposed: a layer's F; its A is the alpha of `share`. OPAQUE: the alphas of `under` and `exposed` are these shares.
+// PLAIN: the picture without layers, which stays where there is none. PLATE: what lies behind. ENDS: the last layer.
 layout(rgba32f) uniform readonly image2DArray under, exposed;
-#if !OPAQUE
+#if OPAQUE
+#  define COVERED own.a
+#  define SEEN light.a
+#else
 uniform sampler2DArray share;
-#endif
-#if BEGINS
-#  if !OPAQUE
+#  define COVERED texelFetch(share, p, 0).a
+#  define SEEN texelFetch(clear, p, 0).a
+#  if BEGINS
 uniform sampler2DArray clear;
 #  endif
-#  if PLAIN
+#endif
+#if PLAIN
 uniform sampler2DArray plain;
-#  endif
-#  if PLATE
+#endif
+#if PLATE
 uniform sampler2DArray plate;
-#  endif
 #endif
 #include "light.glsl"
 uniform ivec2 size;
@@ -42,24 +44,14 @@ uniform ivec2 size;
 layout(rgba32f) uniform writeonly image2DArray picture;
 #endif
 
-// Of Σ qₖ hₖ, what must have been seen; and from where on none of a layer was in the way, but for rounding.
-const float CLEAR = 1.0 / 16.0;
-const float UNCOVERED = 1.0 - 2e-5;
+const float CLEAR = 1.0 / 16.0;  // the least of Σ qₖ hₖ that needs no plate
+const float UNCOVERED = 1.0 - 2e-5;  // from here on no layer was in the way, up to rounding
 
 void at(ivec3 p) {
   vec4 light = imageLoad(under, p);
   vec4 own = imageLoad(exposed, p);
-#if OPAQUE
-  float covered = own.a;
-#else
-  float covered = texelFetch(share, p, 0).a;
-#endif
 #if BEGINS
-#  if OPAQUE
-  float seen = light.a;
-#  else
-  float seen = texelFetch(clear, p, 0).a;
-#  endif
+  float seen = SEEN;
 #  if PLATE
   float lacking = max(CLEAR - seen, 0.0);
   light = (light + lacking * texelFetch(plate, p, 0)) / max(seen, CLEAR);
@@ -72,7 +64,7 @@ void at(ivec3 p) {
   }
 #  endif
 #endif
-  light = own + (1.0 - covered) * light;
+  light = own + (1.0 - COVERED) * light;
 #if ENDS
   finish(ivec2(p.x, size.y - 1 - p.y), light);
 #else

@@ -1,9 +1,9 @@
-// The operators of compute/diffusion_gpu.py, by what ties a grid's cells: those of coarser grids their STENCIL, pixels the
-// LINKS that follow edges, or links of 1. Weights are what each cell takes of the four coarse cells around it.
+// The operators of compute/diffusion_gpu.py. Cells of coarser grids are coupled by a STENCIL, pixels by LINKS that follow
+// edges, or by links of 1. Weights: how much each cell takes of the four coarse cells around it.
 #include "tiles.glsl"
 
 #ifdef STENCIL
-// The entries for the four cells before one, for the four behind it, then 1 / its own and its own; beyond the edge, zeros.
+// Layers: the entries for the four cells before a cell; for the four behind it; 1 / its own entry, and that. 0 at edges.
 layout(rgba32f) uniform readonly image2DArray stencil;
 
 bool is_free(ivec2 i) {
@@ -32,13 +32,13 @@ vec4 links_of(ivec2 i) {
 #endif
 
 #ifdef WEIGHTS
-// How much every cell takes of the coarse cells around it: along a line of these by what it is coupled to on either side,
-// between four of them by its own equation. A coarse cell with a dot on it stands for those around the dot: they take a
-// little of it, or coarser grids would know of nothing as near. Beyond the last coarse cell, a cell has that one alone.
+// Makes the weights: on a line between two coarse cells from the couplings on either side, between four of them from the
+// cell's own equation. Cells beside a dot take a little of the coarse cell under it, or coarser grids would have nothing
+// near. Beyond the last coarse cell, a cell takes from that one only.
 layout(rgba32f) uniform writeonly image2DArray weights;
 uniform float hold;
 
-// What ties the free cell i to the free ones around it, and its diagonal; nothing for a fixed cell.
+// The couplings of the free cell i to the free cells around it, and its diagonal; zeros for a fixed cell.
 void couplings(ivec2 i, out float c[9], out float diagonal) {
 #  ifdef STENCIL
   diagonal = 0.0;
@@ -67,12 +67,12 @@ bool is_fixed(ivec2 i) {
   return inside(i, size) && !is_free(i);
 }
 
-// Whether the coarse cell at i is fixed, and what lies on either side of it across a line is not: no wall.
+// Whether the coarse cell at i is fixed but its neighbours across the line are not: a dot, no wall.
 bool is_dot(ivec2 i, ivec2 across) {
   return is_fixed(i) && !is_fixed(i + across) && !is_fixed(i - across);
 }
 
-// What a cell takes of the coarse cells before and after it in its row, or in its column.
+// How much a cell takes of the coarse cells before and after it in its row, or in its column.
 vec2 between(ivec2 i, bool in_row) {
   float c[9];
   float diagonal;
@@ -81,7 +81,7 @@ vec2 between(ivec2 i, bool in_row) {
   for (int k = 0; k < 9; k++) {
     coupled += c[k];
   }
-  // How closely the cell follows those around it.
+  // How much of the cell's diagonal is coupled to free cells.
   float follows = diagonal > 0.0 ? clamp(coupled / diagonal, 0.0, 1.0) : 0.0;
   ivec2 along = in_row ? ivec2(1, 0) : ivec2(0, 1);
   ivec2 before = i - along;
@@ -94,7 +94,7 @@ vec2 between(ivec2 i, bool in_row) {
     return follows * mix(vec2(is_free(before), is_free(after)) * 2.0 / 3.0, vec2(1.0 / 6.0), dots);
   }
   vec2 ends = in_row ? vec2(c[0] + c[3] + c[6], c[2] + c[5] + c[8]) : vec2(c[0] + c[1] + c[2], c[6] + c[7] + c[8]);
-  // What holds the cell lies on the side that pulls less, and the rest beside the line: it holds the coarse cells as well.
+  // What holds the cell first counts on the side that pulls less. The rest, off the line, holds the coarse cells as well.
   float pull = ends.x + ends.y;
   float held = max(0.0, diagonal - pull - (in_row ? c[1] + c[7] : c[3] + c[5]));
   float aside = max(0.0, held - abs(ends.x - ends.y));
@@ -108,7 +108,7 @@ void store(ivec2 i, vec4 value) {
   }
 }
 
-// Invocations (·, y) run over the 2 × 2 cells of two tiles.
+// Invocations (·, y) cover two tiles, 2 × 2 cells each.
 void main() {
   ivec2 id = ivec2(gl_GlobalInvocationID);
   ivec2 p = corner(first + 2 * id.y + (id.x >> 2), size) + 2 * ivec2(id.x & 1, id.x >> 1 & 1);
@@ -138,13 +138,13 @@ layout(rgba32f) uniform readonly image2DArray weights;
 layout(rgba32f) uniform writeonly image2DArray next;  // of the next coarser grid
 uniform ivec2 coarse;  // its size
 
-// Two cells around one: n = 0 … 24, itself 12; which of them cell k is.
+// The 5 × 5 cells around one: n = 0 … 24, itself 12. AMONG_25: the number there of cell k of 3 × 3.
 #  define OFFSET_OF_25(n) (ivec2((n) % 5, (n) / 5) - 2)
 #  define AMONG_25(k) (5 * ((k) / 3 + 1) + (k) % 3 + 1)
-// Which of a cell's four weights is for the coarse cell p, where the cell is OFFSET(k) from 2p.
+// Which of a cell's four weights belongs to the coarse cell p, if the cell lies OFFSET(k) from 2p.
 #  define TAKES(k) (((k) % 3 == 0 ? 1 : 0) + ((k) / 3 == 0 ? 2 : 0))
 
-// Calls a function for every cell of 3 × 3, or of 5 × 5: arrays that a loop indexes go through memory.
+// Calls a function for each of 3 × 3 or 5 × 5 cells. A loop would move the arrays that it indexes to memory.
 #  define EACH_OF_9(does) \
     does(0); does(1); does(2); does(3); does(4); does(5); does(6); does(7); does(8)
 #  define EACH_OF_25(does) \
@@ -153,12 +153,12 @@ uniform ivec2 coarse;  // its size
 #endif
 
 #ifdef COARSEN
-// The next operator PᵀAP.
+// Makes the next operator, PᵀAP.
 ivec2 p;
 float row[9];
-float product[25];  // of the cells 2p − 2 … 2p + 2
+float product[25];  // for the cells 2p − 2 … 2p + 2
 
-// Adds row i of A, whose cell is number `at` of the 25.
+// Adds row i of A; its cell has number `at` among the 25.
 void add_row(ivec2 i, int at, float weight) {
 #  ifdef STENCIL
   vec4 before = weight * imageLoad(stencil, ivec3(i, 0));
@@ -220,16 +220,16 @@ void main() {
 #endif
 
 #ifdef RESTRICT
-// What a grid's equations miss becomes the right side of the next one.
+// Restricts a grid's residual to the right side of the next grid.
 layout(rgba32f) uniform readonly image2DArray own;
 #  ifdef STENCIL
 uniform sampler2DArray right;
 #  endif
 ivec3 p;
 vec4 total;
-vec4 near[25];  // the cells 2p − 2 … 2p + 2; beyond the frame's edge the last ones again
+vec4 near[25];  // the cells 2p − 2 … 2p + 2; beyond the frame's edge, the last ones repeated
 
-// What equation i misses, whose cell is number `at` of the 25.
+// The residual of equation i; its cell has number `at` among the 25.
 vec4 missing(ivec3 i, int at) {
 #  ifdef STENCIL
   vec4 before = imageLoad(stencil, ivec3(i.xy, 0));
@@ -239,7 +239,7 @@ vec4 missing(ivec3 i, int at) {
   total -= after.x * near[at + 1] + after.y * near[at + 4] + after.z * near[at + 5] + after.w * near[at + 6];
   return total;
 #  elif defined(LINKS)
-  // By differences: a diagonal that is rounded would leak like a ground.
+  // Sums differences: a rounded diagonal would leak.
   vec4 tied = links_of(i.xy);
   vec4 self = near[at];
   return tied.x * (near[at - 5] - self) + tied.y * (near[at - 1] - self) + tied.z * (near[at + 1] - self) +
@@ -282,7 +282,7 @@ layout(rgba32f) uniform readonly image2DArray values;
 #  ifdef STENCIL
 layout(rgba32f) uniform readonly image2DArray right;
 
-// What an equation takes of the cells around p.
+// The sum over the cells around p in the equation of p.
 vec4 taken_around(ivec3 p) {
   vec4 before = imageLoad(stencil, ivec3(p.xy, 0));
   vec4 after = imageLoad(stencil, ivec3(p.xy, 1));
@@ -294,7 +294,7 @@ vec4 taken_around(ivec3 p) {
 
 #ifdef SMOOTH
 #  ifdef STENCIL
-// A quarter of a Gauss-Seidel sweep. Invocations run over the cells of one of four colours.
+// A quarter of a Gauss-Seidel sweep, over the cells of one of four colours.
 uniform ivec2 colour;
 
 void at(ivec3 p) {
@@ -302,7 +302,7 @@ void at(ivec3 p) {
 }
 #    define PLACE 2 * IN_FOURS + colour
 #  else
-// Half a red-black Gauss-Seidel sweep. Invocations run over the pixels of one colour.
+// Half a red-black Gauss-Seidel sweep, over the pixels of one colour.
 uniform int colour;
 
 void at(ivec3 p) {
@@ -319,7 +319,7 @@ void at(ivec3 p) {
 #endif
 
 #ifdef MISSING
-// What the equations of values miss of a share of the right side.
+// The residual of `values`, with the right side times `amount`.
 layout(rgba32f) uniform writeonly image2DArray result;
 uniform float amount;
 

@@ -1,8 +1,8 @@
-// A frame as exposures that follow something read it: a whole number a pixel, with that of the pixel below beside it, and
-// a rim of two pixels before and three behind that repeat the frame's edges.
+// Packs a frame for exposures that follow something. Each texel has two pixels, one below the other, as whole numbers. A
+// rim repeats the frame's edges: two pixels before, three behind.
 uniform sampler2DArray frame;
 layout(rgba16ui) uniform writeonly uimage2DArray packed_frames;
-uniform ivec2 size, last;  // of what is stored; the frame's last pixel
+uniform ivec2 size, last;  // the stored size; the frame's last pixel
 uniform int layer;
 #include "light.glsl"
 #include "packed.glsl"

@@ -1,6 +1,6 @@
-// What draws in previews. Textures have the top row first, `block` pixels of `size` along each side of a texel.
+// Draws in the preview. Textures have the top row first; a texel is a block of `block` × `block` pixels of `size`.
 #ifdef QUAD
-// A piece of the picture on the region. `corner`: in the region's pixels; `place`: in the picture, y up.
+// Places a part of the picture in the region. corner: in pixels of the region; place: in the picture, y up.
 in vec2 corner;
 in vec2 place;
 out vec2 at;
@@ -16,18 +16,18 @@ void main() {
 in vec2 at;
 in vec2 pixel;
 out vec4 shown;
-uniform bool srgbTarget;  // set by Blender: what is drawn into encodes by itself
+uniform bool srgbTarget;  // set by Blender: the target encodes what is drawn
 uniform float opacity;
 #  include "light.glsl"
 
-// Premultiplied code values as the region takes them: what is drawn over a preview, Blender shows with a gamma of 2.2.
+// Premultiplied code values for the region: Blender shows what is drawn over a preview with a gamma of 2.2.
 vec4 on_region(vec4 color) {
   return srgbTarget ? vec4(pow(max(straight(color), 0.0), vec3(2.2)) * color.a, color.a) : color;
 }
 #endif
 
 #ifdef PICTURE
-// A composed picture's levels.
+// Draws a composed picture's levels.
 uniform sampler2DArray picture;
 
 void main() {
@@ -35,21 +35,21 @@ void main() {
 }
 
 #elif defined(COEFFICIENTS) || defined(EDGES)
-// Four shutters per layer.
+// coefficients: four shutters per layer.
 uniform sampler2DArray coefficients, palette;
 uniform ivec2 size;
 uniform int block, count;
-uniform float unit;  // of the interface, in the region's pixels
+uniform float unit;  // pixels of the region per unit of the interface
 #endif
 
 #ifdef COEFFICIENTS
-// The shutters' colours, with their patterns, in shares of a pixel's coefficients.
+// Draws the shutters' colours and patterns, mixed by the pixel's coefficients.
 
 bool is_line(float place, float period) {
   return place - floor(place / period) * period < 1.7;
 }
 
-// Where a shutter's pattern has ink; core/pixels/patterns.py is the reference.
+// Whether a shutter's pattern has ink at a place; core/pixels/patterns.py is the reference.
 bool is_marked(int index, vec2 place) {
   bool across = is_line(place.x, 8.0), up = is_line(place.y, 8.0);
   bool rising = is_line(place.x - place.y + 0.3, 12.0), falling = is_line(place.x + place.y + 0.3, 12.0);
@@ -83,7 +83,7 @@ void main() {
 }
 
 #elif defined(EDGES)
-// A line, in a shutter's colour, around what that gets more than half of; around the first one's there is none.
+// Draws a line around the pixels of which a shutter gets more than half, in its colour. The first shutter gets none.
 int most(vec2 place) {
   vec2 all = vec2(size) / float(block);
   vec2 texels = clamp(vec2(place.x, 1.0 - place.y) * all, vec2(0.5), all - 0.5);
@@ -109,7 +109,7 @@ void main() {
 }
 
 #elif defined(SCRIBBLES)
-// The pixels that scribbles hold, in the colours of their shutters; labels: 0 where free.
+// Draws scribbles in the colours of their shutters. labels: 0 where free, else 1 + shutter.
 uniform usampler2DArray labels;
 uniform sampler2DArray palette;
 uniform ivec2 size;

@@ -1,8 +1,8 @@
-// Shutters that combine frames in several ways: of each way a picture is made with its own, then these are mixed.
+// Mixes pictures and coefficients. A picture whose shutters combine frames in several ways is composed once for each way.
 uniform ivec2 size;
 #ifdef SELECT
-// The coefficients of some shutters alone, for Σ = 1, and how much all of them have. `chosen`: their numbers, four to a
-// vector; −1: none. GROUPS of four; ALL shutters.
+// Picks the coefficients of some shutters, scaled to a sum of 1, and stores their share of all coefficients.
+// chosen: GROUPS of four shutter numbers, -1 where there is none; ALL: the number of all shutters; count: of those chosen.
 layout(rgba32f) uniform readonly image2DArray coefficients;
 layout(rgba32f) uniform writeonly image2DArray selected;
 layout(r32f) uniform writeonly image2DArray share;
@@ -33,8 +33,8 @@ void at(ivec3 p) {
   imageStore(share, p, vec4(own / sum));
 }
 #else
-// Adds a way's picture, as much as its shutters have, to `mixed`. Both are scene-linear, bottom row first. BEGINS: it is
-// the first. LEVELS: it is the last, and the sum becomes a picture of levels.
+// Adds a share of `part` to `mixed`: pictures (scene-linear, bottom row first) or coefficients. `share` has the top row
+// first, one texel for blocks of 2^block_bits pixels. BEGINS: the first part. LEVELS: the last one, which makes levels.
 layout(rgba32f) uniform readonly image2DArray part;
 layout(r32f) uniform readonly image2DArray share;
 #if BEGINS
@@ -44,15 +44,16 @@ layout(rgba32f) uniform readonly image2DArray mixed;
 #else
 layout(rgba32f) uniform image2DArray mixed;
 #endif
+uniform ivec2 given;  // the size of `part`: coefficients of the whole picture have one texel
 uniform int block_bits;
 #include "light.glsl"
 #if LEVELS
 #  include "finish.glsl"
 #endif
 
-void at(ivec3 p) {  // top row first
-  ivec3 place = ivec3(p.x, size.y - 1 - p.y, 0);
-  vec4 light = imageLoad(share, ivec3(p.xy >> block_bits, 0)).r * imageLoad(part, place);
+void at(ivec3 p) {
+  ivec3 place = ivec3(p.x, size.y - 1 - p.y, p.z);
+  vec4 light = imageLoad(share, ivec3(p.xy >> block_bits, 0)).r * imageLoad(part, ivec3(min(place.xy, given - 1), p.z));
 #if !BEGINS
   light += imageLoad(mixed, place);
 #endif

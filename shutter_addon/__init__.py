@@ -1,1 +1,1 @@
-"""Virtual Shutter: every pixel its own exposure. Sub-packages: core, media, compute (no bpy) and blender."""
+"""Virtual Shutter: every pixel its own exposure. Only the package `blender` uses bpy."""

@@ -21,12 +21,12 @@ def main() -> int:
     except ImportError as error:
         missing = "Blender as a library is needed (Python 3.13: pip install bpy); or run scripts/setup"
         return _refuse(missing if error.name == "bpy" else f"Blender as a library cannot be used: {error}")
-    except Exception as error:  # whatever stands there by that name
+    except Exception as error:  # any other module of that name
         return _refuse(f"Blender as a library cannot be used: {error!r}")
     try:
         return command(sys.argv[1:])
     finally:
-        blender.unregister()  # what sources still hold then, OpenImageIO reports as leaked
+        blender.unregister()  # else OpenImageIO reports open sources as leaks
         _flush()
 
 
@@ -38,7 +38,7 @@ def _refuse(sentence: str) -> int:
 
 
 def _open_streams() -> None:
-    """A stream that is closed gets the null device: else the next file gets its number, and what Blender prints."""
+    """Open closed standard streams on the null device, so that no file gets their numbers and Blender's output."""
     for number in range(3):
         try:
             os.fstat(number)
@@ -46,11 +46,11 @@ def _open_streams() -> None:
             os.open(os.devnull, os.O_RDWR)
     for name in ("stdout", "stderr"):
         if getattr(sys, name) is None:
-            setattr(sys, name, open(os.devnull, "w"))  # noqa: SIM115 (as long as the process lives)
+            setattr(sys, name, open(os.devnull, "w"))  # noqa: SIM115 (stays open)
 
 
 def _flush() -> None:
-    """Where nobody reads what was printed (a pipe's end that is closed), it is no fault of the film."""
+    """Flush stdout. A closed pipe is not an error of the film."""
     try:
         sys.stdout.flush()
     except OSError:

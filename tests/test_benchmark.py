@@ -27,56 +27,28 @@ runpy.run_path(sys.argv[0], run_name="__main__")
 @pytest.fixture(scope="module")
 def ran(tmp_path_factory):
     file = tmp_path_factory.mktemp("benchmark") / "rows.json"
-    options = "--sizes 45x27 --shutters 2,5 --windows 8 --bars preset,smooth,random --repeats 2 --pixels 300 --table"
+    options = "--sizes 45x27 --shutters 2,5 --windows 8 --bars preset,smooth,random --repeats 2 --pixels 300"
     command = [sys.executable, "-c", ALONE, "scripts/benchmark.py", "--json", str(file), *options.split()]
-    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=True)
-    return json.loads(file.read_text()), done.stdout
+    subprocess.run(command, cwd=ROOT, check=True)
+    return json.loads(file.read_text())
 
 
 def test_rows(ran):
-    rows, _ = ran
-    assert all(set(row) == KEYS and row["ms"] > 0 for row in rows)
-    passes = {"copy", "compose", "accumulate", "diffuse", "diffuse_moved", "readback", "frame"}
-    assert {row["pass"] for row in rows} == passes
-    composed = [row for row in rows if row["pass"] == "compose"]
+    assert all(set(row) == KEYS and row["ms"] > 0 for row in ran)
+    passes = {"compose", "accumulate", "diffuse", "diffuse_moved", "readback", "frame"}
+    assert {row["pass"] for row in ran} == passes
+    composed = [row for row in ran if row["pass"] == "compose"]
     # For each of the cases: ours, a layer, the paper's, what follows and what is combined in three other ways, at
     # either aggregation, and the average.
     assert len(composed) == 2 * 3 * 15
 
 
 def test_errors(ran):
-    rows, _ = ran
-    for row in rows:
-        if row["pass"] == "copy":
-            assert row["error"] == 0
+    for row in ran:
         if row["pass"] in ("compose", "frame", "diffuse", "accumulate"):
             assert row["error"] <= ALLOWED[row["method"]], row
         if row["pass"] == "diffuse_moved":  # a pixel of so few is far to go
             assert row["error"] <= 8, row
-
-
-def test_table(ran):
-    _, printed = ran
-    assert "45×27, random bars" in printed
-    assert "| N\\T | ours T=8 | layer T=8 | paper T=8 | average T=8 | follow T=8 | lightest T=8 | darkest" in printed
-
-
-def test_numpy(tmp_path):
-    file = tmp_path / "rows.json"
-    options = "--device cpu --sizes 45x27 --shutters 3 --windows 8 --repeats 1 --pixels 300"
-    subprocess.run(
-        [sys.executable, "-c", ALONE, "scripts/benchmark.py", "--json", str(file), *options.split()], cwd=ROOT
-    )
-    rows = json.loads(file.read_text())
-    assert {row["device"] for row in rows} == {"NumPy"}
-    assert {(row["pass"], row["method"]) for row in rows} == {
-        *((name, "ours") for name in ("copy", "compose", "accumulate", "diffuse", "frame")),
-        *((name, "layer") for name in ("compose", "accumulate", "frame")),
-        *((name, "average") for name in ("compose", "accumulate", "frame")),
-        ("diffuse", "edges"),
-        *(("compose", name) for name in ("follow", "lightest", "darkest", "median")),
-    }
-    assert all(row["error"] <= ALLOWED[row["method"]] for row in rows)
 
 
 def test_mattes(tmp_path):
@@ -86,7 +58,7 @@ def test_mattes(tmp_path):
     options = f"--sizes 46x28 --shutters 3 --windows 8 --bars preset --repeats 2 --passes {','.join(passes)}"
     command = [sys.executable, "scripts/benchmark.py", "--json", str(file), *options.split()]
     subprocess.run(command, cwd=ROOT, capture_output=True, check=True)
-    rows = [row for row in json.loads(file.read_text()) if row["pass"] != "copy"]
+    rows = json.loads(file.read_text())
     assert [(row["pass"], row["method"], row["aggregate"]) for row in rows] == [
         (name, "ours", block) for block in (1, 2) for name in passes
     ]

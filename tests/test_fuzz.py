@@ -8,7 +8,7 @@ import planted
 import pytest
 
 SCRIPTS = Path(__file__).parents[1] / "scripts"
-INPUTS = {"recipes": 8, "media": 20, "blends": 18}
+INPUTS = {"recipes": 8, "media": 20}
 
 
 @pytest.fixture

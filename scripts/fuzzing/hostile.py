@@ -55,15 +55,11 @@ def drawn(strategy, random):
     return found[-1]
 
 
-def number(random):
-    return random.choice((random.choice(NUMBERS), random.uniform(-2, 2), random.lognormvariate(0, 9)))
-
-
 def value(random):
     """Anything that JSON can hold, and what else as_json can write."""
     kind = random.randrange(8)
     if kind < 3:
-        return number(random)
+        return random.choice((random.choice(NUMBERS), random.uniform(-2, 2), random.lognormvariate(0, 9)))
     if kind < 5:
         return random.choice(TEXTS)
     return drawn(_JSON, random) if kind < 7 else random.choice((DIGITS, DEEP, [], {}, None, True, [[]]))

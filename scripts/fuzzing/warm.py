@@ -10,7 +10,7 @@ import cv2  # noqa: F401
 import moderngl  # noqa: F401
 import tqdm
 
-from . import blends, hostile, media, recipes  # noqa: F401
+from . import hostile, media, recipes  # noqa: F401
 
 hostile.value(random.Random(0))  # Hypothesis makes tables when it is first used
 tqdm.tqdm.get_lock()  # a semaphore, which processes that end in the midst of a render would leave behind

@@ -1,4 +1,4 @@
-// Composes a block of pixels by `expose_frames`, which goes through the frames: of a median, once a scan (combine.glsl).
+// Composes a block of pixels by `expose_frames`, which goes through the frames; for a median, once per scan.
 void main() {
   if (!start_block()) {
     return;

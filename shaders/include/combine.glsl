@@ -1,28 +1,28 @@
-// What is made of frames that are not averaged; core/pixels/combined.py is the reference. COMBINE: 1 lightest, 2 darkest:
-// `total` has the best light by now and the most of wₖ aₖ, and `share` the most of wₖ, a frame's weight times `gain`; 3
-// median. BY_LUMINANCE: a pixel's light is one frame's. THRESHOLD: what is darker (or lighter) than `threshold`, give or
-// take half of the softness behind it, leaves no trail beside the window's frame `shown`.
+// Combines frames other than by averaging; core/pixels/combined.py is the reference. COMBINE: 1 lightest, 2 darkest, 3
+// median. For 1 and 2, `total` holds the best light so far and the largest wₖ aₖ; `share` the largest wₖ, a frame's weight
+// times `gain`. BY_LUMINANCE: all channels of a pixel come from one frame. THRESHOLD: light below (darkest: above)
+// `threshold.x`, with a soft edge of ± `threshold.y`, leaves no trail; the window's frame `shown` always counts.
 #if COMBINE == 3
-// By a level that rises with a sample: each scan through the frames chooses a quarter of the levels where the median may
-// still lie, by the weight of what is below three thresholds; the last one finds the samples at that level, and the next
-// above. LEVELS_OF: 0 samples of 8 bits, 1 of 16, 2 light of any.
+// Finds the median by levels, which rise with the samples. Each scan through the frames narrows the range of levels to a
+// quarter, by the weight below three thresholds. The last scan finds the samples at that level, and the next ones above.
+// LEVELS_OF: 0 for 8-bit samples, 1 for 16-bit samples, 2 for light.
 #  define SCANS (LEVELS_OF == 0 ? 4 : 9)
 #  define WIDEST (LEVELS_OF == 0 ? 64.0 : 65536.0)
 #  define HIGHEST (LEVELS_OF == 0 ? 255.0 : LEVELS_OF == 1 ? 65535.0 : 262143.0)
 #  define STEPS 3
-// Around the middle, where both neighbours count: MIDDLE of core/pixels/combined.py.
+// Within this of the middle, both neighbours count: MIDDLE of core/pixels/combined.py.
 const float NEAR_MIDDLE = 1.0 / 8192.0;
 int scan = 0;
 float width_of_step = WIDEST;
-vec3 base[4];  // the level from which on the median lies, by pixel
+vec3 base[4];  // of each pixel, the lowest level that the median may have
 vec3 bounds[4 * STEPS];  // the thresholds, between levels
-vec3 below[4 * STEPS];  // the weight of what is below each
-vec3 until[4];  // in the last scan, that of what is at the median's level or below
+vec3 below[4 * STEPS];  // the weight below each threshold
+vec3 until[4];  // in the last scan, the weight at the median's level or below
 vec3 lower[4];
 vec3 upper[4];
-vec4 covered = vec4(0.0);  // Σ qₖ aₖ of each pixel
+vec4 covered = vec4(0.0);  // each pixel's Σ qₖ aₖ
 
-// A sample of a frame, whose light rises with it, and its alpha; what of it is compared, and its light.
+// A frame's sample and alpha; the level that is compared; the sample's light, which rises with it.
 #  if LEVELS_OF == 2
 vec4 sample_at(ivec2 place, int slot) {
   vec4 light = frame_light(place, slot);
@@ -30,7 +30,7 @@ vec4 sample_at(ivec2 place, int slot) {
 }
 
 vec3 level_of(vec3 value) {
-  vec3 root = sign(value) * sqrt(sqrt(abs(value)));  // light of wide gamuts may be below 0
+  vec3 root = sign(value) * sqrt(sqrt(abs(value)));  // light of wide gamuts may be negative
   return 0.5 + 0.5 * root / (1.0 + abs(root));
 }
 #    define light_of(value) (value)
@@ -52,7 +52,7 @@ void start_median() {
 void start_scan() {
   for (int pixel = 0; pixel < 4; pixel++) {
     for (int k = 0; k < STEPS; k++) {
-      // In the last scan: below the median's level, and above it.
+      // The last scan's thresholds lie below and above the median's level.
       float up = scan < SCANS ? float(k + 1) * width_of_step : float(min(k, 1));
       bounds[pixel * STEPS + k] = (base[pixel] + up - 0.5) / HIGHEST;
       below[pixel * STEPS + k] = vec3(0.0);
@@ -108,7 +108,7 @@ vec4 median_of(int pixel) {
 }
 #else
 const vec3 LUMINANCE = vec3(0.2126, 0.7152, 0.0722);
-// How much of a light leaves a trail.
+// How much of a light leaves a trail, from 0 to 1.
 #  if THRESHOLD
 uniform vec2 threshold;
 uniform int shown;
@@ -132,7 +132,7 @@ vec3 better(vec3 best, vec3 other) {
 #  endif
 }
 
-// A frame's light, which counts `weight`, from 0 to 1.
+// Folds a frame's light into `total`. weight: from 0 to 1.
 void fold(int quad, int pixel, vec4 light, float weight) {
 #  if COMBINE == 2
   vec3 dark = vec3(light.a) - light.rgb;
@@ -145,7 +145,7 @@ void fold(int quad, int pixel, vec4 light, float weight) {
   total[quad][pixel] = vec4(better(best.rgb, value.rgb), max(best.a, value.a));
 }
 
-// What was folded, to be folded with what other passes have.
+// The folded light, which other passes go on with.
 vec4 folded(int quad, int pixel) {
   vec4 best = total[quad][pixel];
   return vec4(best.rgb, best.a / max(share[quad][pixel], 1e-30));

@@ -1,17 +1,17 @@
-// What ways to compose share: a block's coefficients, the sums over its frames, the finished picture. An
-// invocation composes QUADS of four pixels above one another, whose look-ups in the table serve all of them. A quad is a
-// matrix: a column each, of coefficients or of light. EACH calls a function for every quad: arrays that a loop indexes go
-// through memory. Software renderers run both sides of a branch: what is costly stands in loops or behind definitions.
-// coefficients: four shutters per layer; table: row 0 the gains, then the knots or the bars, four shutters per texel.
-// The window's frame k is frame `origin` + k · `direction` of the shot, which has `count`. frames: source frame i in layer
-// i mod `layers`; or with SUMS the running sums instead, from position `lowest` on, the shot's ends extended: position i's.
-// MOVED: shutters follow something (moved.glsl). COMBINE: frames are not averaged (combine.glsl). VALUE: bars are mixed by
-// value. GROUPS of four shutters, TILED, EDGES, DECODE, PREMULTIPLIED, ENCODED: see compute/composition_passes.py.
+// Shared by the passes that compose: a block's coefficients, the sums over its frames, and the finished picture. An
+// invocation composes QUADS of four pixels above one another, which share each look-up in the table. A quad is a matrix
+// with a column for each pixel. EACH calls a function for every quad: a loop would move the arrays that it indexes to
+// memory. Software renderers run both sides of a branch, so costly code is in loops or behind macros.
+// coefficients: four shutters per layer. table: row 0 has the gains, the others knots or bars, four shutters per texel.
+// Frame k of the window is frame `origin` + k · `direction` of the shot's `count`. frames: source frame i is in layer
+// i mod `layers`. SUMS: running sums in their place, from position `lowest` on; the shot's ends are extended.
+// MOVED: shutters follow something (moved.glsl). COMBINE: frames are not averaged (combine.glsl). VALUE: value
+// interpolation. GROUPS of four shutters, TILED, EDGES, DECODE, PREMULTIPLIED, ENCODED: compute/composition_passes.py.
 layout(rgba32f) uniform readonly image2DArray table;
 uniform ivec2 size;
 uniform int top, block_bits;
 #if MOVED
-uniform sampler2DArray coefficients;  // no image: others take all that Vulkan guarantees
+uniform sampler2DArray coefficients;  // no image: Vulkan guarantees only the four that this pass has
 #else
 layout(rgba32f) uniform readonly image2DArray coefficients;
 uniform int origin, direction, layers, lowest, lowest_layer;
@@ -45,22 +45,22 @@ layout(rgba32f) uniform writeonly image2DArray picture;
 
 ivec2 corner;
 #if TILED
-ivec3 corner_place;  // of the corner's sums
+ivec3 corner_place;  // where the corner's sums begin
 #endif
 mat4 c[QUADS * GROUPS];
 #if SUMS
-SUM sum_before[4 * QUADS];  // of each pixel, the sum at the frame's start
+SUM sum_before[4 * QUADS];  // each pixel's sum at the frame's start
 LIGHT total[4 * QUADS];
 #else
 mat4 total[QUADS];
 #endif
-vec4 share[QUADS];  // of the exposure that fell on frames that are there
-vec4 centre[QUADS];  // of the exposure in time, frames left out included
+vec4 share[QUADS];  // the part of the exposure that fell on frames that exist
+vec4 centre[QUADS];  // the exposure's mean time, with missing frames
 #if COMBINE == 1 || COMBINE == 2
 vec4 gain[QUADS];  // how much a frame's weight counts (combine.glsl)
 #endif
 
-// A pixel of a quad; beyond the picture's edge the last one inside.
+// A pixel of a quad. Pixels beyond the picture's edge repeat the last one.
 ivec2 pixel_at(int quad, int pixel) {
   return min(corner + ivec2(0, 4 * quad + pixel), size - 1);
 }
@@ -69,7 +69,7 @@ vec4 coefficients_at(ivec2 pixel, int group) {
   ivec3 place = ivec3((pixel + ivec2(0, top)) >> block_bits, group);
 #if MOVED
   vec4 found = max(texelFetch(coefficients, place, 0), 0.0);
-  // Which are zero, the compiler then knows.
+  // Tells the compiler which ones are zero.
   return found * vec4(lessThan(ivec4(0, 1, 2, 3), ivec4(SHUTTERS - 4 * group)));
 #else
   return max(imageLoad(coefficients, place), 0.0);
@@ -77,7 +77,7 @@ vec4 coefficients_at(ivec2 pixel, int group) {
 }
 
 #if SUMS
-// Where a pixel's sums begin. The block is as high as a tile of them.
+// Where a pixel's sums begin. A block is as high as a tile.
 ivec3 place_of_light(int quad, int pixel) {
 #if TILED
   return corner_place + ivec3(8 * (4 * quad + pixel), 0, 0);
@@ -86,13 +86,13 @@ ivec3 place_of_light(int quad, int pixel) {
 #endif
 }
 
-// The layer of the sum at a position, or at the nearest that is there.
+// The layer of the sum at a position, or at the nearest one that is held.
 int layer_at(int position) {
   int layer = clamp(position - lowest, 0, held) + lowest_layer;
   return layer < layers ? layer : layer - layers;
 }
 
-// The layer of the sum where the window's frame begins.
+// The layer of the sum at the start of a frame of the window.
 int start_of(int frame) {
   return layer_at(origin + direction * frame + (direction < 0 ? 1 : 0));
 }
@@ -119,7 +119,7 @@ void start_light(int quad) {
 }
 #endif
 
-// Σ cᵢ tableᵢ, for the table's row and the first of its columns.
+// Σ cᵢ tableᵢ in a row of the table, from a column on.
 vec4 mixed(int quad, int column, int row) {
   vec4 sum = vec4(0.0);
   for (int g = 0; g < GROUPS; g++) {
@@ -148,14 +148,14 @@ void start_quad(int quad) {
 #if COMBINE == 1 || COMBINE == 2
 #  if VALUE
   gain[quad] = vec4(1.0);
-  centre[quad] = mixed(quad, 0, 0);  // these weights count, but their sum is not 1
+  centre[quad] = mixed(quad, 0, 0);  // the sum of these weights is not 1
 #  else
   gain[quad] = mixed(quad, 0, 0);
 #  endif
 #endif
 }
 
-// False where the block lies outside the picture.
+// Starts the block. False: it lies outside the picture.
 bool start_block() {
   corner = ivec2(gl_GlobalInvocationID.xy) * ivec2(1, 4 * QUADS);
 #if TILED
@@ -186,7 +186,7 @@ vec4 frame_light(ivec2 place, int slot) {
 #  endif
 
 #  if !MOVED
-// The layer of the window's frame, or of the shot's end beyond which it lies.
+// The layer of a frame of the window, or of the shot's nearest end.
 int layer_of(int frame) {
   int index = origin + direction * frame;
 #if EDGES == 1  // mirror
@@ -217,7 +217,7 @@ void fold_sight(int quad, int frame) {}
 #if MOVED
 #  include "moved.glsl"
 #else
-// Frames one after another: with SUMS, at each the sum at its end is looked up, and that at its start is known.
+// Adds a frame. Frames come in order, so with SUMS the sum at its start is the last frame's end.
 void expose(int quad, int frame, vec4 weight) {
 #if EDGES == 2  // shorten
 #  if COMBINE == 3
@@ -267,7 +267,7 @@ void expose(int quad, int frame, vec4 weight) {
 #endif
 
 #if !MOVED && EDGES == 2
-// The light of the frame that is nearest to the window's among those that are there.
+// The light of the existing frame that is nearest to a frame of the window.
 vec4 nearest_light(int quad, int pixel, int frame) {
 #if SUMS
   int position = clamp(origin + direction * frame, 0, count - 1);
@@ -297,7 +297,7 @@ void store(int quad, int pixel, float brightness) {
   vec4 color = total[quad][pixel] / max(share[quad][pixel], 1e-6);
 #endif
 #if EDGES == 2
-  // Where nothing of the shutter is left, the nearest frame that there is (core/pixels/compositor.py has the 1e-3).
+  // Where no exposed frame exists, the nearest one does (core/pixels/compositor.py has the same 1e-3).
   for (int once = share[quad][pixel] > 1e-6 ? 1 : 0; once < 1; once++) {
     color = nearest_light(quad, pixel, int(centre[quad][pixel] - 1e-3));
   }

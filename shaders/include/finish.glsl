@@ -1,5 +1,5 @@
-// Stores a pixel of the finished picture, of `height` rows. LEVELS: display code values (view transform Standard), top row
-// first; else scene-linear, bottom row first: Blender's order, and GL's. Both are premultiplied.
+// Stores a pixel of the finished picture, premultiplied. LEVELS: display code values (view transform Standard), top row
+// first; else scene-linear, bottom row first, as in Blender and OpenGL. height: rows of the picture.
 #if LEVELS
 layout(rgba8) uniform writeonly image2DArray picture;
 #else

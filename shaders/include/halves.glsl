@@ -1,5 +1,5 @@
-// Two words of 32 bits in a texel of four halves, rgba16ui: Metal has no images of two components that a pass both loads
-// from and stores to, and Vulkan has them as an extra feature alone.
+// Two 32-bit words in a texel of four 16-bit halves (rgba16ui). Images of two components that a pass loads and stores are
+// missing in Metal and optional in Vulkan.
 uvec2 words_of(uvec4 halves) {
   return halves.xz | (halves.yw << 16);
 }

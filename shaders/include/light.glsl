@@ -1,6 +1,6 @@
 // The sRGB transfer; core/frames/light.py is the reference.
 
-// For code values in [0, 1] a polynomial within 0.03 of an 8-bit level: three powers cost more than a frame's fetch.
+// For code values in [0, 1]: a polynomial within 0.03 of an 8-bit level. Powers cost more than fetching a frame.
 vec3 to_linear(vec3 x) {
   vec3 curve =
       ((((((-0.05115455 * x + 0.21591497) * x - 0.42194232) * x + 0.71005759) * x + 0.51325115) * x + 0.03294947) * x) +
@@ -13,7 +13,7 @@ vec3 to_linear_exact(vec3 encoded) {
   return mix(curve, encoded / 12.92, lessThanEqual(encoded, vec3(0.04045)));
 }
 
-// For code values of any range, as straight colours are that were premultiplied: in [0, 1] the polynomial's.
+// For code values of any range, which straight colours have that were premultiplied. In [0, 1] it is the polynomial.
 vec3 to_linear_of_any(vec3 encoded) {
   return mix(to_linear(encoded), to_linear_exact(encoded), greaterThan(encoded, vec3(1.0)));
 }
@@ -23,7 +23,7 @@ vec3 to_encoded(vec3 linear) {
   return mix(curve, linear * 12.92, lessThanEqual(linear, vec3(0.0031308)));
 }
 
-// As to_encoded, for light in [0, 1]: of its fourth root a polynomial within 0.0005 of an 8-bit level, cheaper than powers.
+// Like to_encoded, for light in [0, 1]: a polynomial of its fourth root, within 0.0005 of an 8-bit level.
 vec3 to_level(vec3 linear) {
   vec3 x = sqrt(sqrt(max(linear, 0.0031308)));
   vec3 curve =
@@ -32,8 +32,7 @@ vec3 to_level(vec3 linear) {
   return mix(curve, linear * 12.92, lessThanEqual(linear, vec3(0.0031308)));
 }
 
-// What a premultiplied colour is multiplied by: what is fully transparent keeps its light, also where rounding of what
-// lies beside it leaves a trace of alpha.
+// The alpha that a premultiplied colour was multiplied by; 1 if it is transparent up to rounding, where light is kept.
 float cover(vec4 color) {
   return color.a > 1e-6 ? color.a : 1.0;
 }
@@ -42,7 +41,7 @@ vec3 straight(vec4 color) {
   return color.rgb / cover(color);
 }
 
-// Samples as the light that is summed: 0 as they are, 1 made linear, 2 made encoded.
+// Converts samples to the light that is summed. DECODE: 0 unchanged, 1 to linear, 2 to encoded.
 vec3 decoded(vec3 color) {
 #if DECODE == 1
   return to_linear(color);

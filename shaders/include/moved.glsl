@@ -1,9 +1,10 @@
-// Frames that are seen where what a pixel's shutters follow was: one resampling a frame, SHARP as compositor.seen has it.
-// frames: some of the window's, in layers; or with PACKED packed_frames, as shaders/pack.glsl makes them. moves: a row for
-// each of the window's frames, seen_first to seen_last of which are there, and of `motions`, several where pictures are
-// mixed: the frame's layer (−1: it is not among these), whether it is there; then turn − 1 and shift of each shutter, MIXED
-// of them. table: a row for each frame and motion; from row `parts` on, one for each motion: 1 for its shutters.
-// SEVERAL: other passes have other frames. CONTINUED: those before have made `summed`; UNFINISHED: another one follows.
+// Exposures that follow something: each frame is resampled once, at the place of what the pixel's shutters follow.
+// SHARP: by the cubic of core/pixels/compositor.py (`seen`). frames: some of the window's frames; with PACKED,
+// packed_frames of shaders/pack.glsl instead. Frames seen_first to seen_last exist.
+// moves: a row for each frame and motion: the frame's layer (−1: another pass has it), whether it exists; then turn − 1 and
+// shift of each shutter (MIXED of them). By value there are `motions`, one for all shutters that move alike.
+// table: a row for each frame and motion; from row `parts` on, one for each motion: 1 for its shutters.
+// SEVERAL: other passes have other frames. CONTINUED: `summed` has theirs so far. UNFINISHED: another pass follows.
 layout(rgba32f) uniform readonly image2DArray moves;
 uniform int motions;
 #if PACKED
@@ -31,41 +32,33 @@ vec4 moved_weights(float t) {
 #if PACKED
 #include "packed.glsl"
 
-// Of a column of four pixels, two pairs.
-struct Column {
-  vec3 a, b, c, d;
-};
-
-Column column_at(ivec2 place, int layer) {
+// Four pixels above one another: two packed pairs.
+mat4x3 column_at(ivec2 place, int layer) {
   uvec2 upper = words_of(imageLoad(packed_frames, ivec3(place, layer)));
   uvec2 lower = words_of(imageLoad(packed_frames, ivec3(place + ivec2(0, 2), layer)));
-  Column column;
-  column.a = unpacked_color(upper.x);
-  column.b = unpacked_color(upper.y);
-  column.c = unpacked_color(lower.x);
-  column.d = unpacked_color(lower.y);
-  return column;
+  return mat4x3(unpacked_color(upper.x), unpacked_color(upper.y), unpacked_color(lower.x), unpacked_color(lower.y));
 }
 
-vec3 column_light(Column column, vec4 y) {
-  return y.x * column.a + y.y * column.b + y.z * column.c + y.w * column.d;
+vec3 column_light(mat4x3 column, vec4 y) {
+  return y.x * column[0] + y.y * column[1] + y.z * column[2] + y.w * column[3];
 }
 
-// The light of a frame at a pixel and a distance from it.
+// The light of a frame at a distance from a pixel.
 vec4 seen_light(ivec2 pixel, vec2 away, int layer) {
   ivec2 place = pixel + ivec2(floor(away)) + BEFORE - 1;
   vec2 t = away - floor(away);
   vec4 x = moved_weights(t.x);
   vec4 y = moved_weights(t.y);
-  Column left = column_at(place + ivec2(1, 0), layer);
-  Column right = column_at(place + ivec2(2, 0), layer);
+  mat4x3 left = column_at(place + ivec2(1, 0), layer);
+  mat4x3 right = column_at(place + ivec2(2, 0), layer);
   vec3 light = x.x * column_light(column_at(place, layer), y) + x.y * column_light(left, y) +
                x.z * column_light(right, y) + x.w * column_light(column_at(place + ivec2(3, 0), layer), y);
-  light = clamp(light, min(min(left.b, left.c), min(right.b, right.c)), max(max(left.b, left.c), max(right.b, right.c)));
+  vec3 least = min(min(left[1], left[2]), min(right[1], right[2]));
+  light = clamp(light, least, max(max(left[1], left[2]), max(right[1], right[2])));
   return vec4(light * PACKED_UNIT, 1.0);
 }
 #else
-// Four pixels of a row, weighted; second, third: of these two the light.
+// The weighted light of four pixels of a row; second, third: the light of the two inner ones.
 vec4 row_light(vec4 x, ivec4 columns, int row, vec4 second, vec4 third, int layer) {
   return x.x * frame_light(ivec2(columns.x, row), layer) + x.y * second + x.z * third +
          x.w * frame_light(ivec2(columns.w, row), layer);
@@ -94,15 +87,14 @@ vec4 seen_light(ivec2 pixel, vec2 away, int layer) {
 }
 #endif
 
-// turn · z + shift − z, where a pixel's (turn − 1, shift) is `move`. Beyond the frame's last pixels all is the same, and
-// large numbers have no fractions.
+// turn · z + shift − z for a pixel z; move: (turn − 1, shift). Clamped to the frame, since large floats have no fractions.
 vec2 moved_by(vec4 move, ivec2 pixel) {
   vec2 z = vec2(pixel);
   vec2 away = vec2(move.x * z.x - move.y * z.y, move.y * z.x + move.x * z.y) + move.zw;
   return clamp(away, vec2(-1 - pixel), vec2(size - pixel));
 }
 
-// (turn − 1, shift) of a quad's pixels, a column each.
+// (turn − 1, shift) of a quad's pixels, in columns.
 mat4 moves_of(int quad, int row) {
 #if MIXED == 1
   vec4 own = imageLoad(moves, ivec3(1, row, 0));
@@ -120,7 +112,7 @@ mat4 moves_of(int quad, int row) {
 }
 
 #if EDGES == 2 || THRESHOLD
-// How much of a pixel's coefficients is that of the motion's shutters.
+// The sum of a pixel's coefficients over the motion's shutters.
 float share_of_motion(int quad, int pixel) {
   float sum = 0.0;
   for (int g = 0; g < GROUPS; g++) {
@@ -131,12 +123,12 @@ float share_of_motion(int quad, int pixel) {
 #endif
 
 #if COMBINE
-// A frame as it is seen by all motions: its light, weighted, how much it counts, and whether it is among these frames.
+// A frame as all motions see it: its weighted light, its weight, and whether this pass has the frame.
 mat4 sight[QUADS];
 vec4 sight_weight[QUADS];
 bool is_here;
 #  if THRESHOLD
-mat4 shown_sight[QUADS];  // its light, whatever it counts
+mat4 shown_sight[QUADS];  // its light without the weight
 #  endif
 
 void start_sight(int quad) {
@@ -176,12 +168,11 @@ void expose(int quad, int frame, vec4 weight) {
   share[quad] += weight;
 #endif
 #if SEVERAL
+  bool is_exposed = any(greaterThan(weight, vec4(0.0)));
 #  if THRESHOLD
-  int layer = frame == shown || any(greaterThan(weight, vec4(0.0))) ? int(place.x) : -1;
-#  else
-  int layer = any(greaterThan(weight, vec4(0.0))) ? int(place.x) : -1;
+  is_exposed = is_exposed || frame == shown;
 #  endif
-  for (; layer >= 0; layer = -1)
+  for (int layer = is_exposed ? int(place.x) : -1; layer >= 0; layer = -1)
 #else
   int layer = max(int(place.x), 0);
 #endif
@@ -197,18 +188,16 @@ void expose(int quad, int frame, vec4 weight) {
 #  endif
     }
 #else
-    mat4 light;
-    light[0] = weight.x * seen_light(pixel_at(quad, 0), moved_by(move[0], pixel_at(quad, 0)), layer);
-    light[1] = weight.y * seen_light(pixel_at(quad, 1), moved_by(move[1], pixel_at(quad, 1)), layer);
-    light[2] = weight.z * seen_light(pixel_at(quad, 2), moved_by(move[2], pixel_at(quad, 2)), layer);
-    light[3] = weight.w * seen_light(pixel_at(quad, 3), moved_by(move[3], pixel_at(quad, 3)), layer);
-    total[quad] += light;
+    total[quad] += mat4(weight.x * seen_light(pixel_at(quad, 0), moved_by(move[0], pixel_at(quad, 0)), layer),
+                        weight.y * seen_light(pixel_at(quad, 1), moved_by(move[1], pixel_at(quad, 1)), layer),
+                        weight.z * seen_light(pixel_at(quad, 2), moved_by(move[2], pixel_at(quad, 2)), layer),
+                        weight.w * seen_light(pixel_at(quad, 3), moved_by(move[3], pixel_at(quad, 3)), layer));
 #endif
   }
 }
 
 #if EDGES == 2  // shorten
-// A pixel's light in the frame that is nearest to its exposure's time, if it is among these frames.
+// A pixel's light in the frame nearest to the exposure's time, if this pass has it.
 vec4 nearest_light(int quad, int pixel, int frame) {
   int nearest = clamp(frame, seen_first, seen_last);
   vec4 light = vec4(0.0);

@@ -1,5 +1,5 @@
-// Light in 32 bits: 11 of red and of green, 10 of blue. SQUARED: linear, its square root, so that dark steps are small;
-// else encoded, so that every level of 8 bits is exact.
+// Packs light into 32 bits: 11 for red, 11 for green, 10 for blue. SQUARED: linear light, by its square root, so that dark
+// steps are small; else encoded light, with every 8-bit level exact.
 #include "halves.glsl"
 
 const int BEFORE = 2;

@@ -1,19 +1,13 @@
-// Running sums along time: a pixel's sum at position p is the light of all frames before p, three fields of 21 bits in
-// one word of 64; with COVER, of a layer (core/pixels/layering.py), four of 32 bits: weighted light, then with 1 the
-// weights, with 2 what they leave. Only differences are taken, which are exact however often the sums have wrapped around.
+// Running sums along time: a pixel's sum at position p is the light of all frames before p, in three fields of 21 bits.
+// With COVER (of a layer, core/pixels/layering.py) there are four fields of 32 bits: weighted light, then with 1 the
+// weights, with 2 one minus the weights. Only differences are used, which stay exact when sums wrap around.
 #if COVER
 #define SUM uvec4
 #define LIGHT vec4
 #define AS_STORED(sum) sum
 #define AS_SUM(stored) stored
-
-uvec4 minus(uvec4 a, uvec4 b) {
-  return a - b;
-}
-
-uvec4 plus(uvec4 a, uvec4 b) {
-  return a + b;
-}
+#define minus(a, b) ((a) - (b))
+#define plus(a, b) ((a) + (b))
 
 vec4 unpacked_light(uvec4 difference) {
   return vec4(ivec4(difference));
@@ -45,7 +39,7 @@ uvec2 packed_light(uvec3 light) {
   return uvec2(light.r | (light.g << 21), (light.g >> 11) | (light.b << 10));
 }
 
-// As signed integers, which convert to floats in one instruction.
+// Signed integers convert to floats in one instruction.
 vec3 unpacked_light(uvec2 difference) {
   uint green = (difference.x >> 21) | (difference.y << 11);
   return vec3(ivec3(difference.x & FIELD, green & FIELD, difference.y >> 10));
@@ -56,8 +50,7 @@ vec4 covered(vec3 light) {
 }
 #endif
 
-// Where a pixel's sums begin. TILED: those of a tile of 8 × 16 pixels lie behind one another in a row of texels, a layer
-// of texels holds a row of tiles.
+// Where a pixel's sums begin. TILED: a row of texels holds a tile of 8 × 16 pixels, a layer holds a row of tiles.
 ivec3 place_of_sums(ivec2 pixel) {
 #if TILED
   return ivec3(((pixel.y & 15) << 3) + (pixel.x & 7), pixel.x >> 3, pixel.y >> 4);
@@ -74,7 +67,7 @@ ivec3 place_in_layer(ivec3 place, int layer) {
 #endif
 }
 
-// imageLoad: a software renderer's texelFetch of whole numbers takes three times as long.
+// On a software renderer, texelFetch of whole numbers takes three times as long as imageLoad.
 SUM sum_at(ivec3 place, int layer) {
   return AS_SUM(imageLoad(sums, place_in_layer(place, layer)));
 }

@@ -1,11 +1,11 @@
-"""Everything that touches bpy: properties, engine, strips, commands."""
+"""Everything that uses bpy: properties, the engine, strips, commands."""
 
 from importlib import import_module
 from types import ModuleType
 
 import bpy
 
-# Blender gets the classes of each (classes_of); all else that it gets, `register` and `unregister` know.
+# The classes of each are registered (classes_of), then its `register` is called.
 _MODULES = (
     "devices.main_thread",
     "interface.translations",
@@ -36,14 +36,14 @@ _commands: list = []
 
 
 def classes_of(module: ModuleType) -> tuple[type, ...]:
-    """Those of a module that Blender gets: its own with Blender's kind of names, and what it calls `classes`."""
+    """Return a module's classes to register: those named SHUTTER_…, and its `classes`."""
     own = [each for each in vars(module).values() if getattr(each, "__module__", "") == module.__name__]
     named = [each for each in own if isinstance(each, type) and each.__name__.startswith("SHUTTER_")]
     return (*named, *getattr(module, "classes", ()))
 
 
 def register() -> None:
-    """Registers everything with Blender, the command included."""
+    """Register everything with Blender, with the command."""
     for module in _modules:
         for cls in classes_of(module):
             bpy.utils.register_class(cls)
@@ -53,7 +53,7 @@ def register() -> None:
 
 
 def unregister() -> None:
-    """Leaves nothing behind."""
+    """Unregister everything."""
     bpy.utils.unregister_cli_command(_commands.pop())
     for module in reversed(_modules):
         if hasattr(module, "unregister"):

@@ -1,7 +1,6 @@
-"""The command line: `python -m shutter_addon render …`, and `blender -c shutter render …` in an installed Blender.
+"""The command line: `python -m shutter_addon render …`, or `blender -c shutter render …` in an installed Blender.
 
-Each command is a module of commands/, whose `add` adds its parser; the parser's default `run` is the function that does
-what it says.
+Each command is a module of commands/. Its `add` adds a parser, whose default `run` is the command's function.
 """
 
 import argparse
@@ -16,12 +15,12 @@ from .output import film_output
 from .rendering import render_job
 
 BAD_INPUT = 2
-PLACES = ("output", "save", "json", "source", "edit")  # where a fault may be that says not where
+PLACES = ("output", "save", "json", "source", "edit")  # options to name where an OSError names no file
 COMMANDS = "render", "track", "bake", "check", "join"
 
 
 def main(argv: list[str]) -> int:
-    """Runs the command; its exit code: 0, or 2 after one sentence on stderr; 130 where it was stopped."""
+    """Run a command and return its exit code: 0, 2 after one sentence on stderr, or 130 if it was stopped."""
     parser, arguments = _parser(), None
     try:
         arguments = parser.parse_args(argv)
@@ -29,9 +28,9 @@ def main(argv: list[str]) -> int:
             if isinstance(path, Path):
                 check_name(path)
         arguments.run(arguments)
-    except SystemExit as stop:  # argparse: --help, or what it has said on stderr
+    except SystemExit as stop:  # argparse, after --help or a message on stderr
         return int(stop.code or 0)
-    except KeyboardInterrupt:  # between the frames of a render; those that are finished stay
+    except KeyboardInterrupt:  # between the frames of a render; finished ones stay
         return film_output.INTERRUPTED
     except film_output.InterruptedRenderError as stopped:
         return _refuse(str(stopped), film_output.INTERRUPTED)

@@ -1,5 +1,4 @@
-"""What happens by itself: effects follow their strips, an old file's sources are closed, and a render that cannot show
-an effect ends."""
+"""Handlers of Blender's events: loading, saving, changes, undo and renders."""
 
 from __future__ import annotations
 
@@ -24,7 +23,7 @@ from .rendering import invalidation, job_snapshots, render_job, sessions, strobi
 from .rendering.render_job import Where
 
 
-def _before_load(*_) -> None:
+def _forget_file(*_) -> None:
     edit_feed.end()
     sharp_frame.forget()
     operator_bases.end_all()
@@ -39,7 +38,7 @@ def _before_load(*_) -> None:
 
 def _after_load(*_) -> None:
     sharp_frame.listen()
-    sessions.drop_removed()  # what a render job took up while the file was loaded
+    sessions.drop_removed()  # a render job may have opened some while the file was loaded
     if not data_format.is_file_newer():
         tell(data_format.migrate())
         reconciling.tidy()
@@ -49,18 +48,18 @@ def _after_load(*_) -> None:
 
 def _after_import(imported: bpy.types.BlendImportContext, *_) -> None:
     items = [item for item in imported.import_items if item.id_type == "SCENE"]
-    # A name that was asked for may not be there.
+    # The file may lack a requested name.
     tell(data_format.note(item.id for item in items if item.id is not None))
 
 
 def tell(words: str | None) -> None:
-    """Says something of a file that was loaded, if anything: in the window, or on stderr where there is none."""
+    """Show a sentence about a loaded file, in the window or on stderr."""
     if words is None:
         return
     told.record(words)
     if bpy.app.background:
         render_job.say(words)
-    else:  # while a file is loaded, its windows are not there yet
+    else:  # a file that is being loaded has no windows yet
         main_thread.soon(partial(_show, sentence(words)))
 
 
@@ -72,7 +71,7 @@ def _show(words: str) -> None:
 
 def _before_save(*_) -> None:
     edit_feed.end()
-    reconciling.update()  # a script may have removed strips, since Blender last told
+    reconciling.update()  # a script may have removed strips without an update
     sharp_frame.give_back(bpy.context)
     if not data_format.is_file_newer():
         data_format.stamp_saved(versions.extension())
@@ -84,8 +83,7 @@ def _update(scene: Scene | None = None, depsgraph: Depsgraph | None = None) -> N
         job_snapshots.look(film)
     if not render_job.cancelling():
         reconciling.update(scene)
-    # Blender itself draws previews again for most of what changes, but not for a mask. And it may crash where one is
-    # drawn while a render ends.
+    # Blender redraws previews for most changes, but not for a mask. It may crash if one is drawn while a render ends.
     if depsgraph is not None and depsgraph.id_type_updated("MASK") and not render_job.runs():
         preview_areas.redraw()
 
@@ -114,15 +112,15 @@ def _before_render(scene: Scene, *_) -> None:
 
 
 def _prepare(film: int, in_job: bool) -> bool:
-    """On the main thread, whatever thread renders. True: it has been done."""
-    revision.changed()  # a script may have, since Blender last told
+    """Prepare a film's render on the main thread, whatever thread renders. Return True when done."""
+    revision.changed()  # a script may have changed something without an update
     sessions.settle()
     invalidation.drop_spoilt()
     invalidation.drop_lesser()
     source_media.look_again()
     source_media.rest(render_job.runs())
     if not data_format.is_file_newer():
-        # In a window the last update has seen to it, but for views, of which Blender tells nobody.
+        # In a window the last update has done that, except for views, which no handler reports.
         reconciling.follow_sources(reconciling.tidy() if bpy.app.background else reconciling.gather())
     for scene in bpy.data.scenes:
         invalidation.invalidate_changed(scene)
@@ -143,7 +141,7 @@ def _before_frame(scene: Scene, *_) -> None:
 
 def _after_render(scene: Scene, *_) -> None:
     if not render_job.is_film(scene):
-        return  # of an effect, for a film or a preview
+        return  # a render of an effect, for a film or a preview
     render_job.soon(invalidation.drop_spoilt)
     edit_feed.end()
     job_snapshots.end()
@@ -151,19 +149,21 @@ def _after_render(scene: Scene, *_) -> None:
     source_media.rest(render_job.runs())
 
 
-_hooks: list = []  # what Python called with errors that nobody caught before it called ours: one, or none
+_hooks: list = []  # the sys.excepthook before ours, if ours is installed
 
 
 def _uncaught(kind: type[BaseException], error: BaseException, trace: TracebackType | None) -> None:
-    """Keeps errors of the extension for Copy Report. Blender has Python print whatever operators, panels, handlers and
-    timers raise, which calls this: there is no other place that all of them pass."""
+    """Keep errors of the extension for Copy Report.
+
+    Blender prints what operators, panels, handlers and timers raise, which calls sys.excepthook. Nothing else gets all.
+    """
     if told.is_ours(error):
         told.exception(error)
     _hooks[-1](kind, error, trace)
 
 
 HANDLERS = {
-    "load_pre": _before_load,
+    "load_pre": _forget_file,
     "load_post": _after_load,
     "blend_import_post": _after_import,
     "save_pre": _before_save,
@@ -185,18 +185,14 @@ def register() -> None:
     if not _hooks:
         _hooks.append(sys.excepthook)
         sys.excepthook = _uncaught
-    # Those that the sequencer keeps from before lack the effects; while this registers, Blender's data cannot be had.
+    # Frames that the sequencer kept lack the effects. While an extension registers, Blender's data is not available.
     main_thread.later(invalidation.drop_frames)
 
 
 def unregister() -> None:
     for name, function in HANDLERS.items():
         getattr(bpy.app.handlers, name).remove(function)
-    if sys.excepthook is _uncaught:  # else somebody who came after us calls it still
+    if sys.excepthook is _uncaught:  # otherwise a hook that was installed later still calls it
         sys.excepthook = _hooks.pop()
-    operator_bases.end_all()
-    edit_feed.end()
-    sessions.forget()
-    source_media.forget()
-    reconciling.forget()
+    _forget_file()
     undelete.forget()

@@ -1,1 +1,1 @@
-"""Passes over a device: diffuse, compose. No bpy."""
+"""Diffusion and composition, on a device or with NumPy. No bpy."""

@@ -1,5 +1,4 @@
-"""The passes that compose: one for each way to go through a window, compiled for what is composed; and which way is
-the fastest. And what they need to know of shutters, once per frame: gains, knots or bars, as float32 tables."""
+"""The passes that compose a picture, the choice of the fastest one, and their tables of shutters."""
 
 from functools import lru_cache
 
@@ -17,38 +16,39 @@ PAIR = 2
 
 MODES = {"average": 0, "lightest": 1, "darkest": 2, "median": 3}
 EDGES = {"hold": 0, "mirror": 1, "shorten": 2}
-# What a picture is stored as, by whether it is levels.
+# The format of a picture: {whether it is levels: format}.
 PICTURE = {False: "rgba32f", True: "rgba8"}
 LEVELS = read_pass("display", "OVER_BLACK")
-# Rows of pixels that one invocation composes, by the pass; BLOCK for all others.
+# Rows of pixels that one invocation composes: {way: rows}; BLOCK for all others.
 _LINES = {"sums": PAIR, "search": 4}
-# The numbers of pieces for which compose_sums is compiled. A table with another number is filled up with empty pieces.
+# The numbers of pieces for which compose_sums is compiled. Tables are filled up with empty pieces.
 _ROWS = (1, 2, 3, 4, 6, 8, 12, 16, 24, 32)
 
 
 def composition(way: str, groups: int, **macros: int | str) -> Pass:
-    """The pass compose_<way>, for `groups` of four shutters. macros: others of shaders/include/compose.glsl and
-    moved.glsl, or of compose_sums, as far as they are not 0."""
+    """Return the pass compose_<way> for `groups` of four shutters, with other macros that its shader names."""
     lines = lines_of(way, is_median=macros.get("COMBINE") == MODES["median"])
     given: dict[str, int | str] = {"GROUPS": groups, "VALUE": int(way == "value"), "QUADS": lines // 4}
     return read_pass(f"compose_{way}", **(given | macros))
 
 
 def lines_of(way: str, *, is_median: bool) -> int:
-    """The rows of pixels that one invocation of a way's pass composes."""
+    """Return the rows of pixels that one invocation of a way's pass composes."""
     return 4 if is_median else _LINES.get(way, BLOCK)
 
 
 def way_of(window: Window, state: FrameState, values: np.ndarray, shortened: bool) -> str:
-    """The fastest way to compose: the name of a pass, without compose_.
+    """Return the fastest way to compose: the name of a pass, without compose_.
 
-    values: the table of `table`, a row of gains and a row per piece
-    shortened: whether frames that a shutter exposes are left out (edges "shorten")
+    The limits come from times at 1080p, for 2 to 8 shutters and windows of 16 to 64 frames. With running sums, in
+    multiples of a plain average of 16 frames: "sums" takes 0.3 + 0.23 · pieces, "frames" 1 + 0.1 · frames. With frames,
+    in multiples of a plain average of the window: "pieces" takes 1.5 + 1.4 · pieces / frames, "frames" 2.1 to 2.8.
 
-    The bounds come from times at 1080p, for 2 to 8 shutters and windows of 16 to 64 frames. From running sums, in
-    multiples of the time of a plain average of 16 frames: "sums" 0.3 + 0.23 · pieces, "frames" 1 + 0.1 · frames. From
-    frames, in multiples of the time of the window's own plain average: "pieces" 1.5 + 1.4 · pieces / frames, "frames"
-    2.1 to 2.8.
+    Args:
+        window: the window
+        state: the effect
+        values: of `table`: a row of gains, then a row for each piece
+        shortened: whether exposed frames are missing (edges "shorten")
     """
     if state.options.interpolation == "value":
         return "value"
@@ -66,10 +66,15 @@ def way_of(window: Window, state: FrameState, values: np.ndarray, shortened: boo
 
 
 def moved_way(state: FrameState, values: np.ndarray, motions: int, mixed: int, quads: int) -> tuple[str, int]:
-    """The way to compose where shutters follow something, and how many quads of pixels, `quads` at most, an invocation
-    can compose by it; arguments as for way_of and composition_of_moved.
+    """Return the way to compose where shutters follow something, and the quads of pixels for each invocation.
 
-    motions: those that a frame is seen by"""
+    Args:
+        state: the effect
+        values: of moved_tables, without the rows of motions
+        motions: motions that see each frame
+        mixed: the MIXED of shaders/include/moved.glsl
+        quads: the most quads
+    """
     span = state.open_span
     frames = span[1] - span[0]
     mixing = frames * motions * (mixed if mixed > 1 else 0)
@@ -82,22 +87,22 @@ def moved_way(state: FrameState, values: np.ndarray, motions: int, mixed: int, q
 
 
 def filled_rows(rows: int) -> float:
-    """The number of pieces that compose_sums is compiled for, if there are `rows`; infinite: there are too many."""
+    """Return the number of pieces for which compose_sums is compiled, at least `rows`; infinity if there is none."""
     return next((filled for filled in _ROWS if filled >= rows), np.inf)
 
 
 def selection(groups: int, shutters: int) -> Pass:
-    """The pass that gathers the coefficients of some shutters, in so many groups of four, out of those of all."""
+    """Return the pass that picks the coefficients of some shutters, in `groups` of four, from those of all shutters."""
     return read_pass("ways", "SELECT", GROUPS=groups, ALL=shutters)
 
 
 def way_sum(begins: bool, levels: bool) -> Pass:
-    """The pass that adds a picture of some shutters to those of the others."""
+    """Return the pass that adds a share of a picture or of coefficients to a sum."""
     return read_pass("ways", BEGINS=int(begins), LEVELS=int(levels))
 
 
 def padded(values: np.ndarray) -> np.ndarray:
-    """(…, N) as (…, G, 4): four shutters to a texel, zeros behind the last."""
+    """Return values (…, N) as (…, G, 4): four shutters to a texel, zeros after the last."""
     groups = -(-values.shape[-1] // 4)
     result = np.zeros((*values.shape[:-1], groups * 4))
     result[..., : values.shape[-1]] = values
@@ -105,12 +110,13 @@ def padded(values: np.ndarray) -> np.ndarray:
 
 
 def table(state: FrameState) -> np.ndarray:
-    """The table (1 + rows, columns, 4) float32 that shaders/include/compose.glsl describes.
+    """Return the table (1 + rows, columns, 4) float32 of shaders/include/compose.glsl.
 
-    Row 0: the gains; of the lightest and the darkest what makes the highest weight 1 (core.pixels.combined), by value
-    the middle of the shutters' times.
-    Displacement: a row per piece of the quantiles: starts, ends, then dz, the time by which the shutters differ at most
-    at either, and z at its start. Value: a row per frame of the shutters' open span, how much it counts.
+    Row 0 has the gains. For lightest and darkest, they scale the highest weight to 1 (core.pixels.combined); by value,
+    they are the shutters' mean times.
+    By displacement, there is a row for each piece of the quantiles: starts, ends, then dz, the most by which the
+    shutters' times differ at either, and z at its start. By value, there is a row of weights for each frame of the open
+    span.
     """
     by_pieces, bars = state.options.interpolation == "displacement", state.bars
     rows = _pieces(bars.tobytes(), bars.dtype, bars.shape) if by_pieces else _bars(state)
@@ -123,7 +129,7 @@ def table(state: FrameState) -> np.ndarray:
 
 @lru_cache(16)
 def _pieces(content: bytes, dtype: np.dtype, shape: tuple[int, ...]) -> np.ndarray:
-    """Bars seldom change from frame to frame."""
+    """Return the rows of pieces. They are cached: bars seldom change from frame to frame."""
     knots = shutters.knots(np.frombuffer(content, dtype).reshape(shape))
     start, end = padded(knots.start), padded(knots.end)
     last = np.zeros((len(start), 1, 4))
@@ -144,19 +150,25 @@ def _gains(state: FrameState) -> np.ndarray:
 
 
 def _bars(state: FrameState) -> np.ndarray:
-    """How much each frame of the open span counts."""
+    """Return the weight of each frame of the open span."""
     (combine,) = state.groups
     whole = state.bars.max(axis=1) if combine.mode in ("lightest", "darkest") else state.bars.sum(axis=1)
     return padded((state.bars / whole[:, None]).T[slice(*state.open_span)])
 
 
 def moved_tables(state: FrameState, frames: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """The table of `table` and that of the moves (L · motions, 1 + N, 4) float32, by value (L · motions, 2, 4), which
-    shaders/include/moved.glsl describes, its first number of each row 0.
+    """Return the table of shutters and that of moves, as in shaders/include/moved.glsl, without the layers of frames.
 
-    By displacement there is one motion, in which the shutters' own are mixed; by value one for all shutters that move
-    alike: the table has a row for each frame and motion. Behind these it has one for each motion, 1 for its shutters.
-    frames: the source frames (L,) of the window; −1: none. ValueError: nothing is followed"""
+    By displacement there is one motion, which mixes those of the shutters. By value there is one for all shutters that
+    move alike, and the table has a row for each frame and motion. A row for each motion follows: 1 for its shutters.
+
+    Args:
+        state: the effect, which follows something
+        frames: the window's source frames (L,), −1 where one is missing
+
+    Returns:
+        The table, and the moves (L · motions, 1 + N, 4) float32; by value (L · motions, 2, 4)
+    """
     if state.following is None:
         raise ValueError("nothing is followed")
     turns, shifts = state.following.at(frames)

@@ -1,4 +1,4 @@
-"""Compositing with NumPy, tile by tile, by the reference itself: the last resort, where there is no GPU. It is slow."""
+"""Compositing with NumPy, tile by tile, by the reference itself. It is slow, for machines without a GPU."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from .diffusion import diffuse
 from .layer_frames import LARGEST, linear
 from .request import Behind, Coefficients, Exposure, Request
 
-# A tile's rows and columns, a multiple of every block: its arrays stay in the processor's cache.
+# Rows and columns of a tile, a multiple of every block. Its arrays stay in the processor's cache.
 TILE = 64
 
 Tile = tuple[slice, slice]
@@ -27,7 +27,7 @@ Moves = tuple[np.ndarray, np.ndarray]
 
 
 class HostWindow:
-    """A window of source frames in the host's memory. is_open, sends: see window.Window."""
+    """A window of source frames in the host's memory. For `is_open` and `sends`, see window.Window."""
 
     is_open, sends = True, False
 
@@ -48,15 +48,16 @@ class HostWindow:
             self.frames[index] = self.source.read(index)
 
     def seen(self, indices: np.ndarray, tile: Tile, moves: Moves | None) -> tuple[list[np.ndarray], Moves | None]:
-        """Return what a tile's pixels show of frames, as `compositor.compose` takes it.
+        """Return the parts of frames that a tile shows, for `compositor.compose`.
 
         Args:
-            indices: (L,) source frames; of one that is not loaded, which nothing exposes, it is one black pixel
-            moves: turns and shifts (L, N) of the picture; None: nothing is followed
+            indices: (L,) source frames. One that is not loaded is not exposed, and becomes one black pixel.
+            tile: rows and columns
+            moves: turns and shifts (L, N) of the picture. None: nothing is followed.
 
         Returns:
-            frames (h, w, 4) in linear light, premultiplied: the tile's pixels, or where exposures follow something
-            those that it looks at; and the turns and shifts from the tile's pixels to these
+            Frames (h, w, 4) in linear light, premultiplied: the tile's pixels, or all that a following exposure reads;
+            and the turns and shifts from the tile's pixels to those
         """
         if moves is None:
             parts, moved = [tile] * len(indices), None
@@ -104,7 +105,7 @@ def _of_tile(coefficients: Coefficients, tile: Tile) -> np.ndarray:
 
 
 class CPUCompositor:
-    """request.Compositor with NumPy, and its request.Stages: there is nothing to keep from one to the next."""
+    """request.Compositor and request.Stages with NumPy."""
 
     name = "NumPy"
     takes_planes = False
@@ -168,7 +169,7 @@ class CPUCompositor:
         return self.over_black(picture) if levels else picture
 
     def draw(self, window: HostWindow, request: Request, coefficients: Coefficients) -> np.ndarray:
-        """The picture (H, W, 4), top row first: float32, or levels in uint8; arguments as for GPUCompositor.draw."""
+        """Return the picture (H, W, 4), top row first: float32, or levels in uint8."""
         state, source = request.state, window.source
         indices = windows.indices(state.options, request.index, window.shot, request.direction)
         moves = None if state.following is None else state.following.at(indices)
@@ -183,4 +184,4 @@ class CPUCompositor:
         return self.over_black(picture) if request.levels else picture
 
     def release(self) -> None:
-        """There is nothing to free."""
+        """Do nothing: there is nothing to free."""

@@ -1,10 +1,10 @@
-"""Diffusion with NumPy: coefficients for every pixel from the scribbles (paper §3.4.2), which spread freely within what
-the picture shows as one, and hardly across its edges.
+"""Diffusion with NumPy: coefficients for every pixel from the scribbles (paper §3.4.2).
 
-The harmonic function with the scribbles as fixed values and free (Neumann) edges, by conjugate gradients, each
-iteration a cycle over grids. A coarse cell is 2 × 2 cells of the finer grid, and has one value for them: its ties are
-the sums of theirs. Such corrections are about half as large as they should be, and are made larger (Braess, "Towards
-algebraic multigrid for elliptic problems of second order", 1995). It is slow: devices have compute.diffusion_gpu.
+Coefficients are harmonic functions with the scribbles as fixed values and free (Neumann) edges. Conductances keep them
+from spreading across edges of the picture. They are solved for by conjugate gradients, preconditioned with a multigrid
+cycle. A coarse cell has one value for 2 × 2 cells, and its conductances are sums of theirs. Such corrections are about
+half too small, and are scaled up (Braess, "Towards algebraic multigrid for elliptic problems of second order", 1995).
+It is slow; devices have compute.diffusion_gpu.
 """
 
 from typing import NamedTuple
@@ -14,22 +14,26 @@ import numpy as np
 from ..core import stopping
 from ..core.pixels.conductances import conductances
 
-# Iterations at most.
+# The most iterations.
 ITERATIONS = 1000
-# They end where one changes no coefficient by as much.
+# Iterations end when one changes every coefficient by less.
 ENOUGH = 1 / 65536
-# How much of a Jacobi step is taken, and how much larger than its grid says a coarse correction is made.
+# The factors of a Jacobi step and of a coarse correction.
 DAMPING, CORRECTION = 0.8, 1.8
-# Coefficients below this are none: regions that one shutter encloses get exactly that one.
+# Coefficients below this become 0, so that a region enclosed by one shutter gets exactly that one.
 NOTHING = 1 / 4096
 
 
 def diffuse(labels: np.ndarray, count: int, guide: np.ndarray | None = None, strength: float = 0.0) -> np.ndarray:
-    """Coefficients (count, H, W) float32, ≥ 0 and of sum 1, from labels (H, W): 0 free, 1 + shutter fixed.
+    """Return coefficients (count, H, W) float32, at least 0, with a sum of 1.
 
     Labels without any scribble give the first shutter everywhere.
-    guide: (h, w, 3 or more) as for core.pixels.conductances; its cells are pixels, or 2 × 2, 4 × 4, … of them
-    strength: 0 … 1, how much conductances follow it
+
+    Args:
+        labels: (H, W): 0 free, 1 + shutter fixed
+        count: the number of shutters
+        guide: (h, w, 3 or more), as for core.pixels.conductances; its cells are 1, 2, 4, … pixels wide
+        strength: 0 … 1, how much conductances follow the guide
     """
     drawn = np.flatnonzero(np.bincount(labels.ravel(), minlength=count + 1)[1:])  # the others are 0 everywhere
     coefficients = np.zeros((count, *labels.shape), np.float32)
@@ -40,7 +44,7 @@ def diffuse(labels: np.ndarray, count: int, guide: np.ndarray | None = None, str
     across, down = np.ones((height, width - 1), np.float32), np.ones((height - 1, width), np.float32)
     if guide is not None and strength > 0:
         across, down = (ties.astype(np.float32) for ties in conductances(guide, strength, labels.shape))
-    *solved, last = drawn  # the last one has what the others leave
+    *solved, last = drawn  # the last one gets the rest
     coefficients[solved] = _solved(labels, np.array(solved), across, down)
     coefficients[last] = 1 - coefficients.sum(axis=0)
     coefficients[coefficients < NOTHING] = 0
@@ -49,13 +53,13 @@ def diffuse(labels: np.ndarray, count: int, guide: np.ndarray | None = None, str
 
 
 def follows_edges(labels: np.ndarray, guide: np.ndarray | None, strength: float) -> bool:
-    """Whether there is anything to diffuse with other conductances than 1."""
+    """Return whether anything is diffused with conductances other than 1."""
     return guide is not None and strength > 0 and 0 < int(np.count_nonzero(labels)) < labels.size
 
 
 class _Grid(NamedTuple):
-    """A grid's equations: what ties a cell to its right neighbour (h, w − 1), to the one below (h − 1, w) and to fixed
-    cells (h, w), and one over the sum of these, 0 for cells that are not free."""
+    """A grid's equations: conductances to the right (h, w − 1), down (h − 1, w) and to fixed cells (h, w); and 1 /
+    their sum, 0 for fixed cells."""
 
     across: np.ndarray
     down: np.ndarray
@@ -64,25 +68,29 @@ class _Grid(NamedTuple):
 
 
 def _solved(labels: np.ndarray, shutters: np.ndarray, across: np.ndarray, down: np.ndarray) -> np.ndarray:
-    """The harmonic functions (N, H, W) of some shutters, not yet clipped.
+    """Return the harmonic functions (N, H, W) of some shutters, not clipped.
 
-    across, down: conductances to the right neighbours and to those below"""
+    Args:
+        labels: (H, W): 0 free, 1 + shutter fixed
+        shutters: (N,)
+        across: (H, W − 1), conductances to the right
+        down: (H − 1, W), conductances to the row below
+    """
     free = labels == 0
     ground = _inflow(across, down, (~free).astype(np.float32)) * free
     grids = [_grid(across * (free[:, 1:] & free[:, :-1]), down * (free[1:] & free[:-1]), ground)]
-    while grids[-1].ground.shape != (1, 1):
-        grids.append(_coarser(grids[-1]))
+    while (last := grids[-1]).ground.shape != (1, 1):
+        grids.append(_grid(_in_twos(last.across[:, 1::2], 0), _in_twos(last.down[1::2], 1), _in_fours(last.ground)))
     solution = (labels == shutters[:, None, None] + 1).astype(np.float32)
     direction, residual = np.zeros_like(solution), np.zeros_like(solution)
     power = np.zeros((len(solution), 1, 1), np.float32)
     for _ in range(ITERATIONS):
-        last, before = residual, power
+        last_residual, before = residual, power
         residual = _inflow(across, down, solution) * free
         guess = _cycle(grids, residual)
         power = _dot(residual, guess)
-        # By how the residual has changed (Polak and Ribière): of what is solved already, directions of rounding's noise
-        # would grow without end.
-        direction = guess + _ratio(np.maximum(_dot(residual - last, guess), 0), before) * direction
+        # Polak and Ribière's formula: with others, rounding errors would grow where the solution is already exact.
+        direction = guess + _ratio(np.maximum(_dot(residual - last_residual, guess), 0), before) * direction
         step = _ratio(_dot(residual, direction), -_dot(direction, _inflow(across, down, direction) * free)) * direction
         solution += step
         if np.abs(step).max() < ENOUGH:
@@ -99,14 +107,8 @@ def _grid(across: np.ndarray, down: np.ndarray, ground: np.ndarray) -> _Grid:
     return _Grid(across, down, ground, inverse)
 
 
-def _coarser(grid: _Grid) -> _Grid:
-    """The next grid, of the ties from one of its cells to another."""
-    return _grid(_in_twos(grid.across[:, 1::2], 0), _in_twos(grid.down[1::2], 1), _in_fours(grid.ground))
-
-
 def _inflow(across: np.ndarray, down: np.ndarray, values: np.ndarray) -> np.ndarray:
-    """What flows into each cell (…, h, w) from its neighbours. By differences: a diagonal that is rounded would leak
-    like a ground."""
+    """Return the flow into each cell (…, h, w). It sums differences: a rounded diagonal would leak."""
     stopping.check()
     flow = np.zeros_like(values)
     for passed, before, after in (
@@ -119,12 +121,12 @@ def _inflow(across: np.ndarray, down: np.ndarray, values: np.ndarray) -> np.ndar
 
 
 def _missing(grid: _Grid, values: np.ndarray, right: np.ndarray) -> np.ndarray:
-    """What a grid's equations still miss with values (N, h, w)."""
+    """Return the residual of values (N, h, w)."""
     return right + _inflow(grid.across, grid.down, values) - grid.ground * values
 
 
 def _cycle(grids: list[_Grid], right: np.ndarray) -> np.ndarray:
-    """An approximate solution (N, h, w), by a cycle over these grids."""
+    """Return an approximate solution (N, h, w), by a cycle over these grids."""
     grid, *below = grids
     if not below:
         return grid.inverse * right
@@ -136,7 +138,7 @@ def _cycle(grids: list[_Grid], right: np.ndarray) -> np.ndarray:
 
 
 def _in_twos(values: np.ndarray, axis: int) -> np.ndarray:
-    """Sums of two neighbours along an axis; the last one may be alone."""
+    """Return sums of pairs along an axis. The last one may be single."""
     along = values.swapaxes(axis, 0)
     total, others = along[::2].copy(order="K"), along[1::2]
     total[: len(others)] += others
@@ -144,7 +146,7 @@ def _in_twos(values: np.ndarray, axis: int) -> np.ndarray:
 
 
 def _in_fours(values: np.ndarray) -> np.ndarray:
-    """Sums over 2 × 2 cells (…, h, w)."""
+    """Return sums over 2 × 2 cells (…, h, w)."""
     return _in_twos(_in_twos(values, values.ndim - 2), values.ndim - 1)
 
 

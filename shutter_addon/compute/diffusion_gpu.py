@@ -1,8 +1,8 @@
-"""Diffusion on a device: the harmonic function of compute.diffusion, computed at full size near scribbles alone.
+"""Diffusion on a device: the harmonic function of compute.diffusion, at full size only near scribbles.
 
-The method is multigrid. The cells of grid 0 are the pixels; those of every coarser grid lie on the even cells of the
-finer one. Far from scribbles the solution is smooth. A grid therefore has cells of its own only in tiles near
-scribbles (see BAND); elsewhere its values are interpolated linearly from the next coarser grid.
+The method is multigrid. The cells of grid 0 are the pixels; those of a coarser grid lie on the even cells of the finer
+one. Far from scribbles the solution is smooth, so a grid solves only tiles near scribbles (BAND). Elsewhere its values
+are interpolated linearly from the next coarser grid.
 
 For one grid, let U be its values, f its right-hand side, A its operator, P the prolongation from the next coarser grid
 and U' the values of that grid. The grid's own part W = U − P U' is zero outside its tiles. The next grid has the
@@ -10,8 +10,8 @@ right-hand side Pᵀ(f − A W) and the Galerkin operator PᵀAP, a stencil of n
 Dendy's black box multigrid: fixed pixels are walls on every grid, so the number of cycles needed does not depend on
 the scene.
 
-A solve that starts from nothing depends on the labels alone, to the bit. For that, operators are made anew where
-scribbles are or were in the last solve, and W and f are set to zero there and outside the tiles.
+A solve that starts from nothing depends only on the labels, to the bit. For that, operators are made again where
+scribbles are or were in the last solve, and W and f are cleared there and outside the tiles.
 """
 
 from itertools import pairwise
@@ -27,30 +27,29 @@ from .diffusion import NOTHING
 # the scenes of the tests (median 2.1, 0.13, 0.07, 0.07), and 11, 1.6, 0.25, 0.24 over their lattices of dots. The error
 # that remains is that of linear interpolation far from scribbles.
 CYCLES = 3
-# V-cycles of a solve that starts from the last solution. One leaves an error × 255 of 0.66 where scribbles moved by 3
-# pixels of 1920. Two leave as little however far they moved, and take twice as long.
+# V-cycles of a solve that starts from the last solution. One leaves an error × 255 of 0.66 if scribbles moved by 3 of
+# 1920 pixels. Two leave that for any move, and take twice as long.
 WARM_CYCLES = 1
-# Smoothing sweeps over a grid before its correction by the coarser grids, and again after it. Full size has two: the
-# error that a moved scribble leaves is all there.
+# Smoothing sweeps over a grid before and after its correction by coarser grids. Full size has two, because all of the
+# error of a moved scribble is there.
 SWEEPS = 1
 FINEST_SWEEPS = 2
 # Cells (x, y) of 2 × 2 in the order of a sweep.
 COLOURS = ((0, 0), (1, 1), (1, 0), (0, 1))
-# Cells along the longer side of a grid: with this many or fewer it has cells everywhere. The finest such grid is
-# visited twice in a cycle.
+# A grid with at most this many cells along its longer side is solved everywhere. The finest such grid is visited twice
+# in a cycle.
 WHOLE = 128
-# Cells along the longer side of a grid: with this many or fewer it is the coarsest, and one invocation solves it.
+# A grid with at most this many cells along its longer side is the coarsest, which one invocation solves.
 SOLVED = 8
-# A grid larger than WHOLE has cells of its own in tiles with a scribble, and in this many tiles on each side of those.
-# With two, the error × 255 falls from 0.66 to 0.19, and a solve takes 1.7 times as long.
+# A larger grid than WHOLE is solved in tiles with a scribble, and in this many tiles on each side of those. With two,
+# the error × 255 falls from 0.66 to 0.19, and a solve takes 1.7 times as long.
 BAND = 1
-# The prolongation to a cell on the line between two coarse cells: the share, 0 … 1, of what ties the cell to fixed
-# cells beside that line that counts against following the two.
+# How much fixed cells beside the line between two coarse cells keep a cell on that line from following the two, 0 … 1.
 HOLD = 0.3
 
 
 def operators(ties: str) -> dict[str, Pass]:
-    """The passes that depend on what ties a grid's cells (shaders/multigrid.glsl)."""
+    """Return the passes that depend on how cells are coupled (shaders/multigrid.glsl)."""
     return {
         name: read_pass("multigrid", name.upper(), **{ties: 1}) for name in ("weights", "coarsen", "smooth", "restrict")
     }
@@ -66,33 +65,33 @@ _EXPAND = read_pass("diffusion", "EXPAND")
 _EXPAND_RIM = read_pass("diffusion", "EXPAND_RIM")
 
 
-# Of each list for the passes, the first of the lists of tiles that it is made of, and the one behind the last.
+# The lists of tiles for passes, as ranges of the lists that _list_tiles makes.
 _RANGES = {"near": (0, 1), "reached": (0, 2), "far": (1, 3), "rim": (3, 4)}
 _RANGES |= {"anew": (4, 5), "feeding": (5, 6), "changed": (6, 7)}
 
 
 class _Grid:
-    """The textures of a grid, and what is known of its tiles.
+    """A grid's textures and tiles.
 
-    textures, rgba32f but for the labels:
+    The textures are rgba32f, except the labels:
         solution, own, right: U, W and f, four shutters per layer; the finest grid has no f
-        stencil: the operator A; the finest grid has r32ui labels in its place
-        weights: P, what each cell takes of the coarse cells around it
+        stencil: the operator A; the finest grid has r32ui labels instead
+        weights: P, how much each cell takes of the coarse cells around it
 
     Tiles of the last solve, as bool arrays (rows, columns):
-        reached: tiles of 8 × 8 cells within BAND tiles of a scribble's; up to WHOLE cells, all tiles
-        touched: tiles of 4 × 4 cells with a scribble in them or beside them
-        solid: tiles of 4 × 4 cells with nothing free in them or around them
+        reached: tiles of 8 × 8 cells within BAND tiles of a scribble; up to WHOLE cells, all tiles
+        touched: tiles of 4 × 4 cells with a scribble in or beside them
+        solid: tiles of 4 × 4 cells with no free cell in or around them
 
-    ranges: {list: (first, last)}, where each list of tiles for the passes lies in the texture of all lists. Tiles of
-    8 × 8 cells, but for the last two:
-        near: with free cells, and cells of the grid's own
-        reached: those near, and the tiles around them, where W can still have an effect
-        far: with free cells, and not reached; their values come from the next grid
-        rim: not near, and at the end of rows or columns that reach beyond the next grid's last cells
-        anew: where values of the last solve may be left
+    `ranges` tells where each list of tiles lies in the texture of all lists: {list: (first, last)}. Tiles have 8 × 8
+    cells, except those of the last two lists:
+        near: tiles with free cells that this grid solves
+        reached: near tiles and those around them, where W still has an effect
+        far: tiles with free cells that are not reached; their values come from the next grid
+        rim: tiles that are not near, at the ends of rows or columns that go beyond the next grid's last cells
+        anew: tiles where values of the last solve may be left
         feeding: near tiles and those around them, as tiles of 4 × 4 cells of the next grid
-        changed: tiles of 4 × 4 cells whose operator may not be that of the last solve
+        changed: tiles of 4 × 4 cells whose operator may differ from that of the last solve
     """
 
     def __init__(self, device: Device, width: int, height: int, layers: int, finest: bool) -> None:
@@ -116,7 +115,7 @@ class _Grid:
 class Diffusion:
     """compute.diffusion.diffuse on a device. Its textures are kept until the size or the number of shutters changes."""
 
-    finest = operators("LABELS")  # those over the pixels
+    finest = operators("LABELS")  # the passes over pixels
     _tiles: Texture  # the lists of tiles of all grids
 
     def __init__(self, device: Device) -> None:
@@ -126,15 +125,20 @@ class Diffusion:
         self._textures = NamedTextures(device)
 
     def solve(self, labels: np.ndarray, count: int, *, warm: bool = False) -> Texture:
-        """Coefficients from labels (H, W) uint16, 0 free, 1 + shutter fixed: a texture array rgba32f, shutter i in
-        layer i // 4 and channel i % 4. The next call overwrites it. Nothing is read back from the device.
+        """Solve for coefficients. Nothing is read back from the device.
 
-        warm: start from the last solution, if that had this size and count. It is faster where scribbles moved a
-        little, and the result depends on the last solution as well, within the error.
+        Args:
+            labels: (H, W) uint16: 0 free, 1 + shutter fixed
+            count: the number of shutters
+            warm: start from the last solution, if it has this size and count. It is faster if scribbles moved a little,
+                and the result depends on the last solution, within the error.
+
+        Returns:
+            A texture array rgba32f, shutter i in layer i // 4 and channel i % 4. The next call overwrites it.
         """
         warm = self._prepare(labels.shape, count) and warm
         finest, made_for = self._grids[0], self._made_for
-        self._made_for = None  # should this be broken off: the next solve goes on from what this one leaves
+        self._made_for = None  # if this solve is interrupted, the next one must start again
         self._device.write(finest.textures["labels"], np.ascontiguousarray(labels, dtype=np.uint32))
         self._list_tiles(labels, next(k for k, grid in enumerate(self._grids) if max(grid.size) <= WHOLE))
         self._start(int(warm))
@@ -153,7 +157,7 @@ class Diffusion:
         self._grids, self._made_for = [], None
 
     def _prepare(self, shape: tuple[int, ...], count: int) -> bool:
-        """Makes the grids for a size (H, W) and a number of shutters. Whether they were there, with a solution."""
+        """Make the grids for a size (H, W) and a number of shutters. Return whether they had a solution already."""
         height, width = shape
         if self._made_for == (width, height, count):
             return True
@@ -169,10 +173,12 @@ class Diffusion:
         return False
 
     def _list_tiles(self, labels: np.ndarray, whole: int, *, anew: bool = False) -> None:
-        """Sends the lists of tiles of all grids to the device, and notes their places (_Grid.ranges).
+        """Send the lists of tiles of all grids to the device, and note their ranges.
 
-        whole: the first of the grids that have cells of their own everywhere
-        anew: whether nothing of the last solve counts, and all operators have changed
+        Args:
+            labels: (H, W)
+            whole: the first grid that is solved everywhere
+            anew: whether all operators have changed since the last solve
         """
         held, free = _in_fours(labels != 0)
         listed, end = [], 0
@@ -181,15 +187,15 @@ class Diffusion:
             solid = ~_grown(free, 1 if grid.finest else 2)
             changed = np.ones_like(touched) if anew else (touched | grid.touched) & ~(solid & grid.solid)
             held, free = _halved(held), _halved(free)
-            # A coarse cell inside a scribble may still have a value: it stands for free cells beside the scribble.
+            # A coarse cell inside a scribble may have a value, for the free cells beside the scribble.
             live = free if grid.finest else _grown(free)
             reached = _grown(held, BAND) if index < whole else np.ones_like(held)
             near = reached & live
             feeding = _grown(near)
             around = feeding & live
             stale = np.ones_like(live) if anew else (reached | grid.reached) & _grown(live)
-            # Passes read W in the tiles around those near, so it must be zero there. At full size, tiles that are all
-            # fixed must hold the values of their labels.
+            # Passes read W in the tiles around near ones, so it must be 0 there. At full size, fixed tiles must have
+            # the values of their labels.
             unsolved = stale | around | ~live if grid.finest else stale | around
             rim = ~near & live & _last_ones(grid)
             eights, fours = grid.codes
@@ -205,14 +211,14 @@ class Diffusion:
         self._device.write(self._tiles, rows)
 
     def _start(self, warm: int) -> None:
-        """The values to start from; whatever else other scribbles left is set to zero."""
+        """Set the starting values, and clear what other scribbles left."""
         finest = self._grids[0]
         self._run(_START, finest, "anew", 64, finest.layers, warm=warm)
         for fine, grid in pairwise(self._grids):
             self._run(_CLEAR, grid, "anew", 64, grid.layers, finer=fine.textures["solution"], warm=warm)
 
     def _coarsen(self) -> None:
-        """Makes each grid's prolongation P, and from it the next grid's operator."""
+        """Make each grid's prolongation P, and from it the next grid's operator."""
         for fine, coarse in pairwise(self._grids):
             weights, coarsen = (self._pass(fine, name) for name in ("weights", "coarsen"))
             self._run(weights, fine, "changed", 8, hold=HOLD)
@@ -221,7 +227,7 @@ class Diffusion:
             self._run(coarsen, coarse, "changed", 16, **to)
 
     def _cycle(self, index: int) -> None:
-        """A V-cycle over the grid of this index and all coarser ones."""
+        """Run a V-cycle over the grid of this index and all coarser ones."""
         grid, *coarser = self._grids[index : index + 2]
         if not coarser:
             self._solve_coarsest(grid)
@@ -239,13 +245,13 @@ class Diffusion:
         self._run(_SOLVE, grid, "near", 1, grid.layers)  # it has one tile
 
     def _hand_down(self, grid: _Grid, coarse: _Grid) -> None:
-        """Makes W of U, and the next grid's right-hand side of W."""
+        """Make W from U, and the next grid's right side from W."""
         images = {"from": grid.textures["solution"], "to": grid.textures["own"]}
         self._prolong(grid, coarse, "near", images, -1.0)
         self._restrict(grid, coarse, grid.textures["own"])
 
     def _take_up(self, grid: _Grid, coarse: _Grid, tiles: str) -> None:
-        """U becomes W + P U' with the next grid's U'."""
+        """Set U to W + P U', where U' is the next grid's solution."""
         self._prolong(grid, coarse, tiles, {"from": grid.textures["own"], "to": grid.textures["solution"]}, 1.0)
 
     def _prolong(self, grid: _Grid, coarse: _Grid, tiles: str, images: dict[str, Texture], amount: float) -> None:
@@ -253,14 +259,18 @@ class Diffusion:
         self._run(_PROLONG, grid, tiles, 16, grid.layers, **coarser, **images, amount=amount)
 
     def _restrict(self, grid: _Grid, coarse: _Grid, own: Texture) -> None:
-        """What a grid's equations miss with these values becomes the next grid's right-hand side."""
+        """Make the next grid's right side from the residual of `own`."""
         to = {"coarse": coarse.size, "next": coarse.textures["right"]}
         self._run(self._pass(grid, "restrict"), grid, "feeding", 16, grid.layers, own=own, **to)
 
     def _smooth(self, grid: _Grid, sweeps: int, *, back: bool = False) -> None:
-        """Gauss-Seidel sweeps: red-black at full size, where cells have four neighbours, and else in four colours.
+        """Run Gauss-Seidel sweeps: red-black at full size, where cells have four neighbors, else in four colors.
 
-        back: in the opposite order"""
+        Args:
+            grid: the grid
+            sweeps: their number
+            back: whether colors come in the opposite order
+        """
         cells: int = 32
         colours: list[int | tuple[int, int]] = [0, 1]
         if not grid.finest:
@@ -273,7 +283,7 @@ class Diffusion:
         return self.finest[name] if grid.finest else _COARSER[name]
 
     def _finish(self) -> None:
-        """Makes coefficients of the solution, on all cells of all grids, from the coarsest to the finest."""
+        """Make coefficients of the solution in all cells, from the coarsest grid to the finest."""
         for index, grid in reversed(list(enumerate(self._grids))):
             self._run(FINISH, grid, "near", 64, nothing=NOTHING)
             if index + 1 < len(self._grids):
@@ -284,24 +294,27 @@ class Diffusion:
                 self._run(_EXPAND_RIM, grid, "rim", 16, **below, beyond=beyond)
 
     def _margin(self, index: int) -> list[float]:
-        """How far the picture's edge lies beyond the centres of the grid's last cells, [x, y] in the grid's cells."""
+        """Return how far the picture's edge lies beyond the centers of the grid's last cells: [x, y] in cells."""
         sizes = zip(self._grids[0].size, self._grids[index].size, strict=True)
         return [(pixels - 0.5) / 2**index - (cells - 1) for pixels, cells in sizes]
 
     def _run(self, program: Pass, grid: _Grid, tiles: str, cells: int, layers: int = 1, **extra: Any) -> None:
-        """Runs a pass over a list of the grid's tiles.
+        """Run a pass over a list of the grid's tiles.
 
-        tiles: the list, a key of grid.ranges
-        cells: invocations for each tile
-        layers: layers of four shutters
-        extra: textures and constants besides the grid's own, by name
+        Args:
+            program: the pass
+            grid: the grid
+            tiles: the list, a key of grid.ranges
+            cells: invocations for each tile
+            layers: layers of four shutters
+            extra: textures and constants besides the grid's, by name
         """
         first, last = grid.ranges[tiles]
         if first == last:
             return
         own = {"size": grid.size, "layers": grid.layers, "first": first, "last": last, "tiles": self._tiles}
         given = {**own, **grid.textures, **extra}
-        # These passes have four invocations for each tile, and take two tiles to a row of eight.
+        # These passes have four invocations for each tile, so two tiles fill a row of eight.
         rows = -(-(last - first) // 2) if program.step == "WEIGHTS" else last - first
         self._device.run(
             program,
@@ -313,7 +326,11 @@ class Diffusion:
 
 
 def _in_fours(fixed: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Which tiles (rows, columns) of 4 × 4 cells have fixed cells, and which have free ones. fixed: (H, W) bool."""
+    """Return which tiles (rows, columns) of 4 × 4 cells have fixed cells, and which have free ones.
+
+    Args:
+        fixed: (H, W) bool
+    """
     height, width = fixed.shape
     if height % 4 or width % 4:
         fixed = np.pad(fixed, ((0, -height % 4), (0, -width % 4)), mode="edge")
@@ -324,14 +341,18 @@ def _in_fours(fixed: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _codes(rows: int, columns: int, fours: int) -> np.ndarray:
-    """The code of each tile (rows, columns) float32 for the shaders: x + 4096 · y of its first cell, counted in fours.
+    """Return each tile's code (rows, columns) float32 for the shaders: x + 4096 · y of its first cell, in fours.
 
-    fours: the side of a tile, in fours of cells."""
+    Args:
+        rows: of tiles
+        columns: of tiles
+        fours: a tile's side, in fours of cells
+    """
     return (fours * (np.arange(columns) + 4096 * np.arange(rows)[:, None])).astype(np.float32)
 
 
 def _last_ones(grid: _Grid) -> np.ndarray:
-    """The tiles (rows, columns) with cells beyond the next grid's last ones: the last tiles where a side is even."""
+    """Return the tiles (rows, columns) that go beyond the next grid's last cells: the last ones of an even side."""
     width, height = grid.size
     last = np.zeros_like(grid.reached)
     last[:, -1] = width % 2 == 0
@@ -340,7 +361,7 @@ def _last_ones(grid: _Grid) -> np.ndarray:
 
 
 def _grown(tiles: np.ndarray, times: int = 1) -> np.ndarray:
-    """Tiles (rows, columns) bool, and all within so many tiles of them."""
+    """Return tiles (rows, columns) bool grown by `times` tiles to every side."""
     for _ in range(times):
         rows = tiles.copy()
         rows[1:] |= tiles[:-1]
@@ -352,7 +373,7 @@ def _grown(tiles: np.ndarray, times: int = 1) -> np.ndarray:
 
 
 def _halved(tiles: np.ndarray) -> np.ndarray:
-    """Tiles (rows, columns) bool, 2 × 2 of them made one: True if any of them is."""
+    """Return tiles (rows, columns) bool at half the size: True if any of 2 × 2 tiles is."""
     height, width = tiles.shape
     if height % 2 or width % 2:
         whole = np.zeros((height + height % 2, width + width % 2), bool)  # np.pad is far slower

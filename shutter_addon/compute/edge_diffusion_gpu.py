@@ -1,8 +1,8 @@
-"""compute.diffusion along edges on a device, at full size near scribbles alone until the last cycle.
+"""Diffusion along edges on a device (compute.diffusion), until the last cycle at full size only near scribbles.
 
-A grid knows little of what lies between edges that are finer than its cells. So one grid is solved by conjugate
-gradients, each iteration a cycle over it and the coarser ones: that whose cells are the guide's, or the grid after the
-pixels where these are pixels. On the grids before it conductances are smooth.
+A grid cannot resolve edges that are finer than its cells. So one grid is solved by conjugate gradients, where each
+iteration is a cycle over it and the coarser ones: the grid with the guide's cells, or the one after the pixels if those
+are pixels. On finer grids conductances are smooth.
 """
 
 from itertools import pairwise
@@ -15,22 +15,22 @@ from ..devices.passes import read_pass
 from .diffusion import NOTHING
 from .diffusion_gpu import FINISH, Diffusion, _Grid, operators
 
-# Cycles at most, and the iterations of conjugate gradients in each: frames of films at 640 × 360 take four cycles,
-# specks of single pixels some forty.
+# Iterations of conjugate gradients in each cycle, for at most as many cycles. Frames of films at 640 × 360 take four
+# cycles, specks of single pixels about forty.
 CYCLES = (4,) * 48
-# Cycles end where those to come would change no coefficient by as much. Largest error × 255 over 40 pictures of specks
-# and noise, for 1/512, 1/1024: 2.1, 0.65; by eight cycles, whatever they change: 27.
+# Cycles end when all later ones would change every coefficient by less. Largest error × 255 over 40 pictures of specks
+# and noise, for 1/512, 1/1024: 2.1, 0.65; after eight cycles: 27.
 ENOUGH = 1 / 1024
-# So many grids after that of the conjugate gradients are visited twice for each visit of the one before.
+# As many grids after that of the conjugate gradients are visited twice for each visit of the one before.
 TWICE = 2
-# Where the guide's cells are larger than pixels: the iterations of conjugate gradients in each cycle, first of cycles
-# near scribbles alone, then of those everywhere. Largest error × 255 in frames of three films at 1920 × 1080: 0.6.
+# If the guide's cells are larger than pixels: iterations of conjugate gradients in each cycle, first near scribbles,
+# then everywhere. Largest error × 255 in frames of three films at 1920 × 1080: 0.6.
 NEAR_CYCLES = (4, 2)
 LAST_CYCLES = (1,)
-# Sweeps over a grid, before and after its correction; and in cycles over smooth conductances.
+# Sweeps over a grid before and after its correction; the same in cycles over smooth conductances.
 SWEEPS, SMOOTH_SWEEPS = 2, 1
 NEAR_SWEEPS = 2  # over the pixels near scribbles
-# Parts that a sum over all cells is made of.
+# Parts of a sum over all cells.
 PARTS = 1024
 
 _LINKS = read_pass("edge_diffusion", "LINKS")
@@ -45,21 +45,21 @@ _SUM = read_pass("edge_diffusion", "SUM")
 
 
 class EdgeDiffusion(Diffusion):
-    """compute.diffusion.diffuse along edges on a device; grids and passes are those of Diffusion, but for the
-    pixels' own, and conjugate gradients on one of them."""
+    """Diffusion along edges on a device. It has other passes for pixels, and conjugate gradients on one grid."""
 
     finest = operators("LINKS")
 
     def __init__(self, device: Device) -> None:
         super().__init__(device)
-        self._more: dict[str, Texture] = {}  # those of the last solve
+        self._more: dict[str, Texture] = {}  # further textures of the last solve
         self._solved, self._sweeps = 0, 0
 
     def solve(self, labels: np.ndarray, count: int, guide: np.ndarray, strength: float) -> Texture:  # type: ignore[override]  # it has a guide
-        """As Diffusion.solve; guide and strength as for compute.diffusion.diffuse. Some pixel has to be fixed, and some
-        free. Where the guide's cells are pixels, a number is read back after each cycle: whether it was enough.
+        """Solve for coefficients, independently of earlier solves. See Diffusion.solve and compute.diffusion.diffuse.
 
-        The result does not depend on what was solved before."""
+        Some pixels must be fixed, and some free. If the guide's cells are pixels, one number is read back after each
+        cycle: whether it was enough.
+        """
         side = cell_side(guide.shape[:2], labels.shape)
         self._prepare(labels.shape, count)
         self._solved = min(max(1, side.bit_length() - 1), len(self._grids) - 1)
@@ -73,7 +73,11 @@ class EdgeDiffusion(Diffusion):
         self._start(0)
         self._coarsen()
         if side > 1:
-            self._cycles_near()
+            for iterations in NEAR_CYCLES:
+                self._near_cycle(0, iterations)
+            # The pixels far from scribbles get their values from the grid that was solved.
+            for fine, coarse in reversed(list(pairwise(self._grids[: self._solved + 1]))):
+                self._take_up(fine, coarse, "far")
             self._list_tiles(labels, 0)
         last = 0.0
         for iterations in CYCLES if side == 1 else LAST_CYCLES:
@@ -86,8 +90,8 @@ class EdgeDiffusion(Diffusion):
         return self._grids[0].textures["solution"]
 
     def _provide(self, cells: tuple[int, int]) -> None:
-        """Makes the textures that plain diffusion has not. Those of conjugate gradients are zero: sums go over all of
-        them, and passes leave out tiles where nothing is free."""
+        """Make the textures that plain diffusion lacks. Those of conjugate gradients are cleared, because sums include
+        tiles without free cells, which passes skip."""
         grid, finest = self._grids[self._solved], self._grids[0]
         vectors = dict.fromkeys(("residual", "guess", "direction", "answer"), (*grid.size, grid.layers))
         sizes = vectors | {"sums": (4, 1, grid.layers), "parts": (PARTS, 1, grid.layers)}
@@ -98,15 +102,8 @@ class EdgeDiffusion(Diffusion):
         if "links" not in finest.textures:
             finest.textures["links"] = self._device.texture(*finest.size, 1, "rgba32f")
 
-    def _cycles_near(self) -> None:
-        """Cycles near scribbles alone; then the pixels far from them get their values from the grid that was solved."""
-        for iterations in NEAR_CYCLES:
-            self._near_cycle(0, iterations)
-        for fine, coarse in reversed(list(pairwise(self._grids[: self._solved + 1]))):
-            self._take_up(fine, coarse, "far")
-
     def _near_cycle(self, index: int, iterations: int) -> None:
-        """A V-cycle near scribbles, over the grids from this one to that of the conjugate gradients."""
+        """Run a V-cycle near scribbles, from this grid to that of the conjugate gradients."""
         grid = self._grids[index]
         if index == self._solved:
             self._conjugate_gradients(grid, iterations)
@@ -120,11 +117,11 @@ class EdgeDiffusion(Diffusion):
         self._smooth(grid, sweeps, back=True)
 
     def _conjugate_gradients(self, grid: _Grid, iterations: int) -> None:
-        """They go on from the grid's solution."""
+        """Improve the grid's solution by conjugate gradients."""
         own, more = grid.textures, self._more
         solution, right = own["solution"], own["right"]
         self._run(_MISSING, grid, "near", 64, grid.layers, values=solution, result=more["residual"], amount=1.0)
-        own["solution"], own["right"] = more["guess"], more["residual"]  # for the cycles
+        own["solution"], own["right"] = more["guess"], more["residual"]  # what the cycles solve
         try:
             for iteration in range(iterations):
                 self._clear(grid, more["guess"])
@@ -143,10 +140,12 @@ class EdgeDiffusion(Diffusion):
             own["solution"], own["right"] = solution, right
 
     def _visit(self, index: int, iterations: int = 0, twice: int = 0) -> None:
-        """A cycle over the grids from this one on: it improves the grid's solution.
+        """Improve a grid's solution by a cycle over it and the coarser grids.
 
-        iterations: of conjugate gradients, if one of the coarser grids is that which they solve
-        twice: how many of the next grids are visited twice
+        Args:
+            index: the grid's number
+            iterations: of conjugate gradients, if they solve a coarser grid
+            twice: how many of the next grids are visited twice
         """
         grid, *coarser = self._grids[index : index + 2]
         if not coarser:
@@ -168,7 +167,7 @@ class EdgeDiffusion(Diffusion):
         self._device.run(_ZERO, (*grid.size, grid.layers), images={"values": values}, size=grid.size)
 
     def _change(self) -> float:
-        """By how much the coefficients have changed at most, since the last call or the start."""
+        """Return the largest change of a coefficient since the last call or the start."""
         grid = self._grids[0]
         parts = min(PARTS, grid.size[0] * grid.size[1])
         own = {"values": grid.textures["solution"], "noted": grid.textures["own"]}
@@ -185,6 +184,10 @@ class EdgeDiffusion(Diffusion):
 
 
 def _is_enough(change: float, before: float) -> bool:
-    """Whether cycles can end, by how much the last one and the one before it have changed coefficients at most; 0 where
-    there was none. Changes are taken to go on shrinking as they did: there are pictures where they hardly do."""
+    """Return whether cycles can end, assuming that changes go on shrinking at the same rate.
+
+    Args:
+        change: the largest change of a coefficient in the last cycle
+        before: the same for the cycle before; 0 if there was none
+    """
     return change == 0 or (change < before and change**2 < ENOUGH * (before - change))

@@ -1,8 +1,8 @@
-"""Compositing on a device: one compute pass per picture and band of rows, over the window's frames or running sums. And
-levels as Blender makes them of a picture (core.pixels.shown_levels).
+"""Compositing on a device: a compute pass for each picture and band of rows, over the window's frames or running sums.
+And the display's levels of a picture (core.pixels.shown_levels).
 
-A device cannot be trusted with powers to the bit. So it takes parabolas, which only add and multiply, and says where
-these are too near to where a level ends; the few such pixels, one in some hundred, are asked of the display itself.
+Powers on devices differ in their last bits. So the device evaluates parabolas, which only add and multiply, and marks
+pixels that are too near to the end of a level. For those, about one in a hundred, the display itself is used.
 """
 
 from dataclasses import replace
@@ -39,18 +39,18 @@ from .running_sums import STORED_SUMS, Sums, open_window
 from .stages import Stages
 from .window import BLOCK, PackedFrames, WholeFrames, Window
 
-# What a median's levels are of (shaders/include/combine.glsl), by the kind of texture.
+# LEVELS_OF of shaders/include/combine.glsl for a format of frames.
 _LEVELS_OF = {"rgba8": 0, "rgba16": 1}
 
-# Of a display's curve.
-_OCTAVES, _LOWEST = 10, -9  # from here on, to 2; below, the display is linear
-_SHIFT = 18  # of a float's bits, for a piece of 1/32 of an octave
+# A display's curve.
+_OCTAVES, _LOWEST = 10, -9  # from 2^-9 to 2; below, the display is linear
+_SHIFT = 18  # shifts a float's bits to the number of its piece, 1/32 of an octave
 _FIRST = (127 + _LOWEST) << (23 - _SHIFT)
 _PIECES = _OCTAVES << (23 - _SHIFT)
-_PROBED = 128  # values of each piece, of which the parabola is made
-# How far off a device's own arithmetic may be, in levels; and how much worse than at the probed values it may be.
+_PROBED = 128  # values of each piece that a parabola is fitted to
+# The error of a device's arithmetic in levels, and a factor for errors between the probed values.
 _ROUNDING, _DOUBT = 1.2e-4, 2.0
-_COLUMNS = 4096  # of pixels that are asked for
+_COLUMNS = 4096  # of the texture of picked pixels
 
 _LIMITS = {"FIRST": f"{_FIRST}u", "LOWEST": repr(2.0**_LOWEST), "HIGHEST": repr(2.0 - 2**-23)}
 SHOW = read_pass("display", "SHOW", **_LIMITS)
@@ -58,7 +58,7 @@ PICK = read_pass("display", "PICK")
 
 
 def _light(window: Any, request: Request) -> dict[str, int | str]:
-    """The macros that say how the passes over a window read, sum, combine and store light."""
+    """Return the macros for how passes over a window read, sum, combine and store light."""
     (combine,), alpha = request.state.groups, window.source.alpha
     return {
         "DECODE": window.decode(request.state.options.light),
@@ -76,9 +76,14 @@ def _light(window: Any, request: Request) -> dict[str, int | str]:
 
 
 def _from_sums(window: Sums, request: Request, values: np.ndarray, origin: int) -> tuple[Pass, Given]:
-    """compose_sums for a table of pieces, and its arguments for Device.run but for the band's.
+    """Return compose_sums for a table of pieces, and its arguments for Device.run, without those of the band.
 
-    origin: the position of the window's first frame"""
+    Args:
+        window: the running sums
+        request: the picture
+        values: of composition_passes.table
+        origin: the position of the window's first frame
+    """
     groups, rows, back = values.shape[1] // 2, filled_rows(len(values) - 1), request.direction < 0
     filled = np.zeros((1 + rows, *values.shape[1:]), np.float32)
     filled[: len(values)] = values
@@ -94,9 +99,16 @@ def _from_sums(window: Sums, request: Request, values: np.ndarray, origin: int) 
 def _from_frames(
     way: str, window: Any, request: Request, rows: int, origin: int, shortened: bool
 ) -> tuple[Pass, Given]:
-    """The pass of another way, and its arguments: as _from_sums.
+    """Return the pass of another way, and its arguments, like _from_sums.
 
-    rows: pieces in the table; shortened: as for way_of"""
+    Args:
+        way: of composition_passes.way_of
+        window: frames or running sums
+        request: the picture
+        rows: pieces in the table
+        origin: the position of the window's first frame
+        shortened: as for way_of
+    """
     state, direction, shot = request.state, request.direction, window.shot
     options, (combine,) = state.options, state.groups
     if isinstance(window, Sums):
@@ -108,14 +120,14 @@ def _from_frames(
     first, last = state.open_span
     given: Given = {"images": {}, "textures": {}, "rows": rows, "direction": direction, "first": first, "last": last}
     given["lowest_layer"] = lowest % window.layers
-    # In these shaders, frame 0 is the shot's first.
+    # In these shaders, frame 0 is the shot's first frame.
     given |= {"count": len(shot), "origin": origin - shot.start, "lowest": lowest - shot.start}
     given |= _threshold(combine, request, shot)
     return composition(way, -(-len(state.bars) // 4), **_light(window, request), EDGES=edges, **macros), given
 
 
 def _threshold(combine: Combine, request: Request, shot: range) -> Given:
-    """The arguments of passes with a threshold."""
+    """Return the arguments of passes with a threshold."""
     if combine.threshold is None:
         return {}
     options = request.state.options
@@ -125,7 +137,7 @@ def _threshold(combine: Combine, request: Request, shot: range) -> Given:
 
 
 def _in_window(state: FrameState, chosen: tuple[int, ...]) -> FrameState:
-    """Return the state of some shutters alone, which still follow if any does: the window holds whole frames then."""
+    """Return the state of some shutters. If any other follows something, these do, too: the window has whole frames."""
     part, following = state.of(chosen), state.following
     if following is None or part.following is not None:
         return part
@@ -134,20 +146,20 @@ def _in_window(state: FrameState, chosen: tuple[int, ...]) -> FrameState:
 
 
 def _bits(coefficients: Coefficients) -> int:
-    """How far a pixel's place is shifted for that of its coefficients."""
+    """Return the shift from a pixel's place to that of its coefficients."""
     return (coefficients.block - 1).bit_length()
 
 
 class Displaying:
-    """Makes levels of pictures on a device."""
+    """Makes a display's levels of pictures on a device."""
 
     def __init__(self, device: Device) -> None:
         self._device = device
         self._textures = NamedTextures(device)
-        self._sent: Memo[tuple[dict[str, Texture], float]] = Memo()  # of a display
+        self._sent: Memo[tuple[dict[str, Texture], float]] = Memo()
 
     def levels(self, picture: Texture, display: Display) -> np.ndarray:
-        """The levels (H, W, 4) uint8 of an opaque picture of GPUCompositor.draw, top row first."""
+        """Return the levels (H, W, 4) uint8 of an opaque picture of GPUCompositor.draw, top row first."""
         width, height, _ = picture.size
         noise, levels = display.noise(width, height), self._textures.of("levels", (width, height, 1), "rgba8")
         images = {"picture": picture, "levels": levels}
@@ -155,10 +167,10 @@ class Displaying:
         images |= own
         self._device.run(SHOW, (width, height), images=images, size=(width, height), slope=slope)
         made = self._device.read(levels)[0]
-        whole = made.view("<u4")  # the alpha lies in its highest bits
+        whole = made.view("<u4")  # alpha is in the highest bits
         unsure = np.flatnonzero(whole < 1 << 24)
         rows, columns = np.divmod(unsure, width)
-        rows = height - 1 - rows  # in pictures, from the bottom
+        rows = height - 1 - rows  # pictures have the bottom row first
         if unsure.size:
             light = self._picked(picture, rows * width + columns)
             found = np.full((unsure.size, 4), 255, np.uint8)
@@ -167,7 +179,7 @@ class Displaying:
         return made
 
     def _picked(self, picture: Texture, places: np.ndarray) -> np.ndarray:
-        """The light (n, 3) of pixels, by their numbers."""
+        """Return the light (n, 3) of pixels, given by their numbers."""
         size = _COLUMNS, -(-len(places) // _COLUMNS)
         numbers = np.zeros((size[1], _COLUMNS), np.uint32)
         numbers.ravel()[: len(places)] = places
@@ -180,19 +192,19 @@ class Displaying:
         return self._device.read(picked)[0].reshape(-1, 4)[: len(places), :3]
 
     def _send(self, display: Display, noise: np.ndarray) -> tuple[dict[str, Texture], float]:
-        """The textures of the noise and the curve; and OpenColorIO's slope below that, which is no 12.92."""
+        """Return the textures of the noise and of the curve, and OpenColorIO's slope below it, which is not 12.92."""
         slope = 255 * float(display.transfer(np.array([2.0**_LOWEST], np.float32))[0]) / 2.0**_LOWEST
         grain = self._textures.filled("grain", [noise], "r32f")
         return {"grain": grain, "curve": self._textures.filled("curve", [_curve(display)])}, slope
 
     def release(self) -> None:
-        """Frees what it has on the device, inside Device.freeing."""
+        """Free all memory on the device. Call it inside Device.freeing."""
         self._textures.release()
         self._sent.clear()
 
 
 def _curve(display: Display) -> np.ndarray:
-    """The pieces (1, n, 4) float32 of the curve: as in shaders/display.glsl."""
+    """Return the pieces (1, n, 4) float32 of the curve for shaders/display.glsl."""
     starts = np.arange(_FIRST, _FIRST + _PIECES, dtype=np.uint32) << np.uint32(_SHIFT)
     steps = np.linspace(0, (1 << _SHIFT) - 1, _PROBED).astype(np.uint32)
     values = display.transfer((starts[:, None] + steps).view(np.float32)).astype(np.float64) * 255
@@ -221,7 +233,7 @@ class GPUCompositor:
         return Stages(self.device)
 
     def labels(self, values: np.ndarray) -> Texture:
-        """Labels (H, W) uint16 as a texture r32ui. Valid until the next call."""
+        """See request.Compositor."""
         return self._textures.filled("labels", [values.astype(np.uint32)], "r32ui")
 
     def coefficients(self, handle: Texture, count: int) -> np.ndarray:
@@ -242,16 +254,15 @@ class GPUCompositor:
         return self._displaying.levels(drawn, display)
 
     def draw(self, window: Handle, request: Request, coefficients: Coefficients) -> Texture:
-        """The picture on the device, premultiplied: a texture array rgba32f of one layer, scene-linear, bottom row
-        first; or of levels rgba8, display code values, top row first. It is one of the window's, valid until its next
-        picture of the kind.
+        """Return the picture on the device, premultiplied: a texture array with one layer.
 
-        window: must have loaded all frames that some shutter exposes
+        It is rgba32f, scene-linear, bottom row first; or with levels rgba8, display code values, top row first. It is
+        the window's texture, valid until its next picture of the kind. The window must have loaded all exposed frames.
         """
         if len(request.state.groups) > 1:
             return self._draw_ways(window, request, coefficients)
         (combine,) = request.state.groups
-        if len(request.state.bars) == 1 and combine != AVERAGE:  # it is not displaced: how much frames count is known
+        if len(request.state.bars) == 1 and combine != AVERAGE:  # with one shutter, nothing is displaced
             options = replace(request.state.options, interpolation="value")
             request = replace(request, state=replace(request.state, options=options))
         state, index, direction, levels = request.state, request.index, request.direction, request.levels
@@ -286,7 +297,7 @@ class GPUCompositor:
         return picture
 
     def _draw_ways(self, window: Handle, request: Request, coefficients: Coefficients) -> Texture:
-        """As `draw`, of shutters that combine in several ways: a picture for each of these, mixed."""
+        """Draw shutters that combine frames in several ways: a picture for each way, mixed."""
         state, size = request.state, (window.source.width, window.source.height)
         groups = list(state.groups.values())
         for number, chosen in enumerate(groups):
@@ -298,11 +309,11 @@ class GPUCompositor:
             if levels:
                 images["picture"] = window.picture(levels=True)
             program, bits = way_sum(not number, levels), _bits(coefficients)
-            self.device.run(program, size, images=images, size=size, block_bits=bits)
+            self.device.run(program, size, images=images, size=size, given=size, block_bits=bits)
         return window.picture(levels=True) if request.levels else window.mixed()
 
     def _selected(self, handle: Texture, chosen: tuple[int, ...], count: int) -> tuple[Texture, Texture]:
-        """The coefficients of some shutters alone, and how much all of them have: valid until the next call."""
+        """Return the coefficients of some shutters, and their sum: valid until the next call."""
         groups, (width, height, _) = -(-len(chosen) // 4), handle.size
         numbers = np.full((groups, 4), -1, np.float32)
         numbers.flat[: len(chosen)] = chosen
@@ -314,8 +325,8 @@ class GPUCompositor:
         return selected, share
 
     def _draw_on_host(self, window: Handle, request: Request, coefficients: Coefficients) -> Texture:
-        """As `draw`, by NumPy: of medians whose frames are seen elsewhere, which passes over some of them at a time
-        cannot find; and of those that take more iterations than a device has."""
+        """Draw with NumPy: medians of following exposures, which need all frames in one pass, and medians that take too
+        many loop iterations for a device."""
         host, source, options = cpu.CPUCompositor(), window.source, request.state.options
         frames = host.window(source)
         frames.load(window_frames.positions(request, window.shot), options, window.shot)
@@ -327,8 +338,7 @@ class GPUCompositor:
         return picture
 
     def _draw_moved(self, window: WholeFrames, request: Request, coefficients: Coefficients) -> Texture:
-        """As `draw`, where shutters follow something: a pass for each texture array of frames, which adds what is seen
-        of these to what those before have."""
+        """Draw shutters that follow something. Each texture array of frames has a pass that adds to the last one."""
         state, options, size = request.state, request.state.options, (window.source.width, window.source.height)
         (combine,), (first, last) = state.groups, state.open_span
         frames = windows.indices(options, request.index, window.shot, request.direction)
@@ -345,7 +355,7 @@ class GPUCompositor:
         macros = {"MOVED": 1, "PACKED": int(packed), "EDGES": EDGES["shorten"] if shortened else 0}
         macros |= {"SHUTTERS": len(state.bars), "MIXED": mixed, "SQUARED": int(options.light != "encoded")}
         macros["SHARP"] = int(window.source.alpha == "opaque")
-        # What is left out is read in another's place: what lies in its own may be no number.
+        # A missing frame is read as the first one that exists: its own texels may be NaN.
         slots = np.where(frames < 0, frames[there[0]], frames) % window.capacity
         picture, summed = window.picture(request.levels), None
         images = {"coefficients": coefficients.handle, "table": self._textures.filled("table", [values])}
@@ -356,7 +366,7 @@ class GPUCompositor:
             images |= {"moves": self._textures.filled("moves", [moves]), "summed": summed, "packed_frames": stack}
             summed = self._textures.of(f"sum {number % 2}", (*size, 1), "rgba32f") if after else picture
             images["picture"] = summed
-            # What has more to do for a pixel takes long to compile for many.
+            # Passes that do more for each pixel take long to compile for several quads.
             several = {"QUADS": 1 if before or after else quads, "SEVERAL": int(before or after)}
             several |= {"CONTINUED": int(before), "UNFINISHED": int(after)}
             groups = -(-len(state.bars) // 4)

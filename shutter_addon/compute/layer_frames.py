@@ -1,5 +1,5 @@
-"""What the windows of layers read: frames weighted, pixel by pixel, by a layer's matte or by what it leaves; and mattes
-of layers in source frames, each made once, and kept within a budget."""
+"""Frames for the windows of layers: weighted pixel by pixel with a layer's matte, or with what all mattes leave. And
+the mattes of layers in source frames, each made once and cached."""
 
 from collections.abc import Callable, Hashable, Iterable
 from functools import partial
@@ -16,16 +16,16 @@ from ..core.model.mattes import FileFrame, Matte, MatteReader, Ramp
 from ..core.pixels import layering
 from ..core.stopping import kept
 
-# Bytes of frames that are kept as they were read, for all windows and mattes that need them.
+# Bytes of cached frames, shared by all windows and mattes.
 RECENT_BYTES = 256 << 20
-# Bytes of mattes that are kept, at most, beyond those of the window.
+# Bytes of cached mattes.
 KEPT_BYTES = 512 << 20
 _WHOLE = 65535
-LARGEST = np.finfo(np.float32).max  # of light
+LARGEST = np.finfo(np.float32).max  # the most light
 
 
 class RecentFrames(SourceWrapper):
-    """A source that keeps the frames which were read last: each window of a layer reads all of them."""
+    """A source that caches the last frames, since each layer's window reads all of them."""
 
     windows = 1
 
@@ -41,21 +41,23 @@ class RecentFrames(SourceWrapper):
         return self._kept.ask(("decoded", index), lambda: self._source.decoded(index), self.most)
 
     def want(self, indices: Iterable[int]) -> None:
-        """Who reads through this says nothing of what comes next: the renderer does."""
+        """Ignore the hint: the renderer tells the source which frames come next."""
 
     def clear(self) -> None:
-        """Forgets all frames."""
+        """Forget all frames."""
         self._kept.clear()
 
 
 class WeightedFrames(SourceWrapper):
-    """A FrameSource of frames that are premultiplied by weights, in linear light.
+    """Frames in linear light, premultiplied with weights.
 
-    source: the frames; opaque 8-bit ones become halves, all others float32
-    weight: gives the weights (H, W) float32, 0 to 1, of a frame
-    rest: whether the weights are what layers leave: then running sums hold what these take
-    alone: the weights themselves, as alpha; colored: with the frames' colours, as a threshold asks for them
-    is_summable: whether running sums can be made of them (running_sums.WeightedSums)
+    Attributes:
+        base: the source of the frames; opaque 8-bit frames become half floats, all others float32
+        weight: returns a frame's weights (H, W) float32, 0 … 1
+        rest: the weights are what layers leave; running sums then hold what layers take
+        alone: only the weights, as alpha
+        colored: alone, but with the frames' colors, which a threshold needs
+        is_summable: whether running sums can be made of them (running_sums.WeightedSums)
     """
 
     alpha, transfer = "premultiplied", "linear"
@@ -87,7 +89,7 @@ class WeightedFrames(SourceWrapper):
 
 
 def linear(frame: np.ndarray, source: FrameSource) -> np.ndarray:
-    """A source's frame (H, W, 4) in linear light, premultiplied, float32."""
+    """Return a source's frame (H, W, 4) float32 in linear light, premultiplied."""
     if frame.dtype.kind == "u":
         most = np.iinfo(frame.dtype).max
         if source.alpha != "premultiplied":
@@ -105,7 +107,14 @@ def linear(frame: np.ndarray, source: FrameSource) -> np.ndarray:
 
 
 def with_colors(frame: np.ndarray, colors: np.ndarray, where: np.ndarray, source: FrameSource) -> np.ndarray:
-    """An opaque source's frame (H, W, 4) with other colours (H, W, 3), in linear light, where (H, W) bool."""
+    """Return an opaque source's frame (H, W, 4) with some colors replaced.
+
+    Args:
+        frame: (H, W, 4)
+        colors: (H, W, 3), in linear light
+        where: (H, W) bool
+        source: the frame's source
+    """
     result, own = frame.copy(), colors[where]
     own = light.to_encoded(own) if source.transfer == "srgb" else own
     if frame.dtype.kind == "u":
@@ -116,11 +125,12 @@ def with_colors(frame: np.ndarray, colors: np.ndarray, where: np.ndarray, source
 
 
 class LayerMattes:
-    """The mattes of a source's layers, and what they leave of what lies behind.
+    """The mattes of a source's layers, cached.
 
-    size: (w, h) of the pictures
-    solve: gives coefficients (N, h, w) float32 of a state (Layers.scribbles) at a source frame
-    reader: what makes the values of mattes; None: there are none
+    Args:
+        size: (w, h) of the pictures
+        solve: returns coefficients (N, h, w) float32 of a state (Layers.scribbles) at a source frame
+        reader: reads the values of mattes. None: there are none.
     """
 
     def __init__(
@@ -134,16 +144,18 @@ class LayerMattes:
         self._most = max(KEPT_BYTES // (2 * size[0] * size[1]), 16)
 
     def of(self, layers: Layers, frame: int) -> list[np.ndarray]:
-        """The mattes (H, W) float32, 0 to 1, of all layers in a source frame, with their opacities."""
+        """Return the mattes (H, W) float32, 0 … 1, of all layers in a source frame, times their opacities."""
         return [self.one(layers, frame, i) for i in range(len(layers.opacities))]
 
     def one(self, layers: Layers, frame: int, layer: int) -> np.ndarray:
-        """That of one layer."""
+        """Return the matte of one layer."""
         return self._whole(layers, frame, layer) * np.float32(layers.opacities[layer])
 
     def edges(self, layers: Layers, frame: int) -> list[np.ndarray]:
-        """The mattes that say which pixels hold some of a subject and some of what lies behind it: without opacities,
-        and nothing of ramps and of what is drawn, whose soft edges are none of the picture's."""
+        """Return the mattes whose soft edges mix a subject with what lies behind it, without opacities.
+
+        Ramps and drawings have soft edges that are not in the picture: their mattes are 0 here.
+        """
         shown = layers.mattes[self._place(layers, frame)]
         tell = [matte is not None and not isinstance(matte.content, Ramp) for matte in shown]
         nothing = np.zeros(self._size[::-1], np.float32)
@@ -154,7 +166,7 @@ class LayerMattes:
         return min(max(frame - layers.first, 0), len(layers.mattes) - 1)
 
     def _whole(self, layers: Layers, frame: int, layer: int) -> np.ndarray:
-        """A matte without its opacity."""
+        """Return a matte without its opacity."""
         place = self._place(layers, frame)
         drawn, matte = layers.scribbles[place], layers.mattes[place][layer]
         if matte is not None:
@@ -164,19 +176,19 @@ class LayerMattes:
         return value.astype(np.float32) / np.float32(_WHOLE)
 
     def behind(self, layers: Layers, frame: int) -> np.ndarray:
-        """How much (H, W) float32 of what lies behind all layers is seen in a source frame."""
+        """Return how much (H, W) float32 of what lies behind all layers a source frame shows."""
         return layering.behind(self.of(layers, frame))
 
     def _read(self, matte: Matte, frame: int) -> np.ndarray:
         if self._reader is None:
-            raise ValueError("nobody reads mattes")
+            raise ValueError("there is no reader of mattes")
         reader = self._reader
         moves = frame if isinstance(matte.content, FileFrame) else None
         key = matte.content, matte.feather, matte.invert, moves
         return self._get(key, lambda: reader.values((matte,), frame, 1)[0][1])
 
     def _drawn(self, state: FrameState, frame: int, layer: int) -> np.ndarray:
-        """Of a layer that is drawn. Where no edges are followed, it is the same whatever the frame shows."""
+        """Return the matte of a drawn layer. Unless it follows edges, it does not depend on the frame."""
         key = state.key, frame if state.options.edge_aware else None
         if (key, layer) not in self._kept:
             for i, values in enumerate(self._solve(state, frame)[1:]):
@@ -198,11 +210,11 @@ class LayerMattes:
         return self._kept.ask(key, made, self._most)
 
     def clear(self) -> None:
-        """Forgets all mattes."""
+        """Forget all mattes."""
         self._kept.clear()
 
     def close(self) -> None:
-        """Forgets all mattes, and closes their files."""
+        """Forget all mattes, and close their files."""
         self.clear()
         if self._reader is not None:
             self._reader.close()

@@ -1,5 +1,5 @@
-"""Pictures with layers: what lies behind them and each of them is composed from a window of its own, then laid over one
-another (core.pixels.layering)."""
+"""Pictures with layers: each layer, and what lies behind all, is composed from a separate window. Then they are laid
+over one another (core.pixels.layering)."""
 
 from collections.abc import Callable, Collection
 from dataclasses import replace
@@ -16,18 +16,22 @@ from .layer_frames import LayerMattes, RecentFrames, WeightedFrames
 from .request import Behind, Coefficients, Compositor, Exposure, Handle, Request, Stages
 from .window import summable
 
-# What is composed, by layer, −1 for what lies behind, and whether it is of the weights alone.
+# The parts of a picture: {(layer, −1 for what lies behind; whether only weights are composed): request}.
 Parts = dict[tuple[int, bool], Request]
-# How much of what lies behind layers has to be seen for a plate to be looked for.
+# The least of what lies behind layers that must be visible for a plate to be made.
 _SEEN = 1 / 1024
 
 
 class LayeredRenderer:
-    """The windows of what is exposed by itself, and the mattes that weigh their frames.
+    """Composes pictures with layers. It has the layers' windows and mattes.
 
-    solve: gives coefficients (N, h, w) float32 of a state (Layers.scribbles) at a frame of a source
-    noted: gives a source whose frames are noted for the guides of the diffusion
-    recent: the source, of which it keeps the frames that were read last
+    Args:
+        compositor: composes the parts
+        stages: lays them over one another
+        source: the footage
+        noted: returns a source whose frames are noted for the guides of the diffusion
+        mattes: reads the values of mattes
+        solve: returns coefficients (N, h, w) float32 of a state (Layers.scribbles) at a frame of a source
     """
 
     def __init__(
@@ -47,18 +51,18 @@ class LayeredRenderer:
         self._colors = plates.LayerColors(self._noted, self.recent, self.mattes)
         self._layers: Layers | None = None
         self._windows: dict[tuple, Handle] = {}
-        self._loaded: dict[int, tuple] = {}  # by source frame in the windows: Layers.key_at
-        self._crowd = 1  # by how much more room windows have to leave than what they are said to need
-        self._kinds: np.ndarray | None = None  # of the last picture's pixels, where some lacked what lies behind
+        self._loaded: dict[int, tuple] = {}  # {source frame in the windows: Layers.key_at}
+        self._crowd = 1  # the factor of the room that windows leave for one another
+        self._kinds: np.ndarray | None = None  # kinds of the last picture's pixels, if some lacked what lies behind
         self._exposed: list[Exposure] = []
 
     @property
     def holes(self) -> np.ndarray | None:
-        """Of the last picture, the kinds (H, W) uint8 of its pixels (plates); None: all behind layers was exposed."""
+        """The kinds (H, W) uint8 of the last picture's pixels (plates). None: all that lies behind was exposed."""
         layers = self._layers
         if not self._exposed or layers is None or layers.camera is None:
             return self._kinds
-        # Exposed frames have been given what they lack; how much tells what it counts less.
+        # Exposed frames are completed from others with a lower weight, which tells how much that was.
         lacking = (1 - layering.CLEAR) * (1 - plates.TAKEN_SHARE)
         taken = self._lacks(self._exposed, 1 - lacking)
         if taken is None or self._kinds is None:
@@ -67,18 +71,22 @@ class LayeredRenderer:
 
     @property
     def held(self) -> Collection[int]:
-        """The source frames that all windows have."""
+        """The source frames that all windows hold."""
         held = [set(window.held) for window in self._windows.values()]
         return set.intersection(*held) if held else ()
 
     def draw(
         self, request: Request, behind: Request, coefficients: Coefficients, shot: range, plain: Callable[[], Handle]
     ) -> Handle:
-        """The picture, as the compositor's `draw` gives it.
+        """Return the picture, like the compositor's `draw`.
 
-        behind: of what lies behind, without layers, and its coefficients
-        shot: the source frames that windows may show
-        plain: gives the picture without layers"""
+        Args:
+            request: the picture
+            behind: the request of what lies behind, without layers
+            coefficients: those of `behind`
+            shot: the source frames that windows may show
+            plain: returns the picture without layers
+        """
         layers = request.state.layers
         if layers is None:
             raise ValueError("there are no layers")
@@ -93,7 +101,7 @@ class LayeredRenderer:
             except ValueError:
                 if all(window.is_open for window in self._windows.values()):
                     raise
-            # They were freed to make room for one another: smaller ones, or frames that are sent, have room.
+            # Windows were freed to make room for others. Try smaller ones, or frames that are sent for each picture.
             self.release_windows()
             self._crowd = max(self._crowd, crowd)
         return self._composed(request, parts, coefficients, shot, plain)
@@ -103,7 +111,7 @@ class LayeredRenderer:
     ) -> Handle:
         count = max(layer for layer, _ in parts) + 1
         moves = any(part.state.following is not None for part in parts.values())
-        # Where there are no running sums, the picture without layers is composed as well.
+        # Without running sums, the picture without layers is composed as well.
         self.recent.windows = self._crowd * (len(parts) + int(moves or not summable(self._source)))
         windows = {name: self._window(name, part, len(request.state.bars)) for name, part in parts.items()}
         self._load(windows, request, shot)
@@ -113,7 +121,7 @@ class LayeredRenderer:
             own = whole if name[0] >= 0 else coefficients
             drawn[name] = self._compositor.draw(windows[name], replace(part, levels=False), own)
         exposed = [Exposure(drawn[i, False], drawn.get((i, True), drawn[i, False])) for i in range(-1, count)]
-        # Running sums have the bits of the picture without layers where none is.
+        # Where there is no layer, running sums give the bits of the picture without layers.
         same = getattr(windows[-1, False], "cover", 0)
         self._exposed = exposed
         plate = self._plate(request, exposed, shot, lambda: self._gain(parts[-1, False].state, coefficients))
@@ -145,7 +153,7 @@ class LayeredRenderer:
         return window
 
     def _load(self, windows: dict, request: Request, shot: range) -> None:
-        """Loads all windows. Where many frames lack, they are loaded a few at a time: each is read once for all."""
+        """Load all windows, a few frames at a time, so that each frame is read once for all windows."""
         options, ordered = request.state.options, np.sort(window_frames.positions(request, shot))
         lacking = set(source_frames(options, ordered, shot).tolist()).difference(self.held)
         step = plates.TOGETHER if len(lacking) > 1 else len(ordered)
@@ -154,7 +162,7 @@ class LayeredRenderer:
                 window.load(ordered[:end], options, shot)
 
     def _forget_changed(self, layers: Layers, parts: dict) -> None:
-        """Windows are loaded anew where the mattes of a frame that they hold are others now, or other layers are."""
+        """Release the windows if the mattes of a held frame, or the layers, have changed."""
         keys = {frame: layers.key_at(frame) for frame in layers.frames}
         count = max(name[0] for name in parts) + 1
         if self._has_changed(keys) or (self._layers is not None and len(self._layers.shutters) != count):
@@ -164,9 +172,11 @@ class LayeredRenderer:
             del self._loaded[frame]
 
     def _has_changed(self, keys: dict[int, tuple]) -> bool:
-        """Whether mattes of frames in the windows have, or of those that these are taken from, or how the camera moves.
+        """Return whether mattes or camera motions of held frames, or of those that complete them, have changed.
 
-        keys: by source frame: Layers.key_at"""
+        Args:
+            keys: {source frame: Layers.key_at}
+        """
         for frame in self.held:
             asked = self._colors.asked.get(frame, {})
             if any(self._loaded.get(each, keys[each]) != keys[each] for each in (frame, *asked) if each in keys):
@@ -179,7 +189,7 @@ class LayeredRenderer:
     def _plate(
         self, request: Request, exposed: list[Exposure], shot: range, gain: Callable[[], np.ndarray]
     ) -> np.ndarray | None:
-        """See Behind.plate; gain: gives how bright (H, W) its pixels are."""
+        """Return Behind.plate. gain: returns the brightness (H, W) of its pixels."""
         layers, (bottom, *_) = request.state.layers, exposed
         self._kinds = None
         if layers is None or (holes := self._lacks(exposed, layering.CLEAR)) is None:
@@ -195,7 +205,7 @@ class LayeredRenderer:
         if (self._kinds == plates.FILLED).any():
             shares, is_open = self._shares(bottom), self._kinds == plates.OPEN
             around = layering.with_plate(self._compositor.read(bottom.color), shares, None)
-            # Of what a layer hides altogether, there is nothing to go on from.
+            # Nothing is known where a layer hides everything.
             known = np.where(is_open, shares >= layering.CLEAR, self._kinds == plates.TAKEN)
             picture = plates.filled(np.where(is_open[..., None], around, picture), known)
         if self._source.alpha == "opaque":
@@ -203,7 +213,7 @@ class LayeredRenderer:
         return picture
 
     def _lacks(self, exposed: list[Exposure], least: float) -> np.ndarray | None:
-        """Where (H, W) less than that of what lies behind is exposed, and it is seen; None: nowhere."""
+        """Return where (H, W) less than `least` of what lies behind is exposed, and visible. None: nowhere."""
         bottom, *own = exposed
         if self._stages.least_share(bottom) >= least:
             return None
@@ -212,11 +222,11 @@ class LayeredRenderer:
         return holes if holes.any() else None
 
     def _shares(self, exposed: Exposure) -> np.ndarray:
-        """The shares (H, W) of an exposure."""
+        """Return the shares (H, W) of an exposure."""
         return self._compositor.read(exposed.share)[..., 3]
 
     def _gain(self, state: FrameState, coefficients: Coefficients) -> np.ndarray:
-        """The brightness (H, W) or (1, 1) of what lies behind."""
+        """Return the brightness (H, W) or (1, 1) of what lies behind."""
         if (state.gains == 1).all():
             return np.ones((1, 1))
         values = np.maximum(self._compositor.coefficients(coefficients.handle, len(state.bars)), 0)
@@ -225,7 +235,7 @@ class LayeredRenderer:
         return whole[: self._source.height, : self._source.width]
 
     def release_windows(self) -> None:
-        """Frees the windows' frames. The next picture reads them again."""
+        """Free the windows' frames. The next picture reads them again."""
         for window in self._windows.values():
             window.release()
         self._windows.clear()
@@ -234,10 +244,10 @@ class LayeredRenderer:
         self._exposed = []
 
     def release(self) -> None:
-        """Frees what it has on the device, and what it keeps of frames."""
+        """Free all memory on the device and all cached frames."""
         self.release_windows()
         self.recent.clear()
 
     def close(self) -> None:
-        """Forgets all, and closes the files of mattes."""
+        """Close the files of mattes."""
         self.mattes.close()

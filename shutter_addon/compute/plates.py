@@ -1,5 +1,5 @@
-"""What source frames show of each layer, and of what lies behind all: the frames that windows of layers weigh. And
-plates: what lies behind layers where a frame does not show it, from other frames, or from what is around."""
+"""Colors of layers and of what lies behind them, in source frames. And plates: what lies behind layers where no exposed
+frame shows it, taken from other frames or filled from around."""
 
 from collections.abc import Callable, Iterable
 from typing import Any, TypeVar
@@ -16,24 +16,25 @@ from .layer_frames import LayerMattes, RecentFrames, linear, with_colors
 T = TypeVar("T")
 Motion = tuple[complex, complex]
 
-# Frames of which both are kept, as several windows load them one after another.
+# Frames that are cached for windows, which load them one after another.
 TOGETHER = 4
-# How much of what lies behind has to be seen of a pixel that a plate is taken from.
+# The least of what lies behind that a pixel must show to be used in a plate.
 SEEN = 0.9
-# How much of an exposed frame counts that is taken from others: a little less than all of it, which would say that no
+# The weight of exposed pixels that are taken from other frames. It is a little less than 1, which would mean that no
 # layer was in the way (layering.UNCOVERED).
 TAKEN_SHARE = 1 - 1 / 64
-# The most that it counts: less than whole in half floats, too.
+# Their largest weight, which is less than 1 in half floats, too.
 TAKEN_MOST = 1 - 1 / 1024
-# Kinds of pixels: seen, taken from another frame, filled from what is around.
+# Kinds of pixels: seen, taken from another frame, filled from around.
 OPEN, TAKEN, FILLED = 0, 1, 2
 
 
 class LayerColors:
-    """Frames with the colours of a layer, in the source's samples, and how much (H, W) float32 each pixel counts.
+    """Frames with the colors of a layer or of what lies behind, in the source's samples, and their weights.
 
-    source: what is read; recent: the same, with the frames that were read last; layers: of the last `begin`
-    asked: by source frame whose covered places are taken from others, which these are, and how the camera moves there
+    Attributes:
+        layers: those of the last `begin`
+        asked: {source frame: {frame that fills what layers cover: the camera's motion to it}}
     """
 
     layers: Layers
@@ -46,16 +47,16 @@ class LayerColors:
         self.asked: dict[int, dict[int, Motion]] = {}
 
     def begin(self, layers: Layers, options: Options, shot: range) -> None:
-        """What the frames are asked for, until this is called again. shot: the frames that may show what lies behind"""
+        """Set layers and options for the next frames. shot: the frames that may show what lies behind."""
         self.layers, self._options, self._shot = layers, options, shot
         self._kept.clear()
 
     def changes(self, layer: int) -> tuple:
-        """Hashable: what `frames` of a layer, or with −1 of what lies behind all, changes in the source's."""
+        """Return a key of what `frames` changes in the source's frames. layer: −1: what lies behind all."""
         return self._separates, self._options.plate_reach if layer < 0 and self._uncovers else None
 
     def frames(self, layer: int) -> FrameSource:
-        """A source of frames with the colours of a layer, or with −1 of what lies behind all layers."""
+        """Return a source of frames with the colors of a layer, or with −1 of what lies behind all layers."""
         if layer < 0 and self._uncovers:
             return SourceWrapper(self._source, lambda frame: self._uncovered(frame)[0])
         if self._separates:
@@ -63,7 +64,7 @@ class LayerColors:
         return self._source
 
     def weights(self, layer: int) -> Callable[[int], np.ndarray]:
-        """What gives how much of a layer, or of what lies behind all, a frame shows."""
+        """Return a function of a frame: how much (H, W) of a layer it shows, or with −1 of what lies behind all."""
         if layer >= 0:
             return lambda frame: self._mattes.one(self.layers, frame, layer)
         if self._uncovers:
@@ -82,8 +83,8 @@ class LayerColors:
         return self._kept.ask((frame, name), make, TOGETHER * (1 + len(self.layers.shutters)))
 
     def _separated(self, frame: int, layer: int) -> tuple[np.ndarray, np.ndarray]:
-        """A frame with a layer's own colours, and with those behind it; −1: behind all layers."""
-        number = 0 if len(self.layers.shutters) == 1 else layer  # behind it is behind all
+        """Return a frame with a layer's colors, and with those behind it. layer: −1: behind all."""
+        number = 0 if len(self.layers.shutters) == 1 else layer  # a single layer has all behind it
         return self._memo(frame, number, lambda: self._separate(frame, number))
 
     def _separate(self, frame: int, number: int) -> tuple[np.ndarray, np.ndarray]:
@@ -101,8 +102,11 @@ class LayerColors:
         return self._memo(frame, "behind", lambda: self._uncover(frame))
 
     def _uncover(self, frame: int) -> tuple[np.ndarray, np.ndarray]:
-        """What lies behind layers, and how much of it counts. What they cover is taken from other frames where the
-        camera's motion is known: of what it pans over, the frames that show it are no mean of all."""
+        """Return a frame of what lies behind layers, and its weights.
+
+        What layers cover comes from other frames, moved by the camera: where it pans, the frames that show a place are
+        no fair sample of the exposure.
+        """
         picture = self._separated(frame, -1)[1] if self._separates else self._decoded(frame)
         seen = self._mattes.behind(self.layers, frame)
         plate, kinds = self._plate(frame, seen < layering.UNCOVERED)
@@ -128,22 +132,24 @@ class LayerColors:
         )
 
     def motion(self, frame: int, other: int) -> Motion:
-        """How what the camera sees moves from one frame to another."""
+        """Return how the camera's view moves from one frame to another."""
         return self.layers.camera.between(frame, other) if self.layers.camera else (1, 0)
 
     def linear_part(self, frame: int, part: tuple[slice, slice]) -> np.ndarray:
-        """Rows and columns of a frame as it was read, in linear light, premultiplied."""
+        """Return rows and columns of a frame in linear light, premultiplied."""
         return linear(self._recent.read(frame)[part], self._source)
 
     def clear(self) -> None:
-        """Forgets all frames."""
+        """Forget all frames."""
         self._kept.clear()
         self.asked.clear()
 
 
 def nearest_frames(index: int, options: Options, shot: range) -> Iterable[int]:
-    """The filmed ones of a shot's frames in reach, in the order in which a plate is taken from them: those nearest to
-    frame `index`, of two the earlier. Moments between them are made of these."""
+    """Return the shot's filmed frames in reach of frame `index`, in the order in which a plate uses them.
+
+    The nearest come first, of two the earlier one. Moments between them are made of these.
+    """
     reach = options.plate_reach * options.step
     near = range(max(index - reach, shot.start), min(index + reach + 1, shot.stop))
     filmed = (frame for frame in near if frame % options.step == 0)
@@ -157,12 +163,18 @@ def plate(
     clear: Callable[[int], np.ndarray],
     motion: Callable[[int], tuple[complex, complex]],
 ) -> tuple[np.ndarray, np.ndarray]:
-    """What lies behind layers in the pixels `holes` (H, W) bool: a picture (H, W, 4) float32, scene-linear and
-    premultiplied, and the kinds (H, W) uint8 of its pixels.
+    """Return what lies behind layers in the pixels `holes`.
 
-    frames: source frames, the first is asked first
-    read: gives rows and columns of a frame's picture; clear: how much (H, W) of what lies behind is seen in it
-    motion: where a point z of this picture lies in a frame: turn · z + shift"""
+    Args:
+        holes: (H, W) bool
+        frames: source frames, in the order in which they are tried
+        read: returns rows and columns of a frame's picture
+        clear: returns how much (H, W) of what lies behind a frame shows
+        motion: returns where a point z of this picture lies in a frame: turn · z + shift
+
+    Returns:
+        A picture (H, W, 4) float32, scene-linear and premultiplied, and the kinds (H, W) uint8 of its pixels
+    """
     height, width = holes.shape
     picture, kinds = np.zeros((height, width, 4), np.float32), np.where(holes, FILLED, OPEN).astype(np.uint8)
     rows, columns = np.nonzero(holes)
@@ -185,10 +197,17 @@ def plate(
 
 
 def uncovered(colors: np.ndarray, seen: np.ndarray, plate: np.ndarray, kinds: np.ndarray) -> tuple[np.ndarray, ...]:
-    """What lies behind layers in a frame, of which it shows `seen` (H, W), with the rest from a plate: colours
-    (H, W, 3), scene-linear, and how much (H, W) float32 they count.
+    """Return what lies behind layers in a frame, completed from a plate.
 
-    colors: (H, W, 3) what it shows; plate, kinds: as from `plate`, with holes where it does not show all"""
+    Args:
+        colors: (H, W, 3), what the frame shows, scene-linear
+        seen: (H, W), how much of what lies behind it shows
+        plate: of `plate`, with holes where the frame does not show all
+        kinds: of `plate`
+
+    Returns:
+        Colors (H, W, 3), scene-linear, and their weights (H, W) float32
+    """
     taken = kinds == TAKEN
     mixed = seen[..., None] * colors + (1 - seen)[..., None] * plate[..., :3]
     share = np.where(taken, np.minimum(seen + (1 - seen) * np.float32(TAKEN_SHARE), np.float32(TAKEN_MOST)), seen)
@@ -196,10 +215,15 @@ def uncovered(colors: np.ndarray, seen: np.ndarray, plate: np.ndarray, kinds: np
 
 
 def filled(picture: np.ndarray, known: np.ndarray) -> np.ndarray:
-    """A picture (H, W, C) float32 whose pixels that are not known (H, W) bool go on smoothly from those around.
+    """Fill unknown pixels smoothly from their neighbors.
 
-    By a pyramid: each level is the mean of what is known of the finer one, and the finer one takes from it what it
-    lacks. It is what diffusion tends to, in one pass over each level."""
+    It uses a pyramid: each level is the mean of the known pixels of the finer one, which takes from it what it lacks.
+    The result resembles diffusion, with one pass for each level.
+
+    Args:
+        picture: (H, W, C) float32
+        known: (H, W) bool
+    """
     if known.all() or min(known.shape) < 2:
         return picture if known.any() else np.zeros_like(picture)
     height, width = known.shape
@@ -214,7 +238,7 @@ def filled(picture: np.ndarray, known: np.ndarray) -> np.ndarray:
 
 
 def _doubled(picture: np.ndarray) -> np.ndarray:
-    """Twice as large, linearly between the pixels' centres."""
+    """Return the picture at twice its size, linear between the centers of pixels."""
     for axis in (0, 1):
         before = np.concatenate([picture.take([0], axis), picture.take(range(picture.shape[axis] - 1), axis)], axis)
         after = np.concatenate([picture.take(range(1, picture.shape[axis]), axis), picture.take([-1], axis)], axis)

@@ -1,5 +1,4 @@
-"""Renders pictures of a source, each a function of one request, in four stages (Renderer.draw): labels, window,
-coefficients, composition."""
+"""Renders pictures of a source in four stages: labels, window, coefficients, composition (Renderer.draw)."""
 
 from __future__ import annotations
 
@@ -28,8 +27,11 @@ if TYPE_CHECKING:
 def open_compositor(
     device: str = "gpu", budget: Budget | None = None, ask_others: Callable[[], None] | None = None
 ) -> Compositor:
-    """The compositor "gpu", on OpenGL 4.3, or "cpu", on NumPy; budget, ask_others: as for Device. NoDeviceError: there
-    is no OpenGL 4.3."""
+    """Return the compositor "gpu" (OpenGL 4.3) or "cpu" (NumPy). budget, ask_others: as for Device.
+
+    Raises:
+        NoDeviceError: there is no OpenGL 4.3
+    """
     if device == "cpu":
         return CPUCompositor()
     from .gpu import GPUCompositor
@@ -38,8 +40,11 @@ def open_compositor(
 
 
 def open_gl(budget: Budget | None = None, ask_others: Callable[[], None] | None = None) -> GLDevice:
-    """A device on an OpenGL 4.3 context of its own; budget, ask_others: as for Device. NoDeviceError: there is none, or
-    no moderngl."""
+    """Return a device on a new OpenGL 4.3 context. budget, ask_others: as for Device.
+
+    Raises:
+        NoDeviceError: OpenGL 4.3 or moderngl is missing
+    """
     try:
         from ..devices.gl import GLDevice
     except ImportError as error:  # a package without wheels, or one for another Python
@@ -48,11 +53,14 @@ def open_gl(budget: Budget | None = None, ask_others: Callable[[], None] | None 
 
 
 class LabelLayer(NamedTuple):
-    """Labels that count for a share of the coefficients.
+    """Labels that make a share of the coefficients.
 
-    labels: (h, w) uint16, of pixels or of blocks of Options.aggregate a side: 0 free, 1 + shutter scribbled
-    sole: the shutter that they give to the whole picture; None: it is not one
-    key: equal for equal layers, whatever shapes they were drawn from"""
+    Attributes:
+        share: the share
+        labels: (h, w) uint16, a label for each block of Options.aggregate pixels a side: 0 free, 1 + shutter scribbled
+        sole: the only shutter of the whole picture. None: there are several.
+        key: equal for equal labels and shares
+    """
 
     share: float
     labels: np.ndarray
@@ -61,10 +69,12 @@ class LabelLayer(NamedTuple):
 
 
 class Renderer:
-    """Pictures of one source. It keeps the window's frames, and the last result of each stage.
+    """Renders pictures of a source. It keeps the window's frames and the last result of each stage.
 
-    mattes: what reads the mattes of its pictures; None: they have none
-    is_short: whether the last picture was slow: the device has no room for its window, and all frames are sent
+    Attributes:
+        compositor: composes the pictures
+        source: the footage
+        is_short: whether the device had no room for the last window, so that each picture sends all frames (slow)
     """
 
     def __init__(self, compositor: Compositor, source: FrameSource, mattes: MatteReader | None = None) -> None:
@@ -82,8 +92,11 @@ class Renderer:
         self._kept_picture: Memo[Handle] = Memo()
 
     def picture(self, request: Request) -> np.ndarray:
-        """The picture (H, W, 4), top row first: scene-linear float32, premultiplied. Of levels: 8-bit sRGB over black,
-        its alpha full, as a movie has it where Blender's view transform is Standard. With a display: its levels."""
+        """Return the picture (H, W, 4), top row first: scene-linear float32, premultiplied.
+
+        With `levels`: 8-bit sRGB over black with full alpha, as in a movie with Blender's view transform Standard. With
+        a display: its levels.
+        """
         with self.compositor.current():
             if request.display is not None:
                 return self.compositor.shown(self.draw(request), request.display)
@@ -92,8 +105,10 @@ class Renderer:
             return self.compositor.read(self.draw(request))
 
     def draw(self, request: Request) -> Handle:
-        """The picture on the device (GPUCompositor.draw); with NumPy an array, like `picture`'s. It is valid until the
-        next picture of this renderer, and composed only if it is not the last one."""
+        """Return the picture on the device (GPUCompositor.draw), or with NumPy an array.
+
+        It is valid until the renderer's next picture. The last picture is not composed again.
+        """
         if request.state.layers is None and (self._window is None or not self._window.is_open):
             self._kept_picture.clear()
         with self.compositor.current():
@@ -108,13 +123,13 @@ class Renderer:
 
     def _plain(self, request: Request) -> Handle:
         labels = self.labels(request)
-        # Before coefficients are solved for: the window reads the frames that guide the diffusion.
+        # The window comes before the coefficients, because it reads the frames that guide the diffusion.
         window = self._loaded_window(request, labels)
         coefficients = self._coefficients(request, labels)
         return self.compositor.draw(window, self._exposing(request, labels), coefficients)
 
     def _with_layers(self, request: Request) -> Handle:
-        """The picture with what lies behind its layers, and each of them, exposed by itself."""
+        """Return the picture whose layers, and what lies behind them, are exposed separately."""
         behind = replace(request, state=replace(request.state, layers=None), levels=False)
         labels, shot = self.labels(behind), self.shot(request)
         self._keep_guides(request)
@@ -134,28 +149,27 @@ class Renderer:
         return self._layered
 
     def _solved_apart(self, source: FrameSource, state: FrameState, index: int) -> np.ndarray:
-        """Coefficients (N, h, w) float32 of another state, at another frame: of layers."""
+        """Return coefficients (N, h, w) float32 of a layer's scribbles at any frame."""
         if self._scribbles is None:
             self._scribbles = Renderer(self.compositor, source)
         return self._scribbles.coefficients(Request(index, state))
 
     def coefficients(self, request: Request) -> np.ndarray:
-        """Coefficients (N, h, w) float32 of `picture`, for each pixel, or for each block of Options.aggregate pixels a
-        side."""
-        self._want(request)  # the picture will read them as well
+        """Return the picture's coefficients (N, h, w) float32, a value for each block of Options.aggregate pixels."""
+        self._want(request)  # the picture will read these frames as well
         count, (width, height) = len(request.state.bars), grid(self.source, request.state)
         drawn = self.drawn_coefficients(request)
         with self.compositor.current():
             return np.broadcast_to(self.compositor.coefficients(drawn.handle, count), (count, height, width))
 
     def drawn_coefficients(self, request: Request) -> Coefficients:
-        """Coefficients on the device, of all shutters. They are valid until the next call of any method."""
+        """Return the coefficients of all shutters on the device, valid until the next call of any method."""
         labels = self.labels(request)
         with self.compositor.current():
             return self._coefficients(request, labels, len(request.state.bars))
 
     def coefficients_with_layers(self, request: Request) -> np.ndarray:
-        """As `coefficients`, of each pixel (N, H, W); where layers are, of their shutters."""
+        """Return coefficients (N, H, W) of each pixel, with the shutters of layers laid over."""
         block = request.state.options.aggregate
         whole = self.coefficients(request).repeat(block, 1).repeat(block, 2)
         values = np.maximum(whole[:, : self.source.height, : self.source.width], 0)
@@ -167,7 +181,7 @@ class Renderer:
         return values.astype(np.float32)
 
     def drawn_with_layers(self, request: Request) -> Coefficients:
-        """As drawn_coefficients; where layers are, of their shutters."""
+        """Return drawn_coefficients with the shutters of layers laid over."""
         if request.state.layers is None:
             return self.drawn_coefficients(request)
         values = self.coefficients_with_layers(request)
@@ -175,13 +189,15 @@ class Renderer:
             return Coefficients(self._stages.upload(values), 1)
 
     def drawn_labels(self, request: Request) -> tuple[Handle, int]:
-        """Labels of the first layer on the device, a GPU: (texture array r32ui, block), top row first, each texel for
-        block × block pixels. They are valid until the next call of any method."""
+        """Return the labels of the first layer on a GPU: a texture array r32ui, top row first, and its block size.
+
+        They are valid until the next call of any method.
+        """
         with self.compositor.current():
             return self.compositor.labels(self.labels(request)[0].labels), request.state.options.aggregate
 
     def drawn_holes(self, request: Request) -> tuple[Handle, int]:
-        """The picture's holes on the device, a GPU, like drawn_labels; 0 where there is none."""
+        """Return the picture's holes on a GPU, like drawn_labels; 0 where there is none."""
         with self.compositor.current():
             self.draw(request)
             if self.holes is None or request.state.layers is None:
@@ -189,7 +205,7 @@ class Renderer:
             return self.compositor.labels(self.holes), 1
 
     def labels(self, request: Request) -> list[LabelLayer]:
-        """Labels of the request's scribbles, of each of scribbles.layers."""
+        """Return labels of the request's scribbles, for each of scribbles.layers."""
         state, size = request.state, grid(self.source, request.state)
         return self._kept_labels.get((size, state.options.border, state.shapes_key), lambda: labelled(state, size))
 
@@ -198,14 +214,13 @@ class Renderer:
         return window_frames.shot_of(request, self.source, self._beside(request), known=known)
 
     def slid(self, request: Request, *, known: bool = False) -> Request:
-        """See window_frames.slid. known: as for `shot`."""
+        """See window_frames.slid."""
         if request.state.options.edges != "slide":
             return request
         return window_frames.slid(request, self.shot(request, known=known))
 
     def missing(self, request: Request) -> set[int]:
-        """The source frames that `draw` would read: needed ones that are not loaded, and those in which it looks for
-        cuts."""
+        """Return the source frames that `draw` would read: to expose them, to guide the diffusion, or to find cuts."""
         held: Collection[int] = ()
         if request.state.layers is not None:
             held = self._layered.held if self._layered else ()
@@ -221,8 +236,7 @@ class Renderer:
         return (missing | unread) - handed
 
     def layer_mattes(self, request: Request, frame: int | None = None) -> list[np.ndarray]:
-        """The mattes (H, W) float32 of the request's layers in a source frame, its own where none is said; with their
-        opacities."""
+        """Return the layers' mattes (H, W) float32, times their opacities. frame: None: the request's."""
         if request.state.layers is None:
             return []
         with self.compositor.current():
@@ -230,8 +244,7 @@ class Renderer:
 
     @property
     def holes(self) -> np.ndarray | None:
-        """Of the last picture that had layers, the kinds (H, W) uint8 of its pixels (compute.plates), top row first;
-        None: what lies behind its layers was exposed everywhere."""
+        """See LayeredRenderer.holes. They belong to the last picture with layers; top row first."""
         with self.compositor.current():
             return self._layered.holes if self._layered else None
 
@@ -242,7 +255,7 @@ class Renderer:
         )
 
     def _is_guided(self, request: Request) -> bool:
-        """Whether coefficients depend on the shown frame."""
+        """Return whether coefficients depend on the shown frame."""
         return request.state.options.edge_aware > 0 and sole_of(self.labels(request)) is None
 
     def _beside(self, request: Request) -> int:
@@ -250,23 +263,23 @@ class Renderer:
         return guide.reach(request.state.options.step) if self._is_guided(request) else 0
 
     def _guiding(self, request: Request, shot: range) -> tuple[int, ...]:
-        """The source frames that guide the diffusion (guide.guiding), the shown one first; none where nothing does."""
+        """Return the source frames that guide the diffusion (guide.guiding); none if nothing does."""
         if not self._is_guided(request):
             return ()
         return guide.guiding(request.index, request.state.options.step, shot)
 
     @property
     def _everywhere(self) -> int:
-        """The side of a block as large as the picture, in pixels."""
+        """The side in pixels of a block that covers the picture."""
         return max(self.source.width, self.source.height)
 
     def _exposing(self, request: Request, labels: list[LabelLayer]) -> Request:
-        """The request as the window and the composition see it: of one shutter, where one holds everywhere."""
+        """Return the request with only the shutter that holds everywhere, if there is one."""
         sole = _sole(request, labels)
         return request if sole is None else replace(request, state=request.state.of([sole]))
 
     def _loaded_window(self, request: Request, labels: list[LabelLayer]) -> Handle:
-        """The window, with the frames loaded that the picture exposes."""
+        """Return the window with all exposed frames loaded."""
         window = self._window_for(request)
         self._keep_guides(request)
         exposing = self._exposing(request, labels)
@@ -276,8 +289,8 @@ class Renderer:
         return window
 
     def _kind_for(self, request: Request) -> tuple[int, bool, int, bool]:
-        """The length of the window, whether its frames are seen elsewhere than where they are, the number of all
-        shutters, and whether sums of frames are enough."""
+        """Return the window's length, whether it is for following exposures, the number of all shutters, and whether
+        sums of frames are enough."""
         exposing = self._exposing(request, self.labels(request)).state
         return request.state.options.window, exposing.following is not None, len(request.state.bars), exposing.averages
 
@@ -286,31 +299,29 @@ class Renderer:
         if self._window is None or self._kind != kind or not self._window.is_open:
             self._drop_window()
             self._kind = kind
-            source = self._layered.recent if self._layered else self.source  # whose windows read the same frames
+            source = self._layered.recent if self._layered else self.source  # the layers' windows read these frames too
             self._window = self.compositor.window(guide.NotedSource(source, self._guides), *kind)
         return self._window
 
     def _keep_guides(self, request: Request) -> None:
-        """Keeps what guides the diffusion of this picture and will guide that of the next ones, as it is read."""
+        """Keep the frames that guide the diffusion of this picture and of the next ones."""
         if not request.state.options.edge_aware:
             self._guides.keep(())
-        elif self._is_guided(request):  # else it is perhaps a still frame between two pictures that are
+        elif self._is_guided(request):  # else this may be a single frame between guided ones
             self._guides.keep(window_frames.guided_later(request, self._beside(request)))
 
     def _coefficients(self, request: Request, labels: list[LabelLayer], count: int = 1) -> Coefficients:
-        """What the composition takes; count: the shutters, of which it takes a single one where that holds
-        everywhere."""
+        """Return coefficients for the composition. count: the shutters, if a single one holds everywhere."""
         if (sole := _sole(request, labels)) is not None:
             return self._constant(np.eye(count)[sole if count > 1 else 0])
         return Coefficients(self._with_mattes(request, labels), request.state.options.aggregate)
 
     def _constant(self, values: np.ndarray) -> Coefficients:
-        """Coefficients (N,) of the whole picture."""
+        """Return one set of coefficients (N,) for the whole picture."""
         return Coefficients(self._stages.upload(values[:, None, None]), self._everywhere)
 
     def _with_mattes(self, request: Request, labels: list[LabelLayer]) -> Handle:
-        """Coefficients on the device, with the mattes laid over what the scribbles give. They are laid again only if
-        either has changed since the last call."""
+        """Return coefficients on the device, with mattes laid over those of scribbles. Kept until either changes."""
         state = request.state
         if not state.mattes or self._mattes is None:
             return self._diffused(request, labels)
@@ -324,8 +335,10 @@ class Renderer:
         return self._kept_mattes.get(key, lambda: self._stages.blend(beneath, state.mattes, values))
 
     def _diffused(self, request: Request, labels: list[LabelLayer]) -> Handle:
-        """Coefficients on the device. They are solved for only if labels or what guides them changed since the last
-        call, or if the last solution was a quick one and this must not be."""
+        """Return the scribbles' coefficients on the device.
+
+        They are kept until labels or guides change, or until a solution is needed that is not quick.
+        """
         options, count = request.state.options, len(request.state.bars)
         frames = self._guiding(request, self.shot(request)) if options.edge_aware else ()
 
@@ -338,8 +351,7 @@ class Renderer:
         return self._kept_diffusion.get(key, solve, quick=request.quick)
 
     def _solved_layers(self, layers: list[LabelLayer], count: int, guided: tuple, quick: bool) -> Handle:
-        """The coefficients of all layers, solved for one after the other and added up. A solution that another layer
-        has begun from would depend on that one."""
+        """Return the sum of all layers' coefficients. Several are never warm: one would depend on another."""
         if len(layers) == 1:
             return self._stages.solve(layers[0].labels, count, *guided, warm=quick)
         mixed: Handle = None
@@ -353,7 +365,7 @@ class Renderer:
         return mixed
 
     def release_window(self) -> None:
-        """Frees the window's frames, and those that the search for cuts has read. The next picture reads them again."""
+        """Free the window's frames and those of the search for cuts. The next picture reads them again."""
         with self.compositor.freeing():
             self._drop_window()
             if self._layered is not None:
@@ -371,7 +383,7 @@ class Renderer:
             self._kept_picture.clear()
 
     def release(self) -> None:
-        """Frees what the renderer has on the device. The next picture makes it again."""
+        """Free all memory on the device. The next picture makes it again."""
         with self.compositor.freeing():
             self.release_window()
             self._stages.release()
@@ -382,7 +394,7 @@ class Renderer:
         self._kept_mattes.clear()
 
     def close(self) -> None:
-        """Frees what the renderer has on the device, and closes the source."""
+        """Free all memory on the device, and close the source."""
         self.release()
         for reader in (self._mattes, self._layered):
             if reader is not None:
@@ -391,12 +403,12 @@ class Renderer:
 
 
 def _sole(request: Request, labels: list[LabelLayer]) -> int | None:
-    """The shutter that holds for the whole picture, if one does."""
+    """Return the only shutter of the picture, or None if there are several or mattes."""
     return None if request.state.mattes else sole_of(labels)
 
 
 def labelled(state: FrameState, size: tuple[int, int]) -> list[LabelLayer]:
-    """The layers of a state's scribbles (scribbles.layers); size: (w, h) of the labels."""
+    """Return the labels of each of scribbles.layers. size: (w, h) of the labels."""
     return [
         _layer(share, scribbles.rasterise(shapes, *size, border=state.options.border))
         for share, shapes in scribbles.layers(state.shapes)
@@ -404,13 +416,13 @@ def labelled(state: FrameState, size: tuple[int, int]) -> list[LabelLayer]:
 
 
 def grid(source: FrameSource, state: FrameState) -> tuple[int, int]:
-    """The size (w, h) of the labels and the coefficients of a source's pictures."""
+    """Return the size (w, h) of a source's labels and coefficients."""
     block = state.options.aggregate
     return -(-source.width // block), -(-source.height // block)
 
 
 def sole_of(layers: list[LabelLayer]) -> int | None:
-    """The shutter that all layers give to the whole picture, if it is one."""
+    """Return the only shutter of all layers, or None."""
     first, *others = layers
     return first.sole if all(layer.sole == first.sole for layer in others) else None
 
@@ -421,9 +433,9 @@ def _layer(share: float, labels: np.ndarray) -> LabelLayer:
 
 
 def _shutter_of(labels: np.ndarray) -> int | None:
-    """The shutter of all scribbles, if it is one; the first where there is no scribble. It holds everywhere."""
+    """Return the only shutter of the scribbles, 0 without scribbles, or None. It holds everywhere."""
     highest = int(labels.max())
     if highest == scribbles.FREE:
         return 0
-    lowest = int((labels - np.uint16(1)).min())  # the lowest shutter: a free pixel's 0 wraps around to 65,535
+    lowest = int((labels - np.uint16(1)).min())  # the lowest shutter: 0 of a free pixel wraps around to 65,535
     return lowest if lowest == highest - 1 else None

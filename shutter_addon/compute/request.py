@@ -1,5 +1,4 @@
-"""What is asked of a renderer, a picture as a function of one value; and what makes it, stage by stage, on a device or
-with NumPy."""
+"""Requests for pictures, and the interfaces of what makes them, on a device or with NumPy."""
 
 from collections.abc import Hashable, Sequence
 from contextlib import AbstractContextManager
@@ -13,22 +12,23 @@ from ..core.model.frame_state import FrameState
 from ..core.model.mattes import Matte
 from ..core.pixels.shown_levels import Display
 
-# What a compositor has on its device, which nothing else looks into: of a picture or of coefficients, on a GPU a
-# Texture, with NumPy an array; of the frames that are exposed, a window.Window or a cpu.HostWindow.
+# An object of a compositor: a picture or coefficients (on a GPU a Texture, with NumPy an array), or a window of frames
+# (a window.Window or cpu.HostWindow).
 Handle: TypeAlias = Any
 
 
 @dataclass(frozen=True)
 class Request:
-    """All that a picture depends on, in plain data.
+    """All that a picture depends on, as plain data.
 
-    index: the source frame that is shown, from 0; where Smooth is on it counts moments
-    state: the effect there
-    direction: 1, or −1 where the source plays in reverse, so that the window's next frames are those before `index`
-    source: what is read and in how much detail, for who has several renderers
-    levels: the picture is of 8-bit display code values, not scene-linear
-    display: what shows the opaque scene-linear picture, whose levels are wanted in its place; None: the picture is
-    quick: the diffusion may start from the last coefficients, so that the picture depends slightly on them
+    Attributes:
+        index: the shown source frame, from 0; with Smooth, the moment
+        state: the effect at that frame
+        direction: 1, or −1 if the source plays in reverse: the window's next frames are then those before `index`
+        source: the footage and its size, for a caller with several renderers
+        levels: the picture has 8-bit display code values instead of scene-linear light
+        quick: the diffusion may start from the last coefficients, on which the picture then depends slightly
+        display: converts the opaque scene-linear picture to levels. None: the picture itself is wanted.
     """
 
     index: int
@@ -41,23 +41,26 @@ class Request:
 
     @property
     def key(self) -> tuple:
-        """Equal for requests of the same picture, quick or not."""
+        """A key that is equal for the same picture, quick or not."""
         return self.source, self.index, self.direction, self.state.key, self.levels, self.display
 
 
 class Coefficients(NamedTuple):
     """How much of each shutter a pixel gets, on a device.
 
-    handle: on a GPU a texture array rgba32f, four shutters per layer, top row first; with NumPy an array (N, h, w)
-    block: each value is for block × block pixels; a single value is for the whole picture"""
+    Attributes:
+        handle: on a GPU a texture array rgba32f, four shutters per layer, top row first; with NumPy an array (N, h, w)
+        block: each value is for block × block pixels
+    """
 
     handle: Handle
     block: int
 
 
 class Exposure(NamedTuple):
-    """What a layer's frames, or those behind all layers, were composed to: a picture, and one whose alpha is the share
-    of the exposure that fell on them. Of opaque frames it is the same picture."""
+    """A composed layer, or what lies behind all: its picture, and a picture whose alpha is its share of the exposure.
+
+    For opaque frames both are the same picture."""
 
     color: Handle
     share: Handle
@@ -66,9 +69,11 @@ class Exposure(NamedTuple):
 class Behind(NamedTuple):
     """What lies behind layers.
 
-    exposed: by its weights
-    plain: the picture without layers; None: where there are none, `exposed` has the same bits
-    plate: (H, W, 4), what lies there where too little of it is exposed; None: nowhere"""
+    Attributes:
+        exposed: composed with its weights
+        plain: the picture without layers. None: `exposed` has its bits wherever no layer is.
+        plate: (H, W, 4), used where too little was exposed. None: enough was exposed everywhere.
+    """
 
     exposed: Exposure
     plain: Handle | None = None
@@ -76,72 +81,92 @@ class Behind(NamedTuple):
 
 
 class Stages(Protocol):
-    """What a renderer has for itself. What a method gives is valid until its next call."""
+    """A renderer's stages besides the composition. Results are valid until a method's next call."""
 
     def solve(self, labels: np.ndarray, count: int, *guided: Any, warm: bool = False) -> Handle:
-        """Coefficients as compute.diffusion.diffuse has them.
+        """Return coefficients, as compute.diffusion.diffuse does.
 
-        guided: its guide and strength, or nothing; warm: they may start from the last ones"""
+        Args:
+            labels: (h, w)
+            count: the number of shutters
+            guided: its guide and strength, or nothing
+            warm: whether it may start from the last coefficients
+        """
 
     def upload(self, values: np.ndarray) -> Handle:
-        """Coefficients (N, h, w), or (N, 1, 1) of the whole picture. Valid until the next call."""
+        """Return coefficients (N, h, w), or (N, 1, 1) for the whole picture, on the device."""
 
     def add(self, mixed: Handle | None, added: Handle, share: float, size: tuple[int, int]) -> Handle:
-        """A sum (h, w) of shares of coefficients with one more; mixed: what was returned last, None: it begins."""
+        """Return a sum (h, w) of coefficients plus a share of others. mixed: the last sum. None: start one."""
 
     def blend(
         self, beneath: Handle, mattes: tuple[Matte, ...], layers: Sequence[tuple[Hashable, np.ndarray]]
     ) -> Handle:
-        """Coefficients with mattes laid over them (core.model.mattes.blended); layers: of each matte a key, and its
-        values (h, w) float32."""
+        """Return coefficients with mattes laid over them (core.model.mattes.blended).
+
+        Args:
+            beneath: the coefficients
+            mattes: the mattes
+            layers: a key and the values (h, w) float32 of each matte
+        """
 
     def least_share(self, exposed: Exposure) -> float:
-        """The least share of any pixel."""
+        """Return the lowest share of any pixel."""
 
     def lay(self, behind: Behind, layers: Sequence[Exposure], levels: bool) -> Handle:
-        """The picture of layers that are laid over one another (core.pixels.layering)."""
+        """Return the picture of layers laid over one another (core.pixels.layering)."""
 
     def release(self) -> None: ...
 
 
 class Compositor(Protocol):
-    """What composes pictures, on a device or with NumPy.
+    """Composes pictures, on a device or with NumPy.
 
-    takes_planes: whether frames that are planes (core.frames.planes) are quickest to send"""
+    Attributes:
+        name: the device's name
+        takes_planes: whether frames are fastest to send as planes (core.frames.planes)
+    """
 
     name: str
     takes_planes: bool
 
     def current(self) -> AbstractContextManager:
-        """A context manager: all other methods are called inside it, on any one thread (Device.current)."""
+        """Return a context manager in which all other methods are called (Device.current)."""
 
     def freeing(self) -> AbstractContextManager:
-        """A context manager: what windows and stages hold is released inside it (Device.freeing)."""
+        """Return a context manager in which windows and stages are released (Device.freeing)."""
 
     def window(
         self, source: FrameSource, capacity: int, moved: bool = False, shutters: int = 4, summed: bool = True
     ) -> Handle:
-        """A window of `capacity` frames; moved: pictures of it have FrameState.following; shutters: of these pictures;
-        summed: all of them average."""
+        """Return a window of `capacity` frames.
+
+        Args:
+            source: the footage
+            capacity: the number of frames
+            moved: whether its pictures have FrameState.following
+            shutters: the number of shutters of its pictures
+            summed: whether all of them average
+        """
 
     def stages(self) -> Stages: ...
 
     def labels(self, values: np.ndarray) -> Handle:
-        """Labels (H, W) uint16, on a GPU a texture r32ui. Valid until the next call."""
+        """Return labels (H, W) uint16 on the device (on a GPU a texture r32ui), valid until the next call."""
 
     def coefficients(self, handle: Handle, count: int) -> np.ndarray:
-        """Coefficients (N, h, w) float32 of `count` shutters."""
+        """Return coefficients (N, h, w) float32 of `count` shutters as an array."""
 
     def read(self, drawn: Handle) -> np.ndarray:
-        """A picture of `draw` as an array (H, W, 4), top row first: float32, or levels in uint8."""
+        """Return a drawn picture as an array (H, W, 4), top row first: float32, or levels in uint8."""
 
     def over_black(self, drawn: Handle) -> np.ndarray:
-        """A scene-linear picture of `draw` as Renderer.picture has it of levels."""
+        """Return the levels over black of a drawn scene-linear picture (Renderer.picture)."""
 
     def shown(self, drawn: Handle, display: Display) -> np.ndarray:
-        """The levels (H, W, 4) uint8 of an opaque scene-linear picture of `draw`, top row first."""
+        """Return the display's levels (H, W, 4) uint8 of a drawn, opaque, scene-linear picture, top row first."""
 
     def draw(self, window: Handle, request: Request, coefficients: Coefficients) -> Handle:
-        """The picture, premultiplied; window: has loaded all frames that some shutter exposes."""
+        """Return the picture, premultiplied. The window must have loaded all exposed frames."""
 
     def release(self) -> None: ...

@@ -1,5 +1,5 @@
-"""The stages of a picture on a device, beside its composition: coefficients are diffused, added up, and covered by
-mattes; layers are laid over what lies behind them."""
+"""The stages of a picture on a device besides its composition: coefficients are diffused, added and covered by mattes;
+layers are laid over one another."""
 
 from collections.abc import Hashable, Sequence
 from typing import Any
@@ -7,23 +7,23 @@ from typing import Any
 import numpy as np
 
 from ..core.model.mattes import Matte
-from ..devices.device import Device, NamedTextures, Texture
+from ..devices.device import Device, Given, NamedTextures, Texture
 from ..devices.passes import read_pass
-from .composition_passes import padded
+from .composition_passes import padded, way_sum
 from .diffusion import follows_edges
 from .diffusion_gpu import Diffusion
 from .edge_diffusion_gpu import EdgeDiffusion
 from .request import Behind, Exposure
 
-# Mattes that one pass lays, whose values are on the device at once.
+# The most mattes of one pass.
 MOST_MATTES = 8
-# Pixels along a side of the blocks whose least share is looked at.
+# The side of a block of shaders/layer.glsl (LEAST), in pixels.
 BLOCK = 16
 LEAST = read_pass("layer", "LEAST")
 
 
 def _in_fours(values: np.ndarray) -> np.ndarray:
-    """Coefficients (N, h, w) as layers (⌈N/4⌉, h, w, 4) float32 of a texture."""
+    """Return coefficients (N, h, w) as layers (⌈N/4⌉, h, w, 4) float32 of a texture."""
     return np.moveaxis(padded(np.moveaxis(values, 0, -1)), 2, 0).astype(np.float32)
 
 
@@ -35,10 +35,10 @@ class Stages:
         self._textures = NamedTextures(device)
         self._plain, self._edged = Diffusion(device), EdgeDiffusion(device)
         self._mattes: Texture | None = None
-        self._held: dict[int, Hashable] = {}  # by layer of that: the key of the values in it
+        self._held: dict[int, Hashable] = {}  # {layer of _mattes: key of the values in it}
 
     def solve(self, labels: np.ndarray, count: int, *guided: Any, warm: bool = False) -> Texture:
-        """See request.Stages. What the other kind of diffusion has on the device is freed."""
+        """See request.Stages. The memory of the other kind of diffusion is freed."""
         if guided and follows_edges(labels, *guided):
             self._plain.release()
             return self._edged.solve(labels, count, *guided)
@@ -54,20 +54,16 @@ class Stages:
         """See request.Stages."""
         height, width = size
         result = self._textures.of("sum", (width, height, added.size[2]), "rgba32f")
-        self._device.run(
-            read_pass("mix", BEGINS=int(mixed is None)),
-            result.size,
-            images={"added": added, "mixed": result},
-            size=(width, height),
-            given=added.size[:2],
-            share=share,
-        )
+        whole = self._textures.filled("share", [np.full((1, 1, 1), share, np.float32)], "r32f")
+        images = {"part": added, "share": whole, "mixed": result}
+        given: Given = {"size": (width, height), "given": added.size[:2], "block_bits": max(size).bit_length()}
+        self._device.run(way_sum(mixed is None, levels=False), result.size, images=images, **given)
         return result
 
     def blend(
         self, beneath: Texture, mattes: tuple[Matte, ...], layers: Sequence[tuple[Hashable, np.ndarray]]
     ) -> Texture:
-        """See request.Stages. Values that it was given last stay on the device."""
+        """See request.Stages. The last values stay on the device."""
         height, width = layers[0][1].shape
         values = self._textures.of("mattes", (width, height, min(len(mattes), MOST_MATTES)), "r32f")
         if values is not self._mattes:
@@ -83,9 +79,8 @@ class Stages:
                     self._device.write(values, np.ascontiguousarray(array[..., None]), layer)
                     self._held[layer] = key
             over = self._textures.of(ends[0], (width, height, beneath.size[2]), "rgba32f")
-            adds = any(matte.blend == "add" for matte, _ in some)
             self._device.run(
-                read_pass("matte_blend", COUNT=len(some), ADDS=int(adds), MOST=MOST_MATTES),
+                read_pass("matte_blend", COUNT=len(some), MOST=MOST_MATTES),
                 over.size,
                 images={"under": beneath, "values": values, "over": over},
                 blocks={"table": table},
@@ -96,7 +91,7 @@ class Stages:
         return beneath
 
     def least_share(self, exposed: Exposure) -> float:
-        """See request.Stages: the least of each block is found on the device."""
+        """See request.Stages. The device finds the lowest share of each block."""
         width, height, _ = exposed.share.size
         least = self._textures.of("least", (-(-width // BLOCK), -(-height // BLOCK), 1), "r32f")
         images = {"clear": exposed.share, "least": least}
@@ -129,7 +124,7 @@ class Stages:
         return under
 
     def release(self) -> None:
-        """Frees what is on the device, inside Device.freeing."""
+        """Free all memory on the device. Call it inside Device.freeing."""
         self._plain.release()
         self._edged.release()
         self._textures.release()

@@ -1,4 +1,4 @@
-"""The window on a device: the source frames around the shown one. Each is read once while the window contains it."""
+"""Windows on a device: the source frames around the shown one. Each frame is read once while a window has it."""
 
 from __future__ import annotations
 
@@ -15,32 +15,34 @@ from ..devices import llvmpipe
 from ..devices.device import Device, NamedTextures, NoDeviceError, Texture, texel_bytes
 from ..devices.passes import Pass, read_pass
 
-# Bytes of a texture array, at most.
+# The most bytes of a texture array.
 BAND_BYTES = llvmpipe.MOST_BYTES
-# What is sent at a time of frames that stay on the host: a share of what the device allows; bytes of a band, at most.
+# If frames stay on the host, the most that is sent at once: a share of the budget, and bytes.
 SENT_SHARE, SENT_BYTES = 1 / 8, 64 << 20
 
-# Rows of pixels that one invocation of the passes through frames composes. Bands are a multiple of it high.
+# Rows of pixels that one invocation composes in most passes. The height of a band is a multiple of it.
 BLOCK = 16
-# Pixels by which packed frames are larger, as in shaders/include/packed.glsl.
+# The rim of packed frames in pixels (shaders/pack.glsl).
 RIM = 5
 
 _STORED = {np.uint8: "rgba8", np.uint16: "rgba16", np.float16: "rgba16f", np.float32: "rgba32f"}
 
 
 def summable(source: FrameSource) -> bool:
-    """Whether running sums can be made of a source: its frames are opaque, of 8 bits."""
+    """Return whether running sums can be made of a source: whether its frames are opaque and have 8 bits."""
     return np.dtype(source.dtype) == np.uint8 and source.alpha == "opaque"
 
 
 def beside(source: FrameSource, shutters: int) -> int:
-    """Bytes that have to be left beside a window: what any pass binds besides, and a frame that is sent. Diffusion
-    along edges binds most: four times the coefficients."""
+    """Return the bytes that a window must leave free: for a sent frame, and for the textures of other passes.
+
+    Diffusion along edges needs most: four times the coefficients.
+    """
     return source.width * source.height * (16 * (4 * -(-shutters // 4) + 2) + 4)
 
 
 class Part(NamedTuple):
-    """What a texture array of a window holds: `height` rows of pixels, from `top` on, of some of its layers."""
+    """The part of a window in one texture array: `height` rows of pixels, from `top` on, of some layers."""
 
     top: int
     height: int
@@ -48,32 +50,34 @@ class Part(NamedTuple):
 
 
 class Window:
-    """What all windows share: texture arrays of the format `kind`, one for each part, so that none is over BAND_BYTES;
-    and the textures that the compositor draws into.
+    """The base of all windows: a texture array for each part, and the textures that the compositor draws into.
 
-    Whether it fits depends on sizes and on the device's budget, and not on what is in use just now: so a picture has
-    the same bits whatever was rendered before. Where another window needs its room, it is released.
+    Whether a window fits depends on sizes and on the device's budget, but not on the free memory. So a picture has the
+    same bits whatever was rendered before. A window is released if another one needs its memory.
 
-    capacity: the most frames in a window; layers: those that it has in textures
-    shutters: as for running_sums.open_window
-    is_open: whether it has its textures; once released, it can show nothing any more
-    sends: whether every picture sends the frames anew, for which the device has no room
-    cover: COVER of the shaders: 0, these are no layer's
-    shot: the source frames that the loaded window may show
+    Attributes:
+        capacity: the most frames in a window
+        layers: the layers of all texture arrays
+        kind: their format
+        shutters: as for running_sums.open_window
+        is_open: whether it has its textures; a released window cannot be used again
+        sends: whether every picture sends all frames, because the device has no room for them
+        cover: COVER of the shaders; 0: not of a layer
+        shot: the source frames that the loaded window may show
     """
 
     layers: int
     kind: str
     cover = 0
     is_open = sends = False
-    _loading: tuple[tuple[str, str], ...] = ()  # textures that frames are loaded by, and their kinds
+    _loading: tuple[tuple[str, str], ...] = ()  # names and formats of textures that load frames
 
     def __init__(self, device: Device, source: FrameSource, capacity: int, shutters: int) -> None:
         self.device, self.source, self.capacity, self.shutters = device, source, capacity, shutters
         self.shot = range(source.count)
         self.parts: list[Part] = []
         self._textures: list[Texture] = []  # of the parts
-        self._extra = NamedTextures(device)  # when they are first asked for
+        self._extra = NamedTextures(device)
         device.use(self.release)
         try:
             self._allocate()
@@ -83,8 +87,11 @@ class Window:
         self.is_open = True
 
     def _allocate(self) -> None:
-        """Makes the texture arrays, and the picture. NoDeviceError: with as large windows of the same picture, they
-        leave too little of the device's memory; or there is no room for all of them."""
+        """Make the texture arrays and the picture.
+
+        Raises:
+            NoDeviceError: there is no room for them, for all windows of a picture, and for other passes
+        """
         width, height = self._texels(self.source.width, self.source.height)
         size = width * height * texel_bytes(self.kind) * self.layers * self.source.windows
         if size + beside(self.source, self.shutters) > self.device.budget.limit:
@@ -97,8 +104,7 @@ class Window:
             self._own(name, kind)
 
     def _divided(self, most: int) -> list[Part]:
-        """Bands of rows, of all layers, of so many bytes at most, but for those of a few rows. Each has a multiple of
-        BLOCK, but for the last."""
+        """Return bands of rows with all layers: at most `most` bytes or BLOCK rows, and a multiple of BLOCK rows."""
         source = self.source
         row_bytes = source.width * texel_bytes(self.kind) * self.layers
         rows = max(1, most // row_bytes // BLOCK) * BLOCK
@@ -106,31 +112,31 @@ class Window:
         return [Part(top, min(rows, source.height - top), range(self.layers)) for top in tops]
 
     def _texels(self, width: int, height: int) -> tuple[int, int]:
-        """The size (across, down) of a layer of so many pixels."""
+        """Return the size (width, height) in texels of a layer with this size in pixels."""
         return width, height
 
     def _size(self, part: Part) -> tuple[int, int, int]:
-        """The size (width, height, layers) of a part's texture."""
+        """Return the size (width, height, layers) of a part's texture."""
         return *self._texels(self.source.width, part.height), len(part.layers)
 
     def stored(self) -> Iterator[tuple[Part, Texture]]:
-        """Yields each part with its texture array, which is valid until the next one."""
+        """Yield each part with its texture array, which is valid until the next one."""
         yield from zip(self.parts, self._textures, strict=True)
 
     def decode(self, light: str) -> int:
-        """DECODE of the shaders (`decoding`) for what is stored; light: what is summed (Options.light)."""
+        """Return DECODE of the shaders (`decoding`). light: what is summed (Options.light)."""
         return 0
 
     def picture(self, levels: bool = False) -> Texture:
-        """The texture that the compositor draws into."""
+        """Return the texture that the compositor draws into."""
         return self._own("levels", "rgba8") if levels else self._own("picture", "rgba32f")
 
     def mixed(self) -> Texture:
-        """The texture that pictures of several ways to combine are added up in."""
+        """Return the texture for the sum of pictures that combine frames in several ways."""
         return self._own("mixed", "rgba32f")
 
     def _own(self, name: str, kind: str) -> Texture:
-        """A texture of the picture's size."""
+        """Return a texture of the picture's size."""
         return self._extra.of(name, (self.source.width, self.source.height, 1), kind)
 
     def release(self) -> None:
@@ -142,17 +148,17 @@ class Window:
 
 
 class Frames(Window):
-    """A window of the frames as they are: source frame i in layer i mod `layers`.
+    """A window of unchanged frames: source frame i is in layer i mod `layers`.
 
-    Where the device has no room for all parts, the frames stay on the host, and every picture sends them part by part.
-    Its bits are the same.
+    If the device has no room for all parts, the frames stay on the host, and every picture sends them part by part. Its
+    bits are the same.
     """
 
     def __init__(self, device: Device, source: FrameSource, capacity: int, shutters: int = 1) -> None:
         self.layers = capacity
-        self._held: dict[int, int] = {}  # layer: source frame
+        self._held: dict[int, int] = {}  # {layer: source frame}
         self._host: dict[int, np.ndarray] | None = None
-        # Encoded floats can exceed 1, for which the shaders' curve is not made: they are made linear on the host.
+        # Encoded floats can exceed 1, the limit of the shaders' curve: they become linear on the host.
         self._linearises = source.transfer == "srgb" and np.dtype(source.dtype).kind == "f"
         self.transfer = "linear" if self._linearises else source.transfer
         self.kind = self._kind(source)
@@ -174,7 +180,7 @@ class Frames(Window):
 
     @property
     def held(self) -> Collection[int]:
-        """The source frames that are loaded, a collection of their indices."""
+        """The loaded source frames."""
         return self._held.values()
 
     def load(self, positions: np.ndarray, options: Options, shot: range) -> None:
@@ -185,7 +191,7 @@ class Frames(Window):
             layer = index % self.capacity
             if self._held.get(layer) == index:
                 continue
-            self._held.pop(layer, None)  # should it be broken off meanwhile
+            self._held.pop(layer, None)  # in case it is interrupted
             frame = self._read(index)
             if self._host is None:
                 for part, texture in super().stored():
@@ -212,7 +218,7 @@ class Frames(Window):
         return decoding(self.transfer, light)
 
     def _read(self, index: int) -> np.ndarray:
-        """The source's frame (height, width, 4) in the samples that are stored."""
+        """Return the source's frame (height, width, 4) in the samples that are stored."""
         frame = self.source.read(index)
         if self._linearises:
             frame = frame.astype(np.float32, copy=False)
@@ -222,7 +228,7 @@ class Frames(Window):
         return frame
 
     def _send(self, part: Part, texture: Texture, layer: int, frame: np.ndarray) -> None:
-        """Sends what a part has of a frame."""
+        """Send a part's rows of a frame."""
         if layer in part.layers:
             self._write(texture, frame[part.top : part.top + part.height], layer - part.layers.start)
 
@@ -235,7 +241,7 @@ class Frames(Window):
 
 
 class WholeFrames(Frames):
-    """A window of the frames as they are, each whole: as many in a texture array as BAND_BYTES allow."""
+    """A window of unchanged frames that are not divided: each texture array has as many as BAND_BYTES allow."""
 
     def _divided(self, most: int) -> list[Part]:
         height = self.source.height
@@ -246,7 +252,7 @@ class WholeFrames(Frames):
 
 
 class PackedFrames(WholeFrames):
-    """A window of whole opaque 8-bit frames, in the light that is summed and quick to read (shaders/pack.glsl)."""
+    """A window of opaque 8-bit frames, packed in the light that is summed (shaders/pack.glsl)."""
 
     _light: Light = "linear"
     _loading = (("sent", "rgba8"),)
@@ -277,12 +283,16 @@ class PackedFrames(WholeFrames):
 
 
 def packing(decode: int, squared: bool) -> Pass:
-    """The pass that packs a frame; decode: of `decoding`; squared: what is summed is linear light."""
+    """Return the pass that packs a frame. decode: of `decoding`; squared: whether linear light is summed."""
     return read_pass("pack", DECODE=decode, SQUARED=int(squared))
 
 
 def decoding(stored: str, light: str) -> int:
-    """DECODE of the shaders, how samples become the light that is summed (Options.light): 0 unchanged, 1 made linear,
-    2 made encoded. stored: the samples' transfer, "srgb" or "linear"."""
+    """Return DECODE of the shaders: 0 unchanged, 1 to linear, 2 to encoded.
+
+    Args:
+        stored: the samples' transfer, "srgb" or "linear"
+        light: what is summed (Options.light)
+    """
     summed = "srgb" if light == "encoded" else "linear"
     return 0 if stored == summed else 1 if summed == "linear" else 2

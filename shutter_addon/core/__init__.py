@@ -1,1 +1,1 @@
-"""What the other layers compute with, in rooms; beside them what all rooms use. Pure Python and NumPy."""
+"""Pure Python and NumPy that all other packages use."""

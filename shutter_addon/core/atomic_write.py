@@ -1,4 +1,4 @@
-"""Files that are written whole or not at all: first in a folder beside their place, then moved there."""
+"""Writing files whole or not at all: first into a folder beside their place, from which they are moved."""
 
 import math
 import os
@@ -9,15 +9,20 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
-LEFT_BEHIND = 3600  # seconds without a change after which a part folder counts as abandoned
+LEFT_BEHIND = 3600  # seconds without a change after which a part folder is abandoned
 
 _NAME = re.compile(r"\.part-[0-9a-f]{16}")
 
 
 @contextmanager
 def writing(path: Path) -> Iterator[Path]:
-    """Gives a path of the same name to write the file to. At the end of the block the file is moved to `path`; after an
-    exception it is removed. A link at `path` is replaced, not followed. OSError: it cannot be written."""
+    """Yield a path of the same name to write to, and move it to `path` at the end.
+
+    An exception removes it. A link at `path` is replaced, not followed.
+
+    Raises:
+        OSError: It cannot be written.
+    """
     with part_folder(path.parent) as folder:
         yield folder / path.name
         os.replace(folder / path.name, path)
@@ -25,8 +30,13 @@ def writing(path: Path) -> Iterator[Path]:
 
 @contextmanager
 def part_folder(parent: Path) -> Iterator[Path]:
-    """A new folder in `parent`, for libraries that write by path: nobody can have put a link there, and no other writer
-    uses it. At the end of the block it is removed with its content. OSError: it cannot be made."""
+    """Yield a new folder in `parent`, and remove it with its content at the end.
+
+    Libraries write by path; in a new folder, nobody can have placed a link, and no other process writes.
+
+    Raises:
+        OSError: It cannot be made.
+    """
     folder = new_part(parent)
     try:
         yield folder
@@ -35,21 +45,20 @@ def part_folder(parent: Path) -> Iterator[Path]:
 
 
 def new_part(parent: Path) -> Path:
-    """Makes a part folder in `parent`. OSError: it cannot be made."""
+    """Make a part folder in `parent`. OSError: it cannot be made."""
     folder = parent / f".part-{secrets.token_hex(8)}"
-    # Only its owner may use it. Not on Windows: a file moved out of such a folder would keep that restriction.
+    # Private to its owner, except on Windows, where moved files would keep the restriction.
     folder.mkdir(0o700 if os.name == "posix" else 0o777)
     return folder
 
 
 def is_part(name: str) -> bool:
-    """Whether it is the name of a part folder."""
+    """Return whether a name is that of a part folder."""
     return _NAME.fullmatch(name) is not None
 
 
 def left_behind(parent: Path) -> list[Path]:
-    """The part folders in `parent` that processes have left behind that were killed. OSError: it cannot be read or
-    written to."""
+    """Return the part folders in `parent` that killed processes left. OSError: it cannot be read or written to."""
     with os.scandir(parent) as entries:
         parts = [entry.path for entry in entries if is_part(entry.name) and entry.is_dir(follow_symlinks=False)]
     if not parts:
@@ -59,22 +68,23 @@ def left_behind(parent: Path) -> list[Path]:
 
 
 def clear_up(parent: Path) -> None:
-    """Removes them, as far as that is possible."""
+    """Remove part folders that killed processes left, where possible."""
     with suppress(OSError):
         for left in left_behind(parent):
             shutil.rmtree(left, ignore_errors=True)
 
 
 def _clock(parent: Path) -> float:
-    """The time by the clock that dates the files there, in seconds since 1970: on a network drive the server's, which
-    need not agree with this machine's."""
+    """Return the time of the clock that dates files there, in seconds since 1970.
+
+    A network drive's server can have another time than this machine.
+    """
     with part_folder(parent) as folder:
         return folder.lstat().st_mtime
 
 
 def _last_written(folder: str) -> float:
-    """When something in the folder last changed, in seconds since 1970; infinite if the folder is gone or cannot be
-    read, so that it never counts as abandoned."""
+    """Return when a folder last changed, in seconds since 1970; infinity if unknown, so that it is never abandoned."""
     try:
         times = [entry.stat(follow_symlinks=False).st_mtime for entry in os.scandir(folder)]
         return max([os.lstat(folder).st_mtime, *times])

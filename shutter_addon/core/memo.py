@@ -1,4 +1,4 @@
-"""Memos: the last value of something, or the last ones, kept with the key of what they were made of."""
+"""Small caches: the last value of something, or the last values, with keys of what they depend on."""
 
 from __future__ import annotations
 
@@ -12,19 +12,22 @@ T = TypeVar("T")
 
 
 class Memo(Generic[T]):
-    """The last value that was made, with its key of plain values: made again where the key is another one.
+    """The last value, with its key of plain values. It is made again for another key.
 
-    made: how many values there were, which tells one from the next where their keys are equal
+    Attributes:
+        made: How many values were made, which distinguishes values with equal keys.
     """
 
     def __init__(self) -> None:
         self.made = 0
-        self._kept: tuple[Hashable, T, bool] | None = None  # the key, its value, and whether that is exact
+        self._kept: tuple[Hashable, T, bool] | None = None  # key, value, and whether that is exact
 
     def get(self, key: Hashable, make: Callable[[], T], *, quick: bool = False) -> T:
-        """The value of a key: the last one, if it was its; else what `make` gives. Broken off, none is kept.
+        """Return the last value if its key is equal, else what `make` returns. If `make` raises, nothing is kept.
 
-        quick: an approximation will do, and `make` may give one. What was made so does for quick requests alone."""
+        Args:
+            quick: Accept an approximation, and let `make` return one. Exact requests do not use it.
+        """
         if self._kept is None or self._kept[0] != key or not (quick or self._kept[2]):
             self.clear()
             value = make()
@@ -34,19 +37,19 @@ class Memo(Generic[T]):
         return self._kept[1]
 
     def clear(self) -> None:
-        """Lets go of the value."""
+        """Drop the value."""
         self._kept = None
 
 
 class Kept(dict[K, T]):
-    """The last values that were asked for, by keys of plain values; asked for longest ago first."""
+    """The last used values by keys of plain values, the least recently used first."""
 
     def ask(self, key: K, make: Callable[[], T], most: int) -> T:
-        """The value of a key: the kept one, or what `make` gives, which is kept beside most − 1 others."""
+        """Return a kept value, or make it and keep it beside most − 1 others."""
         return self.keep(key, self[key] if key in self else make(), most)
 
     def keep(self, key: K, value: T, most: int) -> T:
-        """Keep a value, in place of the key's last one, beside most − 1 others."""
+        """Keep a value as the most recently used one, beside most − 1 others."""
         self.pop(key, None)
         self[key] = value
         while len(self) > most:

@@ -1,4 +1,4 @@
-"""Sentences for users: one line each, which every terminal can show."""
+"""Messages for users: one line each, printable on every terminal."""
 
 from __future__ import annotations
 
@@ -8,11 +8,11 @@ from contextlib import contextmanager
 
 from . import told
 
-LONGEST = 300  # characters of a sentence, as users see it
+LONGEST = 300  # characters
 
 
 class UserError(Exception):
-    """What a user can mend: one clear sentence, the place first, which can be shown anywhere whatever it quotes."""
+    """An error that a user can fix. Its message is one printable sentence that begins with the place."""
 
     def __init__(self, *arguments: object) -> None:
         super().__init__(*arguments)
@@ -23,9 +23,12 @@ class UserError(Exception):
 
 
 class EffectError(UserError, RuntimeError):
-    """The effect cannot be rendered as it stands; the message is one sentence for the user.
+    """The effect cannot be rendered. The message is one sentence.
 
-    words: what the sentence's braces stand for, so that an interface can translate the sentence (`template`)."""
+    Attributes:
+        template: The sentence with placeholders, so that an interface can translate it.
+        words: Values of the placeholders.
+    """
 
     def __init__(self, template: str, **words: object) -> None:
         super().__init__(template.format(**words) if words else template)
@@ -34,8 +37,7 @@ class EffectError(UserError, RuntimeError):
 
 @contextmanager
 def translated(translate: Callable[[str], str]) -> Iterator[None]:
-    """Context in which the sentences of EffectErrors are passed on in the user's language. translate: a template into
-    it."""
+    """In this context, raise EffectErrors in the user's language; `translate` translates templates."""
     try:
         yield
     except EffectError as error:
@@ -48,9 +50,10 @@ def translated(translate: Callable[[str], str]) -> Iterator[None]:
 
 
 def sentence(text: object, longest: int = LONGEST) -> str:
-    """The text on one line of at most `longest` characters; where it is longer, its middle is left out, for it begins
-    with the place and ends with the reason. What cannot be shown (control characters, names of files that are not
-    UTF-8) is escaped."""
+    """Return the text on one line of at most `longest` characters, without its middle if it is longer.
+
+    Sentences begin with the place and end with the reason. Unprintable characters are escaped.
+    """
     words = " ".join(str(text).split())
     line = "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in words)
     if len(line) <= longest:
@@ -60,10 +63,10 @@ def sentence(text: object, longest: int = LONGEST) -> str:
 
 
 def of_file(error: OSError, place: str | os.PathLike[str] = "") -> str:
-    """What the system says of a file, its place first. place: where the error has none."""
+    """Return the system's message about a file, after its name, or `place` if the error has none."""
     return f"{os.fsdecode(error.filename or place)}: {error.strerror or error}"
 
 
 def signed(text: object) -> str:
-    """The sentence with the name of who says it, where it stands among Blender's own."""
+    """Return the sentence after the extension's name, for output among Blender's own."""
     return sentence(f"Virtual Shutter: {text}")

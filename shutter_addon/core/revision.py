@@ -1,7 +1,7 @@
-"""A number that grows with every change of the edit that Blender tells of, and values that are kept until it does.
+"""A counter of the edit's changes that Blender reports, and a cache of values until the next change.
 
-Blender tells of properties (their update callbacks), of what its depsgraph sees (keys, strips), of undo and of files.
-It tells nobody of strokes and of files on disk: previews look for them when they are drawn (rendering/invalidation.py).
+Blender reports changed properties (update callbacks), keys and strips (depsgraph), undo and loaded files. It does not
+report strokes and files on disk; previews look for these when they are drawn (rendering/invalidation.py).
 """
 
 from collections.abc import Callable, Hashable
@@ -10,11 +10,11 @@ from typing import Any, TypeVar
 from .memo import Kept
 
 T = TypeVar("T")
-_MOST = 128  # values of until_change
+_MOST = 128  # cached values
 
 
 class Revision:
-    """number: grows with every change"""
+    """A counter of changes."""
 
     number = 0
 
@@ -22,41 +22,41 @@ class Revision:
         self.number += 1
 
 
-_data = Revision()
-_kept: Kept[tuple, tuple[bool, Any]] = Kept()  # values of until_change, by number, each with whether it was made
+_changes = Revision()
+_kept: Kept[tuple, tuple[bool, Any]] = Kept()  # by number, subject and key: whether `make` succeeded, and its outcome
 
 
 def number() -> int:
-    """Grows with every change; equal numbers: nothing has changed but the current frame."""
-    return _data.number
+    """Return the counter of changes. While it is equal, only the current frame can have changed."""
+    return _changes.number
 
 
 def changed() -> None:
-    """Something has changed, or may have."""
-    _data.changed()
+    """Count a change, or a possible change."""
+    _changes.changed()
 
 
 def until_change(what: str, key: Hashable, make: Callable[[], T]) -> T:
-    """The value that `make` gives for something and a key, made once until something changes; what it raised, if it
-    did. The values that were asked for last are kept.
+    """Return what `make` returns or raises, called once per subject and key until the next change.
 
-    For what is drawn: operators, which may follow a change that nobody has told of yet, read anew."""
+    This is for drawing. Operators can follow a change that Blender has not reported yet, and read again.
+    """
     if next(reversed(_kept), (number(),))[0] != number():
-        _kept.clear()  # all were made before
+        _kept.clear()  # outdated
     good, value = _kept.ask((number(), what, key), lambda: _outcome(make), _MOST)
     if not good:
-        raise value.with_traceback(None)  # which would grow with every raise
+        raise value.with_traceback(None)  # a traceback would grow with every raise
     return value
 
 
 def known(what: str, key: Hashable) -> Any:
-    """The value of until_change that has been made since something changed; None: none has, or it could not be."""
+    """Return the cached value of `until_change`, or None."""
     good, value = _kept.get((number(), what, key), (False, None))
     return value if good else None
 
 
 def _outcome(make: Callable[[], object]) -> tuple[bool, Any]:
-    """Whether a call succeeds, and what it gives, or raises."""
+    """Return whether a call succeeds, and its result or error."""
     try:
         return True, make()
     except Exception as error:

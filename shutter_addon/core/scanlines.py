@@ -1,6 +1,6 @@
-"""Closed polygons on the lines of a picture: where these cross them, and which pixels they fill.
+"""Filling closed polygons by scanlines.
 
-Polygons (n, 2) are in pixels, x along the lines and y across them, from the corner of the first pixel on.
+Polygons (n, 2) are in pixels from the corner of the first pixel, x along the lines and y across them.
 """
 
 from __future__ import annotations
@@ -11,13 +11,13 @@ import numpy as np
 
 
 def edges(polygons: Sequence[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
-    """Where the edges of polygons start and end, (m, 2) each."""
+    """Return the starts and ends of the polygons' edges, (m, 2) each."""
     start = np.concatenate([np.zeros((0, 2)), *polygons])
     return start, np.concatenate([np.zeros((0, 2)), *(np.roll(polygon, -1, axis=0) for polygon in polygons)])
 
 
 def crossings(start: np.ndarray, end: np.ndarray, lines: range) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Where edges cross the middles of lines: the edge, the line, and x, (m,) each."""
+    """Return where edges cross the middles of lines: edge, line and x, (m,) each."""
     lower, upper = np.where((start[:, 1] < end[:, 1])[:, None], (start, end), (end, start))
     first, last = (
         np.clip(np.ceil(y - 0.5), lines.start, lines.stop).astype(np.intp) for y in (lower[:, 1], upper[:, 1])
@@ -31,16 +31,19 @@ def crossings(start: np.ndarray, end: np.ndarray, lines: range) -> tuple[np.ndar
 def fill(
     picture: np.ndarray, polygons: Sequence[np.ndarray], value: float, *, odd: bool = False, seam: float = 0.0
 ) -> bool:
-    """Set the pixels of a picture (h, w) whose middles the polygons wind around, together; whether there are any.
+    """Set the pixels of a picture (h, w) with a nonzero winding number. Return whether there are any.
 
-    odd: those that an odd number of them wind around; seam: pixels by which what is filled reaches farther along x"""
+    Args:
+        odd: Fill by the even-odd rule instead.
+        seam: Extend filled spans along x by so many pixels.
+    """
     height, width = picture.shape
     start, end = edges(polygons)
     edge, line, x = crossings(start, end, range(height))
     turn = np.where(start[:, 1] < end[:, 1], 1, -1)[edge]
     order = np.lexsort((x, line))
     line, x, winding = line[order], x[order], np.cumsum(turn[order])[:-1]
-    # What lies between two edges that follow each other on a line.
+    # A span lies between two consecutive edges on the same line.
     inside = (winding % 2 != 0 if odd else winding != 0) & (line[1:] == line[:-1])
     ends = x[:-1][inside], x[1:][inside] + seam
     first, last = (np.ceil(np.clip(x - 0.5, 0, width)).astype(int) for x in ends)
@@ -50,7 +53,7 @@ def fill(
 
 
 def ranges(first: np.ndarray, last: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """All whole numbers from first to before last (n,): the index of the range each is of, and the number."""
+    """Return all integers of ranges first … last − 1 (n,): index of the range, and integer."""
     counts = np.maximum(last - first, 0)
     index = np.repeat(np.arange(len(counts)), counts)
     return index, np.arange(len(index)) - np.repeat(np.cumsum(counts) - counts - first, counts)

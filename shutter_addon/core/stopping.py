@@ -1,7 +1,7 @@
-"""Work that may be broken off: whoever does it looks between two of its steps whether it is still wanted.
+"""Cancelling work: it checks between short steps whether it is still wanted.
 
-A step is short: a pass over a picture, a frame that is waited for. What is kept from one step to the next has to be
-right, or forgotten, wherever the work ends.
+A step is a pass over a picture, or waiting for a frame. Work can end after any step, so state that is kept between
+steps has to be valid.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 
 class StoppedError(Exception):
-    """The work is not wanted any longer."""
+    """The work is no longer wanted."""
 
 
 def never() -> bool:
@@ -23,10 +23,14 @@ def never() -> bool:
 
 @dataclass
 class Slice:
-    """What tells work to end after some time, and to go on in another slice.
+    """A time slice, after which work ends to continue in the next slice.
 
-    soon: of time.monotonic(), when it ends once something is kept for the next one; end: when it ends all the same
-    waits: whether it may wait for what a thread makes; has_kept: whether something is kept"""
+    Attributes:
+        soon: Time of time.monotonic() when work ends if it has kept something for the next slice.
+        end: Time when it ends in any case.
+        waits: Whether work may wait for another thread's results.
+        has_kept: Whether something was kept.
+    """
 
     soon: float
     end: float
@@ -37,16 +41,19 @@ class Slice:
         return time.monotonic() > (self.soon if self.has_kept else self.end)
 
 
-# By how much the next slice is longer, so that all ends: of each, and of one that begins again what the last one did.
+# Growth of the next slice, so that all work ends: normally, and for a slice that starts over.
 _LONGER, _AGAIN = 1.02, 1.5
 
 
 @dataclass
 class Slices:
-    """The slices of time in which one thing is made: each is longer than the one before, so that it ends.
+    """The time slices in which one result is made, each longer than the one before.
 
-    key: of what is made; last: the last slice, None: nothing is on its way
-    soon, seconds: how long that was to be, with something kept and at most"""
+    Attributes:
+        key: Of the result.
+        last: The last slice; None: nothing is being made.
+        soon, seconds: The last slice's duration with something kept, and at most.
+    """
 
     key: Hashable = None
     last: Slice | None = None
@@ -54,7 +61,7 @@ class Slices:
     seconds: float = 0.0
 
     def next(self, key: Hashable, first: float, least: float, *, waits: bool = True) -> Slice:
-        """Begins a slice of so many seconds: the first one of a key, or another one."""
+        """Begin a slice of `first` seconds for a new key, or a longer one."""
         if self.last is None or self.key != key:
             self.soon = self.seconds = first
         else:
@@ -65,7 +72,7 @@ class Slices:
         return self.last
 
     def end(self) -> None:
-        """It is made."""
+        """Mark the result as made."""
         self.key = self.last = None
 
 
@@ -74,7 +81,7 @@ _stopped: ContextVar[Callable[[], bool]] = ContextVar("stopped", default=never)
 
 @contextmanager
 def once(stopped: Callable[[], bool]) -> Iterator[None]:
-    """Inside, on this thread, work ends once `stopped` says so."""
+    """In this context and thread, stop work when `stopped` returns true."""
     token = _stopped.set(stopped)
     try:
         yield
@@ -83,17 +90,17 @@ def once(stopped: Callable[[], bool]) -> Iterator[None]:
 
 
 def kept() -> None:
-    """Notes that what this step has made is kept, should the work end here."""
+    """Note that this step's result is kept if work ends here."""
     if isinstance(now := _stopped.get(), Slice):
         now.has_kept = True
 
 
 def waits() -> bool:
-    """Whether this step may wait for what another thread makes."""
+    """Return whether this step may wait for another thread's results."""
     return not isinstance(now := _stopped.get(), Slice) or now.waits
 
 
 def check() -> None:
-    """StoppedError: the work that this step belongs to is to end here."""
+    """Raise StoppedError if the current work has to end."""
     if _stopped.get()():
         raise StoppedError

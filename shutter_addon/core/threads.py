@@ -1,5 +1,7 @@
-"""The one place that starts threads. docs/internals.md (Threads) lists what runs on them, and why none of it touches
-Blender's data, which belongs to Blender's main thread.
+"""Threads: only this module starts any.
+
+docs/internals.md (Threads) lists what runs on them, and why none of it touches Blender's data, which belongs to
+Blender's main thread.
 """
 
 from __future__ import annotations
@@ -18,8 +20,7 @@ _NAME = "Virtual Shutter"
 
 
 def start(function: Callable[..., T], *arguments: object) -> Future[T]:
-    """What a function will return or raise, called by a thread of its own, which ends with it. Python waits for it
-    before it ends."""
+    """Call a function on a new thread and return its Future. Python waits for the thread before it exits."""
     executor = pool(1)
     future = executor.submit(function, *arguments)
     executor.shutdown(wait=False)
@@ -27,24 +28,23 @@ def start(function: Callable[..., T], *arguments: object) -> Future[T]:
 
 
 def pool(workers: int | None = None) -> ThreadPoolExecutor:
-    """So many threads that call functions, to be shut down; None: as many as Python chooses."""
+    """Return a pool of worker threads, which the caller shuts down; None: Python chooses their number."""
     return ThreadPoolExecutor(workers, _NAME)
 
 
 def fulfil(future: Future[T], function: Callable[[], T]) -> bool:
-    """Has a future what a function gives or raises. Whether it was called: not where the future was cancelled."""
+    """Set a future to what a function returns or raises. Return False if the future was cancelled."""
     if not future.set_running_or_notify_cancel():
         return False
     try:
         future.set_result(function())
     except Exception as error:
-        future.set_exception(error.with_traceback(None))  # whose frames may refer to textures
+        future.set_exception(error.with_traceback(None))  # its frames may refer to textures
     return True
 
 
 def daemon(function: Callable[..., object], *arguments: object) -> threading.Thread:
-    """A thread that calls a function, which goes on until it is told to end. Python ends without it, and prints what it
-    raises."""
+    """Call a function on a thread that does not keep Python from exiting, and which prints what it raises."""
     thread = threading.Thread(target=_noting, args=(function, *arguments), name=_NAME, daemon=True)
     thread.start()
     return thread
@@ -53,16 +53,19 @@ def daemon(function: Callable[..., object], *arguments: object) -> threading.Thr
 def _noting(function: Callable[..., object], *arguments: object) -> None:
     try:
         function(*arguments)
-    except Exception as error:  # that nobody expected: others find no way to whoever waits
+    except Exception as error:  # unexpected: functions report other errors themselves
         told.exception(error)
         raise
 
 
 def beside(steps: Iterable[T], patience: float | None) -> Generator[T | None, None, None]:
-    """What an iterable gives, found by a thread of its own, which goes ahead.
+    """Iterate on a thread that runs ahead.
 
-    patience: seconds after which it gives None where nothing was found yet; None: it waits. Closed early, it has the
-    thread end at its next `stopping.check`, and waits for that."""
+    Closing the generator stops the thread at its next `stopping.check` and waits for it.
+
+    Args:
+        patience: Seconds without a result after which it yields None; None: it waits.
+    """
     ended, results = threading.Event(), queue.SimpleQueue[tuple[T | None, Exception | None, bool]]()
     thread = daemon(_find, steps, ended, results)
     try:
@@ -89,5 +92,5 @@ def _find(steps: Iterable, ended: threading.Event, results: queue.SimpleQueue) -
                 results.put((step, None, False))
                 check()
         results.put((None, None, True))
-    except Exception as error:  # raised to whoever asks for the next step
+    except Exception as error:  # the consumer gets it
         results.put((None, error, True))

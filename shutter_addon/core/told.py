@@ -1,6 +1,6 @@
-"""The last errors and warnings that users were told, for a report of an error: in memory alone, a hundred at most.
+"""The last errors and warnings that users saw, in memory only, for reports.
 
-Sentences quote what is the user's. A report has the lines of source that made them instead, which are ours.
+Messages can quote the user's names. A report instead quotes the lines of our source that made the messages.
 """
 
 import linecache
@@ -14,18 +14,23 @@ from typing import NamedTuple
 
 from .memo import Kept
 
-MOST = 100  # sentences
+MOST = 100  # messages
 _PACKAGE = Path(__file__).parents[1]
 _CALLS = 8  # of a traceback
-_LEAST = 5  # letters of a sentence; what has fewer stands in others by chance
+_LEAST = 5  # letters; shorter messages are part of others by chance
 _start = time.monotonic()
-_lock = threading.RLock()  # films are rendered on threads of their own
+_lock = threading.RLock()  # films are rendered on other threads
 
 
 class Told(NamedTuple):
-    """A sentence as it was shown, names included, and the words for it that have none.
+    """A message.
 
-    seconds: after the start, when it was told last; times: how often that was"""
+    Attributes:
+        text: As it was shown, possibly with names.
+        words: Its description without names.
+        seconds: Since the start, when it was shown last.
+        times: How often it was shown.
+    """
 
     text: str
     words: str
@@ -33,12 +38,12 @@ class Told(NamedTuple):
     times: int
 
 
-_told: Kept[tuple[str, str], Told] = Kept()  # in the order in which they were told last
-_made: Kept[str, tuple[str, int]] = Kept()  # by sentence of an error: the file and the line that made it last
+_told: Kept[tuple[str, str], Told] = Kept()  # the last one shown is last
+_made: Kept[str, tuple[str, int]] = Kept()  # by an error's message: file and line that made it last
 
 
 def made(sentence: str) -> None:
-    """Notes who makes an error of this sentence: the caller of its class."""
+    """Remember where an error with this message is made: in the caller of its class."""
     frame: FrameType | None = sys._getframe(1)
     while frame and frame.f_code.co_name == "__init__":
         frame = frame.f_back
@@ -48,7 +53,7 @@ def made(sentence: str) -> None:
 
 
 def record(text: object, level: int = 1) -> None:
-    """Keeps a sentence that a user is told. level: which of the callers tells it, where no error of ours has said it"""
+    """Keep a message that a user sees; `level` is the caller that shows it, if no error of ours made it."""
     words = described(text)
     if not words:
         frame = sys._getframe(level)
@@ -57,7 +62,7 @@ def record(text: object, level: int = 1) -> None:
 
 
 def shown(text: object, level: int = 1) -> None:
-    """As `record`, for what is drawn again and again: it counts once."""
+    """Keep a message like `record`, but count it once, since it is drawn repeatedly."""
     with _lock:
         is_known = any(known == str(text) for known, _ in _told)
     if not is_known:
@@ -65,21 +70,21 @@ def shown(text: object, level: int = 1) -> None:
 
 
 def exception(error: BaseException) -> None:
-    """Keeps an error that nobody expected: its type and calls of the extension's code, not what it says."""
+    """Keep an unexpected error: its type and the extension's calls, but not its message."""
     inner_first = reversed(_frames(error)[-_CALLS:])
     calls = " < ".join(f"{_place(frame.filename, frame.lineno)} {frame.name}" for frame in inner_first)
     _keep(type(error).__name__, f"{type(error).__name__} [{calls}]")
 
 
 def described(text: object) -> str:
-    """The lines that made the errors which a sentence quotes, the last made first; "": it quotes none."""
+    """Return the lines that made the errors that a message quotes, the last made first; "" for none."""
     with _lock:
         lines = [line for sentence, line in _made.items() if sentence in str(text)]
     return " < ".join(_source(*line) for line in reversed(lines))
 
 
 def last() -> list[Told]:
-    """What was told, the oldest first."""
+    """Return the messages, the oldest first."""
     with _lock:
         return list(_told.values())
 
@@ -90,7 +95,7 @@ def forget() -> None:
 
 
 def is_ours(error: BaseException) -> bool:
-    """Whether code of the extension has to do with it."""
+    """Return whether the extension's code is in the error's traceback."""
     return bool(_frames(error))
 
 
@@ -101,7 +106,7 @@ def _keep(text: str, words: str) -> None:
 
 
 def _source(file: str, line: int) -> str:
-    """A line of source, and where it is."""
+    """Return a line of source and its place."""
     if not Path(file).is_relative_to(_PACKAGE):
         return "(words that are not the extension's own)"
     return f"{linecache.getline(file, line).strip()} [{_place(file, line)}]"
@@ -112,6 +117,6 @@ def _place(file: str, line: int | None) -> str:
 
 
 def _frames(error: BaseException) -> list[traceback.FrameSummary]:
-    """Those in files of the extension."""
+    """Return the frames in files of the extension."""
     frames = traceback.StackSummary.extract(traceback.walk_tb(error.__traceback__), lookup_lines=False)
     return [frame for frame in frames if Path(frame.filename).is_relative_to(_PACKAGE)]

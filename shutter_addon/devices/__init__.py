@@ -1,1 +1,1 @@
-"""What passes run on: OpenGL by moderngl, its memory, and how a pass is declared. No bpy."""
+"""Devices that run compute passes: OpenGL through moderngl, its memory, and how passes are declared. No bpy."""

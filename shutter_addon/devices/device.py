@@ -1,8 +1,8 @@
-"""What compositing needs of a GPU, whatever it is reached by: texture arrays within a budget, and compute passes.
+"""The interface of a GPU: texture arrays within a memory budget, and compute passes.
 
-Where the budget is full, what no pass uses just now makes room. Textures of numbers that passes compute move to the
-host's memory and come back when a pass binds them, to the bit, so a picture does not depend on the room there is. If
-that is not enough, windows that other pictures show are freed, to be read again.
+When the budget is full, textures that no pass uses make room. Computed textures move to the host and come back, bit for
+bit, when a pass binds them, so a picture does not depend on the free memory. If that is not enough, the windows of
+other pictures are freed and read again later.
 """
 
 from __future__ import annotations
@@ -22,35 +22,35 @@ from ..core import stopping
 from .passes import Pass
 
 MEGABYTE = 1 << 20
-# The share of the memory that a GPU says it has: the rest is for Blender, for what else is on the screen, and for what
-# a driver takes beside textures.
+# The share of a GPU's memory that textures may take. Blender, the screen and the driver need the rest.
 GPU_SHARE = 0.75
-# The share of the machine's memory, at most: software renderers and many GPUs have no other.
+# The largest share of the machine's memory, which software renderers and many GPUs use.
 MACHINE_SHARE = 0.5
-# Bytes of a GPU that does not say what it has.
+# Bytes that textures may take on a GPU that does not tell its memory.
 UNKNOWN = 6 << 30
-# Formats that can move to the host. Those of frames stay: a window that does not fit is kept on the host as a whole.
+# Formats that can move to the host. Frames do not move: a window that does not fit stays on the host as a whole.
 MOVABLE = ("rgba32f", "r32f", "r32ui")
 
-Bound: TypeAlias = Mapping[str, "Texture"]  # textures by the names that a pass has for them
-Given: TypeAlias = dict[str, Any]  # arguments of Device.run, by name
-Own: TypeAlias = Any  # what the library of a device has for a texture
+Bound: TypeAlias = Mapping[str, "Texture"]  # textures by their names in a pass
+Given: TypeAlias = dict[str, Any]  # keyword arguments of Device.run
+Own: TypeAlias = Any  # a texture of the device's library
 
 
 def texel_bytes(kind: str) -> int:
-    """The bytes of a texel of a format, as GLSL calls it: its components and the bits of each."""
+    """Return the bytes of a texel of a GLSL format, such as rgba32f."""
     components, bits = re.findall(r"[a-z]+|\d+", kind)[:2]
     return len(components) * int(bits) // 8
 
 
 class NoDeviceError(RuntimeError):
-    """The device cannot be used, or has no room; the message is one sentence for the user."""
+    """The device cannot be used or has no room. The message is a sentence for the user."""
 
 
 class Budget:
-    """Bytes that textures may take on a GPU, for all devices that reach it, on any thread.
+    """The memory that textures may take on a GPU, shared by all devices on it. Usable on any thread.
 
-    used: those that are taken
+    Attributes:
+        used: bytes that are taken
     """
 
     def __init__(self, limit: int | None = None) -> None:
@@ -59,16 +59,16 @@ class Budget:
 
     @property
     def limit(self) -> int:
-        """The most; until a device tells, what a GPU gets that does not say what it has."""
+        """The most bytes. Until a device tells its memory, that of a GPU that does not tell."""
         return allowed(None) if self._limit is None else self._limit
 
     def tell(self, memory: int | None) -> None:
-        """Sets the limit, if there is none, by the bytes of the GPU's memory; None: it does not say."""
+        """Set the limit, if there is none, from the bytes of the GPU's memory (None: unknown)."""
         if self._limit is None:
             self._limit = allowed(memory)
 
     def take(self, size: int) -> bool:
-        """Takes so many bytes, if they are left. Whether they were."""
+        """Take bytes if they are free. Return whether they were."""
         with self._lock:
             fits = self.used + size <= self.limit
             self.used += size if fits else 0
@@ -80,8 +80,13 @@ class Budget:
 
 
 def allowed(memory: int | None) -> int:
-    """The bytes that textures may take on a GPU of so many bytes; None: it does not say. It is to be the
-    same at each start: then a film's parts have the same bits whenever they are rendered."""
+    """Return the bytes that textures may take on a GPU.
+
+    It must be the same at each start, so that all parts of a film have the same bits.
+
+    Args:
+        memory: the GPU's bytes. None: unknown.
+    """
     limits = [UNKNOWN if memory is None else int(memory * GPU_SHARE)]
     if (machine := machine_memory()) is not None:
         limits.append(int(machine * MACHINE_SHARE))
@@ -89,7 +94,7 @@ def allowed(memory: int | None) -> int:
 
 
 def machine_memory() -> int | None:
-    """Bytes of the machine's memory; None: it cannot be asked."""
+    """Return the bytes of the machine's memory, or None if they are unknown."""
     if sys.platform == "win32":
         kilobytes = ctypes.c_ulonglong()
         known = ctypes.windll.kernel32.GetPhysicallyInstalledSystemMemory(ctypes.byref(kilobytes))
@@ -103,10 +108,13 @@ def machine_memory() -> int | None:
 class Texture:
     """A texture array on a device.
 
-    device: whose it is; None: it is a small one that lies beside the device's own, and outside its budget
-    size: (width, height, layers), in texels; kind: as for Device.texture; bytes: what it takes on the device
-    own: what the device's library has for it; None while its content waits on the host, and after `release`
-    waiting: its content (layers, height, width, components) meanwhile
+    Attributes:
+        device: the device. None: a small texture outside the budget.
+        size: (width, height, layers) in texels
+        kind: the format, as for Device.texture
+        bytes: its size on the device
+        own: the texture of the device's library; None after `release`, and while the content is on the host
+        waiting: that content (layers, height, width, components)
     """
 
     def __init__(self, device: Device | None, size: tuple[int, int, int], kind: str, own: Own = None) -> None:
@@ -117,30 +125,30 @@ class Texture:
 
     @property
     def gpu(self) -> Own:
-        """`own`, on the device in any case."""
+        """`own`, brought to the device if it is on the host."""
         if self.device is not None:
             self.device.bring((self,))
         return self.own
 
     def release(self) -> None:
-        """Frees its memory; inside `Device.current` or `Device.freeing`."""
+        """Free the memory. Call it inside `Device.current` or `Device.freeing`."""
         if self.device is not None:
             self.device.drop(self)
         self.waiting = None
 
 
 class Device:
-    """Texture arrays and compute passes, on a GPU or on a software renderer; what they are reached by are its
-    subclasses. Call its methods inside `with device.current():`, on any one thread. Textures that it is given are its
-    own.
+    """A GPU or software renderer with texture arrays and compute passes.
 
-    name: the renderer, as it calls itself
-    max_size: texels along a texture's side, at most
-    max_layers: layers of a texture array, at most
-    budget: what all textures on this GPU may take, those of other devices that reach it as well
-    takes_planes: whether frames that are planes (core.frames.planes) are quickest to send as such; it has to write
-    r32ui then
-    ask_others: called where the budget is full, has them free what they hold; None: there are none
+    Call its methods inside `with device.current():`, on one thread at a time, and with textures that it made.
+
+    Attributes:
+        name: the renderer's name
+        max_size: the most texels along a texture's side
+        max_layers: the most layers of a texture array
+        budget: the memory of all textures on this GPU, shared with other devices on it
+        takes_planes: whether frames are fastest to send as planes (core.frames.planes), in r32ui textures
+        ask_others: called when the budget is full; makes other devices free memory. None: there are none.
     """
 
     name: str
@@ -150,44 +158,69 @@ class Device:
 
     def __init__(self, budget: Budget | None = None, ask_others: Callable[[], None] | None = None) -> None:
         self.budget, self.ask_others = budget or Budget(), ask_others
-        self._held: dict[Texture, None] = {}  # on the device, used longest ago first
-        self._windows: dict[Callable[[], None], None] = {}  # what frees each, likewise; the last one is in use
+        self._held: dict[Texture, None] = {}  # textures on the device, least recently used first
+        self._windows: dict[Callable[[], None], None] = {}  # what frees each window, likewise; the last one is in use
 
     def current(self) -> AbstractContextManager[Device]:
-        """Makes the device usable on this thread until the `with` block ends. NoDeviceError: it cannot be, just now."""
+        """Make the device usable on this thread until the `with` block ends.
+
+        Raises:
+            NoDeviceError: the device cannot be used now
+        """
         raise NotImplementedError
 
     def freeing(self) -> AbstractContextManager[Device]:
-        """Makes textures of the device releasable until the `with` block ends, on any one thread, at any time."""
+        """Allow textures to be released until the `with` block ends, on any thread at any time."""
         raise NotImplementedError
 
     def texture(self, width: int, height: int, layers: int, kind: str) -> Texture:
-        """A texture array of undefined content. NoDeviceError: the device has no room for it.
+        """Return a new texture array of undefined content.
 
-        kind: the format as in GLSL: rgba8, rgba16, rgba16f, rgba16ui, rgba32ui, rgba32f, r32f or r32ui. Passes read
-        rgba8 and rgba16 as 0 … 1, all others as they are, and none with filtering."""
+        Args:
+            width: in texels
+            height: in texels
+            layers: their number
+            kind: a GLSL format: rgba8, rgba16, rgba16f, rgba16ui, rgba32ui, rgba32f, r32f or r32ui. Passes read rgba8
+                and rgba16 as 0 … 1, and nothing with filtering.
+
+        Raises:
+            NoDeviceError: the device has no room for it
+        """
         texture = Texture(self, (width, height, layers), kind)
         texture.own = self._made(texture, ())
         self._held[texture] = None
         return texture
 
     def write(self, texture: Texture, array: np.ndarray, layer: int = 0, *, opaque: bool = False) -> None:
-        """Fills a layer, or its first rows, with a C-contiguous array (rows, width[, components]) of the format's type.
+        """Fill a layer, or its first rows.
 
-        opaque: every alpha in the array is full; a device may then send the colours alone.
-        TypeError: the device neither writes nor reads this format, only passes do (rgba16ui and rgba32ui on Blender's
-        GPU)."""
+        Args:
+            texture: the texture
+            array: (rows, width[, components]), C-contiguous, in the format's type
+            layer: the layer's number
+            opaque: every alpha is full, so the device may send only the colors
+
+        Raises:
+            TypeError: only passes write and read this format (rgba16ui and rgba32ui on Blender's GPU)
+        """
         raise NotImplementedError
 
     def send(self, texture: Texture, frame: np.ndarray) -> Texture:
-        """Sends an opaque 8-bit frame (rows, width, 4) for the pass that is run next. It returns what that binds:
-        `texture`, rgba8 of the frame's size, filled; or one of the format r32f, of numbers R + 256 G + 65536 B."""
+        """Send an opaque 8-bit frame (rows, width, 4) for the next pass.
+
+        Returns:
+            The texture for that pass: `texture` (rgba8, of the frame's size), or an r32f one with the numbers
+            R + 256 G + 65536 B.
+        """
         self.write(texture, frame, opaque=True)
         return texture
 
     def read(self, texture: Texture) -> np.ndarray:
-        """A copy of the texture (layers, height, width, components) in the format's type, after all passes that were
-        run. TypeError: as for `write`."""
+        """Return a copy (layers, height, width, components) in the format's type, after all passes so far.
+
+        Raises:
+            TypeError: as for `write`
+        """
         raise NotImplementedError
 
     def run(
@@ -201,12 +234,18 @@ class Device:
         blocks: Mapping[str, np.ndarray] | None = None,
         **constants: Any,
     ) -> None:
-        """Runs a pass over `extent` invocations (x, y[, z]). Later passes read what it stored. StoppedError
-        (core.stopping): the picture is not wanted any longer, and the pass is not run.
+        """Run a pass. Later passes read what it stored.
 
-        textures, images: {name: Texture} for the samplers and the images that the pass declares
-        blocks: {name: C-contiguous float32 array (length, 4)} for its blocks
-        constants: {name: number or tuple of numbers} for its constants, by keyword
+        Args:
+            program: the pass
+            extent: the number of invocations (x, y[, z])
+            textures: {name: texture} for its samplers
+            images: {name: texture} for its images
+            blocks: {name: C-contiguous float32 array (length, 4)} for its blocks
+            constants: {name: number or tuple of numbers} for its constants
+
+        Raises:
+            core.stopping.StoppedError: the picture is no longer wanted
         """
         stopping.check()
         sampled = {name: (textures or {})[name] for name in program.samplers}
@@ -216,20 +255,24 @@ class Device:
         self._dispatch(program, program.groups(extent), *own, blocks or {}, constants)
 
     def use(self, release: Callable[[], None]) -> None:
-        """Notes that what `release` frees, a window, is in use: others are freed before it, where there is no room."""
+        """Note that the window that `release` frees is in use. If memory is short, other windows are freed first."""
         self.forget(release)
         self._windows[release] = None
 
     def forget(self, release: Callable[[], None]) -> None:
-        """Notes that a window was freed."""
+        """Note that a window was freed."""
         self._windows.pop(release, None)
 
     def release(self) -> None:
-        """Frees the device, at any time, but not its textures: each has its own `release`."""
+        """Free the device at any time. Textures have a `release` of their own."""
         raise NotImplementedError
 
     def bring(self, textures: Iterable[Texture]) -> None:
-        """Has textures on the device, all at the same time. NoDeviceError: it has no room for them."""
+        """Bring all these textures to the device.
+
+        Raises:
+            NoDeviceError: it has no room for all of them at once
+        """
         wanted = tuple(texture for texture in textures if texture.device is self)
         for texture in wanted:
             if texture.own is None:
@@ -243,7 +286,7 @@ class Device:
             self._held[texture] = None
 
     def drop(self, texture: Texture) -> None:
-        """Frees what a texture has on the device."""
+        """Free the device's memory of a texture."""
         if texture.own is not None:
             own, texture.own = texture.own, None
             self._held.pop(texture, None)
@@ -257,7 +300,7 @@ class Device:
             if self.budget.take(texture.bytes):
                 try:
                     return self._make(width, height, layers, texture.kind)
-                except NoDeviceError:  # the GPU has less than was thought
+                except NoDeviceError:  # the GPU has less memory than it told
                     self.budget.give_back(texture.bytes)
             possible = self._make_room(beside)
         raise NoDeviceError(
@@ -266,7 +309,7 @@ class Device:
         )
 
     def _make_room(self, beside: tuple[Texture, ...]) -> bool:
-        """Frees something that is not in use, nor among the textures `beside`. Whether there was anything."""
+        """Free something that is not in use and not among `beside`. Return whether there was anything."""
         used = self.budget.used
         if self.ask_others is not None and used > sum(texture.bytes for texture in self._held):
             self.ask_others()
@@ -283,28 +326,31 @@ class Device:
         return False
 
     def _make(self, width: int, height: int, layers: int, kind: str) -> Own:
-        """What the library has for a texture. NoDeviceError: it has no room for it."""
+        """Return a new texture of the library.
+
+        Raises:
+            NoDeviceError: there is no room for it
+        """
         raise NotImplementedError
 
     def _free(self, own: Own) -> None:
-        """Frees what `_make` gave."""
+        """Free a texture of `_make`."""
         raise NotImplementedError
 
     def _dispatch(self, program: Pass, groups: tuple[int, ...], textures: dict, images: dict, *given: Mapping) -> None:
-        """Runs a pass in so many workgroups; textures, images: what `_make` gave, by name; given: blocks, constants."""
+        """Run a pass in `groups` workgroups. textures, images: of `_make`, by name; given: blocks, then constants."""
         raise NotImplementedError
 
 
 class NamedTextures:
-    """Textures of a device that are kept from picture to picture, by name, each made anew where another size is asked
-    for."""
+    """Textures that are kept from picture to picture, by name. A texture is made again when its size changes."""
 
     def __init__(self, device: Device) -> None:
         self.device = device
         self._kept: dict[str, Texture] = {}
 
-    def of(self, name: str, size: tuple[int, int, int], kind: str) -> Texture:
-        """The texture of a name, whose kind is always the same; size: width, height, layers."""
+    def of(self, name: str, size: tuple[int, int, int], kind: str = "rgba32f") -> Texture:
+        """Return the texture of a name, which always has the same kind. size: (width, height, layers)."""
         texture = self._kept.get(name)
         if texture is None or texture.size != size:
             if texture is not None:
@@ -313,7 +359,7 @@ class NamedTextures:
         return texture
 
     def filled(self, name: str, layers: Sequence[np.ndarray] | np.ndarray, kind: str = "rgba32f") -> Texture:
-        """The texture of a name, with these layers (height, width[, components]) in the format's type."""
+        """Return the texture of a name, filled with layers (height, width[, components]) of the format's type."""
         height, width = layers[0].shape[:2]
         texture = self.of(name, (width, height, len(layers)), kind)
         for number, layer in enumerate(layers):
@@ -321,7 +367,7 @@ class NamedTextures:
         return texture
 
     def release(self) -> None:
-        """Frees them, inside Device.freeing."""
+        """Free all textures. Call it inside Device.freeing."""
         for texture in self._kept.values():
             texture.release()
         self._kept.clear()

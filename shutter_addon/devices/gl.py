@@ -1,4 +1,4 @@
-"""The GL device: a moderngl context of its own, with a window or without one (EGL, WGL)."""
+"""The OpenGL device: a moderngl context without a window (EGL, WGL)."""
 
 import ctypes
 import sys
@@ -16,7 +16,7 @@ from .passes import Pass
 
 _EGL = sys.platform == "linux"
 
-# Format as in GLSL: (components, moderngl's type, NumPy's type of the arrays that are written and read).
+# GLSL format: (components, moderngl's type, NumPy's type).
 FORMATS = {
     "rgba8": (4, "f1", np.uint8),
     "rgba16": (4, "nu2", np.uint16),
@@ -27,17 +27,17 @@ FORMATS = {
     "rgba16ui": (4, "u2", np.uint16),
     "rgba32ui": (4, "u4", np.uint32),
 }
-# OpenGL functions that are called by ctypes, see _gl.
+# OpenGL functions that are called through ctypes (_gl).
 _CALLED = "glUseProgram", "glDispatchCompute", "glFinish"
-# Of GL_NVX_gpu_memory_info, which Mesa's drivers have as well: all memory of the GPU, in kB.
+# GL_NVX_gpu_memory_info, also in Mesa's drivers: all memory of the GPU in kB.
 _TOTAL_MEMORY = 0x9048
-# Of GL_ATI_meminfo: what is free for textures, in kB, the first of four numbers.
+# GL_ATI_meminfo: the free texture memory in kB, the first of four numbers.
 _FREE_MEMORY = 0x87FC
 
 
 @contextmanager
 def _kept_context() -> Iterator[None]:
-    """Restores the thread's current context at the end. On EGL moderngl would leave the thread without one."""
+    """Restore the thread's current context at the end. On EGL, moderngl would leave the thread without one."""
     if not _EGL:
         yield
         return
@@ -62,20 +62,25 @@ def _egl() -> ctypes.CDLL:
 
 @cache
 def _gl(name: str) -> Callable[..., Any]:
-    """An OpenGL function without a result. ctypes releases Python's lock while it runs: other threads go on.
-    NoDeviceError: there is none."""
+    """Return an OpenGL function without a result. ctypes releases Python's lock while it runs.
+
+    Raises:
+        NoDeviceError: there is no such function
+    """
     if sys.platform == "win32":
-        return getattr(ctypes.windll.opengl32, name)  # of OpenGL 1.1; others are not there
+        return getattr(ctypes.windll.opengl32, name)  # this DLL has only those of OpenGL 1.1
     find = _egl().eglGetProcAddress
     find.restype, find.argtypes = ctypes.c_void_p, [ctypes.c_char_p]
-    if not (address := find(name.encode())):  # to call that would end the process
+    if not (address := find(name.encode())):  # a call would crash
         raise NoDeviceError(f"no {name}")
     return ctypes.CFUNCTYPE(None)(address)
 
 
 def _memory(context: moderngl.Context, renderer: str) -> int | None:
-    """Bytes of the memory of a current context's GPU; None: it does not say. Of what is free, the largest power of two:
-    it is to be the same at the next start."""
+    """Return the bytes of memory of the current context's GPU, or None if it does not tell.
+
+    If only the free memory is known, it is the power of two below that, to be the same at the next start.
+    """
     if is_llvmpipe(renderer):
         return machine_memory()
     for extension, name in (("GL_NVX_gpu_memory_info", _TOTAL_MEMORY), ("GL_ATI_meminfo", _FREE_MEMORY)):
@@ -88,12 +93,13 @@ def _memory(context: moderngl.Context, renderer: str) -> int | None:
 
 
 class GLDevice(Device):
-    """A Device on an OpenGL 4.3 context of its own; see Device. NoDeviceError: there is no OpenGL 4.3.
+    """A Device on a new OpenGL 4.3 context. It tells the budget how much memory there is.
 
-    It tells the budget what memory there is.
+    Do not use it on a thread with a current GLX context, such as Blender's main thread on X11: EGL does not replace
+    that context, which would get the calls.
 
-    Do not use it on a thread where a GLX context is current, as Blender's is in a window on X11: EGL does not replace
-    that context, so the calls would go to it.
+    Raises:
+        NoDeviceError: there is no OpenGL 4.3
     """
 
     takes_planes = True
@@ -104,7 +110,7 @@ class GLDevice(Device):
         try:
             with _kept_context():
                 self._context = moderngl.create_context(standalone=True, require=430, **backend)
-                for name in _CALLED if _EGL else ():  # so that a lack is met here, and in no picture
+                for name in _CALLED if _EGL else ():  # to fail here if one is missing, and not while rendering
                     _gl(name)
                 with self._context:  # not current afterwards, so that another thread can use it
                     info = self._context.info
@@ -119,16 +125,16 @@ class GLDevice(Device):
 
     @contextmanager
     def current(self) -> Iterator[Self]:
-        """See Device. Afterwards the thread's previous context is current again."""
+        """See Device. The thread's previous context is current again afterwards."""
         with _kept_context(), self._context:
             yield self
 
-    freeing = current  # without it, textures of another context that have the same numbers would be freed
+    freeing = current  # else another context's textures with the same numbers would be freed
 
     def _make(self, width: int, height: int, layers: int, kind: str) -> moderngl.TextureArray:
         components, dtype, _ = FORMATS[kind]
         texture = self._context.texture_array((width, height, layers), components, dtype=dtype)
-        # moderngl does not check this: a texture that got no memory would read as black.
+        # moderngl does not check this: a texture without memory would read as black.
         if (fault := self._context.error) != "GL_NO_ERROR":
             texture.release()
             raise NoDeviceError(fault)
@@ -139,7 +145,7 @@ class GLDevice(Device):
         own.release()
 
     def write(self, texture: Texture, array: np.ndarray, layer: int = 0, *, opaque: bool = False) -> None:
-        """See Device. `opaque` changes nothing here."""
+        """See Device. `opaque` has no effect here."""
         height, width = array.shape[:2]
         texture.gpu.write(array, viewport=(0, 0, layer, width, height, 1), alignment=1)
 
@@ -164,9 +170,9 @@ class GLDevice(Device):
         for unit, name in enumerate(program.blocks):
             self._block(unit, blocks[name])
         for name, value in constants.items():
-            if name in used:  # the compiler removes constants that a source does not use
+            if name in used:  # the compiler removes unused constants
                 used[name].value = value
-        # A software renderer returns only when the pass is done. By ctypes, Python's other threads run meanwhile.
+        # A software renderer returns when the pass is done. Through ctypes, other Python threads run meanwhile.
         if _EGL:
             _gl("glUseProgram")(ctypes.c_uint(shader.glo))
             _gl("glDispatchCompute")(*map(ctypes.c_uint, groups))
@@ -182,7 +188,7 @@ class GLDevice(Device):
         buffer.bind_to_uniform_block(unit)
 
     def finish(self) -> None:
-        """Waits until all passes are done. On EGL Python's other threads run meanwhile."""
+        """Wait until all passes are done. On EGL, other Python threads run meanwhile."""
         _gl("glFinish")() if _EGL else self._context.finish()
 
     def release(self) -> None:

@@ -1,9 +1,9 @@
-"""The passes: each a step of a file in shaders/, and what it binds.
+"""Reads passes from shaders/: each is a step of a file, with what it binds.
 
-A file is GLSL that declares what each of its steps binds, between `#ifdef STEP` and `#endif` where it has several. That
-is read here: Blender's `gpu` module has to be told what is declared, and moderngl where it is bound. So #include and
-conditions are resolved here: of steps, and of macros whose values Python gives, 0 where it gives none. A condition is
-NAME, !NAME, NAME == number or defined(STEP), or several of these joined by && and ||; others are refused.
+A file with several steps has each between `#ifdef STEP` and `#endif`. Declarations are read here, because Blender's
+`gpu` module needs them, and moderngl needs binding points. So #include and conditions are resolved here. A condition
+consists of NAME, !NAME, NAME == number and defined(STEP), joined by && and ||; others are refused. Macros have the
+values that Python gives, or 0.
 """
 
 import re
@@ -26,8 +26,7 @@ _BETWEEN = re.compile(r"(in|out) (\w+) (\w+);")
 
 @dataclass(frozen=True)
 class Image:
-    """An image array that a pass binds. format: as in GLSL; reads, writes: whether the pass loads from it and stores
-    to it."""
+    """An image array that a pass binds: its GLSL format, and whether the pass loads from it and stores to it."""
 
     format: str
     reads: bool
@@ -36,18 +35,21 @@ class Image:
 
 @dataclass(eq=False)
 class Pass:
-    """A compute pass, or a stage of what draws; `read_pass` gives it.
+    """A compute pass, or a vertex or fragment stage, made by `read_pass`.
 
-    file, step: in shaders/, without .glsl; the step is "" where the file has one alone
-    defines: {name: value} of its other macros
-    source: the whole compute shader in GLSL 4.3
-    body: that without macros and declarations, for Blender's `gpu` module, which writes them
-    samplers: {name: GLSL type}
-    images: {name: Image}
-    constants: {name: GLSL type} of its uniforms
-    blocks: {name: length} of its uniform blocks, each an array of vec4
-    ins, outs: {name: GLSL type} of what a stage that draws gets and gives
-    local_size: invocations of a workgroup (x, y, z), where the file says no other
+    Attributes:
+        file: its file in shaders/, without .glsl
+        step: its step there; "" if the file has only one
+        defines: {name: value} of its other macros
+        source: the whole compute shader in GLSL 4.3
+        body: the source without macros and declarations, which Blender's `gpu` module adds
+        samplers: {name: GLSL type}
+        images: {name: Image}
+        constants: {name: GLSL type} of its uniforms
+        blocks: {name: length} of its uniform blocks, each an array of vec4
+        ins: {name: GLSL type} of a stage's inputs
+        outs: {name: GLSL type} of a stage's outputs
+        local_size: invocations of a workgroup (x, y, z)
     """
 
     file: str
@@ -64,13 +66,13 @@ class Pass:
     local_size: tuple[int, int, int] = (64, 1, 1)
 
     def groups(self, extent: tuple[int, ...]) -> tuple[int, ...]:
-        """The workgroups that cover `extent` invocations (x, y[, z])."""
+        """Return the number of workgroups that cover `extent` invocations (x, y[, z])."""
         return tuple(-(-n // local) for n, local in zip((*extent, 1)[:3], self.local_size, strict=True))
 
 
 @cache
 def read_pass(file: str, step: str = "", **defines: int | str) -> Pass:
-    """The pass of a step of shaders/FILE.glsl, compiled with these macros; the same one for the same arguments."""
+    """Return the pass of a step of shaders/FILE.glsl with these macros: the same object for the same arguments."""
     program = Pass(file, step, defines)
     source, body = [], []
     for line in _live(SHADERS / f"{file}.glsl", {step: 1, **defines}):
@@ -86,7 +88,7 @@ def read_pass(file: str, step: str = "", **defines: int | str) -> Pass:
 
 
 def _declared(program: Pass, line: str) -> str:
-    """Notes what a line declares. The line with its bindings; empty: it declares nothing."""
+    """Note what a line declares. Return the line with its bindings, or "" if it declares nothing."""
     defines, samplers, images = program.defines, len(program.samplers), len(program.images)
     if found := _LOCAL_SIZE.fullmatch(line):
         program.local_size = int(found[1]), int(found[2] or 1), 1
@@ -112,12 +114,12 @@ def _declared(program: Pass, line: str) -> str:
     return line
 
 
-# Of a condition: whether its lines count, whether those of a later branch may, or none any more.
+# States of a condition: its lines count; a later branch may count; no branch counts any more.
 _LIVE, _WAITS, _OVER = range(3)
 
 
 def _live(path: Path, macros: Mapping[str, int | str]) -> Iterator[str]:
-    """The lines of a source whose conditions hold, others blank; includes in place, numbered for compilers."""
+    """Yield the lines whose conditions hold and blanks for others, with includes in place and #line numbers."""
     yield "#line 1"
     around: list[int] = []  # the states of the conditions around a line
     for number, line in enumerate(path.read_text(encoding="utf-8").splitlines(), 1):
@@ -134,7 +136,7 @@ def _live(path: Path, macros: Mapping[str, int | str]) -> Iterator[str]:
         elif word == "endif":
             around.pop()
         elif word not in ("", "include", "define"):
-            raise ValueError(f"{path.name}, line {number}: #{word} is not read here")
+            raise ValueError(f"{path.name}, line {number}: #{word} is not supported")
         live = all(state == _LIVE for state in around)
         if live and word == "include":
             yield from _live(SHADERS / "include" / rest.strip('"'), macros)
@@ -149,7 +151,7 @@ def _holds(condition: str, macros: Mapping[str, int | str]) -> bool:
 
 def _is(term: str, macros: Mapping[str, int | str]) -> bool:
     if not (found := _TERM.fullmatch(term)):
-        raise ValueError(f"#if {term}: such a condition is not read here")
+        raise ValueError(f"#if {term}: this condition is not supported")
     negated, step, name, number = found.groups()
     holds = step in macros if step else macros.get(name, 0) == int(number) if number else macros.get(name, 0) != 0
     return holds != bool(negated)

@@ -1,4 +1,4 @@
-"""Frames of a source: movies by PyAV, image sequences by OpenImageIO. No bpy."""
+"""Footage: movies through PyAV, image sequences through OpenImageIO, cuts, tracking, optical flow. No bpy."""
 
 from ..core.frames.frame_source import FrameSource
 from .errors import MediaError

@@ -1,12 +1,17 @@
-"""Frames of a movie where PyAV is missing: decoded by a second Blender, those of movie.MovieSource. Whoever has Blender
-says how it is started (`lend`); it answers as blender/data/decoding_process.py says, and ends with this one."""
+"""Movies without PyAV: a second Blender decodes the frames of movie.MovieSource.
+
+`lend` sets the command that starts it. blender/data/decoding_process.py is the other side of the pipe. The process ends
+with this one.
+"""
 
 import itertools
 import json
 import math
 import subprocess
 import threading
+from collections.abc import Iterator
 from contextlib import suppress
+from dataclasses import dataclass, field
 from fractions import Fraction
 from pathlib import Path
 from typing import IO
@@ -18,23 +23,41 @@ from ..core.frames.frame_source import FrameSource
 from .errors import MediaError
 from .files import OTHER, check_file, check_index, check_name, check_size, is_other
 
-ANSWER = "Virtual Shutter decodes"  # what an answer's line begins with: a Blender prints what it likes before
-STARTING = 60  # seconds after which a process that has not begun to answer is killed
-ANSWERING = 120  # seconds after which one that does not answer any more is: no frame takes as long
-ENDING = 5  # seconds after which one that does not end is
-_PIPE = 1 << 20  # bytes, where a pipe's size can be chosen: of 64 KB, a frame takes twice as long
+ANSWER = "Virtual Shutter decodes"  # the beginning of an answer's line, since Blender prints other lines as well
+STARTING = 60  # seconds after which a process is killed if it does not start
+ANSWERING = 120  # seconds after which it is killed if it does not answer; no frame takes as long
+ENDING = 5  # seconds after which it is killed if it does not end
+_PIPE = 1 << 20  # the pipe's bytes, if they can be set; with 64 KB a frame takes twice as long
 
-_command: list[str] | None = None  # what starts the process, which all movies share
-_process: subprocess.Popen[bytes] | None = None  # that runs
-_asking = threading.Lock()  # one question at a time, from any thread
-_numbers = itertools.count()  # a movie's for the process, which may have the same file open several times
-_FLOAT_ERROR = 2**-23  # relative, of a number that Blender has as a float
+_FLOAT_ERROR = 2**-23  # the relative error of Blender's floats
+
+
+@dataclass
+class _Decoder:
+    """The process that decodes movies.
+
+    Attributes:
+        command: starts it
+        process: the running one
+        asking: held during a question, from any thread
+        numbers: the movies' numbers in the process, which may have a file open several times
+    """
+
+    command: list[str] | None = None
+    process: subprocess.Popen[bytes] | None = None
+    asking: threading.Lock = field(default_factory=threading.Lock)
+    numbers: Iterator[int] = field(default_factory=itertools.count)
+
+
+_decoder = _Decoder()  # all movies share a process: starting one takes seconds
 
 
 class BlenderMovie(FrameSource):
-    """A movie's frames, as movie.MovieSource has them; but for damaged ones, in whose place Blender may show others.
+    """A movie's frames, decoded by a second Blender.
 
-    8 bits are equal to the bit; deeper ones are as Blender's floats are."""
+    8-bit frames equal those of movie.MovieSource to the bit; deeper ones are Blender's floats. In place of damaged
+    frames Blender may show others.
+    """
 
     file_kind, transfer, by_blender = "a movie, read by a second Blender", "srgb", True
 
@@ -43,7 +66,8 @@ class BlenderMovie(FrameSource):
         self.files = [self.path]
         check_name(self.path.absolute())
         self.options = {"stream": 0, "deinterlace": bool(deinterlace)}
-        self._known = {"number": next(_numbers), "path": str(self.path.absolute()), "deinterlace": bool(deinterlace)}
+        number = next(_decoder.numbers)
+        self._known = {"number": number, "path": str(self.path.absolute()), "deinterlace": bool(deinterlace)}
         try:
             about, _ = ask(self._known | {"wanted": "about"})
         except MediaError as error:
@@ -62,7 +86,7 @@ class BlenderMovie(FrameSource):
     def read(self, index: int) -> np.ndarray:
         check_index(self, index)
         try:
-            if is_other(self.path):  # in the place of the file that was there
+            if is_other(self.path):  # the file may have been replaced
                 raise MediaError(OTHER)
             _, frame = ask(self._known | {"wanted": index})
         except MediaError as error:
@@ -76,8 +100,7 @@ class BlenderMovie(FrameSource):
 
 
 def frame_rate(number: float) -> Fraction:
-    """The frame rate that Blender has as a float: a whole number, a thousand of 1001ths of one, or the fraction that is
-    nearest."""
+    """Return the frame rate of Blender's float: a whole number, such a number · 1000/1001, or the nearest fraction."""
     for rate in (Fraction(round(number)), Fraction(round(number * 1.001) * 1000, 1001)):
         if rate and abs(float(rate) / number - 1) <= _FLOAT_ERROR:
             return rate
@@ -85,51 +108,53 @@ def frame_rate(number: float) -> Fraction:
 
 
 def lend(command: list[str] | None) -> None:
-    """Says what starts the process, whose last argument will be ANSWER; None: nothing does. One that runs is ended,
-    without the answer that somebody may be waiting for, if that takes long."""
-    global _command
-    _command = command
-    if _asking.acquire(timeout=ENDING):
+    """Set the command that starts the process, and end a running one.
+
+    Args:
+        command: gets ANSWER as its last argument. None: movies cannot be decoded this way.
+    """
+    _decoder.command = command
+    if _decoder.asking.acquire(timeout=ENDING):
         try:
             _end()
         finally:
-            _asking.release()
-    elif (process := _process) is not None:
-        process.kill()  # whoever waits is told so by its pipe, and ends it
+            _decoder.asking.release()
+    elif (process := _decoder.process) is not None:
+        process.kill()  # the waiting thread notices the closed pipe and ends the process
 
 
 def is_lent() -> bool:
-    """Whether movies can be decoded so."""
-    return _command is not None
+    """Return whether movies can be decoded this way."""
+    return _decoder.command is not None
 
 
 def ask(wanted: dict) -> tuple[dict, np.ndarray | None]:
-    """What the process answers, with a frame of new memory, if it gives one. MediaError: why it cannot."""
-    with _asking:
-        for _ in range(2):  # it may have ended with another movie
+    """Return the process's answer, and a frame in new memory if there is one; raise MediaError with its message."""
+    with _decoder.asking:
+        for _ in range(2):  # another movie may have ended it
             if (answer := _answer(wanted)) is not None:
                 return answer
     raise MediaError("the Blender that decodes it has ended")
 
 
 def tell(wanted: dict) -> None:
-    """Tells the process something, if one runs."""
-    with _asking, suppress(MediaError):
-        if _process is not None:
+    """Send a message to the process if it runs."""
+    with _decoder.asking, suppress(MediaError):
+        if _decoder.process is not None:
             _answer(wanted)
 
 
 def _answer(wanted: dict) -> tuple[dict, np.ndarray | None] | None:
-    """None: the process has ended, or was ended as it did not answer."""
-    is_new = _process is None
+    """Return the answer, or None if the process has ended or was killed because it did not answer."""
+    is_new = _decoder.process is None
     try:
-        asked = threads.start(_asked, _process or _started(), json.dumps(wanted).encode() + b"\n")
+        asked = threads.start(_asked, _decoder.process or _started(), json.dumps(wanted).encode() + b"\n")
         return asked.result(STARTING if is_new else ANSWERING)
     except MediaError:
         raise
-    except BaseException as error:  # an interrupt, say: what is still to come would be taken for the next answer
+    except BaseException as error:  # such as an interrupt: its late answer would be taken for the next one
         _end()
-        if is_new and isinstance(error, TimeoutError):  # it was stopped, say
+        if is_new and isinstance(error, TimeoutError):
             raise MediaError(f"the Blender that decodes it is not ready after {STARTING} seconds") from None
         if isinstance(error, (EOFError, OSError, ValueError)):
             return None
@@ -137,7 +162,7 @@ def _answer(wanted: dict) -> tuple[dict, np.ndarray | None] | None:
 
 
 def _asked(process: subprocess.Popen[bytes], question: bytes) -> tuple[dict, np.ndarray | None]:
-    """By a thread, as Windows waits for no pipe for some time only. EOFError: the process ended before it answered."""
+    """Ask on a thread, since Windows has no timeout for pipes; raise EOFError if the process ends before it answers."""
     assert process.stdin is not None
     assert process.stdout is not None
     process.stdin.write(question)
@@ -154,7 +179,7 @@ def _asked(process: subprocess.Popen[bytes], question: bytes) -> tuple[dict, np.
 
 
 def _line(stream: IO[bytes]) -> bytes:
-    """The next answer's line, without its beginning."""
+    """Return the next answer's line without its beginning."""
     while line := stream.readline():
         if line.startswith(ANSWER.encode()):
             return line.removeprefix(ANSWER.encode())
@@ -162,38 +187,36 @@ def _line(stream: IO[bytes]) -> bytes:
 
 
 def _started() -> subprocess.Popen[bytes]:
-    """MediaError: it cannot be."""
-    global _process
-    if _command is None:
+    """Start the process; raise MediaError if that fails."""
+    if _decoder.command is None:
         raise MediaError("no Blender decodes it any more")
     try:
-        _process = subprocess.Popen(
-            [*_command, ANSWER],
-            stdin=subprocess.PIPE,  # which ends with this process, and with that the other one
+        _decoder.process = subprocess.Popen(
+            [*_decoder.command, ANSWER],
+            stdin=subprocess.PIPE,  # ends with this process, which ends the other one
             stdout=subprocess.PIPE,
             stderr=subprocess.DEVNULL,
-            # What stops this process by the keyboard is not for the other one: a frame that is read comes whole.
+            # Ctrl+C must not stop the other process, or a frame would be cut off.
             start_new_session=True,
             creationflags=getattr(subprocess, "CREATE_NO_WINDOW", 0),
         )
     except OSError as error:
         raise MediaError(f"the Blender that decodes it cannot be started: {error.strerror or error}") from None
     with suppress(ImportError, AttributeError, OSError):
-        # Not every system can, and Linux refuses it to a user who has many large pipes.
+        # Some systems cannot do this, and Linux refuses it to users with many large pipes.
         import fcntl
 
-        fcntl.fcntl(_process.stdout, fcntl.F_SETPIPE_SZ, _PIPE)  # type: ignore[arg-type]
-    return _process
+        fcntl.fcntl(_decoder.process.stdout, fcntl.F_SETPIPE_SZ, _PIPE)  # type: ignore[arg-type]
+    return _decoder.process
 
 
 def _end() -> None:
-    global _process
-    process, _process = _process, None
+    process, _decoder.process = _decoder.process, None
     if process is None:
         return
     assert process.stdin is not None
     assert process.stdout is not None
-    with suppress(OSError):  # what was still to be written cannot be
+    with suppress(OSError):  # flushing fails if the process has ended
         process.stdin.close()
     try:
         process.wait(ENDING)

@@ -1,8 +1,7 @@
-"""How the camera has moved, by what stands still in front of it: the whole picture but what regions cover.
+"""Tracks the camera by everything that stands still: the whole picture without regions. No bpy.
 
-Every frame is compared with one and the same, the anchor, as long as enough of that is seen; then with the last frame
-before. So a camera that shakes does not drift, and one that pans drifts by one comparison for every picture that it
-has passed: what a window shows at once is right, what it comes back to after a turn is a little elsewhere. No bpy.
+Each frame is compared with an anchor frame while enough of that is visible, then with the last frame before, which
+becomes the anchor. So a shaking camera does not drift, and a panning one drifts only with each change of anchor.
 """
 
 from __future__ import annotations
@@ -22,35 +21,36 @@ from .pursuit import Sighting
 from .registration import Part
 from .tracking import Tracked, TrackingError
 
-BARE = "what the regions leave of the picture has too few corners to follow"
+BARE = "the picture outside the regions has too few corners to follow"
 UNLIKE = "the picture is too unlike those before"
-GOES_ON = "the picture is too unlike those before, and it goes on from here"
+GOES_ON = "the picture is too unlike those before; tracking goes on from here"
 
-_ANEW = 0.6  # below this confidence the last frame is compared as well, and becomes the anchor if that is surer
-_LEAST = 0.12  # below it nothing was found
-# Frames from one look to the next by which it is seen whether a motion explains the picture; cells of its width and its
-# height; heights of the picture that they may be off; the share of them that may be off more, and from which on nothing
-# is sure.
+_ANEW = 0.6  # below this confidence the last frame is compared as well, and may become the anchor
+_LEAST = 0.12  # below this confidence nothing was found
+# How well a motion explains the picture: frames between the compared ones, cells along each side, the error in heights
+# of the picture that a cell may have, the share of cells that may have more, and the share at which nothing is sure.
 _SPAN, _CELLS, _OFF, _FEW, _MOST = 8, 8, 0.008, 0.3, 0.6
-_FADING = 0.9  # what a frame keeps of the doubt in the one before
-_MARGIN = 0.02  # heights of the picture about a region, where corners may be those of its edge
+_FADING = 0.9  # how much doubt goes over to the next frame
+_MARGIN = 0.02  # the margin around regions in heights of the picture: its corners may be those of the region's edge
 
 
 class CameraTrack(tracking.Track):
-    """Tracks what the camera sees."""
+    """Tracks the camera."""
 
     def __init__(self, camera: Subject, regions: Sequence[Region]) -> None:
-        """regions: what they cover is left out; evaluated at any of the frames"""
+        """Track the camera without what regions cover at any of the frames."""
         super().__init__(camera)
         self._regions = regions
-        self._begun: dict[int, Placement] = {}  # where it has begun anew
+        self._begun: dict[int, Placement] = {}  # {frame where tracking began again: placement}
 
     def _placement(self, frame: int) -> Placement:
         return self._begun.get(frame) or super()._placement(frame)
 
     def _onward(self, start: int, frames: range) -> Iterator[Tracked]:
-        """As `_from`; where that ends, it begins anew, in place of where it was last: behind a cut, for windows end
-        there; and where two frames can be compared again. How it moved in between, nobody knows: there is a fault."""
+        """Like Track, but go on after a fault from the last placement, where frames can be compared again.
+
+        At a cut there is no fault, because no window goes across cuts.
+        """
         last, fault = Tracked(frame=start, placement=self._placement(start), confidence=1.0), None
         for tracked in self._from(start, frames):
             if tracked.fault:
@@ -73,8 +73,7 @@ class CameraTrack(tracking.Track):
             yield from self._onward(begin, rest[rest.index(begin) + 1 :])
 
     def _next_begin(self, frames: range) -> int | None:
-        """The first of these frames with which the next one, or none of its shot, can be compared; None: there is
-        none."""
+        """Return the first frame that can be compared with the next one, or that is the last of its shot."""
         self._footage.want(frames)
         for frame, after in zip(frames, [*frames[1:], None], strict=True):
             if not self._has_part(frame):
@@ -86,7 +85,7 @@ class CameraTrack(tracking.Track):
         return None
 
     def _cut(self, frame: int, after: int) -> bool:
-        self._footage.picture(after)  # in the order in which they are read, before cuts are looked for
+        self._footage.picture(after)  # frames are read in order before cuts are looked for
         return self._footage.cut(frame, after)
 
     def _part(self, frame: int) -> tuple[Part, float]:
@@ -108,21 +107,21 @@ class CameraTrack(tracking.Track):
 
 
 class _Pursuit:
-    """The motion of what stands still, from one frame to others after it."""
+    """The camera's motion from one frame to the next ones."""
 
     reason = UNLIKE
 
     def __init__(self, part_at: Callable[[int], Part], footage: Footage, frame: int, motion: Motion) -> None:
-        """part_at: what of a frame stands still; TrackingError: too little"""
+        """Start at a frame. part_at: returns what stands still in a frame, or raises TrackingError."""
         self._part_at, self._footage, self._motion = part_at, footage, motion
         self._anchor = part_at(frame), frame, Similarity()  # with the motion from the first frame to it
-        self._older = deque([self._anchor], 2)  # looks from some time ago
-        self._doubt = 0.0  # whether a motion explains what is seen
-        self._last = frame, Similarity()  # where it was found last
+        self._older = deque([self._anchor], 2)  # anchors from some time ago
+        self._doubt = 0.0  # whether a motion explains the picture
+        self._last = frame, Similarity()  # the last frame with a motion
         self._speed = Similarity()
 
     def next(self, frame: int) -> Sighting | None:
-        """Where it is in a frame; None: it is not found."""
+        """Return the motion to a frame, or None if it is not found."""
         picture, (before, known) = self._footage.picture(frame), self._last
         sighting = self._compared(picture, self._anchor)
         if sighting.confidence < _ANEW and before != self._anchor[1] and (anchor := self._anchor_at(before, known)):
@@ -138,8 +137,11 @@ class _Pursuit:
         return sighting._replace(confidence=max((1 - self._doubt) * sighting.confidence, _LEAST))
 
     def _explained(self, picture: np.ndarray, frame: int, motion: Similarity) -> float:
-        """How far a motion is that of all that is seen, up to 1: by the cells of a frame some time ago that are not
-        where it has them. What moves by itself fills few of them; where the camera moves through a scene, many."""
+        """Return how well a motion explains the whole picture, up to 1.
+
+        It counts cells of an earlier frame that are elsewhere. Moving things fill few cells; when the camera moves
+        through a scene, many are elsewhere.
+        """
         part, _, known = self._older[0]
         points, off = part.astray(picture, motion.after(known.inverse()))
         if abs(frame - self._older[-1][1]) >= _SPAN and (anchor := self._anchor_at(frame, motion)):
@@ -153,7 +155,7 @@ class _Pursuit:
         return float(np.clip((_MOST - np.mean(astray)) / (_MOST - _FEW), 0, 1)) if astray else 1.0
 
     def _compared(self, picture: np.ndarray, anchor: tuple[Part, int, Similarity]) -> Sighting:
-        """The surer one of two looks: where it would be if it went on, and where it was last."""
+        """Return the surer motion, starting from its last speed and from its last place."""
         part, _, motion = anchor
         known, sightings = self._last[1], []
         for guess in (self._speed.after(known), known):

@@ -1,8 +1,8 @@
-"""A source in any colour space that Blender knows; and the code values that light is shown as by its sequencer, to the
-bit: sRGB, view transform Standard.
+"""Sources in any color space of Blender. And the code values, to the bit, that Blender's sequencer shows for light
+(sRGB, view transform Standard).
 
-OpenColorIO, which Blender asks as well, raises to powers by polynomials of some 15 bits. So its own rounding counts, as
-often as Blender asks it.
+Blender converts with OpenColorIO, whose powers are polynomials with about 15 bits. So the same conversions are made
+here, as often as Blender makes them.
 """
 
 from functools import cache
@@ -15,18 +15,23 @@ from ..core.frames import light
 from ..core.frames.frame_source import FrameSource, SourceWrapper
 from .errors import MediaError
 
-SCENE_LINEAR = "Linear Rec.709"  # of Blender's own configuration
-# A configuration would be read anew for every picture, which takes milliseconds; files of transforms are kept.
+SCENE_LINEAR = "Linear Rec.709"  # in Blender's configuration
+# OpenImageIO caches files of transforms, but would read a configuration for every picture, which takes milliseconds.
 _ENCODE, _DECODE = (str(Path(__file__).with_name(f"srgb_{name}.clf")) for name in ("encode", "decode"))
 TRANSFERS = {"sRGB": "srgb", SCENE_LINEAR: "linear", "Non-Color": "linear"}
 
 
 def in_colorspace(source: FrameSource, name: str, config: str | Path | None) -> FrameSource:
-    """The source, its samples taken as those of a colour space: the one itself, or a ColorSource around it.
+    """Return a source whose samples are in a color space: the source itself, or a ColorSource.
 
-    name: Blender's, as a strip has it
-    config: path of the OpenColorIO configuration that defines it; not needed for sRGB and scene linear
-    MediaError: the configuration has no such colour space"""
+    Args:
+        source: the footage
+        name: Blender's name of the color space
+        config: the OpenColorIO configuration, not needed for sRGB and scene linear
+
+    Raises:
+        MediaError: the configuration has no such color space
+    """
     if name in TRANSFERS:
         source.transfer = TRANSFERS[name]
         return source
@@ -35,14 +40,14 @@ def in_colorspace(source: FrameSource, name: str, config: str | Path | None) -> 
 
 @cache
 def keeps(name: str, config: str | Path) -> bool:
-    """Whether the colours of 8-bit footage, made those of a colour space and light again, are less than a level off."""
+    """Return whether converting 8-bit colors to a color space and back changes them by less than a level."""
     if name in TRANSFERS:
         return True
     levels = np.linspace(0, 1, 18, dtype=np.float32)
     colours = np.stack(np.meshgrid(levels, levels, levels), axis=-1).reshape(1, -1, 3)
     there = _converted(ImageBuf(light.to_linear(colours)), SCENE_LINEAR, name, config)
     back = _converted(there, name, SCENE_LINEAR, config)
-    if back.has_error:  # a space of another configuration
+    if back.has_error:  # the space belongs to another configuration
         return True
     return bool(np.abs(light.to_encoded(np.asarray(back.get_pixels(FLOAT))) - colours).max() < 1 / 255)
 
@@ -64,7 +69,7 @@ class ColorSource(SourceWrapper):
         self.options = {**source.options, "colorspace": name}
 
     def read(self, index: int) -> np.ndarray:
-        """The source's frame, scene linear. MediaError as well where it cannot be converted."""
+        """Return the source's frame in scene linear light; raise MediaError if it cannot be converted."""
         samples = self._source.read(index)
         scale = np.iinfo(samples.dtype).max if samples.dtype.kind == "u" else 1
         picture = ImageBuf(samples.astype(np.float32) / np.float32(scale))
@@ -77,13 +82,16 @@ class ColorSource(SourceWrapper):
 
 
 def shown(light: np.ndarray) -> np.ndarray:
-    """The code values of light float32 of any shape, as the display has it. RuntimeError: this OpenImageIO cannot make
-    them."""
+    """Return the display's code values of light float32 of any shape.
+
+    Raises:
+        RuntimeError: this OpenImageIO cannot convert it
+    """
     return _transformed(light, (_ENCODE,))
 
 
 def blended(light: np.ndarray) -> np.ndarray:
-    """As `shown`, of light that was blended over something: to the sequencer's colours, and back, first."""
+    """Return `shown` for light that the sequencer blended: it converts to its own colors and back first."""
     return _transformed(light, (_ENCODE, _DECODE, _ENCODE))
 
 

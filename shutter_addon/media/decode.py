@@ -1,4 +1,4 @@
-"""Frames of one video stream by time stamp, in any order, each the same as in a decode from the start of the file."""
+"""Decodes frames of a video stream by time stamp, in any order, with the same result as decoding from the start."""
 
 from __future__ import annotations
 
@@ -24,18 +24,18 @@ from .files import FOREIGN, OTHER, is_other
 if TYPE_CHECKING:
     from av.rational import AVRational
 
-KEPT_DECODING = 16  # frames ahead that are cheaper to reach by decoding on than by a seek, whatever the file
-MISSING = 1.0  # seconds between a file's end and the end that it promises, from which on it counts as cut off
-# In MPEG program streams a seek may end inside a picture whose remains take the time stamp of the next one, so that
-# all up to the next time stamp are off. There only key frames count that a decode from the start has met before.
+KEPT_DECODING = 16  # up to as many frames ahead, decoding on is faster than a seek
+MISSING = 1.0  # seconds that a file may end before its declared end without counting as cut off
+# In MPEG program streams a seek may end inside a picture, whose rest gets the time stamp of the next one. There only
+# key frames count that a decode from the start has seen.
 MISLEADING = frozenset({"mpeg"})
-# FFmpeg takes any picture for a movie of one frame: these, and all formats that end in "_pipe".
+# FFmpeg opens pictures as movies of one frame: these formats, and all that end in "_pipe".
 STILLS = frozenset({"image2", "alias_pix", "brender_pix", "fits", "ico"})
 DAMAGED = "its data are damaged"
 
 
 class File(NamedTuple):
-    """An open file, its video stream, and what decodes that."""
+    """An open file with its video stream and decoder."""
 
     container: InputContainer
     stream: VideoStream
@@ -43,43 +43,53 @@ class File(NamedTuple):
 
 
 class FrameReader:
-    """A file's video stream; tags: of `_tags`. Time stamps are in units of time_base; `start` is the stream's own.
+    """A file's video stream, for one thread at a time. It keeps the shown frame and the next one in memory.
 
-    Memory: the frame on screen, its successor, and what the decoder holds. Not for two threads at once.
+    Attributes:
+        time_base: the unit of time stamps
+        start: the stream's first time stamp
+        tags: of `_tags`
     """
 
     def __init__(self, path: Path, number: int = 0) -> None:
-        """number: which of the file's video streams"""
+        """Read a stream. number: which of the file's video streams."""
         self._path, self._number, self._threads = path, number, "AUTO"
         self._container: InputContainer | None = None
         self._run: _Run | None = None
         self._landmarks = _Landmarks()
 
     def first(self) -> tuple[File, av.VideoFrame]:
-        """The open file, and its first frame. MediaError: none of it can be decoded."""
+        """Return the open file and its first frame; raise MediaError if no frame can be decoded."""
         run = self._restart()
         if run.shown is None:
             raise MediaError(f"{self._path.name}: no frame of it can be decoded")
         return run.file, run.shown.frame
 
     def frame_at(self, time: float, step: float) -> av.VideoFrame:
-        """The frame at that time, or the last before the first that is later, or the first one, as in Blender, where
-        time stamps go back as well; step: the usual distance of two frames.
+        """Return the frame at a time: the last one before the first later frame, or the first frame.
 
-        Raises MediaError, with the reason alone, if the file should have that frame but it cannot be decoded."""
+        This is Blender's choice, also where time stamps go back.
+
+        Args:
+            time: in units of time_base
+            step: the usual distance between frames
+
+        Raises:
+            MediaError: the file should have the frame, but it cannot be decoded. The message is only the reason.
+        """
         try:
             return self._find(time, step)
         except MediaError:
             if self._threads == "SLICE":
                 raise
-        self._threads = "SLICE"  # an error within several frames decoded at once takes sound neighbours along
+        self._threads = "SLICE"  # an error while several frames are decoded at once also loses good ones
         self._restart()
         return self._find(time, step)
 
     def _find(self, time: float, step: float) -> av.VideoFrame:
         run = self._run_at(time, step)
         if run.is_first and run.next is not None and time <= _known(run).time == run.next.time:
-            # Of key frames that are all at that time, a seek finds the last one, as Blender does.
+            # If several key frames have that time, a seek finds the last one, as in Blender.
             run = self._run_from(run.file, run.next.time, run.next.time) or self._restart()
         while run.next is not None and _known(run).time < time and run.next.time <= time:
             run.advance()
@@ -91,12 +101,12 @@ class FrameReader:
         return shown.frame
 
     def close(self) -> None:
-        """Closes the file and ends the decoder's threads, until it is next asked for a frame."""
+        """Close the file and end the decoder's threads. The next frame opens it again."""
         if self._run is not None:
             self._run.close()
         if self._container is not None:
             self._container.close()
-        # PyAV's decoder has no close: its threads end when nothing refers to it.
+        # PyAV's decoder has no `close`; its threads end when nothing refers to it.
         self._container = self._run = None
 
     def _is_near(self, run: _Run, time: float, step: float) -> bool:
@@ -115,7 +125,7 @@ class FrameReader:
         return next(filter(None, tries), None) or self._restart()
 
     def _run_from(self, file: File, start: int, time: float) -> _Run | None:
-        """Decodes on from a key frame near `start`. None: what comes out there is not clean, or after a time."""
+        """Decode from a key frame near `start`. None: its frame is damaged or later than `time`."""
         try:
             file.container.seek(start, stream=file.stream)
         except av.error.FFmpegError:
@@ -124,22 +134,22 @@ class FrameReader:
         run = self._begin(file, seeking=True)
         if (shown := run.shown) is None or shown.time > time:
             return None
-        # No I frame: a wrong index or a gradual refresh. What follows would lack references.
+        # Without an I frame (wrong index, gradual refresh), the next frames would lack references.
         return run if shown.frame.key_frame or shown.frame.pict_type == PictureType.I else None
 
     def _restart(self) -> _Run:
-        """Decodes on from the start. Not by a seek: with an edit list or without an index that ends elsewhere."""
+        """Open the file again and decode from the start. With an edit list or without an index, a seek would fail."""
         self.close()
-        if is_other(self._path):  # in the place of the file that was there
+        if is_other(self._path):  # the file may have been replaced
             raise MediaError(OTHER)
         self._container = av.open(str(self._path))
         stream = _video_stream(self._container, self._path.name, self._number)
         self.time_base, self.start = fraction(stream.time_base), stream.start_time or 0
-        self.tags = _tags(stream.codec_context)  # the decoder will write those of frames over them
+        self.tags = _tags(stream.codec_context)  # before the decoder overwrites them
         return self._begin(File(self._container, stream, _decoder(stream, self._threads)), seeking=False)
 
     def _begin(self, file: File, seeking: bool) -> _Run:
-        """The one run that there is from now on."""
+        """Start the only run."""
         if self._run is not None:
             self._run.close()
             self._run = None
@@ -148,15 +158,15 @@ class FrameReader:
 
 
 class _Landmarks:
-    """What was seen of the key frames: their packets' time stamps and sizes, the most frames from one to the next."""
+    """Known key frames by their packets' time stamps and sizes, and the most frames from one to the next (longest)."""
 
     def __init__(self) -> None:
-        self._seen: dict[tuple[int | None, int], bool] = {}  # whether its time is later than all before it
+        self._seen: dict[tuple[int | None, int], bool] = {}  # whether no packet before it has a later time
         self._latest, self._goes_back = -math.inf, False
         self.longest = self._since = 0
 
     def note(self, packet: Packet, from_start: bool) -> None:
-        """Takes in the next packet."""
+        """Take the next packet."""
         self._since = 0 if packet.is_keyframe else self._since + 1
         self.longest = max(self.longest, self._since)
         time = time_of(packet)
@@ -167,24 +177,31 @@ class _Landmarks:
             self._latest = max(self._latest, packet.pts)
 
     def is_sound(self, packet: Packet, misleading: bool) -> bool:
-        """Whether decoding may begin at that key frame: what a decode from the start has met before it is earlier.
-        misleading: whether it has to have been met, as where time stamps go back."""
+        """Return whether decoding may begin at a key frame: no packet before it has a later time.
+
+        Args:
+            packet: the key frame's
+            misleading: whether a decode from the start must have seen it, as when time stamps go back
+        """
         return self._seen.get((time_of(packet), packet.size), not (misleading or self._goes_back))
 
 
 class _Timed(NamedTuple):
-    """A frame and its time stamp."""
+    """A frame with its time stamp."""
 
     time: int
     frame: av.VideoFrame
 
 
 class _Run:
-    """One decode onwards from where the container stands.
+    """A decode from the container's position onward.
 
-    shown: the frame on screen; next: its successor; None past the end
-    fault: the last error's sentence; is_first: whether the file's first frame is shown
-    passed: the latest time of a frame before it
+    Attributes:
+        shown: the frame on screen, None past the end
+        next: the frame after it, None past the end
+        fault: the last error's message
+        is_first: whether the file's first frame is shown
+        passed: the latest time of a frame before it
     """
 
     def __init__(self, file: File, landmarks: _Landmarks, seeking: bool) -> None:
@@ -199,21 +216,21 @@ class _Run:
         self.next = next(self._frames, None)
 
     def close(self) -> None:
-        """Ends it. The generator refers to the run and the run to it: together they would wait for the collector."""
+        """End it. This breaks the cycle of the run and its generator, which would stay until Python collects it."""
         self._frames.close()
 
     def advance(self) -> None:
-        """On to the successor."""
+        """Go to the next frame."""
         self.passed = max(self.passed, _known(self).time)
         self.shown, self.is_first = self.next, False
         self.next = next(self._frames, None)
 
     def lost_between(self, time: float) -> bool:
-        """Whether a frame that the file has at or before that time, after the one shown, failed to decode."""
+        """Return whether a frame after the shown one, up to a time, could not be decoded."""
         return self.shown is not None and any(self.shown.time < lost <= time for lost in self._lost)
 
     def cut_off(self) -> bool:
-        """Whether the file's end is reached, and before the end that it promises."""
+        """Return whether the file ended before its declared end."""
         container = self.file.container
         if self._broken or not self._ended or container.duration is None:
             return self._broken
@@ -221,8 +238,13 @@ class _Run:
         return promised - self._end > MISSING
 
     def _decoded(self, seeking: bool) -> Generator[_Timed, None, None]:
-        """Frames in order of presentation. seeking: from the first key frame on, without the pictures shown before it:
-        in an open group they lean on frames that were not decoded."""
+        """Yield frames in order of presentation.
+
+        Args:
+            seeking: begin at the first key frame, without frames shown before it: in an open group they depend on
+            frames
+                that were not decoded
+        """
         floor: float | None = None if seeking else -math.inf
         misleading = self.file.container.format.name in MISLEADING
         for packet in self._packets():
@@ -235,7 +257,7 @@ class _Run:
             if packet is not None and packet.pts is not None and packet.pts >= floor:
                 heapq.heappush(self._awaited, packet.pts)
             for frame in self._decode(packet):
-                time = time_of(frame) or 0  # a raw stream has none, nor a length: MovieSource does not accept it
+                time = time_of(frame) or 0  # a raw stream has none; it has no length, so MovieSource refuses it
                 if time < floor:
                     continue
                 self._settle(time)
@@ -247,10 +269,10 @@ class _Run:
         self._settle(math.inf)
 
     def _packets(self) -> Iterator[Packet | None]:
-        """The stream's packets, then None. Packets of all streams are looked at, to know where the file ends."""
+        """Yield the stream's packets, then None. Packets of all streams are read to know where the file ends."""
         try:
             for packet in self.file.container.demux():
-                if packet.size == 0:  # PyAV's mark of the end; to the decoder an empty packet says the same
+                if packet.size == 0:  # PyAV's mark of the end
                     continue
                 if (time := time_of(packet)) is not None:
                     self._end = max(self._end, float((time + (packet.duration or 0)) * packet.time_base))
@@ -264,12 +286,12 @@ class _Run:
     def _decode(self, packet: Packet | None) -> list[av.VideoFrame]:
         try:
             return self.file.codec.decode(packet)
-        except (av.error.FFmpegError, ValueError) as error:  # ValueError: of a decoder that could not be opened
+        except (av.error.FFmpegError, ValueError) as error:  # ValueError: the decoder could not be opened
             self.fault = f"{DAMAGED} ({reason(error)})"
             return []
 
     def _settle(self, time: float) -> None:
-        """Notes which frames before that time never came. Without an error they were not meant to be shown."""
+        """Note frames before a time that never came. Without an error, they are not meant to be shown."""
         while self._awaited and self._awaited[0] <= time:
             awaited = heapq.heappop(self._awaited)
             if awaited < time and self.fault:
@@ -277,40 +299,39 @@ class _Run:
 
 
 def _known(run: _Run) -> _Timed:
-    """What a run shows. MediaError: what was put in the place of a file has no frame."""
+    """Return the shown frame; raise MediaError if there is none, as when the file was replaced."""
     if run.shown is None:
         raise MediaError(run.fault or "no frame of it can be decoded")
     return run.shown
 
 
 def time_of(item: Packet | av.VideoFrame) -> int | None:
-    """The time stamp of a packet or frame; AVI files may have none but those of decoding."""
+    """Return the time stamp of a packet or frame. AVI files may only have those of decoding."""
     return item.dts if item.pts is None else item.pts
 
 
 def fraction(rational: AVRational | Fraction | None) -> Fraction:
-    """PyAV's rational as a Fraction; 0 where there is none."""
+    """Return PyAV's rational as a Fraction, or 0 if there is none."""
     return Fraction(rational.numerator, rational.denominator) if rational and rational.denominator else Fraction(0)
 
 
 def reason(error: Exception) -> str:
-    """What libav says of an error, for use inside a sentence."""
+    """Return libav's message of an error, for use inside a sentence."""
     text = (getattr(error, "strerror", None) or str(error)).strip()
     return text[:1].lower() + text[1:]
 
 
 def _tags(codec: VideoCodecContext) -> tuple[int, bool, int]:
-    """What Blender takes from a file before it decodes a frame, and keeps for all of them: the matrix of YUV, by its
-    number in ITU-T H.273; whether samples are of full range; and the quarter turns counter-clockwise by which pictures
-    are stored."""
-    # libswscale takes what it does not know for BT.601.
+    """Return what Blender reads once from a file: the YUV matrix by its number in ITU-T H.273, whether samples have
+    full range, and the quarter turns counterclockwise by which pictures are stored."""
+    # libswscale assumes BT.601 for matrices that it does not know.
     space = {1: 1, 4: 4, 7: 7, 9: 9, 10: 9}.get(int(codec.colorspace), 5)
-    side_data = getattr(codec, "coded_side_data", {})  # PyAV before 19 has none, and pictures lie as they are stored
+    side_data = getattr(codec, "coded_side_data", {})  # missing before PyAV 19: pictures are not turned then
     return space, codec.color_range == ColorRange.JPEG, _turns(side_data.get("display_matrix"))
 
 
 def _turns(display_matrix: bytes | None) -> int:
-    """FFmpeg's av_display_rotation_get, in quarter turns; 0 where the matrix is empty or lacking."""
+    """Return FFmpeg's av_display_rotation_get in quarter turns, 0 if the matrix is empty or missing."""
     if display_matrix is None or len(display_matrix) != 36:
         return 0
     a, b, _, c, d, *_ = struct.unpack("=9i", display_matrix)
@@ -321,7 +342,7 @@ def _turns(display_matrix: bytes | None) -> int:
 def _video_stream(container: InputContainer, name: str, number: int) -> VideoStream:
     pictures = av.stream.Disposition.attached_pic
     streams = [s for s in container.streams.video if not s.disposition & pictures]
-    if not streams or container.format.name == "tty":  # FFmpeg takes any text for a movie of a terminal
+    if not streams or container.format.name == "tty":  # FFmpeg opens any text as a movie of a terminal
         raise MediaError(f"{name}: no video stream")
     if container.format.name.endswith("_pipe") or container.format.name in STILLS:
         raise MediaError(f"{name}: {FOREIGN}")
@@ -334,7 +355,7 @@ def _video_stream(container: InputContainer, name: str, number: int) -> VideoStr
 
 def _decoder(stream: VideoStream, threads: str) -> VideoCodecContext:
     codec = stream.codec_context
-    # FFmpeg's own decoders of VP8 and VP9 ignore the alpha channel; Blender turns to libvpx as well.
+    # FFmpeg's decoders of VP8 and VP9 ignore alpha. Blender uses libvpx as well.
     if codec.name in ("vp8", "vp9") and stream.metadata.get("alpha_mode") == "1":
         codec = av.CodecContext.create("libvpx" if codec.name == "vp8" else "libvpx-vp9", "r")
         codec.extradata = stream.codec_context.extradata

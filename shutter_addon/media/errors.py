@@ -1,7 +1,7 @@
-"""What the media layer says when it cannot do something."""
+"""The errors of footage."""
 
 from ..core.messages import UserError
 
 
 class MediaError(UserError):
-    """One clear sentence for the user, naming the file."""
+    """An error of a file: a sentence for the user that names the file."""

@@ -1,4 +1,4 @@
-"""Small checks that movies and sequences share."""
+"""Checks of files, names and sizes for movies and image sequences."""
 
 import os
 from functools import cache
@@ -7,15 +7,17 @@ from pathlib import Path
 from ..core.frames.frame_source import FrameSource
 from .errors import MediaError
 
-PIXELS = 1 << 28  # 16384×16384; FFmpeg decodes no more either, and a damaged header may promise anything
+PIXELS = 1 << 28  # 16384×16384, FFmpeg's limit; a damaged header may claim any size
 OTHER = "is no file, but a pipe, a socket or a device"
 FOREIGN = "an image of a kind that Blender does not read; save it as PNG, TIFF or EXR first"
 
 
 @cache
 def pyav_missing() -> str:
-    """Why PyAV does not decode movies, in Python's words; "": it does. A package without wheels lacks it: a second
-    Blender decodes movies then, where one is lent."""
+    """Return Python's message if PyAV cannot be imported, else "".
+
+    A package without wheels lacks it. A second Blender then decodes movies (blender_movie).
+    """
     try:
         from .movie import MovieSource  # noqa: F401
     except ImportError as error:
@@ -24,7 +26,7 @@ def pyav_missing() -> str:
 
 
 def check_file(path: str | Path) -> Path:
-    """The path as a Path; MediaError unless it is a file with something in it that may be read."""
+    """Return the path of a readable file that is not empty; raise MediaError for any other."""
     path = Path(path)
     if path.is_dir():
         raise MediaError(f"{path.name}: is a folder, not a file")
@@ -40,7 +42,7 @@ def check_file(path: str | Path) -> Path:
 
 
 def stamp(path: str | Path) -> tuple[int, int] | None:
-    """What changes when a file is written to or replaced, or a folder's entries are; None: there is none."""
+    """Return a value that changes when a file or a folder's entries change. None: nothing is there."""
     try:
         status = os.stat(path)
     except (OSError, ValueError):  # a name with a null character
@@ -49,7 +51,7 @@ def stamp(path: str | Path) -> tuple[int, int] | None:
 
 
 def check_sound(path: str | Path) -> None:
-    """MediaError unless it is a file that has sound; without PyAV, unless it is a file."""
+    """Raise MediaError unless a file has sound. Without PyAV, any file passes."""
     path = check_file(path)
     if pyav_missing():
         return
@@ -65,12 +67,12 @@ def check_sound(path: str | Path) -> None:
 
 
 def is_other(path: Path) -> bool:
-    """Whether something lies there that is neither a file nor a folder; who opens a pipe may wait for ever."""
+    """Return whether a path is neither a file nor a folder. Opening a pipe may never return."""
     return path.exists() and not (path.is_file() or path.is_dir())
 
 
 def check_name(path: str | Path) -> str:
-    """The path as text, as OpenImageIO and Blender want it; MediaError unless it is UTF-8."""
+    """Return the path as text for OpenImageIO and Blender; raise MediaError unless it is UTF-8."""
     name = os.fspath(path)
     try:
         name.encode()
@@ -81,12 +83,12 @@ def check_name(path: str | Path) -> str:
 
 
 def check_size(name: str, width: int, height: int) -> None:
-    """MediaError for a picture of no pixels, or of more than can be worked with."""
+    """Raise MediaError for a picture without pixels or with more than PIXELS."""
     if not 0 < width * height <= PIXELS:
         raise MediaError(f"{name}: {width}×{height} are too many pixels, or none; up to 16384×16384 can be read")
 
 
 def check_index(source: FrameSource, index: int) -> None:
-    """IndexError unless the source has a frame of that index."""
+    """Raise IndexError unless the source has the frame."""
     if not 0 <= index < source.count:
         raise IndexError(f"frame {index} of {source.path.name}: it has frames 0 to {source.count - 1}")

@@ -1,4 +1,4 @@
-"""A movie that is written in parts, each whole or not at all, so that one that was broken off goes on where it was."""
+"""Movies that are written in parts, so that an interrupted one can go on. Each part is complete or missing."""
 
 from __future__ import annotations
 
@@ -21,14 +21,21 @@ if TYPE_CHECKING:
 
 LENGTH = 32  # frames of a part
 ENDING = ".mp4"
-# Fine enough that 99 % of levels are within 3. Whole frames at short distances, and none that wait for later ones: who
-# jumps about in an edit sees the frame at once.
+# 99 % of levels are within 3. For quick seeking, key frames are close, and no frame depends on a later one.
 _OPTIONS = {"crf": "8", "preset": "fast", "tune": "fastdecode", "g": "12", "bf": "0"}
 
 
 def write_part(path: Path, pictures: Iterable[np.ndarray], fps: Fraction) -> None:
-    """Writes pictures, levels (H, W, 3 or 4) uint8 without alpha, as H.264. MediaError: they cannot be
-    written. What `pictures` raises goes through, and nothing is written."""
+    """Write pictures as an H.264 movie, complete or not at all.
+
+    Args:
+        path: the movie
+        pictures: levels (H, W, 3 or 4) uint8; alpha is ignored. Its errors are not caught.
+        fps: the frame rate
+
+    Raises:
+        MediaError: the movie cannot be written
+    """
 
     def fill(container: OutputContainer) -> int:
         stream, count = None, 0
@@ -45,8 +52,7 @@ def write_part(path: Path, pictures: Iterable[np.ndarray], fps: Fraction) -> Non
 
 
 def _write(path: Path, fill: Callable[[OutputContainer], int]) -> None:
-    """Writes a movie whole or not at all. fill: puts frames into its container, and gives how many these are.
-    MediaError: it cannot be written."""
+    """Write a movie, complete or not at all. fill: adds frames to its container and returns their number."""
     import av
 
     try:
@@ -85,8 +91,11 @@ def _frame(picture: np.ndarray, stream: VideoStream, index: int) -> VideoFrame:
 
 
 def join(paths: Sequence[Path], output: Path, fps: Fraction) -> None:
-    """Joins parts of `write_part` to one movie, as they are. MediaError: one cannot be read, or that cannot be
-    written."""
+    """Join parts of `write_part` into one movie without encoding them again.
+
+    Raises:
+        MediaError: a part cannot be read, or the movie cannot be written
+    """
     import av
 
     def fill(container: OutputContainer) -> int:
@@ -99,7 +108,7 @@ def join(paths: Sequence[Path], output: Path, fps: Fraction) -> None:
                 for packet in read.demux(video=0):
                     if packet.size:
                         packet.stream, packet.time_base = stream, 1 / fps
-                        packet.pts = packet.dts = count  # no frame waits for a later one
+                        packet.pts = packet.dts = count  # no frame depends on a later one
                         packet.duration = 1
                         container.mux(packet)
                         count += 1

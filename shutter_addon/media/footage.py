@@ -1,4 +1,4 @@
-"""What a strip shows, for tracking: grey pictures of a size that is enough for it."""
+"""Small grey pictures of a strip, for tracking."""
 
 from collections.abc import Callable, Sequence
 
@@ -9,19 +9,26 @@ from ..core.frames.frame_source import FrameSource
 from ..core.memo import Kept
 from . import flow, opencv
 
-WIDTH = 960  # pixels of the pictures that are compared, at most, along their longer side
+WIDTH = 960  # the most pixels along the longer side of the pictures
 AHEAD = 8  # frames that the source may decode in advance
-BLOCK = 48  # frames that are read at once where tracking goes backward: movies are decoded upwards alone
-KEPT = 256  # grey pictures that are kept, of half a megabyte each
+BLOCK = 48  # frames that are read at once when tracking goes backward, because movies are decoded forward
+KEPT = 256  # pictures that are cached, half a megabyte each
 
 
 class Footage:
-    """What a strip shows, for tracking: grey pictures of a size that is enough for it.
+    """Small grey pictures of a strip, for tracking.
 
-    size: width and height of the pictures; index_at: the source's frame that is shown at a timeline frame"""
+    Attributes:
+        size: (width, height) of the pictures
+    """
 
     def __init__(self, source: FrameSource, index_at: Callable[[int], int]) -> None:
-        """MediaError: OpenCV is missing."""
+        """Take pictures of a source; raise MediaError without OpenCV.
+
+        Args:
+            source: the footage
+            index_at: returns the source frame that is shown at a timeline frame
+        """
         opencv.check("tracking needs")
         self._source, self._index_at = source, index_at
         share = min(1.0, WIDTH / max(source.width, source.height))
@@ -30,12 +37,11 @@ class Footage:
         self._wanted: Sequence[int] = ()
 
     def want(self, frames: Sequence[int]) -> None:
-        """Says which timeline frames will be asked for, in this order."""
+        """Announce the next timeline frames, in order."""
         self._wanted = frames
 
     def picture(self, frame: int) -> np.ndarray:
-        """The picture (H, W) uint8 at a timeline frame. MediaError: it cannot be read. Tracking may end here
-        (core.stopping)."""
+        """Return the picture (H, W) uint8 at a timeline frame. Tracking can be stopped here (core.stopping)."""
         stopping.check()
         index = self._index_at(frame)
         if index not in self._kept:
@@ -43,7 +49,7 @@ class Footage:
         return self._kept[index]
 
     def cut(self, before: int, after: int) -> bool:
-        """Whether there is a cut between what two timeline frames show."""
+        """Return whether there is a cut between two timeline frames."""
         first, second = self._index_at(before), self._index_at(after)
         return self._cut(min(first, second), max(first, second))
 
@@ -52,8 +58,8 @@ class Footage:
         return shots is not None and low != high and high not in shots.around(low, low, high)
 
     def _read(self, frame: int, index: int) -> None:
-        """Reads the source's frame that a timeline frame shows, and those that come next if they lie before it."""
-        before, upcoming = index, list[int]()  # the one that is shown before it, and those that are lacking behind it
+        """Read the source frame at a timeline frame. If tracking goes backward, read a block of frames."""
+        before, upcoming = index, list[int]()  # the frame shown before it, and the next ones that are not cached
         if frame in self._wanted:
             place = self._wanted.index(frame)
             before = self._index_at(self._wanted[place - 1] if place else frame)
@@ -65,7 +71,7 @@ class Footage:
         last = min(before, block[0])
         for i in block:
             stopping.check()
-            self._cut(last, i)  # so that frames are read upwards, and once, to find cuts
+            self._cut(last, i)  # finds cuts now, so that each frame is read once, in ascending order
             picture = flow.luma(self._source.read(i), self._source.transfer, self._source.alpha)
             self._kept.keep(i, flow.resized(picture, self.size), KEPT)
             last = i

@@ -1,4 +1,4 @@
-"""Pictures of numbers: float EXR files with channels of any name, and grey PNG files."""
+"""Writes arrays as pictures: EXR files with any channels, and grey PNG files. Each is complete or not written."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -13,30 +13,35 @@ from .rendered_pictures import UNKNOWN, why_short
 
 
 def write_exr(path: Path, values: np.ndarray, names: Sequence[str], note: str = "") -> None:
-    """Writes values (height, width, channels) with these channel names, whole or not at all: halves where they are, and
-    else float32.
+    """Write an EXR file.
 
-    note: for its metadata, which rendered_pictures reads. MediaError: it cannot be written."""
+    Args:
+        path: the file
+        values: (height, width, channels); half floats stay so, all others become float32
+        names: of the channels
+        note: metadata that rendered_pictures reads
+
+    Raises:
+        MediaError: it cannot be written
+    """
     samples = values if values.dtype == np.float16 else np.asarray(values, np.float32)
     spec = _spec(samples)
     spec.channelnames = tuple(names)
     spec["compression"] = "zip"
-    spec["DateTime"] = "1970:01:01 00:00:00"  # else the time of writing: equal samples are equal files
+    spec["DateTime"] = "1970:01:01 00:00:00"  # not the time of writing, so that equal samples make equal files
     if note:
         spec["Note"] = note
     _write(path, spec, samples)
 
 
 def write_grey(path: Path, values: np.ndarray) -> None:
-    """Writes values (height, width) float32, 0 to 1, as a PNG of 16 bits, whole or not at all. MediaError: it cannot be
-    written."""
+    """Write values (height, width) float32, 0 … 1, as a 16-bit PNG; raise MediaError if that fails."""
     samples = np.rint(values[..., None] * np.float32(65535)).astype(np.uint16)
     _write(path, _spec(samples), samples)
 
 
 def write_levels(path: Path, levels: np.ndarray, description: str) -> None:
-    """Writes levels (height, width) uint8 as a grey PNG of 8 bits with a description, whole or not at all. MediaError:
-    it cannot be written."""
+    """Write levels (height, width) uint8 as an 8-bit PNG with a description; raise MediaError if that fails."""
     spec = _spec(levels[..., None])
     spec["ImageDescription"] = description
     _write(path, spec, levels[..., None])

@@ -1,4 +1,4 @@
-"""Following what a matte covers, by dense flow inside it, from frame to frame. No bpy."""
+"""Tracks what a matte covers, by dense optical flow inside it, from frame to frame. No bpy."""
 
 from __future__ import annotations
 
@@ -21,33 +21,43 @@ from .tracking import Tracked, TrackingError
 
 EMPTY = "the outline encloses nothing here"
 
-# The share (h, w) float32 of each pixel that a matte covers at a timeline frame, of pictures of a width and height.
+# Returns a matte (h, w) float32 at a timeline frame, for pictures of a (width, height).
 Cover = Callable[[int, tuple[int, int]], np.ndarray]
 
-_INSIDE = 0.9  # of a matte: its soft edge may move with what is behind it
-_AROUND = 24  # pixels around a matte, in which flow is found
-_POINTS = 4000  # that tell a motion, at most; and so many at least
+_INSIDE = 0.9  # a matte's least value inside: its soft edge may move with the background
+_AROUND = 24  # pixels around a matte in which flow is found
+_POINTS = 4000  # the most points of a motion, and the fewest
 _FEWEST = 24
-_BACK = 1.0  # pixels that flow forth and back may be off, of 640
-_ALIKE = 2.0  # pixels of 640 within which a point moves as the subject does
-_AGREEING = 0.5  # share of the points that do, from which on a step is sure
+_BACK = 1.0  # pixels of 640 by which flow forth and back may differ
+_ALIKE = 2.0  # pixels of 640 within which a point moves with the subject
+_AGREEING = 0.5  # share of such points from which on a step is sure
 
 
 def cover_of(mattes: CarriedMattes, shown: Callable[[int], int]) -> Cover:
-    """What carried mattes cover; shown: which filmed frame is seen at a timeline frame."""
+    """Return the cover of carried mattes. shown: returns the filmed frame at a timeline frame."""
     return lambda frame, size: flow.resized(mattes.read(min(shown(frame), mattes.count - 1)), size)
 
 
 def cover_within(drawn: Callable[[int], Sequence]) -> Cover:
-    """What curves enclose that are known at every timeline frame."""
+    """Return the cover of curves. drawn: returns them at a timeline frame."""
     return lambda frame, size: outlines.coverage(drawn(frame), *size)
 
 
 def follow_carried(
     region: Subject, file: CarriedFile, shown: Mapping[float, int], *what: Any, **how: Any
 ) -> Iterator[Tracked]:
-    """As MatteTrack.follow, of what a carried outline encloses; shown: the filmed frames that timeline frames show.
-    MediaError, too: a matte cannot be carried."""
+    """Yield MatteTrack.follow for a carried outline.
+
+    Args:
+        region: the region
+        file: its carried mattes
+        shown: {timeline frame: filmed frame}
+        what: arguments of MatteTrack.follow
+        how: the same
+
+    Raises:
+        MediaError: a matte cannot be carried
+    """
     with closing(file.open()) as mattes:
         yield from MatteTrack(region, cover_of(mattes, shown.__getitem__)).follow(*what, **how)
 
@@ -56,9 +66,9 @@ class MatteTrack(tracking.Track):
     """Tracks what a matte covers."""
 
     def __init__(self, region: Subject, cover: Cover) -> None:
-        """region: says where its centre is"""
+        """Track a matte. region: has its center."""
         super().__init__(region)
-        self._covers = lru_cache(2)(cover)  # a step looks at two frames, of which one was looked at before
+        self._covers = lru_cache(2)(cover)  # each step needs two mattes, one of which the last step had
 
     def _cover(self, frame: int) -> np.ndarray:
         return self._covers(frame, self._footage.size)
@@ -72,14 +82,14 @@ class MatteTrack(tracking.Track):
 
 
 class _Pursuit:
-    """The motion of what a matte covers, from one frame to those after it."""
+    """The motion of what a matte covers, from one frame to the next ones."""
 
     def __init__(self, cover: Callable[[int], np.ndarray], footage: Footage, frame: int, motion: Motion) -> None:
         self._cover, self._footage, self._way = cover, footage, motion
         self._last, self._motion, self.reason = frame, Similarity(), COVERED
 
     def next(self, frame: int) -> Sighting | None:
-        """Where it is in a frame; None: it is not there."""
+        """Return the motion to a frame, or None if the subject is not found."""
         before, after = (self._cover(each) for each in (self._last, frame))
         if not (after > _INSIDE).any():
             self.reason = LEFT
@@ -96,10 +106,15 @@ class _Pursuit:
 def moved(
     first: np.ndarray, second: np.ndarray, before: np.ndarray, after: np.ndarray, motion: Motion = "location"
 ) -> Sighting | None:
-    """How what a matte covers moves from one picture (H, W) uint8 to another, and how sure that is; None: nobody
-    knows.
+    """Return how what a matte covers moves from one picture to another, or None if that is unknown.
 
-    before, after: (H, W) float32, 0 to 1, the matte of each"""
+    Args:
+        first: (H, W) uint8
+        second: (H, W) uint8
+        before: (H, W) float32, 0 … 1, the matte of `first`
+        after: (H, W) float32, 0 … 1, the matte of `second`
+        motion: what changes
+    """
     unit, box = max(first.shape) / 640, box_around(np.maximum(before, after), _AROUND)
     if box is None:
         return None
@@ -121,7 +136,7 @@ def moved(
     chosen = chosen[:: -(-chosen.size // _POINTS)]
     corner = complex(columns.start, rows.start)
     starts, ends = (registration.plane(each)[chosen] + corner for each in (grid, there))
-    # Where it turns as well, no location alone suits many points: that of its middle is asked for then.
+    # If the subject also turns, its points move differently: the location of its middle counts.
     way: Motion = "scale" if motion == "location" else motion
     fitted = registration.fit(starts, ends, np.ones(len(chosen)), way, _ALIKE * unit)
     if fitted is None:

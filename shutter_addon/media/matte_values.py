@@ -1,4 +1,4 @@
-"""Values of mattes: files, masks and ramps on the pixels of a picture, feathered and inverted."""
+"""Values of mattes: files, masks and ramps at a picture's pixels, feathered and inverted."""
 
 from __future__ import annotations
 
@@ -13,20 +13,25 @@ from ..core.pixels.matte_grid import block_means, feathered, fitted
 from .carried_mattes import CarriedMattes
 from .cuts import ShotSource
 
-# Files that stay open though the last mattes were of others.
+# The most files that stay open.
 MOST_OPEN = 16
 
 Late = Callable[[Any, int], None]
 
 
 class MatteValues:
-    """A core.model.mattes.MatteReader for pictures of one size.
-
-    step: frames of the source for each filmed one (Options.step)
-    late: is told of each matte of an outline that would have to be carried first, by its file and frame: a straight one
-    stands in for it; None: it is carried"""
+    """A core.model.mattes.MatteReader for pictures of one size."""
 
     def __init__(self, width: int, height: int, step: int = 1, late: Late | None = None) -> None:
+        """Read mattes.
+
+        Args:
+            width: of the pictures
+            height: of the pictures
+            step: source frames for each filmed one (Options.step)
+            late: called with the file and frame of each matte that is not carried yet; a straight one is used instead.
+                None: it is carried.
+        """
         self._size, self._step, self._late = (width, height), step, late
         self._sources: dict[MatteFile, MatteSource] = {}
         self._made: list[tuple[Hashable, np.ndarray]] = []
@@ -37,11 +42,11 @@ class MatteValues:
 
     @classmethod
     def of(cls, source: ShotSource, late: Late | None = None) -> MatteValues:
-        """For the pictures of a source, as core.model.mattes has them."""
+        """Return a reader for the pictures of a source."""
         return cls(source.width, source.height, source.step, late)
 
     def values(self, mattes: tuple[Matte, ...], index: int, block: int) -> list[tuple[Hashable, np.ndarray]]:
-        """As MatteReader.values. EffectError, MediaError: those of a file cannot be had."""
+        """See MatteReader. Raise EffectError or MediaError if a file cannot be read."""
         files = {matte.content.file for matte in mattes if isinstance(matte.content, FileFrame)}
         if len(self._sources.keys() | files) > MOST_OPEN:
             for file in self._sources.keys() - files:
@@ -54,7 +59,7 @@ class MatteValues:
         return list(self._made)
 
     def _content(self, content: Content, index: int) -> tuple[Hashable, Callable[[], np.ndarray]]:
-        """A key of what a matte shows at a frame of the source, and what gives it; its file is opened."""
+        """Return a key of a matte's content at a source frame, and a function that reads it. Its file is opened."""
         if not isinstance(content, FileFrame):
             return content, partial(content.values, *self._size)
         file, late = content.file, self._late
@@ -76,7 +81,7 @@ class MatteValues:
         return block_means(1 - values if matte.invert else values, block)
 
     def close(self) -> None:
-        """Closes the files; they are opened again when they are needed."""
+        """Close the files. They are opened again when needed."""
         for source in self._sources.values():
             source.close()
         self._sources.clear()

@@ -1,4 +1,4 @@
-"""Frames of a movie: those that Blender's movie strip shows, converted to RGB as Blender converts them."""
+"""Movies: the frames that Blender's movie strip shows, converted to RGB as in Blender."""
 
 import math
 import re
@@ -26,14 +26,14 @@ from .errors import MediaError
 from .files import check_file, check_index
 from .reduced import reduced, reduced_size
 
-# Blender's choice for YUV to RGB; libswscale's defaults are a level too dark and smear colours.
+# Blender's choice from YUV to RGB. libswscale's defaults are a level too dark and blur colors.
 SCALER = Interpolation.POINT | Interpolation.ACCURATE_RND | Interpolation.FULL_CHR_H_INT
-REDUCER = Interpolation.AREA | Interpolation.ACCURATE_RND | Interpolation.FULL_CHR_H_INT  # where frames become smaller
-_NO_COUNT = 1 << 31  # frames: Blender has no number for so many, and a header that claims them is damaged
-# Whether a frame tells where its chroma lies: with PyAV 19.
+REDUCER = Interpolation.AREA | Interpolation.ACCURATE_RND | Interpolation.FULL_CHR_H_INT  # for smaller frames
+_NO_COUNT = 1 << 31  # Blender cannot count so many frames; a header that claims them is damaged
+# Whether frames have the position of chroma: since PyAV 19.
 _TELLS_CHROMA = hasattr(av.VideoFrame, "chroma_location")
 _UNSPECIFIED = 2  # in ITU-T H.273
-# Formats of which Blender interpolates one field; it blurs all others.
+# Formats whose fields Blender interpolates. It blurs all others.
 _WITH_FIELDS = frozenset({"yuv420p", "yuvj420p", "yuv422p", "yuvj422p", "yuv444p", "yuv411p", "gray"})
 _PLANAR_420 = frozenset({"yuv420p", "yuvj420p"})
 _PLANAR_YUV = re.compile(r"yuv[aj]?4\d\dp(\d+le)?")
@@ -42,15 +42,15 @@ _PLANAR_YUV = re.compile(r"yuv[aj]?4\d\dp(\d+le)?")
 class MovieSource(FrameSource):
     """A movie's frames.
 
-    Frame i is the one on screen at the stream's start + i / fps: the last whose time stamp is not later, or the first
-    frame. So frames repeat or drop out where the rate varies, and the last one holds while sound goes on beyond it.
-    8-bit movies give uint8, deeper ones uint16 (libswscale keeps 16 bits even of floats), always display values.
+    Frame i is on screen at the stream's start + i / fps: the last one whose time stamp is not later, or the first
+    frame. So frames repeat or are skipped if the rate varies, and the last one repeats while sound goes on. 8-bit
+    movies have uint8 samples, deeper ones uint16 (libswscale keeps 16 bits even of floats), always display values.
     """
 
     transfer = "srgb"
 
     def __init__(self, path: str | Path, *, stream: int = 0, deinterlace: bool = False, divisor: int = 1) -> None:
-        """divisor: how many times smaller than the file's the frames are each way (reduced.smaller)"""
+        """Open a movie. See opening.open_source."""
         self.path = check_file(path)
         self.files = [self.path]
         self._deinterlace, self._divisor = deinterlace, divisor
@@ -85,10 +85,10 @@ class MovieSource(FrameSource):
         self.width, self.height = size[::-1] if self._turns % 2 else size
         deep = max(component.bits for component in first.format.components) > 8
         self._format, self.dtype = "rgba64le" if deep else "rgba", np.dtype(np.uint16 if deep else np.uint8)
-        # Blender takes 8-bit colours for straight, but those of deeper movies, its floats, for premultiplied.
+        # In Blender, 8-bit colors are straight, but those of deeper movies, which are floats there, are premultiplied.
         has_alpha = any(component.is_alpha for component in first.format.components)
         self.alpha = "opaque" if not has_alpha else "premultiplied" if deep else "straight"
-        # libswscale takes the mean of straight colours whatever their cover.
+        # libswscale would average straight colors without regard to alpha.
         in_conversion = size != filmed and self.alpha != "straight"
         self._size, self._scaler = (size, REDUCER) if in_conversion else (filmed, SCALER)
 
@@ -100,9 +100,10 @@ class MovieSource(FrameSource):
             return self._pixels(frame)
 
     def decoded(self, index: int) -> Decoded:
-        """As `read`, or the frame's planes, where they are 8-bit 4:2:0 and as large as the frame, and BT.601 or 709.
+        """Return the frame, or its planes in the decoder's memory if they are 8-bit 4:2:0 in BT.601 or 709.
 
-        They are those of the decoder's own memory. What they become is what libswscale makes of them, by SCALER."""
+        Planes have the frame's size, and are converted as libswscale does with SCALER.
+        """
         with self._named(index):
             frame = self._frame(index)
             if (to_rgb := self._matrix(frame)) is None:
@@ -112,7 +113,7 @@ class MovieSource(FrameSource):
             return Planes(luma=luma, chroma=(cb, cr), matrix=to_rgb, rgba=rgba)
 
     def grey(self, index: int) -> np.ndarray | None:
-        """The frame's luma (height, width, 1), where that is the luminance of its colours; else None."""
+        """Return the frame's luma (height, width, 1) if it is the luminance of its colors, else None."""
         with self._named(index):
             frame = self._frame(index)
             if not _is_grey(frame):
@@ -124,7 +125,7 @@ class MovieSource(FrameSource):
         frame = self._reader.frame_at(self._reader.start + _round(index * self._step), self._step)
         if not frame.format.is_rgb:
             frame.colorspace, frame.color_range = self._space, self._range
-        # Light is converted later; and Blender has libswscale take chroma where it takes what is not specified.
+        # Colors are converted later. As in Blender, libswscale assumes the default position of chroma.
         frame.color_primaries = frame.color_trc = _UNSPECIFIED
         if _TELLS_CHROMA:
             frame.chroma_location = 0
@@ -132,7 +133,7 @@ class MovieSource(FrameSource):
 
     @contextmanager
     def _named(self, index: int) -> Iterator[None]:
-        """Inside, what fails is said of that frame, by MediaError."""
+        """Turn errors into a MediaError that names the frame."""
         try:
             yield
         except av.error.FFmpegError as error:
@@ -141,7 +142,7 @@ class MovieSource(FrameSource):
             raise MediaError(f"frame {index} of {self.path.name} cannot be decoded: {error}") from error
 
     def _matrix(self, frame: av.VideoFrame) -> Matrix | None:
-        """What makes RGB of the frame's planes; None where more has to be done with it."""
+        """Return the matrix from the frame's planes to RGB, or None if it needs more conversions."""
         if frame.format.name not in _PLANAR_420 or self._deinterlace or self._turns:
             return None
         if (frame.width, frame.height) != self._size or self._scaler != SCALER:
@@ -149,10 +150,11 @@ class MovieSource(FrameSource):
         return matrix(frame.colorspace, frame.format.name == "yuvj420p" or self._is_full)
 
     def _pixels(self, frame: av.VideoFrame) -> np.ndarray:
-        by_fields = self._deinterlace and _has_fields(frame)
+        has_fields = frame.format.name in _WITH_FIELDS and frame.width % 4 == 0 and frame.height % 4 == 0
+        by_fields = self._deinterlace and has_fields
         frame = _interpolate_fields(frame) if by_fields else frame
         picture = self._converted(frame, self._format)
-        if self._deinterlace and not by_fields and self._divisor == 1:  # smaller frames have both fields' means
+        if self._deinterlace and not by_fields and self._divisor == 1:  # smaller frames average both fields
             picture = _blur_rows(picture, opaque=self.alpha == "opaque")
         if self.alpha == "straight":
             picture = reduced(picture, self._divisor, self.alpha)
@@ -160,7 +162,7 @@ class MovieSource(FrameSource):
 
     def _converted(self, frame: av.VideoFrame, pix_fmt: str) -> np.ndarray:
         with self._converting:
-            # libswscale takes twice as long for packed colours with alpha as for planes, and then those from these.
+            # Converting to planes and then to packed colors takes libswscale half the time of converting directly.
             if pix_fmt == "rgba" and _is_opaque_yuv(frame.format):
                 frame = self._reformatted(self._to_planes, frame, "gbrp")
             return self._reformatted(self._to_packed, frame, pix_fmt).to_ndarray()
@@ -176,15 +178,14 @@ class MovieSource(FrameSource):
         return np.require(np.rot90(picture, -self._turns), requirements=["C", "W"])
 
     def close(self) -> None:
-        """Closes the file and ends all threads; a later read opens it again."""
+        """Close the file and end all threads. A later read opens it again."""
         self._reader.close()
         with self._converting:
             self._to_planes, self._to_packed = VideoReformatter(), VideoReformatter()
 
 
 def _untold(frame: av.VideoFrame) -> av.VideoFrame:
-    """A copy of a frame that does not say that it has fields, nor where its chroma lies: PyAV cannot take the former
-    from the frame itself, and before 19 not the latter."""
+    """Return a copy of a frame without marks for fields and for the position of chroma, which PyAV cannot clear."""
     copy = av.VideoFrame(frame.width, frame.height, frame.format.name)
     for own, plane in zip(frame.planes, copy.planes, strict=True):
         rows = np.frombuffer(own, np.uint8)[: own.height * own.line_size].reshape(own.height, own.line_size)
@@ -197,12 +198,12 @@ def _untold(frame: av.VideoFrame) -> av.VideoFrame:
 
 
 def _is_opaque_yuv(pixels: VideoFormat) -> bool:
-    """Whether a frame's format has luma and chroma, and no alpha."""
+    """Return whether a format has luma and chroma, and no alpha."""
     return not pixels.is_rgb and len(pixels.components) == 3 and not any(each.is_alpha for each in pixels.components)
 
 
 def _is_grey(frame: av.VideoFrame) -> bool:
-    """Whether a frame's luma is the luminance of its RGB: it has no chroma, or a neutral one, as grey pictures get."""
+    """Return whether a frame's luma is the luminance of its RGB: its chroma is neutral or missing."""
     name, bits = frame.format.name, frame.format.components[0].bits
     if name.startswith("gray"):
         return True
@@ -217,7 +218,7 @@ def _round(x: float) -> int:
 
 
 def _count(container: InputContainer, stream: VideoStream, fps: Fraction) -> int:
-    """The movie's length as Blender takes it from what the container says, without decoding; 0: unknown."""
+    """Return the movie's length from its container, as in Blender, without decoding. 0: unknown."""
     if not fps:
         return 0
     time_base = fraction(stream.time_base)
@@ -234,13 +235,8 @@ def _start(stream: Stream) -> float:
     return float((stream.start_time or 0) * fraction(stream.time_base))
 
 
-def _has_fields(frame: av.VideoFrame) -> bool:
-    """Whether Blender interpolates one field of such a frame; it blurs all others."""
-    return frame.format.name in _WITH_FIELDS and frame.width % 4 == 0 and frame.height % 4 == 0
-
-
 def _interpolate_fields(frame: av.VideoFrame) -> av.VideoFrame:
-    """A copy of the frame, its odd rows filtered with (-1 4 2 4 -1)/8 down the columns."""
+    """Return a copy of the frame, its odd rows filtered with (-1 4 2 4 -1)/8 down the columns."""
     result = av.VideoFrame(frame.width, frame.height, frame.format.name)
     result.colorspace, result.color_range = frame.colorspace, frame.color_range
     for source, target in zip(frame.planes, result.planes, strict=True):
@@ -252,9 +248,10 @@ def _interpolate_fields(frame: av.VideoFrame) -> av.VideoFrame:
 
 
 def _blur_rows(picture: np.ndarray, opaque: bool) -> np.ndarray:
-    """A copy of the RGBA picture, filtered with (1 2 1)/4 down the columns from the bottom row upwards.
+    """Return a copy of the RGBA picture, filtered with (1 2 1)/4 along columns, from the bottom row upward.
 
-    It hands on what rounding leaves over to the next row. Blender leaves out an opaque picture's red."""
+    The remainder of rounding goes over to the next row. Like Blender, it skips the red of opaque pictures.
+    """
     result = picture.copy()
     rows = result[::-1, :, 1:] if opaque else result[::-1]
     wide = rows.astype(np.int64)
@@ -265,6 +262,6 @@ def _blur_rows(picture: np.ndarray, opaque: bool) -> np.ndarray:
 
 
 def _samples_of(plane: VideoPlane, dtype: DTypeLike = np.uint8) -> np.ndarray:
-    """A plane's samples as a view (height, width) of its memory."""
+    """Return a plane's samples as a view (height, width) of its memory."""
     samples = np.frombuffer(plane, dtype)
     return samples.reshape(-1, plane.line_size // samples.itemsize)[: plane.height, : plane.width]

@@ -1,4 +1,4 @@
-"""OpenCV, which a package without wheels lacks; the extension registers without it."""
+"""OpenCV, which is missing in a package without wheels."""
 
 from .errors import MediaError
 
@@ -11,9 +11,14 @@ __all__ = ["check", "cv2"]
 
 
 def check(what: str, module: str = "") -> None:
-    """MediaError: OpenCV is missing, or its contributed module of that name: another add-on may bring one without.
+    """Raise MediaError if OpenCV, or one of its contributed modules, is missing.
 
-    what: the sentence's beginning, as "tracking needs"."""
+    Another add-on may bring an OpenCV without these modules.
+
+    Args:
+        what: the beginning of the message, such as "tracking needs"
+        module: the name of the contributed module
+    """
     if cv2 is None or (module and not hasattr(cv2, module)):
         raise MediaError(
             f"{what} the Python package opencv-contrib-python-headless; "

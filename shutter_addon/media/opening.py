@@ -1,5 +1,5 @@
-"""Opens a movie or an image sequence; both give their frames by index, as Blender's strips count them. Mattes in files:
-one channel of a movie, of an image sequence or of a still picture, as values from 0 to 1."""
+"""Opens movies and image sequences, whose frames are counted as in Blender's strips. And mattes in files: a channel of
+a movie, of an image sequence or of a picture, as values 0 … 1."""
 
 from __future__ import annotations
 
@@ -30,15 +30,20 @@ def open_source(
     deinterlace: bool = False,
     divisor: int = 1,
 ) -> FrameSource:
-    """Opens a movie, or the image sequence that starts with the file `path`. MediaError: it cannot be read.
+    """Open a movie, or the image sequence that starts with the file `path`.
 
-    stream: which of a movie's video streams, from 0
-    files: the names of an image strip's files, one per frame, in place of those found beside `path`
-    colorspace: the strip's colour space, by Blender's name (default: what Blender assumes for such a file)
-    config: path of the OpenColorIO configuration; colour spaces other than sRGB and Linear Rec.709 need it
-    alpha: an image strip's alpha mode, "straight" or "premultiplied" (default: what Blender assumes); not a movie's
-    deinterlace: a movie strip's option of that name
-    divisor: how many times smaller than the files' the frames are each way, one of reduced.DIVISORS
+    Args:
+        path: the file
+        stream: the number of a movie's video stream
+        files: the file names of an image strip, one for each frame. None: those found beside `path`.
+        colorspace: Blender's name of the strip's color space. None: what Blender assumes for such a file.
+        config: the OpenColorIO configuration, needed for color spaces other than sRGB and Linear Rec.709
+        alpha: an image strip's alpha mode, "straight" or "premultiplied". None: what Blender assumes.
+        deinterlace: a movie strip's option
+        divisor: the factor by which frames are reduced to each side, one of reduced.DIVISORS
+
+    Raises:
+        MediaError: it cannot be read
     """
     path = Path(path)
     source: FrameSource
@@ -54,9 +59,12 @@ def open_source(
 
 
 def with_proxy(source: FrameSource, opened: Callable[[], FrameSource]) -> FrameSource:
-    """The source with its frames read from a proxy, which is opened; the source itself, where there is none that fits.
+    """Return a source that reads the frames from a proxy, or the source itself if no proxy fits.
 
-    opened: gives the proxy, or raises MediaError"""
+    Args:
+        source: the footage
+        opened: returns the proxy, or raises MediaError
+    """
     try:
         proxy = opened()
     except MediaError:
@@ -70,9 +78,17 @@ def with_proxy(source: FrameSource, opened: Callable[[], FrameSource]) -> FrameS
 def open_channel(
     path: str | Path, channel: str, *, files: Sequence[str | Path] | None = None, stream: int = 0
 ) -> FrameSource:
-    """Opens what `open_source` opens, for one channel alone. MediaError: it cannot be read, or has no such channel.
+    """Open one channel of a movie or of an image sequence.
 
-    channel: one of sequence.CHANNELS, or the name of a channel of the images' own; files, stream: see open_source"""
+    Args:
+        path: the file
+        channel: one of sequence.CHANNELS, or the name of a channel in the images
+        files: as for open_source
+        stream: as for open_source
+
+    Raises:
+        MediaError: it cannot be read, or has no such channel
+    """
     path = Path(path)
     if not _is_movie(path, files):
         return SequenceChannel(path, channel, files=files)
@@ -96,7 +112,7 @@ def _opened_movie(path: Path, stream: int, deinterlace: bool = False, divisor: i
 
 
 def _check_lent(path: Path, stream: int) -> None:
-    """MediaError: without PyAV (a package without wheels, or one for another system) that movie cannot be read."""
+    """Raise MediaError if a movie cannot be read without PyAV."""
     if is_lent() and stream == 0:
         return
     check_file(path)
@@ -108,9 +124,11 @@ def _check_lent(path: Path, stream: int) -> None:
 
 
 def movie_channel(movie: FrameSource, channel: str) -> FrameSource:
-    """One channel of a movie's frames. Its samples are (height, width, n): n is 3, RGB, for the luminance of colours, 0
-    for the alpha of an opaque movie, 1 otherwise."""
-    grey_of = getattr(movie, "grey", lambda _index: None)  # which a second Blender's movies have not
+    """Return one channel of a movie's frames as samples (height, width, n).
+
+    n is 3 (RGB) for the luminance of colors, 0 for the alpha of an opaque movie, else 1.
+    """
+    grey_of = getattr(movie, "grey", lambda _index: None)  # BlenderMovie has no `grey`
 
     def samples(index: int) -> np.ndarray:
         if channel == "alpha" and movie.alpha == "opaque":
@@ -123,13 +141,14 @@ def movie_channel(movie: FrameSource, channel: str) -> FrameSource:
 
 @dataclass(frozen=True)
 class MatteFile:
-    """Where a matte is read from.
+    """The file of a matte.
 
-    path: a movie, a still picture, or the first file of an image sequence
-    channel: luminance, red, green, blue, alpha, or the name of a channel of an EXR
-    files: the names of an image strip's files, one per frame, in place of those found beside `path`
-    stream: which of a movie's video streams, as a movie strip counts them
-    stamp: tells a file from another one that took its place
+    Attributes:
+        path: a movie, a picture, or the first file of an image sequence
+        channel: luminance, red, green, blue, alpha, or the name of a channel of an EXR
+        files: the file names of an image strip, one for each frame. None: those found beside `path`.
+        stream: the number of a movie's video stream
+        stamp: differs when another file takes its place
     """
 
     path: Path
@@ -139,18 +158,20 @@ class MatteFile:
     stamp: Hashable = None
 
     def open(self) -> SourceWrapper:
-        """The frames of the matte (core.model.mattes.MatteSource), each a new array; what is no number is 0. Not for
-        two threads at once. MediaError: it cannot be read, or has no such channel.
+        """Open the matte's frames (core.model.mattes.MatteSource), for one thread at a time.
 
-        Values are samples as they are stored: no transfer function, no colour space, alpha neither multiplied nor
-        divided; a movie's range is expanded to 0 … 1. Luminance is that of Rec.709's weights, and of a grey file its
-        grey."""
+        Each frame is a new array of the stored samples: without a transfer function or color space, with alpha neither
+        multiplied nor divided. A movie's range is expanded to 0 … 1, NaN becomes 0. Luminance has Rec.709's weights.
+
+        Raises:
+            MediaError: it cannot be read, or has no such channel
+        """
         channel = open_channel(self.path, self.channel, files=self.files, stream=self.stream)
         return SourceWrapper(channel, lambda index: _values(channel.read(min(max(index, 0), channel.count - 1))))
 
 
 def _values(samples: np.ndarray) -> np.ndarray:
-    """Values (h, w) of samples (h, w, n) of any type, n being 3 (RGB), 1, or 0 for what is opaque."""
+    """Return values (h, w) of samples (h, w, n): RGB, one channel, or none for opaque files."""
     if samples.shape[2] == 0:
         return np.ones(samples.shape[:2], np.float32)
     values = samples[..., 0]
@@ -160,5 +181,5 @@ def _values(samples: np.ndarray) -> np.ndarray:
             values += samples[..., i] * REC709[i]
     if samples.dtype.kind == "u":
         return values / np.float32(np.iinfo(samples.dtype).max)
-    values = np.fmax(values.astype(np.float32), 0)  # unlike `maximum`, it gives 0 for what is no number
+    values = np.fmax(values.astype(np.float32), 0)  # NaN becomes 0, unlike with `maximum`
     return np.minimum(values, 1, out=values)

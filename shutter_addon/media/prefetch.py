@@ -1,4 +1,4 @@
-"""Frames of a source, decoded ahead of time by a thread."""
+"""Decodes a source's frames ahead of time on a thread."""
 
 import threading
 from collections.abc import Iterable
@@ -15,24 +15,24 @@ _PATIENCE = 0.1  # seconds between two looks at whether a frame is still wanted
 
 
 class PrefetchSource(SourceWrapper):
-    """A source whose wanted frames are decoded ahead, all by one thread. Its frames are read-only.
+    """A source that decodes wanted frames ahead on one thread. Its frames are read-only.
 
-    The frames of the last `want` are kept until the next one: they are what it holds in memory.
+    It keeps the frames of the last `want` in memory until the next one.
     """
 
     def __init__(self, source: FrameSource, *, planes: bool = False) -> None:
-        """planes: frames lie decoded as the source's `decoded` gives them, which `read` then has to convert"""
+        """Decode a source ahead. planes: with `decoded`, so that `read` has to convert frames."""
         super().__init__(source)
         self._fetch = source.decoded if planes else source.read
         self._wanted: list[int] = []  # in the order of decoding
-        self._asked: list[int] = []  # by reads that wait
-        self._due: int | None = None  # by the last read, which did not wait
+        self._asked: list[int] = []  # frames that reads wait for
+        self._due: int | None = None  # the frame of the last read, which did not wait
         self._done: dict[int, Decoded | Exception] = {}
         self._changed = threading.Condition()
         self._thread: threading.Thread | None = None
 
     def want(self, indices: Iterable[int]) -> None:
-        """Decodes these frames, in this order, and frees all others."""
+        """Decode these frames, in this order, and free all others."""
         with self._changed:
             self._wanted = list(dict.fromkeys(indices))
             self._due = self._due if self._wanted else None
@@ -40,17 +40,21 @@ class PrefetchSource(SourceWrapper):
             self._wake()
 
     def read(self, index: int) -> np.ndarray:
-        """The source's frame, read-only. One that is not decoded yet is decoded next, before all wanted ones.
+        """Return the source's frame, read-only. If it is not decoded yet, it comes before all wanted frames.
 
-        An error of the source's `read` is raised here once; the next call decodes the frame again. MediaError as well
-        if `close` is called meanwhile, and core.stopping.StoppedError; also where this step may not wait
-        (stopping.waits) and the frame is not decoded yet."""
+        Errors of the source are raised once; the next call decodes the frame again.
+
+        Raises:
+            MediaError: the source cannot read it, or `close` was called meanwhile
+            core.stopping.StoppedError: the frame is no longer wanted; or it is not decoded yet, and this step may not
+                wait (stopping.waits)
+        """
         picture = as_rgba(self.decoded(index))
         picture.flags.writeable = False
         return picture
 
     def decoded(self, index: int) -> Decoded:
-        """As `read`, but for the conversion."""
+        """Return the frame like `read`, without conversion."""
         stopping.check()
         with self._changed:
             self._due = None if stopping.waits() or index in self._done else index
@@ -77,7 +81,7 @@ class PrefetchSource(SourceWrapper):
         return frame
 
     def close(self) -> None:
-        """Ends the thread, closes the file and frees all frames; a later read starts again."""
+        """End the thread, close the file and free all frames. A later read starts again."""
         with self._changed:
             thread, self._thread = self._thread, None
             self._wanted, self._due, self._done = [], None, {}
@@ -114,9 +118,9 @@ class PrefetchSource(SourceWrapper):
                     frame = self._fetch(index)
                 if isinstance(frame, np.ndarray):
                     frame.flags.writeable = False
-            except stopping.StoppedError:  # it is not wanted any longer
+            except stopping.StoppedError:  # it is no longer wanted
                 continue
-            except Exception as error:  # raised to whoever reads the frame
+            except Exception as error:  # raised by the read
                 frame = error
             with self._changed:
                 if self._thread is mine:

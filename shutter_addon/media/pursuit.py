@@ -1,4 +1,4 @@
-"""A part of a picture, looked for in one picture after another, and how sure that is."""
+"""Follows a part of a picture from frame to frame, with a confidence."""
 
 from __future__ import annotations
 
@@ -15,28 +15,29 @@ from .registration import Match, Part
 
 COVERED = "the subject is covered, or looks too different"
 LEFT = "the subject has left the picture"
-SURE = 0.5  # from here on a frame is within about a pixel of 640
-_LOST = 0.12  # below it nothing was found
-_AGAIN = 0.3  # below it nothing was found where it might be anywhere
-DOUBTFUL = 0.2  # below it, it may as well be anywhere
-_DRIFT, _LEAST = 0.95, 0.1  # what a later look is worth beside the one before it, and at least
-_SHIFTED = 0.6  # what a location is worth where rotation and scale could not be found
-_FADING = 0.6  # below it another frame is taken to compare with beside the first
-_AROUND = 0.05  # widths of the picture around its place within which it is sought at least
-# Frames through which the corners of what is found are traced back; the share of them that has to be traced, and what
-# a frame keeps of the trust where they are not; how far they may be off, in lengths of the part, and the share of them
-# that may not be.
+# Confidences:
+SURE = 0.5  # from here on, errors are within about a pixel of 640
+_LOST = 0.12  # below, nothing was found
+_AGAIN = 0.3  # below, nothing was found in a search of a larger area
+DOUBTFUL = 0.2  # below, a larger area is searched
+_DRIFT, _LEAST = 0.95, 0.1  # the factor for a later look, and its least confidence
+_SHIFTED = 0.6  # the factor if only the location was found, without rotation and scale
+_FADING = 0.6  # below, a later look is compared as well
+_REPEATED = 0.3  # the factor for a part that looks like its surroundings
+
+_AROUND = 0.05  # the least search radius in widths of the picture
+# Corners are traced back through _BACK frames. At least _TRACED of them must be traced, or the trust becomes _UNTRACED
+# of it. They may be off by _ASTRAY lengths of the part; _AGREEING of them must not be.
 _BACK, _TRACED, _UNTRACED, _ASTRAY, _AGREEING = 8, 0.1, 0.85, 0.15, 0.5
-_KEPT = 0.999  # so much of the trust a step keeps at most
-_BRIEF, _LEFT = 8, 3  # so many unsure frames between sure ones are more than a moment, and at the end of a track
-_REPEATED = 0.3  # what a part is worth that looks like what is beside it
+_KEPT = 0.999  # the most of the trust that a step keeps
+_BRIEF, _LEFT = 8, 3  # unsure frames after which a subject is lost: between sure ones, and at the end of a track
 _NONE = np.zeros(0, complex)
 
 
 class Sighting(NamedTuple):
-    """Where something is in a picture: its motion from the first one, and how sure that is, 0 to 1.
+    """A motion from the first picture to another one, with its confidence 0 … 1.
 
-    held: (n,) complex, the corners in the picture that tell it"""
+    held: (n,) complex, the corners in the picture that agree with it"""
 
     motion: Similarity
     confidence: float
@@ -44,23 +45,25 @@ class Sighting(NamedTuple):
 
 
 class PartPursuit:
-    """A part of a picture, looked for in one picture after another.
+    """Follows a part of a picture.
 
-    reason: why it was not found in the last one"""
+    Attributes:
+        reason: why it was not found in the last picture
+    """
 
     def __init__(self, part: Part, footage: Footage, frame: int, motion: Motion) -> None:
-        """frame: the part's"""
+        """Follow the part from its frame."""
         self._first, self._footage, self._motion, self.reason = part, footage, motion, COVERED
-        # the motion up to the last picture in which it was found, and its last step
+        # the motion to the last picture in which it was found, and its last step
         self._known = self._speed = Similarity()
-        self._missed = 0  # for how many pictures it was not found
-        self._look = _Look(part, Similarity(), 1.0)  # how it looked later, if it is no longer like the first
-        # the last pictures in which it was found, the motion, its confidence
+        self._missed = 0  # pictures since then
+        self._look = _Look(part, Similarity(), 1.0)  # how it looked later, if it has changed
+        # the last pictures in which it was found, with motion and confidence
         self._seen = deque([(footage.picture(frame), Similarity(), 1.0)], _BACK)
-        self._trust = 1.0  # how sure it is that what is followed is still the part
+        self._trust = 1.0  # the confidence that this is still the part
 
     def next(self, frame: int) -> Sighting | None:
-        """Where it is in a frame's picture; None: it is not there."""
+        """Return its motion to a frame, or None if it is not found."""
         picture, missed = self._footage.picture(frame), self._missed
         sighting = None if missed else self._near(picture, self._speed.after(self._known))
         if sighting is None:
@@ -82,9 +85,16 @@ class PartPursuit:
         return Sighting(sighting.motion, self._trust)
 
     def _trusted(self, picture: np.ndarray, sighting: Sighting, goes_on: bool) -> float:
-        """How sure it is that it is the part. What goes on is as sure as before, as far as its corners come from there.
-        It is as sure as it is like the first look where they do, unless that was lost and is seen elsewhere, too.
-        goes_on: it was found in the picture before."""
+        """Return the confidence that this is still the part.
+
+        It stays as before as far as the corners come from the part's last place. If they all do, it is at least the
+        likeness to the first look, unless the part was lost and something else looks like it, too.
+
+        Args:
+            picture: the picture
+            sighting: what was found in it
+            goes_on: whether the part was found in the picture before
+        """
         held = self._held(picture, sighting) if goes_on else None
         kept = _KEPT * self._trust * (_UNTRACED if held is None else held) if goes_on else 0.0
         if sighting.confidence <= kept or (held is not None and held < 1):
@@ -93,8 +103,10 @@ class PartPursuit:
         return kept if was_lost and self._first.lookalike(picture, sighting.motion) else sighting.confidence
 
     def _held(self, picture: np.ndarray, sighting: Sighting) -> float | None:
-        """The share, up to 1, of the corners by which it was found that have come from where it was some pictures
-        before: what has slipped onto something else comes from elsewhere. None: hardly any can be traced."""
+        """Return the share of its corners that come from its place some pictures before, up to 1.
+
+        They come from elsewhere if tracking slipped onto something else. None: too few can be traced.
+        """
         pictures, back = [picture, *(each[0] for each in reversed(self._seen))], sighting.motion.inverse()
         step = self._known.after(back)(sighting.held) - sighting.held
         traced = registration.traced(pictures, sighting.held, step)
@@ -104,7 +116,7 @@ class PartPursuit:
         return min(float((off < _ASTRAY * max(self._first.box[2:])).mean()) / _AGREEING, 1.0)
 
     def _near(self, picture: np.ndarray, guess: Similarity) -> Sighting | None:
-        """As `next`, near to a guess: as it looked first or, if that is not sure, as it looked later."""
+        """Find the part near a guess by its first look or, if that is not sure, by a later one."""
         match = self._first.find(picture, guess, self._motion)
         sure = confidence(match, picture)
         if match and sure >= SURE:
@@ -116,7 +128,7 @@ class PartPursuit:
             return Sighting(match.motion, sure, match.held) if match and sure >= _LOST else None
         points = self._first.points
         if sure < SURE and np.abs(later.motion(points) - guess(points)).max() > 1:
-            # from there the first look may be near enough
+            # starting from there, the first look may be found
             again = self._first.find(picture, later.motion, self._motion)
             if confidence(again, picture) > sure:
                 match, sure = again, confidence(again, picture)
@@ -134,13 +146,13 @@ class PartPursuit:
         return sighting
 
     def _look_anew(self) -> None:
-        """Takes the look that it had when it was found last."""
+        """Take its look in the last picture in which it was found."""
         picture, motion, worth = self._seen[-1]
         if later := self._first.again(picture, motion):
             self._look = _Look(later, motion, max(_DRIFT * worth, _LEAST))
 
     def _elsewhere(self, picture: np.ndarray, missed: int, *looks: _Look) -> Sighting | None:
-        """As `_near`, of all places where it may be by now; only if it looks as it did first, or as in other looks."""
+        """Find the part by its first look or by others, in the area where it may be by now."""
         radius = _AROUND * picture.shape[1] * (1 + missed / 4)
         sightings = []
         for look in (_Look(self._first, Similarity(), 1.0), *looks):
@@ -152,21 +164,21 @@ class PartPursuit:
         return max(sightings, key=lambda each: each.confidence, default=None)
 
     def _leaves(self, picture: np.ndarray) -> bool:
-        """Whether most of the part would lie outside of the picture if it went on."""
+        """Return whether most of the part would be outside the picture if it went on moving."""
         places = self._speed.after(self._speed).after(self._known)(self._first.points)
         return bool(registration.inside(picture, places).mean() < 0.5)
 
 
 @dataclass(frozen=True)
 class _Look:
-    """How a part looked in some picture; motion: from the first picture to that one; worth: the confidence of that."""
+    """How a part looked in a picture, with the motion from the first picture to that one and its confidence."""
 
     part: Part
     motion: Similarity
     worth: float
 
     def find(self, picture: np.ndarray, guess: Similarity, motion: Motion) -> Sighting | None:
-        """Where it is by corners or, where these do not agree on the motion, by the location alone."""
+        """Find the part by its motion or, if corners do not agree on that, by its location."""
         guess = guess.after(self.motion.inverse())
         ways: list[tuple[Motion, float]] = [(motion, 1.0), ("location", _SHIFTED)]
         for way, share in ways:
@@ -177,8 +189,11 @@ class _Look:
 
 
 def confidence(match: Match | None, picture: np.ndarray) -> float:
-    """How sure a match is, 0 to 1: by its expected error, how many corners agree, and how like the pixels are: the more
-    alike, the fewer corners have to agree."""
+    """Return the confidence of a match, 0 … 1, from its expected error, the agreeing corners and the likeness of
+    pixels.
+
+    The more alike the pixels, the fewer corners have to agree.
+    """
     if match is None:
         return 0.0
     error = match.error * 640 / max(picture.shape)
@@ -188,10 +203,12 @@ def confidence(match: Match | None, picture: np.ndarray) -> float:
 
 
 def lost(frames: np.ndarray, sure: np.ndarray) -> int | None:
-    """The frame of a track at which its subject was lost: at the first of its unsure stretches that lasts, the end from
-    which it was tracked; None: nowhere.
+    """Return the frame at which a subject was lost: at the first long stretch of unsure frames. None: nowhere.
 
-    frames: (n,) ascending; sure: (n,) confidence"""
+    Args:
+        frames: (n,) ascending
+        sure: (n,) confidences
+    """
     ends = np.flatnonzero(np.diff(np.concatenate([[False], sure < SURE, [False]])))
     for first, end in ends.reshape(-1, 2):
         if end - first >= (_BRIEF if first > 0 and end < len(frames) else _LEFT):
@@ -200,5 +217,5 @@ def lost(frames: np.ndarray, sure: np.ndarray) -> int | None:
 
 
 def distinctness(part: Part, width: int) -> float:
-    """How sure it is that a part is not taken for what is beside it in a picture of that width, up to 1."""
+    """Return the confidence that a part is not confused with its surroundings, up to 1. width: of the picture."""
     return float(np.clip((1 - part.rival(_AROUND * width)) / (1 - registration.ALIKE), _REPEATED, 1))

@@ -1,10 +1,9 @@
-"""How long a sensor reads out, by lines that lean as they move.
+"""Measures the readout time of a rolling shutter by lines that lean as they move. No bpy.
 
-A row at a height y of H is filmed y/H of the readout after the first one. So a line that the picture moves sideways by
-v pixels a frame leans by v · readout / H beside its own direction. Edges that are nearly upright are followed from
-frame to frame; how much each of them leans is held against its speed, with a direction of its own for each: what they
-have in common is the readout. Speeds have to change, therefore: what always moves alike may well lean by itself. No
-bpy.
+A row at height y of H is filmed y/H of the readout after the first one. So a line that moves sideways by v pixels per
+frame leans by v · readout / H more than its own direction. Nearly upright edges are followed from frame to frame. A
+regression of their leans on their speeds, with a direction for each edge, gives the readout. Speeds must change: an
+edge that always moves alike may lean by itself.
 """
 
 from collections.abc import Sequence
@@ -19,24 +18,24 @@ from . import flow, opencv
 from .errors import MediaError
 from .opencv import cv2
 
-ROWS = 540  # of the pictures that are looked at, at most
-FRAMES = 48  # one after the other, that are looked at
-# Of an edge: how long it is at least, in heights of the picture, how far it leans at most, and how many are followed.
+ROWS = 540  # the most rows of the pictures
+FRAMES = 48  # the most successive frames
+# An edge's least length in heights of the picture, its largest lean, and the most edges.
 LONG, UPRIGHT, MOST = 0.1, 0.35, 60
 _ANEW = 6  # frames after which more edges are looked for
-_REACH, _NEAR = 6, 3  # pixels beside where an edge is expected, and beside where it was found then
-_STEEP = 6.0  # levels from one side of a pixel to the other, from which on there is an edge
-_ROUGH = 0.3  # pixels by which an edge's rows are off, beyond which they hardly count
-_SEEN, _OFF = 0.6, 1.0  # the share of an edge's rows where it has to be, and how far they may be off, in pixels
-# What has to be there to tell a readout: edges, frames of one, pixels a frame by which speeds differ, and how sure the
-# readout is then, as a share of a frame, or of itself.
+_REACH, _NEAR = 6, 3  # pixels around the expected place of an edge, and around the place found there
+_STEEP = 6.0  # the least difference of an edge in levels, across a pixel
+_ROUGH = 0.3  # the error of a row in pixels, beyond which it hardly counts
+_SEEN, _OFF = 0.6, 1.0  # the share of an edge's rows that must be found, and their largest median error in pixels
+# What a readout needs: edges, frames of each, the spread of speeds in pixels per frame, and the largest standard error,
+# as a share of a frame or of the readout.
 LINES, _SAMPLES, CHANGING = 3, 5, 0.7
 SURE, SURE_SHARE = 0.02, 0.1
-_LONGEST = 1.2  # of a frame: beyond it, it is none
+_LONGEST = 1.2  # the longest readout in frames
 
 
 class ReadoutError(MediaError):
-    """It cannot be told, and why: a sentence, without its beginning, that is looked up where it is shown."""
+    """The readout cannot be measured. The message is the end of a sentence, which the interface translates."""
 
 
 TOO_FEW_FRAMES = "there are too few frames"
@@ -46,8 +45,13 @@ UNLIKE = "lines do not lean as one readout would have them"
 
 
 class Readout(NamedTuple):
-    """share: of the time from a filmed frame to the next, which the readout takes; below 0 where the last row is read
-    first; error: its standard error; lines: how many edges tell it"""
+    """A measured readout.
+
+    Attributes:
+        share: in frames; negative if the last row is read first
+        error: its standard error
+        lines: the number of edges
+    """
 
     share: float
     error: float
@@ -55,10 +59,17 @@ class Readout(NamedTuple):
 
 
 def of_source(source: FrameSource, indices: Sequence[int], *, columns: bool = False) -> Readout:
-    """The readout of a source, by FRAMES of its filmed frames at most, the middle ones of `indices`, which follow one
-    another in one shot. columns: the sensor reads column by column, from the left.
+    """Measure the readout of a source.
 
-    ReadoutError: it cannot be told. MediaError: the frames cannot be read, or OpenCV is missing."""
+    Args:
+        source: the footage
+        indices: successive filmed frames of a shot, of which the middle FRAMES are used
+        columns: the sensor reads column by column, from the left
+
+    Raises:
+        ReadoutError: it cannot be measured
+        MediaError: the frames cannot be read, or OpenCV is missing
+    """
     opencv.check("the readout is found by")
     first = max((len(indices) - FRAMES) // 2, 0)
     chosen = indices[first : first + FRAMES]
@@ -71,7 +82,7 @@ def of_source(source: FrameSource, indices: Sequence[int], *, columns: bool = Fa
 
 
 def of_pictures(pictures: Sequence[np.ndarray]) -> Readout:
-    """As of_source, of pictures (H, W) uint8 that follow one another."""
+    """Measure the readout of successive pictures (H, W) uint8."""
     if len(pictures) < _SAMPLES + 2:
         raise ReadoutError(TOO_FEW_FRAMES)
     if min(pictures[0].shape) < flow.SMALLEST:
@@ -84,30 +95,35 @@ def of_pictures(pictures: Sequence[np.ndarray]) -> Readout:
 
 @dataclass
 class _Edge:
-    """An edge by the rows that it goes through, as long as it is followed.
+    """An edge that is followed through frames.
 
-    polarity: 1 where it is lighter on its right, −1 on its left; places: of each frame, where it is in its middle row
-    and how far it leans: pixels to the right from a row to the next"""
+    Attributes:
+        rows: the rows that it crosses
+        polarity: 1 if it is lighter on the right, −1 on the left
+        places: for each frame, its x in the middle row and its lean: pixels to the right per row
+    """
 
     rows: np.ndarray
     polarity: float
     places: list[tuple[float, float]] = field(default_factory=list)
 
     def samples(self) -> tuple[np.ndarray, np.ndarray] | None:
-        """Speeds and leans (n,), in pixels a frame and from row to row; None: there are too few."""
+        """Return speeds in pixels per frame and leans in pixels per row, (n,) each. None: there are too few."""
         if len(self.places) < _SAMPLES + 2:
             return None
         x, lean = np.array(self.places).T
         return _speeds(x)[1:-1], lean[1:-1]
 
     def at(self, x: float, lean: float) -> np.ndarray:
-        """Where its rows are (n,)."""
+        """Return the x of its rows (n,)."""
         return x + lean * (self.rows - self.rows.mean())
 
 
 def _speeds(x: np.ndarray) -> np.ndarray:
-    """Pixels a frame (n,) of what is at places (n,), along the natural cubic spline through them: of hands that shake,
-    differences of neighbours are too small by a fifth."""
+    """Return speeds (n,) in pixels per frame along the natural cubic spline through x (n,).
+
+    For shaking hands, differences of neighbors are too small by a fifth.
+    """
     of = 4 * np.eye(len(x)) + np.eye(len(x), k=1) + np.eye(len(x), k=-1)
     of[[0, -1], [0, -1]] = 2
     outer = np.pad(x, 1, mode="edge")
@@ -115,9 +131,9 @@ def _speeds(x: np.ndarray) -> np.ndarray:
 
 
 def _followed(pictures: Sequence[np.ndarray]) -> list[_Edge]:
-    """The edges of pictures, as long as each is seen."""
+    """Return the edges of pictures, each followed while it is visible."""
     edges: list[_Edge] = []
-    seen: list[_Edge] = []  # up to the last picture
+    seen: list[_Edge] = []  # those visible in the last picture
     for index, picture in enumerate(pictures):
         stopping.check()
         steepness = _steepness(picture)
@@ -131,13 +147,13 @@ def _followed(pictures: Sequence[np.ndarray]) -> list[_Edge]:
 
 
 def _steepness(picture: np.ndarray) -> np.ndarray:
-    """By how much (H, W) it gets lighter from the left to the right of each pixel."""
+    """Return the horizontal gradient (H, W)."""
     smooth = cv2.GaussianBlur(picture.astype(np.float32), (5, 1), 0.8, sigmaY=1e-6)
     return cv2.filter2D(smooth, -1, np.array([[-0.5, 0, 0.5]], np.float32), borderType=cv2.BORDER_REPLICATE)
 
 
 def _follow(edge: _Edge, vectors: np.ndarray, steepness: np.ndarray) -> bool:
-    """Notes where an edge is in the next picture; whether it is seen there."""
+    """Follow an edge into the next picture. Return whether it is visible there."""
     x, lean = edge.places[-1]
     columns = np.clip(np.rint(edge.at(x, lean)).astype(int), 0, vectors.shape[1] - 1)
     moved = float(np.median(vectors[edge.rows, columns]))
@@ -147,7 +163,7 @@ def _follow(edge: _Edge, vectors: np.ndarray, steepness: np.ndarray) -> bool:
 
 
 def _new(seen: list[_Edge], picture: np.ndarray, steepness: np.ndarray) -> list[_Edge]:
-    """The longest edges of a picture that are none of those already."""
+    """Return the longest new edges of a picture."""
     new: list[_Edge] = []
     for x0, y0, x1, y1 in _segments(picture):
         if len(seen) + len(new) >= MOST:
@@ -165,7 +181,7 @@ def _new(seen: list[_Edge], picture: np.ndarray, steepness: np.ndarray) -> list[
 
 
 def _is_same(edge: _Edge, place: tuple[float, float], other: _Edge) -> bool:
-    """Whether it goes where another one of the same polarity does, in the rows that they share."""
+    """Return whether an edge coincides with another one of the same polarity in their common rows."""
     if edge.polarity != other.polarity or not np.intersect1d(edge.rows, other.rows).size:
         return False
     x, lean = other.places[-1]
@@ -175,7 +191,7 @@ def _is_same(edge: _Edge, place: tuple[float, float], other: _Edge) -> bool:
 
 
 def _segments(picture: np.ndarray) -> np.ndarray:
-    """Edges (n, 4) that are nearly upright: x and y of their upper ends and of their lower ones, the longest first."""
+    """Return nearly upright edges (n, 4), the longest first: x and y of their upper and lower ends."""
     found = cv2.createLineSegmentDetector().detect(picture)[0]
     if found is None:
         return np.empty((0, 4))
@@ -187,7 +203,7 @@ def _segments(picture: np.ndarray) -> np.ndarray:
 
 
 def _placed(edge: _Edge, expected: tuple[float, float], steepness: np.ndarray) -> tuple[float, float] | None:
-    """Where an edge is that is expected at a place, as _Edge.places; None: it is not seen there."""
+    """Find an edge near an expected place (_Edge.places). None: it is not visible."""
     place = expected
     for reach in (_REACH, _NEAR, _NEAR):
         centres, is_there = _centres(edge, place, steepness, reach)
@@ -201,13 +217,13 @@ def _placed(edge: _Edge, expected: tuple[float, float], steepness: np.ndarray) -
 def _centres(
     edge: _Edge, place: tuple[float, float], steepness: np.ndarray, reach: int
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Where an edge is in each of its rows (n,), within a reach beside where it is expected, and whether it is."""
+    """Find an edge in each of its rows, within `reach` pixels: its x (n,), and whether it is there (n,)."""
     width = steepness.shape[1]
     middle = np.rint(edge.at(*place)).astype(int)
     columns = middle[:, None] + np.arange(-reach, reach + 1)
     is_inside = (middle >= reach) & (middle < width - reach)
     values = np.maximum(edge.polarity * steepness[edge.rows[:, None], np.clip(columns, 0, width - 1)], 0)
-    # Around the steepest place near by: another edge of the same polarity must not draw it away.
+    # Use only pixels around the steepest one, without other edges of the same polarity.
     peak = columns[np.arange(len(columns)), values.argmax(axis=1)]
     values = np.where(np.abs(columns - peak[:, None]) <= 2, values, 0)
     total = values.sum(axis=1)
@@ -216,7 +232,7 @@ def _centres(
 
 
 def _line(rows: np.ndarray, centres: np.ndarray, is_there: np.ndarray) -> tuple[float, float]:
-    """The line through places of rows, as _Edge.places, by most of them."""
+    """Return a robust line through places in rows, as in _Edge.places."""
     points = np.column_stack([centres, rows - rows.mean()])[is_there].astype(np.float32)
     right, down, x, y = cv2.fitLine(points, cv2.DIST_WELSCH, _ROUGH, 1e-3, 1e-4).ravel()
     lean = right / down
@@ -224,7 +240,7 @@ def _line(rows: np.ndarray, centres: np.ndarray, is_there: np.ndarray) -> tuple[
 
 
 def _fitted(samples: list[tuple[np.ndarray, np.ndarray]], height: int) -> Readout:
-    """The readout that speeds and leans of edges say, each of which has a direction of its own."""
+    """Return the readout from speeds and leans of edges, each with its own direction."""
     speeds, leans = (np.concatenate(part) for part in zip(*samples, strict=True))
     of = np.repeat(np.arange(len(samples)), [len(speed) for speed, _lean in samples])
     leans = leans * height
@@ -239,7 +255,7 @@ def _fitted(samples: list[tuple[np.ndarray, np.ndarray]], height: int) -> Readou
         off = own_leans - share * own_speeds
         scale = max(2.5 * 1.48 * float(np.median(np.abs(off))), 0.02)
         weight = 1 / (1 + (off / scale) ** 2) ** 2
-    # Errors of one edge go together.
+    # Errors of one edge are correlated.
     error = float(np.sqrt((np.bincount(of, weight * own_speeds * off) ** 2).sum()) / spread)
     if error > max(SURE, SURE_SHARE * abs(share)) or abs(share) > _LONGEST:
         raise ReadoutError(UNLIKE)
@@ -247,5 +263,5 @@ def _fitted(samples: list[tuple[np.ndarray, np.ndarray]], height: int) -> Readou
 
 
 def _without_mean(values: np.ndarray, weight: np.ndarray, of: np.ndarray) -> np.ndarray:
-    """Values (n,) less the mean of those that are of the same edge."""
+    """Return values (n,) minus the mean of the same edge."""
     return values - (np.bincount(of, weight * values) / np.bincount(of, weight))[of]

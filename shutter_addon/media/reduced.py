@@ -1,5 +1,4 @@
-"""Frames for previews: at a half or a quarter of their width and height, or read from a proxy, the smaller or lighter
-copy that Blender's sequencer has made of the footage."""
+"""Smaller frames for previews: reduced to a half or a quarter, or read from a proxy of Blender's sequencer."""
 
 from functools import cached_property
 
@@ -12,11 +11,11 @@ from .errors import MediaError
 from .opencv import cv2
 
 DIVISORS = 1, 2, 4
-STRETCHED = 0.1  # by which share the sides may differ: Blender's movies have even ones
+STRETCHED = 0.1  # how much a proxy's aspect may differ, since the sides of Blender's movies are even
 
 
 def smaller(source: FrameSource, divisor: int) -> FrameSource:
-    """The source, that many times smaller each way; a last pixel stands for what is left."""
+    """Return a source reduced by a factor to each side. The last pixels may stand for fewer."""
     if divisor == 1:
         return source
     made = SourceWrapper(source, lambda index: reduced(source.read(index), divisor, source.alpha))
@@ -25,13 +24,16 @@ def smaller(source: FrameSource, divisor: int) -> FrameSource:
 
 
 def reduced_size(length: int, divisor: int) -> int:
-    """How many pixels stand for so many."""
+    """Return a reduced length in pixels."""
     return -(-length // divisor)
 
 
 def reduced(frame: np.ndarray, divisor: int, alpha: str) -> np.ndarray:
-    """The means over squares of a frame (height, width, 4), of the same type; at the right and the bottom the last
-    pixel goes on. alpha: a FrameSource's; straight colours count by their cover."""
+    """Return the means over squares of a frame (height, width, 4) in its type. The last pixels are repeated at the
+    edges.
+
+    Straight colors are weighted with alpha.
+    """
     if divisor == 1:
         return frame
     whole = frame.dtype.kind == "u"
@@ -49,24 +51,26 @@ def reduced(frame: np.ndarray, divisor: int, alpha: str) -> np.ndarray:
 
 
 class ProxySource(SourceWrapper):
-    """A source whose frames are those of a proxy that `fits`, made to its size and samples. A frame that the proxy
-    lacks, or that is damaged there, is the source's own."""
+    """A source that reads frames from a proxy and converts them to its size and samples.
+
+    Frames that are missing or damaged in the proxy come from the source.
+    """
 
     from_proxy = True
 
     def __init__(self, source: FrameSource, proxy: FrameSource) -> None:
         super().__init__(source)
         self._proxy = proxy
-        source.close()  # until a frame is wanted of it
+        source.close()  # a read opens it again
 
     def read(self, index: int) -> np.ndarray:
-        """The frame (height, width, 4), of new memory."""
+        """Return the frame (height, width, 4) in new memory."""
         try:
             frame = self._proxy.read(index)
         except MediaError:
             return self._source.read(index)
         if frame.shape[:2] != (self.height, self.width):
-            dtype = np.float32 if frame.dtype == np.float16 else frame.dtype  # which OpenCV does not resize
+            dtype = np.float32 if frame.dtype == np.float16 else frame.dtype  # OpenCV does not resize half floats
             size = self.width, self.height
             fitted = cv2.resize(frame.astype(dtype, copy=False), size, interpolation=cv2.INTER_AREA)
             frame = fitted.astype(frame.dtype, copy=False)
@@ -76,10 +80,10 @@ class ProxySource(SourceWrapper):
 
     @cached_property
     def _samples(self) -> np.ndarray:
-        """What the source has for each sample of the proxy: bytes, or halves by their bits."""
+        """The source's sample for each sample of the proxy: bytes, or half floats by their bits."""
         is_byte = self._proxy.dtype == np.uint8
         levels = np.arange(256) / 255 if is_byte else np.arange(1 << 16, dtype=np.uint16).view(np.float16).astype(float)
-        with np.errstate(invalid="ignore", over="ignore"):  # not every half is a number
+        with np.errstate(invalid="ignore", over="ignore"):  # some half floats are NaN
             if self._proxy.transfer != self.transfer:
                 levels = to_linear(levels)
             if self.dtype.kind == "u":
@@ -92,8 +96,10 @@ class ProxySource(SourceWrapper):
 
 
 def fits(proxy: FrameSource, source: FrameSource) -> bool:
-    """Whether a proxy may stand for a source: as many frames, not turned, nothing to see through in either, and bytes
-    or halves: what Blender writes of float images, named .jpg, is EXR with sRGB values. To resize it takes OpenCV."""
+    """Return whether a proxy can replace a source: same length, not turned, both opaque, in bytes or half floats.
+
+    Blender's proxies of float images are EXR files named .jpg, with sRGB values. Another size needs OpenCV.
+    """
     stretched = proxy.width * source.height / (proxy.height * source.width)
     return (
         proxy.count == source.count

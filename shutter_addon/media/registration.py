@@ -1,7 +1,7 @@
-"""How a part of a picture has moved in another one: corners, Lucas and Kanade's optical flow, RANSAC.
+"""Finds how a part of a picture moved: corners, Lucas and Kanade's optical flow, RANSAC.
 
-Pictures are grey, (H, W) uint8; points are complex, x + iy in pixels, y down, whole numbers in the middle of a pixel.
-Equal pictures give equal results, whatever the number of threads.
+Pictures are grey, (H, W) uint8. Points are complex: x + iy in pixels, y down, whole numbers at the centers of pixels.
+Results do not depend on the number of threads.
 """
 
 from __future__ import annotations
@@ -16,43 +16,47 @@ import numpy as np
 from ..core.model.motions import Motion, Similarity
 from .opencv import cv2
 
-# What may change beside the location, each with what comes before it.
+# What may change, from only the location to location, rotation and scale.
 MOTIONS = get_args(Motion)
 
 MOST_CORNERS = 200
-FEWEST = {"location": 4, "rotation": 5, "scale": 5}  # corners that have to agree
-_QUALITY = 0.01  # of a corner, as a share of the best one's
-_WEAKEST = 2e-4  # the same, whatever the best one is: noise of some levels has less
-_LEVELS = 3  # a motion between two frames is found up to about 2 ** _LEVELS half windows
-_WINDOWS = 9, 21  # sides of the windows that are compared, in pixels: for small and for large parts
-_UNTIL = 3, 30, 0.01  # OpenCV's own: after 30 steps, or at one of less than 0.01 pixels
-_THERE_AND_BACK = 1.0  # pixels from where a corner started that it may come back to
+FEWEST = {"location": 4, "rotation": 5, "scale": 5}  # corners that must agree
+_QUALITY = 0.01  # the least quality of a corner, as a share of the best one's
+_WEAKEST = 2e-4  # the least quality of any corner; noise of a few levels has less
+_LEVELS = 3  # motions up to about 2 ** _LEVELS half windows are found
+_WINDOWS = 9, 21  # sides of the compared windows in pixels, for small and large parts
+_UNTIL = 3, 30, 0.01  # OpenCV's criteria: 30 steps, or a step below 0.01 pixels
+_THERE_AND_BACK = 1.0  # pixels by which a corner that is traced back may miss its start
 _HYPOTHESES = 300
-_SOUGHT = 64  # pixels to which a part is made smaller to be sought, or compared as a whole
-ALIKE = 0.6  # the correlation from which on something else may be taken for a part
-_NOWHERE = -2.0  # in place of a correlation, where no part has room
-_RIVAL = 0.85  # of its own likeness, from which on something else may be it as well
-_TRACED = 13  # side of the windows by which points are traced through pictures
-_NOISE = 16.0  # levels² of contrast that noise may have: they make no two pictures unlike
-# Beyond these the motion between two pictures is none that a film has.
+_SOUGHT = 64  # the size in pixels of a part that is searched for or compared as a whole
+ALIKE = 0.6  # the correlation from which on something else may be confused with a part
+_NOWHERE = -2.0  # instead of a correlation, where a part has no room
+_RIVAL = 0.85  # the share of its own likeness from which on something else may be the part
+_TRACED = 13  # the side of the windows that trace points through pictures
+_NOISE = 16.0  # contrast in levels² that may be noise, and does not make pictures unlike
+# The largest scale and turn between two pictures of a film.
 _MOST_SCALE, _MOST_TURN = 1.5, 0.8
 
 
 def distances(mask: np.ndarray) -> np.ndarray:
-    """How far in pixels each pixel lies from where a mask (H, W) bool is true."""
+    """Return the distance of each pixel, in pixels, from where a mask (H, W) bool is true."""
     return cv2.distanceTransform((~mask).astype(np.uint8), cv2.DIST_L2, 0)
 
 
 @dataclass(frozen=True)
 class Match:
-    """Where a part of a picture is in another one.
+    """The place of a part in another picture.
 
-    motion: from its picture to the other; agreeing: which of its corners move so (n,) bool, of those `seen` (n,) bool
-    share: of the corners' weight, of those that lie in the picture, that moves so
-    visible: share of the corners' weight that lies in the picture
-    error: pixels by which the part's farthest point is expected to be off
-    likeness: correlation of its pixels with those found, −1 to 1
-    held: where the corners that agree are in the other picture"""
+    Attributes:
+        motion: from the part's picture to the other one
+        agreeing: (n,) bool, the corners with this motion
+        seen: (n,) bool, the corners inside the picture
+        share: the agreeing share of the weight of the corners in the picture
+        visible: the share of the corners' weight inside the picture
+        error: the expected error of the part's farthest point in pixels
+        held: the places of the agreeing corners in the other picture
+        likeness: the correlation of the part's pixels with the picture, −1 … 1
+    """
 
     motion: Similarity
     agreeing: np.ndarray
@@ -65,13 +69,15 @@ class Match:
 
 
 class Part:
-    """What is looked for: a part of a picture, and its corners.
-
-    Weights of the corners say how much each one counts; `learn` lowers those of corners that move otherwise, as
-    those of the background do."""
+    """A part of a picture with weighted corners. `learn` lowers the weights of corners of the background."""
 
     def __init__(self, picture: np.ndarray, weight: np.ndarray) -> None:
-        """weight: (H, W) float32, 0 to 1: how much each pixel belongs to it; there has to be one above 0."""
+        """Take a part of a picture.
+
+        Args:
+            picture: (H, W) uint8
+            weight: (H, W) float32, 0 … 1: how much each pixel belongs to the part; not 0 everywhere
+        """
         self.weight, self._whole = weight, picture
         x, y, width, height = cv2.boundingRect((weight > 0).astype(np.uint8))
         self.box = x, y, width, height
@@ -90,9 +96,9 @@ class Part:
         self._ends = np.array([complex(a, b) for a in (x, x + width) for b in (y, y + height)])
 
     def find(self, picture: np.ndarray, guess: Similarity, motion: Motion) -> Match | None:
-        """Where it is in a picture, near to a guess. None: its corners are not found there, or do not agree."""
+        """Find the part in a picture, near a guess. None: its corners are not found there, or do not agree."""
         match = self._match(picture, guess, motion)
-        for _ in range(2):  # where the guess was far off, what was found is a better one
+        for _ in range(2):  # after a bad guess, start again from what was found
             if match is None or np.abs(match.motion(self._ends) - guess(self._ends)).max() < 2:
                 break
             guess = match.motion
@@ -100,14 +106,22 @@ class Part:
         return match and replace(match, likeness=self._likeness(picture, match.motion))
 
     def seek(self, picture: np.ndarray, known: Similarity, radius: float) -> Similarity | None:
-        """Where in a picture its pixels are most alike, turned and scaled as in `known`, within a radius of pixels of
-        where that puts it: a guess for `find`. None: there is no room for it in the picture."""
+        """Return the place in a picture that looks most like the part, as a guess for `find`.
+
+        Args:
+            picture: (H, W) uint8
+            known: where it was; turn and scale stay so
+            radius: the search radius in pixels
+
+        Returns:
+            None if there is no room for the part in the picture
+        """
         scores, alone, around = self._scores(picture, known, radius)
         _, likeness, _, best = cv2.minMaxLoc(scores)
         return None if likeness <= _NOWHERE else around.inverse().after(Similarity(1, complex(*best))).after(alone)
 
     def lookalike(self, picture: np.ndarray, known: Similarity) -> bool:
-        """Whether something elsewhere in a picture looks nearly as much like it as what `known` takes it to."""
+        """Return whether something elsewhere in a picture looks nearly as much like the part as its place `known`."""
         scores, _, _ = self._scores(picture, known, max(picture.shape))
         y, x = (length // 2 for length in scores.shape)
         apart = [max(1, round(_SOUGHT / 2 * length / max(self.box[2:]))) for length in self.box[2:]]
@@ -118,8 +132,12 @@ class Part:
     def _scores(
         self, picture: np.ndarray, known: Similarity, radius: float
     ) -> tuple[np.ndarray, Similarity, Similarity]:
-        """How like it places in a picture are, in its middle that where `known` has it, _NOWHERE beyond the picture;
-        the motions to the part by itself, and around its known place, both made smaller."""
+        """Correlate the part with a picture around a known place.
+
+        Returns:
+            The correlations, with the known place in their middle and _NOWHERE outside the picture; and the motions to
+            the reduced pictures of the part and of its surroundings
+        """
         x, y, width, height = self.box
         middle = complex(x + width / 2, y + height / 2)
         extent = abs(known.turn) * max(width, height)
@@ -139,15 +157,18 @@ class Part:
         return np.where(fits, scores, np.float32(_NOWHERE)), alone, around
 
     def rival(self, radius: float) -> float:
-        """How like it something beside it looks, up to 1: the highest correlation with its own picture displaced by up
-        to a radius of pixels, but for the hill around no displacement; 0: none is above ALIKE. Shading that is coarser
-        than the windows does not count, as it tells no corner from another."""
+        """Return how much the surroundings look like the part, up to 1.
+
+        It is the highest correlation with its own picture, displaced by up to `radius` pixels, outside the peak at no
+        displacement; 0 if none is above ALIKE. Shading that is coarser than the windows does not count, since it does
+        not distinguish corners.
+        """
         x, y, width, height = self.box
         room = round(radius)
         fine = self._whole - cv2.GaussianBlur(self._whole.astype(np.float32), (0, 0), _WINDOWS[1] / 2)
         place = cv2.copyMakeBorder(fine, room, room, room, room, cv2.BORDER_CONSTANT)
         place = place[y : y + height + 2 * room, x : x + width + 2 * room]
-        # a level of noise: what is flat is like nothing
+        # noise of a level, so that flat areas correlate with nothing
         place = place + np.random.default_rng(0).normal(0, 1, place.shape).astype(np.float32)
         part = place[room : room + height, room : room + width]
         weight = self.weight[y : y + height, x : x + width]
@@ -157,19 +178,18 @@ class Part:
         return float(scores[others].max(initial=0.0))
 
     def astray(self, picture: np.ndarray, known: Similarity) -> tuple[np.ndarray, np.ndarray]:
-        """Its corners that are found in a picture, around where a motion has them: where they were in its own, and how
-        many pixels each has moved otherwise."""
+        """Return the corners found in a picture, in their own picture, and their distances in pixels from `known`."""
         moved, good = self._flow(picture, known)
         good &= inside(picture, known(self.points))
         return self.points[good], np.abs(moved - self.points)[good]
 
     def again(self, picture: np.ndarray, motion: Similarity) -> Part | None:
-        """The part as it looks in another picture after a motion; None: it is not in it."""
+        """Return the part as it looks in another picture after a motion, or None if it is outside."""
         weight = cv2.warpAffine(self.weight, matrix(motion), picture.shape[::-1])
         return Part(picture, weight) if (weight > 0).any() else None
 
     def learn(self, match: Match) -> None:
-        """Takes in which corners move with the part, and which do not."""
+        """Adapt the weights of corners to whether they move with the part."""
         wanted = self._weights * np.where(match.agreeing, 1.0, 0.05)
         self._believed += np.where(match.seen, 0.2 * (wanted - self._believed), 0)
 
@@ -199,14 +219,14 @@ class Part:
         )
 
     def _flow(self, picture: np.ndarray, guess: Similarity) -> tuple[np.ndarray, np.ndarray]:
-        """Where each corner is in a picture that is taken back by a guess, and whether it comes back from there."""
+        """Trace each corner into a picture that is moved back by a guess, and whether it can be traced back."""
         size, flags = self._picture.shape[::-1], cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP
         back = cv2.warpAffine(picture, matrix(guess, self._origin), size, flags=flags)
         there, is_good = _there_and_back(self._picture, back, self.points - self._origin, self._side)
         return there + self._origin, is_good
 
     def _likeness(self, picture: np.ndarray, motion: Similarity) -> float:
-        """Correlation of the part's pixels with those in another picture, as far as they lie in it; both smaller."""
+        """Return the correlation of the reduced part with another picture, as far as it is inside."""
         x, y, width, height = self.box
         share = min(1.0, _SOUGHT / max(width, height))
         size = max(1, round(share * width)), max(1, round(share * height))
@@ -218,9 +238,16 @@ class Part:
 
 
 def traced(pictures: Sequence[np.ndarray], points: np.ndarray, step: np.ndarray) -> np.ndarray:
-    """Where points (n,) of the first picture are in the last one, by flow from each picture to the next; NaN: lost.
+    """Return the places in the last picture of points (n,) in the first one, by flow from picture to picture.
 
-    step: (n,) how they may move up to the second picture; they go on like that, more or less"""
+    Args:
+        pictures: (H, W) uint8 each
+        points: (n,)
+        step: (n,) a guess of their motion to the second picture
+
+    Returns:
+        (n,), NaN for lost points
+    """
     places = np.full(len(points), complex(np.nan, np.nan))
     left = np.arange(len(points))
     reach = _SOUGHT + len(pictures) * int(np.abs(step).max())
@@ -240,9 +267,15 @@ def traced(pictures: Sequence[np.ndarray], points: np.ndarray, step: np.ndarray)
 def _there_and_back(
     first: np.ndarray, second: np.ndarray, points: np.ndarray, side: int, step: np.ndarray | None = None
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Where points (n,) of a picture are in another one, and whether they come back from there (n,) bool.
+    """Return the places of points (n,) in another picture, and whether they can be traced back (n,) bool.
 
-    side: of the windows that are compared, in pixels; step: (n,) how they may move"""
+    Args:
+        first: (H, W) uint8
+        second: (H, W) uint8
+        points: (n,) in `first`
+        side: of the compared windows in pixels
+        step: (n,) a guess of their motion
+    """
     ways = None, None, (side, side), _LEVELS, _UNTIL, cv2.OPTFLOW_USE_INITIAL_FLOW
     start = _pairs(points)
     guess = start.copy() if step is None else _pairs(points + step)
@@ -253,7 +286,7 @@ def _there_and_back(
 
 
 def correlation(first: np.ndarray, second: np.ndarray, weight: np.ndarray) -> float:
-    """Correlation of two pictures, −1 to 1, each pixel by its weight; contrast that noise may have counts for none."""
+    """Return the weighted correlation of two pictures, −1 … 1. Contrast that may be noise does not count."""
     total = float(weight.sum(dtype=np.float64))
     if total <= 0:
         return 0.0
@@ -269,8 +302,18 @@ def correlation(first: np.ndarray, second: np.ndarray, weight: np.ndarray) -> fl
 def fit(
     source: np.ndarray, target: np.ndarray, weights: np.ndarray, motion: Motion, tolerance: float
 ) -> tuple[Similarity, np.ndarray] | None:
-    """The similarity close to none that takes most weight of the source's points to the target's within a tolerance in
-    pixels, and which points (n,) bool; None: too few agree. By RANSAC, then by least squares."""
+    """Fit a similarity to pairs of points by RANSAC, then by least squares.
+
+    Args:
+        source: (n,)
+        target: (n,)
+        weights: (n,)
+        motion: what may change
+        tolerance: in pixels
+
+    Returns:
+        The similarity, and which points agree (n,) bool. None: too few agree.
+    """
     usable = np.flatnonzero(weights > 0)
     if len(usable) < FEWEST[motion]:
         return None
@@ -292,7 +335,7 @@ def fit(
 
 
 def _hypotheses(p: np.ndarray, q: np.ndarray, motion: Motion) -> tuple[np.ndarray, np.ndarray]:
-    """Turns and shifts (k,) of similarities, each by one or two pairs of points."""
+    """Return turns and shifts (k,) of similarities, each from one or two pairs of points."""
     count = len(p)
     shifts = (q - p)[:: -(-count // _HYPOTHESES)]
     if motion == "location":
@@ -314,7 +357,7 @@ def _hypotheses(p: np.ndarray, q: np.ndarray, motion: Motion) -> tuple[np.ndarra
 
 
 def least_squares(p: np.ndarray, q: np.ndarray, weights: np.ndarray, motion: Motion) -> Similarity:
-    """The best similarity between points, by complex regression."""
+    """Return the best similarity between points, by complex regression."""
     total = weights.sum()
     middle, target = (weights * p).sum() / total, (weights * q).sum() / total
     turn = 1 + 0j
@@ -330,8 +373,10 @@ def least_squares(p: np.ndarray, q: np.ndarray, weights: np.ndarray, motion: Mot
 def _expected_error(
     points: np.ndarray, off: np.ndarray, weights: np.ndarray, ends: np.ndarray, motion: Motion
 ) -> float:
-    """Standard error in pixels, where it is largest, of a motion that was fitted to points which it leaves off by so
-    much. Corners beside one another err alike: only every fourth counts as one by itself."""
+    """Return the largest standard error, in pixels, of a fitted motion at the part's ends.
+
+    Errors of close corners are correlated, so four corners count as one.
+    """
     count = max(len(points) / 4, 1.0)
     variance = float((weights * off**2).sum() / weights.sum()) / count
     if motion == "location":
@@ -343,7 +388,7 @@ def _expected_error(
 
 
 def _corners(picture: np.ndarray, weight: np.ndarray) -> np.ndarray:
-    """The corners (n,) in the part of a picture whose weight is above 0, more than noise and apart from one another."""
+    """Return the corners (n,) where the weight is above 0. They are stronger than noise, and not too close."""
     mask = (weight > 0).astype(np.uint8)
     apart = max(3.0, np.sqrt(mask.sum() / MOST_CORNERS) * 0.6)
     strength = cv2.cornerMinEigenVal(picture, 5)
@@ -353,7 +398,7 @@ def _corners(picture: np.ndarray, weight: np.ndarray) -> np.ndarray:
 
 
 def plane(places: np.ndarray) -> np.ndarray:
-    """Points (…, 2) as complex numbers (n,)."""
+    """Return points (…, 2) as complex numbers (n,)."""
     x, y = places.reshape(-1, 2).astype(np.float64).T
     return x + 1j * y
 
@@ -363,14 +408,14 @@ def _pairs(points: np.ndarray) -> np.ndarray:
 
 
 def inside(picture: np.ndarray, points: np.ndarray, margin: float = 0) -> np.ndarray:
-    """Which points (n,) lie in a picture (H, W), a margin in pixels away from its edges (n,) bool."""
+    """Return which points (n,) are inside a picture (H, W), at least `margin` pixels from its edges."""
     height, width = picture.shape
     across = (points.real >= margin) & (points.real < width - margin)
     return across & (points.imag >= margin) & (points.imag < height - margin)
 
 
 def matrix(motion: Similarity, origin: complex = 0) -> np.ndarray:
-    """OpenCV's (2, 3) of a motion that begins in a picture cropped to `origin`."""
+    """Return OpenCV's (2, 3) matrix of a motion from a picture that is cropped at `origin`."""
     shift = motion(origin)
     turn = motion.turn
     return np.array([[turn.real, -turn.imag, shift.real], [turn.imag, turn.real, shift.imag]])

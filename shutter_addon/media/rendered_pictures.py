@@ -1,10 +1,10 @@
-"""Files that have been written: whether they are whole, for a full disk leaves them short, and Blender does not always
-say so; and what pictures of a render are of."""
+"""Checks of written files: whether they are complete, since Blender does not always report a full disk; and which edit
+a rendered picture belongs to."""
 
 import os
 import struct
 import zlib
-from contextlib import suppress
+from contextlib import closing, suppress
 from pathlib import Path
 from typing import NamedTuple
 
@@ -13,16 +13,22 @@ from OpenImageIO import ImageInput, geterror
 from ..core.farm import job_file
 from .files import check_name, pyav_missing
 
-UNKNOWN = "nothing says why"  # why a file is short
+UNKNOWN = "the cause is unknown"  # why a file is cut off
 _PNG_END = b"IEND\xaeB`\x82"
-_BLEND_END = 32  # bytes of its last block
+_BLEND_END = 32  # bytes of the last block
 _ZSTD_TABLE_END = b"\xb1\xea\x92\x8f"
 _SIGNATURE = b"\x89PNG\r\n\x1a\n"
 
 
 class RenderedPicture(NamedTuple):
-    """size: width and height in pixels; channels: how many; samples: as "uint16"
-    edit: the key of the edit's version (core.farm.job_file); None: the picture has none"""
+    """A rendered picture.
+
+    Attributes:
+        size: (width, height)
+        channels: their number
+        samples: their type, such as "uint16"
+        edit: the key of the edit's version (core.farm.job_file), or None
+    """
 
     size: tuple[int, int]
     channels: int
@@ -31,11 +37,15 @@ class RenderedPicture(NamedTuple):
 
 
 def read(path: Path, edit: str | None = None) -> RenderedPicture | None:
-    """What a PNG or EXR file holds; None: there is none, or it is damaged. A PNG's checksums are compared. An EXR is
-    decoded, which finds damage of its pixels where ZIP or ZIPS made these smaller, whose streams have checksums; of
-    other codecs, and of noise, only that something is missing or cannot be decoded.
+    """Return the facts of a PNG or EXR file, or None if it is missing or damaged.
 
-    edit: the key of an edit's version; None too, and little is read, of pictures of another"""
+    A PNG's checksums are compared. An EXR is decoded: ZIP and ZIPS have checksums. With other codecs, only missing data
+    and errors of decoding are found.
+
+    Args:
+        path: the file
+        edit: the key of an edit's version. Pictures of others give None, and are not decoded.
+    """
     image = ImageInput.open(check_name(path)) if path.is_file() else None
     if image is None:
         geterror()
@@ -50,15 +60,14 @@ def read(path: Path, edit: str | None = None) -> RenderedPicture | None:
             return None
         size = spec.width, spec.height
         return RenderedPicture(size=size, channels=spec.nchannels, samples=str(spec.format), edit=key)
-    except (OSError, UnicodeDecodeError):  # the latter of names in a damaged file
+    except (OSError, UnicodeDecodeError):  # UnicodeDecodeError: of names in a damaged file
         return None
     finally:
         image.close()
 
 
 def stamp(path: Path) -> tuple[int, int, int] | None:
-    """What changes when a picture is replaced; None: there is none. It is opened, as network drives tell the news
-    then."""
+    """Return a value that changes when a picture is replaced, or None. Opening it makes network drives look again."""
     try:
         with path.open("rb") as file:
             status = os.fstat(file.fileno())
@@ -68,20 +77,18 @@ def stamp(path: Path) -> tuple[int, int, int] | None:
 
 
 def is_transparent(path: Path) -> bool:
-    """Whether a pixel of a picture, whose last channel is alpha, is not opaque; False where it cannot be read."""
+    """Return whether any pixel is not opaque. The last channel is alpha. False if the picture cannot be read."""
     image = ImageInput.open(check_name(path))
     if image is None:
         return False
-    try:
+    with closing(image):
         last = image.spec().nchannels - 1
         alpha = image.read_image(0, 0, last, last + 1, "float")
         return alpha is not None and bool(alpha.min() < 1)
-    finally:
-        image.close()
 
 
 def _is_sound_png(path: Path) -> bool:
-    """Whether the file is a PNG whose chunks all match their checksums, to the last one."""
+    """Return whether a file is a complete PNG whose chunks match their checksums."""
     data, place, name = memoryview(path.read_bytes()), len(_SIGNATURE), b""
     if data[:place] != _SIGNATURE:
         return False
@@ -97,7 +104,7 @@ def _is_sound_png(path: Path) -> bool:
 
 
 def is_whole_picture(path: Path) -> bool:
-    """Whether a PNG or EXR file is complete, by its end alone."""
+    """Return whether a PNG or EXR file is complete, judged by its end."""
     if path.suffix.lower() == ".png":
         with path.open("rb") as file:
             file.seek(max(0, path.stat().st_size - len(_PNG_END)))
@@ -112,14 +119,14 @@ def is_whole_picture(path: Path) -> bool:
 
 
 def is_whole_movie(path: Path, count: int) -> bool:
-    """Whether a movie holds that many pictures, without decoding them; without PyAV, whether there is anything."""
+    """Return whether a movie has `count` pictures, without decoding. Without PyAV: whether the file is not empty."""
     if pyav_missing():
         return path.is_file() and path.stat().st_size > 0
     return whole_pictures(path) >= count
 
 
 def whole_pictures(path: Path) -> int:
-    """How many pictures a movie holds, without decoding them; 0: it cannot be read, or PyAV is missing."""
+    """Return the number of a movie's pictures, without decoding. 0: it cannot be read, or PyAV is missing."""
     if pyav_missing():
         return 0
     import av
@@ -132,7 +139,7 @@ def whole_pictures(path: Path) -> int:
 
 
 def is_whole_blend(path: Path) -> bool:
-    """Whether a .blend file is complete, by its end alone: its last block, or the table behind compressed ones."""
+    """Return whether a .blend file is complete, judged by its last block or by the table after compressed blocks."""
     with path.open("rb") as file:
         file.seek(max(0, path.stat().st_size - _BLEND_END))
         end = file.read()
@@ -140,7 +147,7 @@ def is_whole_blend(path: Path) -> bool:
 
 
 def why_short(folder: Path) -> str:
-    """Why files in a folder may have been cut short: what the system says to another file there."""
+    """Return why files in a folder may be cut off: the error of writing another file there."""
     probe = folder / "probe"
     try:
         probe.write_bytes(bytes(1 << 20))

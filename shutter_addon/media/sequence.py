@@ -1,4 +1,4 @@
-"""Frames of an image sequence, or of one image: the samples that the files hold, whatever their format."""
+"""Image sequences and single images: the samples of their files."""
 
 import itertools
 import re
@@ -14,7 +14,7 @@ from ..core.frames.frame_source import FrameSource
 from .errors import MediaError
 from .files import FOREIGN, check_file, check_index, check_name, check_size, stamp
 
-# Those that every picture has, whatever its file calls them.
+# The channels that every picture has, whatever their names in the file.
 CHANNELS = {
     "luminance": slice(0, 3),
     "red": slice(0, 1),
@@ -22,38 +22,38 @@ CHANNELS = {
     "blue": slice(2, 3),
     "alpha": slice(3, 4),
 }
-_TOLD = 6  # channels of a file that a sentence names
-# Blender takes these for scene linear, even logarithmic DPX, and every other format for sRGB, even float TIFF.
+_TOLD = 6  # channels that a message names
+# In Blender, these are scene linear, even logarithmic DPX. All other formats are sRGB, even float TIFF.
 LINEAR_SUFFIXES = frozenset({".exr", ".hdr", ".rgbe", ".dpx", ".cin"})
 OTHER_SUFFIXES = ".png .jpg .jpeg .jpe .tif .tiff .tga .bmp .webp .jp2 .j2k .j2c .psd .sgi .rgb .rgba .bw"
 IMAGE_SUFFIXES = LINEAR_SUFFIXES.union(OTHER_SUFFIXES.split())
 WITHOUT_ALPHA = frozenset({".jpg", ".jpeg", ".jpe", ".hdr", ".rgbe"})
 SAMPLES = {"uint8": np.uint8, "uint16": np.uint16, "half": np.float16}  # all others are read as float
 BLENDERS_FORMATS = "openexr hdr dpx cineon png jpeg tiff targa bmp webp jpeg2000 psd sgi dds"
-ALPHA = 2, 4  # channels of colours with alpha: YA, RGBA
-COLOURS = ("RGBA", "RGB"), ("XYZA", "XYZ"), ("YA", "Y")  # in an EXR; those before go before
-NO_GREY = frozenset({"X", "BY", "RY"})  # beside these, Y is not all of the picture
+ALPHA = 2, 4  # the numbers of channels with alpha: YA, RGBA
+COLOURS = ("RGBA", "RGB"), ("XYZA", "XYZ"), ("YA", "Y")  # of an EXR, in order of preference
+NO_GREY = frozenset({"X", "BY", "RY"})  # with these, Y is not the whole picture
 _VERSION = re.compile(r"(?<![a-z])v[0-9]{1,3}$", re.IGNORECASE)
-MISSING = 100  # numbers in a row; what lies beyond a wider gap is another sequence, or a stray number
+MISSING = 100  # the most missing numbers in a row; files after a wider gap belong to another sequence
 LONGEST = 1_048_574  # Blender's last frame
 
 Window = tuple[int, int, int, int]  # x, y, width, height
-_Parts = tuple[str, str, str]  # of a file's stem: what is before a number, its digits, what is behind it
-Layer = tuple[ImageSpec, list[int]]  # what describes a part of an image, and the positions of channels in it
+_Parts = tuple[str, str, str]  # a file's stem: before a number, its digits, after it
+Layer = tuple[ImageSpec, list[int]]  # the spec of a part of an image, and positions of channels in it
 
 
 class _Sequence(FrameSource):
-    """The files of an image sequence, as frames.
+    """The files of an image sequence as frames.
 
-    Found beside its first file, frame i is the file whose number is i above the first's; where a number is missing,
-    the file before it holds. Where more than MISSING in a row are, the sequence ends, and `left_out` says so. With
-    `files` (an image strip's list) frame i is files[i].
+    With `files` (an image strip's list), frame i is files[i]. Else files are found beside the first one, and frame i is
+    the file whose number is i higher. If a number is missing, the file before it is repeated. If more than MISSING are
+    missing in a row, the sequence ends, and `left_out` tells so.
     """
 
     fps = None
 
     def __init__(self, path: str | Path, files: Sequence[str | Path] | None) -> None:
-        """MediaError: there is no first file, or its folder cannot be listed."""
+        """Find the files; raise MediaError if the first one is missing or its folder cannot be listed."""
         path = Path(path)
         if files is None:
             self.path = check_file(path)
@@ -73,23 +73,23 @@ class _Sequence(FrameSource):
         self.count = len(self.files)
 
     def _file(self, index: int) -> Path:
-        """MediaError: it is missing. IndexError: there is no such frame."""
+        """Return a frame's file; raise MediaError if it is missing, IndexError if there is no such frame."""
         check_index(self, index)
         return check_file(self.files[index])
 
     def _check_size(self, path: Path, size: tuple[int, int], window: str = "") -> None:
-        """MediaError unless it is the first one's."""
+        """Raise MediaError if a file's size differs from the first one's."""
         if size != (self.width, self.height):
             first = f"{self.path.name} is {self.width}×{self.height}"
             raise MediaError(f"{path.name}: is {size[0]}×{size[1]}{window}, but {first}")
 
 
 class SequenceSource(_Sequence):
-    """Images as frames: see _Sequence for which file is which frame.
+    """Images as frames (see _Sequence).
 
-    Samples are as stored: straight alpha stays straight, EXIF orientation is left alone, and of an EXR the data window
-    is the picture, wherever its display window lies; all as in Blender. All frames must have the first one's size and
-    sample type; one with alpha among them, and the source has alpha.
+    As in Blender, samples are not changed: straight alpha stays straight, EXIF orientation is ignored, and the picture
+    of an EXR is its data window. All frames must have the first one's size and sample type. The source has alpha if any
+    frame has.
     """
 
     def __init__(
@@ -106,7 +106,7 @@ class SequenceSource(_Sequence):
         self.options = {}
 
     def read(self, index: int) -> np.ndarray:
-        """MediaError: the file is missing, damaged or unlike the first."""
+        """Return the frame; raise MediaError if the file is missing, damaged or unlike the first."""
         path = self._file(index)
         with _opened(path) as (image, spec, layer):
             size, dtype = (spec.width, spec.height), _dtype(spec)
@@ -117,13 +117,13 @@ class SequenceSource(_Sequence):
             return expanded(_samples(image, spec, layer, path))
 
     def _usual_alpha(self) -> str:
-        """What Blender assumes, whatever a TIFF says of itself."""
+        """Return what Blender assumes. It ignores what a TIFF tells."""
         deep_tiff = self.path.suffix.lower() in (".tif", ".tiff") and self.dtype == np.uint16
         return "premultiplied" if self.transfer == "linear" or deep_tiff else "straight"
 
 
 def expanded(samples: np.ndarray) -> np.ndarray:
-    """Y, YA, RGB or RGBA samples (height, width, n) as RGBA, of new memory."""
+    """Return Y, YA, RGB or RGBA samples (height, width, n) as RGBA in new memory."""
     height, width, channels = samples.shape
     picture = np.empty((height, width, 4), samples.dtype)
     picture[..., :3] = samples[..., : 1 if channels < 3 else 3]
@@ -133,25 +133,29 @@ def expanded(samples: np.ndarray) -> np.ndarray:
 
 
 class SequenceChannel(_Sequence):
-    """One channel of the images of a sequence: see _Sequence for which file is which frame.
+    """A channel of the images of a sequence (see _Sequence), with its stored samples of any type.
 
-    Samples are as stored, of any type. All frames must have the first one's size. An EXR's picture is its display
-    window, since mattes are often cropped to what they cover: what its data window leaves out is 0. Where that is
-    larger all around, it is the picture, as in Blender.
+    All frames must have the first one's size. An EXR's picture is its display window, 0 outside its data window,
+    because mattes are often cropped to what they cover. If the data window is larger on all sides, it is the picture,
+    as in Blender.
     """
 
     def __init__(self, path: str | Path, channel: str, *, files: Sequence[str | Path] | None = None) -> None:
-        """channel: one of CHANNELS, or the name of one of the files' own. MediaError: they have none of that name."""
+        """Open a channel: one of CHANNELS, or a name in the files. Raise MediaError if there is none."""
         super().__init__(path, files)
         self._layer_of = partial(_channel_named, channel)
         with _opened(self.path, self._layer_of) as (image, spec, _positions):
             _, _, self.width, self.height = _picture_window(image, spec, self.path)
 
     def read(self, index: int) -> np.ndarray:
-        """The samples (height, width, n) that the channel is made of, top row first: n is 3, RGB, for the luminance of
-        colours, 0 for the alpha of an opaque image, 1 otherwise.
+        """Return the channel's samples (height, width, n), top row first.
 
-        Raises MediaError for a file that is missing, damaged or unlike the first, IndexError outside 0 … count-1."""
+        n is 3 (RGB) for the luminance of colors, 0 for the alpha of an opaque image, else 1.
+
+        Raises:
+            MediaError: the file is missing, damaged or unlike the first
+            IndexError: there is no such frame
+        """
         path = self._file(index)
         with _opened(path, self._layer_of) as (image, spec, positions):
             window = _picture_window(image, spec, path)
@@ -162,7 +166,7 @@ class SequenceChannel(_Sequence):
 
 
 def _picture_window(image: ImageInput, spec: ImageSpec, path: Path) -> Window:
-    """(x, y, width, height) of what a SequenceChannel shows of an image."""
+    """Return the window (x, y, width, height) of an image that a SequenceChannel shows."""
     if image.format_name() != "openexr" or spec.roi.contains(spec.roi_full):
         return spec.x, spec.y, spec.width, spec.height
     check_size(path.name, spec.full_width, spec.full_height)
@@ -170,7 +174,7 @@ def _picture_window(image: ImageInput, spec: ImageSpec, path: Path) -> Window:
 
 
 def _in_window(samples: np.ndarray, spec: ImageSpec, window: Window) -> np.ndarray:
-    """An image's samples in a window (x, y, width, height), 0 beside them."""
+    """Return an image's samples in a window (x, y, width, height), 0 outside the image."""
     x, y, width, height = window
     if window == (spec.x, spec.y, spec.width, spec.height):
         return samples
@@ -182,14 +186,15 @@ def _in_window(samples: np.ndarray, spec: ImageSpec, window: Window) -> np.ndarr
 
 
 def sequence_files(path: Path) -> list[Path]:
-    """The files of the sequence that starts with a file. MediaError: there is no such file, or its folder cannot be
-    listed."""
+    """Return the files of the sequence that starts with a file; raise MediaError if there is none."""
     return [*_numbered(check_file(path))[0].values()]
 
 
 def _numbered(path: Path) -> tuple[dict[int, Path], Path | None]:
-    """The files by frame from that file on, which is frame 0: those that differ in the frame number only; and the file
-    beyond too wide a gap, or None."""
+    """Return the files that differ only in the frame number, by frame, and the first one after too wide a gap, or None.
+
+    The given file is frame 0.
+    """
     parts, alike = _frame_number(path)
     if parts is None:
         return {0: path}, None
@@ -208,14 +213,20 @@ def _numbered(path: Path) -> tuple[dict[int, Path], Path | None]:
 
 
 def numbered_alike(path: Path) -> list[Path]:
-    """The files in a file's folder, in order, whose name differs from its own in the frame number only, if at all.
-    MediaError: the folder cannot be listed."""
+    """Return the sorted files of a folder whose names differ at most in the frame number.
+
+    Raises:
+        MediaError: the folder cannot be listed
+    """
     return _frame_number(path)[1]
 
 
 def _frame_number(path: Path) -> tuple[_Parts | None, list[Path]]:
-    """Where a file's name has its frame number, and the files in its folder that differ there only: the last number
-    that varies between them, though a version (v3) only where no other does; where none does, the last."""
+    """Return where a file's name has its frame number, and the files in its folder that differ only there.
+
+    It is the last number that varies between them; a version (v3) counts only if no other varies. If none varies, it is
+    the last number.
+    """
     numbers = _numbers(path.stem)
     if not numbers:
         return None, [path] if path.exists() else []
@@ -230,16 +241,20 @@ def _frame_number(path: Path) -> tuple[_Parts | None, list[Path]]:
 
 
 def _numbers(stem: str) -> list[_Parts]:
-    """The numbers in a file's stem, the last one first."""
+    """Return the numbers in a file's stem, the last one first."""
     found = [(stem[: n.start()], n[0], stem[n.end() :]) for n in re.finditer(r"[0-9]+", stem)]
     return found[::-1]
 
 
 def by_number(path: Path, *, listed: bool = False) -> Callable[[int], Path] | None:
-    """A function that gives the file i numbers on from that one, in the same folder; None: its stem has no number.
+    """Return a function of i: the file whose number is i higher. None: the stem has no number.
 
-    listed: the files in the folder say which number counts (MediaError: it cannot be listed); else the last one does,
-    as in Blender's movie clips"""
+    Args:
+        path: the first file
+        listed: the folder's files decide which number counts (MediaError: it cannot be listed); else it is the last
+        one,
+            as in Blender's movie clips
+    """
     parts = _frame_number(path)[0] if listed else next(iter(_numbers(path.stem)), None)
     if parts is None:
         return None
@@ -255,12 +270,12 @@ def _listed(folder: Path) -> list[Path]:
 
 
 def _has_alpha(path: Path) -> bool:
-    """Whether that file of a sequence has alpha, as far as it can be read; it is opened only if it changed since."""
+    """Return whether a readable file has alpha. It is opened only if it has changed."""
     if path.suffix.lower() in WITHOUT_ALPHA:
         return False
     try:
         return path.is_file() and _had_alpha(path, stamp(path))
-    except (OSError, MediaError):  # who needs the frame is told
+    except (OSError, MediaError):  # reading the frame raises it
         return False
 
 
@@ -271,7 +286,7 @@ def _had_alpha(path: Path, _stamp: tuple[int, int] | None) -> bool:
 
 
 def _parts(image: ImageInput) -> Iterator[ImageSpec]:
-    """What describes each part of an image, which is the one that is read then."""
+    """Yield the spec of each part of an image, and select the part for reading."""
     for part in itertools.count():
         if not image.seek_subimage(part, 0):
             return
@@ -279,7 +294,7 @@ def _parts(image: ImageInput) -> Iterator[ImageSpec]:
 
 
 def _first_colours(image: ImageInput, path: Path) -> Layer:
-    """(spec, positions) of the channels that Blender shows."""
+    """Return the channels that Blender shows."""
     spec = whole = image.spec()
     if image.format_name() != "openexr":
         return spec, [*range(min(spec.nchannels, 4))]
@@ -295,8 +310,10 @@ def _first_colours(image: ImageInput, path: Path) -> Layer:
 
 
 def _channel_named(channel: str, image: ImageInput, path: Path) -> Layer:
-    """(spec, positions) of a channel: three for the luminance of colours, none for the alpha of an opaque image.
-    What an EXR calls "red" itself is that: coefficients have the names of shutters."""
+    """Return a channel: three positions for the luminance of colors, none for the alpha of an opaque image.
+
+    A channel of an EXR that is named "red" comes first: coefficients have the names of shutters.
+    """
     names: list[str] = []
     is_exr = image.format_name() == "openexr"
     for spec in _parts(image) if is_exr or channel not in CHANNELS else ():
@@ -313,8 +330,11 @@ def _channel_named(channel: str, image: ImageInput, path: Path) -> Layer:
 
 
 def _colour_channels(names: Iterable[str]) -> list[int]:
-    """Where an EXR keeps the colours that Blender shows: those of its first layer, there plain ones or "Combined"
-    before other passes; XYZ for want of colours, and then grey."""
+    """Return the positions of the colors that Blender shows of an EXR.
+
+    They belong to the first layer, and there to no pass or "Combined" before other passes. Without RGB, it is XYZ, then
+    grey.
+    """
     passes: dict[str, dict[str, int]] = {}
     for position, name in enumerate(names):
         place, _, channel = name.rpartition(".")
@@ -337,9 +357,10 @@ def _rank(place: str) -> tuple[str, bool, str]:
 def _opened(
     path: Path, layer_of: Callable[[ImageInput, Path], Layer] = _first_colours
 ) -> Iterator[tuple[ImageInput, ImageSpec, list[int]]]:
-    """(open image, spec, positions of channels). MediaError: there is no such image.
+    """Open an image with a layer of `layer_of`; raise MediaError if it cannot be read.
 
-    layer_of: gives spec and positions; those of the colours are Y, YA, RGB or RGBA"""
+    The layer's channels are Y, YA, RGB or RGBA, or those of a SequenceChannel.
+    """
     wishes = ImageSpec()
     wishes.attribute("oiio:UnassociatedAlpha", 1)  # no premultiplication on reading
     image = ImageInput.open(check_name(path), wishes)
@@ -351,7 +372,7 @@ def _opened(
         spec, layer = layer_of(image, path)
         check_size(path.name, spec.width, spec.height)
         yield image, spec, layer
-    except UnicodeDecodeError as error:  # names within a damaged file
+    except UnicodeDecodeError as error:  # names in a damaged file
         raise MediaError(f"{path.name}: cannot be read as an image ({_as_text(error)})") from None
     finally:
         image.close()
@@ -362,13 +383,13 @@ def _dtype(spec: ImageSpec) -> np.dtype:
 
 
 def _samples(image: ImageInput, spec: ImageSpec, layer: list[int], path: Path) -> np.ndarray:
-    """The layer's samples (height, width, channels)."""
+    """Return the layer's samples (height, width, channels)."""
     kind = str(spec.format) if str(spec.format) in SAMPLES else "float"
     first, stop = min(layer), max(layer) + 1
-    if image.format_name() != "openexr":  # they hold a pixel's channels together: some take longer than all
+    if image.format_name() != "openexr":  # channels are interleaved: reading some takes longer than reading all
         first, stop = 0, max(stop, min(spec.nchannels, 4))
     elif str(spec.channelformat(layer[0])) == "uint":
-        kind = "uint"  # whole numbers of an EXR stand for themselves
+        kind = "uint"  # whole numbers in an EXR are not scaled
     samples = image.read_image(image.current_subimage(), 0, first, stop, kind)
     if samples is None or image.has_error or samples.size != spec.height * spec.width * (stop - first):
         raise MediaError(f"{path.name}: cannot be decoded ({_told(image.geterror, path, 'its data are damaged')})")
@@ -377,7 +398,7 @@ def _samples(image: ImageInput, spec: ImageSpec, layer: list[int], path: Path) -
 
 
 def _told(geterror: Callable[[], str], path: Path, otherwise: str) -> str:
-    """What OpenImageIO says of an error in a file, for use inside a sentence; it may quote bytes that are no text."""
+    """Return OpenImageIO's message of an error in a file, for use inside a sentence. It may quote bytes."""
     try:
         text = geterror()
     except UnicodeDecodeError as error:
@@ -390,7 +411,7 @@ def _as_text(error: UnicodeDecodeError) -> str:
 
 
 def no_channel(path: Path, channel: str, names: Iterable[str]) -> MediaError:
-    """What is said where a file has no such channel, but others."""
+    """Return the error for a file without a channel, which names others."""
     names = list(names)
     others = len(names) - _TOLD
     told = ", ".join(names[:_TOLD]) + (f" and {others} others" if others > 0 else "")

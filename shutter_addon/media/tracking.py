@@ -1,7 +1,7 @@
-"""Following what a region covers through footage, from the frame at which it was drawn.
+"""Tracks what a region covers through footage, from the frame at which it was drawn. No bpy.
 
-Every frame is compared with the one that tracking started from, so that what is found does not drift; only where that
-fails, with the last one in which the subject was surely seen. No bpy.
+Each frame is compared with the first one, so that tracks do not drift. Only where that fails, it is compared with the
+last frame in which the subject was surely found.
 """
 
 from abc import ABC, abstractmethod
@@ -20,9 +20,9 @@ from .footage import Footage
 from .pursuit import PartPursuit, Sighting, distinctness
 from .registration import Part
 
-PATIENCE = 25  # frames for which a lost subject is looked for
+PATIENCE = 25  # frames for which a lost subject is searched
 
-# Why tracking ends before its last frame, and why it cannot begin.
+# Why tracking ends early, and why it cannot begin.
 SHOT_ENDS = "the shot ends here"
 FEW = "there are too few corners to follow"
 EMPTY = "the region has no strokes to follow"
@@ -30,22 +30,22 @@ OUTSIDE = "the region lies outside the picture"
 ALONE = "there is no other frame to track"
 NOT_SHOWN = "the frame lies outside what can be tracked"
 
-# Heights of the picture around a region within which corners are looked for, as far as there are not enough of them.
+# Distances from a region, in heights of the picture, within which corners are looked for until there are _ENOUGH.
 _REACHES = {"line": (0.015, 0.03, 0.06, 0.12, 0.24), "lasso": (0.0, 0.015, 0.03, 0.06, 0.12)}
 _ENOUGH = 14
-# So far from it corners still are its own, and so many have to be; what others may say of it, for they may belong to
-# something else.
+# The distance within which corners belong to the region, and how many must. With fewer, the confidence falls to _FAR.
 _NEAR, _ENOUGH_NEAR, _FAR = 0.03, 3, 0.3
 
 
 class TrackingError(MediaError, ValueError):
-    """Nothing can be tracked from there; the message is one sentence."""
+    """Nothing can be tracked. The message is one sentence."""
 
 
 @dataclass(frozen=True)
 class Tracked:
-    """Where a region is at a frame; confidence: 0 to 1. With a fault, a sentence, tracking ended before this frame, and
-    the frame is not to be keyed."""
+    """A region's placement at a frame, with its confidence 0 … 1.
+
+    With a fault (a sentence), tracking ended before this frame, which gets no keyframe."""
 
     frame: int
     placement: Placement
@@ -54,21 +54,23 @@ class Tracked:
 
 
 class Pursuit(Protocol):
-    """What is looked for in one frame after another.
+    """Follows something from frame to frame.
 
-    reason: why it was not found in the last one"""
+    Attributes:
+        reason: why it was not found in the last frame
+    """
 
     reason: str
 
     def next(self, frame: int) -> Sighting | None:
-        """Where it is in a frame; None: it is not there."""
+        """Return its motion to a frame, or None if it is not found."""
 
 
 class Track(ABC):
-    """How a subject is tracked, a region or the camera; for one `follow`."""
+    """Tracks a subject, a region or the camera. Call `follow` once."""
 
     def __init__(self, subject: Subject) -> None:
-        """subject: its placement is evaluated at the frame that tracking starts from, and at anchors."""
+        """Track a subject. Its placement is known at the first frame and at anchors."""
         self._subject = subject
         self._parts: dict[int, tuple[Part, float]] = {}
 
@@ -81,16 +83,24 @@ class Track(ABC):
         motion: Motion = "scale",
         anchors: Collection[int] = (),
     ) -> Iterator[Tracked]:
-        """Where it is at frames of the timeline, if it moves with what it covers at `start`: that frame itself, then
-        those behind it, then those before it.
+        """Yield placements at timeline frames: at `start`, then after it, then before it.
 
-        frames: all that may be tracked, `start` among them
-        motion: what changes beside the location: "rotation", or "scale" and rotation
-        anchors: frames whose placement is right as it is. Tracking ends at the nearest one on each side; what lies
-        between comes a second time then, blended with what is tracked back from there.
-        A direction that ends early ends with a Tracked that has a fault; where a gap is left on the way to an anchor,
-        there is one on each side of it. TrackingError, at once: nothing can be tracked from there.
-        MediaError, while it goes on: a frame cannot be read."""
+        A direction that ends early ends with a Tracked that has a fault. If a gap is left on the way to an anchor,
+        there is a fault on each side of it.
+
+        Args:
+            footage: the pictures
+            start: the first frame
+            frames: all frames that may be tracked, with `start`
+            motion: what changes: "location", also "rotation", or also "scale"
+            anchors: frames with correct placements. Tracking ends at the nearest one on each side. Frames in between
+            are
+                then yielded again, blended with tracking back from the anchor.
+
+        Raises:
+            TrackingError: at once, if nothing can be tracked
+            MediaError: while iterating, if a frame cannot be read
+        """
         self._footage, self._motion = footage, motion
         centres = {frame: self._subject.centre(frame) for frame in frames}
         self._centres = {frame: centre for frame, centre in centres.items() if centre is not None}
@@ -104,23 +114,26 @@ class Track(ABC):
         return self._both_ways(start, range(min(frames), max(frames) + 1), {*anchors} - {start})
 
     def part(self, frame: int) -> tuple[Part, float]:
-        """What is seen of the subject at a frame, and how surely its corners are those of the subject, up to 1.
-        TrackingError: there is nothing to follow."""
+        """Return the subject's part of a frame, and the confidence that its corners belong to it.
+
+        Raises:
+            TrackingError: there is nothing to follow
+        """
         if frame not in self._parts:
             self._parts[frame] = self._part(frame)
         return self._parts[frame]
 
     def _part(self, frame: int) -> tuple[Part, float]:
-        """As `part`, which keeps it."""
+        """Make the result of `part`, which caches it."""
         raise NotImplementedError
 
     def _check(self, frame: int) -> None:
-        """TrackingError: at that frame there is nothing to follow."""
+        """Raise TrackingError if there is nothing to follow at a frame."""
         self.part(frame)
 
     @abstractmethod
     def _pursuit(self, start: int) -> tuple[Pursuit, float]:
-        """The pursuit of what is seen at `start`, and what that is worth."""
+        """Return the pursuit of what `start` shows, and its confidence."""
 
     def _both_ways(self, start: int, frames: range, anchors: set[int]) -> Iterator[Tracked]:
         yield Tracked(frame=start, placement=self._subject.placement(start), confidence=1.0)
@@ -132,15 +145,15 @@ class Track(ABC):
                 yield from self._between(start, anchor)
 
     def _onward(self, start: int, frames: range) -> Iterator[Tracked]:
-        """Frames one after another, away from `start`, where no anchor waits."""
+        """Track away from `start` in a direction without an anchor."""
         return self._from(start, frames)
 
     def _placement(self, frame: int) -> Placement:
-        """Where it is at a frame that something is tracked from."""
+        """Return the placement at a frame where tracking starts."""
         return self._subject.placement(frame)
 
     def _between(self, start: int, anchor: int) -> Iterator[Tracked]:
-        """From `start` towards an anchor, and then blended with the way back from there."""
+        """Track from `start` to an anchor, then yield frames blended with tracking back."""
         step = 1 if anchor > start else -1
         there, back, faults = {}, {}, []
         for tracked in self._from(start, range(start + step, anchor, step)):
@@ -149,7 +162,7 @@ class Track(ABC):
             else:
                 there[tracked.frame] = tracked
                 yield tracked
-        if self._has_part(anchor):  # or what was found from the start alone has to do
+        if self._has_part(anchor):  # else only what was tracked from the start counts
             returning = list(self._from(anchor, range(anchor - step, start, -step)))
             back = {tracked.frame: tracked for tracked in returning if not tracked.fault}
             faults += [tracked for tracked in returning if tracked.fault]
@@ -161,13 +174,13 @@ class Track(ABC):
         yield from (fault for fault in faults if fault.frame not in there | back)
 
     def _from(self, start: int, frames: range) -> Iterator[Tracked]:
-        """Frames one after another, away from `start`."""
+        """Track frames in order, away from `start`."""
         self._footage.want(frames)
         pursuit, worth = self._pursuit(start)
         last, shown = Tracked(frame=start, placement=self._placement(start), confidence=1.0), start
         lost: list[int] = []
         for frame in frames:
-            self._footage.picture(frame)  # in the order in which they are read, before cuts are looked for
+            self._footage.picture(frame)  # frames are read in order before cuts are looked for
             if self._footage.cut(shown, frame):
                 fault = pursuit.reason if lost else SHOT_ENDS
                 yield Tracked(frame=(lost or [frame])[0], placement=last.placement, confidence=0.0, fault=fault)
@@ -199,8 +212,7 @@ class Track(ABC):
         return motions.unwound(moved, near)
 
     def _bridged(self, last: Tracked, seen: Tracked, lost: list[int]) -> Iterator[Tracked]:
-        """Frames at which the subject was not seen, on a straight way between those beside them, however the shape is
-        redrawn meanwhile."""
+        """Yield frames without the subject, on a straight path between their neighbors, whatever is redrawn."""
         for missing in lost:
             share = (missing - last.frame) / (seen.frame - last.frame)
             centre = (1 - share) * self._centres[last.frame] + share * self._centres[seen.frame]
@@ -210,12 +222,12 @@ class Track(ABC):
 
 
 class RegionTrack(Track):
-    """Tracks what a region covers, whose drawings are evaluated at all of the frames."""
+    """Tracks what a region covers."""
 
     _subject: Region
 
     def _part(self, frame: int) -> tuple[Part, float]:
-        """Corners far from the region are less surely its own; those of a pattern may be those of its next period."""
+        """See Track. Corners far from the region may belong to something else; so may those of a repeated pattern."""
         shape, (width, height) = self._subject.at(frame), self._footage.size
         covered = scribbles.rasterise([replace(shape, shutter=0)], width, height) > 0
         if not covered.any():
@@ -236,13 +248,16 @@ class RegionTrack(Track):
 
 
 def _falloff(away: np.ndarray, reach: float) -> np.ndarray:
-    """How much pixels count that are so far away from a region, 0 to 1 float32; none beyond the reach."""
+    """Return the weights of pixels, 0 … 1 float32, from their distance to a region; 0 beyond the reach."""
     return np.where(away <= reach, np.exp(-2 * (away / max(reach, 1e-9)) ** 2), 0).astype(np.float32)
 
 
 def _blended(first: Tracked | None, second: Tracked | None, share: float) -> Tracked | None:
-    """What two ways say of a frame, a share of the way from the first one's start to the second one's; the surer one
-    counts for more. None: neither says anything."""
+    """Blend two results for a frame by their confidence, and by the share of the way from the first start to the
+    second.
+
+    None: there is neither.
+    """
     if first is None or second is None:
         return first or second
     weights = (1 - share) * (first.confidence + 1e-3), share * (second.confidence + 1e-3)

@@ -3,18 +3,17 @@
 from types import SimpleNamespace
 
 import pytest
-from support import sequencer
 
-from shutter_addon.blender.data import fcurves, selection
+from shutter_addon.blender.data import fcurves
 from shutter_addon.blender.editing import region_edits
 from shutter_addon.blender.interface import menus
 
 
 class Recorder:
-    """Stands for Blender's layout, which only a window has: it notes the operators and menus that are put into it."""
+    """Stands for Blender's layout, which only a window has: it notes what is put into it."""
 
     def __init__(self):
-        self.operators, self.menus = [], []
+        self.operators, self.menus, self.properties = [], [], []
 
     def operator(self, name, **_look):
         self.operators.append(name)
@@ -35,6 +34,7 @@ class Recorder:
 
     def prop(self, data, name, **_look):
         assert name in data.bl_rna.properties
+        self.properties.append(name)
 
     prop_menu_enum = prop
 
@@ -80,15 +80,7 @@ def test_a_region_is_moved_by_numbers_and_keyed_where_blender_keys_by_itself(bpy
     assert len(list(fcurves.curves_under(edit, region.path_from_id()))) == 4
 
 
-def test_a_pixel_is_probed_by_numbers(bpy, effect):
-    live = bpy.context.window_manager.virtual_shutter
-    with sequencer(bpy) as area:
-        area.spaces.active.view_type = "SEQUENCER_PREVIEW"
-        assert selection.in_picture(bpy.context) is not None
-        assert bpy.ops.shutter.probe_pixel(column=1, row=24) == {"FINISHED"}
-        assert live.probe
-        assert tuple(live.probe_at) == pytest.approx((0.5 / 40, 23.5 / 24))
-        with pytest.raises(RuntimeError, match="The picture has 40 × 24 pixels"):
-            bpy.ops.shutter.probe_pixel(column=41, row=1)
-    assert tuple(live.probe_at) == pytest.approx((0.5 / 40, 23.5 / 24))
-    live.probe = False
+def test_the_split_and_the_probe_are_moved_by_numbers_in_the_menu(bpy, effect):
+    recorder = Recorder()
+    bpy.types.SHUTTER_MT_of_preview.draw(SimpleNamespace(layout=recorder), bpy.context)
+    assert {"split", "probe", "probe_at"} <= set(recorder.properties)

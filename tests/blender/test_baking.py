@@ -355,7 +355,7 @@ def test_what_cannot_stand_in_is_refused(bpy, film, owner):
     scene, _effect, strip = film()
     if owner == "strobe":
         strip.strobe = 3
-        said = "is retimed, strobed or reversed itself"
+        said = "is retimed, strobed or reversed"
     else:
         scene.sequence_editor.strips.new_effect("blur", "GAUSSIAN_BLUR", 5, 1, length=COUNT, input1=strip)
         said = "is the input of another strip"

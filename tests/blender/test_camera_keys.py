@@ -308,7 +308,7 @@ def test_a_clip_that_is_not_stabilized_is_refused(bpy, edit, effect, clip):
             marker.mute = True
     refuses(bpy, "follow_stabilization", '"2D Stabilization" of clip ".*" has no marker at frame 16')
     edit.frame_set(40)
-    refuses(bpy, "follow_stabilization", "the current frame is outside of the Shutter strip")
+    refuses(bpy, "follow_stabilization", "the current frame is outside the Shutter strip")
     effect.camera.follow_clip = None
     with pytest.raises(validation.EffectError, match="Choose a clip first"):
         follow_track.follow_stabilization(*active(bpy))

@@ -348,7 +348,7 @@ def _gap(edit):
         (lambda edit: None, "film.mp4", ""),
         (lambda edit: None, "film", "film: none of .mp4"),
         (lambda edit: None, "edit.blend", "edit.blend: none of .mp4"),
-        (lambda edit: None, "in/f0001.png/film.mp4", "f0001.png: is a file, and no folder"),
+        (lambda edit: None, "in/f0001.png/film.mp4", "f0001.png: is a file, not a folder"),
         (lambda edit: None, "folder.mp4", "folder.mp4: is a folder, not a movie"),
         (_odd, "film.mp4", "film.mp4: a movie has even sizes, not 65×48"),
         (_uppermost, "film.mp4", "the edit has strips in the uppermost channel"),

@@ -83,7 +83,7 @@ def test_a_layer_leaves_its_trail_before_a_sharp_street(edited):
 def test_what_is_no_recipe():
     for shutter, sentence in (
         ({"combine": "brightest"}, "combine"),
-        ({"threshold": 0.5}, "the lightest and the darkest alone have a threshold"),
+        ({"threshold": 0.5}, "only lightest and darkest have a threshold"),
         ({"combine": "lightest", "threshold": -1}, "threshold"),
         ({"combine": "lightest", "threshold": 1, "softness": "soft"}, "softness"),
     ):

@@ -445,7 +445,7 @@ def test_a_longer_name_of_a_file_shows_and_is_no_recipe(effect_on, place):
     item.bl_system_properties_get()["name"] = name
     assert item.name == name
     assert state(edit, effect, strip, FIRST).bars.any()
-    sentence = f'{place} "{name}": its name has 70 characters, 63 are the most'
+    sentence = f'{place} "{name}": its name has 70 characters, but at most 63 are possible'
     with pytest.raises(validation.EffectError, match=sentence):
         export(effect_on)
 

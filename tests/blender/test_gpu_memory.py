@@ -31,7 +31,7 @@ def test_little_memory_shows_the_same_and_says_so_once(command, film, tmp_path):
     for name, megabytes in (("roomy", ROOMY), ("small", SMALL)):
         options = "--output", tmp_path / name, "--frames", "1:3", "--gpu-memory", str(megabytes)
         done = command(first, *options, recipe=data)
-        told = "the 12 MB that may be taken of the GPU are too few for 8 frames of 480×270: all are sent for every"
+        told = "12 MB of GPU memory are too little for 8 frames of 480×270: every picture uploads all of them"
         assert done.stderr.count(told) == (name == "small"), done.stderr
     command(first, "--output", tmp_path / "part", "--frames", "3", "--gpu-memory", str(SMALL), recipe=data)
     roomy, small, part = (pictures(tmp_path / name) for name in ("roomy", "small", "part"))

@@ -95,7 +95,7 @@ def words():
 
     bpy.context.view_layer.update()
     effects = bpy.context.scene.virtual_shutter.effects
-    return sorted({word for effect in effects for word in match_source.differences(effect)})
+    return sorted({word for effect in effects for word in match_source.shown(effect).differences})
 
 
 def apart(some, others) -> float:
@@ -186,10 +186,10 @@ def strokes(effect) -> list:
 
 def test_refused_where_nothing_differs(bpy, edit, made):
     _strip, source = made()
-    with pytest.raises(RuntimeError, match="The Shutter strip is like its source"):
+    with pytest.raises(RuntimeError, match="The Shutter strip matches its source"):
         bpy.ops.shutter.match_source()
     edit.sequence_editor.strips.remove(source)
-    with pytest.raises(RuntimeError, match="The Shutter strip has no source any more"):
+    with pytest.raises(RuntimeError, match="The Shutter strip has no source"):
         bpy.ops.shutter.match_source()
 
 
@@ -246,7 +246,7 @@ def test_never_over_a_neighbor(bpy, edit, made, capfd):
     match(bpy)
     assert (strip.left_handle, strip.right_handle) == (-4, 45)
     assert (neighbor.left_handle, neighbor.right_handle) == (45, 55)
-    assert '"Title" is in the way: "Shutter" has not the whole range of its source' in capfd.readouterr().out
+    assert '"Title" is in the way: "Shutter" does not have the whole range of its source' in capfd.readouterr().out
     assert words() == []
 
 
@@ -385,7 +385,7 @@ def test_another_size_of_the_edit(bpy, edit, made, shown):
 def test_modifiers_of_the_source_are_copied_where_they_lack(bpy, edit, made, shown):
     strip, source = made()
     effect = edit.virtual_shutter.effects[0]
-    with pytest.raises(RuntimeError, match="The Shutter strip has the modifiers of its source"):
+    with pytest.raises(RuntimeError, match="The Shutter strip already has the modifiers of its source"):
         bpy.ops.shutter.copy_modifiers()
     strip.modifiers.new("Own", "BRIGHT_CONTRAST")
     source.modifiers.new("Same", "BRIGHT_CONTRAST").bright = 5

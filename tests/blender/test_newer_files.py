@@ -109,7 +109,7 @@ def test_a_recipe_of_it_says_what_it_lacks(bpy, newer, tmp_path, capfd):
         out = tmp_path / "recipe.json"
         assert bpy.ops.shutter.recipe_export(filepath=str(out)) == {"FINISHED"}
     assert recipe_file.load(out).options.at(1).window == 6
-    assert f'Warning: Saved "{out}", without what a newer version' in capfd.readouterr().out
+    assert f'Warning: Saved "{out}" without data of a newer version' in capfd.readouterr().out
 
 
 def test_an_appended_scene_of_it_is_told(bpy, edit, made, capfd):

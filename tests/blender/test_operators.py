@@ -313,12 +313,12 @@ NO_SOURCE = "The active strip is not a movie, image or clip strip"
 SELECT = "Select a Shutter strip or its source strip"
 NO_SHUTTER = "The effect has no shutter: add one"
 NO_REGION = "The shutter has no region: draw one"
-NO_LAYER = "The preview shows no annotation layer that is not a region yet"
+NO_LAYER = "Every annotation layer of the preview is a region already"
 LINKED = "The edit is linked from another file"
 ANY_EFFECT = ("smooth_streaks", "shutter_add", "recipe_import", "recipe_export")  # need nothing in it
 ALIKE = {
-    "match_source": "The Shutter strip is like its source",
-    "copy_modifiers": "The Shutter strip has the modifiers of its source",
+    "match_source": "The Shutter strip matches its source",
+    "copy_modifiers": "The Shutter strip already has the modifiers of its source",
 }
 UNSEEN = "Move the playhead onto the Shutter strip"
 REGION_NEEDED = dict.fromkeys(("erase", "region_assign", "region_remove", "region_move", "region_key"), NO_REGION)
@@ -409,13 +409,13 @@ def test_what_cannot_be_used_says_why(bpy, operators, edit, effect, tmp_path, si
 def test_no_more_shutters_than_a_picture_has(bpy, effect, name):
     while len(effect.shutters) < limits.MAX_SHUTTERS:
         assert call(bpy, name) == {"FINISHED"}
-    with pytest.raises(RuntimeError, match=f"An effect has {limits.MAX_SHUTTERS} shutters at most"):
+    with pytest.raises(RuntimeError, match=f"An effect can have at most {limits.MAX_SHUTTERS} shutters"):
         call(bpy, name)
     assert len(effect.shutters) == limits.MAX_SHUTTERS
 
 
 def test_no_more_regions_than_a_picture_has(bpy, effect, preview):
-    full = f"An effect has {limits.MAX_REGIONS} regions at most"
+    full = f"An effect can have at most {limits.MAX_REGIONS} regions"
     preview.annotation = effect.scene.annotation
     preview.annotation.layers.new("Notes").frames.new(3)
     for number in range(limits.MAX_REGIONS):

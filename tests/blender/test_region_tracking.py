@@ -602,7 +602,7 @@ def test_a_clip_of_other_footage_is_refused(bpy, edit, region, clip, frames, tmp
 
 def test_what_cannot_be_followed_is_said(bpy, edit, region, clip):
     refuses(bpy, "follow", "Choose a clip first")
-    refuses(bpy, "follow_update", "The region follows no track yet")
+    refuses(bpy, "follow_update", "The region does not follow a track")
     set_up(region, clip, "TRACK", "none")
     refuses(bpy, "follow", 'clip "f0001.png" has no track "none"')
     set_up(region, clip, "PLANE", "middle")

@@ -213,7 +213,7 @@ def test_where_it_cannot_be_found_one_sentence_says_so(bpy, edited):
 
 def test_where_there_is_none_nothing_is_repaired(bpy, edited):
     _strip, effect = edited(0.0)
-    with pytest.raises(RuntimeError, match="lines stand upright however they move"):
+    with pytest.raises(RuntimeError, match="moving lines stay upright"):
         call(bpy, "find_readout", reads="ROWS")
     assert (effect.inbetween, len(effect.shutters)) == ("1", 2)
 

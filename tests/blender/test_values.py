@@ -166,7 +166,7 @@ IMPOSSIBLE = {
     ),
     "shutters": (
         lambda e: [e.shutters.add() for _ in range(MAX_SHUTTERS)],
-        f'effect "Shutter": {MAX_SHUTTERS + 2} shutters, {MAX_SHUTTERS} are the most',
+        f'effect "Shutter": {MAX_SHUTTERS + 2} shutters, but at most {MAX_SHUTTERS} are possible',
     ),
     "points": (
         lambda e: draw(e.scene.annotation.layers[0], [(0, 0)] * 100_001),

@@ -102,18 +102,15 @@ def _filling():
         yield running_sums.accumulation(1, sent, tiled, tiled)
     yield window.packing(1, True)
     yield window.packing(2, False)
-    for adds in (False, True):
-        yield read_pass("matte_blend", COUNT=2, ADDS=int(adds), MOST=stages.MOST_MATTES)
-        yield read_pass("mix", BEGINS=int(adds))
+    yield read_pass("matte_blend", COUNT=2, MOST=stages.MOST_MATTES)
 
 
 def _unpacking():
     if importlib.util.find_spec("bpy"):
         from shutter_addon.blender.devices import blender_gpu
 
-        for kind, sent in blender_gpu.FORMATS.items():
-            if sent is not None:
-                yield blender_gpu.unpacking(kind, sent[2])
+        for kind, (_, _, packing) in blender_gpu.FORMATS.items():
+            yield blender_gpu.unpacking(kind, packing)
         yield blender_gpu.LETTING_GO
 
 

@@ -112,7 +112,7 @@ def test_time_that_stands_still_runs_as_it_came():
 
 def test_strokes_far_off_and_too_many_points_are_refused():
     far = region([np.full((2, 2), 10 * limits.MAX_DISTANCE)], Constant(np.eye(3)))
-    with pytest.raises(EffectError, match='region "Face": a point of its strokes is nowhere near the picture'):
+    with pytest.raises(EffectError, match='region "Face": a point of its strokes is too far from the picture'):
         made(Bars(Constant(FIRST)), [far]).at(1)
     half = [np.zeros((limits.MAX_POINTS // 2 + 1, 2))]
     assert len(made(Bars(Constant(FIRST)), [region(half)]).at(1).shapes) == 1

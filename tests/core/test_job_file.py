@@ -1,6 +1,5 @@
 """The file that says which version of an edit a job's pictures are of."""
 
-import os
 from dataclasses import replace
 
 import pytest
@@ -57,14 +56,6 @@ def test_a_folder_without_a_job_takes_all(tmp_path):
 def test_a_damaged_file_is_told(tmp_path, content):
     (tmp_path / job_file.NAME).write_text(content)
     with pytest.raises(job_file.JobError, match="is damaged"):
-        job_file.read(tmp_path)
-
-
-@pytest.mark.parametrize("make", [getattr(os, "mkfifo", os.mkdir), os.mkdir])
-def test_what_is_no_file_is_told(tmp_path, make):
-    """A pipe would be waited for without end."""
-    make(tmp_path / job_file.NAME)
-    with pytest.raises(job_file.JobError, match="is no file"):
         job_file.read(tmp_path)
 
 

@@ -32,7 +32,7 @@ linux = pytest.mark.skipif(not sys.platform.startswith("linux"), reason="looks a
 @pytest.fixture(autouse=True)
 def _lent():
     """Blender as a library decodes; one process for all tests that lend no other."""
-    if blender_movie._command != [sys.executable, str(SCRIPT)]:  # nobody else is told which it is
+    if blender_movie._decoder.command != [sys.executable, str(SCRIPT)]:  # nobody else is told which it is
         blender_movie.lend([sys.executable, str(SCRIPT)])
 
 
@@ -44,7 +44,7 @@ def _ended():
 
 def process():
     """The process that decodes."""
-    return blender_movie._process.pid  # nobody else is told which it is
+    return blender_movie._decoder.process.pid  # nobody else is told which it is
 
 
 def assert_same(path, *, deinterlace=False):
@@ -236,7 +236,7 @@ def test_a_blender_that_is_never_ready_is_killed_and_one_sentence(coloured, monk
     blender_movie.lend(SILENT)
     with pytest.raises(MediaError, match=r"\(the Blender that decodes it is not ready after 0\.3 seconds\)$"):
         BlenderMovie(coloured["bt709.mp4"])
-    assert blender_movie._process is None  # nobody else is told whether one runs
+    assert blender_movie._decoder.process is None  # nobody else is told whether one runs
 
 
 def test_nobody_waits_for_an_answer_that_does_not_come(coloured, monkeypatch):
@@ -244,7 +244,7 @@ def test_nobody_waits_for_an_answer_that_does_not_come(coloured, monkeypatch):
     blender_movie.lend(SILENT)
     with ThreadPoolExecutor(1) as threads:
         asked = threads.submit(BlenderMovie, coloured["bt709.mp4"])
-        while blender_movie._process is None:  # nobody else is told whether one runs
+        while blender_movie._decoder.process is None:  # nobody else is told whether one runs
             assert not asked.done()
         monkeypatch.setattr(blender_movie, "ENDING", 0.1)
         blender_movie.lend(None)
@@ -371,7 +371,7 @@ from shutter_addon.media import blender_movie
 from shutter_addon.media.blender_movie import BlenderMovie
 blender_movie.lend([sys.executable, sys.argv[1]])
 source = BlenderMovie(sys.argv[2])
-print(blender_movie._process.pid, flush=True)
+print(blender_movie._decoder.process.pid, flush=True)
 sys.stdin.read()
 """
 

@@ -39,7 +39,7 @@ def test_preview_and_film_take_turns_where_the_gpu_is_small(tmp_path):
     given = {"footage": first, "recipe": path, "megabytes": megabytes}
     (*seen, told), console = tell("memory_story.py", "opengl", linked(tmp_path), **given)
     assert "Traceback" not in console
-    assert f"the {megabytes // 4} MB that may be taken of the GPU are too few for 16 frames" in told["said"][-1]
+    assert f"{megabytes // 4} MB of GPU memory are too little for 16 frames" in told["said"][-1]
     options = ("--recipe", path, "--output", tmp_path / "expected", "--device", "opengl", "--frames", "1:4")
     subprocess.run([sys.executable, "-m", "shutter_addon", "render", first, *options], check=True, cwd=ROOT)
     sums = 17 * 8 * size[0] * size[1]

@@ -1,4 +1,4 @@
-"""The command `bake`: the film of one effect of a saved edit, for an ordinary strip to show."""
+"""The command `bake`: the film of one effect of a saved edit, which an ordinary strip shows."""
 
 from __future__ import annotations
 
@@ -14,25 +14,25 @@ from ..data import strips
 from ..editing import whole_edits
 from ..output import baked_film, film_output
 from . import command_line
-from .command_line import place
+from .command_line import to_path
 
 
 def add(commands: argparse._SubParsersAction) -> None:
     parser = commands.add_parser("bake", help="render one effect of a saved edit, for a strip to show")
     option = parser.add_argument
-    option("source", type=place, help="a saved edit (.blend)")
+    option("source", type=to_path, help="a saved edit (.blend)")
     option("--strip", required=True, metavar="NAME", help="its effect strip")
-    option("--scene", metavar="NAME", help="the scene that the strip is in (default: the active one)")
+    option("--scene", metavar="NAME", help="the strip's scene (default: the active one)")
     option("--format", choices=tuple(baked_film.KINDS), default="movie", help="H.264, or float EXR (default: movie)")
-    option("--output", type=place, metavar="DIR", help="the folder it gets into (default: beside the edit)")
+    option("--output", type=to_path, metavar="DIR", help="folder of the film (default: beside the edit)")
     command_line.add_device(parser)
-    option("--attached", action="store_true", help=argparse.SUPPRESS)  # to a Blender, whose copy of an edit it reads
+    option("--attached", action="store_true", help=argparse.SUPPRESS)  # to the Blender whose copy of an edit it reads
     parser.set_defaults(run=run)
 
 
 def run(arguments: Namespace) -> None:
     scene = whole_edits.open_edit(arguments.source, arguments.scene)
-    scene.frame_set(scene.frame_current)  # what drivers and keys say, once
+    scene.frame_set(scene.frame_current)  # evaluates drivers and keys
     if arguments.attached:
         arguments.source.unlink(missing_ok=True)
         os.set_blocking(0, False)
@@ -41,31 +41,30 @@ def run(arguments: Namespace) -> None:
     if arguments.attached:
         _check_parent(film)
     total = len(film.frames)
-    with command_line.rendered_by(arguments), film_output.progress(total, "frame") as moved:
+    with command_line.using_device(arguments), film_output.progress(total, "frame") as moved:
         finished = 0
 
         def told(done: int) -> None:
             nonlocal finished
             moved(done - finished)
             finished = done
-            command_line.tell(f"{done} of {total}")
+            command_line.print_line(f"{done} of {total}")
             if arguments.attached:
                 _check_parent(film)
 
         baked_film.render(scene, effect, strip, film, told)
-    command_line.tell(str(film.place))
+    command_line.print_line(str(film.place))
 
 
 def _check_parent(film: baked_film.Film) -> None:
-    """InterruptedRenderError: it was begun by a Blender that has ended. Nobody holds the other end of this process's
-    input any more."""
-    with suppress(OSError):  # there is nothing to read, as somebody does
+    """Raise InterruptedRenderError if the Blender that started this process has ended, and closed its stdin."""
+    with suppress(OSError):  # nothing to read: it is still there
         if not os.read(0, 1):
             raise film_output.InterruptedRenderError(f"{film.place}: stopped")
 
 
 def _effect_strip(scene: Scene, name: str) -> tuple[PropertyGroup, Strip]:
-    """OutputError: the scene has no such effect strip."""
+    """Return an effect and its strip. OutputError: the scene has no such strip."""
     for strip in strips.effect_strips(scene):
         if strip.name == name and (effect := strips.effect_of(scene, strip.scene)) is not None:
             return effect, strip

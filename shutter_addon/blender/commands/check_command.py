@@ -24,45 +24,41 @@ from ..output import edit_check, error_report, film_join, film_output, shared_fr
 from ..output.edit_check import EffectCheck
 from ..rendering import render_job, render_settings
 from . import command_line
-from .command_line import place
+from .command_line import to_path
 
-_OF_EFFECT = "strip", "source", "size", "window", "shutters", "inbetween"  # what is told of an EffectCheck
+_OF_EFFECT = "strip", "source", "size", "window", "shutters", "inbetween"  # reported fields of an EffectCheck
 
 
 def add(commands: argparse._SubParsersAction) -> None:
     parser = commands.add_parser("check", help="find out whether an edit can be rendered here")
     option = parser.add_argument
-    option("edit", metavar="FILE.blend", type=place, help="a saved edit")
+    option("edit", metavar="FILE.blend", type=to_path, help="a saved edit")
     option("--frames", metavar="A:B", help="timeline frames A to B (default: all of the edit)")
-    option("--output", type=place, metavar="DIR", help="where the frames are to go: it gets the job's file")
+    option("--output", type=to_path, metavar="DIR", help="folder for the frames; it gets the job's file")
     option("--format", choices=tuple(film_output.FORMATS), help="of the frames (default: png)")
     option("--resume", action="store_true", help="the frames will be rendered with --resume")
-    option(
-        "--movie",
-        type=place,
-        metavar="FILE",
-        help=f"what the frames will be joined to ({', '.join(film_output.MOVIES)})",
-    )
+    movies = ", ".join(film_output.MOVIES)
+    option("--movie", type=to_path, metavar="FILE", help=f"the movie that the frames will be joined to ({movies})")
     command_line.add_device(parser)
     printed = parser.add_mutually_exclusive_group()
     printed.add_argument("--json", action="store_true", help="print one JSON object")
-    printed.add_argument("--report", action="store_true", help="print what a report of an error needs, without names")
+    printed.add_argument("--report", action="store_true", help="print a report for a bug report, without names")
     parser.set_defaults(run=run)
 
 
 def run(arguments: Namespace) -> None:
     edit = command_line.open_edit(arguments.edit, arguments.frames)
     scene = edit.scene
-    with command_line.rendered_by(arguments):
+    with command_line.using_device(arguments):
         report = _report(arguments, scene, edit.frames, edit.version())
         if arguments.report:
             for found in (*report["notes"], *report["faults"]):
                 told.record(found)
-            command_line.tell(error_report.text(scene))
+            command_line.print_line(error_report.text(scene))
         elif arguments.json:
-            command_line.tell(json.dumps(report, indent=1))
+            command_line.print_line(json.dumps(report, indent=1))
         else:
-            command_line.tell("\n".join(_lines(report)))
+            command_line.print_line("\n".join(_lines(report)))
     for fault in report["faults"]:
         render_job.say(fault)
     if report["faults"]:
@@ -70,16 +66,24 @@ def run(arguments: Namespace) -> None:
 
 
 def _report(arguments: Namespace, scene: Scene, frames: range, version: EditVersion) -> dict:
-    """What is found, as JSON has it (docs/command.md)."""
+    """Return the result as JSON data (docs/command.md)."""
     faults = [*_version_faults(scene), *_setting_faults(arguments, scene, frames)]
     notes: list[str] = []
-    device, checks = _on_device(scene, frames, faults, notes)
+    device: str | None = None
+    checks: list[EffectCheck] = []
+    try:
+        kind, lesser = available.choose(render_settings.wanted())
+    except NoDeviceError as error:
+        faults.append(str(error))
+    else:
+        notes += [lesser] if lesser else []
+        device, checks = available.name(kind), edit_check.effects(scene, frames)
     for check in checks:
         faults += [f'"{check.strip}": {fault}' for fault in check.faults]
         notes += [f'"{check.strip}": {note}' for note in check.notes]
     faults += edit_check.left_out(scene, frames)
     notes += edit_check.stale_films(scene, frames)
-    faults += external_files.faults(scene, frames, sources=False)  # of these the effects' own say more
+    faults += external_files.faults(scene, frames, sources=False)  # the effects' own faults are already there
     faults += external_files.sound_faults(scene, frames)
     for folder in dict.fromkeys(_written_folders(arguments, checks)):
         faults += _fault(film_output.check_writable, folder)
@@ -98,12 +102,12 @@ def _report(arguments: Namespace, scene: Scene, frames: range, version: EditVers
     if arguments.movie and film_output.is_movie(arguments.movie):  # last: it changes the scene
         faults += _fault(film_join.rehearse, scene, arguments.movie, arguments.format or "png", frames)
     if arguments.output and not faults:
-        faults += _fault(film_output.prepare, arguments.output) or _fault(job_file.write, arguments.output, version)
+        faults += _fault(film_output.make_folder, arguments.output) or _fault(job_file.write, arguments.output, version)
     return report
 
 
 def _version_faults(scene: Scene) -> list[str]:
-    """Whether something newer than what is here has saved the file."""
+    """Check whether a newer version saved the file."""
     faults, saved, here = [], scene.virtual_shutter.version, versions.extension()
     if _numbers(saved) > _numbers(here):
         faults.append(f"the edit was saved by version {saved} of the extension, this machine has {here}")
@@ -113,7 +117,7 @@ def _version_faults(scene: Scene) -> list[str]:
 
 
 def _file_version() -> str:
-    """The version of Blender that saved the edit. (Its third number is another one than a release's.)"""
+    """Return the version of Blender that saved the edit. (The file's third number differs from a release's.)"""
     return ".".join(map(str, bpy.data.version[:2]))
 
 
@@ -122,7 +126,7 @@ def _numbers(version: str) -> list[int]:
 
 
 def _setting_faults(arguments: Namespace, scene: Scene, frames: range) -> list[str]:
-    """Whether what the edit's output is can be written, and lie where it is wanted."""
+    """Check whether the outputs can be written where they are wanted."""
     read = [arguments.edit, *versions.read_files(scene)]
     faults = _fault(shared_frames.check_resumable, scene) if arguments.resume else []
     if arguments.output:
@@ -134,7 +138,7 @@ def _setting_faults(arguments: Namespace, scene: Scene, frames: range) -> list[s
 
 
 def _fault(check: Callable, *arguments) -> list[str]:
-    """The sentence of the error that a check raises, if it does."""
+    """Return the message of the error that a check raises, if it does."""
     try:
         check(*arguments)
     except film_output.InterruptedRenderError:
@@ -144,22 +148,8 @@ def _fault(check: Callable, *arguments) -> list[str]:
     return []
 
 
-def _on_device(
-    scene: Scene, frames: range, faults: list[str], notes: list[str]
-) -> tuple[str | None, list[EffectCheck]]:
-    """The name of the device that will render, and what is found of the effects (edit_check.effects); without a device,
-    which is a fault, nothing."""
-    try:
-        kind, lesser = available.choose(render_settings.wanted())
-    except NoDeviceError as error:
-        faults.append(str(error))
-        return None, []
-    notes += [lesser] if lesser else []
-    return available.name(kind), edit_check.effects(scene, frames)
-
-
 def _written_folders(arguments: Namespace, checks: list[EffectCheck]) -> Iterator[Path]:
-    """The folders that the job will write to."""
+    """Yield the folders that the job will write to."""
     if arguments.output:
         yield arguments.output
     if arguments.movie:
@@ -169,7 +159,7 @@ def _written_folders(arguments: Namespace, checks: list[EffectCheck]) -> Iterato
 
 
 def _lines(report: dict) -> list[str]:
-    """The report for people."""
+    """Return the result as lines of text."""
     lines = [
         f"Edit: {report['edit']}, version {report['key']}",
         "Frames: {} to {}, {}×{}".format(*report["frames"], *report["size"]),
@@ -188,5 +178,5 @@ def _lines(report: dict) -> list[str]:
 
 
 def _saved_by(name: str, version: dict) -> str:
-    saved = f"was saved by {version['saved']}" if version["saved"] else "does not say which saved it"
+    saved = f"was saved by {version['saved']}" if version["saved"] else "does not name the version that saved it"
     return f"{name}: {version['here']}, the edit {saved}"

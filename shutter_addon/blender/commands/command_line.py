@@ -1,11 +1,10 @@
-"""What several commands take: values of their options, and the source that they read."""
+"""Options that several commands have, and reading their inputs."""
 
 import argparse
 import os
 import re
 import sys
 from argparse import Namespace
-from collections.abc import Iterable
 from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import NamedTuple
@@ -28,25 +27,25 @@ from ..editing import whole_edits
 from ..output import film_output
 from ..rendering import render_job, render_settings
 
-SMOOTH = tuple(map(str, fields_of(Options)["step"].words))  # 1: off
+SMOOTH = tuple(map(str, fields_of(Options)["step"].words))  # 1 is off
 
 
-def place(text: str) -> Path:
-    """A path as it is named. Two slashes at its beginning, which Blender takes for the .blend's folder, are one."""
+def to_path(text: str) -> Path:
+    """Parse a path. Leading slashes become one, since Blender takes two for the .blend file's folder."""
     if not text:
         raise argparse.ArgumentTypeError("a name is missing")
     return Path(re.sub("^//+", "/", os.path.abspath(text)))
 
 
 def megabytes(text: str) -> int | None:
-    """None for 0: as without the option."""
+    """Parse a number of megabytes. 0 is None, as without the option."""
     if not text.isdecimal():
-        raise argparse.ArgumentTypeError(f"{text!r} is no number of megabytes")
+        raise argparse.ArgumentTypeError(f"{text!r} is not a number of megabytes")
     return int(text) or None
 
 
 def add_device(parser: argparse.ArgumentParser) -> None:
-    """The options that say what composes pictures."""
+    """Add the options for the device that composes pictures."""
     parser.add_argument(
         "--device",
         choices=available.CHOICES,
@@ -57,34 +56,27 @@ def add_device(parser: argparse.ArgumentParser) -> None:
         "--gpu-memory",
         type=megabytes,
         metavar="MB",
-        help="of the GPU's memory, what textures may take (default: as in Blender's preferences, else three quarters,"
-        " and half of the machine's memory at most)",
+        help="GPU memory for textures (default: as in Blender's preferences, else three quarters, and at most half of"
+        " the machine's memory)",
     )
 
 
-def rendered_by(arguments: Namespace) -> AbstractContextManager[None]:
-    """Inside, renders are composed as these options say."""
+def using_device(arguments: Namespace) -> AbstractContextManager[None]:
+    """In this context, render with the device that the options choose."""
     return render_settings.using(arguments.device, gpu_memory=arguments.gpu_memory)
 
 
-def refuse(arguments: Namespace, names: Iterable[str], why: str) -> None:
-    """OutputError: one of these options is given, which is for something else."""
-    for name in names:
-        if getattr(arguments, name) is not None:
-            raise film_output.OutputError(f"--{name.replace('_', '-')}: {why}")
-
-
 def recipe(path: Path) -> Effect:
-    """The recipe in a file, with a word on stderr where it showed another picture once. RecipeError: there is none."""
+    """Read a recipe. Print a warning if older versions showed another picture. RecipeError: it is invalid."""
     found = recipe_file.load(path)
     if found.lost is not None:
-        told = f"{path}: {found.lost}"  # no message that is translated
+        told = f"{path}: {found.lost}"  # not translated
         render_job.say(told)
     return found
 
 
-def opened(path: Path) -> FrameSource:
-    """The source, with a word on stderr of files that were left out."""
+def open_footage(path: Path) -> FrameSource:
+    """Open a source. Print a warning about files that were left out."""
     medium = open_source(path)
     if left_out := medium.left_out:
         render_job.say(left_out)
@@ -92,16 +84,20 @@ def opened(path: Path) -> FrameSource:
 
 
 def files(medium: FrameSource) -> list[Path]:
-    """The source's files, also those that are missing in an image sequence: it would show them, were they there."""
+    """Return the source's files, including those that a sequence lacks, which would belong to it if they appeared."""
     files = medium.files
     beside = by_number(files[0], listed=True) if len(files) > 1 else None
     return [*files, *(map(beside, range(len(files))) if beside else ())]
 
 
 class Edit(NamedTuple):
-    """A saved edit that is open.
+    """An open saved edit.
 
-    frames: those of its timeline that are asked for; whole: all; opened: the file's stamp, before it was"""
+    Attributes:
+        frames: The chosen timeline frames.
+        whole: All timeline frames.
+        opened: The file's stamp before it was opened.
+    """
 
     path: Path
     scene: Scene
@@ -110,10 +106,10 @@ class Edit(NamedTuple):
     opened: tuple[int, int] | None
 
     def version(self) -> EditVersion:
-        """Give the version of the edit as it was opened.
+        """Return the version of the edit as it was opened.
 
         Raises:
-            UserError: It was saved over since, so that its key would be that of another edit.
+            UserError: It was saved since, so that the key would be another edit's.
             OSError: It is gone.
         """
         current = versions.of_edit(self.scene)
@@ -123,7 +119,7 @@ class Edit(NamedTuple):
 
 
 def open_edit(path: Path, asked: str | None) -> Edit:
-    """Opens a saved edit; asked: as for `frames`. UserError, OutputError: there is no such edit, or frame."""
+    """Open a saved edit, with frames as for `frames`. UserError: there is no such edit, or frame."""
     opened = stamp(path)
     scene = whole_edits.open_edit(path)
     whole = range(scene.frame_start, scene.frame_end + 1)
@@ -131,8 +127,11 @@ def open_edit(path: Path, asked: str | None) -> Edit:
 
 
 def frames(text: str | None, whole: range, what: str = "clip") -> range:
-    """The timeline frames of `A:B` (or `A-B`, as schedulers name chunks), of `A` alone, or of the whole. OutputError:
-    what is rendered has no such frames."""
+    """Return the timeline frames of `A:B` (or `A-B`, as schedulers name chunks), of `A` alone, or all frames.
+
+    Raises:
+        OutputError: The clip has no such frames.
+    """
     if text is None:
         return whole
     numbers = re.fullmatch(r"(\d{1,9})(?:[:-](\d{1,9}))?", text)
@@ -144,12 +143,12 @@ def frames(text: str | None, whole: range, what: str = "clip") -> range:
     return range(first, last + 1)
 
 
-def tell(text: str) -> None:
-    """Prints it on stdout; characters that a terminal lacks as "?". OutputError: it cannot be written there."""
+def print_line(text: str) -> None:
+    """Print to stdout, with "?" for characters that the terminal lacks. OutputError: it cannot be written there."""
     encoding = sys.stdout.encoding or "utf-8"
     try:
         print(text.encode(encoding, "replace").decode(encoding), flush=True)
-    except BrokenPipeError:  # nobody reads on
+    except BrokenPipeError:  # the reader has gone
         pass
     except OSError as error:
         raise film_output.OutputError(f"stdout: {error.strerror or error}") from None

@@ -1,4 +1,4 @@
-"""The command `join`: rendered frames, and the sound of their edit, as a movie."""
+"""The command `join`: a movie of rendered frames, with the edit's sound."""
 
 from __future__ import annotations
 
@@ -9,15 +9,15 @@ from ...core.farm import job_file
 from ..data import external_files, versions
 from ..output import film_join, film_output
 from . import command_line
-from .command_line import place
+from .command_line import to_path
 
 
 def add(commands: argparse._SubParsersAction) -> None:
     parser = commands.add_parser("join", help="make a movie of rendered frames, with the edit's sound and settings")
     option = parser.add_argument
-    option("folder", metavar="FRAMES", type=place, help="the folder of the frames")
-    option("--edit", type=place, required=True, metavar="FILE.blend", help="what they were rendered from")
-    option("--output", type=place, required=True, help=f"a movie ({', '.join(film_output.MOVIES)})")
+    option("folder", metavar="FRAMES", type=to_path, help="the folder of the frames")
+    option("--edit", type=to_path, required=True, metavar="FILE.blend", help="the edit that they were rendered from")
+    option("--output", type=to_path, required=True, help=f"a movie ({', '.join(film_output.MOVIES)})")
     option("--frames", metavar="A:B", help="timeline frames A to B (default: all of the edit)")
     parser.set_defaults(run=run)
 
@@ -27,7 +27,7 @@ def run(arguments: Namespace) -> None:
     film_join.check(arguments.output, [edit.path, *versions.read_files(edit.scene), *versions.sounds()])
     for fault in external_files.sound_faults(edit.scene, edit.frames):
         raise film_output.OutputError(fault)  # Blender would make a silent film
-    film_join.say_what_is_left_out(arguments.folder, edit.whole)
+    film_join.warn_of_other_pictures(arguments.folder, edit.whole)
     version = edit.version()
     job_file.guard(arguments.folder, version)
     film_join.join(edit.scene, arguments.folder, arguments.output, edit.frames, version.key)

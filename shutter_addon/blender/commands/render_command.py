@@ -1,4 +1,4 @@
-"""The command `render`: from a source and a recipe to a finished film, through Blender's sequencer."""
+"""The command `render`: a film of a source and a recipe, or of a saved edit, through Blender's sequencer."""
 
 from __future__ import annotations
 
@@ -13,6 +13,8 @@ from bpy.types import Scene
 from ...core import atomic_write
 from ...core.farm import job_file
 from ...core.model.effect import Effect
+from ...core.model.fields import fields_of
+from ...core.model.frame_state import Options
 from ...core.model.keyframes import Constant
 from ...core.recipes import recipe
 from ...media.opening import MatteFile
@@ -23,22 +25,22 @@ from ..editing import whole_edits
 from ..output import film_output, shared_frames
 from ..rendering import render_settings
 from . import command_line
-from .command_line import place
+from .command_line import to_path
 
 
 def add(commands: argparse._SubParsersAction) -> None:
     parser = commands.add_parser("render", help="render a source through a recipe, or a saved edit")
     option = parser.add_argument
-    option("source", type=place, help="a movie, the first file of an image sequence, or a saved edit (.blend)")
-    option("--recipe", type=place, help="the effect, a JSON file; of a saved edit none")
-    option("--output", type=place, help=f"a folder, or a movie ({', '.join(film_output.MOVIES)})")
-    option("--format", choices=tuple(film_output.FORMATS), help="of the pictures in a folder: 16-bit png, float exr")
+    option("source", type=to_path, help="a movie, the first file of an image sequence, or a saved edit (.blend)")
+    option("--recipe", type=to_path, help="the effect, a JSON file; not for a saved edit")
+    option("--output", type=to_path, help=f"a folder, or a movie ({', '.join(film_output.MOVIES)})")
+    option("--format", choices=tuple(film_output.FORMATS), help="of pictures in a folder: 16-bit png, float exr")
     option("--frames", metavar="A:B", help="timeline frames A to B; 1 is the strip's first")
-    option("--resume", action="store_true", help="of a saved edit: only what is missing, shared with other machines")
+    option("--resume", action="store_true", help="of a saved edit: only missing frames, shared with other machines")
     command_line.add_device(parser)
-    option("--weights", type=place, metavar="DIR", help="also write the mattes of the shutters, as float EXR")
-    option("--save", type=place, metavar="FILE.blend", help="keep the edit")
-    option("--inbetween", choices=command_line.SMOOTH, help="moments for a filmed frame, in place of the recipe's")
+    option("--weights", type=to_path, metavar="DIR", help="also write the mattes of the shutters, as float EXR")
+    option("--save", type=to_path, metavar="FILE.blend", help="keep the edit")
+    option("--inbetween", choices=command_line.SMOOTH, help="moments per filmed frame, in place of the recipe's")
     parser.set_defaults(run=run)
 
 
@@ -50,9 +52,11 @@ def run(arguments: Namespace) -> None:
 
 
 def _render_edit(arguments: Namespace) -> None:
-    """Renders a saved edit as it is."""
-    names = "recipe", "weights", "save", "inbetween"
-    command_line.refuse(arguments, names, "is for a source and a recipe; a saved edit is rendered as it is")
+    """Render a saved edit as it is."""
+    for name in ("recipe", "weights", "save", "inbetween"):
+        if getattr(arguments, name) is not None:
+            why = "is for a source and a recipe; a saved edit is rendered as it is"
+            raise film_output.OutputError(f"--{name}: {why}")
     output, file_format = arguments.output, arguments.format or "png"
     if output is None:
         raise film_output.OutputError("nothing to do: give --output")
@@ -60,8 +64,8 @@ def _render_edit(arguments: Namespace) -> None:
     scene, frames = edit.scene, edit.frames
     scene.frame_start, scene.frame_end = frames[0], frames[-1]
     for fault in external_files.faults(scene, frames, sources=True):
-        raise film_output.OutputError(fault)  # Blender would render on without it
-    with command_line.rendered_by(arguments), shared_frames.of_same_footage(scene) as rendered:
+        raise film_output.OutputError(fault)  # Blender would render without it
+    with command_line.using_device(arguments), shared_frames.refuse_changed_footage(scene) as rendered:
         version = edit.version()
         job_file.guard(output, version)
         shared_frames.check(output, arguments.format, frames, [edit.path, *versions.read_files(scene)])
@@ -70,7 +74,7 @@ def _render_edit(arguments: Namespace) -> None:
 
 
 def _render_source(arguments: Namespace) -> None:
-    """Makes an edit of a source and a recipe, and renders it."""
+    """Make an edit of a source and a recipe, and render it."""
     if arguments.recipe is None:
         raise film_output.OutputError("--recipe is missing: only a saved edit (.blend) is rendered without one")
     if arguments.resume:
@@ -79,7 +83,7 @@ def _render_source(arguments: Namespace) -> None:
         raise film_output.OutputError("nothing to do: give --output, --save or both")
     source_recipe = _recipe(arguments)
     path = arguments.source
-    with command_line.opened(path) as medium:
+    with command_line.open_footage(path) as medium:
         output, file_format = arguments.output, arguments.format or "png"
         if output:
             film_output.check(output, arguments.format, (medium.width, medium.height))
@@ -87,7 +91,7 @@ def _render_source(arguments: Namespace) -> None:
                 raise film_output.OutputError(f"{output}: in a saved edit, Blender takes # for the frames' numbers")
         frames = command_line.frames(arguments.frames, range(1, whole_edits.length(medium, source_recipe) + 1))
         read = path, *command_line.files(medium), arguments.recipe, *_mattes(source_recipe, arguments.recipe.parent)
-        film_output.spare(_written(arguments, file_format, frames), read)
+        film_output.refuse_overwriting(_written(arguments, file_format, frames), read)
         scene = whole_edits.make_edit(path, medium, source_recipe, arguments.recipe.parent)
     scene.frame_start, scene.frame_end = frames[0], frames[-1]
     if output:
@@ -98,18 +102,18 @@ def _render_source(arguments: Namespace) -> None:
     weights = arguments.weights if output else None
     with render_settings.using(arguments.device, weights, arguments.gpu_memory):
         if output and arguments.weights:
-            film_output.prepare(arguments.weights)
+            film_output.make_folder(arguments.weights)
         if output:
-            film_output.film(scene, output)
+            film_output.render_made_edit(scene, output)
 
 
 def _check_device(arguments: Namespace) -> None:
-    """NoDeviceError: there is none as it is wanted. Called before anything is written."""
+    """Raise NoDeviceError if the wanted device is missing, before anything is written."""
     available.choose(arguments.device or preferences.device())
 
 
 def _written(arguments: Namespace, file_format: str, frames: range) -> list[Path]:
-    """All files that a render writes."""
+    """Return all files that a render writes."""
     files = [arguments.save] if arguments.save else []
     if arguments.output and film_output.is_movie(arguments.output):
         files.append(arguments.output)
@@ -121,7 +125,7 @@ def _written(arguments: Namespace, file_format: str, frames: range) -> list[Path
 
 
 def _mattes(source_recipe: Effect, folder: Path) -> list[Path]:
-    """The files of a recipe's mattes; folder: where the recipe lies. MediaError: there are none."""
+    """Return the files of a recipe's mattes; `folder` is the recipe's. MediaError: a matte is missing."""
     files = []
     for content in recipe.contents(source_recipe):
         with MatteFile(folder / content.path, content.channel).open() as matte:
@@ -130,26 +134,29 @@ def _mattes(source_recipe: Effect, folder: Path) -> list[Path]:
 
 
 def _recipe(arguments: Namespace) -> Effect:
-    """The recipe, as smooth as was asked for."""
+    """Read the recipe, with the chosen number of moments."""
     found = command_line.recipe(arguments.recipe)
     if arguments.inbetween is None:
         return found
-    step = int(arguments.inbetween) if arguments.inbetween.isdigit() else arguments.inbetween
+    step = fields_of(Options)["step"].word(arguments.inbetween)
     return replace(found, options=Constant(replace(found.options.at(1), step=step)))
 
 
 def _save(scene: Scene, path: Path) -> None:
-    """Saves the edit, its paths relative to the file: it may be opened on another machine. OutputError: it cannot be
-    saved whole; what stood there stays."""
+    """Save the edit with relative paths, so that it can be opened on another machine.
+
+    Raises:
+        OutputError: It cannot be saved whole; an older file stays.
+    """
     try:
-        film_output.prepare(path.parent)
+        film_output.make_folder(path.parent)
         with atomic_write.writing(path) as part:
             with film_output.quiet(), whole_edits.paths_relative(scene, path.parent):
                 bpy.ops.wm.save_as_mainfile(filepath=str(part), compress=True, copy=True, relative_remap=False)
             if not is_whole_blend(part):
                 raise film_output.OutputError(f"{path}: could not be saved whole; {why_short(part.parent)}")
             if path.is_file() and bpy.context.preferences.filepaths.save_version:
-                path.replace(f"{path}1")  # as Blender itself keeps what stood there
+                path.replace(f"{path}1")  # a backup like Blender's own
     except RuntimeError as error:
         raise film_output.OutputError(f"{path}: {film_output.message(error)}") from None
     except OSError as error:

@@ -1,4 +1,4 @@
-"""The command `track`: a recipe's region follows what it covers, or its camera what stands still."""
+"""The command `track`: keys for a region of a recipe, which follows what it covers, or for the camera."""
 
 from __future__ import annotations
 
@@ -24,43 +24,46 @@ from ..editing import whole_edits
 from ..output import film_output
 from ..rendering import render_job
 from . import command_line
-from .command_line import place
+from .command_line import to_path
 
 
 def add(commands: argparse._SubParsersAction) -> None:
     parser = commands.add_parser("track", help="follow what a region covers, or the camera")
     option = parser.add_argument
-    option("source", type=place, help="a movie, or the first file of an image sequence")
-    option("--recipe", type=place, required=True, help="the effect, a JSON file")
-    option("--region", metavar="NAME", help="the region that is to follow")
-    option("--camera", action="store_true", help="in its place: the camera, by all that regions leave free")
-    option("--frame", type=int, required=True, metavar="F", help="the frame at which it lies right")
+    option("source", type=to_path, help="a movie, or the first file of an image sequence")
+    option("--recipe", type=to_path, required=True, help="the effect, a JSON file")
+    option("--region", metavar="NAME", help="the region to track")
+    option("--camera", action="store_true", help="track the camera instead, by everything outside of regions")
+    option("--frame", type=int, required=True, metavar="F", help="the frame at which it is in place")
     option("--frames", metavar="A:B", help="timeline frames A to B, both ways from F; 1 is the strip's first")
     option("--motion", choices=registration.MOTIONS, default="scale", help="location; rotation too; or scale as well")
     option("--all-keys", action="store_true", help="a key at every frame, needed or not")
+    option("--hold", action="store_true", help="stay opaque where the track has ended: no keys of opacity")
+    option("--output", type=to_path, required=True, metavar="R2.json", help="the recipe with the keys")
     option(
-        "--hold", action="store_true", help="all of it counts where its track has ended, too: its opacity gets no keys"
+        "--report",
+        type=to_path,
+        metavar="FILE.json",
+        help="the confidence of each frame, and where tracking ended",
     )
-    option("--output", type=place, required=True, metavar="R2.json", help="the recipe with the keys")
-    option("--report", type=place, metavar="FILE.json", help="how sure each frame is, and where it ended")
     parser.set_defaults(run=run)
 
 
 def run(arguments: Namespace) -> None:
     if arguments.camera == (arguments.region is not None):
-        raise film_output.OutputError("track: either --region NAME or --camera, one of the two")
+        raise film_output.OutputError("track: give either --region NAME or --camera")
     source_recipe = command_line.recipe(arguments.recipe)
     index = None if arguments.camera else _region_index(arguments, source_recipe)
     subject = recipe.CAMERA if arguments.camera else arguments.region
-    with command_line.opened(arguments.source) as medium:
-        film_output.spare(
+    with command_line.open_footage(arguments.source) as medium:
+        film_output.refuse_overwriting(
             filter(None, (arguments.output, arguments.report)),
             [arguments.source, *command_line.files(medium), arguments.recipe],
         )
         frames = command_line.frames(arguments.frames, range(1, whole_edits.length(medium, source_recipe) + 1))
         if arguments.frame not in frames:
-            fault = f"{arguments.frame} is not within the frames {frames[0]}:{frames[-1]}"
-            raise film_output.OutputError(f"--frame: {fault}")
+            within = f"{frames[0]}:{frames[-1]}"
+            raise film_output.OutputError(f"--frame: {arguments.frame} is not within the frames {within}")
         try:
             tracked, stops = _followed(arguments, source_recipe, index, medium, frames)
         except tracking.TrackingError as error:
@@ -70,7 +73,7 @@ def run(arguments: Namespace) -> None:
     placements = {frame: step.placement for frame, step in tracked.items()}
     new: Any = region_keys.with_placements(old, placements, {arguments.frame}, size, thin=not arguments.all_keys)
     if not arguments.hold:
-        reach = replace(source_recipe.options.at(1), step=1).reach  # a recipe's bars count filmed frames
+        reach = replace(source_recipe.options.at(1), step=1).reach  # the bars of a recipe count filmed frames
         new = _ended(new, reach, tracked, stops, arguments.frame, frames)
     regions = [new if region is old else region for region in source_recipe.regions]
     keyed = source_recipe.with_parts(regions, new if index is None else None)
@@ -90,16 +93,19 @@ def _region_index(arguments: Namespace, source_recipe: Effect) -> int:
         raise film_output.OutputError(f'{arguments.recipe}: there is no region "{arguments.region}"')
     index = names.index(arguments.region)
     if not isinstance(source_recipe.regions[index], Region | OutlineRegion):
-        sentence = f'region "{arguments.region}" is a matte or a ramp, and has no strokes to track'
-        raise film_output.OutputError(f"{arguments.recipe}: {sentence}")
+        fault = f'region "{arguments.region}" is a matte or a ramp, and has no strokes to track'
+        raise film_output.OutputError(f"{arguments.recipe}: {fault}")
     return index
 
 
 def _followed(
     arguments: Namespace, source_recipe: Effect, index: int | None, medium: FrameSource, frames: range
 ) -> tuple[dict, list]:
-    """What tracking of a region, or of the camera, found by frame, and where it ended before the last frame.
-    TrackingError: at once."""
+    """Track a region or the camera. Return the found steps by frame, and where tracking ended early.
+
+    Raises:
+        TrackingError: Tracking failed at the first frame.
+    """
     effect = source_recipe.for_picture(medium.width / medium.height)
     subject: Any = effect.camera if index is None else effect.regions[index]
     options = source_recipe.options.at(1)
@@ -128,14 +134,14 @@ def _followed(
 
 
 def _cover(arguments: Namespace, region: OutlineRegion, clip: Clip, ends: ExitStack) -> matte_tracking.Cover:
-    """What an outline covers; clip: says what is shown at timeline frames; ends: what closes its mattes."""
+    """Return the cover of an outline; `ends` closes its mattes."""
     if region.between == "straight":
         return matte_tracking.cover_within(region.drawings.at)
 
     def filmed(frame: float) -> int:
         return clip.shown(frame).source_frame // clip.step
 
-    medium = ends.enter_context(command_line.opened(arguments.source))
+    medium = ends.enter_context(command_line.open_footage(arguments.source))
     drawn = zip(region.drawings.frames, region.drawings.strokes, strict=True)
     curves = {filmed(frame): outlines.curves(strokes) for frame, strokes in drawn}
     mattes = ends.enter_context(closing(CarriedMattes(medium, tuple(sorted(curves.items())))))
@@ -143,20 +149,20 @@ def _cover(arguments: Namespace, region: OutlineRegion, clip: Clip, ends: ExitSt
 
 
 def _ended(moving: Any, reach: int, tracked: dict, stops: list, start: int, frames: range) -> Any:
-    """A region, or the camera, that counts only where it was tracked."""
+    """Return the region or camera with keys that fade it out where it was not tracked."""
     seen = [frame for frame, step in tracked.items() if step.confidence > 0]
     ends = [presence.Stop(stop.frame, stop.frame > start, stop.fault == tracking.SHOT_ENDS) for stop in stops]
     if isinstance(moving, Camera):
         keys = presence.keys(seen, ends, (), max(reach, presence.FADE), beside=1)
         return replace(moving, influence=region_keys.with_ends(moving.influence, keys, frames))
-    if isinstance(moving, OutlineRegion):  # a matte says itself where it is
+    if isinstance(moving, OutlineRegion):  # its matte is empty there
         return moving
     keys = presence.keys(seen, ends, {start})
     return replace(moving, opacity=region_keys.with_ends(moving.opacity, keys, frames))
 
 
 def _write_track(arguments: Namespace, result: Effect, tracked: dict, stops: list) -> None:
-    """Writes the recipe, and the report of it, both whole or neither."""
+    """Write the recipe and the report, both or neither."""
     report = {
         **({"camera": True} if arguments.camera else {"region": arguments.region}),
         "frame": arguments.frame,
@@ -165,7 +171,7 @@ def _write_track(arguments: Namespace, result: Effect, tracked: dict, stops: lis
         "stops": [{"frame": stop.frame, "reason": stop.fault} for stop in stops],
     }
     for path in filter(None, (arguments.output, arguments.report)):
-        film_output.prepare(path.parent)
+        film_output.make_folder(path.parent)
     with atomic_write.writing(arguments.output) as part:
         moved = recipe.moved(result, arguments.recipe.parent, arguments.output.parent)
         part.write_text(recipe_file.dump(moved), encoding="utf-8")

@@ -1,1 +1,1 @@
-"""What an effect is in Blender's data, and what it is made of as plain data."""
+"""Read and write what Blender stores of an effect."""

@@ -1,5 +1,4 @@
-"""Scribbles: Blender's annotation layers and strokes; and where they lie on an effect's picture, and that on the
-sequencer's image."""
+"""Scribbles: annotation layers and strokes, and the transform between an effect's picture and the sequencer's image."""
 
 from __future__ import annotations
 
@@ -14,25 +13,27 @@ from bpy.types import Annotation, AnnotationFrame, PropertyGroup, Region, Scene,
 from ...core.messages import EffectError
 from .fcurves import numbers
 
-# Pixels of a strip's side on the image, below which nobody sees where its scribbles are.
-_SMALLEST = 4
-USERS = "user"  # in place of an effect's identity: the annotation is the user's own, whatever its name
-# The numbers of a strip's transform that can be keyed.
+_SMALLEST = 4  # pixels: smaller sides are too small for scribbles
+USERS = "user"  # in place of an effect's identity: the annotation is the user's own
+# The properties of a strip's transform that can be keyed.
 TRANSFORM = ("offset_x", "offset_y", "scale_x", "scale_y", "rotation")
 
 
 def picture_size(effect: PropertyGroup) -> tuple[int, int]:
-    """Width and height of the effect's picture, which are its source's."""
+    """Return width and height of the effect's picture, which are its source's."""
     return effect.scene.render.resolution_x, effect.scene.render.resolution_y
 
 
-@np.errstate(invalid="ignore")  # the result is then not finite, which image_to_picture reports
+@np.errstate(invalid="ignore")  # image_to_picture reports a result that is not finite
 def picture_to_image(strip: Strip, size: tuple[int, int], **moved: float) -> np.ndarray:
-    """Matrix (3, 3) from fractions of the strip's picture to the sequencer's image space.
+    """Return the matrix (3, 3) from fractions of the strip's picture to the sequencer's image space.
 
-    Image space, as annotations have it: pixels, origin at the image's centre, y up. size: the picture's, in pixels;
-    moved: numbers of the strip's transform, in place of its own.
-    Blender scales and turns a strip about its transform's origin, and mirrors the whole image after that.
+    Annotations use image space: pixels, origin at the image's center, y up. Blender scales and turns a strip about its
+    transform's origin, and mirrors the whole image after that.
+
+    Args:
+        size: The picture's width and height in pixels.
+        moved: Properties of the transform, in place of the strip's own.
     """
     width, height = size
     x, y, scale_x, scale_y, rotation = (moved.get(name, getattr(strip.transform, name)) for name in TRANSFORM)
@@ -47,19 +48,19 @@ def picture_to_image(strip: Strip, size: tuple[int, int], **moved: float) -> np.
 
 
 def is_invertible(matrix: np.ndarray) -> bool:
-    """Whether a matrix (3, 3) leads back: a strip may be scaled to nothing, and a file may hold what is no number."""
+    """Tell whether a matrix (3, 3) has an inverse: a strip may have scale 0, and a file may hold NaN."""
     with np.errstate(all="ignore"):
         return bool(np.isfinite(matrix).all() and np.isfinite(1 / np.linalg.det(matrix)))
 
 
 def picture_to_region(strip: Strip, size: tuple[int, int], region: Region) -> np.ndarray:
-    """Matrix (3, 3) from fractions of the strip's picture to pixels of a preview's region."""
+    """Return the matrix (3, 3) from fractions of the strip's picture to pixels of a preview's region."""
     return image_to_region(region) @ picture_to_image(strip, size)
 
 
 def image_to_region(region: Region) -> np.ndarray:
-    """Matrix (3, 3) from the sequencer's image space to pixels of a preview's region."""
-    # view_to_region rounds to whole pixels, region_to_view does not; and its last pixel is what is drawn at the edge.
+    """Return the matrix (3, 3) from the sequencer's image space to pixels of a preview's region."""
+    # region_to_view does not round to whole pixels. The last pixel is at the edge of the drawn area.
     (left, bottom), (right, top) = (
         region.view2d.region_to_view(x, y) for x, y in ((0, 0), (region.width - 1, region.height - 1))
     )
@@ -70,8 +71,13 @@ def image_to_region(region: Region) -> np.ndarray:
 
 
 def image_to_picture(strip: Strip, size: tuple[int, int], **moved: float) -> np.ndarray | None:
-    """Matrix (3, 3) from the sequencer's image to fractions of the strip's picture; None where the strip is scaled to
-    nothing that can be seen. size, moved: as picture_to_image has them. EffectError: its transform is none."""
+    """Return the matrix (3, 3) from the sequencer's image to fractions of the strip's picture.
+
+    None: the strip is too small to be seen. `size` and `moved` are as in picture_to_image.
+
+    Raises:
+        EffectError: A number of its transform is not finite.
+    """
     matrix = picture_to_image(strip, size, **moved)
     if not np.isfinite(matrix).all():
         raise EffectError(rpt_('strip "{strip}": a number of its transform is not finite').format(strip=strip.name))
@@ -81,13 +87,13 @@ def image_to_picture(strip: Strip, size: tuple[int, int], **moved: float) -> np.
 
 
 def strokes_of(drawing: AnnotationFrame) -> list[np.ndarray]:
-    """The strokes (n, 2) float64 of an annotation's frame, in the sequencer's image space; empty ones left out."""
+    """Return the strokes (n, 2) float64 of an annotation's frame in image space, without empty ones."""
     strokes = [numbers(stroke.points, "co", size=3)[:, :2].astype(np.float64) for stroke in drawing.strokes]
     return [points for points in strokes if len(points)]
 
 
 def add_stroke(drawing: AnnotationFrame, points: np.ndarray) -> None:
-    """Adds a stroke (n, 2), in the sequencer's image space, to an annotation's frame."""
+    """Add a stroke (n, 2) in image space to an annotation's frame."""
     stroke = drawing.strokes.new()
     stroke.display_mode = "2DSPACE"
     stroke.points.add(len(points))
@@ -97,25 +103,25 @@ def add_stroke(drawing: AnnotationFrame, points: np.ndarray) -> None:
 
 
 def layer_of(effect: PropertyGroup, region: PropertyGroup) -> Any:
-    """The annotation layer of a region, or None."""
+    """Return the annotation layer of a region, or None."""
     annotation = effect.scene and effect.scene.annotation
     return annotation.layers.get(region.layer) if annotation else None
 
 
 def is_hidden(effect: PropertyGroup, region: PropertyGroup) -> bool:
-    """Whether the user has hidden a region's lines."""
+    """Tell whether the user has hidden a region's lines."""
     layer = layer_of(effect, region)
     return layer is not None and layer.annotation_hide
 
 
 def annotation(effect: PropertyGroup) -> Annotation:
-    """What the effect's scribbles are drawn on; made where somebody has removed it."""
+    """Return the annotation of the effect's scribbles, made again where it was removed."""
     if effect.scene.annotation is None:
         new_annotation(effect.scene, data_("Scribbles {effect}").format(effect=effect.name))
     return effect.scene.annotation
 
 
 def new_annotation(scene: Scene, name: str) -> None:
-    """Gives an effect's scene an empty annotation, which goes with it."""
+    """Give an effect's scene an empty annotation, which is removed with it."""
     scene.annotation = bpy.data.annotations.new(name)
     scene.annotation.virtual_shutter_made = scene.virtual_shutter.identity

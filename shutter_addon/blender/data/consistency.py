@@ -1,4 +1,4 @@
-"""What changes along with a property of an effect: bars with the window, regions with names, scribbles with colors."""
+"""Keep parts of an effect consistent: bars with the window, regions with shutters' names, scribbles with colors."""
 
 from __future__ import annotations
 
@@ -18,14 +18,12 @@ from .selection import active_region, active_shutter
 
 
 def changed(group: PropertyGroup, _context: Context) -> None:
-    """For update callbacks: the sequencer keeps finished frames, and knows nothing of what the effect's strips depend
-    on."""
+    """Drop finished frames, as an update callback: the sequencer does not know what effect strips depend on."""
     strips.invalidate(group.id_data)
 
 
 def choose_region(effect: PropertyGroup) -> None:
-    """Makes a region of the active shutter the active one, the nearest in the list, unless it is one or there is none:
-    the list shows that shutter's alone."""
+    """Make the nearest region of the active shutter active, unless one is: the list shows only those."""
     shutter = active_shutter(effect)
     own = [i for i, region in enumerate(effect.regions) if shutter and region.shutter == shutter.name]
     if own and effect.active_region not in own:
@@ -33,7 +31,7 @@ def choose_region(effect: PropertyGroup) -> None:
 
 
 def aim_pen(effect: PropertyGroup) -> None:
-    """Strokes are drawn on the active region's layer from now on."""
+    """Make strokes go to the active region's layer."""
     region = active_region(effect)
     layer = layer_of(effect, region) if region else None
     if layer is not None:
@@ -42,7 +40,7 @@ def aim_pen(effect: PropertyGroup) -> None:
 
 
 def unique(name: str, taken: Container[str]) -> str:
-    """The name, as long as a recipe has it, with a number behind it where it is taken, as Blender names things."""
+    """Return a name, cut as in recipes, with a number where it is taken, as Blender names things."""
     number, wanted = 0, name[: limits.MAX_NAME]
     while wanted in taken:
         number += 1
@@ -52,11 +50,11 @@ def unique(name: str, taken: Container[str]) -> str:
 
 
 def rename(effect: PropertyGroup, old: str, new: str) -> str:
-    """The name that a shutter gets for a wish: a unique one. Its regions follow it."""
+    """Return a unique name for a shutter, and let its regions follow."""
     others = [shutter.name for shutter in effect.shutters]
     others.remove(old)
     new = unique(new, others)
-    # A name that is taken twice is that of a copy: the regions belong to the original.
+    # Another shutter with the old name is the original, which has the regions; this one is its copy.
     if old not in others:
         for region in effect.regions:
             if region.shutter == old:
@@ -65,7 +63,7 @@ def rename(effect: PropertyGroup, old: str, new: str) -> str:
 
 
 def rename_followed(effect: PropertyGroup, old: str, new: str) -> None:
-    """Shutters that follow a region go on to do so under its new name, unless another region has the old one."""
+    """Let shutters follow a region under its new name, unless another region has the old one."""
     if [region.name for region in effect.regions].count(old) > 1:
         return
     for shutter in effect.shutters:
@@ -74,7 +72,7 @@ def rename_followed(effect: PropertyGroup, old: str, new: str) -> None:
 
 
 def forget_followed(effect: PropertyGroup, name: str) -> None:
-    """Shutters follow nothing that followed a region of this name, unless there is one."""
+    """Let shutters follow nothing where the region of this name is gone."""
     if name in [region.name for region in effect.regions]:
         return
     for shutter in effect.shutters:
@@ -83,22 +81,30 @@ def forget_followed(effect: PropertyGroup, name: str) -> None:
 
 
 def bars(shutter: PropertyGroup) -> np.ndarray:
-    """A shutter's bars as they stand, float64 (L,)."""
+    """Return a shutter's bars without keys, float64 (L,)."""
     return numbers(shutter.bars, "weight").astype(np.float64)
 
 
 def fit_bars(effect: PropertyGroup) -> None:
-    """After a change of the window's length or its position: shutters that keep to a preset have its bars again, all
-    others, their keys as well, keep their shape and share of light."""
+    """Fit bars after the window's length or position has changed.
+
+    Shutters that keep to a preset get its bars. Others, and keys, keep their shape and share of light.
+    """
     for index, shutter in enumerate(effect.shutters):
-        is_made = _made_again(effect, index)
+        is_made = _remade(effect, index)
         if not is_made and len(shutter.bars) not in (0, effect.window):
             _change_bars(effect, index, lambda old: shutters.resample(old, effect.window))
 
 
 def count_filmed(effect: PropertyGroup) -> str | None:
-    """Has an effect of format 1, whose bars counted moments between filmed frames, count filmed frames. What says that
-    it exposes other moments now; None: it does not. EffectError: a value that no effect can have is in the way."""
+    """Convert an effect of format 1, whose bars counted moments between filmed frames, to bars of filmed frames.
+
+    Returns:
+        A sentence if it exposes other moments now, else None.
+
+    Raises:
+        EffectError: A value is out of range.
+    """
     steps = int(effect.inbetween)
     lost = [_count_bars(effect, index, steps) for index in range(len(effect.shutters))]
     effect.window = -(-effect.window // steps)
@@ -107,7 +113,7 @@ def count_filmed(effect: PropertyGroup) -> str | None:
 
 
 def _count_bars(effect: PropertyGroup, index: int, steps: int) -> EffectError | None:
-    """As count_filmed, of the bars of a shutter."""
+    """Convert the bars of a shutter as in count_filmed."""
     shutter, keys = effect.shutters[index], []
     position, interpolation = (validation.word(effect, name).lower() for name in ("position", "interpolation"))
     counted = Shutter(
@@ -127,8 +133,10 @@ def _count_bars(effect: PropertyGroup, index: int, steps: int) -> EffectError | 
 
 
 def preset_of(effect: PropertyGroup, index: int) -> str:
-    """The preset that a shutter keeps to, a key of shutters.PRESETS: the one that it was given last, as long as its
-    bars are just those. "": none, as they were edited, or are keyed."""
+    """Return the preset that a shutter keeps to, a key of shutters.PRESETS, or "".
+
+    That is its last preset, as long as the bars are not edited or keyed.
+    """
     shutter, weights = effect.shutters[index], bars(effect.shutters[index])
     if shutter.preset not in shutters.PRESETS or not weights.size:
         return ""
@@ -138,9 +146,12 @@ def preset_of(effect: PropertyGroup, index: int) -> str:
     return shutter.preset if is_kept else ""
 
 
-def _made_again(effect: PropertyGroup, index: int) -> bool:
-    """Gives a shutter that keeps to a preset its bars for the window; any other one forgets which it was given. Whether
-    it keeps to one."""
+def _remade(effect: PropertyGroup, index: int) -> bool:
+    """Make the bars of a shutter that keeps to a preset again, for the window.
+
+    Returns:
+        Whether it keeps to one. If not, it forgets which it had.
+    """
     shutter = effect.shutters[index]
     shutter.preset = preset_of(effect, index)
     if shutter.preset:
@@ -151,7 +162,7 @@ def _made_again(effect: PropertyGroup, index: int) -> bool:
 
 
 def _change_bars(effect: PropertyGroup, index: int, change: Callable[[np.ndarray], np.ndarray]) -> None:
-    """Gives a shutter other bars, and as many, at all its keys: those that `change` makes of the old ones."""
+    """Apply a function to a shutter's bars, and to their values at all keys. It may change their number."""
     shutter = effect.shutters[index]
     scene, path = effect.id_data, f"{effect.path_from_id()}.shutters[{index}].bars"
     curves = fcurves.Curves(scene)
@@ -169,14 +180,14 @@ def _change_bars(effect: PropertyGroup, index: int, change: Callable[[np.ndarray
 
 
 def _bars_keyed(old: np.ndarray, keyed: dict[int, FCurve], frame: float) -> np.ndarray:
-    """The bars at a frame, where some have F-curves."""
+    """Return the bars at a frame, where F-curves drive some of them."""
     weights = old.copy()
     weights[list(keyed)] = [max(curve.evaluate(frame), 0.0) for curve in keyed.values()]
     return weights
 
 
 def color_layers(effect: PropertyGroup, shutter: PropertyGroup) -> None:
-    """Scribbles have the colour of their shutter."""
+    """Give scribbles the color of their shutter."""
     for region in effect.regions:
         if region.shutter == shutter.name and (layer := layer_of(effect, region)) is not None:
             layer.color = shutter.color

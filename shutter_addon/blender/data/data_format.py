@@ -1,6 +1,7 @@
-"""The format of what the extension keeps in .blend files: a number that each scene with effects carries.
+"""The format of data in .blend files: a number on each scene with effects.
 
-A file of a newer format opens: what is not known here stays as it is stored, unseen, and nothing is tidied by itself.
+Files of a newer format open. Unknown data stays as it is stored, without being shown, and nothing is tidied
+automatically.
 """
 
 from collections.abc import Callable, Iterable, Iterator
@@ -11,43 +12,45 @@ from . import consistency, strips
 
 
 def _count_filmed() -> Iterator[str | None]:
-    """Format 2: bars count filmed frames, not the moments between them as well; frames that repeat stayed."""
-    for scene in _holding():
+    """Migrate to format 2: bars count filmed frames, no moments between them; repeated frames still count."""
+    for scene in _scenes_with_effects():
         for effect in scene.virtual_shutter.effects if scene.virtual_shutter.format < 2 else ():
             if effect.inbetween not in ("1", "AUTO"):
                 effect.skip_repeats = False
                 yield consistency.count_filmed(effect)
 
 
-# Raise it with the first change after a release that older versions would not understand: a property, an item of an
-# enum, another meaning.
+# Raise this with the first change after a release that older versions do not understand: a property, an enum item,
+# another meaning.
 FORMAT = 2
-# What then becomes of older files: by the format that each leads to, in order; the first version's was 1. They are run
-# as a file is loaded of which anything is older, and may find newer scenes beside: what needs no change stays as it is.
-# Each gives sentences of what it could not keep.
+# Migrations by the format that they lead to, in order. They run when a file is loaded in which anything is older, and
+# leave newer scenes alone. Each yields sentences about what it could not keep.
 MIGRATIONS: tuple[tuple[int, Callable[[], Iterable[str | None]]], ...] = ((2, _count_filmed),)
 
 
 def of_file() -> int:
-    """The oldest format of the effects that can be changed, 0: of before there were numbers; this one, if there are
-    none."""
-    return min((scene.virtual_shutter.format for scene in _holding()), default=FORMAT)
+    """Return the oldest format of the effects that can be changed; 0 is from before formats had numbers."""
+    return min((scene.virtual_shutter.format for scene in _scenes_with_effects()), default=FORMAT)
 
 
 def is_newer(scene) -> bool:
-    """Whether a scene's effects are of a newer format than is known here."""
+    """Tell whether a scene's effects have a newer format than this version knows."""
     return scene.virtual_shutter.format > FORMAT
 
 
 def is_file_newer() -> bool:
-    """Whether any scene that can be changed is: then nothing is written into the file but what the user changes."""
+    """Tell whether any scene that can be changed is newer. Then only the user's changes are written."""
     return any(map(is_newer, strips.local_scenes()))
 
 
 def new_effect(scene, number: int):
-    """Adds an effect to a scene, which is noted to be of the oldest format of its effects: autosave tells nobody.
+    """Add an effect to a scene, and set the scene's format to the oldest of its effects, unless it is newer.
 
-    number: the format of what the effect is filled with, FORMAT if it is new. A newer scene stays so."""
+    Done here because no handler runs before an autosave.
+
+    Args:
+        number: Format of the data that fills the effect.
+    """
     group = scene.virtual_shutter
     if not is_newer(scene):
         group.format = min(number, group.format if group.effects else FORMAT)
@@ -55,31 +58,35 @@ def new_effect(scene, number: int):
 
 
 def migrate() -> str | None:
-    """Brings the file that was loaded to this format, and notes that in all scenes with effects: not as it is saved,
-    as autosave tells nobody. The sentence about the first thing that could not be kept; None: all was."""
+    """Migrate the loaded file, and set the format of all scenes with effects. No handler runs before an autosave.
+
+    Returns:
+        A sentence about the first thing that could not be kept, or None.
+    """
     stored = of_file()
     lost = [sentence for number, change in MIGRATIONS if stored < number for sentence in change()]
-    for scene in _holding():
+    for scene in _scenes_with_effects():
         if scene.virtual_shutter.format != FORMAT:
             scene.virtual_shutter.format = FORMAT
     return next(filter(None, lost), None)
 
 
 def stamp_saved(version: str) -> None:
-    """Notes in all scenes with effects the version of the extension that saves them. Their format stays: one that was
-    appended from an older file has its own until the file is loaded, and so migrated."""
-    for scene in _holding():
+    """Set the version that saves the scenes with effects.
+
+    Their format stays: a scene that was appended from an older file migrates when the file is loaded.
+    """
+    for scene in _scenes_with_effects():
         scene.virtual_shutter.version = version
 
 
 def note(scenes: Iterable) -> str | None:
-    """The sentence about the first of these scenes whose effects are of a newer format, linked ones last; None: none
-    is."""
+    """Return a sentence about the first scene with effects of a newer format, local ones first, or None."""
     newer = sorted(filter(is_newer, scenes), key=lambda scene: scene.library is not None)
     if not newer:
         return None
     scene = newer[0]
-    if scene.library is not None:  # it is left alone in any case
+    if scene.library is not None:  # nothing tidies linked scenes
         sentence = rpt_(
             '"{scene}" was saved by a newer version of Virtual Shutter ({version}): what this one does not know '
             "is kept, but not shown"
@@ -92,5 +99,5 @@ def note(scenes: Iterable) -> str | None:
     return sentence.format(scene=scene.name, version=scene.virtual_shutter.version)
 
 
-def _holding() -> list:
+def _scenes_with_effects() -> list:
     return [scene for scene in strips.local_scenes() if scene.virtual_shutter.effects]

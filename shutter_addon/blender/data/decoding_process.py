@@ -1,9 +1,8 @@
-"""What a second Blender runs to decode movies: it answers on its output what it is asked on its input, until that ends.
+"""The script that a second Blender runs to decode movies. It answers on stdout what it is asked on stdin.
 
-Blender runs it as a script, no part of the extension there. A question is a line of JSON: `number`, `path` and
-`deinterlace` of a movie, and `wanted`, which is "about", "close", or a frame's index; a file may be open several times,
-by several numbers. An answer is a line of JSON behind the script's last argument, and as many bytes as its `bytes`
-says.
+It is no part of the extension there. A question is a line of JSON with `number`, `path` and `deinterlace` of a movie,
+and `wanted`: "about", "close", or a frame's index. A file may be open several times under different numbers. An answer
+is the script's last argument, a line of JSON, and as many bytes as its `bytes` says.
 """
 
 from __future__ import annotations
@@ -18,14 +17,14 @@ import numpy as np
 
 
 class Movie:
-    """A movie that is open. Its frames are counted from 0."""
+    """An open movie. Frames count from 0."""
 
     def __init__(self, path: str, deinterlace: bool) -> None:
         self._path = path
         self._image = bpy.data.images.load(path)
         self._image.use_deinterlace = deinterlace
-        self._image.colorspace_settings.is_data = True  # or it makes light of deep samples
-        # An image's pixels are those of the frame that was looked at last, and a texture can be told which that is.
+        self._image.colorspace_settings.is_data = True  # otherwise Blender converts deep samples to light
+        # An image has the pixels of the frame that was evaluated last, and a texture can set that frame.
         self._look = bpy.data.textures.new("look", "IMAGE")
         self._look.image = self._image
 
@@ -34,7 +33,7 @@ class Movie:
         bpy.data.images.remove(self._image)
 
     def about(self) -> dict:
-        """What it says of itself; frames are as many as a strip of it has. RuntimeError: it is no movie."""
+        """Return the movie's properties, with as many frames as a strip of it has. RuntimeError: it is no movie."""
         if self._image.source != "MOVIE":
             raise RuntimeError("Blender knows no such movie")
         frame = self.frame(0)
@@ -53,8 +52,11 @@ class Movie:
             strips.remove(strip)
 
     def frame(self, index: int) -> np.ndarray:
-        """A frame as RGBA (H, W, 4), top row first, uint8 or, of deeper movies, uint16. RuntimeError: it cannot be
-        decoded."""
+        """Return a frame as RGBA (H, W, 4), top row first: uint8, or uint16 for deeper movies.
+
+        Raises:
+            RuntimeError: It cannot be decoded.
+        """
         self._look.image_user.frame_current = index + 1
         self._look.evaluate((0, 0, 0))
         width, height = self._image.size
@@ -64,7 +66,7 @@ class Movie:
         self._image.pixels.foreach_get(samples.reshape(-1))
         if not self._image.is_float:
             levels = np.empty(samples.shape, np.uint8)
-            # Level b is b / 255: so much more than b comes out that what is cut off is all behind the point.
+            # Level b is b / 255. Half a level more makes sure that truncation gives b.
             return np.multiply(samples[::-1], np.float32(255.5), out=levels, casting="unsafe")
         np.nan_to_num(samples, copy=False)
         return np.rint(samples[::-1].clip(0, 1) * 65535).astype(np.uint16)
@@ -75,14 +77,14 @@ def _has_sound(path: str) -> bool:
         import aud
 
         return aud.Sound(path).specs[1] > 0
-    except Exception:  # of a file without, or a Blender that was built without
+    except Exception:  # the file, or this build of Blender, has no sound
         return False
 
 
 def _answer(
     movies: dict[int, Movie], wanted: str | int, number: int, path: str, deinterlace: bool
 ) -> tuple[dict, np.ndarray | None]:
-    """The line and the bytes that are an answer. movies: those that are open, by number"""
+    """Return the line and the bytes of an answer. `movies` are open, by number."""
     try:
         if wanted == "close":
             _close(movies, number)
@@ -104,8 +106,8 @@ def _close(movies: dict[int, Movie], number: int) -> None:
 
 
 def main() -> None:
-    """Answers until its input ends."""
-    # Whatever else Blender prints would be taken for an answer.
+    """Answer until stdin ends."""
+    # Nothing else that Blender prints may be taken for an answer.
     questions, answers = (os.fdopen(os.dup(number), mode) for number, mode in ((0, "rb"), (1, "wb")))
     os.dup2(os.open(os.devnull, os.O_RDWR), 1)
     if sys.platform == "win32":
@@ -113,9 +115,9 @@ def main() -> None:
 
         for stream in (questions, answers):
             msvcrt.setmode(stream.fileno(), os.O_BINARY)
-    bpy.context.preferences.system.memory_cache_limit = 1  # megabyte: of frames, but for the last one
+    bpy.context.preferences.system.memory_cache_limit = 1  # megabyte, so that only the last frame is cached
     movies: dict[int, Movie] = {}
-    answers.write(b"\n")  # Blender may not have ended its line
+    answers.write(b"\n")  # Blender may have left a line open
     while line := questions.readline():
         said, frame = _answer(movies, **json.loads(line))
         said["bytes"] = 0 if frame is None else frame.nbytes
@@ -126,5 +128,5 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    with contextlib.suppress(BrokenPipeError):  # nobody waits for an answer any more
+    with contextlib.suppress(BrokenPipeError):  # the asking process has ended
         main()

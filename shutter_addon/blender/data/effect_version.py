@@ -1,10 +1,13 @@
-"""What an effect's pictures depend on: one list for previews, which drop finished frames where it changes, and for
-bakes, whose version is a key of it that is the same wherever the strips lie on the timeline and their files on disk."""
+"""What an effect's pictures depend on, in one list for previews and bakes.
+
+Previews drop finished frames when it changes. A bake stores a hash of it, which is the same wherever the strips lie on
+the timeline and the files on disk.
+"""
 
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable, Hashable, Iterable, Iterator
+from collections.abc import Callable, Hashable, Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -31,24 +34,25 @@ from . import (
 from .annotations import TRANSFORM, layer_of, picture_size
 from .fcurves import numbers
 
-# What stands for the files of a strip, or of a region whose matte is an image.
+# Identifies the files of a strip, or of a region whose matte is an image.
 Files = Callable[[Strip | PropertyGroup], Hashable]
 
-_Curve = tuple[str, int, FCurve]  # with its path and index
-
 _MOVES = "location", "rotation", "scale"
-# Keyframe.interpolation as a number: constant, linear, bezier, then the others.
-_BEZIER = 2
+_BEZIER = 2  # of Keyframe.interpolation as a number; those above have parameters
 
 
 def frames_of(strip: Strip) -> range:
-    """The frames that an effect strip shows, counted from its origin: the same for all parts of a cut strip."""
+    """Return the frames that an effect strip shows, from its origin: comparable between parts of a cut strip."""
     start = round(strips.origin(strip))
     return range(strip.left_handle - start, strip.right_handle - start)
 
 
 def key(scene: Scene, effect: PropertyGroup, strip: Strip, frames: range) -> str:
-    """16 hexadecimal digits; frames: as frames_of. EffectError, MediaError: the effect cannot be shown."""
+    """Return 16 hexadecimal digits that identify an effect's pictures at frames as in frames_of.
+
+    Raises:
+        EffectError, MediaError: The effect cannot be shown.
+    """
     start = round(strips.origin(strip))
     snapshot.check_counts(effect)
     source = strips.source_of(scene, effect, strip)
@@ -56,7 +60,7 @@ def key(scene: Scene, effect: PropertyGroup, strip: Strip, frames: range) -> str
     digest = hashlib.sha256()
     for part in (
         (versions.extension(), versions.colours(), rate, frames, picture_size(effect)),
-        (None if effect.use_source_time else timing(source, start), _contents(source)),
+        _source(effect, source, _contents, start),
         *_settings(effect),
         *parts(scene, effect, strip, _contents, start),
     ):
@@ -64,11 +68,19 @@ def key(scene: Scene, effect: PropertyGroup, strip: Strip, frames: range) -> str
     return digest.hexdigest()[:16]
 
 
+def preview_key(scene: Scene, effect: PropertyGroup, strip: Strip) -> int:
+    """Return a number that changes with an effect's pictures, except by properties with an update callback."""
+    source = strips.nearest_source(scene, effect, strip)
+    lies = None if source is None else (source.left_handle, _source(effect, source, _stamps, 0))
+    names = tuple(shutter.name for shutter in effect.shutters)
+    return hash((names, lies, *parts(scene, effect, strip, _stamps)))
+
+
 def is_changed(scene: Scene, effect: PropertyGroup, strip: Strip) -> bool:
-    """Whether an effect is another than when its strip was baked, or cannot be shown any more."""
+    """Tell whether an effect has changed since its strip was baked, or cannot be shown any more."""
     bake, frames = strip.virtual_shutter_bake, frames_of(strip)
     if frames.start < bake.first or frames.stop > bake.first + bake.count:
-        return True  # it has become longer
+        return True  # the strip is longer now
     try:
         return key(scene, effect, strip, range(bake.first, bake.first + bake.count)) != bake.version
     except (UserError, MemoryError):
@@ -78,10 +90,13 @@ def is_changed(scene: Scene, effect: PropertyGroup, strip: Strip) -> bool:
 def parts(
     scene: Scene, effect: PropertyGroup, strip: Strip, files: Files, start: int | None = None
 ) -> Iterator[Hashable]:
-    """All that an effect's pictures depend on, but for its source and for properties with an update callback.
+    """Yield what an effect's pictures depend on, except the source and properties with an update callback.
 
-    The values of keyed properties do not count: they change with every frame that plays. start: the timeline frame that
-    frames count from, so that the parts are the same wherever the strips lie; None: that counts as well"""
+    Values of keyed properties do not count, as they change with every frame that plays.
+
+    Args:
+        start: Timeline frame that frames count from, so that moved strips give the same. None: they do not.
+    """
     names = [shutter.name for shutter in effect.shutters]
     yield tuple(len(shutter.bars) for shutter in effect.shutters)
     for region in effect.regions:
@@ -90,18 +105,22 @@ def parts(
         if region.kind == "MATTE":
             yield from _matte(region, files, start)
     yield fcurves.stretched(scene)
-    found = [(curve.data_path, curve.array_index, curve) for curve in fcurves.curves_under(scene, "")]
-    yield from _curves(_below(effect.path_from_id() + ".", found), start)
-    placed = _below(f"{strip.path_from_id()}.transform.", found)
-    yield from _curves(placed, start)
-    keyed = {name for name, _index, curve in placed if _drives(curve)}
-    # As words: "not a number" is never the same again.
+    transform = f"{strip.path_from_id()}.transform."
+    yield from _curves(scene, effect.path_from_id() + ".", start)
+    yield from _curves(scene, transform, start)
+    keyed = {c.data_path.removeprefix(transform) for c in fcurves.curves_under(scene, transform) if _drives(c)}
+    # As text, because NaN never equals NaN.
     yield repr([getattr(strip.transform, name) for name in TRANSFORM if name not in keyed])
-    yield repr(tuple(strip.transform.origin)), strip.use_flip_x, strip.use_flip_y  # scribbles lie mirrored with it
+    yield repr(tuple(strip.transform.origin)), strip.use_flip_x, strip.use_flip_y
+
+
+def _source(effect: PropertyGroup, source: Strip, files: Files, start: int) -> Hashable:
+    """Return what an effect's source shows, and when."""
+    return None if effect.use_source_time else timing(source, start), files(source)
 
 
 def _settings(effect: PropertyGroup) -> Iterator[Hashable]:
-    """The properties of an effect that are not keyed, but for names and colors."""
+    """Yield an effect's properties that are not keyed, except names and colors."""
     path, followed = effect.path_from_id(), [region.name for region in effect.regions]
     curves = filter(_drives, fcurves.curves_under(effect.id_data, path + "."))
     keyed = {(curve.data_path, curve.array_index) for curve in curves}
@@ -112,49 +131,45 @@ def _settings(effect: PropertyGroup) -> Iterator[Hashable]:
             numbers = (value,) if isinstance(value, str | float | int) else tuple(value)
             yield name, tuple(number for i, number in enumerate(numbers) if (where, i) not in keyed)
 
-    yield from values(effect, "", *_told(model.Effect, Options), "use_source_time", "source_time")
-    yield from values(effect.camera, ".camera", *_told(model.Camera), *_MOVES)
+    yield from values(effect, "", *_setting_names(model.Effect, Options), "use_source_time", "source_time")
+    yield from values(effect.camera, ".camera", *_setting_names(model.Camera), *_MOVES)
     for i, shutter in enumerate(effect.shutters):
-        yield from values(shutter, f".shutters[{i}]", *_told(model.Shutter), "follow")
+        yield from values(shutter, f".shutters[{i}]", *_setting_names(model.Shutter), "follow")
         is_followed = shutter.follow == "REGION" and shutter.follow_region in followed
         yield followed.index(shutter.follow_region) if is_followed else None
         for k, bar in enumerate(shutter.bars):
             yield from values(bar, f".shutters[{i}].bars[{k}]", "weight")
-    told = _told(model.Region, model.OutlineRegion, model.FileContent, model.RampContent)
+    names = _setting_names(model.Region, model.OutlineRegion, model.FileContent, model.RampContent)
     for i, region in enumerate(effect.regions):
-        yield from values(region, f".regions[{i}]", *told, "kind", "matte", "channel_name", *_MOVES)
+        yield from values(region, f".regions[{i}]", *names, "kind", "matte", "channel_name", *_MOVES)
         yield tuple((noted.frame, tuple(noted.location), noted.rotation, noted.scale) for noted in region.drawn)
 
 
 def _drives(curve: FCurve) -> bool:
-    """Whether it has any say in its property."""
+    """Tell whether an F-curve drives its property."""
     return not (curve.mute or curve.is_empty)
 
 
-def _told(*kinds: type) -> list[str]:
-    """The properties that the fields of the model's classes define, but for names and colors."""
+def _setting_names(*kinds: type) -> list[str]:
+    """Return the properties of the model's fields, except names and colors."""
     fields = fields_of(*kinds).values()
     return [field.blender for field in fields if field.choices or not isinstance(field.default, str | tuple)]
 
 
-def _below(path: str, curves: Iterable[_Curve]) -> list[_Curve]:
-    """Those of F-curves whose path begins so, the rest of it, in an order that does not change."""
-    found = [(name.removeprefix(path), index, curve) for name, index, curve in curves if name.startswith(path)]
-    return sorted(found, key=lambda each: each[:2])
-
-
-def _curves(curves: Iterable[_Curve], start: int | None) -> Iterator[Hashable]:
-    for path, index, curve in curves:
-        yield path, index, curve.mute, curve.extrapolation
+def _curves(owner: Scene | Mask, path: str, start: int | None) -> Iterator[Hashable]:
+    """Yield what the F-curves say whose path starts with `path`, in the order of their paths."""
+    found = fcurves.curves_under(owner, path)
+    for curve in sorted(found, key=lambda curve: (curve.data_path, curve.array_index)):
+        yield curve.data_path.removeprefix(path), curve.array_index, curve.mute, curve.extrapolation
         points = curve.keyframe_points
         for name in ("handle_left", "co", "handle_right"):
             places = numbers(points, name, size=2)
-            if start is not None:  # floats of other frames are others
+            if start is not None:  # rounded, because float32 errors differ between frames
                 places[:, 0] = np.round(places[:, 0] - start, 2) + 0.0
             yield places.tobytes()
         interpolations = numbers(points, "interpolation", np.int32)
         yield interpolations.tobytes()
-        if max(interpolations.tolist(), default=0) > _BEZIER:  # one of those that have parameters
+        if max(interpolations.tolist(), default=0) > _BEZIER:
             yield numbers(points, "easing", np.int32).tobytes()
             yield tuple(numbers(points, name).tobytes() for name in ("back", "amplitude", "period"))
         for modifier in curve.modifiers:
@@ -170,7 +185,7 @@ def _strokes(effect: PropertyGroup, region: PropertyGroup, start: int | None) ->
 
 
 def _matte(region: PropertyGroup, files: Files, start: int | None) -> Iterator[Hashable]:
-    """What a matte shows, but for properties of the region."""
+    """Yield what a matte shows, except properties of the region."""
     try:
         if region.matte == "IMAGE":
             yield files(region)
@@ -185,24 +200,35 @@ def _matte(region: PropertyGroup, files: Files, start: int | None) -> Iterator[H
 
 
 def _mask(mask: Mask) -> Iterator[Hashable]:
-    # Blender tells of these; many points take long to read.
+    # Blender reports changes of a mask, and many points take long to read.
     key = mask.session_uid
     yield mask.frame_start
     yield revision.until_change("mask", key, lambda: repr(mask_reading.mask_at(mask, mask.frame_start)))
     yield from mask_reading.motion(mask)
-    yield from _curves([(c.data_path, c.array_index, c) for c in fcurves.curves_under(mask, "")], None)
+    yield from _curves(mask, "", None)
 
 
 def timing(strip: Strip, start: int = 0) -> StripTiming:
-    """How a movie, image or clip strip lies on the timeline, whatever it is called and wherever it was cut."""
+    """Return how a movie, image or clip strip lies on the timeline, without its name and cuts."""
     lies = source_media.timing_of(strip)
     begins, ends = lies.content_start - start, lies.content_end - start
     return replace(lies, name="", left_handle=0, content_start=begins, content_end=ends)
 
 
+def _stamps(owner: Strip | PropertyGroup) -> Hashable:
+    """Return a key of the files of a strip or an image matte, as they are on disk now, or why there is none."""
+    try:
+        return source_media.media_key(owner) if isinstance(owner, Strip) else matte_content.image_file(owner)
+    except (MediaError, EffectError) as error:
+        return str(error)
+
+
 def _contents(owner: Strip | PropertyGroup) -> Hashable:
-    """How the files of a strip, or of a region's matte, are read, and digests of what is in them. EffectError,
-    MediaError: it has none."""
+    """Return how the files of a strip or of a region's matte are read, and digests of their contents.
+
+    Raises:
+        EffectError, MediaError: It has no files.
+    """
     if isinstance(owner, Strip):
         spec = source_media.spec(owner)
         read = repr(sorted(item for item in spec.options.items() if item[0] != "config"))

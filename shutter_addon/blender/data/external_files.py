@@ -1,5 +1,4 @@
-"""The files beside the .blend file that images, volumes, sounds, libraries and the like name; and those of an edit that
-are not there, or cannot be read."""
+"""Files that data-blocks name: images, volumes, sounds, libraries; and faults of those that an edit needs."""
 
 from __future__ import annotations
 
@@ -15,12 +14,11 @@ from ...media.files import check_file, check_sound
 from ...media.sequence import numbered_alike, sequence_files
 from . import requirements, strips
 
-_MADE = "GENERATED", "VIEWER"  # sources of images that are in no file
+_MADE = "GENERATED", "VIEWER"  # sources of images without a file
 
 
 def named(item: ID) -> list[Path]:
-    """The file of an ID; of an image in tiles one for each; of a sequence the one that it names. Empty: it is packed,
-    or made by Blender."""
+    """Return a data-block's file: several of a tiled image, a sequence's first, none of a packed or generated one."""
     source = getattr(item, "source", "FILE")
     if source in _MADE or item.filepath in ("", "<builtin>") or getattr(item, "packed_file", None):
         return []
@@ -28,12 +26,12 @@ def named(item: ID) -> list[Path]:
 
 
 def every(item: ID) -> list[Path]:
-    """As `named`, but of a sequence all files that are there, in order."""
+    """Return the files as `named` does, but all of a sequence, in order."""
     return [file for path in named(item) for file in _sequence(item, path)]
 
 
 def absolute(owner: ID | Strip, path: str) -> Path:
-    """An absolute path, where an ID or a strip of one names it."""
+    """Return the absolute path of a file that a data-block or a strip names."""
     library = owner.library if isinstance(owner, bpy.types.ID) else owner.id_data.library
     return Path(bpy.path.abspath(path, library=library))
 
@@ -48,7 +46,7 @@ def _sequence(item: ID, path: Path) -> list[Path]:
     if not (getattr(item, "is_sequence", False) or getattr(item, "source", "") == "SEQUENCE"):
         return [path]
     try:
-        # All but clips show files by their own number, those before the named one as well.
+        # Clips start at the named file. Others may show files before it, too.
         files = sequence_files(path) if isinstance(item, bpy.types.MovieClip) else numbered_alike(path)
     except MediaError:
         return [path]
@@ -56,11 +54,14 @@ def _sequence(item: ID, path: Path) -> list[Path]:
 
 
 def faults(scene: Scene, frames: range, *, sources: bool) -> list[str]:
-    """A sentence for each file that the pictures of these frames need and that cannot be had: of movie, image and clip
-    strips, of images, volumes, caches and fonts that what is shown uses, and of libraries. Edits that it shows count as
-    a whole; files of mattes are not looked for.
+    """Return a sentence for each file that pictures of these frames need and that is missing or unreadable.
 
-    sources: those of effects, too, as far as the sources are shown themselves"""
+    These are files of movie, image and clip strips, of images, volumes, caches and fonts that are shown, and of
+    libraries. Edits in Scene strips count as a whole. Files of mattes are left out.
+
+    Args:
+        sources: Include the source strips of effects, as far as they are shown themselves.
+    """
     sentences = _of_strips(scene, frames, strips.SOURCES, sources=sources)
     used, data = requirements.used_data(scene, frames) - _clips(scene), bpy.data
     for items in (data.images, data.volumes, data.cache_files, data.movieclips, data.fonts):
@@ -70,12 +71,12 @@ def faults(scene: Scene, frames: range, *, sources: bool) -> list[str]:
 
 
 def sound_faults(scene: Scene, frames: range) -> list[str]:
-    """As `faults`, of sound strips."""
+    """Return faults of sound strips, as `faults` does."""
     return _of_strips(scene, frames, ("SOUND",), sources=False)
 
 
 def _clips(scene: Scene) -> set:
-    """Those of the strips, which are looked at as such."""
+    """Return the clips of strips, which _of_strips looks at."""
     shown = (strip for each in strips.shown_scenes(scene) for strip in each.sequence_editor.strips_all)
     return {strip.clip for strip in shown if strip.type == "MOVIECLIP"}
 
@@ -110,8 +111,7 @@ def _of_strip(strip: Strip, frames: range) -> Iterator[str]:
 
 
 def _of_item(item: ID, check: Callable = check_file) -> Iterator[str]:
-    """Of a sound, a library, an image or the like; of a sequence its first file. check: raises MediaError for a
-    file."""
+    """Yield faults of a data-block's files; of a sequence, of its first. `check` raises MediaError for a file."""
     for path in named(item):
         yield from _fault(check, path)
 

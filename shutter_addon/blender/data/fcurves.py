@@ -1,6 +1,6 @@
-"""F-curves of a scene: values at any frame, whatever frame Blender itself is at.
+"""F-curves of a scene, evaluated at any frame.
 
-The engine is called with the effect scene's depsgraph, which knows nothing of other scenes' animation.
+The engine gets the effect scene's depsgraph, which does not contain other scenes' animation.
 """
 
 import re
@@ -21,13 +21,13 @@ _EASES: dict[int, Ease] = {0: "constant", 1: "linear", 2: "bezier"}
 
 
 def stretched(scene) -> float:
-    """How far F-curves go on in a frame of the timeline, as Output ▸ Time Stretching has it."""
+    """Return the time stretching of Output Properties: how far F-curves advance in a frame of the timeline."""
     render = getattr(scene, "render", None)  # clips have none
     return render.frame_map_old / render.frame_map_new if render else 1.0
 
 
 class Timed:
-    """An F-curve that is asked for by frames of a scene's timeline, which may be stretched."""
+    """An F-curve in frames of a scene's timeline, which may be stretched."""
 
     def __init__(self, curve, scene):
         self._curve, self._pace = curve, stretched(scene)
@@ -39,29 +39,32 @@ class Timed:
         return self._curve.evaluate(frame * self._pace)
 
     def points(self) -> np.ndarray:
-        """As points_of."""
+        """Return frames and values (n, 2) of the keys."""
         points = points_of(self._curve)
-        if self._pace != 1:  # a key that was set at a whole frame lies there
+        if self._pace != 1:  # rounded, so that a key set at a whole frame stays there
             points[:, 0] = np.round(points[:, 0] / self._pace, 3)
         return points
 
     def insert(self, frame: float, value: float, **how):
-        """As keyframe_points.insert."""
+        """Insert a key as keyframe_points.insert does."""
         return self._curve.keyframe_points.insert(frame * self._pace, value, **how)
 
 
 class Curves:
-    """The F-curves of a scene, found by path; each is looked through once."""
+    """The F-curves of a scene by path. Each is checked once."""
 
     def __init__(self, scene):
         self._scene, self._pace = scene, stretched(scene)
         found = (c for c in curves_under(scene, "") if not (c.mute or c.is_empty))
         self._curves = {(c.data_path, c.array_index): c if self._pace == 1 else Timed(c, scene) for c in found}
-        self._frames: dict = {}  # by curve: the frames (n,) of its keys
+        self._frames: dict = {}  # frames (n,) of the keys by curve
 
     def find(self, path: str, index: int = 0):
-        """The F-curve of a property, or None; muted and empty ones do not count. EffectError: a key of it lies where
-        no timeline is."""
+        """Return the F-curve of a property, or None; muted and empty ones do not count.
+
+        Raises:
+            EffectError: A key lies beyond the timeline.
+        """
         curve = self._curves.get((path, index))
         if curve is not None and curve not in self._frames:
             frames = points_of(curve)[:, 0]
@@ -73,14 +76,16 @@ class Curves:
         return curve
 
     def of(self, owner, path: str, name: str) -> list:
-        """The F-curves of a property, or of a vector's components; path: the owner's, from the scene."""
+        """Return the F-curves of a property's components. `path` is the owner's, from the scene."""
         length = getattr(owner.bl_rna.properties[name], "array_length", 0)
         all_curves = (self.find(f"{path}.{name}", index) for index in range(max(length, 1)))
         return [curve for curve in all_curves if curve is not None]
 
     def keys(self, curves: list) -> tuple[tuple[float, Ease], ...]:
-        """Frames with a key on any of these curves, ascending, and the recipe's words for their eases: of the first
-        curve that has a key there."""
+        """Return the frames with a key on any of the curves, ascending, with eases as recipes name them.
+
+        The first curve with a key on a frame gives its ease.
+        """
         eases: dict[float, Ease] = {}
         for curve in curves:
             frames = self._frames[curve].tolist()
@@ -89,8 +94,11 @@ class Curves:
         return tuple(sorted(eases.items()))
 
     def value(self, owner, path: str, name: str, frame: float):
-        """A float property, or a float vector as a list, at a frame; path: the owner's, from the scene. EffectError:
-        it is outside of its range."""
+        """Return a float, or a vector as a list, at a frame. `path` is the owner's, from the scene.
+
+        Raises:
+            EffectError: It is out of range.
+        """
         value = getattr(owner, name)
         if isinstance(value, float):
             return self._component(owner, path, name, 0, frame, value)
@@ -100,50 +108,50 @@ class Curves:
         curve = self.find(f"{path}.{name}", index)
         if curve is not None:
             prop = owner.bl_rna.properties[name]
-            # In this order "not a number" stays what it is.
+            # In this order NaN stays NaN, and is refused.
             value = min(max(curve.evaluate(frame), prop.hard_min), prop.hard_max)
         return validation.number(owner, name, value)
 
 
 def numbers(items: bpy_prop_collection, name: str, kind: type = np.float32, size: int = 1) -> np.ndarray:
-    """A property of all items of a collection: (n,), or (n, size) of a vector; of an enum, its numbers."""
+    """Return a property of all items: (n,), or (n, size) for a vector; enums as numbers."""
     values: np.ndarray = np.empty(len(items) * size, kind)
     items.foreach_get(name, values)
     return values if size == 1 else values.reshape(-1, size)
 
 
 def points_of(curve) -> np.ndarray:
-    """Frames and values (n, 2) of an F-curve's keys."""
+    """Return frames and values (n, 2) of an F-curve's keys."""
     return numbers(curve.keyframe_points, "co", size=2)
 
 
 def _eases(curve) -> list[Ease]:
-    """The recipe's words for the eases of an F-curve's keys: those that it does not know are "bezier"."""
+    """Return the eases of an F-curve's keys as recipes name them; unknown ones become "bezier"."""
     eases = numbers(curve.keyframe_points, "interpolation", np.int32)
     return [_EASES.get(number, "bezier") for number in eases.tolist()]
 
 
 def key_frames(curves) -> list[float]:
-    """Frames with a key on any of the curves, ascending."""
+    """Return the frames with a key on any of the curves, ascending."""
     frames = [points_of(curve)[:, 0] for curve in curves]
     return np.unique(np.concatenate([np.empty(0, np.float32), *frames])).tolist()
 
 
 def leading(curves, start: float, end: float) -> tuple[Any, float, float]:
-    """Of F-curves, the one that changes most between two frames, and its values at them: its easing is that of all."""
+    """Return the F-curve that changes most between two frames, whose easing counts for all, and its values there."""
     ends = [(curve, curve.evaluate(start), curve.evaluate(end)) for curve in curves]
     return max(ends, key=lambda end: abs(end[2] - end[1]))
 
 
 def progress(curve, first: float, last: float, frame: float) -> float:
-    """Share 0 to 1 of the way that an F-curve has gone at a frame, from one value to another."""
+    """Return the share 0 to 1 of the way from one value to another that an F-curve has gone at a frame."""
     if abs(last - first) < 1e-9:
         return 0.0
     return min(max((curve.evaluate(frame) - first) / (last - first), 0.0), 1.0)
 
 
 def set_keys(scene, path: str, index: int, keys: Sequence[tuple[float, float, Ease]], group: str = "") -> None:
-    """Replaces a property's F-curve by keys (frame, value, ease of the span that follows)."""
+    """Replace a property's F-curve by keys: frame, value, and ease of the span that follows."""
     pace = stretched(scene)
     keys = [(frame * pace, value, ease) for frame, value, ease in keys]
     points = new_curve(scene, path, index, group).keyframe_points
@@ -152,7 +160,7 @@ def set_keys(scene, path: str, index: int, keys: Sequence[tuple[float, float, Ea
     for point, (_, _, ease) in zip(points, keys, strict=True):
         point.interpolation = ease.upper()
         point.handle_left_type = point.handle_right_type = "FREE"
-    # Flat handles of a third of the span: eased is u²(3 − 2u), as in core.model.keyframes, whatever lies beside it.
+    # Flat handles of a third of the span give u²(3 − 2u), as core.model.keyframes.eased.
     reach = [(b[0] - a[0]) / 3 for a, b in pairwise(keys)]
     for point, before, after in zip(points, [1.0, *reach], [*reach, 1.0], strict=True):
         point.handle_left = point.co[0] - before, point.co[1]
@@ -160,7 +168,7 @@ def set_keys(scene, path: str, index: int, keys: Sequence[tuple[float, float, Ea
 
 
 def new_curve(scene, path: str, index: int = 0, group: str = ""):
-    """An empty F-curve for a property, in place of the one it may have, and in a group of that name."""
+    """Return a new, empty F-curve for a property, which replaces an old one."""
     bag = _channelbag(scene)
     if (old := bag.fcurves.find(path, index=index)) is not None:
         bag.fcurves.remove(old)
@@ -168,12 +176,12 @@ def new_curve(scene, path: str, index: int = 0, group: str = ""):
 
 
 def ensure_curve(scene, path: str, index: int = 0, group: str = ""):
-    """The F-curve of a property; a new one, in a group of that name, where there is none."""
+    """Return the F-curve of a property, made if there is none."""
     return _channelbag(scene).fcurves.ensure(path, index=index, group_name=group)
 
 
 def find_curve(scene, path: str, index: int = 0):
-    """The F-curve of a property as it is, muted or not; or None."""
+    """Return the F-curve of a property, muted or not, or None."""
     return next((c for c in curves_under(scene, path) if (c.data_path, c.array_index) == (path, index)), None)
 
 
@@ -187,22 +195,22 @@ def _channelbag(scene):
 
 
 def remove_curves(scene, path: str) -> None:
-    """Removes the scene's F-curves whose path starts with `path`."""
+    """Remove the F-curves whose path starts with `path`."""
     for curve in curves_under(scene, path):
         _channelbag(scene).fcurves.remove(curve)
 
 
 def move_curves(scene, path: str, frames: float) -> None:
-    """Moves the keys of the F-curves whose path starts with `path` in time."""
+    """Move the keys of the F-curves whose path starts with `path` in time."""
     frames *= stretched(scene)
     for curve in curves_under(scene, path):
         for point in curve.keyframe_points:
-            point.co_ui[0] += frames  # and its handles
+            point.co_ui[0] += frames  # moves the handles, too
         curve.update()
 
 
 def copy_curves(scene, path: str, new_scene, new_path: str) -> None:
-    """Copies the F-curves whose path starts with `path` to the same properties under `new_path` of a scene."""
+    """Copy the F-curves whose path starts with `path` to the same properties under `new_path`."""
     for curve in curves_under(scene, path):
         copy = _channelbag(new_scene).fcurves.new_from_fcurve(
             curve, data_path=new_path + curve.data_path.removeprefix(path)
@@ -211,7 +219,7 @@ def copy_curves(scene, path: str, new_scene, new_path: str) -> None:
 
 
 def remove_item(owner: PropertyGroup, collection: str, index: int) -> None:
-    """Removes an item of a collection together with its F-curves; owner: a scene's property group that has it."""
+    """Remove an item of a collection in a scene's property group, with its F-curves."""
     items = getattr(owner, collection)
     places = {index: None} | {i: i - 1 for i in range(index + 1, len(items))}
     items.remove(index)
@@ -219,7 +227,7 @@ def remove_item(owner: PropertyGroup, collection: str, index: int) -> None:
 
 
 def move_item(owner: PropertyGroup, collection: str, index: int, to: int) -> None:
-    """Moves an item of a collection together with its F-curves; owner: as in remove_item."""
+    """Move an item of a collection in a scene's property group, with its F-curves."""
     items = getattr(owner, collection)
     order = list(range(len(items)))
     order.insert(to, order.pop(index))
@@ -228,14 +236,15 @@ def move_item(owner: PropertyGroup, collection: str, index: int, to: int) -> Non
 
 
 def _reindex(owner: PropertyGroup, collection: str, places: Mapping[int, int | None]) -> None:
-    """Keeps F-curves with the items of a collection whose places changed: old index → new, None: removed.
+    """Change indices in F-curves' paths after items of a collection have moved.
 
-    Blender finds properties by index, and knows nothing of items that move.
+    Args:
+        places: New index by old index; None: removed.
     """
     scene, path = owner.id_data, f"{owner.path_from_id()}.{collection}"
     item = re.compile(re.escape(path) + r"\[(\d+)\]")
     for curve in curves_under(scene, f"{path}["):
-        if (match := item.match(curve.data_path)) is None:  # a script's: it goes by the item's name
+        if (match := item.match(curve.data_path)) is None:  # made by a script, with the item's name
             continue
         index = int(match[1])
         place = places.get(index, index)
@@ -246,6 +255,6 @@ def _reindex(owner: PropertyGroup, collection: str, places: Mapping[int, int | N
 
 
 def curves_under(scene, path: str) -> list:
-    """The scene's F-curves whose path starts with `path`."""
+    """Return the scene's F-curves whose path starts with `path`."""
     bag = anim_utils.animdata_get_channelbag_for_assigned_slot(scene.animation_data)
     return [curve for curve in bag.fcurves if curve.data_path.startswith(path)] if bag else []

@@ -1,14 +1,14 @@
-"""Blender's masks as plain data at any of their frames, whatever frame Blender itself is at.
+"""Read Blender's masks as plain data at any of their frames.
 
-Python's API has a mask at Blender's current frame alone. Its shape keys are read from Blender's memory (struct_dna),
-and checked against what the API has. Points with parents are refused.
+Python's API has a mask only at Blender's current frame. So its shape keys are read from Blender's memory (struct_dna),
+and checked against the API. Points with parents are refused.
 """
 
 from __future__ import annotations
 
 from bisect import bisect_right
 from collections.abc import Iterator
-from itertools import chain
+from itertools import accumulate, chain
 
 import bpy
 import numpy as np
@@ -18,15 +18,12 @@ from numpy.typing import ArrayLike
 from ...core.messages import EffectError
 from ...core.model.masks import MaskLayer, MaskShape, MaskSpline
 from . import fcurves
-from .fcurves import numbers
 from .struct_dna import LayoutError, memory, read, record, text
 
-# Coordinates that are farther off are no mask of any picture.
-_FARTHEST = 1e4
-# Numbers of a point in a shape key, float32: two handles with the point between them, weight and radius.
-_SHAPE_NUMBERS = 8
+_FARTHEST = 1e4  # of coordinates, in pictures
+_SHAPE_NUMBERS = 8  # float32 of a point in a shape key: left handle, point, right handle, weight, radius
 
-# Records of Blender's memory, as struct_dna.record takes them.
+# Records of Blender's memory, for struct_dna.record.
 _LAYER = ("char name[64]", "S64"), ("ListBase splines", "2u8"), ("ListBase splines_shapes", "2u8")
 _SHAPE = (
     *(("MaskLayerShape *next", "u8"), ("MaskLayerShape *prev", "u8"), ("float *data", "u8")),
@@ -37,36 +34,39 @@ Shapes = dict[int, np.ndarray]  # shape keys by frame, ascending: (points, 8) fl
 
 
 def mask_at(mask: bpy.types.Mask, frame: float) -> MaskShape:
-    """A mask at one of its frames: shape keys and the layers' animated opacity are evaluated.
+    """Return a mask at one of its frames, with shape keys and the layers' animated opacity.
 
-    EffectError: its points or opacities are no usable numbers, its shape keys cannot be read, or a point has a parent.
+    Raises:
+        EffectError: A number is not usable, shape keys cannot be read, or a point has a parent.
     """
     return MaskShape(tuple(_layer_at(mask, layer, frame) for layer in mask.layers if not layer.hide_render))
 
 
 def motion(mask: bpy.types.Mask) -> Iterator[tuple]:
-    """What lets a mask differ from frame to frame, F-curves apart: its shape keys. EffectError: they cannot be read."""
+    """Yield the shape keys of a mask, for comparisons. EffectError: they cannot be read."""
     for layer in mask.layers:
         for frame, points in _shapes(mask, layer).items():
             yield frame, points.tobytes()
 
 
 def key_frames(mask: bpy.types.Mask) -> list[float]:
-    """The frames of a mask at which something is said of it: shape keys, and keys of its F-curves; without any it never
-    changes. EffectError: they cannot be read."""
+    """Return the frames with shape keys or keys of F-curves; without any, the mask never changes.
+
+    Raises:
+        EffectError: Shape keys cannot be read.
+    """
     keyed = {float(frame) for layer in mask.layers for frame in _shapes(mask, layer)}
     return sorted(keyed.union(fcurves.key_frames(fcurves.curves_under(mask, ""))))
 
 
 def _layer_at(mask: bpy.types.Mask, layer: bpy.types.MaskLayer, frame: float) -> MaskLayer:
-    keyed = _keyed_points(layer, _shapes(mask, layer), frame)
-    splines, at = [], 0
-    for spline in layer.splines:
-        count = len(spline.points)
-        splines.append(_spline_at(mask, spline, None if keyed is None else keyed[at : at + count]))
-        at += count
+    points = _keyed_points(layer, _shapes(mask, layer), frame)
+    if points is None:
+        points = np.concatenate([np.empty((0, 7)), *map(_points, layer.splines)])
+    ends = accumulate(len(spline.points) for spline in layer.splines)
+    splines = zip(layer.splines, np.split(points, list(ends)), strict=False)
     return MaskLayer(
-        splines=tuple(splines),
+        splines=tuple(_spline(mask, spline, own) for spline, own in splines),
         alpha=float(_checked(mask, _alpha_at(mask, layer, frame))),
         holes=layer.use_fill_holes,
         **{name: getattr(layer, name) for name in ("blend", "invert", "falloff", "fill_solver")},
@@ -79,14 +79,14 @@ def _alpha_at(mask: bpy.types.Mask, layer: bpy.types.MaskLayer, frame: float) ->
     return layer.alpha if curve is None or curve.mute or curve.is_empty else curve.evaluate(frame)
 
 
-def _spline_at(mask: bpy.types.Mask, spline: bpy.types.MaskSpline, keyed: np.ndarray | None) -> MaskSpline:
-    """keyed: its points by shape keys, as `_keyed_points` has them; None: as they stand."""
+def _spline(mask: bpy.types.Mask, spline: bpy.types.MaskSpline, numbers: np.ndarray) -> MaskSpline:
+    """Return a spline with these points (n, 7 or more): left handle, point, right handle, weight."""
     if any(point.parent.id is not None for point in spline.points):
         sentence = rpt_(
             'mask "{mask}": parents of its points are not followed, but a film of its Mask strip can be the matte'
         )
         raise EffectError(sentence.format(mask=mask.name))
-    points, weights = _standing_points(spline) if keyed is None else (keyed[:, :6].reshape(-1, 3, 2), keyed[:, 6])
+    points, weights = numbers[:, :6].reshape(-1, 3, 2), numbers[:, 6]
     feathers = tuple(tuple((f.u, f.weight) for f in point.feather_points) for point in spline.points)
     _checked(mask, [*points.flat, *weights, *chain(*chain(*feathers))])
     return MaskSpline(
@@ -99,13 +99,13 @@ def _spline_at(mask: bpy.types.Mask, spline: bpy.types.MaskSpline, keyed: np.nda
     )
 
 
-def _standing_points(spline: bpy.types.MaskSpline) -> tuple[np.ndarray, np.ndarray]:
-    places = [numbers(spline.points, name, size=2) for name in ("handle_left", "co", "handle_right")]
-    return np.stack(places, axis=1).astype(np.float64), numbers(spline.points, "weight").astype(np.float64)
+def _points(spline: bpy.types.MaskSpline) -> np.ndarray:
+    places = [fcurves.numbers(spline.points, name, size=2) for name in ("handle_left", "co", "handle_right")]
+    return np.column_stack([*places, fcurves.numbers(spline.points, "weight")]).astype(np.float64)
 
 
 def _checked(mask: bpy.types.Mask, values: ArrayLike) -> np.ndarray:
-    """Numbers of a mask. EffectError: one is none, or too far off."""
+    """Return numbers of a mask as an array. EffectError: one is not finite, or too far away."""
     values = np.asarray(values, np.float64)
     if not (np.abs(values) <= _FARTHEST).all():
         sentence = rpt_('mask "{mask}": a point, a feather or an opacity is not a usable number')
@@ -114,8 +114,10 @@ def _checked(mask: bpy.types.Mask, values: ArrayLike) -> np.ndarray:
 
 
 def _keyed_points(layer: bpy.types.MaskLayer, shapes: Shapes, frame: float) -> np.ndarray | None:
-    """The points of all splines of a layer (n, 8) by its shape keys, which are held before the first and behind the
-    last; None where it has none that fit."""
+    """Return the points (n, 8) of all splines of a layer by its shape keys; None: it has none that fit.
+
+    Before the first and after the last shape key, that one holds.
+    """
     if not shapes:
         return None
     frames, count = list(shapes), sum(len(spline.points) for spline in layer.splines)
@@ -129,7 +131,7 @@ def _keyed_points(layer: bpy.types.MaskLayer, shapes: Shapes, frame: float) -> n
 
 
 def _shapes(mask: bpy.types.Mask, layer: bpy.types.MaskLayer) -> Shapes:
-    """The shape keys of a layer, from Blender's memory. EffectError: they cannot be read in this Blender."""
+    """Return the shape keys of a layer. EffectError: this Blender stores them differently."""
     try:
         return _shapes_in_memory(layer) if layer.splines else {}
     except LayoutError:
@@ -141,8 +143,10 @@ def _shapes(mask: bpy.types.Mask, layer: bpy.types.MaskLayer) -> Shapes:
 
 
 def _shapes_in_memory(layer: bpy.types.MaskLayer) -> Shapes:
-    """LayoutError: they are not there. No address is followed before the record that has it was found to be what the
-    API says, or what leads there."""
+    """Read the shape keys of a layer. LayoutError: they are not stored as expected.
+
+    Every record is compared with the API, or with the record before it, before its pointers are followed.
+    """
     kind = record("MaskLayerShape", *_SHAPE)
     name, splines, (address, last) = read(record("MaskLayer", *_LAYER), layer.as_pointer())
     ends = [layer.splines[0].as_pointer(), layer.splines[-1].as_pointer()]

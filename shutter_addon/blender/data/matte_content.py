@@ -1,5 +1,7 @@
-"""What the mattes and ramps of an effect show, as plain data (core.model.mattes.Content); and the strips of the scene
-that are mattes, which are found by an identity, so that they may be renamed and cut."""
+"""What mattes and ramps show, as plain data (core.model.mattes.Content), and the strips that are mattes.
+
+Regions know a matte strip by an identity, so that it may be renamed and cut.
+"""
 
 from __future__ import annotations
 
@@ -12,7 +14,7 @@ from pathlib import Path
 
 import bpy
 from bpy.app.translations import pgettext_rpt as rpt_
-from bpy.types import PropertyGroup, Scene, Strip
+from bpy.types import PropertyGroup, Strip
 
 from ...core.messages import EffectError
 from ...core.model import keyframes, mattes, outlines
@@ -26,41 +28,49 @@ from ...media.opening import MatteFile
 from ...media.sequence import sequence_files
 from . import mask_reading, source_media, strips, validation
 from .external_files import absolute
-from .sampled import Frames, over
+from .sampled import Sampling
 
-_MOMENTS = 16  # of a filmed frame, that masks are read at
+_MOMENTS = 16  # steps from a filmed frame to the next, at which masks are read
 
 
-def content(
-    effect: PropertyGroup, strip: Strip, region: PropertyGroup, moves: Moves, frames: Frames, time: Channel | None
-) -> Channel:
-    """The channel of a matte or a ramp, sampled at timeline frames; strip: the effect strip that shows it, moves:
-    the region's, time: see core.model.effect.Effect. EffectError, MediaError: there is none."""
-    scene = effect.id_data
+def content(sampling: Sampling, region: PropertyGroup, moves: Moves) -> Channel:
+    """Return the channel of a matte or a ramp, where `moves` are the region's.
+
+    Raises:
+        EffectError, MediaError: There is none.
+    """
     if region.kind == "RAMP":
         ramp = validation.word(region, "ramp")
         if ramp != "LUMINANCE":
             return placed_ramp(ramp.lower(), moves)
-        return mattes.FileFrames(file=_of_strip(strips.source_of(scene, effect, strip), "luminance"))
+        return mattes.FileFrames(file=_of_strip(_source(sampling), "luminance"))
     matte = validation.word(region, "matte")
     if matte == "STRIP":
-        return _strip_frames(strip, region, frames)
+        return _strip_frames(sampling, region)
     if matte == "MASK":
-        return _mask_shapes(effect, strip, region, frames, time)
-    first = strips.origin(strip) if validation.word(region, "timing") == "TIMELINE" else None
+        return _mask_shapes(sampling, region)
+    first = strips.origin(sampling.strip) if validation.word(region, "timing") == "TIMELINE" else None
     return mattes.FileFrames(file=image_file(region), offset=validation.number(region, "offset"), first=first)
 
 
+def _source(sampling: Sampling) -> Strip:
+    return strips.source_of(sampling.effect.id_data, sampling.effect, sampling.strip)
+
+
 def carried_file(effect: PropertyGroup, strip: Strip, drawn: dict[int, outlines.Curves]) -> CarriedFile:
-    """What gives the mattes of an outline in the frames of the source, by the curves at some of them. EffectError,
-    MediaError: there is no source."""
+    """Return the file that gives a tracked outline's mattes, made from its curves by frame of the source.
+
+    Raises:
+        EffectError, MediaError: There is no source.
+    """
     spec = source_media.spec(strips.source_of(effect.id_data, effect, strip))
-    place = Path(bpy.data.filepath).parent if bpy.data.filepath else Path(bpy.app.tempdir)  # which Blender clears up
+    # Blender clears its temporary folder.
+    place = Path(bpy.data.filepath).parent if bpy.data.filepath else Path(bpy.app.tempdir)
     return CarriedFile(footage=spec, drawings=tuple(sorted(drawn.items())), folder=place / FOLDER)
 
 
 def channel(region: PropertyGroup) -> str:
-    """The channel that is read of a matte, as a recipe has it. EffectError: it has no name."""
+    """Return the channel that is read from a matte, as recipes name it. EffectError: it has no name."""
     word = validation.word(region, "channel")
     if word != "NAMED":
         return word.lower()
@@ -70,7 +80,7 @@ def channel(region: PropertyGroup) -> str:
 
 
 def image_path(region: PropertyGroup) -> Path:
-    """The file of a matte that is an image. EffectError: it has none."""
+    """Return the file of an image matte. EffectError: it has none."""
     place, image = validation.place(region), region.image
     if image is None:
         raise EffectError(rpt_("{place}: it has no matte file").format(place=place))
@@ -81,7 +91,7 @@ def image_path(region: PropertyGroup) -> Path:
 
 
 def image_file(region: PropertyGroup) -> MatteFile:
-    """A matte that is an image, to be read. EffectError: it has no file."""
+    """Return an image matte, ready to be read. EffectError: it has no file."""
     path = image_path(region)
     files = (path,) if region.image.source == "FILE" else None
     folder = path.parent if region.image.source == "SEQUENCE" else path
@@ -94,69 +104,76 @@ def image_file(region: PropertyGroup) -> MatteFile:
 
 @lru_cache(64)
 def _listed(path: Path, _stamp: tuple) -> list[Path]:
-    """The files of an image sequence, listed anew where its folder has changed."""
+    """Return the files of an image sequence, listed again when its folder changes."""
     try:
         return sequence_files(path)
-    except MediaError:  # which whoever reads it is told
+    except MediaError:  # reading it raises this again
         return []
 
 
-def _mask_shapes(
-    effect: PropertyGroup, strip: Strip, region: PropertyGroup, frames: Frames, time: Channel | None
-) -> Channel:
-    """A mask's shapes at the source's frames, of which the first is the mask's start, as a Mask strip on it has it."""
+def _mask_shapes(sampling: Sampling, region: PropertyGroup) -> Channel:
+    """Return a mask's shapes by frame of the source: its first is the mask's start, as in a Mask strip above it."""
     mask = region.mask
     if mask is None:
         raise EffectError(rpt_("{place}: it has no mask").format(place=validation.place(region)))
-    if not mask_reading.key_frames(mask):
-        return over(None, lambda _frame: mask_reading.mask_at(mask, mask.frame_start))
-    filmed = shown_frame(effect.id_data, effect, strip, time)
-    return over(frames, lambda frame: mask_reading.mask_at(mask, mask.frame_start + filmed(frame)))
+    is_keyed = bool(mask_reading.key_frames(mask))
+    filmed = shown_frame(sampling) if is_keyed else lambda _frame: 0.0
+    return sampling.over(is_keyed, lambda frame: mask_reading.mask_at(mask, mask.frame_start + filmed(frame)))
 
 
-def shown_frame(scene: Scene, effect: PropertyGroup, strip: Strip, time: Channel | None) -> Callable[[float], float]:
-    """What gives the source's frame that an effect strip shows at a timeline frame: filmed ones counted from 0, those
-    between them in parts. time: see `content`. EffectError, MediaError: it cannot be known."""
-    source = strips.source_of(scene, effect, strip)
-    spec, timing = source_media.spec(source), time or source_media.timing_of(source)
+def shown_frame(sampling: Sampling) -> Callable[[float], float]:
+    """Return a function from a timeline frame to the source's frame that it shows.
+
+    Filmed frames count from 0; moments between them are fractions.
+
+    Raises:
+        EffectError, MediaError: It cannot be known.
+    """
+    source = _source(sampling)
+    spec, timing = source_media.spec(source), sampling.time or source_media.timing_of(source)
     filmed, fps = (len(spec.files), None) if spec.files else _movie(spec)
-    size = 0, 0  # nothing of it is in pixels
-    clip = Clip(*size, filmed, fps=fps, timing=timing).stepped(_MOMENTS if effect.inbetween != "1" else 1)
+    size = 0, 0  # timing does not depend on it
+    clip = Clip(*size, filmed, fps=fps, timing=timing).stepped(_MOMENTS if sampling.effect.inbetween != "1" else 1)
     return lambda frame: clip.shown(frame).source_frame / clip.step
 
 
 @lru_cache(64)
 def _movie(spec: source_media.SourceSpec) -> tuple[int, Fraction | None]:
-    """Length and rate of a movie. A strip tells how long it is itself, which is another length once it is retimed.
-    MediaError: it cannot be read."""
+    """Return the length and rate of a movie; a retimed strip has another length.
+
+    Raises:
+        MediaError: It cannot be read.
+    """
     with closing(spec.open()) as movie:
         return movie.count, movie.fps
 
 
-def _strip_frames(strip: Strip, region: PropertyGroup, frames: Frames) -> Channel:
-    parts, word = parts_for(region, strip), channel(region)
+def _strip_frames(sampling: Sampling, region: PropertyGroup) -> Channel:
+    parts, word = parts_for(region, sampling.strip), channel(region)
     shown = {
         part.name: mattes.FileFrames(file=_of_strip(part, word), timing=source_media.timing_of(part)) for part in parts
     }
     if len(parts) == 1:
         return shown[parts[0].name]
-    return keyframes.Samples({f: shown[part_at(parts, f).name].at(f) for f in frames})
+    return keyframes.Samples({f: shown[part_at(parts, f).name].at(f) for f in sampling.frames})
 
 
 def _of_strip(strip: Strip, word: str) -> MatteFile:
-    """A channel of what a movie, image or clip strip reads. MediaError: it has no files."""
+    """Return a channel of what a movie, image or clip strip reads. MediaError: it has no files."""
     spec = source_media.spec(strip)
     return MatteFile(path=spec.path, channel=word, files=spec.files, stream=spec.options["stream"], stamp=spec.key)
 
 
 def strip_name(region: PropertyGroup) -> str:
-    """The name of the first strip that is a region's matte; "": there is none."""
+    """Return the name of the first strip that is a region's matte, or ""."""
     return next((strip.name for strip in _with_identity(region)), "")
 
 
 def choose_strip(region: PropertyGroup, name: str) -> None:
-    """Makes a strip a region's matte, by its name, with the other parts of it, if it was cut; no strip, where none is
-    called so."""
+    """Make the strip of a name a region's matte, with the other parts where it was cut.
+
+    Without such a strip, the region has none.
+    """
     editor = region.id_data.sequence_editor
     strip = editor and editor.strips_all.get(name)
     if strip is None:
@@ -165,7 +182,7 @@ def choose_strip(region: PropertyGroup, name: str) -> None:
     known = strip.virtual_shutter_matte
     same = [other for other in editor.strips_all if known and other.virtual_shutter_matte == known]
     parts = [strip, *(other for other in same if _is_part(other, strip))]
-    if len(parts) != len(same):  # it has no identity yet, or that of a strip which it is a copy of
+    if len(parts) != len(same):  # it has no identity, or that of the strip that it was copied from
         identity = uuid.uuid4().hex
         for part in parts:
             part.virtual_shutter_matte = identity
@@ -173,13 +190,16 @@ def choose_strip(region: PropertyGroup, name: str) -> None:
 
 
 def _is_part(other: Strip, strip: Strip) -> bool:
-    """Whether a strip and another one that has its identity were cut from one."""
+    """Tell whether two strips of the same identity were cut from one."""
     return strips.origin(other) == strips.origin(strip) and not _overlap(_content(other), _content(strip))
 
 
 def strips_of(region: PropertyGroup) -> list:
-    """The movie, image and clip strips that have the identity of a region's matte: several, where it was cut or copied.
-    EffectError: there is none."""
+    """Return the movie, image and clip strips of a region's matte: several, where it was cut or copied.
+
+    Raises:
+        EffectError: There is none.
+    """
     matching = _with_identity(region)
     if not matching:
         words = rpt_("{place}: its matte strip was deleted") if region.strip else rpt_("{place}: it has no matte strip")
@@ -192,12 +212,15 @@ def strips_of(region: PropertyGroup) -> list:
 
 
 def parts_for(region: PropertyGroup, effect_strip: Strip) -> list:
-    """The parts of the strip that is a region's matte, where an effect strip shows it: of copies, the nearest in time.
-    EffectError: there is none."""
+    """Return the parts of a region's matte strip, in order. Of copies, the nearest to the effect strip counts.
+
+    Raises:
+        EffectError: There is none.
+    """
     copies: list[list] = []
     for strip in sorted(strips_of(region), key=lambda strip: (strips.origin(strip), strip.left_handle)):
         fitting = [parts for parts in copies if not any(_overlap(_content(strip), _content(part)) for part in parts)]
-        # Parts that were moved apart have other origins.
+        # Parts that were moved apart have different origins.
         same = [parts for parts in fitting if strips.origin(parts[-1]) == strips.origin(strip)]
         if fitting:
             (same or fitting)[-1].append(strip)
@@ -209,7 +232,7 @@ def parts_for(region: PropertyGroup, effect_strip: Strip) -> list:
 
 
 def _content(strip: Strip) -> tuple[float, float]:
-    """What a strip shows of its content, from frame to frame."""
+    """Return the first and last frame of a strip's content that it shows."""
     return strip.left_handle - strips.origin(strip), strip.right_handle - strips.origin(strip)
 
 
@@ -218,12 +241,12 @@ def _overlap(one: tuple[float, float], other: tuple[float, float]) -> bool:
 
 
 def _apart(one: tuple[float, float], other: tuple[float, float]) -> tuple[float, float]:
-    """How far apart two spans lie, and where they meet, how far their starts."""
+    """Return the distance of two spans, and for spans that meet, that of their starts."""
     return max(other[0] - one[1], one[0] - other[1], 0), abs(other[0] - one[0])
 
 
 def part_at(parts: list, frame: float) -> Strip:
-    """Of the parts of a strip that was cut the one that shows a timeline frame, or the nearest."""
+    """Return the part of a cut strip at a timeline frame, or the nearest."""
     return min(parts, key=lambda part: max(part.left_handle - frame, frame - part.right_handle + 1, 0))
 
 

@@ -1,4 +1,4 @@
-"""What a panel says of a matte: how large and how long it is, and what is wrong with it."""
+"""What a panel shows of a matte: its size and length, and what is wrong with it."""
 
 from __future__ import annotations
 
@@ -19,8 +19,13 @@ from . import matte_content, snapshot
 
 
 class Look(NamedTuple):
-    """text: of the medium, "" where there is none to tell of; fault: why it cannot be shown; note: that its last frame
-    holds; each a sentence or \"\""""
+    """What a panel says of a matte: sentences, or "".
+
+    Attributes:
+        text: Size and length.
+        fault: Why it cannot be shown.
+        note: That its last frame holds.
+    """
 
     text: str = ""
     fault: str = ""
@@ -28,7 +33,7 @@ class Look(NamedTuple):
 
 
 def look(scene: Scene, effect: PropertyGroup, strip: Strip, region: PropertyGroup) -> Look:
-    """The look at a region that is a matte, taken once until something changes."""
+    """Return what to say of a region that is a matte, kept until something changes."""
     index = list(effect.regions).index(region)
     key = effect.scene.session_uid, index, strip.name
     return revision.until_change("matte", key, lambda: _look(scene, effect, strip, index))
@@ -58,7 +63,7 @@ def _look(scene: Scene, effect: PropertyGroup, strip: Strip, index: int) -> Look
 def _note(
     scene: Scene, effect: PropertyGroup, strip: Strip, region: PropertyGroup, content: keyframes.Channel, count: int
 ) -> str:
-    """That a matte is shorter than what it is for."""
+    """Return a sentence if a matte is shorter than the film."""
     if region.matte == "STRIP":
         ends = max(part.right_handle for part in matte_content.parts_for(region, strip))
         return iface_("Ends before the film: its last frame holds") if ends < strip.right_handle else ""
@@ -69,7 +74,7 @@ def _note(
     else:
         try:
             last = snapshot.last_shown(scene, effect, strip)
-        except UserError:  # which the live preview tells
+        except UserError:  # the live preview shows it
             return ""
     if content.offset + last < count:
         return ""
@@ -78,7 +83,7 @@ def _note(
 
 @lru_cache(64)
 def _size(file: MatteFile) -> tuple[int, int, int] | str:
-    """Width, height and number of frames, or why it cannot be read."""
+    """Return width, height and number of frames, or why the file cannot be read."""
     try:
         with closing(file.open()) as source:
             return source.width, source.height, source.count

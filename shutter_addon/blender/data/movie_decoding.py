@@ -1,4 +1,4 @@
-"""Lends Blender's own decoding of movies to the media layer, for where PyAV is missing."""
+"""Let the media layer decode movies by a second Blender, where PyAV is missing."""
 
 import sys
 from pathlib import Path
@@ -11,7 +11,7 @@ _SCRIPT = Path(__file__).with_name("decoding_process.py")
 
 
 def _command() -> list[str]:
-    """What runs that script in a Blender of its own, which has nothing of the user's, and asks no network."""
+    """Return the command that runs the script in a Blender without user settings and network."""
     if not bpy.app.binary_path:  # Blender as a library
         return [sys.executable, str(_SCRIPT)]
     alone = ["--background", "--factory-startup", "--offline-mode", "-noaudio"]

@@ -11,7 +11,7 @@ ADDON = __package__.rpartition(".shutter_addon")[0] or "shutter_addon"
 DEVICES = (
     ("AUTO", "Automatic", "OpenGL 4.3 where there is one, else Blender's own GPU, else NumPy"),
     ("GPU", "GPU", "As Automatic, but never NumPy"),
-    ("OPENGL", "OpenGL 4.3", "An OpenGL context of its own, beside Blender's"),
+    ("OPENGL", "OpenGL 4.3", "A separate OpenGL context beside Blender's"),
     ("BLENDER", "Blender's GPU", "The GPU that Blender draws with"),
     ("CPU", "NumPy", "The processor, which is slow"),
 )
@@ -22,7 +22,7 @@ class ShutterPreferences(bpy.types.AddonPreferences):
 
     device: EnumProperty(
         name="Render Device",
-        description="What composes renders; the preview is always composed on the GPU that Blender draws with",
+        description="Device that composes renders. Previews always use the GPU that Blender draws with",
         items=DEVICES,
         translation_context=CONTEXT,
     )
@@ -42,14 +42,14 @@ class ShutterPreferences(bpy.types.AddonPreferences):
 
 
 def device() -> str:
-    """The device that renders are wanted on, one of devices.available.CHOICES."""
+    """Return the render device that the user wants, one of devices.available.CHOICES."""
     preferences = _preferences()
-    known = preferences.device if preferences else ""  # nor is one that a newer version has chosen
+    known = preferences.device if preferences else ""  # "" also for a device of a newer version
     return known.lower() or "auto"
 
 
 def gpu_memory() -> int:
-    """Megabytes of the GPU that textures may take; 0: as devices.device allows."""
+    """Return the megabytes of the GPU that textures may take; 0: as devices.device allows."""
     preferences = _preferences()
     return preferences.gpu_memory if preferences else 0
 

@@ -1,4 +1,4 @@
-"""Blender's areas that show a preview, and what they show of an effect: read of Blender's data here alone."""
+"""Areas that show a preview, and how they show an effect. Only this module reads that from Blender."""
 
 import math
 from collections.abc import Iterator
@@ -20,7 +20,10 @@ _PLAIN_SPACE = {"display_mode": "IMAGE", "display_channel": 0, "show_overexposed
 class Shown:
     """The effect strip that a preview shows.
 
-    strips_above: whether others hide it; hides_strokes: by region that is drawn, whether its lines are hidden"""
+    Attributes:
+        strips_above: Whether other strips may hide it.
+        hides_strokes: Whether a region's lines are hidden, for each region with strokes.
+    """
 
     scene: Scene
     effect: PropertyGroup
@@ -31,11 +34,13 @@ class Shown:
 
 @dataclass(frozen=True)
 class Look:
-    """How an effect's picture is looked at in all previews of its scene.
+    """How all previews of a scene show an effect's picture.
 
-    scale: how wide or high a pixel of the source is in the largest of them; None: there is none
-    proxy: what Blender reads of the source for that one; None: the footage itself
-    is_plain: whether they show the strip's picture as it is, so that it may be drawn in their place"""
+    Attributes:
+        scale: Size of a source pixel in the largest preview; None: there is no preview.
+        proxy: What Blender reads of the source for that preview; None: the footage itself.
+        is_plain: Whether they show the strip's picture unchanged, so that it may be drawn in their place.
+    """
 
     scale: float | None
     proxy: source_media.Proxy | None
@@ -43,7 +48,7 @@ class Look:
 
 
 def previews(context: Context) -> Iterator[tuple[bpy.types.Window, Area]]:
-    """Window and area of every sequencer that shows a preview."""
+    """Yield window and area of every sequencer that shows a preview."""
     for window in context.window_manager.windows:
         for area in window.screen.areas:
             if area.type == "SEQUENCE_EDITOR" and area.spaces.active.view_type != "SEQUENCER":
@@ -51,13 +56,13 @@ def previews(context: Context) -> Iterator[tuple[bpy.types.Window, Area]]:
 
 
 def redraw(_owner: object = None, _context: Context | None = None) -> None:
-    """Draws all previews again; Blender calls it with two arguments after a change of a property."""
+    """Redraw all previews. The arguments are those of an update callback."""
     for _window, area in previews(bpy.context):
-        area.tag_redraw()  # of the area alone, Blender's picture and ours
+        area.tag_redraw()
 
 
 def redraw_panels() -> None:
-    """Draws panels again, and no preview; a timer as well."""
+    """Redraw panels, but no preview."""
     kinds = {"SEQUENCE_EDITOR": "UI", "PROPERTIES": "WINDOW"}
     for window in bpy.context.window_manager.windows:
         for area in window.screen.areas:
@@ -67,18 +72,21 @@ def redraw_panels() -> None:
 
 
 def within(window: bpy.types.Window, area: Area) -> AbstractContextManager:
-    """A context in which Blender's operators work in the preview of a sequencer's area."""
+    """Return a context in which operators work in a sequencer's preview."""
     return bpy.context.temp_override(window=window, area=area, region=preview_region(area))
 
 
 def preview_region(area: Area) -> bpy.types.Region:
-    """The region of a sequencer's area that shows the picture."""
+    """Return the region of a sequencer's area that shows the picture."""
     return next(region for region in area.regions if region.type == "PREVIEW")
 
 
 def shown(context: Context, channel: int = 0) -> Shown | None:
-    """The effect strip under the playhead that the preview shows, as selection.seen has it. channel: that the preview
-    has to show, 0: all."""
+    """Return the effect strip under the playhead that the preview shows (selection.seen).
+
+    Args:
+        channel: Channel that the preview has to show; 0: all.
+    """
     scene, space = selection.scene_of(context), context.space_data
     if (space.display_mode, space.display_channel) != ("IMAGE", channel) or (seen := selection.seen(scene)) is None:
         return None
@@ -89,7 +97,7 @@ def shown(context: Context, channel: int = 0) -> Shown | None:
 
 
 def look(context: Context, scene: Scene, effect: PropertyGroup, strip: Strip) -> Look:
-    """How an effect's picture is looked at."""
+    """Return how previews show an effect's picture."""
     areas = list(_areas_of(context, scene))
     scales = {area.spaces.active: _scale(context, scene, strip, area) for area in areas}
     scales = {space: scale for space, scale in scales.items() if math.isfinite(scale)}
@@ -101,7 +109,7 @@ def look(context: Context, scene: Scene, effect: PropertyGroup, strip: Strip) ->
 
 
 def _is_plain(scene: Scene, strip: Strip) -> bool:
-    """Whether the scene shows a strip's picture as it is."""
+    """Tell whether the scene shows a strip's picture unchanged."""
     return (
         strip.blend_type in ("REPLACE", "ALPHA_OVER")
         and seen_alone.has(strip, _PLAIN_STRIP)
@@ -115,7 +123,7 @@ def _is_plain(scene: Scene, strip: Strip) -> bool:
 
 
 def _proxy(scene: Scene, effect: PropertyGroup, strip: Strip, space: Space) -> source_media.Proxy | None:
-    """What Blender reads of an effect's source in a preview; None: the footage itself."""
+    """Return what Blender reads of an effect's source in a preview; None: the footage itself."""
     source, percent = strips.nearest_source(scene, effect, strip), _PERCENT.get(space.proxy_render_size)
     if source is None or percent is None or not space.use_proxies:
         return None
@@ -123,8 +131,7 @@ def _proxy(scene: Scene, effect: PropertyGroup, strip: Strip, space: Space) -> s
 
 
 def _scale(context: Context, scene: Scene, strip: Strip, area: Area) -> float:
-    """How wide or high a pixel of the source is in a preview: in its picture, which is as small as Blender's menu has
-    it; and on the screen, where our handler draws."""
+    """Return the size of a source pixel in a preview: the smaller of that in Blender's picture and on the screen."""
     space = area.spaces.active
     percent = _PERCENT.get(space.proxy_render_size, scene.render.resolution_percentage)
     size = strip.scene.render.resolution_x, strip.scene.render.resolution_y
@@ -138,12 +145,12 @@ def _scale(context: Context, scene: Scene, strip: Strip, area: Area) -> float:
 
 
 def _pixel(matrix: np.ndarray, size: tuple[int, int]) -> float:
-    """The larger side of a picture's pixel after a matrix (3, 3) from fractions of the picture."""
+    """Return the larger side of a picture's pixel after a matrix (3, 3) from fractions of the picture."""
     return float(np.max(np.hypot(*matrix[:2, :2]) / size))
 
 
 def _areas_of(context: Context, scene: Scene) -> Iterator[Area]:
-    """The areas in which a scene's preview is drawn."""
+    """Yield the areas in which a scene's preview is drawn."""
     for window, area in previews(context):
         shows = getattr(window.workspace, "sequencer_scene", None) or window.scene
         if shows == scene and area.spaces.active.proxy_render_size != "NONE":

@@ -1,8 +1,7 @@
-"""The effect's data: on the scene that has its strips, where it can be keyed (properties nested on a strip cannot).
+"""The effect's properties: on the scene that has its strips, because properties nested on a strip cannot be keyed.
 
-`scene.virtual_shutter.effects[i]` belongs to the effect scene it points to; the Scene strips that show that scene
-are the effect's strips. Frames are timeline frames, as everywhere in Blender. What the model's fields define
-(core/model/fields.py) becomes properties here.
+`scene.virtual_shutter.effects[i]` points to its effect scene. The Scene strips that show that scene are the effect's
+strips. Frames are timeline frames. Fields of the model (core/model/fields.py) become properties here.
 """
 
 import math
@@ -33,13 +32,15 @@ from ...core.model.limits import MAX_BAR, MAX_CHANNEL, MAX_DEGREES, MAX_DISTANCE
 from . import consistency, matte_content, selection
 from .consistency import changed
 
-KEYED = {"ANIMATABLE"}  # as properties are where nothing else is said
+KEYED = {"ANIMATABLE"}  # Blender's default
 
 
 def with_fields(*kinds: type, **more: dict) -> Callable[[type], type]:
-    """A decorator: adds to a class, behind its own properties, those of the fields of the model's classes.
+    """Return a class decorator that adds properties for the fields of the model's classes.
 
-    more: for a property of that name in Blender, what is said of it beside its field, such as its `update`"""
+    Args:
+        more: By property name, further arguments of the property, such as `update`.
+    """
 
     def added(group: type) -> type:
         for field in fields_of(*kinds).values():
@@ -50,7 +51,7 @@ def with_fields(*kinds: type, **more: dict) -> Callable[[type], type]:
 
 
 def _property(field: Field, **more: Any) -> object:
-    """A field as Blender's property: of what pictures are made by, unless it is a text, which is a name."""
+    """Return a field as a property of Blender's."""
     kind, default = type(field.default), field.default
     said: dict = {"name": field.label, "description": field.description, "translation_context": field.context}
     if kind is str and not field.choices:
@@ -70,11 +71,11 @@ def _property(field: Field, **more: Any) -> object:
     return FloatProperty(**said, precision=field.precision, step=1 if field.precision > 2 else 3)
 
 
-def _shortened(region: PropertyGroup, new: str, old: str, is_set: bool) -> str:
-    """As recipes have names. Blender's own `maxlen` counts bytes, of which a character takes up to four."""
+def _region_renamed(region: PropertyGroup, new: str, old: str, is_set: bool) -> str:
+    """Return a region's name, cut as in recipes. Blender's own `maxlen` counts bytes instead of characters."""
     new = new[:MAX_NAME]
-    # Blender takes long to find an item's place among many: only where the name counts. The default name of a region
-    # that has none yet is nobody's.
+    # Finding an item's effect is slow among many, so only where a shutter follows the old name. A region that is not
+    # set yet has no old name.
     effects = region.id_data.virtual_shutter.effects
     if is_set and any(shutter.follow_region == old for effect in effects for shutter in effect.shutters):
         consistency.rename_followed(selection.effect_of_item(region), old, new)
@@ -89,14 +90,16 @@ def choice(
     update: Callable | None = changed,
     **more: str,
 ) -> object:
-    """An enum; as most are, of what pictures are made by, and without keys."""
+    """Return an enum property without keys, which by default changes pictures."""
     return EnumProperty(name=name, description=description, items=items, update=update, options=UNKEYED, **more)
 
 
 class TrackStop(PropertyGroup):
-    """Where tracking of a region stopped before it was to.
+    """The end of a track before its target.
 
-    frame: counts from the effect's start, so that it moves with its strips"""
+    Attributes:
+        frame: Counts from the effect's start, so that it moves with its strips.
+    """
 
     frame: FloatProperty(min=-2 * MAX_FRAME, max=2 * MAX_FRAME)
     forward: BoolProperty()
@@ -104,7 +107,7 @@ class TrackStop(PropertyGroup):
 
 
 class DrawnPlace(PropertyGroup):
-    """Where a region was as its drawing at a frame was made, which is seen there; frame: as that of a TrackStop."""
+    """Where a region was when its drawing at a frame was made. `frame` is as in TrackStop."""
 
     frame: FloatProperty()
     location: FloatVectorProperty(size=2)
@@ -113,11 +116,11 @@ class DrawnPlace(PropertyGroup):
 
 
 class _Tracked:
-    """What tracking has found of a region or of the camera, and how it is tracked."""
+    """Results and settings of tracking a region or the camera."""
 
     confidence: FloatProperty(
         name="Confidence",
-        description="How sure tracking was of where it is",
+        description="How certain the tracked position is",
         subtype="PERCENTAGE",
         default=100.0,
         min=0.0,
@@ -159,13 +162,7 @@ class _Tracked:
 
 def location_property(description: str, **more: Any) -> object:
     return FloatVectorProperty(
-        name="Location",
-        description=description,
-        subtype="XYZ",
-        size=2,
-        min=-MAX_DISTANCE,
-        max=MAX_DISTANCE,
-        **more,
+        name="Location", description=description, subtype="XYZ", size=2, min=-MAX_DISTANCE, max=MAX_DISTANCE, **more
     )
 
 
@@ -179,16 +176,12 @@ def scale_property(description: str, **more: Any) -> object:
 
 
 @with_fields(
-    model.Region,
-    model.OutlineRegion,
-    model.FileContent,
-    model.RampContent,
-    name={"set_transform": _shortened},
+    model.Region, model.OutlineRegion, model.FileContent, model.RampContent, name={"set_transform": _region_renamed}
 )
 class ShutterRegion(_Tracked, PropertyGroup):
     shutter: StringProperty(name="Shutter", description="Name of the shutter that holds in the region", update=changed)
     layer: StringProperty(name="Layer", description="Annotation layer that holds the strokes", update=changed)
-    # Where there is any, drawings without one are seen where they were drawn as well; else, where it has not moved.
+    # Empty: drawings lie where the region has not moved. Otherwise, each lies where it was drawn.
     drawn: CollectionProperty(type=DrawnPlace)
     kind: choice("Type", "What says where the shutter holds", KINDS, translation_context=CONTEXT)
     matte: choice("From", "What the matte is", MATTE_SOURCES)
@@ -220,8 +213,7 @@ class ShutterRegion(_Tracked, PropertyGroup):
         name="Object", description="Tracking object that has the tracks; without one, the camera"
     )
     follow_track: StringProperty(name="Track", description="Name of the track or plane track that is followed")
-    # The frame, from the effect's start, at which the editor has put the region; and a digest of the markers that its
-    # keys were made from.
+    # Frame, from the effect's start, at which the user placed the region; digest of the markers that made its keys.
     follow_frame: FloatProperty(name="Follow From", min=-2 * MAX_FRAME, max=2 * MAX_FRAME, options={"HIDDEN"})
     follow_stamp: StringProperty(options={"HIDDEN"})
 
@@ -229,23 +221,23 @@ class ShutterRegion(_Tracked, PropertyGroup):
 @with_fields(model.Camera)
 class ShutterCamera(_Tracked, PropertyGroup):
     name: StringProperty(name="Name", description="Name of the camera's animation channels", default="Camera")
-    location: location_property("Where what the camera sees has moved to, as a fraction of the picture", update=changed)
+    location: location_property("Movement of what the camera sees, as a fraction of the picture", update=changed)
     rotation: rotation_property("Rotation of what the camera sees, about the picture's center", update=changed)
     scale: scale_property("Scale of what the camera sees, about the picture's center", update=changed)
 
 
-def _renamed(shutter: PropertyGroup, new: str, old: str, _is_set: bool) -> str:
+def _shutter_renamed(shutter: PropertyGroup, new: str, old: str, _is_set: bool) -> str:
     revision.changed()
     return consistency.rename(selection.effect_of_item(shutter), old, new)
 
 
-def _recolored(shutter: PropertyGroup, _context: Context) -> None:
+def _shutter_recolored(shutter: PropertyGroup, _context: Context) -> None:
     revision.changed()
     consistency.color_layers(selection.effect_of_item(shutter), shutter)
 
 
 def _window_changed(effect: PropertyGroup, context: Context) -> None:
-    """Why bars cannot follow would only be printed from here."""
+    """Fit bars to the window. Errors of an update callback would only be printed, so this shows them."""
     try:
         consistency.fit_bars(effect)
     except EffectError as error:
@@ -259,19 +251,19 @@ def _window_changed(effect: PropertyGroup, context: Context) -> None:
     changed(effect, context)
 
 
-def _chosen(effect: PropertyGroup, context: Context) -> None:
+def _shutter_selected(effect: PropertyGroup, context: Context) -> None:
     consistency.choose_region(effect)
-    _aimed(effect, context)
+    _region_selected(effect, context)
 
 
-def _aimed(effect: PropertyGroup, _context: Context) -> None:
+def _region_selected(effect: PropertyGroup, _context: Context) -> None:
     consistency.aim_pen(effect)
 
 
 class ShutterBar(PropertyGroup):
     weight: FloatProperty(
         name="Weight",
-        description="How much the bar's frame contributes",
+        description="Contribution of the bar's frame",
         default=1.0,
         min=0.0,
         max=MAX_BAR,
@@ -280,38 +272,29 @@ class ShutterBar(PropertyGroup):
     )
 
 
-@with_fields(
-    model.Shutter,
-    name={"set_transform": _renamed},
-    color={"update": _recolored},
-)
+@with_fields(model.Shutter, name={"set_transform": _shutter_renamed}, color={"update": _shutter_recolored})
 class Shutter(PropertyGroup):
     bars: CollectionProperty(type=ShutterBar)
     follow: choice("Exposure Moves With", "What the exposure moves with", FOLLOWS)
     follow_region: StringProperty(
         name="Moved With", description="Name of the region that the exposure moves with", update=changed
     )
-    # The preset that it was given last, and the effect's position then (consistency.preset_of).
+    # The last preset, and the effect's position when it was set (consistency.preset_of).
     preset: StringProperty(options={"HIDDEN"})
     preset_position: StringProperty(options={"HIDDEN"})
 
 
-@with_fields(
-    model.Effect,
-    Options,
-    window={"update": _window_changed},
-    position={"update": _window_changed},
-)
+@with_fields(model.Effect, Options, window={"update": _window_changed}, position={"update": _window_changed})
 class _Settings:
-    """All of an effect but its shutters and regions. Copies get these first, and bars that fit them after that."""
+    """An effect without its shutters and regions. Copies set these first, so that bars fit."""
 
     name: StringProperty(name="Name", description="Name of the effect", default="Shutter")
     scene: PointerProperty(name="Scene", description="Scene that the effect's strips show", type=bpy.types.Scene)
-    # Its scene's. Undo may bring the effect back with a pointer to another scene, if its own had been removed.
+    # Its scene's. If that was removed, undo may bring the effect back with a pointer to another scene.
     identity: StringProperty(options={"HIDDEN"})
     source: StringProperty(name="Source", description="Identity of the source strip")
     start: FloatProperty(name="Start", description="Timeline frame where the effect's content starts", options=UNKEYED)
-    camera: PointerProperty(name="Camera", description="How what the camera sees moves", type=ShutterCamera)
+    camera: PointerProperty(name="Camera", description="Motion of what the camera sees", type=ShutterCamera)
     use_source_time: BoolProperty(
         name="Custom Time",
         description="Show the source at the time that is set here, in place of the strip's own timing",
@@ -332,13 +315,15 @@ class _Settings:
 class ShutterEffect(_Settings, PropertyGroup):
     shutters: CollectionProperty(type=Shutter)
     regions: CollectionProperty(type=ShutterRegion)
-    active_shutter: IntProperty(name="Active Shutter", min=0, update=_chosen, options=UNKEYED)
-    active_region: IntProperty(name="Active Region", min=0, update=_aimed, options=UNKEYED)
+    active_shutter: IntProperty(name="Active Shutter", min=0, update=_shutter_selected, options=UNKEYED)
+    active_region: IntProperty(name="Active Region", min=0, update=_region_selected, options=UNKEYED)
 
 
 class ShutterScene(PropertyGroup):
-    """Of a scene: its effects, the version of the extension that saved it, and the format of what it saved
-    (data_format). Of an effect scene: an identity, by which a copy is known."""
+    """A scene's effects, with the extension's version and the data format that saved them (data_format).
+
+    An effect scene has an identity, which tells copies from it.
+    """
 
     effects: CollectionProperty(type=ShutterEffect)
     version: StringProperty()
@@ -347,12 +332,13 @@ class ShutterScene(PropertyGroup):
 
 
 class ShutterBake(PropertyGroup):
-    """Of a strip that was baked from an effect strip, and of that strip: `identity` is the same.
+    """On a baked strip and on the effect strip that it was made from; both have the same identity.
 
-    version: of the effect when it was baked (effect_version), over `count` frames from `first`, which count from the
-    effect strip's origin
-    source: identity of the effect's source, for 0.1.0 alone; channel: that of the effect strip before it made room for
-    the film"""
+    Attributes:
+        version: Of the effect when it was baked (effect_version).
+        first: First of `count` baked frames, from the effect strip's origin.
+        channel: Of the effect strip before it made room for the film.
+    """
 
     identity: StringProperty()
     version: StringProperty()
@@ -361,28 +347,28 @@ class ShutterBake(PropertyGroup):
     channel: IntProperty()
 
 
-# In the order in which Blender gets to know them.
+# In the order of registration.
 _MOVING = TrackStop, DrawnPlace, ShutterRegion, ShutterCamera
 classes = (ShutterBar, Shutter, *_MOVING, ShutterEffect, ShutterScene, ShutterBake)
 
 
 def register() -> None:
     bpy.types.Scene.virtual_shutter = PointerProperty(type=ShutterScene)
-    # A strip cannot be pointed to and may be renamed: the source strip carries the identity that effects look for.
+    # Strips cannot be pointed to, and may be renamed. So a source strip has an identity that its effects know.
     bpy.types.Strip.virtual_shutter_source = StringProperty(options={"HIDDEN"})
-    # And that which mattes look for: apart, as a source that is duplicated and given other files may be one.
+    # Another identity for mattes: a duplicated source with other files may be a matte.
     bpy.types.Strip.virtual_shutter_matte = StringProperty(options={"HIDDEN"})
-    # The effect strip carries its scene's: Blender's clipboard drops the scene itself.
+    # On an effect strip, the identity of its scene, which Blender's clipboard drops.
     bpy.types.Strip.virtual_shutter_effect = StringProperty(options={"HIDDEN"})
-    # That the source was muted when the effect was made, and shall show again when it goes.
+    # On a source that was muted for an effect, and shows again when that is removed.
     bpy.types.Strip.virtual_shutter_muted = BoolProperty(options={"HIDDEN"})
     bpy.types.Strip.virtual_shutter_bake = PointerProperty(type=ShutterBake, options={"HIDDEN"})
-    # Of annotations and cameras that were made for an effect: its scene's identity. They go with it.
-    # annotations.USERS: the user's own.
+    # On annotations and cameras made for an effect, which are removed with it: its scene's identity. On the user's own
+    # annotations: annotations.USERS.
     bpy.types.ID.virtual_shutter_made = StringProperty(options={"HIDDEN"})
-    # The effect's start that an annotation's drawings are for.
+    # The effect's start to which an annotation's drawings belong.
     bpy.types.Annotation.virtual_shutter_start = FloatProperty(options={"HIDDEN"})
-    # The names of its drawings that regions go by, a line each.
+    # The names of layers that regions use, a line each.
     bpy.types.Annotation.virtual_shutter_names = StringProperty(options={"HIDDEN"})
 
 

@@ -1,4 +1,4 @@
-"""Property groups as they are stored, enum numbers without an item included; and values that they have for a while."""
+"""Copy property groups as they are stored, with enum numbers that have no item; and set values temporarily."""
 
 from __future__ import annotations
 
@@ -8,20 +8,22 @@ from typing import Any
 
 from bpy.types import PropertyGroup, bpy_struct
 
-# What effects point to, and where bpy.data has it.
+# Types that effects point to, and their collections in bpy.data.
 POINTED = {"MovieClip": "movieclips", "Image": "images", "Mask": "masks"}
 
 
 def copy_properties(old: PropertyGroup, new: PropertyGroup) -> None:
-    """Gives a new property group all that is stored in another one, also what a newer version has stored there; IDs
-    stay shared. It calls no update functions: what depends on each other is copied as it is."""
+    """Copy all stored values to a new property group, with those of newer versions. IDs stay shared.
+
+    No update function runs.
+    """
     there, copied = old.bl_system_properties_get(do_create=True), new.bl_system_properties_get(do_create=True)
     for name, value in there.items():
         copied[name] = value
 
 
 def plain(struct: bpy_struct) -> dict[str, Any]:
-    """A struct of Blender's with all that is in it as plain data; of what it points to, the session_uid."""
+    """Return a struct with everything in it as plain data; pointers become session_uids."""
     found: dict[str, Any] = {}
     for prop in struct.bl_rna.properties:
         name, value = prop.identifier, getattr(struct, prop.identifier)
@@ -38,7 +40,7 @@ def plain(struct: bpy_struct) -> dict[str, Any]:
 
 
 def _stored(group: bpy_struct, name: str) -> Any:
-    """A property's value for a copy of the group; of an enum that has none of its items, the number it is kept as."""
+    """Return a property's value; for an enum without a valid item, its number."""
     value = getattr(group, name)
     if value == "" and group.bl_rna.properties[name].type == "ENUM" and isinstance(group, PropertyGroup):
         return group.bl_system_properties_get()[name]
@@ -46,7 +48,7 @@ def _stored(group: bpy_struct, name: str) -> Any:
 
 
 def store(group: bpy_struct, name: str, value: object) -> None:
-    """Gives a property what `plain` has of it."""
+    """Set a property to a value from `plain`."""
     if isinstance(value, int) and group.bl_rna.properties[name].type == "ENUM":
         group.bl_system_properties_get(do_create=True)[name] = value
     else:
@@ -55,7 +57,7 @@ def store(group: bpy_struct, name: str, value: object) -> None:
 
 @contextmanager
 def for_a_while(changes: Iterable[tuple[object, str, object]]) -> Iterator[None]:
-    """Inside, attributes have other values. changes: owner, name and value of each."""
+    """Set attributes inside a `with` block. `changes` are owner, name and value of each."""
     changes = list(changes)
     before = [(owner, name, getattr(owner, name)) for owner, name, _ in changes]
     try:

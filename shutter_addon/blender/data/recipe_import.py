@@ -1,4 +1,4 @@
-"""A recipe into Blender's data: shutters, regions, strokes, keys and options."""
+"""Write a recipe into Blender's data: shutters, regions, strokes, keys and options."""
 
 import os
 from collections.abc import Callable, Iterable, Sequence
@@ -26,9 +26,15 @@ from .annotations import add_stroke, annotation, picture_size, picture_to_image
 
 
 def apply(scene, effect, strip, source: model.Effect, folder: Path = Path()) -> None:
-    """Replaces the effect's data and keys by a recipe's, whose frame 1 is the strip's first; folder: where it lies,
-    which its mattes' paths begin at. EffectError: its keys cannot lie there; MediaError: it has no such mattes; nothing
-    has changed."""
+    """Replace the effect's data and keys by a recipe's, whose frame 1 is the strip's first.
+
+    Args:
+        folder: Folder of the recipe, to which paths of mattes are relative.
+
+    Raises:
+        EffectError: Keys cannot lie there. Nothing has changed.
+        MediaError: A matte is missing. Nothing has changed.
+    """
     first = strip.left_handle - 1
     _check_keys(source, first)
     contents = [region.content for region in source.regions if isinstance(region, model.MatteRegion)]
@@ -46,14 +52,14 @@ def apply(scene, effect, strip, source: model.Effect, folder: Path = Path()) -> 
     for i, shutter in enumerate(source.shutters):
         _add_shutter(scene, effect, f"{path}.shutters[{i}]", shutter, first)
     for i, region in enumerate(source.regions):
-        # By its path: Blender takes long to find an item's place among many.
+        # Pass the path: path_from_id is slow among many items.
         _add_region(scene, effect, strip, f"{path}.regions[{i}]", region, source.shutters[region.shutter], first)
         if isinstance(region, model.MatteRegion) and isinstance(region.content, model.FileContent):
             _set_file(effect.regions[-1], strip, region.content, images[region.content])
 
 
 def _set_fields(scene, owner, path: str, part: Any, first: float, **curve) -> None:
-    """What fields define of a part of an effect, and its keys."""
+    """Set the fields of a part of an effect, and their keys."""
     for name, each in fields_of(type(part)).items():
         value = getattr(part, name)
         if each.is_channel:
@@ -65,7 +71,7 @@ def _set_fields(scene, owner, path: str, part: Any, first: float, **curve) -> No
 def _set_channel(
     scene, owner, path: str, name: str, channel: keyframes.Channel, first: float, change: Callable = float, **curve
 ) -> None:
-    """A number or a vector of a property group, or its keys; change: makes Blender's values of the channel's."""
+    """Set a number or a vector of a property group, or its keys. `change` converts values to Blender's."""
     if not isinstance(channel, keyframes.Keys):
         setattr(owner, name, change(channel.at(1)))
         return
@@ -76,14 +82,17 @@ def _set_channel(
 
 
 def _set_keys(scene, path: str, index: int, keys: keyframes.Keys, values: Iterable[float], first: float, **curve):
-    """An F-curve with these values at the frames of keys."""
+    """Make an F-curve with these values at the frames of keys."""
     frames = (frame + first for frame in keys.frames)
     fcurves.set_keys(scene, path, index, list(zip(frames, values, keys.eases, strict=True)), **curve)
 
 
 def matte_image(path: str | Path, channel: str = "luminance"):
-    """The movie, image sequence or picture at a path, to which a region can point. MediaError: there is none, or none
-    with such a channel."""
+    """Return the movie, image sequence or picture at a path as an image for a region.
+
+    Raises:
+        MediaError: There is none, or it lacks the channel.
+    """
     with MatteFile(path=Path(path), channel=channel).open() as matte:
         found, count = Path(matte.path), matte.count
     name = _kept(check_name(found))
@@ -91,8 +100,8 @@ def matte_image(path: str | Path, channel: str = "luminance"):
     if is_sequence and (known := _sequence_at(name)) is not None:
         return known
     try:
-        image = bpy.data.images.load(name, check_existing=not is_sequence)  # one that is there may be no sequence
-    except RuntimeError as error:  # its path is longer than Blender's may be
+        image = bpy.data.images.load(name, check_existing=not is_sequence)  # an existing image may be a single one
+    except RuntimeError as error:  # the path is too long for Blender
         sentence = rpt_("{file}: Blender cannot read it ({error})")
         raise MediaError(sentence.format(file=found.name, error=error)) from None
     if is_sequence:
@@ -101,15 +110,14 @@ def matte_image(path: str | Path, channel: str = "luminance"):
 
 
 def _sequence_at(name: str):
-    """The image that is the sequence at a path already, or None."""
+    """Return the existing image of the sequence at a path, or None."""
     own = [image for image in bpy.data.images if image.source == "SEQUENCE" and image.library is None]
     return next((image for image in own if bpy.path.abspath(image.filepath) == bpy.path.abspath(name)), None)
 
 
 def _kept(name: str) -> str:
-    """A path as Blender keeps those that are chosen: relative to the saved file, if the preferences say so. With two
-    slashes before it, it would be relative in any case."""
-    if os.name == "posix" and name.startswith("//"):
+    """Return a path as Blender stores it: relative to the saved file, if the preferences say so."""
+    if os.name == "posix" and name.startswith("//"):  # Blender would take it as relative
         name = name[1:]
     if bpy.data.filepath and bpy.context.preferences.filepaths.use_relative_paths:
         with suppress(ValueError):  # another drive
@@ -118,7 +126,7 @@ def _kept(name: str) -> str:
 
 
 def _check_keys(source: model.Effect, first: float) -> None:
-    """EffectError: keys would lie beyond Blender's timeline, or on the same frame, as it counts in float32."""
+    """Raise EffectError where keys would lie beyond Blender's timeline, or on the same frame in float32."""
     for keys in _keyed(source):
         frames = np.array([frame + first for frame in keys.frames], dtype=np.float32)
         if (wrong := np.flatnonzero(np.abs(frames) > limits.MAX_FRAME)).size:
@@ -130,7 +138,7 @@ def _check_keys(source: model.Effect, first: float) -> None:
 
 
 def _keyed(source: model.Effect) -> list[keyframes.Keys]:
-    """All channels of an effect that have keys."""
+    """Return all channels of an effect that have keys."""
     parts: tuple = source, source.camera, *source.shutters, *source.regions
     channels = [
         getattr(part, name) for part in parts for name, each in fields_of(type(part)).items() if each.is_channel
@@ -142,7 +150,7 @@ def _keyed(source: model.Effect) -> list[keyframes.Keys]:
 
 
 def clear(scene, effect) -> None:
-    """Removes the effect's shutters, regions, scribbles and keys."""
+    """Remove the effect's shutters, regions, scribbles and keys."""
     fcurves.remove_curves(scene, effect.path_from_id() + ".")
     effect.shutters.clear()
     effect.regions.clear()
@@ -188,9 +196,9 @@ def _add_region(
 
 
 def _set_file(region, strip, content: model.FileContent, image) -> None:
-    """A matte that a file has."""
+    """Set a region's matte to an image."""
     region.matte, region.image = "IMAGE", image
-    # Blender's offset counts from the strip's untrimmed start, a recipe's from the strip's first frame.
+    # Blender's offset counts from the strip's untrimmed start, a recipe's from its first frame.
     region.offset = content.offset - (strips.skipped(strip) if content.timing == "timeline" else 0)
     region.timing = content.timing.upper()
     is_named = content.channel not in [word.lower() for word, *_ in CHANNELS if word != "NAMED"]
@@ -199,7 +207,7 @@ def _set_file(region, strip, content: model.FileContent, image) -> None:
 
 
 def _set_moves(scene, moving, path: str, moves: model.Moves, first: float, **curve) -> None:
-    """Location, rotation and scale of a region or of the camera, and their keys."""
+    """Set location, rotation and scale of a region or the camera, and their keys."""
     for name, change in (("location", tuple), ("rotation", np.radians), ("scale", float)):
         _set_channel(scene, moving, path, name, getattr(moves, name), first, change, **curve)
 
@@ -207,7 +215,7 @@ def _set_moves(scene, moving, path: str, moves: model.Moves, first: float, **cur
 def _draw(
     effect, strip, source: model.AnyRegion, drawings: model.Drawings, color: Sequence[float], first: float
 ) -> str:
-    """Draws a region's strokes on an annotation layer of its own, a frame per drawing; the layer's name."""
+    """Draw a region's strokes on a new annotation layer, with a frame for each drawing. Return the layer's name."""
     layer = annotation(effect).layers.new(source.name or data_("Region"), set_active=False)
     layer.color = color
     to_image = picture_to_image(strip, picture_size(effect))

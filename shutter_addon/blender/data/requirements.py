@@ -1,5 +1,4 @@
-"""What an effect strip and its scene need so that Blender's sequencer asks the engine for the whole picture; and what
-the pictures of an edit are made of: scenes, objects, materials, images and all other data of a file."""
+"""What Blender's sequencer needs to ask the engine for an effect, and which data an edit's pictures use."""
 
 from __future__ import annotations
 
@@ -15,7 +14,7 @@ from .strips import ENGINE, all_strips, own_strips
 
 
 def left_out(scene: Scene) -> list[tuple[range, str]]:
-    """The timeline frames that the sequencer leaves an effect out of, and why."""
+    """Return the timeline frames at which the sequencer leaves an effect out, and why."""
     reasons = ((shown_frames(scene, strip), why) for strip in own_strips(scene) if (why := _why(strip)) is not None)
     return [(frames, why) for frames, why in reasons if frames]
 
@@ -33,7 +32,7 @@ def _why(strip: Strip) -> str | None:
 
 
 def settings(strip: Strip) -> Iterator[tuple[bpy_struct, str, object]]:
-    """Owner, name and value of what a strip's picture needs, besides a camera."""
+    """Yield owner, name and value of the settings that a strip's picture needs, besides a camera."""
     scene = strip.scene
     yield strip, "scene_input", "CAMERA"
     yield scene.render, "engine", ENGINE
@@ -46,20 +45,19 @@ def settings(strip: Strip) -> Iterator[tuple[bpy_struct, str, object]]:
 
 
 def _composites(scene: Scene) -> bool:
-    """Blender 5.3 has a list of effects in place of one tree, and calls that deprecated."""
+    """Tell whether the compositor runs. Blender 5.3 has a list of effects, and deprecates the single tree."""
     effects = getattr(scene, "compositor_effects", None)
     return scene.compositing_node_group is not None if effects is None else len(effects) > 0
 
 
 def camera(strip: Strip) -> Object | None:
-    """The camera that the strip's scene is shown through, or None."""
+    """Return the camera that shows the strip's scene, or None."""
     bound = (marker.camera for marker in strip.scene.timeline_markers if marker.camera)
     return strip.scene_camera or strip.scene.camera or next(bound, None)
 
 
 def scenes_at(film: Scene, frames: range) -> list[tuple[Scene, range]]:
-    """What a film shows at some of its frames: (scene, frames) of itself, and of every scene in its Scene strips, which
-    counts as a whole."""
+    """Return what a film shows at some frames: itself, and every scene in its Scene strips at all frames."""
     shown = {film: frames}
     new = [film]
     while new:
@@ -73,12 +71,12 @@ def scenes_at(film: Scene, frames: range) -> list[tuple[Scene, range]]:
 
 
 def is_shown(scene: Scene, strip: Strip, frames: range) -> bool:
-    """Whether a strip is shown at one of these timeline frames."""
+    """Tell whether a strip is shown at one of these timeline frames."""
     return bool(frame_ranges.common(shown_frames(scene, strip), frames))
 
 
 def shown_frames(scene: Scene, strip: Strip) -> range:
-    """The timeline frames at which a strip is shown: neither muted, nor in a meta strip that is not."""
+    """Return the timeline frames at which a strip is shown: not muted, nor in a meta strip that is."""
     first, last = strip.left_handle, strip.right_handle
     while strip is not None:
         outer = strip.parent_meta()
@@ -90,8 +88,10 @@ def shown_frames(scene: Scene, strip: Strip) -> range:
 
 
 def used_data(scene: Scene, frames: range) -> set[ID]:
-    """The scene, those in its Scene strips, what the strips name that are shown at these frames, and whatever that uses
-    in turn. What scenes hold beside their strips is in no picture."""
+    """Return the data-blocks that pictures at these frames use: scenes, and what their shown strips use in turn.
+
+    What scenes hold beside their strips is in no picture.
+    """
     shown = scenes_at(scene, frames)
     uses: dict = {}
     for item, users in bpy.data.user_map().items():

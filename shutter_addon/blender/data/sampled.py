@@ -1,10 +1,15 @@
-"""What of Blender's data has F-curves, as channels that are sampled at timeline frames. On Blender's main thread."""
+"""Sample an effect's properties and F-curves at timeline frames, as channels of plain data.
+
+Only on Blender's main thread.
+"""
 
 from collections.abc import Callable, Collection
+from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
-from bpy.types import PropertyGroup, Strip
+from bpy.types import PropertyGroup, Scene, Strip
 
 from ...core.messages import EffectError, UserError
 from ...core.model import effect as model
@@ -18,53 +23,25 @@ Frames = Collection[float]  # of the timeline
 
 
 def tried(function: Callable, *arguments: object) -> Any:
-    """The result, or the UserError in its place, which is raised where the value is asked for."""
+    """Return a function's result, or the UserError that it raises.
+
+    Channels raise such an error when the value is asked for.
+    """
     try:
         return function(*arguments)
     except UserError as error:
         return error
 
 
-def channel(
-    curves: Curves, owner: PropertyGroup, path: str, name: str, frames: Frames, change: Callable = lambda v: v
-) -> keyframes.Channel:
-    """A float property or a vector, each value changed by a function."""
-
-    def at(frame: float) -> object:
-        return change(curves.value(owner, path, name, frame))
-
-    try:
-        keyed = curves.of(owner, path, name)
-    except EffectError as error:
-        return keyframes.Constant(error)
-    return over(frames if keyed else None, at, curves.keys(keyed))
-
-
-def over(
-    frames: Frames | None, at: Callable[[float], object], keys: tuple[tuple[float, keyframes.Ease], ...] = ()
-) -> keyframes.Channel:
-    """What a function gives, sampled at frames; None: it gives the same at all of them."""
-    if frames is None:
-        return keyframes.Constant(tried(at, 0.0))
-    return keyframes.Samples({frame: tried(at, frame) for frame in frames}, keys)
-
-
-def sampled_fields(
-    curves: Curves, owner: PropertyGroup, path: str, kind: type, frames: Frames, unused: Collection[str] = ()
-) -> dict:
-    """What the fields of one of the model's classes are in Blender, by their names there; path: the owner's, from the
-    scene; unused: those that count nothing, which stay as a new one has them. EffectError: a choice is none of its
-    items, or a number without keys outside of its range."""
-    return {
-        name: channel(curves, owner, path, field.blender, frames) if field.is_channel else value(owner, field)
-        for name, field in fields_of(kind).items()
-        if name not in unused
-    }
-
-
 def value(owner: PropertyGroup, field: Field, number: float | None = None) -> Any:
-    """What a field without a channel is, as the model has it; number: which an F-curve gives it. EffectError: it is
-    none of its choices, or outside of its range."""
+    """Return the model's value of a field that has no channel.
+
+    Args:
+        number: Value of the property's F-curve.
+
+    Raises:
+        EffectError: The value is none of its choices, or out of range.
+    """
     if field.choices:
         return field.word(validation.word(owner, field.blender, number))
     if isinstance(field.default, bool) and number is not None:
@@ -76,80 +53,145 @@ def value(owner: PropertyGroup, field: Field, number: float | None = None) -> An
     return validation.number(owner, field.blender)
 
 
-def moves(curves: Curves, moving: PropertyGroup, path: str, frames: Frames) -> model.Moves:
-    """Of a region or of the camera."""
-    return model.Moves(
-        location=channel(curves, moving, path, "location", frames),
-        rotation=channel(curves, moving, path, "rotation", frames, np.degrees),
-        scale=channel(curves, moving, path, "scale", frames),
-    )
-
-
 def placement_now(moving: PropertyGroup) -> Placement:
-    """Where a region or the camera is as its properties stand: at the current frame, keyed or not."""
+    """Return where the properties of a region or the camera place it, whether they are keyed or not."""
     return Placement(tuple(moving.location), float(np.degrees(moving.rotation)), moving.scale)
 
 
-def _origins(
-    curves: Curves, path: str, effect: PropertyGroup, region: PropertyGroup, numbers: Collection[float]
-) -> tuple[Placement, ...]:
-    """Where a region was as its drawings at these frames were made (model.Drawings)."""
-    if not region.drawn or region.kind in strips.LAID:
-        return ()
-    known = {np.rint(effect.start + noted.frame): placement_now(noted) for noted in region.drawn}
-    there = moves(curves, region, path, numbers)
-    return tuple(known[number] if number in known else there.at(number) for number in numbers)
+@dataclass(frozen=True)
+class Sampling:
+    """Samples an effect's channels.
 
+    Attributes:
+        strip: The effect strip. None: nothing depends on where it lies.
+        frames: Timeline frames at which channels are sampled.
+    """
 
-def drawings(
-    curves: Curves,
-    path: str,
-    effect: PropertyGroup,
-    region: PropertyGroup,
-    placement: keyframes.Channel | None,
-    frames: Frames | None,
-) -> model.Drawings:
-    """A region's drawings: between two of them with the ease of its location's keys. Only those that the frames need
-    are read; None: all."""
-    width, height = annotations.picture_size(effect)
-    layer = annotations.layer_of(effect, region)
-    drawings = sorted(layer.frames, key=lambda drawing: drawing.frame_number) if layer else []
-    numbers = tuple(drawing.frame_number for drawing in drawings)
-    frames = numbers if frames is None else frames
-    needed = {index for frame in frames for index in keyframes.span(numbers, frame)[:2]} if drawings else ()
-    timing = tried(curves.find, f"{path}.location")
-    is_curve = timing is not None and not isinstance(timing, EffectError)
-    eases = dict(curves.keys([timing])) if is_curve and len(numbers) > 1 else {}
-    return model.Drawings(
-        name=region.name,
-        frames=numbers,
-        strokes=tuple(annotations.strokes_of(drawing) if i in needed else None for i, drawing in enumerate(drawings)),
-        eases=tuple(eases.get(number, "linear") for number in numbers),
-        aspect=width / height,
-        placement=placement,
-        origins=_origins(curves, path, effect, region, numbers),
-    )
+    curves: Curves
+    effect: PropertyGroup
+    strip: Strip | None
+    frames: Frames
 
+    @staticmethod
+    def of(scene: Scene, effect: PropertyGroup, strip: Strip | None, frames: Frames) -> "Sampling":
+        return Sampling(Curves(scene), effect, strip, frames)
 
-def placement(curves: Curves, effect: PropertyGroup, strip: Strip, frames: Frames) -> keyframes.Channel:
-    """The matrix from the sequencer's image to the strip's picture, which may be keyed."""
-    size, path = annotations.picture_size(effect), f"{strip.path_from_id()}.transform"
-    keyed = {name: curve for name in annotations.TRANSFORM if (curve := tried(curves.find, f"{path}.{name}"))}
+    @cached_property
+    def path(self) -> str:
+        """The effect's path from its scene."""
+        return self.effect.path_from_id()
 
-    def at(frame: float) -> np.ndarray | None:
-        moved = {name: curve.evaluate(frame) for name, curve in keyed.items() if not isinstance(curve, EffectError)}
-        return annotations.image_to_picture(strip, size, **moved)
+    def over(self, keyed: object, at: Callable[[float], object], keys: tuple = ()) -> keyframes.Channel:
+        """Return a channel of a function's values: sampled where it is keyed, else constant.
 
-    return over(frames if keyed else None, at)
+        Args:
+            keyed: F-curves that the function evaluates, or anything true where it depends on the frame.
+            keys: As of keyframes.Samples.
+        """
+        if not keyed:
+            return keyframes.Constant(tried(at, 0.0))
+        return keyframes.Samples({frame: tried(at, frame) for frame in self.frames}, keys)
 
+    def channel(
+        self, owner: PropertyGroup, path: str, name: str, change: Callable = lambda value: value
+    ) -> keyframes.Channel:
+        """Return the channel of a float property or vector, with a function applied to each value."""
+        try:
+            keyed = self.curves.of(owner, path, name)
+        except EffectError as error:
+            return keyframes.Constant(error)
+        return self.over(
+            keyed, lambda frame: change(self.curves.value(owner, path, name, frame)), self.curves.keys(keyed)
+        )
 
-def source_time(curves: Curves, path: str, effect: PropertyGroup, frames: Frames) -> keyframes.Channel:
-    def value(frame: float) -> float:
-        return curves.value(effect, path, "source_time", frame)
+    def fields(self, owner: PropertyGroup, path: str, kind: type, unused: Collection[str] = ()) -> dict:
+        """Return values and channels for the fields of a model's class, by field name.
 
-    try:
-        keyed = curves.of(effect, path, "source_time")
-    except EffectError as error:
-        return keyframes.Constant(error)
-    keys = curves.keys(keyed)
-    return over(frames if keyed else None, keyframes.SourceTime(keyframes.Computed(value), keys).at, keys)
+        Args:
+            path: The owner's path from the scene.
+            unused: Fields without effect, which keep their defaults.
+
+        Raises:
+            EffectError: A choice is none of its items, or a number without keys is out of range.
+        """
+        return {
+            name: self.channel(owner, path, field.blender) if field.is_channel else value(owner, field)
+            for name, field in fields_of(kind).items()
+            if name not in unused
+        }
+
+    def moves(self, moving: PropertyGroup, path: str) -> model.Moves:
+        """Return the motion of a region or the camera."""
+        return model.Moves(
+            location=self.channel(moving, path, "location"),
+            rotation=self.channel(moving, path, "rotation", np.degrees),
+            scale=self.channel(moving, path, "scale"),
+        )
+
+    @cached_property
+    def placement(self) -> keyframes.Channel:
+        """The matrix from the sequencer's image to the strip's picture, which may be keyed."""
+        strip = self.strip
+        if strip is None:
+            return keyframes.Constant(None)
+        size, path = annotations.picture_size(self.effect), f"{strip.path_from_id()}.transform"
+        found = {name: tried(self.curves.find, f"{path}.{name}") for name in annotations.TRANSFORM}
+        keyed = {name: curve for name, curve in found.items() if curve and not isinstance(curve, EffectError)}
+
+        def at(frame: float) -> np.ndarray | None:
+            moved = {name: curve.evaluate(frame) for name, curve in keyed.items()}
+            return annotations.image_to_picture(strip, size, **moved)
+
+        return self.over(keyed, at)
+
+    @cached_property
+    def time(self) -> keyframes.Channel | None:
+        """The source time that the effect sets; None: the strip's own timing counts."""
+        effect = self.effect
+        if not effect.use_source_time:
+            return None
+        sampling = self
+        if any(shutter.length == "TIMELINE" for shutter in effect.shutters):
+            moments = np.unique(np.add.outer(sorted(self.frames), (-0.5, 0, 0.5))).tolist()
+            sampling = Sampling(self.curves, effect, self.strip, moments)
+        try:
+            keyed = self.curves.of(effect, self.path, "source_time")
+        except EffectError as error:
+            return keyframes.Constant(error)
+        numbers = keyframes.Computed(lambda frame: self.curves.value(effect, self.path, "source_time", frame))
+        keys = self.curves.keys(keyed)
+        return sampling.over(keyed, keyframes.SourceTime(numbers, keys).at, keys)
+
+    def drawings(self, index: int, every: bool = False) -> model.Drawings:
+        """Return a region's drawings, eased by the keys of its location.
+
+        Args:
+            every: Read the strokes of all drawings, not only of those that the frames need.
+        """
+        region, path = self.effect.regions[index], f"{self.path}.regions[{index}]"
+        width, height = annotations.picture_size(self.effect)
+        layer = annotations.layer_of(self.effect, region)
+        drawn = sorted(layer.frames, key=lambda drawing: drawing.frame_number) if layer else []
+        numbers = tuple(drawing.frame_number for drawing in drawn)
+        frames = numbers if every else self.frames
+        needed = {i for frame in frames for i in keyframes.span(numbers, frame)[:2]} if drawn else ()
+        timing = tried(self.curves.find, f"{path}.location")
+        is_curve = timing is not None and not isinstance(timing, EffectError)
+        eases = dict(self.curves.keys([timing])) if is_curve and len(numbers) > 1 else {}
+        return model.Drawings(
+            name=region.name,
+            frames=numbers,
+            strokes=tuple(annotations.strokes_of(drawing) if i in needed else None for i, drawing in enumerate(drawn)),
+            eases=tuple(eases.get(number, "linear") for number in numbers),
+            aspect=width / height,
+            placement=self.placement,
+            origins=self._origins(region, path, numbers),
+        )
+
+    def _origins(self, region: PropertyGroup, path: str, numbers: tuple[int, ...]) -> tuple[Placement, ...]:
+        """Return where a region was when its drawings at these frames were made, as model.Drawings has it."""
+        if not region.drawn or region.kind in strips.LAID:
+            return ()
+        known = {np.rint(self.effect.start + noted.frame): placement_now(noted) for noted in region.drawn}
+        there = Sampling(self.curves, self.effect, self.strip, numbers).moves(region, path)
+        return tuple(known[number] if number in known else there.at(number) for number in numbers)

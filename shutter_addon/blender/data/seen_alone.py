@@ -1,5 +1,4 @@
-"""What a film shows of an effect: whether its picture hides what lies below, is all that is seen, and becomes levels
-that are known beforehand."""
+"""Whether a film shows nothing but an effect's picture, unchanged, and whether its 8-bit levels can be predicted."""
 
 from __future__ import annotations
 
@@ -8,10 +7,9 @@ from collections.abc import Mapping
 import bpy
 from bpy.types import Scene, Strip, bpy_struct
 
-from . import fcurves, strips, versions
+from . import fcurves, requirements, strips, versions
 
-# Of Blender's dither and colours no other versions are known to the bit.
-_KNOWN_TO = (5, 4)
+_KNOWN_TO = (5, 4)  # versions before this have the dither and colors that are known to the bit
 _PLAIN_STRIP = {
     **{"blend_alpha": 1.0, "color_multiply": 1.0, "color_saturation": 1.0, "scene_input": "CAMERA"},
     **dict.fromkeys(
@@ -26,24 +24,24 @@ _PLAIN_RENDER = _UNMARKED | {"use_sequencer": True, "frame_map_old": 100, "frame
 PLAIN_VIEW = {"look": "None", "exposure": 0.0, "gamma": 1.0, "use_curve_mapping": False, "use_white_balance": False}
 STANDARD = PLAIN_VIEW | {"view_transform": "Standard"}
 _LEVELS = {"color_depth": "8", "color_management": "FOLLOW_SCENE"}
-_MODES = "RGB", "RGBA"  # grey is made of light
+_MODES = "RGB", "RGBA"  # Blender makes grey from light
 _FORMATS = ("FFMPEG", "PNG", "JPEG")
 
 
 def has(item: bpy_struct, values: Mapping[str, object]) -> bool:
-    """Whether an item's properties have these values."""
+    """Tell whether an item's properties have these values."""
     return all(getattr(item, name) == value for name, value in values.items())
 
 
 def hides(scene: Scene, strip: Strip) -> bool:
-    """Whether an effect strip's picture, where it is opaque, stays as it is over all that lies below, at all frames."""
+    """Tell whether an effect strip's picture, where it is opaque, covers all below unchanged, at all frames."""
     size, shown = scene.render, strip.scene.render
     return (
         strip.blend_type in ("REPLACE", "ALPHA_OVER")
         and has(strip, _PLAIN_STRIP)
         and has(strip.transform, IN_PLACE)
         and has(strip.crop, _UNCROPPED)
-        and strip.strobe <= 1  # of new strips 0 in Blender 5.2, 1 in 5.3: both show all frames
+        and strip.strobe <= 1  # 0 or 1 shows all frames: defaults of Blender 5.2 and 5.3
         and not strip.modifiers
         and not strip.retiming_keys
         and has(size, _WHOLE)
@@ -54,36 +52,38 @@ def hides(scene: Scene, strip: Strip) -> bool:
 
 
 def alone(scene: Scene, frame: int, but: str | None = None) -> tuple[Strip, bool] | None:
-    """What is seen of a scene at a frame, if it is an effect strip alone, by `hides`; and whether Blender lays it over
-    something, which makes other bits of it. but: the name of a strip that does not count."""
+    """Return the effect strip that alone is seen of a scene at a frame (`hides`), and whether Blender blends it.
+
+    Blending it over something changes bits.
+
+    Args:
+        but: Name of a strip that does not count.
+    """
     editor = scene.sequence_editor
     if has_animation(scene, ".mute"):
-        return None  # what is muted now may not be then
+        return None  # strips may be muted at other frames
     seen = [
         strip
         for strip in editor.strips
-        if strip.type != "SOUND"
-        and strip.name != but
-        and strips.is_at(strip, frame)
-        and not (strip.mute or editor.channels[strip.channel].mute)
+        if strip.type != "SOUND" and strip.name != but and frame in requirements.shown_frames(scene, strip)
     ]
     top = max(seen, key=lambda strip: strip.channel, default=None)
     if top is None or top not in strips.effect_strips(scene) or not hides(scene, top):
         return None
-    # What an effect takes as its input is not seen itself, wherever that effect lies.
+    # An input of an effect strip is not seen itself.
     inputs = [getattr(strip, name, None) for strip in seen for name in ("input_1", "input_2")]
     if top in inputs or not strips.origin(top).is_integer():
         return None
     is_blended = top.blend_type != "REPLACE" and len(seen) > 1
     effect = strips.effect_of(scene, top.scene)
-    # Others may give nothing to be laid over.
+    # A strip other than the source may have no picture below.
     if is_blended and (effect is None or strips.nearest_source(scene, effect, top) not in seen):
         return None
     return top, is_blended
 
 
 def makes_levels(scene: Scene) -> bool:
-    """Whether a scene's render makes levels of 8 bits of what its sequencer shows, by sRGB alone."""
+    """Tell whether a scene's render makes 8-bit levels of the sequencer's picture by sRGB alone."""
     return (
         bpy.app.version < _KNOWN_TO
         and not versions.colours()
@@ -101,7 +101,7 @@ def makes_levels(scene: Scene) -> bool:
 
 
 def has_animation(scene: Scene, part: str) -> bool:
-    """Whether anything animates a property of the scene in whose path that is; of what the NLA does, it may."""
+    """Tell whether a property of the scene whose path contains `part` may be animated; with NLA tracks, any may."""
     animation = scene.animation_data
     if animation is None:
         return False

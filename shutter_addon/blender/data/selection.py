@@ -1,4 +1,4 @@
-"""What is seen, and what is active: the scene, the strip, its effect, and the effect's shutter and region."""
+"""What is seen and what is active: scene, strip, effect, shutter and region."""
 
 from __future__ import annotations
 
@@ -12,13 +12,15 @@ from .strips import SOURCES, effect_of, effect_strips
 
 
 def scene_of(context: Context) -> Any:
-    """The scene whose sequencer the context shows, or None."""
+    """Return the scene whose sequencer the context shows, or None."""
     return getattr(context, "sequencer_scene", None) or context.scene
 
 
 def active_strip(context: Context) -> Any:
-    """The active strip of the context's scene, or None; in place of a movie's sound, which is the active one after both
-    were added, the movie."""
+    """Return the active strip of the context's scene, or None. A movie counts in place of its sound.
+
+    Blender makes the sound active when it adds both.
+    """
     scene = scene_of(context)
     strip = scene.sequence_editor.active_strip if scene and scene.sequence_editor else None
     if strip is None or strip.type != "SOUND":
@@ -27,8 +29,10 @@ def active_strip(context: Context) -> Any:
 
 
 def active(context: Context) -> Any:
-    """Scene, effect and effect strip that the interface shows and changes: those of the active strip, which may be the
-    source as well, if it is selected; else those that are seen. None: that strip has no effect, or nothing has."""
+    """Return scene, effect and effect strip that the interface shows and changes, or None.
+
+    They belong to the active strip, or to the source that it is, if it is selected. Otherwise they are those seen.
+    """
     scene, strip = scene_of(context), active_strip(context)
     if strip is not None and (baked := _baked_part(scene, strip)) is not None:
         return baked
@@ -44,14 +48,16 @@ def active(context: Context) -> Any:
 
 
 def in_picture(context: Context) -> Any:
-    """What is active, where it is seen; else None: nothing in the picture belongs to it."""
+    """Return what is active, if it is also seen, else None."""
     shown = active(context)
     return shown if shown and seen(shown[0]) == shown else None
 
 
 def seen(scene: Scene) -> Any:
-    """Scene, effect and effect strip that previews of a scene show at the playhead: of several the active strip's own,
-    then those of the active strip's source, as the other half of a cut one, then the highest. None: no effect."""
+    """Return scene, effect and effect strip that previews of a scene show at the playhead, or None.
+
+    Of several, the active strip's own counts, then one of the active strip's source, then the highest.
+    """
     scene_strips = [strip for strip in visible(scene) if strip.type == "SCENE" and strip.scene]
     shown = [(strip, effect) for strip in scene_strips if (effect := effect_of(scene, strip.scene))]
     if not shown:
@@ -63,7 +69,7 @@ def seen(scene: Scene) -> Any:
 
 
 def visible(scene: Scene) -> list:
-    """Strips with a picture under the playhead, not muted, of the scene or of the meta strip that is open."""
+    """Return the strips with a picture under the playhead, of the scene or of the open meta strip."""
     editor, frame = scene and scene.sequence_editor, scene and scene.frame_current
     if not editor:
         return []
@@ -79,7 +85,7 @@ def visible(scene: Scene) -> list:
 
 
 def why_unseen(scene: Scene, strip: Strip) -> str:
-    """Why nothing of an effect strip is in the picture, and what to do, as a sentence."""
+    """Return a sentence: why an effect strip is not in the picture, and what to do."""
     if not strips.is_at(strip, scene.frame_current):
         return rpt_("Move the playhead onto the Shutter strip")
     if strip.mute and strip.virtual_shutter_bake.identity:
@@ -90,7 +96,7 @@ def why_unseen(scene: Scene, strip: Strip) -> str:
 
 
 def _effects_of(scene: Scene, strip: Strip | None) -> list:
-    """The effect that a strip shows, or those of the source that it is."""
+    """Return the effect that a strip shows, or those of which it is the source."""
     if strip is None:
         return []
     if strip.type == "SCENE" and (own := effect_of(scene, strip.scene)):
@@ -100,8 +106,10 @@ def _effects_of(scene: Scene, strip: Strip | None) -> list:
 
 
 def _baked_part(scene: Scene, strip: Strip) -> Any:
-    """Scene, effect and effect strip that a baked strip was made of; None: it is no baked strip. Copies have the same
-    identity: the one counts that shares frames with it."""
+    """Return scene, effect and effect strip that a baked strip was made from, or None.
+
+    Copies have the same identity; the one that shares frames with the strip counts.
+    """
     parts = [part for part in of_bake(scene, strip) if part.type == "SCENE" and part.scene]
     parts.sort(key=lambda part: (part != strip, not strips.overlap(part, strip)))
     shown = ((effect_of(scene, part.scene), part) for part in parts)
@@ -109,37 +117,37 @@ def _baked_part(scene: Scene, strip: Strip) -> Any:
 
 
 def of_bake(scene: Scene, strip: Strip) -> list:
-    """All strips that belong to the same bake as a strip, and that itself; none, if it belongs to none."""
+    """Return all strips of the same bake as a strip, with itself."""
     identity = strip.virtual_shutter_bake.identity
     found = scene.sequence_editor.strips_all if identity else ()
     return [other for other in found if other.virtual_shutter_bake.identity == identity]
 
 
 def choose(scene: Scene, strip: Strip) -> None:
-    """Makes a strip the active and only selected one."""
+    """Make a strip the active and only selected one."""
     for other in scene.sequence_editor.strips_all:
         other.select = other == strip
     scene.sequence_editor.active_strip = strip
 
 
 def effect_of_item(item: PropertyGroup) -> PropertyGroup:
-    """The effect that a shutter or a region belongs to."""
+    """Return the effect of a shutter or a region."""
     path = item.path_from_id()
     return item.id_data.path_resolve(path[: path.index("]") + 1])
 
 
 def moving(effect: PropertyGroup, index: int | None) -> PropertyGroup:
-    """The region of an index; None: the camera. What both can do, functions take by such an index."""
+    """Return the region of an index, or the camera for None. Functions for both take such an index."""
     return effect.camera if index is None else effect.regions[index]
 
 
 def active_shutter(effect: PropertyGroup) -> Any:
-    """The shutter that is chosen in the list, or None."""
+    """Return the active shutter in the list, or None."""
     return effect.shutters[effect.active_shutter] if 0 <= effect.active_shutter < len(effect.shutters) else None
 
 
 def active_region(effect: PropertyGroup) -> Any:
-    """The region that is chosen in the list, if it is one of the active shutter's; or None."""
+    """Return the active region in the list, if it belongs to the active shutter, or None."""
     region = effect.regions[effect.active_region] if 0 <= effect.active_region < len(effect.regions) else None
     shutter = active_shutter(effect)
     return region if region and shutter and region.shutter == shutter.name else None

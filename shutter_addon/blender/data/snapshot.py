@@ -1,8 +1,8 @@
-"""An effect strip as plain data, and as a recipe: the one place that reads what an effect is from Blender's data.
+"""Read an effect strip as plain data, and as a recipe: the only place that reads effects from Blender's data.
 
-On Blender's main thread alone. What comes of it holds no Blender data, so that threads may read it, and it does not
-change when the scene does. Channels are sampled at the frames that are asked for: Blender's F-curves are evaluated by
-Blender itself. Drivers, NLA strips and further layers of an action do not count (docs/manual.md).
+Only on Blender's main thread. A snapshot holds no Blender data, so threads may read it, and it does not change with the
+scene. Blender itself evaluates F-curves, at the frames that are asked for. Drivers, NLA strips and further layers of an
+action do not count (docs/manual.md).
 """
 
 from __future__ import annotations
@@ -28,28 +28,33 @@ from ...core.recipes import baking
 from ...media.carried_mattes import CarriedFile
 from . import matte_content, sampled, source_media, strips, validation
 from .annotations import image_to_picture, layer_of, picture_size
-from .fcurves import Curves, curves_under, key_frames, leading, progress, stretched
-from .sampled import Frames
+from .fcurves import curves_under, key_frames, leading, progress, stretched
+from .sampled import Frames, Sampling
 
-# Sentences of core/model/effect.py, which are looked up where they are passed on.
+# Sentences of core/model/effect.py, for the list of texts to translate.
 _CORE = (
     n_('shutter "{name}" at frame {frame}: {fault}'),
-    n_('region "{name}": a point of its strokes is nowhere near the picture'),
-    n_('region "{name}": more than {most} points with those before it'),
+    n_('region "{name}": a point of its strokes is too far from the picture'),
+    n_('region "{name}": more than {most} points together with the regions before it'),
     n_('shutter "{name}": bars {first} to {last} of the older file are one filmed frame now, and expose other moments'),
 )
 
 
 @dataclass(frozen=True, eq=False)
 class Snapshot:
-    """All that the pictures of an effect strip depend on; frames are timeline frames.
+    """Everything that the pictures of an effect strip depend on. Frames are timeline frames.
 
-    scene: session_uid of the effect's scene, whose frame 0 is shown at the timeline frame `origin`
-    effect: its channels are sampled at `frames`
-    source: what is read, and `timing`, when; None: the effect's own source time says that
-    blended: the sequencer's colour space, in which Blender lays the strip over others; "": it does not
-    first: the strip's first timeline frame; film: from frame to frame of the scene's film, and its last frame
-    folder: that of the .blend file; None: it was not saved"""
+    Attributes:
+        scene: session_uid of the effect's scene.
+        origin: Timeline frame that shows frame 0 of the effect's scene.
+        first: First timeline frame of the strip.
+        film: Frame step and last frame of the scene that is rendered.
+        frames: Timeline frames at which channels are sampled.
+        source: What is read.
+        timing: When it is read; None: the effect has a Custom Time.
+        blended: Color space in which the sequencer lays the strip over others; "": it does not.
+        folder: Folder of the .blend file; None: it was not saved.
+    """
 
     scene: int
     origin: float
@@ -63,13 +68,16 @@ class Snapshot:
     folder: Path | None = None
 
     def timeline_frame(self, scene_frame: float) -> float:
-        """The timeline frame at which the effect's scene is at one of its own."""
+        """Return the timeline frame that shows a frame of the effect's scene."""
         return self.origin + scene_frame
 
 
 def take(scene: Scene, effect: PropertyGroup, strip: Strip, frames: Frames) -> Snapshot:
-    """The snapshot of an effect strip at timeline frames. EffectError, MediaError: there is no source, or no picture at
-    any frame."""
+    """Take the snapshot of an effect strip at timeline frames.
+
+    Raises:
+        EffectError, MediaError: There is no source, or no picture at any frame.
+    """
     source = strips.source_of(scene, effect, strip)
     return Snapshot(
         scene=effect.scene.session_uid,
@@ -86,55 +94,56 @@ def take(scene: Scene, effect: PropertyGroup, strip: Strip, frames: Frames) -> S
 
 
 def read(scene: Scene, effect: PropertyGroup, strip: Strip, frames: Frames) -> model.Effect:
-    """An effect, its channels sampled at timeline frames; strip: the effect strip that shows it. EffectError: it has no
-    shutter, or more of anything than an effect has. What is wrong at one frame is told at that frame."""
+    """Read an effect, with its channels sampled at timeline frames.
+
+    What is wrong at one frame is raised when that frame is asked for.
+
+    Raises:
+        EffectError: It has no shutter, or too many shutters or regions.
+    """
     check_counts(effect)
-    curves, path = Curves(scene), effect.path_from_id()
-    options = _options(curves, path, effect, frames)
-    names = [shutter.name for shutter in effect.shutters]
-    followed = {shutter.follow_region for shutter in effect.shutters if shutter.follow == "REGION"}
     layers = any(region.is_layer for region in effect.regions)
-    if layers:  # then every one says where they are, in all frames around
-        followed = {region.name for region in effect.regions}
-    around = _around(effect, frames)
-    sampling = _Sampling.of(curves, effect, strip, around)
+    # With layers, motions count for every region, at all frames around.
+    followed = {s.follow_region for s in effect.shutters if s.follow == "REGION"}
+    narrow = Sampling.of(scene, effect, strip, frames)
+    wide = replace(narrow, frames=_around(effect, frames))
+    names = [shutter.name for shutter in effect.shutters]
     regions = tuple(
-        _any_region(
-            sampling if region.name in followed else replace(sampling, frames=frames), i, names.index(region.shutter)
-        )
+        _any_region(wide if layers or region.name in followed else narrow, i, names.index(region.shutter))
         for i, region in enumerate(effect.regions)
         if region.shutter in names
     )
-    camera = _camera(curves, effect, around)
+    options, camera = _options(narrow), _camera(wide)
     return model.Effect(
         shutters=tuple(
-            replace(_shutter(curves, effect, i, options, frames), follow=_followed(shutter, regions, camera))
+            replace(_shutter(narrow, i, options), follow=_followed(shutter, regions, camera))
             for i, shutter in enumerate(effect.shutters)
         ),
         regions=regions,
         options=options,
-        time=sampling.time,
+        time=wide.time,
         camera=camera,
-        **sampled.sampled_fields(curves, effect, path, model.Effect, around if layers else frames),
+        **(wide if layers else narrow).fields(effect, narrow.path, model.Effect),
     )
 
 
 def _around(effect: PropertyGroup, frames: Frames) -> Frames:
-    """The frames at which motions are asked for: where a shutter follows something, or a region is a layer, those
-    around these frames too."""
+    """Return the frames at which motions are needed: with those around where a shutter follows or a layer fills in."""
     has_layers = any(region.is_layer for region in effect.regions)
-    if not has_layers and all(shutter.follow == "NOTHING" for shutter in effect.shutters):
-        beside = int(any(shutter.length == "TIMELINE" for shutter in effect.shutters))
-        return np.unique(np.add.outer(sorted(frames), np.arange(-beside, beside + 1))).tolist() if beside else frames
-    smooth = max(validation.number(shutter, "follow_smooth") for shutter in effect.shutters)
-    reach = following.reach(validation.number(effect, "window")) + smooth
-    if has_layers:
-        reach += validation.number(effect, "plate_reach") + 1
+    if has_layers or any(shutter.follow != "NOTHING" for shutter in effect.shutters):
+        smooth = max(validation.number(shutter, "follow_smooth") for shutter in effect.shutters)
+        reach = following.reach(validation.number(effect, "window")) + smooth
+        if has_layers:
+            reach += validation.number(effect, "plate_reach") + 1
+    elif any(shutter.length == "TIMELINE" for shutter in effect.shutters):
+        reach = 1
+    else:
+        return frames
     return np.unique(np.add.outer(sorted(frames), np.arange(-reach, reach + 1))).tolist()
 
 
 def _followed(shutter: PropertyGroup, regions: Sequence[model.AnyRegion], camera: model.Camera) -> model.Subject | None:
-    """What a shutter follows. EffectError: there is no such region."""
+    """Return what a shutter follows. EffectError: there is no such region."""
     follow = validation.word(shutter, "follow")
     if follow == "NOTHING":
         return None
@@ -148,17 +157,22 @@ def _followed(shutter: PropertyGroup, regions: Sequence[model.AnyRegion], camera
 
 
 def bars_at(scene: Scene, effect: PropertyGroup, index: int, frame: float) -> np.ndarray:
-    """Bars (L,) of a shutter at a timeline frame, whether or not a picture can be made of them. EffectError: they are
-    not as many as the window is long, or one cannot be."""
-    curves, frames = Curves(scene), (frame,)
-    options = _options(curves, effect.path_from_id(), effect, frames)
-    shutter = _shutter(curves, effect, index, options, frames)
-    return shutter.bars.at(frame, options.at(frame).interpolation)
+    """Return the bars (L,) of a shutter at a timeline frame.
+
+    Raises:
+        EffectError: A bar is out of range, or they are not as many as the window is long.
+    """
+    sampling = Sampling.of(scene, effect, None, (frame,))
+    options = _options(sampling)
+    return _shutter(sampling, index, options).bars.at(frame, options.at(frame).interpolation)
 
 
 def strokes_at(scene: Scene, effect: PropertyGroup, strip: Strip, index: int, frame: float) -> list[np.ndarray]:
-    """A region's strokes (n, 2) on the picture at a timeline frame, not moved yet; a matte has none. EffectError: they
-    lie nowhere."""
+    """Return a region's strokes (n, 2) on the picture before it moves; a matte has none.
+
+    Raises:
+        EffectError: They are nowhere near the picture.
+    """
     if effect.regions[index].kind in strips.MATTES:
         return []
     with translated(rpt_):
@@ -166,113 +180,126 @@ def strokes_at(scene: Scene, effect: PropertyGroup, strip: Strip, index: int, fr
 
 
 def region_at(scene: Scene, effect: PropertyGroup, strip: Strip, index: int, frames: Frames) -> Any:
-    """A region as plain data, by its kind a Region or a MatteRegion, its channels sampled at timeline frames; an
-    outline is the Region that its curves would be as a lasso. What is wrong at one frame is told at that frame."""
+    """Return a region as plain data, sampled at timeline frames: a Region or a MatteRegion.
+
+    An outline becomes the Region of its curves as a lasso. What is wrong at one frame is raised when that frame is
+    asked for.
+    """
     read_region = _region if effect.regions[index].kind == "OUTLINE" else _any_region
-    return read_region(_Sampling.of(Curves(scene), effect, strip, frames), index, 0)
+    return read_region(Sampling.of(scene, effect, strip, frames), index, 0)
 
 
 def matte_content_at(
     scene: Scene, effect: PropertyGroup, strip: Strip, index: int, frames: Frames
 ) -> keyframes.Channel:
-    """The content of a region that is a matte, an outline too, sampled at timeline frames; as region_at."""
-    region: Any = _any_region(_Sampling.of(Curves(scene), effect, strip, frames), index, 0)
+    """Return the content of a matte, ramp or outline, sampled as in region_at."""
+    region: Any = _any_region(Sampling.of(scene, effect, strip, frames), index, 0)
     return region.content
 
 
 def carried_outline(
     scene: Scene, effect: PropertyGroup, strip: Strip, index: int, frames: Frames
 ) -> tuple[CarriedFile, dict[float, int]]:
-    """What gives the mattes of an outline (a media.carried_mattes.CarriedFile), and which of the source's filmed frames
-    timeline frames show. EffectError, MediaError: it is straight, or has no source."""
-    region = effect.regions[index]
-    if validation.word(region, "between") == "STRAIGHT":
-        raise EffectError(rpt_("{place}: a linear outline is not tracked").format(place=validation.place(region)))
-    sampling = _Sampling.of(Curves(scene), effect, strip, frames)
-    return _carried(sampling, _drawings(sampling, index)), source_frames(scene, effect, strip, frames)
+    """Return the file of a tracked outline's mattes, and the filmed frames that timeline frames show.
+
+    Raises:
+        EffectError, MediaError: The outline is linear, or has no source.
+    """
+    if validation.word(effect.regions[index], "between") == "STRAIGHT":
+        place = validation.place(effect.regions[index])
+        raise EffectError(rpt_("{place}: a linear outline is not tracked").format(place=place))
+    sampling = Sampling.of(scene, effect, strip, frames)
+    return _carried(sampling, sampling.drawings(index, every=True)), source_frames(scene, effect, strip, frames)
 
 
 def drawn_outline(scene: Scene, effect: PropertyGroup, strip: Strip, index: int) -> dict[int, outlines.Curves]:
-    """The curves of an outline by the source's filmed frame at which they are drawn. EffectError, MediaError: it has no
-    source."""
-    sampling = _Sampling.of(Curves(scene), effect, strip, ())
-    return _by_source_frame(sampling, _drawings(sampling, index))
+    """Return the curves of an outline by the filmed frame on which they are drawn.
+
+    Raises:
+        EffectError, MediaError: It has no source.
+    """
+    sampling = Sampling.of(scene, effect, strip, ())
+    return _by_source_frame(sampling, sampling.drawings(index, every=True))
 
 
 def source_frames(scene: Scene, effect: PropertyGroup, strip: Strip, frames: Frames) -> dict[float, int]:
-    """Which of the source's filmed frames an effect strip shows, by timeline frame. EffectError, MediaError: nobody
-    knows."""
-    time = _Sampling.of(Curves(scene), effect, strip, frames).time
-    shown = matte_content.shown_frame(scene, effect, strip, time)
+    """Return the filmed frame of the source that each timeline frame shows.
+
+    Raises:
+        EffectError, MediaError: It cannot be known.
+    """
+    shown = matte_content.shown_frame(Sampling.of(scene, effect, strip, frames))
     return {frame: int(shown(frame)) for frame in frames}
 
 
 def last_shown(scene: Scene, effect: PropertyGroup, strip: Strip) -> float:
-    """The last of the source's frames that an effect strip shows (see matte_content.shown_frame); where keys say which
-    these are, of a hundred frames of the strip. EffectError, MediaError: it cannot be known."""
+    """Return the last source frame that an effect strip shows (matte_content.shown_frame).
+
+    With a Custom Time, about a hundred frames of the strip are looked at.
+
+    Raises:
+        EffectError, MediaError: It cannot be known.
+    """
     first, last = strip.left_handle, strip.right_handle - 1
-    frames, time = (first, last), None
-    if effect.use_source_time:
-        frames = *range(first, last, max(1, (last - first) // 100)), last
-        time = sampled.source_time(Curves(scene), effect.path_from_id(), effect, frames)
-    return max(map(matte_content.shown_frame(scene, effect, strip, time), frames))
+    step = max(1, (last - first) // 100) if effect.use_source_time else max(1, last - first)
+    frames = *range(first, last, step), last
+    return max(map(matte_content.shown_frame(Sampling.of(scene, effect, strip, frames)), frames))
 
 
 def camera_at(scene: Scene, effect: PropertyGroup, frames: Frames) -> model.Camera:
-    """The camera as plain data, its channels sampled at timeline frames; as region_at."""
-    return _camera(Curves(scene), effect, frames)
+    """Return the camera as plain data, sampled as in region_at."""
+    return _camera(Sampling.of(scene, effect, None, frames))
 
 
 def check_counts(effect: PropertyGroup) -> None:
-    """EffectError: there are no shutters, or more of anything than an effect has."""
+    """Raise EffectError where an effect has no shutter, or too many shutters or regions."""
     if not effect.shutters:
         raise EffectError(rpt_('"{effect}" has no shutter').format(effect=effect.name))
     for sentence, items, most in (
-        (rpt_("{place}: {count} shutters, {most} are the most"), effect.shutters, limits.MAX_SHUTTERS),
-        (rpt_("{place}: {count} regions, {most} are the most"), effect.regions, limits.MAX_REGIONS),
+        (rpt_("{place}: {count} shutters, but at most {most} are possible"), effect.shutters, limits.MAX_SHUTTERS),
+        (rpt_("{place}: {count} regions, but at most {most} are possible"), effect.regions, limits.MAX_REGIONS),
     ):
         if len(items) > most:
             raise EffectError(sentence.format(place=validation.place(effect), count=len(items), most=most))
 
 
-def _options(curves: Curves, path: str, effect: PropertyGroup, frames: Frames) -> keyframes.Channel:
-    """EffectErrors in it: an option that no effect can have."""
+def _options(sampling: Sampling) -> keyframes.Channel:
+    """Return the channel of an effect's options; it raises EffectError for an option out of range."""
     fields = fields_of(Options).items()
     try:
-        keyed = {name: curves.find(f"{path}.{name}") for name, field in fields if field.keyed}
+        found = {name: sampling.curves.find(f"{sampling.path}.{name}") for name, field in fields if field.keyed}
     except EffectError as error:
         return keyframes.Constant(error)
+    keyed = {name: curve for name, curve in found.items() if curve is not None}
 
     def at(frame: float) -> Options:
-        numbers = {name: curve.evaluate(frame) for name, curve in keyed.items() if curve is not None}
-        return Options(**{name: sampled.value(effect, field, numbers.get(name)) for name, field in fields})
+        numbers = {name: curve.evaluate(frame) for name, curve in keyed.items()}
+        return Options(**{name: sampled.value(sampling.effect, field, numbers.get(name)) for name, field in fields})
 
-    return sampled.over(frames if any(keyed.values()) else None, at)
+    return sampling.over(keyed, at)
 
 
-def _shutter(
-    curves: Curves, effect: PropertyGroup, index: int, options: keyframes.Channel, frames: Frames
-) -> model.Shutter:
-    """A shutter, but for what it follows."""
-    path, shutter = f"{effect.path_from_id()}.shutters[{index}]", effect.shutters[index]
-    bars = sampled.tried(_bars, curves, path, shutter, options, frames)
+def _shutter(sampling: Sampling, index: int, options: keyframes.Channel) -> model.Shutter:
+    """Return a shutter, except for what it follows."""
+    path, shutter = f"{sampling.path}.shutters[{index}]", sampling.effect.shutters[index]
+    bars = sampled.tried(_bars, sampling, path, shutter, options)
     if isinstance(bars, EffectError):
         bars = keyframes.Bars(keyframes.Constant(bars))
     unused = [] if shutter.use_threshold else ["threshold", "softness"]
     if validation.word(shutter, "follow") == "NOTHING" or shutter.length != "MOTION":
         unused += ["trail"] if shutter.length != "MOTION" else ["trail", "length"]
-    return model.Shutter(bars=bars, **sampled.sampled_fields(curves, shutter, path, model.Shutter, frames, unused))
+    return model.Shutter(bars=bars, **sampling.fields(shutter, path, model.Shutter, unused))
 
 
-def _bars(
-    curves: Curves, path: str, shutter: PropertyGroup, options: keyframes.Channel, frames: Frames
-) -> keyframes.Bars:
-    """EffectError: they are not as many as the window is long."""
-    stored = [bar.weight for bar in shutter.bars]
+def _bars(sampling: Sampling, path: str, shutter: PropertyGroup, options: keyframes.Channel) -> keyframes.Bars:
+    """Return a shutter's bars. EffectError: they are not as many as the window is long."""
+    curves, frames, stored = sampling.curves, sampling.frames, [bar.weight for bar in shutter.bars]
     keyed = {i: curve for i in range(len(stored)) if (curve := curves.find(f"{path}.bars[{i}].weight"))}
     chosen = (sampled.tried(options.at, frame) for frame in frames)
     for window in {state.window for state in chosen if isinstance(state, Options)}:
-        check_bar_count(shutter, window)
+        if len(stored) != window:
+            sentence = rpt_("{place}: {count} bars, and {window} frames")
+            raise EffectError(sentence.format(place=validation.place(shutter), count=len(stored), window=window))
     if not keyed:
         return keyframes.Bars(keyframes.Constant(_bars_over(shutter, stored, keyed, [0.0])[0.0]))
     keys = curves.keys(list(keyed.values()))
@@ -287,10 +314,10 @@ def _bars(
 def _bars_over(
     shutter: PropertyGroup, stored: list[float], keyed: dict[int, FCurve], frames: list[float]
 ) -> dict[float, np.ndarray | UserError]:
-    """The bars (L,) at frames; keyed: F-curves by the bar's index."""
+    """Return the bars (L,) at each frame. `keyed` has the F-curves by index of the bar."""
     rows = np.tile(np.array(stored), (len(frames), 1))
     for i, curve in keyed.items():
-        # No bar is below 0, a curve may be; "not a number" stays what it is.
+        # A curve may go below 0, a bar may not. NaN stays NaN, and is refused below.
         rows[:, i] = np.clip([curve.evaluate(frame) for frame in frames], 0.0, limits.MAX_BAR)
     usable = ((rows >= 0) & (rows <= limits.MAX_BAR)).all(axis=1)
     return {
@@ -300,7 +327,10 @@ def _bars_over(
 
 
 def _ways(curves: list, keys: list[float], frames: Frames) -> dict[float, tuple[tuple[float, float], float]]:
-    """Of frames, the keys before and after each, and how far the curve has gone between them that changes most."""
+    """Return, for each frame, the keys before and after it and the share of the way between them.
+
+    The curve that changes most between the two keys gives the share.
+    """
     ways, leaders = {}, {}
     for frame in frames:
         before, after, _share = keyframes.span(keys, frame)
@@ -311,125 +341,87 @@ def _ways(curves: list, keys: list[float], frames: Frames) -> dict[float, tuple[
     return ways
 
 
-def check_bar_count(shutter: PropertyGroup, window: int) -> None:
-    """EffectError: a shutter has not as many bars as the window is long."""
-    if len(shutter.bars) != window:
-        sentence = rpt_("{place}: {count} bars, and {window} frames")
-        raise EffectError(sentence.format(place=validation.place(shutter), count=len(shutter.bars), window=window))
-
-
-@dataclass(frozen=True)
-class _Sampling:
-    """What the regions of an effect are read from.
-
-    frames: the timeline frames at which channels are sampled
-    placement: of the strip's picture (sampled.placement); time: of the source, None where its strip says that"""
-
-    curves: Curves
-    effect: PropertyGroup
-    strip: Strip
-    frames: Frames
-    placement: keyframes.Channel
-    time: keyframes.Channel | None
-
-    @staticmethod
-    def of(curves: Curves, effect: PropertyGroup, strip: Strip, frames: Frames) -> _Sampling:
-        moments, time = frames, None
-        if any(shutter.length == "TIMELINE" for shutter in effect.shutters):
-            moments = np.unique(np.add.outer(sorted(frames), (-0.5, 0, 0.5))).tolist()
-        if effect.use_source_time:
-            time = sampled.source_time(curves, effect.path_from_id(), effect, moments)
-        return _Sampling(
-            curves=curves,
-            effect=effect,
-            strip=strip,
-            frames=frames,
-            placement=sampled.placement(curves, effect, strip, frames),
-            time=time,
-        )
-
-
-def _any_region(sampling: _Sampling, index: int, shutter: int) -> model.Region | model.MatteRegion:
-    """The region of that index; shutter: the index of its shutter."""
-    effect, curves, frames = sampling.effect, sampling.curves, sampling.frames
-    region, path = effect.regions[index], f"{effect.path_from_id()}.regions[{index}]"
+def _any_region(sampling: Sampling, index: int, shutter: int) -> model.Region | model.MatteRegion:
+    """Return a region of any kind. `shutter` is the index of its shutter."""
+    region, path = sampling.effect.regions[index], f"{sampling.path}.regions[{index}]"
     if region.kind not in strips.LAID:
         return _region(sampling, index, shutter)
-    moves = sampled.moves(curves, region, path, frames)
+    moves = sampling.moves(region, path)
     kind: type[model.MatteRegion] = model.MatteRegion
     drawn: dict = {}
     if region.kind == "OUTLINE":
-        drawings = _drawings(sampling, index)
+        drawings = sampling.drawings(index, every=True)
         kind, drawn = model.OutlineRegion, {"drawings": drawings}
         content = sampled.tried(_outlines, sampling, region, drawings)
     else:
-        content = sampled.tried(matte_content.content, effect, sampling.strip, region, moves, frames, sampling.time)
-    fields = sampled.tried(sampled.sampled_fields, curves, region, path, kind, frames)
-    if isinstance(fields, UserError):  # of a choice; it is told where the matte is asked for
+        content = sampled.tried(matte_content.content, sampling, region, moves)
+    fields = sampled.tried(sampling.fields, region, path, kind)
+    if isinstance(fields, UserError):  # a choice is wrong: the matte raises that when it is asked for
         content = content if isinstance(content, UserError) else fields
         choices = [name for name, each in fields_of(kind).items() if each.choices]
-        fields = sampled.sampled_fields(curves, region, path, kind, frames, choices)
+        fields = sampling.fields(region, path, kind, choices)
     if isinstance(content, UserError):
         content = keyframes.Constant(content)
     return kind(shutter=shutter, content=content, moves=moves, **drawn, **fields)
 
 
-def _outlines(sampling: _Sampling, region: PropertyGroup, drawings: model.Drawings) -> keyframes.Channel:
-    """The content of an outline. EffectError, MediaError: there is no source."""
+def _outlines(sampling: Sampling, region: PropertyGroup, drawings: model.Drawings) -> keyframes.Channel:
+    """Return the content of an outline. EffectError, MediaError: there is no source."""
     if validation.word(region, "between") == "STRAIGHT":
         return model.drawn_outlines(drawings)
     return mattes.FileFrames(file=_carried(sampling, drawings))
 
 
-def _carried(sampling: _Sampling, drawings: model.Drawings) -> CarriedFile:
+def _carried(sampling: Sampling, drawings: model.Drawings) -> CarriedFile:
     drawn = _by_source_frame(sampling, drawings)
     return matte_content.carried_file(sampling.effect, sampling.strip, drawn)
 
 
-def _by_source_frame(sampling: _Sampling, drawings: model.Drawings) -> dict[int, outlines.Curves]:
-    """The curves of drawings by the source's filmed frame. EffectError, MediaError: there is no source."""
-    numbers, effect, strip = drawings.frames, sampling.effect, sampling.strip
-    there = _Sampling.of(sampling.curves, effect, strip, numbers)
+def _by_source_frame(sampling: Sampling, drawings: model.Drawings) -> dict[int, outlines.Curves]:
+    """Return the curves of drawings by filmed frame of the source. EffectError, MediaError: there is no source."""
+    there = replace(sampling, frames=drawings.frames)
     placed = replace(drawings, placement=there.placement)
-    shown = matte_content.shown_frame(effect.id_data, effect, strip, there.time)
-    return {int(shown(frame)): outlines.curves(placed.drawing(i, frame)) for i, frame in enumerate(numbers)}
+    shown = matte_content.shown_frame(there)
+    return {int(shown(frame)): outlines.curves(placed.drawing(i, frame)) for i, frame in enumerate(drawings.frames)}
 
 
-def _drawings(sampling: _Sampling, index: int) -> model.Drawings:
-    effect, path = sampling.effect, f"{sampling.effect.path_from_id()}.regions[{index}]"
-    return sampled.drawings(sampling.curves, path, effect, effect.regions[index], sampling.placement, None)
-
-
-def _region(sampling: _Sampling, index: int, shutter: int) -> model.Region:
-    effect, curves, frames = sampling.effect, sampling.curves, sampling.frames
-    region, path = effect.regions[index], f"{effect.path_from_id()}.regions[{index}]"
+def _region(sampling: Sampling, index: int, shutter: int) -> model.Region:
+    region, path = sampling.effect.regions[index], f"{sampling.path}.regions[{index}]"
     return model.Region(
         shutter=shutter,
-        kind=keyframes.Constant(sampled.tried(_word_of_kind, region)),
-        drawings=sampled.drawings(curves, path, effect, region, sampling.placement, frames),
-        moves=sampled.moves(curves, region, path, frames),
-        **sampled.sampled_fields(curves, region, path, model.Region, frames),
+        kind=keyframes.Constant(sampled.tried(_scribble, region)),
+        drawings=sampling.drawings(index),
+        moves=sampling.moves(region, path),
+        **sampling.fields(region, path, model.Region),
     )
 
 
-def _word_of_kind(region: PropertyGroup) -> str:
+def _scribble(region: PropertyGroup) -> str:
+    """Return the kind of the region's strokes: an outline's curves are a lasso."""
     word = validation.word(region, "kind").lower()
     return "lasso" if word == "outline" else word
 
 
-def _camera(curves: Curves, effect: PropertyGroup, frames: Frames) -> model.Camera:
-    path = effect.camera.path_from_id()
-    moves = sampled.moves(curves, effect.camera, path, frames)
-    return model.Camera(moves, **sampled.sampled_fields(curves, effect.camera, path, model.Camera, frames))
+def _camera(sampling: Sampling) -> model.Camera:
+    camera, path = sampling.effect.camera, sampling.effect.camera.path_from_id()
+    return model.Camera(sampling.moves(camera, path), **sampling.fields(camera, path, model.Camera))
 
 
 def recipe_of(scene: Scene, effect: PropertyGroup, strip: Strip, contents: Sequence = ()) -> model.Effect:
-    """The effect as a recipe, whose frame 1 is the strip's first; left out is what baking.baked leaves out, and regions
-    without a shutter. contents: see baking.baked. EffectError: it cannot be rendered as it stands."""
+    """Return the effect as a recipe, whose frame 1 is the strip's first.
+
+    Regions without a shutter are left out, and what baking.baked leaves out.
+
+    Args:
+        contents: As in baking.baked.
+
+    Raises:
+        EffectError: The effect cannot be rendered as it stands.
+    """
     check_counts(effect)
     shown = range(strip.left_handle, strip.right_handle)
     if not -limits.MAX_FRAME <= shown.start <= shown.stop <= limits.MAX_FRAME:
-        sentence = rpt_('strip "{strip}" lies at frames {first} to {last}, where no timeline is')
+        sentence = rpt_('strip "{strip}" lies at frames {first} to {last}, beyond the timeline')
         raise EffectError(sentence.format(strip=strip.name, first=shown.start, last=shown.stop - 1))
     drawn = [region for region in strips.drawn_regions(effect) if layer_of(effect, region)]
     for item in (*effect.shutters, *drawn, *strips.matte_regions(effect)):
@@ -446,17 +438,17 @@ def recipe_of(scene: Scene, effect: PropertyGroup, strip: Strip, contents: Seque
 
 
 def _keyed(scene: Scene, effect: PropertyGroup) -> set[float]:
-    """The timeline frames of the effect's keys and drawings."""
+    """Return the timeline frames of the effect's keys and drawings."""
     curves, pace = curves_under(scene, effect.path_from_id() + "."), stretched(scene)
-    # In float32, as the keys of Curves are.
+    # Curves has float32 keys, too.
     frames = set((np.array(key_frames(curves), np.float32) / pace).tolist())
     layers = (layer_of(effect, region) for region in effect.regions)
     return frames.union(float(drawing.frame_number) for layer in layers if layer for drawing in layer.frames)
 
 
 def _check_name(item: PropertyGroup) -> None:
-    """EffectError: the name is longer than a recipe has it, from a script or a file of another version."""
+    """Raise EffectError for a name that is too long for a recipe, from a script or a file of another version."""
     if len(item.name) > limits.MAX_NAME:
-        sentence = rpt_("{place}: its name has {count} characters, {most} are the most")
+        sentence = rpt_("{place}: its name has {count} characters, but at most {most} are possible")
         words = {"place": validation.place(item), "count": len(item.name), "most": limits.MAX_NAME}
         raise EffectError(sentence.format(**words))

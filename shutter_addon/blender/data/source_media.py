@@ -1,6 +1,4 @@
-"""The medium of a source strip: what it is, opened as shutter_addon.media has it; and how the strip lies on the
-timeline, where Blender's sequencer keeps its proxies, and its retiming keys, of which Blender's Python API gives a
-part."""
+"""The footage of a source strip: its files, how it is opened, its timing, retiming keys and proxies."""
 
 from __future__ import annotations
 
@@ -25,22 +23,29 @@ from ...media.sequence import by_number
 from . import external_files
 from .struct_dna import LayoutError, memory, read, record, text
 
-_AT_ONCE = 100  # files of a sequence, which may be long, that one look asks, beside the first and the last
-_REST = 1.0  # seconds from one look at them to the next: on a network's drive a look takes a while
+_AT_ONCE = 100  # files between a sequence's first and last that are checked at a time
+_REST = 1.0  # seconds between two checks, which are slow on a network drive
 _KEPT = 256
 _TIMES = (
     *("name", "content_start", "content_end", "content_trim_start", "content_trim_end", "left_handle"),
     *("use_reverse_frames", "strobe"),
 )
-# Records of Blender's memory, as struct_dna.record takes them.
+# Records of Blender's memory, for struct_dna.record.
 _SEQUENCE = ("char name[64]", "S64"), ("SeqRetimingHandle *retiming_handles", "u8"), ("int retiming_handle_num", "i4")
 _KEY = ("double strip_frame_index", "f8"), ("int flag", "i4"), ("float retiming_factor", "f4")
 
 
 @dataclass
 class _Look:
-    """What is known of a strip's files: path and stamp of each, which of them is next, how many are still to be asked
-    at once, when some were asked last, and a number that changes with what is known."""
+    """What is known of a strip's files.
+
+    Attributes:
+        known: Path and stamp of each.
+        next: Index of the next one to check.
+        due: How many have to be checked at once.
+        when: Time of the last check.
+        key: Changes with what is known.
+    """
 
     known: list
     next: int
@@ -50,18 +55,21 @@ class _Look:
 
 
 _specs: Kept[tuple, SourceSpec] = Kept()  # by media_key
-_looks: Kept[tuple, _Look] = Kept()  # by scene and strip, or by image, and how many files they have
-_resting = False  # while a film is rendered, all its files have been asked before it
+_looks: Kept[tuple, _Look] = Kept()  # by scene and strip, or by image, and number of files
+_resting = False  # while a film renders: all files were checked before
 
 
 def media_key(strip: Strip) -> tuple:
-    """What the strip reads and how; equal keys give the same frames."""
+    """Return what the strip reads and how; equal keys give the same frames."""
     return strip.type, *files_key(strip), *reading(strip)
 
 
 def files_key(strip: Strip) -> tuple:
-    """The strip's files: the first and the last as they are now, and those between as they were when they were looked
-    at: a hundred of them a second, in turn, and none while a film is rendered. MediaError: it has none."""
+    """Return a key of the strip's files: the first and the last as they are now, others as `between` has checked them.
+
+    Raises:
+        MediaError: It has no files.
+    """
     count, path = _files(strip)
     ends = dict.fromkeys((path(0), path(count - 1)))
     place = strip.id_data.session_uid, strip.name
@@ -69,29 +77,35 @@ def files_key(strip: Strip) -> tuple:
 
 
 def look_again() -> None:
-    """Has all files asked again at the next look."""
+    """Have all files checked at the next look."""
     for look in list(_looks.values()):
         look.due = len(look.known)
 
 
 def rest(resting: bool) -> None:
-    """While a film renders, the files between a sequence's first and last are asked after look_again alone."""
+    """While a film renders, check files between a sequence's first and last only after look_again."""
     global _resting
     _resting = resting
 
 
 def forget() -> None:
-    """Forgets what the files were, before another file is loaded."""
+    """Forget all files, before another file is loaded."""
     rest(False)
     _looks.clear()
     _specs.clear()
 
 
 def between(place: tuple, count: int, path: Callable[[int], Path]) -> int:
-    """A number that changes when a file of a sequence is found replaced. One that is gone is not: what was made of it
-    still holds, and whoever needs the file itself is told.
+    """Return a number that changes when a file of a sequence is found to be replaced.
 
-    place: what knows it, a strip or an image, as a key; count: of its files; path: gives that of each by its index"""
+    A hundred files are checked each second, in turn. A missing file changes nothing: frames made from it stay valid,
+    and reading it raises an error.
+
+    Args:
+        place: Key of the strip or image.
+        count: Number of its files.
+        path: Function from an index to a file.
+    """
     if count < 3:
         return 0
     look = _looks.ask((*place, count), lambda: _Look(known=[None] * count, next=0, due=count), _KEPT)
@@ -110,7 +124,7 @@ def between(place: tuple, count: int, path: Callable[[int], Path]) -> int:
 
 
 def reading(strip: Strip) -> tuple:
-    """How the strip's files are read: colour space, alpha and the like."""
+    """Return how the strip's files are read: color space, alpha and the like."""
     clip = strip.clip if strip.type == "MOVIECLIP" else None
     reader = clip if strip.type == "MOVIECLIP" else strip
     return (
@@ -126,8 +140,11 @@ def reading(strip: Strip) -> tuple:
 class Proxy:
     """What previews of one size read in place of a strip's footage.
 
-    path: a movie; of_images: a folder with a picture for each of the strip's
-    stamp: tells files that were built anew"""
+    Attributes:
+        path: A movie, or a folder with a picture for each of the strip's.
+        of_images: Whether it is a folder.
+        stamp: Changes when the files are built again.
+    """
 
     path: Path
     of_images: bool
@@ -136,10 +153,12 @@ class Proxy:
 
 @dataclass(frozen=True)
 class SourceSpec:
-    """What a source strip reads, and how: plain data, equal where it gives the same frames.
+    """What a source strip reads, and how, as plain data: equal specs give the same frames.
 
-    files: of an image strip, one per frame; None: a movie, or what is found beside `path`
-    options: of media.open_source"""
+    Attributes:
+        files: Of an image strip, one for each frame; None: a movie, or what is found beside `path`.
+        options: Arguments of media.open_source.
+    """
 
     key: tuple
     path: Path = field(compare=False)
@@ -147,29 +166,36 @@ class SourceSpec:
     options: dict = field(compare=False)
 
     def open(self, divisor: int = 1, proxy: Proxy | None = None) -> FrameSource:
-        """The medium, as Blender would show it; divisor: of media.open_source; proxy: what frames are read from, where
-        it fits. MediaError: it cannot be read."""
+        """Open the footage as Blender shows it.
+
+        Args:
+            divisor: As in media.open_source.
+            proxy: Where frames are read from, if it fits.
+
+        Raises:
+            MediaError: It cannot be read.
+        """
         medium = open_source(self.path, files=self.files, divisor=divisor, **self.options)
         if proxy is None:
             return medium
         how = {name: self.options[name] for name in ("colorspace", "config")}
         if proxy.of_images and self.files:
             files = [of_image(proxy.path, file) for file in self.files]
-            # Blender has converted them to the sequencer's colour space, but for data.
+            # Blender has converted all but data to the sequencer's color space.
             how = {"files": files, "colorspace": "Non-Color" if how["colorspace"] == "Non-Color" else None}
         return with_proxy(medium, partial(open_source, proxy.path, **how))
 
 
 def spec(strip: Strip, key: tuple | None = None) -> SourceSpec:
-    """What a source strip reads; key: its media_key, where that is known. MediaError: it has no files."""
+    """Return what a source strip reads. `key` is its media_key, if known. MediaError: it has no files."""
     key = key or media_key(strip)
     return _specs.ask(key, lambda: _spec(strip, key), _KEPT)
 
 
 def _spec(strip: Strip, key: tuple) -> SourceSpec:
     count, path = _files(strip)
-    config = Path(bpy.utils.system_resource("DATAFILES", path="colormanagement"), "config.ocio")  # finds folders only
-    alpha = "premultiplied" if strip.alpha_mode == "PREMUL" else "straight"  # whatever the files say
+    config = Path(bpy.utils.system_resource("DATAFILES", path="colormanagement"), "config.ocio")
+    alpha = "premultiplied" if strip.alpha_mode == "PREMUL" else "straight"  # the strip decides, not the files
     options = {
         "stream": getattr(strip, "stream_index", 0),
         "colorspace": reading(strip)[0],
@@ -183,30 +209,33 @@ def _spec(strip: Strip, key: tuple) -> SourceSpec:
 
 
 def open_media(strip: Strip) -> FrameSource:
-    """The strip's medium, as Blender would show it. MediaError: it cannot be read."""
+    """Open the strip's footage as Blender shows it. MediaError: it cannot be read."""
     return spec(strip).open()
 
 
 def files(strip: Strip) -> list[Path]:
-    """The files of a movie, image or clip strip, there or not, whether or not an effect can read it so. MediaError: it
-    has none."""
+    """Return the files of a movie, image or clip strip, even if they are missing or effects cannot use them.
+
+    Raises:
+        MediaError: It has none.
+    """
     count, path = _clip_files(strip) if strip.type == "MOVIECLIP" else _files(strip)
     return [path(index) for index in range(count)]
 
 
 def first_frame(strip: Strip) -> int:
-    """Which frame of the medium is the first of the strip's content."""
+    """Return the frame of the footage at which the strip's content begins."""
     return strip.clip.frame_offset if strip.type == "MOVIECLIP" and is_movie(strip) else 0
 
 
 def is_movie(strip: Strip) -> bool:
-    """Whether a movie, image or clip strip reads a movie."""
+    """Tell whether a movie, image or clip strip reads a movie."""
     clip = strip.clip if strip.type == "MOVIECLIP" else None
     return strip.type == "MOVIE" or (clip is not None and clip.source == "MOVIE")
 
 
 def _files(strip: Strip) -> tuple[int, Callable[[int], Path]]:
-    """How many files the strip reads, and a function that gives the path of each."""
+    """Return the number of the strip's files, and a function from an index to a path."""
     if strip.type == "MOVIECLIP":
         if strip.clip is not None and (strip.undistort or strip.stabilize2d):
             sentence = rpt_('strip "{strip}": undistorted or stabilized clips are not supported')
@@ -222,7 +251,7 @@ def _files(strip: Strip) -> tuple[int, Callable[[int], Path]]:
 
 
 def _clip_files(strip: Strip) -> tuple[int, Callable[[int], Path]]:
-    """A clip's movie, or its images by their numbers, without a gap."""
+    """Return a clip's movie, or its images by number without gaps, as _files does."""
     clip = strip.clip
     if clip is None:
         raise MediaError(rpt_('strip "{strip}" has no clip').format(strip=strip.name))
@@ -234,7 +263,7 @@ def _clip_files(strip: Strip) -> tuple[int, Callable[[int], Path]]:
 
 
 def timing_of(strip: Strip) -> StripTiming:
-    """The timing of a source strip, as plain data."""
+    """Return the timing of a source strip as plain data."""
     render = strip.id_data.render
     keys = retiming_keys(strip)
     is_known = keys is not None
@@ -251,8 +280,11 @@ def timing_of(strip: Strip) -> StripTiming:
 
 
 def retiming_keys(strip: Strip) -> tuple[RetimingKey, ...] | None:
-    """The strip's retiming keys from Blender's memory. Python gets their frames alone, in Blender 5.2 as if the strip
-    began with the first one of the edit, and of a clip strip nothing at all. None: they cannot be read."""
+    """Read the strip's retiming keys from Blender's memory; None: they cannot be read.
+
+    Python's API has only their frames, none for clip strips, and Blender 5.2 counts them from the start of the edit's
+    first strip.
+    """
     try:
         name, first, count = read(record("Sequence", *_SEQUENCE), strip.as_pointer())
         kind = record("SeqRetimingHandle", *_KEY)
@@ -266,7 +298,7 @@ def retiming_keys(strip: Strip) -> tuple[RetimingKey, ...] | None:
 
 
 def proxy_of(scene: Scene, strip: Strip, percent: int) -> Proxy | None:
-    """What Blender reads of a strip in previews of that size, in percent; None: the footage itself."""
+    """Return what Blender reads of a strip in previews of a size in percent; None: the footage itself."""
     if strip.type not in ("MOVIE", "IMAGE") or not strip.use_proxy or not getattr(strip.proxy, f"build_{percent}"):
         return None
     by_strip = scene.sequence_editor.proxy_storage == "PER_STRIP"
@@ -276,7 +308,7 @@ def proxy_of(scene: Scene, strip: Strip, percent: int) -> Proxy | None:
         movie = external_files.absolute(strip, strip.filepath)
         stream = f"_st{strip.stream_index}" if strip.stream_index else ""
         return _proxy(_folder(scene, strip, movie.parent) / movie.name / f"proxy_{percent}{stream}.avi")
-    if scene.sequencer_colorspace_settings.name != "sRGB":  # what Blender keeps its pictures in
+    if scene.sequencer_colorspace_settings.name != "sRGB":  # the color space of Blender's proxy pictures
         return None
     folder = _folder(scene, strip, external_files.absolute(strip, strip.directory)) / "images" / str(percent)
     ends = strip.elements[0], strip.elements[-1]
@@ -284,12 +316,12 @@ def proxy_of(scene: Scene, strip: Strip, percent: int) -> Proxy | None:
 
 
 def of_image(folder: Path, image: str | Path) -> Path:
-    """The proxy of an image file, by its name or path."""
+    """Return the proxy of an image file."""
     return folder / f"{Path(image).name}_proxy.jpg"
 
 
 def _folder(scene: Scene, strip: Strip, beside: Path) -> Path:
-    """Where the strip's proxies lie; beside: the folder of its footage."""
+    """Return the folder of the strip's proxies. `beside` is the folder of its footage."""
     if scene.sequence_editor.proxy_storage == "PROJECT":
         return _absolute(scene.sequence_editor.proxy_dir or "//BL_proxy")
     if strip.proxy.use_proxy_custom_directory:
@@ -298,11 +330,11 @@ def _folder(scene: Scene, strip: Strip, beside: Path) -> Path:
 
 
 def _proxy(path: Path, *files: Path) -> Proxy | None:
-    """files: those of a folder that are looked at. None: one is missing."""
+    """Return a proxy, or None if a file is missing. `files` are those of a folder that are checked."""
     stamps = tuple(map(stamp, files or (path,)))
     return None if None in stamps else Proxy(path, bool(files), stamps)
 
 
 def _absolute(path: str) -> Path:
-    """Blender finds folders of proxies from the file that is open, wherever their strip is from."""
+    """Return an absolute path: Blender finds proxy folders from the open file, even for a linked strip."""
     return Path(bpy.path.abspath(path))

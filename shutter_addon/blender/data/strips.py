@@ -1,4 +1,4 @@
-"""Effect strips: a Scene strip above its source, and the scene, data and source that belong to it."""
+"""Effect strips: Scene strips above their source, and the scene, effect and source that belong to them."""
 
 from __future__ import annotations
 
@@ -16,41 +16,41 @@ from ...core.messages import EffectError
 ENGINE = "VIRTUAL_SHUTTER"
 CHANNELS = 128  # of Blender's sequencer
 SOURCES = ("MOVIE", "IMAGE", "MOVIECLIP")
-MATTES = ("MATTE", "RAMP")  # kinds of regions that have no strokes
-LAID = ("OUTLINE", *MATTES)  # kinds of mattes, which are laid over what scribbles give
-# Where Blender scales or turns a Scene strip, it mixes the light of pixels, and of movies and 8-bit pictures their code
-# values. It makes code values first where a strip's colours are multiplied: by this, nothing else changes.
+MATTES = ("MATTE", "RAMP")  # kinds of regions without strokes
+LAID = ("OUTLINE", *MATTES)  # kinds of regions that are mattes, laid over what scribbles give
+# Where Blender scales or turns a Scene strip, it mixes light; in movies and 8-bit pictures, it mixes code values. It
+# makes code values first where a strip's colors are multiplied. This factor causes that, and changes no color.
 IN_CODE_VALUES = 1 + 2**-23
 
 
 def is_carried(region: PropertyGroup) -> bool:
-    """Whether a region is an outline that the footage's own motion carries from drawing to drawing."""
+    """Tell whether a region is an outline that is tracked from drawing to drawing."""
     return region.kind == "OUTLINE" and region.between != "STRAIGHT"
 
 
 def all_strips(scene: Scene) -> Iterable[Strip]:
-    """The scene's strips, those inside meta strips too."""
+    """Return the scene's strips, with those in meta strips."""
     return scene.sequence_editor.strips_all if scene.sequence_editor else ()
 
 
 def effect_strips(scene: Scene) -> list[Strip]:
-    """The scene's effect strips, those inside meta strips too."""
+    """Return the scene's effect strips, with those in meta strips."""
     found = [strip for strip in all_strips(scene) if strip.type == "SCENE" and strip.scene]
     return [strip for strip in found if strip.scene.render.engine == ENGINE]
 
 
 def scene_of_uid(uid: int | None) -> Any:
-    """The scene of a session_uid, unless it is gone."""
+    """Return the scene of a session_uid, or None."""
     return next((scene for scene in bpy.data.scenes if scene.session_uid == uid), None)
 
 
 def local_scenes() -> list:
-    """The scenes that can be changed: linked ones cannot."""
+    """Return the scenes that can be changed; linked ones cannot."""
     return [scene for scene in bpy.data.scenes if scene.library is None]
 
 
 def shown_scenes(scene: Scene) -> list:
-    """The scene, and those that its Scene strips show."""
+    """Return the scene, and those that its Scene strips show."""
     shown, new = [], [scene]
     while new:
         other = new.pop()
@@ -61,7 +61,7 @@ def shown_scenes(scene: Scene) -> list:
 
 
 def own_strips(scene: Scene) -> list[Strip]:
-    """The strips that were made for effects, those too whose scene has another engine or is gone."""
+    """Return the strips that were made for effects, even if their scene has another engine or was deleted."""
     return [strip for strip in all_strips(scene) if strip.type == "SCENE" and _is_own(strip)]
 
 
@@ -73,13 +73,18 @@ def _is_own(strip: Strip) -> bool:
 
 
 def effect_of(scene: Scene, effect_scene: Scene) -> Any:
-    """The scene's effect that an effect scene shows, or None."""
+    """Return the scene's effect that an effect scene shows, or None."""
     return next((effect for effect in scene.virtual_shutter.effects if effect.scene == effect_scene), None)
 
 
 def find_effect(effect_scene: Scene, scene_frame: float | None = None) -> tuple[Scene, PropertyGroup, Strip]:
-    """Scene, effect and one of its strips for an effect scene: the part of a cut one that shows a frame of the effect
-    scene, or the first. EffectError: nothing uses it any more."""
+    """Return the scene, the effect and an effect strip of an effect scene.
+
+    Of the parts of a cut strip, the one counts that shows the frame of the effect scene, else the first.
+
+    Raises:
+        EffectError: No strip shows the effect scene.
+    """
     for scene in bpy.data.scenes:
         if (effect := effect_of(scene, effect_scene)) is not None:
             parts = [strip for strip in effect_strips(scene) if strip.scene == effect_scene]
@@ -91,34 +96,39 @@ def find_effect(effect_scene: Scene, scene_frame: float | None = None) -> tuple[
 
 
 def origin(strip: Strip) -> float:
-    """Timeline frame at which the strip's untrimmed content would start: the same for all parts of a cut strip."""
+    """Return the timeline frame at which untrimmed content would start: the same for all parts of a cut strip."""
     return strip.content_start - strip.content_trim_start
 
 
 def skipped(strip: Strip) -> int:
-    """How many frames of its content a strip leaves out before the first that it shows."""
+    """Return the number of frames of its content that a strip skips before the first that it shows."""
     return math.floor(strip.left_handle - origin(strip))
 
 
 def overlap(a: Strip, b: Strip) -> bool:
-    """Whether two strips share timeline frames."""
+    """Tell whether two strips share timeline frames."""
     return a.left_handle < b.right_handle and b.left_handle < a.right_handle
 
 
 def is_at(strip: Strip, frame: float) -> bool:
-    """Whether a strip lies at a timeline frame."""
+    """Tell whether a strip lies at a timeline frame."""
     return strip.left_handle <= frame < strip.right_handle
 
 
 def timeline_frame(strip: Strip, scene_frame: float) -> float:
-    """The timeline frame at which an effect strip shows a frame of its scene."""
+    """Return the timeline frame at which an effect strip shows a frame of its scene."""
     return origin(strip) + scene_frame - strip.scene.frame_start
 
 
 def source_of(scene: Scene, effect: PropertyGroup, strip: Strip) -> Strip:
-    """The effect's source strip: of those with its identity (parts of a cut strip, copies) the nearest in time, then
-    that in the same meta strip, the connected one, the nearest below. EffectError: there is none any more, or none that
-    has frames."""
+    """Return the source strip of an effect strip.
+
+    Parts of a cut strip and copies share the source identity of an effect. The nearest in time counts, then
+    one in the same meta strip, a connected one, and the nearest channel, below first.
+
+    Raises:
+        EffectError: It was deleted, or is not a movie, image or clip strip.
+    """
     if (source := nearest_source(scene, effect, strip)) is None:
         if others := _with_identity(scene, effect.source):
             sentence = rpt_('the source of "{strip}", "{source}", is not a movie, image or clip strip')
@@ -128,7 +138,7 @@ def source_of(scene: Scene, effect: PropertyGroup, strip: Strip) -> Strip:
 
 
 class Shown(NamedTuple):
-    """An effect, its strip, and its source; None: it has none."""
+    """An effect, its strip, and its source strip, or None."""
 
     effect: PropertyGroup
     strip: Strip
@@ -136,24 +146,24 @@ class Shown(NamedTuple):
 
 
 def shown_effects(scene: Scene) -> list[Shown]:
-    """The effects that the scene's strips show."""
+    """Return the effects that the scene's strips show."""
     pairs = [(effect, strip) for strip in effect_strips(scene) if (effect := effect_of(scene, strip.scene))]
     return [Shown(effect, strip, nearest_source(scene, effect, strip)) for effect, strip in pairs]
 
 
 def with_sources(scene: Scene) -> list[Shown]:
-    """The effects that the scene's strips show, without those that lack a source."""
+    """Return the effects that the scene's strips show and that have a source."""
     return [each for each in shown_effects(scene) if each.source is not None]
 
 
 def shown_sources(scene: Scene) -> set[str]:
-    """Names of the strips that are sources of the scene's effect strips."""
+    """Return the names of the source strips of the scene's effect strips."""
     return {each.source.name for each in shown_effects(scene) if each.source}
 
 
 def nearest_source(scene: Scene, effect: PropertyGroup, strip: Strip) -> Any:
-    """What source_of finds, or None."""
-    connected = list(strip.connections)  # as a pair stays that is duplicated
+    """Return the source strip as source_of finds it, or None."""
+    connected = list(strip.connections)  # a duplicated pair stays connected
 
     def distance(other: Strip) -> tuple:
         apart = max(other.left_handle - strip.right_handle + 1, strip.left_handle - other.right_handle + 1, 0)
@@ -171,25 +181,25 @@ def nearest_source(scene: Scene, effect: PropertyGroup, strip: Strip) -> Any:
 
 
 def _with_identity(scene: Scene, identity: str) -> list:
-    """The scene's strips that an effect with this source is for, whatever they are."""
+    """Return the scene's strips with a source identity, whatever their type."""
     return [strip for strip in scene.sequence_editor.strips_all if strip.virtual_shutter_source == identity != ""]
 
 
 def invalidate(scene: Scene, effect_scene: Scene | None = None) -> None:
-    """Drops the finished frames of a scene's effect strips; of those that show one effect scene, if given."""
+    """Drop the sequencer's finished frames of a scene's effect strips, or only of those that show one effect scene."""
     revision.changed()
     for strip in effect_strips(scene):
         if effect_scene is None or strip.scene == effect_scene:
-            strip.invalidate_cache("RAW")  # and with them all that was composed of them
+            strip.invalidate_cache("RAW")  # drops what was composed from it, too
 
 
 def drawn_regions(effect: PropertyGroup) -> list:
-    """The regions of strokes that have a shutter, in order: those that an effect's state has shapes of."""
+    """Return the regions with strokes and a shutter, in order."""
     names = {shutter.name for shutter in effect.shutters}
     return [region for region in effect.regions if region.shutter in names and region.kind not in MATTES]
 
 
 def matte_regions(effect: PropertyGroup) -> list:
-    """The regions of mattes and ramps that have a shutter, in order: those that lie over the others."""
+    """Return the mattes and ramps with a shutter, in order."""
     names = {shutter.name for shutter in effect.shutters}
     return [region for region in effect.regions if region.shutter in names and region.kind in MATTES]

@@ -1,7 +1,7 @@
-"""How Blender's records lie in its memory, as the Blender that runs says itself.
+"""The layout of records in Blender's memory, from the running Blender.
 
-Every .blend file ends with a description of all records (SDNA), which Blender writes of itself, and whose places and
-sizes its compiler has compared with the memory's (dna_verify.cc). A file of nothing else is written once and read.
+Every .blend file ends with a description of all records (SDNA). Blender writes its own, and its compiler has checked
+the offsets and sizes (dna_verify.cc). An empty file is written once and parsed.
 """
 
 from __future__ import annotations
@@ -22,19 +22,19 @@ _POINTER = 8  # bytes
 
 
 class LayoutError(Exception):
-    """The Blender that runs has no such record, or does not tell."""
+    """This Blender stores a record differently, or its layout cannot be read."""
 
 
 @cache
 def record(name: str, *fields: tuple[str, str]) -> np.dtype:
-    """Give the type of a record of Blender's memory with some of its fields.
+    """Return the type of a record in Blender's memory with some of its fields.
 
     Args:
         fields: Each as Blender declares it, and as NumPy reads it: ("char name[64]", "S64"). A list has two addresses,
             of its first and its last item.
 
     Raises:
-        LayoutError: It is another one in this Blender.
+        LayoutError: This Blender has no such record or field.
     """
     size, places = described().get(name, (0, {}))
     declared = [words for words, _format in fields]
@@ -45,25 +45,27 @@ def record(name: str, *fields: tuple[str, str]) -> np.dtype:
 
 
 def read(kind: np.dtype, address: int) -> tuple:
-    """Give the fields of a record (`record`) at an address in Blender's memory: numbers, bytes and lists."""
+    """Return the fields of a record (`record`) at an address in Blender's memory: numbers, bytes and lists."""
     fields = np.frombuffer(memory(address, kind.itemsize), kind)[0]
     return tuple(fields[name].tolist() for name in kind.names or ())
 
 
 def memory(address: int, size: int) -> bytes:
-    """A copy of that many bytes of Blender's memory."""
+    """Return a copy of bytes of Blender's memory."""
     return ctypes.string_at(address, size)
 
 
 def text(field: bytes) -> bytes:
-    """What a field of text says."""
+    """Return a text field without padding."""
     return field.partition(b"\0")[0]
 
 
 @cache
 def described() -> dict[str, tuple[int, dict[str, int]]]:
-    """Of each record its size, and by its fields as they are declared where these lie, in bytes. None at all: Blender
-    does not tell, and is not asked again, as masks are read at every frame."""
+    """Return size and field offsets in bytes of each record, with fields as declared; empty: they cannot be read.
+
+    It is kept even if empty, because masks are read at every frame.
+    """
     try:
         with tempfile.TemporaryDirectory(prefix="virtual_shutter_dna_", ignore_cleanup_errors=True) as folder:
             file = Path(folder, "dna.blend")
@@ -74,8 +76,11 @@ def described() -> dict[str, tuple[int, dict[str, int]]]:
 
 
 def parsed(blend: bytes) -> dict[str, tuple[int, dict[str, int]]]:
-    """The description at the end of an uncompressed .blend file, see `described`. ValueError, IndexError,
-    struct.error: there is none."""
+    """Parse the description at the end of an uncompressed .blend file, as `described` returns it.
+
+    Raises:
+        ValueError, IndexError, struct.error: There is none.
+    """
     data = memoryview(blend)[blend.rindex(b"SDNANAME") + 4 :]
     names, at = _words(data, 0)
     kinds, at = _words(data, at)
@@ -97,7 +102,7 @@ def parsed(blend: bytes) -> dict[str, tuple[int, dict[str, int]]]:
 
 
 def _words(data: memoryview, at: int) -> tuple[list[str], int]:
-    """The words behind a mark and their number, and where the next mark begins."""
+    """Return the words behind a mark and their count, and the offset of the next mark."""
     (count,) = struct.unpack_from("<i", data, at + 4)
     words = bytes(data[at + 8 :]).split(b"\0", count)[:count]
     end = at + 8 + sum(map(len, words)) + count
@@ -105,6 +110,6 @@ def _words(data: memoryview, at: int) -> tuple[list[str], int]:
 
 
 def _length(name: str, size: int) -> int:
-    """Bytes of a field: the size of its type, or a pointer's, as often as its dimensions say."""
+    """Return the bytes of a field: the size of its type or of a pointer, times its dimensions."""
     one = _POINTER if name.startswith(("*", "(*")) else size
     return one * math.prod(map(int, re.findall(r"\[(\d+)\]", name)))

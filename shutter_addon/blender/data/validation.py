@@ -1,7 +1,7 @@
-"""Values of an effect as a .blend file may hold them: one that no effect can have is refused, by its place.
+"""Check values of an effect in a .blend file, and name the place of one that is out of range.
 
-Blender keeps properties in their ranges where users and F-curves set them. Scripts and files of other versions get past
-that, and "not a number" past every range.
+Blender keeps properties in range where users and F-curves set them. Scripts and files of other versions get past that,
+and NaN gets past every range.
 """
 
 from __future__ import annotations
@@ -29,23 +29,26 @@ _PLACES = {
 
 
 def place(group: PropertyGroup) -> str:
-    """The effect, shutter, bar, region or camera that a property group is, in the user's words."""
+    """Return the user's words for an effect, shutter, bar, region or camera."""
     path = group.path_from_id()
     if path.endswith(".camera"):
         words = _PLACES["camera"]
         return rpt_(words).format(name=group.id_data.path_resolve(path.removesuffix(".camera")).name)
     match = re.match(r".*?effects\[\d+\](?:\.(shutters|regions)\[\d+\])?", path)
-    assert match  # all but the camera are an effect, or lie in one
+    assert match  # the group is an effect, or lies in one
     words = rpt_(_PLACES[match[1] or ""]).format(name=group.id_data.path_resolve(match[0]).name)
     bar = re.search(r"\.bars\[(\d+)\]$", path)
     return rpt_("{shutter}, bar {number}").format(shutter=words, number=int(bar[1]) + 1) if bar else words
 
 
 def number(group: PropertyGroup, name: str, value: float | None = None) -> Any:
-    """A number, or one of a vector's, as the property has it; or `value`, which it would be. EffectError: it is outside
-    of the property's range."""
+    """Return a property's number, or `value` in place of it.
+
+    Raises:
+        EffectError: It is out of the property's range.
+    """
     value, prop = getattr(group, name) if value is None else value, group.bl_rna.properties[name]
-    if prop.hard_min <= value <= prop.hard_max:  # nothing but a number is
+    if prop.hard_min <= value <= prop.hard_max:  # false for NaN
         return value
     show = math.degrees if prop.subtype == "ANGLE" else float
     low, high = (f"{show(limit):.7g}" for limit in (prop.hard_min, prop.hard_max))
@@ -56,17 +59,13 @@ def number(group: PropertyGroup, name: str, value: float | None = None) -> Any:
 
 
 def check(items: Sequence[PropertyGroup], name: str, numbers: np.ndarray) -> None:
-    """EffectError: one of the numbers (n,) of as many items of a collection is outside of the property's range."""
+    """Raise EffectError where one of the numbers (n,) for the items of a collection is out of range."""
     for item, value in zip(items, numbers.tolist(), strict=True):
         number(item, name, value)
 
 
 def check_moving(moving: PropertyGroup) -> None:
-    """Check the properties of a region or the camera, as they stand.
-
-    Raises:
-        EffectError: One is outside of its range.
-    """
+    """Raise EffectError where a property of a region or the camera is out of range."""
     for prop in moving.bl_rna.properties:
         if prop.identifier == "kind":
             word(moving, "kind")
@@ -75,8 +74,11 @@ def check_moving(moving: PropertyGroup) -> None:
 
 
 def word(group: PropertyGroup, name: str, value: float | None = None) -> Any:
-    """The identifier of an enum as the property has it; or of the item with the number `value`. EffectError: it has
-    none of its items."""
+    """Return the identifier of an enum, or of the item with the number `value`.
+
+    Raises:
+        EffectError: There is no such item.
+    """
     prop = group.bl_rna.properties[name]
     if value is None:
         identifier = getattr(group, name)
@@ -90,12 +92,12 @@ def word(group: PropertyGroup, name: str, value: float | None = None) -> Any:
 
 
 def beyond_timeline(frames: np.ndarray) -> np.ndarray:
-    """Those of the frames (n,) of an F-curve's keys that are on no timeline."""
+    """Return those of the frames (n,) that lie beyond the timeline."""
     return frames[~(np.abs(frames) <= MAX_FRAME)]
 
 
 def refuse_key(group: PropertyGroup, name: str, frame: float) -> None:
-    """EffectError: a property has a key at a frame that is on no timeline."""
+    """Raise EffectError for a property's key at a frame beyond the timeline."""
     sentence = rpt_("{place}: {property} has a keyframe at frame {frame}, not {low} to {high}")
     words = {"place": place(group), "property": _called(group.bl_rna.properties[name]), "frame": f"{frame:.7g}"}
     raise EffectError(sentence.format(**words, low=-MAX_FRAME, high=MAX_FRAME))

@@ -1,4 +1,4 @@
-"""The versions of the extension, of Blender, and of the edit that is open."""
+"""The versions of the extension, of Blender, and of the open edit."""
 
 from __future__ import annotations
 
@@ -21,9 +21,9 @@ from ...media.files import stamp
 from . import external_files, source_media, strips
 
 MANIFEST = Path(__file__).parents[3] / "blender_manifest.toml"
-_FEW = 256  # files of a sequence; of a longer one's, blocks are hashed: to read all of it would take hours
-_BLOCKS = 1 << 16  # bytes of such a file, above which that is so
-_READERS = 16  # threads: what takes long is that a network drive answers
+_FEW = 256  # files: of longer sequences, only blocks are hashed, because reading all would take hours
+_BLOCKS = 1 << 16  # bytes: smaller files of such sequences are hashed as a whole
+_READERS = 16  # threads, because a network drive answers slowly
 
 
 def extension() -> str:
@@ -31,15 +31,16 @@ def extension() -> str:
 
 
 def blender() -> str:
-    """Major, minor and micro version."""
+    """Return Blender's major, minor and micro version."""
     return ".".join(map(str, bpy.app.version))
 
 
 def colours() -> str:
-    """The OpenColorIO configuration that Blender has taken: of one that OpenColorIO brings, its name; of a file, its
-    SHA-256 in hexadecimal; "": Blender's own, wherever it is installed. Of the tables that a file names, only the names
-    count."""
-    # Blender itself sets OCIO to its own file as it starts, and what it starts inherits that.
+    """Return an identifier of Blender's OpenColorIO configuration; "": Blender's own, wherever it is installed.
+
+    A built-in configuration of OpenColorIO has its name; a file has its SHA-256, without the tables that it names.
+    """
+    # Blender sets OCIO to its own file when it starts, and its child processes inherit that.
     path = os.environ.get("BLENDER_OCIO", os.environ.get("OCIO", ""))
     if path.startswith("ocio://"):
         return path
@@ -53,7 +54,7 @@ def _own_config() -> str:
 
 
 def _config_digest(path: Path) -> str:
-    """ "": there is no such file; Blender then takes its own."""
+    """Return the digest of a file, or "" if it is missing: Blender then takes its own."""
     try:
         return _sha256(path)
     except OSError:
@@ -66,30 +67,29 @@ def _sha256(path: str | Path) -> str:
 
 
 def of_edit(scene: Scene) -> EditVersion:
-    """The version of an edit, as it is in the .blend file that is open. OSError: the file is gone."""
+    """Return the version of the edit in the open .blend file. OSError: the file is gone."""
     blend = _sha256(bpy.data.filepath)
     footage = tuple(map(_footage, _footage_files(scene)))
     return EditVersion(blend=blend, extension=extension(), blender=blender(), colours=colours(), footage=footage)
 
 
 def read_files(scene: Scene) -> list[Path]:
-    """All files that the edit's pictures are made of, beside the .blend file."""
+    """Return all files that the edit's pictures are made from, except the .blend file."""
     return [path for files in _footage_files(scene) for path in files]
 
 
 def sounds() -> list[Path]:
-    """The files of all sounds."""
+    """Return the files of all sounds."""
     return [path for sound in bpy.data.sounds for path in external_files.named(sound)]
 
 
 def stamps(scene: Scene) -> dict[Path, tuple[int, int] | None]:
-    """The stamp of each of `read_files`."""
+    """Return the stamp of each of `read_files`."""
     return {path: stamp(path) for path in read_files(scene)}
 
 
 def _footage_files(scene: Scene) -> Iterator[list[Path]]:
-    """What the edit's pictures are made of beside the .blend file, as lists of files: of its strips, of those of the
-    edits that it shows, and of all other data; without sound."""
+    """Yield lists of the files that the edit's pictures are made from: of strips, of shown edits, and of other data."""
     for shown in strips.shown_scenes(scene):
         for strip in shown.sequence_editor.strips_all:
             if strip.type in strips.SOURCES:
@@ -103,8 +103,8 @@ def _footage_files(scene: Scene) -> Iterator[list[Path]]:
 
 
 def _footage(files: list[Path]) -> Footage:
-    """The digest of files: of an image sequence's, in order."""
-    files = [path for path, _ in groupby(files)]  # a still that is held is one file
+    """Return the digest of files, in order."""
+    files = [path for path, _ in groupby(files)]  # a still that is held counts once
     content, missing = hashlib.sha256(), ""
     for path, digest in zip(files, digests(files), strict=True):
         missing = missing or ("" if digest else path.name)
@@ -113,14 +113,14 @@ def _footage(files: list[Path]) -> Footage:
 
 
 def digests(files: list[Path]) -> list[bytes | None]:
-    """Digests of the contents of files that are read together; None for one that is missing, or cannot be read."""
+    """Return digests of files' contents, read in parallel; None for one that is missing or unreadable."""
     whole = derived.WHOLE if len(files) <= _FEW else _BLOCKS
     with threads.pool(_READERS) as pool:
         return list(pool.map(partial(_digest, whole=whole), files))
 
 
 def _digest(path: Path, whole: int) -> bytes | None:
-    """As derived.content_digest; None: the file is missing, or cannot be read."""
+    """Return derived.content_digest, or None for a file that is missing or unreadable."""
     try:
         return derived.content_digest(path, whole)
     except MediaError:

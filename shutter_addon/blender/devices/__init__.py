@@ -1,1 +1,1 @@
-"""The GPU that Blender draws with as a device, and which device makes which picture."""
+"""Blender's own GPU as a device, and the choice of the device that renders."""

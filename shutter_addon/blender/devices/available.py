@@ -1,4 +1,4 @@
-"""Which device renders: an OpenGL 4.3 context of its own, else Blender's own GPU, else NumPy."""
+"""Choose the device that renders: a separate OpenGL 4.3 context, else Blender's own GPU, else NumPy."""
 
 import threading
 from collections.abc import Callable
@@ -17,21 +17,29 @@ from ...devices.device import NoDeviceError
 from .blender_gpu import BlenderDevice, opens_in_background
 from .main_thread import RelayedDevice
 
-CHOICES = ("auto", "gpu", "opengl", "blender", "cpu")  # gpu: opengl, or else blender
-# Given a Budget and `ask_others`, as Device.
+CHOICES = ("auto", "gpu", "opengl", "blender", "cpu")  # gpu: opengl, else blender
+# What opens each device. Arguments: a Budget and `ask_others`, as for Device.
 OPEN: dict[str, Callable[..., Compositor]] = {
     "opengl": partial(open_compositor, "gpu"),
     "blender": lambda *memory: GPUCompositor(BlenderDevice(*memory)),
-    "relayed": lambda *memory: GPUCompositor(RelayedDevice(*memory)),  # Blender's from a thread of a window's job
+    "relayed": lambda *memory: GPUCompositor(RelayedDevice(*memory)),  # Blender's GPU, from the thread of a job
     "cpu": partial(open_compositor, "cpu"),
 }
 
 
 def choose(wanted: str, *, window_waits: bool = False) -> tuple[str, str | None]:
-    """The device that renders, a key of OPEN; and where "auto" found a lesser one, why, a sentence for the user.
-    NoDeviceError: there is none as it is wanted.
+    """Choose the device that renders.
 
-    wanted: one of CHOICES; window_waits: for the picture, so that it cannot lend its GPU"""
+    Args:
+        wanted: one of CHOICES
+        window_waits: whether Blender's window waits for the picture, so that its GPU cannot be used
+
+    Returns:
+        A key of OPEN. If "auto" found only a slower device, also a sentence for the user that says why.
+
+    Raises:
+        NoDeviceError: the wanted device is missing
+    """
     if wanted == "cpu":
         return "cpu", None
     lacking = []
@@ -55,15 +63,14 @@ def choose(wanted: str, *, window_waits: bool = False) -> tuple[str, str | None]
 
 
 def name(kind: str) -> str:
-    """What a device that `choose` gave calls itself."""
+    """Return the name of a device, a key of OPEN."""
     if kind == "cpu":
         return "NumPy"
     return opengl().name if kind == "opengl" else gpu.platform.renderer_get()
 
 
 class OpenGL(NamedTuple):
-    """The names of an OpenGL 4.3 context's renderer and of its driver, and the bytes that its textures may take, or why
-    there is none."""
+    """Facts of OpenGL 4.3: its renderer, its driver, the bytes that textures may take; or why there is none."""
 
     name: str = ""
     driver: str = ""
@@ -73,9 +80,7 @@ class OpenGL(NamedTuple):
 
 @cache
 def opengl() -> OpenGL:
-    """What is known of OpenGL 4.3. It is tried once.
-
-    On a thread of its own: where Blender's context is current, another one cannot always be."""
+    """Try OpenGL 4.3, once. A separate thread does it: where Blender's context is current, another may fail."""
     return threads.start(_tried).result()
 
 

@@ -1,8 +1,8 @@
-"""Blender's own GPU as a device: what devices/gl.py does, through the `gpu` module, on OpenGL, Vulkan and Metal.
+"""Blender's own GPU as a device, through the `gpu` module, on OpenGL, Vulkan and Metal.
 
-Nothing can be sent into a part of a texture from Python, and floats alone can be sent at all. So what is written goes
-into a float texture of its own, small samples several to a float as whole numbers up to 2²⁴, which floats hold
-exactly; a pass unpacks them into the layer. (Bit patterns would be simpler, but a GPU may flush denormal floats.)
+Python can only send floats, and only whole textures. So data is sent in a float texture, and a pass unpacks it into the
+layer. Small samples are packed into whole numbers up to 2²⁴, which floats hold exactly. (Bit patterns would be simpler,
+but a GPU may flush denormal floats.)
 """
 
 from __future__ import annotations
@@ -26,7 +26,8 @@ from ...devices.passes import Pass, read_pass
 
 TYPES = {"sampler2DArray": "FLOAT_2D_ARRAY", "usampler2DArray": "UINT_2D_ARRAY"}
 _AS_IT_IS, _WHOLE, _OPAQUE_BYTES, _PAIRS_OF_BYTES, _SIXTEEN_BITS = range(5)
-# Format (as in GLSL): NumPy's type of what is written and read, the format sent, how it is unpacked (UNPACK).
+# GLSL format: NumPy's type, the format that is sent, how it is unpacked (UNPACK). Only passes use rgba16ui and
+# rgba32ui: floats cannot hold them, and Blender reads whole numbers only of one component.
 FORMATS = {
     "rgba8": (np.uint8, "RG32F", _PAIRS_OF_BYTES),
     "rgba16": (np.uint16, "RGBA32F", _SIXTEEN_BITS),
@@ -34,53 +35,50 @@ FORMATS = {
     "rgba32f": (np.float32, "RGBA32F", _AS_IT_IS),
     "r32f": (np.float32, "R32F", _AS_IT_IS),
     "r32ui": (np.uint32, "R32F", _WHOLE),
-    # Of passes alone: floats do not hold them, and Blender reads whole numbers of one component only.
-    "rgba16ui": None,
-    "rgba32ui": None,
 }
-# Bytes of the float texture by which something is sent, at most: larger arrays are sent by strips of rows.
+# The most bytes of the float texture that sends data. Larger arrays are sent in bands of rows.
 _SENT_BYTES = 16 << 20
-
-
-# Samplers and images, as many as any pass has; with OpenGL alone.
+# Has as many samplers and images as any pass. Only OpenGL needs it.
 LETTING_GO = read_pass("blender_gpu", "LET_GO")
-
-
-_unused: list = []  # objects of the gpu module that are to be freed
+_unused: list = []  # objects of the gpu module, to be freed once Blender's GPU is current
 
 
 def has_context() -> bool:
-    """Whether Blender's GPU is current on this thread: it is where Blender draws. It is not after a window was closed,
-    until another one is drawn; a pass that is run then ends Blender, as does another one's shader that is freed."""
+    """Return whether Blender's GPU is current on this thread, as it is where Blender draws.
+
+    It is not current after a window was closed, until another one is drawn. Running a pass or freeing a shader would
+    crash Blender then.
+    """
     try:
         gpu.types.GPUTexture((1, 1))
-    except (RuntimeError, SystemError):  # the latter in the background, where nobody has called gpu.init()
+    except (RuntimeError, SystemError):  # SystemError: in the background without gpu.init()
         return False
     return True
 
 
 def require_context() -> None:
-    """NoDeviceError: Blender's GPU is not current on this thread."""
+    """Raise NoDeviceError if Blender's GPU is not current on this thread."""
     if not has_context():
         raise NoDeviceError(rpt_("Blender's GPU cannot be used until a window is drawn"))
 
 
 def free(*objects: object) -> None:
-    """Frees textures and shaders to which nothing else refers: now, or once Blender's GPU is current."""
+    """Free textures and shaders that nothing else refers to, now or once Blender's GPU is current."""
     _unused.extend(objects)
     if has_context():
         free_unused()
 
 
 def free_unused() -> None:
-    """Frees what was to be freed while Blender's GPU was not current; called where it is."""
+    """Free what could not be freed before. Call it where Blender's GPU is current."""
     _unused.clear()
 
 
 class BlenderDevice(Device):
-    """A Device, wherever Blender's GPU context is current: in draw handlers, or after gpu.init().
+    """A Device where Blender's GPU context is current: in draw handlers, or after gpu.init().
 
-    What begins with _ gets and gives the gpu module's own textures; RelayedDevice has it called elsewhere."""
+    Private methods take and return the gpu module's textures. RelayedDevice calls them on the main thread.
+    """
 
     def __init__(self, budget: Budget | None = None, ask_others: Callable[[], None] | None = None) -> None:
         super().__init__(budget, ask_others)
@@ -92,7 +90,7 @@ class BlenderDevice(Device):
         self.budget.tell(machine_memory() if is_llvmpipe(self.name) else None)
 
     def current(self) -> AbstractContextManager[BlenderDevice]:
-        """See Device. NoDeviceError: Blender's GPU is not current on this thread."""
+        """See Device."""
         require_context()
         free_unused()
         return self._cleared()
@@ -107,11 +105,11 @@ class BlenderDevice(Device):
         return nullcontext(self)
 
     def _let_go(self) -> None:
-        """Has the current OpenGL context bind no texture of ours any more.
+        """Unbind our textures from the current OpenGL context.
 
-        An engine's render and what Blender draws have a context each. A texture that is freed in one of them stays
-        bound in the other; and a new one that gets its number is taken for bound there, by Blender as by Mesa, so that
-        passes would read and write the old one."""
+        Blender has one context for an engine's render and one for drawing. A texture that is freed in one stays bound
+        in the other. Blender and Mesa take a new texture with the same number for that one, so passes would use it.
+        """
         if self._spare is None:
             self._spare = Texture(None, (1, 1, 1), "rgba32f", self._make(1, 1, 1, "rgba32f"))
         spares = dict.fromkeys((*LETTING_GO.samplers, *LETTING_GO.images), self._spare)
@@ -138,7 +136,7 @@ class BlenderDevice(Device):
             self._send(texture.gpu, unpacking(texture.kind, packing), sent, top, layer)
 
     def send(self, texture: Texture, frame: np.ndarray) -> Texture:
-        """See Device. Numbers are what is sent anyway."""
+        """See Device. The numbers need no unpacking."""
         height, width = frame.shape[:2]
         if width * height * texel_bytes("r32f") > _SENT_BYTES:
             return super().send(texture, frame)
@@ -146,7 +144,7 @@ class BlenderDevice(Device):
         return Texture(None, (width, height, 1), "r32f", _of_numbers((width, height), "R32F", data))
 
     def _send(self, stored: gpu.types.GPUTexture, program: Pass, sent: tuple, top: int, layer: int) -> None:
-        """sent: arguments of _of_numbers, first the size"""
+        """Send numbers and unpack them into a layer. sent: arguments of _of_numbers."""
         textures, size = {"sent": _of_numbers(*sent)}, sent[0]
         constants = {"size": size, "top": top, "layer": layer}
         BlenderDevice._dispatch(self, program, program.groups(size), textures, {"stored": stored}, {}, constants)
@@ -178,12 +176,12 @@ class BlenderDevice(Device):
         for name, image in images.items():
             shader.image(name, image)
         uniforms = {name: gpu.types.GPUUniformBuf(_buffer("FLOAT", blocks[name])) for name in program.blocks}
-        for name, uniform in uniforms.items():  # which must outlive the dispatch
+        for name, uniform in uniforms.items():  # they must live until the dispatch
             shader.uniform_block(name, uniform)
         for name, kind in program.constants.items():
             set_constant = shader.uniform_float if kind in ("float", "vec2") else shader.uniform_int
             set_constant(name, constants[name])
-        gpu.compute.dispatch(shader, *groups)  # which makes the next one wait for what this one stores
+        gpu.compute.dispatch(shader, *groups)  # the next one waits for what this one stores
 
     def release(self) -> None:
         free(*self._shaders.values(), self._spare)
@@ -191,7 +189,7 @@ class BlenderDevice(Device):
 
 
 def texel(texture: Texture, x: int, y: int) -> np.ndarray:
-    """The numbers (4 · layers,) float32 of all layers of an rgba32f texture at a texel; nothing else is read."""
+    """Return the numbers (4 · layers,) float32 of all layers of an rgba32f texture at one texel."""
     layers = texture.size[2]
     values = np.empty((layers, 4), np.float32)
     for layer, pixel in enumerate(values):
@@ -202,7 +200,7 @@ def texel(texture: Texture, x: int, y: int) -> np.ndarray:
 def _read_layer(
     texture: gpu.types.GPUTexture, layer: int, box: tuple, components: int, kind: str, pixels: np.ndarray
 ) -> None:
-    """By a framebuffer, for GPUTexture.read() gives a first layer alone. box: left, bottom, width and height"""
+    """Read a box (left, bottom, width, height) of a layer. GPUTexture.read() reads only the first layer."""
     framebuffer = gpu.types.GPUFrameBuffer(color_slots={"texture": texture, "layer": layer})
     with framebuffer.bind():
         framebuffer.read_color(*box, components, 0, kind, data=_buffer(kind, pixels))
@@ -210,9 +208,10 @@ def _read_layer(
 
 @cache
 def opens_in_background() -> bool:
-    """Whether Blender's GPU can be used without a window; it is from then on, on the main thread.
+    """Return whether Blender's GPU can be used without a window. If so, it is current on the main thread from then on.
 
-    Another Blender tries first: where there is none, 5.2's gpu.init() does not raise, it crashes."""
+    Another Blender process tries first: without a GPU, gpu.init() of Blender 5.2 crashes.
+    """
     try:
         subprocess.run(_trial(), check=True, capture_output=True, timeout=60)
         gpu.init()
@@ -222,7 +221,7 @@ def opens_in_background() -> bool:
 
 
 def _trial() -> list[str]:
-    """The command that tries gpu.init() with this process's backend."""
+    """Return the command that tries gpu.init() with this process's backend."""
     if bpy.app.module:
         return [sys.executable, "-c", "import bpy, gpu; gpu.init()"]
     given = dict(pairwise(sys.argv)).get("--gpu-backend", bpy.context.preferences.system.gpu_backend.lower())
@@ -235,15 +234,18 @@ def unpacking(kind: str, packing: int) -> Pass:
 
 
 def _exchanged(texture: Texture) -> tuple:
-    """The entry of FORMATS. TypeError: Blender neither sends nor reads such a texture; asked to read one, it leaves
-    the memory as it was, without an error."""
-    if (entry := FORMATS[texture.kind]) is None:
-        raise TypeError(f"{texture.kind}: such a texture is written and read by passes alone on Blender's GPU")
-    return entry
+    """Return the texture's entry of FORMATS.
+
+    Raises:
+        TypeError: Blender neither sends nor reads such a texture. It would read nothing, without an error.
+    """
+    if texture.kind not in FORMATS:
+        raise TypeError(f"on Blender's GPU only passes read and write textures of {texture.kind}")
+    return FORMATS[texture.kind]
 
 
 def _of_numbers(size: tuple[int, int], kind: str, data: gpu.types.Buffer) -> gpu.types.GPUTexture:
-    """A texture of these numbers. NoDeviceError: the GPU has no room for it."""
+    """Return a texture of numbers. Raise NoDeviceError if the GPU has no room for it."""
     try:
         return gpu.types.GPUTexture(size, layers=1, format=kind, data=data)
     except RuntimeError as error:
@@ -251,7 +253,7 @@ def _of_numbers(size: tuple[int, int], kind: str, data: gpu.types.Buffer) -> gpu
 
 
 def _buffer(kind: str, array: np.ndarray) -> gpu.types.Buffer:
-    """Blender's view of a contiguous array: nothing is copied."""
+    """Return Blender's view of a contiguous array, without a copy."""
     return gpu.types.Buffer(kind, array.size, array.reshape(-1))
 
 

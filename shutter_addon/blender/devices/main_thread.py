@@ -1,9 +1,9 @@
-"""What other threads have Blender's main thread do, where its data, its operators and its GPU belong.
+"""Calls from other threads to Blender's main thread, which owns Blender's data, operators and GPU.
 
-Functions wait in a queue for a timer, as Blender's manual has it: a timer itself may be registered on the main thread
-alone, as Blender goes through its list of them without a lock. Blender's GPU is lent as a device whose calls the main
-thread makes, a few at a time between redraws of the window. An engine's own way to it (bl_use_gpu_context) holds a lock
-of Blender's for as long as a picture takes, and no window is drawn meanwhile.
+Functions wait in a queue for a timer, as Blender's manual recommends. Timers may be registered only on the main thread:
+Blender iterates over them without a lock. RelayedDevice is Blender's GPU for other threads: the main thread makes its
+calls, a few at a time between redraws. With an engine's bl_use_gpu_context, Blender would hold a lock while a picture
+is made, and draw no window meanwhile.
 """
 
 import queue
@@ -24,68 +24,74 @@ from ...devices.passes import Pass
 from .blender_gpu import BlenderDevice, has_context
 
 T = TypeVar("T")
-# Seconds of the main thread that calls take at once, if none takes longer: as many as all else took, within these.
+# The main thread spends as many seconds on calls as on everything else, within these limits.
 _LEAST, _MOST = 0.02, 0.05
-_GAP = 0.005  # seconds that the main thread waits there for the next call
-_MOMENT = 0.01  # seconds that the passes take for which it waits at once
-_AHEAD = 4  # passes that wait for the main thread at most: they are run, too, where the picture is not wanted any more
-_REST = 1.0  # seconds without a call, after which the main thread looks for none
-_TICK = 0.02  # seconds from one look at the queue to the next
-_calls: queue.SimpleQueue[Callable[[], object]] = queue.SimpleQueue()  # of any thread, for the timer
-
-
-def soon(function: Callable[[], object]) -> None:
-    """Has the main thread of a window call a function, after those before it; for any thread."""
-    _calls.put(function)
-
-
-def call_waiting() -> float:
-    """A timer, which is there as long as the extension is: it makes the calls of relayed devices as well."""
-    for _ in range(_calls.qsize()):
-        try:
-            _calls.get_nowait()()
-        except Exception:  # Blender would end the timer
-            sys.excepthook(*sys.exc_info())  # as Blender does, which prints it and keeps ours (handlers)
-    return 0.0 if look() else _TICK
-
-
-_timers: set[Callable[[], float | None]] = set()  # that Blender may have still once the extension is disabled
-
-
-def later(timer: Callable[[], float | None], seconds: float = 0.0, *, persistent: bool = False) -> None:
-    """Has Blender call a timer, unless it is going to; for the main thread."""
-    _timers.add(timer)
-    if not bpy.app.timers.is_registered(timer):
-        bpy.app.timers.register(timer, first_interval=seconds, persistent=persistent)
-
-
-def drop(*timers: Callable[[], float | None]) -> None:
-    """Has Blender call timers no more."""
-    for timer in filter(bpy.app.timers.is_registered, timers):
-        bpy.app.timers.unregister(timer)
+_GAP = 0.005  # seconds that the main thread then waits for the next call
+_MOMENT = 0.01  # seconds that a batch of passes takes, before the main thread waits for it
+_AHEAD = 4  # the most passes that wait for the main thread; they run even if the picture is no longer wanted
+_REST = 1.0  # seconds without a call, after which the main thread stops looking
+_TICK = 0.02  # seconds between two looks at the queue
 
 
 @dataclass
 class _MainThread:
-    """calls: that wait for it, as (future, function); until: until when it looks for more; looked: when it did last
-    unfinished: passes that may be under way; batch: after how many they are waited for"""
+    """What other threads ask of the main thread.
 
+    Attributes:
+        functions: of `soon`, for the timer
+        calls: of relayed devices, as (future, function). They also run while Blender draws, when no data may change.
+        timers: timers to remove when the extension is disabled
+        until: when it stops looking for more calls
+        looked: when it last looked
+        unfinished: passes that may still run
+        batch: the number of passes after which it waits for them
+    """
+
+    functions: queue.SimpleQueue[Callable[[], object]]
     calls: queue.SimpleQueue[tuple[Future, Callable]]
+    timers: set[Callable[[], float | None]]
     until: float = 0.0
     looked: float = 0.0
     unfinished: int = 0
     batch: int = 8
 
 
-# Apart from `soon`: these calls are made while Blender draws as well, where no data may be changed.
-_main = _MainThread(queue.SimpleQueue())
+_main = _MainThread(queue.SimpleQueue(), queue.SimpleQueue(), set())  # Blender has one main thread
+
+
+def soon(function: Callable[[], object]) -> None:
+    """Have the main thread of a window call a function, in the order of these calls. Usable on any thread."""
+    _main.functions.put(function)
+
+
+def call_waiting() -> float:
+    """Call the waiting functions, and those of relayed devices: a timer that runs as long as the extension."""
+    for _ in range(_main.functions.qsize()):
+        try:
+            _main.functions.get_nowait()()
+        except Exception:  # Blender would end the timer
+            sys.excepthook(*sys.exc_info())  # as Blender does: prints the error, and ours are kept (handlers)
+    return 0.0 if look() else _TICK
+
+
+def later(timer: Callable[[], float | None], seconds: float = 0.0, *, persistent: bool = False) -> None:
+    """Register a timer unless it is registered. Call it on the main thread."""
+    _main.timers.add(timer)
+    if not bpy.app.timers.is_registered(timer):
+        bpy.app.timers.register(timer, first_interval=seconds, persistent=persistent)
+
+
+def drop(*timers: Callable[[], float | None]) -> None:
+    """Unregister timers."""
+    for timer in filter(bpy.app.timers.is_registered, timers):
+        bpy.app.timers.unregister(timer)
 
 
 class RelayedDevice(BlenderDevice):
-    """A devices.device.Device, on any one thread but Blender's main one. What a pass raises is met later, at
-    the latest when something is made, sent or read next.
+    """Blender's GPU as a Device for a thread other than the main one.
 
-    Its own textures are lists of one, which the main thread empties: on Vulkan Blender crashes where another frees one.
+    Errors of a pass are raised later, at the latest when something is made, sent or read. Its textures are lists of
+    one, which the main thread empties: on Vulkan, Blender crashes if another thread frees a texture.
     """
 
     def __init__(self, *memory: Any) -> None:
@@ -93,7 +99,7 @@ class RelayedDevice(BlenderDevice):
         self._passes: list[Future] = []
 
     def current(self) -> AbstractContextManager[BlenderDevice]:
-        """See Device. Whether Blender's GPU is current is for the main thread to see."""
+        """See Device. The main thread checks whether Blender's GPU is current."""
         return self._cleared()
 
     def _make(self, *arguments: Any) -> list:
@@ -102,7 +108,7 @@ class RelayedDevice(BlenderDevice):
     def _free(self, own: list) -> None:
         _called(own.clear)
 
-    send = Device.send  # what others make would have to be freed there, too
+    send = Device.send  # BlenderDevice.send makes a texture, which only the main thread could free
 
     def _send(self, stored: list, *arguments: Any) -> None:
         self._wait_for(lambda: BlenderDevice._send(self, *stored, *arguments))
@@ -123,7 +129,7 @@ class RelayedDevice(BlenderDevice):
         self._wait_for(lambda: BlenderDevice.release(self))
 
     def _wait_for(self, function: Callable[[], T]) -> T:
-        """What the function gives on the main thread, after all passes."""
+        """Return the function's result on the main thread, after all passes."""
         result = _called(function).result()
         passes, self._passes = self._passes, []
         for done in passes:
@@ -132,8 +138,7 @@ class RelayedDevice(BlenderDevice):
 
 
 def ask(function: Callable[[], None], seconds: float) -> None:
-    """Has the main thread call a function, and waits for its end, but no longer than that: then it is not called any
-    more, unless it has begun."""
+    """Have the main thread call a function, and wait at most `seconds` for it. Then the call is cancelled."""
     asked = _called(function)
     try:
         asked.result(seconds)
@@ -142,8 +147,11 @@ def ask(function: Callable[[], None], seconds: float) -> None:
 
 
 def serve(seconds: float = _LEAST) -> bool:
-    """Makes calls, on the main thread while it waits for another that may call, for these seconds or a call more.
-    False: there are some, but Blender's GPU is not current."""
+    """Make calls on the main thread for some seconds, while it waits for a thread that may call.
+
+    Returns:
+        False: calls wait, but Blender's GPU is not current
+    """
     if not has_context():
         _redraw()
         time.sleep(_GAP)
@@ -154,15 +162,15 @@ def serve(seconds: float = _LEAST) -> bool:
             done, function = _main.calls.get(timeout=min(left, _GAP))
         except queue.Empty:
             return True
-        _keep_looking()
+        _main.until = time.monotonic() + _REST
         if threads.fulfil(done, function):
-            with suppress(RuntimeError):  # the GPU is full: that is met by who needs it
+            with suppress(RuntimeError):  # the GPU is full: the next call that needs memory raises it
                 _finish_some()
     return True
 
 
 def _finish_some() -> None:
-    """Waits for passes, after so many that it takes a moment: whatever is drawn or read waits for all before it."""
+    """Wait for passes after each batch, since drawing and reading have to wait for all passes before."""
     _main.unfinished += 1
     if _main.unfinished >= _main.batch:
         start = time.monotonic()
@@ -172,19 +180,15 @@ def _finish_some() -> None:
 
 
 def _called(function: Callable[[], T]) -> Future[T]:
-    """The function, called on the main thread after all calls before."""
+    """Queue a call for the main thread. Return its future."""
     done: Future[T] = Future()
-    _keep_looking()
+    _main.until = time.monotonic() + _REST
     _main.calls.put((done, function))
     return done
 
 
-def _keep_looking() -> None:
-    _main.until = time.monotonic() + _REST
-
-
 def look() -> bool:
-    """Makes calls, on the main thread while it waits for nothing. Whether it has to look again at once."""
+    """Make calls on the main thread. Return whether it has to look again at once."""
     if _main.calls.empty() and time.monotonic() >= _main.until:
         return False
     serve(min(max(time.monotonic() - _main.looked, _LEAST), _MOST))
@@ -193,7 +197,7 @@ def look() -> bool:
 
 
 def _redraw() -> None:
-    """Has all windows drawn, after which Blender's GPU is current."""
+    """Redraw all windows, which makes Blender's GPU current."""
     for window in bpy.context.window_manager.windows:
         for area in window.screen.areas:
             area.tag_redraw()
@@ -205,4 +209,4 @@ def register() -> None:
 
 
 def unregister() -> None:
-    drop(*_timers)
+    drop(*_main.timers)

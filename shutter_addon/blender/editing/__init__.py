@@ -1,1 +1,1 @@
-"""What happens to effects: added, edited, copied, removed, brought back."""
+"""Changes of effects: add, edit, copy, track, bake, remove, restore."""

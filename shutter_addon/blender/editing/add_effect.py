@@ -1,4 +1,4 @@
-"""A new effect: its strip above the source, and its scene."""
+"""Add an effect to a source strip: an effect strip above it, and an effect scene."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from ..data.property_copy import for_a_while
 from ..data.strips import ENGINE, Shown, effect_of, nearest_source, origin, overlap, shown_effects
 
 _COLOR = "COLOR_06"
-# What a strip looks like: what it is called, and the names of the strip's properties and groups.
+# The look of a strip: each part's label, and the strip's properties and groups that it consists of.
 LOOK = {
     n_("transform"): ("transform",),
     n_("crop"): ("crop",),
@@ -31,9 +31,13 @@ LOOK = {
 
 
 def add_effect(scene: Scene, source: Strip) -> tuple[Strip, PropertyGroup]:
-    """Puts a new effect on a movie, image or clip strip: its strip above the source, same range, transform and crop.
+    """Add an effect to a movie, image or clip strip. The effect has no shutter yet.
 
-    Returns strip and effect; the effect has no shutter yet. MediaError: the source cannot be read."""
+    Return the effect strip, which lies above the source with its range, transform and crop, and the effect.
+
+    Raises:
+        MediaError: the source cannot be read.
+    """
     medium = _take(source)
     name = data_("Shutter {source}").format(source=source.name)
     effect_scene = new_effect_scene(scene, uuid.uuid4().hex, name, (medium.width, medium.height))
@@ -47,38 +51,51 @@ def add_effect(scene: Scene, source: Strip) -> tuple[Strip, PropertyGroup]:
     config = source_media.spec(source).options["config"]
     keeps = color.keeps(scene.sequencer_colorspace_settings.name, config)
     if not keeps and medium.alpha == "opaque" and seen_alone.hides(scene, strip):
-        strip.blend_type = "REPLACE"  # Blender changes colours as it lays strips over others
+        strip.blend_type = "REPLACE"  # Blender changes colors when it blends strips
     effect = data_format.new_effect(scene, data_format.FORMAT)
     effect.name, effect.scene, effect.start = strip.name, effect_scene, origin(strip)
     effect.source = source.virtual_shutter_source
     strip.virtual_shutter_effect = effect.identity = effect_scene.virtual_shutter.identity
-    scene.render.sequencer_gl_preview = "RENDERED"  # or the preview shows the effect's empty scene
+    scene.render.sequencer_gl_preview = "RENDERED"  # otherwise the preview shows the empty effect scene
     strip.color_tag = _COLOR
     connect(scene, [strip, source, *source.connections])
-    return strip, effect_of(scene, effect_scene)  # again: an operator's update may move the collection's items
+    return strip, effect_of(scene, effect_scene)  # looked up again: operators may move it in memory
 
 
 def choose_source(effect: PropertyGroup, strip: Strip, source: Strip) -> None:
-    """Has an effect show another movie, image or clip strip. MediaError: it cannot be read."""
+    """Make an effect use another movie, image or clip strip as its source.
+
+    Raises:
+        MediaError: the source cannot be read.
+    """
     _take(source)
     scene, effect.source = effect.id_data, source.virtual_shutter_source
-    if nearest_source(scene, effect, strip) != source:  # but a copy or another part of it
+    if nearest_source(scene, effect, strip) != source:  # the identity belongs to a copy or another part, too
         own_source(source, shown_effects(scene))
         effect.source = source.virtual_shutter_source
     connect(scene, [strip, source, *source.connections])
 
 
 def own_source(source: Strip, shown: list[Shown]) -> None:
-    """Gives a source an identity that no other strip has; the effects that show it, of all those, go along."""
+    """Give a source strip a unique identity, and update the effects that show it.
+
+    Args:
+        shown: all effects that are shown.
+    """
     source.virtual_shutter_source = uuid.uuid4().hex
     for effect in [each.effect for each in shown if each.source == source]:
         effect.source = source.virtual_shutter_source
 
 
 def _take(source: Strip) -> FrameSource:
-    """Gives a strip an identity as a source, unless it has one; its medium, which is closed. Through a transparent
-    picture the plain source would show; an opaque one stays: mute the effect to see it. MediaError: it cannot be
-    read."""
+    """Give a strip an identity as a source, and return its medium, closed.
+
+    A transparent source is muted, because it would show behind the effect. An opaque one stays visible if the effect is
+    muted.
+
+    Raises:
+        MediaError: the source cannot be read.
+    """
     medium = source_media.open_media(source)
     medium.close()
     source.virtual_shutter_source = source.virtual_shutter_source or uuid.uuid4().hex
@@ -88,21 +105,25 @@ def _take(source: Strip) -> FrameSource:
 
 
 def connect(scene: Scene, connected: list[Strip]) -> None:
-    """Connects strips, so that they are selected and moved together; each leaves the strips it was connected to."""
+    """Connect strips, so that they are selected and moved together. They leave their previous connections."""
     with selecting(scene, connected):
         bpy.ops.sequencer.connect(toggle=False)
 
 
 @contextmanager
 def selecting(scene: Scene, chosen: list[Strip]) -> Iterator[None]:
-    """For what Blender has an operator only, which takes the selection: these strips are it meanwhile."""
+    """Select strips for an operator that works on the selection, then restore the selection."""
     selected = ((strip, "select", strip in chosen) for strip in scene.sequence_editor.strips_all)
     with for_a_while(selected), bpy.context.temp_override(sequencer_scene=scene):
         yield
 
 
 def copy_look(source: Strip, strip: Strip, *, keys: bool = False) -> None:
-    """Transform, crop, flip and colour of the source strip; keys: theirs as well, in place of the strip's own."""
+    """Copy transform, crop, flip and color of a strip to another.
+
+    Args:
+        keys: copy their F-curves as well.
+    """
     for name in (name for names in LOOK.values() for name in names):
         for (old, prop), (new, _prop) in zip(settings(source, name), settings(strip, name), strict=True):
             setattr(new, prop, getattr(old, prop))
@@ -113,7 +134,7 @@ def copy_look(source: Strip, strip: Strip, *, keys: bool = False) -> None:
 
 
 def settings(strip: Strip, name: str) -> list[tuple[bpy_struct, str]]:
-    """Owner and name of a strip's property, or of all that are in a group of it."""
+    """Return owner and name of a strip's property, or of all properties of a group."""
     group = getattr(strip, name)
     if not isinstance(group, bpy_struct):
         return [(strip, name)]
@@ -121,7 +142,7 @@ def settings(strip: Strip, name: str) -> list[tuple[bpy_struct, str]]:
 
 
 def new_footage(level: StripsTopLevel, name: str, files: list[str], channel: int, start: int, is_movie: bool) -> Strip:
-    """A new strip of a movie, or of an image sequence."""
+    """Add a movie strip or an image sequence strip."""
     if is_movie:
         return level.new_movie(name, files[0], channel, start)
     strip = level.new_image(name, files[0], channel, start)
@@ -131,16 +152,16 @@ def new_footage(level: StripsTopLevel, name: str, files: list[str], channel: int
 
 
 def new_effect_scene(scene: Scene, identity: str, name: str, size: tuple[int, int]) -> Scene:
-    """An effect scene for an effect of the scene, with a camera and an empty annotation."""
+    """Add an effect scene with a camera and an empty annotation."""
     effect_scene = bpy.data.scenes.new(name)
     effect_scene.virtual_shutter.identity = identity
     effect_scene.render.engine = ENGINE
     effect_scene.render.resolution_x, effect_scene.render.resolution_y = size
     effect_scene.render.resolution_percentage = 100
-    # Past its scene's end a Scene strip shows the last frame. Source and strip may be made longer, by hand, by speed or
-    # by keys of the source time.
+    # Past the end of its scene, a Scene strip shows the last frame. Strips may become longer, by hand, retiming or a
+    # keyed source time.
     effect_scene.frame_start, effect_scene.frame_end = 1, MAX_FRAME
-    # A Scene strip plays at its own scene's rate; at that of the timeline it shows one frame per timeline frame.
+    # A Scene strip plays at the rate of its scene. With the timeline's rate it shows one frame per timeline frame.
     effect_scene.render.fps, effect_scene.render.fps_base = scene.render.fps, scene.render.fps_base
     add_camera(effect_scene)
     new_annotation(effect_scene, name)
@@ -148,7 +169,7 @@ def new_effect_scene(scene: Scene, identity: str, name: str, size: tuple[int, in
 
 
 def add_camera(scene: Scene) -> None:
-    """Without a camera, Blender renders a Scene strip empty and never asks the engine."""
+    """Add a camera. Without one, Blender renders a Scene strip empty without asking the engine."""
     name = f"{scene.name} Camera"
     camera = bpy.data.objects.new(name, bpy.data.cameras.new(name))
     camera.data.virtual_shutter_made = scene.virtual_shutter.identity

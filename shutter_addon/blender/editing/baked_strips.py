@@ -1,6 +1,6 @@
-"""Baked strips: an ordinary strip that shows an effect's film, above the effect strip, which is muted.
+"""Baked strips: movie or image strips with a rendered effect, above the muted effect strip.
 
-Both have the same identity, and keep it where they are cut or copied.
+Both strips have the same bake identity, which cuts and copies keep.
 """
 
 from __future__ import annotations
@@ -24,7 +24,11 @@ _LOOK = ("blend_type", "blend_alpha")
 
 
 def check(scene: Scene, strip: Strip) -> None:
-    """EffectError: no film could stand in for an effect strip, and why."""
+    """Check that a baked strip could replace an effect strip.
+
+    Raises:
+        EffectError: it could not.
+    """
     if match_source.effects_on(scene, strip):
         sentence = rpt_('"{strip}" is the input of another strip, which would not show the baked one')
         raise EffectError(sentence.format(strip=strip.name))
@@ -32,8 +36,13 @@ def check(scene: Scene, strip: Strip) -> None:
 
 
 def lay(scene: Scene, strip: Strip, film: Film) -> Strip:
-    """Puts a finished film in the place of the effect strip that it was baked of, and mutes that; the new strip. That
-    of an older bake goes. EffectError: there is no room for it."""
+    """Add the baked strip of a finished film above its effect strip, which is muted, and return it.
+
+    It replaces the strip of an older bake.
+
+    Raises:
+        EffectError: no channel has room.
+    """
     owner = strip.parent_meta() or scene.sequence_editor
     older = [baked for baked in baked_of(scene, strip) if strips.overlap(baked, strip)]
     home = strip.virtual_shutter_bake.channel if older else strip.channel
@@ -48,13 +57,13 @@ def lay(scene: Scene, strip: Strip, film: Film) -> Strip:
             owner.strips.remove(other)
         _move(owner, baked, channel)
     elif any(home < each.channel < baked.channel and strips.overlap(each, strip) for each in owner.strips):
-        # What lies above the effect has to lie above its film.
+        # Strips above the effect have to stay above its film.
         spare = baked.channel
         _move(owner, strip, _channel(scene, strip))
         _move(owner, baked, home)
         _move(owner, strip, spare)
     add_effect.copy_look(strip, baked, keys=True)
-    if baked.color_multiply == strips.IN_CODE_VALUES:  # a film is mixed so by itself
+    if baked.color_multiply == strips.IN_CODE_VALUES:  # films do not need it
         baked.color_multiply = 1
     for look in _LOOK:
         setattr(baked, look, getattr(strip, look))
@@ -69,12 +78,16 @@ def lay(scene: Scene, strip: Strip, film: Film) -> Strip:
 
 
 def _channel(scene: Scene, strip: Strip) -> int:
-    """The first channel above an effect strip that has room beside it, and is not muted. EffectError: there is none."""
+    """Return the first unmuted channel with room above an effect strip.
+
+    Raises:
+        EffectError: there is none.
+    """
     owner = strip.parent_meta() or scene.sequence_editor
     for channel in range(strip.channel + 1, strips.CHANNELS + 1):
         if _is_free(owner, strip, channel) and not owner.channels[channel].mute:
             return channel
-    sentence = rpt_('above "{strip}" there is no channel with room for the baked strip')
+    sentence = rpt_('no channel above "{strip}" has room for the baked strip')
     raise EffectError(sentence.format(strip=strip.name))
 
 
@@ -83,21 +96,24 @@ def _is_free(owner: SequenceEditor | MetaStrip, strip: Strip, channel: int) -> b
 
 
 def _move(owner: SequenceEditor | MetaStrip, strip: Strip, channel: int) -> None:
-    """Moves a strip to a channel, where there is room: Blender would shift it in time."""
+    """Move a strip to a channel if there is room. Otherwise Blender would shift it in time."""
     if _is_free(owner, strip, channel):
         strip.channel = channel
 
 
 def _relative(path: Path) -> str:
-    """As the edit names a file, so that both may be moved together."""
-    with suppress(ValueError):  # another drive
+    """Return a path relative to the .blend file, so that both can be moved together."""
+    with suppress(ValueError):  # on another drive
         return bpy.path.relpath(str(path))
     return str(path)
 
 
 def _note(strip: Strip, baked: Strip, film: Film, channel: int) -> None:
-    """Says of both strips that they belong together, and of which version the film is. channel: the effect strip's
-    own"""
+    """Mark both strips as belonging to a bake, with the version of the effect.
+
+    Args:
+        channel: original channel of the effect strip.
+    """
     identity = uuid.uuid4().hex
     for each in (strip, baked):
         bake = each.virtual_shutter_bake
@@ -106,22 +122,21 @@ def _note(strip: Strip, baked: Strip, film: Film, channel: int) -> None:
 
 
 def baked_of(scene: Scene, strip: Strip) -> list:
-    """The baked strips, or their parts, of an effect strip and all that it was cut into: those that begin with it.
-    Copies that were moved elsewhere are none of them."""
+    """Return the baked strips of an effect strip that begin with it. Copies that were moved elsewhere do not count."""
     start = round(strips.origin(strip))
     parts = [other for other in selection.of_bake(scene, strip) if other.type in strips.SOURCES]
     return [part for part in parts if round(strips.origin(part)) - part.virtual_shutter_bake.first == start]
 
 
 def effect_parts(scene: Scene, strip: Strip) -> list:
-    """What an effect strip that was baked has been cut into; none, if it was not."""
+    """Return the parts that a baked effect strip was cut into, with itself; []: it is not baked."""
     start = round(strips.origin(strip))
     parts = (other for other in selection.of_bake(scene, strip) if round(strips.origin(other)) == start)
     return [part for part in parts if part.type == "SCENE"]
 
 
 def unbake(scene: Scene, strip: Strip) -> None:
-    """Removes what is baked of an effect strip, and shows the effect again. Files stay."""
+    """Remove the baked strips of an effect strip and show the effect again. Files stay."""
     parts = effect_parts(scene, strip)
     for baked in baked_of(scene, strip):
         (baked.parent_meta() or scene.sequence_editor).strips.remove(baked)
@@ -132,14 +147,13 @@ def unbake(scene: Scene, strip: Strip) -> None:
 
 
 def is_stale(scene: Scene, effect: PropertyGroup, strip: Strip) -> bool:
-    """Whether an effect has changed since its strip was baked: its pictures would be others. True as well where it has
-    none any more."""
+    """Return whether the baked film is outdated or gone."""
     place = _place(scene, effect, strip)
     return revision.until_change("bake", place, lambda: effect_version.is_changed(scene, effect, strip))
 
 
 def known_stale(scene: Scene, effect: PropertyGroup, strip: Strip) -> bool | None:
-    """As is_stale, where that has been asked since something changed; None: it has not."""
+    """Return `is_stale` if it was called since the last change; None: it was not."""
     return revision.known("bake", _place(scene, effect, strip))
 
 

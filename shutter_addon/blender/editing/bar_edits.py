@@ -1,4 +1,4 @@
-"""A shutter's bars: painted, keyed, and as they are at the current frame."""
+"""Edit a shutter's bars: paint, key, and read them at the current frame."""
 
 from collections.abc import Sequence
 from contextlib import suppress
@@ -17,8 +17,7 @@ from ..rendering import effect_source, invalidation, sessions
 
 
 def summary(weights: np.ndarray, combine: str = "AVERAGE") -> str:
-    """A shutter's bars (L,) in words: its angle, and how many of the frames that is; or how many it combines otherwise
-    (choices.COMBINES)."""
+    """Return a text about bars (L,): their angle and number of frames, or what they combine (choices.COMBINES)."""
     if not shutters.exposure(weights):
         return iface_("All bars are zero: the shutter never opens")
     if combine != "AVERAGE":
@@ -31,9 +30,10 @@ def summary(weights: np.ndarray, combine: str = "AVERAGE") -> str:
 
 
 def open_for(scene: Scene, effect: PropertyGroup, strip: Strip, index: int) -> str | None:
-    """For how many frames a shutter is open at the current frame whose trail has a length, in words; None: its bars say
-    that, or there is no picture. For what is drawn: worked out once, with all that the live preview shows, until
-    something changes."""
+    """Return a text about how many frames a shutter whose exposure length varies is open at the current frame.
+
+    None: the bars tell it, or there is no picture. The result is kept until something changes.
+    """
     shutter, frame = effect.shutters[index], scene.frame_current
     has_length = shutter.length == "TIMELINE" or (shutter.follow != "NOTHING" and shutter.length == "MOTION")
     is_shown = strip.left_handle <= frame < strip.right_handle and not bpy.app.is_job_running("RENDER")
@@ -41,27 +41,30 @@ def open_for(scene: Scene, effect: PropertyGroup, strip: Strip, index: int) -> s
         return None
     try:
         state = sessions.of_drawing().request(invalidation.current(scene, effect, strip, frame), frame).state
-    except effect_source.FAULTS:  # which the live preview tells
+    except effect_source.FAULTS:  # the live preview shows the error
         return None
     words = iface_("Open for {frames} of {window} frames here")
     return words.format(frames=f"{state.open_for[index]:.3g}", window=state.options.window)
 
 
 def set_bars(shutter: PropertyGroup, weights: Sequence[float] | np.ndarray) -> None:
-    """Gives a shutter these bars (L,); those that stay are not touched."""
+    """Set the weights (L,) of a shutter's bars that differ."""
     for bar, weight in zip(shutter.bars, weights, strict=True):
         if bar.weight != np.float32(weight):
             bar.weight = weight
 
 
 def auto_key(context: Context) -> bool:
-    """Whether Blender's auto keying is on."""
+    """Return whether Blender's Auto Keying is on."""
     return context.scene.tool_settings.use_keyframe_insert_auto
 
 
 def paint(effect: PropertyGroup, index: int, weights: Sequence[float] | np.ndarray, key: bool = False) -> None:
-    """Gives a shutter bars (L,) as an editor does at the current frame, and as many as it may lack or have too many;
-    key: and keys them there."""
+    """Set a shutter's bars (L,) at the current frame, changing their number if necessary.
+
+    Args:
+        key: insert keyframes for them.
+    """
     shutter = effect.shutters[index]
     while len(shutter.bars) > len(weights):
         shutter.bars.remove(len(shutter.bars) - 1)
@@ -73,39 +76,39 @@ def paint(effect: PropertyGroup, index: int, weights: Sequence[float] | np.ndarr
 
 
 def key_bars(effect: PropertyGroup, index: int) -> None:
-    """Keys all bars of a shutter at the current frame, as Blender's own key buttons do."""
-    # Between keys the bars stand where their F-curves are, a cross-fade: the picture is made with others.
+    """Insert keyframes for all bars of a shutter at the current frame."""
+    # Between keys, the values of F-curves differ from the bars that the picture uses.
     shutter, scene = effect.shutters[index], effect.id_data
     set_bars(shutter, bars_now(effect, index))
     for path in _paths(effect, index):
-        # Without a frame Blender takes that of the window's scene, which may be another one.
+        # Without a frame, Blender would use the one of the window's scene, which may be another one.
         scene.keyframe_insert(path, group=shutter.name, frame=scene.frame_current)
 
 
 def _paths(effect: PropertyGroup, index: int) -> list[str]:
-    """Of the weights of a shutter's bars, from the scene."""
+    """Return the data paths of a shutter's weights, from the scene."""
     path = f"{effect.path_from_id()}.shutters[{index}].bars"
     return [f"{path}[{k}].weight" for k in range(len(effect.shutters[index].bars))]
 
 
 def unkey_bars(effect: PropertyGroup, index: int) -> bool:
-    """Deletes the keys of a shutter's bars at the current frame; whether there were any."""
+    """Delete the keyframes of a shutter's bars at the current frame. Return whether there were any."""
     scene = effect.id_data
     curves, is_deleted = fcurves.Curves(scene), False
     for path in filter(curves.find, _paths(effect, index)):
-        with suppress(RuntimeError):  # no key at this frame
+        with suppress(RuntimeError):  # no keyframe here
             is_deleted |= scene.keyframe_delete(path, frame=scene.frame_current)
     return is_deleted
 
 
 def shown(effect: PropertyGroup, index: int) -> tuple[np.ndarray, list[str]]:
-    """What bars_now and key_state say, for what is drawn: worked out once until something changes."""
+    """Return bars (L,) and key states for drawing code. The result is kept until something changes."""
     key = effect.scene.session_uid, index, effect.id_data.frame_float
     return revision.until_change("bars", key, lambda: _read(effect, index))
 
 
 def key_state(effect: PropertyGroup, index: int) -> list[str]:
-    """For each of a shutter's bars, as Blender colours its fields: "", "animated", "keyed" here, or "changed" since."""
+    """Return the state of each bar, as Blender colors fields: "", "animated", "keyed" or "changed"."""
     scene = effect.id_data
     curves = fcurves.Curves(scene)
     bars_and_paths = zip(effect.shutters[index].bars, _paths(effect, index), strict=True)
@@ -115,16 +118,19 @@ def key_state(effect: PropertyGroup, index: int) -> list[str]:
 def _state(curve: FCurve | None, value: float, scene: Scene) -> str:
     if curve is None:
         return ""
-    frame = scene.frame_current_final  # by which keys are stretched
+    frame = scene.frame_current_final  # keyframes are stretched like this one
     if abs(max(curve.evaluate(scene.frame_float), 0.0) - value) > 1e-4:  # no bar is below 0, a curve may be
         return "changed"
     return "keyed" if any(abs(key.co[0] - frame) < 1e-3 for key in curve.keyframe_points) else "animated"
 
 
 def bars_now(effect: PropertyGroup, index: int) -> np.ndarray:
-    """Bars (L,) that the picture at the current frame is made with, interpolated between keys.
+    """Return the bars (L,) of the picture at the current frame, interpolated between keyframes.
 
-    Bars that were changed since, and not keyed yet, count as they stand. EffectError: the picture cannot be made.
+    Bars that were changed and not keyed yet count as they are.
+
+    Raises:
+        EffectError: the picture is impossible.
     """
     return _read(effect, index)[0]
 

@@ -1,4 +1,4 @@
-"""What is drawn is seen where it is drawn, however its region moves: where that was as a drawing was made is noted."""
+"""Keep strokes where they were drawn: note the placement that a moving region had for each drawing."""
 
 from contextlib import suppress
 from itertools import repeat
@@ -9,24 +9,28 @@ from bpy.types import PropertyGroup, Strip
 from ...core.messages import EffectError
 from ...core.model.effect import Drawings
 from ...core.model.motions import Placement
-from ..data import sampled, snapshot, strips
-from ..data.fcurves import Curves
+from ..data import snapshot, strips
+from ..data.sampled import Sampling
 from . import outline_drawings, region_edits
 from .motion_keys import MotionKeys
 
 
 def hold(effect: PropertyGroup, index: int) -> None:
-    """Notes where a region was as its drawings were made, before it is moved: from then on they move with it."""
-    region, curves = effect.regions[index], Curves(effect.id_data)
+    """Note the placement of a region for its drawings before it is moved. From then on they move with it."""
+    region = effect.regions[index]
     if region.kind not in strips.LAID:
-        path = region.path_from_id()
-        _note(effect, region, _origins(sampled.drawings(curves, path, effect, region, None, ())))
+        _note(effect, region, _origins(Sampling.of(effect.id_data, effect, None, ()).drawings(index)))
 
 
 def begin(effect: PropertyGroup, strip: Strip, index: int, *, erases: bool = False) -> None:
-    """Makes the current frame ready for the pen: what it draws is seen there. What is drawn at that frame already is
-    stored where it is seen; for the eraser, so is all of the region that is seen elsewhere than it is stored.
-    EffectError: the region lies nowhere."""
+    """Prepare the current frame for the pen, so that strokes appear where they are drawn.
+
+    A drawing of this frame is first stored where it appears. The eraser also needs the strokes that another frame's
+    drawing shows here, so they are stored at this frame, too.
+
+    Raises:
+        EffectError: the region has no placement.
+    """
     region, scene = effect.regions[index], effect.id_data
     frame = scene.frame_current
     if region.kind in strips.LAID:
@@ -37,13 +41,13 @@ def begin(effect: PropertyGroup, strip: Strip, index: int, *, erases: bool = Fal
     if origins.get(frame, here) != here or (erases and is_elsewhere and frame not in origins):
         outline_drawings.draw(effect, strip, region, shown.at(frame).strokes, frame)
     if MotionKeys(effect, index, region.motion).are_made():
-        with suppress(EffectError):  # where curves are locked, Track does not come either
+        with suppress(EffectError):  # with locked curves, tracking stops, too
             region_edits.key_region(effect, index)
     _note(effect, region, {**origins, frame: here})
 
 
 def _origins(drawings: Drawings) -> dict[float, Placement]:
-    """By frame, where the region was as it was drawn."""
+    """Return the placement of the region for each drawing, by frame."""
     return dict(zip(drawings.frames, drawings.origins or repeat(Placement()), strict=False))
 
 

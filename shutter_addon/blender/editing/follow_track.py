@@ -1,9 +1,7 @@
-"""A region that follows what Blender has tracked in a movie clip: a track, a plane track, or all tracks of an object.
+"""Key a region by what Blender has tracked in a movie clip: a track, a plane track, or all tracks of an object.
 
-Markers lie at frames of the clip, 1 is its first, in fractions of its picture. A region is moved as they are, from
-where it is at one frame of the timeline, and from the editor's other keys; it gets keys as tracking makes them.
-
-And the camera, that follows the tracks of a clip's 2D stabilization: what that takes back, shutters can follow.
+Markers are at frames of the clip, which begin at 1, in fractions of its picture. The region moves with them from the
+current frame and from the user's other keyframes. The camera follows the tracks of the clip's 2D stabilization.
 """
 
 import hashlib
@@ -27,14 +25,17 @@ from ..rendering import effect_source
 from . import motion_keys
 from .motion_keys import MotionKeys
 
-Motions = dict[int, Similarity]  # of the picture, by the frame to which it moves
-Points = dict[str, complex]  # where markers are in the picture, in pixels as motions.Similarity counts them
+Motions = dict[int, Similarity]  # motion of the picture to each frame
+Points = dict[str, complex]  # positions of markers in pixels, as in motions.Similarity
 Markers = list[tuple[str, np.ndarray, np.ndarray]]  # see _markers
 
 
 def follow(scene: Scene, effect: PropertyGroup, strip: Strip, index: int) -> None:
-    """Keys a region by what it is set to follow, from where it is now, at the current frame. EffectError, MediaError:
-    it cannot be followed, and nothing has changed."""
+    """Key a region by its track, from its place at the current frame.
+
+    Raises:
+        EffectError, MediaError: it cannot be followed. Nothing has changed.
+    """
     start = scene.frame_current
     points = _points(scene, effect, strip, index, start)
     _keys(effect, index).begin(start)
@@ -43,8 +44,11 @@ def follow(scene: Scene, effect: PropertyGroup, strip: Strip, index: int) -> Non
 
 
 def update(scene: Scene, effect: PropertyGroup, strip: Strip, index: int) -> None:
-    """Keys a region anew by what it follows, from where it is at the frame at which it began to. EffectError,
-    MediaError: it cannot be followed, and nothing has changed."""
+    """Key a region again by its track, from its place at the frame where it began.
+
+    Raises:
+        EffectError, MediaError: it cannot be followed. Nothing has changed.
+    """
     _key(scene, effect, strip, index, _points(scene, effect, strip, index, _start(effect, index)))
 
 
@@ -67,10 +71,14 @@ def _key(scene: Scene, effect: PropertyGroup, strip: Strip, index: int, points: 
 def carry(
     keys: MotionKeys, shape: Region | Camera, start: int, frames: list[int], motions_from: Callable[[int], Motions]
 ) -> None:
-    """Keys a region or the camera as the picture moves, from where it is at the frame `start` and at the editor's other
-    keys; no stop of tracking is known of it any more.
+    """Key a region or the camera by the motion of the picture, and remove its tracking stops.
 
-    frames: those at which motions are known, ascending; motions_from: by one of these, from there to the others"""
+    It moves from its place at the frame `start` and at the user's other keyframes.
+
+    Args:
+        frames: with known motions, ascending.
+        motions_from: returns the motions from one of these frames to the others.
+    """
     known = {start, *(frame for frame in keys.edited(range(frames[0], frames[-1] + 1)) if frame in frames)}
     moves = {frame: motions_from(frame) for frame in known}
     placements = followed(shape, frames, moves, start, annotations.picture_size(keys.effect))
@@ -81,7 +89,7 @@ def carry(
 
 
 def is_changed(region: PropertyGroup) -> bool:
-    """Whether a region follows what has changed since; for what is drawn."""
+    """Return whether the track of a region has changed since it was keyed. For drawing code."""
     if not region.follow_stamp:
         return False
     key = region.id_data.session_uid, region.path_from_id()
@@ -89,7 +97,7 @@ def is_changed(region: PropertyGroup) -> bool:
 
 
 def stamp(region: PropertyGroup) -> str:
-    """Changes with the markers that a region follows; empty where there are none."""
+    """Return a hash of the markers that a region follows; "": there are none."""
     try:
         markers = _markers(region)
     except EffectError:
@@ -101,8 +109,13 @@ def stamp(region: PropertyGroup) -> str:
 
 
 def _markers(region: PropertyGroup) -> Markers:
-    """Of each point that a region follows its name, the clip's frames (n,) at which it has a marker, ascending, and
-    where that is (n, 2), in fractions of the picture. EffectError: the clip has nothing of that name."""
+    """Return name, frames (n,) and places (n, 2) of each point that a region follows.
+
+    Frames are the clip's, ascending, and places are fractions of the picture.
+
+    Raises:
+        EffectError: the clip has no such track.
+    """
     clip = region.follow_clip
     if clip is None:
         raise EffectError(rpt_("Choose a clip first"))
@@ -134,13 +147,16 @@ def _corners(plane: bpy.types.MovieTrackingPlaneTrack) -> Markers:
 
 
 def _marker_frames(markers: bpy.types.MovieTrackingMarkers) -> tuple[np.ndarray, np.ndarray]:
-    """The frames (n,) of markers, ascending, and which of them are not muted."""
+    """Return the frames (n,) of markers, ascending, and which of them are not muted."""
     return fcurves.numbers(markers, "frame", np.int32), ~fcurves.numbers(markers, "mute", bool)
 
 
 def _points(scene: Scene, effect: PropertyGroup, strip: Strip, index: int, start: int) -> dict[int, Points]:
-    """By timeline frame of the strip the points that a region follows, as the strip shows them. EffectError,
-    MediaError: there is nothing that it can follow from the frame `start` on."""
+    """Return the points that a region follows, by timeline frame of the strip.
+
+    Raises:
+        EffectError, MediaError: there are none at the frame `start`.
+    """
     region = effect.regions[index]
     validation.check_moving(region)
     motion_keys.check_curves(effect, index)
@@ -164,8 +180,11 @@ def _unmarked(name: str, clip: MovieClip, frame: int) -> EffectError:
 
 
 def clip_times(scene: Scene, effect: PropertyGroup, strip: Strip, clip: MovieClip) -> dict[int, float]:
-    """By timeline frame of the strip what it shows, in the clip's frames; moments lie between two of them.
-    EffectError, MediaError: the strip does not show the clip's footage."""
+    """Return the clip's frame for each timeline frame of the strip. It may lie between two frames.
+
+    Raises:
+        EffectError, MediaError: the strip does not show the clip's footage.
+    """
     frames = range(strip.left_handle, strip.right_handle)
     source = strips.source_of(scene, effect, strip)
     _check_footage(source, clip)
@@ -176,8 +195,7 @@ def clip_times(scene: Scene, effect: PropertyGroup, strip: Strip, clip: MovieCli
 
 
 def _points_by_frame(tracks: Markers, times: dict[int, float], size: tuple[int, int]) -> dict[int, Points]:
-    """By frame, of the markers those that there are at its time in the clip's frames; frames without any are left
-    out."""
+    """Return the markers that exist at each frame's time. Frames without any are left out."""
     by_frame = {}
     for frame, time in times.items():
         at_time = {name: _place_at(frames, places, time) for name, frames, places in tracks}
@@ -186,7 +204,12 @@ def _points_by_frame(tracks: Markers, times: dict[int, float], size: tuple[int, 
 
 
 def _check_footage(source: Strip, clip: MovieClip) -> None:
-    """EffectError: a clip begins with another file than a strip does. MediaError: the strip has no files."""
+    """Check that a clip and a strip begin with the same file.
+
+    Raises:
+        EffectError: they do not.
+        MediaError: the strip has no files.
+    """
     own = source.clip if source.type == "MOVIECLIP" else None
     first = external_files.absolute(own, own.filepath) if own else source_media.spec(source).path
     if first.resolve() != external_files.absolute(clip, clip.filepath).resolve():
@@ -195,14 +218,14 @@ def _check_footage(source: Strip, clip: MovieClip) -> None:
 
 
 def _first_frame(source: Strip, clip: MovieClip) -> int:
-    """The clip's frame that the first frame of a strip's medium is."""
+    """Return the clip's frame that is the first frame of the strip's medium."""
     if source.type == "MOVIECLIP" and not source_media.first_frame(source):
         return 1
     return 1 - clip.frame_offset
 
 
 def _place_at(frames: np.ndarray, places: np.ndarray, time: float) -> np.ndarray | None:
-    """Where a marker is at a time in the clip's frames: between two frames on the way from one to the other."""
+    """Return the place of a marker at a time in clip frames, interpolated between two frames."""
     ends = [np.flatnonzero(frames == end) for end in (np.floor(time), np.ceil(time))]
     if not all(map(len, ends)):
         return None
@@ -213,16 +236,18 @@ def _place_at(frames: np.ndarray, places: np.ndarray, time: float) -> np.ndarray
 def followed(
     subject: Region | Camera, frames: list[int], moves: dict[int, Motions], start: int, size: tuple[int, int]
 ) -> dict[int, Placement]:
-    """By frame the placement of a region or the camera, carried from the frames at which that is known.
+    """Return the placement of a region or the camera by frame, moved from the frames where it is known.
 
-    subject: a core.model.effect.Region or Camera; frames: ascending; moves: by frame at which the placement is known,
-    `start` among them, the motions of the picture to other frames"""
+    Args:
+        frames: ascending.
+        moves: motions of the picture to other frames, by frame with a known placement, including `start`.
+    """
     known, placed = sorted(moves), ((frame, subject.centre(frame)) for frame in frames)
     centres = {frame: centre for frame, centre in placed if centre is not None}
     result = {start: subject.placement(start)}
 
     def carried(origin: int, frame: int, near: Placement) -> Placement | None:
-        """The placement at a frame, its rotation next to another one's; None: too few points are there."""
+        """Return the placement at a frame, with its rotation near another one's; None: there are too few points."""
         if (motion := moves[origin].get(frame)) is None:
             return None
         moved = motions.carried(subject.placement(origin), motion, centres[origin], centres[frame], size)
@@ -235,7 +260,7 @@ def followed(
             after = known[min(bisect_left(known, frame), len(known) - 1)]
             first, second = carried(before, frame, near), carried(after, frame, near)
             placement = first or second
-            if first and second and before != after:  # blended from both
+            if first and second and before != after:  # blend both
                 placement = motions.between(first, second, (frame - before) / (after - before))
             if placement is not None:
                 near = result[frame] = placement
@@ -243,12 +268,12 @@ def followed(
 
 
 def _ways(frames: list[int], start: int) -> tuple[list[int], list[int]]:
-    """The frames after one, and those before it, backward."""
+    """Return the frames after one, and those before it, backward."""
     return [frame for frame in frames if frame > start], [frame for frame in reversed(frames) if frame < start]
 
 
 def _motions(points: dict[int, Points], origin: int, motion: Motion = "scale") -> Motions:
-    """By frame the motion from the points of one frame; where too few of these are left, by way of the frame before."""
+    """Return the motion from one frame to each frame. With too few common points it goes through the previous frame."""
     by_frame = {origin: Similarity()}
     enough = min(2, len(points[origin]))
     for way in _ways(sorted(points), origin):
@@ -266,8 +291,11 @@ def _motions(points: dict[int, Points], origin: int, motion: Motion = "scale") -
 
 
 def follow_stabilization(scene: Scene, effect: PropertyGroup, strip: Strip) -> None:
-    """Keys the camera by the tracks that stabilize its clip, from where it is now, at the current frame. EffectError,
-    MediaError: there is nothing to follow, and nothing has changed."""
+    """Key the camera by the tracks that stabilize its clip, from its place at the current frame.
+
+    Raises:
+        EffectError, MediaError: there is nothing to follow. Nothing has changed.
+    """
     camera, start, size = effect.camera, scene.frame_current, annotations.picture_size(effect)
     validation.check_moving(camera)
     motion_keys.check_curves(effect, None)
@@ -275,7 +303,7 @@ def follow_stabilization(scene: Scene, effect: PropertyGroup, strip: Strip) -> N
         raise EffectError(rpt_("Choose a clip first"))
     times = clip_times(scene, effect, strip, camera.follow_clip)
     if start not in times:
-        raise EffectError(rpt_("the current frame is outside of the Shutter strip"))
+        raise EffectError(rpt_("the current frame is outside the Shutter strip"))
     tracks, motion = _stabilizing(camera.follow_clip)
     points = _points_by_frame(tracks, times, size)
     if start not in points:
@@ -287,8 +315,11 @@ def follow_stabilization(scene: Scene, effect: PropertyGroup, strip: Strip) -> N
 
 
 def _stabilizing(clip: MovieClip) -> tuple[Markers, Motion]:
-    """The markers of the tracks that stabilize a clip, and which motion these take back. EffectError: the clip is not
-    stabilized."""
+    """Return the markers of the tracks that stabilize a clip, and the motion that they remove.
+
+    Raises:
+        EffectError: the clip is not stabilized.
+    """
     settings = clip.tracking.stabilization
     motion: Motion = "location"
     names = {track.name for track in settings.tracks}

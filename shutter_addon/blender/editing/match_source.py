@@ -1,7 +1,6 @@
-"""What an editor may have set on purpose on an effect's strip is made that of its source when asked for: place, crop,
-flip and colour, and the range. Scribbles stay where they lie on the picture.
+"""Compare an effect strip with its source, and match it on request: transform, crop, flip, color and range.
 
-What could only be wrong follows by itself (reconcile.follow_sources).
+Strokes keep their place on the picture. What can only be wrong is corrected automatically by reconcile.follow_sources.
 """
 
 from __future__ import annotations
@@ -27,14 +26,20 @@ _RANGE = n_("range")
 
 
 def strip_and_source(effect: PropertyGroup) -> list[Strip]:
-    """The strip of an effect and its source; empty: it has one of them no more."""
+    """Return the strip of an effect and its source; []: one of them is missing."""
     shown = strips.with_sources(effect.id_data)
     return next(([each.strip, each.source] for each in shown if each.effect == effect), [])
 
 
 class Shown(NamedTuple):
-    """What panels say of an effect beside its source: that one's name; what `match` would change, in words to be
-    translated; whether it lacks modifiers of its source, and whether effect strips of Blender's are on that."""
+    """What panels show about an effect's source.
+
+    Attributes:
+        source: its name.
+        differences: labels of what `match` would change.
+        lacks_modifiers: the source has modifiers that the effect strip lacks.
+        has_effects: the source has effect strips.
+    """
 
     source: str
     differences: list[str]
@@ -43,42 +48,39 @@ class Shown(NamedTuple):
 
 
 def shown(effect: PropertyGroup) -> Shown | None:
-    """For what is drawn: worked out once until something changes. None: it has no source."""
+    """Return what panels show about the source, kept until something changes; None: there is no source."""
     return revision.until_change("source", effect.scene.session_uid, lambda: _compare(effect))
 
 
 def _compare(effect: PropertyGroup) -> Shown | None:
     if not (pair := strip_and_source(effect)):
         return None
-    lacks, has_effects = bool(missing_modifiers(*pair)), bool(effects_on(effect.id_data, pair[1]))
-    return Shown(pair[1].name, differences(effect), lacks, has_effects)
-
-
-def differences(effect: PropertyGroup) -> list[str]:
-    """What match would change, in words to be translated."""
-    strip, source = strip_and_source(effect)
+    strip, source = pair
     look, wanted = _looks(strip), _looks(source)
     words = [word for word in add_effect.LOOK if look[word] != wanted[word]]
     if _goal(effect, strip, source)[:2] != (strip.left_handle, strip.right_handle):
         words.append(_RANGE)
-    return words
+    lacks_modifiers, has_effects = bool(missing_modifiers(strip, source)), bool(effects_on(effect.id_data, source))
+    return Shown(source.name, words, lacks_modifiers, has_effects)
 
 
 def match(effect: PropertyGroup) -> Strip | None:
-    """Gives the effect's strip the look and the range of its source. Returns the neighbour in its channel that is in
-    the way of the whole range, or None."""
+    """Give the effect strip the look and range of its source.
+
+    Return the neighboring strip that limits the range, or None.
+    """
     scene, (strip, source) = effect.id_data, strip_and_source(effect)
     with scribbles_kept(effect, strip):
         add_effect.copy_look(source, strip, keys=True)
     left, right, neighbor = _goal(effect, strip, source)
     _slip(scene, strip, source, left, right)
-    strip.right_handle = max(strip.right_handle, right)  # or the left one could not pass it
+    strip.right_handle = max(strip.right_handle, right)  # otherwise the left handle could not pass it
     strip.left_handle, strip.right_handle = left, right
     return neighbor
 
 
 def _looks(strip: Strip) -> dict[str, str]:
-    """What a strip looks like: values and keys, as words: "not a number" is never the same again."""
+    """Return values and keyframes of each part of a strip's look, as text so that NaN equals NaN."""
     path = f"{strip.path_from_id()}."
     curves = [curve for curve in fcurves.curves_under(strip.id_data, path) if not curve.mute]
     return {
@@ -105,9 +107,11 @@ def _keyed(curves: list[FCurve], path: str) -> list:
 
 
 def _goal(effect: PropertyGroup, strip: Strip, source: Strip) -> tuple[int, int, Strip | None]:
-    """The handles that an effect's strip would have from its source, or from the parts that this was cut into, short of
-    the strips in its channel; and which of these stops it, or None. Where they leave no room at all it stays. An edge
-    where another effect goes on with the same source stays as well."""
+    """Return the handles that an effect strip would get, and the neighboring strip that limits them or None.
+
+    They are those of the source, or of the parts that it was cut into. An edge where another effect of the same source
+    continues stays. Without any room, both handles stay.
+    """
     parts = (s for s in effect.id_data.sequence_editor.strips_all if s.virtual_shutter_source == effect.source)
     parts = (s for s in parts if s.type == source.type and strips.origin(s) == strips.origin(source))
     below = [s for s in parts if s == source or strips.overlap(s, strip)]
@@ -127,8 +131,10 @@ def _goal(effect: PropertyGroup, strip: Strip, source: Strip) -> tuple[int, int,
 
 
 def _slip(scene: Scene, strip: Strip, source: Strip, left: int, right: int) -> None:
-    """Has the effect's content, and with it its keys, go along with a source that has moved as a whole, or that begins
-    before it: an effect shows nothing but its first frame there."""
+    """Slip the effect's content and its keyframes with a source that moved as a whole, or that begins before it.
+
+    Before its content begins, an effect strip shows only its first frame.
+    """
     frames = int(source.content_start - strip.content_start)
     moved = frames == left - strip.left_handle == right - strip.right_handle
     if frames and (moved or (frames < 0 and left < strip.content_start)):
@@ -138,23 +144,26 @@ def _slip(scene: Scene, strip: Strip, source: Strip, left: int, right: int) -> N
 
 @contextmanager
 def scribbles_kept(effect: PropertyGroup, strip: Strip) -> Iterator[None]:
-    """Has scribbles stay on the effect's picture while it is laid elsewhere: every drawing at its own frame."""
+    """Keep strokes on the effect's picture while the picture moves."""
     before = places(effect, strip)
     yield
     put_back(effect, strip, before)
 
 
 def places(effect: PropertyGroup, strip: Strip) -> list[np.ndarray | None]:
-    """What takes the image to the picture of an effect, at each of its drawings; None: it is too small to be seen, or
-    nowhere."""
+    """Return the matrix from image to picture for each drawing; None: the picture has no size or place there."""
     frames = [drawing.frame_number for drawing in _drawings(effect)]
-    placement = sampled.placement(fcurves.Curves(effect.id_data), effect, strip, frames)
+    placement = sampled.Sampling.of(effect.id_data, effect, strip, frames).placement
     found = [sampled.tried(placement.at, frame) for frame in frames]
     return [place if isinstance(place, np.ndarray) else None for place in found]
 
 
 def put_back(effect: PropertyGroup, strip: Strip, before: list[np.ndarray | None]) -> None:
-    """Puts an effect's drawings where they lie on its picture; before: the places at which they do."""
+    """Move an effect's drawings back to their place on the picture.
+
+    Args:
+        before: result of `places` before the change.
+    """
     for drawing, old, new in zip(_drawings(effect), before, places(effect, strip), strict=True):
         if old is not None and new is not None and not np.array_equal(old, new):
             _move(drawing, np.linalg.inv(new) @ old)
@@ -166,7 +175,7 @@ def _drawings(effect: PropertyGroup) -> list[AnnotationFrame]:
 
 
 def _move(drawing: AnnotationFrame, change: np.ndarray) -> None:
-    """Moves the strokes of a drawing on the image."""
+    """Move the strokes of a drawing in the image."""
     for stroke in drawing.strokes:
         points = fcurves.numbers(stroke.points, "co", size=3)
         points[:, :2] = mapped(change, points[:, :2].astype(np.float64))
@@ -174,7 +183,7 @@ def _move(drawing: AnnotationFrame, change: np.ndarray) -> None:
 
 
 def missing_modifiers(part: Strip, source: Strip) -> list[StripModifier]:
-    """The source's modifiers that its effect lacks: the engine reads the medium, which has none."""
+    """Return the source's modifiers that the effect strip lacks. The engine reads the file, without modifiers."""
     own = Counter(modifier.type for modifier in part.modifiers)
     lacking = []
     for modifier in (modifier for modifier in source.modifiers if not modifier.mute):
@@ -185,18 +194,22 @@ def missing_modifiers(part: Strip, source: Strip) -> list[StripModifier]:
 
 
 def copy_modifiers(effect: PropertyGroup) -> None:
-    """Gives the effect's strip the modifiers of its source that it lacks, keys included."""
+    """Copy the source's modifiers that the effect strip lacks, with their keyframes."""
     strip, source = strip_and_source(effect)
     append_modifiers(effect.id_data, source, strip, missing_modifiers(strip, source))
 
 
 def append_modifiers(scene: Scene, source: Strip, part: Strip, chosen: list[StripModifier] | None = None) -> None:
-    """Gives a strip the modifiers of another one, keys included; chosen: these alone."""
+    """Copy the modifiers of a strip to another, with their keyframes.
+
+    Args:
+        chosen: copy only these.
+    """
     if not source.modifiers:
         return
     count = len(part.modifiers)
     active = scene.sequence_editor, "active_strip", source
-    with for_a_while([active]), add_effect.selecting(scene, [part]):  # and all modifiers of the active strip
+    with for_a_while([active]), add_effect.selecting(scene, [part]):  # it copies all of the active strip
         bpy.ops.sequencer.strip_modifier_copy(type="APPEND")
     for old, new in list(zip(source.modifiers, part.modifiers[count:], strict=True)):
         if chosen is None or old in chosen:
@@ -206,6 +219,6 @@ def append_modifiers(scene: Scene, source: Strip, part: Strip, chosen: list[Stri
 
 
 def effects_on(scene: Scene, source: Strip) -> list[Strip]:
-    """The effect strips of Blender's that have a source as input: what they make of it, the engine does not see."""
+    """Return the effect strips that have a source as input. The engine does not see their result."""
     inputs = ("input_1", "input_2")
     return [s for s in scene.sequence_editor.strips_all if any(getattr(s, name, None) == source for name in inputs)]

@@ -1,11 +1,10 @@
-"""Keys of the motion of a region or of the camera: those that tracking has made, among those of the editor, who mends
-it by more of them.
+"""Keyframes of a region's or the camera's motion: those that tracking made, and the user's, which correct them.
 
-What was made has Blender's key type Generated, which editors show in a colour of its own, and the value that it was
-made with. All other keys are the editor's: they keep frame and value, and are linear where a made key follows.
+Tracking makes keyframes of Blender's type Generated, which has its own color, and stores their value in them. All
+others are the user's: they keep frame and value, and become linear before a generated one.
 
-A key that the editor sets bends the frames around it, as keys do, until tracking begins at it: then frames that are not
-tracked again are where tracking had left them.
+A keyframe that the user inserts bends its surroundings until tracking begins at it. Then frames that are not tracked
+again get their tracked place back.
 """
 
 from collections.abc import Collection, Iterable, Mapping, Sequence
@@ -28,14 +27,13 @@ from ..data import annotations, fcurves, selection, validation
 
 MADE = "GENERATED"
 _MADE = bpy.types.Keyframe.bl_rna.properties["type"].enum_items[MADE].value
-# What Blender gives each key as the overshoot of the ease Back, which linear keys have no use for: a made key keeps
-# there the value that it was made with, so that one which the editor has moved is told from it. Keys that the editor
-# has set keep what was tracked there before.
+# Blender's default overshoot of the ease Back, which linear keyframes do not use. A generated keyframe stores its value
+# there, which shows whether the user has moved it. A user's keyframe stores what tracking had found at its frame.
 NOTHING_KEPT = float(np.float32(1.70158))
-# The channels, and how many of their components a motion has.
+# The channels, and how many of their components each motion has.
 _COMPONENTS = (("location", 0), ("location", 1), ("rotation", 0), ("scale", 0))
 CHANNELS = ("location", "rotation", "scale")
-# What says how much a region counts, and the camera.
+# Influence of a region and of the camera.
 ENDS = "opacity", "influence"
 _LOCKED = n_('{place}: the F-curve of "{channel}" is locked')
 _MUTED = n_('{place}: the F-curve of "{channel}" is muted')
@@ -44,40 +42,47 @@ _COUNTS = {"LOCATION": 2, "ROTATION": 3, "SCALE": 4}
 
 @dataclass(frozen=True)
 class MotionKeys:
-    """The keys of a region, or of the camera (index: see selection.moving), for a motion (properties.MOTIONS); frames
-    are timeline frames."""
+    """The keyframes of a motion (choices.MOTIONS) of a region or the camera. Frames are timeline frames.
+
+    Attributes:
+        index: see selection.moving.
+    """
 
     effect: bpy.types.PropertyGroup
     index: int | None
     motion: str
 
     def edited(self, frames: range) -> list[int]:
-        """The whole frames, among these, at which the editor has set a key."""
+        """Return the whole frames, among these, with a user's keyframe."""
         keys = map(_read, self._curves(_COUNTS[self.motion]))
         keyed = {frame for all_frames, made in keys for frame in all_frames[~made].tolist()}
         return sorted(int(frame) for frame in keyed if frame in frames)
 
     def are_made(self) -> bool:
-        """Whether any key of the location was made."""
+        """Return whether tracking made any keyframe of the location."""
         curve = self._curve("location")
         return curve is not None and bool(_read(curve)[1].any())
 
     def reach(self, frame: int) -> bool:
-        """Whether there are keys of a motion, and tracking, if any of them come from it, has come through a frame. With
-        a single one the region stands still."""
+        """Return whether the motion has keyframes, and tracking, if it made any, reached a frame.
+
+        A single keyframe does not count, because nothing moves.
+        """
         tracked = self.confidence()[0]
         are_several = any(len(curve.keyframe_points) > 1 for curve in self._curves(_COUNTS[self.motion]))
         return are_several and (not len(tracked) or frame in tracked)
 
     def channels(self) -> list[str]:
-        """The channels that the motion has, and those that have keys already."""
+        """Return the channels of the motion, and those that have keyframes already."""
         count = _COUNTS[self.motion]
         names = (name for k, (name, component) in enumerate(_COMPONENTS) if k < count or self._curve(name, component))
         return list(dict.fromkeys(names))
 
     def hold(self, first: int, last: int) -> None:
-        """Keys what was tracked right before and after these frames where tracking has left it: it stays, whatever
-        becomes of the keys between, and wherever the editor has moved the first and the last of them."""
+        """Key what was tracked right before and after these frames, so that changes between do not move it.
+
+        It does not matter if the user has moved the first and last frame since.
+        """
         tracked = self.confidence()[0]
         beside = tracked[np.isin(tracked, (first - 1, last + 1))].tolist()
         for curve in self._curves():
@@ -85,17 +90,24 @@ class MotionKeys:
                 _insert(curve, frame, value)
 
     def begin(self, frame: int) -> None:
-        """Makes the scene's current frame, at which it begins, the editor's; what was tracked beside it stays there.
-        EffectError: as check_curves says."""
+        """Make the scene's current frame, where tracking begins, a user's keyframe, and keep what was tracked beside
+        it.
+
+        Raises:
+            EffectError: see check_curves.
+        """
         self.hold(frame, frame)
         insert(self.effect, self.index, self.channels(), begins=True)
 
     def write(self, placements: Mapping[int, Placement], confidence: Mapping[int, float]) -> None:
-        """Makes keys at some of the frames that have a confidence, in place of all that were made at these, of the
-        channels that are not keyed as well. Other frames that were tracked stay as they are; those between, which never
-        were, have no confidence at all: it is 0.
+        """Replace the keyframes that tracking made at the frames that have a confidence.
 
-        confidence: 0 to 1 by frame"""
+        Other tracked frames stay. Frames between them that were never tracked get a confidence of 0.
+
+        Args:
+            placements: the new keyframes, at some of these frames.
+            confidence: 0 to 1, by frame.
+        """
         for first, last in frame_ranges.runs(confidence):
             self.hold(first, last)
         for k, (name, component) in enumerate(_COMPONENTS):
@@ -109,26 +121,29 @@ class MotionKeys:
         _replace(self._curve("confidence", new=True), every, every)
 
     def needed(self, shape: Region | Camera, start: int, placements: Placements, kept: Collection[int]) -> list[int]:
-        """The frames whose keys say the motion, within a pixel for a region, as it is drawn at the frame `start`; kept:
-        those that stay in any case."""
+        """Return the frames whose keyframes reproduce the motion within a pixel.
+
+        Args:
+            start: frame whose drawing of a region counts.
+            kept: frames to return in any case.
+        """
         size = annotations.picture_size(self.effect)
         if isinstance(shape, Camera):
             return motions.thinned(placements, region_keys.CORNERS, size, kept, region_keys.STEADY)
         return motions.thinned(placements, motions.offsets(shape.drawings.at(start)), size, kept)
 
     def confidence(self) -> tuple[np.ndarray, np.ndarray]:
-        """The frames (n,) that have a confidence, ascending, and what it is, 0 to 1."""
+        """Return the frames (n,) with a confidence, ascending, and the confidence (n,), 0 to 1."""
         curve = self._curve("confidence")
         points = curve.points() if curve else np.empty((0, 2))
         return points[:, 0], points[:, 1] / 100
 
     def fade(self, name: str, keys: Iterable[presence.Key]) -> None:
-        """Makes keys of how much it counts, a property from 0 to 1, in place of all that were made: between these it is
-        what the editor has it at, keyed or not."""
+        """Replace the keyframes that tracking made for a property from 0 to 1. Between them the user's value counts."""
         curve = self._curve(name, new=True)
         moving, path = selection.moving(self.effect, self.index), curve.data_path
         points, (frames, made) = curve.keyframe_points, _read(curve)
-        # What was made has hidden the number that the editor had set.
+        # The generated keyframes have hidden the user's value.
         whole = max((points[i].co[1] for i in np.flatnonzero(made).tolist()), default=getattr(moving, name))
         for i in np.flatnonzero(made)[::-1].tolist():
             points.remove(points[i], fast=True)
@@ -144,7 +159,7 @@ class MotionKeys:
             setattr(moving, name, whole)
 
     def _curves(self, count: int = len(_COMPONENTS)) -> list[fcurves.Timed]:
-        """Of the first components, those that are keyed."""
+        """Return the F-curves of the first components that have one."""
         found = (self._curve(name, component) for name, component in _COMPONENTS[:count])
         return [curve for curve in found if curve is not None]
 
@@ -158,7 +173,11 @@ class MotionKeys:
 
 
 def check_curves(effect: PropertyGroup, index: int | None) -> None:
-    """EffectError: an F-curve of where a region or the camera is cannot be keyed, or its keys would do nothing."""
+    """Check that a region or the camera can be keyed.
+
+    Raises:
+        EffectError: an F-curve is locked or muted.
+    """
     moving = selection.moving(effect, index)
     for name in (*CHANNELS, "confidence", ENDS[index is None]):
         for curve in fcurves.curves_under(effect.id_data, f"{moving.path_from_id()}.{name}"):
@@ -170,17 +189,18 @@ def check_curves(effect: PropertyGroup, index: int | None) -> None:
 
 
 def insert(
-    effect: PropertyGroup,
-    index: int | None,
-    channels: Sequence[str] = CHANNELS,
-    *,
-    begins: bool = False,
+    effect: PropertyGroup, index: int | None, channels: Sequence[str] = CHANNELS, *, begins: bool = False
 ) -> None:
-    """Keys channels of a region or of the camera at the scene's current frame; where tracking has made a key, it is the
-    editor's from now on, and sure. EffectError: as check_curves says.
+    """Key channels of a region or the camera at the scene's current frame, as the user's keyframes with full
+    confidence.
 
-    begins: whether tracking begins there, so that they are read there; of a timeline that is stretched, others lie
-    where Blender's own do, and are read elsewhere. Those keep what was tracked there, for the next MotionKeys.hold"""
+    Args:
+        begins: tracking begins here, so that its frame counts. Other keyframes on a stretched timeline lie where
+            Blender's own do. They store what was tracked there for MotionKeys.hold.
+
+    Raises:
+        EffectError: see check_curves.
+    """
     check_curves(effect, index)
     scene, moving = effect.id_data, selection.moving(effect, index)
     path, pace, frame = moving.path_from_id(), fcurves.stretched(scene), scene.frame_current
@@ -188,7 +208,7 @@ def insert(
         frame = round(frame / pace, 3)
     for name in channels:
         tracked = [_tracked_value(curve, frame) for curve in _curves(scene, f"{path}.{name}")]
-        # Without a frame Blender takes that of the window's scene, which may be another one.
+        # Without a frame, Blender would use the one of the window's scene, which may be another one.
         scene.keyframe_insert(f"{path}.{name}", group=moving.name, frame=frame * pace)
         tracked += [NOTHING_KEPT] * len(_COMPONENTS)
         for curve, value in zip(_curves(scene, f"{path}.{name}"), tracked, strict=False):
@@ -209,8 +229,7 @@ def _keys_at(curve: fcurves.Timed, frame: float) -> list:
 
 
 def _tracked_value(curve: fcurves.Timed, frame: float) -> float:
-    """What tracking has made of a frame, for a key that the editor sets there; of the editor's key there, what it
-    keeps."""
+    """Return what tracking found at a frame, for a user's keyframe there."""
     for key in _keys_at(curve, frame):
         if key.type != MADE:
             return key.back
@@ -218,8 +237,10 @@ def _tracked_value(curve: fcurves.Timed, frame: float) -> float:
 
 
 def _as_tracked(curve: fcurves.Timed, edited: tuple[int, int], frames: list[float]) -> dict[float, float]:
-    """The values of an F-curve at frames without a key, straight between its keys, with what tracking said of two
-    frames that the editor may have keyed since; it is forgotten after this."""
+    """Return tracked values at frames without a keyframe, interpolated linearly.
+
+    The two edited frames count as tracked once more, and then forget it.
+    """
     points = curve.points()
     for i in np.flatnonzero(np.isin(points[:, 0], edited)).tolist():
         key = curve.keyframe_points[i]
@@ -230,12 +251,12 @@ def _as_tracked(curve: fcurves.Timed, edited: tuple[int, int], frames: list[floa
 
 
 def _values(placement: Placement) -> tuple[float, ...]:
-    """In the order of _COMPONENTS, as Blender has them."""
+    """Return a placement in the order of _COMPONENTS and in Blender's units."""
     return *placement.location, np.radians(placement.rotation), placement.scale
 
 
 def _replace(curve: fcurves.Timed, values: dict[int, float], tracked: Iterable[int]) -> None:
-    """Makes keys of these values by frame, in place of those that were made at the frames that were tracked."""
+    """Replace the generated keyframes of the tracked frames with these values by frame."""
     points, (frames, made) = curve.keyframe_points, _read(curve)
     within = np.isin(frames, list(tracked))
     edited = within & ~made
@@ -255,7 +276,7 @@ def _insert(curve: fcurves.Timed, frame: float, value: float, ease: str = "LINEA
 
 
 def _read(curve: fcurves.Timed) -> tuple[np.ndarray, np.ndarray]:
-    """The frames (n,) of an F-curve's keys, and which of them were made and are as they were made."""
+    """Return the frames (n,) of an F-curve's keyframes, and which of them are generated and unchanged."""
     points = curve.points()
     types = fcurves.numbers(curve.keyframe_points, "type", np.int32)
     kept = fcurves.numbers(curve.keyframe_points, "back")

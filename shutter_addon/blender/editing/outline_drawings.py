@@ -1,7 +1,6 @@
-"""Drawings of an outline that are made of what is carried: to mend it, and where one is needed next; and an outline
-as a Blender mask with shape keys, and a mask as an outline.
+"""Draw outlines: correct a tracked outline, find where a drawing is needed, and convert between outlines and masks.
 
-Annotations have no key types in Blender 5.2: a drawing that was made and one's own look alike in the Dope Sheet.
+Annotations have no key types in Blender 5.2, so the Dope Sheet shows generated and hand-made drawings the same way.
 """
 
 from bisect import bisect
@@ -28,22 +27,30 @@ from ..data.property_copy import for_a_while
 from ..rendering import effect_source
 from . import region_edits
 
-Strokes = outlines.Curves | list[np.ndarray]  # (n, 2) in fractions of the picture
-SURE = 0.75  # confidence from which on no drawing is needed: an overlap of nine tenths, as a rule
+Strokes = outlines.Curves | list[np.ndarray]  # each (n, 2), in fractions of the picture
+SURE = 0.75  # a more confident frame needs no drawing: its overlap is usually 90 %
 
 
 class Needed(NamedTuple):
-    """Where a drawing is needed most.
+    """The frame that needs a drawing most.
 
-    frame: of the timeline, None: nowhere; confidence: 0 to 1, of its matte"""
+    Attributes:
+        frame: timeline frame; None: no frame needs one.
+        confidence: of its matte, 0 to 1.
+    """
 
     frame: int | None
     confidence: float
 
 
 def curves_now(scene: Scene, effect: PropertyGroup, strip: Strip, index: int) -> outlines.Curves:
-    """The curves of an outline at the current frame, in fractions of the picture: drawn, carried, or straight where
-    nothing is carried yet. EffectError, MediaError: there are none."""
+    """Return the curves of an outline at the current frame, in fractions of the picture.
+
+    They are drawn or tracked, or interpolated linearly where nothing is tracked yet.
+
+    Raises:
+        EffectError, MediaError: there are none.
+    """
     frame = scene.frame_current
     if not strips.is_carried(effect.regions[index]):
         return outlines.curves(snapshot.strokes_at(scene, effect, strip, index, frame))
@@ -52,31 +59,32 @@ def curves_now(scene: Scene, effect: PropertyGroup, strip: Strip, index: int) ->
         return mattes.curves(min(shown[frame], mattes.count - 1))
 
 
-@lru_cache(1)  # to open a movie at each frame that is passed would be slow; it is opened again where it is read
+@lru_cache(1)  # opening a movie for each frame would be slow; reading opens it again
 def _opened(file: CarriedFile) -> CarriedMattes:
     return file.open()
 
 
 def shown_curves(scene: Scene, effect: PropertyGroup, strip: Strip, index: int) -> outlines.Curves:
-    """As curves_now, read once until something changes: for what is drawn."""
+    """Return `curves_now` for drawing code. The result is kept until something changes."""
     key = effect.scene.session_uid, strip.name, index, scene.frame_current
     return revision.until_change("outline", key, lambda: curves_now(scene, effect, strip, index))
-
-
-def add(effect: PropertyGroup, strip: Strip, region: PropertyGroup, curve: np.ndarray, frame: int) -> None:
-    """Adds a curve (n, 2), in fractions of the picture, to the drawing of a region at a timeline frame. EffectError: as
-    draw."""
-    draw(effect, strip, region, [curve], frame, adds=True)
 
 
 def draw(
     effect: PropertyGroup, strip: Strip, region: PropertyGroup, curves: Strokes, frame: int, *, adds: bool = False
 ) -> None:
-    """Makes curves the drawing of a region at a timeline frame; in place of one that is there, unless it adds to it.
-    EffectError: the strip is scaled to nothing."""
+    """Make curves the drawing of a region at a timeline frame.
+
+    Args:
+        curves: in fractions of the picture.
+        adds: add to the drawing at this frame instead of replacing it.
+
+    Raises:
+        EffectError: the strip has a scale of 0.
+    """
     to_image = annotations.picture_to_image(strip, annotations.picture_size(effect))
     if not annotations.is_invertible(to_image):
-        raise EffectError(rpt_('strip "{strip}" is scaled to nothing').format(strip=strip.name))
+        raise EffectError(rpt_('strip "{strip}" has a scale of 0').format(strip=strip.name))
     layer = layer_of(effect, region) or region_edits.new_layer(effect, region)
     there = [drawing for drawing in layer.frames if drawing.frame_number == frame]
     while there and not adds:
@@ -84,11 +92,15 @@ def draw(
     drawing = there[0] if there else layer.frames.new(frame)
     for points in curves:
         annotations.add_stroke(drawing, mapped(to_image, np.asarray(points)))
-    revision.changed()  # Blender tells of no strokes
+    revision.changed()  # Blender does not report new strokes
 
 
 def picture_now(scene: Scene, effect: PropertyGroup, strip: Strip) -> np.ndarray:
-    """The source's frame (H, W, 3) uint8 that is seen at the current frame. EffectError, MediaError: there is none."""
+    """Return the source frame (H, W, 3) uint8 that the current frame shows.
+
+    Raises:
+        EffectError, MediaError: there is none.
+    """
     shown = snapshot.take(scene, effect, strip, (scene.frame_current,))
     with effect_source.open_source(shown) as source:
         samples = source.read(effect_source.clip_of(shown, source).shown(scene.frame_current).source_frame)
@@ -96,16 +108,20 @@ def picture_now(scene: Scene, effect: PropertyGroup, strip: Strip) -> np.ndarray
 
 
 def nearest(effect: PropertyGroup, index: int, frame: int) -> int:
-    """The timeline frame of a region's drawing that is nearest to a frame; that itself, where there is none."""
+    """Return the timeline frame of a region's drawing that is nearest to `frame`, or `frame` if there is no drawing."""
     layer = layer_of(effect, effect.regions[index])
     drawn = [drawing.frame_number for drawing in layer.frames] if layer else []
     return min(drawn, key=lambda each: abs(each - frame), default=frame)
 
 
 def outline_it(scene: Scene, effect: PropertyGroup, strip: Strip, index: int) -> bool:
-    """Makes a region the outline of the subject that its strokes run over, or are drawn around, at the current frame;
-    what was drawn at other frames of an outline stays. Whether there is one. EffectError, MediaError: there are no
-    strokes, or no picture."""
+    """Make a region the outline of the subject under or inside its strokes at the current frame.
+
+    Drawings of an outline at other frames stay. Return whether a subject was found.
+
+    Raises:
+        EffectError, MediaError: there are no strokes, or no picture.
+    """
     region, frame = effect.regions[index], scene.frame_current
     there = snapshot.region_at(scene, effect, strip, index, (frame,))
     strokes = there.drawings.at(frame) if region.kind == "OUTLINE" else there.at(frame).strokes
@@ -131,23 +147,30 @@ def outline_it(scene: Scene, effect: PropertyGroup, strip: Strip, index: int) ->
 
 
 def carried_frames(scene: Scene, effect: PropertyGroup, strip: Strip, index: int) -> tuple[CarriedFile, dict[int, int]]:
-    """What gives the mattes of an outline (media.carried_mattes.CarriedFile), and which frames of the source the frames
-    of its strip show, by timeline frame. EffectError, MediaError: nothing is carried."""
+    """Return the tracked mattes of an outline, and the source frame for each timeline frame of its strip.
+
+    Raises:
+        EffectError, MediaError: nothing is tracked.
+    """
     frames = range(strip.left_handle, strip.right_handle)
     file, shown = snapshot.carried_outline(scene, effect, strip, index, frames)
     return file, {int(frame): number for frame, number in shown.items()}
 
 
 def next_needed(scene: Scene, effect: PropertyGroup, strip: Strip, index: int) -> Needed:
-    """Where in the strip a drawing of an outline that is carried helps most: of the stretches between drawings, and
-    beyond the first and the last, in the one that is least sure altogether; there, where as much of the doubt lies
-    before it as behind it. EffectError, MediaError: nothing is carried."""
+    """Return where in the strip another drawing would help a tracked outline most.
+
+    Of the stretches between, before and after the drawings, the least confident one counts. The frame halves its doubt.
+
+    Raises:
+        EffectError, MediaError: nothing is tracked.
+    """
     file, shown = carried_frames(scene, effect, strip, index)
     drawn = [number for number, _curves in file.drawings]
     stretches: dict[int, list[tuple[int, int, float]]] = {}
     with closing(file.open()) as mattes:
         for number, frame in sorted({number: frame for frame, number in shown.items()}.items()):
-            sure = mattes.confidence(number) or 0.0  # None: too far from all drawings
+            sure = mattes.confidence(number) or 0.0  # None: too far from any drawing
             if number not in drawn and sure < SURE:
                 stretches.setdefault(bisect(drawn, number), []).append((number, frame, sure))
     if not stretches:
@@ -159,12 +182,17 @@ def next_needed(scene: Scene, effect: PropertyGroup, strip: Strip, index: int) -
 
 
 def to_mask(context: Context, of: tuple[Scene, PropertyGroup, Strip], index: int, step: int) -> Mask:
-    """A new mask of an outline, whose frames are the source's, from its start on; each curve that comes and goes has a
-    layer, and what two of them enclose lies outside.
+    """Make a new mask from an outline. Its frames are those of the source.
 
-    of: scene, effect and strip
-    step: how many frames from one shape key to the next, between the drawings of what is carried; 0: drawings alone
-    EffectError, MediaError: nothing is drawn, nothing can be carried, or there is no window to write shape keys in."""
+    Each curve gets a layer with keys of its opacity. Areas that two curves enclose are outside.
+
+    Args:
+        of: scene, effect and strip.
+        step: frames between shape keys of a tracked outline; 0: only its drawings.
+
+    Raises:
+        EffectError, MediaError: nothing is drawn or tracked, or no window is open to write shape keys.
+    """
     scene, effect, strip = of
     keys = _keys(scene, effect, strip, index, step)
     if not any(curves for _frame, curves in keys):
@@ -186,8 +214,11 @@ def to_mask(context: Context, of: tuple[Scene, PropertyGroup, Strip], index: int
 
 
 def from_mask(scene: Scene, effect: PropertyGroup, strip: Strip, shutter: PropertyGroup, mask: Mask) -> PropertyGroup:
-    """A new region: an outline with a drawing for each frame at which something is said of a mask. EffectError,
-    MediaError: the mask cannot be read or encloses nothing there, or OpenCV is missing."""
+    """Add a region: an outline with a drawing for each keyframe of a mask.
+
+    Raises:
+        EffectError, MediaError: the mask cannot be read, encloses nothing in the strip, or OpenCV is missing.
+    """
     size = annotations.picture_size(effect)
     shapes = {
         frame: outlining.traced(mask_reading.mask_at(mask, mask.frame_start + number).values(*size))
@@ -205,7 +236,7 @@ def from_mask(scene: Scene, effect: PropertyGroup, strip: Strip, shutter: Proper
 def _keys(
     scene: Scene, effect: PropertyGroup, strip: Strip, index: int, step: int
 ) -> list[tuple[int, outlines.Curves]]:
-    """The curves of an outline, at the source's frames that get a shape key, ascending."""
+    """Return the curves of an outline at the source frames that get a shape key, ascending."""
     if not (strips.is_carried(effect.regions[index]) and step):
         return sorted(snapshot.drawn_outline(scene, effect, strip, index).items())
     file, _shown = snapshot.carried_outline(scene, effect, strip, index, ())
@@ -215,21 +246,16 @@ def _keys(
         return [(frame, mattes.curves(frame)) for frame in frames]
 
 
-def _in_mask(points: np.ndarray, size: tuple[int, int]) -> np.ndarray:
-    """Points (..., 2) in mask space (core.model.masks), of fractions of the picture."""
-    return (points - 0.5) * np.array(size) / max(size) + 0.5
-
-
 def _add_layer(mask: Mask, name: str, chain: outlines.Chain, size: tuple[int, int]) -> None:
-    """A layer of one spline, which is there from its first frame on until it is gone."""
+    """Add a layer with one spline, visible from its first frame until the curve ends."""
     layer = mask.layers.new(name=name)
-    layer.blend, layer.alpha = "DIFFERENCE", 1.0  # Blender's own begin with 0 where a script makes them
+    layer.blend, layer.alpha = "DIFFERENCE", 1.0  # scripted layers begin with an opacity of 0
     spline = layer.splines.new()
     spline.points.add(chain.points.shape[1] - len(spline.points))
     spline.use_cyclic = True
     for point in spline.points:
         point.handle_type = "FREE"
-    _place(spline, _in_mask(chain.points[0], size))
+    _place(spline, chain.points[0], size)
     keys: list[tuple[float, float, Ease]] = [(1.0, 0.0, "constant")] if chain.frames[0] else []
     keys.append((chain.frames[0] + 1.0, 1.0, "constant"))
     if chain.gone is not None:
@@ -238,26 +264,27 @@ def _add_layer(mask: Mask, name: str, chain: outlines.Chain, size: tuple[int, in
         fcurves.set_keys(mask, f'layers["{bpy.utils.escape_identifier(layer.name)}"].alpha', 0, keys)
 
 
-def _place(spline: MaskSpline, points: np.ndarray) -> None:
-    flat = np.ascontiguousarray(points, np.float32).ravel()
+def _place(spline: MaskSpline, points: np.ndarray, size: tuple[int, int]) -> None:
+    """Set the points of a spline, given in fractions of the picture, in the mask's space."""
+    flat = np.ascontiguousarray((points - 0.5) * np.array(size) / max(size) + 0.5, np.float32).ravel()
     for name in ("co", "handle_left", "handle_right"):
         spline.points.foreach_set(name, flat)
 
 
 def _insert_keys(context: Context, mask: Mask, chains: list[outlines.Chain], size: tuple[int, int]) -> None:
-    """Blender gives shape keys to selected layers, at its current frame."""
+    """Insert shape keys. Blender's operator keys the selected points at the current frame."""
     edited = context.window.scene
     with for_a_while([(edited, "frame_current", edited.frame_current)]):
         for frame in sorted({frame for chain in chains for frame in chain.frames}):
             edited.frame_current = frame + 1
-            context.window.view_layer.update()  # or the operator would, and put the points where the last key has them
+            context.window.view_layer.update()  # the operator would update, too, and reset the points to the last key
             for layer, chain in zip(mask.layers, chains, strict=True):
                 has_key = frame in chain.frames
                 layer.hide = not has_key
                 for point in layer.splines[0].points:
                     point.select = has_key
                 if has_key:
-                    _place(layer.splines[0], _in_mask(chain.points[chain.frames.index(frame)], size))
+                    _place(layer.splines[0], chain.points[chain.frames.index(frame)], size)
             bpy.ops.mask.shape_key_insert()
         for layer in mask.layers:
             layer.hide = False
@@ -265,11 +292,14 @@ def _insert_keys(context: Context, mask: Mask, chains: list[outlines.Chain], siz
 
 @contextmanager
 def _mask_editor(context: Context, mask: Mask) -> Iterator[None]:
-    """Where Blender's operators on masks run: the area becomes an editor of one for a moment. EffectError: there is no
-    window."""
+    """Turn an area into a mask editor for a moment, because Blender's mask operators need one.
+
+    Raises:
+        EffectError: no window is open.
+    """
     window = context.window
     if window is None:
-        raise EffectError(rpt_("A mask is written in a window of Blender, and there is none"))
+        raise EffectError(rpt_("Making a mask needs an open Blender window"))
     area = context.area or window.screen.areas[0]
     with for_a_while([(area, "ui_type", "IMAGE_EDITOR")]):
         space = area.spaces.active
@@ -280,8 +310,10 @@ def _mask_editor(context: Context, mask: Mask) -> Iterator[None]:
 
 
 def _drawn_frames(scene: Scene, effect: PropertyGroup, strip: Strip, mask: Mask) -> dict[int, int]:
-    """The timeline frames of the strip that get a drawing, and the source's that they show: those of a mask's keys, and
-    the ends, where it has some beyond them."""
+    """Return the timeline frames that get a drawing, with their source frames.
+
+    These are the frames of the mask's keys, and the strip's ends if the mask has keys beyond them.
+    """
     frames = range(strip.left_handle, strip.right_handle)
     shown = snapshot.source_frames(scene, effect, strip, frames)
     wanted = [frame - mask.frame_start for frame in mask_reading.key_frames(mask)] or [0]
@@ -291,8 +323,10 @@ def _drawn_frames(scene: Scene, effect: PropertyGroup, strip: Strip, mask: Mask)
 
 
 def _in_order(shapes: dict[int, outlines.Curves], aspect: float) -> dict[int, outlines.Curves]:
-    """Curves by frame, so that those go into each other, as they go straight from drawing to drawing, that belong
-    together: those first that are there all the time."""
+    """Sort the curves of each frame so that matching curves have the same position.
+
+    The interpolation between drawings pairs curves by position. Curves that exist at all frames come first.
+    """
     chains = outlines.chains(sorted(shapes.items()), aspect)
     chains.sort(key=lambda chain: -len(chain.frames))
     return {

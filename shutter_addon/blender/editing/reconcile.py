@@ -1,13 +1,14 @@
-"""Brings scenes, effects and annotations in line with the strips that there are, however these came and went: deleted,
-pasted, cut, moved, copied with their edit, brought back by undo. What holds then, and a second call changes nothing:
+"""Update scenes, effects and annotations after strips were deleted, pasted, cut, moved, copied, or changed by undo.
 
-- Each effect strip shows an effect scene of its own, whose effect its scene has, and each effect has a strip. Blender
-  copies or cuts a Scene strip, but not the scene that it shows: the copy would show the original's effect.
-- An effect scene has a camera, and the settings without which the sequencer leaves it out; an annotation of its own; an
-  identity that no other has, which is its strip's and its effect's too. Of those that are gone nothing is left.
-- Edits share no action, and effects that show different strips no source. What an effect muted is its source.
-- Keys and drawings lie where they did within their strip, and regions have the names of their drawings.
-- An effect scene has its edit's rate and its source's size.
+Afterwards these hold, and a second call changes nothing:
+
+- Each effect strip shows its own effect scene, whose effect is in its scene, and each effect has a strip. Blender
+  copies or cuts a Scene strip without its scene, so that the copy would show the original's effect.
+- An effect scene has a camera, the settings that the sequencer needs, its own annotation, and a unique identity, which
+  its strip and effect share. Nothing is left of removed ones.
+- Edits share no action, and effects of different strips share no source. Only sources that an effect muted are muted.
+- Keyframes and drawings keep their place in their strip, and regions have the names of their drawings.
+- An effect scene has its edit's frame rate and its source's size.
 """
 
 from __future__ import annotations
@@ -28,27 +29,29 @@ from ..data.property_copy import copy_properties
 from ..rendering import invalidation, render_job, sessions
 from . import add_effect, match_source, shown_annotations, undelete
 
-# What an effect scene has as its edit; Blender crashes where one in stereo shows a scene that is not.
+# Settings that an effect scene copies from its edit. Blender crashes if a stereo scene shows one that is not.
 _OF_EDIT = "fps", "fps_base", "use_multiview"
-_names: dict[int, list[str]] = {}  # of layers, by session_uid of their annotation, as they were at the last update
+_names: dict[int, list[str]] = {}  # names of layers at the last update, by session_uid of their annotation
 
 
 def update(updated: Scene | None = None) -> None:
-    """Has everything follow a change of the edit. What a newer version has saved is left to it.
+    """Update everything after a change of the edit. Data of a newer version is not changed.
 
-    updated: the scene whose depsgraph is being updated, which must not go now."""
+    Args:
+        updated: scene whose depsgraph is being updated, which must not be removed now.
+    """
     if bpy.app.is_job_running("RENDER"):
         return
     if not data_format.is_file_newer():
         shown = tidy(updated)
-        if not render_job.runs():  # a film keeps its size
+        if not render_job.runs():  # the size stays during a render
             follow_sources(shown)
     for scene in strips.local_scenes():
         invalidation.invalidate_changed(scene)
 
 
 def tidy(updated: Scene | None = None) -> list[strips.Shown]:
-    """Does all but follow_sources, which reads media. Returns what is shown then."""
+    """Do everything except follow_sources, which reads media. Return what is shown then."""
     scenes = _oldest_first(strips.local_scenes())
     _find_scenes(scenes)
     _mend(scenes)
@@ -69,12 +72,12 @@ def tidy(updated: Scene | None = None) -> list[strips.Shown]:
 
 
 def gather() -> list[strips.Shown]:
-    """All that scenes which can be changed show of effects."""
+    """Return the effects that editable scenes show."""
     return [each for scene in strips.local_scenes() for each in strips.shown_effects(scene)]
 
 
 def forget() -> None:
-    """Forgets what the annotations and the media of a file were, before another one is loaded."""
+    """Forget annotations and media of a file before another one is loaded."""
     _names.clear()
     _header.cache_clear()
     shown_annotations.forget()
@@ -82,9 +85,11 @@ def forget() -> None:
 
 
 def find_lost() -> None:
-    """Finds again what Blender's undo loses. A scene that was changed is read into new memory, and what points there is
-    taken for pointing to the scene itself. This memory may be that of data which the undone step had removed: of effect
-    scenes, and of actions (_renew_action)."""
+    """Restore pointers after undo.
+
+    Blender reads a changed scene into new memory, and pointers in there then point to the scene itself. The memory may
+    be that of data which the undone step removed: of effect scenes, and of actions (_renew_action).
+    """
     scenes = strips.local_scenes()
     for scene in scenes:
         _find_action(scene)
@@ -92,19 +97,19 @@ def find_lost() -> None:
 
 
 def _find_action(scene: Scene) -> None:
-    """Whoever takes an action away by hand leaves no handle of a slot."""
+    """Restore the pointer to the action. If the user had removed the action, no slot handle would be left."""
     animation = scene.animation_data
     if animation is None or animation.action is not None or not animation.action_slot_handle:
         return
     for action in bpy.data.actions:
         slots = [slot for slot in action.slots if slot.handle == animation.action_slot_handle]
-        if slots and action.users == action.use_fake_user:  # nothing else has it
+        if slots and action.users == action.use_fake_user:  # nothing else uses it
             animation.action, animation.action_slot = action, slots[0]
             return
 
 
 def _find_scenes(scenes: list[Scene]) -> None:
-    """Effects and strips that lost their effect scene, or were pasted without, get it by its identity."""
+    """Restore pointers of effects and strips to their effect scene by its identity, also after pasting."""
     known = {scene.virtual_shutter.identity: scene for scene in reversed(_oldest_first(_effect_scenes()))}
     for scene in scenes:
         for effect in scene.virtual_shutter.effects:
@@ -117,7 +122,7 @@ def _find_scenes(scenes: list[Scene]) -> None:
 
 
 def _mend(scenes: list[Scene]) -> None:
-    """Undoes what would leave effects out of the picture: their camera deleted, another engine, and the like."""
+    """Restore what an effect scene needs to be rendered, such as its camera and engine."""
     for strip in [strip for scene in scenes for strip in strips.own_strips(scene)]:
         if strip.scene is not None and strip.scene.library is None:
             for owner, name, value in requirements.settings(strip):
@@ -127,29 +132,31 @@ def _mend(scenes: list[Scene]) -> None:
 
 
 def _give(owner: bpy_struct, name: str, value: object) -> None:
-    """Gives a property a value that it has not: Blender takes whatever is set for a change."""
+    """Set a property only if it differs, because Blender counts any assignment as a change."""
     if getattr(owner, name) != value:
         setattr(owner, name, value)
 
 
 def _bring_back(scenes: list[Scene]) -> None:
-    """Pasted effect strips get their effects again: Blender's clipboard holds strips, but not the scenes they show."""
+    """Restore the effects of pasted strips. Blender's clipboard has strips without the scenes that they show."""
     lost = [strip for scene in scenes for strip in strips.own_strips(scene) if strip.scene is None]
     if lost:
-        _remove_left()  # of their scenes, which somebody removed
+        _remove_left()  # remains of their removed scenes
     for strip in lost:
         if strip.scene is None and undelete.restore(strip.id_data, strip.virtual_shutter_effect):
-            _find_scenes(scenes)  # others have the same
+            _find_scenes(scenes)  # other strips may show the same
 
 
 def _oldest_first(scenes: list[Scene]) -> list[Scene]:
-    """Copies come after what they were made of, so that this stays what it is: undo takes a scene for unchanged that
-    the last step did not change."""
+    """Sort scenes so that copies follow their original, which then stays unchanged.
+
+    Undo assumes that a scene which the last step did not change is unchanged.
+    """
     return sorted(scenes, key=lambda scene: scene.session_uid)
 
 
 def _separate(scenes: list[Scene]) -> None:
-    """A copied edit gets keys of its own: Blender lets both share their action."""
+    """Give a copied edit its own action. Blender lets both share one."""
     taken = set()
     for animation in [scene.animation_data for scene in scenes if scene.virtual_shutter.effects]:
         if animation and animation.action:
@@ -159,14 +166,14 @@ def _separate(scenes: list[Scene]) -> None:
 
 
 def _adopt(scenes: list[Scene]) -> None:
-    """Effect strips that are copies, parts of cut ones or pasted from another scene get a scene and an effect."""
+    """Give effect strips that were copied, cut or pasted from another scene their own effect scene and effect."""
     taken = set()
     for scene in scenes:
         for strip in sorted(strips.effect_strips(scene), key=_place):
             own, effect = strip.scene, strips.effect_of(scene, strip.scene)
-            # Without an effect, Blender copied the scene with its strip, or the strip is pasted from another scene.
+            # Without an effect, the scene was copied with its strip, or the strip is pasted from another scene.
             original = effect or _original(scene, own)
-            if original is None or own == scene:  # what a scene shows of itself Blender allows nobody to change
+            if original is None or own == scene:  # Blender lets nobody change what a scene shows of itself
                 continue
             if own in taken or (effect is None and strips.effect_of(original.id_data, own)):
                 own = own.copy()
@@ -176,13 +183,13 @@ def _adopt(scenes: list[Scene]) -> None:
 
 
 def _place(strip: Strip) -> tuple[bool, int, int]:
-    """Of strips with the same effect, the first of those that begin where its keys are comes first, and keeps it."""
+    """Return a sort key: of strips with the same effect, the first one that begins at its keyframes keeps it."""
     effect = strips.effect_of(strip.id_data, strip.scene)
     return effect is None or strips.origin(strip) != effect.start, strip.left_handle, strip.channel
 
 
 def _original(scene: Scene, effect_scene: Scene) -> PropertyGroup | None:
-    """The effect that a copied effect scene was made for; those of the scene itself first."""
+    """Return the effect that a copied effect scene was made for, preferring those of the scene."""
     identity = effect_scene.virtual_shutter.identity
     scenes = sorted(bpy.data.scenes, key=lambda other: other != scene)
     effects = (effect for other in scenes for effect in other.virtual_shutter.effects if effect.scene)
@@ -190,10 +197,10 @@ def _original(scene: Scene, effect_scene: Scene) -> PropertyGroup | None:
 
 
 def _duplicate(effect: PropertyGroup, strip: Strip, effect_scene: Scene) -> None:
-    """Gives a strip and its scene a copy of an effect."""
+    """Give a strip and its scene a copy of an effect."""
     scene, old_scene, path = strip.id_data, effect.id_data, effect.path_from_id()
     new = data_format.new_effect(scene, old_scene.virtual_shutter.format)
-    old = old_scene.path_resolve(path)  # adding to a collection moves its items in memory
+    old = old_scene.path_resolve(path)  # looked up again, because adding to a collection moves its items
     copy_properties(old, new)
     new.scene = effect_scene
     _shorten(strip, [other for other in strips.effect_strips(old_scene) if other.scene == old.scene])
@@ -203,14 +210,14 @@ def _duplicate(effect: PropertyGroup, strip: Strip, effect_scene: Scene) -> None
 
 
 def _shorten(strip: Strip, same: list[Strip]) -> None:
-    """Blender's Add menu offers effect scenes: a strip of all their frames gets the length of the effect's own."""
+    """Give a strip that Blender's Add menu made from an effect scene the length of the effect's own strip."""
     if strip.right_handle - strip.left_handle == MAX_FRAME:
         ends = [other.right_handle - strips.origin(other) for other in same if other != strip]
         strip.right_handle = strip.left_handle + round(min(ends, default=MAX_FRAME))
 
 
 def _remove_effects(scene: Scene) -> None:
-    """Removes the scene's effects that none of its strips shows any more."""
+    """Remove effects of a scene that no strip shows."""
     group, shown = scene.virtual_shutter, {strip.scene for strip in strips.effect_strips(scene)}
     gone = [i for i, effect in enumerate(group.effects) if effect.scene not in shown]
     if gone:
@@ -221,10 +228,10 @@ def _remove_effects(scene: Scene) -> None:
 
 
 def _renew_action(scene: Scene) -> None:
-    """Puts a copy of the action that holds a scene's keys in its place, for a handler to change.
+    """Replace a scene's action by a copy, for a handler to change.
 
-    Handlers come after the undo push of the user's step. Undo keeps data that is equal in both steps as it is now,
-    whatever a handler did to it since; the copy is in neither of them, and the action comes back.
+    Handlers run after the undo push of the user's step. Undo keeps data that is equal in both steps in its current
+    state, with the handler's changes. The copy is in neither step, so undo restores the action.
     """
     action = scene.animation_data and scene.animation_data.action
     if not action or action.library is not None:
@@ -237,13 +244,17 @@ def _renew_action(scene: Scene) -> None:
 
 
 def _effect_scenes() -> list[Scene]:
-    """The scenes that were made for effects, and can be changed."""
+    """Return the editable scenes that were made for effects."""
     made = [scene for scene in strips.local_scenes() if scene.virtual_shutter.identity]
     return [scene for scene in made if scene.render.engine == strips.ENGINE]
 
 
+def _effect_strips() -> list[Strip]:
+    return [strip for scene in strips.local_scenes() for strip in strips.effect_strips(scene)]
+
+
 def _identify(shown: list[strips.Shown]) -> None:
-    """Every effect scene has an identity and an annotation of its own; its strip, its effect and that carry it."""
+    """Give every effect scene a unique identity and its own annotation, and its strip and effect the same identity."""
     identities, drawn = set(), set()
     for scene in _oldest_first(_effect_scenes()):
         group = scene.virtual_shutter
@@ -256,17 +267,17 @@ def _identify(shown: list[strips.Shown]) -> None:
             drawn.add(scene.annotation)
             if shown_annotations.is_own(scene.annotation):
                 _give(scene.annotation, "virtual_shutter_made", group.identity)
-    for strip in [strip for scene in strips.local_scenes() for strip in strips.effect_strips(scene)]:
+    for strip in _effect_strips():
         _give(strip, "virtual_shutter_effect", strip.scene.virtual_shutter.identity)
     for effect, _strip, _source in shown:
         _give(effect, "identity", effect.scene.virtual_shutter.identity)
 
 
 def _follow_strips(shown: list[strips.Shown]) -> None:
-    """Moves keys and drawings with their strips."""
+    """Move keyframes and drawings with their strips."""
     for effect, strip, _source in shown:
         start = strips.origin(strip)
-        if not abs(effect.start) <= 2 * MAX_FRAME:  # no frame: its keys are where they are
+        if not abs(effect.start) <= 2 * MAX_FRAME:  # not a valid frame: leave the keyframes
             effect.start = start
         _move_drawings(effect, start)
         if start != effect.start:
@@ -276,8 +287,10 @@ def _follow_strips(shown: list[strips.Shown]) -> None:
 
 
 def _move_drawings(effect: PropertyGroup, start: float) -> None:
-    """Drawings go along to where an effect starts now, from that which the annotation says they are for: undo may bring
-    the effect's back and leave the annotation, which a handler moved, as it is."""
+    """Move drawings from the start that their annotation stores to the effect's start.
+
+    Undo may restore the effect's start without the annotation, which a handler moved.
+    """
     annotation = effect.scene.annotation
     if annotation is None or annotation.library is not None:
         return
@@ -292,7 +305,7 @@ def _move_drawings(effect: PropertyGroup, start: float) -> None:
 
 
 def _part_sources(shown: list[strips.Shown]) -> None:
-    """Where effects with the same source show different strips, parts of a cut source or copies, each gets its own."""
+    """Give each source its own identity where effects of one identity show different strips: copies or cut parts."""
     first: dict[tuple[Scene, str], Strip] = {}
     for effect, strip, source in shown:
         if source and first.setdefault((strip.id_data, effect.source), source) != source:
@@ -300,7 +313,7 @@ def _part_sources(shown: list[strips.Shown]) -> None:
 
 
 def _unmute_sources(scenes: list[Scene], shown: list[strips.Shown]) -> None:
-    """Sources that an effect muted show again once no effect strip shows them."""
+    """Unmute sources that an effect muted and that no effect strip shows any more."""
     sources = {each.source for each in shown}
     for strip in [strip for scene in scenes for strip in strips.all_strips(scene) if strip.virtual_shutter_muted]:
         if strip not in sources and not _is_baked_over(strip):
@@ -308,20 +321,20 @@ def _unmute_sources(scenes: list[Scene], shown: list[strips.Shown]) -> None:
 
 
 def _is_baked_over(source: Strip) -> bool:
-    """Whether a film that was baked of a source lies above it: the source would be seen through transparent parts."""
+    """Return whether a baked film of a source lies above it. The source would show through transparent parts."""
     baked = (s for s in source.connections if s.type in strips.SOURCES and s.channel > source.channel)
     return any(s.virtual_shutter_bake.identity and strips.overlap(s, source) for s in baked)
 
 
 def _follow_names(shown: list[strips.Shown]) -> None:
-    """Gives regions the new names of their drawings, layers of the effect's annotation.
+    """Give regions the new names of their drawings, which are layers of the effect's annotation.
 
-    Handlers come after the undo push of the user's step. Undoing the step after a rename brings back a region with
-    the old name and an annotation that has the new one: so the annotation carries the names that its regions go by.
-    Undoing the rename itself leaves the region as it is now: that the names before were others is told by memory.
+    Handlers run after the undo push of the user's step. Undoing the step after a rename restores the old name in the
+    region, but not in the annotation, so the annotation stores the names of its regions. Undoing the rename itself
+    leaves the region unchanged, so the previous names are also in memory.
     """
     before = dict(_names)
-    _names.clear()  # of annotations that are gone
+    _names.clear()  # drop removed annotations
     for effect, _strip, _source in shown:
         annotation = effect.scene.annotation
         if annotation is None or annotation.library is not None:
@@ -334,7 +347,7 @@ def _follow_names(shown: list[strips.Shown]) -> None:
 
 
 def _rename(effect: PropertyGroup, before: list[str], names: list[str]) -> None:
-    """One name among the same number of drawings is another: it was renamed."""
+    """Rename the region's layer if exactly one of the same number of drawings has a new name."""
     changed = [(old, new) for old, new in zip(before, names, strict=False) if old != new]
     if len(before) == len(names) and len(changed) == 1:
         for region in effect.regions:
@@ -343,8 +356,8 @@ def _rename(effect: PropertyGroup, before: list[str], names: list[str]) -> None:
 
 
 def _remove_scenes(updated: Scene | None) -> None:
-    """Removes effect scenes that no strip and no window shows."""
-    stay = {strip.scene for scene in strips.local_scenes() for strip in strips.effect_strips(scene)} | {updated}
+    """Remove effect scenes that no strip and no window shows."""
+    stay = {strip.scene for strip in _effect_strips()} | {updated}
     for window in [window for manager in bpy.data.window_managers for window in manager.windows]:
         stay.update((window.scene, window.workspace.sequencer_scene))
     for scene in _effect_scenes():
@@ -354,15 +367,14 @@ def _remove_scenes(updated: Scene | None) -> None:
 
 
 def _remove_left() -> None:
-    """Removes the annotations and cameras that were made for effects which are gone. What is used elsewhere is the
-    user's from then on, as is what an effect does not use, as a copy."""
+    """Remove annotations and cameras of removed effects. Those that are used elsewhere become the user's."""
     scenes = _effect_scenes()
     used = {scene.annotation for scene in scenes} | {scene.camera.data for scene in scenes if scene.camera}
     identities = {scene.virtual_shutter.identity for scene in bpy.data.scenes}
     for made in (*bpy.data.annotations, *bpy.data.cameras):
         if made.library is not None or made in used or not shown_annotations.is_own(made):
             continue
-        # Copies of an effect scene share its camera, which may outlive that whose identity it has.
+        # Copies of an effect scene share its camera, which may have the identity of a removed original.
         if made.virtual_shutter_made not in identities or isinstance(made, bpy.types.Camera):
             shown_annotations.let_go(made)
             bpy.data.batch_remove([each for each in bpy.data.objects if each.data == made and not each.users])
@@ -373,9 +385,8 @@ def _remove_left() -> None:
 
 
 def follow_sources(shown: list[strips.Shown]) -> None:
-    """Gives effect scenes the rate and views of the scene that shows them, and the size of their sources; has Blender
-    mix the strips' pixels as their sources'."""
-    for strip in [strip for scene in strips.local_scenes() for strip in strips.effect_strips(scene)]:
+    """Update effect scenes: rate and views of their edit, size of their source, and how Blender blends their strips."""
+    for strip in _effect_strips():
         if strip.scene.library is None:
             for name in _OF_EDIT:
                 _give(strip.scene.render, name, getattr(strip.id_data.render, name))
@@ -412,8 +423,11 @@ def _follow_mixing(strip: Strip, source: Strip, *, is_encoded: bool) -> None:
 
 @lru_cache(256)
 def _header(spec: source_media.SourceSpec) -> tuple[tuple[int, int], bool] | None:
-    """Width and height of a medium's picture, as a scene can have them, and whether Blender keeps code values of it in
-    place of light. None: it cannot be read, and is not tried again and again."""
+    """Return the size of a medium, limited to that of scenes, and whether Blender blends its display values instead of
+    light.
+
+    None: it cannot be read. It is not opened again and again.
+    """
     with suppress(MediaError):
         medium = open_source(spec.path, files=spec.files, **spec.options | {"colorspace": None})
         medium.close()

@@ -1,4 +1,4 @@
-"""An effect's regions and their annotation layers: added, removed, moved, keyed."""
+"""Edit an effect's regions and their annotation layers: add, remove, move, key."""
 
 import numpy as np
 from bpy.app.translations import pgettext_rpt as rpt_
@@ -12,19 +12,22 @@ from . import motion_keys
 
 
 def why_full(effect: PropertyGroup, *, regions: int = 0, shutters: int = 0) -> str | None:
-    """Why an effect cannot have so many more regions and shutters, in a sentence; None if it can."""
+    """Return why an effect cannot have this many more regions and shutters; None: it can."""
     if regions and len(effect.regions) + regions > limits.MAX_REGIONS:
-        return rpt_("An effect has {most} regions at most").format(most=limits.MAX_REGIONS)
+        return rpt_("An effect can have at most {most} regions").format(most=limits.MAX_REGIONS)
     if shutters and len(effect.shutters) + shutters > limits.MAX_SHUTTERS:
-        return rpt_("An effect has {most} shutters at most").format(most=limits.MAX_SHUTTERS)
+        return rpt_("An effect can have at most {most} shutters").format(most=limits.MAX_SHUTTERS)
     return None
 
 
 def add_region(
     effect: PropertyGroup, shutter: PropertyGroup, kind: str = "LINE", name: str = "", **values: object
 ) -> PropertyGroup:
-    """Appends a region of a shutter, with these values of its properties and, unless it is a matte or a ramp, on an
-    empty annotation layer of its own; and makes it the active one."""
+    """Append a region of a shutter and make it active. It gets an annotation layer unless it is a matte or ramp.
+
+    Args:
+        values: of its properties.
+    """
     region = effect.regions.add()
     region.name = unique(name or shutter.name, {r.name for r in effect.regions})
     region.shutter, region.kind = shutter.name, kind
@@ -37,9 +40,11 @@ def add_region(
 
 
 def first_drawn(effect: PropertyGroup, shutter: PropertyGroup, kind: str) -> PropertyGroup:
-    """Appends a region for strokes, as add_region does; the active one of that shutter becomes it while it has none.
-    The first of an effect, of a shutter that is sharp, follows edges, unless the editor has said how much: a subject is
-    meant, and no spot of it."""
+    """Return a region for new strokes: the shutter's active one if nothing is drawn in it, otherwise a new one.
+
+    The first region of a sharp shutter follows edges, because it usually marks a subject, not a spot. It does not if
+    the user has set *Follow Edges*.
+    """
     is_sharp = np.count_nonzero(bars(shutter)) <= 1
     is_scribble = kind not in strips.LAID
     if is_scribble and is_sharp and not effect.regions and not effect.is_property_set("edge_aware"):
@@ -48,12 +53,12 @@ def first_drawn(effect: PropertyGroup, shutter: PropertyGroup, kind: str) -> Pro
         region = add_region(effect, shutter, kind)
     region.kind = kind
     if not is_scribble:
-        region.motion = "LOCATION"  # limbs turn, and the subject does not
+        region.motion = "LOCATION"  # limbs would turn the whole subject
     return region
 
 
 def _undrawn(effect: PropertyGroup, shutter: PropertyGroup) -> PropertyGroup | None:
-    """The active region, where it is a shutter's and nothing is drawn in it; None: it is not so."""
+    """Return the active region if it belongs to a shutter and nothing is drawn in it, or None."""
     region = selection.active_region(effect)
     if region is None or region.kind in strips.MATTES or region.shutter != shutter.name:
         return None
@@ -62,7 +67,7 @@ def _undrawn(effect: PropertyGroup, shutter: PropertyGroup) -> PropertyGroup | N
 
 
 def new_layer(effect: PropertyGroup, region: PropertyGroup) -> AnnotationLayer:
-    """Gives a region an empty annotation layer, named after it and in its shutter's colour."""
+    """Give a region an empty annotation layer with its name and its shutter's color."""
     layer = annotation(effect).layers.new(region.name, set_active=True)
     layer.color = effect.shutters[region.shutter].color
     region.layer = layer.info
@@ -70,7 +75,7 @@ def new_layer(effect: PropertyGroup, region: PropertyGroup) -> AnnotationLayer:
 
 
 def remove_region(effect: PropertyGroup, index: int) -> None:
-    """Removes a region, its keys and its annotation layer."""
+    """Remove a region, its keyframes and its annotation layer."""
     layer = layer_of(effect, effect.regions[index])
     if layer is not None:
         effect.scene.annotation.layers.remove(layer)
@@ -82,13 +87,13 @@ def remove_region(effect: PropertyGroup, index: int) -> None:
 
 
 def move_region(effect: PropertyGroup, index: int, to: int) -> None:
-    """Moves a region in the list; later ones lie over earlier ones."""
+    """Move a region in the list. Later regions cover earlier ones."""
     fcurves.move_item(effect, "regions", index, to)
     effect.active_region = to
 
 
 def assign_region(effect: PropertyGroup, index: int, shutter: PropertyGroup) -> None:
-    """Gives a region to another shutter, which becomes the active one."""
+    """Assign a region to another shutter, which becomes active."""
     effect.regions[index].shutter = shutter.name
     color_layers(effect, shutter)
     effect.active_region = index
@@ -96,7 +101,7 @@ def assign_region(effect: PropertyGroup, index: int, shutter: PropertyGroup) -> 
 
 
 def take_layer(effect: PropertyGroup, shutter: PropertyGroup, layer: AnnotationLayer) -> PropertyGroup:
-    """A region of a shutter from any annotation layer, whose drawings are copied unless it is one of the effect's."""
+    """Make an annotation layer a region of a shutter. Layers of other annotations are copied."""
     own = effect.scene.annotation and layer.id_data == effect.scene.annotation
     region = add_region(effect, shutter, name=layer.info)
     copy = layer_of(effect, region)
@@ -110,11 +115,15 @@ def take_layer(effect: PropertyGroup, shutter: PropertyGroup, layer: AnnotationL
 
 
 def free_layers(effect: PropertyGroup, annotation: Annotation | None) -> list:
-    """Layers of an annotation that are no region yet."""
+    """Return the layers of an annotation that belong to no region."""
     taken = {region.layer for region in effect.regions} if annotation == effect.scene.annotation else set()
     return [layer for layer in annotation.layers if layer.info not in taken] if annotation else []
 
 
 def key_region(effect: PropertyGroup, index: int) -> None:
-    """Keys where the editor has put a region at the current frame. EffectError: it cannot be keyed."""
+    """Insert keyframes for a region's transform at the current frame.
+
+    Raises:
+        EffectError: it cannot be keyed.
+    """
     motion_keys.insert(effect, index)

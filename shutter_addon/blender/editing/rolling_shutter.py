@@ -1,10 +1,9 @@
-"""Rolling Shutter Repair: a sensor that is read row by row films each row at a moment of its own, and each is shown
-from another one in turn, so that all of them show what was there when the middle row was read.
+"""Repair a rolling shutter: a sensor that reads row by row films each row at another moment.
 
-A row that is read a part y of the readout after the first one is shown y - 1/2 of the readout earlier. Two shutters are
-open for a single frame each, the one before the shown one and the one behind it, and a ramp across the whole picture
-goes from the one to the other. By displacement its pixels' moments lie evenly in between. The ramp is larger than the
-picture, as a readout is shorter than two frames.
+A row that is read a fraction y of the readout after the first one is shown y - 1/2 of the readout earlier. Then all
+rows show the moment of the middle row. Two shutters are open for one frame each, before and after the shown one, and a
+ramp across the picture displaces between them. The ramp is larger than the picture, as a readout is shorter than two
+frames.
 """
 
 import math
@@ -19,22 +18,27 @@ from ...core.messages import EffectError
 from ...core.model.frame_state import Options
 from ...media import flow, readout
 from ...media.cuts import ShotSource
-from ..data import sampled, snapshot, source_media, strips, validation
+from ..data import snapshot, source_media, strips, validation
 from ..data.consistency import bars
-from ..data.fcurves import Curves
+from ..data.sampled import Sampling
 from . import bar_edits, region_edits, shutter_edits
 
-SMOOTH = "8"  # of effects that were not smooth
-FRAMES = 3  # of the window, at least: the shown one and those beside it
-LEAST = 0.02  # of a frame: a readout that is shorter, and found, is none
-# How the ramp is turned, in degrees, so that what is read first is at its end, which is shown from later.
+SMOOTH = "8"  # for effects that are not smooth
+FRAMES = 3  # least window: the shown frame and those beside it
+LEAST = 0.02  # fraction of a frame: shorter readouts count as none
+# Rotation of the ramp in degrees. What is read first lies at its end, which is shown from later.
 _TURNS = {"TOP": 90, "BOTTOM": -90, "LEFT": 180, "RIGHT": 0}
 _OPPOSITE = {"TOP": "BOTTOM", "BOTTOM": "TOP", "LEFT": "RIGHT", "RIGHT": "LEFT"}
 
 
 class Repair(NamedTuple):
-    """What an effect repairs. region: the index of its ramp; readout: from the first to the last row, as a share
-    of the time from a filmed frame to the next; side: that is read first, a key of choices.SIDES"""
+    """The repair of an effect.
+
+    Attributes:
+        region: index of its ramp.
+        readout: from the first to the last row, as a fraction of a filmed frame.
+        side: read first, a key of choices.SIDES.
+    """
 
     region: int
     readout: float
@@ -42,7 +46,7 @@ class Repair(NamedTuple):
 
 
 def of(effect: PropertyGroup) -> Repair | None:
-    """The repair that an effect has, however its shutters and its ramp are called; None: it has none."""
+    """Return the repair of an effect, whatever its shutters and ramp are named; None: it has none."""
     if effect.inbetween == "1" or not effect.shutters:
         return None
     default = _moment(effect.shutters[0])
@@ -59,22 +63,26 @@ def of(effect: PropertyGroup) -> Repair | None:
 
 
 def _moment(shutter: PropertyGroup) -> float:
-    """The middle of a shutter's open time, in bars from the middle of the first; none: it is never open."""
+    """Return the middle of a shutter's open time, in bars from the middle of the first one; NaN: it is never open."""
     weights = bars(shutter)
     return float((weights * np.arange(len(weights))).sum() / weights.sum()) if weights.any() else math.nan
 
 
 def _shown(effect: PropertyGroup) -> int:
-    """The bar of the shown frame."""
+    """Return the bar of the shown frame."""
     return Options(validation.number(effect, "window"), position="center").before
 
 
 def repair(scene: Scene, effect: PropertyGroup, strip: Strip, share: float, side: str) -> None:
-    """Repairs the readout of an effect's source, or changes the repair that it has.
+    """Repair the readout of an effect's source, or change its repair.
 
-    share: as Repair.readout, 0 to 1; side: likewise
-    EffectError: there is no room for it. MediaError: the footage cannot be read, or OpenCV is missing. Nothing has
-    changed then."""
+    Args:
+        share: see Repair.readout.
+        side: see Repair.side.
+
+    Raises:
+        EffectError, MediaError: it has no room, the footage cannot be read, or OpenCV is missing. Nothing has changed.
+    """
     backward = _is_backward(scene, effect, strip)
     known = of(effect)
     if known is None and (sentence := region_edits.why_full(effect, regions=1, shutters=2)):
@@ -85,7 +93,11 @@ def repair(scene: Scene, effect: PropertyGroup, strip: Strip, share: float, side
     if effect.inbetween == "1":
         effect.inbetween = SMOOTH
     shown = _shown(effect)
-    region = _begin(effect) if known is None else effect.regions[known.region]
+    if known is None:
+        names = (data_("Earlier"), "ANGLE_360"), (data_("Later"), "ANGLE_360")
+        region = shutter_edits.ramp_between(effect, *names, name=data_("Rolling Shutter"), ramp="LINEAR")
+    else:
+        region = effect.regions[known.region]
     region.rotation, region.scale = math.radians(_TURNS[side]), 2 / share
     region.location, region.opacity, region.invert, region.blend = (0, 0), 1.0, False, "OVER"
     earlier, later = effect.shutters[0], effect.shutters[region.shutter]
@@ -98,23 +110,20 @@ def repair(scene: Scene, effect: PropertyGroup, strip: Strip, share: float, side
 
 
 def _is_backward(scene: Scene, effect: PropertyGroup, strip: Strip) -> bool:
-    """Whether the source runs backward at the current frame: its next frames are those that were filmed before."""
+    """Return whether the source runs backward at the current frame."""
     frame = scene.frame_current
-    if effect.use_source_time:
-        time = sampled.source_time(Curves(scene), effect.path_from_id(), effect, (frame,))
+    if (time := Sampling.of(scene, effect, strip, (frame,)).time) is not None:
         return bool(time.at(frame)[1])
     return bool(source_media.timing_of(strips.source_of(scene, effect, strip)).use_reverse_frames)
 
 
-def _begin(effect: PropertyGroup) -> PropertyGroup:
-    """The two shutters, the first of which is the default, and the ramp; which is returned."""
-    earlier, later = (data_("Earlier"), "ANGLE_360"), (data_("Later"), "ANGLE_360")
-    return shutter_edits.ramp_between(effect, earlier, later, data_("Rolling Shutter"), "LINEAR")
-
-
 def share_of(scene: Scene, effect: PropertyGroup, strip: Strip, milliseconds: float) -> float:
-    """What share of the time from a filmed frame to the next a time is. EffectError: it is longer than that.
-    MediaError: the footage cannot be read."""
+    """Convert milliseconds to a fraction of a filmed frame.
+
+    Raises:
+        EffectError: it is longer than a frame.
+        MediaError: the footage cannot be read.
+    """
     with source_media.open_media(strips.source_of(scene, effect, strip)) as medium:
         rate = float(medium.fps or scene.render.fps / scene.render.fps_base)
     share = milliseconds * rate / 1000
@@ -125,9 +134,15 @@ def share_of(scene: Scene, effect: PropertyGroup, strip: Strip, milliseconds: fl
 
 
 def find(scene: Scene, effect: PropertyGroup, strip: Strip, side: str) -> tuple[readout.Readout, str]:
-    """The readout of an effect's source, by what it shows around the current frame; and the side that is read first:
-    that one, or the one across. EffectError: it cannot be found, and why, or there is none. MediaError: the footage
-    cannot be read."""
+    """Find the readout of a source around the current frame, and the side that is read first.
+
+    Args:
+        side: any side of the direction in which the sensor reads.
+
+    Raises:
+        EffectError: there is none, or it cannot be found.
+        MediaError: the footage cannot be read.
+    """
     frame = scene.frame_current
     index = snapshot.source_frames(scene, effect, strip, (frame,))[frame]
     with ShotSource(source_media.open_media(strips.source_of(scene, effect, strip))) as medium:
@@ -141,6 +156,6 @@ def find(scene: Scene, effect: PropertyGroup, strip: Strip, side: str) -> tuple[
             sentence = rpt_("the readout cannot be found here: {why}")
             raise EffectError(sentence.format(why=rpt_(str(error)))) from None
     if abs(found.share) < LEAST:
-        raise EffectError(rpt_("lines stand upright however they move: there is no rolling shutter to repair"))
+        raise EffectError(rpt_("moving lines stay upright: there is no rolling shutter to repair"))
     first = "TOP" if side in ("TOP", "BOTTOM") else "LEFT"
     return found, first if found.share > 0 else _OPPOSITE[first]

@@ -1,9 +1,8 @@
-"""Which annotation the previews show: that of the effect that is seen, none where none is seen, and never another one
-in place of one that the user made. Blender shows an effect's while the pen is down alone: it has it as it was drawn, at
-whatever frame, and our draw handler where it is now.
+"""Show the annotation of the visible effect in previews, and leave the user's own annotations alone.
 
-A sequencer keeps its annotation in every one of its spaces, those too that lie behind another editor or in a workspace
-that is not shown: each is a user of it, and would bring it into the saved file.
+Blender shows an effect's annotation only while the pen is down, because it ignores that strokes move. Otherwise our
+draw handler draws it. Every sequencer space keeps an annotation, even in hidden editors and workspaces. It is a user of
+the annotation, and would save it in the file.
 """
 
 from __future__ import annotations
@@ -17,12 +16,12 @@ from ..data import selection
 from ..data.annotations import USERS
 from ..rendering import previews
 
-_emptied: set[int] = set()  # addresses of spaces whose annotation was an effect's, until none was seen or it went
-_shown: dict[int, bool] = {}  # by such an address, whether the user's own annotations are shown there
+_emptied: set[int] = set()  # addresses of spaces from which an effect's annotation was removed
+_shown: dict[int, bool] = {}  # by address: whether the user's annotations are visible there
 
 
 def follow() -> None:
-    """Previews that are shown, and have an effect's scribbles, get those of the effect that is seen."""
+    """Give the visible effect's annotation to open previews that have another effect's."""
     for window in bpy.data.window_managers[0].windows:
         seen = selection.seen(window.workspace.sequencer_scene or window.scene)
         for area in window.screen.areas:
@@ -33,13 +32,17 @@ def follow() -> None:
 
 
 def is_laid_wrong(space: SpaceSequenceEditor) -> bool:
-    """Whether Blender shows an effect's annotation in a preview without the pen, or does not with it."""
+    """Return whether a preview shows an effect's annotation without the pen, or hides it with the pen."""
     is_effects = space.annotation is not None and is_own(space.annotation)
     return is_effects and space.preview_overlay.show_annotation != previews.pen_is_down()
 
 
 def is_other(space: SpaceSequenceEditor, seen: tuple | None) -> bool:
-    """Whether a preview has to get another annotation, for what selection.seen has found in its scene."""
+    """Return whether a preview needs another annotation.
+
+    Args:
+        seen: result of selection.seen for its scene.
+    """
     wanted = seen[1].scene.annotation if seen else None
     if space.annotation is None:
         return wanted is not None and space.as_pointer() in _emptied
@@ -47,16 +50,15 @@ def is_other(space: SpaceSequenceEditor, seen: tuple | None) -> bool:
 
 
 def is_own(made: ID) -> bool:
-    """Whether an annotation, or a camera, was made for an effect."""
+    """Return whether an annotation or camera was made for an effect."""
     return made.virtual_shutter_made not in ("", USERS)
 
 
 def give(space: SpaceSequenceEditor, annotation: Annotation | None) -> None:
-    """Makes an effect's annotation that of a preview; one of the user's goes on without it. None: takes it away until
-    an effect is seen."""
+    """Give a preview an effect's annotation; None: remove it until an effect is visible."""
     before = space.annotation
     if before is not None and annotation is not None and not is_own(before):
-        before.use_fake_user = True  # or it would not be saved
+        before.use_fake_user = True  # keeps the user's annotation in the file
     if before is None or not is_own(before):
         _shown[space.as_pointer()] = space.preview_overlay.show_annotation
     if annotation is None:
@@ -66,21 +68,21 @@ def give(space: SpaceSequenceEditor, annotation: Annotation | None) -> None:
 
 
 def let_go(annotation: ID) -> None:
-    """Takes an annotation away from all previews."""
+    """Remove an annotation from all previews."""
     for space in _spaces():
         if space.annotation == annotation:
             give(space, None)
 
 
 def before_undo(*_: object) -> None:
-    """Notes where scribbles are shown: Blender takes away what undo removes, and does not give it back."""
+    """Note which previews show strokes. Blender removes undone annotations from them without restoring them."""
     for space in _spaces():
         if space.annotation is not None and is_own(space.annotation):
             _emptied.add(space.as_pointer())
 
 
 def forget() -> None:
-    """Forgets the previews of a file, before another one is loaded."""
+    """Forget all previews before another file is loaded."""
     _emptied.clear()
     _shown.clear()
 

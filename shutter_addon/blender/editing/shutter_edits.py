@@ -1,8 +1,6 @@
-"""An effect's shutters: added, duplicated, removed, moved; and time maps, of which every pixel shows its own moment of
-the window, as a ramp or a matte says.
+"""Edit an effect's shutters: add, duplicate, remove, move, time maps.
 
-What one click makes of a subject that is drawn, or has a matte: it becomes a layer, which leaves no ghost. And of
-footage that was held in the hand: an exposure for which the camera stands still.
+And operators of one click: subjects as layers without ghosts, and exposures that follow a region or the camera.
 """
 
 import numpy as np
@@ -19,10 +17,10 @@ from . import bar_edits, track_region
 from .motion_keys import MotionKeys
 from .region_edits import add_region, assign_region, remove_region
 
-SMOOTHNESS = 6  # frames before and after each: half a second in all
+SMOOTHNESS = 6  # frames before and after each: half a second
 
-# Told apart by eyes that lack red, green or blue cones: seven by Okabe and Ito (https://jfly.uni-koeln.de/color), then
-# three that lie farthest from these to all eyes.
+# Distinct for color-blind people: seven by Okabe and Ito (https://jfly.uni-koeln.de/color), and the three farthest from
+# them for all eyes.
 COLORS = (
     (0.337, 0.706, 0.914),
     (0.902, 0.624, 0.0),
@@ -41,11 +39,11 @@ COLORS = (
 
 
 def start(effect: PropertyGroup) -> None:
-    """What a new effect begins with: a long shutter everywhere, and a sharp one to scribble with.
+    """Set up a new effect: a long shutter everywhere, and a sharp one for strokes.
 
-    With the border, the first scribble is sharp around itself; without, it would be the only one, and hold everywhere.
-    Streaks keep their length up to the clip's ends, and are smooth where OpenCV finds moments between frames. A recipe
-    says so itself, and older files have another default.
+    With *Border*, the first stroke is sharp only around itself instead of everywhere. Streaks keep their length at the
+    ends of the clip, and are smooth if OpenCV is installed. Recipes set this themselves, and older files have other
+    defaults.
     """
     effect.border, effect.edges = True, "SLIDE"
     effect.inbetween = "1" if opencv.cv2 is None else "AUTO"
@@ -54,8 +52,11 @@ def start(effect: PropertyGroup) -> None:
 
 
 def add_shutter(effect: PropertyGroup, name: str = "", preset: str = "ANGLE_360") -> PropertyGroup:
-    """Appends a shutter, fully open unless another preset is given, and makes it the active one. EffectError: the
-    window has no length, and nothing has changed."""
+    """Append a shutter and make it active.
+
+    Raises:
+        EffectError: the window has no length. Nothing has changed.
+    """
     color = _free_color(effect)
     validation.number(effect, "window")
     shutter = effect.shutters.add()
@@ -66,8 +67,14 @@ def add_shutter(effect: PropertyGroup, name: str = "", preset: str = "ANGLE_360"
 
 
 def apply_preset(effect: PropertyGroup, index: int, preset: str, key: bool = False) -> None:
-    """Gives a shutter the bars of a preset, which it keeps to (consistency.preset_of); key: keys them at the current
-    frame. EffectError: the window has no length, and nothing has changed."""
+    """Give a shutter the bars of a preset, which it keeps (consistency.preset_of).
+
+    Args:
+        key: insert keyframes at the current frame.
+
+    Raises:
+        EffectError: the window has no length. Nothing has changed.
+    """
     shutter, window = effect.shutters[index], validation.number(effect, "window")
     shutter.preset, shutter.preset_position = preset, effect.position
     weights = shutters.preset_bars(preset, window, effect.position.lower())
@@ -75,18 +82,18 @@ def apply_preset(effect: PropertyGroup, index: int, preset: str, key: bool = Fal
 
 
 def _free_color(effect: PropertyGroup) -> tuple[float, float, float]:
-    """The first colour that no shutter has; where all are taken, they begin anew."""
+    """Return the first unused color. If all are used, they repeat."""
     used = np.array([shutter.color for shutter in effect.shutters]).reshape(-1, 3)
     free = [color for color in COLORS if not np.isclose(used, color, atol=1e-3).all(axis=1).any()]
     return free[0] if free else COLORS[len(used) % len(COLORS)]
 
 
 def duplicate_shutter(effect: PropertyGroup, index: int) -> PropertyGroup:
-    """A copy of a shutter, with its keys, behind it; regions stay with the original."""
+    """Add a copy of a shutter with its keyframes after it. Its regions stay with the original."""
     scene, path, color = effect.id_data, f"{effect.path_from_id()}.shutters", _free_color(effect)
     last, new = len(effect.shutters), effect.shutters.add()
     property_copy.copy_properties(effect.shutters[index], new)
-    new.name, new.color = new.name, color  # a name that is taken gets a number as it is set
+    new.name, new.color = new.name, color  # setting a used name adds a number
     fcurves.copy_curves(scene, f"{path}[{index}].", scene, f"{path}[{last}].")
     move_shutter(effect, last, index + 1)
     effect.active_shutter = index + 1
@@ -94,8 +101,14 @@ def duplicate_shutter(effect: PropertyGroup, index: int) -> PropertyGroup:
 
 
 def follow(effect: PropertyGroup, index: int, subject: str, key: bool) -> None:
-    """Has a shutter follow its region ("REGION") or the camera ("CAMERA"), open for a whole window that lies around the
-    frame; key: keys the bars at the current frame. EffectError: the window has no length, and nothing has changed."""
+    """Make a shutter follow its region ("REGION") or the camera ("CAMERA"), fully open around the frame.
+
+    Args:
+        key: insert keyframes for its bars.
+
+    Raises:
+        EffectError: the window has no length. Nothing has changed.
+    """
     apply_preset(effect, index, "ANGLE_360", key)
     shutter = effect.shutters[index]
     shutter.follow, shutter.length, effect.position = subject, "FRAMES", "CENTER"
@@ -103,7 +116,7 @@ def follow(effect: PropertyGroup, index: int, subject: str, key: bool) -> None:
 
 
 def remove_shutter(effect: PropertyGroup, index: int) -> None:
-    """Removes a shutter, its keys and its regions. The first of those that remain is the default."""
+    """Remove a shutter, its keyframes and its regions. The first remaining one is the default."""
     name = effect.shutters[index].name
     for i in reversed([i for i, region in enumerate(effect.regions) if region.shutter == name]):
         remove_region(effect, i)
@@ -112,16 +125,20 @@ def remove_shutter(effect: PropertyGroup, index: int) -> None:
 
 
 def move_shutter(effect: PropertyGroup, index: int, to: int) -> None:
-    """Moves a shutter in the list; whichever comes first is the default."""
+    """Move a shutter in the list. The first one is the default."""
     fcurves.move_item(effect, "shutters", index, to)
     effect.active_shutter = to
 
 
 def add_time_map(effect: PropertyGroup, ramp: str) -> PropertyGroup:
-    """Gives an effect two shutters, that show the first and the last frame of its window, the first one everywhere, and
-    a ramp from one to the other; the ramp's region, which is the active one then.
+    """Add two shutters that show the first and last frame of the window, and a ramp between them, which is returned.
 
-    ramp: one of properties.RAMPS. EffectError: the window has no length, and nothing has changed."""
+    Args:
+        ramp: a word of choices.RAMPS.
+
+    Raises:
+        EffectError: the window has no length. Nothing has changed.
+    """
     region = ramp_between(effect, (data_("First"), "FIRST"), (data_("Last"), "LAST"), data_("Time Map"), ramp)
     effect.interpolation = "DISPLACEMENT"
     return region
@@ -130,7 +147,7 @@ def add_time_map(effect: PropertyGroup, ramp: str) -> PropertyGroup:
 def ramp_between(
     effect: PropertyGroup, first: tuple[str, str], last: tuple[str, str], name: str, ramp: str
 ) -> PropertyGroup:
-    """Adds two shutters, by name and preset, the first of which is the default, and the ramp between them."""
+    """Add two shutters, by name and preset, and a ramp between them. The first one becomes the default."""
     add_shutter(effect, *first)
     move_shutter(effect, effect.active_shutter, 0)
     return add_region(effect, add_shutter(effect, *last), "RAMP", name, ramp=ramp)
@@ -140,36 +157,47 @@ def ramp_between(
 
 
 def sharp_subject(effect: PropertyGroup, index: int, key: bool = False) -> None:
-    """A region is sharp before all else, which is exposed for a whole window around the frame. key: keys the bars."""
-    place = _as_layer(effect, index)
-    apply_preset(effect, place, "STILL", key)
+    """Make a region a sharp layer in front of a long exposure.
+
+    Args:
+        key: insert keyframes for the bars.
+    """
+    apply_preset(effect, _as_layer(effect, index), "STILL", key)
     apply_preset(effect, 0, "ANGLE_360", key)
 
 
 def clean_trail(effect: PropertyGroup, index: int, key: bool = False) -> None:
-    """A region leaves a trail, over a whole window around the frame, before all else, which is sharp. key: keys the
-    bars."""
-    place = _as_layer(effect, index)
-    apply_preset(effect, place, "ANGLE_360", key)
+    """Make a region a layer with a long exposure in front of a sharp background.
+
+    Args:
+        key: insert keyframes for the bars.
+    """
+    apply_preset(effect, _as_layer(effect, index), "ANGLE_360", key)
     apply_preset(effect, 0, "STILL", key)
 
 
 def panning_shot(effect: PropertyGroup, index: int, key: bool = False) -> None:
-    """As sharp_subject; and the exposure of all else moves with the region, as a camera's that pans with it. key: keys
-    the bars."""
+    """Make a region a sharp layer, and make the other exposure move with it, like a panning camera.
+
+    Args:
+        key: insert keyframes for the bars.
+    """
     sharp_subject(effect, index, key)
     region = effect.regions[index]
     region.name = unique(region.name, {other.name for other in effect.regions if other != region})
     follow(effect, 0, "REGION", key)
     default = effect.shutters[0]
     default.follow_region = region.name
-    # Turns and scales of a small subject are unsure, and whirl what is far from it; and a camera on its head has mass.
+    # Rotation and scale of a small subject are uncertain and would whirl distant pixels. A real camera pans smoothly.
     default.follow_motion, default.follow_smooth = "LOCATION", SMOOTHNESS
 
 
 def can_pan(scene: Scene, effect: PropertyGroup, strip: Strip, index: int) -> bool:
-    """Whether a region has keys of motion, and those that were tracked reach the current frame; without, it has to be
-    tracked before its panning shot. EffectError: it has keys, and no strokes that could be followed."""
+    """Return whether a region has a motion that reaches the current frame. Otherwise *Panning Shot* tracks it first.
+
+    Raises:
+        EffectError: it has keyframes, but no strokes to follow.
+    """
     if not MotionKeys(effect, index, "SCALE").reach(scene.frame_current):
         return False
     if not snapshot.strokes_at(scene, effect, strip, index, scene.frame_current):
@@ -178,27 +206,37 @@ def can_pan(scene: Scene, effect: PropertyGroup, strip: Strip, index: int) -> bo
 
 
 def can_stand(effect: PropertyGroup) -> bool:
-    """Whether the camera has keys of motion, and those that were tracked reach the current frame, whose shot may be
-    another one; without, it has to be tracked before it stands still."""
+    """Return whether the camera has a motion that reaches the current frame, which may be in another shot.
+
+    Otherwise *Stabilize Exposure* tracks it first.
+    """
     return MotionKeys(effect, None, "SCALE").reach(effect.id_data.frame_current)
 
 
 def tripod(effect: PropertyGroup, key: bool = False) -> None:
-    """Has the active shutter follow the camera, open for a whole window that lies around the frame. Where it has no
-    region, and so holds nowhere, the default one takes its place.
+    """Make the active shutter follow the camera, fully open around the frame.
 
-    key: keys the bars at the current frame. EffectError: the window has no length, and nothing has changed."""
+    Without a region it covers nothing, so the default shutter is used instead.
+
+    Args:
+        key: insert keyframes for the bars.
+
+    Raises:
+        EffectError: the window has no length. Nothing has changed.
+    """
     index, name = effect.active_shutter, effect.shutters[effect.active_shutter].name
     if not any(region.shutter == name for region in effect.regions):
         index = 0
     follow(effect, index, "CAMERA", key)
     effect.active_shutter = index
-    track_region.key_ends(effect, None)  # the window lies elsewhere now
+    track_region.key_ends(effect, None)  # the window has moved
 
 
 def _as_layer(effect: PropertyGroup, index: int) -> int:
-    """Makes a region a layer of a shutter of its own, which moves with nothing, as the default one; the place of that
-    shutter."""
+    """Make a region a layer whose shutter has no other region, and return the index of that shutter.
+
+    Neither this nor the default shutter follows anything.
+    """
     region = effect.regions[index]
     place = effect.shutters.find(region.shutter)
     if place <= 0 or any(other.shutter == region.shutter for other in effect.regions if other != region):

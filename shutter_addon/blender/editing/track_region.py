@@ -1,7 +1,7 @@
-"""A region, or the camera, that is tracked through what its strip shows, from where it is at the current frame on.
+"""Track a region or the camera through its strip, from its place at the current frame.
 
-What is tracked has an index (see selection.moving). A key comes with every frame that is tracked, so that the preview
-can go along; at the end they are thinned to those that the motion needs within a pixel of the picture.
+An index tells what is tracked (see selection.moving). Each tracked frame gets a keyframe, so that the preview shows it.
+At the end, only keyframes that the motion needs within a pixel remain.
 """
 
 import math
@@ -32,22 +32,26 @@ from ..rendering import effect_source
 from . import motion_keys
 from .motion_keys import MotionKeys
 
-_replaced = revision.Revision()  # Blender's data, by undo or by another file
+_replaced = revision.Revision()  # of Blender's data, by undo or another file
 
 
 def data_replaced() -> None:
-    """Ends all tracking, without another key: what it has found belongs to data that is gone."""
+    """End all tracking without another keyframe, because its data is gone."""
     _replaced.changed()
 
 
 @dataclass(frozen=True)
 class Target:
-    """What is tracked: found again before each step, as anything may happen to Blender's data in between.
+    """What is tracked. It is looked up before each step, because Blender's data may have changed.
 
-    scene: session_uid of the effect's scene; known: what would change if another region took its place"""
+    Attributes:
+        scene: session_uid of the effect scene.
+        index: see selection.moving.
+        known: differs if another region has taken its place.
+    """
 
     scene: int
-    index: Any  # as for selection.moving
+    index: Any
     known: tuple
 
     @classmethod
@@ -55,7 +59,7 @@ class Target:
         return cls(effect.scene.session_uid, index, cls._known(effect, index))
 
     def effect(self) -> PropertyGroup | None:
-        """The effect, or None: it is gone, has another region there, lies elsewhere, or something was undone."""
+        """Return the effect; None: it is gone, moved, or undone, or another region has this index."""
         effects = (effect for scene in bpy.data.scenes for effect in scene.virtual_shutter.effects if effect.scene)
         effect = next((effect for effect in effects if effect.scene.session_uid == self.scene), None)
         is_there = effect is not None and (self.index is None or self.index < len(effect.regions))
@@ -68,12 +72,18 @@ class Target:
 
 
 def frames_to_track(scene: Scene, strip: Strip, direction: str, until: int = 0) -> range:
-    """The timeline frames from the current one FORWARD, BACKWARD or in BOTH directions: as far as the strip goes, and
-    not beyond the frame `until`, unless that is 0. EffectError: the current one is none of the strip's, or `until` does
-    not lie in that direction."""
+    """Return the timeline frames to track from the current one, up to the ends of the strip or the frame `until`.
+
+    Args:
+        direction: FORWARD, BACKWARD or BOTH.
+        until: 0: the end of the strip.
+
+    Raises:
+        EffectError: the current frame is outside of the strip, or `until` is not in this direction.
+    """
     current, first, last = scene.frame_current, strip.left_handle, strip.right_handle - 1
     if not first <= current <= last:
-        raise EffectError(rpt_("the current frame is outside of the Shutter strip"))
+        raise EffectError(rpt_("the current frame is outside the Shutter strip"))
     if until and (until == current or direction == ("BACKWARD" if until > current else "FORWARD")):
         sentence = rpt_("Until is frame {frame}, which does not lie in that direction; 0 is the end of the strip")
         raise EffectError(sentence.format(frame=until))
@@ -95,13 +105,19 @@ def track(
     all_keys: bool = False,
     patience: float | None = None,
 ) -> Generator[int | None, None, None]:
-    """Tracks a region or the camera from the current frame through timeline frames (frames_to_track). Gives each frame
-    once it is keyed. Closed early, it keeps what it has. It ends without another key where the region is not there any
-    more.
+    """Track a region or the camera from the current frame through timeline frames (frames_to_track).
 
-    motion: one of properties.MOTIONS; all_keys: keys are not thinned; patience: seconds after which None is given
-    where no frame was tracked yet, so that Blender goes on; None: it is waited for
-    EffectError, MediaError: it cannot be tracked; where no frame has come yet, nothing has changed."""
+    Yield each frame after it is keyed. Closing the generator early keeps the tracked frames. It ends if the region is
+    gone.
+
+    Args:
+        motion: a word of choices.MOTIONS.
+        all_keys: keep a keyframe at each frame.
+        patience: seconds after which None is yielded while no frame is ready; None: wait.
+
+    Raises:
+        EffectError, MediaError: it cannot be tracked. If no frame has been yielded, nothing has changed.
+    """
     moving = selection.moving(effect, index)
     validation.check_moving(moving)
     motion_keys.check_curves(effect, index)
@@ -115,7 +131,7 @@ def track(
         min((a for a in anchors if a > start), default=frames[-1]),
     )
     shown, target = snapshot.take(scene, effect, strip, frames), Target.of(effect, index)
-    del scene, effect, strip, keys, moving  # which may not outlive the first step
+    del scene, effect, strip, keys, moving  # these may become invalid after the first step
     with effect_source.open_source(shown) as source:
         try:
             clip = effect_source.clip_of(shown, source)
@@ -146,30 +162,32 @@ def track(
                 _mark(effect, index, tracked, stops, reach)
                 key_ends(effect, index)
                 if index is not None:
-                    effect.regions[index].follow_stamp = ""  # what it followed would undo this
+                    effect.regions[index].follow_stamp = ""  # updating from a track would undo this
     if len(tracked) == 1:
         raise EffectError(rpt_(stops[0].fault))
 
 
 def stops(effect: PropertyGroup, index: int | None) -> list[tuple[int, str, bool]]:
-    """The timeline frames at which tracking stopped, ascending, why, in the user's language, and whether that is a
-    fault: the end of a shot is none."""
+    """Return where tracking stopped: timeline frame, reason in the user's language, and whether it is a fault.
+
+    The end of a shot is no fault. Frames are ascending.
+    """
     return sorted((frame, rpt_(stop.fault), stop.fault != tracking.SHOT_ENDS) for frame, stop in _stops(effect, index))
 
 
 def _stops(effect: PropertyGroup, index: int | None) -> list[tuple[int, PropertyGroup]]:
-    """By timeline frame, where tracking stopped."""
+    """Return the stops of tracking with their timeline frames."""
     known = [(effect.start + stop.frame, stop) for stop in selection.moving(effect, index).stops]
     return [(round(frame), stop) for frame, stop in known if math.isfinite(frame)]
 
 
 def gaps(effect: PropertyGroup, index: int | None) -> list[presence.Gap]:
-    """The timeline frames without a track, from its ends on, ascending."""
+    """Return the ranges of timeline frames without a track, ascending."""
     return presence.gaps(*_track(effect, index))
 
 
 def _track(effect: PropertyGroup, index: int | None) -> tuple[list[int], list[presence.Stop]]:
-    """The timeline frames at which it was found, and where its track ended."""
+    """Return the timeline frames with a track, and where it ended."""
     frames, confidence = MotionKeys(effect, index, "LOCATION").confidence()
     seen = np.round(frames[confidence > 0]).astype(int).tolist()
     ends = [presence.Stop(at, stop.forward, stop.fault == tracking.SHOT_ENDS) for at, stop in _stops(effect, index)]
@@ -177,8 +195,7 @@ def _track(effect: PropertyGroup, index: int | None) -> tuple[list[int], list[pr
 
 
 def key_ends(effect: PropertyGroup, index: int | None) -> None:
-    """Keys how much it counts by where its track ends, or takes such keys back; an outline's matte itself says where it
-    is."""
+    """Key the influence where the track ends, or remove such keyframes. An outline needs none."""
     keys, (seen, stops), fades = MotionKeys(effect, index, "SCALE"), _track(effect, index), []
     has_matte = index is not None and effect.regions[index].kind in strips.LAID
     if selection.moving(effect, index).track_ends and seen and not has_matte:
@@ -190,19 +207,19 @@ def key_ends(effect: PropertyGroup, index: int | None) -> None:
 
 
 def _reach(effect: PropertyGroup) -> int:
-    """The frames over which the camera's influence fades: so no exposure reaches one whose motion nobody knows."""
+    """Return the frames of the camera's fade, so that no exposure reaches frames with unknown motion."""
     window, position = validation.number(effect, "window"), validation.word(effect, "position").lower()
     return max(Options(window=window, position=position).reach, presence.FADE)
 
 
 def confidence_at(effect: PropertyGroup, index: int | None, frame: float) -> float | None:
-    """How sure tracking was of a timeline frame, 0 to 1; None: it did not come there."""
+    """Return the tracking confidence at a timeline frame, 0 to 1; None: it was not tracked."""
     frames, confidence = MotionKeys(effect, index, "LOCATION").confidence()
     return next(iter(confidence[frames == frame].tolist()), None)
 
 
 def next_unsure(effect: PropertyGroup, index: int | None, frame: float) -> int | None:
-    """The least sure timeline frame of the first stretch of unsure ones that begins after a frame, or None."""
+    """Return the least confident frame of the next stretch of unsure frames, or None."""
     frames, confidence = MotionKeys(effect, index, "LOCATION").confidence()
     unsure = (frames <= limits.MAX_FRAME) & (confidence < pursuit.SURE)
     begins = np.flatnonzero(unsure & ~np.append(False, unsure[:-1]) & (frames > frame))
@@ -213,18 +230,16 @@ def next_unsure(effect: PropertyGroup, index: int | None, frame: float) -> int |
 
 
 def lost(effect: PropertyGroup, index: int | None) -> tuple[int, str] | None:
-    """The timeline frame from which on tracking is not sure for long, and what it says of that, in the user's language;
-    None: there is none."""
+    """Return the timeline frame where tracking lost the subject, and a note in the user's language, or None."""
     frame = pursuit.lost(*MotionKeys(effect, index, "LOCATION").confidence())
     if frame is None:
         return None
     words = rpt_(
-        "Track lost the subject at frame {frame}: move the region back onto it, there or where it is seen again, or"
-        " outline it"
+        "Tracking lost the subject at frame {frame}: move the region back onto it, there or later, or outline it"
     )
     if index is None:
         words = rpt_(
-            "From frame {frame} on, near and far move differently, or too little is seen: not all can be held still"
+            "From frame {frame} on, near and far move differently or too little is visible: not all can be stabilized"
         )
     return frame, words.format(frame=frame)
 
@@ -232,7 +247,7 @@ def lost(effect: PropertyGroup, index: int | None) -> tuple[int, str] | None:
 def _subject(
     scene: Scene, effect: PropertyGroup, strip: Strip, index: int | None, frames: Sequence[int], here: Tracked
 ) -> tuple[Region | Camera, Callable]:
-    """A region or the camera as plain data, and what follows it: a function as tracking.Track.follow."""
+    """Return a region or the camera as plain data, and the function that follows it, like tracking.Track.follow."""
     if index is None:
         camera = _standing(snapshot.camera_at(scene, effect, frames), here)
         drawn = [i for i, region in enumerate(effect.regions) if region.kind not in strips.MATTES]
@@ -249,7 +264,7 @@ def _subject(
 
 
 def _standing(moving: Any, here: Tracked) -> Any:
-    """A region or the camera, which is where the editor has put it, keyed or not."""
+    """Return a region or the camera with the place that the user has set, keyed or not."""
     sampled = {
         name: replace(channel, values=channel.values | {here.frame: getattr(here.placement, name)})
         for name, channel in vars(moving.moves).items()
@@ -259,8 +274,11 @@ def _standing(moving: Any, here: Tracked) -> Any:
 
 
 def _followed(follow: Callable, patience: float | None) -> Iterator[Tracked | None]:
-    """What `follow` gives, a tracking.Track.follow with all it takes, found by a thread beside Blender
-    (threads.beside); its sentences are in the user's language."""
+    """Yield what `follow` finds on a thread (threads.beside), with errors in the user's language.
+
+    Args:
+        follow: a tracking.Track.follow with its arguments.
+    """
     with translated(rpt_):
         try:
             with closing(threads.beside(_each(follow), patience)) as steps:
@@ -280,10 +298,11 @@ def _write(keys: MotionKeys, kept: Iterable[Tracked], tracked: Iterable[Tracked]
 def _mark(
     effect: PropertyGroup, index: int | None, tracked: dict[int, Tracked], stops: list[Tracked], reach: tuple[int, int]
 ) -> None:
-    """Notes where tracking stopped, in place of what was noted of frames that it came through, and of those behind a
-    stop up to where it was to go.
+    """Note where tracking stopped, and remove older stops of the frames that it passed or was to reach.
 
-    reach: the first and the last frame that it was to track"""
+    Args:
+        reach: first and last frame to track.
+    """
     moving, start = selection.moving(effect, index), next(iter(tracked))
     ways = {stop.frame > start for stop in stops}
     first, last = reach[0] if False in ways else min(tracked), reach[1] if True in ways else max(tracked)

@@ -1,7 +1,6 @@
-"""Effects kept in memory: removed ones, so that a strip which is cut and pasted gets its effect back, and the one that
-Copy Effect took.
+"""Effects in memory: removed ones, for strips that are cut and pasted, and the one that *Copy Effect* took.
 
-Blender's clipboard holds a Scene strip without its scene, and outlives the file that the strip was cut from.
+Blender's clipboard has Scene strips without their scenes, and outlives the file.
 """
 
 from __future__ import annotations
@@ -15,19 +14,19 @@ from ..data.annotations import annotation
 from . import add_effect, match_source
 
 _MOST = 64
-_COPIED = "copied"  # in place of an identity
-_OWN = {"name", "identity", "source", "start"}  # of an effect, what stays where another one is pasted over it
+_COPIED = "copied"  # key of the copied effect
+_OWN = {"name", "identity", "source", "start"}  # properties of an effect that pasting keeps
 _effects: Kept[str, dict] = Kept()
 
 
 def keep(effect: PropertyGroup) -> None:
-    """Keeps an effect that is about to be removed, under its scene's identity: properties, F-curves, annotations."""
+    """Keep a removed effect under its identity, with its properties, F-curves and annotation."""
     if effect.scene is not None and effect.scene.virtual_shutter.identity:
         _keep(effect.scene.virtual_shutter.identity, effect)
 
 
 def copy(effect: PropertyGroup, strip: Strip) -> None:
-    """Keeps an effect, as its strip shows it, for `paste`."""
+    """Keep an effect for `paste`."""
     first, skipped, places = strip.left_handle, strips.skipped(strip), match_source.places(effect, strip)
     _keep(_COPIED, effect, first=first, skipped=skipped, places=places)
 
@@ -37,13 +36,15 @@ def has_copy() -> bool:
 
 
 def forget_copy() -> None:
-    """Keeps no copied effect any more: before another file is loaded, which has not the images that it points to."""
+    """Forget the copied effect. It points to images of a file, which is about to be closed."""
     _effects.pop(_COPIED, None)
 
 
 def paste(effect: PropertyGroup, strip: Strip) -> None:
-    """Replaces an effect's shutters, regions, keys and options by those of the copied one. Frames count from the first
-    that a strip shows; drawings lie on the picture as they did."""
+    """Replace an effect's shutters, regions, keyframes and options with the copied ones.
+
+    Frames count from the first frame of a strip. Drawings keep their place on the picture.
+    """
     data, scene = _effects[_COPIED], effect.id_data
     recipe_import.clear(scene, effect)
     _restore(scene, effect, data, {name: value for name, value in data["effect"].items() if name not in _OWN})
@@ -77,12 +78,12 @@ def _keep(identity: str, effect: PropertyGroup, **more: object) -> None:
 
 
 def forget() -> None:
-    """Keeps nothing any more: when the extension goes."""
+    """Forget all effects when the extension is disabled."""
     _effects.clear()
 
 
 def restore(scene: Scene, identity: str) -> Scene | None:
-    """Makes a kept effect again in a scene. Returns the effect scene; None: none was kept under this identity."""
+    """Restore a kept effect in a scene and return its effect scene; None: no effect has this identity."""
     if (data := _effects.get(identity)) is None:
         return None
     effect_scene = add_effect.new_effect_scene(scene, identity, *data["scene"])
@@ -93,7 +94,7 @@ def restore(scene: Scene, identity: str) -> Scene | None:
 
 
 def _restore(scene: Scene, effect: PropertyGroup, data: dict, content: dict) -> None:
-    """Gives an effect the content, keys and drawings of a kept one."""
+    """Fill an effect with kept properties, keyframes and drawings."""
     _fill(effect, content)
     for plain in data["curves"]:
         path = effect.path_from_id() + plain["data_path"]

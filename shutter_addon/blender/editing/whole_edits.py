@@ -1,5 +1,4 @@
-"""Whole edits. Those made from nothing: a source strip, its effect, and where the film goes. And saved ones: a .blend
-file's active scene, as Blender itself would render it."""
+"""Edits for the command: new ones from a file and a recipe, and saved ones from a .blend file."""
 
 import math
 import os
@@ -19,12 +18,19 @@ from ..data.property_copy import for_a_while
 from ..output import film_output
 from . import add_effect
 
-_PATHS = {"MOVIE": "filepath", "IMAGE": "directory", "SOUND": "filepath"}  # the property of a strip of that type
+_PATHS = {"MOVIE": "filepath", "IMAGE": "directory", "SOUND": "filepath"}  # path property of each type
 
 
 def make_edit(path: Path, medium: FrameSource, source_recipe: Effect, folder: Path) -> Scene:
-    """An edit of one source strip (an opened medium's) under one effect strip; its scene. folder: of the recipe.
-    MediaError: the recipe has mattes that cannot be read."""
+    """Make an edit of one source strip with an effect, and return its scene.
+
+    Args:
+        medium: the source, opened.
+        folder: of the recipe.
+
+    Raises:
+        MediaError: a matte of the recipe cannot be read.
+    """
     source = make_source(path, medium)
     scene = source.id_data
     strip, effect = add_effect.add_effect(scene, source)
@@ -36,7 +42,7 @@ def make_edit(path: Path, medium: FrameSource, source_recipe: Effect, folder: Pa
 
 
 def make_source(path: Path, medium: FrameSource) -> Strip:
-    """A source strip (an opened medium's), alone in an edit that fits it."""
+    """Make an edit with a single source strip from an opened medium, and return the strip."""
     bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
     scene = bpy.context.scene
     scene.name = "Edit"
@@ -46,12 +52,11 @@ def make_source(path: Path, medium: FrameSource) -> Strip:
         render.fps_base = render.fps / float(medium.fps)
     render.resolution_x, render.resolution_y = medium.width, medium.height
     render.resolution_percentage = 100
-    # Dither would add noise to a still frame; Standard shows code values as the source has them.
+    # Dither adds noise to a still frame. *Standard* shows the source's display values.
     render.dither_intensity = 0
     scene.view_settings.view_transform = "Standard"
     editor = scene.sequence_editor_create()
-    # Of a file that is gone Blender would make a picture of the size that its element has: none where Python has added
-    # it, but what lay in memory there.
+    # For a missing file Blender would show a picture whose size scripts leave uninitialized.
     editor.show_missing_media = False
     is_movie = medium.fps is not None
     if is_movie and medium.has_audio:
@@ -61,42 +66,44 @@ def make_source(path: Path, medium: FrameSource) -> Strip:
 
 
 def length(medium: FrameSource, source_recipe: Effect) -> int:
-    """How many timeline frames the edit has: the source's, and more where its time is keyed beyond them; as many as
-    Blender has at most."""
+    """Return the length of the edit in timeline frames: that of the source, or up to the last key of its time."""
     time = source_recipe.time
     keys = [math.ceil(frame) for frame, _ in time.keys] if isinstance(time, SourceTime) else []
     return min(max([medium.count, *keys]), MAX_FRAME)
 
 
 def paths_relative(scene: Scene, folder: Path) -> AbstractContextManager[None]:
-    """Inside, the edit's paths are relative to the folder that it is saved in, as far as there is such a path."""
+    """Make the edit's paths relative to the folder of its file, where possible, and restore them afterwards."""
     owners = [(scene.render, "filepath")]
     for strip in scene.sequence_editor.strips_all:
         if strip.type in _PATHS:
             owners.append((strip.sound if strip.type == "SOUND" else strip, _PATHS[strip.type]))
-    owners += [(image, "filepath") for image in bpy.data.images]  # mattes
+    owners += [(image, "filepath") for image in bpy.data.images]
     relative = []
     for owner, name in owners:
         if path := getattr(owner, name):
-            with suppress(ValueError):  # another drive
-                end = "/" if path.endswith(os.sep) else ""  # which relpath leaves out behind a folder
+            with suppress(ValueError):  # on another drive
+                end = "/" if path.endswith(os.sep) else ""  # relpath removes it
                 relative.append((owner, name, bpy.path.relpath(path, start=str(folder)) + end))
     return for_a_while(relative)
 
 
 def is_saved(path: Path) -> bool:
-    """Whether the path's name is that of a saved edit."""
+    """Return whether a path is a .blend file."""
     return path.suffix.lower() == ".blend"
 
 
 def open_edit(path: Path, name: str | None = None) -> Scene:
-    """Opens a .blend file, none of whose scripts is run: it may be a stranger's. Its scene of that name; None: the
-    active one, which Blender would render. UserError: it cannot be opened, or shows no edit."""
+    """Open a .blend file without running its scripts, and return its scene of this name, or its active scene.
+
+    Raises:
+        UserError: the file cannot be opened or has no edit.
+    """
     if not path.is_file():
         raise UserError(f"{path}: " + ("is no file" if path.exists() else "no such file"))
     try:
         with film_output.quiet():
-            # With its windows, as `blender -b` does: load_ui=False would hold for all that this process opens after it.
+            # With its windows, like `blender -b`: load_ui=False would stay set for later files.
             bpy.ops.wm.open_mainfile(filepath=str(path), use_scripts=False)
     except RuntimeError as error:
         raise UserError(f"{path}: {film_output.message(error)}") from None
@@ -111,7 +118,7 @@ def open_edit(path: Path, name: str | None = None) -> Scene:
         if getattr(scene.render, setting) != wanted:
             name, turn = scene.render.bl_rna.properties[setting].name, "on" if wanted else "off"
             raise UserError(f'{path}: turn "{name}" {turn} in the scene "{scene.name}", and save the file')
-    for owner, driver in _scripts(scene) if name is None else ():  # of a scene's effects drivers do not count
+    for owner, driver in _scripts(scene) if name is None else ():  # drivers do not matter for the effects of a scene
         words = f'a driver of the {owner.bl_rna.name.lower()} "{owner.name}" needs scripts, which are not run'
         words += f" ({sentence(driver.expression, 40)}); bake it to keyframes, and save the file"
         raise UserError(f"{path}: {words}")
@@ -119,13 +126,12 @@ def open_edit(path: Path, name: str | None = None) -> Scene:
 
 
 def _scripts(scene: Scene) -> list[tuple]:
-    """(owner, driver) of each driver that Blender does not evaluate because it could do anything, of all that the
-    edit's pictures are made of."""
+    """Return (owner, driver) of each driver that needs scripts, among the data that the edit renders."""
     used = requirements.used_data(scene, range(scene.frame_start, scene.frame_end + 1))
     drivers = [(item, curve.driver) for item in used for curve in _driven(item)]
     scripted = ((owner, driver) for owner, driver in drivers if driver.type == "SCRIPTED")
     complex_ones = [(owner, driver) for owner, driver in scripted if not driver.is_simple_expression]
-    if complex_ones:  # only once they are evaluated it is known of them
+    if complex_ones:  # evaluation finds out which of them are valid
         with film_output.quiet():
             for other in used.intersection(bpy.data.scenes):
                 for layer in other.view_layers:
@@ -134,7 +140,7 @@ def _scripts(scene: Scene) -> list[tuple]:
 
 
 def _driven(item: bpy.types.ID) -> list:
-    """The driver curves of an ID, and of the nodes that are its own."""
+    """Return the driver curves of an ID and of its node tree."""
     animations = (getattr(each, "animation_data", None) for each in (item, getattr(item, "node_tree", None)))
     return [curve for animation in animations if animation for curve in animation.drivers]
 

@@ -1,1 +1,1 @@
-"""What users see and click: operators, panels, preview, gizmos, languages."""
+"""The user interface: operators, panels, preview, gizmos, translations."""

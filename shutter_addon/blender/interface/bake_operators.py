@@ -1,4 +1,4 @@
-"""Operators that bake an effect to a strip of its own, and bring the effect back; and their panel."""
+"""Operators and panel that bake an effect to a strip and unbake it."""
 
 import bpy
 from bpy.app.translations import pgettext_iface as iface_
@@ -15,14 +15,14 @@ from ..output import baked_film, film_output
 from .operator_bases import Named, operator, redraw
 from .panel_parts import draw_progress, sentence
 
-TICK = 0.5  # seconds from one look at the job to the next
-STILL = 1.0  # seconds from one look at whether a film is stale to the next, at least
+TICK = 0.5  # seconds between two looks at the job
+STILL = 1.0  # seconds before the panel asks again whether the bake is outdated
 FORMATS = (
-    ("MOVIE", "Movie", "H.264, for playing: levels are off by little, and there is no transparency"),
-    ("OPEN_EXR", "OpenEXR", "A folder of pictures in full precision, which play more slowly"),
+    ("MOVIE", "Movie", "H.264, for playback: small errors and no transparency"),
+    ("OPEN_EXR", "OpenEXR", "A folder of pictures in full precision; playback is slower"),
 )
-_running: list[baked_film.BakeJob] = []  # one at most
-_stopped: list[baked_film.BakeJob] = []  # that finish the frame they are at
+_running: list[baked_film.BakeJob] = []  # at most one
+_stopped: list[baked_film.BakeJob] = []  # still finishing a frame
 _failures: dict[str, str] = {}  # by the effect's identity: why its last bake failed
 
 
@@ -33,7 +33,7 @@ def _why_baking(_effect: PropertyGroup) -> str | None:
 
 @operator("Bake to Strip", _why_baking, file_format=EnumProperty(name="Format", items=FORMATS))
 def bake(self: Operator, _context: Context, effect: PropertyGroup) -> set[str] | None:
-    """Render the effect beside Blender, and put the film above it as a strip. Frames that are finished are kept"""
+    """Render the effect in the background and add the film as a strip above it. Finished frames are kept"""
     _failures.pop(effect.identity, None)
     baked_strips.check(self.edit, self.effect_strip)
     film = baked_film.film_of(self.edit, effect, self.effect_strip, self.file_format)
@@ -47,11 +47,11 @@ def bake(self: Operator, _context: Context, effect: PropertyGroup) -> set[str] |
     except (film_output.OutputError, OSError) as error:
         raise UserError(film_output.in_words(error, film.place)) from None
     main_thread.later(_look, TICK)
-    return {"CANCELLED"}  # nothing has changed yet that could be undone
+    return {"CANCELLED"}  # nothing to undo yet
 
 
 class SHUTTER_OT_bake_stop(Named, Operator):
-    """Stop the bake that runs. Frames that are finished stay, and the next bake goes on from there"""
+    """Stop the bake. Finished frames are kept, and the next bake continues from there"""
 
     bl_label = "Stop Baking"
 
@@ -71,12 +71,12 @@ def _why_not_baked(_effect: PropertyGroup) -> str | None:
 
 @operator("Unbake", _why_not_baked)
 def unbake(self: Operator, _context: Context, _effect: PropertyGroup) -> None:
-    """Remove the baked strip, and show the effect again. The baked files stay"""
+    """Remove the baked strip and show the effect again. The baked files stay"""
     baked_strips.unbake(self.edit, self.effect_strip)
 
 
 def _look() -> float | None:
-    """Lays the film of a job that is over."""
+    """Add the strip of a finished bake."""
     if not _running:
         return None
     job = _running[0]
@@ -85,7 +85,7 @@ def _look() -> float | None:
         return TICK
     windows = bpy.context.window_manager.windows
     if bpy.app.is_job_running("RENDER") or any(window.modal_operators for window in windows):
-        return TICK  # a film is rendered of strips that would change, or a strip is being dragged
+        return TICK  # a render reads the strips, or the user drags one
     try:
         if (failure := job.failure()) is None:
             failure = _lay(job)
@@ -97,11 +97,11 @@ def _look() -> float | None:
 
 
 def _lay(job: baked_film.BakeJob) -> str | None:
-    """Puts a finished film where its effect strip is by now. A sentence: there is none any more, or no room."""
+    """Put a finished film above its effect strip. Return why it is impossible, or None."""
     scene = strips.scene_of_uid(job.scene)
     parts = [s for s in strips.effect_strips(scene) if s.scene.virtual_shutter.identity == job.effect] if scene else []
     if not parts:
-        return rpt_('the strip that was baked is gone; its film is "{path}"').format(path=job.film.place)
+        return rpt_('the strip was removed during the bake; its film is "{path}"').format(path=job.film.place)
     try:
         baked_strips.lay(scene, next((part for part in parts if part.name == job.strip), parts[0]), job.film)
     except (EffectError, RuntimeError) as error:
@@ -112,14 +112,14 @@ def _lay(job: baked_film.BakeJob) -> str | None:
 
 
 def stop() -> None:
-    """Ends the bake that runs."""
+    """End the running bake."""
     while _running:
         _stopped.append(job := _running.pop())
         job.end()
 
 
 def forget() -> None:
-    """As stop, and what failed is forgotten: before another file is loaded."""
+    """Stop and forget errors, before another file is loaded."""
     stop()
     _failures.clear()
 
@@ -146,7 +146,7 @@ def _draw_state(layout: UILayout, scene: Scene, effect: PropertyGroup, strip: St
     if not baked_strips.baked_of(scene, strip):
         sentence(layout, iface_("The baked strip was deleted"), "ERROR")
     elif (is_stale := baked_strips.known_stale(scene, effect, strip)) is None:
-        main_thread.later(_ask_whether_stale, STILL)  # beside drawing: it reads all of the effect
+        main_thread.later(_ask_whether_stale, STILL)  # not while drawing: it reads the whole effect
     elif is_stale:
         sentence(layout, iface_("The effect has changed since it was baked"), "ERROR")
     else:

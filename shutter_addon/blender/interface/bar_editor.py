@@ -1,4 +1,4 @@
-"""The bar editor: a gizmo in the sequencer's preview that shows the active shutter's bars, to paint and to key."""
+"""The bar editor: a gizmo in the preview that shows the active shutter's bars, to paint and key them."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -15,30 +15,36 @@ from ..editing import bar_edits, track_region
 from . import drawing
 from .gizmo_groups import TWEAK, Dragged, WithKeys
 
-_MARGIN, _HEIGHT, _BAR = 16, 96, 16  # in units of the interface
+_MARGIN, _HEIGHT, _BAR = 16, 96, 16  # interface units
 _PAD, _HEADER = 8, 18
 _SWATCH = 12
 _SNAP = 0.1
 _FINE = 0.1
-_THRESHOLD = 3  # units of the interface that make a click a drag
+_THRESHOLD = 3  # interface units: a longer movement is a drag
 
 
 @dataclass(frozen=True)
 class Layout:
-    """Where the bars lie in the region, in pixels: the frame around them, and the box in which they stand."""
+    """Where the bars lie in the region, in pixels.
+
+    Attributes:
+        frame: around everything; left, bottom, right, top.
+        box: around the bars.
+        top: weight at the box's upper edge.
+    """
 
     frame: tuple[float, float, float, float]
     box: tuple[float, float, float, float]
     count: int
-    top: float  # weight at the box's upper edge
+    top: float
 
     def bar_at(self, x: float) -> int:
-        """The bar under x; the first or last beyond the ends."""
+        """Return the bar under x. Beyond the ends it is the first or last one."""
         left, _, right, _ = self.box
         return min(max(int((x - left) / (right - left) * self.count), 0), self.count - 1)
 
     def weight_at(self, y: float) -> float:
-        """The weight at y, not below 0."""
+        """Return the weight at y, at least 0."""
         _, bottom, _, top = self.box
         return max((y - bottom) / (top - bottom) * self.top, 0.0)
 
@@ -48,10 +54,13 @@ class Layout:
 
 
 def layout(width: float, bars: np.ndarray, unit: float) -> Layout:
-    """The bar editor's place at the lower left of a region of this width for bars (L,); unit: of the interface, in
-    pixels."""
+    """Return the layout of bars (L,) at the lower left of a region of this width.
+
+    Args:
+        unit: pixels per interface unit.
+    """
     margin, pad = _MARGIN * unit, _PAD * unit
-    # A region that is too narrow shows the editor's left part.
+    # A narrow region shows the left part of the editor.
     width = max(min(max(len(bars) * _BAR, 200) * unit, width - 2 * margin), 4 * pad)
     frame = margin, margin, margin + width, margin + _HEIGHT * unit
     box = frame[0] + pad, frame[1] + pad, frame[2] - pad, frame[3] - _HEADER * unit
@@ -65,7 +74,7 @@ def _layout(context: Context, bars: np.ndarray) -> Layout:
 def painted(
     values: np.ndarray, place: Layout, start: tuple[float, float], end: tuple[float, float], snap: bool
 ) -> np.ndarray:
-    """Bars (L,) after a stroke from one point to another: every bar it crosses takes the stroke's height there."""
+    """Return bars (L,) after a stroke between two points: each bar that it crosses gets its height there."""
     result = np.array(values, dtype=np.float64)
     first, last = place.bar_at(start[0]), place.bar_at(end[0])
     steps = abs(last - first)
@@ -78,7 +87,7 @@ def painted(
 
 
 def bar_under(context: Context, x: float, y: float) -> int | None:
-    """The bar of the active shutter at a point of the preview's region, or None."""
+    """Return the active shutter's bar at a point of the preview's region, or None."""
     if context.region is None or context.region.type != "PREVIEW" or (seen := _seen(context)) is None:
         return None
     place = _layout(context, seen[3])
@@ -86,19 +95,18 @@ def bar_under(context: Context, x: float, y: float) -> int | None:
 
 
 def _seen(context: Context) -> tuple[Scene, PropertyGroup, Strip, np.ndarray, list[str]] | None:
-    """Scene, effect and strip that are seen, and the bars that the editor shows, with their states; None: there is no
-    shutter, or none that a picture can be made with."""
+    """Return the visible scene, effect and strip with the bars and their key states; None: there are no valid bars."""
     seen = selection.in_picture(context)
     if seen is None or selection.active_shutter(effect := seen[1]) is None:
         return None
     try:
         return (*seen, *bar_edits.shown(effect, effect.active_shutter))
-    except EffectError:  # panels and the live preview tell it
+    except EffectError:  # panels and the live preview show the error
         return None
 
 
 def _key_colors() -> dict:
-    """As in Blender's own fields."""
+    """Return the theme's colors of keyed fields."""
     theme = bpy.context.preferences.themes[0].user_interface.wcol_state
     return {"animated": theme.inner_anim, "keyed": theme.inner_key, "changed": theme.inner_changed}
 
@@ -121,20 +129,20 @@ class SHUTTER_GT_bars(Dragged, Gizmo):
     def grab(self, context: Context, event: Event, seen: tuple) -> None:
         effect = seen[1]
         self.index = effect.active_shutter
-        self.target = track_region.Target.of(effect, None)  # while it plays, another may come into the picture
+        self.target = track_region.Target.of(effect, None)  # during playback, another effect may become active
         self.before = consistency.bars(effect.shutters[self.index])
-        # Between keys what is shown, and painted on, is not what is stored.
+        # Between keys, the visible bars differ from the stored ones.
         self.values = bar_edits.bars_now(effect, self.index)
-        # The scale stays while dragging, or a bar would run away from the pointer.
+        # The scale stays while dragging, so that bars do not run away from the pointer.
         self.place = _layout(context, self.values)
         self.mouse = self.point = event.mouse_region_x, event.mouse_region_y
-        self.paints = False  # a click does not, nor the two of a double click
+        self.paints = False  # a click or double click does not paint
 
     def drag(self, context: Context, event: Event, tweak: set[str]) -> None:
         mouse = event.mouse_region_x, event.mouse_region_y
         threshold = _THRESHOLD * drawing.ui_scale()
         self.paints = self.paints or max(abs(a - b) for a, b in zip(mouse, self.mouse, strict=True)) >= threshold
-        # `tweak` knows of keys that are pressed while dragging, the event of those that were held before.
+        # `tweak` has keys that are pressed during the drag, the event those that were held before.
         fine, snap = "PRECISE" in tweak or event.shift, "SNAP" in tweak or event.ctrl
         if self.paints and (mouse != self.mouse or snap):
             point = mouse[0], self.point[1] + (mouse[1] - self.mouse[1]) * (_FINE if fine else 1.0)
@@ -162,9 +170,13 @@ class SHUTTER_GT_bars(Dragged, Gizmo):
 
 
 def marked(boxes: Sequence[drawing.Box], combine: str, thickness: float) -> list[tuple[float, float, float, float]]:
-    """What tells at the bars' boxes (left, bottom, right, top), to all eyes, that they do not average: a line below
-    the upper ends of bars that keep the lightest, above the feet of those that keep the darkest, and across the middle
-    of those of a median."""
+    """Return marks on bars that do not average, visible without colors.
+
+    There is a line below the top of bars of *Lightest*, above the foot of *Darkest*, and across the middle of *Median*.
+
+    Args:
+        boxes: of the bars; left, bottom, right, top.
+    """
     if combine == "AVERAGE":
         return []
     middle = {"LIGHTEST": 1.0, "DARKEST": 0.0, "MEDIAN": 0.5}[combine]
@@ -195,11 +207,11 @@ def _draw(place: Layout, shutter: PropertyGroup, values: np.ndarray, states: lis
 
 
 def _draw_header(place: Layout, shutter: PropertyGroup, index: int, words: str) -> None:
-    """Above the bars: what the shutter looks like in mattes, and words."""
+    """Draw the shutter's swatch and a text above the bars."""
     unit, (left, _, _, top) = drawing.ui_scale(), place.box
     bottom = top + 4 * unit
     start, (_, _, right, upper) = left + (_SWATCH + 6) * unit, place.frame
-    if (end := start + drawing.text_width(words) + _PAD * unit) > right:  # on footage, words would be hard to read
+    if (end := start + drawing.text_width(words) + _PAD * unit) > right:  # text on footage would be hard to read
         drawing.rectangles([(right, top, end, upper)], [drawing.BACK])
     drawing.swatch(left, bottom - unit, _SWATCH * unit, shutter, index)
     drawing.text(start, bottom, words)

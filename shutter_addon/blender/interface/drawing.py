@@ -1,5 +1,4 @@
-"""Flat shapes and texts in a region, in its pixels; and pictures where a preview's strip has its own, by
-shaders/show.glsl."""
+"""Draw shapes and text in pixels of a region, and pictures in the place of a preview's strip (shaders/show.glsl)."""
 
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
@@ -24,23 +23,26 @@ from .gizmo_groups import view
 
 Box = tuple[float, float, float, float]  # left, bottom, right, top, in pixels of a region
 
-SIZE = 11  # of texts, in points
-BACK = (0.08, 0.08, 0.08, 0.8)  # behind texts and bars, so that they are read over any footage
+SIZE = 11  # points, of texts
+BACK = (0.08, 0.08, 0.08, 0.8)  # behind texts and bars, to be readable on any footage
 
 
 def ui_scale() -> float:
-    """Pixels per unit of Blender's interface."""
+    """Return pixels per interface unit."""
     return bpy.context.preferences.system.ui_scale
 
 
 def line_width() -> float:
-    """Pixels of Blender's own lines: with the interface's scale, and thicker or thinner by its Line Width."""
+    """Return the width of Blender's own lines in pixels, which *Resolution Scale* and *Line Width* set."""
     return bpy.context.preferences.system.pixel_size
 
 
 def wrapped(words: str, width: float, size: float | None = None) -> list[str]:
-    """Words in lines that are no wider, in pixels, as `text` draws them, or by default as Blender's interface does; a
-    word stays whole."""
+    """Break words into lines up to a width in pixels.
+
+    Args:
+        size: points; None: as in Blender's panels.
+    """
     blf.size(0, (size or bpy.context.preferences.ui_styles[0].widget.points) * ui_scale())
     lines = [""]
     for word in words.split():
@@ -54,7 +56,7 @@ def wrapped(words: str, width: float, size: float | None = None) -> list[str]:
 
 @contextmanager
 def pixel_space(region: Region) -> Iterator[None]:
-    """Coordinates are the region's pixels, whatever was drawn before: Blender's own state varies in draw handlers."""
+    """Use the region's pixels as coordinates. Blender's own state varies between draw handlers."""
     with gpu.matrix.push_pop(), gpu.matrix.push_pop_projection():
         gpu.matrix.load_identity()
         width, height = region.width, region.height
@@ -65,7 +67,12 @@ def pixel_space(region: Region) -> Iterator[None]:
 
 
 def rectangles(boxes: Sequence[Box] | np.ndarray, colors: ArrayLike) -> None:
-    """Filled boxes (n, 4) of left, bottom, right, top; colors: (n, 4), display code values with straight alpha."""
+    """Draw filled boxes.
+
+    Args:
+        boxes: (n, 4) left, bottom, right, top.
+        colors: (n, 4) display values with straight alpha.
+    """
     if not len(boxes):
         return
     left, bottom, right, top = np.asarray(boxes, dtype=np.float32).T
@@ -80,7 +87,11 @@ def rectangles(boxes: Sequence[Box] | np.ndarray, colors: ArrayLike) -> None:
 
 
 def bars(box: Box, shares: np.ndarray, color: Sequence[float]) -> list[Box]:
-    """Bars side by side in a box, as high as their shares (n,) of it, 0 to 1, and never nothing; their boxes."""
+    """Draw bars side by side in a box and return their boxes.
+
+    Args:
+        shares: (n,) heights as fractions of the box. Each bar is at least a line.
+    """
     left, bottom, right, top = box
     edges = np.linspace(left, right, len(shares) + 1)
     thin = line_width()
@@ -93,7 +104,7 @@ def bars(box: Box, shares: np.ndarray, color: Sequence[float]) -> list[Box]:
 
 
 def swatch(left: float, bottom: float, size: float, shutter: PropertyGroup, index: int) -> None:
-    """A square of a shutter's colour and of the pattern that it has at an index of the list, as mattes show it."""
+    """Draw a square with a shutter's color and pattern, as in the view *Mattes*."""
     left, bottom = round(left), round(bottom)
     rectangles([(left, bottom, left + size, bottom + size)], [(*shutter.color, 1.0)])
     y, x = np.mgrid[: round(size), : round(size)]
@@ -104,7 +115,11 @@ def swatch(left: float, bottom: float, size: float, shutter: PropertyGroup, inde
 
 
 def lines(points: ArrayLike, color: Sequence[float], closed: bool = False, width: float = 1.0) -> None:
-    """A line through points (n, 2); width: in widths of Blender's own lines."""
+    """Draw a line through points (n, 2).
+
+    Args:
+        width: as a multiple of Blender's line width.
+    """
     points = np.asarray(points, dtype=np.float32)
     if len(points) < 2:
         return
@@ -120,7 +135,11 @@ def lines(points: ArrayLike, color: Sequence[float], closed: bool = False, width
 
 
 def text(x: float, y: float, words: str, color: Sequence[float] = (1, 1, 1, 0.9), until: float | None = None) -> None:
-    """Words with their lower left corner at a point; until: the x where they are cut off."""
+    """Draw text with its lower left corner at a point.
+
+    Args:
+        until: x at which it is cut off.
+    """
     size = SIZE * ui_scale()
     blf.size(0, size)
     blf.color(0, *color)
@@ -136,20 +155,20 @@ def text(x: float, y: float, words: str, color: Sequence[float] = (1, 1, 1, 0.9)
 
 
 def plated(x: float, y: float, words: str) -> None:
-    """As `text`, on a dark plate."""
+    """Draw text on a dark background."""
     pad = 4 * ui_scale()
     rectangles([(x - pad, y - pad - 1, x + text_width(words) + pad, y + SIZE * ui_scale() + pad)], [BACK])
     text(x, y, words)
 
 
 def text_width(words: str) -> float:
-    """How wide `text` draws words, in pixels."""
+    """Return the width of a text in pixels."""
     blf.size(0, SIZE * ui_scale())
     return blf.dimensions(0, words)[0]
 
 
 class Quad:
-    """Where the picture of the strip that a preview shows lies in its region, the crop considered."""
+    """The area of a strip's picture in a preview's region, with its crop."""
 
     def __init__(self, region: Region, shown: Shown) -> None:
         self.view = view(shown.effect, shown.strip, region)
@@ -161,11 +180,11 @@ class Quad:
         self._high = 1 - np.array([crop.max_x / width, crop.max_y / height])
 
     def draw(self, name: str, textures: dict, left: float = 0.0, right: float = 1.0, **constants) -> None:
-        """Draws from `left` to `right`, in fractions of the picture's width, by a step of shaders/show.glsl."""
+        """Draw from `left` to `right`, as fractions of the picture's width, with a pass of shaders/show.glsl."""
         low, high = np.maximum(self._low, (left, 0)), np.minimum(self._high, (right, 1))
         if (low >= high).any():
             return
-        corners = [(low[0], low[1]), (high[0], low[1]), (low[0], high[1]), (high[0], high[1])]  # as strips have them
+        corners = [(low[0], low[1]), (high[0], low[1]), (low[0], high[1]), (high[0], high[1])]  # triangle strip
         shader = shader_of(name)
         shader.bind()
         for sampler, texture in textures.items():
@@ -178,7 +197,7 @@ class Quad:
         gpu.state.blend_set("NONE")
 
     def _clipped(self, batch: GPUBatch, shader: GPUShader) -> None:
-        """Draws as much as lies in the sequencer's image, which shows no more of a strip."""
+        """Draw only what lies in the sequencer's image, which cuts off strips."""
         left, bottom, width, height = before = gpu.state.scissor_get()
         low = np.maximum(np.rint(self._image[0]), (left, bottom))
         high = np.minimum(np.rint(self._image[1]), (left + width, bottom + height))
@@ -187,14 +206,14 @@ class Quad:
             gpu.state.scissor_set(*map(int, (*low, *(high - low))))
             batch.draw(shader)
             gpu.state.scissor_set(*before)
-            gpu.state.scissor_test_set(False)  # as it is where Blender has handlers draw
+            gpu.state.scissor_test_set(False)  # Blender's state in draw handlers
 
 
-_shaders: dict[str, GPUShader] = {}  # by step: to compile one takes long
+_shaders: dict[str, GPUShader] = {}  # by pass, because compiling takes long
 
 
 def shader_of(name: str) -> GPUShader:
-    """What draws by a step of shaders/show.glsl, compiled once."""
+    """Return the shader of a pass of shaders/show.glsl, compiled once."""
     if name not in _shaders:
         quad, shown = read_pass("show", "QUAD"), read_pass("show", name)
         between = gpu.types.GPUStageInterfaceInfo("show_interface")
@@ -217,6 +236,6 @@ def shader_of(name: str) -> GPUShader:
 
 
 def free() -> None:
-    """Frees the shaders."""
+    """Free the shaders."""
     blender_gpu.free(*_shaders.values())
     _shaders.clear()

@@ -1,5 +1,7 @@
-"""One look at the shown frame as it will be rendered: composed in full, exactly, and a pixel of the picture to one of
-the screen. It ends with a second click, with the frame, and with a change of the effect; then the view is as before."""
+"""*Full Quality*: show the current frame exactly as it will be rendered, one pixel of it on one pixel of the screen.
+
+It ends with a second click, at another frame, or when the effect changes. Then the view is as before.
+"""
 
 from collections.abc import Callable
 from functools import partial
@@ -13,14 +15,14 @@ from ..devices import main_thread
 from ..rendering import previews
 from .operator_bases import Named
 
-_TICK = 0.1  # seconds between two looks at whether it has ended
+_TICK = 0.1  # seconds between two checks whether it has ended
 
 
-_back: Callable[[], None] | None = None  # Full Quality ends by itself, and then brings back how a preview was before
+_back: Callable[[], None] | None = None  # restores the view; it can end without a click
 
 
 class SHUTTER_OT_full_quality(Named, Operator):
-    """Show this frame as it will be rendered, each of its pixels on one of the screen's, or end that"""
+    """Show this frame exactly as it will be rendered, at one screen pixel per pixel; click again to end"""
 
     bl_label = "Full Quality"
     bl_options = {"REGISTER"}
@@ -42,7 +44,8 @@ class SHUTTER_OT_full_quality(Named, Operator):
 
 
 def _shown(context: Context) -> tuple[Window, Area, preview_areas.Shown] | None:
-    """Window and area of the preview that is looked at, the context's own or another, and what it shows; or None."""
+    """Return window, area and content of the preview to use, preferring the context's; None: no preview shows an
+    effect."""
     areas = sorted(preview_areas.previews(context), key=lambda pair: pair[1] != context.area)
     for window, area in areas:
         with preview_areas.within(window, area):
@@ -76,7 +79,11 @@ def _end() -> None:
 
 
 def _bring_back(address: int, proxies: tuple[str, bool], rows: float, centre: tuple[float, float]) -> None:
-    """Has the view of an area as before: what of it the user has not changed since. rows, centre: see _view_of"""
+    """Restore zoom, center and proxy settings of an area, except for those that the user has changed since.
+
+    Args:
+        rows, centre: see `_view_of`.
+    """
     for window, area in list(preview_areas.previews(bpy.context)):
         if area.as_pointer() != address:
             continue
@@ -90,16 +97,16 @@ def _bring_back(address: int, proxies: tuple[str, bool], rows: float, centre: tu
 
 
 def _view_of(region: Region) -> tuple[float, tuple[float, float]]:
-    """How many rows of the sequencer's picture a region shows, and what lies in its centre."""
+    """Return how many rows of the picture a region shows, and the position in its center."""
     size = region.width, region.height
     (left, bottom), (right, top) = (region.view2d.region_to_view(*at) for at in ((0, 0), size))
-    # Blender takes the region for one pixel smaller.
+    # Blender counts one pixel less.
     return (top - bottom) * (region.height - 1) / region.height, ((left + right) / 2, (bottom + top) / 2)
 
 
 def _zoom(window: Window, area: Area, rows: float) -> None:
     with preview_areas.within(window, area):
-        # The operator shows the height divided by the ratio, and a half, rounded up.
+        # The operator divides the height by the ratio, adds a half and rounds up.
         bpy.ops.sequencer.view_zoom_ratio(ratio=bpy.context.region.height / (rows - 0.6))
 
 
@@ -112,7 +119,7 @@ def _centre(window: Window, area: Area, centre: tuple[float, float]) -> None:
 
 
 def forget() -> None:
-    """Ends it, and leaves the view as it is."""
+    """End without restoring the view."""
     global _back
     _back = previews.looking.whole = None
 

@@ -1,4 +1,4 @@
-"""What gizmos in previews and their groups share; and the groups' keymaps, which Blender leaves behind."""
+"""Base classes of gizmos in previews and of their groups, with keymaps; and how the picture lies in a preview."""
 
 from typing import NamedTuple
 
@@ -15,10 +15,11 @@ TWEAK = ("gizmogroup.gizmo_tweak", "LEFTMOUSE", "PRESS", {"any": True})
 
 
 class Seen(Mixin):
-    """A gizmo that is drawn, and hit, where there is something to see.
+    """A gizmo that is drawn and clickable while it has something to show.
 
-    Each has `seen(context)`, what is drawn, or None; `show(context, seen)`, which draws it; and `is_at(context, seen,
-    location)`, whether it lies at a point of the region."""
+    Subclasses have `seen(context)`, which returns what to draw or None; `show(context, seen)`, which draws it; and
+    `is_at(context, seen, location)`, which tells whether a point of the region hits it.
+    """
 
     def draw(self, context: Context) -> None:
         if (seen := self.seen(context)) is not None:
@@ -30,16 +31,17 @@ class Seen(Mixin):
 
 
 class Dragged(Seen):
-    """A gizmo that is dragged, and is drawn meanwhile as well.
+    """A gizmo that can be dragged, and is drawn during that.
 
-    Each has `grab(context, event, seen)`, which begins that; and `drag(context, event, tweak)`, which follows the
-    pointer."""
+    Subclasses have `grab(context, event, seen)`, which begins, and `drag(context, event, tweak)`, which follows the
+    pointer.
+    """
 
     def setup(self) -> None:
         self.use_draw_modal = True
 
     def invoke(self, context: Context, event: Event) -> set[str]:
-        if (seen := self.seen(context)) is None:  # while it plays, it may just have gone
+        if (seen := self.seen(context)) is None:  # it may disappear during playback
             return {"CANCELLED"}
         self.grab(context, event, seen)
         return {"RUNNING_MODAL"}
@@ -50,7 +52,7 @@ class Dragged(Seen):
 
 
 class InPreview(Mixin):
-    """A group in previews of a single gizmo."""
+    """A gizmo group in previews, with one gizmo."""
 
     bl_space_type = "SEQUENCE_EDITOR"
     bl_region_type = "PREVIEW"
@@ -59,7 +61,7 @@ class InPreview(Mixin):
 
     @classmethod
     def poll(cls, context: Context) -> bool:
-        """By default, where the live preview shows an effect, and as it is set."""
+        """Show the group where the live preview shows an effect, if its setting `is_wanted`."""
         live = context.window_manager.virtual_shutter
         return live.live and cls.is_wanted(live) and preview_areas.shown(context) is not None
 
@@ -72,9 +74,11 @@ class InPreview(Mixin):
 
 
 class WithKeys(InPreview):
-    """A group with a keymap, in which Blender's own key for the pen is the pen's still.
+    """A gizmo group with a keymap. It keeps Blender's own key for annotating.
 
-    shortcuts: operator, type and value of the event, and what else Blender has of a key"""
+    Attributes:
+        shortcuts: operator, type and value of the event, and other arguments of Blender's keymap items.
+    """
 
     shortcuts: tuple[tuple[str, str, str, dict], ...] = (TWEAK,)
 
@@ -91,28 +95,31 @@ class WithKeys(InPreview):
 class View(NamedTuple):
     """How an effect's picture lies in a preview's region.
 
-    matrix: from fractions of the picture to the region's pixels; aspect: the picture's width over its height"""
+    Attributes:
+        matrix: from fractions of the picture to pixels of the region.
+        aspect: width of the picture divided by its height.
+    """
 
     matrix: np.ndarray
     aspect: float
 
     def on_region(self, points: ArrayLike) -> np.ndarray:
-        """Points (n, 2) of the picture, in pixels of the region."""
+        """Convert points (n, 2) of the picture to pixels of the region."""
         return mapped(self.matrix, np.asarray(points, np.float64))
 
     def on_picture(self, x: float, y: float) -> np.ndarray:
-        """A point of the region, in fractions of the picture."""
+        """Convert a point of the region to fractions of the picture."""
         return mapped(np.linalg.inv(self.matrix), np.array([(x, y)], np.float64))[0]
 
 
 def view(effect: PropertyGroup, strip: Strip, region: Region) -> View:
-    """The view of an effect's picture in a preview's region."""
+    """Return the view of an effect's picture in a preview's region."""
     width, height = size = annotations.picture_size(effect)
     return View(annotations.picture_to_region(strip, size, region), width / height)
 
 
 def unregister() -> None:
-    """Once the groups are gone."""
+    """Remove the keymaps, which Blender leaves behind."""
     made = {group.__name__ for group in WithKeys.__subclasses__()}
     keyconfigs = bpy.context.window_manager.keyconfigs
     for keyconfig in filter(None, (keyconfigs.default, keyconfigs.user)):

@@ -1,5 +1,4 @@
-"""Operators that make regions of mattes, ramps and time maps; that repair what a rolling shutter has skewed, and find
-how long its readout is."""
+"""Operators for mattes, ramps, time maps and rolling shutters."""
 
 from contextlib import ExitStack
 from pathlib import Path
@@ -20,6 +19,7 @@ from ..editing import outline_drawings, region_edits, rolling_shutter, shutter_e
 from ..output import matte_export
 from . import needs
 from .operator_bases import OfEffect, chosen_file, kept, operator
+from .panel_parts import draw_properties
 
 
 class SHUTTER_OT_matte_add(OfEffect, ImportHelper, Operator):
@@ -34,7 +34,7 @@ class SHUTTER_OT_matte_add(OfEffect, ImportHelper, Operator):
         maxlen=MAX_CHANNEL,
         options={"SKIP_SAVE"},
     )
-    # What the file browser shows.
+    # What the file browser shows
     filter_movie: BoolProperty(default=True, options={"HIDDEN", "SKIP_SAVE"})
     filter_image: BoolProperty(default=True, options={"HIDDEN", "SKIP_SAVE"})
     filter_folder: BoolProperty(default=True, options={"HIDDEN", "SKIP_SAVE"})
@@ -58,7 +58,7 @@ STRIP = EnumProperty(name="Strip", items=_strips, translation_context=contexts.n
 
 @operator("Matte from Strip", needs.room_for_a_region, strip=STRIP)
 def matte_strip(self: Operator, _context: Context, effect: PropertyGroup) -> None:
-    """Make a movie, image or clip strip of the edit the matte of the active shutter, muted or not"""
+    """Make a movie, image or clip strip of the edit the matte of the active shutter, even if it is muted"""
     region = region_edits.add_region(effect, selection.active_shutter(effect), "MATTE", self.strip, matte="STRIP")
     matte_content.choose_strip(region, self.strip)
 
@@ -68,7 +68,7 @@ def _masks(_context: Context) -> list[tuple]:
     return [(mask.name_full, mask.name_full, "") for mask in bpy.data.masks]
 
 
-def _chosen(name: str) -> Mask:
+def _mask_named(name: str) -> Mask:
     return next(mask for mask in bpy.data.masks if mask.name_full == name)
 
 
@@ -82,24 +82,24 @@ _MASK = EnumProperty(name="Mask", items=_masks, translation_context=contexts.no_
 @operator("Matte from Mask", needs.room_for_a_region, _why_no_mask, mask=_MASK)
 def matte_mask(self: Operator, _context: Context, effect: PropertyGroup) -> None:
     """Make a mask the matte of the active shutter"""
-    mask = _chosen(self.mask)
+    mask = _mask_named(self.mask)
     region_edits.add_region(effect, selection.active_shutter(effect), "MATTE", mask.name, matte="MASK", mask=mask)
 
 
 @operator("Outline from Mask", needs.room_for_a_region, _why_no_mask, mask=_MASK)
 def outline_from_mask(self: Operator, _context: Context, effect: PropertyGroup) -> None:
-    """Make an outline of the active shutter that is drawn at each key of a mask"""
+    """Make an outline of the active shutter with a drawing at each key of a mask"""
     shutter = selection.active_shutter(effect)
-    outline_drawings.from_mask(self.edit, effect, self.effect_strip, shutter, _chosen(self.mask))
+    outline_drawings.from_mask(self.edit, effect, self.effect_strip, shutter, _mask_named(self.mask))
 
 
 def _why_not_laid(effect: PropertyGroup) -> str | None:
     is_laid = selection.active_region(effect).kind in strips.LAID
-    return None if is_laid else rpt_("The region is no matte, ramp or outline")
+    return None if is_laid else rpt_("The region is not a matte, ramp or outline")
 
 
 class SHUTTER_OT_matte_export(OfEffect, ImportHelper, Operator):
-    """Write what the active matte or outline shows at each frame of its strip as pictures, for any other program"""
+    """Write the active matte or outline as pictures, one for each frame of its strip, for other programs"""
 
     bl_label = "Export Matte"
     bl_options = {"REGISTER"}
@@ -108,7 +108,7 @@ class SHUTTER_OT_matte_export(OfEffect, ImportHelper, Operator):
     directory: StringProperty(name="Folder", subtype="DIR_PATH", options={"SKIP_SAVE"})
     format: EnumProperty(
         name="Format",
-        description="What the pictures are",
+        description="File format of the pictures",
         items=(("PNG", "PNG", "Grey, 16 bits"), ("EXR", "OpenEXR", "Float, in the channel Y")),
     )
     filter_folder: BoolProperty(default=True, options={"HIDDEN", "SKIP_SAVE"})
@@ -123,7 +123,7 @@ class SHUTTER_OT_matte_export(OfEffect, ImportHelper, Operator):
         self.report({"INFO"}, rpt_('Saved {count} pictures in "{folder}"').format(count=count, folder=folder))
 
 
-_RAMP = EnumProperty(name="Ramp", description="How the ramp runs", items=RAMPS)
+_RAMP = EnumProperty(name="Ramp", description="Shape of the ramp", items=RAMPS)
 
 
 @operator("Ramp", needs.room_for_a_region, ramp=_RAMP)
@@ -138,7 +138,7 @@ def _why_no_time_map(effect: PropertyGroup) -> str | None:
 
 @operator("Time Map", needs.a_shutter, _why_no_time_map, ramp=_RAMP)
 def time_map(self: Operator, _context: Context, effect: PropertyGroup) -> None:
-    """Show every pixel at its own moment: a ramp from the first of the frames to the last (slit-scan)"""
+    """Show every pixel at its own moment: a ramp from the first frame to the last (slit-scan)"""
     shutter_edits.add_time_map(effect, self.ramp)
 
 
@@ -151,27 +151,27 @@ def _why_no_repair(effect: PropertyGroup) -> str | None:
 
 
 class SHUTTER_OT_rolling_shutter(OfEffect, Operator):
-    """Show every row as it was when the middle one was filmed: straight, where a rolling shutter has skewed it"""
+    """Show every row as it was when the middle one was filmed, so that skewed lines become straight"""
 
     bl_label = "Rolling Shutter Repair"
     needs = (_why_no_repair,)
 
     side: EnumProperty(
         name="Read First",
-        description="Side of the filmed picture that the sensor reads first",
+        description="The side of the picture that the sensor reads first",
         items=SIDES,
         translation_context=CONTEXT,
     )
     unit: EnumProperty(
         name="Unit",
-        description="What the readout is counted in",
+        description="Unit of the readout",
         items=READOUT_UNITS,
         translation_context=CONTEXT,
         options={"SKIP_SAVE"},
     )
     readout: FloatProperty(
         name="Readout",
-        description="Time from the first row to the last, of that from a filmed frame to the next",
+        description="Time from reading the first row to the last, as a percentage of a frame",
         subtype="PERCENTAGE",
         default=50.0,
         min=1.0,
@@ -189,16 +189,13 @@ class SHUTTER_OT_rolling_shutter(OfEffect, Operator):
     )
 
     def draw(self, _context: Context) -> None:
-        layout = self.layout
-        layout.use_property_split = True
-        layout.prop(self, "side")
-        layout.prop(self, "unit")
-        layout.prop(self, "readout" if self.unit == "PERCENT" else "milliseconds")
+        self.layout.use_property_split = True
+        draw_properties(self.layout, self, "side", "unit", "readout" if self.unit == "PERCENT" else "milliseconds")
 
     def change(self, _context: Context, effect: PropertyGroup) -> None:
         known = rolling_shutter.of(effect)
         if known is not None and not self.properties.is_property_set("readout"):
-            self.readout = 100 * known.readout  # from the menu, another side keeps it
+            self.readout = 100 * known.readout  # choosing a side in the menu keeps the readout
         share = self.readout / 100
         if self.unit == "MILLISECONDS":
             share = rolling_shutter.share_of(self.edit, effect, self.effect_strip, self.milliseconds)
@@ -207,7 +204,7 @@ class SHUTTER_OT_rolling_shutter(OfEffect, Operator):
 
 _READS = EnumProperty(
     name="Reads",
-    description="What the sensor reads one after the other",
+    description="Whether the sensor reads row by row or column by column",
     items=READS,
     translation_context=CONTEXT,
 )
@@ -215,7 +212,7 @@ _READS = EnumProperty(
 
 @operator("Find Readout", _why_no_repair, reads=_READS)
 def find_readout(self: Operator, context: Context, effect: PropertyGroup) -> None:
-    """Find how long the sensor reads out, by lines that lean as they move around the current frame, and repair that"""
+    """Find the sensor's readout time from lines that lean while they move around the current frame, and repair it"""
     with ExitStack() as after:
         if (window := context.window) is not None:
             window.cursor_modal_set("WAIT")

@@ -1,5 +1,4 @@
-"""The menu Strip ▸ Shutter: every operator, so that Blender's search finds it, and keys reach it; and what
-Blender's own menus have of ours."""
+"""The menu *Strip ▸ Shutter*, which has every operator for search and shortcuts, and entries in Blender's menus."""
 
 import bpy
 from bpy.types import Context, Menu, UILayout
@@ -36,7 +35,7 @@ def region_menu(layout: UILayout, _context: Context) -> None:
     draw_operators(layout, ("sharp_subject", "RENDERLAYERS"), ("clean_trail", "CURVE_PATH"))
 
 
-# Of operators alone: by the end of its name, what a menu is called, and its groups (panel_parts.draw_operators).
+# Menus of operators only. End of the name: label, and groups for panel_parts.draw_operators.
 _GROUPS: dict[str, tuple] = {
     "bars": (
         "Bars",
@@ -88,7 +87,7 @@ def preview_menu(layout: UILayout, context: Context) -> None:
     layout.prop(live, "split")
     layout.separator()
     layout.prop(live, "probe")
-    layout.operator("shutter.probe_pixel")
+    layout.prop(live, "probe_at")
 
 
 def _add_entry(self, _context: Context) -> None:

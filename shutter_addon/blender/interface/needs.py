@@ -1,4 +1,4 @@
-"""What operators need of an effect: each says in the user's language why it has it not; None: it has."""
+"""What operators need from an effect. Each function returns why it is missing, in the user's language, or None."""
 
 from bpy.app.translations import pgettext_rpt as rpt_
 from bpy.types import PropertyGroup
@@ -19,13 +19,13 @@ def strokes(effect: PropertyGroup) -> str | None:
     if sentence := a_region(effect):
         return sentence
     is_matte = selection.active_region(effect).kind in strips.MATTES
-    return rpt_("The region is a matte or a ramp, and has no strokes") if is_matte else None
+    return rpt_("The region is a matte or a ramp without strokes") if is_matte else None
 
 
 def an_outline(effect: PropertyGroup) -> str | None:
     if sentence := a_region(effect):
         return sentence
-    return None if selection.active_region(effect).kind == "OUTLINE" else rpt_("The region is no outline")
+    return None if selection.active_region(effect).kind == "OUTLINE" else rpt_("The region is not an outline")
 
 
 def room_for_a_region(effect: PropertyGroup) -> str | None:

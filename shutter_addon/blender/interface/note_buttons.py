@@ -1,4 +1,4 @@
-"""Buttons at the ends of the preview's notes, each of which calls an operator."""
+"""Buttons behind the preview's notes. Each calls an operator."""
 
 from bpy.app.translations import pgettext_iface as iface_
 from bpy.app.translations import pgettext_rpt as rpt_
@@ -7,36 +7,40 @@ from bpy.types import Context, Gizmo, GizmoGroup, Region
 from . import drawing
 from .gizmo_groups import InPreview, Seen
 
-HEIGHT = 19  # in units of the interface
+HEIGHT = 19  # interface units
 _PAD = 8
 OPERATORS = "shutter.full_quality", "shutter.smooth_streaks"
 
 
-Button = tuple[str, str]  # an operator, in previews one of OPERATORS; and a label: in panels, empty for the operator's
+Button = tuple[str, str]  # operator (in previews one of OPERATORS) and label (in panels, "" for the operator's own)
 
 
 def of_strobing(step: float) -> tuple[str, Button]:
-    """That an exposure has too few frames, and what helps against that. step: pixels from one to the next"""
+    """Return the note about too few frames with its button.
+
+    Args:
+        step: pixels from one exposed frame to the next.
+    """
     words = rpt_("Too few frames: steps of {pixels} pixels").format(pixels=f"{step:.0f}")
     return words, ("shutter.smooth_streaks", iface_("Smooth"))
 
 
-places: dict[tuple[int, str], tuple[drawing.Box, Button]] = {}  # by region and operator: a handler puts them there
+places: dict[tuple[int, str], tuple[drawing.Box, Button]] = {}  # by region and operator, for the gizmos
 
 
 def clear(region: Region) -> None:
-    """Takes all buttons from a region."""
+    """Remove all buttons from a region."""
     for key in [key for key in places if key[0] == region.as_pointer()]:
         del places[key]
 
 
 def width(button: Button) -> float:
-    """In pixels of a region."""
+    """Return the width of a button in pixels."""
     return drawing.text_width(button[1]) + 2 * _PAD * drawing.ui_scale()
 
 
 def place(region: Region, left: float, bottom: float, button: Button) -> None:
-    """Puts a button into a region: its gizmo draws it."""
+    """Put a button into a region, where its gizmo draws it."""
     box = left, bottom, left + width(button), bottom + HEIGHT * drawing.ui_scale()
     places[region.as_pointer(), button[0]] = box, button
 

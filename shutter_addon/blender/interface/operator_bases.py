@@ -1,4 +1,4 @@
-"""What operators of an effect, a shutter or a region have in common."""
+"""Base classes and helpers of operators: why they are greyed out, their errors, and operators that run for a while."""
 
 from collections.abc import Callable, Iterable
 
@@ -12,14 +12,14 @@ from ...core.recipes import recipe
 from ..data import selection
 from ..rendering.effect_source import FAULTS
 
-Mixin: Operator = object  # for what is mixed into Blender's classes: mypy takes it to have what these have
+Mixin: Operator = object  # for mix-ins of Blender's classes: mypy then knows their attributes
 UNDOABLE = {"REGISTER", "UNDO"}
-Need = Callable[[PropertyGroup], str | None]  # why an effect does not do, in the user's language; None: it does
-Change = Callable[[Operator, Context, PropertyGroup], set[str] | None]  # changes an effect; None: it has been done
+Need = Callable[[PropertyGroup], str | None]  # why an effect does not fit, in the user's language; None: it fits
+Change = Callable[[Operator, Context, PropertyGroup], set[str] | None]  # changes an effect; None: finished
 
 
 def redraw(context: Context) -> None:
-    """Sequencer and properties show the effect's data, of whose changes Blender does not know."""
+    """Redraw editors that show the effect. Blender does not know that its data changed."""
     for window in context.window_manager.windows:
         for area in window.screen.areas:
             if area.type in {"SEQUENCE_EDITOR", "PROPERTIES", "DOPESHEET_EDITOR", "GRAPH_EDITOR"}:
@@ -27,25 +27,25 @@ def redraw(context: Context) -> None:
 
 
 def report_error(operator: Operator, sentence: str) -> None:
-    """Reports a sentence that is already translated; Copy Report has it, without what it names."""
+    """Report a translated sentence as an error, and keep it for *Copy Report* without its names."""
     told.record(sentence, level=2)
     operator.report({"ERROR"}, sentence)
 
 
 def report_warning(operator: Operator, sentence: str) -> None:
-    """As report_error, of what has been done in part or otherwise."""
+    """Report a translated sentence as a warning, like `report_error`."""
     told.record(sentence, level=2)
     operator.report({"WARNING"}, sentence)
 
 
 def popup(context: Context, words: str, **looks: str) -> None:
-    """Says a sentence that is already translated beside the pointer."""
+    """Show a translated sentence in a popup at the pointer."""
     show = context.window_manager.popup_menu
     show(lambda menu, _context: menu.layout.label(text=words, translate=False), **looks)
 
 
 def kept(items: Callable[[Context], Iterable[tuple]]) -> Callable[[object, Context], list[tuple]]:
-    """What gives the items of an EnumProperty: Blender needs the list kept that it got last."""
+    """Turn a function into the `items` of an EnumProperty. Blender needs the last list to stay in memory."""
     last: list[tuple] = []
 
     def given(_self: object, context: Context) -> list[tuple]:
@@ -56,7 +56,7 @@ def kept(items: Callable[[Context], Iterable[tuple]]) -> Callable[[object, Conte
 
 
 class Named(Mixin):
-    """An operator that is named as its class is."""
+    """An operator whose bl_idname comes from its class name."""
 
     def __init_subclass__(cls) -> None:
         super().__init_subclass__()
@@ -64,18 +64,18 @@ class Named(Mixin):
 
     @classmethod
     def poll(cls, context: Context) -> bool:
-        """Greys the operator out where there is a reason, and says it."""
+        """Grey the operator out and show the reason, if there is one."""
         if sentence := cls.refusal(context):
             cls.poll_message_set(sentence)
         return not sentence
 
     @classmethod
     def refusal(cls, context: Context) -> str | None:
-        """Why the operator cannot be used, in the user's language; None: it can."""
+        """Return why the operator cannot be used, in the user's language; None: it can be."""
         return None
 
     def tried(self, step: Callable[..., set[str] | None], *arguments: object) -> set[str]:
-        """What a step of the operator returns, that it is finished where that is nothing; an error is reported."""
+        """Run a step and return its result, {"FINISHED"} by default. Errors are reported."""
         try:
             return step(*arguments) or {"FINISHED"}
         except (*FAULTS, UserError) as error:
@@ -84,13 +84,16 @@ class Named(Mixin):
 
 
 class OfEffect(Named):
-    """Works on the effect that is seen, or where none is, on that of the active strip.
+    """An operator that changes the visible effect, or else the effect of the active strip.
 
-    needs: each may say why an effect that can be changed does not do; the first reason counts
-    edit, effect_strip: the scene and the strip of the effect, while it is changed"""
+    Attributes:
+        needs: each may return why the effect does not fit. The first reason counts.
+        only_seen: the effect has to be visible in the preview.
+        edit, effect_strip: scene and strip of the effect, set before `change` is called.
+    """
 
     bl_options = UNDOABLE
-    only_seen = False  # it does something in the picture
+    only_seen = False
     needs: tuple[Need, ...] = ()
 
     @classmethod
@@ -112,14 +115,12 @@ class OfEffect(Named):
 
 
 def operator(
-    label: str,
-    *needs: Need,
-    options: set[str] = UNDOABLE,
-    only_seen: bool = False,
-    **properties: object,
+    label: str, *needs: Need, options: set[str] = UNDOABLE, only_seen: bool = False, **properties: object
 ) -> Callable[[Change], type[Operator]]:
-    """Makes an operator of a function that changes an effect, with its name and docstring; the rest as OfEffect has
-    it."""
+    """Make an operator from a function that changes an effect. Its name, label and docstring become the operator's.
+
+    Other arguments are those of OfEffect, and properties of the operator.
+    """
 
     def made(change: Change) -> type[Operator]:
         content = {
@@ -138,19 +139,23 @@ def operator(
 
 
 class Beside(Named):
-    """Goes on beside Blender, step by step; or at once, in the background and for scripts.
+    """An operator that works in steps while Blender goes on. In the background and in scripts it does everything at
+    once.
 
-    Each has `begin(context, waits)`, which does all of it, or goes on, and has to do all if it `waits`;
-    `goes_on(context)`, which does a step, and says whether there are more; and `end(context, is_stopped)`, called once
-    all steps are done, or once Esc has stopped them. What `begin` and `end` give is for `tried`.
+    Subclasses have `begin(context, waits)`, which does everything if `waits`, and otherwise returns `go_on(context)`;
+    `goes_on(context)`, which does a step and returns whether there are more; and `end(context, is_stopped)`, called
+    after the last step or Esc. `tried` handles what `begin` and `end` return or raise.
 
-    tick: seconds from step to step; blocks: whether Blender waits meanwhile"""
+    Attributes:
+        tick: seconds between steps.
+        blocks: whether Blender ignores other input meanwhile.
+    """
 
     tick = 0.1
     blocks = False
 
     def leave(self, context: Context) -> None:
-        """Lets go of what steps need."""
+        """Remove the timer and the text in the status bar."""
         if self._timer in _timers:
             _timers.remove(self._timer)
             context.window_manager.event_timer_remove(self._timer)
@@ -173,7 +178,7 @@ class Beside(Named):
         is_over = is_stopped or self._timer not in _timers
         try:
             is_over = is_over or (event.type == "TIMER" and not self.goes_on(context))
-        except Exception:  # Blender ends the operator then, and asks for no `cancel`
+        except Exception:  # Blender then ends the operator without calling `cancel`
             self.leave(context)
             raise
         if not is_over:
@@ -182,28 +187,32 @@ class Beside(Named):
         return self.tried(self.end, context, is_stopped)
 
     def cancel(self, context: Context) -> None:
-        """Its window was closed."""
+        """Clean up when Blender closes the operator's window."""
         self.leave(context)
 
 
-_timers: list = []  # of what goes on
+_timers: list = []  # of running operators
 
 
 def show_status(words: str | None) -> None:
-    """Says it in the status bar, of whichever workspace; None: what Blender says."""
+    """Show a text in the status bar of all workspaces; None: Blender's own."""
     for workspace in bpy.data.workspaces:
         workspace.status_text_set(words)
 
 
 def end_all() -> None:
-    """Ends what goes on, before another file is loaded."""
-    while _timers:  # Blender crashes where a text is taken from the status bar while it quits
+    """End all running operators before another file is loaded."""
+    while _timers:  # Blender crashes if the status text changes while it quits
         bpy.context.window_manager.event_timer_remove(_timers.pop())
         show_status(None)
 
 
 def chosen_file(operator: Operator) -> str:
-    """The path that an operator got. RecipeError: it got none."""
+    """Return the operator's file path.
+
+    Raises:
+        RecipeError: no file was chosen.
+    """
     if not operator.filepath:
         raise recipe.RecipeError(rpt_("Choose a file"))
     return operator.filepath

@@ -1,5 +1,4 @@
-"""Operators: what the user can do with effects, shutters and regions, as thin calls of plain functions; what gives an
-effect to another clip, its shutters and regions to another effect or a recipe, and a report to whoever helps."""
+"""Operators of effects, shutters, regions and recipes. Each calls a function of `editing`."""
 
 from collections.abc import Callable, Iterator
 from functools import partial
@@ -10,7 +9,7 @@ from bpy.app.translations import contexts
 from bpy.app.translations import pgettext_iface as iface_
 from bpy.app.translations import pgettext_rpt as rpt_
 from bpy.props import BoolProperty, EnumProperty, FloatProperty, IntProperty, StringProperty
-from bpy.types import Annotation, Context, Event, Operator, PropertyGroup
+from bpy.types import Context, Event, Operator, PropertyGroup
 from bpy_extras.io_utils import ExportHelper, ImportHelper
 
 from ...core.messages import EffectError, UserError
@@ -19,15 +18,7 @@ from ...core.model.choices import CONTEXT, DRAWN
 from ...core.recipes import recipe_file
 from ..data import annotations, consistency, data_format, preview_areas, recipe_import, selection, strips
 from ..devices import main_thread
-from ..editing import (
-    add_effect,
-    bar_edits,
-    drawn_places,
-    region_edits,
-    shown_annotations,
-    shutter_edits,
-    undelete,
-)
+from ..editing import add_effect, bar_edits, drawn_places, region_edits, shown_annotations, shutter_edits, undelete
 from ..editing import match_source as matching
 from ..output import error_report, matte_export
 from . import needs, sharp_frame
@@ -47,22 +38,8 @@ from .operator_bases import (
 from .panel_parts import icon_of
 
 
-class SHUTTER_OT_add_effect(Named, Operator):
-    """Add a Shutter strip above the active strip, which gives every pixel an exposure of its own"""
-
-    bl_label = "Add Shutter Strip"
-    bl_options = UNDOABLE
-
-    @classmethod
-    def refusal(cls, context: Context) -> str | None:
-        return why_no_effect(context)
-
-    def execute(self, context: Context) -> set[str]:
-        return self.tried(give_effect, context)
-
-
 def why_no_effect(context: Context) -> str | None:
-    """Why the active strip cannot be given an effect; None: it can."""
+    """Return why the active strip cannot get an effect; None: it can."""
     scene, source = selection.scene_of(context), selection.active_strip(context)
     if scene is None or source is None:
         return rpt_("Select a movie, image or clip strip")
@@ -72,7 +49,11 @@ def why_no_effect(context: Context) -> str | None:
 
 
 def give_effect(context: Context) -> None:
-    """Gives the active strip an effect, and shows it. One of FAULTS: it cannot be."""
+    """Add an effect to the active strip and show its panel.
+
+    Raises:
+        FAULTS: it is impossible.
+    """
     scene = selection.scene_of(context)
     strip, effect = add_effect.add_effect(scene, selection.active_strip(context))
     shutter_edits.start(effect)
@@ -82,8 +63,19 @@ def give_effect(context: Context) -> None:
     redraw(context)
 
 
+class SHUTTER_OT_add_effect(Named, Operator):
+    """Add a Shutter strip, which gives every pixel its own exposure, above the active strip"""
+
+    bl_label = "Add Shutter Strip"
+    bl_options = UNDOABLE
+    refusal = staticmethod(why_no_effect)
+
+    def execute(self, context: Context) -> set[str]:
+        return self.tried(give_effect, context)
+
+
 class MakesEffect(Mixin):
-    """Gives the active strip an effect first, if that has none."""
+    """A mix-in for operators that first add an effect if the active strip has none."""
 
     @classmethod
     def refusal(cls, context: Context) -> str | None:
@@ -97,45 +89,45 @@ class MakesEffect(Mixin):
 
 def _why_alike(effect: PropertyGroup) -> str | None:
     if (shown := matching.shown(effect)) is None:
-        return rpt_("The Shutter strip has no source any more")
-    return None if shown.differences else rpt_("The Shutter strip is like its source")
+        return rpt_("The Shutter strip has no source")
+    return None if shown.differences else rpt_("The Shutter strip matches its source")
 
 
 @operator("Match Source", _why_alike)
 def match_source(self: Operator, _context: Context, effect: PropertyGroup) -> None:
-    """Give the Shutter strip transform, crop, flip, color and range of its source (scribbles stay on the picture)"""
+    """Copy transform, crop, flip, color and range of the source to the Shutter strip (strokes stay on the picture)"""
     if (neighbor := matching.match(effect)) is not None:
-        sentence = rpt_('"{neighbor}" is in the way: "{strip}" has not the whole range of its source')
+        sentence = rpt_('"{neighbor}" is in the way: "{strip}" does not have the whole range of its source')
         report_warning(self, sentence.format(neighbor=neighbor.name, strip=self.effect_strip.name))
 
 
 def _why_no_modifiers(effect: PropertyGroup) -> str | None:
     if (shown := matching.shown(effect)) is not None and shown.lacks_modifiers:
         return None
-    return rpt_("The Shutter strip has the modifiers of its source")
+    return rpt_("The Shutter strip already has the modifiers of its source")
 
 
 @operator("Copy Modifiers", _why_no_modifiers)
 def copy_modifiers(_self: Operator, _context: Context, effect: PropertyGroup) -> None:
-    """Copy the modifiers of the source to the Shutter strip, which shows the source's file as it is"""
+    """Copy the modifiers of the source to the Shutter strip, which otherwise shows the file without them"""
     matching.copy_modifiers(effect)
 
 
 def _why_smooth(effect: PropertyGroup) -> str | None:
-    return None if effect.inbetween == "1" else rpt_("The exposures are smooth")
+    return None if effect.inbetween == "1" else rpt_("The exposures are already smooth")
 
 
 @operator("Smooth Streaks", _why_smooth)
 def smooth_streaks(_self: Operator, _context: Context, effect: PropertyGroup) -> None:
-    """Expose moments between filmed frames as well, as many as the footage needs"""
+    """Expose as many moments between filmed frames as the footage needs"""
     effect.inbetween = "AUTO"
 
 
 def show_panel(context: Context) -> None:
-    """Opens the sidebar's Shutter tab beside the picture: in the Properties editor it is below all other panels."""
+    """Open the sidebar's Shutter tab in all previews. In the Properties editor it is below all other panels."""
     for _window, area in preview_areas.previews(context):
         area.spaces.active.show_region_ui = True
-    # A sidebar has tabs once it has been drawn, which a slow window does late, and one without room never.
+    # A sidebar has no tabs before it is drawn. A slow window draws it late; one without room never does.
     main_thread.later(partial(_choose_tab, iter([0.1] * 30)), 0.1)
 
 
@@ -177,7 +169,7 @@ _DIRECTION = EnumProperty(name="Direction", items=(("UP", "Up", ""), ("DOWN", "D
 
 
 def _move(places: list[int], index: int, direction: str, move: Callable[[int, int], None]) -> set[str] | None:
-    """Moves an item to the place after or before it in a list, among the places that it shows."""
+    """Move an item one place up or down among the places that the list shows."""
     step = places.index(index) + (1 if direction == "DOWN" else -1)
     if not 0 <= step < len(places):
         return {"CANCELLED"}
@@ -187,18 +179,16 @@ def _move(places: list[int], index: int, direction: str, move: Callable[[int, in
 
 @operator("Move Shutter", needs.a_shutter, direction=_DIRECTION)
 def shutter_move(self: Operator, _context: Context, effect: PropertyGroup) -> set[str] | None:
-    """Move the active shutter in the list (the first one is the default, which holds where nothing is scribbled)"""
+    """Move the active shutter in the list (the first one is the default, used where nothing is drawn)"""
     places = list(range(len(effect.shutters)))
     return _move(places, effect.active_shutter, self.direction, partial(shutter_edits.move_shutter, effect))
 
 
 @kept
 def _presets(_context: Context) -> list[tuple]:
-    """With icons, which exist only once the extension is registered."""
-    return [
-        (name, label, description, icon_of(name), i)
-        for i, (name, (label, description, _make)) in enumerate(shutters.PRESETS.items())
-    ]
+    """Return the presets with their icons, which exist only while the extension is registered."""
+    presets = enumerate(shutters.PRESETS.items())
+    return [(name, label, description, icon_of(name), i) for i, (name, (label, description, _make)) in presets]
 
 
 _PRESET = EnumProperty(name="Preset", items=_presets, translation_context=CONTEXT)
@@ -232,13 +222,13 @@ class SHUTTER_OT_bar_set(OfEffect, Operator):
     needs = (needs.a_shutter,)
 
     bar: IntProperty(name="Bar", description="Number of the bar, from 1", default=1, min=1)
-    weight: FloatProperty(name="Weight", description="How much the bar's frame contributes", min=0.0, soft_max=1.0)
+    weight: FloatProperty(name="Weight", description="Contribution of the bar's frame", min=0.0, soft_max=1.0)
 
     def invoke(self, context: Context, event: Event) -> set[str]:
         from .bar_editor import bar_under
 
         effect = selection.active(context)[1]
-        is_clicked = event.value == "DOUBLE_CLICK"  # else it comes from a menu, wherever the pointer rests
+        is_clicked = event.value == "DOUBLE_CLICK"  # from a menu, the pointer is anywhere
         place = bar_under(context, event.mouse_region_x, event.mouse_region_y) if is_clicked else None
         self.is_pointed_at = place is not None
         if place is not None:
@@ -254,7 +244,7 @@ class SHUTTER_OT_bar_set(OfEffect, Operator):
 
     def draw(self, _context: Context) -> None:
         self.layout.activate_init = True
-        if not getattr(self, "is_pointed_at", False):  # from a menu, by keys
+        if not getattr(self, "is_pointed_at", False):  # from a menu
             self.layout.prop(self, "bar")
         self.layout.prop(self, "weight")
 
@@ -271,13 +261,13 @@ def _why_no_room(effect: PropertyGroup) -> str | None:
 
 
 class SHUTTER_OT_draw(MakesEffect, OfEffect, Operator):
-    """Draw on the sharp frame where the active shutter holds (at another frame, this redraws the active region)"""
+    """Draw on the sharp frame where the active shutter is used (at another frame, this redraws the active region)"""
 
     bl_label = "Draw"
     only_seen = True
     needs = needs.a_shutter, _why_no_room
 
-    # Blender would use again what a button was pressed with before.
+    # SKIP_SAVE: Blender would otherwise reuse the values of the last button.
     new: BoolProperty(
         name="New Region",
         description="Start a new region instead of adding strokes to the active one",
@@ -294,7 +284,7 @@ class SHUTTER_OT_draw(MakesEffect, OfEffect, Operator):
     def change(self, context: Context, effect: PropertyGroup) -> None:
         region = selection.active_region(effect)
         if self.new or region is None or region.kind in strips.MATTES:
-            if sentence := region_edits.why_full(effect, regions=1):  # poll() does not know what `new` is
+            if sentence := region_edits.why_full(effect, regions=1):  # poll() does not know the value of `new`
                 raise EffectError(sentence)
             region = region_edits.first_drawn(effect, selection.active_shutter(effect), self.kind)
         drawn_places.begin(effect, self.effect_strip, effect.active_region)
@@ -312,7 +302,10 @@ def erase(self: Operator, context: Context, effect: PropertyGroup) -> None:
 
 
 def drawing_tool(context: Context, effect: PropertyGroup, region: PropertyGroup, tool: str) -> bool:
-    """Makes the region's layer the active annotation of every preview, and the tool theirs; whether there is one."""
+    """Make the region's layer the active annotation and activate a drawing tool in all previews.
+
+    Return whether there is a preview.
+    """
     if annotations.layer_of(effect, region) is None:
         region_edits.new_layer(effect, region)
     consistency.aim_pen(effect)
@@ -321,7 +314,7 @@ def drawing_tool(context: Context, effect: PropertyGroup, region: PropertyGroup,
 
 
 def _show_annotation(context: Context, effect: PropertyGroup) -> None:
-    """Has every preview show the effect's annotation."""
+    """Show the effect's annotation in all previews."""
     for _window, area in preview_areas.previews(context):
         shown_annotations.give(area.spaces.active, effect.scene.annotation)
 
@@ -329,18 +322,17 @@ def _show_annotation(context: Context, effect: PropertyGroup) -> None:
 @kept
 def _layers(context: Context) -> list[tuple]:
     active = selection.active(context)
-    layers = region_edits.free_layers(active[1], annotation_of(context)) if active else []
-    return [(layer.info, layer.info, "") for layer in layers]
+    return [(layer.info, layer.info, "") for layer in _free_layers(active[1])] if active else []
 
 
-def annotation_of(context: Context) -> Annotation | None:
-    """The annotation that the first preview shows."""
-    return next((area.spaces.active.annotation for _window, area in preview_areas.previews(context)), None)
+def _free_layers(effect: PropertyGroup) -> list:
+    """Return the layers of the first preview's annotation that are no regions."""
+    previews = preview_areas.previews(bpy.context)
+    return region_edits.free_layers(effect, next((area.spaces.active.annotation for _, area in previews), None))
 
 
 def _why_no_layer(effect: PropertyGroup) -> str | None:
-    has_some = region_edits.free_layers(effect, annotation_of(bpy.context))
-    return None if has_some else rpt_("The preview shows no annotation layer that is not a region yet")
+    return None if _free_layers(effect) else rpt_("The preview shows no annotation layer that could become a region")
 
 
 _LAYER = EnumProperty(name="Layer", items=_layers, translation_context=contexts.no_translation)
@@ -349,8 +341,7 @@ _LAYER = EnumProperty(name="Layer", items=_layers, translation_context=contexts.
 @operator("Add Region from Annotation Layer", needs.room_for_a_region, _why_no_layer, only_seen=True, layer=_LAYER)
 def region_take(self: Operator, context: Context, effect: PropertyGroup) -> None:
     """Make an annotation layer of the preview a region of the active shutter"""
-    free = region_edits.free_layers(effect, annotation_of(context))
-    layer = next(layer for layer in free if layer.info == self.layer)
+    layer = next(layer for layer in _free_layers(effect) if layer.info == self.layer)
     region_edits.take_layer(effect, selection.active_shutter(effect), layer)
     _show_annotation(context, effect)
 
@@ -378,7 +369,7 @@ def region_remove(_self: Operator, _context: Context, effect: PropertyGroup) -> 
 
 @operator("Move Region", needs.a_region, direction=_DIRECTION)
 def region_move(self: Operator, _context: Context, effect: PropertyGroup) -> set[str] | None:
-    """Move the active region in the list (later ones lie over earlier ones)"""
+    """Move the active region in the list (later ones cover earlier ones)"""
     name = selection.active_shutter(effect).name
     places = [i for i, region in enumerate(effect.regions) if region.shutter == name]
     return _move(places, effect.active_region, self.direction, partial(region_edits.move_region, effect))
@@ -392,7 +383,7 @@ def region_key(_self: Operator, _context: Context, effect: PropertyGroup) -> Non
 
 @operator("Choose Source", strip=STRIP)
 def source(self: Operator, _context: Context, effect: PropertyGroup) -> None:
-    """Give the effect another clip: the movie, image or clip strip whose frames it exposes"""
+    """Choose the movie, image or clip strip whose frames the effect exposes"""
     add_effect.choose_source(effect, self.effect_strip, self.edit.sequence_editor.strips_all[self.strip])
 
 
@@ -401,11 +392,11 @@ def effect_copy(self: Operator, _context: Context, effect: PropertyGroup) -> Non
     """Copy the shutters, regions, keyframes and options of the effect, for other strips and scenes of this file"""
     undelete.copy(effect, self.effect_strip)
     if data_format.is_newer(self.edit):
-        report_warning(self, rpt_("Copied, without what a newer version of Virtual Shutter has added"))
+        report_warning(self, rpt_("Copied without data of a newer version of Virtual Shutter"))
 
 
 class SHUTTER_OT_effect_paste(MakesEffect, OfEffect, Operator):
-    """Give the active strip the copied effect; where it has one, that is replaced"""
+    """Paste the copied effect to the active strip, replacing its effect"""
 
     bl_label = "Paste Effect"
 
@@ -447,14 +438,14 @@ class SHUTTER_OT_recipe_export(OfEffect, ExportHelper, Operator):
         except OSError as error:
             raise UserError(f"{path}: {error.strerror or error}") from None
         if data_format.is_newer(self.edit):
-            words = rpt_('Saved "{path}", without what a newer version of Virtual Shutter has added')
+            words = rpt_('Saved "{path}" without data of a newer version of Virtual Shutter')
             report_warning(self, words.format(path=path))
         else:
             self.report({"INFO"}, rpt_('Saved "{path}"').format(path=path))
 
 
 class SHUTTER_OT_copy_report(Named, Operator):
-    """Copy versions, device, kinds and numbers of the edit, and last errors: no names, no paths. Nothing is sent"""
+    """Copy versions, device, types and numbers of the edit, and last errors: no names, no paths. Nothing is sent"""
 
     bl_label = "Copy Report"
 
@@ -463,5 +454,5 @@ class SHUTTER_OT_copy_report(Named, Operator):
             report_error(self, rpt_("Without a window there is no clipboard: use the command check with --report"))
             return {"CANCELLED"}
         context.window_manager.clipboard = error_report.text(selection.scene_of(context))
-        self.report({"INFO"}, rpt_("Report copied: paste it into your message, and read it before you send it"))
+        self.report({"INFO"}, rpt_("Report copied: paste it into your message and read it before you send it"))
         return {"FINISHED"}

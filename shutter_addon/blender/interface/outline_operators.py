@@ -1,8 +1,7 @@
-"""Operators of outlines: carried now, drawn where that is needed most, made of what is carried; and drawn point by
-point: between two of them a curve goes along the picture's edges. And the active outline in previews, as it is carried
-to the current frame: pulling at it mends it, and makes that frame a drawing."""
+"""Operators and the gizmo of outlines: track, draw by points, correct, find where a drawing is needed, convert."""
 
 from contextlib import closing
+from functools import partial
 from typing import Any
 
 import bpy
@@ -26,25 +25,25 @@ from .preview import show_carried
 from .region_gizmo import SHUTTER_GGT_region
 
 _COLOR = (0.2, 0.9, 1.0, 0.9)
-_NEAR = 6  # units of the interface, within which the pointer is at a curve
-_REACH = 0.08  # parts of the picture's height, along the curve, that are pulled along at first
-_MORE = 1.25  # times, with a turn of the wheel
-_STRIDE = 12  # units of the interface from point to point, as the pointer is dragged
-_CLOSES = 8  # units of the interface around the first point, within which a click closes the curve
+_NEAR = 6  # interface units from the pointer to a curve that it can grab
+_REACH = 0.08  # fraction of the picture's height: how far a pull reaches along the curve at first
+_MORE = 1.25  # factor for each turn of the wheel
+_STRIDE = 12  # interface units between points while the pointer is dragged
+_CLOSES = 8  # interface units around the first point: a click there closes the curve
 _KEYS = {"ESC", "RIGHTMOUSE", "RET", "NUMPAD_ENTER", "BACK_SPACE"}
 _ARROWS = {"LEFT_ARROW": (-1, 0), "RIGHT_ARROW": (1, 0), "DOWN_ARROW": (0, -1), "UP_ARROW": (0, 1)}
-_STEP, _FINE = 10, 1  # units of the interface that an arrow key moves the pointer by, and with Shift
+_STEP, _FINE = 10, 1  # interface units that an arrow key moves the pointer, without and with Shift
 
 
 class _Carries(Beside, OfEffect):
-    """Carries the active outline through its strip, beside Blender, and then does something with it."""
+    """An operator that tracks the active outline through its strip, and then calls `carried`."""
 
     bl_options = {"REGISTER"}
     only_seen = True
     needs = (needs.an_outline,)
 
     def carried(self, context: Context) -> set[str] | None:
-        """Called once all is carried. One of FAULTS: what comes then cannot be done."""
+        """Do the operator's own work after tracking. Errors of FAULTS are reported."""
         return None
 
     def begin(self, context: Context, waits: bool) -> set[str] | None:
@@ -67,8 +66,8 @@ class _Carries(Beside, OfEffect):
     def goes_on(self, _context: Context) -> bool:
         if self._target.effect() is None or (progress := outline_carrying.progress()) is None:
             return False
-        sentence = rpt_("Tracking the outline: {done} of {total} frames, Esc to stop")
-        show_status(sentence.format(done=progress[0], total=progress[1]))
+        done, total = progress
+        show_status(rpt_("Tracking the outline: {done} of {total} frames, Esc to stop").format(done=done, total=total))
         return True
 
     def end(self, context: Context, is_stopped: bool) -> set[str] | None:
@@ -88,7 +87,7 @@ class SHUTTER_OT_outline_carry(_Carries, Operator):
 
 
 class SHUTTER_OT_outline_needed(_Carries, Operator):
-    """Go to the middle of the frames at which the outline is least sure, tracking it first"""
+    """Go to the frame that needs a drawing most, after tracking the outline"""
 
     bl_label = "Next Drawing Needed"
 
@@ -96,24 +95,24 @@ class SHUTTER_OT_outline_needed(_Carries, Operator):
         scene, effect, strip = selection.active(context)
         needed = outline_drawings.next_needed(scene, effect, strip, self._target.index)
         if needed.frame is None:
-            self.report({"INFO"}, rpt_("The outline is sure by 75 % or more at all frames"))
+            self.report({"INFO"}, rpt_("The confidence is 75 % or more at all frames"))
             return {"CANCELLED"}
         scene.frame_set(needed.frame)
-        sentence = rpt_("Frame {frame}: the outline is sure by {share:.0f} %")
+        sentence = rpt_("Frame {frame}: the confidence is {share:.0f} %")
         self.report({"INFO"}, sentence.format(frame=needed.frame, share=100 * needed.confidence))
         redraw(context)
         return None
 
 
 class SHUTTER_OT_outline_mask(_Carries, Operator):
-    """Make a Blender mask with shape keys of the active outline, tracking it first"""
+    """Make a Blender mask with shape keys of the active outline, after tracking it"""
 
     bl_label = "Outline to Mask"
     bl_options = UNDOABLE
 
     step: IntProperty(
         name="Every",
-        description="Frames from one shape key to the next between drawings of a tracked outline; 0 for drawings alone",
+        description="Frames between shape keys of a tracked outline; 0 for its drawings only",
         default=5,
         min=0,
         soft_max=50,
@@ -126,36 +125,34 @@ class SHUTTER_OT_outline_mask(_Carries, Operator):
 
 @operator("Insert Outline Drawing", needs.an_outline, only_seen=True)
 def outline_draw(self: Operator, _context: Context, effect: PropertyGroup) -> set[str] | None:
-    """Make the outline that is tracked to the current frame a drawing of its own, to be mended"""
+    """Turn the tracked outline at the current frame into a drawing that can be edited"""
     scene, strip, index = self.edit, self.effect_strip, effect.active_region
     curves = outline_drawings.curves_now(scene, effect, strip, index)
     if not curves:
-        report_warning(self, rpt_("The outline encloses nothing at the current frame"))
+        report_warning(self, rpt_("The outline is empty at the current frame"))
         return {"CANCELLED"}
     outline_drawings.draw(effect, strip, effect.regions[index], curves, scene.frame_current)
     return None
 
 
 _FRAME = IntProperty(
-    name="Frame",
-    description="Timeline frame of the strokes; without one, the current frame",
-    options={"SKIP_SAVE"},
+    name="Frame", description="Timeline frame of the strokes; without one, the current frame", options={"SKIP_SAVE"}
 )
 
 
 @operator("Find Outline", needs.strokes, only_seen=True, frame=_FRAME)
 def outline_it(self: Operator, _context: Context, effect: PropertyGroup) -> set[str] | None:
-    """Make the active region an outline of the subject that its strokes run over, or go around, at this frame"""
+    """Make the active region an outline of the subject that its strokes mark or enclose at this frame"""
     if self.properties.is_property_set("frame"):
         self.edit.frame_set(self.frame)
     if not outline_drawings.outline_it(self.edit, effect, self.effect_strip, effect.active_region):
-        report_warning(self, rpt_("No subject is told from what is around it"))
+        report_warning(self, rpt_("No subject stands out from its surroundings"))
         return {"CANCELLED"}
     return None
 
 
 def _there(held: Operator | Gizmo) -> Any:
-    """Scene, effect and strip of what has a `target` and a `strip` by its name, as Blender has them now; None: they are
+    """Return scene, effect and strip of an operator or gizmo that keeps a `target` and a `strip` name; None: they are
     gone."""
     effect = held.target.effect()
     strip = effect and effect.id_data.sequence_editor.strips_all.get(held.strip)
@@ -183,8 +180,8 @@ class SHUTTER_OT_outline_points(OfEffect, Operator):
         sharp_frame.show(context)
         self._drawn = bpy.types.SpaceSequenceEditor.draw_handler_add(self._draw, (), "PREVIEW", "POST_PIXEL")
         sentence = rpt_(
-            "Click points around the subject (arrow keys, Space), Ctrl: straight, Backspace: one less, "
-            "Return: close, Esc: nothing"
+            "Click points around the subject (arrow keys, Space), Ctrl: straight, Backspace: undo point, "
+            "Return: close, Esc: cancel"
         )
         show_status(sentence)
         context.window_manager.modal_handler_add(self)
@@ -192,10 +189,10 @@ class SHUTTER_OT_outline_points(OfEffect, Operator):
 
     def _read(self, scene: Scene, effect: PropertyGroup, strip: Strip) -> None:
         self._picture = outline_drawings.picture_now(scene, effect, strip)
-        outlining.along_edges(self._picture, np.zeros(2), np.zeros(2))  # that it can, before anything is drawn
+        outlining.along_edges(self._picture, np.zeros(2), np.zeros(2))  # raises now if OpenCV is missing
 
     def execute(self, _context: Context) -> set[str]:
-        """Without a preview: it is drawn in one alone."""
+        """Report that drawing needs a preview."""
         report_warning(self, rpt_("Open a sequencer with a preview to draw"))
         return {"CANCELLED"}
 
@@ -213,7 +210,7 @@ class SHUTTER_OT_outline_points(OfEffect, Operator):
         return self._key(context, event) if event.type in _KEYS else {"PASS_THROUGH"}
 
     def _pointed(self, context: Context, event: Event) -> set[str]:
-        """A click or the space bar adds a point; dragging adds one after the other."""
+        """Add a point at a click or the space bar, and points along the way while dragging."""
         point = self._on_picture(event)
         if event.type in {"LEFTMOUSE", "SPACE"} and event.value in {"PRESS", "DOUBLE_CLICK"}:
             if len(self._ways) > 2 and self._apart(point, self._ways[0][0]) <= _CLOSES * drawing.ui_scale():
@@ -227,7 +224,7 @@ class SHUTTER_OT_outline_points(OfEffect, Operator):
         return {"RUNNING_MODAL"}
 
     def _stepped(self, context: Context, event: Event) -> set[str]:
-        """An arrow key moves the pointer, from elsewhere to the preview's middle first."""
+        """Move the pointer with an arrow key, first into the middle of the preview."""
         region = preview_areas.preview_region(self._area)
         x, y = region.x + region.width // 2, region.y + region.height // 2
         if self._is_over(event):
@@ -252,20 +249,18 @@ class SHUTTER_OT_outline_points(OfEffect, Operator):
         return {"RUNNING_MODAL"}
 
     def _closed(self, context: Context) -> set[str]:
-        """The curve becomes one of the drawing at this frame."""
+        """Close the curve and add it to the drawing of this frame."""
         if len(self._ways) < 3:
-            report_warning(self, rpt_("A curve has three points at least"))
+            report_warning(self, rpt_("A curve needs at least three points"))
             return {"RUNNING_MODAL"}
         _scene, effect, strip = _there(self)
         region = effect.regions[self.target.index]
-        # The first click is at no edge; the way from it begins at the one beside it.
+        # The first click snaps to no edge, so the curve begins at the edge point next to it.
         first = self._ways[1][0]
         curve = np.concatenate([*self._ways[1:], self._way(first, False)])
         steps = np.hypot(*np.diff(curve, axis=0, append=curve[:1]).T)
-        return self._ended(
-            context,
-            self.tried(outline_drawings.add, effect, strip, region, curve[steps > 0], self._frame),
-        )
+        add = partial(outline_drawings.draw, adds=True)
+        return self._ended(context, self.tried(add, effect, strip, region, [curve[steps > 0]], self._frame))
 
     def _ended(self, context: Context, result: set[str]) -> set[str]:
         self.cancel(context)
@@ -273,13 +268,13 @@ class SHUTTER_OT_outline_points(OfEffect, Operator):
         return result
 
     def cancel(self, context: Context) -> None:
-        """It has ended, or its window was closed."""
+        """Clean up at the end, or when Blender closes the window."""
         bpy.types.SpaceSequenceEditor.draw_handler_remove(self._drawn, "PREVIEW")
         show_status(None)
         sharp_frame.give_back(context)
 
     def _way(self, point: np.ndarray, is_straight: bool) -> np.ndarray:
-        """From the last point to another one; the first is on its own."""
+        """Return the points from the last point to a new one. The first point is alone."""
         if not self._ways:
             return point[None]
         last = self._ways[-1][-1]
@@ -295,12 +290,12 @@ class SHUTTER_OT_outline_points(OfEffect, Operator):
         return view(effect, strip, preview_areas.preview_region(self._area))
 
     def _on_picture(self, event: Event) -> np.ndarray:
-        """Where the pointer is, in fractions of the picture."""
+        """Return the pointer's position in fractions of the picture."""
         region = preview_areas.preview_region(self._area)
         return self._view().on_picture(event.mouse_x - region.x, event.mouse_y - region.y)
 
     def _apart(self, *points: np.ndarray) -> float:
-        """How far two points are from each other, in pixels of the region."""
+        """Return the distance of two points in pixels of the region."""
         return float(np.hypot(*np.diff(self._view().on_region(points), axis=0)[0]))
 
     def _draw(self) -> None:
@@ -311,17 +306,17 @@ class SHUTTER_OT_outline_points(OfEffect, Operator):
 
 
 class SHUTTER_GT_outline(Dragged, Gizmo):
-    """The curves."""
+    """The curves of the active outline in a preview. Dragging corrects them and makes the frame a drawing."""
 
     def seen(self, context: Context) -> tuple[outlines.Curves, View] | None:
-        """The active outline's curves at the current frame, and how the picture lies; none are while it plays."""
+        """Return the curves at the current frame and the view of the picture. There are none during playback."""
         seen = None if context.screen.is_animation_playing else selection.in_picture(context)
         if seen is None:
             return None
         scene, effect, strip = seen
         try:
             curves = outline_drawings.shown_curves(scene, effect, strip, effect.active_region)
-        except UserError:  # panels and the live preview tell it
+        except UserError:  # panels and the live preview show the error
             return None
         return (curves, view(effect, strip, context.region)) if curves else None
 
@@ -333,8 +328,8 @@ class SHUTTER_GT_outline(Dragged, Gizmo):
 
     def is_at(self, _context: Context, seen: tuple[outlines.Curves, View], location: tuple[int, int]) -> bool:
         curves, seen_as = seen
-        _index, apart = outlines.nearest(curves, _on_picture(seen_as, location), seen_as.aspect)
-        height = float(np.hypot(*seen_as.matrix[:2, 1]))  # of the picture, in pixels of the region
+        _index, apart = outlines.nearest(curves, tuple(seen_as.on_picture(*location)), seen_as.aspect)
+        height = float(np.hypot(*seen_as.matrix[:2, 1]))  # of the picture, in region pixels
         return bool(apart * height <= drawing.ui_scale() * _NEAR)
 
     def grab(self, context: Context, event: Event, seen: tuple[outlines.Curves, View]) -> None:
@@ -343,7 +338,7 @@ class SHUTTER_GT_outline(Dragged, Gizmo):
         self.target, self.frame = track_region.Target.of(effect, effect.active_region), scene.frame_current
         self.strip, self.curves, self.by, self.reach = strip.name, curves, (0.0, 0.0), _REACH
         self.aspect = seen_as.aspect
-        self.grabbed = _on_picture(seen_as, (event.mouse_region_x, event.mouse_region_y))
+        self.grabbed = tuple(seen_as.on_picture(event.mouse_region_x, event.mouse_region_y))
         self.pulled, _apart = outlines.nearest(curves, self.grabbed, self.aspect)
 
     def mended(self) -> outlines.Curves:
@@ -355,9 +350,8 @@ class SHUTTER_GT_outline(Dragged, Gizmo):
         if event.type in {"WHEELUPMOUSE", "WHEELDOWNMOUSE"}:
             self.reach *= _MORE if event.type == "WHEELUPMOUSE" else 1 / _MORE
         _scene, effect, strip = there
-        seen = view(effect, strip, context.region)
-        point = _on_picture(seen, (event.mouse_region_x, event.mouse_region_y))
-        self.by = tuple(np.subtract(point, self.grabbed))
+        point = view(effect, strip, context.region).on_picture(event.mouse_region_x, event.mouse_region_y)
+        self.by = tuple(point - np.array(self.grabbed))
         context.area.tag_redraw()
 
     def exit(self, context: Context, cancel: bool) -> None:
@@ -366,13 +360,7 @@ class SHUTTER_GT_outline(Dragged, Gizmo):
         _scene, effect, strip = there
         outline_drawings.draw(effect, strip, effect.regions[self.target.index], self.mended(), self.frame)
         context.area.tag_redraw()
-        bpy.ops.ed.undo_push(message=iface_("Mend Outline", contexts.operator_default))
-
-
-def _on_picture(seen: View, location: tuple[int, int]) -> tuple[float, float]:
-    """A point of the preview's region in fractions of the picture."""
-    x, y = seen.on_picture(*location)
-    return float(x), float(y)
+        bpy.ops.ed.undo_push(message=iface_("Edit Outline", contexts.operator_default))
 
 
 class SHUTTER_GGT_outline(WithKeys, GizmoGroup):

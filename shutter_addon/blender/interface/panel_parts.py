@@ -1,5 +1,4 @@
-"""What panels are made of: sentences, lists, and when there is an effect to show. And icons: little pictures of the
-presets' bars, for menus, and of the patterns that mattes show, for lists."""
+"""Parts of panels: sentences, lists, buttons, and the icons of presets and patterns."""
 
 from collections.abc import Callable, Sequence
 from typing import Any
@@ -20,21 +19,26 @@ from ..data import selection
 from . import drawing
 from .operator_bases import Mixin
 
-Draws = Callable[[UILayout, Scene, PropertyGroup, Strip], None]  # what a panel shows of an effect
+Draws = Callable[[UILayout, Scene, PropertyGroup, Strip], None]  # draws the content of a panel
 
-# Units of the interface beside a sentence in a panel: margins and the tabs of a sidebar; its icon.
+# Interface units beside a sentence in a panel: its margins with the sidebar's tabs, and its icon.
 _MARGIN, _ICON = 64, 20
-WIDEST = 360  # units of the interface that a sentence takes at most, as a popover does
+WIDEST = 360  # interface units: the widest sentence, as in a popover
 
-_MOST_ROWS = 5  # of a list; the rest is scrolled to
-_SIZE, _WINDOW = 32, 8  # of an icon, in pixels, and of the bars that it shows
-_UNITS = 16  # of the interface, along each side of an icon
+_MOST_ROWS = 5  # rows of a list without scrolling
+_SIZE, _WINDOW = 32, 8  # pixels of an icon; bars that it shows
+_UNITS = 16  # interface units along each side of an icon
 _LIGHT = (0.8, 0.8, 0.8)
-_icons: list[ImagePreviewCollection] = []  # of Blender's: one while the extension is registered
+_icons: list[ImagePreviewCollection] = []  # one item while the extension is registered
 
 
 def sentence(layout: UILayout, words: str, icon: str = "NONE", room: float = 1.0, is_quiet: bool = False) -> None:
-    """A sentence, already translated, in as many lines as the panel's width takes; room: its share of that width."""
+    """Draw a translated sentence in as many lines as the panel needs.
+
+    Args:
+        room: fraction of the panel's width.
+        is_quiet: draw it greyed out.
+    """
     if icon == "ERROR":
         told.shown(words, level=2)
     unit, region = drawing.ui_scale(), bpy.context.region
@@ -51,7 +55,7 @@ def sentence(layout: UILayout, words: str, icon: str = "NONE", room: float = 1.0
 
 
 def draw_fields(layout: UILayout, owner: PropertyGroup, kind: type) -> None:
-    """The properties that the fields of a class of the model have panels show by themselves."""
+    """Draw the properties whose field (core.model.fields) has `shown`."""
     for field in fields_of(kind).values():
         if field.shown:
             layout.prop(owner, field.blender)
@@ -60,7 +64,7 @@ def draw_fields(layout: UILayout, owner: PropertyGroup, kind: type) -> None:
 def draw_list(
     layout: UILayout, effect: PropertyGroup, kind: str, items: Sequence[PropertyGroup], menu: str | None = None
 ) -> None:
-    """The list of shutters or regions, as high as it has to be, and the buttons beside it."""
+    """Draw the list of shutters or regions with its buttons."""
     row = layout.row()
     row.template_list(
         f"SHUTTER_UL_{kind}s",
@@ -84,7 +88,7 @@ def draw_list(
 
 
 def draw_moves(layout: UILayout, kind: str, *, has_text: bool = True) -> None:
-    """What moves the active shutter or region in its list."""
+    """Draw the buttons that move the active shutter or region in its list."""
     ways = (
         ("UP", n_("Move Up", contexts.operator_default), "TRIA_UP"),
         ("DOWN", n_("Move Down", contexts.operator_default), "TRIA_DOWN"),
@@ -94,7 +98,7 @@ def draw_moves(layout: UILayout, kind: str, *, has_text: bool = True) -> None:
 
 
 def draw_operators(layout: UILayout, *entries: tuple[str, ...]) -> None:
-    """Operators of ours: see _draw_operator."""
+    """Draw operators of the extension. An entry has a name, an icon and a property whose items become a submenu."""
     for entry in entries:
         _draw_operator(layout, *entry)
 
@@ -118,9 +122,13 @@ def draw_progress(layout: UILayout, done: int, total: int) -> None:
 
 
 def of_effect(label: str, draws: Draws, shows: Callable[[PropertyGroup], Any] | None = None, **look: object) -> type:
-    """Makes a panel of the effect, closed at first.
+    """Make a panel that shows the effect, closed by default.
 
-    shows: gives what there is to show of an effect, if anything; look: what else the class has for Blender"""
+    Args:
+        draws: draws its content.
+        shows: returns what the panel shows of an effect; without it the panel is hidden.
+        look: other class attributes for Blender.
+    """
 
     class Drawn(Mixin):
         @classmethod
@@ -136,7 +144,7 @@ def of_effect(label: str, draws: Draws, shows: Callable[[PropertyGroup], Any] | 
 
 
 def menu(name: str, label: str) -> Callable[[Callable[[UILayout, Context], None]], type[Menu]]:
-    """Makes a menu, SHUTTER_MT_ and its name, of a function that draws it."""
+    """Make a menu SHUTTER_MT_name from a function that draws it."""
 
     def made(draws: Callable[[UILayout, Context], None]) -> type[Menu]:
         def draw(self: Menu, context: Context) -> None:
@@ -149,17 +157,17 @@ def menu(name: str, label: str) -> Callable[[Callable[[UILayout, Context], None]
 
 
 def icon_of(name: str) -> int:
-    """The icon of a preset; 0, which is none, in the background."""
+    """Return the icon of a preset; 0 in the background."""
     return _icons[0][name].icon_id if _icons and name in _icons[0] else 0
 
 
 def pattern_icon(index: int) -> int:
-    """The icon of the pattern that the shutter at an index of the list has; 0, which is none, in the background."""
+    """Return the icon of the pattern of the shutter at this index; 0 in the background."""
     return icon_of(str(index % patterns.COUNT))
 
 
 def _drawn(bars: np.ndarray) -> np.ndarray:
-    """Bars as a picture (size, size, 4), bottom row first."""
+    """Return a picture (size, size, 4) of bars, bottom row first."""
     picture = np.zeros((_SIZE, _SIZE, 4), dtype=np.float32)
     width = _SIZE // len(bars)
     picture[1, :] = 0.5
@@ -169,7 +177,7 @@ def _drawn(bars: np.ndarray) -> np.ndarray:
 
 
 def _painted(index: int) -> np.ndarray:
-    """A pattern as a picture (size, size, 4), bottom row first."""
+    """Return a picture (size, size, 4) of a pattern, bottom row first."""
     y, x = (np.mgrid[:_SIZE, :_SIZE] + 0.5) * _UNITS / _SIZE
     picture = np.ones((_SIZE, _SIZE, 4), dtype=np.float32)
     picture[..., :3] = patterns.painted(_LIGHT, index, x, y)

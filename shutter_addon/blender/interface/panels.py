@@ -1,4 +1,4 @@
-"""Panels, lists and menus: in the Properties editor's Strip tab, and as a tab in the sequencer's sidebar."""
+"""Panels, lists and menus in the Properties editor's Strip tab and in the sequencer's sidebar."""
 
 from collections.abc import Iterator
 
@@ -70,7 +70,7 @@ class SHUTTER_UL_regions(UIList):
             row.prop(layer, "annotation_hide", text="", emboss=False)
 
     def filter_items(self, _context: Context, effect: PropertyGroup, _property: str) -> tuple[list[int], list[int]]:
-        """Those of the active shutter."""
+        """Show only the regions of the active shutter."""
         shutter = selection.active_shutter(effect)
         own = [bool(shutter) and region.shutter == shutter.name for region in effect.regions]
         return [self.bitflag_filter_item if is_own else 0 for is_own in own], []
@@ -87,7 +87,7 @@ def region_menu(layout: UILayout, _context: Context) -> None:
     outline.new, outline.kind = True, "OUTLINE"
     layout.separator()
     draw_operators(layout, ("matte_add", "FILE_MOVIE"), ("matte_strip", "SEQUENCE", "strip"))
-    # Without a mask they are greyed out; their tooltips say why.
+    # Without a mask they are greyed out, and the tooltip says why.
     mask = ("mask",) if bpy.data.masks else ()
     draw_operators(layout, ("matte_mask", "MOD_MASK", *mask), ("outline_from_mask", _ICONS["OUTLINE"], *mask))
     draw_operators(layout, ("ramp_add", "IPO_EASE_IN_OUT", "ramp"))
@@ -110,7 +110,7 @@ def shutter_menu(layout: UILayout, _context: Context) -> None:
 
 
 class _Shutters(Mixin):
-    """What an editor needs first, from the top down: it shows without scrolling in Blender's own layout."""
+    """The first panel. It fits into Blender's default layout without scrolling."""
 
     bl_label = "Shutter"
 
@@ -137,7 +137,7 @@ def _draw_header(self: Panel, context: Context) -> None:
 
 
 def _draw_exposure(layout: UILayout, scene: Scene, effect: PropertyGroup, strip: Strip) -> None:
-    """What the active shutter makes of the frames."""
+    """Draw how the active shutter exposes frames."""
     shutter = selection.active_shutter(effect)
     row = layout.row(align=True)
     preset = consistency.preset_of(effect, effect.active_shutter)
@@ -151,7 +151,7 @@ def _draw_exposure(layout: UILayout, scene: Scene, effect: PropertyGroup, strip:
     if effect.inbetween != "1":
         row.prop(effect, "skip_repeats", text="", icon="FRAME_NEXT")
         if strobing.repeats(effect):
-            sentence(layout, iface_("Frames of the source repeat: motion goes on across them"), "INFO")
+            sentence(layout, iface_("The source repeats frames: motion continues across them"), "INFO")
     layout.prop(shutter, "length")
     if shutter.length == "MOTION" and shutter.follow != "NOTHING":
         layout.prop(shutter, "trail")
@@ -162,7 +162,7 @@ def _draw_exposure(layout: UILayout, scene: Scene, effect: PropertyGroup, strip:
 
 
 def _draw_combine(layout: UILayout, shutter: PropertyGroup) -> None:
-    """What the shutter makes of the frames."""
+    """Draw how the active shutter combines frames."""
     layout.prop(shutter, "combine")
     if shutter.combine not in ("LIGHTEST", "DARKEST"):
         return
@@ -177,7 +177,7 @@ def _draw_combine(layout: UILayout, shutter: PropertyGroup) -> None:
 
 
 def _draw_bars(layout: UILayout, scene: Scene, effect: PropertyGroup, strip: Strip) -> None:
-    """What the active shutter's bars come to."""
+    """Draw a summary of the active shutter's bars."""
     try:
         bars, _states = bar_edits.shown(effect, effect.active_shutter)
     except EffectError as error:
@@ -208,14 +208,14 @@ def _draw_live(layout: UILayout, context: Context) -> None:
 
 
 def _draw_source(layout: UILayout, effect: PropertyGroup) -> None:
-    """Which clip the effect is for, and the choice of another."""
+    """Draw the menu that chooses the source, named after the current one."""
     shown = match_source.shown(effect)
     words = iface_("Source: {strip}").format(strip=shown.source) if shown else iface_("Choose Source")
     layout.operator_menu_enum("shutter.source", "strip", text=words, icon="SEQUENCE", translate=False)
 
 
 def _notes(context: Context) -> Iterator[tuple[str, Button | None]]:
-    """What is to be said of the active effect, and the button that helps; one without a label has its operator's."""
+    """Yield notes on the active effect, each with the button that helps. An empty label means the operator's own."""
     scene, effect, strip = selection.active(context)
     if (newer := data_format.note([scene, *bpy.data.scenes])) is not None:
         yield newer, None
@@ -226,24 +226,24 @@ def _notes(context: Context) -> Iterator[tuple[str, Button | None]]:
             what = ", ".join(iface_(word) for word in shown.differences)
             yield iface_("Differs from its source: {what}").format(what=what), ("shutter.match_source", "")
         if shown.lacks_modifiers:
-            words = iface_("Modifiers of the source do not reach the effect")
+            words = iface_("The effect does not use the modifiers of the source")
             yield words, ("shutter.copy_modifiers", "")
         if shown.has_effects:
-            words = iface_("Effect strips on the source do not reach the effect: make the Shutter strip their input")
+            words = iface_("The effect does not use effect strips of the source: make the Shutter strip their input")
             yield words, None
     if (step := strobing.last(effect)) is not None:
         yield note_buttons.of_strobing(step)
 
 
 def _tracked(effect: PropertyGroup) -> list[int | None]:
-    """What may have been tracked of what the tab shows (selection.moving)."""
+    """Return what may be tracked of the active region and shutter (selection.moving)."""
     region = [effect.active_region] if selection.active_region(effect) is not None else []
     shutter = selection.active_shutter(effect)
     return region + ([None] if shutter is not None and shutter.follow == "CAMERA" else [])
 
 
 class SHUTTER_PT_notes(Panel):
-    """What there is to say of the effect: apart, so that no button moves as it comes and goes."""
+    """Notes on the effect. It is a popover, so that no button moves when notes come and go."""
 
     bl_label = "Notes"
     bl_space_type = "TOPBAR"
@@ -288,11 +288,11 @@ def _draw_options(layout: UILayout, _scene: Scene, effect: PropertyGroup, _strip
     column.active = effect.use_source_time
     column.prop(effect, "source_time")
     if effect.use_source_time and effect.inbetween == "1":
-        sentence(column, iface_("Smooth is off: the nearest source frame is shown"), "INFO")
+        sentence(column, iface_("Smooth is off: the nearest source frame is used"), "INFO")
 
 
 class _Report(Mixin):
-    """The last of the tab, whether there is an effect or not."""
+    """The last panel, with or without an effect."""
 
     bl_label = "Report"
     bl_options = {"HIDE_HEADER"}
@@ -322,7 +322,7 @@ class _InSidebar:
         return selection.active_strip(context) is not None or selection.active(context) is not None
 
 
-# By the end of its name, what each panel draws, and in which other one it lies.
+# End of each panel's name: its content, and the panel that contains it.
 _PANELS = {
     "": (_Shutters, None),
     "_regions": (of_effect("Regions", region_panels.draw_regions, bl_options=set()), ""),
@@ -351,7 +351,4 @@ def _panels(start: str, place: type) -> list[type]:
     ]
 
 
-classes = (
-    *_panels("STRIP_PT_shutter", _InProperties),
-    *_panels("SEQUENCER_PT_shutter", _InSidebar),
-)
+classes = (*_panels("STRIP_PT_shutter", _InProperties), *_panels("SEQUENCER_PT_shutter", _InSidebar))

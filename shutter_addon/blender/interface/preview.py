@@ -1,4 +1,4 @@
-"""The live preview: what is drawn over the sequencer's picture, composed on Blender's GPU: views, and scribbles."""
+"""The live preview: pictures, views, strokes and notes that a handler draws over the sequencer's picture."""
 
 from collections.abc import Sequence
 from contextlib import suppress
@@ -41,14 +41,14 @@ from .note_buttons import Button
 VIEWS = (
     ("RESULT", "Result", "The finished picture"),
     ("SPLIT", "Split", "The source on the left of the handle, the result on its right"),
-    ("EDGES", "Edges", "The result, and a line around what a shutter gets more than half of"),
-    ("SCRIBBLES", "Scribbles", "The source, and where each shutter is scribbled"),
-    ("COEFFICIENTS", "Mattes", "How much of each shutter a pixel gets, in the shutters' colors and patterns"),
+    ("EDGES", "Edges", "The result with a line around the area of each shutter"),
+    ("SCRIBBLES", "Scribbles", "The source with the strokes of each shutter"),
+    ("COEFFICIENTS", "Mattes", "Each pixel's share of each shutter, in the shutters' colors and patterns"),
     (
         "HOLES",
         "Holes",
-        "The result, and where no exposed frame shows what lies behind layers: orange is taken from another frame, "
-        "purple is filled from what is around",
+        "The result and the holes behind layers: orange is taken from another frame, "
+        "purple is filled from its surroundings",
     ),
 )
 
@@ -59,27 +59,27 @@ def _view_chosen(_settings: PropertyGroup, context: Context) -> None:
 
 
 def _redraw_when_still() -> float | None:
-    """Blender does not draw again where the playhead is let go, or tracking ends."""
+    """Redraw after scrubbing or tracking ends, which Blender does not do."""
     if previews.is_going(bpy.context):
         return _SOON
     preview_areas.redraw()
     return None
 
 
-_HOLES = (1.0, 0.55, 0.0), (0.75, 0.2, 0.9)  # the colours of compute.plates.TAKEN and FILLED
-Colors = Sequence[Sequence[float]]  # display code values
-_NAVIGATION = 56  # units at the right of a preview, where Blender's own buttons lie
+_HOLES = (1.0, 0.55, 0.0), (0.75, 0.2, 0.9)  # colors of compute.plates.TAKEN and FILLED
+Colors = Sequence[Sequence[float]]  # display values
+_NAVIGATION = 56  # interface units: Blender's navigation buttons at the right of a preview
 _TICK = 0.25  # seconds
-_STILL = 0.4  # seconds after which a frame that is shown stays
+_STILL = 0.4  # seconds after which a frame counts as still
 _SOON = 0.1  # seconds
 
 
 class ShutterPreview(PropertyGroup):
-    """How the live preview looks: of the window manager, neither saved nor undone."""
+    """Settings of the live preview, in the window manager: not saved, without undo."""
 
     live: BoolProperty(
         name="Live",
-        description="Show scribbles and views of the effect in the preview",
+        description="Show strokes and views of the effect in the preview",
         default=True,
         update=_view_chosen,
     )
@@ -92,7 +92,7 @@ class ShutterPreview(PropertyGroup):
     )
     split: FloatProperty(
         name="Split Position",
-        description="Where the source ends and the result begins, as a fraction of the picture's width",
+        description="Border between source and result, as a fraction of the picture's width",
         subtype="FACTOR",
         default=0.5,
         min=0.0,
@@ -101,12 +101,12 @@ class ShutterPreview(PropertyGroup):
     )
     probe: BoolProperty(
         name="Probe",
-        description="Show the shutter of the pixel that the pointer was over last, and how much of each it gets",
+        description="Show the bars of the pixel under the pointer, and its share of each shutter",
         update=preview_areas.redraw,
     )
     probe_at: FloatVectorProperty(
         name="Probe Position",
-        description="The pixel that is probed, in fractions of the picture from its lower left corner",
+        description="Position of the probe, as fractions of the picture from its lower left corner",
         size=2,
         default=(-1.0, -1.0),
         update=preview_areas.redraw,
@@ -114,7 +114,7 @@ class ShutterPreview(PropertyGroup):
 
 
 def _draw() -> None:
-    """The draw handler of the previews."""
+    """Draw over a preview. This is the draw handler."""
     context = bpy.context
     blender_gpu.free_unused()
     note_buttons.clear(context.region)
@@ -122,24 +122,24 @@ def _draw() -> None:
     if bpy.app.is_job_running("RENDER") or render_job.ends_films():
         return
     invalidation.drop_lesser()
-    # Blender tells nobody of strokes that are drawn or erased, but it draws the preview again.
+    # Blender does not report strokes, but it redraws the preview after them.
     scene = selection.scene_of(context)
     if scene is not None and scene.library is None and invalidation.invalidate_changed(scene):
-        main_thread.later(preview_areas.redraw)  # what is tagged while it is drawn is not drawn again
+        main_thread.later(preview_areas.redraw)  # a redraw tag that is set during drawing is lost
     sharp_frame.follow_pen()
     space = context.space_data
     if shown_annotations.is_laid_wrong(space) or shown_annotations.is_other(space, selection.seen(scene)):
-        main_thread.later(shown_annotations.follow)  # nothing may be changed while it is drawn
+        main_thread.later(shown_annotations.follow)  # drawing code must not change data
     if sharp_frame.is_shown(space):
         _show_sharp(context, preview_areas.shown(context, space.display_channel))
-    # A stroke that is being drawn would lie below our picture: Blender's own shows the same.
+    # Our picture would cover the stroke under the pen; Blender's own picture shows the same.
     if previews.pen_is_down():
         previews.was_drawn()
         previews.refine()
         return
     say = _Notes(context.region)
     if not context.window_manager.virtual_shutter.live:
-        with suppress(*effect_source.FAULTS):  # nothing is told
+        with suppress(*effect_source.FAULTS):  # no notes
             previews.refine()
         return
     with drawing.pixel_space(context.region):
@@ -157,7 +157,11 @@ def _draw() -> None:
 
 
 def _show(context: Context, shown: Shown, decision: Decision | None, say: "_Notes") -> None:
-    """Shows the effect, or says why not. decision: what the engine was asked for."""
+    """Draw the effect, or a note why that is impossible.
+
+    Args:
+        decision: what the engine was asked for.
+    """
     try:
         wanted = previews.for_drawing(context, shown, decision)
         if previews.is_going(context):
@@ -180,7 +184,7 @@ def _show(context: Context, shown: Shown, decision: Decision | None, say: "_Note
 
 
 def _tell_unseen(context: Context, say: "_Notes") -> None:
-    """Says why nothing of the active effect is in the picture, where no other one is."""
+    """Add a note why the active effect is not visible, if no other effect is."""
     active = selection.active(context)
     if active is None or selection.seen(active[0]) or not context.space_data.show_overlays:
         return
@@ -216,25 +220,29 @@ def _show_picture(context: Context, quad: Quad, shown: Shown, wanted: Drawing, s
     for sentence in pictures.shortages(renderer, wanted.decision.snapshot, request):
         told.shown(sentence)
         say(sentence)
-    # What it measures would take from what runs.
+    # Measuring would slow down what is running.
     decision = wanted.decision
     if context.space_data.show_overlays and is_still and not decision.is_plain and not previews.may_be_late():
         _tell_strobing(*strobing.look(shown.effect, decision.snapshot, renderer, decision.request), say)
 
 
 def _warn(shown: Shown, say: "_Notes") -> None:
-    """Says what a picture that is drawn over the sequencer's cannot show."""
+    """Add notes about what a picture drawn over the sequencer's cannot show."""
     if shown.strips_above:
         say(rpt_("The strips above are hidden in this view"))
     if shown.scene.view_settings.view_transform != "Standard":
-        say(rpt_("This view has the view transform Standard"))
+        say(rpt_("This view uses the view transform Standard"))
 
 
 def _tell_detail(wanted: Drawing, size: tuple[int, int], is_still: bool, say: "_Notes") -> None:
-    """Says in what the picture is less than a render's; size: of that. And gives the way to see that one, and back."""
+    """Add a note about how the preview is less than a render, with the button for full quality.
+
+    Args:
+        size: of the rendered picture.
+    """
     source = wanted.renderer.source
     if previews.looking.whole is not None:
-        say(rpt_("Full quality, as it will be rendered"), ("shutter.full_quality", iface_("Back")))
+        say(rpt_("Full quality: as it will be rendered"), ("shutter.full_quality", iface_("Back")))
         return
     less = []
     if source.width < size[0]:
@@ -242,34 +250,34 @@ def _tell_detail(wanted: Drawing, size: tuple[int, int], is_still: bool, say: "_
     if source.from_proxy:
         less.append(rpt_("from a proxy"))
     if wanted.request is not wanted.decision.request:
-        less.append(rpt_("a draft of the edges"))
+        less.append(rpt_("draft edges"))
     if less:
         button = ("shutter.full_quality", iface_("Full Quality")) if is_still else None
         say(rpt_("Preview: {what}").format(what=", ".join(less)), button)
 
 
 def _tell_strobing(known: float | None, is_new: bool, say: "_Notes") -> None:
-    """Says that the exposure has too few frames, and gives the way to more; as strobing.look has it."""
+    """Add a note about too few frames, as strobing.look returns it."""
     if known is not None:
         say(*note_buttons.of_strobing(known))
     if is_new:
-        main_thread.later(preview_areas.redraw_panels)  # which may have been drawn before
+        main_thread.later(preview_areas.redraw_panels)  # panels may have been drawn before
     if strobing.is_busy():
         main_thread.drop(_measure)
-        main_thread.later(_measure, _STILL)  # once a frame stays
+        main_thread.later(_measure, _STILL)  # when the frame stays
 
 
 def _measure() -> float | None:
-    """Has measured what tells of strobing, a little at a time."""
+    """Measure strobing, a little at a time."""
     if strobing.advance():
         preview_areas.redraw()
     return _TICK if strobing.is_busy() else None
 
 
 def _show_sharp(context: Context, shown: Shown | None) -> None:
-    """What is drawn over the sharp frame."""
+    """Draw notes and strokes over the source frame."""
     say = _Notes(context.region)
-    say(rpt_("The sharp frame, to draw on: the result comes with the stroke"))
+    say(rpt_("Sharp frame to draw on: the result appears after the stroke"))
     with drawing.pixel_space(context.region), suppress(*effect_source.FAULTS):
         say.draw()
         if shown is not None and not previews.pen_is_down():
@@ -279,7 +287,7 @@ def _show_sharp(context: Context, shown: Shown | None) -> None:
 
 
 def _tell_carrying(say: "_Notes") -> None:
-    """Has mattes carried that the picture lacks, and says so."""
+    """Track missing mattes of outlines, and add a note on the progress."""
     fault, progress = outline_carrying.begin(show_carried), outline_carrying.progress()
     if fault is not None:
         _tell_fault(fault, say)
@@ -289,20 +297,20 @@ def _tell_carrying(say: "_Notes") -> None:
 
 
 def show_carried() -> None:
-    """Previews are made anew, with what was carried."""
+    """Redraw previews with new mattes of outlines."""
     sessions.WINDOW.keep(set())
     invalidation.drop_frames()
     preview_areas.redraw()
 
 
 def _tell_fault(error: Exception | str, say: "_Notes") -> None:
-    """Says why there is no picture."""
+    """Add a note why there is no picture."""
     told.shown(error)
     say(rpt_("Shutter: {fault}").format(fault=error))
 
 
 def _show_strokes(context: Context, quad: Quad, shown: Shown, snapshot: Snapshot) -> None:
-    """The scribbles where they are by now."""
+    """Draw the strokes at their current place."""
     if not context.space_data.show_overlays:
         return
     shapes = snapshot.effect.drawn_at(shown.scene.frame_current)
@@ -315,11 +323,11 @@ def _show_strokes(context: Context, quad: Quad, shown: Shown, snapshot: Snapshot
 
 
 def _show_source(quad: Quad, shown: Shown, renderer: Renderer, request: Request, right: float) -> None:
-    """The source's own frame, from the left edge on: that of a shutter that is open for it alone."""
-    options = replace(request.state.options, step=1)  # no moments come first in reverse
+    """Draw the source frame from the left edge to `right`: the picture of a shutter that is open for it alone."""
+    options = replace(request.state.options, step=1)  # reversed moments would come first
     still = np.zeros((1, options.window))
     still[0, options.before] = 1
-    # The shown frame lies where it is for all that move. Without a motion, other frames would have to be read for it.
+    # The shown frame does not move, whatever follows a motion. Without one, other frames would have to be read.
     following = request.state.following
     moving = following and following.of([following.moving()[0]])
     plain = replace(request, state=FrameState(options=options, bars=still, following=moving), levels=True)
@@ -328,7 +336,7 @@ def _show_source(quad: Quad, shown: Shown, renderer: Renderer, request: Request,
 
 
 def _show_scribbles(quad: Quad, colors: Colors, drawn: tuple[object, int], renderer: Renderer) -> None:
-    """Labels of a picture in their colours."""
+    """Draw a picture of labels in their colors."""
     labels, block = drawn
     size = renderer.source.width, renderer.source.height
     textures = {"labels": labels, "palette": _palette(colors)}
@@ -346,7 +354,7 @@ def _show_coefficients(
 
 
 def _palette(palette: Colors) -> Texture:
-    """Colours, display code values, side by side."""
+    """Return a texture of colors, side by side."""
     colors = np.ones((len(palette), 4), dtype=np.float32)
     colors[:, :3] = palette
     size = len(colors), 1
@@ -355,14 +363,14 @@ def _palette(palette: Colors) -> Texture:
 
 
 class _Notes:
-    """Sentences at the upper left of a region, each with a button or none."""
+    """Sentences at the upper left of a region, some with a button."""
 
     def __init__(self, region: Region) -> None:
         self._region = region
         self._lines: list[tuple[str, Button | None]] = []
 
     def __call__(self, sentence: str, button: Button | None = None) -> None:
-        """Says a sentence after all others."""
+        """Add a sentence below the others."""
         self._lines.append((sentence, button))
 
     def draw(self) -> None:
@@ -377,7 +385,7 @@ class _Notes:
                 drawing.plated(left, y, line)
             if button is not None:
                 x = left + drawing.text_width(lines[-1]) + 10 * unit
-                if x + note_buttons.width(button) > right:  # below the sentence
+                if x + note_buttons.width(button) > right:  # no room beside it
                     x, y = left, y - high
                 note_buttons.place(self._region, x, y - 6 * unit, button)
 
@@ -389,7 +397,7 @@ _handler = None
 def register() -> None:
     global _handler
     bpy.types.WindowManager.virtual_shutter = PointerProperty(type=ShutterPreview)
-    # After the sequencer's picture and before annotations and gizmos, which stay visible.
+    # After the sequencer's picture, before annotations and gizmos.
     _handler = bpy.types.SpaceSequenceEditor.draw_handler_add(_draw, (), "PREVIEW", "POST_VIEW")
 
 

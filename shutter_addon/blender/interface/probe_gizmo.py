@@ -1,5 +1,4 @@
-"""The probe: a pixel's shutter as bars, and its coefficients as shares, beside it in the preview; and the handle of the
-split view."""
+"""Gizmos of the probe, which shows the shutter of a pixel, and of the handle of the split view."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -7,32 +6,31 @@ from dataclasses import dataclass, replace
 import bpy
 import numpy as np
 from bpy.app.translations import pgettext_iface as iface_
-from bpy.app.translations import pgettext_rpt as rpt_
-from bpy.props import IntProperty
-from bpy.types import Context, Event, Gizmo, GizmoGroup, Operator, PropertyGroup, Region, Strip
+from bpy.types import Context, Event, Gizmo, GizmoGroup, PropertyGroup, Region, Strip
 
 from ...compute import plates
 from ...compute.renderer import Renderer
 from ...compute.request import Request
-from ...core.messages import EffectError
 from ...core.pixels import compositor
-from ..data import annotations, preview_areas, selection
+from ..data import annotations, preview_areas
 from ..devices import blender_gpu
 from ..rendering import effect_source, previews, sessions
 from . import drawing
 from .gizmo_groups import Dragged, InPreview, View, view
-from .operator_bases import OfEffect
 
-_WIDTH, _HEIGHT, _LINE, _PAD, _APART = 180, 64, 17, 8, 14  # in units of the interface
-_REACH = 8  # of the pointer to the split's handle, in units of the interface
+_WIDTH, _HEIGHT, _LINE, _PAD, _APART = 180, 64, 17, 8, 14  # interface units
+_REACH = 8  # interface units from the pointer to the split's handle
 _MARK = (1.0, 1.0, 1.0, 0.9)
 
 
 @dataclass(frozen=True)
 class Probed:
-    """A pixel's coefficients (N,), which sum to 1, and its shutter's bars (L,).
+    """A pixel's coefficients (N,), which sum to 1, and the bars (L,) of its shutter.
 
-    layers: how much of each layer covers it; hole: of compute.plates, how it gets what lies behind these"""
+    Attributes:
+        layers: how much each layer covers the pixel.
+        hole: source of what lies behind the layers, a constant of compute.plates.
+    """
 
     coefficients: np.ndarray
     bars: np.ndarray
@@ -41,10 +39,14 @@ class Probed:
 
 
 def probed_at(renderer: Renderer, request: Request, point: Sequence[float]) -> Probed | None:
-    """What the pixel at a point is made with; None: the point lies beside the picture.
+    """Return what a pixel is made of; None: the point is outside the picture.
 
-    point: fractions of the picture, y up. It is called where Blender's GPU draws; one texel is read, and coefficients
-    are solved for only if what they depend on has changed since they were drawn."""
+    It runs where Blender's GPU draws and reads one texel. Coefficients are solved only if something changed since they
+    were drawn.
+
+    Args:
+        point: fractions of the picture, y up.
+    """
     source = renderer.source
     column, row = int(np.floor(point[0] * source.width)), int(np.floor((1 - point[1]) * source.height))
     if not (0 <= column < source.width and 0 <= row < source.height):
@@ -65,9 +67,12 @@ def probed_at(renderer: Renderer, request: Request, point: Sequence[float]) -> P
 
 @dataclass(frozen=True)
 class Layout:
-    """Where the probe's box, its bars and its lines of text lie, in pixels of the region.
+    """Where the probe's box, bars and lines of text lie, in pixels of the region.
 
-    frame, bars: left, bottom, right, top; lines: the bottoms of the lines, from the first on"""
+    Attributes:
+        frame, bars: left, bottom, right, top.
+        lines: bottom of each line, from the top down.
+    """
 
     frame: tuple[float, float, float, float]
     bars: tuple[float, float, float, float]
@@ -75,9 +80,15 @@ class Layout:
 
 
 def layout(point: Sequence[float], size: tuple[int, int], count: int, unit: float) -> Layout:
-    """The layout for a point of a region of this size with `count` shutters; unit: of the interface, in pixels.
+    """Return the layout of the probe at a point of a region.
 
-    The box lies at the right of the point and below it, or on the other side where the region ends."""
+    The box lies at the lower right of the point, or on the other side if there is no room.
+
+    Args:
+        size: of the region.
+        count: lines of text.
+        unit: pixels per interface unit.
+    """
     width, height = (_WIDTH + 2 * _PAD) * unit, (_HEIGHT + count * _LINE + 3 * _PAD) * unit
     x, y = point
     apart, pad = _APART * unit, _PAD * unit
@@ -90,7 +101,7 @@ def layout(point: Sequence[float], size: tuple[int, int], count: int, unit: floa
 
 
 def _view(context: Context) -> View | None:
-    """The view of the shown picture; None: nothing is seen of it."""
+    """Return the view of the picture; None: it is not visible."""
     if (shown := preview_areas.shown(context)) is None:
         return None
     seen = view(shown.effect, shown.strip, context.region)
@@ -103,7 +114,7 @@ def _is_cropped(strip: Strip, size: tuple[int, int], point: Sequence[float]) -> 
 
 
 class SHUTTER_GT_probe(Gizmo):
-    """It follows the pointer, and is never hit: clicks go to whatever lies there."""
+    """The probe. It follows the pointer and lets clicks through."""
 
     def draw(self, context: Context) -> None:
         shown, at = preview_areas.shown(context), tuple(context.window_manager.virtual_shutter.probe_at)
@@ -115,14 +126,14 @@ class SHUTTER_GT_probe(Gizmo):
             render = sessions.of_drawing()
             request = previews.request_of(context, shown)
             probed = probed_at(render.renderer(request), request, at)
-        except effect_source.FAULTS:  # which the live preview tells
+        except effect_source.FAULTS:  # the live preview shows the error
             return
         if probed is not None:
             (point,) = seen.on_region([at])
             _draw(context.region, point, shown.effect.shutters, probed, _of_layers(shown, probed))
 
     def test_select(self, context: Context, location: tuple[int, int]) -> int:
-        """Blender asks whenever the pointer moves: nothing else tells of it without taking events from others."""
+        """Follow the pointer: Blender calls this whenever it moves. No other callback leaves the events to others."""
         if (seen := _view(context)) is not None:
             x, y = location
             context.window_manager.virtual_shutter.probe_at = seen.on_picture(x + 0.5, y + 0.5)
@@ -130,7 +141,7 @@ class SHUTTER_GT_probe(Gizmo):
 
 
 def _of_layers(shown: preview_areas.Shown, probed: Probed) -> list[tuple[str, str]]:
-    """Of each layer its name and how much of it covers the pixel; and what takes the place of what lies behind."""
+    """Return lines of text: name and coverage of each layer, and what replaces the background."""
     regions = [region for region in shown.effect.regions if region.is_layer and region.opacity > 0]
     lines = [(region.name, f"{share:.1%}") for region, share in zip(regions, probed.layers, strict=False)]
     words = {plates.TAKEN: iface_("Behind: another frame"), plates.FILLED: iface_("Behind: filled")}
@@ -172,44 +183,9 @@ class SHUTTER_GGT_probe(InPreview, GizmoGroup):
         return live.probe and not bpy.app.is_job_running("RENDER")
 
 
-class SHUTTER_OT_probe_pixel(OfEffect, Operator):
-    """Probe a pixel that is named by its numbers, and not the one under the pointer"""
-
-    bl_label = "Probe Pixel"
-    bl_options = {"REGISTER"}
-    only_seen = True
-
-    column: IntProperty(name="Column", description="Number of the pixel from the left, from 1", default=1, min=1)
-    row: IntProperty(name="Row", description="Number of the pixel from below, from 1", default=1, min=1)
-
-    def invoke(self, context: Context, _event: Event) -> set[str]:
-        size = annotations.picture_size(selection.active(context)[1])
-        at = context.window_manager.virtual_shutter.probe_at
-        inside = all(0 <= place < 1 for place in at)
-        self.column, self.row = (
-            int(place * n) + 1 for place, n in zip(at if inside else (0.5, 0.5), size, strict=True)
-        )
-        return context.window_manager.invoke_props_dialog(self)
-
-    def draw(self, _context: Context) -> None:
-        self.layout.activate_init = True
-        self.layout.prop(self, "column")
-        self.layout.prop(self, "row")
-
-    def change(self, context: Context, effect: PropertyGroup) -> None:
-        width, height = annotations.picture_size(effect)
-        if self.column > width or self.row > height:
-            sentence = rpt_("The picture has {width} × {height} pixels")
-            raise EffectError(sentence.format(width=width, height=height))
-        live = context.window_manager.virtual_shutter
-        live.live = live.probe = True
-        live.probe_at = (self.column - 0.5) / width, (self.row - 0.5) / height
-        preview_areas.redraw()
-
-
 class SHUTTER_GT_split(Dragged, Gizmo):
     def seen(self, context: Context) -> np.ndarray | None:
-        """Where the split is, in pixels of the region (2, 2)."""
+        """Return the ends (2, 2) of the split line in pixels of the region."""
         at = context.window_manager.virtual_shutter.split
         return None if (seen := _view(context)) is None else seen.on_region([(at, 0.0), (at, 1.0)])
 

@@ -1,5 +1,4 @@
-"""Where the active region lies, and handles to move, turn and scale it in the sequencer's preview; and the same by
-numbers."""
+"""Handles that move, rotate and scale the active region in the preview, and the operator that does it by numbers."""
 
 from typing import NamedTuple
 
@@ -20,16 +19,19 @@ from . import drawing, needs
 from .gizmo_groups import TWEAK, Dragged, View, WithKeys, view
 from .operator_bases import OfEffect, popup
 
-_RADIUS = 7  # of a handle, in units of the interface
-_NEAREST = 0.03  # of the corner's handle to the centre's, in parts of the picture
+_RADIUS = 7  # interface units: radius of a handle
+_NEAREST = 0.03  # fraction of the picture: least distance between the two handles
 _MARK = (1.0, 1.0, 1.0, 0.9)
-_RAMP = np.array([(0.25, 0.5), (0.75, 0.5)])  # what handles of a ramp are about, in fractions of the picture
+_RAMP = np.array([(0.25, 0.5), (0.75, 0.5)])  # line of a ramp, in fractions of the picture
 
 
 class Place(NamedTuple):
     """Where a region's handles are at the current frame, in pixels of the preview's region.
 
-    centre: the handle that moves; corner: the one that turns and scales"""
+    Attributes:
+        centre: the handle that moves the region.
+        corner: the handle that rotates and scales it.
+    """
 
     centre: np.ndarray
     corner: np.ndarray
@@ -37,7 +39,7 @@ class Place(NamedTuple):
 
 
 def _strokes_now(scene: Scene, effect: PropertyGroup, strip: Strip) -> list[np.ndarray]:
-    """The active region's strokes, or the line of a ramp, not moved yet: read once until something changes."""
+    """Return the active region's strokes, or the line of a ramp, without transform. Kept until something changes."""
     index, frame = effect.active_region, scene.frame_float
     region = effect.regions[index]
     if region.kind == "RAMP":
@@ -47,7 +49,7 @@ def _strokes_now(scene: Scene, effect: PropertyGroup, strip: Strip) -> list[np.n
 
 
 def place(context: Context) -> Place | None:
-    """The place of the active region's handles, or None where none is seen, or nothing of it is drawn."""
+    """Return the place of the active region's handles; None: no region is visible, or nothing is drawn in it."""
     seen = selection.in_picture(context)
     region = selection.active_region(seen[1]) if seen else None
     if region is None:
@@ -56,7 +58,7 @@ def place(context: Context) -> Place | None:
     try:
         strokes = _strokes_now(scene, effect, strip)
         validation.check_moving(region)
-    except EffectError:  # panels and the live preview tell it
+    except EffectError:  # panels and the live preview show the error
         return None
     if not strokes:
         return None
@@ -65,7 +67,7 @@ def place(context: Context) -> Place | None:
     low, high = points.min(axis=0), points.max(axis=0)
     middle = (low + high) / 2
     corner = high if region.kind == "RAMP" else np.maximum(high, middle + _NEAREST)
-    # Mirrored at the middle as well, so that it is what the corner turns about.
+    # The corner rotates about the middle of these points, so they include its mirror image.
     ((_, moved, _),) = scribbles.transform(
         [[2 * middle - corner, corner, middle]],
         region.location,
@@ -78,8 +80,7 @@ def place(context: Context) -> Place | None:
 
 
 def outline(context: Context, where: Place) -> list[np.ndarray]:
-    """The active region's strokes (n, 2) where its properties have it, keyed or not, in pixels of the preview's
-    region."""
+    """Return the active region's strokes (n, 2) by its properties, keyed or not, in pixels of the preview's region."""
     scene, effect, strip = selection.active(context)
     region = selection.active_region(effect)
     numbers = region.location, np.degrees(region.rotation), region.scale
@@ -88,12 +89,12 @@ def outline(context: Context, where: Place) -> list[np.ndarray]:
 
 
 class SHUTTER_GT_region(Dragged, Gizmo):
-    """One handle; `turns`: turns and scales, or moves."""
+    """A handle of the active region: it moves the region, or, if `turns`, rotates and scales it."""
 
     seen = staticmethod(place)
 
     def show(self, context: Context, seen: Place) -> None:
-        if self.is_modal:  # what is keyed is shown where its keys have it
+        if self.is_modal:  # else the draw handler shows the keyed place
             for points in outline(context, seen):
                 drawing.lines(points, _MARK, width=2)
         if not self.turns:
@@ -115,7 +116,7 @@ class SHUTTER_GT_region(Dragged, Gizmo):
         effect = selection.active(context)[1]
         region = selection.active_region(effect)
         drawn_places.hold(effect, effect.active_region)
-        # While it plays, another effect may come into the picture.
+        # During playback, another effect may become active.
         self.target = track_region.Target.of(effect, effect.active_region)
         self.before = tuple(region.location), region.rotation, region.scale
         self.grabbed = event.mouse_region_x, event.mouse_region_y
@@ -133,7 +134,7 @@ class SHUTTER_GT_region(Dragged, Gizmo):
 
     def _move(self, region: PropertyGroup, point: np.ndarray, snap: bool) -> None:
         moved = self.where.view.on_picture(*point) - self.where.view.on_picture(*self.grabbed)
-        if snap:  # along one axis
+        if snap:  # along one axis only
             moved[np.abs(moved * (self.where.view.aspect, 1)).argmin()] = 0
         region.location = np.array(self.before[0]) + moved
 
@@ -154,17 +155,17 @@ class SHUTTER_GT_region(Dragged, Gizmo):
             return
         if wants_keys(context, effect, index):
             _key(context, effect, index)
-            context.area.tag_redraw()  # panels show keys
+            context.area.tag_redraw()  # panels show whether it is keyed
         bpy.ops.ed.undo_push(message=iface_("Transform Region", contexts.operator_default))
 
 
 def wants_keys(context: Context, effect: PropertyGroup, index: int) -> bool:
-    """Whether a region that the editor moves is keyed: Blender's Auto Keying is on, or tracking has made keys of it."""
+    """Return whether moving a region keys it: Auto Keying is on, or the region has keys from tracking."""
     return bar_edits.auto_key(context) or MotionKeys(effect, index, effect.regions[index].motion).are_made()
 
 
 def _key(context: Context, effect: PropertyGroup, index: int) -> None:
-    """Keys the region, or says why it cannot be: gizmos have no reports."""
+    """Key the region. Gizmos have no reports, so an error is a popup."""
     try:
         region_edits.key_region(effect, index)
     except EffectError as error:
@@ -172,7 +173,7 @@ def _key(context: Context, effect: PropertyGroup, index: int) -> None:
 
 
 def _is_drawing(context: Context) -> bool:
-    """Whether the preview's tool draws strokes, or erases them."""
+    """Return whether the preview's tool draws or erases strokes."""
     tool = context.workspace.tools.from_space_sequencer(context.space_data.view_type)
     return tool is not None and tool.idname.startswith("builtin.annotate")
 
@@ -184,7 +185,7 @@ class SHUTTER_GGT_region(WithKeys, GizmoGroup):
     @classmethod
     def poll(cls, context: Context) -> bool:
         settings, seen = context.window_manager.virtual_shutter, selection.in_picture(context)
-        # A handle under the pointer would take it from the probe, and a stroke from the pen.
+        # A handle would take the pointer from the probe or from the pen.
         if (settings.live and settings.probe) or _is_drawing(context):
             return False
         return seen is not None and seen[0].is_editable and selection.active_region(seen[1]) is not None
@@ -195,7 +196,7 @@ class SHUTTER_GGT_region(WithKeys, GizmoGroup):
 
 
 class SHUTTER_OT_region_transform(OfEffect, Operator):
-    """Move, turn and scale the active region by numbers, as its handles in the preview do"""
+    """Move, rotate and scale the active region by numbers, like its handles in the preview"""
 
     bl_label = "Transform Region"
     needs = (needs.a_region,)
@@ -211,7 +212,7 @@ class SHUTTER_OT_region_transform(OfEffect, Operator):
 
     def draw(self, _context: Context) -> None:
         layout = self.layout
-        layout.activate_init = True  # Blender heeds it neither with a property split nor for a vector
+        layout.activate_init = True  # Blender ignores it with a property split or for a vector
         layout.prop(self, "location", index=0, text="Location X")
         layout.prop(self, "location", index=1, text="Location Y")
         layout.prop(self, "rotation")

@@ -1,4 +1,4 @@
-"""Panels of the active region and of the camera: what it covers, where it is, and how it is tracked."""
+"""Panels of the active region and of the camera: mattes, transform and tracking."""
 
 import math
 
@@ -14,7 +14,7 @@ from .panel_parts import draw_list, draw_properties, sentence
 
 _PLACEMENT = "location", "rotation", "scale"
 _TRACKING = "motion", "track_until", "track_all_keys", "track_ends"
-_OF_KIND = {"LINE": "width", "OUTLINE": "between", "RAMP": "ramp"}  # the property that each kind adds
+_OF_KIND = {"LINE": "width", "OUTLINE": "between", "RAMP": "ramp"}  # the property that only this kind has
 
 
 def draw_regions(layout: UILayout, scene: Scene, effect: PropertyGroup, strip: Strip) -> None:
@@ -52,7 +52,7 @@ def draw_regions(layout: UILayout, scene: Scene, effect: PropertyGroup, strip: S
 
 
 def _draw_matte(layout: UILayout, look: matte_look.Look, region: PropertyGroup) -> None:
-    """What the matte is, and what is wrong with it."""
+    """Draw the matte's source and settings, and its size or error."""
     layout.prop(region, "matte")
     if region.matte == "IMAGE":
         layout.template_ID(region, "image", open="image.open")
@@ -73,16 +73,16 @@ def _draw_matte(layout: UILayout, look: matte_look.Look, region: PropertyGroup) 
 
 
 def _draw_blend(layout: UILayout, region: PropertyGroup) -> None:
-    """How a matte or a ramp lies over what is beneath."""
+    """Draw how a matte, ramp or outline blends with the mattes below."""
     for name in ("opacity", "feather", "invert", "blend"):
         row = layout.row()
-        row.active = name != "blend" or not region.is_layer  # a layer lies before all of them
+        row.active = name != "blend" or not region.is_layer  # a layer covers all of them
         row.prop(region, name)
     layout.operator("shutter.matte_export")
 
 
 def draw_tracking(layout: UILayout, index: int | None) -> None:
-    """The buttons that track a region or the camera (selection.moving)."""
+    """Draw the buttons that track a region or the camera (selection.moving)."""
     row = layout.row(align=True)
     track = "shutter.track_camera" if index is None else "shutter.track"
     for direction, _name, _description, icon, _number in track_operators.DIRECTIONS:
@@ -94,7 +94,7 @@ def draw_tracking(layout: UILayout, index: int | None) -> None:
 
 
 def tracking_icon(effect: PropertyGroup, index: int | None) -> str | None:
-    """Of what `draw_tracked` draws; None: nothing."""
+    """Return the icon of what `draw_tracked` draws; None: it draws nothing."""
     stops = track_region.stops(effect, index)
     if track_region.lost(effect, index) or any(is_fault for _, _, is_fault in stops):
         return "ERROR"
@@ -103,17 +103,16 @@ def tracking_icon(effect: PropertyGroup, index: int | None) -> str | None:
 
 
 def draw_tracked(layout: UILayout, effect: PropertyGroup, index: int | None) -> None:
-    """How sure tracking of a region or the camera was of the current frame, where it was lost, and where it stopped."""
+    """Draw the tracking confidence at the current frame, and where tracking stopped or lost the subject."""
     look = "shutter.track_camera_look" if index is None else "shutter.track_look"
     confidence = track_region.confidence_at(effect, index, effect.id_data.frame_current)
     if confidence is not None:
         text = iface_("Confidence: {percent} %").format(percent=f"{100 * confidence:.0f}")
         layout.label(text=text, icon="CHECKMARK" if confidence >= SURE else "ERROR", translate=False)
-    if index is None:  # a region's gaps go from its stops on
+    if index is None:  # the gaps of a region begin at its stops, which are listed below
         _draw_camera_gaps(layout, effect)
     lost = track_region.lost(effect, index)
-    faults = [(*lost, True)] if lost else []
-    faults += track_region.stops(effect, index)
+    faults = [*([(*lost, True)] if lost else []), *track_region.stops(effect, index)]
     for frame, reason, is_fault in faults:
         row = layout.row(align=True)
         sentence(row, reason, "ERROR" if is_fault else "INFO", room=0.85)
@@ -127,7 +126,7 @@ def draw_tracked(layout: UILayout, effect: PropertyGroup, index: int | None) -> 
 
 
 def _draw_camera_gaps(layout: UILayout, effect: PropertyGroup) -> None:
-    """The frames at which the camera is not tracked."""
+    """Draw the frame ranges without a camera track."""
     for gap in track_region.gaps(effect, None):
         if math.isinf(gap.last):
             text = iface_("Not tracked: from frame {first} on")
@@ -177,7 +176,7 @@ def _draw_tracks(layout: UILayout, region: PropertyGroup, tracking: MovieTrackin
 
 
 def draw_camera(layout: UILayout, _scene: Scene, effect: PropertyGroup, _strip: Strip) -> None:
-    """Its numbers, and how they are found; the shutter that follows it has the buttons that track it."""
+    """Draw the camera's transform and tracking settings. The track buttons are in the panel *Exposure Moves With*."""
     draw_properties(layout.column(align=True), effect.camera, *_PLACEMENT)
     draw_properties(layout, effect.camera, "influence", *_TRACKING, "follow_clip")
     layout.operator("shutter.follow_stabilization", icon="TRACKER")

@@ -1,7 +1,7 @@
-"""The source's own frame in the previews, sharp, while somebody draws on it: Blender's own, of the source's channel.
+"""Show the source frame in the previews while the user draws: Blender's own picture, by its channel.
 
-From *Draw* on until a stroke is finished, and again for as long as the pen is down: what our handler draws would hide
-the stroke. It is a setting of the previews, which files keep: before one is saved, the result is given back.
+It appears with *Draw* until the stroke is finished, and whenever the pen is down, because our draw handler would cover
+the stroke. The display channel is saved in files, so it is reset before saving.
 """
 
 from dataclasses import dataclass
@@ -13,24 +13,29 @@ from ..data import preview_areas, selection, strips
 from ..devices import main_thread
 from ..rendering.previews import pen_is_down
 
-_TOOLS = "builtin.annotate"  # how the tools' names begin
+_TOOLS = "builtin.annotate"  # prefix of the tools' names
 
 
 @dataclass
 class _Pen:
-    """channel: that the previews show, 0: they show the result; is_down: when a preview was drawn last
-    tool: that Draw or Erase has taken the place of, which comes back with the stroke; "": they have not"""
+    """What the pen has changed in the previews.
+
+    Attributes:
+        channel: display channel that the previews show; 0: the result.
+        tool: tool that *Draw* or *Erase* replaced, to restore after the stroke; "": none.
+        is_down: whether the pen was down when a preview was last drawn.
+    """
 
     channel: int = 0
     tool: str = ""
     is_down: bool = False
 
 
-_pen = _Pen()  # Blender draws with it, and tells of no stroke
+_pen = _Pen()  # module state, because Blender does not report strokes
 
 
 def take_up(context: Context, tool: str) -> bool:
-    """Makes a pen the tool of the previews, until a stroke is finished; whether there is a preview."""
+    """Activate a drawing tool in the previews until a stroke is finished. Return whether there is a preview."""
     before = context.workspace.tools.from_space_sequencer("PREVIEW", create=False)
     if before is None or not before.idname.startswith(_TOOLS):
         _pen.tool = before.idname if before else "builtin.select_box"
@@ -42,12 +47,13 @@ def _choose(context: Context, tool: str) -> bool:
     for window, area in areas:
         with preview_areas.within(window, area):
             bpy.ops.wm.tool_set_by_id(name=tool, space_type="SEQUENCE_EDITOR")
-        area.tag_redraw()  # or handles would come with the pointer alone
+        area.tag_redraw()  # otherwise gizmos would appear only when the pointer moves
     return bool(areas)
 
 
 def show(context: Context) -> None:
-    """Shows the source of the active effect, if that is beside it and not muted, where the pen draws for the effect."""
+    """Show the source of the active effect in previews that have its annotation, if it is unmuted and on the same
+    level."""
     active = selection.active(context)
     source = active and strips.nearest_source(*active)
     if source is None or source.mute or source.parent_meta() != active[2].parent_meta():
@@ -61,7 +67,7 @@ def show(context: Context) -> None:
 
 
 def give_back(context: Context) -> None:
-    """The previews show the result again."""
+    """Show the result in the previews again."""
     for _window, area in preview_areas.previews(context) if _pen.channel else ():
         if area.spaces.active.display_channel == _pen.channel:
             area.spaces.active.display_channel = 0
@@ -69,13 +75,13 @@ def give_back(context: Context) -> None:
 
 
 def forget() -> None:
-    """Lets go of the pen, before another file is loaded."""
+    """Forget the pen before another file is loaded."""
     give_back(bpy.context)
     _pen.tool = ""
 
 
 def follow_pen() -> None:
-    """For what draws a preview, which may change nothing: what the pen asks for comes right after."""
+    """Notice the pen while a preview is drawn. Changes follow later, as drawing code must not change data."""
     was_down, _pen.is_down = _pen.is_down, pen_is_down()
     if _pen.is_down and not _pen.channel:
         main_thread.later(_show)
@@ -84,12 +90,12 @@ def follow_pen() -> None:
 
 
 def is_shown(space: SpaceSequenceEditor) -> bool:
-    """Whether a preview shows the sharp frame for the pen."""
+    """Return whether a preview shows the source frame for the pen."""
     return bool(_pen.channel) and space.display_channel == _pen.channel
 
 
 def _tool_chosen() -> None:
-    """Who takes another tool draws no more. A new tool draws no preview again."""
+    """Show the result when the user activates another tool, which redraws no preview."""
     tool = bpy.context.workspace.tools.from_space_sequencer("PREVIEW", create=False)
     if tool is not None and not tool.idname.startswith(_TOOLS):
         _pen.tool = ""
@@ -108,11 +114,11 @@ def _lay_down() -> None:
             _choose(bpy.context, _pen.tool)
 
 
-_OWNER = object()  # of what Blender tells of tools
+_OWNER = object()  # of the message bus subscription
 
 
 def listen() -> None:
-    """Asks Blender to tell of tools; it forgets that with every file that is opened."""
+    """Subscribe to changes of the tool. Blender forgets this with every file that is opened."""
     tools = bpy.types.WorkSpace, "tools"
     bpy.msgbus.clear_by_owner(_OWNER)
     bpy.msgbus.subscribe_rna(key=tools, owner=_OWNER, args=(), notify=_tool_chosen)

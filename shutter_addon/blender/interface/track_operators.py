@@ -1,5 +1,4 @@
-"""Operators that key a region or the camera by the footage: as what is seen moves, or as a movie clip's tracks do; and
-those that make layers of regions, a panning shot, or a tripod."""
+"""Operators that track the region or the camera, follow movie clips, and use tracks for layers and exposures."""
 
 import math
 import time
@@ -15,7 +14,7 @@ from ..rendering.effect_source import FAULTS
 from . import needs
 from .operator_bases import Beside, OfEffect, operator, redraw, report_warning, show_status
 
-# Seconds of work from one look at the window to the next, at least and at most, and between two looks at its thread.
+# Seconds: work between two redraws, at least and at most; waiting for the tracking thread.
 _TICK, _MOST, _PATIENCE = 0.05, 0.1, 0.02
 
 DIRECTIONS = (
@@ -25,10 +24,10 @@ DIRECTIONS = (
 )
 
 
-# Blender would use again what a button was pressed with before.
+# SKIP_SAVE: Blender would otherwise reuse the direction of the last button.
 _DIRECTION = EnumProperty(
     name="Direction",
-    description="Where tracking goes from the current frame",
+    description="Direction of tracking from the current frame",
     items=DIRECTIONS,
     default="BOTH",
     options={"SKIP_SAVE"},
@@ -37,7 +36,7 @@ _DIRECTION = EnumProperty(
 
 
 class _Tracks(Beside):
-    """Tracks the active region, or the camera, from the current frame in a `direction` of DIRECTIONS."""
+    """An operator that tracks the active region or the camera from the current frame in a `direction` of DIRECTIONS."""
 
     bl_options = {"UNDO"}
     only_seen = True
@@ -46,28 +45,33 @@ class _Tracks(Beside):
     is_camera = False
 
     def is_ready(self, scene: Scene, effect: PropertyGroup, strip: Strip) -> bool:
-        """Whether nothing has to be tracked. EffectError: what comes after tracking cannot be done."""
+        """Return whether tracking is not needed.
+
+        Raises:
+            EffectError: the work after tracking is impossible.
+        """
         return False
 
     def ended(self, context: Context) -> None:
-        """Called once all is tracked, and not after Esc. EffectError: what comes after tracking cannot be done."""
+        """Do the work after tracking. Esc skips it.
+
+        Raises:
+            EffectError: it is impossible.
+        """
 
     def begin(self, context: Context, waits: bool) -> set[str] | None:
-        """Tracks for a while, and then whenever Blender has time."""
+        """Track for a moment, and then in steps."""
         scene, effect, strip = selection.active(context)
         index = None if self.is_camera else effect.active_region
         moving = selection.moving(effect, index)
         self._target, self._start = track_region.Target.of(effect, index), scene.frame_current
-        self._done: set[int] = set()
+        self._frame, self._done = self._start, set[int]()
         if self.is_ready(scene, effect, strip):
             return self._finish(context)
         self._frames = track_region.frames_to_track(scene, strip, self.direction, moving.track_until)
-        motion, all_keys = validation.word(moving, "motion"), moving.track_all_keys
-        self._frame = self._start
-        patience = None if waits else _PATIENCE
-        self._steps = track_region.track(
-            scene, effect, strip, index, self._frames, motion, all_keys=all_keys, patience=patience
-        )
+        options = {"all_keys": moving.track_all_keys, "patience": None if waits else _PATIENCE}
+        motion = validation.word(moving, "motion")
+        self._steps = track_region.track(scene, effect, strip, index, self._frames, motion, **options)
         if not self._track(math.inf if waits else _TICK):
             return self._finish(context)
         context.window_manager.progress_begin(0, len(self._frames))
@@ -75,9 +79,9 @@ class _Tracks(Beside):
         return self.go_on(context)
 
     def goes_on(self, context: Context) -> bool:
-        if self._target.effect() is None:  # undone or removed in another window, or another file was loaded
+        if self._target.effect() is None:  # undone, removed in another window, or another file was loaded
             return False
-        # What it takes to draw a frame, tracking takes as well, unless Esc would have to wait.
+        # Track for as long as drawing a frame takes, but not so long that Esc has to wait.
         goes_on = self._track(min(max(_TICK, time.perf_counter() - self._shown), _MOST))
         self._show(context)
         return goes_on
@@ -95,7 +99,7 @@ class _Tracks(Beside):
         if has_ended and self.tried(self.ended, context) == {"CANCELLED"} and not self._done:
             return {"CANCELLED"}
         redraw(context)
-        return None  # what was tracked can be undone
+        return None  # so that tracked frames can be undone
 
     def leave(self, context: Context) -> None:
         self._steps.close()
@@ -103,7 +107,11 @@ class _Tracks(Beside):
         super().leave(context)
 
     def _track(self, seconds: float) -> bool:
-        """Tracks for a while; whether there is more to track. One of FAULTS: there is nothing to track at all."""
+        """Track for some seconds. Return whether frames remain.
+
+        Raises:
+            FAULTS: nothing can be tracked.
+        """
         end = time.perf_counter() + seconds
         try:
             for frame in self._steps:
@@ -126,15 +134,14 @@ class _Tracks(Beside):
         self._go_to(self._frame)
         done, total = len(self._done), len(self._frames) - 1
         context.window_manager.progress_update(done)
-        sentence = rpt_("Tracking: {done} of {total} frames, Esc to stop")
-        show_status(sentence.format(done=done, total=total))
+        show_status(rpt_("Tracking: {done} of {total} frames, Esc to stop").format(done=done, total=total))
         redraw(context)
         self._shown = time.perf_counter()
 
     def _tell(self) -> None:
         if (effect := self._target.effect()) is None or not self._done:
             return
-        sentence = rpt_("Frames {first} to {last} are tracked")
+        sentence = rpt_("Tracked frames {first} to {last}")
         first, last = min(self._done | {self._start}), max(self._done | {self._start})
         self.report({"INFO"}, sentence.format(first=first, last=last))
         lost = track_region.lost(effect, self._target.index)
@@ -143,8 +150,7 @@ class _Tracks(Beside):
             return
         for frame, fault, is_fault in track_region.stops(effect, self._target.index):
             if frame in self._frames:
-                sentence = rpt_("Tracking stopped at frame {frame}: {fault}")
-                words = sentence.format(frame=frame, fault=fault)
+                words = rpt_("Tracking stopped at frame {frame}: {fault}").format(frame=frame, fault=fault)
                 if is_fault:
                     report_warning(self, words)
                 else:
@@ -152,7 +158,7 @@ class _Tracks(Beside):
 
 
 class SHUTTER_OT_track(_Tracks, OfEffect, Operator):
-    """Key the active region by what it covers here, up to your own keys (Esc stops and keeps the tracked frames)"""
+    """Track what the active region covers here, up to your own keyframes (Esc stops and keeps the tracked frames)"""
 
     bl_label = "Track Region"
     needs = (needs.strokes,)
@@ -161,7 +167,7 @@ class SHUTTER_OT_track(_Tracks, OfEffect, Operator):
 
 
 class SHUTTER_OT_track_camera(_Tracks, OfEffect, Operator):
-    """Key the camera by what the regions leave free, up to your own keys (Esc stops and keeps the tracked frames)"""
+    """Track the camera outside the regions, up to your own keyframes (Esc stops and keeps the tracked frames)"""
 
     bl_label = "Track Camera"
     is_camera = True
@@ -170,7 +176,7 @@ class SHUTTER_OT_track_camera(_Tracks, OfEffect, Operator):
 
 
 class SHUTTER_OT_panning_shot(_Tracks, OfEffect, Operator):
-    """Keep the active region sharp while all else streaks past it (tracks the region unless it has keys)"""
+    """Keep the active region sharp while all else streaks past it (tracks the region unless it has keyframes)"""
 
     bl_label = "Panning Shot"
     needs = (needs.strokes,)
@@ -184,7 +190,7 @@ class SHUTTER_OT_panning_shot(_Tracks, OfEffect, Operator):
 
 
 class SHUTTER_OT_tripod(_Tracks, OfEffect, Operator):
-    """Expose for long as if the camera had stood still (tracks the camera unless it has keys)"""
+    """Make a long exposure as if the camera stood still (tracks the camera unless it has keyframes)"""
 
     bl_label = "Stabilize Exposure"
     needs = (needs.a_shutter,)
@@ -200,16 +206,15 @@ class SHUTTER_OT_tripod(_Tracks, OfEffect, Operator):
 
 _FRAME = IntProperty(
     name="Frame",
-    description="Timeline frame; without one, the worst of the next that are unsure",
+    description="Timeline frame; without one, the least confident of the next unsure frames",
     options={"SKIP_SAVE"},
 )
 
 
 def _look(looking: Operator, effect: PropertyGroup, index: int | None) -> set[str] | None:
-    """Goes to a frame at which tracking of what has an `index` (selection.moving) is not sure."""
-    frame: int | None = looking.frame
-    if not looking.properties.is_property_set("frame"):
-        frame = track_region.next_unsure(effect, index, looking.edit.frame_current)
+    """Go to a frame with low tracking confidence. The index is that of selection.moving."""
+    is_given = looking.properties.is_property_set("frame")
+    frame = looking.frame if is_given else track_region.next_unsure(effect, index, looking.edit.frame_current)
     if frame is None:
         looking.report({"INFO"}, "No other stretch of unsure frames lies ahead")
         return {"CANCELLED"}
@@ -219,53 +224,49 @@ def _look(looking: Operator, effect: PropertyGroup, index: int | None) -> set[st
 
 @operator("Next Unsure Frame", needs.a_region, options={"REGISTER"}, frame=_FRAME)
 def track_look(self: Operator, _context: Context, effect: PropertyGroup) -> set[str] | None:
-    """Go to a frame that tracking is not sure of"""
+    """Go to the next frames with low tracking confidence"""
     return _look(self, effect, effect.active_region)
 
 
 @operator("Next Unsure Camera Frame", options={"REGISTER"}, frame=_FRAME)
 def track_camera_look(self: Operator, _context: Context, effect: PropertyGroup) -> set[str] | None:
-    """Go to a frame that tracking of the camera is not sure of"""
+    """Go to the next frames with low tracking confidence of the camera"""
     return _look(self, effect, None)
 
 
-def _why_no_clip(effect: PropertyGroup) -> str | None:
-    return None if selection.active_region(effect).follow_clip is not None else rpt_("Choose a clip first")
+def _why_no_clip(moving: PropertyGroup) -> str | None:
+    return None if moving.follow_clip is not None else rpt_("Choose a clip first")
 
 
-@operator("Follow Track", needs.strokes, _why_no_clip)
+@operator("Follow Track", needs.strokes, lambda effect: _why_no_clip(selection.active_region(effect)))
 def follow(self: Operator, _context: Context, effect: PropertyGroup) -> None:
-    """Key the active region by a track of a movie clip, from where the region is at this frame"""
+    """Key the active region by a track of a movie clip, from its place at this frame"""
     follow_track.follow(self.edit, effect, self.effect_strip, effect.active_region)
 
 
 def _why_no_track(effect: PropertyGroup) -> str | None:
-    return None if selection.active_region(effect).follow_stamp else rpt_("The region follows no track yet")
+    return None if selection.active_region(effect).follow_stamp else rpt_("The region does not follow a track")
 
 
 @operator("Update Followed Track", needs.strokes, _why_no_track)
 def follow_update(self: Operator, _context: Context, effect: PropertyGroup) -> None:
-    """Key the active region anew by what it follows, after the track has changed"""
+    """Key the active region again after the track that it follows has changed"""
     follow_track.update(self.edit, effect, self.effect_strip, effect.active_region)
 
 
-def _why_no_camera_clip(effect: PropertyGroup) -> str | None:
-    return None if effect.camera.follow_clip is not None else rpt_("Choose a clip first")
-
-
-@operator("Follow Stabilization", _why_no_camera_clip)
+@operator("Follow Stabilization", lambda effect: _why_no_clip(effect.camera))
 def follow_stabilization(self: Operator, _context: Context, effect: PropertyGroup) -> None:
-    """Key the camera by the 2D stabilization of a movie clip, from where the camera is at this frame"""
+    """Key the camera by the 2D stabilization of a movie clip, from its place at this frame"""
     follow_track.follow_stabilization(self.edit, effect, self.effect_strip)
 
 
 @operator("Sharp Subject", needs.a_region)
 def sharp_subject(_self: Operator, context: Context, effect: PropertyGroup) -> None:
-    """Keep the active region sharp before all else, which is exposed for long and without it"""
+    """Keep the active region sharp in front of a long exposure of everything else"""
     shutter_edits.sharp_subject(effect, effect.active_region, bar_edits.auto_key(context))
 
 
 @operator("Trail", needs.a_region)
 def clean_trail(_self: Operator, context: Context, effect: PropertyGroup) -> None:
-    """Have the active region leave a trail before all else, which stays sharp"""
+    """Make the active region leave a trail in front of everything else, which stays sharp"""
     shutter_edits.clean_trail(effect, effect.active_region, bar_edits.auto_key(context))

@@ -1,1 +1,1 @@
-"""Films and pictures as files: written whole, shared by machines, joined, and checked before."""
+"""Films and pictures as files: writing, sharing among machines, joining and checking."""

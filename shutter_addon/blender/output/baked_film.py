@@ -1,8 +1,7 @@
-"""The film of an effect by itself, as files that an ordinary strip shows: a movie, or a folder of EXR pictures.
+"""Baking an effect to a movie or a folder of EXR pictures, which an ordinary strip shows.
 
-The pictures are those that the engine gives to Blender. They are written past the sequencer, which would put them
-through its own colour space and back: an EXR has their very bits. They are made at once (`render`), or by a Blender of
-their own, while the editor goes on working (`start`).
+The pictures are the engine's. They bypass the sequencer, which would convert them to its colour space and back, so an
+EXR has the same bits. `render` makes them immediately, and `start` in a second Blender while the editor works on.
 """
 
 from __future__ import annotations
@@ -39,21 +38,24 @@ from . import film_output
 
 FOLDER = "virtual_shutter_baked"  # beside the .blend file
 Kind = Literal["MOVIE", "OPEN_EXR"]
-KINDS: dict[str, Kind] = {"movie": "MOVIE", "exr": "OPEN_EXR"}  # as the command calls them
+KINDS: dict[str, Kind] = {"movie": "MOVIE", "exr": "OPEN_EXR"}  # by the command's names
 _CHANNELS = ["R", "G", "B", "A"]
-_ZSTD = b"\x28\xb5\x2f\xfd"  # how a compressed file begins
+_ZSTD = b"\x28\xb5\x2f\xfd"  # the beginning of a compressed file
 _ROOT = Path(__file__).parents[3]  # of the extension, or of the checkout
 _COPY = re.compile(r"[^/\\]+\.bake-[0-9a-f]{8}\.blend")
-_MANIFEST = "copy"  # the file of a log that has the name of the copy
-Picture = Callable[[int], np.ndarray]  # that of a frame
+_MANIFEST = "copy"  # the file in a log that names the copy
+Picture = Callable[[int], np.ndarray]  # gives that of a frame
 
 
 @dataclass(frozen=True)
 class Film:
-    """What is baked of an effect strip.
+    """A film of an effect strip.
 
-    frames: counted from the strip's origin (effect_version.frames_of); version: the key of the effect there
-    place: the movie, or the folder of pictures, numbered from 1"""
+    Attributes:
+        frames: Counted from the strip's origin (effect_version.frames_of).
+        version: The effect's key.
+        place: The movie, or the folder of pictures, numbered from 1.
+    """
 
     kind: Kind
     frames: range
@@ -67,7 +69,7 @@ class Film:
 
     @property
     def parts(self) -> list[tuple[Path, range]]:
-        """The parts of the movie that are there before all of it is, and the frames of each."""
+        """The parts from which the movie is joined, and their frames."""
         folder, length = self.place.with_suffix(".parts"), film_parts.LENGTH
         starts = range(0, len(self.frames), length)
         return [
@@ -75,16 +77,18 @@ class Film:
         ]
 
     def is_finished(self) -> bool:
-        """Whether all of it is there; pictures are not decoded for that."""
+        """Return whether all of it exists, without decoding pictures."""
         if self.kind == "MOVIE":
             return self.place.is_file() and is_whole_movie(self.place, len(self.frames))
         return all(picture.is_file() and is_whole_picture(picture) for picture in self.pictures)
 
 
 def film_of(scene: Scene, effect: PropertyGroup, strip: Strip, kind: Kind, folder: Path | None = None) -> Film:
-    """What would be baked of an effect strip as it is now. folder: where; None: beside the .blend file.
+    """Return the film that baking would make of an effect strip, by default beside the .blend file.
 
-    EffectError, MediaError: it cannot be."""
+    Raises:
+        EffectError, MediaError: The strip cannot be baked.
+    """
     _check(scene, effect, strip, kind)
     frames = effect_version.frames_of(strip)
     version = effect_version.key(scene, effect, strip, frames)
@@ -95,17 +99,17 @@ def film_of(scene: Scene, effect: PropertyGroup, strip: Strip, kind: Kind, folde
 
 
 def default_folder() -> Path:
-    """EffectError: there is none, beside a file that is not saved."""
+    """Return the folder for films beside the .blend file. EffectError: the file is not saved."""
     if not bpy.data.filepath:
-        raise EffectError(rpt_("baked frames lie beside the .blend file: save it first"))
+        raise EffectError(rpt_("baked frames are stored beside the .blend file: save it first"))
     return Path(bpy.data.filepath).parent / FOLDER
 
 
 def _check(scene: Scene, effect: PropertyGroup, strip: Strip, kind: Kind) -> None:
-    """EffectError: the strip's film would not be its picture."""
+    """Raise EffectError if a film would not show what the strip shows."""
     if getattr(strip, "retiming_keys", ()) or strip.strobe > 1 or strip.use_reverse_frames:
         raise EffectError(
-            rpt_('"{strip}" is retimed, strobed or reversed itself: do that to its source').format(strip=strip.name)
+            rpt_('"{strip}" is retimed, strobed or reversed: do that to its source instead').format(strip=strip.name)
         )
     if kind != "MOVIE":
         return
@@ -123,14 +127,19 @@ def _check(scene: Scene, effect: PropertyGroup, strip: Strip, kind: Kind) -> Non
             raise EffectError(rpt_("a movie has no light above white: bake to OpenEXR"))
 
 
-def render(scene: Scene, effect: PropertyGroup, strip: Strip, film: Film, told: Callable[[int], object]) -> None:
-    """Renders what is missing of a film. told: called with the number of frames that are there, and may raise.
+def render(scene: Scene, effect: PropertyGroup, strip: Strip, film: Film, report: Callable[[int], object]) -> None:
+    """Render what is missing of a film. Finished frames stay when it is stopped or fails.
 
-    One of FAULTS, OutputError, OSError: it cannot be made. InterruptedRenderError: it was stopped. What is finished
-    stays, and the next call goes on from there."""
+    Args:
+        report: Called with the number of finished frames. It may raise to stop.
+
+    Raises:
+        effect_source.FAULTS, OutputError, OSError: The film cannot be made.
+        InterruptedRenderError: It was stopped.
+    """
     if film.kind == "MOVIE" and film.is_finished():
         _remove_parts(film)
-        told(len(film.frames))
+        report(len(film.frames))
         return
     start = round(strips.origin(strip))
     taken = snapshot.take(scene, effect, strip, [start + frame for frame in film.frames])
@@ -144,18 +153,18 @@ def render(scene: Scene, effect: PropertyGroup, strip: Strip, film: Film, told: 
 
         try:
             if film.kind == "MOVIE":
-                _make_movie(film, picture, frame_rate(scene.render.fps / scene.render.fps_base), told)
+                _make_movie(film, picture, frame_rate(scene.render.fps / scene.render.fps_base), report)
             else:
-                _make_pictures(film, picture, film_output.size(effect.scene), told)
+                _make_pictures(film, picture, film_output.size(effect.scene), report)
         except StoppedError:
             raise film_output.InterruptedRenderError(f"{film.place}: stopped") from None
         except (MediaError, OSError):
-            if not film.is_finished():  # by another process, which has removed the parts
+            if not film.is_finished():  # another process may have finished it and removed the parts
                 raise
-            told(len(film.frames))
+            report(len(film.frames))
 
 
-def _make_pictures(film: Film, picture: Picture, size: tuple[int, int], told: Callable[[int], object]) -> None:
+def _make_pictures(film: Film, picture: Picture, size: tuple[int, int], report: Callable[[int], object]) -> None:
     _prepare(film.place)
     note = job_file.note(film.version)
     for number, (path, frame) in enumerate(zip(film.pictures, film.frames, strict=True), start=1):
@@ -164,31 +173,31 @@ def _make_pictures(film: Film, picture: Picture, size: tuple[int, int], told: Ca
             made = pictures.resized(picture(frame), *size)
             channels = 3 if (made[..., 3] == 1).all() else 4
             image_writing.write_exr(path, made[..., :channels], _CHANNELS[:channels], note)
-        told(number)
+        report(number)
 
 
-def _make_movie(film: Film, picture: Picture, fps: Fraction, told: Callable[[int], object]) -> None:
+def _make_movie(film: Film, picture: Picture, fps: Fraction, report: Callable[[int], object]) -> None:
     done = 0
     for path, frames in film.parts:
         if path.is_file() and is_whole_movie(path, len(frames)):
-            told(done + len(frames))
+            report(done + len(frames))
         else:
             _prepare(path.parent)
-            film_parts.write_part(path, _counted(map(picture, frames), done, told), fps)
+            film_parts.write_part(path, _counted(map(picture, frames), done, report), fps)
         done += len(frames)
-    if not film.is_finished():  # by another process, say
+    if not film.is_finished():  # another process may have finished it
         film_parts.join([path for path, _frames in film.parts], film.place, fps)
     _remove_parts(film)
 
 
 def _prepare(place: Path) -> None:
-    """OSError: it cannot be made, or is a link, which a stranger may have put there."""
+    """Make a folder. OSError: it cannot be made, or is a link that somebody else may have made."""
     own_folder(place)
     atomic_write.clear_up(place)
 
 
 def _remove_parts(film: Film) -> None:
-    """Removes the parts of a movie that is finished, and what killed processes left there, and no other file."""
+    """Remove the parts of a finished movie and what killed processes left, but no other file."""
     parts = [path for path, _frames in film.parts]
     place = parts[0].parent
     with suppress(OSError):
@@ -201,19 +210,23 @@ def _remove_parts(film: Film) -> None:
         place.rmdir()
 
 
-def _counted(shown: Iterator[np.ndarray], done: int, told: Callable[[int], object]) -> Iterator[np.ndarray]:
+def _counted(shown: Iterator[np.ndarray], done: int, report: Callable[[int], object]) -> Iterator[np.ndarray]:
     for number, picture in enumerate(shown, start=done + 1):
         yield picture
-        told(number)
+        report(number)
 
 
 @dataclass
 class BakeJob:
-    """A bake that runs in a Blender of its own, which reads a copy of the edit as it was then.
+    """A bake in a second Blender, which reads a copy of the edit.
 
-    scene: session_uid of the edit's; effect: identity of the effect, strip: name of its strip
-    copy: of the edit, which the process removes once it has read it
-    log: part folder beside the film with what the process says, and the name of the copy"""
+    Attributes:
+        scene: session_uid of the edit's scene.
+        effect: Identity of the effect.
+        strip: Name of its strip.
+        copy: The copy of the edit, which the process removes after reading it.
+        log: A part folder beside the film with the process's output and the name of the copy.
+    """
 
     scene: int
     effect: str
@@ -224,7 +237,7 @@ class BakeJob:
     process: subprocess.Popen
 
     def done(self) -> int:
-        """How many frames are finished."""
+        """Return the number of finished frames."""
         lines = self._said("out").split("\n")[:-1]
         counts = [line.split()[0] for line in lines[-2:] if line.endswith(f" of {len(self.film.frames)}")]
         return int(counts[-1]) if counts else 0
@@ -233,40 +246,40 @@ class BakeJob:
         return self.process.poll() is not None
 
     def failure(self) -> str | None:
-        """Why it failed, as a sentence, once it is over; None: the film is there."""
+        """Return why it failed, after its end; None: the film is finished."""
         if self.film.is_finished():
             return None
         said = [line for line in self._said("err").splitlines() if line.startswith(signed(""))]
-        return said[-1].removeprefix(signed("")).strip() if said else rpt_("the bake ended without a word")
+        return said[-1].removeprefix(signed("")).strip() if said else rpt_("the bake ended without a message")
 
     def _said(self, stream: str) -> str:
         return (self.log / stream).read_text(encoding="utf-8", errors="replace")
 
     def end(self) -> None:
-        """Stops it, if it runs, and removes what it needed alone. Frames that are finished stay."""
+        """Stop it if it runs, and remove its temporary files. Finished frames stay."""
         if not self.is_over():
             self.process.terminate()
-        with suppress(OSError):  # Windows keeps what is open
+        with suppress(OSError):  # Windows keeps open files
             self.copy.unlink(missing_ok=True)
         shutil.rmtree(self.log, ignore_errors=True)
 
 
 def start(scene: Scene, effect: PropertyGroup, strip: Strip, film: Film) -> BakeJob:
-    """Begins to bake a film. EffectError, OSError: it cannot be begun."""
+    """Begin to bake a film. EffectError, OSError: it cannot begin."""
     edit = Path(bpy.data.filepath)
     film.place.parent.mkdir(parents=True, exist_ok=True)
     _clear_up(film.place.parent, edit)
     log = atomic_write.new_part(film.place.parent)
-    copy = edit.with_name(f"{edit.stem}.bake-{secrets.token_hex(4)}.blend")  # where the paths in it lead to the same
+    copy = edit.with_name(f"{edit.stem}.bake-{secrets.token_hex(4)}.blend")  # relative paths stay valid there
     try:
         (log / _MANIFEST).write_text(copy.name, encoding="utf-8")
         bpy.ops.wm.save_as_mainfile(filepath=str(copy), copy=True, compress=_is_compressed(edit), relative_remap=False)
-        words = _words(scene, strip, film)
+        options = _options(scene, strip, film)
         with open(log / "out", "wb") as out, open(log / "err", "wb") as err:
             process = subprocess.Popen(
-                [*_command(), "bake", str(copy), *words],
+                [*_command(), "bake", str(copy), *options],
                 cwd=_ROOT,
-                stdin=subprocess.PIPE,  # which ends with this process, and with that the other one
+                stdin=subprocess.PIPE,  # closes with this process, which ends the other one
                 stdout=out,
                 stderr=err,
             )
@@ -274,19 +287,11 @@ def start(scene: Scene, effect: PropertyGroup, strip: Strip, film: Film) -> Bake
         copy.unlink(missing_ok=True)
         shutil.rmtree(log, ignore_errors=True)
         raise EffectError(rpt_("the bake cannot begin: {reason}").format(reason=" ".join(str(error).split()))) from None
-    return BakeJob(
-        scene=scene.session_uid,
-        effect=effect.identity,
-        strip=strip.name,
-        film=film,
-        copy=copy,
-        log=log,
-        process=process,
-    )
+    return BakeJob(scene.session_uid, effect.identity, strip.name, film, copy, log, process)
 
 
 def _clear_up(folder: Path, edit: Path) -> None:
-    """Removes what bakes left behind that were killed: logs, and the copies of an edit that these name."""
+    """Remove what killed bakes left: logs, and the copies of an edit that these name."""
     for left in atomic_write.left_behind(folder):
         with suppress(OSError):
             manifest = left / _MANIFEST
@@ -296,15 +301,15 @@ def _clear_up(folder: Path, edit: Path) -> None:
     atomic_write.clear_up(folder)
 
 
-def _words(scene: Scene, strip: Strip, film: Film) -> list[str]:
-    """The command's options. Names may begin with a dash."""
+def _options(scene: Scene, strip: Strip, film: Film) -> list[str]:
+    """Return the command's options. Names can begin with a dash."""
     kind = next(name for name, kind in KINDS.items() if kind == film.kind)
     names = [f"--scene={scene.name}", f"--strip={strip.name}", f"--format={kind}", f"--output={film.place.parent}"]
     return [*names, f"--device={preferences.device()}", f"--gpu-memory={preferences.gpu_memory()}", "--attached"]
 
 
 def _is_compressed(edit: Path) -> bool:
-    """Whether a .blend file is: Blender writes the user's own as it was last told to, by a copy as well."""
+    """Return whether a .blend file is compressed. Saving a copy would change how Blender saves the user's file next."""
     try:
         with edit.open("rb") as file:
             return file.read(4) == _ZSTD
@@ -313,9 +318,9 @@ def _is_compressed(edit: Path) -> bool:
 
 
 def _command() -> list[str]:
-    """What runs the command `shutter` in a process of its own."""
+    """Return the words that run the command `shutter` in another process."""
     if not bpy.app.binary_path:  # Blender as a library
         return [sys.executable, "-m", "shutter_addon"]
     package = __package__.rpartition(".shutter_addon")[0]
-    enabled = ["--addons", package] if package else []  # as here, whatever the preferences that are saved say
+    enabled = ["--addons", package] if package else []  # as here, regardless of saved preferences
     return [bpy.app.binary_path, "--background", *enabled, "--command", "shutter"]

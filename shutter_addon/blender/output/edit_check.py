@@ -1,4 +1,4 @@
-"""Whether an edit can be rendered on this machine, as far as can be told without rendering it."""
+"""Checking whether an edit can be rendered on this machine, without rendering it."""
 
 from __future__ import annotations
 
@@ -28,14 +28,18 @@ from ..rendering.session import RenderContext, RenderSession
 
 @dataclass
 class EffectCheck:
-    """What was found of an effect.
+    """The check of an effect.
 
-    strip: its name; source: the footage's first file, "": it cannot be read
-    size: of its pictures, width and height in pixels; window: filmed frames of the longest
-    shutters: how many
-    inbetween: moments for a filmed frame, 1: it is not smooth
-    mattes: how many mattes of outlines are to be carried first, by the folder that they are kept in
-    faults, notes: sentences; notes are of what can be rendered, but otherwise than one may think"""
+    Attributes:
+        strip: Its name.
+        source: The footage's first file; "" if it cannot be read.
+        size: Width and height of its pictures.
+        window: Filmed frames of the longest window.
+        shutters: Their number.
+        inbetween: Moments per filmed frame; 1 without *Smooth*.
+        mattes: The number of outlines' mattes that have to be carried first, by their folder.
+        faults, notes: Messages. Notes are about effects that can be rendered, but not as one may expect.
+    """
 
     strip: str
     shutters: int
@@ -49,9 +53,11 @@ class EffectCheck:
 
 
 def effects(scene: Scene, frames: range) -> list[EffectCheck]:
-    """Looks at the effects that the scene's frames show, those of scenes in it included. Files are opened, and of each
-    the first and the last frame that is needed are read."""
-    # It asks no device, which would have to wait for its first picture: states and windows are known without.
+    """Check the effects that the scene's frames show, including those of scenes in it.
+
+    Files are opened, and the first and last frames that are needed are read.
+    """
+    # No GPU is needed, which would have to wait for its first picture, since only states and windows are read.
     session = RenderSession(lambda: ("cpu", None), lambda: None)
     try:
         return [_effect(session, shown) for shown in _shown_effects(scene, frames)]
@@ -60,12 +66,12 @@ def effects(scene: Scene, frames: range) -> list[EffectCheck]:
 
 
 def _shown_effects(film: Scene, frames: range) -> Iterator[tuple]:
-    """(scene, effect, strip, frames) of every effect that is shown at one of the film's frames."""
+    """Yield (scene, effect, strip, frames) of every effect that is shown at one of the film's frames."""
     wanted = dict(requirements.scenes_at(film, frames))
     for scene, effect, parts in job_snapshots.shown_effects(film):
         shown: set[float] = set()
         for part in parts if scene in wanted else ():
-            start = strips.timeline_frame(part, 0)  # a strip may begin between frames
+            start = strips.timeline_frame(part, 0)  # a strip can begin between frames
             at = frame_ranges.common(requirements.shown_frames(scene, part), wanted[scene])
             shown |= {start + math.floor(frame - start) for frame in at}
         if shown:
@@ -73,10 +79,10 @@ def _shown_effects(film: Scene, frames: range) -> Iterator[tuple]:
 
 
 def _effect(session: RenderSession, shown: tuple) -> EffectCheck:
-    """shown: of _shown_effects"""
+    """Check an effect of `_shown_effects`."""
     scene, effect, strip, frames = shown
     check = EffectCheck(strip=strip.name, shutters=len(effect.shutters))
-    if not _look_at_footage(check, scene, effect, strip):
+    if not _check_footage(check, scene, effect, strip):
         return check
     try:
         taken = snapshot.take(scene, effect, strip, frames)
@@ -89,14 +95,14 @@ def _effect(session: RenderSession, shown: tuple) -> EffectCheck:
         source = renderer.source
         check.inbetween = source.step
         check.window = max(request.state.options.window for request in requests.values()) // source.step
-        _look_at_frames(check, renderer, requests)
-        _look_at_mattes(check, source, requests)
+        _check_frames(check, renderer, requests)
+        _check_mattes(check, source, requests)
         check.notes += _notes(check, taken, requests, source)
     return check
 
 
 def _requests(session: RenderSession, taken: snapshot.Snapshot, check: EffectCheck) -> dict[float, Request]:
-    """What each frame asks for, where it can be shown; faults of others are noted, each at the first of its frames."""
+    """Return the requests of frames that can be shown. A fault of several frames is noted once."""
     requests, context = {}, RenderContext(session)
     faults: dict[str, list[str]] = {}
     for frame in sorted(taken.frames):
@@ -111,9 +117,11 @@ def _requests(session: RenderSession, taken: snapshot.Snapshot, check: EffectChe
     return requests
 
 
-def _look_at_footage(check: EffectCheck, scene: Scene, effect: PropertyGroup, strip: Strip) -> bool:
-    """Whether the footage can be opened; and whether it is what it was when the edit was saved: the effect's scene has
-    the size of it."""
+def _check_footage(check: EffectCheck, scene: Scene, effect: PropertyGroup, strip: Strip) -> bool:
+    """Return whether the footage can be opened. Note if it has changed since the edit was saved.
+
+    The effect's scene has the size of the footage then.
+    """
     try:
         source = strips.source_of(scene, effect, strip)
         medium = source_media.open_media(source)
@@ -127,25 +135,23 @@ def _look_at_footage(check: EffectCheck, scene: Scene, effect: PropertyGroup, st
         words = "{}×{}, but was {}×{} when the edit was saved".format(*check.size, *saved)
         check.faults.append(f"{medium.path.name}: is {words}")
     timing = source_media.timing_of(source)
-    rate = min(float(medium.fps or math.inf) / timing.scene_fps, 1.0)  # the strip may keep the movie's speed
+    rate = min(float(medium.fps or math.inf) / timing.scene_fps, 1.0)  # the strip can keep the movie's speed
     if not timing.keys and medium.count < int(source.content_duration * rate):
         words = f"{medium.count} frames, fewer than the {source.content_duration} of strip"
         check.faults.append(f'{medium.path.name}: has {words} "{source.name}"')
     return True
 
 
-def _look_at_frames(check: EffectCheck, renderer: Renderer, requests: dict[float, Request]) -> None:
-    """Whether the frames that windows need are there: files of image sequences, and of a movie the first and the last
-    one."""
-    source = renderer.source
+def _check_frames(check: EffectCheck, renderer: Renderer, requests: dict[float, Request]) -> None:
+    """Check the files that windows need: all of image sequences, and the first and last frame of a movie."""
+    step = renderer.source.step
     needed: set[int] = set().union(*map(renderer.missing, requests.values()))
-    ends = {end for index in needed for end in (index // source.step, -(-index // source.step))}
-    check.faults += _unreadable(source, ends, source.step)
+    ends = {end for index in needed for end in (index // step, -(-index // step))}
+    check.faults += _unreadable(renderer.source, ends, step)
 
 
 def _unreadable(source: FrameSource, indices: set[int], step: int = 1) -> list[str]:
-    """What is wrong with the files of these filmed frames: those that are not there, and the first and the last frame
-    if they cannot be decoded."""
+    """Return the faults of filmed frames: missing files, else a first or last frame that cannot be decoded."""
     files, missing = source.files, []
     if len(files) > 1:
         for path in sorted({files[index] for index in indices}):
@@ -165,7 +171,7 @@ def _unreadable(source: FrameSource, indices: set[int], step: int = 1) -> list[s
     return faults
 
 
-def _look_at_mattes(check: EffectCheck, source: FrameSource, requests: dict[float, Request]) -> None:
+def _check_mattes(check: EffectCheck, source: FrameSource, requests: dict[float, Request]) -> None:
     shown: dict = {}
     for request in requests.values():
         layers = request.state.layers
@@ -199,13 +205,13 @@ def _notes(
 
 
 def left_out(scene: Scene, frames: range) -> list[str]:
-    """Why the sequencer leaves effects out of some of these frames."""
+    """Return why the sequencer leaves out effects at some of these frames."""
     reasons = [why for shown, why in requirements.left_out(scene) if frame_ranges.common(shown, frames)]
     return list(dict.fromkeys(reasons))
 
 
 def stale_films(scene: Scene, frames: range) -> list[str]:
-    """Which baked strips that are shown at some of these frames are not of their effect as it is now."""
+    """Return notes on baked strips that are shown at some of these frames although their effect has changed."""
     found = []
     for shown, _at in requirements.scenes_at(scene, frames):
         for strip in strips.effect_strips(shown):

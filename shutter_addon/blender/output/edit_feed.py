@@ -1,21 +1,20 @@
-"""Renders of the user's edit from files of finished levels, as long as they run.
+"""Feeding finished 8-bit levels to renders of the user's edit, through a file.
 
-Where an effect is all that is seen of an edit, Blender makes levels of the engine's floats in several passes, and
-blends them over footage that nobody sees: several times the work that it has with a strip of footage. So a strip above
-shows a file of the very levels that Blender would make (core.pixels.shown_levels), from a film's second frame on: a
-picture by itself keeps its floats, as a script may save it as others than the edit's settings say. The edit is as it
-was once the render ends, or a file is saved or loaded meanwhile: from then on the engine renders.
+Where only an effect is visible, Blender would convert the engine's floats to levels in several passes and blend them
+over hidden footage, which takes several times as long as showing a strip of footage. So a temporary strip on top shows
+a file with the exact levels that Blender would make (core/pixels/shown_levels.py), from a film's second frame on. A
+single picture keeps its floats, since a script can save it with other settings. The edit is restored when the render
+ends, or when a file is saved or loaded, after which the engine renders.
 
-A movie that the command makes of footage and a recipe is known to be such an edit (`feeding`). Its levels are made by
-the GPU alone, and those where rounding decides may be others than Blender's.
+A movie that the command makes of footage and a recipe is known to be such an edit (`feeding`). Only the GPU makes its
+levels, which can differ from Blender's where rounding decides.
 """
 
 from __future__ import annotations
 
 import os
 import tempfile
-from collections.abc import Iterator
-from contextlib import AbstractContextManager, ExitStack, closing, contextmanager
+from contextlib import AbstractContextManager, ExitStack
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import ClassVar
@@ -33,21 +32,25 @@ from ..rendering import job_snapshots, pictures, render_job, sessions
 from ..rendering.effect_source import FULL, in_words
 from ..rendering.render_job import Where
 
-# Rows of a tile of the file; its columns are a multiple of 16. A TIFF without tiles takes twice the time: Blender reads
-# rows upwards, for which OpenImageIO then allocates 64 MB for each picture.
+# Size of the file's tiles; columns are a multiple of 16. A TIFF without tiles takes twice the time: Blender reads rows
+# upwards, for which OpenImageIO allocates 64 MB per picture.
 _ROWS, _COLUMNS = 64, 16
 
 
 @dataclass
 class _Film:
-    """What a render has changed.
+    """The changes of a render.
 
-    is_own: whether renders are movies of new_edit.make_edit
-    scene: session_uid of the edit; changed: what puts it back
-    strip: of the file, by name; None: there is none yet
-    file: of levels; None: as above
-    makes_levels: as seen_alone.makes_levels; None: nobody has asked; has_failed: it was not possible
-    has_begun: whether a frame is rendered"""
+    Attributes:
+        is_own: Whether renders are movies of whole_edits.make_edit.
+        scene: session_uid of the edit.
+        changed: Restores the edit.
+        strip: Name of the file's strip; None: not added yet.
+        file: The file of levels; None: not made yet.
+        makes_levels: The result of seen_alone.makes_levels; None: unknown.
+        has_failed: Whether feeding failed.
+        has_begun: Whether a frame was rendered.
+    """
 
     is_own: ClassVar[bool] = False
     scene: int
@@ -59,44 +62,44 @@ class _Film:
     has_begun: bool = False
 
 
-_running: list[_Film] = []  # one at most
+_running: list[_Film] = []  # at most one
 
 
 def feeding() -> AbstractContextManager[None]:
-    """Inside, renders are movies of edits of whole_edits.make_edit, from their first frame on."""
+    """In this context, renders are movies of whole_edits.make_edit and are fed from their first frame on."""
     return for_a_while([(_Film, "is_own", True)])
 
 
 def begin(scene: Scene) -> None:
-    """The render of an edit begins, on the main thread."""
+    """Begin the render of an edit, on the main thread."""
     end()
     if render_job.where() is Where.BACKGROUND and scene.sequence_editor is not None:
         _running.append(_Film(scene.session_uid))
 
 
 def end() -> None:
-    """Puts the edit back."""
+    """Restore the edit."""
     while _running:
         _running.pop().changed.close()
 
 
 def before_frame(scene: Scene) -> None:
-    """Prepares the edit for its current frame."""
+    """Prepare the edit for its current frame."""
     film = next((film for film in _running if film.scene == scene.session_uid), None)
     if film is None:
         return
-    if not (film.has_begun or film.is_own):  # a picture by itself may be saved as floats afterwards
+    if not (film.has_begun or film.is_own):  # a single picture can be saved as floats later
         film.has_begun = True
         return
     seen = None if film.has_failed else _seen(film, scene)
     is_fed = seen is not None and _feed(film, scene, *seen)
     shown = film.strip and scene.sequence_editor.strips_all.get(film.strip)
-    if shown and shown.mute == is_fed:  # each change costs
+    if shown and shown.mute == is_fed:  # changes are slow
         shown.mute = not is_fed
 
 
 def _seen(film: _Film, scene: Scene) -> tuple[Strip, bool] | None:
-    """As seen_alone.alone, at the current frame, where Blender makes known levels of it."""
+    """Return seen_alone.alone at the current frame, if Blender's levels of it are known."""
     if film.is_own:
         is_known = not versions.colours()
         return (strips.effect_strips(scene)[0], False) if is_known else None
@@ -106,7 +109,7 @@ def _seen(film: _Film, scene: Scene) -> tuple[Strip, bool] | None:
 
 
 def _feed(film: _Film, scene: Scene, strip: Strip, is_blended: bool) -> bool:
-    """Fills the file with the effect's levels. False: the engine has to render the frame, and to say what is wrong."""
+    """Write the effect's levels to the file. Return False if the engine has to render the frame, and report errors."""
     try:
         shown = scene.frame_current - strips.origin(strip) + strip.scene.frame_start
         snapshot, frame = job_snapshots.of(strip.scene, int(shown))
@@ -116,7 +119,7 @@ def _feed(film: _Film, scene: Scene, strip: Strip, is_blended: bool) -> bool:
         with stopping.once(render_job.stopping):
             source = context.renderer(context.request(snapshot, frame, FULL)).source
             size = scene.render.resolution_x, scene.render.resolution_y
-            is_known = film.is_own or source.alpha == "opaque"  # over black, what shines through is known
+            is_known = film.is_own or source.alpha == "opaque"  # only over black, transparency is known
             if not is_known or (source.width, source.height) != size:
                 return False
             levels = pictures.picture(context, snapshot, frame)
@@ -125,17 +128,24 @@ def _feed(film: _Film, scene: Scene, strip: Strip, is_blended: bool) -> bool:
     except Exception:
         film.has_failed = True
         return False
-    except BaseException as error:  # Ctrl-C, of which the engine would not hear
+    except BaseException as error:  # Ctrl-C, which the engine would not get
         render_job.fail(in_words(error))
         render_job.cancel()
     return True
 
 
 def _file(film: _Film, scene: Scene) -> LevelsFile:
-    """The file of the film, with a strip that shows it. OSError: it cannot be written. ValueError: there is no channel
-    for the strip."""
+    """Return the film's file, with a strip that shows it.
+
+    Raises:
+        OSError: It cannot be written.
+        ValueError: There is no channel for the strip.
+    """
     if film.file is None:
-        film.file = film.changed.enter_context(_temporary(scene))
+        atomic_write.clear_up(place := Path(tempfile.gettempdir()))
+        folder = film.changed.enter_context(atomic_write.part_folder(place))
+        film.file = LevelsFile(folder / "picture.tif", scene.render.resolution_x, scene.render.resolution_y)
+        film.changed.callback(film.file.close)
         film.strip = _add_strip(film, scene, film.file.path)
     return film.file
 
@@ -149,7 +159,7 @@ def _add_strip(film: _Film, scene: Scene, path: Path) -> str:
         raise ValueError
     strip = editor.strips.new_image(path.name, str(path), channel, first)
     strip.right_handle, strip.blend_type = last + 1, "REPLACE"
-    # Blender would keep the file's first picture, and every frame of the film.
+    # Do not let Blender cache the file's first picture, or every frame of the film.
     editor.active_strip, editor.use_cache_raw, editor.use_cache_final = active, False, False
     name = strip.name
 
@@ -164,21 +174,11 @@ def _add_strip(film: _Film, scene: Scene, path: Path) -> str:
     return name
 
 
-@contextmanager
-def _temporary(scene: Scene) -> Iterator[LevelsFile]:
-    """A file for the pictures of a scene. OSError: there is no room for it."""
-    atomic_write.clear_up(place := Path(tempfile.gettempdir()))
-    with atomic_write.part_folder(place) as folder:
-        file = LevelsFile(folder / "picture.tif", scene.render.resolution_x, scene.render.resolution_y)
-        with closing(file):
-            yield file
-
-
 class LevelsFile:
-    """An uncompressed TIFF of RGBA levels, whose pixels are replaced in place."""
+    """An uncompressed TIFF of RGBA levels, whose pixels are overwritten in place."""
 
     def __init__(self, path: Path, width: int, height: int) -> None:
-        """OSError: it cannot be written. After this there is room for all that is written to it."""
+        """Create the file with room for all later writes. OSError: it cannot be written."""
         self.path, self._padding = path, -width % _COLUMNS
         columns = width + self._padding
         spec = OpenImageIO.ImageSpec(width, height, 4, "uint8")
@@ -189,13 +189,16 @@ class LevelsFile:
         file = OpenImageIO.ImageOutput.create(str(path))
         if not (file and file.open(str(path), spec) and file.write_image(white) and file.close()):
             raise OSError(f"{path}: cannot be written")
-        # The tiles are one below the other, and nothing lies between.
+        # The tiles are stored one after the other, without gaps.
         self._start = path.read_bytes().index(b"\xff" * (4 * width))
         self._file = path.open("r+b", buffering=0)
 
     def write(self, levels: np.ndarray) -> None:
-        """levels: uint8 (H, W, 4), top row first. OSError: there is no such file any more, which Blender would show as
-        a picture of one colour."""
+        """Write levels uint8 (H, W, 4), top row first.
+
+        Raises:
+            OSError: The file is gone. Blender would show it as a single colour.
+        """
         if self._padding:
             levels = np.pad(levels, ((0, 0), (0, self._padding), (0, 0)))
         self._file.seek(self._start)

@@ -1,5 +1,7 @@
-"""What a report of an error should have in it, as short Markdown: versions, the device, what the edit is made of, and
-the last errors and warnings. Nothing in it names what is the user's: no strip, no scene, no file, no folder."""
+"""Reports of errors as short Markdown: versions, the device, the edit's parts, and the last errors and warnings.
+
+They contain no names of strips, scenes, files or folders of the user.
+"""
 
 import importlib
 import os
@@ -22,26 +24,20 @@ from ..data.validation import word
 from ..devices import available
 from ..rendering import render_settings
 
-# What the extension uses, by the names that it is imported by.
-PACKAGES = {
-    "NumPy": "numpy",
-    "OpenImageIO": "OpenImageIO",
-    "PyAV": "av",
-    "OpenCV": "cv2",
-    "moderngl": "moderngl",
-}
+# The packages that the extension uses, by module.
+PACKAGES = {"NumPy": "numpy", "OpenImageIO": "OpenImageIO", "PyAV": "av", "OpenCV": "cv2", "moderngl": "moderngl"}
 BACKENDS = {"OPENGL": "OpenGL", "VULKAN": "Vulkan", "METAL": "Metal", "NONE": "nothing", "UNKNOWN": "unknown"}
 
 
 def text(scene: Scene | None) -> str:
-    """The report; scene: whose sequencer is shown, or None. On the main thread."""
-    lines = ["### Virtual Shutter: report of an error", "", *_told(_versions), *_told(_device)]
-    lines += ["", "Edit", "", *_told(lambda: _edit(scene) if scene else ["- none"])]
+    """Return the report, on the main thread; `scene` is the sequencer's, or None."""
+    lines = ["### Virtual Shutter: report of an error", "", *_lines_of(_versions), *_lines_of(_device)]
+    lines += ["", "Edit", "", *_lines_of(lambda: _edit(scene) if scene else ["- none"])]
     return "\n".join([*lines, "", "Last errors and warnings", "", *(_sentences() or ["- none"]), ""])
 
 
-def _told(part: Callable[[], Iterable[str]]) -> list[str]:
-    """The lines of a part: what is reported may be broken in any way, the edit as well as a driver."""
+def _lines_of(part: Callable[[], Iterable[str]]) -> list[str]:
+    """Return the lines of a part, as far as nothing fails: the edit or a driver can be broken in any way."""
     lines: list[str] = []
     try:
         lines.extend(part())
@@ -62,7 +58,7 @@ def _versions() -> Iterator[str]:
 
 
 def _zip() -> str:
-    """Which of the extension's zips this is: those for a system list their wheels in the manifest."""
+    """Return which of the extension's zips this is. Those for a system list their wheels in the manifest."""
     manifest = tomllib.loads(versions.MANIFEST.read_text(encoding="utf-8"))
     if wheels := manifest.get("wheels"):
         return f"zip for {', '.join(manifest.get('platforms', ['any system']))} with {len(wheels)} wheels"
@@ -74,17 +70,17 @@ def _version(module: str) -> str:
         return str(getattr(importlib.import_module(module), "__version__", "of unknown version"))
     except ModuleNotFoundError as error:
         return "missing" if error.name == module else f"lacks {error.name}"
-    except Exception as error:  # a library of another system, or another Python
+    except Exception as error:  # a library for another system or Python
         return f"cannot be imported ({type(error).__name__})"
 
 
 def _device() -> Iterator[str]:
-    with suppress(SystemError):  # in the background, where nobody has called gpu.init()
+    with suppress(SystemError):  # in the background, without gpu.init()
         backend = BACKENDS.get(gpu.platform.backend_type_get(), "unknown")
         driver = f"{gpu.platform.renderer_get()}, {gpu.platform.vendor_get()}, {gpu.platform.version_get()}"
         yield f"- Blender's GPU: {backend}, {driver}"
     wanted = render_settings.wanted()
-    if wanted not in ("blender", "cpu"):  # else it is left alone
+    if wanted not in ("blender", "cpu"):  # otherwise OpenGL is not opened
         opengl = available.opengl()
         yield f"- OpenGL 4.3: {without_paths(opengl.lacking or f'{opengl.name}, {opengl.driver}')}"
     try:
@@ -101,20 +97,22 @@ def _device() -> Iterator[str]:
 
 
 def without_paths(words: str) -> str:
-    """What a driver or a library says, without the paths that it may name: all from the first one's beginning to the
-    last one's end, as folders may have spaces in their names."""
+    """Remove paths from a message of a driver or a library.
+
+    Everything from the first path's beginning to the last path's end goes, since folders' names can have spaces.
+    """
     return re.sub(r"(?<!\w)(?:[A-Za-z]:)?[\\/~](?:.*[\\/])?\S*", "(path)", words)
 
 
 def _sentences() -> list[str]:
-    """The oldest first; when each was told last, and how often."""
+    """Return the messages, the oldest first, with the time when each was shown last, and how often."""
     return [
         f"- {each.seconds:.0f} s: {each.words}" + (f" × {each.times}" if each.times > 1 else "") for each in told.last()
     ]
 
 
 def _edit(scene: Scene) -> list[str]:
-    """What an edit is made of, in kinds and numbers: of a scene and its effects."""
+    """Describe an edit by kinds and numbers: the scene and its effects."""
     found = list(_of_scene(scene))
     for number, strip in enumerate(strips.effect_strips(scene), 1):
         effect = strips.effect_of(scene, strip.scene)
@@ -129,7 +127,7 @@ def _of_scene(scene: Scene) -> Iterator[str]:
     rate = f"{render.fps / render.fps_base:g} fps"
     yield f"- Frames: {scene.frame_start} to {scene.frame_end}, at {scene.frame_current}; {size}, {rate}"
     saved = scene.virtual_shutter.version
-    by = saved if re.fullmatch(r"[\d.]{1,20}", saved) else "none"  # a script may have written anything there
+    by = saved if re.fullmatch(r"[\d.]{1,20}", saved) else "none"  # scripts can write anything there
     yield f"- Saved: by Blender {'.'.join(map(str, bpy.data.version))}, version {by} of the extension"
     yield f"- Output: {render.image_settings.file_format}, {render.image_settings.color_depth} bits"
     colours = {
@@ -202,7 +200,7 @@ def _of_source(scene: Scene, effect: PropertyGroup, strip: Strip) -> Iterator[st
 
 
 def _of_region(effect: PropertyGroup, region: PropertyGroup) -> list[str]:
-    """Whose it is as a number: shutters are named."""
+    """Describe a region, with its shutter as a number, since shutters have names."""
     names = [shutter.name for shutter in effect.shutters]
     words = [f"shutter {names.index(region.shutter) + 1 if region.shutter in names else 'none'}"]
     if layer := annotations.layer_of(effect, region):
@@ -211,7 +209,7 @@ def _of_region(effect: PropertyGroup, region: PropertyGroup) -> list[str]:
 
 
 def _chosen(group: PropertyGroup) -> Iterator[str]:
-    """What is otherwise in a property group than in a new one: enums, switches and whole numbers."""
+    """Yield the enums, switches and integers of a property group that differ from their defaults."""
     for prop in group.bl_rna.properties:
         name = prop.identifier
         if prop.type in ("ENUM", "BOOLEAN", "INT") and not (prop.is_hidden or name.startswith("active_")):
@@ -221,20 +219,20 @@ def _chosen(group: PropertyGroup) -> Iterator[str]:
 
 
 def _listed(scene: Scene, what: str, found: list[tuple]) -> Iterator[str]:
-    """Property groups with words that tell of each; equal ones in one line."""
+    """List property groups with a description; equal ones share a line."""
     yield f"- {what}s: {len(found)}"
     lines = (", ".join([*words, *_chosen(group), f"{_keys(scene, group)} keys"]) for group, words in found)
     yield from (f"  - {times} × {line}" for line, times in Counter(lines).items())
 
 
 def _keys(scene: Scene, group: PropertyGroup) -> int:
-    """How many keyframes there are of a property group and of all in it."""
+    """Count the keyframes of a property group and everything in it."""
     curves = fcurves.curves_under(scene, f"{group.path_from_id()}.")
     return sum(len(curve.keyframe_points) for curve in curves)
 
 
 def _word(owner: PropertyGroup, name: str) -> str:
-    """An enum's identifier; files can hold numbers that stand for none."""
+    """Return an enum's identifier; files can hold invalid numbers."""
     try:
         return word(owner, name)
     except UserError:
@@ -242,6 +240,6 @@ def _word(owner: PropertyGroup, name: str) -> str:
 
 
 def _standard(name: str) -> str:
-    """A name of Blender's own OpenColorIO configuration, or of one that OpenColorIO brings; others are somebody's."""
+    """Return a name from Blender's or OpenColorIO's own configurations; other names are the user's."""
     configuration = versions.colours()
     return name if not configuration or configuration.startswith("ocio://") else "(of another configuration)"

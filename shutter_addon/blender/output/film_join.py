@@ -1,4 +1,4 @@
-"""A movie of rendered frames, with the sound and the output settings of the edit that they were rendered from."""
+"""Joining rendered frames to a movie, with the sound and output settings of their edit."""
 
 from __future__ import annotations
 
@@ -20,21 +20,23 @@ from ..rendering import render_job
 from . import film_output
 from .film_output import OutputError
 
-AT_ONCE = 1000  # pictures of a strip: Blender copies all that it has for each that is added
+AT_ONCE = 1000  # pictures per strip: Blender copies all of them for each that is added
 
 
 def check(output: Path, read: list[Path]) -> None:
-    """OutputError: the movie cannot lie there; read: what is not to be written over."""
+    """Raise OutputError if the movie cannot be there; `read` are files that must not be overwritten."""
     if not film_output.is_movie(output):
         raise OutputError(f"{output}: none of {', '.join(film_output.MOVIES)}")
-    film_output.for_blender(str(output))
-    film_output.spare([output], read)
+    film_output.blender_path(str(output))
+    film_output.refuse_overwriting([output], read)
 
 
 def rehearse(scene: Scene, output: Path, file_format: str, frames: range) -> None:
-    """Joins one black picture to a movie that is thrown away; `scene` is changed, and not to be used again.
+    """Join one black picture to a movie that is thrown away. This changes `scene`: do not use it again.
 
-    OutputError, MediaError, OSError: these frames, of such a format, could not be joined to that movie."""
+    Raises:
+        OutputError, MediaError, OSError: Frames of this format could not be joined to that movie.
+    """
     film_output.check(output, None, film_output.size(scene))
     _refuse_gaps(scene, file_format, frames)
     with tempfile.TemporaryDirectory() as place:
@@ -47,7 +49,7 @@ def rehearse(scene: Scene, output: Path, file_format: str, frames: range) -> Non
 
 
 def _refuse_gaps(scene: Scene, file_format: str, frames: range) -> None:
-    """OutputError: frames at which no strip is shown are transparent, and would be refused for it."""
+    """Raise OutputError if no strip is shown at some frames: they are transparent, and would be refused."""
     if file_format == "png" and scene.render.image_settings.color_mode == "RGBA" and _changes_transparency(scene):
         strips = [strip for strip in scene.sequence_editor.strips_all if strip.type not in ("SOUND", "META")]
         shown = set().union(*(requirements.shown_frames(scene, strip) for strip in strips))
@@ -67,11 +69,17 @@ def _write_black(path: Path, size: tuple[int, int]) -> None:
 def join(
     scene: Scene, folder: Path, output: Path, frames: range, key: str, progress: Callable = film_output.progress
 ) -> None:
-    """Makes a movie of these rendered frames in a folder; `scene` is changed, and not to be used again.
+    """Join rendered frames in a folder to a movie, whole or not at all. This changes `scene`: do not use it again.
 
-    key: that of the edit; progress: as film_output.progress. OutputError, MediaError: frames are missing, broken,
-    unlike each other or of another edit, or the movie cannot be written, which is there whole or not at all.
-    InterruptedRenderError: by Ctrl-C or TERM."""
+    Args:
+        key: Of the edit's version.
+        progress: Like film_output.progress.
+
+    Raises:
+        OutputError, MediaError: Frames are missing, damaged, different or of another edit, or the movie cannot be
+            written.
+        InterruptedRenderError: Stopped by Ctrl-C or TERM.
+    """
     scene.frame_start, scene.frame_end = frames[0], frames[-1]
     paths = _pictures(folder, frames[:: scene.frame_step])
     size = film_output.size(scene)
@@ -79,23 +87,23 @@ def join(
     with progress(len(paths), "picture") as looked:
         first = _common(paths, looked, size, key)
     _refuse_transparency(scene, paths, first)
-    _lay_over(scene, paths, first)
+    _cover_edit(scene, paths, first)
     _set_output(scene, output, size)
-    film_output.prepare(output.parent)
+    film_output.make_folder(output.parent)
     left = iter(paths[1:])
     with progress(len(paths), "frame") as moved:
 
         def rendered() -> None:
-            """Ends the film before a frame whose picture is gone by then: Blender would show a colour in its place."""
+            """End the film if the next picture is gone, since Blender would show a colour in its place."""
             moved()
             if (path := next(left, None)) and not path.is_file():
                 raise OutputError(f"{path}: no such file")
 
-        film_output.write(scene, output, rendered)
+        film_output.render_frames(scene, output, rendered)
 
 
 def _pictures(folder: Path, frames: range) -> list[Path]:
-    """The picture of each frame. OutputError: some are missing, or are there twice."""
+    """Return the picture of each frame. OutputError: some are missing, or exist twice."""
     pictures = _numbered(folder)
     if not pictures:
         raise OutputError(f"{folder}: there are no frames, such as 0001.png or 0001.exr")
@@ -105,8 +113,7 @@ def _pictures(folder: Path, frames: range) -> list[Path]:
 
 
 def _numbered(folder: Path) -> dict[int, Path]:
-    """The pictures of a folder whose name is the number of a frame. OutputError: it is no folder, or a frame has two
-    pictures."""
+    """Return the pictures of a folder by frame. OutputError: it is not a folder, or a frame has two pictures."""
     try:
         files = sorted(path for path in folder.iterdir() if path.suffix[1:] in film_output.FORMATS)
     except OSError as error:
@@ -121,20 +128,23 @@ def _numbered(folder: Path) -> dict[int, Path]:
 
 
 def _are(frames: list[int]) -> str:
-    """For use in a sentence: "frame 12 is", or "frames 12, 17 to 20 are"."""
+    """Return words for a sentence: "frame 12 is", or "frames 12, 17 to 20 are"."""
     return f"{frame_ranges.in_words(frames)} {'is' if len(frames) == 1 else 'are'}"
 
 
-def say_what_is_left_out(folder: Path, frames: range) -> None:
-    """A word on stderr of pictures that are no frames of the edit."""
+def warn_of_other_pictures(folder: Path, frames: range) -> None:
+    """Print a warning about pictures that are not frames of the edit."""
     if others := [frame for frame in _numbered(folder) if frame not in frames]:
         words = f"{folder}: {_are(others)} not of the edit, and left out"
         render_job.say(words)
 
 
 def _common(paths: list[Path], looked: Callable, size: tuple[int, int], key: str) -> RenderedPicture:
-    """What all pictures are; looked: called after each. OutputError: one is broken, unlike the first, or of another
-    edit than that of `key`."""
+    """Return the common properties of all pictures; `looked` is called after each.
+
+    Raises:
+        OutputError: A picture is damaged, unlike the first, or of another edit than that of `key`.
+    """
     pool = threads.pool()
     first: RenderedPicture | None = None
     try:
@@ -147,7 +157,7 @@ def _common(paths: list[Path], looked: Callable, size: tuple[int, int], key: str
             looked()
     finally:
         pool.shutdown(cancel_futures=True)
-    assert first is not None  # an edit has a frame
+    assert first is not None  # an edit has at least one frame
     if first.size != size:
         raise OutputError(f"{paths[0]}: is {_by(first.size)}, but the edit's frames are {_by(size)}")
     if first.edit not in (None, key):
@@ -157,7 +167,7 @@ def _common(paths: list[Path], looked: Callable, size: tuple[int, int], key: str
 
 
 def _difference(path: Path, picture: RenderedPicture, other: Path, first: RenderedPicture) -> str:
-    """How a picture is unlike the first one; "": it is not."""
+    """Return how a picture differs from the first one, or ""."""
     name = other.name
     if path.suffix != other.suffix:
         return f"is another format than {name}"
@@ -178,8 +188,10 @@ def _by(size: tuple[int, int]) -> str:
 
 
 def _refuse_transparency(scene: Scene, paths: list[Path], first: RenderedPicture) -> None:
-    """OutputError: PNG files of which Blender's own film would show other colours. It applies the view to what lies
-    over black, where they have it applied to the colours that shine through."""
+    """Raise OutputError for transparent PNG files that Blender's own film would show in other colours.
+
+    A film applies the view after composing over black, but the files have it applied to their colours.
+    """
     if paths[0].suffix == ".png" and first.channels in (2, 4) and _changes_transparency(scene):
         for path in paths:
             if rendered_pictures.is_transparent(path):
@@ -192,15 +204,15 @@ def _changes_transparency(scene: Scene) -> bool:
 
 
 def _shown(scene: Scene) -> Scene | ImageFormatSettings:
-    """What has the display and the view that the edit's output has."""
+    """Return the owner of the display and view settings of the edit's output."""
     settings = scene.render.image_settings
     return settings if settings.color_management == "OVERRIDE" else scene
 
 
-def _lay_over(scene: Scene, paths: list[Path], first: RenderedPicture) -> None:
-    """Has the pictures cover all else that the edit shows. Its sounds are heard."""
+def _cover_edit(scene: Scene, paths: list[Path], first: RenderedPicture) -> None:
+    """Cover everything that the edit shows with the pictures. Sounds stay."""
     editor = scene.sequence_editor
-    editor.display_stack(None)  # out of meta strips: Blender renders what was open when the file was saved
+    editor.display_stack(None)  # Blender renders the meta strip that was open when the file was saved
     channel = max((strip.channel for strip in editor.strips), default=0) + 1
     if channel > strips.CHANNELS:
         raise OutputError("the edit has strips in the uppermost channel, where the frames are to lie; move them down")
@@ -219,8 +231,10 @@ def _lay_over(scene: Scene, paths: list[Path], first: RenderedPicture) -> None:
 
 
 def _keep_colours(scene: Scene, suffix: str, first: RenderedPicture) -> str | None:
-    """Has the view of PNG files, which are finished, change nothing any more; the colour space that they are in. EXR
-    files are scene-linear: None."""
+    """Make the view leave PNG files unchanged, which are finished, and return their colour space.
+
+    EXR files are scene-linear: None.
+    """
     if suffix == ".exr":
         return None
     shown = _shown(scene)
@@ -231,13 +245,15 @@ def _keep_colours(scene: Scene, suffix: str, first: RenderedPicture) -> str | No
     for name, value in seen_alone.PLAIN_VIEW.items():
         setattr(shown.view_settings, name, value)
     if first.samples == "uint8":
-        scene.render.dither_intensity = 0  # it has been added to them
+        scene.render.dither_intensity = 0  # they are dithered already
     return shown.display_settings.display_device
 
 
 def _set_output(scene: Scene, output: Path, size: tuple[int, int]) -> None:
-    """The edit's own settings, if its output is a movie, else those of the command's films; the container by the
-    output's ending. Nothing is burnt in again, and what else makes a picture of another size or place is off."""
+    """Set the output: the edit's own settings if they are a movie's, else those of the command.
+
+    The container follows the output's suffix. Burnt in metadata, other sizes and other places are turned off.
+    """
     render = scene.render
     if render.image_settings.media_type == "VIDEO":
         render.ffmpeg.format = film_output.MOVIES[output.suffix.lower()][0]

@@ -1,4 +1,4 @@
-"""Where a film goes: a movie, or a folder of pictures; each file whole or not at all."""
+"""Writing films as movies or folders of pictures, each file whole or not at all."""
 
 from __future__ import annotations
 
@@ -23,9 +23,9 @@ from ..rendering import render_job
 from . import edit_feed
 
 INTERRUPTED = 130
-Move = Callable[[Path, Path], object]  # moves a picture to its place
+Move = Callable[[Path, Path], object]  # moves a picture to its destination
 
-# Ending: container, codec, audio codec (Blender's names).
+# Suffix: container, codec, audio codec (Blender's names).
 MOVIES = {
     ".mp4": ("MPEG4", "H264", "AAC"),
     ".mov": ("QUICKTIME", "H264", "AAC"),
@@ -36,7 +36,7 @@ MOVIES = {
 
 
 class PictureFormat(NamedTuple):
-    """blender: its name in Blender; bits: of a channel's sample; samples: as rendered_pictures calls them"""
+    """A format: Blender's name, bits per sample, and the samples' name in rendered_pictures."""
 
     blender: str
     bits: int
@@ -45,21 +45,21 @@ class PictureFormat(NamedTuple):
 
 FORMATS = {"png": PictureFormat("PNG", 16, "uint16"), "exr": PictureFormat("OPEN_EXR", 32, "float")}
 
-# What Blender would write into a picture about its making; a frame's number has as many digits as the range's last.
+# Metadata about the render itself. A frame's number would have as many digits as the range's last.
 _STAMPS = (
     *("use_stamp_frame", "use_stamp_frame_range"),
     *("use_stamp_date", "use_stamp_time", "use_stamp_render_time", "use_stamp_memory", "use_stamp_hostname"),
     *("use_stamp_filename", "use_stamp_sequencer_strip"),
 )
-_LONGEST = 1000  # bytes of a path, a frame's number included: Blender has room for 1023 and cuts off the rest
+_LONGEST = 1000  # bytes of a path including the frame's number: Blender truncates at 1023
 
 
 class OutputError(UserError, ValueError):
-    """This cannot be written; the message is one sentence for the user."""
+    """A film cannot be written. The message is one sentence."""
 
 
 class InterruptedRenderError(OutputError):
-    """Stopped by the user or a farm; the message says what is left."""
+    """The user or a farm stopped the render. The message says what is left."""
 
 
 def is_movie(path: Path) -> bool:
@@ -67,13 +67,13 @@ def is_movie(path: Path) -> bool:
 
 
 def size(scene: Scene) -> tuple[int, int]:
-    """Width and height of the pictures that Blender renders of a scene, in pixels."""
+    """Return width and height of the pictures that Blender renders of a scene, in pixels."""
     render = scene.render
     return tuple(n * render.resolution_percentage // 100 for n in (render.resolution_x, render.resolution_y))
 
 
 def check(path: Path, file_format: str | None, size: tuple[int, int]) -> None:
-    """OutputError: Blender cannot write a film of this size there. A new folder is made on the way."""
+    """Raise OutputError if Blender cannot write a film of this size to `path`. A missing folder is no error."""
     width, height = size
     if width < 4 or height < 4:
         raise OutputError(f"the source has {width}×{height} pixels; Blender renders no picture smaller than 4×4")
@@ -89,25 +89,25 @@ def check(path: Path, file_format: str | None, size: tuple[int, int]) -> None:
 
 
 def check_folder(path: Path, file_format: str | None) -> None:
-    """OutputError: it looks like a file of another kind, and no format says that it is a folder of pictures."""
+    """Raise OutputError if the path looks like a file of another kind and no format tells that it is a folder."""
     if path.suffix.strip(".") and not path.is_dir() and file_format is None:
         raise OutputError(f"{path}: neither a folder nor one of {', '.join(MOVIES)}")
 
 
 def check_writable(folder: Path) -> None:
-    """OutputError: nothing can be written to a folder, or where it is to be made."""
+    """Raise OutputError if a folder, or the first existing one above, cannot be written to."""
     place = next(path for path in (folder, *folder.parents) if path.exists())
     if not place.is_dir():
-        raise OutputError(f"{place}: is a file, and no folder")
+        raise OutputError(f"{place}: is a file, not a folder")
     try:
-        with atomic_write.part_folder(place):  # what permissions and mounts promise is not always so
+        with atomic_write.part_folder(place):  # permissions and mounts do not always tell
             pass
     except OSError as error:
         raise OutputError(f"{place}: {error.strerror or error}") from None
 
 
-def spare(written: Iterable[Path], read: Collection[Path]) -> None:
-    """OutputError: a file that would be written is one that is read, whatever link leads to it, or is written twice."""
+def refuse_overwriting(written: Iterable[Path], read: Collection[Path]) -> None:
+    """Raise OutputError if a file to write is one that is read, also through links, or is written twice."""
     taken = {_identity(path): path for path in read}
     places = set()
     for path in written:
@@ -120,7 +120,7 @@ def spare(written: Iterable[Path], read: Collection[Path]) -> None:
 
 
 def _identity(path: Path) -> tuple[int, int] | str:
-    """Equal for all paths of a file; where there is none, for all that lead to its place."""
+    """Return a value that is equal for all paths to a file, or to a place without a file."""
     try:
         status = os.stat(path)
     except OSError:
@@ -129,12 +129,12 @@ def _identity(path: Path) -> tuple[int, int] | str:
 
 
 def pictures_of(folder: Path, ending: str, frames: range) -> list[Path]:
-    """The files of these frames in a folder."""
+    """Return the files of these frames in a folder."""
     return [folder / f"{frame:04d}.{ending}" for frame in frames]
 
 
-def for_blender(path: str) -> str:
-    """The path as Blender takes it for a name: it has templates in braces. OutputError: no name of Blender's."""
+def blender_path(path: str) -> str:
+    """Return the path with braces escaped, which Blender uses for templates. OutputError: Blender cannot use it."""
     if os.sep == "/" and "\\" in path:
         raise OutputError(f"{path}: Blender cannot write to a path with \\")
     if len(os.fsencode(path)) > _LONGEST:
@@ -143,9 +143,14 @@ def for_blender(path: str) -> str:
 
 
 def set_output(scene: Scene, path: Path, file_format: str, *, alpha: bool) -> None:
-    """Where and how the edit's render goes: a movie by its ending, else a folder of pictures named by frame.
+    """Set the edit's output: a movie by its suffix, else a folder of pictures named by frame.
 
-    alpha: pictures keep the source's transparency. OutputError: Blender cannot write there."""
+    Args:
+        alpha: Whether pictures keep the source's transparency.
+
+    Raises:
+        OutputError: Blender cannot write there.
+    """
     settings, render = scene.render.image_settings, scene.render
     set_place(render, path)
     if is_movie(path):
@@ -161,28 +166,27 @@ def set_output(scene: Scene, path: Path, file_format: str, *, alpha: bool) -> No
 
 
 def set_place(render: RenderSettings, path: Path) -> None:
-    """Where the edit's render goes, and that it says nothing of its making. OutputError: Blender cannot write there."""
+    """Set the output's path, without metadata about the render. OutputError: Blender cannot write there."""
     render.use_file_extension = not is_movie(path)
     _stamp_nothing(render)
-    render.filepath = for_blender(str(path) if is_movie(path) else f"{path}{os.sep}")
+    render.filepath = blender_path(str(path) if is_movie(path) else f"{path}{os.sep}")
 
 
 def _has_sound(scene: Scene) -> bool:
-    """Whether a scene has sound strips, or one that it shows."""
+    """Return whether a scene, or one that it shows, has sound strips."""
     shown_strips = [strip for shown in strips.shown_scenes(scene) for strip in shown.sequence_editor.strips_all]
     return any(strip.type == "SOUND" for strip in shown_strips)
 
 
 def set_pictures(scene: Scene, file_format: str, note: str) -> None:
-    """What pictures a saved edit's render writes: every frame anew, as colours are set in the edit, with a note in
-    their metadata."""
+    """Set up pictures of a saved edit: all frames, with the edit's colours, and a note in their metadata."""
     settings, render = scene.render.image_settings, scene.render
     settings.media_type = "IMAGE"
     _set_format(settings, FORMATS[file_format])
     render.use_file_extension = render.use_overwrite = True
     render.use_placeholder = False
     scene.frame_step = 1
-    if not render.use_stamp:  # what is burnt into pictures stays as it is
+    if not render.use_stamp:  # burnt in metadata stays
         _stamp_nothing(render)
         render.use_stamp_note, render.stamp_note_text = True, note
 
@@ -190,38 +194,47 @@ def set_pictures(scene: Scene, file_format: str, note: str) -> None:
 def _set_format(settings: ImageFormatSettings, kind: PictureFormat) -> None:
     settings.file_format, settings.color_depth = kind.blender, str(kind.bits)
     if kind.blender == "OPEN_EXR":
-        settings.exr_codec = "ZIP"  # lossless, and with checksums, by which a damaged file is known
+        settings.exr_codec = "ZIP"  # lossless, with checksums that reveal damaged files
 
 
 def _stamp_nothing(render: RenderSettings) -> None:
-    """No time or place of the render in pictures: equal pixels are equal files."""
+    """Write no time or place of the render into pictures, so that equal pixels are equal files."""
     for name in _STAMPS:
         setattr(render, name, False)
 
 
-def film(scene: Scene, output: Path) -> None:
-    """Renders an edit of whole_edits.make_edit to a movie or a folder.
+def render_made_edit(scene: Scene, output: Path) -> None:
+    """Render an edit of whole_edits.make_edit to a movie or a folder.
 
-    OutputError: it cannot be rendered or written; finished pictures stay, and of a movie what was finished, under a
-    name of its own. InterruptedRenderError: the same, by Ctrl-C or a farm's TERM."""
-    prepare(output.parent if is_movie(output) else output)
+    Raises:
+        OutputError: It cannot be rendered or written. Finished pictures stay, and the finished part of a movie under
+            another name.
+        InterruptedRenderError: The same, by Ctrl-C or a farm's TERM.
+    """
+    make_folder(output.parent if is_movie(output) else output)
     feed = edit_feed.feeding() if is_movie(output) and strips.effect_strips(scene) else nullcontext()
     with progress(scene.frame_end - scene.frame_start + 1, "frame") as moved, _without_sources(scene), feed:
-        write(scene, output, moved)
+        render_frames(scene, output, moved)
 
 
-def write(scene: Scene, output: Path, moved: Callable[[], None], move: Move = Path.replace) -> None:
-    """Renders the frames of any edit to a movie, or to the pictures that its settings say in a prepared folder. Blender
-    writes into a folder beside the output, and what is finished moves out of it.
+def render_frames(scene: Scene, output: Path, moved: Callable[[], None], move: Move = Path.replace) -> None:
+    """Render the frames of an edit to a movie, or to pictures in a prepared folder by the edit's settings.
 
-    moved: called after each frame; move: moves a picture to its place. Both may raise what ends the render
-    OutputError, InterruptedRenderError: see `film`."""
+    Blender writes into a folder beside the output, from which finished files are moved.
+
+    Args:
+        moved: Called after each frame. It may raise to end the render.
+        move: Moves a picture to its place. It may raise to end the render.
+
+    Raises:
+        OutputError, InterruptedRenderError: See `render_made_edit`.
+    """
     kept = scene.render.filepath
     faults: list[str] = []
     with atomic_write.part_folder(output.parent if is_movie(output) else output) as part:
         part_film = part / f"film{output.suffix}"
         try:
-            scene.render.filepath = for_blender(str(part_film) if is_movie(output) else f"{part}{os.sep}")
+            scene.render.filepath = blender_path(str(part_film) if is_movie(output) else f"{part}{os.sep}")
             with (
                 render_job.telling(faults.append),
                 stoppable() as stopped,
@@ -231,7 +244,10 @@ def write(scene: Scene, output: Path, moved: Callable[[], None], move: Move = Pa
             ):
                 bpy.ops.render.render(animation=True, scene=scene.name)
             if is_movie(output) and not faults and not stopped:
-                _finish(part_film, output, len(range(scene.frame_start, scene.frame_end + 1, scene.frame_step)))
+                count = len(range(scene.frame_start, scene.frame_end + 1, scene.frame_step))
+                if not is_whole_movie(part_film, count):
+                    raise OutputError(f"{output}: could not be written whole ({why_short(part)})")
+                part_film.replace(output)
             elif missing and not faults and not stopped:
                 raise OutputError(f"{output}: {len(missing)} frames were not written; {why_short(part)}")
         except RuntimeError as error:
@@ -245,20 +261,14 @@ def write(scene: Scene, output: Path, moved: Callable[[], None], move: Move = Pa
             raise InterruptedRenderError(f"{output}: stopped{rescued}")
 
 
-def prepare(folder: Path) -> None:
-    """Makes a folder, or clears it up. OSError: it cannot be made."""
+def make_folder(folder: Path) -> None:
+    """Make a folder and remove abandoned parts in it. OSError: it cannot be made."""
     folder.mkdir(parents=True, exist_ok=True)
     atomic_write.clear_up(folder)
 
 
-def _finish(part: Path, output: Path, count: int) -> None:
-    if not is_whole_movie(part, count):
-        raise OutputError(f"{output}: could not be written whole ({why_short(part.parent)})")
-    part.replace(output)
-
-
 def _rescued(part: Path, output: Path) -> str:
-    """Keeps what was finished of a movie, beside its output; how a sentence ends that says so."""
+    """Keep the finished part of a movie beside its output. Return the end of a sentence that says so, or ""."""
     count = whole_pictures(part)
     if count == 0:
         return ""
@@ -267,20 +277,26 @@ def _rescued(part: Path, output: Path) -> str:
     kept = next(path for path in names if not os.path.lexists(path))
     try:
         part.replace(kept)
-    except OSError:  # the sentence is about something else
+    except OSError:  # the message is about another error
         return ""
     return f"; its first {count} frames are in {kept.name}"
 
 
 def message(error: RuntimeError) -> str:
-    """What Blender reported, without its "Error: ", in one line."""
+    """Return Blender's message on one line, without "Error: "."""
     return " ".join(str(error).removeprefix("Error: ").split())
 
 
 @contextmanager
 def _moved(part: Path, output: Path, scene: Scene, update: Callable[[], None], move: Move) -> Iterator[dict[str, Path]]:
-    """Moves each finished picture from `part` to `output`, and calls both, which may raise. Gives the pictures that are
-    missing so far, by name; none of a movie's."""
+    """Move finished pictures from `part` to `output` after each frame.
+
+    Args:
+        update, move: May raise to end the render.
+
+    Yields:
+        The missing pictures by name; empty for a movie.
+    """
     frames = range(scene.frame_start, scene.frame_end + 1)
     settings = scene.render.image_settings
     ending = next((name for name, kind in FORMATS.items() if settings.file_format == kind.blender), "")
@@ -289,7 +305,7 @@ def _moved(part: Path, output: Path, scene: Scene, update: Callable[[], None], m
     def moved(*_) -> None:
         try:
             update()
-            os.utime(part)  # a movie's encoder may not write for long: nobody shall take it for left behind
+            os.utime(part)  # a movie's encoder may pause for long: keep others from taking the folder for abandoned
             for name in [path.name for path in part.iterdir() if path.name in missing]:
                 if not is_whole_picture(part / name):
                     raise OutputError(f"{output / name}: could not be written whole; {why_short(part)}")
@@ -302,7 +318,7 @@ def _moved(part: Path, output: Path, scene: Scene, update: Callable[[], None], m
 
 
 def in_words(error: Exception, place: Path | str) -> str:
-    """A fault as a sentence, the place first. place: where there is none in an OSError."""
+    """Return an error's message, beginning with its place, or `place` if an OSError has none."""
     if isinstance(error, OSError):
         return of_file(error, place)
     return str(error)
@@ -310,10 +326,10 @@ def in_words(error: Exception, place: Path | str) -> str:
 
 @contextmanager
 def progress(count: int, unit: str) -> Iterator[Callable]:
-    """A progress bar on a terminal; gives what moves it on by one, or by as many as it is told."""
+    """Show a progress bar on a terminal. Yield a function that advances it, by 1 unless told otherwise."""
     try:
         from tqdm import tqdm
-    except ImportError:  # a Blender that the extension was copied into without its wheels
+    except ImportError:  # the extension was copied without its wheels
         yield lambda _count=1: None
         return
     with tqdm(total=count, unit=unit, disable=None) as bar:
@@ -322,10 +338,13 @@ def progress(count: int, unit: str) -> Iterator[Callable]:
 
 @contextmanager
 def stoppable() -> Iterator[list[int]]:
-    """Ctrl-C and a farm's TERM end the render after its frame, so that an open movie is finished; a second time, at
-    once. Gives a list with the signal that came, if any.
+    """End the render after the current frame on Ctrl-C or a farm's TERM, so that a movie is closed properly.
 
-    No exception gets through Blender: it prints it and renders on."""
+    A second signal ends it immediately. No exception passes through Blender, which prints it and renders on.
+
+    Yields:
+        A list that gets the signal.
+    """
     signals: list[int] = []
 
     def stop(number: int, _frame: object) -> None:
@@ -339,27 +358,29 @@ def stoppable() -> Iterator[list[int]]:
         yield signals
     finally:
         for number, handler in before.items():
-            signal.signal(number, handler or signal.SIG_DFL)  # None: Blender's own, which Python cannot put back
+            signal.signal(number, handler or signal.SIG_DFL)  # None: Blender's own, which Python cannot restore
 
 
 def _uncached(scene: Scene) -> AbstractContextManager[None]:
-    """Each frame is rendered once: those that Blender would keep would fill gigabytes."""
+    """Turn off Blender's caches: each frame is rendered once, and caches would take gigabytes."""
     names = ("use_cache_raw", "use_cache_final") if scene.sequence_editor else ()
     return for_a_while((scene.sequence_editor, name, False) for name in names)
 
 
 def _without_sources(scene: Scene) -> AbstractContextManager[None]:
-    """Spares Blender what no frame shows: the source lies wholly below its effect, but Blender takes any Scene strip
-    for transparent: it would decode the source and blend the two, 2/5 of all its work."""
+    """Mute sources, which their effects cover completely.
+
+    Blender takes Scene strips for transparent: it would decode the source and blend, 2/5 of its work.
+    """
     sources = [scene.sequence_editor.strips_all[name] for name in strips.shown_sources(scene)]
     return for_a_while((strip, "mute", True) for strip in sources)
 
 
 @contextmanager
 def quiet() -> Iterator[None]:
-    """Keeps Blender's log of every saved frame off the terminal; what goes wrong comes as an exception."""
+    """Keep Blender's log of every saved frame off the terminal. Errors are raised as exceptions."""
     if sys.stdout is not None:
-        with suppress(OSError):  # nobody reads it
+        with suppress(OSError):  # the reader has gone
             sys.stdout.flush()
     terminal, nothing = os.dup(1), os.open(os.devnull, os.O_WRONLY)
     os.dup2(nothing, 1)

@@ -1,5 +1,5 @@
-"""Mattes of an effect as pictures: for its recipe, which points to files and has strips and masks written beside it;
-and for other programs."""
+"""Writing mattes of an effect as pictures: beside its recipe, which needs files for strips and masks, or for other
+programs."""
 
 from __future__ import annotations
 
@@ -26,28 +26,36 @@ from ..rendering import effect_source
 
 
 def recipe_for(scene: Scene, effect: PropertyGroup, strip: Strip, path: Path) -> Effect:
-    """An effect as a recipe that is to lie at a path. What it cannot point to is written into a folder beside it, "NAME
-    mattes". One of effect_source.FAULTS: the effect cannot be rendered as it stands, or a matte cannot be read or
-    written. OSError: there can be no such folder."""
+    """Return an effect as a recipe for a path. Mattes without a file are written beside it, into "NAME mattes".
+
+    Raises:
+        effect_source.FAULTS: The effect cannot be rendered, or a matte cannot be read or written.
+        OSError: The folder cannot be made.
+    """
     regions = strips.matte_regions(effect)
-    # Once before anything is written.
+    # Find faults before anything is written.
     snapshot.recipe_of(scene, effect, strip, [_ramp(region) for region in regions])
     folders = [_folder(region, path, number) for number, region in enumerate(regions, 1)]
-    _spare(folders, _read(scene, effect, strip, regions))
-    words = [_words(scene, effect, strip, *both, path) for both in zip(regions, folders, strict=True)]
-    return snapshot.recipe_of(scene, effect, strip, words)
+    _refuse_overwriting(folders, _read_files(scene, effect, strip, regions))
+    contents = [_content(scene, effect, strip, *both, path) for both in zip(regions, folders, strict=True)]
+    return snapshot.recipe_of(scene, effect, strip, contents)
 
 
-def save(scene: Scene, effect: PropertyGroup, strip: Strip, region: PropertyGroup, folder: Path, word: str) -> int:
-    """Writes what a matte, a ramp or an outline shows at each timeline frame of the effect strip: FRAME.png, grey of 16
-    bits, or FRAME.exr, float, its channel Y. All of them are written or none; how many they are. One of
-    effect_source.FAULTS: the matte cannot be read, or the pictures cannot be written. OSError: nor their folder."""
+def save(scene: Scene, effect: PropertyGroup, strip: Strip, region: PropertyGroup, folder: Path, suffix: str) -> int:
+    """Write a matte, ramp or outline at each timeline frame of the effect strip, all or none, and return their number.
+
+    Files are FRAME.png, 16-bit grey, or FRAME.exr, float, with the channel Y.
+
+    Raises:
+        effect_source.FAULTS: The matte cannot be read, or the pictures cannot be written.
+        OSError: Their folder cannot be written to.
+    """
     folder.mkdir(parents=True, exist_ok=True)
-    _spare([folder], _read(scene, effect, strip, strips.matte_regions(effect)))
+    _refuse_overwriting([folder], _read_files(scene, effect, strip, strips.matte_regions(effect)))
     with atomic_write.part_folder(folder) as part:
-        frames = [frame for frame, _key in _write_frames(scene, effect, strip, region, part, word)]
+        frames = [frame for frame, _key in _write_frames(scene, effect, strip, region, part, suffix)]
         for frame in frames:
-            os.replace(part / _name(frame, word), folder / _name(frame, word))
+            os.replace(part / _name(frame, suffix), folder / _name(frame, suffix))
     return len(frames)
 
 
@@ -57,7 +65,7 @@ def _ramp(region: PropertyGroup) -> RampContent:
 
 
 def _folder(region: PropertyGroup, path: Path, number: int) -> Path | None:
-    """Where the pictures of a matte are written; None: a recipe can say what it is."""
+    """Return the folder for a matte's pictures; None: a recipe can refer to it without."""
     if region.kind == "RAMP" or (region.matte == "IMAGE" and not _is_one_of_many(region)):
         return None
     name = re.sub(r"[^\w. -]", "_", region.name).strip(". ") or "Matte"
@@ -65,13 +73,13 @@ def _folder(region: PropertyGroup, path: Path, number: int) -> Path | None:
 
 
 def _is_one_of_many(region: PropertyGroup) -> bool:
-    """Whether a matte is a single picture that a recipe would take for the first of a sequence."""
+    """Return whether a matte is a single picture that a recipe would read as the first of a sequence."""
     path = matte_content.image_path(region)
     return region.image.source == "FILE" and path.exists() and len(sequence_files(path)) > 1
 
 
-def _read(scene: Scene, effect: PropertyGroup, strip: Strip, regions: list) -> Iterator[Path]:
-    """A file of each medium that is read while mattes are written, or by those that are not."""
+def _read_files(scene: Scene, effect: PropertyGroup, strip: Strip, regions: list) -> Iterator[Path]:
+    """Yield a file of each medium that the effect's mattes and source read."""
     yield source_media.spec(strips.source_of(scene, effect, strip)).path
     for region in regions:
         if region.kind == "MATTE" and region.matte == "IMAGE":
@@ -80,8 +88,8 @@ def _read(scene: Scene, effect: PropertyGroup, strip: Strip, regions: list) -> I
             yield from (source_media.spec(part).path for part in matte_content.parts_for(region, strip))
 
 
-def _spare(folders: list[Path | None], read: Iterator[Path]) -> None:
-    """EffectError: pictures would be written where others are read."""
+def _refuse_overwriting(folders: list[Path | None], read: Iterator[Path]) -> None:
+    """Raise EffectError if pictures would be written where others are read."""
     taken = {file.parent.resolve() for file in read}
     for folder in folders:
         if folder is not None and folder.resolve() in taken:
@@ -89,7 +97,7 @@ def _spare(folders: list[Path | None], read: Iterator[Path]) -> None:
             raise EffectError(sentence.format(folder=folder))
 
 
-def _words(
+def _content(
     scene: Scene, effect: PropertyGroup, strip: Strip, region: PropertyGroup, folder: Path | None, path: Path
 ) -> FileContent | RampContent:
     if region.kind == "RAMP":
@@ -98,36 +106,34 @@ def _words(
         first = recipe.relative(_write(scene, effect, strip, region, folder), path.parent)
         return FileContent(path=first, timing="timeline")
     file, channel = matte_content.image_path(region), matte_content.channel(region)
-    # A recipe's timeline begins with the strip, trimmed as it is.
+    # A recipe's timeline begins with the trimmed strip.
     offset = region.offset + (strips.skipped(strip) if region.timing == "TIMELINE" else 0)
     named = recipe.relative(file, path.parent)
     return FileContent(path=named, channel=channel, offset=offset, timing=region.timing.lower())
 
 
 def _write(scene: Scene, effect: PropertyGroup, strip: Strip, region: PropertyGroup, folder: Path) -> Path:
-    """Writes what a matte shows at each timeline frame of the effect strip, or one picture, if it shows that at all of
-    them; the first one's path."""
+    """Write a matte at each timeline frame of the effect strip, or once if it never changes. Return the first path."""
     folder.mkdir(parents=True, exist_ok=True)
     with atomic_write.part_folder(folder) as part:
         written = list(_write_frames(scene, effect, strip, region, part))
         kept = 1 if len({key for _frame, key in written}) == 1 else len(written)
         for number, (frame, _key) in enumerate(written[:kept], 1):
             os.replace(part / _name(frame), folder / _name(number))
-    for file in folder.glob("[0-9]*.png"):  # of a longer film, exported before
+    for file in folder.glob("[0-9]*.png"):  # of an earlier, longer export
         if file.stem.isdecimal() and int(file.stem) > kept:
             file.unlink()
     return folder / _name(1)
 
 
-def _name(number: int, word: str = "png") -> str:
-    return f"{number:04d}.{word}"
+def _name(number: int, suffix: str = "png") -> str:
+    return f"{number:04d}.{suffix}"
 
 
 def _write_frames(
-    scene: Scene, effect: PropertyGroup, strip: Strip, region: PropertyGroup, folder: Path, word: str = "png"
+    scene: Scene, effect: PropertyGroup, strip: Strip, region: PropertyGroup, folder: Path, suffix: str = "png"
 ) -> Iterator[tuple[int, Hashable]]:
-    """Writes what a matte shows at each timeline frame of the effect strip: gives the frame, and a key that is equal
-    for equal ones."""
+    """Write a matte at each timeline frame of the effect strip. Yield the frame, and a key of the values."""
     frames = range(strip.left_handle, strip.right_handle)
     shown = snapshot.take(scene, effect, strip, frames)
     content = snapshot.matte_content_at(scene, effect, strip, list(effect.regions).index(region), frames)
@@ -137,8 +143,8 @@ def _write_frames(
             with translated(rpt_):
                 matte = mattes.Matte(shutter=0, content=content.at(frame))
             ((key, array),) = values.values((matte,), clip.shown(frame).source_frame, 1)
-            if word == "exr":
-                write_exr(folder / _name(frame, word), array[..., None], ["Y"])
+            if suffix == "exr":
+                write_exr(folder / _name(frame, suffix), array[..., None], ["Y"])
             else:
-                write_grey(folder / _name(frame, word), array)
+                write_grey(folder / _name(frame, suffix), array)
             yield frame, key

@@ -1,4 +1,4 @@
-"""Frames of a saved edit in a folder that many machines may share: each is rendered by one of them, and once."""
+"""Rendering frames of a saved edit into a folder that several machines share, each frame once."""
 
 from __future__ import annotations
 
@@ -19,35 +19,45 @@ from ..data import versions
 from ..rendering import render_job
 from . import film_output
 
-RUN = 8  # frames that are claimed at once
+RUN = 8  # frames per claim of a machine
 Stamps = dict[Path, tuple | None]  # rendered_pictures.stamp of pictures
-_PAUSE = 1.0  # seconds between two looks at what others have finished
+_PAUSE = 1.0  # seconds between checks of what others have finished
 
 
 def check(folder: Path, file_format: str | None, frames: range, read: list[Path]) -> None:
-    """OutputError: an edit's frames cannot be rendered there.
+    """Raise OutputError if an edit's frames cannot be rendered there.
 
-    file_format: None for PNG, where the folder is not to be taken for a file; read: what is not to be written over"""
+    Args:
+        file_format: None for PNG, if the folder cannot be mistaken for a file.
+        read: Files that must not be overwritten.
+    """
     if film_output.is_movie(folder):
         words = "a saved edit is rendered to a folder of pictures, not to a movie"
         raise film_output.OutputError(f"{folder}: {words}")
     film_output.check_folder(folder, file_format)
-    film_output.for_blender(str(folder))
-    film_output.spare(film_output.pictures_of(folder, file_format or "png", frames), read)
+    film_output.blender_path(str(folder))
+    film_output.refuse_overwriting(film_output.pictures_of(folder, file_format or "png", frames), read)
 
 
 def check_resumable(scene: Scene) -> None:
-    """OutputError: the edit's pictures do not say which version of it they are of."""
+    """Raise OutputError if pictures cannot carry the edit's version."""
     if scene.render.use_stamp:
         words = "the edit burns metadata into its pictures, so that they carry no version; turn Burn Into Image off"
         raise film_output.OutputError(f"--resume: {words}")
 
 
 @contextmanager
-def of_same_footage(scene: Scene) -> Iterator[Stamps]:
-    """Gives a dictionary for the pictures that are rendered inside, with their stamps. They are removed if the footage
-    is written to meanwhile: they carry the key of what it was, and would count as finished. Pictures that others have
-    put in their places stay. OutputError: it was written to."""
+def refuse_changed_footage(scene: Scene) -> Iterator[Stamps]:
+    """Remove pictures that are rendered in this context if the footage changes meanwhile.
+
+    They carry the key of the earlier footage and would count as finished. Pictures of other processes stay.
+
+    Yields:
+        A dictionary for the pictures and their stamps.
+
+    Raises:
+        OutputError: The footage has changed.
+    """
     before, rendered = versions.stamps(scene), Stamps()
     try:
         yield rendered
@@ -63,30 +73,33 @@ def of_same_footage(scene: Scene) -> Iterator[Stamps]:
 def render(
     scene: Scene, folder: Path, file_format: str, version: EditVersion, rendered: Stamps, *, resume: bool
 ) -> None:
-    """Renders the edit's frames, from its first to its last, to pictures that carry the key of its version.
+    """Render all frames of the edit to pictures that carry the key of its version.
 
-    rendered: gets each picture with its stamp, as it is written
-    resume: leaves frames alone that are finished, and those to others that these are rendering, until they are
-    finished or given up
-    OutputError, InterruptedRenderError: see film_output.film, or the folder is for another version by now; OSError:
-    the folder cannot be written to"""
+    Args:
+        rendered: Gets each picture with its stamp when it is written.
+        resume: Skip finished frames, and wait for frames that other processes render, until these finish or give up.
+
+    Raises:
+        OutputError, InterruptedRenderError: See film_output.render_made_edit, or the folder's job has changed.
+        OSError: The folder cannot be written to.
+    """
     if resume:
         check_resumable(scene)
     film_output.set_pictures(scene, file_format, job_file.note(version.key))
-    film_output.prepare(folder)
+    film_output.make_folder(folder)
     samples = film_output.FORMATS[file_format].samples
     is_finished = partial(_is_finished, film_output.size(scene), samples, version.key, {})
     frames = range(scene.frame_start, scene.frame_end + 1)
     pictures = dict(zip(frames, film_output.pictures_of(folder, file_format, frames), strict=True))
 
     def move(part: Path, picture: Path) -> None:
-        job_file.guard(folder, version)  # again: it may be for a newer version by now
+        job_file.guard(folder, version)  # again, as the job may have changed
         stamp = rendered_pictures.stamp(part)
         part.replace(picture)
         rendered[picture] = stamp
 
     with film_output.progress(len(pictures), "frame") as moved:
-        write = partial(film_output.write, scene, folder, moved, move)
+        write = partial(film_output.render_frames, scene, folder, moved, move)
         if resume:
             _render_missing(scene, folder, pictures, is_finished, write, moved)
         else:
@@ -107,9 +120,13 @@ def _render_missing(
             if stopped:
                 raise film_output.InterruptedRenderError(f"{folder}: stopped")
             if run := _claim_run(claims, missing, is_finished):
-                _render_run(scene, claims, run, write)
-                for frame in run:
-                    del missing[frame]
+                scene.frame_start, scene.frame_end = min(run), max(run)
+                try:
+                    write()
+                finally:
+                    for picture in run.values():
+                        claims.release(_name(picture))
+                missing = {frame: picture for frame, picture in missing.items() if frame not in run}
             else:
                 if not waits:
                     awaited = frame_ranges.in_words(list(missing))
@@ -121,13 +138,13 @@ def _render_missing(
 
 
 def _claim_run(claims: Claims, missing: dict[int, Path], is_finished: Callable) -> dict[int, Path]:
-    """The first frames of those missing, without a gap, that nobody has claimed; none: others have them all."""
+    """Claim the first missing frames without a gap. Return them; empty if others have claimed all."""
     run: dict[int, Path] = {}
     for frame, picture in missing.items():
         if len(run) == RUN or (run and frame - 1 not in run):
             break
         if claims.take(_name(picture)):
-            if not is_finished(picture):  # it may be, since the last look
+            if not is_finished(picture):  # since the last check
                 run[frame] = picture
                 continue
             claims.release(_name(picture))
@@ -136,25 +153,18 @@ def _claim_run(claims: Claims, missing: dict[int, Path], is_finished: Callable) 
     return run
 
 
-def _render_run(scene: Scene, claims: Claims, run: dict[int, Path], write: Callable) -> None:
-    scene.frame_start, scene.frame_end = min(run), max(run)
-    try:
-        write()
-    finally:
-        for picture in run.values():
-            claims.release(_name(picture))
-
-
 def _name(picture: Path) -> str:
-    """The name of a picture's claim."""
+    """Return the name of a picture's claim."""
     return f"{picture.stem}_{picture.suffix[1:]}"
 
 
 def _is_finished(size: tuple[int, int], samples: str, key: str, rejected: Stamps, picture: Path) -> bool:
-    """Whether a picture is sound, and of this version of the edit.
+    """Return whether a picture is undamaged and of this version of the edit.
 
-    rejected: the stamps of pictures that were not, which are read no second time; it gets more of them"""
-    stamp = rendered_pictures.stamp(picture) if picture.is_file() else None  # a pipe would never open
+    Args:
+        rejected: Stamps of pictures that were not, which are not read again; this function adds to them.
+    """
+    stamp = rendered_pictures.stamp(picture) if picture.is_file() else None  # opening a pipe would wait forever
     if stamp is None or rejected.get(picture) == stamp:
         return False
     rendered = rendered_pictures.read(picture, key)

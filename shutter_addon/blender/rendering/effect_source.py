@@ -1,4 +1,4 @@
-"""What a renderer reads for an effect: its source, with the moments between its frames, in some detail."""
+"""The footage that a renderer reads for an effect, with moments between frames, at a preview's size."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ FAULTS = (EffectError, MediaError, NoDeviceError, MemoryError)
 
 
 def in_words(error: BaseException) -> str:
-    """A sentence for whatever a picture failed by; what nobody expected is kept for a report."""
+    """Return a sentence for an error that ended a picture. Unexpected ones are kept for a report."""
     if isinstance(error, FAULTS):
         return str(error) or "not enough memory"
     if isinstance(error, KeyboardInterrupt):
@@ -39,31 +39,37 @@ def in_words(error: BaseException) -> str:
 
 @dataclass(frozen=True)
 class Detail:
-    """In how much detail a preview is composed.
+    """How much detail a preview has.
 
-    divisor: how many times smaller than the source's the picture is each way (media.open_source)
-    proxy: what frames are read from, where it fits
-    smooth: whether moments between frames are exposed as well"""
+    Attributes:
+        divisor: How many times smaller than the source the picture is each way (media.open_source).
+        proxy: Where frames are read from, if it fits.
+        smooth: Whether moments between frames are exposed, too.
+    """
 
     divisor: int = 1
     proxy: Proxy | None = None
     smooth: bool = True
 
 
-_steps: Kept[tuple, int] = Kept()  # moments that effects have for a filmed frame, by what they are found of
+_steps: Kept[tuple, int] = Kept()  # steps from a filmed frame to the next, by steps_key
 _KEPT = 64
 
-FULL = Detail()  # what renders are composed in
+FULL = Detail()  # of renders
 
 
 @dataclass(frozen=True)
 class SourceKey:
-    """What a renderer reads, in plain data: equal where it reads the same frames for the same effect.
+    """What a renderer reads, as plain data: equal keys read the same frames for the same effect.
 
-    scene: session_uid of the effect's scene; spec: Snapshot's source; steps: moments from a filmed frame to the next
-    skip_repeats: as Options has it of the effect, where there are steps
-    detail: smooth where nothing more than filmed frames is to be had
-    folder: where vectors are kept; None: nowhere"""
+    Attributes:
+        scene: session_uid of the effect's scene.
+        spec: The footage.
+        steps: Steps from a filmed frame to the next.
+        skip_repeats: As in Options, if there are steps.
+        detail: `smooth` is also set where only filmed frames can be had.
+        folder: Where vectors are stored; None: nowhere.
+    """
 
     scene: int
     spec: SourceSpec
@@ -74,7 +80,7 @@ class SourceKey:
 
     @staticmethod
     def of(snapshot: Snapshot, detail: Detail = FULL) -> SourceKey:
-        """EffectError, MediaError: how many steps there are cannot be told."""
+        """Return the key of a snapshot. EffectError, MediaError: the steps cannot be found."""
         steps = find_steps(snapshot) if detail.smooth else 1
         if known_steps(snapshot) == 1:
             detail = replace(detail, smooth=True)
@@ -89,19 +95,25 @@ class SourceKey:
 
     @property
     def place(self) -> tuple[int, bool]:
-        """Of its renderer: its effect has one for plain pictures, and one for smooth ones."""
+        """The place of its renderer: an effect has one for plain and one for smooth pictures."""
         return self.scene, self.steps > 1
 
     def is_beside(self, other: SourceKey) -> bool:
-        """Whether one is plain while the other, of the same footage in the same detail, is smooth."""
+        """Tell whether one is plain and the other smooth, of the same footage in the same detail."""
         is_smooth = self.detail.smooth, other.detail.smooth
         same = self.spec == other.spec and replace(self.detail, smooth=is_smooth[1]) == other.detail
         return same and is_smooth[0] != is_smooth[1]
 
     def open(self, *, planes: bool = False, keeps: bool = False) -> ShotSource:
-        """The source. EffectError, MediaError: there is none.
+        """Open the source.
 
-        planes: see PrefetchSource; keeps: whether vectors are written to the folder"""
+        Args:
+            planes: As in PrefetchSource.
+            keeps: Write vectors to the folder.
+
+        Raises:
+            EffectError, MediaError: There is none.
+        """
         medium = self.spec.open(self.detail.divisor, self.detail.proxy)
         if self.steps == 1:
             return ShotSource(PrefetchSource(medium, planes=planes))
@@ -115,13 +127,17 @@ class SourceKey:
 
 
 def known_steps(snapshot: Snapshot) -> int | None:
-    """How many moments an effect has from a filmed frame to the next; None: `find_steps` has not found it yet."""
+    """Return an effect's steps from a filmed frame to the next; None: find_steps has not found them yet."""
     key = steps_key(snapshot)
     return 1 if key[1] == 1 else _steps.get(key)
 
 
 def find_steps(snapshot: Snapshot) -> int:
-    """As known_steps. It may have to compare frames. EffectError, MediaError: they cannot be read."""
+    """Return the steps as known_steps. This may compare frames.
+
+    Raises:
+        EffectError, MediaError: They cannot be read.
+    """
     key = steps_key(snapshot)
     _source, smooth, window, skip_repeats = key
 
@@ -133,21 +149,21 @@ def find_steps(snapshot: Snapshot) -> int:
 
 
 def steps_key(snapshot: Snapshot) -> tuple:
-    """What the steps are found of."""
+    """Return what the steps depend on."""
     options = _options(snapshot)
     return snapshot.source.key, options.step, options.window, options.skip_repeats
 
 
 def _options(snapshot: Snapshot) -> Options:
-    """An effect's options, of which those that decide about steps have no keys."""
+    """Return an effect's options; those that decide about steps cannot be keyed."""
     return snapshot.effect.options.at(min(snapshot.frames))
 
 
 def open_source(snapshot: Snapshot) -> ShotSource:
-    """An effect's source in full. EffectError, MediaError: there is none."""
+    """Open an effect's source in full detail. EffectError, MediaError: there is none."""
     return SourceKey.of(snapshot).open()
 
 
 def clip_of(snapshot: Snapshot, source: FrameSource) -> Clip:
-    """An effect's source as plain facts, with what tells when it is shown."""
+    """Return an effect's source as plain facts, with its timing."""
     return Clip.of(source, snapshot.effect.time or snapshot.timing)

@@ -1,4 +1,4 @@
-"""The render engine of effect scenes: Blender's sequencer calls it for every frame it needs of an effect strip."""
+"""The render engine of effect scenes, which Blender's sequencer calls for every frame of an effect strip."""
 
 import inspect
 
@@ -22,11 +22,11 @@ class VirtualShutterEngine(bpy.types.RenderEngine):
 
     def render(self, depsgraph: Depsgraph) -> None:
         if render_job.cancelling():
-            self.report({"ERROR"}, self.bl_label)  # whatever it says, it ends the other render
+            self.report({"ERROR"}, self.bl_label)  # any error ends the other render
             return
         try:
             self._render(depsgraph, called_by_script=render_job.script_waits(inspect.currentframe()))
-        except BaseException as error:  # Blender would print it, and render the frame without the effect
+        except BaseException as error:  # otherwise Blender prints it, and renders the frame without the effect
             invalidation.spoil(depsgraph.scene.session_uid)
             if not isinstance(error, StoppedError):
                 fail(self, effect_source.in_words(error))
@@ -47,10 +47,10 @@ class VirtualShutterEngine(bpy.types.RenderEngine):
         if detail != effect_source.FULL or is_drawn:
             invalidation.keep_until_drawn(scene.session_uid)
         if is_drawn:
-            return  # nothing, which costs Blender the least
+            return  # without a result, which is fastest for Blender
         last = job_snapshots.pictures.get(scene.session_uid) if render_job.where() is Where.JOB else None
         if last is not None and last.shape == (height, width, 4):
-            self._show(last)  # in the render's window, which would be empty until this one is made
+            self._show(last)  # so that the render's window is not empty meanwhile
         context = sessions.of_engine(self._say)
         try:
             with stopping.once(stopped or self._stopped):
@@ -71,16 +71,16 @@ class VirtualShutterEngine(bpy.types.RenderEngine):
     def _show(self, picture: np.ndarray) -> None:
         axes = [mathutils.Color(axis).from_rec709_linear_to_scene_linear() for axis in np.eye(3)]
         to_working = np.array(axes, np.float32)
-        if not np.allclose(to_working, np.eye(3), atol=1e-5):  # sums of light are the same in any space of its kind
+        if not np.allclose(to_working, np.eye(3), atol=1e-5):  # sums of light are the same in any linear space
             colours = picture[..., :3] @ to_working
             picture = np.concatenate([colours, picture[..., 3:]], axis=-1)
-        # A result of a single pixel has Blender make room for the whole picture. One of all would be copied there.
+        # After a result of a single pixel, Blender has room for the whole picture. A full result would be copied.
         self.end_result(self.begin_result(0, 0, 1, 1))
-        # Blender's rows go up; composed pictures lie so in memory, and this copies nothing.
+        # Blender's rows go up, as composed pictures do in memory, so this copies nothing.
         values = np.ascontiguousarray(picture[::-1]).ravel()
-        for seen in self.get_result().layers[0].passes:
-            if seen.name == "Combined":  # one for each view of an edit in stereo
-                seen.rect.foreach_set(values)
+        for render_pass in self.get_result().layers[0].passes:
+            if render_pass.name == "Combined":  # one for each view of a stereo edit
+                render_pass.rect.foreach_set(values)
 
     def _stopped(self) -> bool:
         return self.test_break() or render_job.stopping()
@@ -94,9 +94,7 @@ class VirtualShutterEngine(bpy.types.RenderEngine):
 
 
 def fail(engine: RenderEngine, sentence: str) -> None:
-    """Says why there is no picture, and ends the render: Blender would go on and write the frame without the effect.
-
-    A preview has its own way to say it, and nothing to end."""
+    """Report why there is no picture, and end a render, which otherwise would write the frame without the effect."""
     if render_job.ends_films():
         render_job.fail(sentence)
         render_job.cancel(engine.test_break)

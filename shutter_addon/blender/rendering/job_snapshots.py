@@ -1,10 +1,10 @@
-"""The snapshots that pictures are made of.
+"""The snapshots of which pictures are made.
 
-On Blender's main thread an effect is read when its picture is asked for; in the background, at the second frame of a
-film for all others, unless a script that Blender calls at frames may change it meanwhile. A job of the window renders
-on a thread of its own, while the editor goes on working: its effects are read on the main thread when it begins, at
-every frame of the film, and not again. What was not read then (a strip that was pasted later, frames that a retimed
-effect strip skips to) is read on the main thread when it is asked for.
+On Blender's main thread, an effect is read when its picture is asked for. In the background, the second frame of a film
+reads it for all later ones, unless a script that runs at frames may change it. A job of the window renders on a thread
+while the user goes on working: its effects are read on the main thread when it begins, at every frame of the film.
+What is missing then (a strip that was pasted later, frames that a retimed effect strip skips to) is read on the main
+thread when it is asked for.
 """
 
 from __future__ import annotations
@@ -24,20 +24,20 @@ from ..data.snapshot import Snapshot
 from . import effect_source, invalidation, render_job, sessions
 from .render_job import Where
 
-# Of the job that runs, by effect scene: of each part of a cut strip its timeline frames and its snapshot.
+# Of the running job, by effect scene: timeline frames and snapshot of each part of a cut strip, or why there is none.
 _taken: dict[int, list[tuple[range, Snapshot]] | Exception] = {}
-# Of the film in the background, by effect scene and strip; None: read once.
+# Of the film in the background, by effect scene and strip; None: it was read once, for one frame.
 _films: dict[tuple[int, str], Snapshot | None] = {}
-pictures: dict[int, np.ndarray] = {}  # likewise: the last one, which the render's window shows until the next is made
-_left_out: list[tuple[range, str]] = []  # of its film, see requirements.left_out
+pictures: dict[int, np.ndarray] = {}  # of the job, the last one by effect scene: shown until the next is made
+_left_out: list[tuple[range, str]] = []  # of the job's film, see requirements.left_out
 
 
 def begin(film: int) -> None:
-    """Reads all effects for a job, on the main thread; film: session_uid of the scene that it renders."""
+    """Read all effects for a job, on the main thread. `film` is the session_uid of the rendered scene."""
     _taken.clear()
     film_scene = strips.scene_of_uid(film)
     for scene, effect, parts in shown_effects(film_scene) if film_scene else ():
-        if effect.scene.session_uid in _taken:  # of a copied scene: the first counts, as for strips.find_effect
+        if effect.scene.session_uid in _taken:  # a copied scene: the first counts, as in strips.find_effect
             continue
         try:
             _taken[effect.scene.session_uid] = [
@@ -53,13 +53,13 @@ def begin(film: int) -> None:
 
 
 def _part_at(parts: list[tuple[range, Snapshot]], scene_frame: float) -> Snapshot:
-    """The snapshot of the part that shows a frame of the effect's scene; else the first."""
+    """Return the snapshot of the part that shows a frame of the effect's scene, else the first."""
     frame = parts[0][1].timeline_frame(scene_frame)
     return next((taken for shown, taken in parts if shown.start <= frame < shown.stop), parts[0][1])
 
 
 def end() -> None:
-    """Forgets what was read, after a job or a film."""
+    """Forget all snapshots, after a job or a film."""
     _taken.clear()
     _films.clear()
     _left_out.clear()
@@ -68,21 +68,26 @@ def end() -> None:
 
 
 def look(film: int) -> None:
-    """Looks on the main thread whether the sequencer leaves effects out of a film, by its session_uid: an editor may
-    delete a camera while it renders."""
+    """Find the frames at which the sequencer leaves effects out: the user may delete a camera during the render."""
     scene = strips.scene_of_uid(film)
     _left_out[:] = requirements.left_out(scene) if scene else []
 
 
 def left_out(scene: Scene) -> str | None:
-    """Why the sequencer leaves an effect out of a film's current frame; None: it does not."""
+    """Return why the sequencer leaves an effect out of a film's current frame, or None."""
     reasons = _left_out if render_job.where() is Where.JOB else requirements.left_out(scene)
     return next((why for frames, why in reasons if scene.frame_current in frames), None)
 
 
 def of(effect_scene: Scene, scene_frame: float, ended: Callable[[], bool] | None = None) -> tuple[Snapshot, float]:
-    """The snapshot of an effect scene, and the timeline frame at which it shows one of its own frames. One of
-    effect_source.FAULTS: there is none. ended: whether nobody waits for it any longer."""
+    """Return the snapshot of an effect scene, and the timeline frame that shows one of its frames.
+
+    Args:
+        ended: Tells whether the result is no longer wanted.
+
+    Raises:
+        One of effect_source.FAULTS: There is none.
+    """
     uid = effect_scene.session_uid
     if render_job.where() is Where.JOB:
         parts = _taken.get(uid)
@@ -98,16 +103,15 @@ def of(effect_scene: Scene, scene_frame: float, ended: Callable[[], bool] | None
     frame = strips.timeline_frame(strip, scene_frame)
     if not bpy.app.background:
         return invalidation.current(scene, effect, strip, frame), frame
-    known = _films.get((effect_scene.session_uid, strip.name))
-    if known is not None and frame in known.frames and not render_job.scripts_act():
-        return known, frame
     return _of_film(scene, effect, strip, frame), frame
 
 
 def _of_film(scene: Scene, effect: PropertyGroup, strip: Strip, frame: float) -> Snapshot:
-    """The snapshot of an effect in the background."""
+    """Return the snapshot of an effect in the background."""
     key, frames = (effect.scene.session_uid, strip.name), {frame, frame + scene.frame_step}
     is_again = key in _films and not render_job.scripts_act()
+    if is_again and (known := _films[key]) is not None and frame in known.frames:
+        return known
     if is_again:
         parts = [part for part in strips.effect_strips(scene) if part.scene == effect.scene]
         frames |= asked_frames(scene, parts, scene.session_uid == render_job.film())
@@ -118,7 +122,7 @@ def _of_film(scene: Scene, effect: PropertyGroup, strip: Strip, frame: float) ->
 
 
 def _late(uid: int, scene_frame: float) -> Snapshot:
-    """What a job did not read when it began. One of effect_source.FAULTS: there is none."""
+    """Return a snapshot that a job did not take when it began. One of effect_source.FAULTS: there is none."""
     if (effect_scene := strips.scene_of_uid(uid)) is None:
         raise EffectError(rpt_("the effect was deleted while it was rendered"))
     scene, effect, strip = strips.find_effect(effect_scene, scene_frame)
@@ -126,8 +130,7 @@ def _late(uid: int, scene_frame: float) -> Snapshot:
 
 
 def shown_effects(film: Scene) -> Iterator[tuple[Scene, PropertyGroup, list[Strip]]]:
-    """The effects that a film's scene shows, and the scenes in its Scene strips: each with its scene and with the
-    strips that show it."""
+    """Yield the effects that a film's scene and the scenes in its Scene strips show: scene, effect, effect strips."""
     for scene in strips.shown_scenes(film):
         shown = strips.effect_strips(scene)
         for effect in scene.virtual_shutter.effects:
@@ -136,8 +139,7 @@ def shown_effects(film: Scene) -> Iterator[tuple[Scene, PropertyGroup, list[Stri
 
 
 def asked_frames(scene: Scene, parts: list[Strip], is_film: bool) -> set[float]:
-    """The timeline frames at which the parts of an effect may be asked for: those of the film, or in another scene,
-    which strips show, all."""
+    """Return the timeline frames at which parts of an effect may be rendered: the film's, or all in another scene."""
     first, last = scene.frame_start, scene.frame_end
     asked = set()
     for strip in parts:

@@ -1,5 +1,4 @@
-"""Mattes of outlines that previews lack, or that are asked for: carried by a thread beside Blender. In previews
-straight ones stand in for them meanwhile."""
+"""Mattes of tracked outlines for previews, made by a background thread. Until they are there, linear ones are shown."""
 
 from __future__ import annotations
 
@@ -17,23 +16,28 @@ from ..data import preview_areas
 from ..devices import main_thread
 from .effect_source import in_words
 
-TICK = 0.25  # seconds from one look at the thread to the next
+TICK = 0.25  # seconds between two looks at the thread
 
 
 @dataclass
 class _Carrying:
-    """The mattes that a thread carries: it touches no bpy.
+    """The mattes that a thread makes. It touches no bpy.
 
-    frames: what is to come, the source frames of a file, those first that are drawn; done: how many are there by now
-    arrived: called on Blender's main thread when what is drawn is there, and when all is"""
+    Attributes:
+        frames: Source frames to make, drawn ones first.
+        arrived: Called on the main thread when the drawn ones are done, and at the end.
+        done: How many are made.
+        told: How many were made when `arrived` was called.
+        soon: How many of the frames are drawn.
+    """
 
     file: CarriedFile
     frames: list[int]
     arrived: Callable[[], None]
     done: int = 0
-    told: int = 0  # how many were there when `arrived` was called
+    told: int = 0
     ended: threading.Event = field(default_factory=threading.Event)
-    soon: int = field(init=False)  # how many of the frames are drawn
+    soon: int = field(init=False)
     future: Future = field(init=False)
 
     def __post_init__(self) -> None:
@@ -49,22 +53,28 @@ class _Carrying:
                 self.done += 1
 
 
-_wanted: dict[CarriedFile, set[int]] = {}  # what was lacking since the last look
-_failed: dict[CarriedFile, str] = {}  # why they cannot be carried
+_wanted: dict[CarriedFile, set[int]] = {}  # source frames that previews have missed since the last `begin`
+_failed: dict[CarriedFile, str] = {}  # why mattes could not be made
 _running: list[_Carrying] = []  # one at most
 
 
 def want(file: CarriedFile, frame: int) -> None:
-    """Notes a matte that a preview lacks, by its source frame."""
+    """Note the source frame of a matte that a preview misses."""
     if file not in _failed:
         _wanted.setdefault(file, set()).add(frame)
 
 
 def begin(arrived: Callable[[], None]) -> str | None:
-    """Carries what was wanted since the last call, in place of what is not wanted any longer: on Blender's main thread,
-    once a preview was drawn. Why something cannot be carried; None: nothing is lacking, or it is on its way.
+    """Make the mattes that were missed since the last call, in place of those that are not wanted any more.
 
-    arrived: called when it is there"""
+    Called on the main thread after a preview was drawn.
+
+    Args:
+        arrived: Called when they are made.
+
+    Returns:
+        Why mattes cannot be made, or None.
+    """
     wanted = {file: frames for file, frames in _wanted.items() if file not in _failed}
     _wanted.clear()
     if wanted and not (_running and _running[0].file in wanted):
@@ -74,7 +84,7 @@ def begin(arrived: Callable[[], None]) -> str | None:
 
 
 def carry(file: CarriedFile, frames: list[int], arrived: Callable[[], None]) -> None:
-    """Carries the mattes of source frames, in place of what is on its way; arrived: as for `begin`."""
+    """Make the mattes of source frames, in place of those being made. `arrived` is as in `begin`."""
     stop()
     _failed.pop(file, None)
     _running.append(_Carrying(file=file, frames=frames, arrived=arrived))
@@ -82,23 +92,23 @@ def carry(file: CarriedFile, frames: list[int], arrived: Callable[[], None]) -> 
 
 
 def failure(file: CarriedFile) -> str | None:
-    """Why the mattes of a file could not be carried."""
+    """Return why the mattes of a file could not be made, or None."""
     return _failed.get(file)
 
 
 def progress() -> tuple[int, int] | None:
-    """How many mattes are carried, and of how many; None: none are on their way."""
+    """Return how many mattes are made, and of how many; None: none are being made."""
     return (_running[0].done, len(_running[0].frames)) if _running else None
 
 
 def _look() -> float | None:
-    """What has come is shown."""
+    """Show what is made, as a timer."""
     if not _running:
         return None
     carrying = _running[0]
     preview_areas.redraw(bpy.context)
     if not carrying.future.done():
-        if carrying.done >= carrying.soon > carrying.told:  # what was mended is to be seen at once
+        if carrying.done >= carrying.soon > carrying.told:  # show drawings as soon as they are corrected
             carrying.told = carrying.done
             carrying.arrived()
         return TICK
@@ -107,21 +117,21 @@ def _look() -> float | None:
         carrying.future.result()
     except stopping.StoppedError:
         return None
-    except Exception as error:  # Blender would end the timer, and the file be asked for again and again
+    except Exception as error:  # otherwise Blender ends the timer, and previews start over again
         _failed[carrying.file] = in_words(error)
     carrying.arrived()
     return None
 
 
 def stop() -> None:
-    """Ends what is on its way; what is carried stays."""
+    """Stop making mattes; finished ones stay."""
     for carrying in _running:
         carrying.ended.set()
     _running.clear()
 
 
 def forget(*_: object) -> None:
-    """Ends what runs: when a file is loaded, and when the extension goes."""
+    """Stop and forget everything, when a file is loaded or the extension is disabled."""
     stop()
     _wanted.clear()
     _failed.clear()

@@ -25,16 +25,21 @@ from .session import RenderContext
 
 SLOW_DECODING = n_("a second Blender decodes movies, which is slow: install the zip that is made for your system")
 
-_said: set[str] = set()  # what is said once
+_said: set[str] = set()  # sentences, each said once
 
 
 def picture(context: RenderContext, snapshot: Snapshot, frame: float, detail: Detail = FULL) -> np.ndarray:
-    """The picture (H, W, 4) of an effect strip at a timeline frame, top row first: scene-linear float32, premultiplied,
-    or levels, if the context asks for them. One of FAULTS: there is none, in one sentence. StoppedError: it is not
-    wanted any longer."""
+    """Return the picture (H, W, 4) of an effect strip at a timeline frame, top row first.
+
+    It is scene-linear premultiplied float32, or levels if the context asks for them.
+
+    Raises:
+        One of FAULTS: There is none, in one sentence.
+        StoppedError: It is no longer wanted.
+    """
     stopping.check()
     session, request = context.session, context.request(snapshot, frame, detail)
-    renderer = context.renderer(request)  # meanwhile the window may close it: it would be opened again
+    renderer = context.renderer(request)  # opened again, if the window has closed it meanwhile
     if (weights := render_settings.weights()) is not None:
         place = weights / f"{round(frame - snapshot.first + 1):04d}.exr"
         _write_weights(place, snapshot, frame, session.weights(request))
@@ -47,8 +52,10 @@ def picture(context: RenderContext, snapshot: Snapshot, frame: float, detail: De
 
 
 def _write_weights(place: Path, snapshot: Snapshot, frame: float, weights: list[np.ndarray]) -> None:
-    """Writes a channel for each shutter, and behind these one for each layer, named after its region; empty where there
-    is none at this frame. A name that is taken gets a number."""
+    """Write a channel for each shutter and, after these, for each layer, named after its region.
+
+    A layer that is missing at this frame is empty. A name that is taken gets a number.
+    """
     effect = snapshot.effect
     names = [shutter.name for shutter in effect.shutters]
     there, shown, channels = effect.layers_at(frame), iter(weights[len(names) :]), weights[: len(names)]
@@ -65,21 +72,21 @@ def _say_once(sentence: str, say: Callable[[str], None]) -> None:
 
 
 def shortages(renderer: Renderer, snapshot: Snapshot, request: Request) -> Iterator[str]:
-    """Sentences about what pictures as requested lack: see `unread`; and, where the GPU has no room, speed."""
+    """Yield sentences about what pictures lack (`unread`), and about speed where GPU memory is short."""
     yield from unread(snapshot, request)
     if renderer.is_short:
         source = renderer.source
         words = {"width": source.width, "height": source.height, "frames": request.state.options.window}
         words["limit"] = render_settings.memory().limit // MEGABYTE
         sentence = rpt_(
-            "the {limit} MB that may be taken of the GPU are too few for {frames} frames of {width}×{height}: all are"
-            " sent for every picture, which is slow"
+            "{limit} MB of GPU memory are too little for {frames} frames of {width}×{height}: every picture uploads all"
+            " of them, which is slow"
         )
         yield sentence.format(**words)
 
 
 def unread(snapshot: Snapshot, request: Request) -> Iterator[str]:
-    """Sentences about what cannot be had of Blender for a picture: how strips are retimed, and colours."""
+    """Yield sentences about what Blender does not tell for a picture: how strips are retimed, and colors."""
     layers = request.state.layers.mattes if request.state.layers else ()
     contents = [matte.content for matte in chain(request.state.mattes, *layers) if matte is not None]
     for timing in (snapshot.timing, *(getattr(content, "timing", None) for content in contents)):
@@ -98,8 +105,10 @@ def unread(snapshot: Snapshot, request: Request) -> Iterator[str]:
 
 
 def resized(picture: np.ndarray, width: int, height: int, divisor: int = 1) -> np.ndarray:
-    """The picture at the size that Blender asks for: the scene's own, or what a resolution below 100 % makes of it; of
-    one that was composed `divisor` times smaller the pixels are repeated."""
+    """Return the picture at the size that Blender asks for, which a resolution below 100 % makes smaller.
+
+    Pixels of a picture that was composed `divisor` times smaller are repeated.
+    """
     if divisor > 1:
         picture = picture.repeat(divisor, axis=0).repeat(divisor, axis=1)[:height, :width]
     if picture.shape[:2] == (height, width):

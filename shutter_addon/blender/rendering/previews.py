@@ -1,10 +1,8 @@
-"""What previews show of an effect: in which detail, and whether our draw handler shows it or Blender.
+"""What previews show of an effect: in which detail, and whether our draw handler or Blender shows it.
 
-It is decided once for each time that a preview is drawn: for the engine, if Blender asks it for the picture, and then
-for the draw handler.
-
-Blender asks the engine for a Scene strip's full size whatever a preview's, takes its floats, converts, blends and sends
-them. Drawn by our handler, the picture stays on the GPU, and is as small as it is shown.
+This is decided once for each redraw: for the engine, if Blender asks it for the picture, and then for the draw handler.
+Blender asks the engine for a Scene strip's full size whatever the preview's size, takes floats, converts, blends and
+uploads them. What our handler draws stays on the GPU, and is as small as it is shown.
 """
 
 import math
@@ -25,25 +23,28 @@ from ..data.snapshot import Snapshot
 from . import effect_source, invalidation, render_job, sessions, smooth_previews
 from .session import RenderContext
 
-# Operators that read the sequencer's pictures, from the window.
+# Operators that read the sequencer's pictures from the window.
 _READERS = {"RENDER_OT_opengl", "SEQUENCER_OT_sample"}
-# Operators by which one picture comes after another, as where it plays: drafts, so that a key need not wait.
+# Operators that show one picture after another: drafts, so that keys need not wait.
 _TRACKING = {"SHUTTER_OT_track", "SHUTTER_OT_track_camera", "SHUTTER_OT_panning_shot", "SHUTTER_OT_tripod"}
 _GOING = {"ANIM_OT_change_frame"} | _TRACKING
 _PEN = "GPENCIL_OT_annotate"
-_MOMENT = 0.3  # seconds
+_MOMENT = 0.3  # seconds that pictures may be late after such an operator
 _SLICE = 0.15  # seconds
-_PLAYED = 1.0  # seconds: of a frame that plays, which has one slice, as the next one is another frame
-_READING_TOOL = "builtin.sample"  # reads once before it is one of those that run
+_PLAYED = 1.0  # seconds of the only slice of a frame during playback
+_READING_TOOL = "builtin.sample"  # it reads once before its operator runs
 DRAFT_ROWS = 270  # blocks along the shorter side of a draft in which shutters follow edges
 RESULTS = "RESULT", "SPLIT", "EDGES", "HOLES"  # views of the live preview that show the result
 
 
 @dataclass
 class Whole:
-    """The picture that is looked at as it will be rendered, by the effect's scene and the timeline frame.
+    """The picture that the user looks at in full quality.
 
-    key: of its request (Request.key), its source excepted; None: it was not drawn yet"""
+    Attributes:
+        scene: session_uid of the effect's scene.
+        key: Request.key without its source; None: it was not drawn yet.
+    """
 
     scene: int
     frame: int
@@ -52,13 +53,15 @@ class Whole:
 
 @dataclass(frozen=True)
 class Decision:
-    """What a preview shows of an effect as it is drawn once.
+    """What a preview shows of an effect in a redraw.
 
-    snapshot: of the effect; frame: of the timeline; request: its picture in the previews' detail
-    is_drawn: whether our draw handler shows the result in place of Blender, and the engine need not
-    is_plain: whether it is the plain picture, and the smooth one is on its way
-    is_late: whether the engine was stopped, for the window to look at its keys
-    stopped: says that it takes too long, and Blender has to look at its keys; None: it is waited for"""
+    Attributes:
+        request: The picture in the previews' detail.
+        is_drawn: Whether our draw handler shows the result, so that the engine need not.
+        is_plain: Whether this is the plain picture, and the smooth one follows.
+        is_late: Whether the engine was stopped so that Blender handles events.
+        stopped: Tells that the picture takes too long; None: Blender waits for it.
+    """
 
     snapshot: Snapshot
     frame: float
@@ -73,9 +76,11 @@ class Decision:
 class Drawing:
     """What our draw handler draws of a decision.
 
-    request: the picture, as a draft where a still result is not exact anyway; renderer: of it
-    left: where the source ends and the result begins, as a fraction of the picture's width; 0: there is no source
-    draws_result: whether our handler draws the result"""
+    Attributes:
+        request: The picture, as a draft where a still result is not exact.
+        left: Where the source ends and the result begins, as a fraction of the width; 0: there is no source.
+        draws_result: Whether our handler draws the result.
+    """
 
     decision: Decision
     request: Request
@@ -88,9 +93,10 @@ class Drawing:
 class _Looking:
     """How previews are looked at.
 
-    whole: the picture that is looked at as it will be rendered; late_until: the time until which pictures may be late
-    decision: the engine's, for the draw handler, which Blender calls after it
-    slices: of time, in which a request is composed, by its key
+    Attributes:
+        late_until: Time until which pictures may be late.
+        decision: The engine's, for the draw handler that Blender calls next.
+        slices: Slices of time in which a request is composed.
     """
 
     whole: Whole | None = None
@@ -103,8 +109,11 @@ looking = _Looking()
 
 
 def for_engine(context: Context, effect_scene: Scene) -> Decision | None:
-    """What the engine is asked for while Blender draws a preview; None: somebody else asks. One of
-    effect_source.FAULTS: the effect cannot be shown."""
+    """Return what the engine has to make while Blender draws a preview; None: something else asks.
+
+    Raises:
+        One of effect_source.FAULTS: The effect cannot be shown.
+    """
     region, looking.decision = context.region, None
     if region is None or region.type != "PREVIEW" or is_read(context):
         return None
@@ -124,20 +133,23 @@ def for_engine(context: Context, effect_scene: Scene) -> Decision | None:
 
 
 def engine_stopped() -> None:
-    """The engine's picture was not done in time: what is drawn after it says so."""
-    assert looking.decision is not None  # it was asked with one
+    """Note that the engine's picture was not finished in time."""
+    assert looking.decision is not None
     looking.decision = replace(looking.decision, is_late=True)
 
 
 def take_decision() -> Decision | None:
-    """What the engine was asked for while Blender draws this preview; None: Blender had the picture already."""
+    """Return the engine's decision for this redraw; None: Blender had the picture already."""
     decision, looking.decision = looking.decision, None
     return decision
 
 
 def for_drawing(context: Context, shown: Shown, decision: Decision | None) -> Drawing:
-    """What our draw handler draws. decision: the engine's; it holds unless something has changed since. One of
-    effect_source.FAULTS: the effect cannot be shown."""
+    """Return what our draw handler draws. The engine's decision holds unless something has changed since.
+
+    Raises:
+        One of effect_source.FAULTS: The effect cannot be shown.
+    """
     settings, snapshot = context.window_manager.virtual_shutter, _snapshot(shown)
     if decision is None or decision.snapshot is not snapshot:
         decision = _decide(context, shown, _look(context, shown), snapshot)
@@ -145,23 +157,20 @@ def for_drawing(context: Context, shown: Shown, decision: Decision | None) -> Dr
     request = _drafted(context, shown, decision.request)
     has_result = settings.view in RESULTS
     left = settings.split if settings.view == "SPLIT" else 0.0 if has_result else 1.0
-    if is_tracking():  # a stroke is seen to stay on its subject where that is sharp
+    if is_tracking():  # in the sharp source, the user sees whether a stroke stays on its subject
         left = 1.0
-    # Else the engine has composed it, and it lies there in its place among the other strips.
+    # Otherwise Blender shows the engine's picture among the other strips.
     draws_result = has_result and left < 1 and (decision.is_drawn or not _is_rendered(shown))
     renderer = sessions.of_drawing().renderer(request)
-    return Drawing(
-        decision=decision,
-        request=request,
-        renderer=renderer,
-        left=left,
-        draws_result=draws_result,
-    )
+    return Drawing(decision=decision, request=request, renderer=renderer, left=left, draws_result=draws_result)
 
 
 def request_of(context: Context, shown: Shown) -> Request:
-    """What our draw handler draws of the effect strip at the current frame. One of effect_source.FAULTS: it cannot be
-    shown."""
+    """Return what our draw handler draws of the effect strip at the current frame.
+
+    Raises:
+        One of effect_source.FAULTS: The effect cannot be shown.
+    """
     return _drafted(context, shown, _decide(context, shown, _look(context, shown), _snapshot(shown)).request)
 
 
@@ -183,8 +192,10 @@ def _snapshot(shown: Shown) -> Snapshot:
 
 
 def _requested(context: Context, render: RenderContext, shown: Shown, snapshot: Snapshot, look: Look) -> Request:
-    """The picture in the previews' detail: in full, while it is looked at so. That ends here with the frame and with a
-    change of the effect."""
+    """Return the picture in the previews' detail, or in full while it is looked at so.
+
+    Another frame or a change of the effect ends full quality.
+    """
     frame = shown.scene.frame_current
     if (
         (whole := looking.whole) is not None
@@ -202,7 +213,7 @@ def _requested(context: Context, render: RenderContext, shown: Shown, snapshot: 
 def _best(
     context: Context, render: RenderContext, snapshot: Snapshot, frame: float, detail: effect_source.Detail
 ) -> Request:
-    """The picture in a detail; the plain one, where the smooth one would have to be waited for."""
+    """Return the picture in a detail, or the plain one where the smooth one is not ready."""
     if is_read(context) or not detail.smooth:
         smooth_previews.rest()
         return render.request(snapshot, frame, detail)
@@ -210,9 +221,11 @@ def _best(
 
 
 def _detail(context: Context, look: Look) -> effect_source.Detail:
-    """What a picture is composed in for the previews of its scene: smaller by the power of two, of reduced.DIVISORS,
-    that is nearest to the largest of them, and from the proxy that Blender reads for that one. What plays is not
-    smooth: it would wait for optical flow. Nor is what the other views show."""
+    """Return the detail of pictures for all previews of a scene.
+
+    The divisor is the one of reduced.DIVISORS that is nearest to the largest preview, whose proxy counts, too. During
+    playback and in other views pictures are not smooth, as optical flow takes long.
+    """
     if (scale := look.scale) is None:
         return effect_source.FULL
     divisor = min(DIVISORS, key=lambda number: abs(math.log2(max(scale, 1e-3) * number)))
@@ -221,11 +234,13 @@ def _detail(context: Context, look: Look) -> effect_source.Detail:
 
 
 def _is_drawn(context: Context, shown: Shown, look: Look, source: FrameSource, *, is_less: bool) -> bool:
-    """Whether our draw handler shows the result, or in another view what covers it, in place of what Blender makes of
-    the engine's picture: wherever both are the same, in all previews of the scene. Not a still picture of full size:
-    what is drawn passes through 8 bits on its way to the screen, and lacks shades next to black.
+    """Tell whether our draw handler shows the picture in place of Blender: where both look the same in all previews.
 
-    is_less: whether a better one will follow"""
+    A still picture of full size is left to Blender, as drawing goes through 8 bits, and lacks shades next to black.
+
+    Args:
+        is_less: Whether a better picture follows.
+    """
     settings = context.window_manager.virtual_shutter
     is_small = source.from_proxy or source.width < annotations.picture_size(shown.effect)[0]
     return (
@@ -246,8 +261,8 @@ def _drafted(context: Context, shown: Shown, request: Request) -> Request:
 
 
 def draft(request: Request, source: FrameSource) -> Request:
-    """The request as it is drawn while an editor waits: where shutters follow edges, of blocks so large that the
-    picture has no more than DRAFT_ROWS of them along its shorter side."""
+    """Return the request as a draft: where shutters follow edges, in blocks, DRAFT_ROWS at most along the shorter side.
+    Return the request as a draft: where shutters follow edges, in blocks, DRAFT_ROWS at most along the shorter side."""
     options = request.state.options
     if not options.edge_aware:
         return request
@@ -258,31 +273,33 @@ def draft(request: Request, source: FrameSource) -> Request:
 
 
 def _is_rendered(shown: Shown) -> bool:
-    """Whether the sequencer renders its previews."""
+    """Tell whether the sequencer renders its previews."""
     return shown.scene.render.sequencer_gl_preview == "RENDERED"
 
 
 def _time_up(context: Context, key: tuple) -> Slice:
-    """What says whether a picture, by its request's key, has been composed for so long that Blender has to look at its
-    keys: it goes on when it is drawn again."""
+    """Return a function that tells that a picture has taken so long that Blender has to handle events.
+
+    The picture goes on in the next redraw.
+    """
     if _is_playing(context):
         looking.slices.end()
         return looking.slices.next(key, _PLAYED, _PLAYED)
-    return looking.slices.next(key, _SLICE / 2, _SLICE)  # the playhead moves with the first one, and a note
+    return looking.slices.next(key, _SLICE / 2, _SLICE)  # the playhead and a note move after the first slice
 
 
 def was_drawn() -> None:
-    """A picture is there, however many times it took."""
+    """Note that a picture is finished."""
     looking.slices.end()
 
 
 def is_composing() -> bool:
-    """Whether a picture is on its way, a better one or the first."""
+    """Tell whether a first or a better picture is being made."""
     return looking.slices.last is not None or smooth_previews.is_busy()
 
 
 def refine() -> None:
-    """Goes on with the smooth pictures behind what was drawn. One of effect_source.FAULTS: there is none."""
+    """Go on with the smooth pictures behind those drawn. One of effect_source.FAULTS: there is none."""
     if pen_is_down():
         smooth_previews.rest()
     elif looking.slices.last is None:
@@ -290,7 +307,7 @@ def refine() -> None:
 
 
 def is_going(context: Context) -> bool:
-    """Whether the film plays, or may_be_late."""
+    """Tell whether the film plays, or pictures may be late."""
     return _is_playing(context) or may_be_late()
 
 
@@ -299,24 +316,23 @@ def _is_playing(context: Context) -> bool:
 
 
 def pen_is_down() -> bool:
-    """Whether a stroke is being drawn, or erased."""
+    """Tell whether a stroke is being drawn or erased."""
     return _PEN in render_job.operators_running()
 
 
 def is_tracking() -> bool:
-    """Whether what is tracked is shown."""
+    """Tell whether a tracking operator runs."""
     return bool(_TRACKING & render_job.operators_running())
 
 
 def may_be_late() -> bool:
-    """Whether the playhead is dragged, or something is tracked, or was a moment ago: keys count for more than
-    pictures."""
+    """Tell whether the playhead is dragged or a tracking operator runs, or did a moment ago: then keys come first."""
     if _GOING & render_job.operators_running():
         looking.late_until = time.monotonic() + _MOMENT
     return time.monotonic() < looking.late_until
 
 
 def is_read(context: Context) -> bool:
-    """Whether somebody reads the sequencer's picture from the window, for whom it has to be whole."""
+    """Tell whether something reads the sequencer's picture from the window, and needs all of it."""
     tool = context.workspace and context.workspace.tools.from_space_sequencer("PREVIEW", create=False)
     return bool(_READERS & render_job.operators_running()) or (tool is not None and tool.idname == _READING_TOOL)

@@ -1,7 +1,7 @@
-"""A render as it goes: which film it is, what went wrong in it, and how it ends early.
+"""The running render: its film, what failed, and how it ends early.
 
-Blender writes a frame whose engine failed without it, so a picture that is missing has to end the whole render. Then
-Blender finishes an open movie, up to the frame before, and calls `render_cancel`.
+Blender writes a frame without the effect if the engine fails, so a missing picture has to end the whole render. Blender
+then finishes a movie file with the frames before, and calls `render_cancel`.
 """
 
 from __future__ import annotations
@@ -32,19 +32,22 @@ from ..devices import main_thread
 T = TypeVar("T")
 BAD_INPUT = 2
 _PATIENCE = 0.1  # seconds between two looks at whether a render has ended
-_LONG = 10.0  # seconds
+_LONG = 10.0  # seconds that a thread waits for the window
 
 
 def say(text: str) -> None:
-    """Says something on stderr."""
-    with suppress(OSError, AttributeError):  # nobody reads it, or there is no stderr
+    """Print a line on stderr."""
+    with suppress(OSError, AttributeError):  # stderr is closed, or missing
         print(signed(text), file=sys.stderr, flush=True)
 
 
 class Where(Enum):
-    """Where Blender calls the extension: without a window; on the main thread of one; on the thread of a job, while the
-    window goes on; or likewise, while it waits for every picture (View ▸ Render Sequencer Animation), so that this
-    thread may read Blender's data by itself, and must not wait for the main one."""
+    """Where Blender calls the extension.
+
+    BACKGROUND is without a window, WINDOW on a window's main thread. JOB is a job's thread, while the window goes on.
+    WAITED_FOR is such a thread while the window waits for every picture (View ▸ Render Sequencer Animation): it reads
+    Blender's data itself, and must not wait for the main thread.
+    """
 
     BACKGROUND = "background"
     WINDOW = "window"
@@ -56,12 +59,15 @@ class Where(Enum):
 class _Job:
     """The render that runs, or ran last.
 
-    film: session_uid of the scene whose render runs, None: none does; neither of those that its Scene strips show, nor
-    of what a preview shows
-    begun: whether its first frame has; stopping: whether it is to end with the frame that is made
-    failure: the sentence that ends it; tell: what is done with that in the background
-    cancelling: whether the small render runs whose error ends it
-    waited_for: whether the window waits for every picture that its thread makes, see Where"""
+    Attributes:
+        film: session_uid of the rendered scene, not of effect scenes or scenes in strips; None: nothing renders.
+        begun: Whether its first frame has begun.
+        stopping: Whether it ends after the current frame.
+        failure: The sentence that ends it.
+        tell: Called with that sentence in the background.
+        cancelling: Whether the small render runs whose error ends it (_cancel).
+        waited_for: Whether the window waits for every picture (Where.WAITED_FOR).
+    """
 
     film: int | None = None
     begun: bool = False
@@ -73,15 +79,15 @@ class _Job:
 
 
 _job = _Job()
-_spent: list[tuple[str, str]] = []  # names of the scenes and cameras of small renders, see _cancel
+_spent: list[tuple[str, str]] = []  # names of scenes and cameras of small renders (_cancel)
 
 
 def begin(scene: Scene) -> bool:
-    """A render begins. True: that of a film or a picture; not of a scene in one, nor of a preview."""
+    """Note that a render begins. Return whether it is a film or a picture, not a scene in one or a preview."""
     is_effect = scene.render.engine == ENGINE
     if _job.film is not None and (_job.begun or is_effect):
         return False
-    # Render Sequencer Animation says of no film that it begins, only of each effect in it.
+    # Render Sequencer Animation calls render_init only for each effect in the film.
     is_job = where() in (Where.JOB, Where.WAITED_FOR)
     _job.waited_for = is_effect and is_job and "RENDER_OT_opengl" in operators_running()
     if is_effect and where() is Where.WINDOW:
@@ -91,17 +97,17 @@ def begin(scene: Scene) -> bool:
 
 
 def runs() -> bool:
-    """Whether a film, or a single picture of it, is rendered."""
+    """Tell whether a film, or a single picture of it, is rendered."""
     return _job.film is not None
 
 
 def film() -> int | None:
-    """session_uid of the scene whose render runs."""
+    """Return the session_uid of the rendered scene."""
     return _job.film
 
 
 def is_film(scene: Scene) -> bool:
-    """Whether this scene's frames are what is rendered; called before each of them."""
+    """Tell whether this scene is what is rendered; called before each of its frames."""
     if scene.session_uid != _job.film:
         return False
     _job.begun = True
@@ -109,34 +115,42 @@ def is_film(scene: Scene) -> bool:
 
 
 def end(scene: Scene, alone: bool) -> None:
-    """A render has ended. alone: no Python waits for it, Blender itself renders, and would go on or end with exit code
-    1."""
+    """Note that a render has ended.
+
+    Args:
+        alone: Whether no Python code waits for it, so that Blender would go on or exit with code 1.
+    """
     if scene.session_uid == _job.film:
         _job.film = None
         if bpy.app.background:
             _remove_spent()
-        else:  # what Blender keeps belongs to its main thread
-            main_thread.soon(lambda: bpy.app.timers.register(_remove_spent_then))
+        else:  # Blender's data belongs to the main thread
+            main_thread.soon(lambda: bpy.app.timers.register(_remove_spent))
         if _job.failure is not None and alone and bpy.app.background:
             leave(BAD_INPUT)
 
 
 def ends_films() -> bool:
-    """Whether what fails here and now is a film: in the background, in a job of the window, or in a script there. Else
-    it is a preview, on the main thread."""
+    """Tell whether an error here ends a film: in the background, in a window's job, or in a script.
+
+    Otherwise it is in a preview.
+    """
     if where() is not Where.WINDOW:
         return True
     return _job.film is not None and not bpy.app.is_job_running("RENDER")
 
 
 def script_waits(call_frame: FrameType | None) -> bool:
-    """Whether a script waits for what Blender does now. call_frame: that (inspect.currentframe) of the function of ours
-    that Blender has called. Blender tells nobody of scripts that render, not even of `render.opengl`."""
+    """Tell whether a script waits for what Blender does now, for which Blender itself has no API.
+
+    Args:
+        call_frame: inspect.currentframe() of the function that Blender has called.
+    """
     return call_frame is not None and call_frame.f_back is not None
 
 
 def where() -> Where:
-    """Where we are called."""
+    """Return where we are called."""
     if bpy.app.background:
         return Where.BACKGROUND
     if threading.current_thread() is threading.main_thread():
@@ -145,19 +159,19 @@ def where() -> Where:
 
 
 def operators_running() -> set[str]:
-    """The names of the operators of all windows that wait for events; where the main thread is, or waits."""
+    """Return the names of the modal operators of all windows."""
     windows = bpy.context.window_manager.windows
     return {operator.bl_idname for window in windows for operator in window.modal_operators}
 
 
 def telling(to: Callable[[str], None]) -> AbstractContextManager[None]:
-    """Inside, the sentence that ends a render in the background goes there in place of stderr."""
+    """Inside a `with` block, pass the sentence that ends a render in the background to a function, not to stderr."""
     return for_a_while([(_job, "tell", to)])
 
 
 @contextmanager
 def calling(handlers: list, function: Callable) -> Iterator[None]:
-    """Inside, one of bpy.app.handlers has that function."""
+    """Add a function to one of bpy.app.handlers inside a `with` block."""
     handlers.append(function)
     try:
         yield
@@ -166,18 +180,20 @@ def calling(handlers: list, function: Callable) -> Iterator[None]:
 
 
 def scripts_act() -> bool:
-    """Whether Blender calls others than us at frames that it renders: they may change anything."""
+    """Tell whether scripts have handlers that run at rendered frames, and may change anything."""
     handlers, own = bpy.app.handlers, __name__.split(".blender.")[0]
     lists: list[list] = [handlers.render_pre, handlers.render_post, handlers.render_write, handlers.render_stats]
-    lists += [handlers.render_init, handlers.frame_change_pre, handlers.frame_change_post]  # of effects at each frame
-    functions = [getattr(each, "func", each) for each in chain(*lists)]  # of partial ones, what they call
+    lists += [handlers.render_init, handlers.frame_change_pre, handlers.frame_change_post]  # run for each effect
+    functions = [getattr(each, "func", each) for each in chain(*lists)]  # unwraps functools.partial
     return any(not str(getattr(function, "__module__", "")).startswith(own) for function in functions)
 
 
 def on_main_thread(function: Callable[[], T], ended: Callable[[], bool] | None = None) -> T | None:
-    """What a function gives on Blender's main thread, where its data and its operators belong; None: it was not waited
-    for, and is not called any more. ended: whether nobody waits for it any longer; without it, the window is not waited
-    for long. Once it is called, its end is waited for."""
+    """Return a function's result on Blender's main thread, or None if it is no longer wanted before it begins.
+
+    Args:
+        ended: Tells whether the result is no longer wanted. Without it, this waits for some seconds.
+    """
     if where() is not Where.JOB:
         return function()
     future: Future[T] = Future()
@@ -191,7 +207,7 @@ def on_main_thread(function: Callable[[], T], ended: Callable[[], bool] | None =
 
 
 def soon(function: Callable[[], None]) -> None:
-    """Has a function called on the main thread: at once, if this is it."""
+    """Call a function on the main thread: at once, if this is it."""
     if where() in (Where.JOB, Where.WAITED_FOR):
         main_thread.soon(function)
     else:
@@ -199,17 +215,17 @@ def soon(function: Callable[[], None]) -> None:
 
 
 def stop() -> None:
-    """Has the render end with the frame that is made, as at Ctrl-C."""
+    """End the render after the current frame, as at Ctrl-C."""
     _job.stopping = True
 
 
 def stopping() -> bool:
-    """Whether the film that this picture or frame belongs to was stopped, or has failed."""
+    """Tell whether the film of this picture was stopped, or has failed."""
     return _job.film is not None and ends_films() and (_job.stopping or _job.failure is not None)
 
 
 def fail(text: str) -> None:
-    """Says why the render that runs has to end; only the first sentence counts."""
+    """Say why the running render has to end; only the first sentence counts."""
     if _job.failure is None:
         _job.failure = text
         told.record(text)
@@ -217,26 +233,29 @@ def fail(text: str) -> None:
 
 
 def failure() -> str | None:
-    """The sentence that ended the render which runs or ran last; None: none had to."""
+    """Return the sentence that ended the current or last render, or None."""
     return _job.failure
 
 
 def cancel(ended: Callable[[], bool] | None = None) -> None:
-    """Ends the render that runs, as soon as this returns to Blender: from a picture, or from what comes before a frame.
-    (After one Blender would go on with the next, and crash.)
+    """End the render once this returns to Blender, from a picture or a handler before a frame.
 
-    ended: whether the window has ended it meanwhile; without it, the window is not waited for long."""
+    (After a frame, Blender would go on with the next, and crash.)
+
+    Args:
+        ended: Tells whether the window has ended it meanwhile. Without it, this waits for some seconds.
+    """
     if where() is Where.JOB:
         on_main_thread(_cancel_and_show, ended)
     elif where() is Where.WAITED_FOR:
-        # Until this picture is done, which is left out. What comes meanwhile fails likewise.
+        # This happens once this picture, which is left out, is done. Pictures until then fail, too.
         soon(_cancel_and_show)
     else:
         _cancel()
 
 
 def _cancel_and_show() -> None:
-    """As _cancel, and says in the window what failed: reports of an engine within the sequencer reach nobody."""
+    """Cancel, and show the failure in the window, where reports of an engine in the sequencer do not arrive."""
     _cancel()
     if _job.failure is not None:
         text = sentence(_job.failure)
@@ -247,8 +266,10 @@ def _cancel_and_show() -> None:
 
 
 def _cancel() -> None:
-    """An engine's error that reaches an operator is all that breaks Blender's renders from Python. Errors from within
-    the sequencer reach none; those of a small render beside it do."""
+    """Break a render from Python, which takes an engine's error that reaches an operator.
+
+    Errors from within the sequencer reach none, so a small render beside it fails.
+    """
     if _job.cancelling:
         return
     _job.cancelling = True
@@ -266,30 +287,27 @@ def _cancel() -> None:
         _job.cancelling = False
 
 
-def _remove_spent_then() -> float | None:
-    """A timer, until the job has ended."""
+def _remove_spent() -> float | None:
+    """Remove what small renders used, once the job has ended; also a timer.
+
+    During the film, Blender would free data of other effects in the same frame along with it, and crash.
+    """
     if bpy.app.is_job_running("RENDER"):
         return _PATIENCE
-    _remove_spent()
-    return None
-
-
-def _remove_spent() -> None:
-    """Removes what the small renders were of. Not before the film has ended: other effects of the same frame would be
-    rendered with what Blender frees along with them, and crash."""
     while _spent:
         scene, camera = _spent.pop()
         items = (bpy.data.scenes.get(scene), bpy.data.objects.get(camera))
         bpy.data.batch_remove([item for item in items if item is not None])
+    return None
 
 
 def cancelling() -> bool:
-    """Whether the small render runs whose error ends the other one."""
+    """Tell whether the small render runs whose error ends the other one."""
     return _job.cancelling
 
 
 def leave(code: int) -> None:
-    """Ends the process from inside Blender; after sys.exit it would complain about its memory."""
+    """Exit the process from inside Blender, which would report memory leaks after sys.exit."""
     with suppress(OSError, AttributeError):
         sys.stdout.flush()
     os._exit(code)

@@ -1,4 +1,4 @@
-"""What a render is made with: what its command sets, else the user's preferences."""
+"""Settings of renders: those of a command, else the user's preferences."""
 
 from __future__ import annotations
 
@@ -16,10 +16,12 @@ from ..devices import available
 class _RenderSettings:
     """What a command sets for its render.
 
-    device: one of available.CHOICES, in place of the user's preference
-    weights: folder for the coefficients of every picture, as EXR files
-    gpu_memory: megabytes of the GPU that textures may take, in place of the user's preference; 0: as device.allowed
-    budget: with the megabytes that it was made for"""
+    Attributes:
+        device: One of available.CHOICES.
+        weights: Folder for the coefficients of every picture, as EXR files.
+        gpu_memory: Megabytes of the GPU that textures may take; 0: as device.allowed.
+        budget: With the megabytes that it was made for.
+    """
 
     device: str | None = None
     weights: Path | None = None
@@ -27,35 +29,37 @@ class _RenderSettings:
     budget: tuple[int, Budget] | None = None
 
 
-_settings = _RenderSettings()  # of the command that runs; of the window none are set
+_settings = _RenderSettings()  # of the running command; empty in the window
 
 
 def using(
     device: str | None = None, weights: Path | None = None, gpu_memory: int | None = None
 ) -> AbstractContextManager[None]:
-    """Inside, renders have these settings: in a command, beside which nothing else renders."""
+    """Give renders these settings inside a `with` block, in a command."""
     changes = {"device": device, "weights": weights, "gpu_memory": gpu_memory}
     return for_a_while((_settings, name, value) for name, value in changes.items())
 
 
 def weights() -> Path | None:
-    """The folder for the coefficients of every picture; None: they are not wanted."""
+    """Return the folder for the coefficients of every picture, or None."""
     return _settings.weights
 
 
 def wanted() -> str:
-    """The device that the command asks for, else the user's preference: one of available.CHOICES."""
+    """Return the device that the command or the user wants, one of available.CHOICES."""
     return _settings.device or preferences.device()
 
 
 def _wanted_memory() -> int:
-    """The megabytes that the command sets, else the user's preference; 0: as many as are allowed."""
+    """Return the megabytes that the command or the user sets; 0: as many as allowed."""
     return preferences.gpu_memory() if _settings.gpu_memory is None else _settings.gpu_memory
 
 
 def memory() -> Budget:
-    """What the textures of both sessions may take together: it is one GPU, which OpenGL knows best, where it may be
-    asked; else the first device tells."""
+    """Return the budget of GPU memory that all sessions share.
+
+    OpenGL knows the size best, where it may be asked; otherwise the first device tells.
+    """
     if _settings.budget is None:
         megabytes = _wanted_memory()
         asks = not megabytes and wanted() in ("auto", "gpu", "opengl")
@@ -64,7 +68,7 @@ def memory() -> Budget:
 
 
 def forget_memory_if_changed() -> bool:
-    """Whether another limit is wanted than the one that `memory` gave; the next call gives that."""
+    """Forget the budget if another limit is wanted now. Return whether it was."""
     if _settings.budget is None or _settings.budget[0] == _wanted_memory():
         return False
     _settings.budget = None

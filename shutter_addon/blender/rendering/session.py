@@ -1,4 +1,4 @@
-"""A render session: a device, and the renderers of the effects that were shown last, whose frames it keeps."""
+"""A render session: a device, and renderers of the effects that were shown last, with the frames that they keep."""
 
 from __future__ import annotations
 
@@ -31,15 +31,18 @@ from .render_job import Where, where
 
 T = TypeVar("T")
 _PATIENCE = 0.1  # seconds between two looks at whether a picture is still wanted
-# Effects whose frames are kept: more than these in one frame decode their windows again for every frame.
-_KEPT = 4
-Place = tuple[int, bool]  # of a renderer: SourceKey.place
+_KEPT = 4  # effects whose frames are kept; with more in one frame, each frame decodes all windows again
+Place = tuple[int, bool]  # SourceKey.place
 
 
 class Work(NamedTuple):
     """What a session's device does.
 
-    future: its result to come; ended: set, it ends before its next step; relayed: the main thread has its GPU"""
+    Attributes:
+        future: Its result.
+        ended: Set, it ends before its next step.
+        relayed: Whether the main thread has its GPU.
+    """
 
     future: Future
     ended: threading.Event
@@ -50,7 +53,7 @@ class Work(NamedTuple):
         self.future.cancel()
 
     def result(self) -> Any:
-        """As result_of. Not waited for, it is broken off."""
+        """Return the result as result_of; break the work off where it is no longer wanted."""
         try:
             return result_of(self.future, self.relayed)
         except StoppedError:
@@ -59,8 +62,12 @@ class Work(NamedTuple):
 
 
 def result_of(future: Future[T], relayed: bool) -> T:
-    """The future's result. StoppedError: it is not wanted any longer (`stopping.once`). NoDeviceError: it cannot be
-    waited for, as Blender's GPU is not current."""
+    """Wait for a future's result.
+
+    Raises:
+        StoppedError: It is no longer wanted (stopping.once).
+        NoDeviceError: Blender's GPU is not current, so waiting would never end.
+    """
     is_window = where() is Where.WINDOW
     while not wait([future], 0 if is_window else _PATIENCE).done:
         if is_window and not main_thread.serve() and relayed:
@@ -70,19 +77,21 @@ def result_of(future: Future[T], relayed: bool) -> T:
 
 
 def broken_off(stopped: Callable[[], bool], function: Callable[..., T], *arguments: object) -> T:
-    """What a function gives, unless it is broken off."""
+    """Return a function's result, with `stopped` to break it off."""
     with stopping.once(stopped):
         return function(*arguments)
 
 
 @dataclass(frozen=True)
 class RenderContext:
-    """For whom pictures are made, whatever they show.
+    """For whom pictures are made.
 
-    session: whose device makes them
-    say: called with a sentence when the device is a lesser one, or something cannot be done
-    levels: they are of 8-bit display code values (Request.levels)
-    display: what shows them, whose levels are wanted (Request.display)"""
+    Attributes:
+        session: The session whose device makes them.
+        say: Called with a sentence about a lesser device, or about what cannot be done.
+        levels: Whether pictures are 8-bit display levels (Request.levels).
+        display: The display of these levels (Request.display).
+    """
 
     session: RenderSession
     say: Callable[[str], None] = print
@@ -90,11 +99,11 @@ class RenderContext:
     display: Display | None = None
 
     def request(self, snapshot: Snapshot, frame: float, detail: Detail | None = None) -> Request:
-        """See RenderSession.request."""
+        """Return a request as RenderSession.request."""
         return self.session.request(snapshot, frame, self, detail)
 
     def renderer(self, request: Request) -> Renderer:
-        """See RenderSession.renderer."""
+        """Return a renderer as RenderSession.renderer."""
         return self.session.renderer(request.source, self.say)
 
 
@@ -102,47 +111,49 @@ class RenderSession:
     """A compositor, opened when it is first used, and the renderers of the effects that were shown last."""
 
     def __init__(
-        self,
-        choose: Callable[[], tuple[str, str | None]],
-        ask_others: Callable[[], None],
-        late: Late | None = None,
+        self, choose: Callable[[], tuple[str, str | None]], ask_others: Callable[[], None], late: Late | None = None
     ) -> None:
-        """choose: gives the device, as available.choose; ask_others: called where the GPU has no room, has others free
-        what they hold of it; late: see MatteValues."""
+        """Make a session.
+
+        Args:
+            choose: Chooses the device, as available.choose.
+            ask_others: Called where the GPU is full, to free what other sessions have there.
+            late: As in MatteValues.
+        """
         self._choose, self._ask_others, self._late = choose, ask_others, late
-        self._asks = False  # others for room, in the middle of a picture
+        self._frees_others = False  # whether others free memory, in the middle of a picture
         self._chosen: tuple[str, str | None] | None = None
         self._executor: Executor | None = None
         self._compositor: Future | None = None
         self._renderers: dict[Place, tuple[SourceKey, Renderer]] = {}
         self._requests: dict[Place, tuple[Snapshot, float, Request]] = {}  # the last ones
-        self._shown: dict[int, float] = {}  # by scene: the timeline frame that was shown last
-        self._begun: dict[int, tuple[tuple, Work]] = {}  # by scene: the key of a request, its picture
+        self._shown: dict[int, float] = {}  # last timeline frame by scene
+        self._begun: dict[int, tuple[tuple, Work]] = {}  # key and work of the begun picture by scene
 
     @property
     def device(self) -> str:
-        """Its device, a key of available.OPEN; it stays until all is forgotten. NoDeviceError: there is none."""
+        """The device, a key of available.OPEN, kept until `forget`. NoDeviceError: there is none."""
         if self._chosen is None:
             self._chosen = self._choose()
         return self._chosen[0]
 
     @property
     def threaded(self) -> bool:
-        """Whether the device belongs to a thread of its own; otherwise to whichever calls."""
+        """Whether the device has its own thread; otherwise it belongs to the calling one."""
         return self.device != "blender"
 
     def run(self, function: Callable[..., T], *arguments: object) -> T:
-        """The result of a function that uses the device, wanted whatever becomes of the picture that is made."""
+        """Return the result of a function that uses the device, even if the picture being made is no longer wanted."""
         with stopping.once(stopping.never):
             return self._submit(function, *arguments).result()
 
     def _submit(self, function: Callable, *arguments: object) -> Work:
-        """A function that uses the device, called after those before it."""
+        """Call a function that uses the device, after those submitted before."""
         ended = threading.Event()
         if self.threaded:
             if self._executor is None:
                 self._executor = threads.pool(1)
-            with suppress(RuntimeError):  # Python ends, and its threads take no more work
+            with suppress(RuntimeError):  # at Python's exit, threads take no more work
                 future = self._executor.submit(broken_off, ended.is_set, function, *arguments)
                 return Work(future, ended, self.device == "relayed")
         done: Future = Future()
@@ -152,10 +163,15 @@ class RenderSession:
     def request(
         self, snapshot: Snapshot, frame: float, context: RenderContext, detail: Detail | None = None
     ) -> Request:
-        """What an effect strip shows at a timeline frame. One of FAULTS: it cannot be shown. StoppedError: it is not
-        wanted any longer.
+        """Return the request for what an effect strip shows at a timeline frame.
 
-        detail: None: as it was the last time, for who asks for no picture"""
+        Args:
+            detail: None: as it was the last time, where no picture is made.
+
+        Raises:
+            One of FAULTS: It cannot be shown.
+            StoppedError: It is no longer wanted.
+        """
         if detail is None:
             known = map(self._renderers.get, ((snapshot.scene, False), (snapshot.scene, True)))
             detail = next((each[0].detail for each in known if each), FULL)
@@ -179,8 +195,7 @@ class RenderSession:
         return request
 
     def picture(self, request: Request) -> np.ndarray:
-        """The requested picture, if need be the one that was begun for it. StoppedError: it is not wanted any
-        longer."""
+        """Return the picture, which may have been begun already. StoppedError: it is no longer wanted."""
         key, begun = self._begun.pop(request.source.scene, (None, None))
         if begun is not None and key != request.key:
             begun.break_off()
@@ -191,26 +206,29 @@ class RenderSession:
         return self._submit(self.renderer(request.source).picture, request)
 
     def begin_next(self, snapshot: Snapshot, frame: float, context: RenderContext) -> None:
-        """Begins the picture after the one at that timeline frame, where a film is rendered: if the last two were
-        neighbours.
+        """Begin the picture after the one at a timeline frame, if the last two were neighbors in a film.
 
-        It is shown only if it proves to be what is asked for, whatever changes meanwhile."""
+        It is used only if the same picture is asked for next.
+        """
         if not self.threaded:
             return
         before, self._shown[snapshot.scene] = self._shown.get(snapshot.scene, frame), frame
         step, last = snapshot.film
         if frame - before == step and frame + step <= last and frame + step in snapshot.frames:
-            with suppress(*FAULTS):  # it is met again when the picture is asked for
+            with suppress(*FAULTS):  # raised again when the picture is asked for
                 request = self.request(snapshot, frame + step, context, FULL)
                 self._begun[snapshot.scene] = request.key, self._begin(request)
 
     def weights(self, request: Request) -> list[np.ndarray]:
-        """Coefficients (h, w) of all shutters, and then the mattes of all layers, in blocks as large."""
+        """Return the coefficients (h, w) of all shutters, then the mattes of all layers in blocks of the same size."""
         return self._submit(_weights, self.renderer(request.source), request).result()
 
     def renderer(self, key: SourceKey, say: Callable[[str], None] = print) -> Renderer:
-        """The renderer that reads what the key says: its effect has one other at most, for plain pictures or for smooth
-        ones. One of FAULTS: there is none."""
+        """Return the renderer of a key. An effect keeps at most two, for plain and smooth pictures.
+
+        Raises:
+            One of FAULTS: There is none.
+        """
         compositor = self._opened(say)
         known = self._renderers.pop(key.place, None)
         if known is None or known[0] != key:
@@ -227,12 +245,12 @@ class RenderSession:
         return known[1]
 
     def open_renderer(self, key: SourceKey) -> Renderer | None:
-        """As `renderer`; None: it was not opened yet."""
+        """Return the renderer of a key, if it is open, else None."""
         known = self._renderers.get(key.place)
         return known[1] if known and known[0] == key else None
 
     def _opened(self, say: Callable[[str], None]) -> Any:
-        """The compositor, opened if need be."""
+        """Return the compositor, opened if necessary."""
         if self._compositor is None:
             with stopping.once(stopping.never):
                 self._compositor = self._submit(available.OPEN[self.device], render_settings.memory(), self._ask).future
@@ -245,26 +263,26 @@ class RenderSession:
             raise
 
     def _ask(self) -> None:
-        """Has others free what they hold. What this one holds is in use."""
-        self._asks = True
+        """Let other sessions free their memory; this one's is in use."""
+        self._frees_others = True
         try:
             self._ask_others()
         finally:
-            self._asks = False
+            self._frees_others = False
 
     def free(self) -> None:
-        """Frees what its renderers have on the device, unless it asks for room itself. They make it again."""
-        if self._asks:
+        """Free the renderers' memory on the device, unless this session asks for room itself. They load it again."""
+        if self._frees_others:
             return
         for _key, renderer in list(self._renderers.values()):
             self.run(renderer.release)
 
     def forget_requests(self) -> None:
-        """Lets go of the last requests, and of their snapshots."""
+        """Forget the last requests and their snapshots."""
         self._requests.clear()
 
     def rest(self) -> None:
-        """Breaks off the pictures that were begun, and decodes nothing in advance."""
+        """Break off begun pictures, and stop decoding in advance."""
         self._drop_begun(list(self._begun))
         for _key, renderer in list(self._renderers.values()):
             renderer.source.want(())
@@ -276,37 +294,35 @@ class RenderSession:
                 begun.break_off()
 
     def keep(self, scenes: set[int]) -> None:
-        """Closes what belongs to other scenes than those of these session_uids. A render job may take them away
-        meanwhile."""
+        """Close the renderers of scenes other than these session_uids. A render job may remove some meanwhile."""
         self._drop_begun(set(self._begun) - scenes)
-        for place in [place for place in list(self._requests) if place[0] not in scenes]:
+        for place in [place for place in (*self._requests, *self._renderers) if place[0] not in scenes]:
             self._requests.pop(place, None)
-        for place in [place for place in list(self._renderers) if place[0] not in scenes]:
             _key, renderer = self._renderers.pop(place, (None, None))
             if renderer is not None:
                 self._submit(renderer.close)
 
     def forget(self) -> None:
-        """Closes all sources and frees the device; where Blender's GPU is not current, once it is."""
+        """Close all sources and free the device; Blender's GPU, once it is current."""
         self.keep(set())
-        while self._renderers:  # a render job may take up more meanwhile
+        while self._renderers:  # a render job may open more meanwhile
             self.keep(set())
         compositor, self._compositor = self._compositor, None
         if compositor is not None:
             with suppress(NoDeviceError):
-                self.run(lambda: compositor.result().release())  # behind what is left of a render that was stopped
+                self.run(lambda: compositor.result().release())  # after the rest of a stopped render
         if self._executor is not None:
             self._executor.shutdown(wait=False)
             self._executor = None
         self._chosen = None
 
     def settle(self) -> None:
-        """Forgets all if the device is not the one that would be chosen now."""
+        """Forget everything if another device would be chosen now."""
         try:
             if self._chosen is None or self._chosen[0] == self._choose()[0]:
                 return
         except NoDeviceError:
-            pass  # met again when a picture is asked for
+            pass  # raised again when a picture is asked for
         self.forget()
 
 

@@ -1,8 +1,8 @@
-"""Smooth pictures of previews, which come behind plain ones: nothing that is drawn waits for optical flow.
+"""Smooth pictures of previews, which follow plain ones, so that drawing never waits for optical flow.
 
-A preview shows the plain exposure of filmed frames at once. While that is seen, a thread makes the moments between
-them, and the smooth picture is composed of those that are there, in slices of time. Then it takes the plain one's
-place. A frame that moves or a stroke that begins ends all of it.
+A preview first shows the plain exposure of filmed frames. Meanwhile a thread makes the moments between them, and the
+smooth picture is composed in slices of time from those that are ready. Then it replaces the plain one. A moving
+playhead or a new stroke ends this.
 """
 
 from __future__ import annotations
@@ -20,20 +20,26 @@ from ..devices import main_thread
 from .effect_source import FAULTS, Detail, SourceKey, find_steps, known_steps, steps_key
 from .session import RenderContext
 
-_WAIT = 0.1  # seconds until it is looked again whether moments are there
-_UNSEEN = 5.0  # seconds after which a picture that nobody has asked for is not wanted any longer
+_WAIT = 0.1  # seconds between two looks at whether moments are ready
+_UNSEEN = 5.0  # seconds without a request after which a picture is dropped
 
 
 @dataclass
 class _Coming:
-    """A smooth picture that is on its way.
+    """A smooth picture that is being made.
 
-    key: of the plain picture, and of what its steps are found of
-    asked: as what it was asked for last: the context, the snapshot, the timeline frame and the detail; since: when
-    is_asked: whether it was since the last look; is_seen: whether the plain picture was drawn
-    is_over: whether nothing comes any more; made: key of the request that was composed
-    is_alone: whether the device has no room for both pictures
-    steps: finds the steps; fault: why there is no picture; slices: of time, in which it is composed"""
+    Attributes:
+        key: Key of the plain picture, and steps_key.
+        asked: What was last asked for: context, snapshot, timeline frame and detail, at the time `since`.
+        steps: Finds the steps.
+        is_asked: Whether it was asked for since the last look.
+        is_seen: Whether the plain picture was drawn.
+        is_over: Whether nothing is left to do.
+        is_alone: Whether the device has no room for both pictures.
+        made: Key of the composed request.
+        fault: Why there is no picture.
+        slices: Slices of time in which it is composed.
+    """
 
     key: tuple
     asked: tuple[RenderContext, Snapshot, float, Detail]
@@ -48,7 +54,7 @@ class _Coming:
     slices: Slices = field(default_factory=Slices)
 
     def request(self) -> Request | None:
-        """The smooth one; None: nothing was made for such requests yet."""
+        """Return the smooth request; None: its steps or its renderer are missing."""
         render, snapshot, frame, detail = self.asked
         if known_steps(snapshot) is None or render.session.open_renderer(SourceKey.of(snapshot, detail)) is None:
             return None
@@ -59,16 +65,16 @@ class _Coming:
         return render.request(snapshot, frame, replace(detail, smooth=False))
 
     def lacks(self, request: Request) -> bool:
-        """Whether frames have to be read for a picture."""
+        """Tell whether frames have to be read for a picture."""
         return bool(self.asked[0].renderer(request).missing(request))
 
     def rest(self) -> None:
-        """Ends the thread's work."""
+        """Stop the thread's work."""
         if (request := self.request()) is not None:
             self.asked[0].renderer(request).source.want(())
 
     def advance(self, seconds: float) -> float:
-        """Composes the picture for about so many seconds. Returns in how many seconds to go on."""
+        """Compose the picture for some seconds. Return in how many seconds to go on."""
         render, snapshot, frame, detail = self.asked
         if not self.is_seen:
             self.is_seen = True
@@ -97,7 +103,7 @@ _coming: dict[int, _Coming] = {}  # by effect scene
 
 
 def chosen(render: RenderContext, snapshot: Snapshot, frame: float, detail: Detail) -> Request:
-    """The smooth picture, if nothing has to be waited for; else the plain one. One of FAULTS: there is none."""
+    """Return the smooth request if its picture is ready, else the plain one. One of FAULTS: there is none."""
     steps, before = known_steps(snapshot), _coming.get(snapshot.scene)
     plain = render.request(snapshot, frame, replace(detail, smooth=False))
     if steps == 1:
@@ -120,18 +126,17 @@ def chosen(render: RenderContext, snapshot: Snapshot, frame: float, detail: Deta
 
 
 def comes(scene: int) -> bool:
-    """Whether a smooth picture of an effect scene, by its session_uid, is on its way."""
+    """Tell whether a smooth picture of an effect scene is being made."""
     return scene in _coming and not _coming[scene].is_over
 
 
 def is_busy() -> bool:
-    """Whether any is on its way."""
+    """Tell whether any smooth picture is being made."""
     return any(map(comes, _coming))
 
 
 def advance(seconds: float) -> None:
-    """Composes, for about so many seconds each, the smooth pictures whose plain ones were drawn. One of FAULTS: there
-    is none."""
+    """Compose the smooth pictures whose plain ones were drawn, for some seconds each. One of FAULTS: there is none."""
     for scene, coming in list(_coming.items()):
         if time.monotonic() > coming.since + _UNSEEN:
             coming.rest()
@@ -151,12 +156,12 @@ def advance(seconds: float) -> None:
 
 
 def rest() -> None:
-    """Ends all of it."""
+    """Stop making smooth pictures."""
     while _coming:
         _coming.popitem()[1].rest()
 
 
 def forget() -> None:
-    """Waits until nothing is found any more: when a file is loaded, and when the extension goes."""
+    """Wait for threads, and forget everything: when a file is loaded or the extension is disabled."""
     wait([coming.steps for coming in _coming.values() if coming.steps is not None])
     _coming.clear()

@@ -1,1 +1,1 @@
-"""How machines render one film together: claims, and versions of an edit. Uses no other room."""
+"""Rendering one film on several machines: claims, and versions of an edit."""

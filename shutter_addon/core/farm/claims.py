@@ -1,9 +1,9 @@
-"""Claims: who works on what, where many processes on many machines share a folder.
+"""Claims: dividing work among processes on machines that share a folder.
 
-A claim is a file that only one process can make. Its holder touches it while it works. Who finds it unchanged for a
-while, by the finder's own clock, takes it over with a claim of the next generation, which again only one can make. No
-clocks are compared and nothing is locked, so it works on network drives. Where the holder was only asleep, both do the
-same work, and nothing else is lost: what is claimed is written whole, and the same whoever writes it.
+A claim is a file that only one process can create. Its holder touches it while it works. A process that sees no change
+for a while, by its own clock, takes it over with a claim of the next generation, which again only one can create. No
+clocks are compared and no locks are used, so this works on network drives. If the holder was only paused, both do the
+same work. Nothing is lost, since results are written whole and are equal.
 """
 
 import os
@@ -19,8 +19,8 @@ from typing import Self
 
 from .. import threads
 
-PATIENCE = 120.0  # seconds without a change after which a claim counts as abandoned
-BEAT = 10.0  # seconds from one touch to the next; network drives may show it up to a minute later
+PATIENCE = 120.0  # seconds without a change after which a claim is abandoned
+BEAT = 10.0  # seconds between touches; network drives can show them a minute late
 
 _NAME = re.compile(r"\.claim-(\w+)-[0-9]+")
 _LONGEST = 256  # bytes of a claim
@@ -28,16 +28,18 @@ _READ = os.O_RDONLY | getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_NONBLOCK", 0
 
 
 class Claims:
-    """The claims of this process in a folder; use it in a `with`, at whose end they are released. For any thread.
+    """The claims of this process in a folder, released at the end of a `with`. For any thread.
 
-    patience, beat: as PATIENCE and BEAT, in seconds"""
+    Args:
+        patience, beat: Like PATIENCE and BEAT, in seconds.
+    """
 
     def __init__(self, folder: Path, patience: float | None = None, beat: float | None = None) -> None:
         self._folder = folder
         self._patience = PATIENCE if patience is None else patience
         self._beat = BEAT if beat is None else beat
-        self._held: dict[str, int] = {}  # the generation of each claim
-        self._seen: dict[Path, tuple] = {}  # what others' claims look like, and since when
+        self._held: dict[str, int] = {}  # generation of each claim
+        self._seen: dict[Path, tuple] = {}  # state of others' claims, and since when
         self._lock, self._ended = threading.Lock(), threading.Event()
         self._thread: threading.Thread | None = None
 
@@ -53,10 +55,16 @@ class Claims:
             self.release(name)
 
     def take(self, name: str) -> bool:
-        """Whether this process has the claim now; else another has it, or had it a moment ago. What is claimed may have
-        been finished meanwhile: look after this. OSError: the folder cannot be written to.
+        """Return whether this process now has the claim.
 
-        name: letters, digits and underscores"""
+        Look whether the work is finished after this call, since the last holder may have finished it.
+
+        Args:
+            name: Letters, digits and underscores.
+
+        Raises:
+            OSError: The folder cannot be written to.
+        """
         generation = 0
         while not _make(path := self._path(name, generation)):
             if not self._is_abandoned(path):
@@ -67,14 +75,14 @@ class Claims:
         return True
 
     def release(self, name: str) -> None:
-        """Gives a claim back, and removes those that it was taken over from."""
+        """Release a claim, and remove earlier generations of it."""
         with self._lock:
             generation = self._held.pop(name)
         for each in range(generation, -1, -1):
             _remove(self._path(name, each))
 
     def clear(self, names: Iterable[str]) -> None:
-        """Removes what killed processes left of claims of what is finished."""
+        """Remove claims that killed processes left on finished work."""
         names = set(names)
         with suppress(OSError), os.scandir(self._folder) as entries:
             for entry in entries:
@@ -95,13 +103,12 @@ class Claims:
             with self._lock:
                 held = list(self._held.items())
             for name, generation in held:
-                with suppress(OSError):  # it was taken over, or the drive is away for a moment
+                with suppress(OSError):  # taken over, or the drive is offline
                     os.utime(self._path(name, generation))
 
 
 def _make(path: Path) -> bool:
-    """Whether the claim was made; else there is one. What it holds is for people who wonder whose it is, and tells it
-    from one that was made later by the same name."""
+    """Create a claim; return False if it exists. Its content tells people whose it is, and distinguishes claims."""
     try:
         file = os.open(path, os.O_CREAT | os.O_EXCL | os.O_WRONLY, 0o666)
     except FileExistsError:
@@ -117,8 +124,10 @@ def _make(path: Path) -> bool:
 
 
 def _look(path: Path) -> tuple[bytes, int] | int | None:
-    """What changes when a claim is touched or made anew; None: there is none. It is opened, as network drives tell the
-    news then."""
+    """Return a value that changes when a claim is touched or replaced; None: there is none.
+
+    It is opened, so that network drives update it.
+    """
     try:
         file = os.open(path, _READ)
         try:
@@ -127,10 +136,10 @@ def _look(path: Path) -> tuple[bytes, int] | int | None:
             os.close(file)
     except FileNotFoundError:
         return None
-    except OSError as error:  # a folder, a link, or another user's; it is as good as a claim that nobody touches
+    except OSError as error:  # a folder, a link, or another user's: like a claim that nobody touches
         return error.errno
 
 
 def _remove(path: Path) -> None:
-    with suppress(OSError):  # it was removed by another, or is another user's
+    with suppress(OSError):  # removed by another process, or another user's
         path.unlink()

@@ -1,12 +1,11 @@
-"""The version of an edit, which tells pictures of it from those of another version, on any machine; and the file beside
-a job's pictures that says which version they are of: no machine renders another one among them."""
+"""The version of an edit, which marks its pictures on any machine, and the job file beside the pictures, which keeps
+machines from rendering different versions into one folder."""
 
 from __future__ import annotations
 
 import hashlib
 import json
 import re
-import stat
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
@@ -14,17 +13,20 @@ from .. import atomic_write
 from ..messages import UserError
 
 NAME = "virtual_shutter_job.json"
-_VERSION = 1  # of the file's format
-_LARGEST = 1 << 26  # bytes
-_NOTE = "virtual_shutter edit "  # what a picture's metadata say, before the key
+_VERSION = 1  # of the file format
+_NOTE = "virtual_shutter edit "  # prefix of the key in a picture's metadata
 
 
 @dataclass(frozen=True)
 class Footage:
-    """Files that the edit reads: a movie, a picture, or those of an image sequence.
+    """A movie, a picture or an image sequence that the edit reads.
 
-    name: of the first file; files: how many; content: a digest of theirs, in hexadecimal
-    missing: the name of the first that is missing or cannot be read; "": none is"""
+    Attributes:
+        name: Of the first file.
+        files: How many.
+        content: A hexadecimal digest of the files.
+        missing: Name of the first missing or unreadable file, or "".
+    """
 
     name: str
     files: int
@@ -34,11 +36,14 @@ class Footage:
 
 @dataclass(frozen=True)
 class EditVersion:
-    """All that an edit's pictures depend on, but for the device that composes them.
+    """Everything that an edit's pictures depend on, except for the device.
 
-    blend: SHA-256 of the .blend file, in hexadecimal; extension, blender: their versions
-    colours: of the OpenColorIO configuration, its SHA-256 or the name of one that OpenColorIO brings; "": Blender's own
-    footage: in the order in which the .blend names it"""
+    Attributes:
+        blend: SHA-256 of the .blend file, hexadecimal.
+        extension, blender: Versions.
+        colours: Of the OpenColorIO configuration: its SHA-256, the name of a built-in one, or "" for Blender's own.
+        footage: In the order in the .blend file.
+    """
 
     blend: str
     extension: str
@@ -48,14 +53,13 @@ class EditVersion:
 
     @property
     def key(self) -> str:
-        """16 hexadecimal digits: equal for copies of the edit, wherever its files lie and whatever they are called."""
+        """16 hexadecimal digits that are equal for copies of the edit, regardless of paths."""
         footage = [(each.files, each.content) for each in self.footage]
         parts = self.blend, self.extension, self.blender, self.colours, footage
         return hashlib.sha256(json.dumps(parts).encode()).hexdigest()[:16]
 
     def difference(self, other: EditVersion) -> str | None:
-        """What is different here from another version, the first thing of all, as the end of a sentence about that
-        version; None: nothing is."""
+        """Return the first difference from another version, as the end of a sentence about that; None: none."""
         if self.key == other.key:
             return None
         if self.extension != other.extension:
@@ -74,17 +78,6 @@ class EditVersion:
                 return f"is of other footage: {name} has other content on this machine"
         return "is of other footage"
 
-    def as_data(self) -> dict:
-        """For JSON."""
-        return {**asdict(self), "key": self.key}
-
-    @classmethod
-    def from_data(cls, data: dict) -> EditVersion:
-        """What `as_data` gave. KeyError, TypeError, ValueError: it gave no such thing."""
-        footage = tuple(Footage(**one) for one in data["footage"])
-        texts = {name: str(data[name]) for name in ("blend", "extension", "blender", "colours")}
-        return cls(footage=footage, **texts)
-
 
 def _configuration(version: EditVersion) -> str:
     which = version.colours[:16] or "of Blender"
@@ -92,41 +85,42 @@ def _configuration(version: EditVersion) -> str:
 
 
 def note(key: str) -> str:
-    """What the metadata of a picture say of its edit's version."""
+    """Return the text for a picture's metadata."""
     return _NOTE + key
 
 
 def key_in(text: str) -> str | None:
-    """The key in what a picture's metadata say; None: they say nothing of an edit."""
+    """Return the key in a picture's metadata, or None."""
     match = re.fullmatch(re.escape(_NOTE) + "([0-9a-f]{16})", text)
     return match and match[1]
 
 
 class JobError(UserError, ValueError):
-    """The file is damaged, or says another version than this machine's; the message is one sentence for the user."""
+    """The job file is damaged, or of another version. The message is one sentence."""
 
 
 def write(folder: Path, version: EditVersion) -> None:
-    """Writes the file into the pictures' folder, whole or not at all. OSError: it cannot be written."""
-    data = {"version": _VERSION, "edit": version.as_data()}
+    """Write the job file into the pictures' folder, whole or not at all. OSError: it cannot be written."""
+    data = {"version": _VERSION, "edit": {**asdict(version), "key": version.key}}
     with atomic_write.writing(folder / NAME) as part:
         part.write_text(json.dumps(data, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
 
 
 def read(folder: Path) -> EditVersion | None:
-    """The version of the edit that the pictures' folder is for; None: there is no job. JobError: the file is damaged,
-    or a pipe or the like. OSError: it cannot be read."""
+    """Return the version of the job in a folder, or None without a job.
+
+    Raises:
+        JobError: The file is damaged, or of a newer version.
+        OSError: It cannot be read.
+    """
     path = folder / NAME
     try:
-        status = path.stat()
-        if not stat.S_ISREG(status.st_mode):  # a pipe would never open
-            raise JobError(f"{path}: is no file")
-        if status.st_size > _LARGEST:
-            raise ValueError
         data = json.loads(path.read_bytes())
         if data["version"] != _VERSION:
             raise JobError(f"{path}: is of a newer version of the extension")
-        return EditVersion.from_data(data["edit"])
+        edit = data["edit"]
+        texts = {name: str(edit[name]) for name in ("blend", "extension", "blender", "colours")}
+        return EditVersion(footage=tuple(Footage(**each) for each in edit["footage"]), **texts)
     except FileNotFoundError:
         return None
     except JobError:
@@ -136,8 +130,7 @@ def read(folder: Path) -> EditVersion | None:
 
 
 def guard(folder: Path, here: EditVersion) -> None:
-    """JobError: the folder is for pictures of another version than this machine would render. OSError: it cannot be
-    known."""
+    """Raise JobError if a folder's job is of another version than `here`. OSError: the job file cannot be read."""
     job = read(folder)
     if job is not None and (difference := here.difference(job)):
         raise JobError(f"{folder / NAME}: the job {difference}")

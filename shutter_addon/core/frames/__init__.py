@@ -1,1 +1,1 @@
-"""Frames as they come in: what a source offers, their light, and which one a strip shows. Uses no other room."""
+"""Frames: what sources offer, light, and which frame a strip shows."""

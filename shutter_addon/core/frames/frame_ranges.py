@@ -1,24 +1,24 @@
-"""Frames as runs of numbers that follow one another, and as words."""
+"""Ranges of frame numbers, and how messages name them."""
 
 from collections.abc import Iterable
 from itertools import groupby
 
 
 def runs(frames: Iterable[int]) -> list[tuple[int, int]]:
-    """(first, last) of every run of the frames, in ascending order."""
-    # numbers that follow one another have the same difference from their place among all
+    """Return (first, last) of each run of consecutive frames, ascending."""
+    # Consecutive numbers have the same difference from their index.
     groups = groupby(enumerate(sorted(set(frames))), lambda item: item[1] - item[0])
     members = ([frame for _, frame in group] for _, group in groups)
     return [(run[0], run[-1]) for run in members]
 
 
 def in_words(frames: Iterable[int]) -> str:
-    """For use in a sentence: "frame 12", or "frames 12, 17 to 20"."""
+    """Return words for a sentence: "frame 12", or "frames 12, 17 to 20"."""
     ends = runs(frames)
     words = ", ".join(f"{first}" if first == last else f"{first} to {last}" for first, last in ends)
     return f"frame{'s' if len(ends) > 1 or ends[0][0] != ends[0][1] else ''} {words}"
 
 
 def common(one: range, other: range) -> range:
-    """The frames of two ranges that both have; of steps of 1."""
+    """Return the intersection of two ranges with step 1."""
     return range(max(one.start, other.start), min(one.stop, other.stop))

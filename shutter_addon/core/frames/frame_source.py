@@ -1,4 +1,4 @@
-"""What every source of frames offers: movies, image sequences, and what wraps them."""
+"""The interface of every source of frames: movies, image sequences, and their wrappers."""
 
 from __future__ import annotations
 
@@ -14,48 +14,52 @@ from .planes import Decoded
 
 
 class ShotFinder(Protocol):
-    """Where the shots of a source end. It may have to read frames for that; those wait for their `read`.
+    """A finder of a source's cuts. It may read frames, which then wait for the source's `read`.
 
-    Frames are counted as the source counts them, from 0.
+    Frames count from 0.
     """
 
     def around(self, index: int, low: int, high: int, *, known: bool = False) -> range:
-        """The frames of the shot around frame `index`, for a window of the frames from `low` to `high`.
+        """Return the frames of the shot around frame `index`, for a window of the frames from `low` to `high`.
 
-        Ends beyond the window are not looked for: the clip's ends take their place. known: it reads nothing; where it
-        does not know whether there is a cut, it takes it that there is none."""
+        Cuts beyond the window are not searched: the range then ends with the clip.
+
+        Args:
+            known: Read nothing, and assume no cut where it is unknown.
+        """
 
     def lacking(self, index: int, low: int, high: int) -> set[int]:
-        """The frames that `around` would read for these arguments, if it found no more cuts."""
+        """Return the frames that `around` would read for these arguments, if it found no more cuts."""
 
     def handed(self) -> set[int]:
-        """The frames that were read and wait for `read`."""
+        """Return the frames that were read and wait for `read`."""
 
     def release(self) -> None:
-        """Frees the frames that wait for `read`."""
+        """Drop the frames that wait for `read`."""
 
 
 class FrameSource(ABC):
-    """The frames of a movie or of an image sequence; close it, or use it in a `with`.
+    """The frames of a movie or an image sequence. Close it, or use it in a `with`.
 
-    path: the movie, or the first file of the sequence
-    file_kind: what kind of file that is: format, codec and samples, as the libraries call them
-    files: the movie, or one for each frame of a sequence
-    width, height: pixels
-    count: frames as Blender's strip counts them (its content_duration)
-    fps: frames per second, None for an image sequence
-    dtype: uint8, uint16, float16 or float32, the samples' type; whole numbers stand for 0 … 1
-    transfer: "srgb" (sRGB display values) or "linear" (scene linear, Rec.709 primaries)
-    alpha: "opaque", "straight" or "premultiplied"
-    options: what the samples depend on besides the files, {name: plain value}
-    has_audio: whether the file has sound
-    left_out: a sentence for the user about files beside the sequence that do not belong to it; "" if there are none
-    step: every step-th frame was filmed, from the first on
-    shots: what knows where its shots end; None: it is one shot
-    from_proxy: whether frames are read from a proxy, as far as it has them
-    by_blender: whether a second Blender decodes them, for want of PyAV
-    repeats: whether frames repeated others so far, and are moments between these
-    windows: how many windows of a picture read it, which have to have room beside one another
+    Attributes:
+        path: The movie, or the first file of the sequence.
+        file_kind: Format, codec and samples of the file, as the libraries name them.
+        files: The movie, or one per frame.
+        width, height: Pixels.
+        count: Frames as Blender's strip counts them (content_duration).
+        fps: Frames per second; None for an image sequence.
+        dtype: uint8, uint16, float16 or float32; integers stand for 0 … 1.
+        transfer: "srgb" (sRGB display values) or "linear" (scene linear, Rec.709 primaries).
+        alpha: "opaque", "straight" or "premultiplied".
+        options: What samples depend on besides the files, {name: plain value}.
+        has_audio: Whether the file has sound.
+        left_out: A sentence about files beside the sequence that do not belong to it, or "".
+        step: Every step-th frame was filmed, from the first on.
+        shots: The finder of cuts; None: there are none.
+        from_proxy: Whether frames come from a proxy where it has them.
+        by_blender: Whether a second Blender decodes them because PyAV is missing.
+        repeats: Whether repeated frames were found and replaced by moments.
+        windows: How many windows of a picture read the source, and need room in caches.
     """
 
     path: Path
@@ -80,21 +84,23 @@ class FrameSource(ABC):
 
     @abstractmethod
     def read(self, index: int) -> np.ndarray:
-        """The frame as an array (height, width, 4), RGBA, top row first. Any order; ascending is fastest.
+        """Return a frame as an array (height, width, 4), RGBA, top row first. Ascending order is fastest.
 
-        MediaError: the frame cannot be decoded. IndexError: it is outside 0 … count-1."""
+        Raises:
+            MediaError: The frame cannot be decoded.
+            IndexError: It is outside 0 … count − 1.
+        """
 
     def decoded(self, index: int) -> Decoded:
-        """The frame as it is quickest to get, raising what `read` raises: its planes, where it has some and nothing but
-        their conversion is between the two, else as `read` gives it."""
+        """Return a frame in its fastest form: planes if only their conversion is missing, else like `read`."""
         return self.read(index)
 
     def want(self, indices: Iterable[int]) -> None:
-        """Says which frames will be read next, in this order; others will not. A source may decode them ahead."""
-        return  # or it need not
+        """Announce which frames will be read next, in this order, so that they can be decoded early."""
+        return  # optional
 
     def close(self) -> None:
-        """Closes the file; a later read opens it again."""
+        """Close the file; a later read reopens it."""
         return
 
     def __enter__(self) -> Self:
@@ -115,17 +121,17 @@ class _Forwarded:
 
 
 class SourceWrapper(FrameSource):
-    """A source around another one. It has all attributes and frames of that one, but for those that a subclass sets."""
+    """A source around another one, with its attributes and frames unless a subclass changes them."""
 
     def __init__(self, source: FrameSource, frames: Callable[[int], np.ndarray] | None = None) -> None:
-        """frames: gives what `read` gives; None: the source does"""
+        """Wrap a source; `frames` replaces its `read`."""
         self._source, self._frames_of = source, frames
 
     def read(self, index: int) -> np.ndarray:
         return (self._frames_of or self._source.read)(index)
 
     def decoded(self, index: int) -> Decoded:
-        return self.read(index)  # which may give other frames than the source
+        return self.read(index)  # it may differ from the source's
 
     def want(self, indices: Iterable[int]) -> None:
         self._source.want(indices)

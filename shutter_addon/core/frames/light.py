@@ -1,4 +1,4 @@
-"""Light and code values: the sRGB transfer, in float64 or in the precision of its argument. Arrays (…) of any range."""
+"""Light and code values: the sRGB transfer, in float64 or the precision of the argument, for arrays of any shape."""
 
 from __future__ import annotations
 
@@ -8,32 +8,34 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 REC709 = np.array([0.2126, 0.7152, 0.0722], np.float32)  # luminance of linear light
-TRACE = 1e-6  # of alpha, as rounding leaves it of what lies beside: no cover
+TRACE = 1e-6  # alpha up to this is rounding and counts as transparent
 
 
 def to_linear(encoded: ArrayLike) -> np.ndarray:
-    """sRGB code values (1.0 = white) to linear light. Negative values pass through the linear foot."""
+    """Convert sRGB code values (1.0 = white) to linear light. Negative values use the linear foot."""
     encoded = np.asarray(encoded)
     curve = ((np.maximum(encoded, 0.04045) + 0.055) / 1.055) ** 2.4
     return np.where(encoded <= 0.04045, encoded / 12.92, curve).astype(encoded.dtype)
 
 
 def to_encoded(linear: ArrayLike) -> np.ndarray:
-    """Linear light to sRGB code values; the inverse of `to_linear`."""
+    """Convert linear light to sRGB code values; the inverse of `to_linear`."""
     linear = np.asarray(linear)
     curve = 1.055 * np.maximum(linear, 0.0031308) ** (1 / 2.4) - 0.055
     return np.where(linear <= 0.0031308, linear * 12.92, curve).astype(linear.dtype)
 
 
 def premultiplied(rgba: np.ndarray, convert: Callable[[np.ndarray], np.ndarray] | None = None) -> np.ndarray:
-    """Straight RGBA (…, 4) to premultiplied, its colours converted on the way."""
+    """Premultiply straight RGBA (…, 4), with its colours converted first."""
     rgb = rgba[..., :3] if convert is None else convert(rgba[..., :3])
     return np.concatenate([rgb * rgba[..., 3:], rgba[..., 3:]], axis=-1)
 
 
 def over_black(frame: np.ndarray, alpha: str) -> np.ndarray:
-    """A source's frame (…, 4) with its colours over black, in its own code values: float32, what is between 0 and 1, if
-    it has floats or a straight alpha, else its whole numbers as they are."""
+    """Return a source's frame (…, 4) over black, in its code values.
+
+    Floats and straight alpha give float32, clipped to 0 … 1. Other integers stay.
+    """
     if frame.dtype.kind == "f":
         frame = np.nan_to_num(frame.astype(np.float32), copy=False).clip(0, 1)
     if alpha != "straight":
@@ -43,12 +45,12 @@ def over_black(frame: np.ndarray, alpha: str) -> np.ndarray:
 
 
 def straight(rgba: np.ndarray) -> np.ndarray:
-    """Premultiplied RGBA (…, 4) to straight; what is fully transparent keeps its colours (light without cover)."""
+    """Convert premultiplied RGBA (…, 4) to straight; transparent pixels keep their colours (light without cover)."""
     return np.concatenate([rgba[..., :3] / _cover(rgba), rgba[..., 3:]], axis=-1)
 
 
 def linearised(rgba: np.ndarray) -> np.ndarray:
-    """Premultiplied RGBA (…, 4) with straight sRGB code values, as linear light; light without cover stays."""
+    """Convert premultiplied RGBA (…, 4) of sRGB code values to linear light; light without cover stays."""
     cover = _cover(rgba)
     return np.concatenate([to_linear(rgba[..., :3] / cover) * cover, rgba[..., 3:]], axis=-1)
 

@@ -1,5 +1,7 @@
-"""Frames as they are quickest to have: of movies luma and subsampled chroma, and the RGB that libswscale makes of them,
-to the bit; of a moment between two filmed frames the two, and where what they show lies in between."""
+"""Frames in their fastest form: planes of luma and chroma, or the neighbours of a moment.
+
+RGB of planes equals libswscale's to the bit.
+"""
 
 from __future__ import annotations
 
@@ -10,18 +12,18 @@ from typing import TypeAlias
 import numpy as np
 
 STEP = 4  # pixels between two vectors of a moment
-UNIT = 32  # of a vector's coordinates, in a pixel
-ZERO = 1 << 15  # what a coordinate of 0 is stored as
+UNIT = 32  # units of a vector's coordinates per pixel
+ZERO = 1 << 15  # stored value of the coordinate 0
 
-# Of the matrices, by the numbers of ITU-T H.273: red of Cr, blue of Cb, green of Cb and of Cr, which is taken away; in
-# libswscale's units of 1/65536 for samples of limited range. Where a file names none, it is BT.601.
+# By number in ITU-T H.273: red of Cr, blue of Cb, and what is subtracted from green for Cb and Cr, in libswscale's
+# units of 1/65536 for samples of limited range. Files that name no matrix use BT.601.
 _BT601 = 104597, 132201, 25675, 53279
 _MATRICES = {1: (117489, 138438, 13975, 34925), 2: _BT601, 5: _BT601, 6: _BT601}
 
 
 @dataclass(frozen=True)
 class Matrix:
-    """Whole numbers by which samples become RGB. offset: of luma, in 1/512 of a level; the others are factors."""
+    """Integers that convert samples to RGB: luma's offset in 1/512 of a level, and factors."""
 
     offset: int
     luma: int
@@ -32,9 +34,11 @@ class Matrix:
 
 
 def matrix(space: int, full: bool) -> Matrix | None:
-    """That of a colour space, by its number in ITU-T H.273; None: another than BT.601 or BT.709.
+    """Return the matrix of a colour space by its number in ITU-T H.273; None: neither BT.601 nor BT.709.
 
-    full: samples are of full range"""
+    Args:
+        full: Whether samples have full range.
+    """
     if space not in _MATRICES:
         return None
     red, blue, *green = _MATRICES[space]
@@ -46,24 +50,27 @@ def matrix(space: int, full: bool) -> Matrix | None:
 
 
 def _rounded(factor: int) -> int:
-    """In units of 1/8192, of which libswscale keeps no finer ones."""
+    """Round to units of 1/8192, as libswscale does."""
     return (factor + 4) >> 3
 
 
 def chroma_step(length: int) -> int:
-    """By how much a pixel's place in the planes of chroma moves on from one to the next, in 1/65536 of a sample, where
-    so many pixels lie along an axis: pixel i has the sample (i · step + step // 2) >> 16."""
+    """Return the step between pixels in the chroma planes, in 1/65536 of a sample, for an axis of `length` pixels.
+
+    Pixel i has the sample (i · step + step // 2) >> 16.
+    """
     return (((length + 1) // 2 << 16) + length // 2) // length
 
 
 @dataclass(frozen=True)
 class Planes:
-    """An opaque 8-bit frame with a sample of chroma for 2 × 2 pixels.
+    """An opaque 8-bit frame with one sample of chroma per 2 × 2 pixels.
 
-    luma: uint8 (H, W), top row first
-    chroma: Cb and Cr, each uint8 (⌈H/2⌉, ⌈W/2⌉)
-    matrix: what makes RGB of them
-    rgba: makes the whole frame, as FrameSource.read gives it
+    Attributes:
+        luma: uint8 (H, W), top row first.
+        chroma: Cb and Cr, uint8 (⌈H/2⌉, ⌈W/2⌉) each.
+        matrix: Converts them to RGB.
+        rgba: Returns the whole frame, like FrameSource.read.
     """
 
     luma: np.ndarray
@@ -76,8 +83,7 @@ class Planes:
         return sum(plane.nbytes for plane in (self.luma, *self.chroma))
 
     def samples(self, rows: slice, columns: slice) -> np.ndarray:
-        """RGB uint8 (h, w, 3) of the pixels in these rows and columns: those of the frame of `rgba`, and nothing else
-        is converted."""
+        """Return RGB uint8 (h, w, 3) of some rows and columns, without converting others."""
         m, shape = self.matrix, self.luma.shape
         down, right = _chroma_places(rows, shape[0]), _chroma_places(columns, shape[1])
         luma = self.luma[rows, columns].astype(np.int32)
@@ -88,7 +94,7 @@ class Planes:
             plane -= 128
             plane <<= 9
         pixels = np.empty((len(luma), 3, luma.shape[1]), np.uint8)
-        # Sums wrap around beyond 32 bits, as libswscale's do.
+        # Sums wrap around at 32 bits, as libswscale's do.
         colours = cr * m.red_of_cr, cb * m.green_of_cb + cr * m.green_of_cr, cb * m.blue_of_cb
         for channel, chroma in enumerate(colours):
             chroma += luma
@@ -97,7 +103,7 @@ class Planes:
 
 
 def _chroma_places(chosen: slice, length: int) -> np.ndarray:
-    """The samples of chroma that pixels have, of so many along an axis."""
+    """Return the indices of the chroma samples of pixels on an axis of `length` pixels."""
     step = chroma_step(length)
     return (np.arange(length)[chosen] * step + step // 2) >> 16
 
@@ -107,13 +113,13 @@ class Moment:
     """A moment between two frames.
 
     Attributes:
-        pair: numbers of the two frames among filmed ones: neighbours, but where those between repeat the first
-        ends: the two frames (H, W, 4), of a FrameSource's type
-        number, steps: how many of so many moments after the first frame it is
-        vectors: uint16 (⌈H / STEP⌉, ⌈W / STEP⌉, 4). For every STEPth pixel: x and y of the way from the first frame to
-            the second that passes there, in 1 / UNIT of a pixel from ZERO; and how surely the first and the second show
-            what goes it, 0 to 255. Between these pixels they are bilinear.
-        rgba: makes the frame, as FrameSource.read gives it
+        pair: Numbers of the two filmed frames. They are neighbours, except for repeated frames in between.
+        ends: The two frames (H, W, 4), with a FrameSource's type.
+        number, steps: The moment's number after the first frame, and the number of moments per frame.
+        vectors: uint16 (⌈H / STEP⌉, ⌈W / STEP⌉, 4). For every STEPth pixel: x and y of the motion from the first frame
+            to the second through that pixel, in 1 / UNIT of a pixel from ZERO; and how reliably the first and the
+            second frame show the moving point, 0 to 255. Values in between are bilinear.
+        rgba: Returns the frame, like FrameSource.read.
     """
 
     pair: tuple[int, int]
@@ -125,13 +131,13 @@ class Moment:
 
     @property
     def nbytes(self) -> int:
-        """Bytes that it takes; its frames are shared by all moments of the pair."""
+        """Memory in bytes, with a share of the frames, which all moments of the pair use."""
         return self.vectors.nbytes + sum(end.nbytes for end in self.ends) // self.steps
 
 
-Decoded: TypeAlias = np.ndarray | Planes | Moment  # what FrameSource.decoded gives
+Decoded: TypeAlias = np.ndarray | Planes | Moment  # results of FrameSource.decoded
 
 
 def as_rgba(frame: Decoded) -> np.ndarray:
-    """A frame of FrameSource.decoded as its `read` gives it."""
+    """Convert a result of FrameSource.decoded to that of `read`."""
     return frame if isinstance(frame, np.ndarray) else frame.rgba()

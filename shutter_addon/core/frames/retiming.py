@@ -1,4 +1,4 @@
-"""How a strip of Blender's sequencer lies on the timeline: trimmed, retimed, reversed, strobed."""
+"""Timing of a strip in Blender's sequencer: trimmed, retimed, reversed, strobed."""
 
 import math
 from collections.abc import Sequence
@@ -7,13 +7,13 @@ from itertools import pairwise
 
 import numpy as np
 
-# eSeqRetimingKeyFlag: the key starts a smooth transition between two speeds.
+# eSeqRetimingKeyFlag: the key begins a smooth transition between two speeds.
 _TRANSITION_IN = 1 << 0
 
 
 @dataclass(frozen=True)
 class RetimingKey:
-    """index: position in frames of the content, before retiming; factor: what it shows, 0 to 1 of the content."""
+    """A key: position in frames of the content before retiming, and the shown position, 0 to 1 of the content."""
 
     index: float
     flag: int
@@ -22,12 +22,14 @@ class RetimingKey:
 
 @dataclass(frozen=True)
 class StripTiming:
-    """How a source strip lies on the timeline; the fields have Blender's names, and its frames of the timeline.
+    """Timing of a source strip. Fields have Blender's names and count timeline frames.
 
-    first: the frame of the medium that is the content's first
-    scene_fps: frames per second of the edit
-    keys: the retiming keys, as Blender has them (are_retiming_keys)
-    is_known: whether these could be read; otherwise it is taken to play evenly"""
+    Attributes:
+        first: The frame of the medium that is the content's first.
+        scene_fps: Frames per second of the edit.
+        keys: The retiming keys (see are_retiming_keys).
+        is_known: Whether the keys could be read; otherwise constant speed is assumed.
+    """
 
     name: str
     first: int
@@ -44,13 +46,17 @@ class StripTiming:
 
     @property
     def start(self) -> int:
-        """The frame of the medium that is shown first, as far as it is not retimed."""
+        """The first frame of the medium that is shown, without retiming."""
         return self.first + self.content_trim_start
 
 
 def position(strip: StripTiming, rate: float, length: int, frame: float) -> np.float32:
-    """Where in the strip's content, of so many frames, a timeline frame lies, in frames; in float32 as Blender reckons,
-    ties included. rate: of playback_rate"""
+    """Return the position in the strip's content of a timeline frame, in frames, in float32 like Blender.
+
+    Args:
+        rate: From `playback_rate`.
+        length: Frames of the content.
+    """
     end = strip.content_end - 1
     position = np.float32(max(end - frame if strip.use_reverse_frames else frame - strip.content_start, 0.0))
     position *= np.float32(rate)
@@ -63,8 +69,11 @@ def position(strip: StripTiming, rate: float, length: int, frame: float) -> np.f
 
 
 def playback_rate(strip: StripTiming, length: int, fps: float) -> float:
-    """Source frames per timeline frame, before it is retimed: 1, or the movie's rate over the scene's if the strip was
-    added to keep its speed. Blender does not tell which; the strip's length does."""
+    """Return the source frames per timeline frame before retiming.
+
+    That is 1, or the movie's rate / the scene's if the strip keeps its speed. Blender's API does not tell; the strip's
+    length does.
+    """
     rate = fps / strip.scene_fps
     if rate <= 0:  # images
         return 1.0
@@ -74,13 +83,13 @@ def playback_rate(strip: StripTiming, length: int, fps: float) -> float:
 
 
 def are_retiming_keys(keys: Sequence[RetimingKey]) -> bool:
-    """Whether keys can be Blender's: numbers, in the order of their frames."""
+    """Return whether keys can be Blender's: finite and in order."""
     numbers = [number for key in keys for number in (key.index, key.factor)]
     return all(map(math.isfinite, numbers)) and all(a.index <= b.index for a, b in pairwise(keys))
 
 
 def retimed(keys: Sequence[RetimingKey], position: float | np.float32) -> np.float32:
-    """What the keys make of a position in the content, 0 to 1: lines between them, arcs through transitions."""
+    """Return the keys' value, 0 to 1, at a position in the content: lines, and arcs for transitions."""
     k = max((i for i, key in enumerate(keys[:-1]) if key.index <= position), default=0)
     first, second = keys[k], keys[k + 1]
     speed = _speed(first, second)
@@ -99,8 +108,8 @@ def _speed(first: RetimingKey, second: RetimingKey) -> np.float32:
 def _arc(
     first: RetimingKey, speed_in: np.float32, second: RetimingKey, speed_out: np.float32, position: float | np.float32
 ) -> np.float32:
-    """The circle that leaves the first key with one slope and reaches the second with the other."""
-    # Its centre lies on both normals: x + slope·y is the same there as at the key.
+    """Return the value of the circle that leaves the first key with one slope and reaches the second with the other."""
+    # Its centre is on both normals, where x + slope·y is the same as at the key.
     slopes = np.array([[1.0, speed_in], [1.0, speed_out]])
     sums = [first.index + speed_in * first.factor, second.index + speed_out * second.factor]
     x, y = np.linalg.solve(slopes, sums)

@@ -1,1 +1,1 @@
-"""The effect as plain data, each value over time, and its state at a frame. Uses frames."""
+"""The effect as plain data, with values over time, and its state at a frame."""

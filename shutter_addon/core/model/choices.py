@@ -1,13 +1,15 @@
-"""What an effect's properties can be chosen from: identifier, name, description, icon, number."""
+"""The choices of an effect's properties, as (identifier, name, description).
 
-# Of labels that Blender translates in another sense ("Frames" is one on the screen). Operators have a context anyway.
+Identifiers are the recipe's words in capitals.
+"""
+
+# The translation context of labels that Blender's own catalog translates differently, such as "Frames".
 CONTEXT = "Virtual Shutter"
 
 
-# Enum identifiers are the recipe's words in capitals.
 POSITIONS = (
     ("START", "Start", "The shown frame is the first of them"),
-    ("CENTER", "Center", "The shown frame lies in their middle"),
+    ("CENTER", "Center", "The shown frame is in their middle"),
     ("END", "End", "The shown frame is the last of them"),
 )
 
@@ -26,11 +28,7 @@ LIGHTS = (
 
 EXPOSURES = (
     ("NORMALIZED", "Normalized", "Every shutter gives the same brightness"),
-    (
-        "WEIGHTED",
-        "Weighted",
-        "A shutter that is open for less time than the default is darker, in linear light whatever is summed",
-    ),
+    ("WEIGHTED", "Weighted", "A shutter that is open for less time than the default is darker, always in linear light"),
 )
 
 
@@ -38,7 +36,7 @@ EDGES = (
     ("HOLD", "Hold", "Repeat the first or last frame beyond the clip's ends"),
     ("MIRROR", "Mirror", "Play the clip backward beyond its ends"),
     ("SHORTEN", "Shorten", "Leave out what lies beyond the clip's ends"),
-    ("SLIDE", "Slide", "Move an exposure into the clip, by as many frames as it reaches beyond its ends"),
+    ("SLIDE", "Slide", "Move exposures into the clip, by the number of frames that they reach beyond its ends"),
 )
 
 
@@ -49,33 +47,30 @@ AGGREGATES = (
 )
 
 
-# Files keep the number of an item: the first five are those of format 1.
+# Files store an item by its position: the first five are those of format 1.
 SMOOTH = (
-    ("1", "Off", "Expose filmed frames alone"),
-    ("2", "2×", "2 moments from a filmed frame to the next"),
-    ("4", "4×", "4 moments from a filmed frame to the next"),
-    ("8", "8×", "8 moments from a filmed frame to the next"),
-    ("16", "16×", "16 moments from a filmed frame to the next"),
-    ("AUTO", "Automatic", "As many moments as the fastest motion in the footage needs, 16 at most"),
+    ("1", "Off", "Expose only filmed frames"),
+    ("2", "2×", "2 moments per filmed frame"),
+    ("4", "4×", "4 moments per filmed frame"),
+    ("8", "8×", "8 moments per filmed frame"),
+    ("16", "16×", "16 moments per filmed frame"),
+    ("AUTO", "Automatic", "As many moments as the fastest motion in the footage needs, at most 16"),
 )
 
 
 STROKES = (
     ("LINE", "Line", "The strokes themselves, as wide as the region's width"),
-    ("LASSO", "Lasso", "All that the strokes enclose"),
+    ("LASSO", "Lasso", "Everything that the strokes enclose"),
 )
 
 
-DRAWN = (
-    *STROKES,
-    ("OUTLINE", "Outline", "What closed curves enclose, to the pixel: a matte that is drawn"),
-)
+DRAWN = (*STROKES, ("OUTLINE", "Outline", "A drawn matte: everything inside closed curves, exact to the pixel"))
 
 
 KINDS = (
     *DRAWN,
-    ("MATTE", "Matte", "What a file, a strip or a mask says for every pixel"),
-    ("RAMP", "Ramp", "From none of the shutter to all of it, across the picture"),
+    ("MATTE", "Matte", "A value per pixel from a file, a strip or a mask"),
+    ("RAMP", "Ramp", "A gradient across the picture, from none of the shutter to all of it"),
 )
 
 
@@ -103,14 +98,14 @@ CHANNELS = (
 
 
 TIMINGS = (
-    ("SOURCE", "Footage", "The matte's frames belong to those of the footage, however that is trimmed and retimed"),
+    ("SOURCE", "Footage", "The matte follows the frames of the footage, even if that is trimmed or retimed"),
     ("TIMELINE", "Timeline", "The matte plays along the timeline, from where the Shutter strip starts untrimmed"),
 )
 
 
 BLENDS = (
-    ("OVER", "Over", "What is beneath shares what the matte leaves"),
-    ("ADD", "Add", "What the matte takes comes from the default shutter alone, so that mattes stand side by side"),
+    ("OVER", "Over", "Regions below share what the matte leaves"),
+    ("ADD", "Add", "The matte replaces only the default shutter, so that mattes can be side by side"),
 )
 
 
@@ -123,9 +118,9 @@ RAMPS = (
 
 
 MOTIONS = (
-    ("LOCATION", "Location", "It is moved"),
-    ("ROTATION", "Location, Rotation", "It is moved and turned"),
-    ("SCALE", "Location, Rotation, Scale", "It is moved, turned and scaled"),
+    ("LOCATION", "Location", "Follow the location"),
+    ("ROTATION", "Location, Rotation", "Follow location and rotation"),
+    ("SCALE", "Location, Rotation, Scale", "Follow location, rotation and scale"),
 )
 
 
@@ -138,35 +133,35 @@ FOLLOWED = (
 
 FOLLOWS = (
     ("NOTHING", "Nothing", "The exposure stays where it is in the picture"),
-    ("REGION", "Region", "The exposure moves with a region: what the region moves with stays sharp"),
-    ("CAMERA", "Camera", "The exposure moves with what the camera sees, as if the camera had stood still"),
+    ("REGION", "Region", "The exposure moves with a region, so that what the region covers stays sharp"),
+    ("CAMERA", "Camera", "The exposure moves with the camera's view, as if the camera stood still"),
 )
 
 
 COMBINES = (
-    ("AVERAGE", "Average", "The average of the frames, as a camera makes it"),
-    ("LIGHTEST", "Lightest", "What is lightest in any of them: a trail of light, as bright however long it is"),
-    ("DARKEST", "Darkest", "What is darkest in any of them"),
-    ("MEDIAN", "Median", "What most of them show: who passes by is gone"),
+    ("AVERAGE", "Average", "The average of the frames, like that of a camera"),
+    ("LIGHTEST", "Lightest", "The lightest value in any frame: trails of light keep their brightness at any length"),
+    ("DARKEST", "Darkest", "The darkest value in any frame"),
+    ("MEDIAN", "Median", "What most frames show: people who pass by disappear"),
 )
 
 LENGTHS = (
-    ("FRAMES", "Frames", "The bars say for how many frames the shutter is open"),
-    ("TIMELINE", "Timeline", "The bars are the exposure of one frame of the timeline, however fast the footage runs"),
-    ("MOTION", "Distance", "The shutter is open while what it follows moves by a set distance; the bars are the shape"),
+    ("FRAMES", "Frames", "The bars set for how many frames the shutter is open"),
+    ("TIMELINE", "Timeline", "The bars are the exposure during one timeline frame, at any speed of the footage"),
+    ("MOTION", "Distance", "The shutter is open while what it follows moves by a distance; bars only set the shape"),
 )
 
 SIDES = (
     ("TOP", "Top", "Rows are read downward, as most cameras do"),
-    ("BOTTOM", "Bottom", "Rows are read upward, as by a camera that hung upside down"),
-    ("LEFT", "Left", "Columns are read, from the left, as by a camera that was turned"),
-    ("RIGHT", "Right", "Columns are read, from the right, as by a camera that was turned"),
+    ("BOTTOM", "Bottom", "Rows are read upward, like those of a camera upside down"),
+    ("LEFT", "Left", "Columns are read from the left, like those of a rotated camera"),
+    ("RIGHT", "Right", "Columns are read from the right, like those of a rotated camera"),
 )
 
 
 READS = (
     ("ROWS", "Rows", "Upright lines lean as they move sideways"),
-    ("COLUMNS", "Columns", "Level lines lean as they move up and down: of a camera that was turned"),
+    ("COLUMNS", "Columns", "Level lines lean as they move up and down, with a rotated camera"),
 )
 
 
@@ -176,5 +171,5 @@ READOUT_UNITS = (
 )
 
 
-# The renderer asks the F-curves itself: keys on these would show, and not render.
+# Properties whose F-curves the renderer would not read.
 UNKEYED: set[str] = set()

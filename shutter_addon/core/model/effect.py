@@ -1,8 +1,8 @@
 """The effect as plain data: shutters, regions, options and source time, each a value or a channel over time.
 
-A recipe gives one (core/recipes/recipe_file.py), and so does an effect strip in Blender (blender/data/snapshot.py).
-Frames are those of whoever made it: a recipe's count from 1, Blender's are the edit's timeline frames. What each
-property is, its field says (fields.py).
+Recipes (core/recipes/recipe_file.py) and effect strips in Blender (blender/data/snapshot.py) both become an `Effect`.
+Frame numbers depend on the origin: a recipe counts from 1, Blender uses timeline frames. fields.py explains the
+declarations of the properties.
 """
 
 from __future__ import annotations
@@ -30,14 +30,18 @@ _CLOSED = 'shutter "{name}" at frame {frame}: {fault}'
 OTHER_MOMENTS = (
     'shutter "{name}": bars {first} to {last} of the older file are one filmed frame now, and expose other moments'
 )
-_TOO_MANY_POINTS = 'region "{name}": more than {most} points with those before it'
+_TOO_MANY_POINTS = 'region "{name}": more than {most} points together with the regions before it'
 
 
 @dataclass(frozen=True)
 class Moves:
-    """Channel of where something lies in the picture.
+    """Where something lies in the picture, over time.
 
-    location: (2,) fractions of the picture; rotation: degrees counter-clockwise; scale: about its centre"""
+    Attributes:
+        location: Channel of (2,) fractions of the picture.
+        rotation: Channel of degrees, counter-clockwise.
+        scale: Channel of a factor about the centre.
+    """
 
     location: Channel = field(default=keyframes.Constant((0.0, 0.0)))
     rotation: Channel = field(default=keyframes.Constant(0.0))
@@ -45,7 +49,7 @@ class Moves:
 
     @staticmethod
     def keyed(keys: Sequence[tuple[float, Placement, keyframes.Ease]]) -> Moves:
-        """Those of keys: of each its frame, where something lies there, and the ease of the span that it begins."""
+        """Return moves with keys of (frame, placement, ease until the next key)."""
         if not keys:
             return Moves()
         frames, placements, eases = zip(*keys, strict=True)
@@ -54,7 +58,7 @@ class Moves:
 
     @property
     def are_keyed(self) -> bool:
-        """Whether it may lie elsewhere at another frame."""
+        """Whether the placement can change over time."""
         return not all(isinstance(each, keyframes.Constant) for each in (self.location, self.rotation, self.scale))
 
     def at(self, frame: float) -> Placement:
@@ -64,42 +68,56 @@ class Moves:
 
 @dataclass(frozen=True, eq=False)
 class Subject:
-    """What the exposure of a shutter may follow: a part of the picture that moves, or all of it."""
+    """Something that a shutter can follow: a region, or the camera."""
 
     moves: Moves
 
     def placement(self, frame: float) -> Placement:
-        """Its keyed numbers at a frame."""
+        """Return the keyed placement at a frame."""
         return self.moves.at(frame)
 
     def centre(self, frame: float) -> np.ndarray | None:
-        """The point (2,) about which it is turned and scaled, in fractions of the picture; None: nothing is drawn.
-        EffectError: its strokes are nowhere near the picture."""
+        """Return the point (2,) about which the subject turns and scales, in fractions of the picture.
+
+        Returns:
+            None where nothing is drawn.
+
+        Raises:
+            EffectError: The strokes are too far outside the picture.
+        """
         return np.array([0.5, 0.5])
 
     def corners(self, frame: float) -> np.ndarray:
-        """Those (4, 2) of the box around it as it lies at a frame, in fractions of the picture; (0, 2): nothing is
-        drawn. EffectError: its strokes are nowhere near the picture."""
+        """Return the corners (4, 2) of the subject's box at a frame, in fractions of the picture.
+
+        Returns:
+            (0, 2) where nothing is drawn.
+
+        Raises:
+            EffectError: The strokes are too far outside the picture.
+        """
         return motions.PICTURE
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class AnyRegion(Subject):
-    """Where a shutter holds. shutter: its index; layer: core.pixels.layering; drawings: of what is drawn, about whose
-    centre it moves; None: it is no drawing, and moves about the picture's"""
+    """A part of the picture with its own shutter.
+
+    Attributes:
+        shutter: Index of the shutter.
+        layer: See core/pixels/layering.py.
+        drawings: The strokes; the region moves about their centre. None for mattes and ramps, which move about the
+            picture's centre.
+    """
 
     name: str = fixed("Name", "Name of the region", default="Region", absent="", most=limits.MAX_NAME)
     shutter: int
     opacity: Channel = number(
-        "Opacity",
-        "How much of the region counts: at 0 the picture is as without it",
-        default=1.0,
-        subtype="FACTOR",
-        told=False,
+        "Opacity", "Influence of the region: 0 is like no region", default=1.0, subtype="FACTOR", told=False
     )
     layer: bool = switch(
         "Layer",
-        "Expose the region by itself, before all else, which is exposed without it: it leaves no ghost",
+        "Expose the region separately, in front of everything else, so that it leaves no ghost",
         blender="is_layer",
     )
     drawings: Drawings | None = None
@@ -113,9 +131,12 @@ class AnyRegion(Subject):
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Region(AnyRegion):
-    """A scribble of a shutter that moves.
+    """Strokes that give a shutter to what they touch or enclose.
 
-    kind: "line" or "lasso", and width: of its lines, fraction of the picture's height"""
+    Attributes:
+        kind: Channel of "line" or "lasso".
+        width: Width of lines, as a fraction of the picture's height.
+    """
 
     kind: Channel
     width: Channel = number(
@@ -136,19 +157,24 @@ class Region(AnyRegion):
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class MatteRegion(AnyRegion):
-    """A region whose shutter gets coefficients by a matte. It moves about the picture's centre: that places a ramp, and
-    says of any other matte how what it covers moves.
+    """A region whose matte says how much of the shutter each pixel gets.
 
-    content: channel of mattes.Content; feather: of mattes.Matte, as blend, invert and opacity"""
+    It moves about the picture's centre. Keys place a ramp. For other mattes, keys describe how the covered object
+    moves.
+
+    Attributes:
+        content: Channel of mattes.Content.
+        blend, invert, feather, opacity: See mattes.Matte.
+    """
 
     content: Channel
     blend: mattes.Blend = choice(
-        "Blend", "How the matte lies over other regions", BLENDS, default="over", context=CONTEXT
+        "Blend", "How the matte combines with other regions", BLENDS, default="over", context=CONTEXT
     )
-    invert: bool = switch("Invert", "The shutter gets what the matte leaves")
+    invert: bool = switch("Invert", "Give the shutter the pixels outside of the matte")
     feather: Channel = number(
         "Feather",
-        "How wide a hard edge of the matte becomes, as a fraction of the picture's height",
+        "Width of the matte's soft edges, as a fraction of the picture's height",
         default=0.0,
         most=limits.MAX_DISTANCE,
         soft_most=0.2,
@@ -158,7 +184,7 @@ class MatteRegion(AnyRegion):
     )
 
     def at(self, frame: float) -> mattes.Matte:
-        """The matte at a frame."""
+        """Return the matte at a frame."""
         opacity, feather = (float(channel.at(frame)) for channel in (self.opacity, self.feather))
         return mattes.Matte(
             shutter=self.shutter,
@@ -172,54 +198,61 @@ class MatteRegion(AnyRegion):
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class OutlineRegion(MatteRegion):
-    """A region whose matte is what closed curves enclose. It moves about their centre, which says how what they enclose
-    moves, and does not move them.
+    """A region whose matte is enclosed by closed curves.
 
-    between: what gives the matte between two drawings: "carried", the footage's own motion, or "straight", curves that
-    go from one to the next; content: a channel of mattes.FileFrame or of mattes.Outline"""
+    Keys describe how the enclosed object moves, about the curves' centre. They do not move the curves.
+
+    Attributes:
+        between: How the matte gets from one drawing to the next: "carried" follows the footage, "straight" moves the
+            curves linearly.
+        content: Channel of mattes.FileFrame or mattes.Outline.
+    """
 
     drawings: Drawings
     between: mattes.Between = choice(
-        "In Between", "What gives the matte between two drawings", BETWEEN, default="carried"
+        "In Between", "How the outline changes between two drawings", BETWEEN, default="carried"
     )
 
     def drawn_at(self, frame: float) -> scribbles.Shape:
-        """The curves at a frame, as a lasso; between drawings, what is carried has none. EffectError: they are nowhere
-        near the picture."""
+        """Return the curves at a frame, as a lasso.
+
+        A carried outline has curves only at its drawings.
+
+        Raises:
+            EffectError: The curves are too far outside the picture.
+        """
         has_curves = self.between == "straight" or frame in self.drawings.frames
         strokes = tuple(self.drawings.at(frame)) if has_curves else ()
         return scribbles.Shape(shutter=self.shutter, kind="lasso", width=0.0, strokes=strokes)
 
 
 def drawn_outlines(drawings: Drawings) -> Channel:
-    """Channel of outlines (mattes.Outline) that go straight from one drawing to the next."""
+    """Return a channel of mattes.Outline that moves linearly from one drawing to the next."""
     return keyframes.Computed(lambda frame: mattes.Outline(outlines.curves(drawings.at(frame))))
 
 
 @dataclass(frozen=True)
 class FileContent:
-    """Channel of a matte that a recipe names: a path has to be found before anybody reads it (for_picture).
+    """A matte file as a recipe names it. `Effect.for_picture` replaces it by a channel that can be read.
 
-    path: a movie, or the first file of an image sequence, relative to the recipe's folder
-    offset: the matte's frame, from 0, that belongs to the source's or the timeline's first"""
+    Attributes:
+        path: A movie, or the first file of an image sequence, relative to the recipe's folder.
+        offset: The matte's frame, from 0, at the first frame of the source or timeline.
+    """
 
     path: str
     channel: str = choice(
-        "Channel",
-        "What of the matte says how much of the shutter a pixel gets",
-        CHANNELS,
-        default="luminance",
-        recipe="",
+        "Channel", "Channel of the matte that sets the amount of the shutter", CHANNELS, default="luminance", recipe=""
     )
     offset: int = fixed(
         "Offset",
-        "Frames by which the matte is ahead",
+        "Number of frames by which the matte plays ahead",
         default=0,
         least=-limits.MAX_FRAME,
         most=limits.MAX_FRAME,
     )
     timing: Literal["source", "timeline"] = choice(
-        "Frames Of", "What the matte's frames belong to", TIMINGS, default="source"
+        "Frames Of", "What the matte's frames are synchronized with", TIMINGS, default="source"
     )
 
     def at(self, _frame: float) -> mattes.FileFrame:
@@ -228,10 +261,10 @@ class FileContent:
 
 @dataclass(frozen=True)
 class RampContent:
-    """Channel of a ramp that a recipe names, or of the luminance of the shown frame (for_picture)."""
+    """A ramp as a recipe names it. `Effect.for_picture` replaces it by a channel that can be read."""
 
     ramp: Literal["linear", "radial", "angle", "luminance"] = choice(
-        "Ramp", "How the ramp runs", RAMPS, default="linear", absent=MISSING
+        "Ramp", "Shape of the ramp", RAMPS, default="linear", absent=MISSING
     )
 
     def at(self, _frame: float) -> mattes.Ramp:
@@ -239,7 +272,7 @@ class RampContent:
 
 
 def placed_ramp(kind: mattes.RampKind, moves: Moves) -> Channel:
-    """Channel of a ramp (mattes.Ramp) that is moved by keys."""
+    """Return a channel of mattes.Ramp that keys move."""
 
     def at(frame: float) -> mattes.Ramp:
         placed = moves.at(frame)
@@ -250,13 +283,15 @@ def placed_ramp(kind: mattes.RampKind, moves: Moves) -> Channel:
 
 @dataclass(frozen=True)
 class Camera(Subject):
-    """How what the camera sees moves in the picture, about the picture's centre.
+    """How the camera's view moves in the picture, about the picture's centre.
 
-    influence: 0 to 1, what is left of the exposure that follows it: at 0 the shown frame alone"""
+    Attributes:
+        influence: 0 to 1, scales exposures that follow the camera. At 0 they show only the current frame.
+    """
 
     influence: Channel = number(
         "Influence",
-        "How much is left of exposures that follow the camera: at 0 the shown frame alone",
+        "Length of exposures that follow the camera: 0 exposes only the shown frame",
         default=1.0,
         subtype="FACTOR",
         recipe="camera_influence",
@@ -269,9 +304,11 @@ STILL_CAMERA = Camera(Moves())
 
 @dataclass(frozen=True, kw_only=True)
 class Shutter:
-    """Bars over time, and what becomes of the frames that they expose.
+    """Bars over time, and how the exposed frames are combined.
 
-    follow: what its exposure moves with, None: nothing"""
+    Attributes:
+        follow: The region or camera that the exposure moves with, or None.
+    """
 
     name: str = fixed("Name", "Name of the shutter", default="Shutter", absent=MISSING, most=limits.MAX_NAME)
     color: tuple[float, float, float] = color(
@@ -280,45 +317,38 @@ class Shutter:
     bars: Bars
     follow: Subject | None = None
     follow_motion: motions.Motion = choice(
-        "Motion", "What of its motion is followed", MOTIONS, default="scale", context=CONTEXT, told=False
+        "Motion", "Part of the motion that the exposure follows", MOTIONS, default="scale", context=CONTEXT, told=False
     )
     follow_smooth: int = fixed(
         "Smoothness",
-        "Frames before and after each over which the motion is averaged, as the mass of a camera does: "
-        "at 0 it is followed as it is",
+        "Frames on each side over which the motion is averaged, like that of a heavy camera",
         default=0,
         most=limits.MAX_SMOOTH,
         soft_most=24,
         told=False,
     )
     length: Length = choice(
-        "Exposure Length", "What says how long the exposure is", LENGTHS, default="frames", context=CONTEXT, recipe=""
+        "Exposure Length", "What sets the length of the exposure", LENGTHS, default="frames", context=CONTEXT, recipe=""
     )
     trail: Channel = number(
         "Distance",
-        "How far what is followed moves while the shutter is open, as a fraction of the picture's height",
+        "Distance of the motion while the shutter is open, as a fraction of the picture's height",
         default=0.1,
         most=limits.MAX_DISTANCE,
         soft_most=1.0,
         precision=3,
         recipe="",
     )
-    combine: Mode = choice(
-        "Combine", "What the frames that are exposed become", COMBINES, default="average", told=False
-    )
+    combine: Mode = choice("Combine", "How exposed frames are combined", COMBINES, default="average", told=False)
     by_luminance: bool = switch(
-        "By Luminance",
-        "Choose a frame for each pixel, by how light it is there, and not one for each color channel",
-        told=False,
+        "By Luminance", "Choose one frame per pixel by its luminance, not one per color channel", told=False
     )
     use_threshold: bool = switch(
-        "Use Threshold",
-        "Let only what is lighter, or of the darkest darker, leave a trail beside what is shown",
-        recipe="",
+        "Use Threshold", "Let only light above the threshold leave trails, or with Darkest, below it", recipe=""
     )
     threshold: Channel = number(
         "Threshold",
-        "Luminance of linear light from which on it leaves a trail; white is 1",
+        "Luminance in linear light from which light leaves a trail; white is 1",
         default=0.5,
         most=limits.MAX_THRESHOLD,
         soft_most=1.0,
@@ -327,7 +357,7 @@ class Shutter:
     )
     softness: Channel = number(
         "Softness",
-        "Range of luminance, around the threshold, over which a trail fades in",
+        "Range of luminance around the threshold in which trails fade in",
         default=0.1,
         absent=0.0,
         most=limits.MAX_THRESHOLD,
@@ -338,23 +368,33 @@ class Shutter:
 
     @property
     def has_trail(self) -> bool:
-        """Whether it is open while what it follows moves by a distance."""
+        """Whether the exposure lasts while the followed subject moves by a distance."""
         return self.follow is not None and self.length == "motion"
 
     def spread(self, steps: int, backward: bool = False) -> Callable[[np.ndarray], np.ndarray]:
-        """What makes its bars of moments, so many for each filmed frame, of those of filmed frames."""
+        """Return a function that turns bars of filmed frames into bars of moments.
+
+        Args:
+            steps: Moments per filmed frame.
+        """
         if self.length == "timeline" or self.has_trail:
             return partial(shutters.held, steps=steps)
         level = self.combine in ("lightest", "darkest")
         return partial(shutters.smoothed, steps=steps, backward=backward, level=level)
 
     def filmed(self, moments: ArrayLike, steps: int, position: str) -> shutters.Filmed:
-        """Bars of filmed frames for its bars of moments, which older versions had."""
+        """Return bars of filmed frames for the bars of moments that recipes of version 1 have."""
         return shutters.filmed(moments, steps, position, self.spread(steps))
 
     def lost(self, keys: Sequence[ArrayLike], steps: int, position: str, interpolation: str) -> EffectError | None:
-        """What says that bars of filmed frames do not expose what its bars of moments did, at the first key where they
-        do not, or between two where bars fade by themselves; None: they do."""
+        """Return a warning if bars of filmed frames cannot expose the same moments as the given bars of moments.
+
+        Args:
+            keys: Bars of moments at each key.
+
+        Returns:
+            The first difference, at a key or where bars fade halfway between two keys; None without one.
+        """
         fading = [np.add(*pair) / 2 for pair in pairwise(keys)] if interpolation == "value" else []
         for moments in (*keys, *fading):
             if (numbers := self.filmed(moments, steps, position).lost) is not None:
@@ -370,35 +410,35 @@ MatteFiles = Callable[[MatteRegion], mattes.MatteFile]
 
 
 def _placed(region: Region | MatteRegion, aspect: float, files: MatteFiles) -> Region | MatteRegion:
-    """A region of a recipe with what its content is."""
+    """Return a recipe's region with a content that can be read."""
     if region.drawings:
         region = replace(region, drawings=replace(region.drawings, aspect=aspect))
-    if isinstance(region, OutlineRegion):
-        if region.between == "straight":
-            return replace(region, content=drawn_outlines(region.drawings))
-        return replace(region, content=mattes.FileFrames(file=files(region)))
-    if isinstance(region, MatteRegion) and isinstance(said := region.content, FileContent):
-        first = None if said.timing == "source" else 1
-        return replace(region, content=mattes.FileFrames(file=files(region), offset=said.offset, first=first))
-    if isinstance(region, MatteRegion) and isinstance(said := region.content, RampContent):
-        if said.ramp == "luminance":
-            return replace(region, content=mattes.FileFrames(file=files(region)))
-        return replace(region, content=placed_ramp(said.ramp, region.moves))
-    return region
+    if not isinstance(region, MatteRegion):
+        return region
+    if isinstance(region, OutlineRegion) and region.between == "straight":
+        return replace(region, content=drawn_outlines(region.drawings))
+    content = region.content
+    if isinstance(content, RampContent) and content.ramp != "luminance":
+        return replace(region, content=placed_ramp(content.ramp, region.moves))
+    frames = mattes.FileFrames(file=files(region))
+    if isinstance(content, FileContent):
+        frames = replace(frames, offset=content.offset, first=None if content.timing == "source" else 1)
+    return replace(region, content=frames)
 
 
 @dataclass(frozen=True)
 class Effect:
-    """The whole effect but its source.
+    """The whole effect, except for its source.
 
-    shutters: the first is the default
-    regions: later ones lie over earlier ones, and all mattes over all scribbles
-    options: channel of frame_state.Options, but for
-    edge_aware: channel of its own, as its keys are numbers
-    camera: which shutters may follow
-    lost: what says that a recipe of an older version showed another picture; None: it did not
-    time: channel of (source frame, whether it runs backward), the source's first frame is 1; None: the strip's own
-    timing tells what is shown"""
+    Attributes:
+        shutters: The first one is the default.
+        regions: Later regions lie over earlier ones, and all mattes lie over all scribbles.
+        options: Channel of frame_state.Options, without `edge_aware`, which has numeric keys.
+        camera: A subject that shutters can follow.
+        lost: A warning that a recipe of an older version showed another picture, or None.
+        time: Channel of (source frame, whether it runs backward); the source's first frame is 1. None: the strip's
+            own timing counts.
+    """
 
     shutters: tuple[Shutter, ...]
     regions: tuple[Region | MatteRegion, ...]
@@ -406,7 +446,7 @@ class Effect:
     time: Channel | None = None
     edge_aware: Channel = number(
         "Follow Edges",
-        "How much shutters keep to the edges of the shown frame: at 1 a scribble fills what it lies in",
+        "How strictly scribbles stop at edges of the shown frame: at 1 they fill the object that they are on",
         default=0.0,
         subtype="FACTOR",
     )
@@ -414,25 +454,27 @@ class Effect:
     lost: EffectError | None = None
 
     def at(self, frame: float) -> FrameState:
-        """The effect at a frame. EffectError: no picture can be made of it."""
+        """Return the effect's state at a frame.
+
+        Raises:
+            EffectError: No picture can be made of it.
+        """
         if (name := self._one_too_many) is not None:
             raise EffectError(_TOO_MANY_POINTS, name=name, most=limits.MAX_POINTS)
         options = replace(self.options.at(frame), edge_aware=float(self.edge_aware.at(frame)))
         bars = [self.bars_at(index, frame) for index in range(len(self.shutters))]
-        drawn = [each for each in self.regions if isinstance(each, Region) and not each.layer]
-        mattes_ = [each for each in self.regions if isinstance(each, MatteRegion) and not each.layer]
-        laid = [region.at(frame) for region in mattes_]
-        seen = tuple(matte for matte in laid if matte.opacity > 0)
+        flat = [region for region in self.regions if not region.layer]
+        laid = [region.at(frame) for region in flat if isinstance(region, MatteRegion)]
         return FrameState(
             options=options,
             bars=np.stack(bars),
-            shapes=tuple(region.at(frame) for region in drawn),
-            mattes=seen,
+            shapes=tuple(region.at(frame) for region in flat if isinstance(region, Region)),
+            mattes=tuple(matte for matte in laid if matte.opacity > 0),
             combines=tuple(shutter.combine_at(frame) for shutter in self.shutters),
         )
 
     def with_parts(self, regions: Sequence[Region | MatteRegion], camera: Camera | None = None) -> Effect:
-        """The effect with other regions in place of its own, and another camera; what shutters follow goes with it."""
+        """Return the effect with other regions, and another camera; shutters follow the replacements."""
         camera = camera or self.camera
         new: dict[int, Subject] = {id(old): each for old, each in zip(self.regions, regions, strict=True)}
         new[id(self.camera)] = camera
@@ -441,24 +483,34 @@ class Effect:
         return replace(self, shutters=shutters_, regions=tuple(regions), camera=camera)
 
     def for_picture(self, aspect: float, files: MatteFiles = lambda _region: mattes.NoFile()) -> Effect:
-        """The effect of a recipe for a picture of width / height = aspect. files: gives the file of a matte, for a ramp
-        the source's luminance, and for an outline its carried mattes; without it, nobody may ask for values of these"""
+        """Return the effect of a recipe for a picture.
+
+        Args:
+            aspect: The picture's width / height.
+            files: Gives the file of a matte, the source's luminance for a ramp, and the carried mattes of an outline.
+                Without it, values of these cannot be read.
+        """
         return self.with_parts([_placed(region, aspect, files) for region in self.regions])
 
     def layers_at(self, frame: float) -> list[Region | MatteRegion]:
-        """The layers that there are at a frame, the first farthest."""
+        """Return the visible layers at a frame, the farthest first."""
         return [region for region in self.regions if region.layer and region.opacity.at(frame) > 0]
 
     def drawn_at(self, frame: float) -> list[scribbles.Shape]:
-        """All that is drawn, layers as well, where it is at a frame, in the order of its regions. EffectError: it lies
-        nowhere."""
+        """Return all drawn shapes at a frame, including layers, in the order of the regions.
+
+        Raises:
+            EffectError: A shape is too far outside the picture.
+        """
         drawn = [region for region in self.regions if isinstance(region, Region | OutlineRegion)]
         return [region.at(frame) if isinstance(region, Region) else region.drawn_at(frame) for region in drawn]
 
     @cached_property
     def _one_too_many(self) -> str | None:
-        """The name of the region whose points are more than there may be with those before it, layers and outlines as
-        well; each counts with the drawing that has the most."""
+        """The name of the first region that exceeds the limit of points, or None.
+
+        Layers and outlines count, too. Each region counts with its largest drawing.
+        """
         room = limits.MAX_POINTS
         for region in self.regions:
             if region.drawings:
@@ -468,12 +520,20 @@ class Effect:
         return None
 
     def bars_at(self, index: int, frame: float) -> np.ndarray:
-        """Bars (L,) of a shutter at a frame. EffectError: no picture can be made of them."""
+        """Return the bars (L,) of a shutter at a frame.
+
+        Raises:
+            EffectError: No picture can be made of them.
+        """
         bars = self.shutters[index].bars.at(frame, self.options.at(frame).interpolation)
         return self.checked(index, frame, bars)
 
     def checked(self, index: int, frame: float, bars: np.ndarray) -> np.ndarray:
-        """The bars (L,) of a shutter at a frame. EffectError: no picture can be made of them."""
+        """Return the given bars (L,) of a shutter, checked.
+
+        Raises:
+            EffectError: No picture can be made of them.
+        """
         try:
             return shutters.check_bars(bars)
         except shutters.ShutterError as error:

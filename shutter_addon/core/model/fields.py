@@ -1,11 +1,11 @@
-"""What a property of an effect is: its label, range, choices and name in a recipe.
+"""Properties of an effect: label, range, choices and name in a recipe.
 
-The classes of the model (effect.py, frame_state.py) define each property once, as a dataclass field that is made here:
+The classes of the model (effect.py, frame_state.py) declare each property once, as a dataclass field:
 
     trail: Channel = number("Distance", "How far …", default=0.1, most=MAX_DISTANCE)
 
-Blender's property groups, recipes, the snapshot, import, export, validation, panels and the table of the recipe's
-fields come from these. What a field has no Field for, such as bars and strokes, is written next to its subject.
+Blender's property groups, recipes, the snapshot, import, export, validation, panels and the documentation's tables are
+derived from these. Bars, strokes and mattes have no Field; the code next to their subject handles them.
 """
 
 from __future__ import annotations
@@ -17,23 +17,27 @@ from typing import Any
 
 from .keyframes import Constant
 
-Choice = tuple[str, str, str]  # its word in capitals, label, description
+Choice = tuple[str, str, str]  # identifier, label, description
 
 
 @dataclasses.dataclass(frozen=True)
 class Field:
     """A property of an effect, a shutter, a region or the camera.
 
-    default: where Blender begins; absent: what a recipe means that does not say it; MISSING: it has to
-    least, most: the range of a number; soft_most: how far a slider goes; of a text, `most` counts its characters
-    choices: of a word; the word in the model and in recipes is in small letters
-    keyed: whether Blender's F-curves may change it; keyed_in_recipe: whether a recipe's keys may
-    is_channel: whether the model has a channel of it (keyframes.Channel), not the value
-    blender, recipe: its names there; recipe "": it has none
-    shown: whether its panel shows it by itself, below what it draws by hand
-    told: whether a recipe says it even where it is as `absent`
-    subtype, context: of Blender's property, and of the translation of its label
-    since: the version of the extension in which it appeared"""
+    Attributes:
+        default: The value of a new effect in Blender.
+        absent: The value of a recipe without the field, or MISSING if it is required.
+        least, most: The range of a number; `most` of a text is its number of characters.
+        soft_most: The end of the slider.
+        choices: The allowed words. The model and recipes write them in small letters.
+        keyed, keyed_in_recipe: Whether F-curves and a recipe's keys can change it.
+        is_channel: Whether the model holds a keyframes.Channel.
+        blender, recipe: The names there; a recipe has no field "".
+        shown: Whether the panel shows it without further code, below the rest.
+        told: Whether recipes write it even if it equals `absent`.
+        subtype, context: Of Blender's property, and of the label's translation.
+        since: The first version of the extension that has it.
+    """
 
     label: str
     description: str
@@ -57,12 +61,12 @@ class Field:
 
     @property
     def words(self) -> tuple[Any, ...]:
-        """Its choices as the model has them: texts, and whole numbers."""
+        """The choices as the model has them."""
         return tuple(self.word(word) for word, *_ in self.choices)
 
     @staticmethod
     def word(choice: str) -> int | str:
-        """A choice as the model has it."""
+        """Return a choice as the model has it: a word or a whole number."""
         return int(choice) if choice.isdigit() else choice.lower()
 
 
@@ -70,35 +74,35 @@ MISSING = dataclasses.MISSING
 
 
 def number(label: str, description: str, *, default: float, **more: Any) -> Any:
-    """Make a number that keys may change; the model has a channel of it."""
+    """Declare a number that keys can change; the model holds a channel."""
     more = {"keyed": True, "is_channel": True, "keyed_in_recipe": True} | more
     return fixed(label, description, default=default, made=lambda: Constant(default), **more)
 
 
 def switch(label: str, description: str, *, default: bool = False, **more: Any) -> Any:
-    """Make a property that is on or off, without keys."""
+    """Declare a boolean without keys."""
     return fixed(label, description, default=default, **more)
 
 
 def choice(label: str, description: str, choices: Sequence[Choice], *, default: str | int, **more: Any) -> Any:
-    """Make a choice of one word among several, without keys."""
+    """Declare a choice of one word, without keys."""
     return fixed(label, description, default=default, choices=choices, **more)
 
 
 def color(label: str, description: str, *, default: tuple[float, float, float], **more: Any) -> Any:
-    """Make a color: red, green and blue display values, 0 to 1."""
+    """Declare a color: red, green and blue display values, 0 to 1."""
     return fixed(label, description, default=default, **({"subtype": "COLOR_GAMMA"} | more))
 
 
 def fixed(label: str, description: str, *, default: Any, made: Callable[[], Any] | None = None, **more: Any) -> Any:
-    """Make a whole number or a text, without keys; made: makes the model's value, where that is not the default."""
+    """Declare a whole number or a text, without keys; `made` makes the model's value instead of `default`."""
     said = {"absent": default, "blender": "", "recipe": None} | more
-    factory = made or (lambda: default)
-    return dataclasses.field(default_factory=factory, metadata={"said": (label, description, default, said)})
+    metadata = {"said": (label, description, default, said)}
+    return dataclasses.field(default_factory=made or (lambda: default), metadata=metadata)
 
 
 def fields_of(*kinds: type) -> dict[str, Field]:
-    """Give the Fields of classes, by the name of the model's field."""
+    """Return the Fields of classes, by attribute name."""
     return _fields_of(kinds)
 
 
@@ -109,9 +113,7 @@ def _fields_of(kinds: tuple[type, ...]) -> dict[str, Field]:
         for each in dataclasses.fields(kind):
             if "said" in each.metadata:
                 label, description, default, said = each.metadata["said"]
-                names = {
-                    "blender": said["blender"] or each.name,
-                    "recipe": each.name if said["recipe"] is None else said["recipe"],
-                }
-                found[each.name] = Field(label, description, default, **(said | names))
+                said = said | {"blender": said["blender"] or each.name}
+                said["recipe"] = each.name if said["recipe"] is None else said["recipe"]
+                found[each.name] = Field(label, description, default, **said)
     return found

@@ -1,9 +1,8 @@
-"""What the exposures of shutters follow: where the points of the shown picture lie in the frames around it.
+"""Motions that exposures follow: where the points of the shown picture lie in the frames around it.
 
-Keys of regions and of the camera are on timeline frames, a window has frames of the source. What a source frame shows
-is where the keys have it at the timeline frame that shows it: of several the one nearest to the shown frame; between
-two timeline frames for a source frame that is passed over there, or for a moment between two. Between timeline frames
-motion is straight.
+Keys are on timeline frames, but a window has source frames. Keys place a source frame's content at the timeline frame
+that shows it: the nearest one to the shown frame if there are several, or a time between two frames for source frames
+that are skipped and for moments. Between timeline frames, motion is linear.
 """
 
 from __future__ import annotations
@@ -21,16 +20,19 @@ from .effect import Camera, Effect, Subject
 from .frame_state import Following, FrameState, Options
 from .motions import Placement, Similarity
 
-# Below this scale a subject is a point, and says nothing of where the others are.
+# Below this scale a subject is a point, which does not tell where other points are.
 _SMALLEST = 1e-6
 
-# What gives at a frame where something lies: its placement, and its centre (2,), None: nothing is drawn.
+# Gives placement and centre (2,) at a frame; the centre is None if nothing is drawn.
 Places = Callable[[float], tuple[Placement, np.ndarray | None]]
 
 
 def followed(effect: Effect, state: FrameState, clip: Clip, at: Shown) -> FrameState:
-    """The effect's state at a timeline frame, with what its shutters follow, and with the bars of those whose trail has
-    a length. EffectError: what is followed lies nowhere."""
+    """Return the state at a timeline frame with the motions that shutters follow, and with bars of trails.
+
+    Raises:
+        EffectError: A followed subject is too far outside the picture.
+    """
     if not any(shutter.follow for shutter in effect.shutters):
         return state
     frames = seen(state.options, at, clip.count)
@@ -55,12 +57,12 @@ def followed(effect: Effect, state: FrameState, clip: Clip, at: Shown) -> FrameS
 def _with_trails(
     effect: Effect, state: FrameState, following: Following, clip: Clip, at: Shown
 ) -> tuple[np.ndarray, dict[int, float]]:
-    """The state's bars (N, L), those of shutters whose trail has a length open for it, and FrameState.open_for."""
+    """Return the state's bars (N, L), with the lengths of trails, and FrameState.open_for."""
     bars, open_for = state.bars.copy(), dict(state.open_for)
     positions = windows.positions(state.options, at.source_frame, at.direction)
     shown_at = float(np.abs(positions - at.source_frame).argmin()) + 0.5
     frames = windows.source_frames(state.options, positions, range(clip.count))
-    # What is left out beyond the clip's ends stands still there, as what is held does.
+    # Frames that are left out beyond the clip's ends stand still, as repeated ones do.
     turns, shifts = following.at(np.where(frames < 0, positions, frames))
     for i, shutter in enumerate(effect.shutters):
         if shutter.follow and shutter.has_trail:
@@ -75,14 +77,18 @@ def _with_trails(
 
 
 def reach(filmed: int) -> int:
-    """How many timeline frames before and after the shown one say where the source frames of a window lie, which has so
-    many filmed frames: enough for footage that is slowed down to a quarter. Source frames shown beyond have the motion
-    of the nearest within."""
+    """Return how many timeline frames around the shown one are searched for a window's source frames.
+
+    It suffices for footage at a quarter of its speed. Source frames beyond get the motion of the nearest one.
+
+    Args:
+        filmed: Filmed frames of the window.
+    """
     return 4 * filmed
 
 
 def seen(options: Options, at: Shown, count: int) -> range:
-    """The source frames, of so many, that a window may show, wherever its shot ends."""
+    """Return the source frames, out of `count`, that a window may show, wherever its shot ends."""
     positions = windows.positions(options, at.source_frame, at.direction)
     if options.edges == "slide" and options.stop_at_cuts:  # a cut may lie on either side
         positions = at.source_frame + np.array([-1, 1]) * (options.window + options.step)
@@ -92,8 +98,7 @@ def seen(options: Options, at: Shown, count: int) -> range:
 
 
 def times_of(clip: Clip, at: Shown, wanted: range, reach: int) -> list[float]:
-    """The time on the timeline, nearest to a frame and no more than `reach` frames away, at which each of the wanted
-    source frames is shown."""
+    """Return the timeline's time, nearest to the shown frame and within reach, that shows each wanted source frame."""
     times, last = {at.source_frame: at.frame}, {1: at.source_frame, -1: at.source_frame}
     for distance in range(1, reach + 1):
         if len(times) == len(wanted):
@@ -111,15 +116,13 @@ def times_of(clip: Clip, at: Shown, wanted: range, reach: int) -> list[float]:
 
 
 def smoothing(smooth: int) -> np.ndarray:
-    """Weights (2 · smooth + 1,), Σ = 1, of the frames before and after one: a bell, without the jolts that a box has
-    where something sudden enters and leaves it."""
+    """Return weights (2 · smooth + 1,), Σ = 1, of the frames around one: a bell, which has no jolts like a box."""
     bell = 1 + np.cos(np.pi * np.arange(-smooth, smooth + 1) / (smooth + 1))
     return bell / bell.sum()
 
 
 def places_of(subject: Subject, motion: motions.Motion = "scale", smooth: int = 0) -> Places:
-    """What a shutter follows of a region or the camera: its location alone, perhaps, and averaged over time. It depends
-    on keys around a frame, and on no other picture."""
+    """Return a function that gives a subject's places, with the followed part of its motion, averaged over time."""
 
     @cache
     def own(frame: float) -> tuple[Placement, np.ndarray | None]:
@@ -141,15 +144,13 @@ def places_of(subject: Subject, motion: motions.Motion = "scale", smooth: int = 
 
 
 def moves(places: Places, clip: Clip, frame: float, times: list[float]) -> np.ndarray:
-    """The turns and shifts (2, n) of the motions of the picture from a timeline frame to times, which may lie between
-    two."""
+    """Return turns and shifts (2, n) of the motions of the picture from a timeline frame to (fractional) times."""
     found = [motion_to(places, frame, time, (clip.width, clip.height)) for time in times]
     return np.array([(motion.turn, motion.shift) for motion in found], np.complex128).T
 
 
 def motion_to(places: Places, frame: float, time: float, size: tuple[int, int]) -> Similarity:
-    """The motion of the picture from a timeline frame to a time that may lie between two; none where nothing is drawn
-    that could be followed."""
+    """Return the motion of the picture from a timeline frame to a (fractional) time; none if nothing is drawn."""
     whole = frame + math.floor(time - frame)
     share = time - whole
     start, centre = places(frame)
@@ -159,5 +160,5 @@ def motion_to(places: Places, frame: float, time: float, size: tuple[int, int]) 
     placement = motions.between(first, second, share)
     moved = (1 - share) * first_centre + share * second_centre
     if start == placement and np.array_equal(centre, moved):
-        return Similarity()  # to the bit
+        return Similarity()  # exactly
     return motions.motion_between(start, placement, centre, moved, size)

@@ -1,4 +1,4 @@
-"""Values over time: constant, at keys with their eases, or sampled; and how a shutter's bars go from key to key."""
+"""Values over time: constant, keyed with eases, or sampled; and a shutter's bars from key to key."""
 
 from __future__ import annotations
 
@@ -18,16 +18,16 @@ EASES: tuple[Ease, ...] = ("linear", "bezier", "constant")
 
 
 def eased(u: float, ease: Ease) -> float:
-    """Progress 0 to 1 through a span. "bezier" has flat handles of a third of the span: u²(3 − 2u)."""
+    """Return the progress 0 to 1 through a span. "bezier" has flat handles of a third of the span: u²(3 − 2u)."""
     if ease == "constant":
         return 0.0 if u < 1 else 1.0
     return u * u * (3 - 2 * u) if ease == "bezier" else u
 
 
 def span(frames: Sequence[float], frame: float) -> tuple[int, int, float]:
-    """Indices of the keys before and after `frame` in ascending `frames`, and the share 0 to 1 between them.
+    """Return the indices of the keys around `frame` in ascending `frames`, and the share 0 to 1 between them.
 
-    Outside the keys both are the nearest one; on a key both are that key.
+    Outside the keys and on a key, both indices are the nearest key's.
     """
     after = bisect_right(frames, frame)
     if after == 0:
@@ -39,8 +39,7 @@ def span(frames: Sequence[float], frame: float) -> tuple[int, int, float]:
 
 
 def between_bars(first: ArrayLike, second: ArrayLike, u: float, interpolation: str = "displacement") -> np.ndarray:
-    """Bars (L,) a share u of the way from one shutter to another: by displacement, or, as F-curves do, bar by bar
-    ("value")."""
+    """Return bars (L,) a share u of the way between two shutters: by displacement, or linearly per bar ("value")."""
     before, after = np.asarray(first, dtype=np.float64), np.asarray(second, dtype=np.float64)
     if u <= 0:
         return before
@@ -55,12 +54,12 @@ class Channel(Protocol):
     """A value over time."""
 
     def at(self, frame: float) -> Any:
-        """The value at a frame. UserError: there is none that an effect can have."""
+        """Return the value at a frame. UserError: the stored value is invalid."""
 
 
 @dataclass(frozen=True)
 class Constant:
-    """The same value at every frame; a UserError is raised where the value is asked for."""
+    """The same value at every frame. A UserError as the value is raised by `at`."""
 
     value: Any
 
@@ -70,7 +69,7 @@ class Constant:
 
 @dataclass(frozen=True)
 class Keys:
-    """Numbers or arrays at ascending frames, linear in between after the ease of the span (eased)."""
+    """Numbers or arrays at ascending frames, interpolated with the ease of each span."""
 
     frames: tuple[float, ...]
     values: tuple
@@ -79,37 +78,37 @@ class Keys:
     def at(self, frame: float) -> np.ndarray:
         before, after, share = eased_span(self.frames, self.eases, frame)
         first, second = np.asarray(self.values[before]), np.asarray(self.values[after])
-        return first + share * (second - first)  # equal ones stay what they are, to the last bit
+        return first + share * (second - first)  # exact for equal values
 
 
 @dataclass(frozen=True)
 class Samples:
-    """Values at frames where they were sampled, and nowhere else. A UserError among them is raised where the value
-    is asked for.
+    """Values at the frames where they were sampled. A UserError among them is raised by `at`.
 
-    keys: frames and eases of the keys of the curve that was sampled, ascending; none where it is no curve of keys."""
+    Attributes:
+        keys: Frames and eases of the sampled curve's keys, ascending; empty if it had none.
+    """
 
     values: dict[float, Any]
     keys: tuple[tuple[float, Ease], ...] = ()
 
     def at(self, frame: float) -> Any:
-        """KeyError: the frame was not sampled."""
+        """Return the value at a sampled frame. KeyError: it was not sampled."""
         return _given(self.values[frame])
 
 
 @dataclass(frozen=True)
 class Computed:
-    """What a function gives at a frame."""
+    """A value that a function computes."""
 
     at: Callable[[float], Any]
 
 
 @dataclass(frozen=True)
 class SourceTime:
-    """Channel of (source frame, whether it runs backward from there), made of a channel of numbers.
+    """A channel of (source frame, whether it runs backward), from a channel of numbers.
 
-    Where time stands still it keeps the direction in which it last moved towards one of its `keys`; forward, if it only
-    jumped.
+    While time stands still, the direction is the last movement's towards one of the `keys`, or forward after jumps.
     """
 
     numbers: Channel
@@ -132,9 +131,11 @@ class SourceTime:
 class Bars:
     """A shutter's bars (L,) float64 over time.
 
-    channel: the bars where they are not displaced: on keys, outside of them, and between keys by value
-    keys: frames and eases of the keys, ascending; without any, `channel` alone counts
-    share: channel of the share 0 to 1 of the way from the key before a frame to the key after it; None: by the eases"""
+    Attributes:
+        channel: The bars where they are not displaced: on keys, outside of them, and between keys by value.
+        keys: Frames and eases of the keys, ascending; without keys, only `channel` counts.
+        share: Channel of the share 0 to 1 between the keys around a frame; None: the eases determine it.
+    """
 
     channel: Channel
     keys: tuple[tuple[float, Ease], ...] = ()
@@ -143,10 +144,14 @@ class Bars:
     def at(
         self, frame: float, interpolation: str, spread: Callable[[np.ndarray], np.ndarray] = np.asarray
     ) -> np.ndarray:
-        """Between keys by displacement (paper §3.4.1, over time), or by `channel`: where interpolation is "value", and
-        on the way to and from a closed shutter, which is no displacement.
+        """Return the bars at a frame.
 
-        spread: makes the bars of moments of those of filmed frames, so that what is displaced passes through moments"""
+        Between keys they are displaced (paper §3.4.1, over time). `channel` counts if interpolation is "value", and
+        before and after a closed shutter, which cannot be displaced.
+
+        Args:
+            spread: Turns bars of filmed frames into bars of moments, so that displacement passes through moments.
+        """
         if not self.keys:
             return spread(self.channel.at(frame))
         frames = [key for key, _ in self.keys]
@@ -164,12 +169,12 @@ class Bars:
 
 
 def eased_span(frames: Sequence[float], eases: Sequence[Ease], frame: float) -> tuple[int, int, float]:
-    """As span, the share with the ease of the span: eases are of the keys that begin them."""
+    """Return `span` with the eased share; a key's ease is that of the span after it."""
     before, after, share = span(frames, frame)
     return before, after, eased(share, eases[before])
 
 
 def _given(value: Any) -> Any:
     if isinstance(value, UserError):
-        raise value.with_traceback(None)  # which would grow with every raise
+        raise value.with_traceback(None)  # a traceback would grow with every raise
     return value

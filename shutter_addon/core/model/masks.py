@@ -1,8 +1,8 @@
-"""Blender's masks: one as it stands at a frame, as plain data, and what it covers, as Blender's Mask strip shows it.
+"""Blender's masks: their data at one frame, and their pictures as Blender's Mask strip shows them.
 
-Mask space has its origin in the lower left corner of a square around the picture, as large as the picture's larger side
-and centred on it: x to the right and y up, from 0 to 1. Splines become polygons in units of the picture: x to the right
-and y up from the lower left corner, both from 0 to 1. Pictures of these have the lowest row first.
+Mask space is a square around the picture, as large as the picture's larger side and centred on it: x to the right and y
+up, from 0 to 1. Outlines are polygons in fractions of the picture: x to the right and y up from the lower left corner,
+from 0 to 1. Their pictures have the lowest row first.
 """
 
 from __future__ import annotations
@@ -16,17 +16,17 @@ import numpy as np
 from .. import scanlines
 from ..scanlines import ranges
 
-# Points a segment has at least and at most.
+# Limits of a segment's number of points.
 _FEWEST, _MOST = 4, 32
-# The direction of a spline at a point is that of the way through points so far before and behind it on its segment.
+# A spline's direction at a point is taken between points this far before and after it on its segment.
 _REACH = 0.05
-# The round ends of an open spline that is not filled have a point every two pixels, in these limits.
+# The round ends of an open spline that is not filled have a point every two pixels, within these limits.
 _CAP_POINTS = 8, 64
-# Pixels that are computed at once: what their numbers take stays in a processor's cache.
+# Pixels that are computed at once: their numbers fit into a processor's cache.
 _BLOCK = 1 << 14
-# By so many pixels quads overlap, so that rounding opens no seam between them.
+# Pixels by which quads overlap, so that rounding opens no seam between them.
 _SEAM = 1e-6
-# Share 0 to 1 of a feather's way inward -> value.
+# Share 0 to 1 of the way inward through a feather -> value.
 _FALLOFFS: dict[str, Callable[[np.ndarray], np.ndarray]] = {
     "SMOOTH": lambda v: v * v * (3 - 2 * v),
     "SPHERE": lambda v: np.sqrt(2 * v - v * v),
@@ -35,7 +35,7 @@ _FALLOFFS: dict[str, Callable[[np.ndarray], np.ndarray]] = {
     "SHARP": np.square,
     "LINEAR": lambda v: v,
 }
-# What lies below and a layer's value -> both. Sums are clamped after each layer.
+# Values of the layers below and of this layer -> both. Sums are clamped after each layer.
 _BLENDS: dict[str, Callable[[np.ndarray, np.ndarray], np.ndarray]] = {
     "MERGE_ADD": lambda below, v: below + v * (1 - below),
     "MERGE_SUBTRACT": lambda below, v: below - v * below,
@@ -50,12 +50,13 @@ _BLENDS: dict[str, Callable[[np.ndarray, np.ndarray], np.ndarray]] = {
 
 @dataclass(frozen=True)
 class MaskSpline:
-    """A spline with its handles; numbers in mask space, tuples so that it can be a key.
+    """A spline with its handles, in mask space; tuples, so that it is hashable.
 
-    points: of each its left handle, itself and its right handle ((x, y), (x, y), (x, y))
-    weights: the width of the feather at each point
-    feathers: for each point, the feather points ((u, factor), …) of the segment that follows it, u ascending; the
-    factors multiply the points' weights
+    Attributes:
+        points: Left handle, point and right handle, ((x, y), (x, y), (x, y)) each.
+        weights: The width of the feather at each point.
+        feathers: For each point, the feather points ((u, factor), …) of the segment that follows it, u ascending. The
+            factors multiply the points' weights.
     """
 
     points: tuple[tuple[tuple[float, float], ...], ...]
@@ -68,7 +69,7 @@ class MaskSpline:
 
 @dataclass(frozen=True)
 class MaskLayer:
-    """A layer; its words are those of Blender's MaskLayer."""
+    """A layer, with the values of Blender's MaskLayer."""
 
     splines: tuple[MaskSpline, ...]
     alpha: float = 1.0
@@ -81,12 +82,12 @@ class MaskLayer:
 
 @dataclass(frozen=True)
 class MaskShape:
-    """A mask as it stands at one frame: the layers that are rendered, from the lowest up."""
+    """A mask at one frame: the rendered layers, the lowest first."""
 
     layers: tuple[MaskLayer, ...]
 
     def values(self, width: int, height: int) -> np.ndarray:
-        """What it covers of a picture: (height, width) float32, 0 to 1, the top row first."""
+        """Return the mask's coverage of a picture: (height, width) float32, 0 to 1, the top row first."""
         value = np.zeros((height, width), np.float32)
         for layer in self.layers:
             value = _blend(layer, value, _layer_value(layer, width, height))
@@ -94,7 +95,7 @@ class MaskShape:
 
 
 def _blend(layer: MaskLayer, below: np.ndarray, value: np.ndarray) -> np.ndarray:
-    """A layer's value (h, w) over what lies below."""
+    """Blend a layer's value (h, w) over the layers below."""
     alpha = np.float32(layer.alpha)
     if layer.blend != "REPLACE" and alpha != 1:
         value = value * alpha
@@ -105,10 +106,10 @@ def _blend(layer: MaskLayer, below: np.ndarray, value: np.ndarray) -> np.ndarray
 
 
 def _layer_value(layer: MaskLayer, width: int, height: int) -> np.ndarray:
-    """What the splines of a layer cover: (height, width) float32, the lowest row first."""
+    """Return the coverage of a layer's splines: (height, width) float32, the lowest row first."""
     value = np.zeros((height, width), np.float32)
-    outlines = [_outlines(spline, width, height) for spline in layer.splines]
-    outlined = [(spline, both) for spline, both in zip(layer.splines, outlines, strict=True) if both is not None]
+    outlines = [(spline, _outlines(spline, width, height)) for spline in layer.splines]
+    outlined = [(spline, both) for spline, both in outlines if both is not None]
     if not outlined or layer.alpha == 0:
         return value
     filled = [edge for spline, (edge, _) in outlined if spline.fill]
@@ -119,9 +120,9 @@ def _layer_value(layer: MaskLayer, width: int, height: int) -> np.ndarray:
 
 
 def _outlines(spline: MaskSpline, width: int, height: int) -> tuple[np.ndarray, np.ndarray] | None:
-    """The outline of a spline and that of its feather, (n, 2) float64 each, point by point; None: it covers nothing.
+    """Return the outlines of a spline and of its feather, (n, 2) float64 each, point by point.
 
-    A feather is a pixel wide at least: that is all there is of anti-aliasing.
+    A feather is at least a pixel wide, which is the only anti-aliasing. None: the spline covers nothing.
     """
     points, weights = np.array(spline.points, np.float64), np.array(spline.weights, np.float64)
     if len(points) < 2:
@@ -138,7 +139,7 @@ def _outlines(spline: MaskSpline, width: int, height: int) -> tuple[np.ndarray, 
 
 
 def _longest_segment(points: np.ndarray, cyclic: bool) -> float:
-    """Of the segments of a spline (n, 3, 2), the length of the longest, along its handles."""
+    """Return the length of the longest segment of a spline (n, 3, 2), along its handles."""
     following = np.roll(points, -1, axis=0)
     hull = np.stack([points[:, 1], points[:, 2], following[:, 0], following[:, 1]], axis=1)
     lengths = np.linalg.norm(np.diff(hull, axis=1), axis=2).sum(axis=1)
@@ -146,7 +147,7 @@ def _longest_segment(points: np.ndarray, cyclic: bool) -> float:
 
 
 def _steps(spline: MaskSpline, points: np.ndarray, weights: np.ndarray, larger: int) -> int:
-    """Points that a segment is cut into: one in four pixels of the longest segment, more where its feather changes."""
+    """Return a segment's number of points: one in four pixels of the longest segment, more for changing feathers."""
     longest = _longest_segment(points, spline.cyclic) * larger
     steepest = 0.0
     for weight, feather in zip(weights, spline.feathers, strict=True):
@@ -157,7 +158,7 @@ def _steps(spline: MaskSpline, points: np.ndarray, weights: np.ndarray, larger: 
 
 
 def _positions(spline: MaskSpline, count: int, steps: int) -> tuple[np.ndarray, np.ndarray]:
-    """Where on a spline of `count` points its outline's points lie: segment (n,) and u (n,) 0 to 1."""
+    """Return segments (n,) and u (n,), 0 to 1, of the outline's points on a spline of `count` points."""
     segments = count if spline.cyclic else count - 1
     segment, u = np.repeat(np.arange(segments), steps), np.tile(np.arange(steps) / steps, segments)
     return (segment, u) if spline.cyclic else (np.append(segment, segments - 1), np.append(u, 1.0))
@@ -170,7 +171,7 @@ def _bezier(a: np.ndarray, b: np.ndarray, c: np.ndarray, d: np.ndarray, u: np.nd
 
 
 def _at(spline: MaskSpline, points: np.ndarray, segment: np.ndarray, u: np.ndarray) -> np.ndarray:
-    """Points (n, 2) of a spline; behind the end of an open one its last point."""
+    """Return points (n, 2) of a spline; beyond the end of an open one, its last point."""
     this, following = points[segment % len(points)], points[(segment + 1) % len(points)]
     inside = _bezier(this[:, 1], this[:, 2], following[:, 0], following[:, 1], u)
     return inside if spline.cyclic else np.where((segment == len(points) - 1)[:, None], points[-1, 1], inside)
@@ -179,7 +180,7 @@ def _at(spline: MaskSpline, points: np.ndarray, segment: np.ndarray, u: np.ndarr
 def _offset(
     spline: MaskSpline, points: np.ndarray, weights: np.ndarray, segment: np.ndarray, u: np.ndarray, edge: np.ndarray
 ) -> np.ndarray:
-    """The feather's outline (n, 2), at right angles to the spline."""
+    """Return the feather's outline (n, 2), at right angles to the spline."""
     before, after = u - _REACH < 0, u + _REACH > 1
     last = _at(spline, points, segment - before, u - _REACH + before)
     following = _at(spline, points, segment + after, u + _REACH - after)
@@ -191,7 +192,7 @@ def _offset(
 
 
 def _widths(spline: MaskSpline, weights: np.ndarray, segment: np.ndarray, u: np.ndarray) -> np.ndarray:
-    """The feather's width (n,) in mask space, eased or linear between points and feather points."""
+    """Return the feather's width (n,) in mask space, eased or linear between points and feather points."""
     result = np.empty(len(u))
     for index, feather in enumerate(spline.feathers):
         here = segment == index
@@ -208,8 +209,7 @@ def _widths(spline: MaskSpline, weights: np.ndarray, segment: np.ndarray, u: np.
 
 
 def _pixel_wide(edge: np.ndarray, feather: np.ndarray, pixel: float) -> np.ndarray:
-    """The feather's outline, a pixel from the edge where it was nearer. The normal is that of the point before, as
-    Blender has it."""
+    """Move the feather's outline to at least a pixel from the edge, along the previous point's normal as in Blender."""
     steps = _normalized(np.roll(edge, 1, axis=0) - edge)
     along = _normalized(np.roll(steps, 1, axis=0) + steps)
     narrow = np.sum((feather - edge) ** 2, axis=1) < pixel * pixel
@@ -217,7 +217,7 @@ def _pixel_wide(edge: np.ndarray, feather: np.ndarray, pixel: float) -> np.ndarr
 
 
 def _feather_quads(spline: MaskSpline, edge: np.ndarray, feather: np.ndarray, width: int, height: int) -> np.ndarray:
-    """The feather of a spline as quads (n, 4, 2): two corners on the spline, whose value is 1, and two beyond, of 0."""
+    """Return the feather of a spline as quads (n, 4, 2): two corners on the spline (value 1), two outside (0)."""
     if spline.fill:
         return _between(edge, feather, closed=True)
     other = 2 * edge - feather
@@ -235,7 +235,7 @@ def _between(edge: np.ndarray, feather: np.ndarray, closed: bool) -> np.ndarray:
 
 
 def _cap(centre: np.ndarray, start: np.ndarray, turn: float, size: np.ndarray, width: int, height: int) -> np.ndarray:
-    """The half disc (n, 4, 2) at an end of an open spline, from a point of its feather on."""
+    """Return the half disc (n, 4, 2) at an end of an open spline, from a point of its feather."""
     pixels = np.linalg.norm(start - centre) * min(width, height)
     count = int(np.clip(pixels // 2, *_CAP_POINTS))
     angle = turn * np.pi * np.arange(count + 1) / count
@@ -252,16 +252,16 @@ def _normalized(vectors: np.ndarray) -> np.ndarray:
 
 
 def _left_of(vectors: np.ndarray) -> np.ndarray:
-    """Directions (n, 2) of length 1 at a right angle to vectors, to their left."""
+    """Return unit vectors (n, 2) at a right angle to the left of vectors."""
     return _normalized(np.stack([-vectors[:, 1], vectors[:, 0]], axis=1))
 
 
 def _fill(value: np.ndarray, polygons: list[np.ndarray], solver: str, holes: bool) -> None:
-    """Set the pixels of `value` (h, w) that polygons (n, 2) fill to 1.
+    """Set the pixels of `value` (h, w) inside polygons (n, 2) to 1.
 
     Args:
-        holes: Fill what the polygons go around together: by CDT, Blender's solver, the sum of their windings, by
-            SWEEP_LINE an odd number of them. Otherwise each polygon is filled by itself.
+        holes: Combine the polygons: "CDT" (Blender's solver) sums their windings, "SWEEP_LINE" is even-odd. Otherwise
+            each polygon is filled separately.
     """
     in_pixels = [polygon * value.shape[::-1] for polygon in polygons]
     for group in [in_pixels] if holes else [[polygon] for polygon in in_pixels]:
@@ -269,8 +269,11 @@ def _fill(value: np.ndarray, polygons: list[np.ndarray], solver: str, holes: boo
 
 
 def feather(value: np.ndarray, quads: np.ndarray, falloff: Callable[[np.ndarray], np.ndarray]) -> None:
-    """Raises the pixels of `value` (h, w) that quads (n, 4, 2) cover to theirs: 1 at the first two corners, 0 at the
-    last two, between them by mean value coordinates, and `falloff` of all."""
+    """Raise the pixels of `value` (h, w) that quads (n, 4, 2) cover to the quads' values.
+
+    The value is 1 at the first two corners and 0 at the last two, interpolated by mean value coordinates, then passed
+    through `falloff`.
+    """
     height, width = value.shape
     flat = value.reshape(-1)
     quad, row, start, stop = _quad_rows(quads, width, height)
@@ -289,10 +292,10 @@ def feather(value: np.ndarray, quads: np.ndarray, falloff: Callable[[np.ndarray]
 
 
 def _quad_rows(quads: np.ndarray, width: int, height: int) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """The pixels that quads (n, 4, 2) cover, row by row: quad, row, first pixel and that behind the last, (m,) each.
+    """Return the pixels of quads (n, 4, 2) by rows: quad, row, first pixel and end, (m,) each.
 
-    A quad is its two triangles on the sides of the way between its first and its third corner, as in Blender, which
-    matters where they are not side by side.
+    A quad is divided into triangles between its first and third corner, as in Blender. That matters for quads that are
+    not convex.
     """
     sides = np.roll(quads, -1, axis=1) - quads
     following = np.roll(sides, -1, axis=1)
@@ -303,7 +306,7 @@ def _quad_rows(quads: np.ndarray, width: int, height: int) -> tuple[np.ndarray, 
     index = np.concatenate([np.flatnonzero(convex), others, others])
     start, end = (corners.reshape(-1, 2) * (width, height) for corners in (parts, np.roll(parts, -1, axis=1)))
     edge, row, x = scanlines.crossings(start, end, range(height))
-    # Each part on each row, from the first to the last place where its edges cross it.
+    # The span of each part on each row is from the first to the last crossing of its edges.
     place = edge // 4 * height + row
     order = np.argsort(place, kind="stable")
     place, x = place[order], x[order]
@@ -317,8 +320,11 @@ def _quad_rows(quads: np.ndarray, width: int, height: int) -> tuple[np.ndarray, 
 
 
 def _nearness(x: np.ndarray, y: np.ndarray) -> np.ndarray:
-    """How near points are to the first two corners of quads: 0 to 1 (n,), by mean value coordinates; x, y (4, n): the
-    ways from the points to the corners."""
+    """Return how near points are to the first two corners of quads, 0 to 1 (n,), by mean value coordinates.
+
+    Args:
+        x, y: (4, n), from the points to the corners.
+    """
     lengths = np.sqrt(x * x + y * y)
     tangents = []
     for a, b in ((0, 1), (1, 2), (2, 3), (3, 0)):

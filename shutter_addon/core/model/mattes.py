@@ -1,6 +1,6 @@
-"""Mattes: coefficients that are given for every pixel, by a file, a mask or a ramp, in place of scribbles.
+"""Mattes: coefficients for every pixel from a file, a mask or a ramp instead of scribbles.
 
-They are laid over the coefficients that scribbles give, in the order of the regions, the later over the earlier.
+They are laid over the scribbles' coefficients in the order of the regions, later ones on top.
 """
 
 from __future__ import annotations
@@ -18,34 +18,37 @@ from .masks import MaskShape
 from .outlines import Curves, coverage
 
 Blend = Literal["over", "add"]
-# What gives an outline's matte between two drawings: the footage's own motion, or curves that go straight.
+# How an outline's matte gets from one drawing to the next: by the footage's motion, or linearly.
 Between = Literal["carried", "straight"]
 RampKind = Literal["linear", "radial", "angle"]
-# A placement's scale from which on a ramp is a step, or none at all.
+# The smallest scale of a ramp, which is almost a step.
 _SMALLEST = 1e-6
 
 
 class MatteFile(Hashable, Protocol):
-    """A movie, an image sequence or a picture that mattes are read from; equal where it gives the same values."""
+    """A movie, an image sequence or a picture with mattes. Files with the same values compare equal."""
 
     def open(self) -> MatteSource:
-        """It, opened. MediaError: it cannot be read."""
+        """Open the file. MediaError: it cannot be read."""
 
 
 class MatteSource(Medium, Protocol):
-    """What was opened."""
+    """An opened MatteFile."""
 
     def read(self, index: int) -> np.ndarray:
-        """The values (height, width) float32 of a frame, 0 to 1, top row first. Beyond its ends the nearest one's.
-        MediaError: they cannot be read."""
+        """Return the values (height, width) float32 of a frame, 0 to 1, top row first, clamped to the file's frames.
+
+        Raises:
+            MediaError: The frame cannot be read.
+        """
 
     def close(self) -> None:
-        """Closes the file."""
+        """Close the file."""
 
 
 @dataclass(frozen=True)
 class NoFile:
-    """A MatteFile of which nobody may ask for values: a recipe's, as long as it is not known where that lies."""
+    """A MatteFile without values, for a recipe whose folder is not known yet."""
 
     def open(self) -> MatteSource:
         raise NotImplementedError
@@ -55,9 +58,11 @@ class NoFile:
 class FileFrame:
     """A frame of a file.
 
-    offset: from the filmed frame of the source that is shown to the matte's, both counted from 0
-    time: frames since the one that shows frame `offset`, which count in place of the source's
-    timing: or a strip of the edit, which shows the frame at the timeline frame `time`"""
+    Attributes:
+        offset: From the source's shown filmed frame to the matte's, both counted from 0.
+        time: Frames since the one that shows frame `offset`; replaces the source's frame.
+        timing: A strip of the edit, which shows the file at the timeline frame `time`.
+    """
 
     file: MatteFile
     offset: int = 0
@@ -65,8 +70,11 @@ class FileFrame:
     timing: StripTiming | None = None
 
     def index(self, source: MatteSource, shown: int) -> int:
-        """Which frame it is, of the opened file, where the source shows the filmed frame `shown`; perhaps beyond its
-        ends. EffectError: how the strip is retimed cannot be known."""
+        """Return the index in the opened file while the source shows the filmed frame `shown`; it may be out of range.
+
+        Raises:
+            EffectError: The strip's retiming is unknown.
+        """
         if self.time is None:
             return shown + self.offset
         if self.timing is None:
@@ -76,10 +84,12 @@ class FileFrame:
 
 @dataclass(frozen=True)
 class FileFrames:
-    """Channel of the frames of a file: as the source shows its own, `offset` frames on.
+    """A channel of a file's frames. By default they belong to the source's, `offset` frames ahead.
 
-    first: the timeline frame that shows the file's frame `offset`, and later ones those behind it, in place of that
-    timing: or a strip of the edit, that shows the file as this says"""
+    Attributes:
+        first: The timeline frame that shows the file's frame `offset`; the file then plays along the timeline.
+        timing: A strip of the edit that shows the file.
+    """
 
     file: MatteFile
     offset: int = 0
@@ -87,7 +97,7 @@ class FileFrames:
     timing: StripTiming | None = None
 
     def at(self, frame: float) -> FileFrame:
-        """What is shown at a timeline frame."""
+        """Return the frame at a timeline frame."""
         if self.timing is not None:
             return FileFrame(file=self.file, offset=0, time=frame, timing=self.timing)
         return FileFrame(file=self.file, offset=self.offset, time=None if self.first is None else frame - self.first)
@@ -97,9 +107,14 @@ class FileFrames:
 class Ramp:
     """Values from 0 to 1 across the picture.
 
-    linear: from left to right, where the first and the last corner of the picture are 0 and 1, whichever way it is
-    turned; radial: from the centre to the farthest corner; angle: once around the centre, clockwise from its top
-    location: (2,) fractions of the picture, rotation: degrees counter-clockwise, scale: about the picture's centre"""
+    A linear ramp goes from left to right; at any rotation, the outermost corners are 0 and 1. A radial one goes from
+    the centre to the farthest corner. An angle goes once around the centre, clockwise from the top.
+
+    Attributes:
+        location: (2,) fractions of the picture.
+        rotation: Degrees counter-clockwise.
+        scale: About the picture's centre.
+    """
 
     kind: RampKind
     location: tuple[float, float] = (0.0, 0.0)
@@ -107,7 +122,7 @@ class Ramp:
     scale: float = 1.0
 
     def values(self, width: int, height: int) -> np.ndarray:
-        """(height, width) float32, 0 to 1, top row first."""
+        """Return (height, width) float32, 0 to 1, top row first."""
         scale = max(abs(self.scale), _SMALLEST)
         x = np.arange(width) + 0.5 - width * (0.5 + self.location[0])
         y = height * (0.5 - self.location[1]) - (np.arange(height)[:, None] + 0.5)
@@ -125,12 +140,12 @@ class Ramp:
 
 @dataclass(frozen=True)
 class Outline:
-    """What closed curves enclose (core.model.outlines)."""
+    """A matte inside closed curves (core/model/outlines.py)."""
 
     curves: Curves
 
     def values(self, width: int, height: int) -> np.ndarray:
-        """As Ramp.values."""
+        """Return (height, width) float32, 0 to 1, top row first."""
         return coverage(self.curves, width, height)
 
 
@@ -141,11 +156,13 @@ Content = FileFrame | Ramp | Outline | MaskShape
 class Matte:
     """A matte at one frame.
 
-    shutter: index of the shutter that gets its values as coefficients
-    opacity: 0 to 1, what they are multiplied by, once they are inverted
-    feather: over what part of the picture's height a hard edge is spread
-    blend: "over": what is beneath shares the rest; "add": the default shutter alone gives what the matte takes, so that
-    mattes which add up to 1 stand side by side"""
+    Attributes:
+        shutter: Index of the shutter whose coefficients the values are.
+        opacity: 0 to 1, a factor after inversion.
+        feather: The width of a hard edge, as a fraction of the picture's height.
+        blend: "over" leaves the rest to what is beneath. "add" takes only from the default shutter, so that mattes that
+            add up to 1 stand side by side.
+    """
 
     shutter: int
     content: Content
@@ -156,23 +173,31 @@ class Matte:
 
 
 class MatteReader(Protocol):
-    """What makes values of mattes. It keeps files open, and the last values of each."""
+    """A reader of mattes' values, which keeps files open and the last values of each."""
 
     def values(self, mattes: tuple[Matte, ...], index: int, block: int) -> list[tuple[Hashable, np.ndarray]]:
-        """Of each matte, at a frame of the source, its values (h, w) float32, 0 to 1, of pixels, or of blocks of block
-        × block pixels, without its opacity; and a key that is equal for equal values. One of UserError."""
+        """Return for each matte a key that is equal for equal values, and the values at a frame of the source.
+
+        Values are (h, w) float32, 0 to 1, per pixel or block of block × block pixels, without the opacity.
+
+        Raises:
+            UserError: They cannot be made.
+        """
 
     def another(self) -> MatteReader:
-        """A new one for the same pictures."""
+        """Return a new reader for the same pictures."""
 
     def close(self) -> None:
-        """Closes the files; they are opened again when they are needed."""
+        """Close the files. They are reopened when needed."""
 
 
 def blended(coefficients: np.ndarray, mattes: tuple[Matte, ...], values: Sequence[np.ndarray]) -> np.ndarray:
-    """Coefficients (N, h, w), Σ = 1, with mattes laid over them: c ← (1 − m) c + m e for the matte's shutter e.
+    """Lay mattes over coefficients, Σ = 1: c ← (1 − m) c + m e for the matte's shutter e.
 
-    coefficients: (N, h, w), or (N, 1, 1) for those of the whole picture; values: of each matte (h, w), 0 to 1"""
+    Args:
+        coefficients: (N, h, w), or (N, 1, 1) if they are the same everywhere.
+        values: (h, w) of each matte, 0 to 1.
+    """
     result = np.array(np.broadcast_to(coefficients, (len(coefficients), *np.shape(values[0]))))
     for matte, value in zip(mattes, values, strict=True):
         share = value * result.dtype.type(matte.opacity)

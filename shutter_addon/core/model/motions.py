@@ -1,4 +1,4 @@
-"""How a region moves: its keyed numbers, what a motion of the picture makes of them, and which keys say so."""
+"""The motion of regions: placements, motions of the picture, and which keys are needed to describe them."""
 
 from __future__ import annotations
 
@@ -11,16 +11,16 @@ from typing import Literal, TypeVar
 
 import numpy as np
 
-# Of the directions in which a shape's farthest points are looked for: the others are farther by 1/2 % at most.
+# Directions in which a shape's farthest points are searched: any other point is at most 1/2 % farther.
 _DIRECTIONS = np.exp(1j * np.linspace(0, 2 * np.pi, 32, endpoint=False))
 
-# What of a motion counts beside the location.
+# What counts of a motion: its location, also its rotation, or also its scale.
 Motion = Literal["location", "rotation", "scale"]
 
 Size = tuple[int, int]  # width and height of a picture in pixels
 Points = TypeVar("Points", complex, np.ndarray)
 
-# From a pixel's corner to its middle.
+# The offset from a pixel's corner to its middle.
 _CORNER = 0.5 + 0.5j
 
 
@@ -28,7 +28,10 @@ _CORNER = 0.5 + 0.5j
 class Placement:
     """A region's keyed numbers at a frame, which act about its shape's centre (see scribbles.transform).
 
-    location: x, y in fractions of the picture, y up; rotation: degrees counter-clockwise"""
+    Attributes:
+        location: x, y in fractions of the picture, y up.
+        rotation: Degrees counter-clockwise.
+    """
 
     location: tuple[float, float] = (0.0, 0.0)
     rotation: float = 0.0
@@ -40,18 +43,20 @@ Placements = Mapping[int, Placement]  # by frame
 
 @dataclass(frozen=True)
 class Similarity:
-    """A motion of the picture that turns, scales and shifts it: z → turn·z + shift, where z = x + iy in pixels, y down,
-    whole numbers in the middle of a pixel."""
+    """A motion of the picture that turns, scales and shifts it: z → turn·z + shift.
+
+    z = x + iy in pixels, y down. Whole numbers are the middles of pixels.
+    """
 
     turn: complex = 1 + 0j
     shift: complex = 0j
 
     def __call__(self, points: Points) -> Points:
-        """Where a point, or an array of points, goes."""
+        """Return where points go."""
         return self.turn * points + self.shift
 
     def after(self, first: Similarity) -> Similarity:
-        """The motion of the first one and then this one."""
+        """Return the motion that applies `first` and then this one."""
         return Similarity(self.turn * first.turn, self(first.shift))
 
     def inverse(self) -> Similarity:
@@ -59,24 +64,24 @@ class Similarity:
 
 
 def centre(strokes: Iterable) -> np.ndarray:
-    """The centre (2,) of the strokes' common bounding box, about which they are scaled and turned."""
+    """Return the centre (2,) of the strokes' common bounding box, about which they scale and turn."""
     points = _points(strokes)
     return (points.min(axis=0) + points.max(axis=0)) / 2
 
 
-# The corners of the picture, in fractions of it.
+# The corners of the picture, as fractions.
 PICTURE = np.array([(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)])
 
 
 def corners(strokes: Iterable) -> np.ndarray:
-    """The corners (4, 2) of the strokes' common bounding box."""
+    """Return the corners (4, 2) of the strokes' common bounding box."""
     points = _points(strokes)
     (left, bottom), (right, top) = points.min(axis=0), points.max(axis=0)
     return np.array([(left, bottom), (right, bottom), (right, top), (left, top)])
 
 
 def offsets(strokes: Iterable) -> np.ndarray:
-    """The strokes' points (n, 2) from their centre on, in fractions of the picture."""
+    """Return the strokes' points (n, 2) relative to their centre, in fractions of the picture."""
     return _points(strokes) - centre(strokes)
 
 
@@ -85,21 +90,23 @@ def _points(strokes: Iterable) -> np.ndarray:
 
 
 def pixel(place: Sequence[float] | np.ndarray, size: Size) -> complex:
-    """A place in fractions of the picture, y up, in pixels of a size as Similarity counts them."""
+    """Convert fractions of the picture, y up, to pixels as in Similarity."""
     return complex(place[0] * size[0], (1 - place[1]) * size[1]) - _CORNER
 
 
 def fractions(pixel: complex, size: Size) -> tuple[float, float]:
-    """The place in fractions of the picture, y up, that is at a pixel."""
+    """Convert pixels as in Similarity to fractions of the picture, y up."""
     corner = pixel + _CORNER
     return corner.real / size[0], 1 - corner.imag / size[1]
 
 
 def carried(placement: Placement, motion: Similarity, before: np.ndarray, after: np.ndarray, size: Size) -> Placement:
-    """The placement of a shape after a motion of the picture.
+    """Return the placement of a shape after a motion of the picture.
 
-    before, after: centres (2,) of the shape as it is drawn when the motion begins and when it ends, fractions
-    size: of the picture whose pixels the motion counts"""
+    Args:
+        before, after: Centres (2,) of the drawn shape at the motion's start and end, in fractions.
+        size: Of the picture in which the motion is measured.
+    """
     x, y = fractions(motion(pixel(np.add(before, placement.location), size)), size)
     location = x - float(after[0]), y - float(after[1])
     rotation = placement.rotation - math.degrees(cmath.phase(motion.turn))
@@ -109,7 +116,7 @@ def carried(placement: Placement, motion: Similarity, before: np.ndarray, after:
 def motion_between(
     first: Placement, second: Placement, before: np.ndarray, after: np.ndarray, size: Size
 ) -> Similarity:
-    """The motion of the picture that takes a shape from one placement to another; arguments like those of `carried`."""
+    """Return the motion of the picture that takes a shape from one placement to another; the inverse of `carried`."""
     angle = math.radians(first.rotation - second.rotation)
     turn = cmath.rect(second.scale / first.scale, angle)
     start, end = (pixel(np.add(*each), size) for each in ((before, first.location), (after, second.location)))
@@ -117,39 +124,41 @@ def motion_between(
 
 
 def unwound(placement: Placement, near: Placement) -> Placement:
-    """The same placement, its rotation less than half a turn from another's: keys between them do not spin."""
+    """Return the placement with a rotation within half a turn of another's, so that keys between them do not spin."""
     turns = round((near.rotation - placement.rotation) / 360)
     return replace(placement, rotation=placement.rotation + 360 * turns)
 
 
 def between(first: Placement, second: Placement, share: float) -> Placement:
-    """A share 0 to 1 of the way from one placement to another, each number by itself, as between linear keys."""
+    """Return the placement a share 0 to 1 of the way between two, each number by itself, as between linear keys."""
     numbers = (1 - share) * _numbers([first]) + share * _numbers([second])
-    x, y, rotation, scale = (float(number) for number in numbers[0])
-    return Placement((x, y), rotation, scale)
+    return _placement(numbers[0])
 
 
 def only(placement: Placement, motion: Motion) -> Placement:
-    """What of a placement counts for a motion: what does not is as if it had never changed."""
+    """Return the part of a placement that counts for a motion."""
     rotation = 0.0 if motion == "location" else placement.rotation
     return Placement(placement.location, rotation, placement.scale if motion == "scale" else 1.0)
 
 
 def averaged(placements: Sequence[Placement], weights: np.ndarray) -> Placement:
-    """The mean of placements, each number by itself; weights (n,), Σ = 1."""
-    x, y, rotation, scale = (float(number) for number in weights @ _numbers(placements))
-    return Placement((x, y), rotation, scale)
+    """Return the mean of placements, each number by itself, with weights (n,), Σ = 1."""
+    return _placement(weights @ _numbers(placements))
 
 
 def thinned(
     placements: Placements, points: np.ndarray, size: Size, kept: Collection[float] = (), tolerance: float = 1.0
 ) -> list[int]:
-    """The frames, ascending, whose keys say the motion: with linear eases between these, no point of the shape is
-    farther than the tolerance from where it was.
+    """Return the frames, ascending, whose keys describe the motion.
 
-    Ramer, Douglas and Peucker's: where a span is off, it is split at the frame that is off most.
-    points: (n, 2) of the shape from its centre on (offsets)
-    size: of the picture whose pixels the tolerance counts; kept: frames that stay in any case"""
+    With linear eases between them, no point of the shape is off by more than the tolerance. A span that is off is split
+    at its worst frame (Ramer, Douglas, Peucker).
+
+    Args:
+        points: (n, 2) of the shape, from `offsets`.
+        size: Of the picture in whose pixels the tolerance is measured.
+        kept: Frames that always keep their keys.
+    """
     frames = sorted(placements)
     if len(frames) < 3:
         return frames
@@ -171,13 +180,20 @@ def thinned(
 
 
 def _numbers(placements: Sequence[Placement]) -> np.ndarray:
-    """Location, rotation and scale as an array (n, 4)."""
+    """Return location, rotation and scale as an array (n, 4)."""
     return np.array([(*p.location, p.rotation, p.scale) for p in placements], dtype=np.float64)
 
 
+def _placement(numbers: np.ndarray) -> Placement:
+    x, y, rotation, scale = numbers.tolist()
+    return Placement((x, y), rotation, scale)
+
+
 def _farthest(points: np.ndarray) -> np.ndarray:
-    """Those of the points (n, 2) that are farthest in some direction, as complex numbers: no other moves more by a
-    change of the shape's placement."""
+    """Return those of the points (n, 2) that are farthest in some direction, as complex numbers.
+
+    No other point moves more when the shape's placement changes.
+    """
     plane = points[:, 0] + 1j * points[:, 1]
     if len(plane) <= len(_DIRECTIONS):
         return plane
@@ -185,8 +201,7 @@ def _farthest(points: np.ndarray) -> np.ndarray:
 
 
 def _distances(frames: np.ndarray, numbers: np.ndarray, points: np.ndarray, size: Size) -> np.ndarray:
-    """How far in pixels a shape's points lie at most, at each frame, from where linear keys at the first and the last
-    frame put them."""
+    """Return by how many pixels a shape's points are off at most, at each frame, with keys only at the ends."""
     share = ((frames - frames[0]) / (frames[-1] - frames[0]))[:, None]
     straight = (1 - share) * numbers[0] + share * numbers[-1]
     (x, y), (turn, other) = ((numbers - straight)[:, :2] * size).T, (_turns(numbers), _turns(straight))

@@ -1,5 +1,5 @@
-"""Outlines: closed curves, how much of each pixel they enclose, and how those of some frames go into each other: as
-chains of curves whose number of points stays, which splines with shape keys are."""
+"""Outlines: closed curves, their coverage of pixels, and chains of curves from frame to frame with a constant number of
+points, as splines with shape keys need."""
 
 from __future__ import annotations
 
@@ -11,29 +11,34 @@ import numpy as np
 from .. import scanlines, stopping
 from . import scribbles
 
-# Lines of each row of pixels on which coverage is exact.
+# Lines per row of pixels on which coverage is exact.
 LINES = 8
-_CROSSINGS = 1 << 22  # of curves with lines that are looked at at once: some 300 MB of memory
-_PULLED = 12  # points at least, of either side of a curve that is pulled
-_NEAR = 0.005  # parts of the picture's height, within which it is known how near a curve is
-ALIKE = 0.1  # how much two curves have in common, from 0 to 1, from which on one goes into the other
-FAR = 2.0  # of both their radii, taken for circles: what is farther apart has nothing in common
-_LINES = 128  # rows of the picture in which that is measured
-_STEP, _POINTS = 0.008, (12, 256)  # parts of the picture's height from point to point; how many these may be
+_CROSSINGS = 1 << 22  # crossings of curves with lines that are computed at once, in about 300 MB of memory
+_PULLED = 12  # the fewest points on either side of a curve that is pulled
+_NEAR = 0.005  # accuracy of distances to curves, in heights of the picture
+ALIKE = 0.1  # the similarity of two curves, 0 to 1, from which on one continues the other
+FAR = 2.0  # in sums of radii, as of circles: curves that are farther apart have no similarity
+_LINES = 128  # rows of the pictures in which similarity is measured
+_STEP, _POINTS = 0.008, (12, 256)  # the distance of points in heights of the picture; limits of their number
 
 Curves = tuple[tuple[tuple[float, float], ...], ...]  # hashable strokes: fractions of the picture, y up
-# What a curve encloses: its middle (2,) in heights of the picture, and (rows, columns) 0 to 1, moved to the picture's.
+# Inside of a curve: its middle (2,) in heights of the picture, and its coverage (rows, columns), moved to the centre.
 _Shape = tuple[np.ndarray, np.ndarray]
 
 
 def curves(strokes: Sequence[np.ndarray]) -> Curves:
-    """Strokes (n, 2) as plain tuples."""
+    """Return strokes (n, 2) as tuples."""
     return tuple(tuple((float(x), float(y)) for x, y in stroke) for stroke in strokes)
 
 
 def coverage(strokes: Sequence, width: int, height: int) -> np.ndarray:
-    """The share (height, width) float32, 0 to 1, of each pixel that closed curves enclose, the top row first; what two
-    of them enclose lies outside (even-odd). strokes: (n, 2) in fractions of the picture, y up"""
+    """Return the share (height, width) float32, 0 to 1, of each pixel that is inside closed curves, the top row first.
+
+    Where two curves overlap is outside (even-odd).
+
+    Args:
+        strokes: (n, 2) in fractions of the picture, y up.
+    """
     rows, bands = max(_CROSSINGS // (LINES * max(sum(map(len, strokes)), 1)), 1), []
     for top in range(0, height, rows):
         stopping.check()
@@ -42,7 +47,7 @@ def coverage(strokes: Sequence, width: int, height: int) -> np.ndarray:
 
 
 def _covered(strokes: Sequence, width: int, height: int, band: range) -> np.ndarray:
-    """The coverage of the rows of a band."""
+    """Return the coverage of a band of rows."""
     lines, scale = range(band.start * LINES, band.stop * LINES), (width, -height * LINES)
     curves = [np.asarray(stroke, np.float64) * scale + (0, height * LINES) for stroke in strokes if len(stroke) > 2]
     _, rows, places = scanlines.crossings(*scanlines.edges(curves), lines)
@@ -52,7 +57,7 @@ def _covered(strokes: Sequence, width: int, height: int, band: range) -> np.ndar
     rank = np.arange(len(rows)) - np.searchsorted(rows, rows)
     signs = np.where(rank % 2 == 0, 1.0, -1.0) / LINES
     columns = np.minimum(places.astype(np.intp), width - 1)
-    beyond = places - columns  # the share of that pixel that lies before the crossing
+    beyond = places - columns  # the share of the pixel before the crossing
     changes = np.zeros((len(band), width + 1))
     np.add.at(changes, (rows // LINES, columns), signs * (1 - beyond))
     np.add.at(changes, (rows // LINES, columns + 1), signs * beyond)
@@ -60,8 +65,14 @@ def _covered(strokes: Sequence, width: int, height: int, band: range) -> np.ndar
 
 
 def nearest(shapes: Curves, point: tuple[float, float], aspect: float) -> tuple[int, float]:
-    """Which of some curves comes nearest to a point, and how near: in parts of the picture's height. ValueError: there
-    is none. aspect: the picture's width over its height"""
+    """Return the index of the curve that is nearest to a point, and its distance in heights of the picture.
+
+    Args:
+        aspect: The picture's width / height.
+
+    Raises:
+        ValueError: There is no curve.
+    """
     apart = [_apart(_finer(shape, aspect, _NEAR)[0], point, aspect).min() for shape in shapes]
     index = int(np.argmin(apart))
     return index, float(apart[index])
@@ -70,24 +81,28 @@ def nearest(shapes: Curves, point: tuple[float, float], aspect: float) -> tuple[
 def dragged(
     shapes: Curves, index: int, grabbed: tuple[float, float], by: tuple[float, float], reach: float, aspect: float
 ) -> Curves:
-    """Curves, one of which is pulled: where it comes nearest to the point `grabbed`, it moves `by` as much, and less
-    and less along its way, up to `reach`.
+    """Return curves after pulling one of them.
 
-    index: which one; grabbed, by: fractions of the picture, y up; reach: in parts of its height, along the curve"""
+    The curve's nearest place to `grabbed` moves `by` as much, and its neighbourhood less and less, up to `reach`.
+
+    Args:
+        index: Of the pulled curve.
+        grabbed, by: Fractions of the picture, y up.
+        reach: Heights of the picture, along the curve.
+    """
     points, own = _finer(shapes[index], aspect, reach / _PULLED)
     start = int(_apart(points, grabbed, aspect).argmin())
     points, own = np.roll(points, -start, axis=0), np.roll(own, -start)
     steps = np.hypot(*(np.diff(points, axis=0, append=points[:1]) * (aspect, 1)).T)
     along = np.concatenate([[0.0], np.cumsum(steps)])
-    way = np.minimum(along[:-1], along[-1] - along[:-1])  # from the start, whichever way is shorter
+    way = np.minimum(along[:-1], along[-1] - along[:-1])  # from the start, in the shorter direction
     share = np.square(1 - np.minimum(way / reach, 1) ** 2)
     moved = (points + share[:, None] * by)[own | (share > 0)]
     return tuple(curves([moved])[0] if i == index else shape for i, shape in enumerate(shapes))
 
 
 def _finer(shape: Sequence, aspect: float, most: float) -> tuple[np.ndarray, np.ndarray]:
-    """Points (n, 2) of a closed curve, with more of them where two are farther apart than `most`, in parts of the
-    picture's height; and which (n,) are its own."""
+    """Add points to a closed curve: return points (n, 2), at most `most` heights apart, and which (n,) are original."""
     points = np.asarray(shape, dtype=np.float64)
     ends = np.roll(points, -1, axis=0)
     counts = np.ceil(np.hypot(*((ends - points) * (aspect, 1)).T) / most).astype(int).clip(1)
@@ -97,15 +112,18 @@ def _finer(shape: Sequence, aspect: float, most: float) -> tuple[np.ndarray, np.
 
 
 def _apart(points: np.ndarray, point: tuple[float, float], aspect: float) -> np.ndarray:
-    """How far points (n, 2) are from one, in parts of the picture's height."""
+    """Return the distances of points (n, 2) from another one, in heights of the picture."""
     return np.hypot(*((points - point) * (aspect, 1)).T)
 
 
 class Chain(NamedTuple):
-    """A curve that goes from frame to frame.
+    """A curve that continues from frame to frame.
 
-    frames: ascending; points: (frames, points, 2) float64, fractions of the picture, y up
-    gone: the first of all frames from which on it is not there; None: it stays"""
+    Attributes:
+        frames: Ascending.
+        points: (frames, points, 2) float64, fractions of the picture, y up.
+        gone: The first frame without the curve; None: it stays.
+    """
 
     frames: tuple[int, ...]
     points: np.ndarray
@@ -113,8 +131,11 @@ class Chain(NamedTuple):
 
 
 def chains(drawn: Sequence[tuple[int, Curves]], aspect: float) -> list[Chain]:
-    """Chains of all curves of some frames, which ascend: a curve goes on as the one of the next frame with which it
-    has most in common. aspect: the picture's width over its height"""
+    """Return chains of the curves of ascending frames: a curve continues as the most similar one of the next frame.
+
+    Args:
+        aspect: The picture's width / height.
+    """
     open_ones: list[list[tuple[int, np.ndarray]]] = []
     found: list[tuple[list[tuple[int, np.ndarray]], int | None]] = []
     for frame, curves in drawn:
@@ -128,7 +149,7 @@ def chains(drawn: Sequence[tuple[int, Curves]], aspect: float) -> list[Chain]:
 
 
 def _pairs(before: list[np.ndarray], after: list[np.ndarray], aspect: float) -> dict[int, int]:
-    """Which curve goes into which, those first that have most in common."""
+    """Pair similar curves, the most similar ones first; return indices by indices."""
     shapes = [[_shape(curve, aspect) for curve in curves] for curves in (before, after)]
     alike = {(i, j): _alike(a, b) for i, a in enumerate(shapes[0]) for j, b in enumerate(shapes[1])}
     pairs: dict[int, int] = {}
@@ -145,7 +166,7 @@ def _shape(curve: np.ndarray, aspect: float) -> _Shape:
 
 
 def _alike(one: _Shape, other: _Shape) -> float:
-    """How much two shapes have in common, from 0 to 1: of what they enclose, and of where."""
+    """Return the similarity of two shapes, 0 to 1, in area and place."""
     (middle, inside), (other_middle, other_inside) = one, other
     reach = sum(np.sqrt(each.sum() / np.pi) / _LINES for each in (inside, other_inside)) * FAR
     if reach == 0:
@@ -155,7 +176,7 @@ def _alike(one: _Shape, other: _Shape) -> float:
 
 
 def _turned(curve: np.ndarray) -> np.ndarray:
-    """Counter-clockwise."""
+    """Return the curve in counter-clockwise order."""
     x, y = curve.T
     return curve if np.dot(x, np.roll(y, -1)) >= np.dot(y, np.roll(x, -1)) else curve[::-1]
 
@@ -171,7 +192,7 @@ def _chain(curves: list[tuple[int, np.ndarray]], gone: int | None, aspect: float
 
 
 def _aligned(before: np.ndarray, curve: np.ndarray, aspect: float) -> np.ndarray:
-    """The points of a curve, from that on which is best to begin with, for each to lie near that of the one before."""
+    """Rotate the order of a curve's points so that each is near that of the curve before."""
     fixed, moved = ((points - points.mean(axis=0)) * (aspect, 1) for points in (before, curve))
     alike = sum(np.fft.irfft(np.conj(np.fft.rfft(fixed[:, k])) * np.fft.rfft(moved[:, k]), len(curve)) for k in (0, 1))
     return np.roll(curve, -int(np.argmax(alike)), axis=0)

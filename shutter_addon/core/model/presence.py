@@ -1,5 +1,5 @@
-"""How much what is tracked counts over time: nothing where its track has ended, all where it is followed, and fading
-in between, while it is still where it was seen."""
+"""Fading of tracked regions: keys that are 0 where a track has ended, 1 where it is followed, and fade in between, at
+frames where the region is still visible."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ FADE = 5
 
 
 class Stop(NamedTuple):
-    """Where a track ended: frame, the first without it in that direction; is_cut: the shot ends there."""
+    """The end of a track: the first frame without it in that direction, and whether the shot ends there."""
 
     frame: int
     is_forward: bool
@@ -23,7 +23,7 @@ class Stop(NamedTuple):
 
 
 class Key(NamedTuple):
-    """value: 0 or 1; ease: of the span that it starts, in a recipe's words"""
+    """A key: value 0 or 1, and the ease until the next key, as in recipes."""
 
     frame: int
     value: float
@@ -31,8 +31,7 @@ class Key(NamedTuple):
 
 
 class Gap(NamedTuple):
-    """Frames at which nothing is there, from the first to the last, perhaps without an end; hard: whether it begins,
-    and ends, at a cut."""
+    """Frames without the subject, first to last, possibly infinite; hard: whether an end is at a cut."""
 
     first: float
     last: float
@@ -46,14 +45,15 @@ _NONE_LATER = Gap(first=math.inf, last=math.inf)
 def keys(
     seen: Collection[int], stops: Iterable[Stop], kept: Collection[int], fade: int = FADE, beside: int = 0
 ) -> list[Key]:
-    """Keys of how much something counts, ascending; none where its track has no end.
+    """Return keys, ascending, of how much a subject counts; none if its track has no end.
 
-    seen: the frames at which it was found. A gap goes from a stop to the next of them; a stop at one of them, behind
-    which it is found by another way, is as long as that frame
-    kept: frames at which all of it counts, if only one beside a gap
-    fade: frames over which it comes and goes, fewer between gaps that are close; at a cut it does so at once, as a fade
-    would show there
-    beside: frames on each side of a gap at which it counts for nothing as well"""
+    Args:
+        seen: Frames where the subject was found. A gap lasts from a stop to the next of them. A stop at one of them, as
+            other tracks have found it, is only that frame.
+        kept: Frames that keep the value 1, even next to a gap.
+        fade: Frames of a fade, fewer between close gaps. At cuts the value jumps.
+        beside: Frames on each side of a gap with the value 0, too.
+    """
     changes: list[Key] = []
     before = -math.inf
     for gap, following in pairwise([*gaps(seen, stops, beside), _NONE_LATER]):
@@ -71,13 +71,13 @@ def keys(
             changes.append(Key(int(gap.last), 0.0, "constant" if gap.hard_last else "linear"))
             changes.append(Key(int(gap.last) + length, 1.0, "constant"))
         before = gap.last
-    # Of two at the same frame the later one counts.
+    # The later of two keys at the same frame counts.
     places = {key.frame: place for place, key in enumerate(changes)}
     return [changes[place] for place in sorted(places.values())]
 
 
 def gaps(seen: Collection[int], stops: Iterable[Stop], beside: int = 0) -> list[Gap]:
-    """Where nothing is there, ascending and apart; arguments like those of `keys`."""
+    """Return gaps, ascending and separate, for arguments as in `keys`."""
     merged: list[Gap] = []
     for each in sorted(_gap(seen, stop) for stop in stops):
         gap = each._replace(first=each.first - beside, last=each.last + beside)

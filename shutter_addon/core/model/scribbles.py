@@ -1,7 +1,7 @@
-"""Scribbles: strokes over time, how they move, and the label image they leave (paper §3.3).
+"""Scribbles: strokes over time, their motion, and the label image that they make (paper §3.3).
 
-Points are fractions of the picture, x to the right and y up from the lower left corner; widths are fractions
-of its height. Pictures here have their top row first.
+Points are fractions of the picture, x to the right and y up from the lower left corner; widths are fractions of its
+height. Pictures here have their top row first.
 """
 
 from __future__ import annotations
@@ -19,19 +19,19 @@ from . import keyframes, limits, motions
 from .keyframes import Channel
 from .motions import Placement
 
-# A line never gets thinner than this radius in pixels: a 5-point diffusion would leak through it.
+# The smallest radius of a line in pixels: a 5-point diffusion would leak through a thinner one.
 _MIN_RADIUS = 0.7072
 # Long segments are cut to this many pixels, so that the box around each stays small.
 _MAX_SEGMENT = 128.0
-# In pixels, far beyond all that limits.py allows: from here on float64 could not say where a line crosses the picture.
+# In pixels, far beyond the limits of limits.py: float64 cannot locate a line's crossing with the picture from there on.
 _FARTHEST = 1e12
 FREE = 0
-_FAR = 'region "{name}": a point of its strokes is nowhere near the picture'
+_FAR = 'region "{name}": a point of its strokes is too far from the picture'
 
 
 @dataclass(frozen=True)
 class Shape:
-    """A region as it stands at one frame: strokes (n, 2) already moved, and the index of its shutter."""
+    """A region at one frame: moved strokes (n, 2) and the index of its shutter."""
 
     shutter: int
     kind: str  # line | lasso
@@ -41,16 +41,21 @@ class Shape:
 
 
 def layers(shapes: Collection[Shape]) -> list[tuple[float, tuple[Shape, ...]]]:
-    """What coefficients are the mean of where shapes are not quite opaque: shares, which add up to 1, each with the
-    shapes that hold in it; the first has all that hold anywhere. So coefficients at an opacity of one half are halfway
-    between those with the shape and those without it, and nothing jumps where it goes."""
+    """Split shapes with opacities into opaque sets.
+
+    Coefficients are the mean of those of the sets, weighted by the returned shares, which add up to 1. So at an opacity
+    of one half, coefficients are halfway between those with and without the shape. The first set has all shapes.
+    """
     steps = sorted({0.0, 1.0, *(shape.opacity for shape in shapes)})
     return [(high - low, tuple(s for s in shapes if s.opacity >= high)) for low, high in pairwise(steps)]
 
 
 def resample(stroke: ArrayLike, count: int, aspect: float = 1.0) -> np.ndarray:
-    """`count` points (count, 2) at equal arc lengths along a stroke (n, 2), its ends kept. aspect: the picture's width
-    over its height, by which lengths are measured."""
+    """Return `count` points (count, 2) at equal arc lengths along a stroke (n, 2), with the same ends.
+
+    Args:
+        aspect: The picture's width / height, for measuring lengths.
+    """
     stroke = np.asarray(stroke, dtype=np.float64)
     steps = np.hypot(*(np.diff(stroke, axis=0) * (aspect, 1)).T) if len(stroke) > 1 else np.zeros(0)
     length = np.concatenate([[0.0], np.cumsum(steps)])
@@ -63,10 +68,10 @@ def resample(stroke: ArrayLike, count: int, aspect: float = 1.0) -> np.ndarray:
 def between_strokes(
     first: Sequence[ArrayLike], second: Sequence[ArrayLike], u: float, aspect: float = 1.0
 ) -> list[np.ndarray]:
-    """Strokes a share u of the way from one drawing to the next, paired in order.
+    """Return strokes a share u of the way from one drawing to the next, paired in order.
 
-    Strokes of the same number of points move point by point, others by arc length (aspect: see `resample`). A stroke
-    without a partner stays as it is until the next drawing.
+    Strokes with equal numbers of points move point by point, others by arc length. A stroke without a partner stays
+    until the next drawing.
     """
     if u <= 0:
         return [np.asarray(s, dtype=np.float64) for s in first]
@@ -85,15 +90,19 @@ def between_strokes(
 
 
 def mapped(matrix: np.ndarray, points: np.ndarray) -> np.ndarray:
-    """Points (n, 2) through a matrix (3, 3)."""
+    """Apply a matrix (3, 3) to points (n, 2)."""
     return points @ matrix[:2, :2].T + matrix[:2, 2]
 
 
 def transform(
     strokes: Iterable[ArrayLike], location: ArrayLike, rotation: float, scale: float, aspect: float
 ) -> tuple[np.ndarray, ...]:
-    """Strokes scaled, turned by `rotation` degrees counter-clockwise about the centre of their common bounding
-    box, and moved by `location` (fractions). `aspect` is the picture's width over its height: circles stay round.
+    """Return strokes scaled, turned and moved about the centre of their common bounding box.
+
+    Args:
+        location: Fractions of the picture.
+        rotation: Degrees counter-clockwise.
+        aspect: The picture's width / height, so that circles stay round.
     """
     strokes = [np.asarray(s, dtype=np.float64) for s in strokes]
     if not strokes:
@@ -107,22 +116,26 @@ def transform(
 def taken_back(
     strokes: Iterable[ArrayLike], location: ArrayLike, rotation: float, scale: float, aspect: float
 ) -> tuple[np.ndarray, ...]:
-    """The strokes that `transform` takes to these."""
+    """Invert `transform`."""
     strokes = tuple(np.asarray(s, dtype=np.float64) for s in strokes)
-    turned = transform(strokes, (0, 0), -rotation, 1 / scale, aspect)  # about another centre, perhaps
+    turned = transform(strokes, (0, 0), -rotation, 1 / scale, aspect)  # the centre may differ
     (there, *_) = transform(turned, location, rotation, scale, aspect)
     return tuple(points + (np.asarray(strokes[0]) - there)[0] for points in turned)
 
 
 @dataclass(frozen=True)
 class Drawings:
-    """A region's strokes over time, before it is moved: drawings at ascending frames, each a list of strokes (n, 2); in
-    between every stroke goes from one drawing to the next with the ease of the span.
+    """A region's strokes over time, before the region's motion.
 
-    name: the region's; aspect: the picture's width over its height
-    placement: channel of the matrix (3, 3) from the strokes' space to fractions of the picture, or of None where they
-    are not on it; without one, strokes are fractions of the picture
-    origins: where the region was as each was drawn, which is seen there; none: where it has not moved"""
+    Drawings are lists of strokes (n, 2) at ascending frames. In between, strokes go from one drawing to the next.
+
+    Attributes:
+        name: The region's.
+        aspect: The picture's width / height.
+        placement: Channel of the matrix (3, 3) from the strokes' space to fractions of the picture, or of None where
+            the strokes are not visible. Without a channel, strokes are fractions of the picture.
+        origins: Where the region was when each drawing was made, which shows the drawing in place; empty: not moved.
+    """
 
     name: str
     frames: tuple[float, ...]
@@ -133,28 +146,28 @@ class Drawings:
     origins: tuple[Placement, ...] = ()
 
     def at(self, frame: float) -> list[np.ndarray]:
-        """Strokes (n, 2) in fractions of the picture. EffectError: a point is nowhere near it (limits.MAX_DISTANCE)."""
+        """Return strokes (n, 2) in fractions of the picture. EffectError: they are beyond limits.MAX_DISTANCE."""
         if not self.frames:
             return []
         before, after, share = keyframes.eased_span(self.frames, self.eases, frame)
         return between_strokes(self.drawing(before, frame), self.drawing(after, frame), share, self.aspect)
 
     def moved(self, frame: float, placed: Placement) -> tuple[np.ndarray, ...]:
-        """As `at`, moved about the centre of what is drawn."""
+        """Return strokes like `at`, moved about their centre."""
         return transform(self.at(frame), placed.location, placed.rotation, placed.scale, self.aspect)
 
     def centre(self, frame: float) -> np.ndarray | None:
-        """See Subject."""
+        """Return what Subject.centre returns."""
         strokes = self.at(frame)
         return motions.centre(strokes) if strokes else None
 
     def corners(self, frame: float, placed: Placement) -> np.ndarray:
-        """See Subject; placed: where it lies at the frame."""
+        """Return what Subject.corners returns, for a placement at the frame."""
         strokes = self.moved(frame, placed)
         return motions.corners(strokes) if strokes else np.empty((0, 2))
 
     def drawing(self, index: int, frame: float) -> list[np.ndarray]:
-        """The strokes of a drawing as they lie on the picture at a frame; raises as `at`."""
+        """Return the strokes of a drawing as they lie on the picture at a frame. EffectError: as for `at`."""
         if self.placement is None:
             return self.strokes[index]
         if (placement := self.placement.at(frame)) is None:
@@ -169,9 +182,9 @@ class Drawings:
 
 
 def rasterise(shapes: Iterable[Shape], width: int, height: int, *, border: bool = False) -> np.ndarray:
-    """Labels (height, width) uint16: 0 where free, 1 + shutter where a shape covers the pixel's centre.
+    """Return labels (height, width) uint16: 0 where free, 1 + shutter where a shape covers the pixel's centre.
 
-    Later shapes win. `border` fixes the frame's edge to the first shutter, under every shape.
+    Later shapes win. `border` labels the frame's edge with the first shutter, under every shape.
     """
     labels = np.zeros((height, width), dtype=np.uint16)
     if border:
@@ -183,7 +196,7 @@ def rasterise(shapes: Iterable[Shape], width: int, height: int, *, border: bool 
                 continue
             pixels = np.clip(np.asarray(stroke, dtype=np.float64) * size, -_FARTHEST, _FARTHEST)
             pixels[:, 1] = height - pixels[:, 1]
-            # A hand-drawn lasso crosses itself: even-odd would leave holes in it.
+            # A hand-drawn lasso crosses itself, and even-odd would leave holes in it.
             filled = shape.kind == "lasso" and scanlines.fill(labels, [pixels], shape.shutter + 1)
             if not filled:
                 _draw(labels, pixels, shape.width * height / 2 if shape.kind == "line" else 0, shape.shutter + 1)
@@ -191,7 +204,7 @@ def rasterise(shapes: Iterable[Shape], width: int, height: int, *, border: bool 
 
 
 def _draw(labels: np.ndarray, points: np.ndarray, radius: float, label: int) -> None:
-    """Labels the pixels within `radius` of a polyline in pixels, y down."""
+    """Label the pixels within `radius` of a polyline in pixels, y down."""
     radius = max(radius, _MIN_RADIUS)
     if len(points) == 1:
         points = np.repeat(points, 2, axis=0)
@@ -207,12 +220,19 @@ def _draw(labels: np.ndarray, points: np.ndarray, radius: float, label: int) -> 
 
 
 def _seen(starts: np.ndarray, steps: np.ndarray, size: np.ndarray, reach: float) -> np.ndarray:
-    """The shares (2, n) of segments between which they are within `reach` of a picture of this size (x, y), in either
-    direction; the first is above the second where they are nowhere. starts, steps: (n, 2) in pixels."""
+    """Return the shares (2, n) of segments between which they are near a picture of this size (x, y).
+
+    Args:
+        starts, steps: (n, 2) in pixels.
+        reach: The distance that counts as near, in either direction.
+
+    Returns:
+        Where a segment is nowhere near, its first share is above its second.
+    """
     inside = (starts >= -reach) & (starts <= size + reach)
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         low, high = np.sort([(-reach - starts) / steps, (size + reach - starts) / steps], axis=0)
-    # Along an axis that it does not move on, a segment is inside throughout, or nowhere.
+    # Along an axis on which it does not move, a segment is either always inside or never.
     low[steps == 0], high[steps == 0] = 0, np.where(inside, 1, -1)[steps == 0]
     return np.stack([low.max(axis=1, initial=0), high.min(axis=1, initial=1)])
 
@@ -223,7 +243,7 @@ def _draw_segment(labels: np.ndarray, a: np.ndarray, b: np.ndarray, radius: floa
     low = np.clip(np.floor(np.minimum(a, b) - radius), 0, limit).astype(int)
     high = np.clip(np.ceil(np.maximum(a, b) + radius), 0, limit).astype(int)
     box = labels[low[1] : high[1], low[0] : high[0]]
-    if (box == label).all():  # or there is none; a thick line's segments cover one another
+    if (box == label).all():  # also for an empty box; segments of a thick line overlap
         return
     x = np.arange(low[0], high[0]) + 0.5 - a[0]
     y = (np.arange(low[1], high[1]) + 0.5 - a[1])[:, None]

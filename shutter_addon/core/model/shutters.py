@@ -1,10 +1,10 @@
 """Shutters: bars, exposure, accumulation, quantile, and their interpolation (paper §3.1, §3.2, §3.4.1).
 
-A shutter is an array of L bars ≥ 0, one per source frame of the window. Its exposure is e = Σ bars, its
-normalised accumulation S is piecewise linear on [0, L] and rises from 0 to 1, its quantile S⁻¹ maps z in
-[0, 1] to a time in [0, L]. Everything here is exact, in float64: the reference of every device.
+A shutter is an array of L bars ≥ 0, one per source frame of the window. Its exposure is e = Σ bars. Its normalised
+accumulation S is piecewise linear on [0, L] and rises from 0 to 1. Its quantile S⁻¹ maps z in [0, 1] to a time in
+[0, L]. Everything here is exact, in float64, and the reference of every device.
 
-Shutters by name, the presets, make L bars in [0, 1] from a window length and a few parameters.
+Presets make L bars in [0, 1] from a window length and a few parameters.
 """
 
 from __future__ import annotations
@@ -21,20 +21,25 @@ from .limits import MAX_BAR, MIN_EXPOSURE
 
 MAX_WINDOW = 256
 
-# Levels of z closer than this are one: float rounding of equal sums, far below any visible weight.
+# Levels of z closer than this are equal: far below any visible weight, but above float rounding.
 _SAME = 1e-12
-# Of an exposure: where bars go from key to key, rounding may leave as much in a bar that is closed.
+# As a fraction of the exposure: interpolation of bars may leave this much in a closed bar by rounding.
 _CLOSED = 1e-9
-_SEEN = 1 / 255  # of the largest bar: less light in other moments is not seen
+_SEEN = 1 / 255  # of the largest bar: less light in other moments is invisible
 
 
 class ShutterError(ValueError):
-    """Bars that are no shutter; the message is one sentence for the user."""
+    """Bars are not a shutter. The message is one sentence for the user."""
 
 
 def check_bars(bars: ArrayLike) -> np.ndarray:
-    """Bars as a float64 array (L,), or ShutterError: 1 to 256 numbers from 0 to a million, a millionth together or
-    more. What counts is what they are as float32: Blender has no others."""
+    """Return bars as a float64 array (L,): 1 to 256 numbers from 0 to a million, with a sum of at least a millionth.
+
+    The sum counts as float32, since Blender has no other numbers.
+
+    Raises:
+        ShutterError: The bars are invalid.
+    """
     bars = np.asarray(bars, dtype=np.float64)
     if bars.ndim != 1 or not 1 <= len(bars) <= MAX_WINDOW:
         raise ShutterError(f"a shutter has 1 to {MAX_WINDOW} bars, not {bars.size}")
@@ -52,12 +57,12 @@ def check_bars(bars: ArrayLike) -> np.ndarray:
 
 
 def exposure(bars: ArrayLike) -> float:
-    """e(s) = Σ bars: the open time in frames."""
+    """Return e = Σ bars: the open time in frames."""
     return float(np.asarray(bars).sum())
 
 
 def accumulation(bars: ArrayLike) -> np.ndarray:
-    """S at the L + 1 frame boundaries, float64, from 0 to exactly 1. Bars as in `check_bars`."""
+    """Return S at the L + 1 frame boundaries, float64, from 0 to exactly 1, for bars as in `check_bars`."""
     sums = np.concatenate([[0.0], np.cumsum(np.asarray(bars, dtype=np.float64))])
     return sums / sums[-1]
 
@@ -66,8 +71,8 @@ def accumulation(bars: ArrayLike) -> np.ndarray:
 class Quantile:
     """S⁻¹ as linear pieces between the levels z (K + 1,), 0 to 1.
 
-    Piece k runs from time start[k] at z[k] to end[k] at z[k + 1]; where end[k] < start[k + 1] the shutter is
-    closed in between and S⁻¹ jumps. start and end have shape (K,), or (K, N) for N shutters on common levels.
+    Piece k runs from time start[k] at z[k] to end[k] at z[k + 1]. Where end[k] < start[k + 1], the shutter is closed in
+    between and S⁻¹ jumps. start and end have shape (K,), or (K, N) for N shutters on common levels.
     """
 
     z: np.ndarray
@@ -76,7 +81,7 @@ class Quantile:
 
 
 def quantile(bars: ArrayLike) -> Quantile:
-    """The quantile of one shutter: a piece per open bar."""
+    """Return the quantile of one shutter: a piece per open bar."""
     total = accumulation(bars)
     is_open = np.diff(total) > 0
     frames = np.flatnonzero(is_open).astype(np.float64)
@@ -85,10 +90,10 @@ def quantile(bars: ArrayLike) -> Quantile:
 
 
 def knots(shutters: ArrayLike) -> Quantile:
-    """The quantiles of N shutters (N, L) on the union of their levels; start and end have shape (K, N).
+    """Return the quantiles of N shutters (N, L) on the union of their levels; start and end have shape (K, N).
 
-    The levels do not depend on the coefficients c: a pixel's quantile on piece k runs from c·start[k] to
-    c·end[k]. Levels at which no shutter jumps or bends are left out (a box has one piece, whatever its length).
+    The levels do not depend on the coefficients c: a pixel's quantile on piece k runs from c·start[k] to c·end[k].
+    Levels where no shutter jumps or bends are left out: a box has one piece, whatever its length.
     """
     parts = [quantile(bars) for bars in np.atleast_2d(shutters)]
     levels = np.unique(np.concatenate([part.z for part in parts]))
@@ -104,7 +109,7 @@ def knots(shutters: ArrayLike) -> Quantile:
 
 
 def _on_levels(part: Quantile, levels: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Start and end times of one quantile between common levels, which contain its own within rounding."""
+    """Return the start and end times of a quantile between common levels, which contain its own within rounding."""
     middle = (levels[:-1] + levels[1:]) / 2
     piece = np.clip(np.searchsorted(part.z, middle) - 1, 0, len(part.start) - 1)
     z0, z1 = part.z[piece], part.z[piece + 1]
@@ -115,7 +120,7 @@ def _on_levels(part: Quantile, levels: np.ndarray) -> tuple[np.ndarray, np.ndarr
 
 
 def _bends(levels: np.ndarray, start: np.ndarray, end: np.ndarray) -> np.ndarray:
-    """Which inner levels are a jump or a change of slope of any shutter; shape (K - 1,)."""
+    """Return at which inner levels any shutter jumps or changes its slope: bool (K - 1,)."""
     slope = (end - start) / np.diff(levels)[:, None]
     jumps = np.abs(start[1:] - end[:-1]) > 1e-9
     turns = np.abs(np.diff(slope, axis=0)) > 1e-9 * (slope[1:] + slope[:-1])
@@ -123,31 +128,37 @@ def _bends(levels: np.ndarray, start: np.ndarray, end: np.ndarray) -> np.ndarray
 
 
 def weights(start: np.ndarray, end: np.ndarray, dz: np.ndarray, window: int) -> np.ndarray:
-    """Normalised weights (…, L) of the frames from a quantile's pieces; start, end (…, K) and dz (K,), in order.
+    """Return the normalised weights (…, L) of the frames for a quantile's pieces: start, end (…, K) and dz (K,).
 
-    q(τ) = Q(τ + 1) − Q(τ): each piece spreads dz evenly over the time between its start and its end.
+    q(τ) = Q(τ + 1) − Q(τ): each piece spreads dz evenly over the time from its start to its end.
     """
     pixels = tuple(range(start.ndim - 1))
     begun, over = start.min(axis=pixels), end.max(axis=pixels)
     levels = np.zeros((*start.shape[:-1], window + 1))
     for time in range(1, window + 1):
-        # The pieces that are over everywhere, and those that have begun somewhere.
+        # Skip pieces that have ended for all pixels, or not begun for any.
         first, last = np.searchsorted(over, time, "right"), np.searchsorted(begun, time, "left")
         some = slice(first, last)
-        # A time never passes slower than its level (slope ≥ 1), so end − start ≥ dz > 0.
+        # Slopes are ≥ 1, so end − start ≥ dz > 0.
         passed = (time - start[..., some]) / (end[..., some] - start[..., some])
         levels[..., time] = dz[:first].sum() + np.clip(passed, 0, 1) @ dz[some]
     return np.diff(levels, axis=-1)
 
 
 def mix_exposure(shutters: ArrayLike, coefficients: ArrayLike) -> np.ndarray:
-    """e(q) = Σ cᵢ eᵢ for coefficients (…, N): the exposure of the interpolated shutter, shape (…)."""
+    """Return e(q) = Σ cᵢ eᵢ for coefficients (…, N): the exposure (…) of the interpolated shutter."""
     return np.asarray(coefficients) @ np.asarray(shutters).sum(axis=1)
 
 
 def displace(shutters: ArrayLike, coefficients: ArrayLike) -> np.ndarray:
-    """Displacement interpolation: bars (…, L) of the shutter between shutters (N, L), for coefficients (…, N)
-    with Σc = 1, c ≥ 0 (paper §3.2, §3.4.1; exact). Σ of the result is e(q)."""
+    """Interpolate shutters (N, L) by displacement (paper §3.2, §3.4.1; exact).
+
+    Args:
+        coefficients: (…, N), Σc = 1, c ≥ 0.
+
+    Returns:
+        Bars (…, L), whose sum is e(q).
+    """
     shutters = np.atleast_2d(np.asarray(shutters, dtype=np.float64))
     coefficients = np.asarray(coefficients, dtype=np.float64)
     table = knots(shutters)
@@ -156,7 +167,7 @@ def displace(shutters: ArrayLike, coefficients: ArrayLike) -> np.ndarray:
 
 
 def mix(shutters: ArrayLike, coefficients: ArrayLike) -> np.ndarray:
-    """Value interpolation: bars (…, L) of Σ cᵢ sᵢ/eᵢ, scaled to e(q). Arguments as for `displace`."""
+    """Interpolate by value: bars (…, L) of Σ cᵢ sᵢ/eᵢ, scaled to e(q). Arguments as for `displace`."""
     shutters = np.atleast_2d(np.asarray(shutters, dtype=np.float64))
     coefficients = np.asarray(coefficients, dtype=np.float64)
     q = coefficients @ (shutters / shutters.sum(axis=1, keepdims=True))
@@ -167,19 +178,21 @@ INTERPOLATIONS = {"displacement": displace, "value": mix}
 
 
 def open_span(shutters: ArrayLike) -> tuple[int, int]:
-    """First and one past the last frame of the window that any mix of these shutters (N, L) can expose."""
+    """Return the first frame of the window, and one past the last, that any mix of shutters (N, L) can expose."""
     used = np.flatnonzero(np.any(np.atleast_2d(shutters) > 0, axis=0))
     return int(used[0]), int(used[-1]) + 1
 
 
 def are_open(bars: np.ndarray) -> np.ndarray:
-    """Return which bars (L,) are open: bool (L,). What rounding leaves in a closed one does not count."""
+    """Return which bars (L,) are open: bool (L,). Rounding errors in closed bars do not count."""
     return bars > _CLOSED * bars.sum()
 
 
 def resample(bars: ArrayLike, window: int) -> np.ndarray:
-    """Bars (window,) of the same shutter over a window of another length. Its shape stays, and its share of
-    the window's light; its angle where no bar is averaged with others."""
+    """Return bars (window,) of the same shape over a window of another length.
+
+    The share of the window's light stays. The angle stays where no bars are averaged.
+    """
     bars = np.asarray(bars, dtype=np.float64)
     total = np.concatenate([[0.0], np.cumsum(bars)])
     at = np.linspace(0, len(bars), window + 1)
@@ -187,29 +200,28 @@ def resample(bars: ArrayLike, window: int) -> np.ndarray:
 
 
 def spanning(bars: ArrayLike, start: float, end: float) -> np.ndarray:
-    """Bars (L,) of the same shutter in other times: it is open from one to the other, 0 ≤ start < end ≤ L, its quantile
-    scaled and shifted, its exposure the same."""
+    """Return bars (L,) of the same shape and sum that are open from `start` to `end`, 0 ≤ start < end ≤ L."""
     bars = np.asarray(bars, dtype=np.float64)
     first, last = open_span(bars)
     boundaries = np.arange(len(bars) + 1, dtype=np.float64)
     times = first + (boundaries - start) * ((last - first) / (end - start))
     total = np.interp(times, boundaries, np.concatenate([[0.0], np.cumsum(bars)]))
-    return np.diff(np.maximum.accumulate(total))  # by rounding alone would it fall
+    return np.diff(np.maximum.accumulate(total))  # avoids negative bars from rounding
 
 
 def smoothed(bars: ArrayLike, steps: int, *, backward: bool = False, level: bool = False) -> np.ndarray:
     """Spread bars (L,) over the moments between filmed frames.
 
-    Where two neighbouring bars are open, light between their frames counts: each spreads its weight evenly over the
-    half intervals towards its open neighbours. A bar without any stays the filmed frame itself.
+    Light between two frames counts if both of their bars are open: each bar spreads its weight evenly over the half
+    intervals towards its open neighbours. A bar without open neighbours exposes only the filmed frame.
 
     Args:
-        steps: moments from a filmed frame to the next, 1 or an even number
-        backward: whether the source plays in reverse, so that a bar's frame is the last of its moments
-        level: moments are as high beside one another as their bars, for who takes the lightest of all
+        steps: Moments per filmed frame, 1 or an even number.
+        backward: Whether the source plays in reverse, so that a bar's frame is the last of its moments.
+        level: Keep the heights of bars instead of their sums, for the lightest of all moments.
 
     Returns:
-        Weights (L · steps,) of the same sum. Moment k · steps is filmed frame k, backward k · steps + steps − 1.
+        Weights (L · steps,) with the same sum. Moment k · steps is filmed frame k, backward k · steps + steps − 1.
     """
     bars = np.asarray(bars, dtype=np.float64)
     if steps == 1:
@@ -220,7 +232,7 @@ def smoothed(bars: ArrayLike, steps: int, *, backward: bool = False, level: bool
     sides = before.astype(int) + after
     share = bars if level else bars / np.maximum(sides, 1)
     half = np.ones(steps // 2 + 1)
-    half[[0, -1]] = 0.5  # the frame, and the middle of the interval, lie half in this half interval
+    half[[0, -1]] = 0.5  # the frame and the middle of the interval belong half to this half interval
     half /= 1 if level else half.sum()
     frames = np.arange(len(bars)) * steps
     moments = np.zeros(len(bars) * steps)
@@ -232,34 +244,39 @@ def smoothed(bars: ArrayLike, steps: int, *, backward: bool = False, level: bool
 
 
 def _open_beside(bars: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Which bars (L,) are open and have an open neighbour before them, and which one behind them."""
+    """Return which bars (L,) are open with an open neighbour before them, and which with one after them."""
     open_ones = are_open(bars)
     after = open_ones & np.append(open_ones[1:], False)
     return np.append(False, after[:-1]), after
 
 
 def held(bars: ArrayLike, steps: int) -> np.ndarray:
-    """Spread each bar evenly over its frame's `steps` moments: (L · steps,), of the same sum."""
+    """Spread each bar evenly over its frame's `steps` moments: (L · steps,), with the same sum."""
     return np.repeat(np.asarray(bars, dtype=np.float64) / steps, steps)
 
 
 class Filmed(NamedTuple):
-    """Bars of filmed frames in place of bars of moments. lost: the numbers, from 1 on, of the first and the last moment
-    of the filmed frame whose light is now farthest from where it was; None: it is where it was."""
+    """Bars of filmed frames in place of bars of moments.
+
+    Attributes:
+        lost: Numbers, from 1, of the first and last moment of the filmed frame whose light moved most; None if it did
+            not move.
+    """
 
     bars: np.ndarray
     lost: tuple[int, int] | None = None
 
 
 def filmed(moments: ArrayLike, steps: int, position: str, spread: Callable[[np.ndarray], np.ndarray]) -> Filmed:
-    """Count filmed frames where bars counted `steps` moments in each, as in recipes of version 1.
+    """Convert bars of moments, as in recipes of version 1, into bars of filmed frames.
 
-    A window that ended within a filmed frame gets all of it; where `position` is "end" it is the first frame that
-    lacked some, otherwise the last. The largest bar keeps its weight.
+    A window that ended within a filmed frame gets all of it: the last one, or the first if `position` is "end". The
+    largest bar keeps its weight.
 
     Args:
-        spread: makes bars of moments of the new ones; where no bars give those that there were, each is the mean of its
-            frame's
+        steps: Moments per filmed frame.
+        spread: Makes bars of moments from the new bars. If no bars reproduce the old moments, each new bar is the mean
+            of its frame's moments.
     """
     moments = np.asarray(moments, dtype=np.float64)
     lacking = -len(moments) % steps
@@ -280,7 +297,7 @@ def filmed(moments: ArrayLike, steps: int, position: str, spread: Callable[[np.n
 
 
 def open_angle(bars: ArrayLike) -> float:
-    """The shutter angle in degrees: 360 for a window that is open throughout, however bright its brightest bar is."""
+    """Return the shutter angle in degrees: 360 for a window of equal bars."""
     bars = np.asarray(bars, dtype=np.float64)
     return 360.0 * exposure(bars) / (len(bars) * max(bars.max(), 1e-30))
 
@@ -289,19 +306,19 @@ def open_angle(bars: ArrayLike) -> float:
 
 
 def still(window: int, frame: int = 0) -> np.ndarray:
-    """One sharp frame, a delta at `frame` (0 to L − 1; beyond the window: the last)."""
+    """Return one sharp frame, a delta at `frame`, clamped to the window."""
     bars = np.zeros(window)
     bars[min(max(frame, 0), window - 1)] = 1
     return bars
 
 
 def angle(window: int, degrees: float = 180.0) -> np.ndarray:
-    """A rotary disc: open for `degrees` of 360 of the window; the last bar may be a part."""
+    """Return a rotary disc, open for `degrees` of 360 of the window; the last bar may be partly open."""
     return np.clip(window * degrees / 360.0 - np.arange(window), 0, 1)
 
 
 def cuts(window: int, count: int = 2, width: int = 1) -> np.ndarray:
-    """A disc with `count` even cuts, each `width` frames wide: that many pictures on top of each other."""
+    """Return a disc with `count` even cuts, each `width` frames wide: multiple exposures."""
     bars = np.zeros(window)
     for start in np.floor(np.arange(count) * window / count).astype(int):
         bars[start : start + width] = 1
@@ -309,39 +326,39 @@ def cuts(window: int, count: int = 2, width: int = 1) -> np.ndarray:
 
 
 def ramp_up(window: int) -> np.ndarray:
-    """From almost closed to open: a trail that ends sharp."""
+    """Return a ramp from almost closed to open: a trail that ends sharp."""
     return np.arange(1, window + 1) / window
 
 
 def ramp_down(window: int) -> np.ndarray:
-    """From open to almost closed."""
+    """Return a ramp from open to almost closed."""
     return ramp_up(window)[::-1].copy()
 
 
 def triangle(window: int) -> np.ndarray:
-    """Rises to the middle of the window and falls again."""
+    """Return a triangle around the middle of the window."""
     bars = 1 - np.abs(2 * (np.arange(window) + 0.5) / window - 1)
     return bars / bars.max()
 
 
 def gaussian(window: int, sigma: float = 0.2) -> np.ndarray:
-    """A bell around the middle; `sigma` in windows."""
+    """Return a bell around the middle; `sigma` in windows."""
     return np.exp(-0.5 * (((np.arange(window) + 0.5) / window - 0.5) / sigma) ** 2)
 
 
 def trail(window: int, decay: float = 0.25) -> np.ndarray:
-    """An exponential trail: a bar falls to 1/e of the first after `decay` windows."""
+    """Return an exponential trail: a bar falls to 1/e of the first after `decay` windows."""
     return np.exp(-np.arange(window) / (decay * window))
 
 
 def stutter(window: int, every: int = 4) -> np.ndarray:
-    """Every n-th frame, as a strobe lights them."""
+    """Return every n-th frame, as a strobe lights them."""
     return (np.arange(window) % every == 0).astype(float)
 
 
-# name: (label, description, bars of a window). "Custom" is no preset: it is whatever the bars are.
+# name: (label, description, bars of a window). "Custom" is not a preset: it stands for any other bars.
 PRESETS: dict[str, tuple[str, str, Callable[[int], np.ndarray]]] = {
-    "STILL": ("Still Frame", "The shown frame alone", still),
+    "STILL": ("Still Frame", "Only the shown frame", still),
     "ANGLE_45": ("45°", "Open for an eighth of the frames", partial(angle, degrees=45.0)),
     "ANGLE_90": ("90°", "Open for a quarter of the frames", partial(angle, degrees=90.0)),
     "ANGLE_180": ("180°", "Open for half of the frames, as film cameras are", angle),
@@ -355,15 +372,14 @@ PRESETS: dict[str, tuple[str, str, Callable[[int], np.ndarray]]] = {
     "GAUSSIAN": ("Gaussian", "A bell curve around the middle frame", gaussian),
     "TRAIL": ("Exponential Trail", "Fades quickly at first and slowly later on", trail),
     "STUTTER": ("Stutter", "Every fourth frame, as a strobe lights them", stutter),
-    # Along two edges, these are a rolling shutter (paper Figure 11).
-    "FIRST": ("First Frame", "The first of the frames alone", still),
-    "LAST": ("Last Frame", "The last of the frames alone", lambda window: still(window, window - 1)),
+    # Along two edges, these two make a rolling shutter (paper Figure 11).
+    "FIRST": ("First Frame", "Only the first of the frames", still),
+    "LAST": ("Last Frame", "Only the last of the frames", lambda window: still(window, window - 1)),
 }
 
 
 def preset_bars(name: str, window: int, position: str = "start") -> np.ndarray:
-    """Bars (L,) of a preset, a key of PRESETS; position: as frame_state.Options has it. KeyError: no such preset."""
-    _label, _description, make = PRESETS[name]
-    if name != "STILL":
-        return make(window)
-    return still(window, {"center": (window - 1) // 2, "end": window - 1}.get(position, 0))
+    """Return the bars (L,) of a preset, a key of PRESETS, for a frame_state.Position. KeyError: no such preset."""
+    if name == "STILL":
+        return still(window, {"center": (window - 1) // 2, "end": window - 1}.get(position, 0))
+    return PRESETS[name][2](window)

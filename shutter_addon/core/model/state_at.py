@@ -1,4 +1,4 @@
-"""An effect at a timeline frame, with everything that its picture needs: plain data of plain data."""
+"""The state of an effect at a timeline frame, as plain data with everything that a picture needs."""
 
 from __future__ import annotations
 
@@ -17,8 +17,7 @@ from .mattes import Matte
 
 
 class Moment(NamedTuple):
-    """What a compute.request.Request begins with: the clip's frame that is shown, the effect there, and 1, or −1 where
-    the clip runs backward."""
+    """The shown frame of the clip, the effect there, and the direction: 1, or −1 where the clip runs backward."""
 
     source_frame: int
     state: FrameState
@@ -26,10 +25,14 @@ class Moment(NamedTuple):
 
 
 def state_at(effect: Effect, clip: Clip, frame: float) -> Moment:
-    """An effect at a timeline frame of a clip: its bars as long as they are on the timeline or as trails are, within
-    the clip; what exposures follow; and layers. Where the shot ends is not known before frames are read.
+    """Return an effect's state at a timeline frame of a clip.
 
-    EffectError: no picture can be made of it."""
+    It has the bars' lengths on the timeline and of trails, followed motions and layers. Cuts are not considered yet,
+    since no frame is read.
+
+    Raises:
+        EffectError: No picture can be made of it.
+    """
     if effect.time is not None:
         clip = replace(clip, timing=effect.time)
     at = clip.shown(frame)
@@ -42,8 +45,10 @@ def state_at(effect: Effect, clip: Clip, frame: float) -> Moment:
 
 
 def _in_moments(effect: Effect, state: FrameState, clip: Clip, at: Shown) -> FrameState:
-    """The state whose bars are of the moments that a clip has, `clip.step` for each filmed frame. Bars that say the
-    shape of an exposure of another length stay that shape, and are moved to its moments later."""
+    """Return the state with bars of the clip's moments, `clip.step` per filmed frame.
+
+    Bars that shape an exposure of another length keep their shape.
+    """
     options = replace(state.options, window=state.options.window * clip.step, step=clip.step, backward=at.direction < 0)
     if clip.step == 1:
         return replace(state, options=options)
@@ -55,7 +60,7 @@ def _in_moments(effect: Effect, state: FrameState, clip: Clip, at: Shown) -> Fra
 
 
 def _layered(effect: Effect, state: FrameState, clip: Clip, at: Shown) -> FrameState:
-    """The effect's state at a timeline frame, with its layers. EffectError: one lies nowhere."""
+    """Return the state at a timeline frame with its layers. EffectError: a layer is too far outside the picture."""
     if not (regions := effect.layers_at(at.frame)):
         return state
     seen, reach, step = following.seen(state.options, at, clip.count), state.options.plate_reach, state.options.step
@@ -87,16 +92,19 @@ def _layered(effect: Effect, state: FrameState, clip: Clip, at: Shown) -> FrameS
 
 
 def _matte(region: Region | MatteRegion, frame: float, share: float) -> Matte | None:
-    """Its matte at a time between a timeline frame and the next: that of the nearer one."""
+    """Return the region's matte at a time between two timeline frames: that of the nearer one."""
     return region.at(frame + round(share)) if isinstance(region, MatteRegion) else None
 
 
 def _scribbles(
     effect: Effect, state: FrameState, drawn: Sequence[tuple[int, Region]], count: int, frame: float, share: float
 ) -> FrameState:
-    """Layers.scribbles at a time between a timeline frame and the next, of so many layers.
+    """Return a state of Layers.scribbles at a time between a timeline frame and the next.
 
-    drawn: regions, the later over the earlier, each with 1 + the number of its layer, 0 for what is none's"""
+    Args:
+        drawn: Regions, later ones on top, each with 1 + its layer's number, or 0 without a layer.
+        count: The number of layers.
+    """
     shapes = []
     for number, region in drawn:
         shape = _between(region, frame, share)

@@ -1,13 +1,12 @@
-"""How long exposures are whose bars say their shape alone.
+"""Lengths of exposures whose bars only describe their shape.
 
-Trail length: an exposure whose span has what it follows move by a given length, however fast that is. The times of its
-bars are scaled about the shown frame, so that the quantile keeps its shape, until the way has its length; the span is
-no whole number of frames, and changes without jumps.
+Trail length: the exposure lasts while the followed subject moves by a given distance, at any speed. The bars' times are
+scaled about the shown frame, so that the quantile keeps its shape. The span is not a whole number of frames and changes
+without jumps.
 
-Length: Timeline. A shutter's bars are the shape of its exposure over a frame of the timeline, however fast the footage
-runs there, as if a camera of the timeline's frame rate had filmed what is seen. Footage that runs s source frames in a
-frame of the timeline is exposed for s of them by a shutter that is open throughout; in a freeze, for the shown frame
-alone.
+Timeline length: the bars are the shape of an exposure over one frame of the timeline, at any speed of the footage, as
+if a camera with the timeline's frame rate had filmed what is seen. If the footage runs s source frames per timeline
+frame, a fully open shutter exposes s of them. In a freeze it exposes the shown frame.
 """
 
 from __future__ import annotations
@@ -21,19 +20,23 @@ from .clip import Clip, Shown
 from .effect import Effect
 from .frame_state import FrameState, Options
 
-# In frames.
+# Frames that the shortest trail lasts.
 _SHORTEST = 1e-3
-# In frames: what is open for less of the timeline is open in one.
+# Frames: shorter spans of the timeline expose a single frame.
 _INSTANT = 1e-6
-# Of the exposure, what has to be in the window.
+# Fraction of the exposure that the window has to contain.
 _LEAST = 1e-9
 
 
 def travelled(places: np.ndarray) -> np.ndarray:
-    """How far a subject has moved at the boundaries of the window's bars: (L + 1,), ascending from 0.
+    """Return how far a subject has moved at the boundaries of the window's bars: (L + 1,), ascending from 0.
 
-    places: (L, P) complex, where P of its points are in the window's frames; of each step the fastest point counts. The
-    way from one frame to the next belongs to both of their bars, and the outermost go on at the pace beside them."""
+    The fastest point counts for each step. The step between two frames belongs to both of their bars. The outermost
+    bars continue at their neighbour's pace.
+
+    Args:
+        places: (L, P) complex, P points of the subject in the window's frames.
+    """
     steps = np.abs(np.diff(places, axis=0)).max(axis=1, initial=0)
     if not steps.size:
         return np.zeros(2)
@@ -42,10 +45,14 @@ def travelled(places: np.ndarray) -> np.ndarray:
 
 
 def shortened(bars: np.ndarray, share: float, shown: float) -> tuple[np.ndarray, float]:
-    """Bars (L,) of the same shape and sum, open for a share 0 to 1 of their time about the shown frame, and for that
-    frame at least. And for how many frames that is.
+    """Return bars (L,) of the same shape and sum that are open for a share of their time, and the number of frames.
 
-    shown: the middle of the shown frame's bar, in 0 … L; of bars that are closed there, the nearest that is open"""
+    They are open for at least one frame.
+
+    Args:
+        share: 0 to 1, about the shown frame.
+        shown: The middle of the shown frame's bar, in 0 … L; clamped to the open bars.
+    """
     bars = np.where(shutters.are_open(bars), bars, 0)
     first, last = shutters.open_span(bars)
     own = min(max(shown - 0.5, first), last - 1)
@@ -54,12 +61,15 @@ def shortened(bars: np.ndarray, share: float, shown: float) -> tuple[np.ndarray,
 
 
 def with_length(bars: np.ndarray, way: np.ndarray, length: float, shown: float) -> tuple[np.ndarray, float]:
-    """Bars (L,) of the same shape and sum, open while a subject moves by `length`, no longer than that takes; for the
-    whole window, where it moves less. And for how many frames that is.
+    """Return bars (L,) of the same shape and sum that are open while a subject moves by `length`, and that time.
 
-    way: of `travelled`, in the unit of the length
-    shown: the time in 0 … L that keeps its place; of bars that are closed there, the nearest that is open. Where an end
-    of the span reaches the window's, only the other one goes on"""
+    If the subject moves less, they are open for the whole window. The time is in frames.
+
+    Args:
+        way: From `travelled`, in the unit of `length`.
+        shown: The time in 0 … L that keeps its place, clamped to the open bars. Where one end of the span reaches the
+            window's end, only the other one continues.
+    """
     bars = np.where(shutters.are_open(bars), bars, 0)
     first, last = shutters.open_span(bars)
     about = min(max(shown, first), last)
@@ -69,13 +79,13 @@ def with_length(bars: np.ndarray, way: np.ndarray, length: float, shown: float) 
     def starts(widths: np.ndarray | float) -> np.ndarray:
         return np.clip(about - before * widths, 0, len(bars) - widths)
 
-    # The way within a span is piecewise linear in its width, and bends where an end passes a boundary.
+    # The way within a span is piecewise linear in the span's width. It bends where an end passes a boundary.
     bends = [boundaries]
     bends += [(boundaries - about) / share for share in (-before, 1 - before) if share]
     widths = np.unique(np.concatenate(bends).clip(0, len(bars)))
     moved = np.interp(starts(widths) + widths, boundaries, way) - np.interp(starts(widths), boundaries, way)
-    moved = np.maximum.accumulate(moved)  # by rounding alone would it fall
-    # Backward, for of widths that add no motion the least counts: a trail of no length is a still frame.
+    moved = np.maximum.accumulate(moved)  # avoids a decrease from rounding
+    # Reversed, so that the smallest of the widths without added motion counts: a trail of length 0 is a still frame.
     width = float(np.interp(-length, -moved[::-1], widths[::-1]) if length <= moved[-1] else len(bars))
     width = max(width, _SHORTEST)
     start = float(starts(width))
@@ -83,14 +93,13 @@ def with_length(bars: np.ndarray, way: np.ndarray, length: float, shown: float) 
 
 
 def exposed(effect: Effect, state: FrameState, clip: Clip, at: Shown) -> FrameState:
-    """The effect's state at a timeline frame, with the bars of those shutters whose length is the timeline's, and for
-    how many frames they are open (FrameState.open_for)."""
+    """Return the state at a timeline frame with the bars and `open_for` of shutters with the timeline's length."""
     chosen = [i for i, shutter in enumerate(effect.shutters) if shutter.length == "timeline"]
     if not chosen:
         return state
     places = np.array([clip.position(at.frame + k) for k in (-1, -0.5, 0, 0.5, 1)])
     here = places[2]
-    if places[0] == here in clip.ends:  # there a strip goes on with the same frame: it is no freeze
+    if places[0] == here in clip.ends:  # the strip repeats its end frame there, which is not a freeze
         places[:2] = 2 * here - places[:2:-1]
     elif places[4] == here in clip.ends:
         places[3:] = 2 * here - places[1::-1]
@@ -101,13 +110,18 @@ def exposed(effect: Effect, state: FrameState, clip: Clip, at: Shown) -> FrameSt
 
 
 def on_timeline(bars: np.ndarray, options: Options, positions: np.ndarray) -> tuple[np.ndarray, float]:
-    """Bars (L,) of a window by those that are the shape of an exposure over a timeline frame, of the same sum; and how
-    many frames it goes through, from its first open time to its last.
+    """Return bars (L,) of the window for bars that shape an exposure over a timeline frame, with the same sum.
 
-    positions: (n,), n odd, in the source, in frames, of the timeline frame before, the shown one in the middle, and the
-    next, evenly apart; even in between
-    What the window does not reach is left out. By Options.position the exposure begins with the shown filmed frame, has
-    its middle there, or ends with it."""
+    Light outside the window is left out. By Options.position, the exposure begins with the shown filmed frame, has its
+    middle there, or ends with it.
+
+    Args:
+        positions: (n,), n odd: positions in the source, in frames, from the previous to the next timeline frame at even
+            distances.
+
+    Returns:
+        Also the number of source frames from first to last open time.
+    """
     window, here = len(bars), positions[len(positions) // 2]
     begin, anchor = {
         "start": (0.0, 0.0),
@@ -117,7 +131,7 @@ def on_timeline(bars: np.ndarray, options: Options, positions: np.ndarray) -> tu
     times = begin + np.arange(window + 1) / window
     way = np.interp(times, np.linspace(-1, 1, len(positions)), positions) - here
     places = options.before + anchor + (-way if options.backward else way)
-    found, shown = np.zeros(window), min(options.shown, window - 1)  # it may be shorter than a filmed frame
+    found, shown = np.zeros(window), min(options.shown, window - 1)  # the window may be shorter than a filmed frame
     if np.ptp(places) < _INSTANT:
         found[shown] = bars.sum()
         return found, 0.0
@@ -125,13 +139,13 @@ def on_timeline(bars: np.ndarray, options: Options, positions: np.ndarray) -> tu
         found += weight * _spread(min(start, end), max(start, end), window)
     is_open = np.flatnonzero(bars)
     length = float(np.ptp(places[is_open[0] : is_open[-1] + 2]))
-    if found.sum() <= _LEAST * bars.sum():  # all of it lies beyond the window
+    if found.sum() <= _LEAST * bars.sum():  # everything is outside the window
         found[shown] = 1.0
     return found * (bars.sum() / found.sum()), length
 
 
 def _spread(start: float, end: float, window: int) -> np.ndarray:
-    """How much of a time from start to end falls on each frame of a window (L,)."""
+    """Return how much of the time from start to end falls on each frame of a window (L,)."""
     if end - start < _INSTANT:
         return (np.arange(window) == np.floor(start + _INSTANT)).astype(float)
     boundaries = np.clip(np.arange(window + 1), start, end)

@@ -1,4 +1,4 @@
-"""Windows: which source frames those of a window are, around the shown one, at the ends of a shot as well."""
+"""Windows: the source frames around the shown one that an exposure can use, also at the ends of a shot."""
 
 from __future__ import annotations
 
@@ -11,35 +11,39 @@ from .frame_state import FrameState, Options
 
 
 def positions(options: Options, index: int, direction: int = 1) -> np.ndarray:
-    """Where the window's frames (L,) lie around source frame `index`, beyond the clip's ends as well.
+    """Return the positions (L,) of the window's frames around source frame `index`, also beyond the clip's ends.
 
-    direction: 1, or −1 where the source plays in reverse, and the window's next frames are those before `index`. A
-    filmed frame lasts until the next one, so that in reverse the moments after it come first, from the last one on.
+    Args:
+        direction: 1, or −1 where the source plays in reverse. Then later frames of the window are before `index`. A
+            filmed frame lasts until the next one, so in reverse the moments after it come first, the last one leading.
     """
     return origin(options, index, direction) + direction * np.arange(options.window)
 
 
 def reach(state: FrameState, index: int, direction: int = 1) -> tuple[int, int]:
-    """The first and the last of the positions that any shutter exposes."""
+    """Return the first and the last position that any shutter exposes."""
     first = origin(state.options, index, direction)
     ends = [first + direction * place for place in (state.open_span[0], state.open_span[1] - 1)]
     return min(ends), max(ends)
 
 
 def origin(options: Options, index: int, direction: int = 1) -> int:
-    """The position of the window's first frame; arguments like those of `positions`."""
+    """Return the position of the window's first frame, for arguments as in `positions`."""
     return (index if direction > 0 else index + options.step - 1) - direction * options.before
 
 
 def slid(state: FrameState, index: int, direction: int, shot: range, *, whole: bool = False) -> FrameState:
-    """The state whose edges "slide", with the bars of shutters that reach beyond the ends of `shot` moved back into it,
-    each shutter's by no more frames than it has to; one that is longer than the shot covers it, and goes beyond.
+    """Return the state with exposures moved back into `shot` if its edges are "slide".
 
-    whole: the window moves even if no bars do, as trails may become as long as it is. Else it moves with them, as it
-    has no room for all otherwise"""
+    Each shutter moves only as far as it has to. An exposure that is longer than the shot covers it and goes beyond.
+
+    Args:
+        whole: Move the window even if no bars move, since trails may become as long as it is. Otherwise it moves only
+            with bars that need the room.
+    """
     options = state.options
     first, last_filmed = origin(options, index, direction), (shot.stop - 1) // options.step * options.step
-    ends = shot.start, last_filmed + options.step - 1  # a filmed frame lasts until the next one
+    ends = shot.start, last_filmed + options.step - 1  # the last filmed frame has moments, too
     low, high = sorted(direction * (end - first) for end in ends)
 
     def way(start: int, stop: int) -> int:
@@ -56,21 +60,22 @@ def slid(state: FrameState, index: int, direction: int, shot: range, *, whole: b
 
 
 def _filmed(span: tuple[int, int], options: Options) -> tuple[int, int]:
-    """A span of the window's frames with all of the filmed ones that it is in: bars move by whole ones."""
+    """Extend a span of the window's frames to whole filmed frames, since bars move by these."""
     start, stop = span
     return start - start % options.step, min(stop + -stop % options.step, options.window)
 
 
 def source_frames(options: Options, positions: np.ndarray, shot: range) -> np.ndarray:
-    """The frames that are seen at `positions` by a window that shows those of `shot` alone; −1: none.
+    """Return the frames that a window shows at `positions`; −1: none.
 
-    shot: range(count) for a whole clip, or the frames between two of its cuts.
-    Past its ends "hold" repeats the last frame, as "slide" does where bars are not moved (`slid`); "mirror" plays back
-    from it without showing it twice.
-    "shorten" leaves frames out, but keeps the nearest when all lie outside.
+    Past the ends, "hold" and "slide" repeat the last frame, and "mirror" plays back from it without repeating it.
+    "shorten" leaves frames out, but keeps the nearest if all are outside.
+
+    Args:
+        shot: range(count) for a whole clip, or the frames between two of its cuts.
     """
     first, count = shot.start, len(shot)
-    held = np.minimum(np.maximum(positions, first), shot.stop - 1)  # quicker than np.clip for so few
+    held = np.minimum(np.maximum(positions, first), shot.stop - 1)  # faster than np.clip for short arrays
     if options.edges == "mirror" and count > 1:
         folded = np.mod(positions - first, 2 * (count - 1))
         return first + np.where(folded < count, folded, 2 * (count - 1) - folded)
@@ -80,5 +85,5 @@ def source_frames(options: Options, positions: np.ndarray, shot: range) -> np.nd
 
 
 def indices(options: Options, index: int, shot: range, direction: int = 1) -> np.ndarray:
-    """Source frames (L,) of the window around source frame `index`; −1: left out. Arguments as above."""
+    """Return source frames (L,) of the window around source frame `index`; −1: left out. Arguments as above."""
     return source_frames(options, positions(options, index, direction), shot)

@@ -1,1 +1,1 @@
-"""What pictures are made by, exactly and in float64: the reference of every device. Uses model and frames."""
+"""How pictures are made, exactly and in float64: the reference of every device."""

@@ -1,14 +1,13 @@
-"""What a shutter makes of the frames that it exposes where it does not average them (frame_state.Combine): the
-reference, in float64.
+"""Combining exposed frames other than by averaging (frame_state.Combine): the reference, in float64.
 
-With wₖ how much a frame counts, from 0 to 1 (`counts`), and Vₖ its light with alpha aₖ, both premultiplied:
+With wₖ the weight of a frame, 0 to 1 (`counts`), and Vₖ its light with alpha aₖ, both premultiplied:
 
     lightest    max wₖ Vₖ                   a frame fades into black
     darkest     A − max uₖ, where uₖ = wₖ (aₖ − Vₖ), or aₖ − Vₖ where that is below 0    a frame fades into white
     median      M · Σ qₖ aₖ / Σ qₖ, where M is the weighted median of Vₖ / aₖ, each counted qₖ aₖ times
 
-and A = max wₖ aₖ / max wₖ, the alpha of the first two. Their brightness does not depend on how many frames there are.
-A threshold lowers wₖ, but not what A divides by: a pixel without light that passes is transparent.
+and A = max wₖ aₖ / max wₖ, the alpha of the first two. Their brightness does not depend on the number of frames. A
+threshold lowers wₖ, but not A's divisor: a pixel without light above it is transparent.
 """
 
 from collections.abc import Sequence
@@ -21,15 +20,17 @@ from ..frames import light
 from ..model import shutters
 from ..model.frame_state import Combine
 
-# Around the middle of a median's weights: within so much of it, both neighbours count, as of an even number of frames.
-# Rounding must not choose between them, for devices round differently.
+# If a median's weights are this close to the middle, both neighbours count, as with an even number of frames. Rounding
+# must not choose between them, since devices round differently.
 MIDDLE = 1 / 8192
 
 
 class Sample(NamedTuple):
-    """A frame as it is seen: its light (H, W, 4), premultiplied, and how much it counts (H, W).
+    """A visible frame: its premultiplied light (H, W, 4), and its weight (H, W).
 
-    shown: of the shown frame, its light whatever counts; None: it is another one"""
+    Attributes:
+        shown: The light of the shown frame regardless of weights; None for other frames.
+    """
 
     light: np.ndarray
     weight: np.ndarray
@@ -37,9 +38,12 @@ class Sample(NamedTuple):
 
 
 def counts(combine: Combine, bars: ArrayLike, coefficients: ArrayLike, interpolation: str) -> np.ndarray:
-    """How much each frame counts (…, L): of medians, the normalised bars that a pixel with coefficients (…, N) gets. Of
-    the lightest and the darkest, 0 to 1: by displacement the same times Σ cᵢ / (the highest of shutter i's), by which
-    equal bars count 1; by value Σ cᵢ (shutter i's bars / its highest)."""
+    """Return the weights of frames (…, L) for pixels with coefficients (…, N).
+
+    For a median these are the normalised interpolated bars. For lightest and darkest they are from 0 to 1: by
+    displacement the same times Σ cᵢ / (the highest of shutter i's), so that equal bars have weight 1; by value
+    Σ cᵢ (shutter i's bars / its highest).
+    """
     bars, coefficients = np.atleast_2d(np.asarray(bars, dtype=np.float64)), np.asarray(coefficients, dtype=np.float64)
     normalised = bars / bars.sum(axis=1, keepdims=True)
     between = shutters.INTERPOLATIONS[interpolation]
@@ -52,13 +56,16 @@ def counts(combine: Combine, bars: ArrayLike, coefficients: ArrayLike, interpola
 
 
 def of_samples(combine: Combine, samples: Sequence[Sample], *, encoded: bool = False) -> np.ndarray:
-    """The picture (H, W, 4), premultiplied, of frames that are there, one at least; where none counts, black. encoded:
-    whether their light is (Options.light)"""
+    """Return the premultiplied picture (H, W, 4) of at least one frame; black where all weights are 0.
+
+    Args:
+        encoded: Whether light is encoded (Options.light).
+    """
     return median(samples) if combine.mode == "median" else extreme(combine, samples, encoded=encoded)
 
 
 def extreme(combine: Combine, samples: Sequence[Sample], *, encoded: bool = False) -> np.ndarray:
-    """The lightest or the darkest (H, W, 4). Frames with a weight of 0 do not count."""
+    """Return the lightest or the darkest (H, W, 4), without frames of weight 0."""
     best = np.full((*samples[0].weight.shape, 3), -np.inf)
     alpha, most = np.zeros(best.shape[:2]), np.zeros(best.shape[:2])
     for sample in samples:
@@ -82,7 +89,7 @@ def extreme(combine: Combine, samples: Sequence[Sample], *, encoded: bool = Fals
 
 
 def _counted(combine: Combine, sample: Sample, encoded: bool) -> list[tuple[np.ndarray, np.ndarray]]:
-    """What of a frame counts, and how much: with a threshold the shown one does whatever its weight is."""
+    """Return the lights of a frame with their weights; with a threshold, the shown frame always counts."""
     if combine.threshold is None:
         return [(sample.light, sample.weight)]
     color = light.straight(sample.light)[..., :3]
@@ -98,7 +105,7 @@ def _luminance(value: np.ndarray) -> np.ndarray:
 
 
 def passes(combine: Combine, luminance: np.ndarray) -> np.ndarray:
-    """How much of light of a linear luminance (…) leaves a trail, 0 to 1."""
+    """Return how much of light with a linear luminance (…) leaves a trail, 0 to 1."""
     half = max(combine.softness, 1e-6) / 2
     t = np.clip((luminance - ((combine.threshold or 0.0) - half)) / (2 * half), 0, 1)
     t = t * t * (3 - 2 * t)
@@ -106,7 +113,7 @@ def passes(combine: Combine, luminance: np.ndarray) -> np.ndarray:
 
 
 def median(samples: Sequence[Sample]) -> np.ndarray:
-    """The median (H, W, 4) of each channel."""
+    """Return the median (H, W, 4) of each channel."""
     straight, weights = light.straight(np.stack([s.light for s in samples])), np.stack([s.weight for s in samples])
     alphas = weights * straight[..., 3]
     cover = (alphas.sum(axis=0) / np.maximum(weights.sum(axis=0), 1e-30))[..., None]
@@ -115,13 +122,15 @@ def median(samples: Sequence[Sample]) -> np.ndarray:
 
 
 def weighted_median(values: np.ndarray, weights: np.ndarray) -> np.ndarray:
-    """The weighted median of values (L, …): the least whose weight with that of all below is half of all, less MIDDLE;
-    where it is within MIDDLE of half, it is mixed with the next one, half and half at half."""
+    """Return the weighted median of values (L, …): the first where the cumulated weight reaches half, less MIDDLE.
+
+    Within MIDDLE of half it is mixed with the next value, equally at exactly half.
+    """
     order = np.argsort(np.where(weights > 0, values, np.inf), axis=0, kind="stable")
     values, weights = (np.take_along_axis(a, order, axis=0) for a in (values, weights))
     below = np.cumsum(weights, axis=0)
     below = below / np.maximum(below[-1:], 1e-30)
-    # Equal values count together.
+    # Equal values count as one.
     for k in range(len(values) - 2, -1, -1):
         below[k] = np.where((values[k] == values[k + 1]) & (weights[k + 1] > 0), below[k + 1], below[k])
     first = (below >= 0.5 - MIDDLE).argmax(axis=0)[None]

@@ -1,4 +1,4 @@
-"""The reference compositor: every pixel's own shutter, exact, in float64, one frame after the other."""
+"""The reference compositor: every pixel's own shutter, exact, in float64, frame by frame."""
 
 from collections.abc import Callable, Iterator, Sequence
 
@@ -10,19 +10,18 @@ from ..model import shutters
 from ..model.frame_state import Combine, FrameState
 from . import combined
 
-# By how much of a frame the window's earlier ones are preferred, where the nearest frame is shown: of two that are as
-# near, rounding must not choose, for devices round differently.
+# In frames: where the nearest frame is shown, the window's earlier one is preferred by this much. Of two equally near
+# frames, rounding must not choose, since devices round differently.
 CLOSE = 1e-3
-# Light of which nothing becomes infinite as it is encoded in float32.
+# Light up to this stays finite when it is encoded in float32.
 _MOST = 1e37
 
-# Turns and shifts, frame by frame (motions.Similarity).
+# Turns and shifts per frame (motions.Similarity).
 Moves = tuple[np.ndarray, np.ndarray]
 
 
 def mixed_shutter(state: FrameState, coefficients: ArrayLike) -> np.ndarray:
-    """The bars (…, L) of the shutter that pixels with coefficients (…, N) are exposed with, Σ coefficients = 1; of
-    shutters that combine in several ways, of all of these."""
+    """Return the bars (…, L) of the shutter that exposes pixels with coefficients (…, N), Σ = 1."""
     mixed, c = shutters.INTERPOLATIONS[state.options.interpolation], np.asarray(coefficients, dtype=np.float64)
     total = np.zeros((*c.shape[:-1], state.bars.shape[1]))
     for chosen, share, own in ways(state, np.moveaxis(c, -1, 0)):
@@ -31,8 +30,8 @@ def mixed_shutter(state: FrameState, coefficients: ArrayLike) -> np.ndarray:
 
 
 def ways(state: FrameState, coefficients: np.ndarray) -> Iterator[tuple[list[int], np.ndarray, np.ndarray]]:
-    """By ways to combine frames, the shutters that do so, how much they have of coefficients (N, …), which are not
-    negative, and their own (n, …), Σ = 1."""
+    """Yield, for each way to combine frames, its shutters, their share of coefficients (N, …) ≥ 0, and their own
+    coefficients (n, …), Σ = 1."""
     for chosen in map(list, state.groups.values()):
         share = coefficients[chosen].sum(axis=0)
         equal = coefficients.dtype.type(1 / len(chosen))
@@ -47,16 +46,19 @@ def compose(
     moves: Moves | None = None,
     sharp: bool | None = None,
 ) -> np.ndarray:
-    """The picture (H, W, 4) float64, scene-linear and premultiplied: F = e(q) · ∫ V(t + ⌊Q⁻¹(z)⌋) dz (§3.1, §3.4.1); or
-    what core.pixels.combined makes of the same frames. Of shutters that combine in several ways, each way makes a
-    picture with its own, and these are mixed by the coefficients.
+    """Return the picture (H, W, 4) float64, scene-linear and premultiplied.
 
-    frames: L pictures (H, W, 4), scene-linear, premultiplied; present: (L,) bool, False for frames left out, whose
-    share goes to the others (if none has a share: to the nearest present frame, of two the window's earlier one).
-    coefficients: (N, H, W), Σ = 1.
-    moves: turns and shifts (L, N) of each frame for each shutter (FrameState.following): a frame is not taken at x, but
-    at Σ cᵢ Wᵢ(x), or by value interpolation mixed of those at each Wᵢ(x). None: nothing is followed.
-    sharp: how frames are seen there (`seen`); None: sharp where all of them are opaque.
+    F = e(q) · ∫ V(t + ⌊Q⁻¹(z)⌋) dz (§3.1, §3.4.1), or the combination of core/pixels/combined.py. Shutters that combine
+    frames in different ways make a picture for each way, mixed by the coefficients.
+
+    Args:
+        frames: L pictures (H, W, 4), scene-linear, premultiplied.
+        present: (L,) bool, False for left out frames, whose share goes to the others. If none has a share, it goes to
+            the nearest present frame, preferring the earlier one.
+        coefficients: (N, H, W), Σ = 1.
+        moves: Turns and shifts (L, N) of frames for shutters (FrameState.following). A frame is sampled at Σ cᵢ Wᵢ(x)
+            instead of x, or by value interpolation at each Wᵢ(x) and mixed. None: nothing is followed.
+        sharp: How `seen` samples frames; None: sharp if all of them are opaque.
     """
     if sharp is None:
         sharp = all((frame[..., 3] == 1).all() for frame in frames)
@@ -88,13 +90,13 @@ def compose(
     if not samples:
         return _decode(total) if encoded else total
     found = combined.of_samples(combine, samples, encoded=encoded)
-    # Where no frame is there that counts, it is the nearest, as of an average.
+    # Where all weights are 0, show the nearest frame, as an average does.
     found = np.where((_counted(combine, samples) > 1e-6)[..., None], found, total)
     return _decode(found) if encoded else found
 
 
 def _counted(combine: Combine, samples: list[combined.Sample]) -> np.ndarray:
-    """How much (H, W) of all frames counts."""
+    """Return the sum of all frames' weights (H, W)."""
     if combine.threshold is not None and any(sample.shown is not None for sample in samples):
         return np.ones(samples[0].weight.shape)
     return sum((sample.weight for sample in samples), np.zeros(samples[0].weight.shape))
@@ -108,7 +110,7 @@ def _samples(
     moves: Moves | None,
     looks_at: Callable[[int], list[np.ndarray]],
 ) -> list[combined.Sample]:
-    """The frames that are there. What is seen of one by several motions is mixed, by how much it counts by each."""
+    """Return the present frames. A frame seen by several motions is mixed by its weight for each."""
     options, bars = state.options, state.bars
     if moves is not None and options.interpolation == "value":
         alone = np.stack([combined.counts(combine, row, np.ones(1), options.interpolation) for row in bars])
@@ -131,8 +133,7 @@ def _samples(
 
 
 def _motions(state: FrameState, coefficients: np.ndarray, moves: Moves | None) -> list[Moves | None]:
-    """The motions by which each frame is seen: by value interpolation those of all shutters, else what pixels have of
-    them."""
+    """Return the motions by which frames are seen: each shutter's for value interpolation, else the pixels' mix."""
     if moves is None:
         return [None]
     turns, shifts = moves
@@ -142,7 +143,7 @@ def _motions(state: FrameState, coefficients: np.ndarray, moves: Moves | None) -
 
 
 def _exposed(state: FrameState, coefficients: np.ndarray, present: np.ndarray, moves: Moves | None) -> np.ndarray:
-    """The weights (M, H, W, L) with which the frames are summed, as they are seen by each of `_motions`."""
+    """Return the weights (M, H, W, L) of frames in the sum, as seen by each of `_motions`."""
     normalised = state.bars / state.bars.sum(axis=1, keepdims=True)
     if moves is not None and state.options.interpolation == "value":
         return _without_absent(coefficients[..., None] * normalised[:, None, None], coefficients, present)
@@ -152,12 +153,16 @@ def _exposed(state: FrameState, coefficients: np.ndarray, present: np.ndarray, m
 
 
 def seen(frame: np.ndarray, places: np.ndarray, *, sharp: bool) -> np.ndarray:
-    """What a frame (H, W, C) shows at places (…), x + iy as motions.Similarity counts: (…, C).
+    """Sample a frame (H, W, C) at places (…), x + iy as in motions.Similarity; return (…, C).
 
-    sharp: by Catmull and Rom's cubic, kept between the four pixels around, for it would ring about highlights; else
-    linearly, as colours with an alpha have to be. Beyond its edges the frame goes on as its last pixels."""
+    Beyond its edges the frame repeats its last pixels.
+
+    Args:
+        sharp: By Catmull-Rom's cubic, clamped to the four pixels around to avoid ringing. Otherwise linearly, as
+            colours with alpha need.
+    """
     height, width = frame.shape[:2]
-    # Far outside all is the same, and large numbers have no fractions.
+    # Far outside everything is the same, and large numbers have no fractions.
     x, y = np.clip(places.real, -2, width + 1), np.clip(places.imag, -2, height + 1)
     column, row = np.floor(x).astype(int), np.floor(y).astype(int)
 
@@ -172,7 +177,7 @@ def seen(frame: np.ndarray, places: np.ndarray, *, sharp: bool) -> np.ndarray:
 
 
 def _weights(t: np.ndarray, sharp: bool) -> dict[int, np.ndarray]:
-    """The weights of the pixels at −1, 0, 1 and 2 for a place between 0 and 1."""
+    """Return the weights of the pixels at −1, 0, 1 and 2 for a place between 0 and 1."""
     if not sharp:
         return {-1: 0 * t, 0: 1 - t, 1: t, 2: 0 * t}
     return {
@@ -184,8 +189,10 @@ def _weights(t: np.ndarray, sharp: bool) -> dict[int, np.ndarray]:
 
 
 def _without_absent(q: np.ndarray, parts: np.ndarray, present: np.ndarray) -> np.ndarray:
-    """The weights q (M, H, W, L), those of frames that are not present given to the others; where these have none, the
-    nearest frame's are the parts (M, H, W)."""
+    """Return weights q (M, H, W, L) with the share of absent frames given to the others.
+
+    If the others have no share, the nearest frame gets the parts (M, H, W).
+    """
     if present.all():
         return q
     kept = q * present

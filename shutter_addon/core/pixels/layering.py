@@ -1,18 +1,18 @@
-"""Layers: regions that are exposed by themselves, each by its own shutter, before what lies behind all of them.
+"""Layers: regions that are exposed by their own shutter in front of everything else.
 
 With mₖ the matte of a layer in source frame k, hₖ = Π (1 − mₖ) over all layers, q a pixel's shutter by the other
 regions and s the layer's own, both normalised:
 
-    B = Σ qₖ hₖ Vₖ / Σ qₖ hₖ    what lies behind, exposed without them
+    B = Σ qₖ hₖ Vₖ / Σ qₖ hₖ    the background, exposed without the layers
     F = Σ sₖ mₖ Vₖ              the layer, premultiplied by A = Σ sₖ mₖ
-    F + (1 − A) B               the picture, layer by layer, the first farthest
+    F + (1 − A) B               the picture, layer by layer, the farthest first
 
-So no layer leaves its ghost beside it. The sums are made in the light of Options.light, laid over one another in linear
-light. Where Σ qₖ hₖ is less than CLEAR, too little of B was seen: a plate takes the place of what lacks.
+So layers leave no ghosts. Sums use the light of Options.light and are composed in linear light. Where Σ qₖ hₖ is less
+than CLEAR, too little of B was visible, and a plate fills in.
 
-A pixel V at the edge of a subject is m S + (1 − m) P (`separated`). S and P are first taken from their surroundings,
-then both take up what that leaves of V, each as much as it covers ("Fast Multi-Level Foreground Estimation", Germer et
-al. 2020, and "blur fusion", Forte 2021): twice, from wide surroundings and from near ones.
+A pixel V at the edge of a subject is m S + (1 − m) P (`separated`). S and P are first estimated from their
+surroundings. The remaining error of V is then distributed to both by coverage ("Fast Multi-Level Foreground
+Estimation", Germer et al. 2020, and "blur fusion", Forte 2021): twice, from wide and from near surroundings.
 """
 
 from collections.abc import Sequence
@@ -23,37 +23,37 @@ from numpy.typing import ArrayLike
 
 from .matte_grid import block_sums
 
-# The share of the exposure that must have fallen on what lies behind layers.
+# The share of the exposure that has to be background.
 CLEAR = 1 / 16
-# The share from where on no layer was in the way, but for rounding: there the picture is that without layers.
+# The share from which on no layer was in front, except for rounding: the picture is then that without layers.
 UNCOVERED = 1 - 2e-5
-# Diffused coefficients that are no matte yet, and those that are a whole one: far from its stroke a subject has little
-# more than half of its shutter, and what is around has a little of it (scripts/layer_truth.py).
+# Diffused coefficients that mean matte values 0 and 1. Far from its stroke, a subject has just over half of its
+# shutter, and its surroundings have some of it (scripts/layer_truth.py).
 NONE, WHOLE = 0.3, 0.5
-# How far the surroundings reach, as a share of the picture's height: wider than edges are soft, then to their detail.
+# Radii of surroundings as fractions of the picture's height: wider than soft edges, then at the scale of detail.
 WIDE, NEAR = 1 / 18, 1 / 90
-# Radii in cells that are enough to tell surroundings: larger ones are seen in larger cells.
+# Larger radii, in cells, use larger cells.
 _CELLS = 4
 
 
 def matte_of(coefficients: ArrayLike) -> np.ndarray:
-    """The matte of a layer that is drawn, of its coefficients."""
+    """Return the matte of a drawn layer from its coefficients."""
     values = (np.asarray(coefficients) - NONE) / (WHOLE - NONE)
     return np.clip(values, 0, 1)
 
 
 def behind(mattes: Sequence[np.ndarray]) -> np.ndarray:
-    """How much of what lies behind layers with these mattes (h, w) is seen: Π (1 − m)."""
+    """Return the visible share of the background behind layers with mattes (h, w): Π (1 − m)."""
     return reduce(np.multiply, [1 - matte for matte in mattes])
 
 
 def laid_over(under: np.ndarray, color: np.ndarray, cover: np.ndarray) -> np.ndarray:
-    """A layer's F (H, W, 4), premultiplied, with its A (H, W), over a picture (H, W, 4)."""
+    """Compose a layer's F (H, W, 4), premultiplied, with its A (H, W), over a picture (H, W, 4)."""
     return color + (1 - cover[..., None]) * under
 
 
 def with_plate(sums: np.ndarray, clear: np.ndarray, plate: np.ndarray | None) -> np.ndarray:
-    """B (H, W, 4) of its sums Σ qₖ hₖ Vₖ (H, W, 4) and Σ qₖ hₖ (H, W); plate: what lies behind where that is little."""
+    """Return B (H, W, 4) from Σ qₖ hₖ Vₖ (H, W, 4) and Σ qₖ hₖ (H, W), filled by the plate where that is small."""
     if plate is None:
         return sums / np.maximum(clear, 1e-6)[..., None]
     lacking = np.maximum(CLEAR - clear, 0)[..., None]
@@ -61,9 +61,10 @@ def with_plate(sums: np.ndarray, clear: np.ndarray, plate: np.ndarray | None) ->
 
 
 def separated(colors: np.ndarray, matte: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """The colours (H, W, C) float32 of a subject, and of what lies behind it, of a picture's in linear light.
+    """Return the colours (H, W, C) float32 of a subject and of its background, from linear light.
 
-    What is no mixed pixel of the matte (H, W) stays as it is."""
+    Only mixed pixels of the matte (H, W) change.
+    """
     own, behind = colors.copy(), colors.copy()
     mixed = (matte > 0) & (matte < 1)
     if not mixed.any():
@@ -83,13 +84,13 @@ def separated(colors: np.ndarray, matte: np.ndarray) -> tuple[np.ndarray, np.nda
 
 
 def _around(mixed: np.ndarray, reach: int) -> slice:
-    """The rows, or columns, from the first to the last that has mixed pixels, and as many around as are looked at."""
+    """Return the rows, or columns, from the first to the last mixed pixel, extended by `reach`."""
     places = np.flatnonzero(mixed)
     return slice(max(int(places[0]) - reach, 0), int(places[-1]) + reach + 1)
 
 
 def _surroundings(own: np.ndarray, behind: np.ndarray, matte: np.ndarray, radius: int) -> tuple[np.ndarray, np.ndarray]:
-    """The means (h, w, C) around each pixel of colours, weighted by a matte (h, w, 1), and of others, by its rest."""
+    """Return means (h, w, C) around each pixel of subject colours, weighted by a matte (h, w, 1), and of the others."""
     cell = max(radius // _CELLS, 1)
     weighted = np.concatenate([own * matte, behind * (1 - matte), matte, 1 - matte], axis=-1)
     sums = _box_sums(block_sums(weighted, cell, np.float32, beyond="constant"), radius // cell)
@@ -102,7 +103,7 @@ def _surroundings(own: np.ndarray, behind: np.ndarray, matte: np.ndarray, radius
 
 
 def _box_sums(values: np.ndarray, radius: int) -> np.ndarray:
-    """Sums (h, w, C) float64 over squares of 2 · radius + 1 cells, of which nothing lies beyond the edges."""
+    """Return sums (h, w, C) float64 over squares of 2 · radius + 1 cells, with nothing beyond the edges."""
     for axis in (0, 1):
         length = values.shape[axis]
         sums = np.cumsum(values, axis=axis, dtype=np.float64)

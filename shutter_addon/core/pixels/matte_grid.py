@@ -1,5 +1,4 @@
-"""A matte's values on the picture's grid: fitted to it, feathered, by blocks of pixels; and what else is blurred or
-summed over blocks. Pure NumPy, and separable."""
+"""Fitting mattes to the picture's pixels: scaling, feathering, means of blocks; and other separable filters."""
 
 import math
 from typing import Literal
@@ -7,20 +6,23 @@ from typing import Literal
 import numpy as np
 from numpy.typing import DTypeLike
 
-Taps = tuple[np.ndarray, np.ndarray]  # for each row that comes out: which rows go in, and their weights, both (rows, k)
+Taps = tuple[np.ndarray, np.ndarray]  # for each row of the result: input rows and their weights, both (rows, k)
 
-EDGE_SIGMAS = 4  # a feather's width is so many standard deviations of its Gaussian; 95 % of an edge's step lie in it
-_COARSE = 2.7  # standard deviations that a Gaussian keeps on a coarser grid: edges are within 1/255 of the exact ones
+EDGE_SIGMAS = 4  # standard deviations per width of a feather, which contain 95 % of an edge's step
+_COARSE = 2.7  # standard deviation of a Gaussian on a coarser grid, in cells: edges are within 1/255 of the exact ones
 _REACH = 3.3  # standard deviations
-_ROWS = 32  # at a time; a processor's cache holds them
+_ROWS = 32  # rows at a time, which fit into a processor's cache
 
 
 def fitted(values: np.ndarray, width: int, height: int) -> np.ndarray:
-    """A matte scaled to fit a picture, its aspect kept, in the middle, with black around it.
+    """Scale a matte to fit into the middle of a picture, with its aspect and black around it.
 
-    values: (h, w) float32, 0 … 1; width, height: of the picture, in pixels
-    A pixel is the mean of what it covers where the matte is reduced, and interpolated linearly where it is enlarged;
-    one that the matte's edge crosses is black in proportion. The matte itself where nothing is to be done.
+    A pixel is the mean of what it covers where the matte is reduced, and linearly interpolated where it is enlarged. A
+    pixel on the matte's edge is black in proportion. A matte of the right size is returned itself.
+
+    Args:
+        values: (h, w) float32, 0 … 1.
+        width, height: Of the picture.
     """
     if values.shape == (height, width):
         return values
@@ -30,23 +32,24 @@ def fitted(values: np.ndarray, width: int, height: int) -> np.ndarray:
 
 
 def feathered(values: np.ndarray, width: float) -> np.ndarray:
-    """Values (h, w) float32 behind a Gaussian that spreads a hard edge over `width` pixels, EDGE_SIGMAS of its standard
-    deviations. Beyond the picture its edges go on. The values themselves where the width is 0."""
+    """Blur values (h, w) float32 with a Gaussian that spreads a hard edge over `width` pixels.
+
+    Beyond the picture its edges continue. With width 0, the values are returned themselves.
+    """
     if width <= 0:
         return values
     sigma = width / EDGE_SIGMAS
     step = max(1, int(sigma / _COARSE))
     if step == 1:
         return blurred(values, _gaussian(sigma))
-    # Coarse cells and lines between them widen an edge as well, by a quarter of the square of a cell on average.
+    # Coarse cells and interpolation also widen an edge, by a quarter of a cell squared on average.
     narrower = math.sqrt((sigma / step) ** 2 - 1 / 4)
     coarse = _resampled(values, *(_means(length, step) for length in values.shape))
     return _resampled(blurred(coarse, _gaussian(narrower)), *(_lines(length, step) for length in values.shape))
 
 
 def block_means(values: np.ndarray, block: int) -> np.ndarray:
-    """Means (⌈h/block⌉, ⌈w/block⌉) float32 of blocks of values (h, w), of which the last may be cut. The values
-    themselves where a block is one value."""
+    """Return means (⌈h/block⌉, ⌈w/block⌉) float32 of blocks of values (h, w); the last blocks may be smaller."""
     if block == 1:
         return values
     return _resampled(values, *(_blocks(length, block) for length in values.shape))
@@ -55,9 +58,11 @@ def block_means(values: np.ndarray, block: int) -> np.ndarray:
 def block_sums(
     picture: np.ndarray, size: int, dtype: DTypeLike, *, beyond: Literal["edge", "constant"] = "edge"
 ) -> np.ndarray:
-    """Sums (⌈h/size⌉, ⌈w/size⌉, C) over blocks of a picture's pixels (h, w, C).
+    """Return sums (⌈h/size⌉, ⌈w/size⌉, C) over blocks of a picture's pixels (h, w, C).
 
-    beyond: what comes after its last pixels, as numpy.pad has it: these again, or "constant", nothing"""
+    Args:
+        beyond: How the picture continues, as in numpy.pad: "constant" for 0.
+    """
     down, right = (-length % size for length in picture.shape[:2])
     if down or right:
         picture = np.pad(picture, [(0, down), (0, right), (0, 0)], beyond)
@@ -71,15 +76,17 @@ def block_sums(
 
 
 def _resampled(values: np.ndarray, down: Taps, across: Taps) -> np.ndarray:
-    if len(across[0]) > values.shape[1]:  # turned twice before it is large, or after it is small
+    if len(across[0]) > values.shape[1]:  # transpose while it is small
         return _weighted(_turned(_weighted(_turned(values), *across)), *down)
     return _turned(_weighted(_turned(_weighted(values, *down)), *across))
 
 
 def blurred(values: np.ndarray, kernel: np.ndarray) -> np.ndarray:
-    """Values (h, w), 1 at most, weighted down and across; beyond the picture its edges go on.
+    """Filter values (h, w) ≤ 1 vertically and horizontally; beyond the picture its edges continue.
 
-    kernel: the weights of a pixel itself and of those at distances 1, 2, …"""
+    Args:
+        kernel: Weights at distances 0, 1, 2, …
+    """
     return _turned(_convolved(_turned(_convolved(values, kernel)), kernel))
 
 
@@ -88,7 +95,7 @@ def _turned(values: np.ndarray) -> np.ndarray:
 
 
 def _weighted(values: np.ndarray, indices: np.ndarray, weights: np.ndarray) -> np.ndarray:
-    """Rows (rows, w) that are weighted sums of others, 1 at most."""
+    """Return rows (rows, w) that are weighted sums of rows, at most 1."""
     result = np.empty((len(indices), values.shape[1]), np.float32)
     weights = weights.astype(np.float32)[:, :, None]
     for start in range(0, len(indices), _ROWS):
@@ -103,7 +110,7 @@ def _weighted(values: np.ndarray, indices: np.ndarray, weights: np.ndarray) -> n
 
 
 def _convolved(values: np.ndarray, kernel: np.ndarray) -> np.ndarray:
-    """As `_weighted`, with the same weights everywhere: see `blurred`."""
+    """Filter rows by a kernel (see `blurred`)."""
     reach = len(kernel) - 1
     padded = np.pad(values, ((reach, reach), (0, 0)), "edge")
     result = np.empty_like(values)
@@ -120,7 +127,7 @@ def _convolved(values: np.ndarray, kernel: np.ndarray) -> np.ndarray:
 
 
 def _fit(length: int, size: int, scale: float) -> Taps:
-    """For each of `size` pixels in a row: which of `length` pixels it shows that are scaled and lie in the middle."""
+    """Return taps for `size` pixels of a row that shows `length` scaled pixels in its middle."""
     edges = (np.arange(size + 1) - size / 2) / scale + length / 2
     start, stop = edges[:-1, None], edges[1:, None]
     if scale < 1:
@@ -138,29 +145,29 @@ def _fit(length: int, size: int, scale: float) -> Taps:
 
 
 def _blocks(length: int, block: int) -> Taps:
-    """Blocks of rows, the last of those that are left."""
+    """Return taps for means of blocks of rows; the last block may be smaller."""
     indices = np.arange(0, length, block)[:, None] + np.arange(block)
     present = indices < length
     return indices.clip(0, length - 1), present / present.sum(axis=1, keepdims=True)
 
 
 def _gaussian(sigma: float) -> np.ndarray:
-    """Weights float32 of a pixel and of those at distances 1, 2, …: what they cover of the Gaussian, so that a hard
-    edge becomes the error function itself."""
+    """Return weights float32 at distances 0, 1, 2, …: the Gaussian's integral over pixels, so that a hard edge becomes
+    the error function."""
     reach = math.ceil(_REACH * sigma)
     ends = np.array([math.erf((i - 0.5) / (sigma * math.sqrt(2))) for i in range(reach + 2)])
     return (np.diff(ends) / (2 * ends[-1])).astype(np.float32)
 
 
 def _means(length: int, step: int) -> Taps:
-    """Cells of `step` pixels, with one more at each end, whose pixels repeat the last one."""
+    """Return taps for cells of `step` pixels, with one more cell at each end that repeats the last pixel."""
     cells = np.arange(-1, math.ceil(length / step) + 1)[:, None]
     indices = (cells * step + np.arange(step)).clip(0, length - 1)
     return indices, np.full(indices.shape, 1 / step)
 
 
 def _lines(length: int, step: int) -> Taps:
-    """The pixels again, on straight lines between the middles of such cells."""
+    """Return taps for pixels that are interpolated linearly between the middles of cells from `_means`."""
     place = (np.arange(length)[:, None] + 0.5) / step + 0.5
     indices = np.floor(place).astype(int) + np.arange(2)
     return indices, 1 - np.abs(place - indices)

@@ -1,20 +1,22 @@
-"""Patterns that tell shutters apart where colours do not; the reference of what shaders/show.glsl draws."""
+"""Patterns that distinguish shutters without colour; the reference of shaders/show.glsl."""
 
 from collections.abc import Sequence
 
 import numpy as np
 
 COUNT = 8  # plain, rising lines, dots, falling lines, horizontal, vertical, hatched, grid
-STRENGTH = 0.4  # of the ink, over a shutter's colour
+STRENGTH = 0.4  # opacity of the ink over a shutter's colour
 _PERIOD, _SLANTED, _WIDTH, _RADIUS = 8.0, 12.0, 1.7, 1.8  # in units of the interface
-_OFF = 0.3  # with it and that width no pixel's middle lies on a line's edge, where rounding would decide
+_OFF = 0.3  # keeps pixels' middles off the lines' edges, where rounding would decide
 _LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
 _DARK = 0.35  # code value below which a colour gets white ink
 
 
 def marks(index: int, x: np.ndarray, y: np.ndarray) -> np.ndarray:
-    """Where the pattern of the shutter at an index of the list has ink: bool, as x and y, which are places of the
-    screen in units of the interface, y up. The first shutter's is plain; after COUNT they begin anew."""
+    """Return where a shutter's pattern has ink: bool, like x and y, in units of the interface, y up.
+
+    The first shutter's pattern is plain. Patterns repeat after COUNT shutters.
+    """
     across, up = _within(x, _PERIOD) < _WIDTH, _within(y, _PERIOD) < _WIDTH
     rising, falling = _within(x - y + _OFF, _SLANTED) < _WIDTH, _within(x + y + _OFF, _SLANTED) < _WIDTH
     apart = np.hypot(_within(x, _PERIOD) - _PERIOD / 2, _within(y, _PERIOD) - _PERIOD / 2)
@@ -23,12 +25,12 @@ def marks(index: int, x: np.ndarray, y: np.ndarray) -> np.ndarray:
 
 
 def ink(color: Sequence[float]) -> tuple[float, float, float]:
-    """The ink of a pattern on a colour (3,), both display code values."""
+    """Return the ink's colour on a colour (3,), both display code values."""
     return (1.0, 1.0, 1.0) if np.dot(color, _LUMINANCE) < _DARK else (0.0, 0.0, 0.0)
 
 
 def painted(color: Sequence[float], index: int, x: np.ndarray, y: np.ndarray) -> np.ndarray:
-    """A colour (3,) with a pattern at places as for `marks`: (..., 3), display code values."""
+    """Return a colour (3,) with a pattern at places as for `marks`: (..., 3), display code values."""
     share = STRENGTH * marks(index, x, y)[..., None]
     return (1 - share) * np.asarray(color) + share * np.array(ink(color))
 

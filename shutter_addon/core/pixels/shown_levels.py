@@ -1,4 +1,4 @@
-"""Levels of 8 bits as Blender makes them of scene-linear light, to the bit, dither included."""
+"""8-bit levels of scene-linear light as Blender makes them, to the bit, including dither."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -7,33 +7,37 @@ from functools import lru_cache
 import numpy as np
 
 _HASH = np.uint32(1103515245)
-_SPREAD = np.float32(0.0033)  # of Blender's dither at an intensity of 1, in code values
+_SPREAD = np.float32(0.0033)  # Blender's dither at intensity 1, in code values
 
 
 @dataclass(frozen=True)
 class Display:
-    """What light becomes on its way to a file.
+    """Conversion of light to a file's levels.
 
-    dither: its intensity, 0 or more
-    transfer: code values float32 that light float32 of any shape is shown as, each to the bit and by itself"""
+    Attributes:
+        dither: Its intensity, ≥ 0.
+        transfer: Converts light float32 of any shape to code values float32, elementwise and to the bit.
+    """
 
     dither: float
     transfer: Callable[[np.ndarray], np.ndarray]
 
     def levels(self, light: np.ndarray, noise: np.ndarray) -> np.ndarray:
-        """Levels uint8 of light (…, C) float32. noise: of its pixels (…), see `noise`."""
+        """Return levels uint8 of light (…, C) float32, with the `noise` (…) of its pixels."""
         return rounded(self.transfer(light) + noise[..., None])
 
     def noise(self, width: int, height: int) -> np.ndarray:
-        """What is added to the code values of a picture (height, width) float32, bottom row first: the same to all its
-        channels, and in all frames. It is not to be written to."""
+        """Return the noise (height, width) float32, bottom row first, that is added to code values of all channels.
+
+        It is the same for all frames. Do not modify it.
+        """
         return _noise(width, height, self.dither)
 
 
 @lru_cache(2)
 def _noise(width: int, height: int, dither: float) -> np.ndarray:
-    """The hash iqint3 (Jarzynski and Olano, Hash Functions for GPU Rendering, 2020) of a pixel's place, its evenly
-    spread values made a triangle from −1 to 1."""
+    """Return the hash iqint3 of pixels (Jarzynski and Olano, Hash Functions for GPU Rendering, 2020), with a triangular
+    distribution from −1 to 1."""
     if not dither:
         return np.zeros((height, width), np.float32)
     y, x = np.ogrid[:height, :width]
@@ -45,5 +49,5 @@ def _noise(width: int, height: int, dither: float) -> np.ndarray:
 
 
 def rounded(values: np.ndarray) -> np.ndarray:
-    """The levels uint8 of code values float32 of any range: to the nearest."""
+    """Return the nearest levels uint8 of code values float32 of any range."""
     return (np.float32(255) * np.clip(values, 0, 1) + np.float32(0.5)).astype(np.uint8)

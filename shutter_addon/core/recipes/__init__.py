@@ -1,1 +1,1 @@
-"""The effect as a JSON file: its format, read, checked, written and edited. Uses model and frames."""
+"""The effect as a JSON file: reading, checking, writing and editing recipes."""

@@ -1,9 +1,10 @@
-"""An effect as a recipe has it, where its channels were sampled: with keys in their place.
+"""Converting an effect with sampled channels into a recipe, whose channels have keys.
 
-Numbers are float32 where they come from: a recipe gets the shortest decimals that give the same ones back, and points
-to a millionth of the picture. So a recipe's numbers come back as they were written, up to seven digits.
-Between two keys a recipe knows three eases. Where a channel does something else there is a key per frame: at every
-whole frame, recipe and effect agree within TOLERANCE.
+Sampled numbers are float32. A recipe gets the shortest decimals that give the same float32, and points are rounded to a
+millionth of the picture. So a recipe's numbers survive a round trip with up to seven digits.
+
+A recipe knows three eases between keys. Where a channel does something else, it gets a key per frame. At every whole
+frame, recipe and effect agree within TOLERANCE.
 """
 
 import itertools
@@ -38,28 +39,32 @@ from ..model.keyframes import Bars, Channel, Constant, Ease, Keys, Samples, Sour
 from ..model.motions import Placement
 from . import recipe, recipe_file
 
-# Of the largest bar, of fractions of the picture, of degrees; of the larger key's value where that is above 1.
+# Relative to the largest bar; absolute for fractions of the picture and degrees, relative for keys above 1.
 TOLERANCE = 1e-4
 
-# Frames of keys, each with the ease of the span that it begins.
+# Frames of keys, each with the ease until the next key.
 _Eased = Sequence[tuple[float, Ease]]
 _Fits = Callable[[float, float, float, float], bool]
 
 
 def baked(effect: Effect, shown: range, contents: Iterable[FileContent | RampContent] = ()) -> Effect:
-    """The effect of a recipe, for an effect that is shown at these frames, of which the first is the recipe's frame 1.
-    Its channels are sampled there, at their keys and at its drawings. EffectError: it cannot be rendered as it stands.
+    """Return a recipe's effect for an effect that is shown at some frames, the first of which is the recipe's frame 1.
 
-    contents: of each matte region but outlines, what a recipe says of it
+    Channels are sampled at these frames, at their keys and at drawings. The result leaves out regions without strokes
+    and drawings before the first with strokes. Widths and options are constant, as at the first frame.
 
-    Left out are regions without strokes, drawings before the first that has strokes, and keys of widths and of options,
-    which are as at the first frame."""
+    Args:
+        contents: The recipe's contents of matte regions, without outlines.
+
+    Raises:
+        EffectError: The effect cannot be rendered.
+    """
     options = effect.options.at(shown.start)
     names = _different([shutter.name for shutter in effect.shutters])
     called, words = _region_names(effect), iter(contents)
     made = [_region(region, name, words, shown) for region, name in zip(effect.regions, called, strict=True)]
     camera = Camera(moves=_moves(effect.camera, {}, shown), **_said(effect.camera, (), shown))
-    # A region without strokes says nothing of how anything moves.
+    # Without strokes, a region does not move anything.
     followed = {id(old): new for old, new in zip(effect.regions, made, strict=True)} | {id(effect.camera): camera}
     shutters = [
         _shutter(effect, index, name, followed.get(id(effect.shutters[index].follow)), options.interpolation, shown)
@@ -77,7 +82,7 @@ def baked(effect: Effect, shown: range, contents: Iterable[FileContent | RampCon
 
 
 def _different(names: list[str]) -> list[str]:
-    """The names, those that occur again with a number: regions mean the first."""
+    """Number repeated names: regions refer to the first."""
     result: list[str] = []
     for name in names:
         result.append(_free(name, result))
@@ -85,14 +90,14 @@ def _different(names: list[str]) -> list[str]:
 
 
 def _free(name: str, taken: Collection[str]) -> str:
-    """The name; where it is taken, with the first number with which it is not."""
+    """Return the name, with the first number that makes it unique."""
     ends = itertools.chain([""], (f" {number}" for number in itertools.count(2)))
     numbered = (name[: limits.MAX_NAME - len(end)] + end for end in ends)
     return next(each for each in numbered if each not in taken)
 
 
 def _region_names(effect: Effect) -> list[str]:
-    """The regions' names; those that shutters follow are as no other's, and not the camera's."""
+    """Return the regions' names, unique for regions that shutters follow and different from the camera's."""
     followed = [shutter.follow for shutter in effect.shutters if shutter.follow]
     names = [region.name for region in effect.regions]
     for i, region in enumerate(effect.regions):
@@ -105,7 +110,7 @@ def _region_names(effect: Effect) -> list[str]:
 def _shutter(
     effect: Effect, index: int, name: str, follow: Subject | None, interpolation: Interpolation, shown: range
 ) -> Shutter:
-    """A shutter whose numbers have the recipe's keys; what counts nothing is as it is at first."""
+    """Return a shutter with the recipe's keys; unused numbers stay at their first value."""
     shutter = effect.shutters[index]
     unused = set() if follow else {"follow_motion", "follow_smooth", "trail"}
     if shutter.combine not in ("lightest", "darkest"):
@@ -121,7 +126,7 @@ def _shutter(
 
 
 def _said(part: Any, unused: Container[str], shown: range) -> dict[str, Any]:
-    """What fields define of a part of an effect, but for those that are unused."""
+    """Return the fields of a part of an effect, without the unused ones."""
     said: dict[str, Any] = {}
     for name, each in fields_of(type(part)).items():
         if name in unused:
@@ -148,7 +153,7 @@ def _bars(effect: Effect, index: int, interpolation: Interpolation, shown: range
 
     def fits(first: float, second: float, frame: float, share: float) -> bool:
         ends = np.array([bars(first), bars(second)])
-        if interpolation == "value" or sampled.share is None:  # every bar has an ease of its own
+        if interpolation == "value" or sampled.share is None:  # every bar has its own ease
             apart = np.abs(bars(frame) - keyframes.between_bars(ends[0], ends[1], share, "value")).max()
         else:
             apart = abs(sampled.share.at(frame) - share) * np.ptp(ends, axis=0).max()
@@ -159,7 +164,7 @@ def _bars(effect: Effect, index: int, interpolation: Interpolation, shown: range
 
 
 def _keyed(eased: _Eased, value: Callable[[float], Any], shown: range) -> Keys:
-    """Keys at these frames; value: gives that at a timeline frame."""
+    """Return keys at these frames; `value` gives the value at a timeline frame."""
     frames, eases = zip(*eased, strict=True)
     return Keys(tuple(_frame(frame, shown) for frame in frames), tuple(map(value, frames)), eases)
 
@@ -176,9 +181,13 @@ def _time(time: Channel, shown: range) -> SourceTime:
 
 
 def _number_keys(at: Callable[[float], float], channel: Channel, shown: range) -> Keys:
-    """The keys of a number; at: its values, channel: where it was sampled."""
+    """Return the keys of a number.
 
-    # Of large numbers, float32 has no more digits.
+    Args:
+        at: Gives its value at a frame.
+        channel: The channel that was sampled.
+    """
+    # float32 has no more digits for large numbers.
     fits = _straight(lambda frame: np.array(at(frame)), lambda largest: max(TOLERANCE, 2e-6 * float(largest)))
     keys: _Eased = [(shown.start, "linear")]
     if isinstance(channel, Samples):
@@ -188,8 +197,11 @@ def _number_keys(at: Callable[[float], float], channel: Channel, shown: range) -
 
 
 def _straight(at: Callable[[float], np.ndarray], allowed: Callable[[np.ndarray], ArrayLike]) -> _Fits:
-    """What tells whether numbers are straight in between (see _keys). allowed: how far they may be off, by the largest
-    at the ends"""
+    """Return a function that tells whether numbers are linear between keys (see `_keys`).
+
+    Args:
+        allowed: Gives the allowed error for the larger values of the two keys.
+    """
 
     def fits(first: float, second: float, frame: float, share: float) -> bool:
         ends = np.array([at(first), at(second)])
@@ -202,7 +214,7 @@ def _straight(at: Callable[[float], np.ndarray], allowed: Callable[[np.ndarray],
 def _region(
     region: Region | MatteRegion, name: str, contents: Iterator[FileContent | RampContent], shown: range
 ) -> Region | MatteRegion | None:
-    """A region whose numbers have the recipe's keys; None: nothing is drawn."""
+    """Return a region with the recipe's keys, or None if nothing is drawn."""
     said = _said(region, (), shown) | {"name": name}
     if isinstance(region, Region):
         said["kind"] = Constant(region.kind.at(shown.start))
@@ -212,7 +224,7 @@ def _region(
     drawn = _drawings(region, shown.start)
     if not drawn:
         return None
-    # The ease from a drawing to the next is its own.
+    # A drawing's ease to the next is independent of the region's keys.
     words = dict(zip(region.drawings.frames, region.drawings.eases, strict=True)) if len(drawn) > 1 else {}
     words = {number: words[number] for number in drawn if words}
     moves = _moves(region, words, shown)
@@ -222,7 +234,7 @@ def _region(
 
 
 def _moves(moving: Subject, words: Mapping[float, Ease], shown: range) -> Moves:
-    """Location, rotation and scale with the recipe's keys; words: see _keys."""
+    """Return location, rotation and scale with the recipe's keys; `words`: see `_keys`."""
     keys = []
     for frame, ease in _move_keys(moving, words, shown):
         x, y, degrees, scale = _place(moving, frame)
@@ -232,10 +244,10 @@ def _moves(moving: Subject, words: Mapping[float, Ease], shown: range) -> Moves:
 
 
 def _move_keys(moving: Subject, words: Mapping[float, Ease], shown: range) -> _Eased:
-    """Frames and eases of the keys of location, rotation and scale; words: see _keys."""
+    """Return the frames and eases of the keys of location, rotation and scale; `words`: see `_keys`."""
     moves = moving.moves.location, moving.moves.rotation, moving.moves.scale
-    sampled = [channel for channel in moves if isinstance(channel, Samples)]
     eases: dict[float, Ease] = {}
+    sampled = [channel for channel in moves if isinstance(channel, Samples)]
     for channel in sampled:
         eases = dict(channel.keys) | eases
     frames = eases.keys() | words.keys()
@@ -246,9 +258,7 @@ def _move_keys(moving: Subject, words: Mapping[float, Ease], shown: range) -> _E
 
     if not frames and tuple(place(shown.start)) != (0, 0, 0, 1):
         frames = {shown.start}
-
     fits = _straight(place, lambda largest: TOLERANCE * np.maximum(1, largest))
-
     return _keys(fits, eases.items(), sorted(frames), words, shown) if frames or sampled else []
 
 
@@ -258,7 +268,7 @@ def _place(moving: Subject, frame: float) -> np.ndarray:
 
 
 def _drawings(region: Region | OutlineRegion, frame: float) -> dict[float, list[np.ndarray]]:
-    """A region's strokes by the frames they were drawn at, from the first that has any, as they lie at a frame."""
+    """Return strokes as they lie at a frame, by the frames of their drawings, from the first with strokes."""
     result: dict[float, list[np.ndarray]] = {}
     for index, number in enumerate(region.drawings.frames):
         strokes = region.drawings.drawing(index, frame)
@@ -274,20 +284,25 @@ def _keys(
     words: Mapping[float, Ease],
     shown: range,
 ) -> _Eased:
-    """Frames and eases of the keys that give the effect at every whole frame of the strip.
+    """Return frames and eases of the keys that reproduce the effect at every whole frame of the strip.
 
-    fits: whether at a frame a share is right between two keys; keys: those of the channels
-    frames: where there has to be a key; words: the ease that a key has to have."""
+    Args:
+        fits: Tells whether a share between two keys is right at a frame.
+        keys: Keys of the channels.
+        frames: Where keys are needed.
+        words: Eases that keys must have.
+    """
     if not frames:
         return [(frame, "linear") for frame in shown]
 
-    def baked(outside: list[int], held: float) -> list[tuple[float, Ease]]:
+    def per_frame(outside: range, held: float) -> list[tuple[float, Ease]]:
+        """Return a key for every frame outside all keys, unless the value at `held` fits."""
         return [] if all(fits(held, held, frame, 0) for frame in outside) else [(frame, "linear") for frame in outside]
 
     eases = dict(keys)
-    kept = baked([frame for frame in shown if frame < frames[0]], frames[0])
+    kept = per_frame(range(shown.start, min(math.ceil(frames[0]), shown.stop)), frames[0])
     for first, second in pairwise(frames):
-        # Keys may lie a million frames outside.
+        # Keys may lie a million frames outside the strip.
         between = range(max(math.floor(first) + 1, shown.start), min(math.ceil(second), shown.stop))
         shares = {frame: (frame - first) / (second - first) for frame in between}
         candidates = (words[first],) if first in words else (eases.get(first, "linear"), *keyframes.EASES)
@@ -300,21 +315,21 @@ def _keys(
             kept += [(frame, "linear") for frame in shares]
     last = frames[-1]
     kept.append((last, words.get(last) or eases.get(last, "linear")))
-    return kept + baked([frame for frame in shown if frame > last], last)
+    return kept + per_frame(range(max(math.floor(last) + 1, shown.start), shown.stop), last)
 
 
 def _short(value: float) -> float:
-    """The shortest decimal that is the same float32."""
+    """Return the shortest decimal with the same float32."""
     return float(str(np.float32(value)))
 
 
 def _short_degrees(degrees: float) -> float:
-    """The shortest decimal that is the same float32 in radians."""
+    """Return the shortest decimal with the same float32 in radians."""
     wanted = np.float32(math.radians(degrees))
     numbers = (float(f"{degrees:.{digits}g}") for digits in range(1, 17))
     return next((number for number in numbers if np.float32(np.radians(number)) == wanted), degrees)
 
 
 def _frame(frame: float, shown: range) -> float:
-    """A frame as the recipe counts; in decimals, where 31.1 less 30 is 1.1."""
+    """Return a frame as the recipe counts it, in decimals: 31.1 − 30 = 1.1."""
     return float(Decimal(str(np.float32(frame))) - (shown.start - 1))

@@ -1,6 +1,6 @@
-"""What is done with an effect as a recipe has it: in whose frames 1 is the strip's first, in fractions of the picture.
+"""Operations on an effect in the form of a recipe: frame 1 is the strip's first, points are fractions of the picture.
 
-recipe_file.py reads and writes it.
+recipe_file.py reads and writes recipes.
 """
 
 from __future__ import annotations
@@ -15,24 +15,24 @@ from ..model.effect import Effect, FileContent, MatteRegion, Region
 
 
 class RecipeError(UserError, ValueError):
-    """A recipe that breaks the format; the message is one sentence (core.messages) that begins with the place."""
+    """A recipe breaks the format. The message is one sentence that begins with the place."""
 
     def __init__(self, text: str):
         super().__init__(sentence(text))
 
 
-# What a shutter follows that moves with the camera.
+# The name by which a shutter follows the camera.
 CAMERA = "camera"
 
 
 def contents(source: Effect) -> list[FileContent]:
-    """What its mattes are read from, as it stands in the recipe."""
+    """Return the files of the effect's mattes, as the recipe names them."""
     found = [region.content for region in source.regions if isinstance(region, MatteRegion)]
     return [content for content in found if isinstance(content, FileContent)]
 
 
 def moved(source: Effect, old: Path, new: Path) -> Effect:
-    """The same effect for a recipe in another folder: relative paths of mattes lead to the same files."""
+    """Return the effect for a recipe in another folder: relative paths of mattes lead to the same files."""
 
     def rebased(region: Region | MatteRegion) -> Region | MatteRegion:
         if not isinstance(region, MatteRegion) or not isinstance(content := region.content, FileContent):
@@ -45,10 +45,10 @@ def moved(source: Effect, old: Path, new: Path) -> Effect:
 
 
 def relative(path: Path, folder: Path) -> str:
-    """The path of a matte, as a recipe in a folder has it: relative, if there is such a one."""
+    """Return the path of a matte as a recipe in `folder` names it: relative where possible."""
     with suppress(ValueError):  # on another drive
         way = os.path.relpath(path, folder)
-        # ".." leads out of where a linked folder really lies
+        # With linked folders, ".." can lead elsewhere.
         if os.path.realpath(os.path.join(folder, way)) == os.path.realpath(path):
             return Path(way).as_posix()
     return Path(os.path.abspath(path)).as_posix()

@@ -1,4 +1,4 @@
-"""What a recipe has to be beyond its types: ranges, names that are known, keys in order."""
+"""Checks of a recipe beyond its types: ranges, references, and the order of keys."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ _COMBINED = "lightest", "darkest"
 
 
 def shown(value: Any) -> str:
-    """A value as JSON, or its first 40 characters; of large ones the rest is not looked at."""
+    """Return a value as JSON, cut to 40 characters without formatting the rest."""
     text = ""
     for part in json.JSONEncoder(ensure_ascii=False).iterencode(value):
         text += part
@@ -40,17 +40,21 @@ def _require(condition: object, place: str, message: str) -> None:
 
 
 def _require_within(value: float, most: float, place: str, least: float | None = None) -> None:
-    """least: −most, where it is not given."""
+    """Check least ≤ value ≤ most; `least` is −most by default."""
     least = -most if least is None else least
     _require(least <= value <= most, place, f"{_plain(value)} is not {_plain(least)} to {_plain(most)}")
 
 
 def check(recipe: Any) -> None:
-    """Check a record of a recipe. RecipeError: it is none that an effect can have."""
+    """Check the record of a recipe.
+
+    Raises:
+        RecipeError: It does not describe a valid effect.
+    """
     for kind in (Options, model.Effect, model.Camera):
         _check_fields(kind, recipe, "")
     _require(recipe.version > 1 or recipe.inbetween != "auto", "inbetween", 'recipes have "auto" from version 2 on')
-    _require(recipe.shutters, "shutters", "there is none; the first is the default")
+    _require(recipe.shutters, "shutters", "empty: the first shutter is the default")
     _check_count(recipe.shutters, limits.MAX_SHUTTERS, "shutters")
     _check_count(recipe.regions, limits.MAX_REGIONS, "regions")
     _check_keys(recipe.time, "time")
@@ -71,20 +75,20 @@ def check(recipe: Any) -> None:
         _require(region.shutter in places, f"regions[{i}].shutter", there_is_none)
         _check_region(region, f"regions[{i}]")
     drawn = [drawings_of(region) for region in recipe.regions if isinstance(region, RegionRecord | OutlineRecord)]
-    # Of each region, those of the drawing that has the most.
+    # Each region counts with its largest drawing.
     points = sum(max(sum(map(len, strokes)) for _, strokes in drawings) for drawings in drawn)
     _require(points <= limits.MAX_POINTS, "regions", f"{points} points at once, the most are {limits.MAX_POINTS}")
 
 
 def _check_fields(kind: type, record: Any, place: str) -> None:
-    """Check what a record says of the fields of a class by their ranges."""
+    """Check the fields of a class against their ranges."""
     for each in fields_of(kind).values():
         if each.recipe:
             _check_field(each, getattr(record, each.recipe), f"{place}{each.recipe}")
 
 
 def _check_field(each: Field, value: Any, place: str) -> None:
-    """A value, or keys of a number."""
+    """Check a value, or the keys of a number."""
     if each.choices or isinstance(value, bool):
         return
     if isinstance(value, str):
@@ -113,24 +117,24 @@ def _check_bars(shutter: Any, window: int, place: str) -> None:
 
 
 def _check_exposure(shutter: Any, place: str) -> None:
-    """What of a shutter goes with what else."""
+    """Check settings of a shutter that depend on each other."""
     ranges = fields_of(model.Shutter)
     if shutter.trail is not None:
-        _require(shutter.follow, f"{place}.trail", "the shutter follows nothing that could move so far")
+        _require(shutter.follow, f"{place}.trail", "the shutter follows nothing that moves")
         _require(shutter.length == "bars", f"{place}.trail", "a shutter has one length")
         _check_field(ranges["trail"], shutter.trail, f"{place}.trail")
     chooses = shutter.combine in _COMBINED
     if shutter.threshold is not None:
-        _require(chooses, f"{place}.threshold", "the lightest and the darkest alone have a threshold")
+        _require(chooses, f"{place}.threshold", "only lightest and darkest have a threshold")
         _check_field(ranges["threshold"], shutter.threshold, f"{place}.threshold")
     is_soft = isinstance(shutter.softness, list) or shutter.softness != 0
     _require(shutter.threshold is not None or not is_soft, f"{place}.softness", "it has no threshold")
     ways = chooses or not shutter.by_luminance
-    _require(ways, f"{place}.by_luminance", "the lightest and the darkest alone go by it")
+    _require(ways, f"{place}.by_luminance", "only lightest and darkest use it")
 
 
 def _check_follow(follow: str | None, regions: list, place: str) -> None:
-    """A name that two of them have says nothing."""
+    """Check that a shutter follows one region, or the camera."""
     if follow is None:
         return
     called = [f"regions[{i}]" for i, region in enumerate(regions) if region.name == follow]
@@ -160,7 +164,7 @@ def _check_drawings(region: Any, place: str) -> None:
     for k, key in enumerate(region.keys):
         where = f"{place}.keys[{k}]"
         whole = not (redrawn if k == 0 else key.strokes is not None) or key.frame == int(key.frame)
-        _require(whole, f"{where}.frame", f"{_plain(key.frame)} is no whole frame, but redrawn")
+        _require(whole, f"{where}.frame", f"{_plain(key.frame)} is not a whole frame, but has strokes")
         if key.strokes is not None:
             _check_strokes(key.strokes, f"{where}.strokes")
     _check_strokes(region.strokes, f"{place}.strokes")
@@ -191,7 +195,7 @@ def _check_count(items: list, most: int, place: str) -> None:
 def _check_name(name: str, place: str, most: int = limits.MAX_NAME) -> None:
     _require(len(name) <= most, place, f"{len(name)} characters, the most are {most}")
     wrong = next((c for c in name if c == "\0" or "\ud800" <= c <= "\udfff"), "")
-    _require(not wrong, place, f"U+{ord(wrong or ' '):04X} is no character of a name")
+    _require(not wrong, place, f"U+{ord(wrong or ' '):04X} is not allowed in a name")
 
 
 def _check_keys(keys: list, place: str) -> None:

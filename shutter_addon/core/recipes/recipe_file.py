@@ -1,4 +1,4 @@
-"""Recipes as files: JSON text that is read into an effect, checked, and written."""
+"""Reading, checking and writing recipes as JSON files."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from .recipe_check import cut, shown
 if TYPE_CHECKING:
     from cattrs import Converter
 
-# Longer numbers are read as floats, which need no time for it; a whole number that counts anything is far shorter.
+# Longer numbers are read as floats, since parsing huge integers takes long. No count needs as many digits.
 _MAX_DIGITS = 300
 
 
@@ -41,10 +41,13 @@ def load(path: str | Path) -> model.Effect:
 
 
 def _read(path: Path) -> str:
-    """The text of a file, a little more at most than a recipe may have. RecipeError, OSError, ValueError: there is
-    none."""
+    """Return a file's text.
+
+    Raises:
+        RecipeError, OSError, ValueError: It cannot be read, or is too large.
+    """
     if path.exists() and not (path.is_file() or path.is_dir()):
-        # opening a pipe would wait for ever, and a device has no end
+        # Opening a pipe would wait forever, and a device has no end.
         raise RecipeError("a pipe or a device, not a file")
     with path.open("rb") as file:
         data = file.read(limits.MAX_BYTES + 1)
@@ -58,21 +61,21 @@ def _check_size(text: str | bytes) -> None:
 
 
 def parse(text: str) -> model.Effect:
-    """Read the recipe in a JSON text. RecipeError: one sentence that names the place, as `shutters[1].bars: …`."""
+    """Read the recipe in a JSON text. RecipeError: one sentence that begins with the place, like `shutters[1].bars`."""
     _check_size(text)
     try:
         data = json.loads(text.removeprefix("\ufeff"), object_pairs_hook=_object, parse_int=_whole)
     except json.JSONDecodeError as error:
         raise RecipeError(f"line {error.lineno}, column {error.colno}: not JSON ({error.msg})") from None
     except RecursionError:
-        raise RecipeError("recipe: lists or objects within one another, too many") from None
+        raise RecipeError("recipe: too many lists or objects within each other") from None
     if isinstance(data, dict) and type(version := data.get("version")) is int and version > records.VERSION:
         newer = f"version: {shown(version)} is of a newer version of Virtual Shutter, this one reads {records.VERSION}"
         raise RecipeError(newer)
     if isinstance(data, dict) and data.get("version") == 1:
-        data.pop("inbetween_method", None)  # there is one way by now
+        data.pop("inbetween_method", None)  # only one method is left
         if data.get("inbetween", 1) != 1:
-            data.setdefault("skip_repeats", False)  # as it was
+            data.setdefault("skip_repeats", False)  # the behaviour of version 1
     converter = _converter()
     try:
         recipe: Any = converter.structure(data, records.RecipeRecord)
@@ -83,9 +86,9 @@ def parse(text: str) -> model.Effect:
 
 
 def dump(effect: model.Effect) -> str:
-    """Write a recipe as JSON text, which `parse` reads. Fields that carry nothing are left out."""
+    """Return a recipe as JSON text that `parse` reads. Fields without meaning are left out."""
     text = json.dumps(_said(records.recipe_of(effect)), indent=1, ensure_ascii=False)
-    # People read and edit these files: a list of numbers stays on one line. Texts are found as well, to be passed over.
+    # People edit these files: keep a list of numbers on one line. The pattern also matches strings, to skip them.
     return re.sub(r'"(?:[^"\\]|\\.)*"|\[[-+.\de,\s]+\]', _on_one_line, text) + "\n"
 
 
@@ -95,12 +98,12 @@ def _on_one_line(match: re.Match) -> str:
 
 
 def save(effect: model.Effect, path: str | Path) -> None:
-    """Write a recipe whole or not at all. OSError: it cannot be written."""
+    """Write a recipe, whole or not at all. OSError: it cannot be written."""
     with atomic_write.writing(Path(path)) as part:
         part.write_text(dump(effect), encoding="utf-8")
 
 
-# What few recipes need is said where it says something.
+# Defaults of fields that few recipes need; they are written only with another value.
 _UNTOLD = {
     each.recipe: each.absent
     for each in fields_of(
@@ -111,7 +114,7 @@ _UNTOLD = {
 
 
 def _said(value: Any) -> Any:
-    """Records as JSON has them."""
+    """Return records as JSON data."""
     if is_dataclass(value):
         columns = {each.name: getattr(value, each.name) for each in fields(value)}
         told = {k: v for k, v in columns.items() if v is not None and (k not in _UNTOLD or v != _UNTOLD[k])}
@@ -120,7 +123,7 @@ def _said(value: Any) -> Any:
 
 
 class _Doubled(dict):
-    """An object of JSON that has a field twice, its name in `field`: which one is meant, nobody knows."""
+    """A JSON object with a duplicate field, whose name is in `field`."""
 
     field: str
 
@@ -194,7 +197,7 @@ def _list(converter: Converter, value: Any, kind: Any) -> list:
     try:
         for each in value:
             structured.append(structure(each, inner))
-    except Exception as error:  # the first one is enough; cattrs' own lists gather millions
+    except Exception as error:  # stop at the first fault; cattrs would collect millions
         from cattrs.errors import IterableValidationError, IterableValidationNote
 
         index = len(structured)
@@ -212,14 +215,14 @@ def _dataclass(kind: Any, converter: Converter) -> Callable[[Any, Any], Any]:
         if not isinstance(value, dict):
             raise ValueError(f"{shown(value)} is not an object")
         if isinstance(value, _Doubled):
-            raise ValueError(f"field {shown(value.field)} stands there twice")
+            raise ValueError(f"field {shown(value.field)} is given twice")
         return structure_fields(value, kind)
 
     return structure
 
 
 def _one_region(converter: Converter, value: Any, _kind: Any) -> Any:
-    """Which of the kinds of regions it is, its field `kind` says."""
+    """Structure a region by its field `kind`."""
     word = value.get("kind", "line") if isinstance(value, dict) else "line"
     if isinstance(word, str) and word in records.KINDS:
         return converter.structure(value, records.KINDS[word])
@@ -236,8 +239,12 @@ def _made_of(origin: Any) -> Callable[[Any], bool]:
 
 @cache
 def _converter() -> Converter:
-    """RecipeError: cattrs is missing. Blender brings it; a Linux distribution's Blender may not, and effects render
-    without it."""
+    """Return the converter.
+
+    Raises:
+        RecipeError: cattrs is missing. Blender brings it, but a Linux distribution's Blender may not. Effects render
+            without it.
+    """
     try:
         import cattrs
     except ImportError as error:
@@ -263,7 +270,7 @@ def _converter() -> Converter:
 
 
 def _first_fault(error: Exception) -> str:
-    """`place: what is wrong`, of the first fault."""
+    """Return the first fault as `place: what is wrong`."""
     import cattrs
     from cattrs.errors import ForbiddenExtraKeysError
 

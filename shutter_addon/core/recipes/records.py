@@ -1,7 +1,7 @@
-"""What a recipe's JSON holds, as records for cattrs; and the effects that these mean.
+"""Records of a recipe's JSON for cattrs, and their conversion to and from effects.
 
-A record has what the model's fields say, and what is special: bars, strokes and keys. Frames are timeline frames, 1 is
-the strip's first. Points are fractions of the picture, y up.
+A record has the fields that the model declares, and special ones: bars, strokes and keys. Frames are timeline frames; 1
+is the strip's first. Points are fractions of the picture, y up.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from ..model.keyframes import Channel, Constant, Ease, Keys
 from ..model.motions import Placement
 from .recipe import CAMERA
 
-VERSION = 2  # the newest one that is read; in the first, bars counted moments between filmed frames
+VERSION = 2  # the newest that is read; in version 1, bars counted moments between filmed frames
 Point = tuple[float, float]
 Stroke = list[Point]
 
@@ -46,7 +46,7 @@ class BarsKey:
 
 @dataclass(frozen=True)
 class MoveKey:
-    """Location in fractions of the picture, rotation in degrees counter-clockwise."""
+    """A placement: location in fractions of the picture, rotation in degrees counter-clockwise."""
 
     frame: float
     location: Point = (0.0, 0.0)
@@ -57,13 +57,13 @@ class MoveKey:
 
 @dataclass(frozen=True)
 class RegionKey(MoveKey):
-    """And perhaps a redrawn shape."""
+    """A placement, and optionally new strokes."""
 
     strokes: list[Stroke] | None = None
 
 
 def _type_of(each: Field) -> Any:
-    """The type of a field's value in a recipe."""
+    """Return the type of a field's value in a recipe."""
     if each.choices:
         return Literal[each.words]
     if isinstance(each.default, tuple):
@@ -72,8 +72,12 @@ def _type_of(each: Field) -> Any:
 
 
 def _record(name: str, kinds: tuple[type, ...], **special: tuple[Any, Any]) -> type:
-    """Build a class of what a recipe says: fields of the model, the first of whose kinds is its `model`, and special
-    ones, by name their type and default."""
+    """Build a record class.
+
+    Args:
+        kinds: Classes of the model whose fields the record has; the first becomes its `model`.
+        special: More fields, each with its type and default.
+    """
     said: dict[str, Any] = {name: special[name] for name in ("version", "kind") if name in special}
     said |= {each.recipe: (_type_of(each), each.absent) for each in fields_of(*kinds).values() if each.recipe} | special
     columns: list[Any] = []
@@ -122,7 +126,7 @@ KINDS = {
     "matte": MatteRecord,
     "ramp": RampRecord,
 }
-# Of a recipe: by its field `kind`, one of KINDS.
+# cattrs chooses one of KINDS by the field `kind`.
 AnyRegionRecord: Any = RegionRecord | OutlineRecord | MatteRecord | RampRecord
 RecipeRecord: Any = _record(
     "RecipeRecord",
@@ -136,7 +140,7 @@ RecipeRecord: Any = _record(
 
 
 def effect_of(recipe: Any) -> model.Effect:
-    """The effect of a recipe that was checked, for no picture in particular yet (Effect.for_picture)."""
+    """Return the effect of a checked recipe. `Effect.for_picture` completes it."""
     options = Options(**_values(Options, recipe))
     order = {shutter.name: index for index, shutter in enumerate(recipe.shutters)}
     regions = tuple(_region(region, order[region.shutter]) for region in recipe.regions)
@@ -158,7 +162,7 @@ def effect_of(recipe: Any) -> model.Effect:
 
 
 def _filmed(effect: model.Effect, options: Options) -> model.Effect:
-    """The effect of a recipe of version 1, whose bars counted moments between filmed frames."""
+    """Convert an effect of version 1, whose bars counted moments between filmed frames."""
     steps, position, lost = int(options.step), options.position, []
     shutters = []
     for shutter in effect.shutters:
@@ -173,7 +177,7 @@ def _filmed(effect: model.Effect, options: Options) -> model.Effect:
 
 
 def _values(kind: type, record: Any) -> dict[str, Any]:
-    """What a record says of the fields of a class, by the model's names."""
+    """Return a record's values for the fields of a class, by the model's names."""
     said = {name: (each, getattr(record, each.recipe)) for name, each in fields_of(kind).items() if each.recipe}
     return {name: _channel(value) if each.is_channel else value for name, (each, value) in said.items()}
 
@@ -183,19 +187,18 @@ def _channel(value: Keyable) -> Channel:
 
 
 def _columns(keys: list, *names: str) -> list[tuple]:
-    """Of keys, each of these fields as a tuple."""
+    """Return the named fields of keys, each as a tuple."""
     return [tuple(getattr(key, name) for key in keys) for name in names]
 
 
 def _shutter(record: Any, follow: model.Subject | None) -> model.Shutter:
-    values = _values(model.Shutter, record)
-    values["length"] = "frames" if record.length == "bars" else record.length
+    values = _values(model.Shutter, record) | {"length": "frames" if record.length == "bars" else record.length}
     if record.trail is not None:
         values |= {"length": "motion", "trail": _channel(record.trail)}
     if record.threshold is not None:
         values |= {"use_threshold": True, "threshold": _channel(record.threshold)}
     else:
-        del values["softness"]  # it says nothing
+        del values["softness"]  # has no meaning without a threshold
     if record.keys:
         frames, bars, eases = _columns(record.keys, "frame", "bars", "ease")
         made = tuple(map(np.array, bars))
@@ -206,8 +209,7 @@ def _shutter(record: Any, follow: model.Subject | None) -> model.Shutter:
 
 
 def _moves(keys: list) -> model.Moves:
-    placed = [(key.frame, Placement(key.location, key.rotation, key.scale), key.ease) for key in keys]
-    return model.Moves.keyed(placed)
+    return model.Moves.keyed([(key.frame, Placement(key.location, key.rotation, key.scale), key.ease) for key in keys])
 
 
 def _region(record: Any, shutter: int) -> model.Region | model.MatteRegion:
@@ -217,18 +219,20 @@ def _region(record: Any, shutter: int) -> model.Region | model.MatteRegion:
     if isinstance(record, RegionRecord):
         values["kind"] = Constant(record.kind)
     elif isinstance(record, OutlineRecord):
-        values["content"] = mattes.FileFrames(file=mattes.NoFile())  # see Effect.for_picture
+        values["content"] = mattes.FileFrames(file=mattes.NoFile())  # Effect.for_picture sets the file
     elif isinstance(record, MatteRecord):
-        said = _values(model.FileContent, record)
-        values["content"] = model.FileContent(path=record.path, channel=record.channel, **said)
+        file = {"path": record.path, "channel": record.channel}
+        values["content"] = model.FileContent(**file, **_values(model.FileContent, record))
     else:
         values["content"] = model.RampContent(ramp=record.ramp)
     return record.model(**values)
 
 
 def drawings_of(record: Any) -> list[tuple[RegionKey | None, list[Stroke]]]:
-    """The key that starts each drawing, and its strokes, in time: those between the keys that carry strokes follow one
-    another; a first key without any carries the region's own."""
+    """Return a region's drawings in time, each as the key that starts it and its strokes.
+
+    The region's own strokes are the first drawing, unless its first key has strokes.
+    """
     drawn: list = [(key, key.strokes) for key in record.keys if key.strokes is not None]
     if not drawn or record.keys[0].strokes is None:
         drawn.insert(0, (record.keys[0] if record.keys else None, record.strokes))
@@ -247,7 +251,7 @@ def _drawings(record: Any) -> model.Drawings:
 
 
 def recipe_of(effect: model.Effect) -> Any:
-    """The record of an effect whose channels are constant or have keys, and whose shutters' names differ."""
+    """Return the record of an effect with constant or keyed channels and unique names of shutters."""
     options, names = effect.options.at(1), [shutter.name for shutter in effect.shutters]
     return RecipeRecord(
         version=VERSION,
@@ -262,7 +266,7 @@ def recipe_of(effect: model.Effect) -> Any:
 
 
 def _words(kind: type, part: Any) -> dict[str, Any]:
-    """What a recipe says of the fields of a class; the inverse of _values."""
+    """Return the recipe's fields for an object of a class; the inverse of `_values`."""
     said = {each.recipe: (each, getattr(part, name)) for name, each in fields_of(kind).items() if each.recipe}
     return {word: _keyable(value) if each.is_channel else value for word, (each, value) in said.items()}
 
@@ -297,7 +301,7 @@ def _shutter_record(shutter: model.Shutter) -> Any:
 
 
 def _move_keys(moves: model.Moves) -> list[dict[str, Any]]:
-    """What its keys say."""
+    """Return the fields of the keys of `moves`."""
     names, channels = ("location", "rotation", "scale"), (moves.location, moves.rotation, moves.scale)
     if not isinstance(moves.location, Keys):
         return []
@@ -315,7 +319,7 @@ def _region_record(region: Any, shutter: str) -> Any:
     if isinstance(region, model.Region | model.OutlineRegion):
         frames = region.drawings.frames
         drawings = [[_points(stroke) for stroke in drawing] for drawing in region.drawings.strokes]
-        # What the region itself carries is its first key's; others stand at keys.
+        # The region carries the first drawing; keys carry the others.
         drawn = dict(zip(frames, drawings, strict=True)) if len(frames) > 1 else {}
         if keys and keys[0]["frame"] == frames[0]:
             drawn.pop(frames[0], None)

@@ -1,4 +1,4 @@
-"""A recipe's region, or its camera, with keys of how it moves."""
+"""Writing tracked motion into a recipe: keys of a region or of the camera."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ from ..model.effect import Camera, Moves, OutlineRegion, Region, Subject
 from ..model.keyframes import Channel, Ease, Keys
 from ..model.motions import Placement, Placements, Size
 
-_DIGITS = 6  # of what was measured: far below a pixel
-# Pixels by which a thinned camera may be off: unlike a region, it carries the picture itself.
+_DIGITS = 6  # of measured numbers: far below a pixel
+# Allowed error of a thinned camera in pixels; it is small because the camera moves the whole picture.
 STEADY = 0.25
-# Of the picture, from its centre on.
+# The picture's corners, from its centre.
 CORNERS = motions.offsets([motions.PICTURE])
 
 
@@ -28,24 +28,27 @@ def with_placements(
     *,
     thin: bool = True,
 ) -> Camera | Region | OutlineRegion:
-    """The region, or the camera, with these placements as its keys, in place of those that it has from the first of
-    these frames to the last. At whole frames beyond these it stays where its keys put it, and its drawings stay where
-    and as they are.
+    """Return the region or camera with keys for these placements.
 
-    exact: those frames among them whose keys are kept in any case, and as they are given
-    size: of the picture; thin: no more keys than the motion needs within a pixel, within a quarter of one everywhere in
-    the picture for a camera"""
+    They replace its keys from the first to the last of these frames. At whole frames beyond, it stays where it was, and
+    its drawings keep their place and shape.
+
+    Args:
+        exact: Frames that keep their keys, with unrounded numbers.
+        size: Of the picture.
+        thin: Leave out keys that the motion does not need, to within a pixel, or a quarter of one for a camera.
+    """
     if isinstance(moving, Camera):
         chosen = motions.thinned(placements, CORNERS, size, exact, STEADY) if thin else sorted(placements)
         return replace(moving, moves=_moves(moving, placements, exact, chosen, {}))
     drawings = replace(moving.drawings, aspect=size[0] / size[1])
     keyed = _eases(moving)
-    # A drawing at no key is there from the first on.
+    # A drawing without a key of its own exists from the first key on.
     drawn = [frame for frame in drawings.frames if frame in keyed]
     eases = {frame: keyed[frame] for frame in drawn if len(drawings.frames) > 1}
     chosen = sorted(placements)
     if thin:
-        # behind a drawing with an ease of its own the motion is to go straight
+        # After a drawing whose ease is not linear, keep the motion straight.
         straight: set[float] = {frame + 1 for frame, ease in eases.items() if ease != "linear"}
         shape = np.concatenate([motions.offsets(strokes) for strokes in drawings.strokes])
         chosen = motions.thinned(placements, shape, size, {*exact, *drawn, *straight})
@@ -58,7 +61,7 @@ def with_placements(
 
 
 def _eases(moving: Subject) -> dict[float, Ease]:
-    """The eases of its keys, by their frames."""
+    """Return the ease of each key, by frame."""
     location = moving.moves.location
     return dict(zip(location.frames, location.eases, strict=True)) if isinstance(location, Keys) else {}
 
@@ -70,8 +73,13 @@ def _moves(
     chosen: list[int],
     eases: Mapping[float, Ease],
 ) -> Moves:
-    """Keys with the chosen placements, in place of those from the first placement to the last; what moves still does so
-    at whole frames beyond. eases: by frame, those that drawings have."""
+    """Return moves with keys for the chosen placements, in place of those from the first placement to the last.
+
+    At whole frames beyond, the subject moves as before.
+
+    Args:
+        eases: The drawings' eases, by frame.
+    """
     first, last = min(placements), max(placements)
     old = _eases(moving)
     keys: dict[float, Placement] = {frame: moving.placement(frame) for frame in old if not first <= frame <= last}
@@ -82,8 +90,14 @@ def _moves(
 
 
 def _cut(keys: Mapping[float, Ease], edge: int, step: int) -> list[int]:
-    """The frames that need a key, so that what lies beyond an edge stays when keys on the other side of it change: the
-    edge where the way to the next key is straight, all frames on a way that is not; none without a key beyond."""
+    """Return the frames that need a key so that motion beyond `edge` stays when keys before it change.
+
+    That is the edge if the motion towards the next key is linear, else all frames up to that key. Nothing is needed
+    without a key beyond.
+
+    Args:
+        step: 1 or −1, the direction away from the changed keys.
+    """
     beyond = [frame for frame in keys if step * (frame - edge) >= 0]
     if not beyond or edge in beyond:
         return []
@@ -98,8 +112,13 @@ def _rounded(placement: Placement) -> Placement:
 
 
 def with_ends(value: Channel, keys: list[presence.Key], frames: range) -> Channel:
-    """How much something counts, with keys of where it is tracked (presence.keys), in place of those that it has at
-    these frames; beyond them it stays what it is. All of it is what it was at most."""
+    """Return an opacity or influence with keys of where the subject is tracked.
+
+    They replace the keys at `frames`; beyond these, the value stays. Each is scaled by the highest old value.
+
+    Args:
+        keys: See presence.keys.
+    """
     if not isinstance(value, Keys):
         return _channel([(key.frame, value.at(1) * key.value, key.ease) for key in keys]) if keys else value
     old = list(zip(value.frames, value.values, value.eases, strict=True))

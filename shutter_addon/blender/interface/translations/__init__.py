@@ -1,11 +1,10 @@
-"""What the extension says in Blender's interface, in other languages.
+"""Translations of the interface.
 
-A language is a module with a dictionary, as Blender's own: (context, English) to the words shown. Python needs nothing
-to read it, and a line is a message, so that changes are easy to compare. To add one, copy german.py and name it below;
-tests/blender/test_translations.py says what a language lacks.
+A language is a module with a dictionary in Blender's format: (context, English) to the translation. To add one, copy
+german.py and name it below. tests/blender/test_translations.py lists missing texts.
 
-What core, media, compute and the command say is English everywhere: it names files, fields and devices, and is looked
-for in logs. Only what core says of a shutter's bars is looked up, where data/snapshot.py passes it on.
+Texts of core, media, compute and the command are always English: they name files, fields and devices, and users search
+for them. Only what core says about a shutter's bars is translated, by data/snapshot.py.
 """
 
 import bpy

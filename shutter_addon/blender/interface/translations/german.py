@@ -38,7 +38,7 @@ MESSAGES = {
     ("Operator", "Add Shutter Strip"): "Verschlussstreifen hinzufügen",
     (
         "*",
-        "Add a Shutter strip above the active strip, which gives every pixel an exposure of its own",
+        "Add a Shutter strip, which gives every pixel its own exposure, above the active strip",
     ): "Verschlussstreifen über dem aktiven Streifen hinzufügen, der jedem Pixel eine eigene Belichtung gibt",
     ("*", "Scene"): "Szene",
     ("*", "Scene that the effect's strips show"): "Szene, die die Streifen des Effekts zeigen",
@@ -69,8 +69,8 @@ MESSAGES = {
     ("*", 'the source strip of "{strip}" was deleted'): "der Quellstreifen von „{strip}“ wurde gelöscht",
     (
         "*",
-        "the {limit} MB that may be taken of the GPU are too few for {frames} frames of {width}×{height}: all are sent"
-        " for every picture, which is slow",
+        "{limit} MB of GPU memory are too little for {frames} frames of {width}×{height}: every picture uploads all of"
+        " them, which is slow",
     ): "die {limit} MB, die von der GPU genommen werden dürfen, reichen nicht für {frames} Einzelbilder von"
     " {width}×{height}: für jedes Bild werden alle neu gesendet, und das ist langsam",
     (
@@ -115,7 +115,7 @@ MESSAGES = {
     "oder gelöscht werden",
     (
         "*",
-        'Saved "{path}", without what a newer version of Virtual Shutter has added',
+        'Saved "{path}" without data of a newer version of Virtual Shutter',
     ): "„{path}“ gespeichert, ohne das, was eine neuere Version von Virtual Shutter hinzugefügt hat",
     ("*", "{place}: {property} is none of its choices"): "{place}: {property} ist keine der Möglichkeiten",
     (
@@ -125,18 +125,18 @@ MESSAGES = {
     ("*", "{place}: {count} bars, and {window} frames"): "{place}: {count} Balken und {window} Bilder",
     (
         "*",
-        "{place}: {count} shutters, {most} are the most",
+        "{place}: {count} shutters, but at most {most} are possible",
     ): "{place}: {count} Verschlüsse, höchstens {most} sind möglich",
     (
         "*",
-        "{place}: {count} regions, {most} are the most",
+        "{place}: {count} regions, but at most {most} are possible",
     ): "{place}: {count} Regionen, höchstens {most} sind möglich",
     (
         "*",
-        "{place}: its name has {count} characters, {most} are the most",
+        "{place}: its name has {count} characters, but at most {most} are possible",
     ): "{place}: der Name hat {count} Zeichen, höchstens {most} sind möglich",
-    ("*", "An effect has {most} shutters at most"): "Ein Effekt hat höchstens {most} Verschlüsse",
-    ("*", "An effect has {most} regions at most"): "Ein Effekt hat höchstens {most} Regionen",
+    ("*", "An effect can have at most {most} shutters"): "Ein Effekt hat höchstens {most} Verschlüsse",
+    ("*", "An effect can have at most {most} regions"): "Ein Effekt hat höchstens {most} Regionen",
     (
         "*",
         'shutter "{name}": bars {first} to {last} of the older file are one filmed frame now, and expose other moments',
@@ -144,11 +144,11 @@ MESSAGES = {
     "andere Momente",
     (
         "*",
-        'region "{name}": more than {most} points with those before it',
+        'region "{name}": more than {most} points together with the regions before it',
     ): "Region „{name}“: mehr als {most} Punkte mit denen davor",
     (
         "*",
-        'region "{name}": a point of its strokes is nowhere near the picture',
+        'region "{name}": a point of its strokes is too far from the picture',
     ): "Region „{name}“: ein Punkt ihrer Striche liegt weit weg vom Bild",
     (
         "*",
@@ -160,7 +160,7 @@ MESSAGES = {
     ): "Streifen „{strip}“ ist zu klein, um seine Markierungen zu finden",
     (
         "*",
-        'strip "{strip}" lies at frames {first} to {last}, where no timeline is',
+        'strip "{strip}" lies at frames {first} to {last}, beyond the timeline',
     ): "Streifen „{strip}“ liegt bei den Bildern {first} bis {last}, wo keine Zeitleiste ist",
     (
         "*",
@@ -199,7 +199,7 @@ MESSAGES = {
     ("Operator", "Match Source"): "An Quelle angleichen",
     (
         "*",
-        "Give the Shutter strip transform, crop, flip, color and range of its source (scribbles stay on the picture)",
+        "Copy transform, crop, flip, color and range of the source to the Shutter strip (strokes stay on the picture)",
     ): "Dem Verschlussstreifen Transformation, Beschnitt, Spiegelung, Farbe und Bereich seiner Quelle geben "
     "(Markierungen bleiben auf dem Bild)",
     ("*", "Differs from its source: {what}"): "Weicht von der Quelle ab: {what}",
@@ -208,25 +208,25 @@ MESSAGES = {
     ("*", "flip"): "Spiegelung",
     ("*", "color"): "Farbe",
     ("*", "range"): "Bereich",
-    ("*", "The Shutter strip is like its source"): "Der Verschlussstreifen ist wie seine Quelle",
-    ("*", "The Shutter strip has no source any more"): "Der Verschlussstreifen hat keine Quelle mehr",
+    ("*", "The Shutter strip matches its source"): "Der Verschlussstreifen ist wie seine Quelle",
+    ("*", "The Shutter strip has no source"): "Der Verschlussstreifen hat keine Quelle mehr",
     (
         "*",
-        '"{neighbor}" is in the way: "{strip}" has not the whole range of its source',
+        '"{neighbor}" is in the way: "{strip}" does not have the whole range of its source',
     ): "„{neighbor}“ ist im Weg: „{strip}“ hat nicht den ganzen Bereich seiner Quelle",
     ("Operator", "Copy Modifiers"): "Modifikatoren kopieren",
     (
         "*",
-        "Copy the modifiers of the source to the Shutter strip, which shows the source's file as it is",
+        "Copy the modifiers of the source to the Shutter strip, which otherwise shows the file without them",
     ): "Die Modifikatoren der Quelle auf den Verschlussstreifen kopieren, der die Datei der Quelle zeigt, wie sie ist",
-    ("*", "Modifiers of the source do not reach the effect"): "Modifikatoren der Quelle erreichen den Effekt nicht",
+    ("*", "The effect does not use the modifiers of the source"): "Modifikatoren der Quelle erreichen den Effekt nicht",
     (
         "*",
-        "The Shutter strip has the modifiers of its source",
+        "The Shutter strip already has the modifiers of its source",
     ): "Der Verschlussstreifen hat die Modifikatoren seiner Quelle",
     (
         "*",
-        "Effect strips on the source do not reach the effect: make the Shutter strip their input",
+        "The effect does not use effect strips of the source: make the Shutter strip their input",
     ): "Effektstreifen auf der Quelle erreichen den Effekt nicht: den Verschlussstreifen zu ihrer Eingabe machen",
     # Shutters
     ("Operator", "Add Shutter"): "Verschluss hinzufügen",
@@ -244,7 +244,7 @@ MESSAGES = {
     ("Operator", "Move Down"): "Nach unten",
     (
         "*",
-        "Move the active shutter in the list (the first one is the default, which holds where nothing is scribbled)",
+        "Move the active shutter in the list (the first one is the default, used where nothing is drawn)",
     ): "Den aktiven Verschluss in der Liste verschieben (der erste ist der Standard und gilt, wo nichts markiert ist)",
     ("*", "Direction"): "Richtung",
     ("*", "Up"): "Hoch",
@@ -274,7 +274,7 @@ MESSAGES = {
     ): "Dem aktiven Verschluss die Balken einer Voreinstellung geben",
     ("Virtual Shutter", "Preset"): "Voreinstellung",
     ("Virtual Shutter", "Still Frame"): "Standbild",
-    ("*", "The shown frame alone"): "Nur das gezeigte Bild",
+    ("*", "Only the shown frame"): "Nur das gezeigte Bild",
     ("Virtual Shutter", "45°"): "45°",
     ("*", "Open for an eighth of the frames"): "Ein Achtel der Bilder lang offen",
     ("Virtual Shutter", "90°"): "90°",
@@ -314,9 +314,9 @@ MESSAGES = {
     ("Virtual Shutter", "Stutter"): "Stottern",
     ("*", "Every fourth frame, as a strobe lights them"): "Jedes vierte Bild, wie von einem Stroboskop beleuchtet",
     ("Virtual Shutter", "First Frame"): "Erstes Bild",
-    ("*", "The first of the frames alone"): "Nur das erste der Bilder",
+    ("*", "Only the first of the frames"): "Nur das erste der Bilder",
     ("Virtual Shutter", "Last Frame"): "Letztes Bild",
-    ("*", "The last of the frames alone"): "Nur das letzte der Bilder",
+    ("*", "Only the last of the frames"): "Nur das letzte der Bilder",
     # Bars
     ("Operator", "Insert Bar Keyframes"): "Schlüsselbilder der Balken einfügen",
     (
@@ -335,59 +335,59 @@ MESSAGES = {
     ("*", "Bar"): "Balken",
     ("*", "Number of the bar, from 1"): "Nummer des Balkens, ab 1",
     ("*", "Weight"): "Gewicht",
-    ("*", "How much the bar's frame contributes"): "Wie viel das Bild des Balkens beiträgt",
+    ("*", "Contribution of the bar's frame"): "Wie viel das Bild des Balkens beiträgt",
     ("*", "The shutter has {count} bars"): "Der Verschluss hat {count} Balken",
     ("Operator", "Paint Bars"): "Balken malen",
     # Regions
     ("*", "{combine} of 1 frame"): "{combine} von 1 Bild",
     ("*", "{combine} of {count} frames"): "{combine} von {count} Bildern",
     ("*", "Combine"): "Verrechnen",
-    ("*", "What the frames that are exposed become"): "Was aus den belichteten Bildern wird",
+    ("*", "How exposed frames are combined"): "Was aus den belichteten Bildern wird",
     ("*", "Average"): "Mittelwert",
-    ("*", "The average of the frames, as a camera makes it"): "Der Mittelwert der Bilder, wie ihn eine Kamera macht",
+    ("*", "The average of the frames, like that of a camera"): "Der Mittelwert der Bilder, wie ihn eine Kamera macht",
     ("*", "Lightest"): "Hellstes",
     (
         "*",
-        "What is lightest in any of them: a trail of light, as bright however long it is",
+        "The lightest value in any frame: trails of light keep their brightness at any length",
     ): "Was in einem von ihnen am hellsten ist: eine Lichtspur, gleich hell, so lang sie auch ist",
     ("*", "Darkest"): "Dunkelstes",
-    ("*", "What is darkest in any of them"): "Was in einem von ihnen am dunkelsten ist",
+    ("*", "The darkest value in any frame"): "Was in einem von ihnen am dunkelsten ist",
     ("*", "Median"): "Median",
     (
         "*",
-        "What most of them show: who passes by is gone",
+        "What most frames show: people who pass by disappear",
     ): "Was die meisten von ihnen zeigen: Wer vorbeigeht, ist weg",
     ("*", "By Luminance"): "Nach Luminanz",
     (
         "*",
-        "Choose a frame for each pixel, by how light it is there, and not one for each color channel",
+        "Choose one frame per pixel by its luminance, not one per color channel",
     ): "Für jedes Pixel ein Bild wählen, danach, wie hell es dort ist, und nicht für jeden Farbkanal eines",
     ("*", "Use Threshold"): "Schwelle verwenden",
     (
         "*",
-        "Let only what is lighter, or of the darkest darker, leave a trail beside what is shown",
+        "Let only light above the threshold leave trails, or with Darkest, below it",
     ): "Nur was heller ist, oder beim Dunkelsten dunkler, neben dem Gezeigten eine Spur hinterlassen lassen",
     ("*", "Threshold"): "Schwelle",
     (
         "*",
-        "Luminance of linear light from which on it leaves a trail; white is 1",
+        "Luminance in linear light from which light leaves a trail; white is 1",
     ): "Luminanz linearen Lichts, von der an es eine Spur hinterlässt; Weiß ist 1",
     ("*", "Softness"): "Weichheit",
     (
         "*",
-        "Range of luminance, around the threshold, over which a trail fades in",
+        "Range of luminance around the threshold in which trails fade in",
     ): "Bereich der Luminanz um die Schwelle, über den eine Spur einblendet",
     ("Operator", "Draw"): "Zeichnen",
     ("Operator", "Draw Outline"): "Umriss zeichnen",
     (
         "*",
-        "Draw on the sharp frame where the active shutter holds (at another frame, this redraws the active region)",
+        "Draw on the sharp frame where the active shutter is used (at another frame, this redraws the active region)",
     ): "Auf dem scharfen Bild zeichnen, wo der aktive Verschluss gilt (bei einem anderen Bild zeichnet das die aktive "
     "Region neu)",
     ("Operator", "Draw Shutter"): "Verschluss zeichnen",
     (
         "*",
-        "The sharp frame, to draw on: the result comes with the stroke",
+        "Sharp frame to draw on: the result appears after the stroke",
     ): "Das scharfe Bild, zum Zeichnen: Das Ergebnis kommt mit dem Strich",
     ("*", "New Region"): "Neue Region",
     (
@@ -408,7 +408,7 @@ MESSAGES = {
     ): "Eine Anmerkungsebene der Vorschau zu einer Region des aktiven Verschlusses machen",
     (
         "*",
-        "The preview shows no annotation layer that is not a region yet",
+        "The preview shows no annotation layer that could become a region",
     ): "Die Vorschau zeigt keine Anmerkungsebene, die noch keine Region ist",
     ("Operator", "Assign Region to Shutter"): "Region einem Verschluss zuweisen",
     ("*", "Assign the active region to another shutter"): "Die aktive Region einem anderen Verschluss zuweisen",
@@ -417,7 +417,7 @@ MESSAGES = {
     ("Operator", "Move Region"): "Region verschieben",
     (
         "*",
-        "Move the active region in the list (later ones lie over earlier ones)",
+        "Move the active region in the list (later ones cover earlier ones)",
     ): "Die aktive Region in der Liste verschieben (spätere liegen über früheren)",
     ("Operator", "Insert Region Keyframes"): "Schlüsselbilder der Region einfügen",
     (
@@ -438,7 +438,7 @@ MESSAGES = {
         "The strokes themselves, as wide as the region's width",
     ): "Die Striche selbst, so breit wie die Breite der Region",
     ("Virtual Shutter", "Lasso"): "Lasso",
-    ("*", "All that the strokes enclose"): "Alles, was die Striche umschließen",
+    ("*", "Everything that the strokes enclose"): "Alles, was die Striche umschließen",
     (
         "*",
         "Tracking the outline: {done} of {total} frames",
@@ -446,10 +446,10 @@ MESSAGES = {
     ("Virtual Shutter", "Outline"): "Umriss",
     (
         "*",
-        "What closed curves enclose, to the pixel: a matte that is drawn",
+        "A drawn matte: everything inside closed curves, exact to the pixel",
     ): "Was geschlossene Kurven umschließen, auf den Pixel genau: eine gezeichnete Matte",
     ("*", "In Between"): "Dazwischen",
-    ("*", "What gives the matte between two drawings"): "Woraus die Matte zwischen zwei Zeichnungen entsteht",
+    ("*", "How the outline changes between two drawings"): "Woraus die Matte zwischen zwei Zeichnungen entsteht",
     ("*", "Tracked"): "Verfolgt",
     (
         "*",
@@ -472,26 +472,26 @@ MESSAGES = {
     ("Operator", "Next Drawing Needed"): "Nächste nötige Zeichnung",
     (
         "*",
-        "Go to the middle of the frames at which the outline is least sure, tracking it first",
+        "Go to the frame that needs a drawing most, after tracking the outline",
     ): "Zur Mitte der Frames gehen, in denen der Umriss am unsichersten ist; er wird vorher verfolgt",
     ("Operator", "Insert Outline Drawing"): "Umrisszeichnung einfügen",
     (
         "*",
-        "Make the outline that is tracked to the current frame a drawing of its own, to be mended",
+        "Turn the tracked outline at the current frame into a drawing that can be edited",
     ): "Den Umriss, der zum aktuellen Frame verfolgt ist, zu einer eigenen Zeichnung machen, um ihn auszubessern",
     (
         "*",
-        "Frame {frame}: the outline is sure by {share:.0f} %",
+        "Frame {frame}: the confidence is {share:.0f} %",
     ): "Frame {frame}: Der Umriss ist zu {share:.0f} % sicher",
     (
         "*",
-        "The outline is sure by 75 % or more at all frames",
-    ): "Der Umriss ist in allen Frames zu 75 % oder mehr sicher",
-    ("*", "The outline encloses nothing at the current frame"): "Der Umriss umschließt im aktuellen Frame nichts",
-    ("*", "The region is no outline"): "Die Region ist kein Umriss",
-    ("*", 'strip "{strip}" is scaled to nothing'): "Streifen „{strip}“ ist zu nichts skaliert",
+        "The confidence is 75 % or more at all frames",
+    ): "Die Sicherheit ist in allen Bildern 75 % oder mehr",
+    ("*", "The outline is empty at the current frame"): "Der Umriss umschließt im aktuellen Frame nichts",
+    ("*", "The region is not an outline"): "Die Region ist kein Umriss",
+    ("*", 'strip "{strip}" has a scale of 0'): "Streifen „{strip}“ ist zu nichts skaliert",
     ("*", "{place}: a linear outline is not tracked"): "{place}: Ein linearer Umriss wird nicht verfolgt",
-    ("Operator", "Mend Outline"): "Umriss ausbessern",
+    ("Operator", "Edit Outline"): "Umriss ausbessern",
     ("*", "Folder"): "Ordner",
     ("*", "Format"): "Format",
     ("*", "OpenEXR"): "OpenEXR",
@@ -499,12 +499,12 @@ MESSAGES = {
     ("Operator", "Export Matte"): "Matte exportieren",
     (
         "*",
-        "Write what the active matte or outline shows at each frame of its strip as pictures, for any other program",
+        "Write the active matte or outline as pictures, one for each frame of its strip, for other programs",
     ): "Was die aktive Matte oder der aktive Umriss in jedem Frame zeigt, für andere Programme als Bilder schreiben",
-    ("*", "What the pictures are"): "Was die Bilder sind",
+    ("*", "File format of the pictures"): "Was die Bilder sind",
     ("*", "Grey, 16 bits"): "Grau, 16 Bit",
     ("*", "Float, in the channel Y"): "Fließkomma, im Kanal Y",
-    ("*", "The region is no matte, ramp or outline"): "Die Region ist keine Matte, keine Rampe und kein Umriss",
+    ("*", "The region is not a matte, ramp or outline"): "Die Region ist keine Matte, keine Rampe und kein Umriss",
     ("*", 'Saved {count} pictures in "{folder}"'): "{count} Bilder in „{folder}“ gespeichert",
     ("Operator", "Find Outline"): "Umriss finden",
     ("Operator", "Draw by Points"): "Punktweise zeichnen",
@@ -515,25 +515,25 @@ MESSAGES = {
     " Linien)",
     (
         "*",
-        "Click points around the subject (arrow keys, Space), Ctrl: straight, Backspace: one less, "
-        "Return: close, Esc: nothing",
+        "Click points around the subject (arrow keys, Space), Ctrl: straight, Backspace: undo point, "
+        "Return: close, Esc: cancel",
     ): "Punkte um das Motiv klicken (Pfeiltasten, Leertaste), Strg: gerade, Rücktaste: einer weniger, "
     "Eingabe: schließen, Esc: nichts",
-    ("*", "A curve has three points at least"): "Eine Kurve hat mindestens drei Punkte",
+    ("*", "A curve needs at least three points"): "Eine Kurve hat mindestens drei Punkte",
     ("Operator", "Outline to Mask"): "Umriss zu Maske",
     ("Operator", "Outline from Mask"): "Umriss aus Maske",
     (
         "*",
-        "Make a Blender mask with shape keys of the active outline, tracking it first",
+        "Make a Blender mask with shape keys of the active outline, after tracking it",
     ): "Aus dem aktiven Umriss eine Blender-Maske mit Formschlüsseln machen; zuvor wird er verfolgt",
     (
         "*",
-        "Make an outline of the active shutter that is drawn at each key of a mask",
+        "Make an outline of the active shutter with a drawing at each key of a mask",
     ): "Einen Umriss des aktiven Verschlusses machen, der an jedem Schlüssel einer Maske gezeichnet ist",
     ("*", "Every"): "Jedes",
     (
         "*",
-        "Frames from one shape key to the next between drawings of a tracked outline; 0 for drawings alone",
+        "Frames between shape keys of a tracked outline; 0 for its drawings only",
     ): "Bilder von einem Formschlüssel zum nächsten zwischen den Zeichnungen eines verfolgten Umrisses; 0 nur für die"
     " Zeichnungen",
     ("*", 'Made the mask "{mask}"'): "Maske „{mask}“ gemacht",
@@ -544,14 +544,14 @@ MESSAGES = {
     ): "Maske „{mask}“ umschließt im Streifen nichts",
     (
         "*",
-        "A mask is written in a window of Blender, and there is none",
+        "Making a mask needs an open Blender window",
     ): "Eine Maske wird in einem Fenster von Blender geschrieben, und es gibt keines",
     (
         "*",
-        "Make the active region an outline of the subject that its strokes run over, or go around, at this frame",
+        "Make the active region an outline of the subject that its strokes mark or enclose at this frame",
     ): "Die aktive Region zum Umriss des Motivs machen, über das ihre Striche in diesem Frame laufen oder das sie"
     " umgeben",
-    ("*", "No subject is told from what is around it"): "Kein Motiv hebt sich von dem ab, was darum herum ist",
+    ("*", "No subject stands out from its surroundings"): "Kein Motiv hebt sich von dem ab, was darum herum ist",
     ("*", "The region has no strokes at the current frame"): "Die Region hat im aktuellen Frame keine Striche",
     ("*", "the outline encloses nothing here"): "der Umriss umschließt hier nichts",
     ("*", "Width"): "Breite",
@@ -568,7 +568,7 @@ MESSAGES = {
     ("*", "Location Y"): "Position Y",
     (
         "*",
-        "Move, turn and scale the active region by numbers, as its handles in the preview do",
+        "Move, rotate and scale the active region by numbers, like its handles in the preview",
     ): "Die aktive Region durch Zahlen bewegen, drehen und skalieren, wie es ihre Griffe in der Vorschau tun",
     ("*", "Scale"): "Skalieren",
     ("*", "Scale about the region's center"): "Skalierung um die Mitte der Region",
@@ -581,7 +581,7 @@ MESSAGES = {
     ("Operator", "Matte from Strip"): "Matte aus Streifen",
     (
         "*",
-        "Make a movie, image or clip strip of the edit the matte of the active shutter, muted or not",
+        "Make a movie, image or clip strip of the edit the matte of the active shutter, even if it is muted",
     ): "Einen Film-, Bild- oder Clipstreifen des Schnitts zur Matte des aktiven Verschlusses machen, stumm oder nicht",
     ("Operator", "Matte from Mask"): "Matte aus Maske",
     ("*", "Make a mask the matte of the active shutter"): "Eine Maske zur Matte des aktiven Verschlusses machen",
@@ -597,7 +597,7 @@ MESSAGES = {
     ("Operator", "Time Map"): "Zeitkarte",
     (
         "*",
-        "Show every pixel at its own moment: a ramp from the first of the frames to the last (slit-scan)",
+        "Show every pixel at its own moment: a ramp from the first frame to the last (slit-scan)",
     ): "Jeden Pixel zu seinem eigenen Zeitpunkt zeigen: ein Verlauf vom ersten der Bilder zum letzten (Slit-Scan)",
     ("*", "First"): "Erstes",
     ("*", "Last"): "Letztes",
@@ -606,33 +606,33 @@ MESSAGES = {
     ("Operator", "Rolling Shutter Repair"): "Rolling Shutter ausgleichen",
     (
         "*",
-        "Show every row as it was when the middle one was filmed: straight, where a rolling shutter has skewed it",
+        "Show every row as it was when the middle one was filmed, so that skewed lines become straight",
     ): "Jede Zeile so zeigen, wie sie war, als die mittlere gefilmt wurde, so dass gerade ist, was ein Rolling Shutter"
     " verzerrt hat",
     ("Virtual Shutter", "Read First"): "Zuerst gelesen",
     (
         "*",
-        "Side of the filmed picture that the sensor reads first",
+        "The side of the picture that the sensor reads first",
     ): "Seite des gefilmten Bildes, die der Sensor zuerst ausliest",
     ("Virtual Shutter", "Top"): "Oben",
     ("*", "Rows are read downward, as most cameras do"): "Zeilen werden abwärts gelesen, wie von den meisten Kameras",
     ("Virtual Shutter", "Bottom"): "Unten",
     (
         "*",
-        "Rows are read upward, as by a camera that hung upside down",
+        "Rows are read upward, like those of a camera upside down",
     ): "Zeilen werden aufwärts gelesen, wie von einer Kamera, die kopfüber hing",
     ("Virtual Shutter", "Left"): "Links",
     (
         "*",
-        "Columns are read, from the left, as by a camera that was turned",
+        "Columns are read from the left, like those of a rotated camera",
     ): "Spalten werden von links gelesen, wie von einer Kamera, die gedreht war",
     ("Virtual Shutter", "Right"): "Rechts",
     (
         "*",
-        "Columns are read, from the right, as by a camera that was turned",
+        "Columns are read from the right, like those of a rotated camera",
     ): "Spalten werden von rechts gelesen, wie von einer Kamera, die gedreht war",
     ("Virtual Shutter", "Unit"): "Einheit",
-    ("*", "What the readout is counted in"): "Worin die Auslesezeit gezählt wird",
+    ("*", "Unit of the readout"): "Worin die Auslesezeit gezählt wird",
     ("Virtual Shutter", "Percent"): "Prozent",
     (
         "*",
@@ -643,7 +643,7 @@ MESSAGES = {
     ("*", "Readout"): "Auslesezeit",
     (
         "*",
-        "Time from the first row to the last, of that from a filmed frame to the next",
+        "Time from reading the first row to the last, as a percentage of a frame",
     ): "Zeit von der ersten Zeile zur letzten, als Anteil der Zeit von einem gefilmten Bild zum nächsten",
     (
         "*",
@@ -652,17 +652,17 @@ MESSAGES = {
     ("Operator", "Find Readout"): "Auslesezeit finden",
     (
         "*",
-        "Find how long the sensor reads out, by lines that lean as they move around the current frame, and repair that",
+        "Find the sensor's readout time from lines that lean while they move around the current frame, and repair it",
     ): "Finden, wie lange der Sensor ausliest, an Linien, die sich um den aktuellen Frame beim Bewegen neigen, und das"
     " ausgleichen",
     ("Virtual Shutter", "Reads"): "Liest",
-    ("*", "What the sensor reads one after the other"): "Was der Sensor nacheinander ausliest",
+    ("*", "Whether the sensor reads row by row or column by column"): "Was der Sensor nacheinander ausliest",
     ("Virtual Shutter", "Rows"): "Zeilen",
     ("*", "Upright lines lean as they move sideways"): "Senkrechte Linien neigen sich, wenn sie sich seitwärts bewegen",
     ("Virtual Shutter", "Columns"): "Spalten",
     (
         "*",
-        "Level lines lean as they move up and down: of a camera that was turned",
+        "Level lines lean as they move up and down, with a rotated camera",
     ): "Waagrechte Linien neigen sich, wenn sie sich auf und ab bewegen: bei einer gedrehten Kamera",
     (
         "*",
@@ -685,23 +685,23 @@ MESSAGES = {
     ): "Linien neigen sich nicht, wie eine einzige Auslesezeit es täte",
     (
         "*",
-        "lines stand upright however they move: there is no rolling shutter to repair",
+        "moving lines stay upright: there is no rolling shutter to repair",
     ): "Linien bleiben gerade, wie sie sich auch bewegen: Es gibt keinen Rolling Shutter auszugleichen",
     ("*", "Region Specials"): "Regions-Spezialmenü",
     (
         "*",
-        "The region is a matte or a ramp, and has no strokes",
+        "The region is a matte or a ramp without strokes",
     ): "Die Region ist eine Matte oder ein Verlauf und hat keine Striche",
     ("*", "What says where the shutter holds"): "Was sagt, wo der Verschluss gilt",
     ("Virtual Shutter", "Matte"): "Matte",
     (
         "*",
-        "What a file, a strip or a mask says for every pixel",
+        "A value per pixel from a file, a strip or a mask",
     ): "Was eine Datei, ein Streifen oder eine Maske für jeden Pixel sagt",
     ("Virtual Shutter", "Ramp"): "Verlauf",
     (
         "*",
-        "From none of the shutter to all of it, across the picture",
+        "A gradient across the picture, from none of the shutter to all of it",
     ): "Über das Bild von nichts vom Verschluss bis zum ganzen",
     ("*", "From"): "Von",
     ("*", "What the matte is"): "Was die Matte ist",
@@ -724,7 +724,7 @@ MESSAGES = {
     ("*", "Channel"): "Kanal",
     (
         "*",
-        "What of the matte says how much of the shutter a pixel gets",
+        "Channel of the matte that sets the amount of the shutter",
     ): "Was an der Matte sagt, wie viel vom Verschluss ein Pixel bekommt",
     ("*", "Luminance"): "Leuchtdichte",
     ("*", "How bright the matte is"): "Wie hell die Matte ist",
@@ -745,13 +745,13 @@ MESSAGES = {
     ): "Name eines Kanals einer EXR-Datei; leer für die Leuchtdichte",
     ("*", "Name of the channel in the EXR file"): "Name des Kanals in der EXR-Datei",
     ("*", "Invert"): "Invertieren",
-    ("*", "The shutter gets what the matte leaves"): "Der Verschluss bekommt, was die Matte übrig lässt",
+    ("*", "Give the shutter the pixels outside of the matte"): "Der Verschluss bekommt, was die Matte übrig lässt",
     ("*", "Frames Of"): "Bilder von",
-    ("*", "What the matte's frames belong to"): "Wozu die Bilder der Matte gehören",
+    ("*", "What the matte's frames are synchronized with"): "Wozu die Bilder der Matte gehören",
     ("*", "Footage"): "Filmmaterial",
     (
         "*",
-        "The matte's frames belong to those of the footage, however that is trimmed and retimed",
+        "The matte follows the frames of the footage, even if that is trimmed or retimed",
     ): "Die Bilder der Matte gehören zu denen des Filmmaterials, auch wenn es getrimmt oder seine Zeit geändert ist",
     ("*", "Timeline"): "Zeitleiste",
     (
@@ -759,28 +759,28 @@ MESSAGES = {
         "The matte plays along the timeline, from where the Shutter strip starts untrimmed",
     ): "Die Matte läuft mit der Zeitleiste, vom ungetrimmten Anfang des Verschlussstreifens an",
     ("*", "Offset"): "Versatz",
-    ("*", "Frames by which the matte is ahead"): "Bilder, um die die Matte voraus ist",
+    ("*", "Number of frames by which the matte plays ahead"): "Bilder, um die die Matte voraus ist",
     ("Virtual Shutter", "Blend"): "Mischmodus",
-    ("*", "How the matte lies over other regions"): "Wie die Matte über anderen Regionen liegt",
+    ("*", "How the matte combines with other regions"): "Wie die Matte über anderen Regionen liegt",
     ("Virtual Shutter", "Over"): "Über",
-    ("*", "What is beneath shares what the matte leaves"): "Was darunter liegt, teilt sich, was die Matte übrig lässt",
+    ("*", "Regions below share what the matte leaves"): "Was darunter liegt, teilt sich, was die Matte übrig lässt",
     ("Virtual Shutter", "Add"): "Addieren",
     (
         "*",
-        "What the matte takes comes from the default shutter alone, so that mattes stand side by side",
+        "The matte replaces only the default shutter, so that mattes can be side by side",
     ): "Was die Matte nimmt, kommt allein vom Standardverschluss, sodass Matten nebeneinander stehen",
     ("*", "Opacity"): "Deckkraft",
     (
         "*",
-        "How much of the region counts: at 0 the picture is as without it",
+        "Influence of the region: 0 is like no region",
     ): "Wie viel von der Region zählt: Bei 0 ist das Bild wie ohne sie",
     ("Virtual Shutter", "Feather"): "Weiche Kante",
     (
         "*",
-        "How wide a hard edge of the matte becomes, as a fraction of the picture's height",
+        "Width of the matte's soft edges, as a fraction of the picture's height",
     ): "Wie breit eine harte Kante der Matte wird, als Bruchteil der Bildhöhe",
     ("*", "Ramp"): "Verlauf",
-    ("*", "How the ramp runs"): "Wie der Verlauf läuft",
+    ("*", "Shape of the ramp"): "Wie der Verlauf läuft",
     ("*", "From the left to the right; its rotation turns it"): "Von links nach rechts; seine Rotation dreht ihn",
     ("*", "Radial"): "Radial",
     ("*", "From the center to the farthest corner"): "Von der Mitte zur entferntesten Ecke",
@@ -818,11 +818,11 @@ MESSAGES = {
     ("*", "Position"): "Position",
     (
         "*",
-        "Where the frames that are exposed lie around the shown one",
+        "Position of the exposed frames relative to the shown frame",
     ): "Wo die belichteten Bilder um das gezeigte liegen",
     ("*", "The shown frame is the first of them"): "Das gezeigte Bild ist ihr erstes",
     ("*", "Center"): "Zentrum",
-    ("*", "The shown frame lies in their middle"): "Das gezeigte Bild liegt in ihrer Mitte",
+    ("*", "The shown frame is in their middle"): "Das gezeigte Bild liegt in ihrer Mitte",
     ("*", "End"): "Ende",
     ("*", "The shown frame is the last of them"): "Das gezeigte Bild ist ihr letztes",
     ("*", "Interpolation"): "Interpolation",
@@ -841,7 +841,7 @@ MESSAGES = {
         "Cross-fade pictures between shutters, and fade every bar by itself between keyframes",
     ): "Bilder zwischen Verschlüssen und jeden Balken für sich zwischen Schlüsselbildern überblenden",
     ("*", "Light"): "Licht",
-    ("*", "How the frames that are exposed are summed"): "Wie die belichteten Bilder summiert werden",
+    ("*", "How exposed frames are summed"): "Wie die belichteten Bilder summiert werden",
     ("*", "Linear"): "Linear",
     (
         "*",
@@ -855,19 +855,19 @@ MESSAGES = {
     ("Virtual Shutter", "Exposure"): "Belichtung",
     (
         "*",
-        "How bright shutters are that are open for different times",
+        "Brightness of shutters that are open for different times",
     ): "Wie hell Verschlüsse sind, die verschieden lange offen sind",
     ("Virtual Shutter", "Normalized"): "Normalisiert",
     ("*", "Every shutter gives the same brightness"): "Jeder Verschluss ergibt die gleiche Helligkeit",
     ("Virtual Shutter", "Weighted"): "Gewichtet",
     (
         "*",
-        "A shutter that is open for less time than the default is darker, in linear light whatever is summed",
+        "A shutter that is open for less time than the default is darker, always in linear light",
     ): "Ein Verschluss, der kürzer als der Standard offen ist, ist dunkler, in linearem Licht, was auch summiert wird",
     ("Virtual Shutter", "Clip Ends"): "Clip-Enden",
     (
         "*",
-        "What an exposure gets that reaches beyond the ends of the clip, or of the shot",
+        "How exposures continue beyond the ends of the clip or the shot",
     ): "Was eine Belichtung erhält, die über die Enden des Clips oder der Einstellung hinausreicht",
     ("Virtual Shutter", "Hold"): "Halten",
     (
@@ -881,7 +881,7 @@ MESSAGES = {
     ("Virtual Shutter", "Slide"): "Verschieben",
     (
         "*",
-        "Move an exposure into the clip, by as many frames as it reaches beyond its ends",
+        "Move exposures into the clip, by the number of frames that they reach beyond its ends",
     ): "Eine Belichtung in den Clip schieben, um so viele Bilder, wie sie über seine Enden hinausreicht",
     ("*", "Matte Resolution"): "Mattenauflösung",
     (
@@ -896,71 +896,68 @@ MESSAGES = {
     ("*", "Blocks of 4×4 pixels share a shutter"): "Blöcke von 4×4 Pixeln teilen sich einen Verschluss",
     (
         "*",
-        "Expose the region by itself, before all else, which is exposed without it: it leaves no ghost",
+        "Expose the region separately, in front of everything else, so that it leaves no ghost",
     ): "Die Region für sich belichten, vor allem anderen, das ohne sie belichtet wird: kein Geisterbild bleibt",
     ("*", "Clean Edges"): "Saubere Kanten",
     (
         "*",
-        "Give layers, and what lies behind them, their own colors in the mixed pixels at their edges",
+        "Separate the colors of layers and their background in the mixed pixels at edges",
     ): "Ebenen und was hinter ihnen liegt behalten in den gemischten Pixeln an ihren Rändern ihre eigenen Farben",
     ("*", "Background Search"): "Hintergrundsuche",
     (
         "*",
-        "Frames before and after the shown one in which what lies behind layers is looked for, "
-        "where no exposed frame shows it",
+        "Frames on each side that are searched for the background of layers, where no exposed frame shows it",
     ): "Frames vor und nach dem gezeigten, die nach dem abgesucht werden, was Ebenen verdecken",
     ("*", "Stop at Cuts"): "An Schnitten enden",
     (
         "*",
-        "Exposures end at the source's cuts as they do at the clip's ends",
+        "End exposures at cuts of the source, like at the clip's ends",
     ): "Belichtungen enden an den Schnitten der Quelle wie an den Enden des Clips",
     ("*", "Keep Edges Default"): "Rand bleibt Standard",
     (
         "*",
-        "Make the picture's edge a scribble of the default shutter, so that a stroke alone acts locally",
+        "Give the picture's edge to the default shutter, so that a single stroke acts locally",
     ): "Den Bildrand zu einer Markierung des Standardverschlusses machen, so dass ein einzelner Strich örtlich wirkt",
     ("*", "Follow Edges"): "Kanten folgen",
     (
         "*",
-        "How much shutters keep to the edges of the shown frame: at 1 a scribble fills what it lies in",
+        "How strictly scribbles stop at edges of the shown frame: at 1 they fill the object that they are on",
     ): "Wie sehr Verschlüsse den Kanten des gezeigten Bildes folgen: bei 1 füllt eine Markierung, worin sie liegt",
     # Smooth exposures
     ("*", "Smooth"): "Glätten",
     (
         "*",
-        "Expose moments between filmed frames as well, which optical flow finds: light counts between two frames "
-        "whose bars are both open",
+        "Also expose moments between filmed frames, found by optical flow, where both bars are open",
     ): "Auch Zeitpunkte zwischen gefilmten Bildern belichten, die optischer Fluss findet: Licht zählt zwischen zwei "
     "Bildern, deren Balken beide offen sind",
-    ("*", "Expose filmed frames alone"): "Nur gefilmte Bilder belichten",
-    ("*", "2 moments from a filmed frame to the next"): "2 Zeitpunkte von einem gefilmten Bild zum nächsten",
-    ("*", "4 moments from a filmed frame to the next"): "4 Zeitpunkte von einem gefilmten Bild zum nächsten",
-    ("*", "8 moments from a filmed frame to the next"): "8 Zeitpunkte von einem gefilmten Bild zum nächsten",
-    ("*", "16 moments from a filmed frame to the next"): "16 Zeitpunkte von einem gefilmten Bild zum nächsten",
+    ("*", "Expose only filmed frames"): "Nur gefilmte Bilder belichten",
+    ("*", "2 moments per filmed frame"): "2 Zeitpunkte von einem gefilmten Bild zum nächsten",
+    ("*", "4 moments per filmed frame"): "4 Zeitpunkte von einem gefilmten Bild zum nächsten",
+    ("*", "8 moments per filmed frame"): "8 Zeitpunkte von einem gefilmten Bild zum nächsten",
+    ("*", "16 moments per filmed frame"): "16 Zeitpunkte von einem gefilmten Bild zum nächsten",
     ("*", "Automatic"): "Automatisch",
     (
         "*",
-        "As many moments as the fastest motion in the footage needs, 16 at most",
+        "As many moments as the fastest motion in the footage needs, at most 16",
     ): "So viele Zeitpunkte, wie die schnellste Bewegung im Filmmaterial braucht, höchstens 16",
     (
         "*",
-        "Expose moments between filmed frames as well, as many as the footage needs",
+        "Expose as many moments between filmed frames as the footage needs",
     ): "Auch Zeitpunkte zwischen gefilmten Bildern belichten, so viele, wie das Filmmaterial braucht",
-    ("*", "The exposures are smooth"): "Die Belichtungen sind geglättet",
+    ("*", "The exposures are already smooth"): "Die Belichtungen sind geglättet",
     ("*", "Skip Repeated Frames"): "Wiederholte Bilder überspringen",
     (
         "*",
-        "Where Smooth is on, show moments between their neighbors in place of frames that repeat the one before, "
-        "as in 24 frames per second that play at 30",
+        "With Smooth, replace repeated frames by moments between their neighbors, as in 24 fps played at 30",
     ): "Wo Glätten an ist, statt Bildern, die das vorige wiederholen, Zeitpunkte zwischen ihren Nachbarn zeigen, etwa "
     "bei 24 Bildern pro Sekunde, die mit 30 laufen",
     (
         "*",
-        "Frames of the source repeat: motion goes on across them",
+        "The source repeats frames: motion continues across them",
     ): "Bilder der Quelle wiederholen sich: Die Bewegung läuft über sie hinweg",
     (
         "*",
-        "Smooth is off: the nearest source frame is shown",
+        "Smooth is off: the nearest source frame is used",
     ): "Glätten ist aus: Das nächste Bild der Quelle wird gezeigt",
     ("*", "Off"): "Aus",
     ("*", "2×"): "2×",
@@ -974,7 +971,7 @@ MESSAGES = {
     ("*", "Live"): "Live",
     (
         "*",
-        "Show scribbles and views of the effect in the preview",
+        "Show strokes and views of the effect in the preview",
     ): "Markierungen und Ansichten des Effekts in der Vorschau zeigen",
     ("Virtual Shutter", "View"): "Ansicht",
     ("*", "What the live preview shows"): "Was die Live-Vorschau zeigt",
@@ -988,75 +985,62 @@ MESSAGES = {
     ("Virtual Shutter", "Scribbles"): "Markierungen",
     (
         "*",
-        "The source, and where each shutter is scribbled",
+        "The source with the strokes of each shutter",
     ): "Die Quelle, und wo jeder Verschluss markiert ist",
     ("Virtual Shutter", "Mattes"): "Matten",
     (
         "*",
-        "How much of each shutter a pixel gets, in the shutters' colors and patterns",
+        "Each pixel's share of each shutter, in the shutters' colors and patterns",
     ): "Wie viel jedes Verschlusses ein Pixel erhält, in den Farben und Mustern der Verschlüsse",
     ("Virtual Shutter", "Edges"): "Ränder",
     (
         "*",
-        "The result, and a line around what a shutter gets more than half of",
+        "The result with a line around the area of each shutter",
     ): "Das Ergebnis, und eine Linie um das, wovon ein Verschluss mehr als die Hälfte erhält",
     ("*", "Split Position"): "Teilung",
     (
         "*",
-        "Where the source ends and the result begins, as a fraction of the picture's width",
+        "Border between source and result, as a fraction of the picture's width",
     ): "Wo die Quelle endet und das Ergebnis beginnt, als Bruchteil der Bildbreite",
     ("*", "Probe"): "Sonde",
     (
         "*",
-        "Show the shutter of the pixel that the pointer was over last, and how much of each it gets",
+        "Show the bars of the pixel under the pointer, and its share of each shutter",
     ): "Verschluss des Pixels zeigen, über dem der Zeiger zuletzt war, und wie viel er von jedem erhält",
     ("*", "Probe Position"): "Ort der Sonde",
     (
         "*",
-        "The pixel that is probed, in fractions of the picture from its lower left corner",
+        "Position of the probe, as fractions of the picture from its lower left corner",
     ): "Das Pixel, das die Sonde zeigt, in Bruchteilen des Bildes von seiner unteren linken Ecke",
-    ("Operator", "Probe Pixel"): "Pixel mit Sonde zeigen",
-    (
-        "*",
-        "Probe a pixel that is named by its numbers, and not the one under the pointer",
-    ): "Mit der Sonde ein Pixel zeigen, das durch Zahlen benannt ist, und nicht das unter dem Zeiger",
-    ("*", "Column"): "Spalte",
-    ("*", "Number of the pixel from the left, from 1"): "Nummer des Pixels von links, ab 1",
-    ("*", "Row"): "Zeile",
-    ("*", "Number of the pixel from below, from 1"): "Nummer des Pixels von unten, ab 1",
-    (
-        "*",
-        "The picture has {width} × {height} pixels",
-    ): "Das Bild hat {width} × {height} Pixel",
     ("*", "Shutter: {fault}"): "Verschluss: {fault}",
     ("*", "Preview: {what}"): "Vorschau: {what}",
     ("*", "{scale} of the size"): "{scale} der Größe",
     ("*", "from a proxy"): "aus einem Proxy",
-    ("*", "a draft of the edges"): "Kanten im Entwurf",
-    ("*", "Full quality, as it will be rendered"): "Volle Qualität, wie es gerendert wird",
+    ("*", "draft edges"): "Kanten im Entwurf",
+    ("*", "Full quality: as it will be rendered"): "Volle Qualität, wie es gerendert wird",
     ("*", "Back"): "Zurück",
     ("*", "Full Quality"): "Volle Qualität",
     ("Operator", "Full Quality"): "Volle Qualität",
     (
         "*",
-        "Show this frame as it will be rendered, each of its pixels on one of the screen's, or end that",
+        "Show this frame exactly as it will be rendered, at one screen pixel per pixel; click again to end",
     ): "Dieses Bild zeigen, wie es gerendert wird, jedes seiner Pixel auf einem des Schirms, oder das beenden",
     ("*", "No preview shows a Shutter strip"): "Keine Vorschau zeigt einen Verschlussstreifen",
     ("*", "Buttons of Notes"): "Knöpfe an Hinweisen",
     ("*", "Composing…"): "Wird berechnet …",
     ("*", "The strips above are hidden in this view"): "Die Streifen darüber sind in dieser Ansicht verborgen",
-    ("*", "This view has the view transform Standard"): "Diese Ansicht hat die Anzeigetransformation Standard",
+    ("*", "This view uses the view transform Standard"): "Diese Ansicht hat die Anzeigetransformation Standard",
     # Tracking and following
     ("Virtual Shutter", "Track"): "Verfolgen",
     ("Operator", "Track"): "Verfolgen",
     ("Operator", "Track Region"): "Region verfolgen",
     (
         "*",
-        "Key the active region by what it covers here, up to your own keys (Esc stops and keeps the tracked frames)",
+        "Track what the active region covers here, up to your own keyframes (Esc stops and keeps the tracked frames)",
     ): "Der aktiven Region Schlüsselbilder nach dem geben, was sie hier bedeckt, bis zu den eigenen "
     "Schlüsselbildern (Esc hält an und behält die verfolgten Bilder)",
     ("Virtual Shutter", "Direction"): "Richtung",
-    ("*", "Where tracking goes from the current frame"): "Wohin vom aktuellen Bild aus verfolgt wird",
+    ("*", "Direction of tracking from the current frame"): "Wohin vom aktuellen Bild aus verfolgt wird",
     ("Virtual Shutter", "Backward"): "Rückwärts",
     ("*", "Towards the strip's first frame"): "Zum ersten Bild des Streifens hin",
     ("Virtual Shutter", "Both"): "Beide",
@@ -1066,11 +1050,11 @@ MESSAGES = {
     ("Virtual Shutter", "Motion"): "Bewegung",
     ("*", "Which channels Track and Follow key"): "Welchen Kanälen Verfolgen und Folgen Schlüsselbilder geben",
     ("Virtual Shutter", "Location"): "Position",
-    ("*", "It is moved"): "Es wird bewegt",
+    ("*", "Follow the location"): "Es wird bewegt",
     ("Virtual Shutter", "Location, Rotation"): "Position, Rotation",
-    ("*", "It is moved and turned"): "Es wird bewegt und gedreht",
+    ("*", "Follow location and rotation"): "Es wird bewegt und gedreht",
     ("Virtual Shutter", "Location, Rotation, Scale"): "Position, Rotation, Skalierung",
-    ("*", "It is moved, turned and scaled"): "Es wird bewegt, gedreht und skaliert",
+    ("*", "Follow location, rotation and scale"): "Es wird bewegt, gedreht und skaliert",
     ("Virtual Shutter", "Until"): "Bis",
     (
         "*",
@@ -1084,17 +1068,16 @@ MESSAGES = {
     ("*", "Tracking: {done} of {total} frames, Esc to stop"): "Verfolgt: {done} von {total} Bildern, Esc hält an",
     (
         "*",
-        "Frames {first} to {last} are tracked",
+        "Tracked frames {first} to {last}",
     ): "Bilder {first} bis {last} sind verfolgt",
     (
         "*",
-        "Track lost the subject at frame {frame}: move the region back onto it, there or where it is seen again, or"
-        " outline it",
+        "Tracking lost the subject at frame {frame}: move the region back onto it, there or later, or outline it",
     ): "Verfolgen verlor das Motiv bei Bild {frame}: die Region dort oder, wo es wieder zu sehen ist, auf das Motiv"
     " ziehen, oder es umreißen",
     (
         "*",
-        "From frame {frame} on, near and far move differently, or too little is seen: not all can be held still",
+        "From frame {frame} on, near and far move differently or too little is visible: not all can be stabilized",
     ): "Ab Frame {frame} bewegen sich Nah und Fern verschieden, oder es ist zu wenig zu sehen: nicht alles steht still",
     ("Operator", "Outline This Subject"): "Dieses Motiv umreißen",
     (
@@ -1103,19 +1086,19 @@ MESSAGES = {
     ): "Bild der Zeitleiste mit den Strichen; ohne eines das aktuelle",
     ("*", "Tracking stopped at frame {frame}: {fault}"): "Das Verfolgen hielt bei Bild {frame} an: {fault}",
     ("*", "Confidence"): "Sicherheit",
-    ("*", "How sure tracking was of where it is"): "Wie sicher das Verfolgen war, wo es ist",
+    ("*", "How certain the tracked position is"): "Wie sicher das Verfolgen war, wo es ist",
     ("*", "Confidence: {percent} %"): "Sicherheit: {percent} %",
     ("Operator", "Next Unsure Frame"): "Nächstes unsicheres Bild",
     ("Operator", "Next Unsure Camera Frame"): "Nächstes unsicheres Bild der Kamera",
     (
         "*",
-        "Go to a frame that tracking of the camera is not sure of",
+        "Go to the next frames with low tracking confidence of the camera",
     ): "Zu einem Bild gehen, das beim Verfolgen der Kamera unsicher ist",
-    ("*", "Go to a frame that tracking is not sure of"): "Zu einem Bild gehen, das beim Verfolgen unsicher ist",
+    ("*", "Go to the next frames with low tracking confidence"): "Zu einem Bild gehen, das beim Verfolgen unsicher ist",
     ("*", "Frame"): "Bild",
     (
         "*",
-        "Timeline frame; without one, the worst of the next that are unsure",
+        "Timeline frame; without one, the least confident of the next unsure frames",
     ): "Bild der Zeitleiste; ohne eines das schlechteste der nächsten unsicheren",
     (
         "*",
@@ -1123,7 +1106,7 @@ MESSAGES = {
     ): "Es folgt keine weitere Strecke unsicherer Bilder",
     (
         "*",
-        "the current frame is outside of the Shutter strip",
+        "the current frame is outside the Shutter strip",
     ): "das aktuelle Bild liegt außerhalb des Verschlussstreifens",
     (
         "*",
@@ -1146,13 +1129,13 @@ MESSAGES = {
     ("*", "the frame lies outside what can be tracked"): "das Bild liegt außerhalb dessen, was verfolgt werden kann",
     (
         "*",
-        "what the regions leave of the picture has too few corners to follow",
-    ): "was die Regionen vom Bild übrig lassen, hat zu wenige Ecken, denen zu folgen wäre",
+        "the picture outside the regions has too few corners to follow",
+    ): "außerhalb der Regionen hat das Bild zu wenige Ecken zum Verfolgen",
     ("*", "the picture is too unlike those before"): "das Bild ist denen davor zu unähnlich",
     (
         "*",
-        "the picture is too unlike those before, and it goes on from here",
-    ): "das Bild ist denen davor zu unähnlich, und von hier aus geht es weiter",
+        "the picture is too unlike those before; tracking goes on from here",
+    ): "das Bild ist denen davor zu unähnlich; von hier aus geht die Verfolgung weiter",
     ("*", "Not tracked: from frame {first} on"): "Nicht verfolgt: ab Bild {first}",
     ("*", "Not tracked: up to frame {last}"): "Nicht verfolgt: bis Bild {last}",
     ("*", "Not tracked: frames {first} to {last}"): "Nicht verfolgt: Bilder {first} bis {last}",
@@ -1163,61 +1146,60 @@ MESSAGES = {
         "a region ends with its shot",
     ): "Verfolgen gibt der Deckkraft einer Region, oder dem Einfluss der Kamera, Schlüsselbilder: Sie klingt aus, "
     "wo die Verfolgung endet; eine Region endet mit ihrer Einstellung",
-    ("*", "What of its motion is followed"): "Was von der Bewegung gilt",
+    ("*", "Part of the motion that the exposure follows"): "Was von der Bewegung gilt",
     ("*", "Smoothness"): "Glätte",
     (
         "*",
-        "Frames before and after each over which the motion is averaged, as the mass of a camera does: "
-        "at 0 it is followed as it is",
+        "Frames on each side over which the motion is averaged, like that of a heavy camera",
     ): "Bilder vor und nach jedem, über die die Bewegung gemittelt wird, wie es die Masse einer Kamera tut: "
     "Bei 0 gilt sie, wie sie ist",
     ("*", "Influence"): "Einfluss",
     (
         "*",
-        "How much is left of exposures that follow the camera: at 0 the shown frame alone",
+        "Length of exposures that follow the camera: 0 exposes only the shown frame",
     ): "Wie viel von Belichtungen bleibt, die der Kamera folgen: bei 0 das gezeigte Bild allein",
     ("Operator", "Track Camera"): "Kamera verfolgen",
     (
         "*",
-        "Key the camera by what the regions leave free, up to your own keys (Esc stops and keeps the tracked frames)",
+        "Track the camera outside the regions, up to your own keyframes (Esc stops and keeps the tracked frames)",
     ): "Der Kamera Schlüsselbilder nach allem geben, was die Regionen frei lassen, bis zu eigenen Schlüsselbildern "
     "(Esc hält an und behält die verfolgten Bilder)",
     ("Operator", "Stabilize Exposure"): "Belichtung stabilisieren",
     (
         "*",
-        "Expose for long as if the camera had stood still (tracks the camera unless it has keys)",
+        "Make a long exposure as if the camera stood still (tracks the camera unless it has keyframes)",
     ): "Lange belichten, als hätte die Kamera still gestanden (verfolgt sie, wenn sie keine Schlüsselbilder hat)",
     ("Operator", "Follow Stabilization"): "Der Stabilisierung folgen",
     (
         "*",
-        "Key the camera by the 2D stabilization of a movie clip, from where the camera is at this frame",
+        "Key the camera by the 2D stabilization of a movie clip, from its place at this frame",
     ): "Der Kamera Schlüsselbilder nach der 2D-Stabilisierung eines Filmclips geben, von ihrem Ort in diesem Bild aus",
     ("*", 'clip "{clip}" has no 2D stabilization'): "Clip „{clip}“ hat keine 2D-Stabilisierung",
     ("*", 'camera of effect "{name}"'): "Kamera des Effekts „{name}“",
-    ("*", "How what the camera sees moves"): "Wie sich bewegt, was die Kamera sieht",
+    ("*", "Motion of what the camera sees"): "Wie sich bewegt, was die Kamera sieht",
     ("*", "Name of the camera's animation channels"): "Name der Animationskanäle der Kamera",
     ("Operator", "Panning Shot"): "Mitzieher",
     (
         "*",
-        "Keep the active region sharp while all else streaks past it (tracks the region unless it has keys)",
+        "Keep the active region sharp while all else streaks past it (tracks the region unless it has keyframes)",
     ): "Die aktive Region scharf halten, während alles andere an ihr vorbei verwischt "
     "(verfolgt die Region, falls sie keine Schlüsselbilder hat)",
     ("Operator", "Sharp Subject"): "Scharfes Motiv",
     (
         "*",
-        "Keep the active region sharp before all else, which is exposed for long and without it",
+        "Keep the active region sharp in front of a long exposure of everything else",
     ): "Die aktive Region scharf vor alles andere stellen, das lange und ohne sie belichtet wird",
     ("Operator", "Trail"): "Bewegungsspur",
     (
         "*",
-        "Have the active region leave a trail before all else, which stays sharp",
+        "Make the active region leave a trail in front of everything else, which stays sharp",
     ): "Die aktive Region eine Spur ziehen lassen, vor allem anderen, das scharf bleibt",
     ("*", "Subject"): "Motiv",
     ("Virtual Shutter", "Holes"): "Löcher",
     (
         "*",
-        "The result, and where no exposed frame shows what lies behind layers: orange is taken from another frame, "
-        "purple is filled from what is around",
+        "The result and the holes behind layers: orange is taken from another frame, "
+        "purple is filled from its surroundings",
     ): "Das Ergebnis, und wo kein belichteter Frame zeigt, was hinter Ebenen liegt: Orange stammt aus einem anderen "
     "Frame, Violett ist aus der Umgebung gefüllt",
     ("*", "Behind: another frame"): "Dahinter: ein anderer Frame",
@@ -1231,11 +1213,11 @@ MESSAGES = {
     ): "Die Belichtung bleibt, wo sie im Bild ist",
     (
         "*",
-        "The exposure moves with a region: what the region moves with stays sharp",
+        "The exposure moves with a region, so that what the region covers stays sharp",
     ): "Die Belichtung bewegt sich mit einer Region: Was sich mit der Region bewegt, bleibt scharf",
     (
         "*",
-        "The exposure moves with what the camera sees, as if the camera had stood still",
+        "The exposure moves with the camera's view, as if the camera stood still",
     ): "Die Belichtung bewegt sich mit dem, was die Kamera sieht, als hätte die Kamera still gestanden",
     ("*", "Moved With"): "Bewegt mit",
     (
@@ -1247,26 +1229,26 @@ MESSAGES = {
     ("Virtual Shutter", "Distance"): "Strecke",
     (
         "*",
-        "The bars are the exposure of one frame of the timeline, however fast the footage runs",
+        "The bars are the exposure during one timeline frame, at any speed of the footage",
     ): "Die Balken sind die Belichtung eines Bildes der Zeitleiste, wie schnell das Material auch läuft",
-    ("*", "What says how long the exposure is"): "Was sagt, wie lang die Belichtung ist",
+    ("*", "What sets the length of the exposure"): "Was sagt, wie lang die Belichtung ist",
     (
         "*",
-        "The bars say for how many frames the shutter is open",
+        "The bars set for how many frames the shutter is open",
     ): "Die Balken sagen, wie viele Bilder lang der Verschluss offen ist",
     (
         "*",
-        "The shutter is open while what it follows moves by a set distance; the bars are the shape",
+        "The shutter is open while what it follows moves by a distance; bars only set the shape",
     ): "Der Verschluss ist offen, während sich das, womit er sich mitbewegt, um eine gegebene Strecke bewegt; "
     "die Balken sind die Form",
     ("*", "Distance"): "Strecke",
     (
         "*",
-        "How far what is followed moves while the shutter is open, as a fraction of the picture's height",
+        "Distance of the motion while the shutter is open, as a fraction of the picture's height",
     ): "Wie weit sich bei offenem Verschluss bewegt, was verfolgt wird, als Bruchteil der Bildhöhe",
     (
         "*",
-        "Where what the camera sees has moved to, as a fraction of the picture",
+        "Movement of what the camera sees, as a fraction of the picture",
     ): "Wohin sich bewegt hat, was die Kamera sieht, als Bruchteil des Bildes",
     (
         "*",
@@ -1285,13 +1267,13 @@ MESSAGES = {
     ("Operator", "Follow Track"): "Einer Spur folgen",
     (
         "*",
-        "Key the active region by a track of a movie clip, from where the region is at this frame",
+        "Key the active region by a track of a movie clip, from its place at this frame",
     ): "Der aktiven Region Schlüsselbilder nach einer Spur eines Filmclips geben, von ihrem Ort in diesem Bild aus",
     ("Operator", "Update"): "Aktualisieren",
     ("Operator", "Update Followed Track"): "Gefolgte Spur aktualisieren",
     (
         "*",
-        "Key the active region anew by what it follows, after the track has changed",
+        "Key the active region again after the track that it follows has changed",
     ): "Der aktiven Region neue Schlüsselbilder nach dem geben, dem sie folgt, nachdem die Spur sich geändert hat",
     ("*", "What the region follows"): "Was die Region verfolgt",
     ("*", "Track"): "Spur",
@@ -1319,7 +1301,7 @@ MESSAGES = {
     ("*", "Follow From"): "Folgen ab",
     ("*", "The track has changed"): "Die Spur hat sich geändert",
     ("*", "Choose a clip first"): "Zuerst einen Clip wählen",
-    ("*", "The region follows no track yet"): "Die Region folgt noch keiner Spur",
+    ("*", "The region does not follow a track"): "Die Region folgt noch keiner Spur",
     ("*", 'clip "{clip}" has no track "{track}"'): "Clip „{clip}“ hat keine Spur „{track}“",
     (
         "*",
@@ -1340,7 +1322,7 @@ MESSAGES = {
     ("*", "Source: {strip}"): "Quelle: {strip}",
     (
         "*",
-        "Give the effect another clip: the movie, image or clip strip whose frames it exposes",
+        "Choose the movie, image or clip strip whose frames the effect exposes",
     ): "Dem Effekt einen anderen Clip geben: den Film-, Bild- oder Clip-Strip, dessen Einzelbilder er belichtet",
     ("Operator", "Copy Effect"): "Effekt kopieren",
     (
@@ -1349,12 +1331,12 @@ MESSAGES = {
     ): "Verschlüsse, Regionen, Keyframes und Optionen des Effekts für andere Strips und Szenen dieser Datei kopieren",
     (
         "*",
-        "Copied, without what a newer version of Virtual Shutter has added",
+        "Copied without data of a newer version of Virtual Shutter",
     ): "Kopiert, ohne das, was eine neuere Version von Virtual Shutter hinzugefügt hat",
     ("Operator", "Paste Effect"): "Effekt einfügen",
     (
         "*",
-        "Give the active strip the copied effect; where it has one, that is replaced",
+        "Paste the copied effect to the active strip, replacing its effect",
     ): "Dem aktiven Strip den kopierten Effekt geben; hat er schon einen, wird der ersetzt",
     ("*", "Copy an effect first"): "Zuerst einen Effekt kopieren",
     ("Operator", "Import Recipe"): "Rezept importieren",
@@ -1397,23 +1379,23 @@ MESSAGES = {
     ("Operator", "Unbake"): "Backen aufheben",
     (
         "*",
-        "Render the effect beside Blender, and put the film above it as a strip. Frames that are finished are kept",
+        "Render the effect in the background and add the film as a strip above it. Finished frames are kept",
     ): "Den Effekt neben Blender rendern und den Film als Strip darüberlegen. Fertige Bilder bleiben erhalten",
     (
         "*",
-        "Stop the bake that runs. Frames that are finished stay, and the next bake goes on from there",
+        "Stop the bake. Finished frames are kept, and the next bake continues from there",
     ): "Das laufende Backen anhalten. Fertige Bilder bleiben, und das nächste Backen macht dort weiter",
     (
         "*",
-        "Remove the baked strip, and show the effect again. The baked files stay",
+        "Remove the baked strip and show the effect again. The baked files stay",
     ): "Den gebackenen Strip entfernen und den Effekt wieder zeigen. Die gebackenen Dateien bleiben",
     (
         "*",
-        "H.264, for playing: levels are off by little, and there is no transparency",
+        "H.264, for playback: small errors and no transparency",
     ): "H.264, zum Abspielen: Werte weichen um wenig ab, und es gibt keine Transparenz",
     (
         "*",
-        "A folder of pictures in full precision, which play more slowly",
+        "A folder of pictures in full precision; playback is slower",
     ): "Ein Ordner von Bildern in voller Genauigkeit, die langsamer abspielen",
     ("*", "Movie"): "Film",
     ("*", "An effect is being baked"): "Ein Effekt wird gerade gebacken",
@@ -1426,11 +1408,11 @@ MESSAGES = {
     ("*", "Baked, and up to date"): "Gebacken und aktuell",
     (
         "*",
-        "baked frames lie beside the .blend file: save it first",
+        "baked frames are stored beside the .blend file: save it first",
     ): "gebackene Bilder liegen neben der .blend-Datei: zuerst speichern",
     (
         "*",
-        '"{strip}" is retimed, strobed or reversed itself: do that to its source',
+        '"{strip}" is retimed, strobed or reversed: do that to its source instead',
     ): "„{strip}“ ist selbst umgezeitet, stroboskopiert oder umgekehrt: das gehört an die Quelle",
     (
         "*",
@@ -1438,7 +1420,7 @@ MESSAGES = {
     ): "„{strip}“ ist die Eingabe eines anderen Strips, der den gebackenen nicht zeigen würde",
     (
         "*",
-        'above "{strip}" there is no channel with room for the baked strip',
+        'no channel above "{strip}" has room for the baked strip',
     ): "über „{strip}“ ist kein Kanal mit Platz für den gebackenen Strip",
     ("*", "a movie has no light above white: bake to OpenEXR"): "ein Film hat kein Licht über Weiß: zu OpenEXR backen",
     (
@@ -1450,21 +1432,21 @@ MESSAGES = {
         "movies are baked in Blender's own colours: with another configuration, bake to OpenEXR",
     ): "Filme haben Blenders eigene Farben: mit einer anderen Konfiguration zu OpenEXR backen",
     ("*", "a movie has no transparency: bake to OpenEXR"): "ein Film hat keine Transparenz: zu OpenEXR backen",
-    ("*", "the bake ended without a word"): "das Backen endete ohne ein Wort",
+    ("*", "the bake ended without a message"): "das Backen endete ohne ein Wort",
     ("*", "the bake cannot begin: {reason}"): "das Backen kann nicht beginnen: {reason}",
     (
         "*",
-        'the strip that was baked is gone; its film is "{path}"',
+        'the strip was removed during the bake; its film is "{path}"',
     ): "der Strip, der gebacken wurde, ist nicht mehr da; sein Film ist „{path}“",
     # Reports
     ("Operator", "Copy Report"): "Bericht kopieren",
     ("*", "Report"): "Bericht",
     (
         "*",
-        "Copy versions, device, kinds and numbers of the edit, and last errors: no names, no paths. Nothing is sent",
+        "Copy versions, device, types and numbers of the edit, and last errors: no names, no paths. Nothing is sent",
     ): "Versionen, Gerät, Arten und Zahlen des Schnitts und die letzten Fehler kopieren: keine Namen, keine Pfade. "
     "Nichts wird gesendet",
-    ("*", "Report copied: paste it into your message, and read it before you send it"): "Bericht kopiert: "
+    ("*", "Report copied: paste it into your message and read it before you send it"): "Bericht kopiert: "
     "in die Nachricht einfügen, und vor dem Senden lesen",
     ("*", "Without a window there is no clipboard: use the command check with --report"): "Ohne Fenster gibt es keine "
     "Zwischenablage: der Befehl check mit --report gibt den Bericht aus",
@@ -1472,7 +1454,7 @@ MESSAGES = {
     ("Virtual Shutter", "Render Device"): "Rendergerät",
     (
         "*",
-        "What composes renders; the preview is always composed on the GPU that Blender draws with",
+        "Device that composes renders. Previews always use the GPU that Blender draws with",
     ): "Was Renderbilder berechnet; die Vorschau berechnet immer die GPU, mit der Blender zeichnet",
     ("Virtual Shutter", "Automatic"): "Automatisch",
     (
@@ -1482,7 +1464,7 @@ MESSAGES = {
     ("Virtual Shutter", "GPU"): "GPU",
     ("*", "As Automatic, but never NumPy"): "Wie Automatisch, aber nie NumPy",
     ("Virtual Shutter", "OpenGL 4.3"): "OpenGL 4.3",
-    ("*", "An OpenGL context of its own, beside Blender's"): "Ein eigener OpenGL-Kontext neben dem von Blender",
+    ("*", "A separate OpenGL context beside Blender's"): "Ein eigener OpenGL-Kontext neben dem von Blender",
     ("Virtual Shutter", "Blender's GPU"): "Blenders GPU",
     ("*", "The GPU that Blender draws with"): "Die GPU, mit der Blender zeichnet",
     ("Virtual Shutter", "NumPy"): "NumPy",
