@@ -21,8 +21,13 @@ uniform int red_of, blue_of;
 #  elif MOMENT
 layout(r32ui) uniform readonly uimage2DArray filmed;  // images: see `luma`
 layout(rgba16) uniform readonly image2DArray vectors;
+// Of moments: the first one's number, of how many; key moments; the layer of the first frame. The tiles are those of a
+// level, listed from `listed.x` to `listed.y`, 256 to a row, each as x + 4096 y. MOMENT, which saves lookups: 1, they are
+// mixes of the two frames; 2, the first one lies behind the first frame, 3, behind key moment `first_key` of the level.
+uniform sampler2DArray tiles;
 uniform ivec4 moment;
-uniform int count, layers;
+uniform ivec2 listed;
+uniform int count, layers, level, first_key;
 #  else
 uniform sampler2DArray frame;
 #  endif
@@ -70,26 +75,65 @@ SUM light_of(vec3 color, ivec2 pixel) {
 }
 #endif
 
+#if MOMENT
+// What the moments of an invocation have in common.
+ivec2 pixel;
+ivec3 place;
+SUM sum;
+vec3 before;
+int made, position;  // how many were added; where the next one lies, in 1 / moment.y of two key moments
+
+// Adds the moments between the key moment before `key`, whose light is `before`, and this one.
+void add_until(int key, vec3 light) {
+  int steps = moment.y, start = (key - 1) * steps;
+  while (made < count && position < key * steps) {
+    vec3 color = mix(before, light, float(position - start) / float(steps));
+#  if DECODE == 0
+    color = to_level(color);
+#  endif
+    sum = added(sum, light_of(color, pixel));
+    int layer = next + made;
+    store(place, layer < layers ? layer : layer - layers, sum);
+    made += 1;
+    position += 1 << level;
+  }
+  before = light;
+}
+
+void main() {
+  ivec2 id = ivec2(gl_GlobalInvocationID.xy);
+  int number = listed.x + (id.y >> 4) * 256 + (id.x >> 3);
+  int tile = int(texelFetch(tiles, ivec3(number & 255, number >> 8, 0), 0).r);
+  pixel = ivec2(tile & 4095, tile >> 12) * ivec2(8, 16) + (id & ivec2(7, 15)) - ivec2(0, top);
+  if (number >= listed.y || any(greaterThanEqual(pixel, size))) {
+    return;
+  }
+  ivec2 shown = pixel + ivec2(0, top);
+  place = place_of_sums(pixel);
+  sum = sum_at(place, known);
+  made = 0;
+  position = moment.x << level;
+#  if MOMENT == 3
+  before = key_light(shown, first_key * moment.z >> level);
+#  else
+  before = frame_light(shown, moment.w);
+#  endif
+#  if MOMENT == 2 || MOMENT == 3
+  for (int key = first_key + 1; key < 1 << level && made < count; ++key) {
+    add_until(key, key_light(shown, key * moment.z >> level));
+  }
+#  endif
+  add_until(1 << level, frame_light(shown, 1 - moment.w));
+}
+#else
 void at(ivec3 p) {
   ivec2 pixel = p.xy;
   ivec3 place = place_of_sums(pixel);
   SUM sum = sum_at(place, known);
-#if MOMENT
-  for (int k = 0; k < count; ++k) {
-    // Rounded to levels, as the reference reads it.
-    vec3 color = floor(to_level(moment_at(pixel + ivec2(0, top), k)) * 255.0 + 0.5) / 255.0;
-#  if DECODE == 1
-    color = to_linear(color);
-#  endif
-    sum = added(sum, light_of(color, pixel));
-    int layer = next + k;
-    store(place, layer < layers ? layer : layer - layers, sum);
-  }
-#elif AGAIN
+#  if AGAIN
   store(place, next, added(sum, minus(sum_at(place, after), sum_at(place, before))));
-#else
-#  if PLANES
-  vec3 color = decoded(color_at(pixel + ivec2(0, top)));
+#  elif PLANES
+  store(place, next, added(sum, light_of(decoded(color_at(pixel + ivec2(0, top))), pixel)));
 #  else
   vec4 sent = texelFetch(frame, ivec3(pixel + ivec2(0, top), 0), 0);
 #    if NUMBERS
@@ -98,9 +142,9 @@ void at(ivec3 p) {
 #    else
   vec3 color = decoded(sent.rgb);
 #    endif
-#  endif
   store(place, next, added(sum, light_of(color, pixel)));
-#endif
+#  endif
 }
 
-#include "pixels.glsl"
+#  include "pixels.glsl"
+#endif

@@ -35,25 +35,29 @@ vec3 row_at(ivec4 columns, int row, vec4 shares, int end) {
          levels_at(columns.z, row, end) * shares.z + levels_at(columns.w, row, end) * shares.w;
 }
 
-// Linear light of a filmed frame at a place in 1 / UNIT of a pixel. end: its layer
+// The levels of a filmed frame at a place in 1 / UNIT of a pixel. end: its layer
 vec3 looked_up(ivec2 place, int end) {
   ivec2 last = imageSize(filmed).xy - 1, corner = place >> 5, part = place & (UNIT - 1);
   ivec4 columns = clamp(corner.x + ivec4(-1, 0, 1, 2), 0, last.x), rows = clamp(corner.y + ivec4(-1, 0, 1, 2), 0, last.y);
   vec4 across = cubic_weights(float(part.x) / float(UNIT)), down = cubic_weights(float(part.y) / float(UNIT));
   vec3 levels = row_at(columns, rows.x, across, end) * down.x + row_at(columns, rows.y, across, end) * down.y +
                 row_at(columns, rows.z, across, end) * down.z + row_at(columns, rows.w, across, end) * down.w;
-  return to_linear(floor(clamp(levels, 0.0, 255.0) + 0.5) / 255.0);
+  return floor(clamp(levels, 0.0, 255.0) + 0.5);
 }
 
-// The linear light of one of the moments at a pixel. which: its vectors' layer; moment: the first one's number, of how
-// many; the shift of a path's parts; the first frame's layer
-vec3 moment_at(ivec2 pixel, int which) {
-  ivec4 said = spread_at(pixel, which);
+vec3 frame_light(ivec2 pixel, int end) {
+  return to_linear(levels_at(pixel.x, pixel.y, end) / 255.0);
+}
+
+// The linear light of a key moment at a pixel.
+vec3 key_light(ivec2 pixel, int key) {
+  ivec4 said = spread_at(pixel, key - 1);
   ivec2 path = said.xy - ZERO * APART * APART, here = pixel * UNIT;
-  int number = moment.x + which, left = moment.y - number, half_ = 1 << (moment.z - 1);
-  vec3 first = looked_up(here - ((number * path + half_) >> moment.z), moment.w);
-  vec3 second = looked_up(here + ((left * path + half_) >> moment.z), 1 - moment.w);
+  int left = moment.z - key, whole_path = APART * APART * moment.z;  // a power of two
+  int shift = findMSB(whole_path), half_ = whole_path >> 1;
+  vec3 first = looked_up(here - ((key * path + half_) >> shift), moment.w);
+  vec3 second = looked_up(here + ((left * path + half_) >> shift), 1 - moment.w);
   vec2 shown = vec2(said.zw) / float(255 * APART * APART) + 0.05;
-  float late = float(number) * shown.y;
-  return mix(first, second, late / (late + float(left) * shown.x));
+  float late = float(key) * shown.y;
+  return to_linear(mix(first, second, late / (late + float(left) * shown.x)) / 255.0);
 }

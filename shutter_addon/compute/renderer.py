@@ -227,6 +227,8 @@ class Renderer:
         elif self._window and self._kind == self._kind_for(request):
             held = self._window.held
         request = self.slid(request, known=True)
+        if request.state.layers is None:
+            request = self._exposing(request, self.labels(request))
         unread, handed = window_frames.looked_for_cuts(request, self.source, self._beside(request))
         shot = self.shot(request, known=True)
         missing = window_frames.exposed_frames(request, shot).difference(held)

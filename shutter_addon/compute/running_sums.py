@@ -9,7 +9,7 @@ from contextlib import suppress
 import numpy as np
 
 from ..core.frames.frame_source import FrameSource
-from ..core.frames.planes import STEP, Moment, Planes, chroma_step
+from ..core.frames.planes import TILE, Moment, Planes, chroma_step
 from ..core.model import windows
 from ..core.model.frame_state import Light, Options
 from ..core.stopping import kept
@@ -17,10 +17,9 @@ from ..devices import llvmpipe
 from ..devices.device import Device, Given, NoDeviceError, Texture
 from ..devices.passes import Pass, read_pass
 from .layer_frames import WeightedFrames
-from .window import BLOCK, Frames, PackedFrames, Part, WholeFrames, Window, decoding, summable
+from .window import Frames, PackedFrames, Part, WholeFrames, Window, decoding, summable
 
-# A tile of running sums in pixels (across, down), as in shaders/include/sums.glsl.
-TILE = 8, BLOCK
+_LISTED = 256  # tiles in a row of a list, as in shaders/accumulate.glsl
 
 
 def open_window(
@@ -48,7 +47,7 @@ def stores_rows(device: Device) -> bool:
 STORED_SUMS = ("rgba16ui", "rgba32ui", "rgba32ui")
 
 
-def accumulation(decode: int, sent: str, back: bool, tiled: bool, cover: int = 0) -> Pass:
+def accumulation(decode: int, sent: str, back: bool, tiled: bool, cover: int = 0, kind: int = 1) -> Pass:
     """The pass that makes a layer of sums from its neighbour: with the frame between the two added, or subtracted.
 
     decode: of `decoding`
@@ -57,8 +56,9 @@ def accumulation(decode: int, sent: str, back: bool, tiled: bool, cover: int = 0
     back: it is subtracted
     tiled: the sums are stored in tiles
     cover: of WeightedSums
+    kind: of moments, MOMENT of the shader
     """
-    macros = {"DECODE": decode, "BACK": int(back), "TILED": int(tiled), "COVER": cover, sent: 1}
+    macros = {"DECODE": decode, "BACK": int(back), "TILED": int(tiled), "COVER": cover, sent: kind}
     return read_pass("accumulate", STORED=STORED_SUMS[cover], **macros)
 
 
@@ -67,6 +67,21 @@ def _in_fours(plane: np.ndarray) -> np.ndarray:
     if missing := -plane.shape[1] % 4:
         plane = np.pad(plane, ((0, 0), (0, missing)))
     return np.ascontiguousarray(plane).view(np.dtype("<u4"))
+
+
+def _by_level(moment: Moment, part: Part, given: Given) -> Iterator[tuple[int, tuple[int, int], Given]]:
+    """Yield, for each level of a part's tiles: MOMENT of the shader, the extent of the pass, and its arguments."""
+    (across, down), listed = TILE, 0
+    rows = part.top // down, -(-(part.top + part.height) // down)
+    for level in range(int(moment.levels.max()) + 1):
+        down_to = np.nonzero(moment.levels == level)[0]
+        first, last = (listed + np.searchsorted(down_to, rows)).tolist()
+        listed += len(down_to)
+        if first < last:
+            key = (moment.number << level) // moment.steps
+            kind = 1 if level == 0 else 2 if key == 0 else 3
+            extent = across * min(last - first, _LISTED), down * -(-(last - first) // _LISTED)
+            yield kind, extent, given | {"listed": (first, last), "level": level, "first_key": key}
 
 
 class Sums(Window):
@@ -92,6 +107,7 @@ class Sums(Window):
         self.start = self.stop = 0
         self._frames: dict[int, int] = {}  # position: source frame
         self._light: Light | None = None
+        self._vectors: np.ndarray | None = None  # those on the device
         self._sent: dict[int, int] = {}  # by layer of `_filmed`: the number of the frame in it
         # White is the largest 2ⁿ − 1 for which the sum of a whole window fits into 21 bits, and n is 16 at most.
         self.whole = (1 << min(16, 21 - (capacity - 1).bit_length())) - 1
@@ -176,11 +192,14 @@ class Sums(Window):
         else:
             sent = "AGAIN"
             given |= {"before": same % self.layers, "after": (same + 1) % self.layers}
-        decode = decoding(self.source.transfer, light)
-        program = accumulation(decode, sent, next_ < known, self.tiled, self.cover)
+        decode, moment = decoding(self.source.transfer, light), given.pop("of", None)
         for part, sums in self.stored():
             size = self.source.width, part.height
-            self.device.run(program, size, images=images | {"sums": sums}, size=size, top=part.top, **given)
+            runs = [(1, size, given)] if moment is None else _by_level(moment, part, given)
+            for kind, extent, arguments in runs:
+                program = accumulation(decode, sent, next_ < known, self.tiled, self.cover, kind)
+                bound = images | {"sums": sums}
+                self.device.run(program, extent, images=bound, size=size, top=part.top, **arguments)
         frames = frames[: given.get("count", 1)]
         self._frames |= dict(enumerate(frames, min(known, next_)))
         kept()
@@ -221,15 +240,25 @@ class Sums(Window):
 
     def _send_moments(self, moments: list[Moment]) -> Given:
         first = moments[0]
-        height, width, _ = first.vectors.shape
-        vectors = self._extra.of("vectors", (width, height, self.source.step - 1), "rgba16")
-        for layer, moment in enumerate(moments):
-            self.device.write(vectors, moment.vectors, layer)
+        layers, height, width, _ = first.vectors.shape
+        vectors = self._extra.of("vectors", (width, height, layers), "rgba16")
+        rows = -(-first.levels.size // _LISTED)
+        tiles = self._extra.of("tiles", (_LISTED, rows, 1), "r32f")
+        if self._vectors is not first.vectors:
+            for layer, values in enumerate(first.vectors):
+                self.device.write(vectors, values, layer)
+            order = np.argsort(first.levels, axis=None, kind="stable")
+            down, across = np.divmod(order, first.levels.shape[1])
+            listed = np.zeros((rows, _LISTED), np.float32)
+            listed.flat[: len(order)] = across + 4096 * down
+            self.device.write(tiles, listed)
+            self._vectors = first.vectors
         filmed, start = self._filmed(first)
-        shift = (STEP**2 * first.steps).bit_length() - 1
         return {
+            "of": first,
+            "textures": {"tiles": tiles},
             "images": {"filmed": filmed, "vectors": vectors},
-            "moment": (first.number, first.steps, shift, start),
+            "moment": (first.number, first.steps, layers + 1, start),
             "count": len(moments),
             "layers": self.layers,
         }
@@ -258,7 +287,7 @@ class Sums(Window):
         return self._extra.of("filmed", (self.source.width, self.source.height, 2), "r32ui")
 
     def release(self) -> None:
-        self._frames, self._light, self._sent = {}, None, {}
+        self._frames, self._light, self._sent, self._vectors = {}, None, {}, None
         super().release()
 
 

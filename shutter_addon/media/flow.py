@@ -2,7 +2,8 @@
 
 The flow comes from OpenCV, in both directions. Each of its vectors carries a pixel to where it is at the time of the
 new frame; where several arrive, the one whose two ends look alike wins (Baker et al. 2011, "A database and evaluation
-methodology for optical flow"). Along what has arrived, both frames are looked up and mixed.
+methodology for optical flow"). Along what has arrived, both frames are looked up and mixed, which takes longest. So a
+part of the picture has only as many of these key moments as its motion needs; the moments between them are mixes.
 """
 
 from __future__ import annotations
@@ -15,7 +16,8 @@ import numpy as np
 from ..core import stopping
 from ..core.frames import light
 from ..core.frames.frame_source import FrameSource
-from ..core.frames.planes import STEP, UNIT, ZERO, Moment
+from ..core.frames.planes import STEP, TILE, UNIT, ZERO, Moment
+from ..core.memo import Kept
 from . import opencv
 from .opencv import cv2
 
@@ -25,6 +27,10 @@ HALF_MAX = 65504  # the largest value of a half float, which infinite samples co
 # brighter; in darker ones in proportion, but for noise.
 UNLIKE, GREY, NOISE = 24.0, 90.0, 4.0
 SHARED = 0.5  # of all vectors, in both directions, have to
+# Where nothing moves farther than STILL between two frames, in 1 / UNIT of a pixel, moments are mixes of both frames.
+# Up to MOVES, one key moment lies between them; each doubling of the distance doubles the key moments.
+STILL, MOVES = UNIT // 8, 2 * UNIT
+_KEPT = 4  # key moments, and sets of vectors
 VERSION = 1  # raise it when `found` gives something else of the same pictures
 
 
@@ -49,6 +55,8 @@ class Between:
         find: gives what `found` gives; None: that"""
         self.ends, self._transfer, self._alpha = (first, second), transfer, alpha
         self._sides: list[_Carriers] | None = None
+        self._paths: Kept[int, tuple[np.ndarray, np.ndarray]] = Kept()
+        self._samples: Kept[tuple[int, int], np.ndarray] = Kept()
         if not np.array_equal(first, second):
             pictures = [luma(end, transfer, alpha) for end in self.ends]
             sides = [_carriers(each) for each in np.split((find or found)(*pictures), 2, axis=2)]
@@ -59,16 +67,42 @@ class Between:
         return [_encoded(end, self._transfer, self._alpha) for end in self.ends]
 
     def moment(self, pair: tuple[int, int], number: int, steps: int) -> np.ndarray | Moment:
-        """One of `steps` moments, a power of two. What only one of the two frames shows is taken from it, all else is
-        mixed in linear light; of two frames that have nothing in common it is the nearer one. pair: Moment's."""
+        """Return one of the moments between the frames.
+
+        What only one of the two frames shows is taken from it; everything else is mixed. If the frames have nothing in
+        common, it is the nearer frame.
+
+        Args:
+            pair: Moment.pair.
+            number: Which moment, 1 to steps - 1.
+            steps: How many equal steps lead from the first frame to the second.
+        """
         if self._sides is None:
             return self.ends[2 * number > steps]
-        vectors = _paths(self._sides, self.ends[0].shape[:2], number / steps)
-        return Moment(pair, self.ends, number, steps, vectors, partial(self._rgba, vectors, number, steps))
+        keys = 1 << (steps - 1).bit_length()
+        vectors, levels = self._paths.ask(keys, lambda: _of_keys(self._sides, self.ends[0].shape[:2], keys), _KEPT)
+        rgba = partial(self._rgba, vectors, levels, number, steps)
+        return Moment(pair, self.ends, number, steps, vectors, levels, rgba)
 
-    def _rgba(self, vectors: np.ndarray, number: int, steps: int) -> np.ndarray:
-        frame = _mixed(self._encoded, vectors, number, steps)
+    def _rgba(self, vectors: np.ndarray, levels: np.ndarray, number: int, steps: int) -> np.ndarray:
+        height, width = self.ends[0].shape[:2]
+        keys = len(vectors) + 1
+        level_of = levels.repeat(TILE[1], axis=0).repeat(TILE[0], axis=1)[:height, :width, None]
+        frame = np.zeros((), np.float32)
+        for level in np.unique(levels).tolist():
+            before, rest = divmod(number << level, steps)
+            shown = self._light(vectors, before * keys >> level)
+            if rest:
+                shown = shown + np.float32(rest / steps) * (self._light(vectors, (before + 1) * keys >> level) - shown)
+            frame = np.where(level_of == level, shown, frame)
         return _decoded(frame, self.ends[0].dtype, self._transfer, self._alpha)
+
+    def _light(self, vectors: np.ndarray, key: int) -> np.ndarray:
+        """Return the linear light of a key moment, (H, W, 3 or 4) float32."""
+        keys = len(vectors) + 1
+        if key % keys == 0:
+            return _light(self._encoded[key // keys])
+        return _light(self._samples.ask((keys, key), lambda: _mixed(self._encoded, vectors[key - 1], key, keys), _KEPT))
 
 
 def luma(frame: np.ndarray, transfer: str, alpha: str) -> np.ndarray:
@@ -165,8 +199,22 @@ def _meet(pictures: list[np.ndarray], sides: list[_Carriers]) -> bool:
     return min(float((costs <= unlike).mean()) for _places, _vectors, costs in sides) >= SHARED
 
 
+def _of_keys(sides: list[_Carriers], shape: tuple[int, ...], keys: int) -> tuple[np.ndarray, np.ndarray]:
+    """Return Moment.vectors and Moment.levels of so many key moments between two pictures of a shape (H, W)."""
+    paths = np.stack([_paths(sides, shape, key / keys) for key in range(1, keys)])
+    farthest = np.abs(paths[..., :2].astype(np.int32) - ZERO).max(axis=(0, 3)).astype(np.float32)
+    # A pixel's path is interpolated between its cell and the next ones to the right and below.
+    farthest = cv2.dilate(farthest, np.ones((2, 2), np.uint8), anchor=(0, 0))
+    across, down = (length // STEP for length in TILE)
+    height, width = farthest.shape
+    cells = np.pad(farthest, ((0, -height % down), (0, -width % across)))
+    tiles = cells.reshape(-(-height // down), down, -1, across).max(axis=(1, 3))
+    steps = [STILL, *(MOVES << level for level in range(keys.bit_length() - 2))]
+    return paths, np.searchsorted(steps, tiles).astype(np.uint8)
+
+
 def _paths(sides: list[_Carriers], shape: tuple[int, ...], t: float) -> np.ndarray:
-    """Moment.vectors at a time in 0 … 1."""
+    """Return the vectors (h, w, 4) of Moment.vectors at a time from 0 to 1."""
     (forth, cost), (back, other) = (_carry(*side, shape, s) for side, s in zip(sides, (t, 1 - t), strict=True))
     vectors = np.where((cost <= other)[..., None], forth, -back)
     arrived = [each < np.inf for each in (cost, other)]
@@ -191,7 +239,7 @@ def _carry(
     corners = (cells[:, 1] + 2) * (w + 4) + cells[:, 0] + 2
     # Of several that arrive the cheapest stays, the last; -1, where nothing arrives, takes what is appended.
     last = np.full((h + 4) * (w + 4), -1, np.int32)
-    np.maximum.at(last, corners, np.arange(len(corners), dtype=np.int32))
+    last[corners] = np.arange(len(corners), dtype=np.int32)
     last = last.reshape(h + 4, w + 4)[1:-2, 1:-2]
     # Each arrives at the four corners of its cell.
     last = np.maximum(last[1:], last[:-1])
@@ -223,25 +271,30 @@ def _filled(vectors: np.ndarray, known: np.ndarray) -> np.ndarray:
     return np.where(known[..., None], vectors, cv2.resize(coarse, known.shape[::-1], interpolation=cv2.INTER_LINEAR))
 
 
-def _mixed(ends: list[np.ndarray], vectors: np.ndarray, number: int, steps: int) -> np.ndarray:
-    """Linear light (H, W, 3 or 4) of a moment: both frames looked up along the paths. Places are whole numbers of
-    1 / UNIT, so that all devices look up the same ones (shaders/include/moment.glsl)."""
+def _mixed(ends: list[np.ndarray], vectors: np.ndarray, key: int, keys: int) -> np.ndarray:
+    """Return the display values of a key moment: both frames looked up along the paths, and mixed.
+
+    They are uint16 for frames of whole numbers.
+
+    Places are whole numbers of 1 / UNIT of a pixel, so that all devices look up the same ones
+    (shaders/include/moment.glsl).
+    """
     stopping.check()
     height, width = ends[0].shape[:2]
     spread = _spread(vectors, height, width)
     paths = spread[..., :2] - (ZERO * STEP**2)
     here = UNIT * np.dstack(np.meshgrid(np.arange(width, dtype=np.int32), np.arange(height, dtype=np.int32)))
-    shift = (STEP**2 * steps).bit_length() - 1
+    shift = (STEP**2 * keys).bit_length() - 1
     half = 1 << (shift - 1)
-    seen = [
-        _cubic(ends[0], here - ((number * paths + half) >> shift)),
-        _cubic(ends[1], here + (((steps - number) * paths + half) >> shift)),
-    ]
+    first = _cubic(ends[0], here - ((key * paths + half) >> shift))
+    second = _cubic(ends[1], here + (((keys - key) * paths + half) >> shift))
     shown = spread[..., 2:] * np.float32(1 / (255 * STEP**2)) + np.float32(0.05)
-    late: np.ndarray = np.float32(number) * shown[..., 1]
-    late = (late / (late + np.float32(steps - number) * shown[..., 0]))[..., None]
-    first, second = map(_light, seen)
-    return first + late * (second - first)
+    late: np.ndarray = np.float32(key) * shown[..., 1]
+    late = (late / (late + np.float32(keys - key) * shown[..., 0]))[..., None]
+    mixed = first + late * (second.astype(np.float32) - first)
+    if first.dtype == np.uint8:
+        mixed *= np.float32(257)  # white of 16 bits over white of 8
+    return np.rint(mixed).astype(np.uint16) if first.dtype.kind == "u" else mixed
 
 
 def _spread(values: np.ndarray, height: int, width: int) -> np.ndarray:
@@ -304,11 +357,12 @@ def levels(samples: np.ndarray) -> np.ndarray:
 
 
 def _light(samples: np.ndarray) -> np.ndarray:
+    """Return display values of `_encoded` as linear light."""
     if samples.dtype.kind == "u":
         return _table(samples.dtype)[samples]
     if samples.shape[2] == 3:
         return light.to_linear(samples)
-    samples[..., 3] = np.clip(samples[..., 3], 0, 1)
+    samples = np.dstack([samples[..., :3], np.clip(samples[..., 3], 0, 1)])
     return light.premultiplied(light.straight(samples), light.to_linear)
 
 

@@ -33,7 +33,6 @@ _PICTURES, _CHANGES = 4, 1024  # that are kept
 
 _PAIRS = 8  # of neighbouring frames, spread over the footage, that "auto" looks at
 _FRAMES = MOST + 2  # frames that are kept: those that say what repeats
-_THIRDS = 256  # moments that stand for those of a gap of three frames, as their number has to be a power of two
 
 
 class Repeats:
@@ -130,8 +129,6 @@ class SmoothSource(SourceWrapper):
     def _moment(self, pair: tuple[int, int], number: int) -> Decoded:
         """What is so many moments after the first of two frames."""
         steps = (pair[1] - pair[0]) * self.step
-        if steps % 3 == 0:
-            number, steps = round(number * _THIRDS / steps), _THIRDS
         return self._pairs.ask(pair, lambda: self._between(pair), 2).moment(pair, number, steps)
 
     def _between(self, pair: tuple[int, int]) -> flow.Between:

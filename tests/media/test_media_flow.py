@@ -264,10 +264,10 @@ def test_vectors_say_where_all_goes(move, dtype):
     wide = noise(3, HEIGHT + 32, WIDTH + 32)
     first, second = (frame(wide[16 - y :, 16 - x :][:HEIGHT, :WIDTH], dtype) for x, y in ((0, 0), move))
     moment = flow.Between(first, second).moment(7, 1, 2)
-    assert moment.vectors.shape == (HEIGHT // 4, WIDTH // 4, 4)
+    assert moment.vectors.shape == (1, HEIGHT // 4, WIDTH // 4, 4)
     assert moment.vectors.dtype == np.uint16
     assert (moment.pair, moment.number, moment.steps) == (7, 1, 2)
     assert all(map(np.array_equal, moment.ends, (first, second)))
-    inside = moment.vectors[6:-6, 6:-6].astype(float)
+    inside = moment.vectors[0, 6:-6, 6:-6].astype(float)
     np.testing.assert_allclose(np.median((inside[..., :2] - 32768) / 32, axis=(0, 1)), move, atol=0.15)
     assert np.median(inside[..., 2:], axis=(0, 1)).tolist() == [255, 255]

@@ -13,6 +13,7 @@ import numpy as np
 
 STEP = 4  # pixels between two vectors of a moment
 UNIT = 32  # units of a vector's coordinates per pixel
+TILE = 8, 16  # pixels across and down that share how many moments are looked up
 ZERO = 1 << 15  # stored value of the coordinate 0
 
 # By number in ITU-T H.273: red of Cr, blue of Cb, and what is subtracted from green for Cb and Cr, in libswscale's
@@ -112,14 +113,19 @@ def _chroma_places(chosen: slice, length: int) -> np.ndarray:
 class Moment:
     """A moment between two frames.
 
+    Both frames are looked up along paths at key moments, equally far apart in time; other moments are mixes of the two
+    key moments around them, in linear light. A part of the picture that moves less has fewer key moments.
+
     Attributes:
-        pair: Numbers of the two filmed frames. They are neighbours, except for repeated frames in between.
-        ends: The two frames (H, W, 4), with a FrameSource's type.
-        number, steps: The moment's number after the first frame, and the number of moments per frame.
-        vectors: uint16 (⌈H / STEP⌉, ⌈W / STEP⌉, 4). For every STEPth pixel: x and y of the motion from the first frame
-            to the second through that pixel, in 1 / UNIT of a pixel from ZERO; and how reliably the first and the
-            second frame show the moving point, 0 to 255. Values in between are bilinear.
-        rgba: Returns the frame, like FrameSource.read.
+        pair: Numbers of the two frames among filmed ones: neighbours, unless those between repeat the first.
+        ends: The two frames (H, W, 4), of a FrameSource's type.
+        number, steps: It lies number / steps of the way from the first frame to the second.
+        vectors: uint16 (keys − 1, ⌈H / STEP⌉, ⌈W / STEP⌉, 4), shared by the moments of a pair; keys is a power of two.
+            The key moment k, of 1 … keys − 1, has vectors[k − 1], for every STEPth pixel: x and y of the path from the
+            first frame to the second that passes there, in 1 / UNIT of a pixel from ZERO; and how surely the first and
+            the second frame show what follows it, 0 to 255. Between these pixels they are bilinear.
+        levels: uint8, one for each tile of TILE pixels, shared by the pair: its key moments are keys / 2^level apart.
+        rgba: Makes the frame, as FrameSource.read gives it.
     """
 
     pair: tuple[int, int]
@@ -127,12 +133,13 @@ class Moment:
     number: int
     steps: int
     vectors: np.ndarray
+    levels: np.ndarray
     rgba: Callable[[], np.ndarray]
 
     @property
     def nbytes(self) -> int:
-        """Memory in bytes, with a share of the frames, which all moments of the pair use."""
-        return self.vectors.nbytes + sum(end.nbytes for end in self.ends) // self.steps
+        """Bytes that it takes, of what all moments of the pair share."""
+        return (self.vectors.nbytes + sum(end.nbytes for end in self.ends)) // self.steps
 
 
 Decoded: TypeAlias = np.ndarray | Planes | Moment  # results of FrameSource.decoded
