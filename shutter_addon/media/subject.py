@@ -106,7 +106,7 @@ class Network:
         stopping.check()
         size = self._size(picture, share)
         small = cv2.resize(picture, size, interpolation=cv2.INTER_AREA).astype(np.float32)
-        values = (small / max(float(small.max()), 1.0) - np.float32(MEAN)) / np.float32(DEVIATION)
+        values = (small / max(float(small.max()), 1.0) - np.array(MEAN, np.float32)) / np.array(DEVIATION, np.float32)
         try:
             self._net.setInput(np.ascontiguousarray(values.transpose(2, 0, 1)[None]))
             mask = self._net.forward(self._net.getUnconnectedOutLayersNames()[0])

@@ -104,7 +104,7 @@ class SubjectMattes(CarriedMattes):
     def read(self, index: int) -> np.ndarray:
         """As CarriedMattes.read. MediaError: the network cannot be read, too."""
         index = min(max(index, 0), self.count - 1)
-        sides = self._sides(index, self._made) or []
+        sides = self._sides(index, self._sure_once_made) or []
         mattes = [(self._kept(path), share) for path, share, _sure in sides]
         shown = [(np.where(it == EXCLUDED, 0, it) / np.float32(255), share) for it, share in mattes if it is not None]
         return mixed(shown) if shown else self._nothing()
@@ -132,7 +132,8 @@ class SubjectMattes(CarriedMattes):
             get: Gives the confidence of a frame's matte in the chain of a keyframe, or None.
         """
         ends = sorted({end for end in self._near(index) if end is not None}, key=lambda end: abs(end - index))
-        span, sides = sum(abs(end - index) for end in ends), []
+        span = sum(abs(end - index) for end in ends)
+        sides: list[tuple[Path, float, float]] = []
         for end in ends:
             share = min(max(MIDDLE * (0.5 - abs(end - index) / span) + 0.5, 0.0), 1.0) if len(ends) > 1 else 1.0
             if share == 0 and sides[0][2] != GONE:
@@ -148,7 +149,7 @@ class SubjectMattes(CarriedMattes):
         """Return the confidence of a frame's matte in the chain of a keyframe; None if it is not kept."""
         return self._described(self._path(index, end, None))
 
-    def _made(self, index: int, end: int) -> float | None:
+    def _sure_once_made(self, index: int, end: int) -> float | None:
         """As `_sure`; makes what is missing of the chain."""
         if self._sure(index, end) is None:
             with self._claimed(index, end, None) as kept:

@@ -130,7 +130,7 @@ def test_processes_make_the_same_mattes_and_nothing_twice(opened, tmp_path):
         assert np.array_equal(alone.read(frame), matte)
     more = opened(strokes | {7: [on_first(7)]})
     assert np.array_equal(more.read(1), alone.read(1))
-    assert not more._source.asked
+    assert not more._source.asked  # private: nobody else is told which frames were read
     assert not np.array_equal(more.read(5), alone.read(5))
 
 

@@ -92,7 +92,7 @@ def told():
     yield from stroke_drawn()
     yield from made_sharp()
     yield from first.picture_rendered()
-    driver.saw(actions=first._actions)
+    driver.saw(actions=first._actions)  # private: the story counts them as the other one does
     yield from turned()
 
 
