@@ -77,10 +77,10 @@ class Between:
             number: Which moment, 1 to steps - 1.
             steps: How many equal steps lead from the first frame to the second.
         """
-        if self._sides is None:
+        if (sides := self._sides) is None:
             return self.ends[2 * number > steps]
         keys = 1 << (steps - 1).bit_length()
-        vectors, levels = self._paths.ask(keys, lambda: _of_keys(self._sides, self.ends[0].shape[:2], keys), _KEPT)
+        vectors, levels = self._paths.ask(keys, lambda: _of_keys(sides, self.ends[0].shape[:2], keys), _KEPT)
         rgba = partial(self._rgba, vectors, levels, number, steps)
         return Moment(pair, self.ends, number, steps, vectors, levels, rgba)
 
