@@ -20,14 +20,17 @@ uniform ivec2 chroma_step, luma_of, green_of;
 uniform int red_of, blue_of;
 #  elif MOMENT
 layout(r32ui) uniform readonly uimage2DArray filmed;  // images: see `luma`
+#    if MOMENT == 2 || MOMENT == 3
 layout(rgba16) uniform readonly image2DArray vectors;
+uniform int first_key;
+#    endif
 // Of moments: the first one's number, of how many; key moments; the layer of the first frame. The tiles are those of a
 // level, listed from `listed.x` to `listed.y`, 256 to a row, each as x + 4096 y. MOMENT, which saves lookups: 1, they are
 // mixes of the two frames; 2, the first one lies behind the first frame, 3, behind key moment `first_key` of the level.
 uniform sampler2DArray tiles;
 uniform ivec4 moment;
 uniform ivec2 listed;
-uniform int count, layers, level, first_key;
+uniform int count, layers, level;
 #  else
 uniform sampler2DArray frame;
 #  endif

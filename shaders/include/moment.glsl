@@ -4,13 +4,18 @@
 #define UNIT 32  // of a coordinate, in a pixel
 #define ZERO 32768
 
-ivec4 stored_at(int x, int y, int which) {
-  return ivec4(imageLoad(vectors, ivec3(x, y, which)) * 65535.0 + 0.5);
-}
-
 vec3 levels_at(int x, int y, int end) {
   uint bytes = imageLoad(filmed, ivec3(x, y, end)).r;
   return vec3(ivec3(bytes, bytes >> 8, bytes >> 16) & 255);
+}
+
+vec3 frame_light(ivec2 pixel, int end) {
+  return to_linear(levels_at(pixel.x, pixel.y, end) / 255.0);
+}
+
+#if MOMENT == 2 || MOMENT == 3
+ivec4 stored_at(int x, int y, int which) {
+  return ivec4(imageLoad(vectors, ivec3(x, y, which)) * 65535.0 + 0.5);
 }
 
 // What the vectors say of a pixel, 16 times as large.
@@ -45,10 +50,6 @@ vec3 looked_up(ivec2 place, int end) {
   return floor(clamp(levels, 0.0, 255.0) + 0.5);
 }
 
-vec3 frame_light(ivec2 pixel, int end) {
-  return to_linear(levels_at(pixel.x, pixel.y, end) / 255.0);
-}
-
 // The linear light of a key moment at a pixel.
 vec3 key_light(ivec2 pixel, int key) {
   ivec4 said = spread_at(pixel, key - 1);
@@ -61,3 +62,4 @@ vec3 key_light(ivec2 pixel, int key) {
   float late = float(key) * shown.y;
   return to_linear(mix(first, second, late / (late + float(left) * shown.x)) / 255.0);
 }
+#endif

@@ -6,8 +6,15 @@
 #define LIGHT vec4
 #define AS_STORED(sum) sum
 #define AS_SUM(stored) stored
-#define minus(a, b) ((a) - (b))
-#define plus(a, b) ((a) + (b))
+
+// No macros: Metal's uniforms are macros themselves.
+uvec4 minus(uvec4 a, uvec4 b) {
+  return a - b;
+}
+
+uvec4 plus(uvec4 a, uvec4 b) {
+  return a + b;
+}
 
 vec4 unpacked_light(uvec4 difference) {
   return vec4(ivec4(difference));
