@@ -89,7 +89,7 @@ def test_every_field_with_every_other(devices, monkeypatch, tmp_path):
     errors = differences(MIXED, devices, tmp_path, mixed=True)
     assert not errors, "\n".join(errors)
     composing = {path.stem for path in SHADERS.glob("*.glsl") if path.stem.startswith("compose_")}
-    assert seen >= composing | {"accumulate", "pack", "ways", "layer", "matte_blend", "mix", "diffusion"}
+    assert seen >= composing | {"accumulate", "pack", "ways", "layer", "matte_blend", "diffusion"}
 
 
 def test_every_field_with_every_other_on_blenders_gpu(blenders_devices, tmp_path):
