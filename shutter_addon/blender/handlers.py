@@ -194,5 +194,9 @@ def unregister() -> None:
         getattr(bpy.app.handlers, name).remove(function)
     if sys.excepthook is _uncaught:  # otherwise a hook that was installed later still calls it
         sys.excepthook = _hooks.pop()
-    _forget_file()
+    operator_bases.end_all()
+    edit_feed.end()
+    sessions.forget()
+    source_media.forget()
+    reconciling.forget()
     undelete.forget()

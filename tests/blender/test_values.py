@@ -120,7 +120,7 @@ IMPOSSIBLE = {
     "window 1e9": (lambda e: raw(e, "window", 10**9), 'effect "Shutter": Frames is 1e'),
     "position": (lambda e: raw(e, "position", 77), 'effect "Shutter": Position is none of its choices'),
     "keyed position": (lambda e: key(e, "position", (1, -1)), 'effect "Shutter": Position is none'),
-    "kind": (lambda e: raw(e.regions[0], "kind", 5), 'region "Face": Type is none'),
+    "kind": (lambda e: raw(e.regions[0], "kind", 99), 'region "Face": Type is none'),
     "a bar": (lambda e: raw(e.shutters[0].bars[2], "weight", -4.0), 'shutter "Long", bar 3: Weight is -4, not 0 to'),
     "few bars": (lambda e: e.shutters[0].bars.remove(0), 'shutter "Long": 3 bars, and 4 frames'),
     "no keyed bars": (
@@ -253,7 +253,7 @@ def test_keys_stay_where_they_are_when_the_start_is_none(bpy, edit, effect, star
 def test_a_copy_has_the_same_impossible_choice(bpy, edit, effect):
     """Copies of what cannot be copied would come with every update, and never be finished."""
     raw(effect, "position", 77)
-    raw(effect.regions[0], "kind", 5)
+    raw(effect.regions[0], "kind", 99)
     edit.sequence_editor.strips.new_scene("copy", effect.scene, 5, 100)
     for _ in range(3):
         reconcile.tidy()
