@@ -107,11 +107,11 @@ void main() {
   ivec2 id = ivec2(gl_GlobalInvocationID.xy);
   int number = listed.x + (id.y >> 4) * 256 + (id.x >> 3);
   int tile = int(texelFetch(tiles, ivec3(number & 255, number >> 8, 0), 0).r);
-  pixel = ivec2(tile & 4095, tile >> 12) * ivec2(8, 16) + (id & ivec2(7, 15)) - ivec2(0, top);
+  ivec2 shown = ivec2(tile & 4095, tile >> 12) * ivec2(8, 16) + (id & ivec2(7, 15));
+  pixel = shown - ivec2(0, top);
   if (number >= listed.y || any(greaterThanEqual(pixel, size))) {
     return;
   }
-  ivec2 shown = pixel + ivec2(0, top);
   place = place_of_sums(pixel);
   sum = sum_at(place, known);
   made = 0;

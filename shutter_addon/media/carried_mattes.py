@@ -5,9 +5,10 @@ files. What a file is made of is in its name: a drawing that changes leaves thos
 from __future__ import annotations
 
 import errno
+import math
 import tempfile
 import time
-from collections.abc import Hashable, Iterator
+from collections.abc import Collection, Hashable, Iterator
 from contextlib import closing, contextmanager
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -173,10 +174,8 @@ class CarriedMattes(SourceWrapper):
         self._shots.close()
 
     def _near(self, index: int) -> tuple[int | None, int | None]:
-        """The drawings before and behind a frame that are near enough; twice its own."""
-        first = max((frame for frame in self._drawings if index - carrying.FARTHEST <= frame <= index), default=None)
-        last = min((frame for frame in self._drawings if index <= frame <= index + carrying.FARTHEST), default=None)
-        return first, last
+        """Return the drawings before and behind a frame that are near enough; twice its own."""
+        return nearest(index, self._drawings, carrying.FARTHEST)
 
     def _in_shot(self, index: int, first: int | None, last: int | None) -> tuple[int | None, int | None]:
         """Those of them that lie in the frame's shot."""
@@ -262,3 +261,9 @@ def _use_elsewhere(parent: Path | None) -> str:
         except OSError as error:
             raise MediaError(f"mattes cannot be written anywhere ({error.strerror or error})") from None
     return _elsewhere[parent].name
+
+
+def nearest(index: int, frames: Collection[int], reach: float = math.inf) -> tuple[int | None, int | None]:
+    """Return the nearest of some frames before and behind a frame, up to `reach` away; twice its own."""
+    before = max((frame for frame in frames if index - reach <= frame <= index), default=None)
+    return before, min((frame for frame in frames if index <= frame <= index + reach), default=None)

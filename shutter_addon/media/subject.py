@@ -136,22 +136,6 @@ class Network:
         return MediaError(f"{self._name}: is no model with one picture in and one mask out")
 
 
-def found_under(network: Network, frame_rgba: np.ndarray, stroke: np.ndarray) -> np.ndarray | None:
-    """Return the matte (H, W) float32, 0 to 1, of the subject that lies under a stroke; None if there is none.
-
-    Args:
-        frame_rgba: (H, W, 3 or 4) uint8, as it is displayed.
-        stroke: (n, 2) in fractions of the picture, y up.
-
-    Raises:
-        MediaError: The network is of another kind.
-    """
-    picture = np.ascontiguousarray(frame_rgba[..., :3])
-    small = flow.resized(picture, carrying.working_size(*picture.shape[1::-1]))
-    subject = found(network, small, covered([stroke], WIDTH, small), np.zeros(small.shape[:2], bool))
-    return None if subject is None else refined(picture, subject.share)
-
-
 def refined(picture: np.ndarray, share: np.ndarray) -> np.ndarray:
     """Return the matte (H, W) float32 of a picture (H, W, 3) uint8, from how sure (h, w) its pixels are inside."""
     # Votes have less of what is thin than answers of the network have.

@@ -8,7 +8,7 @@ a process begins. Between two keyframes, both chains are mixed in the middle.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
@@ -20,7 +20,7 @@ from ..core import stopping
 from ..core.frames.frame_source import FrameSource
 from ..core.model import outlines
 from . import carrying, derived, flow, opencv
-from .carried_mattes import CONFIDENCE, CarriedMattes, Footage
+from .carried_mattes import CONFIDENCE, CarriedMattes, Footage, nearest
 from .image_writing import write_levels
 from .opencv import cv2
 from .outlining import traced
@@ -97,7 +97,7 @@ class SubjectMattes(CarriedMattes):
         # What a keyframe with nothing but strokes of what the subject is not shows depends on the others.
         self._showing = {frame: key for frame, key in self._keys.items() if frame in drawn or frame in strokes}
         for frame in self._keys.keys() - self._showing.keys():
-            around = [self._keys[end] for end in _around(frame, self._showing) if end is not None]
+            around = [self._keys[end] for end in nearest(frame, self._showing) if end is not None]
             self._keys[frame] = derived.key({"strokes": self._keys[frame], "around": around})
         self._before: tuple[int, np.ndarray, np.ndarray] | None = None
 
@@ -227,7 +227,7 @@ class SubjectMattes(CarriedMattes):
         return Network(self._model)
 
     def _near(self, index: int) -> tuple[int | None, int | None]:
-        return _around(index, self._keys)
+        return nearest(index, self._keys)
 
     def _drawn(self, first: int | None, last: int | None) -> list[str]:
         return [*super()._drawn(first, last), f"subject {VERSION}", self._digest]
@@ -250,10 +250,3 @@ def mixed(mattes: list[tuple[np.ndarray, float]]) -> np.ndarray:
 def _fitted(values: np.ndarray | float, matte: np.ndarray) -> np.ndarray | float:
     """Return values (h, w) for each pixel of a matte (H, W)."""
     return values if isinstance(values, float) else cv2.resize(values, matte.shape[::-1])
-
-
-def _around(index: int, frames: Iterable[int]) -> tuple[int | None, int | None]:
-    """Return the frames before and behind a frame that are nearest; twice its own."""
-    frames = list(frames)
-    before = max((each for each in frames if each <= index), default=None)
-    return before, min((each for each in frames if each >= index), default=None)

@@ -57,9 +57,10 @@ class Footage:
     """Frames of the scene, or of another ground from a cut on, as a source; read: those that were asked for."""
 
     transfer, alpha, dtype, fps, step = "srgb", "opaque", np.dtype(np.uint8), None, 1
-    width, height, options = WIDTH, HEIGHT, ()
+    options = ()
 
-    def __init__(self, folder, count=COUNT, cut=None):
+    def __init__(self, folder, count=COUNT, cut=None, shows=picture):
+        self.shows, (self.height, self.width) = shows, shows(0).shape[:2]
         self.path = folder / "scene.png"
         self.path.write_bytes(b"the files of frames")
         self.files, self.count, self.cut, self.asked = (self.path,), count, cut, []
@@ -69,7 +70,7 @@ class Footage:
 
     def read(self, index):
         self.asked.append(index)
-        shown = picture(index) if self.cut is None or index < self.cut else 255 - picture(index)[:, ::-1] // 3
+        shown = self.shows(index) if self.cut is None or index < self.cut else 255 - self.shows(index)[:, ::-1] // 3
         return np.dstack([shown, np.full(shown.shape[:2], 255, np.uint8)])
 
     decoded = read
@@ -323,7 +324,7 @@ def test_any_picture_that_blender_renders_is_large_enough(size):
     ends = (carrying.Drawing(frame, cover) for frame in (0, 4))
     assert [each.matte.shape for each in carrying.carried(pictures.__getitem__, *ends, range(1, 4))] == 3 * [size]
     whole = np.ones(size, np.float32)
-    step = matte_tracking.moved(pictures[0, ..., 0].copy(), pictures[1, ..., 0].copy(), whole, whole)
+    step = matte_tracking.moved(pictures[0, ..., 0].copy(), pictures[1, ..., 0].copy(), whole, whole, "location")
     assert step is None or 0 <= step.confidence <= 1
 
 

@@ -8,11 +8,13 @@ from itertools import pairwise
 import cv2
 import numpy as np
 import pytest
+from test_carrying import Footage
 
 from shutter_addon.core.model import outlines
-from shutter_addon.media import subject_mattes
+from shutter_addon.media import carrying, flow, subject_mattes
 from shutter_addon.media.errors import MediaError
-from shutter_addon.media.subject import MODEL, Network, found_under
+from shutter_addon.media.subject import MODEL, Network, covered, found, refined
+from shutter_addon.media.subject import WIDTH as STROKE
 from shutter_addon.media.subject_mattes import Subject, SubjectFile
 
 WIDTH, HEIGHT, COUNT = 240, 160, 8
@@ -37,32 +39,16 @@ def picture(frame, noise=0, seed=0):
     return np.rint(np.clip(shown, 0, 255)).astype(np.uint8)
 
 
-class Footage:
-    """The scene as a source; from a cut on, another one. asked: the frames that were read."""
+def film(folder, count=COUNT, shows=picture, **what):
+    return Footage(folder, count, shows=shows, **what)
 
-    transfer, alpha, dtype, fps, step = "srgb", "opaque", np.dtype(np.uint8), None, 1
-    width, height, options = WIDTH, HEIGHT, ()
 
-    def __init__(self, folder, count=COUNT, cut=None, shows=picture):
-        self.path = folder / "scene.png"
-        self.path.write_bytes(b"the files of frames")
-        self.files, self.count, self.cut, self.shows, self.asked = (self.path,), count, cut, shows, []
-
-    def open(self):
-        return self
-
-    def read(self, index):
-        self.asked.append(index)
-        shown = self.shows(index) if self.cut is None or index < self.cut else 255 - self.shows(index)[:, ::-1] // 3
-        return np.dstack([shown, np.full(shown.shape[:2], 255, np.uint8)])
-
-    decoded = read
-
-    def want(self, _indices):
-        pass
-
-    def close(self):
-        pass
+def found_under(network, shown, line):
+    """The matte of what lies under a stroke in one picture, or None."""
+    shown = np.ascontiguousarray(shown[..., :3])
+    small = flow.resized(shown, carrying.working_size(*shown.shape[1::-1]))
+    subject = found(network, small, covered([line], STROKE, small), np.zeros(small.shape[:2], bool))
+    return None if subject is None else refined(shown, subject.share)
 
 
 def stroke(x, top, bottom):
@@ -84,7 +70,7 @@ def iou(matte, mask):
 @pytest.fixture
 def opened(tmp_path):
     def made(strokes, nots=None, drawings=(), **what):
-        footage = Footage(tmp_path, **what)
+        footage = film(tmp_path, **what)
         return SubjectFile(footage, Subject(strokes, nots or {}, 0.02), drawings, tmp_path / "mattes").open()
 
     return made
@@ -164,5 +150,5 @@ def test_models_that_cannot_be_used(tmp_path):
         with pytest.raises(MediaError, match=f"{path.name}: is damaged, or no ONNX model that OpenCV can run"):
             Network(path)
     with pytest.raises(MediaError, match="the model that finds subjects cannot be read"):
-        SubjectFile(Footage(tmp_path), Subject({}, {}, 0.02), model=tmp_path / "missing.onnx").open()
+        SubjectFile(film(tmp_path), Subject({}, {}, 0.02), model=tmp_path / "missing.onnx").open()
     assert subject_mattes.MODEL == MODEL
