@@ -59,12 +59,12 @@ def test_a_shutter_over_subframes_is_the_exposure_that_cycles_computes(tmp_path)
 
 
 def test_sped_up_footage_is_blurred_as_cycles_own(tmp_path):
-    """With Length: Timeline."""
+    """With Length: Timeline. Its streak is as long within a quarter of a pixel, which is how far moments lie apart."""
     options = "--output", tmp_path, "--frames", "1", "--size", "320x180", "--samples", "128"
     rows = {(row["case"], row["picture"]): row for row in rows_of("timeline_truth", tmp_path, *options)}
     for case in ("eight times", "ramp"):
         assert rows[case, "timeline"]["similarity"] >= 0.97
-        assert rows[case, "timeline"]["length"] == pytest.approx(rows[case, "timeline"]["truth"], rel=0.02)
+        assert rows[case, "timeline"]["length"] == pytest.approx(rows[case, "timeline"]["truth"], abs=0.25)
     assert rows["ramp", "bars"]["similarity"] < 0.95
     assert rows["ramp", "bars"]["length"] > 2 * rows["ramp", "bars"]["truth"]
     assert (tmp_path / "timeline_truth.png").exists()

@@ -103,6 +103,7 @@ def by_blender(colors, shares, unit, step="COEFFICIENTS") -> np.ndarray:
         batch_for_shader(shader, "TRI_STRIP", {"corner": PLACES, "place": CORNERS}).draw(shader)
         read = gpu.state.active_framebuffer_get().read_color(0, 0, WIDTH, HEIGHT, 4, 0, "FLOAT")
     picture = np.array(read.to_list()).reshape(HEIGHT, WIDTH, 4)
+    gpu.shader.unbind()  # Blender takes a new shader at the address of one that it has freed for the bound one
     target.free()
     drawing.free()
     return picture

@@ -81,12 +81,6 @@ def told():
     yield from found("transform region", lambda: True)
     yield from typed("0.1")
     yield from driver.until(lambda: abs(story.effect().regions[-1].location[0] - 0.1) < 1e-6, "the region is moved")
-    yield from found("probe pixel", lambda: True)
-    yield from typed("320", "180")
-    live = bpy.context.window_manager.virtual_shutter
-    yield from driver.until(lambda: live.probe, "the probe is on")
-    driver.saw(probed=[live.probe_at[0] * 1280, live.probe_at[1] * 720])
-    driver.shot("probe")
 
 
 if __name__ == "__main__":

@@ -15,7 +15,7 @@ import numpy as np
 import story
 from support import write_frames
 
-REPAIR, FIND = 8, 9  # the entries in the menu of regions
+REPAIR, FIND = 9, 10  # the entries in the menu of regions
 MENU = 210  # where that is below four shutters, in pixels below the sidebar's upper edge
 FIELD = 210, 101  # of the readout in the panel of the last operation, to the right of where that opens, and below
 ADJUSTED = 30

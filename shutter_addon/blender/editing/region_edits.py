@@ -45,7 +45,7 @@ def first_drawn(effect: PropertyGroup, shutter: PropertyGroup, kind: str) -> Pro
     The first region of a sharp shutter follows edges, because it usually marks a subject, not a spot. It does not if
     the user has set *Follow Edges*. It becomes a subject if the model finds one under its first stroke.
     """
-    is_sharp = np.count_nonzero(bars(shutter)) <= 1
+    is_sharp = bool(np.count_nonzero(bars(shutter)) <= 1)
     is_scribble = kind not in strips.LAID
     is_first = is_scribble and is_sharp and not effect.regions and not effect.is_property_set("edge_aware")
     if is_first:
