@@ -8,6 +8,7 @@ import subprocess
 from pathlib import Path
 
 import hypothesis
+import long_checks
 import numpy as np
 import pytest
 
@@ -23,9 +24,35 @@ ROOT = Path(__file__).parents[1]
 LONG = "window", "farm", "differential", "tests"
 
 
-def pytest_collection_modifyitems(items):
+def pytest_addoption(parser):
+    parser.addoption("--all", action="store_true", help="run the long checks whose files have not changed, too")
+
+
+def pytest_report_header(config):
+    groups = set() if config.option.all else long_checks.unchanged()
+    return [f"long checks left out, since their files have not changed: {', '.join(sorted(groups))}"] if groups else []
+
+
+def pytest_collection_modifyitems(config, items):
     """The folders of the longest files come first, so that no process is left alone with one at the end."""
+    if not config.option.all and (left := long_checks.left_out(items)):
+        items[:] = [item for item in items if item not in set(left)]
+        config.hook.pytest_deselected(items=left)
     items.sort(key=lambda item: item.path.parent.name not in LONG)
+
+
+OUTCOMES = {}  # by file: what its tests came to
+
+
+def pytest_runtest_logreport(report):
+    OUTCOMES.setdefault(report.nodeid.partition("::")[0], set()).add(report.outcome)
+
+
+def pytest_sessionfinish(session):
+    options = session.config.option
+    is_part = options.keyword or any("::" in argument for argument in session.config.args)
+    if options.all and not is_part and not hasattr(session.config, "workerinput"):
+        long_checks.note({file for file, outcomes in OUTCOMES.items() if outcomes == {"passed"}})
 
 
 @pytest.fixture(scope="session")

@@ -49,14 +49,16 @@ def blenders_devices():
     gc.collect()
 
 
-def differences(seeds, devices, folder, mixed=False, of=make) -> list[str]:
-    errors = []
+def each_difference(seeds, devices, folder, mixed=False, of=make):
     for seed in seeds:
         try:
             (check_mixed if mixed else check)(make(seed, mixed) if mixed else of(seed), devices, folder)
         except DifferenceError as error:
-            errors.append(str(error))
-    return errors
+            yield str(error)
+
+
+def differences(*given, **options) -> list[str]:
+    return list(each_difference(*given, **options))
 
 
 @pytest.mark.parametrize("first", SEEDS[::BATCH])
@@ -250,14 +252,12 @@ def twice(options, positions, shot):
 def test_planted_faults_are_found(monkeypatch, fault, tmp_path):
     """Each makes some pictures wrong, which is told, with what repeats it, and left to be seen."""
     monkeypatch.setattr(*FAULTS[fault])
-    errors = [error for error in differences(range(40), open_devices(["cpu"]), tmp_path) if "/255 off" in error]
-    assert errors
-    for error in errors:
-        told, again = error.splitlines()
-        place = Path(told.partition("pictures in ")[2])
-        names = sorted(path.name for path in place.iterdir())
-        assert names == ["difference-x64.png", "made.exr", "recipe.json", "right.exr"]
-        assert again.endswith(f"tests/differential/compare.py {place.name.partition('-')[0]} --ways cpu")
+    found = each_difference(range(40), open_devices(["cpu"]), tmp_path)
+    told, again = next(error for error in found if "/255 off" in error).splitlines()
+    place = Path(told.partition("pictures in ")[2])
+    names = sorted(path.name for path in place.iterdir())
+    assert names == ["difference-x64.png", "made.exr", "recipe.json", "right.exr"]
+    assert again.endswith(f"tests/differential/compare.py {place.name.partition('-')[0]} --ways cpu")
 
 
 SMOOTH_FAULTS = {
@@ -274,8 +274,8 @@ smoothed = shutters.smoothed
 @pytest.mark.parametrize("fault", SMOOTH_FAULTS)
 def test_planted_faults_of_moments_are_found(monkeypatch, fault, tmp_path):
     monkeypatch.setattr(shutters, "smoothed", SMOOTH_FAULTS[fault])
-    errors = differences(range(40), open_devices(["cpu"]), tmp_path, of=make_smooth)
-    assert any("/255 off" in error for error in errors)
+    found = each_difference(range(40), open_devices(["cpu"]), tmp_path, of=make_smooth)
+    assert any("/255 off" in error for error in found)
 
 
 MIXED_FAULTS = {
@@ -291,14 +291,14 @@ def test_a_texel_that_no_pass_writes_is_seen(monkeypatch, devices, tmp_path):
         run(device, program, (extent[0], rows, *extent[2:]), **given)
 
     monkeypatch.setattr(gl.GLDevice, "run", half)
-    errors = differences(MIXED[:4], {"gpu": devices["gpu"]}, tmp_path, mixed=True)
-    assert any("nan instead of" in error for error in errors)
+    found = each_difference(MIXED[:4], {"gpu": devices["gpu"]}, tmp_path, mixed=True)
+    assert any("nan instead of" in error for error in found)
 
 
 @pytest.mark.parametrize("fault", MIXED_FAULTS)
 def test_planted_faults_of_a_gpu_are_found(monkeypatch, devices, fault, tmp_path):
     monkeypatch.setattr(*MIXED_FAULTS[fault])
-    assert any(differences([seed], {"gpu": devices["gpu"]}, tmp_path, mixed=True) for seed in range(60))
+    assert any(each_difference(range(60), {"gpu": devices["gpu"]}, tmp_path, mixed=True))
 
 
 @pytest.mark.parametrize("value", [np.nan, np.inf, 0.6 / 255])

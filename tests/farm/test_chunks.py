@@ -4,7 +4,7 @@ import random
 
 from farm_job import FRAMES, shutter
 
-CHUNKS = 8
+CHUNKS = 4
 
 
 def test_chunks_in_random_order_give_the_bits_of_one_process(job, single):
