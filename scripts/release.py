@@ -109,7 +109,7 @@ def test(released: str) -> None:
     if not os.environ.get("BLENDER"):
         fail("set BLENDER to the command that runs a Blender in which the zips are tested, or give --no-tests")
     environment = os.environ | {"SHUTTER_BACKENDS": "both"}
-    if subprocess.run([build.ROOT / "scripts" / "test"], env=environment, check=False).returncode:
+    if subprocess.run([build.ROOT / "scripts" / "test", "--all"], env=environment, check=False).returncode:
         fail("the tests fail")
     if commit() != released:
         fail("another commit was checked out while the tests ran")

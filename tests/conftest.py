@@ -35,24 +35,24 @@ def pytest_report_header(config):
 
 def pytest_collection_modifyitems(config, items):
     """The folders of the longest files come first, so that no process is left alone with one at the end."""
-    if not config.option.all and (left := long_checks.left_out(items)):
-        items[:] = [item for item in items if item not in set(left)]
-        config.hook.pytest_deselected(items=left)
+    left = set() if config.option.all else long_checks.left_out([item.nodeid for item in items])
+    config.hook.pytest_deselected(items=[item for item in items if item.nodeid in left])
+    items[:] = [item for item in items if item.nodeid not in left]
     items.sort(key=lambda item: item.path.parent.name not in LONG)
 
 
-OUTCOMES = {}  # by file: what its tests came to
+OUTCOMES = {}  # by the name of a test: what its steps came to
 
 
 def pytest_runtest_logreport(report):
-    OUTCOMES.setdefault(report.nodeid.partition("::")[0], set()).add(report.outcome)
+    OUTCOMES.setdefault(report.nodeid, set()).add(report.outcome)
 
 
 def pytest_sessionfinish(session):
     options = session.config.option
     is_part = options.keyword or any("::" in argument for argument in session.config.args)
     if options.all and not is_part and not hasattr(session.config, "workerinput"):
-        long_checks.note({file for file, outcomes in OUTCOMES.items() if outcomes == {"passed"}})
+        long_checks.note(OUTCOMES)
 
 
 @pytest.fixture(scope="session")
