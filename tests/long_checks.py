@@ -29,6 +29,33 @@ GROUPS = {
     ),
     "Slurm": (["tests/farm/test_slurm.py"], ["farm/slurm*", "shutter_addon/blender/commands/*.py"]),
     "set-up": (["tests/test_setup.py"], ["scripts/setup", "scripts/fetch_*.py"]),
+    "life of Blender's GPU": (
+        [
+            "tests/window/test_rendered.py::test_blender_lives_where_its_gpu_is_not_current",
+            "tests/window/test_rendered.py::test_films_on_blenders_own_gpu",
+            "tests/window/test_rendered.py::test_preview_and_film_take_turns_where_the_gpu_is_small",
+        ],
+        [
+            *("tests/window/gpu_*.py", "tests/window/own_gpu_story.py", "tests/window/memory_story.py"),
+            *(
+                "shutter_addon/devices/*.py",
+                "shutter_addon/blender/devices/*.py",
+                "shutter_addon/blender/rendering/*.py",
+            ),
+        ],
+    ),
+    "tracking by mouse": (
+        ["tests/window/test_tracked.py::test_one_stroke"],
+        [
+            *(
+                "tests/window/one_stroke_story.py",
+                "shutter_addon/media/tracking.py",
+                "shutter_addon/media/registration.py",
+            ),
+            *("shutter_addon/blender/editing/track_region.py", "shutter_addon/blender/editing/motion_keys.py"),
+            *("shutter_addon/blender/interface/track_operators.py", "shutter_addon/blender/interface/region_gizmo.py"),
+        ],
+    ),
     "Metal": (["tests/compute/test_metal.py"], ["shaders/**/*", "shutter_addon/devices/passes.py"]),
     "measures": (
         ["tests/test_measures.py"],
