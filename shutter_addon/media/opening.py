@@ -104,23 +104,16 @@ def _is_movie(path: Path, files: Sequence[str | Path] | None) -> bool:
 def _opened_movie(path: Path, stream: int, deinterlace: bool = False, divisor: int = 1) -> FrameSource:
     """See open_source."""
     if pyav_missing():
-        _check_lent(path, stream)
+        check_file(path)
+        if stream or not is_lent():
+            raise MediaError(
+                f"{path.name}: movies need the Python package PyAV ({pyav_missing()}); "
+                "install the zip of Virtual Shutter that is made for your system, or use an image sequence"
+            )
         return smaller(BlenderMovie(path, deinterlace=deinterlace), divisor)
     from .movie import MovieSource
 
     return MovieSource(path, stream=stream, deinterlace=deinterlace, divisor=divisor)
-
-
-def _check_lent(path: Path, stream: int) -> None:
-    """Raise MediaError if a movie cannot be read without PyAV."""
-    if is_lent() and stream == 0:
-        return
-    check_file(path)
-    what = f"video stream {stream} of a movie needs" if is_lent() else "movies need"
-    raise MediaError(
-        f"{path.name}: {what} the Python package PyAV ({pyav_missing()}); "
-        "install the zip of Virtual Shutter that is made for your system, or use an image sequence"
-    )
 
 
 def movie_channel(movie: FrameSource, channel: str) -> FrameSource:

@@ -201,7 +201,7 @@ def test_without_pyav_movies_are_opened_so(coloured):
         lambda **which: open_source(coloured["bt709.mp4"], **which),
         lambda **which: open_channel(coloured["bt709.mp4"], "red", **which),
     ):
-        with pytest.raises(MediaError, match=r"^bt709\.mp4: video stream 1 of a movie needs the Python package PyAV"):
+        with pytest.raises(MediaError, match=r"^bt709\.mp4: movies need the Python package PyAV"):
             opened(stream=1)
 
 
