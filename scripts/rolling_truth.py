@@ -91,7 +91,7 @@ def found(first: Path) -> str:
     """The readout that is found, in per cent, or why it is not."""
     with open_source(first) as source:
         try:
-            return f"{100 * readout.of_source(source, range(source.count)).share:.1f} %"
+            return f"{100 * readout.of_source(source, range(min(source.count, readout.FRAMES))):.1f} %"
         except MediaError as error:
             return str(error)
 

@@ -8,7 +8,6 @@ edge that always moves alike may lean by itself.
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import NamedTuple
 
 import numpy as np
 
@@ -19,7 +18,7 @@ from .errors import MediaError
 from .opencv import cv2
 
 ROWS = 540  # the most rows of the pictures
-FRAMES = 48  # the most successive frames
+FRAMES = 48  # successive frames that tell the readout
 # An edge's least length in heights of the picture, its largest lean, and the most edges.
 LONG, UPRIGHT, MOST = 0.1, 0.35, 60
 _ANEW = 6  # frames after which more edges are looked for
@@ -44,26 +43,12 @@ TOO_LITTLE_MOTION = "lines move too little, or always alike"
 UNLIKE = "lines do not lean as one readout would have them"
 
 
-class Readout(NamedTuple):
-    """A measured readout.
-
-    Attributes:
-        share: in frames; negative if the last row is read first
-        error: its standard error
-        lines: the number of edges
-    """
-
-    share: float
-    error: float
-    lines: int
-
-
-def of_source(source: FrameSource, indices: Sequence[int], *, columns: bool = False) -> Readout:
-    """Measure the readout of a source.
+def of_source(source: FrameSource, indices: Sequence[int], *, columns: bool = False) -> float:
+    """Return the readout of a source in frames; negative if the last row is read first.
 
     Args:
         source: the footage
-        indices: successive filmed frames of a shot, of which the middle FRAMES are used
+        indices: successive filmed frames of a shot, FRAMES are enough
         columns: the sensor reads column by column, from the left
 
     Raises:
@@ -71,18 +56,16 @@ def of_source(source: FrameSource, indices: Sequence[int], *, columns: bool = Fa
         MediaError: the frames cannot be read, or OpenCV is missing
     """
     opencv.check("the readout is found by")
-    first = max((len(indices) - FRAMES) // 2, 0)
-    chosen = indices[first : first + FRAMES]
-    source.want(chosen)
+    source.want(indices)
     pictures = []
-    for index in chosen:
+    for index in indices:
         stopping.check()
         pictures.append(flow.of_rows(source.read(index), source, ROWS, turned=columns))
     return of_pictures(pictures)
 
 
-def of_pictures(pictures: Sequence[np.ndarray]) -> Readout:
-    """Measure the readout of successive pictures (H, W) uint8."""
+def of_pictures(pictures: Sequence[np.ndarray]) -> float:
+    """Return the readout of successive pictures (H, W) uint8, as of_source."""
     if len(pictures) < _SAMPLES + 2:
         raise ReadoutError(TOO_FEW_FRAMES)
     if min(pictures[0].shape) < flow.SMALLEST:
@@ -239,7 +222,7 @@ def _line(rows: np.ndarray, centres: np.ndarray, is_there: np.ndarray) -> tuple[
     return float(x - lean * y), float(lean)
 
 
-def _fitted(samples: list[tuple[np.ndarray, np.ndarray]], height: int) -> Readout:
+def _fitted(samples: list[tuple[np.ndarray, np.ndarray]], height: int) -> float:
     """Return the readout from speeds and leans of edges, each with its own direction."""
     speeds, leans = (np.concatenate(part) for part in zip(*samples, strict=True))
     of = np.repeat(np.arange(len(samples)), [len(speed) for speed, _lean in samples])
@@ -259,7 +242,7 @@ def _fitted(samples: list[tuple[np.ndarray, np.ndarray]], height: int) -> Readou
     error = float(np.sqrt((np.bincount(of, weight * own_speeds * off) ** 2).sum()) / spread)
     if error > max(SURE, SURE_SHARE * abs(share)) or abs(share) > _LONGEST:
         raise ReadoutError(UNLIKE)
-    return Readout(share=share, error=error, lines=len(samples))
+    return share
 
 
 def _without_mean(values: np.ndarray, weight: np.ndarray, of: np.ndarray) -> np.ndarray:

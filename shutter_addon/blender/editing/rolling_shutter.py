@@ -133,7 +133,7 @@ def share_of(scene: Scene, effect: PropertyGroup, strip: Strip, milliseconds: fl
     return share
 
 
-def find(scene: Scene, effect: PropertyGroup, strip: Strip, side: str) -> tuple[readout.Readout, str]:
+def find(scene: Scene, effect: PropertyGroup, strip: Strip, side: str) -> tuple[float, str]:
     """Find the readout of a source around the current frame, and the side that is read first.
 
     Args:
@@ -155,7 +155,7 @@ def find(scene: Scene, effect: PropertyGroup, strip: Strip, side: str) -> tuple[
         except readout.ReadoutError as error:
             sentence = rpt_("the readout cannot be found here: {why}")
             raise EffectError(sentence.format(why=rpt_(str(error)))) from None
-    if abs(found.share) < LEAST:
+    if abs(found) < LEAST:
         raise EffectError(rpt_("moving lines stay upright: there is no rolling shutter to repair"))
     first = "TOP" if side in ("TOP", "BOTTOM") else "LEFT"
-    return found, first if found.share > 0 else _OPPOSITE[first]
+    return found, first if found > 0 else _OPPOSITE[first]

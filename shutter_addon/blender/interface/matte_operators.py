@@ -220,8 +220,8 @@ def find_readout(self: Operator, context: Context, effect: PropertyGroup) -> Non
         found, side = rolling_shutter.find(
             self.edit, effect, self.effect_strip, "TOP" if self.reads == "ROWS" else "LEFT"
         )
-    rolling_shutter.repair(self.edit, effect, self.effect_strip, min(abs(found.share), 1.0), side)
+    rolling_shutter.repair(self.edit, effect, self.effect_strip, min(abs(found), 1.0), side)
     name = next(name for word, name, _ in SIDES if word == side)
-    percent = round(100 * abs(found.share))
+    percent = round(100 * abs(found))
     sentence = rpt_("Readout of {percent} % of a frame, read first: {side}")
     self.report({"INFO"}, sentence.format(percent=percent, side=iface_(name, CONTEXT)))
