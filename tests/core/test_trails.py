@@ -9,7 +9,6 @@ from made_recipes import key, made
 
 from shutter_addon.core.model import trails, windows
 from shutter_addon.core.model.clip import Clip
-from shutter_addon.core.model.effect import Moves
 from shutter_addon.core.model.keyframes import Constant
 from shutter_addon.core.model.state_at import state_at
 from shutter_addon.core.pixels import compositor
@@ -19,7 +18,7 @@ SOURCE = Clip(width=160, height=100, count=60)
 
 
 def with_length(*arguments):
-    return trails.with_length(*arguments)[0]
+    return trails.with_length(*arguments)
 
 
 def open_frames(bars):
@@ -114,18 +113,6 @@ def test_what_slides_is_as_long_at_the_clips_end_and_lies_within(bars):
     assert windows.reach(state, index)[1] == SOURCE.count - 1
     held, index = followed(with_options(source, edges="hold"), SOURCE.count)
     assert windows.reach(held, index)[1] > SOURCE.count + 3
-
-
-def test_for_how_long_a_shutter_is_open_is_told():
-    """Whatever its shape; of one without a length, its bars say it."""
-    state, _ = followed(accelerating(0.2), 30)
-    assert state.open_for == {0: pytest.approx(open_frames(state.bars[0]))}
-    ramp, _ = followed(accelerating(0.2, bars=np.linspace(1, 2, WINDOW)), 30)
-    assert ramp.open_for == state.open_for
-    source = accelerating(0.2)
-    still, _ = followed(source.with_parts([replace(source.regions[0], moves=Moves())]), 30)
-    assert still.open_for == {0: WINDOW}
-    assert followed(accelerating(None), 30)[0].open_for == {}
 
 
 def test_moments_count_as_the_parts_of_a_frame():

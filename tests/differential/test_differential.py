@@ -205,7 +205,7 @@ FAULTS = {
     "an edge twice": (windows, "source_frames", lambda *given: twice(*given)),
     "nothing followed": (following, "followed", lambda effect, state, *_: state),
     "a dull filter": (compositor, "seen", lambda frame, places, sharp: seen(frame, places, sharp=False)),
-    "trails of no length": (trails, "with_length", lambda bars, *_: (bars, len(bars))),
+    "trails of no length": (trails, "with_length", lambda bars, *_: bars),
     "edges passed over": (
         cpu.CPUCompositor,
         "solve",

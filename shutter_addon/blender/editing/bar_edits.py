@@ -43,8 +43,8 @@ def open_for(scene: Scene, effect: PropertyGroup, strip: Strip, index: int) -> s
         state = sessions.of_drawing().request(invalidation.current(scene, effect, strip, frame), frame).state
     except effect_source.FAULTS:  # the live preview shows the error
         return None
-    words = iface_("Open for {frames} of {window} frames here")
-    return words.format(frames=f"{state.open_for[index]:.3g}", window=state.options.window)
+    words, frames = iface_("Open for {frames} of {window} frames here"), shutters.are_open(state.bars[index])
+    return words.format(frames=np.count_nonzero(frames), window=state.options.window)
 
 
 def set_bars(shutter: PropertyGroup, weights: Sequence[float] | np.ndarray) -> None:

@@ -79,22 +79,14 @@ class Subject:
     def centre(self, frame: float) -> np.ndarray | None:
         """Return the point (2,) about which the subject turns and scales, in fractions of the picture.
 
-        Returns:
-            None where nothing is drawn.
-
-        Raises:
-            EffectError: The strokes are too far outside the picture.
+        None where nothing is drawn. EffectError: the strokes are too far outside the picture.
         """
         return np.array([0.5, 0.5])
 
     def corners(self, frame: float) -> np.ndarray:
         """Return the corners (4, 2) of the subject's box at a frame, in fractions of the picture.
 
-        Returns:
-            (0, 2) where nothing is drawn.
-
-        Raises:
-            EffectError: The strokes are too far outside the picture.
+        (0, 2) where nothing is drawn. EffectError: as for `centre`.
         """
         return motions.PICTURE
 
@@ -131,12 +123,7 @@ class AnyRegion(Subject):
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Region(AnyRegion):
-    """Strokes that give a shutter to what they touch or enclose.
-
-    Attributes:
-        kind: Channel of "line" or "lasso".
-        width: Width of lines, as a fraction of the picture's height.
-    """
+    """Strokes that give a shutter to what they touch or enclose. `kind`: a channel of "line" or "lasso"."""
 
     kind: Channel
     width: Channel = number(
@@ -186,21 +173,12 @@ class MatteRegion(AnyRegion):
     def at(self, frame: float) -> mattes.Matte:
         """Return the matte at a frame."""
         opacity, feather = (float(channel.at(frame)) for channel in (self.opacity, self.feather))
-        return mattes.Matte(
-            shutter=self.shutter,
-            content=self.content.at(frame),
-            blend=self.blend,
-            opacity=opacity,
-            feather=feather,
-            invert=self.invert,
-        )
+        return mattes.Matte(self.shutter, self.content.at(frame), self.blend, opacity, feather, self.invert)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class OutlineRegion(MatteRegion):
-    """A region whose matte is enclosed by closed curves.
-
-    Keys describe how the enclosed object moves, about the curves' centre. They do not move the curves.
+    """A region whose matte is enclosed by closed curves. Keys describe how the enclosed object moves, not the curves.
 
     Attributes:
         between: How the matte gets from one drawing to the next: "carried" follows the footage, "straight" moves the
@@ -214,12 +192,9 @@ class OutlineRegion(MatteRegion):
     )
 
     def drawn_at(self, frame: float) -> scribbles.Shape:
-        """Return the curves at a frame, as a lasso.
+        """Return the curves at a frame, as a lasso; those of a carried outline are only at its drawings.
 
-        A carried outline has curves only at its drawings.
-
-        Raises:
-            EffectError: The curves are too far outside the picture.
+        EffectError: they are too far outside the picture.
         """
         has_curves = self.between == "straight" or frame in self.drawings.frames
         strokes = tuple(self.drawings.at(frame)) if has_curves else ()
@@ -332,11 +307,7 @@ STILL_CAMERA = Camera(Moves())
 
 @dataclass(frozen=True, kw_only=True)
 class Shutter:
-    """Bars over time, and how the exposed frames are combined.
-
-    Attributes:
-        follow: The region or camera that the exposure moves with, or None.
-    """
+    """Bars over time, and how the exposed frames are combined. `follow`: what the exposure moves with."""
 
     name: str = fixed("Name", "Name of the shutter", default="Shutter", absent=MISSING, most=limits.MAX_NAME)
     color: tuple[float, float, float] = color(
@@ -400,11 +371,7 @@ class Shutter:
         return self.follow is not None and self.length == "motion"
 
     def spread(self, steps: int, backward: bool = False) -> Callable[[np.ndarray], np.ndarray]:
-        """Return a function that turns bars of filmed frames into bars of moments.
-
-        Args:
-            steps: Moments per filmed frame.
-        """
+        """Return a function that turns bars of filmed frames into bars of moments, `steps` per filmed frame."""
         if self.length == "timeline" or self.has_trail:
             return partial(shutters.held, steps=steps)
         level = self.combine in ("lightest", "darkest")
@@ -482,11 +449,7 @@ class Effect:
     lost: EffectError | None = None
 
     def at(self, frame: float) -> FrameState:
-        """Return the effect's state at a frame.
-
-        Raises:
-            EffectError: No picture can be made of it.
-        """
+        """Return the effect's state at a frame. EffectError: no picture can be made of it."""
         if (name := self._one_too_many) is not None:
             raise EffectError(_TOO_MANY_POINTS, name=name, most=limits.MAX_POINTS)
         options = replace(self.options.at(frame), edge_aware=float(self.edge_aware.at(frame)))
@@ -511,12 +474,9 @@ class Effect:
         return replace(self, shutters=shutters_, regions=tuple(regions), camera=camera)
 
     def for_picture(self, aspect: float, files: MatteFiles = lambda _region: mattes.NoFile()) -> Effect:
-        """Return the effect of a recipe for a picture.
+        """Return the effect of a recipe for a picture of this width / height.
 
-        Args:
-            aspect: The picture's width / height.
-            files: Gives the file of a matte, the source's luminance for a ramp, and the mattes of an outline or a
-                subject. Without it, values of these cannot be read.
+        `files` gives the file of a matte, the source's luminance for a ramp, and the mattes of an outline or a subject.
         """
         return self.with_parts([_placed(region, aspect, files) for region in self.regions])
 
@@ -525,11 +485,7 @@ class Effect:
         return [region for region in self.regions if region.layer and region.opacity.at(frame) > 0]
 
     def drawn_at(self, frame: float) -> list[scribbles.Shape]:
-        """Return all drawn shapes at a frame, including layers, in the order of the regions.
-
-        Raises:
-            EffectError: A shape is too far outside the picture.
-        """
+        """Return all drawn shapes at a frame, including layers, in the order of the regions. EffectError: as `at`."""
         drawn = [region for region in self.regions if isinstance(region, Region | OutlineRegion | SubjectRegion)]
         return [region.at(frame) if isinstance(region, Region) else region.drawn_at(frame) for region in drawn]
 
@@ -548,20 +504,12 @@ class Effect:
         return None
 
     def bars_at(self, index: int, frame: float) -> np.ndarray:
-        """Return the bars (L,) of a shutter at a frame.
-
-        Raises:
-            EffectError: No picture can be made of them.
-        """
+        """Return the bars (L,) of a shutter at a frame. EffectError: no picture can be made of them."""
         bars = self.shutters[index].bars.at(frame, self.options.at(frame).interpolation)
         return self.checked(index, frame, bars)
 
     def checked(self, index: int, frame: float, bars: np.ndarray) -> np.ndarray:
-        """Return the given bars (L,) of a shutter, checked.
-
-        Raises:
-            EffectError: No picture can be made of them.
-        """
+        """Return the given bars (L,) of a shutter. EffectError: no picture can be made of them."""
         try:
             return shutters.check_bars(bars)
         except shutters.ShutterError as error:

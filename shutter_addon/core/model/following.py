@@ -50,15 +50,13 @@ def followed(effect: Effect, state: FrameState, clip: Clip, at: Shown) -> FrameS
             )
         turns[:, i], shifts[:, i] = known[way]
     following = Following(frames.start, turns, shifts)
-    bars, open_for = _with_trails(effect, state, following, clip, at)
-    return replace(state, bars=bars, following=following.of(slice(None)), open_for=open_for)
+    bars = _with_trails(effect, state, following, clip, at)
+    return replace(state, bars=bars, following=following.of(slice(None)))
 
 
-def _with_trails(
-    effect: Effect, state: FrameState, following: Following, clip: Clip, at: Shown
-) -> tuple[np.ndarray, dict[int, float]]:
-    """Return the state's bars (N, L), with the lengths of trails, and FrameState.open_for."""
-    bars, open_for = state.bars.copy(), dict(state.open_for)
+def _with_trails(effect: Effect, state: FrameState, following: Following, clip: Clip, at: Shown) -> np.ndarray:
+    """Return the state's bars (N, L), with the lengths of trails."""
+    bars = state.bars.copy()
     positions = windows.positions(state.options, at.source_frame, at.direction)
     shown_at = float(np.abs(positions - at.source_frame).argmin()) + 0.5
     frames = windows.source_frames(state.options, positions, range(clip.count))
@@ -69,11 +67,11 @@ def _with_trails(
             corners = [motions.pixel(corner, (clip.width, clip.height)) for corner in shutter.follow.corners(at.frame)]
             places = np.outer(turns[:, i], corners) + shifts[:, i, None]
             way = trails.travelled(places) / clip.height
-            bars[i], open_for[i] = trails.with_length(bars[i], way, float(shutter.trail.at(at.frame)), shown_at)
+            bars[i] = trails.with_length(bars[i], way, float(shutter.trail.at(at.frame)), shown_at)
         share = float(shutter.follow.influence.at(at.frame)) if isinstance(shutter.follow, Camera) else 1.0
         if share < 1:
-            bars[i], open_for[i] = trails.shortened(bars[i], share, shown_at)
-    return bars, open_for
+            bars[i] = trails.shortened(bars[i], share, shown_at)
+    return bars
 
 
 def reach(filmed: int) -> int:

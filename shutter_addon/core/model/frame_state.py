@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Literal
 
@@ -257,8 +257,6 @@ class FrameState:
         mattes: Laid over the scribbles' coefficients, later ones on top.
         layers: Regions in front of the rest, or None.
         combines: How each shutter combines its frames; empty: all average.
-        open_for: Frames from first to last open time, for shutters with a trail's or the timeline's length. It is only
-            shown to users; the bars determine the exposure.
     """
 
     options: Options
@@ -269,7 +267,6 @@ class FrameState:
     mattes: tuple[Matte, ...] = ()
     layers: Layers | None = None
     combines: tuple[Combine, ...] = ()
-    open_for: dict[int, float] = field(default_factory=dict)
 
     @property
     def gains(self) -> np.ndarray:

@@ -44,8 +44,8 @@ def travelled(places: np.ndarray) -> np.ndarray:
     return np.concatenate([[0.0], np.cumsum(own)])
 
 
-def shortened(bars: np.ndarray, share: float, shown: float) -> tuple[np.ndarray, float]:
-    """Return bars (L,) of the same shape and sum that are open for a share of their time, and the number of frames.
+def shortened(bars: np.ndarray, share: float, shown: float) -> np.ndarray:
+    """Return bars (L,) of the same shape and sum that are open for a share of their time.
 
     They are open for at least one frame.
 
@@ -57,13 +57,13 @@ def shortened(bars: np.ndarray, share: float, shown: float) -> tuple[np.ndarray,
     first, last = shutters.open_span(bars)
     own = min(max(shown - 0.5, first), last - 1)
     start, end = own + share * (first - own), own + 1 + share * (last - own - 1)
-    return shutters.spanning(bars, start, end), end - start
+    return shutters.spanning(bars, start, end)
 
 
-def with_length(bars: np.ndarray, way: np.ndarray, length: float, shown: float) -> tuple[np.ndarray, float]:
-    """Return bars (L,) of the same shape and sum that are open while a subject moves by `length`, and that time.
+def with_length(bars: np.ndarray, way: np.ndarray, length: float, shown: float) -> np.ndarray:
+    """Return bars (L,) of the same shape and sum that are open while a subject moves by `length`.
 
-    If the subject moves less, they are open for the whole window. The time is in frames.
+    If the subject moves less, they are open for the whole window.
 
     Args:
         way: From `travelled`, in the unit of `length`.
@@ -89,11 +89,11 @@ def with_length(bars: np.ndarray, way: np.ndarray, length: float, shown: float) 
     width = float(np.interp(-length, -moved[::-1], widths[::-1]) if length <= moved[-1] else len(bars))
     width = max(width, _SHORTEST)
     start = float(starts(width))
-    return shutters.spanning(bars, start, start + width), width
+    return shutters.spanning(bars, start, start + width)
 
 
 def exposed(effect: Effect, state: FrameState, clip: Clip, at: Shown) -> FrameState:
-    """Return the state at a timeline frame with the bars and `open_for` of shutters with the timeline's length."""
+    """Return the state at a timeline frame with the bars of shutters with the timeline's length."""
     chosen = [i for i, shutter in enumerate(effect.shutters) if shutter.length == "timeline"]
     if not chosen:
         return state
@@ -103,13 +103,13 @@ def exposed(effect: Effect, state: FrameState, clip: Clip, at: Shown) -> FrameSt
         places[:2] = 2 * here - places[:2:-1]
     elif places[4] == here in clip.ends:
         places[3:] = 2 * here - places[1::-1]
-    bars, open_for = state.bars.copy(), dict(state.open_for)
+    bars = state.bars.copy()
     for index in chosen:
-        bars[index], open_for[index] = on_timeline(bars[index], state.options, places)
-    return replace(state, bars=bars, open_for=open_for)
+        bars[index] = on_timeline(bars[index], state.options, places)
+    return replace(state, bars=bars)
 
 
-def on_timeline(bars: np.ndarray, options: Options, positions: np.ndarray) -> tuple[np.ndarray, float]:
+def on_timeline(bars: np.ndarray, options: Options, positions: np.ndarray) -> np.ndarray:
     """Return bars (L,) of the window for bars that shape an exposure over a timeline frame, with the same sum.
 
     Light outside the window is left out. By Options.position, the exposure begins with the shown filmed frame, has its
@@ -118,9 +118,6 @@ def on_timeline(bars: np.ndarray, options: Options, positions: np.ndarray) -> tu
     Args:
         positions: (n,), n odd: positions in the source, in frames, from the previous to the next timeline frame at even
             distances.
-
-    Returns:
-        Also the number of source frames from first to last open time.
     """
     window, here = len(bars), positions[len(positions) // 2]
     begin, anchor = {
@@ -134,14 +131,12 @@ def on_timeline(bars: np.ndarray, options: Options, positions: np.ndarray) -> tu
     found, shown = np.zeros(window), min(options.shown, window - 1)  # the window may be shorter than a filmed frame
     if np.ptp(places) < _INSTANT:
         found[shown] = bars.sum()
-        return found, 0.0
+        return found
     for weight, start, end in zip(bars, places[:-1], places[1:], strict=True):
         found += weight * _spread(min(start, end), max(start, end), window)
-    is_open = np.flatnonzero(bars)
-    length = float(np.ptp(places[is_open[0] : is_open[-1] + 2]))
     if found.sum() <= _LEAST * bars.sum():  # everything is outside the window
         found[shown] = 1.0
-    return found * (bars.sum() / found.sum()), length
+    return found * (bars.sum() / found.sum())
 
 
 def _spread(start: float, end: float, window: int) -> np.ndarray:
