@@ -259,7 +259,7 @@ def test_a_copy_has_the_same_impossible_choice(bpy, edit, effect):
         reconcile.tidy()
     assert len(edit.virtual_shutter.effects) == 2
     for scene in [effect.scene for effect in edit.virtual_shutter.effects]:
-        with pytest.raises(effect_source.FAULTS, match="Position is none of its choices"):
+        with pytest.raises(effect_source.FAULTS, match="is none of its choices"):
             picture_of(scene, 4)
 
 
