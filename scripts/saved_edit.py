@@ -206,12 +206,11 @@ def _add_other_regions(scene: Any, effect: Any, footage: Path) -> None:
     followed.kind = "LINE"
     followed.follow_clip = bpy.data.movieclips.load(str(footage / "f0001.png"))
     followed.follow_kind, followed.follow_object, followed.follow_track = "PLANE", "Camera", "Plane Track"
-    followed.follow_frame, followed.follow_stamp = 3, "0123456789abcdef"
     stop = followed.stops.add()
     stop.frame, stop.forward, stop.fault = 9, True, "it left the picture"
     noted = followed.drawn.add()
     noted.frame, noted.location, noted.rotation, noted.scale = 1, (0.05, 0.1), 0.2, 1.3
-    effect.camera.name, effect.camera.follow_clip = "Handheld", followed.follow_clip
+    effect.camera.name = "Handheld"
     for moving in (followed, effect.camera):
         moving.confidence, moving.motion, moving.track_until = 87.5, "ROTATION", 34
         moving.track_all_keys, moving.track_ends = True, False

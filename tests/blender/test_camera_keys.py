@@ -7,10 +7,9 @@ import numpy as np
 import pytest
 from support import image_strip, request, write_frames
 
-from shutter_addon.blender.data import annotations, consistency, fcurves, selection, snapshot, strips, validation
+from shutter_addon.blender.data import annotations, consistency, fcurves, selection, snapshot, strips
 from shutter_addon.blender.editing import (
     add_effect,
-    follow_track,
     motion_keys,
     region_edits,
     shutter_edits,
@@ -239,76 +238,3 @@ def test_where_the_cameras_motion_is_unknown_exposures_become_short(bpy, edit, t
     for curve in fcurves.curves_under(edit, f"{effect.camera.path_from_id()}.influence"):
         curve.mute = True
     assert len(np.flatnonzero(request(*active(bpy), 40).state.bars[0])) == 8
-
-
-# From a movie clip
-
-
-TRACKS = {  # frames of the clip, and place
-    "a": (range(1, COUNT + 1), (0.2, 0.3)),
-    "b": (range(1, 7), (0.8, 0.4)),
-    "c": (range(3, COUNT + 1), (0.4, 0.8)),
-    "d": ((1, 2, 3, 7, 8), (0.7, 0.7)),
-}
-
-
-def tracked(frame):
-    """How a clip's tracks have moved at one of its frames: a turn and a shift, in heights of the picture, y up."""
-    turn = (1 + 0.02 * frame) * np.exp(1j * (0.06 * math.sin(frame) + 0.02 * frame))
-    return turn, complex(0.05 * math.sin(2 * frame), 0.03 * math.cos(frame))
-
-
-@pytest.fixture
-def clip(bpy, frames):
-    """A clip of the same footage with four tracks that stabilize it, of which three begin late or end early."""
-    clip = bpy.data.movieclips.load(str(frames))
-    holder, settings = clip.tracking.objects[0], clip.tracking.stabilization
-    for name, (marked, (x, y)) in TRACKS.items():
-        track = holder.tracks.new(name=name, frame=marked[0])
-        track.select = True
-        for frame in marked:
-            turn, shift = tracked(frame)
-            place = complex((x - 0.5) * WIDTH / HEIGHT, y - 0.5) * turn + shift
-            track.markers.insert_frame(frame, co=(place.real * HEIGHT / WIDTH + 0.5, place.imag + 0.5))
-    settings.use_2d_stabilization = settings.use_stabilize_rotation = settings.use_stabilize_scale = True
-    window = bpy.context.window_manager.windows[0]
-    area = window.screen.areas[0]
-    kind, area.type = area.type, "CLIP_EDITOR"
-    area.spaces.active.clip = clip
-    with bpy.context.temp_override(window=window, area=area, region=area.regions[-1]):
-        bpy.ops.clip.stabilize_2d_add()
-        bpy.ops.clip.stabilize_2d_rotation_add()
-    area.type = kind
-    return clip
-
-
-def test_the_camera_follows_a_clips_stabilization(bpy, edit, effect, clip):
-    effect.camera.follow_clip = clip
-    before = everything(bpy)
-    bpy.context.view_layer.update()
-    bpy.ops.ed.undo_push(message="before")
-    assert call(bpy, "follow_stabilization") == {"FINISHED"}
-    middle, expected = motions.pixel(CENTRE, SIZE), {}
-    for frame in TRUTH:
-        turn, shift = (number.conjugate() for number in tracked(frame - 10))
-        expected[frame] = Similarity(turn, middle - turn * middle + HEIGHT * shift)
-    assert apart(placements(bpy), expected, 16) < 0.3
-    assert {kind for *_, kind in keys(bpy)[0]} == {"GENERATED", "KEYFRAME"}
-    bpy.ops.ed.undo()
-    assert everything(bpy) == before
-
-
-def test_a_clip_that_is_not_stabilized_is_refused(bpy, edit, effect, clip):
-    effect.camera.follow_clip = clip
-    clip.tracking.stabilization.use_2d_stabilization = False
-    refuses(bpy, "follow_stabilization", "has no 2D stabilization")
-    clip.tracking.stabilization.use_2d_stabilization = True
-    for track in clip.tracking.objects[0].tracks:
-        if marker := track.markers.find_frame(6):
-            marker.mute = True
-    refuses(bpy, "follow_stabilization", '"2D Stabilization" of clip ".*" has no marker at frame 16')
-    edit.frame_set(40)
-    refuses(bpy, "follow_stabilization", "the current frame is outside the Shutter strip")
-    effect.camera.follow_clip = None
-    with pytest.raises(validation.EffectError, match="Choose a clip first"):
-        follow_track.follow_stabilization(*active(bpy))

@@ -147,7 +147,7 @@ def test_pasted_strips_have_their_effect(bpy, edit, add, images, render, cut):
     add()
     clip = bpy.data.movieclips.load(str(images))
     effect = edit.virtual_shutter.effects[0]
-    effect.regions[0].follow_clip = effect.camera.follow_clip = clip
+    effect.regions[0].follow_clip = clip
     effect.regions[0].image, effect.regions[0].mask = bpy.data.images.new("matte", 4, 4), bpy.data.masks.new("mask")
     effect.regions[0].strip = "deleted with it"
     before = render(edit, [1, 5, 9, 20])
@@ -167,7 +167,6 @@ def test_pasted_strips_have_their_effect(bpy, edit, add, images, render, cut):
     shown = render(edit, [frame + 100 for frame in before] + [frame + 200 for frame in before])
     assert [effect.start for effect in edit.virtual_shutter.effects] == ([101, 201] if cut else [1, 101, 201])
     assert all(effect.regions[0].follow_clip == clip for effect in edit.virtual_shutter.effects)
-    assert all(effect.camera.follow_clip == clip for effect in edit.virtual_shutter.effects)
     for region, *_ in (effect.regions for effect in edit.virtual_shutter.effects):
         assert (region.image.name, region.mask.name, region.strip) == ("matte", "mask", "deleted with it")
     for frame, picture in before.items():

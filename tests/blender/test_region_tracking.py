@@ -5,7 +5,7 @@ import pytest
 from support import image_strip, write_frames
 
 from shutter_addon.blender.data import annotations, fcurves, selection, snapshot, strips
-from shutter_addon.blender.editing import add_effect, bar_edits, follow_track, region_edits, shutter_edits, track_region
+from shutter_addon.blender.editing import add_effect, bar_edits, region_edits, shutter_edits, track_region
 from shutter_addon.blender.editing.motion_keys import MotionKeys
 from shutter_addon.core.model.motions import Placement
 
@@ -362,7 +362,7 @@ def everything(bpy):
     edit = bpy.context.scene
     region = edit.virtual_shutter.effects[0].regions[0]
     stops = [(stop.frame, stop.forward, stop.fault) for stop in region.stops]
-    numbers = tuple(region.location), region.rotation, region.scale, region.confidence, region.follow_stamp
+    numbers = tuple(region.location), region.rotation, region.scale, region.confidence
     return numbers, stops, [keys(bpy, channel) for channel in ("location", "rotation", "scale", "confidence")]
 
 
@@ -533,38 +533,13 @@ def test_a_gap_in_a_track_is_bridged_and_unsure(bpy, edit, region, clip):
     assert track_region.lost(effect, 0) is None
 
 
-def test_a_changed_track_is_followed_anew(bpy, edit, region, clip, does):
-    set_up(region, clip, "TRACK", "middle")
-    call(bpy, "follow")
-    assert not follow_track.is_changed(region)
-    before = keys(bpy)
-    clip.tracking.objects[0].tracks["middle"].markers.find_frame(10).co[1] += 0.2
-    bpy.context.view_layer.update()
-    edit.frame_set(25)
-    does("follow_update")
-    assert not follow_track.is_changed(active(bpy)[1].regions[0])
-    after = keys(bpy)
-    assert after[1][0] == before[1][0], "it follows from the same place"
-    y = fcurves.find_curve(bpy.context.scene, "virtual_shutter.effects[0].regions[0].location", 1)
-    expected = (centre(0) - centre(9))[1] / SIZE[1] + 0.2
-    assert y.evaluate(20) == pytest.approx(expected, abs=1 / SIZE[1])
-
-
-def test_what_was_tracked_since_is_not_followed_anew(bpy, edit, region, clip):
-    set_up(region, clip, "TRACK", "middle")
-    call(bpy, "follow")
-    track(bpy)
-    assert not bpy.ops.shutter.follow_update.poll()
-    assert not follow_track.is_changed(active(bpy)[1].regions[0])
-
-
 def test_an_editors_key_mends_what_is_followed(bpy, edit, region, clip):
     set_up(region, clip, "TRACK", "middle")
     call(bpy, "follow")
     edit.frame_set(21)
     active(bpy)[1].regions[0].location[1] += 0.1
     region_edits.key_region(active(bpy)[1], 0)
-    call(bpy, "follow_update")
+    call(bpy, "follow")
     y = fcurves.find_curve(bpy.context.scene, "virtual_shutter.effects[0].regions[0].location", 1)
     off = {frame: y.evaluate(frame) - (centre(0) - centre(frame - 11))[1] / SIZE[1] for frame in (11, 16, 21, 28)}
     assert off == pytest.approx({11: 0, 16: 0.05, 21: 0.1, 28: 0.1}, abs=1 / SIZE[1])
@@ -602,7 +577,6 @@ def test_a_clip_of_other_footage_is_refused(bpy, edit, region, clip, frames, tmp
 
 def test_what_cannot_be_followed_is_said(bpy, edit, region, clip):
     refuses(bpy, "follow", "Choose a clip first")
-    refuses(bpy, "follow_update", "The region does not follow a track")
     set_up(region, clip, "TRACK", "none")
     refuses(bpy, "follow", 'clip "f0001.png" has no track "none"')
     set_up(region, clip, "PLANE", "middle")

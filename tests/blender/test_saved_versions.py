@@ -44,6 +44,9 @@ def count_filmed(effect):
     that ended within a frame is in no saved file."""
     for gone in ("bars_per_frame", "inbetween_method", "inbetween_place"):
         del effect[gone]
+    del effect["camera"]["follow_clip"]
+    for region in effect["regions"]:
+        del region["follow_frame"], region["follow_stamp"]
     steps = int(effect["inbetween"])
     effect["window"] //= steps
     for shutter in effect["shutters"] if steps > 1 else ():

@@ -153,11 +153,6 @@ class _Tracked:
         default=True,
         options=UNKEYED,
     )
-    follow_clip: PointerProperty(
-        name="Clip",
-        description="Movie clip of the source's footage, in which something is tracked",
-        type=bpy.types.MovieClip,
-    )
 
 
 def location_property(description: str, **more: Any) -> object:
@@ -216,14 +211,16 @@ class ShutterRegion(_Tracked, PropertyGroup):
     )
     rotation: rotation_property("Rotation about the region's center", update=changed)
     scale: scale_property("Scale about the region's center", update=changed)
+    follow_clip: PointerProperty(
+        name="Clip",
+        description="Movie clip of the source's footage, in which something is tracked",
+        type=bpy.types.MovieClip,
+    )
     follow_kind: choice("Follow Track", "What the region follows", FOLLOWED, update=None, default="TRACK")
     follow_object: StringProperty(
         name="Object", description="Tracking object that has the tracks; without one, the camera"
     )
     follow_track: StringProperty(name="Track", description="Name of the track or plane track that is followed")
-    # Frame, from the effect's start, at which the user placed the region; digest of the markers that made its keys.
-    follow_frame: FloatProperty(name="Follow From", min=-2 * MAX_FRAME, max=2 * MAX_FRAME, options={"HIDDEN"})
-    follow_stamp: StringProperty(options={"HIDDEN"})
 
 
 @with_fields(model.Camera)

@@ -1,26 +1,22 @@
 """Key a region by what Blender has tracked in a movie clip: a track, a plane track, or all tracks of an object.
 
 Markers are at frames of the clip, which begin at 1, in fractions of its picture. The region moves with them from the
-current frame and from the user's other keyframes. The camera follows the tracks of the clip's 2D stabilization.
+current frame and from the user's other keyframes.
 """
 
-import hashlib
 from bisect import bisect_left, bisect_right
-from collections.abc import Callable
-from functools import partial
 
 import bpy
 import numpy as np
 from bpy.app.translations import pgettext_rpt as rpt_
 from bpy.types import MovieClip, MovieTrackingTrack, PropertyGroup, Scene, Strip
 
-from ...core import revision
 from ...core.messages import EffectError, translated
 from ...core.model import motions
-from ...core.model.effect import Camera, Region
-from ...core.model.motions import Motion, Placement, Similarity
+from ...core.model.effect import Region
+from ...core.model.motions import Placement, Similarity
 from ...media import registration
-from ..data import annotations, external_files, fcurves, selection, snapshot, source_media, strips, validation
+from ..data import annotations, external_files, fcurves, snapshot, source_media, strips, validation
 from ..rendering import effect_source
 from . import motion_keys
 from .motion_keys import MotionKeys
@@ -31,81 +27,25 @@ Markers = list[tuple[str, np.ndarray, np.ndarray]]  # see _markers
 
 
 def follow(scene: Scene, effect: PropertyGroup, strip: Strip, index: int) -> None:
-    """Key a region by its track, from its place at the current frame.
+    """Key a region by its track, from its place at the current frame and at the user's other keyframes.
+
+    Its tracking stops are removed.
 
     Raises:
         EffectError, MediaError: it cannot be followed. Nothing has changed.
     """
-    start = scene.frame_current
+    start, region = scene.frame_current, effect.regions[index]
     points = _points(scene, effect, strip, index, start)
-    _keys(effect, index).begin(start)
-    effect.regions[index].follow_frame = start - effect.start
-    _key(scene, effect, strip, index, points)
-
-
-def update(scene: Scene, effect: PropertyGroup, strip: Strip, index: int) -> None:
-    """Key a region again by its track, from its place at the frame where it began.
-
-    Raises:
-        EffectError, MediaError: it cannot be followed. Nothing has changed.
-    """
-    _key(scene, effect, strip, index, _points(scene, effect, strip, index, _start(effect, index)))
-
-
-def _start(effect: PropertyGroup, index: int) -> int:
-    return round(effect.start + validation.number(effect.regions[index], "follow_frame"))
-
-
-def _keys(effect: PropertyGroup, index: int) -> MotionKeys:
-    region = effect.regions[index]
-    return MotionKeys(effect, index, "LOCATION" if region.follow_kind == "TRACK" else region.motion)
-
-
-def _key(scene: Scene, effect: PropertyGroup, strip: Strip, index: int, points: dict[int, Points]) -> None:
-    region, start = effect.regions[index], _start(effect, index)
-    shape = snapshot.region_at(scene, effect, strip, index, points)
-    carry(_keys(effect, index), shape, start, sorted(points), partial(_motions, points))
-    region.follow_stamp = stamp(region)
-
-
-def carry(
-    keys: MotionKeys, shape: Region | Camera, start: int, frames: list[int], motions_from: Callable[[int], Motions]
-) -> None:
-    """Key a region or the camera by the motion of the picture, and remove its tracking stops.
-
-    It moves from its place at the frame `start` and at the user's other keyframes.
-
-    Args:
-        frames: with known motions, ascending.
-        motions_from: returns the motions from one of these frames to the others.
-    """
-    known = {start, *(frame for frame in keys.edited(range(frames[0], frames[-1] + 1)) if frame in frames)}
-    moves = {frame: motions_from(frame) for frame in known}
-    placements = followed(shape, frames, moves, start, annotations.picture_size(keys.effect))
+    frames, size = sorted(points), annotations.picture_size(effect)
+    keys = MotionKeys(effect, index, "LOCATION" if region.follow_kind == "TRACK" else region.motion)
+    keys.begin(start)
+    shape = snapshot.region_at(scene, effect, strip, index, frames)
+    known = {start, *(frame for frame in keys.edited(range(frames[0], frames[-1] + 1)) if frame in points)}
+    placements = _followed(shape, frames, {frame: _motions(points, frame) for frame in known}, start, size)
     kept = keys.needed(shape, start, placements, known)
     between = range(min(placements), max(placements) + 1)
     keys.write({frame: placements[frame] for frame in kept}, {frame: float(frame in placements) for frame in between})
-    selection.moving(keys.effect, keys.index).stops.clear()
-
-
-def is_changed(region: PropertyGroup) -> bool:
-    """Return whether the track of a region has changed since it was keyed. For drawing code."""
-    if not region.follow_stamp:
-        return False
-    key = region.id_data.session_uid, region.path_from_id()
-    return region.follow_stamp != revision.until_change("track", key, lambda: stamp(region))
-
-
-def stamp(region: PropertyGroup) -> str:
-    """Return a hash of the markers that a region follows; "": there are none."""
-    try:
-        markers = _markers(region)
-    except EffectError:
-        return ""
-    digest = hashlib.sha256()
-    for name, frames, places in markers:
-        digest.update(b"".join((name.encode(errors="surrogateescape"), frames.tobytes(), places.tobytes())))
-    return digest.hexdigest()
+    region.stops.clear()
 
 
 def _markers(region: PropertyGroup) -> Markers:
@@ -162,11 +102,12 @@ def _points(scene: Scene, effect: PropertyGroup, strip: Strip, index: int, start
     motion_keys.check_curves(effect, index)
     validation.word(region, "motion")
     tracks, size = _markers(region), annotations.picture_size(effect)
-    times = clip_times(scene, effect, strip, region.follow_clip)
+    times = _clip_times(scene, effect, strip, region.follow_clip)
     by_frame = _points_by_frame(tracks, times, size)
     if start not in by_frame:
         name = region.follow_object if region.follow_kind == "OBJECT" else region.follow_track
-        raise _unmarked(name, region.follow_clip, start)
+        sentence = rpt_('"{track}" of clip "{clip}" has no marker at frame {frame}')
+        raise EffectError(sentence.format(track=name, clip=region.follow_clip.name, frame=start))
     with translated(rpt_):
         shape = snapshot.region_at(scene, effect, strip, index, by_frame)
         if not all(shape.drawings.at(frame) for frame in by_frame):
@@ -174,12 +115,7 @@ def _points(scene: Scene, effect: PropertyGroup, strip: Strip, index: int, start
     return by_frame
 
 
-def _unmarked(name: str, clip: MovieClip, frame: int) -> EffectError:
-    sentence = rpt_('"{track}" of clip "{clip}" has no marker at frame {frame}')
-    return EffectError(sentence.format(track=name, clip=clip.name, frame=frame))
-
-
-def clip_times(scene: Scene, effect: PropertyGroup, strip: Strip, clip: MovieClip) -> dict[int, float]:
+def _clip_times(scene: Scene, effect: PropertyGroup, strip: Strip, clip: MovieClip) -> dict[int, float]:
     """Return the clip's frame for each timeline frame of the strip. It may lie between two frames.
 
     Raises:
@@ -233,10 +169,10 @@ def _place_at(frames: np.ndarray, places: np.ndarray, time: float) -> np.ndarray
     return before + (time - np.floor(time)) * (after - before)
 
 
-def followed(
-    subject: Region | Camera, frames: list[int], moves: dict[int, Motions], start: int, size: tuple[int, int]
+def _followed(
+    subject: Region, frames: list[int], moves: dict[int, Motions], start: int, size: tuple[int, int]
 ) -> dict[int, Placement]:
-    """Return the placement of a region or the camera by frame, moved from the frames where it is known.
+    """Return the placement of a region by frame, moved from the frames where it is known.
 
     Args:
         frames: ascending.
@@ -272,7 +208,7 @@ def _ways(frames: list[int], start: int) -> tuple[list[int], list[int]]:
     return [frame for frame in frames if frame > start], [frame for frame in reversed(frames) if frame < start]
 
 
-def _motions(points: dict[int, Points], origin: int, motion: Motion = "scale") -> Motions:
+def _motions(points: dict[int, Points], origin: int) -> Motions:
     """Return the motion from one frame to each frame. With too few common points it goes through the previous frame."""
     by_frame = {origin: Similarity()}
     enough = min(2, len(points[origin]))
@@ -283,49 +219,8 @@ def _motions(points: dict[int, Points], origin: int, motion: Motion = "scale") -
                 shared = sorted(points[base].keys() & points[frame].keys())
                 if len(shared) >= enough:
                     there, here = (np.array([points[end][name] for name in shared]) for end in (base, frame))
-                    moved = registration.least_squares(there, here, np.ones(len(shared)), motion)
+                    moved = registration.least_squares(there, here, np.ones(len(shared)), "scale")
                     by_frame[frame] = moved.after(by_frame[base])
                     before = frame
                     break
     return by_frame
-
-
-def follow_stabilization(scene: Scene, effect: PropertyGroup, strip: Strip) -> None:
-    """Key the camera by the tracks that stabilize its clip, from its place at the current frame.
-
-    Raises:
-        EffectError, MediaError: there is nothing to follow. Nothing has changed.
-    """
-    camera, start, size = effect.camera, scene.frame_current, annotations.picture_size(effect)
-    validation.check_moving(camera)
-    motion_keys.check_curves(effect, None)
-    if camera.follow_clip is None:
-        raise EffectError(rpt_("Choose a clip first"))
-    times = clip_times(scene, effect, strip, camera.follow_clip)
-    if start not in times:
-        raise EffectError(rpt_("the current frame is outside the Shutter strip"))
-    tracks, motion = _stabilizing(camera.follow_clip)
-    points = _points_by_frame(tracks, times, size)
-    if start not in points:
-        raise _unmarked("2D Stabilization", camera.follow_clip, start)
-    keys = MotionKeys(effect, None, motion.upper())
-    keys.begin(start)
-    motions_from = partial(_motions, points, motion=motion)
-    carry(keys, snapshot.camera_at(scene, effect, points), start, sorted(points), motions_from)
-
-
-def _stabilizing(clip: MovieClip) -> tuple[Markers, Motion]:
-    """Return the markers of the tracks that stabilize a clip, and the motion that they remove.
-
-    Raises:
-        EffectError: the clip is not stabilized.
-    """
-    settings = clip.tracking.stabilization
-    motion: Motion = "location"
-    names = {track.name for track in settings.tracks}
-    if settings.use_stabilize_rotation:
-        motion = "scale" if settings.use_stabilize_scale else "rotation"
-        names |= {track.name for track in settings.rotation_tracks}
-    if not settings.use_2d_stabilization or not names:
-        raise EffectError(rpt_('clip "{clip}" has no 2D stabilization').format(clip=clip.name))
-    return [_track_markers(track) for track in clip.tracking.objects[0].tracks if track.name in names], motion

@@ -161,8 +161,6 @@ def track(
                 _write(keys, [tracked[frame] for frame in kept], tracked.values())
                 _mark(effect, index, tracked, stops, reach)
                 key_ends(effect, index)
-                if index is not None:
-                    effect.regions[index].follow_stamp = ""  # updating from a track would undo this
     if len(tracked) == 1:
         raise EffectError(rpt_(stops[0].fault))
 

@@ -57,7 +57,6 @@ def paste(effect: PropertyGroup, strip: Strip) -> None:
     for noted in [*drawn, *(stop for moving in (effect.camera, *effect.regions) for stop in moving.stops)]:
         noted.frame += later
     for region in effect.regions:
-        region.follow_frame += later
         region.offset -= later if region.timing == "TIMELINE" else 0
 
 

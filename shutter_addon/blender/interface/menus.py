@@ -51,12 +51,11 @@ _GROUPS: dict[str, tuple] = {
     "track": (
         "Track",
         [("track", "NONE", "direction"), ("track_look",), ("panning_shot", "CON_FOLLOWTRACK")],
-        [("follow", "TRACKER"), ("follow_update", "FILE_REFRESH")],
+        [("follow", "TRACKER")],
     ),
     "camera": (
         "Camera",
         [("track_camera", "NONE", "direction"), ("track_camera_look",), ("tripod", "CON_CAMERASOLVER")],
-        [("follow_stabilization", "TRACKER")],
     ),
     "footage": (
         "Footage",

@@ -8,7 +8,7 @@ from bpy.types import MovieTracking, PropertyGroup, Scene, Strip, UILayout
 from ...core.messages import EffectError
 from ...media.pursuit import SURE
 from ..data import matte_look, selection, strips, validation
-from ..editing import follow_track, outline_drawings, track_region
+from ..editing import outline_drawings, track_region
 from . import needs, track_operators
 from .panel_parts import draw_list, draw_operators, draw_properties, sentence
 
@@ -163,11 +163,7 @@ def draw_follow(layout: UILayout, _scene: Scene, effect: PropertyGroup, _strip: 
     draw_properties(layout, region, "follow_clip", "follow_kind")
     if region.follow_clip is not None:
         _draw_tracks(layout, region, region.follow_clip.tracking)
-    if follow_track.is_changed(region):
-        sentence(layout, iface_("The track has changed"), "ERROR")
-    row = layout.row(align=True)
-    row.operator("shutter.follow", icon="TRACKER")
-    row.operator("shutter.follow_update", text="Update", icon="FILE_REFRESH")
+    layout.operator("shutter.follow", icon="TRACKER")
 
 
 def _draw_tracks(layout: UILayout, region: PropertyGroup, tracking: MovieTracking) -> None:
@@ -182,5 +178,4 @@ def _draw_tracks(layout: UILayout, region: PropertyGroup, tracking: MovieTrackin
 def draw_camera(layout: UILayout, _scene: Scene, effect: PropertyGroup, _strip: Strip) -> None:
     """Draw the camera's transform and tracking settings. The track buttons are in the panel *Exposure Moves With*."""
     draw_properties(layout.column(align=True), effect.camera, *_PLACEMENT)
-    draw_properties(layout, effect.camera, "influence", *_TRACKING, "follow_clip")
-    layout.operator("shutter.follow_stabilization", icon="TRACKER")
+    draw_properties(layout, effect.camera, "influence", *_TRACKING)

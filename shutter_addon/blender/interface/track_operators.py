@@ -238,30 +238,15 @@ def track_camera_look(self: Operator, _context: Context, effect: PropertyGroup) 
     return _look(self, effect, None)
 
 
-def _why_no_clip(moving: PropertyGroup) -> str | None:
-    return None if moving.follow_clip is not None else rpt_("Choose a clip first")
+def _why_no_clip(effect: PropertyGroup) -> str | None:
+    has_clip = selection.active_region(effect).follow_clip is not None
+    return None if has_clip else rpt_("Choose a clip first")
 
 
-@operator("Follow Track", needs.strokes, lambda effect: _why_no_clip(selection.active_region(effect)))
+@operator("Follow Track", needs.strokes, _why_no_clip)
 def follow(self: Operator, _context: Context, effect: PropertyGroup) -> None:
     """Key the active region by a track of a movie clip, from its place at this frame"""
     follow_track.follow(self.edit, effect, self.effect_strip, effect.active_region)
-
-
-def _why_no_track(effect: PropertyGroup) -> str | None:
-    return None if selection.active_region(effect).follow_stamp else rpt_("The region does not follow a track")
-
-
-@operator("Update Followed Track", needs.strokes, _why_no_track)
-def follow_update(self: Operator, _context: Context, effect: PropertyGroup) -> None:
-    """Key the active region again after the track that it follows has changed"""
-    follow_track.update(self.edit, effect, self.effect_strip, effect.active_region)
-
-
-@operator("Follow Stabilization", lambda effect: _why_no_clip(effect.camera))
-def follow_stabilization(self: Operator, _context: Context, effect: PropertyGroup) -> None:
-    """Key the camera by the 2D stabilization of a movie clip, from its place at this frame"""
-    follow_track.follow_stabilization(self.edit, effect, self.effect_strip)
 
 
 @operator("Sharp Subject", needs.a_region)
