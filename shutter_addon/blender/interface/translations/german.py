@@ -401,15 +401,6 @@ MESSAGES = {
         "Erase strokes of the active region in the preview",
     ): "Striche der aktiven Region in der Vorschau ausradieren",
     ("*", "Open a sequencer with a preview to erase"): "Zum Radieren einen Sequenzer mit Vorschau öffnen",
-    ("Operator", "Add Region from Annotation Layer"): "Region aus Anmerkungsebene hinzufügen",
-    (
-        "*",
-        "Make an annotation layer of the preview a region of the active shutter",
-    ): "Eine Anmerkungsebene der Vorschau zu einer Region des aktiven Verschlusses machen",
-    (
-        "*",
-        "The preview shows no annotation layer that could become a region",
-    ): "Die Vorschau zeigt keine Anmerkungsebene, die noch keine Region ist",
     ("Operator", "Assign Region to Shutter"): "Region einem Verschluss zuweisen",
     ("*", "Assign the active region to another shutter"): "Die aktive Region einem anderen Verschluss zuweisen",
     ("Operator", "Remove Region"): "Region entfernen",
@@ -529,12 +520,6 @@ MESSAGES = {
         "*",
         "Make the active subject a scribble: its strokes, as wide as the region's width",
     ): "Das aktive Motiv zu Strichen machen, so breit wie die Breite der Region",
-    ("Operator", "Outline"): "Umriss",
-    (
-        "*",
-        "Make the active subject an outline, which is drawn where the subject has strokes",
-    ): "Das aktive Motiv zum Umriss machen, der dort gezeichnet ist, wo das Motiv Striche hat",
-    ("*", "The subject has no outline there"): "Das Motiv hat dort keinen Umriss",
     ("*", 'strip "{strip}" has a scale of 0'): "Streifen „{strip}“ ist zu nichts skaliert",
     ("*", "{place}: a linear outline is not tracked"): "{place}: Ein linearer Umriss wird nicht verfolgt",
     ("Operator", "Edit Outline"): "Umriss ausbessern",
