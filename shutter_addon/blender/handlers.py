@@ -56,7 +56,6 @@ def tell(words: str | None) -> None:
     """Show a sentence about a loaded file, in the window or on stderr."""
     if words is None:
         return
-    told.record(words)
     if bpy.app.background:
         render_job.say(words)
     else:  # a file that is being loaded has no windows yet
@@ -157,8 +156,7 @@ def _uncaught(kind: type[BaseException], error: BaseException, trace: TracebackT
 
     Blender prints what operators, panels, handlers and timers raise, which calls sys.excepthook. Nothing else gets all.
     """
-    if told.is_ours(error):
-        told.exception(error)
+    told.exception(error)
     _hooks[-1](kind, error, trace)
 
 

@@ -16,7 +16,7 @@ class UserError(Exception):
 
     def __init__(self, *arguments: object) -> None:
         super().__init__(*arguments)
-        told.made(str(self))
+        told.record(level=2)
 
     def __str__(self) -> str:
         return sentence(super().__str__())

@@ -13,7 +13,6 @@ from pathlib import Path
 import bpy
 from bpy.types import Scene
 
-from ...core import told
 from ...core.farm import job_file
 from ...core.farm.job_file import EditVersion
 from ...core.messages import UserError
@@ -52,8 +51,6 @@ def run(arguments: Namespace) -> None:
     with command_line.using_device(arguments):
         report = _report(arguments, scene, edit.frames, edit.version())
         if arguments.report:
-            for found in (*report["notes"], *report["faults"]):
-                told.record(found)
             command_line.print_line(error_report.text(scene))
         elif arguments.json:
             command_line.print_line(json.dumps(report, indent=1))

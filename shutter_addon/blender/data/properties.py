@@ -22,7 +22,7 @@ from bpy.props import (
 )
 from bpy.types import Context, PropertyGroup
 
-from ...core import revision, told
+from ...core import revision
 from ...core.messages import EffectError
 from ...core.model import effect as model
 from ...core.model.choices import CONTEXT, FOLLOWED, FOLLOWS, KINDS, MATTE_SOURCES, MOTIONS, UNKEYED
@@ -247,7 +247,6 @@ def _window_changed(effect: PropertyGroup, context: Context) -> None:
         consistency.fit_bars(effect)
     except EffectError as error:
         sentence = str(error)
-        told.record(sentence)
         if bpy.app.background:
             print(sentence, file=sys.stderr)
         else:

@@ -28,13 +28,13 @@ def redraw(context: Context) -> None:
 
 def report_error(operator: Operator, sentence: str) -> None:
     """Report a translated sentence as an error, and keep it for *Copy Report* without its names."""
-    told.record(sentence, level=2)
+    told.record(level=2)
     operator.report({"ERROR"}, sentence)
 
 
 def report_warning(operator: Operator, sentence: str) -> None:
     """Report a translated sentence as a warning, like `report_error`."""
-    told.record(sentence, level=2)
+    told.record(level=2)
     operator.report({"WARNING"}, sentence)
 
 

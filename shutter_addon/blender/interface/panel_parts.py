@@ -11,7 +11,6 @@ from bpy.app.translations import pgettext_n as n_
 from bpy.types import Context, Menu, PropertyGroup, Scene, Strip, UILayout
 from bpy.utils.previews import ImagePreviewCollection
 
-from ...core import told
 from ...core.model import shutters
 from ...core.model.fields import fields_of
 from ...core.pixels import patterns
@@ -39,8 +38,6 @@ def sentence(layout: UILayout, words: str, icon: str = "NONE", room: float = 1.0
         room: fraction of the panel's width.
         is_quiet: draw it greyed out.
     """
-    if icon == "ERROR":
-        told.shown(words, level=2)
     unit, region = drawing.ui_scale(), bpy.context.region
     width = (
         room * min(region.width if region else 300 * unit, WIDEST * unit)

@@ -14,7 +14,7 @@ from bpy.types import Context, PropertyGroup, Region
 
 from ...compute.renderer import Renderer
 from ...compute.request import Request
-from ...core import stopping, told
+from ...core import stopping
 from ...core.model.choices import CONTEXT
 from ...core.model.effect import SubjectRegion
 from ...core.model.frame_state import FrameState
@@ -219,7 +219,6 @@ def _show_picture(context: Context, quad: Quad, shown: Shown, wanted: Drawing, s
     previews.was_drawn()
     _tell_carrying(say)
     for sentence in pictures.shortages(renderer, wanted.decision.snapshot, request):
-        told.shown(sentence)
         say(sentence)
     # Measuring would slow down what is running.
     decision = wanted.decision
@@ -306,7 +305,6 @@ def show_carried() -> None:
 
 def _tell_fault(error: Exception | str, say: "_Notes") -> None:
     """Add a note why there is no picture."""
-    told.shown(error)
     say(rpt_("Shutter: {fault}").format(fault=error))
 
 

@@ -7,7 +7,7 @@ import mathutils
 import numpy as np
 from bpy.types import Depsgraph, RenderEngine
 
-from ...core import stopping, told
+from ...core import stopping
 from ...core.messages import signed
 from ...core.stopping import StoppedError
 from ..data.strips import ENGINE
@@ -86,7 +86,6 @@ class VirtualShutterEngine(bpy.types.RenderEngine):
         return self.test_break() or render_job.stopping()
 
     def _say(self, message: str) -> None:
-        told.record(message, level=2)
         if bpy.app.background:
             render_job.say(message)
         else:
@@ -99,7 +98,6 @@ def fail(engine: RenderEngine, sentence: str) -> None:
         render_job.fail(sentence)
         render_job.cancel(engine.test_break)
     else:
-        told.shown(sentence)
         engine.report({"ERROR"}, signed(sentence))
 
 

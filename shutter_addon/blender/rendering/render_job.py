@@ -23,7 +23,7 @@ from typing import TypeVar
 import bpy
 from bpy.types import Scene
 
-from ...core import threads, told
+from ...core import threads
 from ...core.messages import sentence, signed
 from ..data.property_copy import for_a_while
 from ..data.strips import ENGINE
@@ -228,7 +228,6 @@ def fail(text: str) -> None:
     """Say why the running render has to end; only the first sentence counts."""
     if _job.failure is None:
         _job.failure = text
-        told.record(text)
         _job.tell(text)
 
 
