@@ -406,9 +406,11 @@ def test_installed_without_wheels(blender, dist, bunny, recipe, tmp_path):
     track = ("track", bunny, "--recipe", recipe, "--region", "R", "--frame", 2, "--output", tmp_path / "out")
     blender.run("--command", "shutter", *track, code=2, says=["tracking needs the Python package opencv"])
     assert not (tmp_path / "out").exists()
-    smooth = (*command, frames / "0001.png", "--recipe", recipe, "--output", tmp_path / "out", "--device", "gpu")
+    smooth_recipe = tmp_path / "smooth.json"
+    smooth_recipe.write_text(json.dumps(json.loads(recipe.read_text()) | {"inbetween": 2}))
+    smooth = (*command, frames / "0001.png", "--recipe", smooth_recipe, "--output", tmp_path / "out", "--device", "gpu")
     lacking = "moments between frames need the Python package opencv"
-    blender.run(*smooth, "--frames", 2, "--inbetween", 2, code=2, says=[lacking])
+    blender.run(*smooth, "--frames", 2, code=2, says=[lacking])
     assert not list(tmp_path.glob("out/*.png"))
     blender.remove()
 

@@ -11,7 +11,7 @@ from support import noise_film, picture_of, read_picture, sequencer
 
 from shutter_addon.blender.data import selection, strips
 from shutter_addon.blender.editing import baked_strips, reconcile
-from shutter_addon.blender.output import baked_film, edit_check, film_output
+from shutter_addon.blender.output import baked_film, film_output
 from shutter_addon.blender.rendering import sessions
 from shutter_addon.core import revision
 from shutter_addon.core.frames import light
@@ -310,18 +310,6 @@ def test_keys_that_moved_along_are_no_change_and_others_are(bpy, film, change):
     assert states(scene, strip) == [True]
 
 
-def test_check_tells_of_a_stale_film_that_is_shown(bpy, film):
-    scene, effect, strip = film()
-    baked = bake(bpy)
-    assert edit_check.stale_films(scene, range(1, COUNT + 1)) == []
-    effect.shutters[0].bars[0].weight = 0.25
-    assert edit_check.stale_films(scene, range(1, COUNT + 1)) == [
-        f'"{strip.name}": the effect has changed since it was baked, and its baked strip is shown'
-    ]
-    baked.mute = True
-    assert edit_check.stale_films(scene, range(1, COUNT + 1)) == []
-
-
 def test_a_longer_strip_is_stale(bpy, film):
     scene, _effect, strip = film()
     strip.right_handle = 6
@@ -373,29 +361,21 @@ def test_a_transparent_source_stays_muted_below_what_was_baked_of_it(bpy, film, 
     assert (rendered(bpy, scene, tmp_path / "left", (4,)) == before).all()
 
 
-def test_a_copy_of_a_killed_bake_goes(bpy, film, tmp_path):
+def test_a_bake_leaves_no_copy(bpy, film, tmp_path):
     scene, effect, strip = film()
-    left, own = tmp_path / "edit.bake-00000000.blend", tmp_path / "edit.bake-20260115.blend"
-    logs = [tmp_path / baked_film.FOLDER / f".part-{number:016x}" for number in range(2)]
-    for log, named in zip(logs, (left.name, "in/f0001.png"), strict=True):  # the second as a stranger may write it
-        log.mkdir(parents=True)
-        (log / "copy").write_text(named)
-    for path in (left, own, *(path for log in logs for path in (log / "copy", log))):
-        path.touch()
-        os.utime(path, (0, 0))
+    left = tmp_path / baked_film.FOLDER / f".part-{0:016x}"  # of a killed bake
+    left.mkdir(parents=True)
+    os.utime(left, (0, 0))
     job = baked_film.start(scene, effect, strip, baked_film.film_of(scene, effect, strip, "OPEN_EXR"))
     try:
         assert not left.exists()
-        assert not any(log.exists() for log in logs)
-        assert (tmp_path / "in" / "f0001.png").exists()
-        assert own.exists()
         assert job.process.wait(60) == 0
         assert not job.copy.exists(), "it has been read"
         assert job.failure() is None
         assert job.done() == COUNT
     finally:
         job.end()
-    assert list(tmp_path.glob("*.bake-*")) == [own]
+    assert not list(tmp_path.glob("*.bake-*"))
     assert not list((tmp_path / baked_film.FOLDER).glob(".*"))
 
 

@@ -11,7 +11,6 @@ from support import noise_film, read_picture
 
 from shutter_addon.blender import command
 from shutter_addon.blender.data import versions
-from shutter_addon.blender.editing import whole_edits
 from shutter_addon.core.farm import job_file
 
 COUNT = 14  # frames
@@ -166,21 +165,6 @@ def at_frame(bpy):
         bpy.app.handlers.render_write.remove(handler)
 
 
-@pytest.mark.parametrize("command", ["render", "check", "join"])
-def test_an_edit_that_is_saved_over_while_it_is_opened(saved, run, tmp_path, monkeypatch, command):
-    def open_edit(path, opened=whole_edits.open_edit):
-        found = opened(path)
-        path.write_bytes(path.read_bytes() + b"newer")
-        return found
-
-    monkeypatch.setattr(whole_edits, "open_edit", open_edit)
-    out = tmp_path / "out"
-    arguments = [tmp_path / "in", "--edit", saved, "--output", tmp_path / "film.mp4"]
-    done = run(command, *(arguments if command == "join" else [saved, "--output", out]))
-    refused((done[0], done[1].splitlines()[-1]), str(saved), "saved over while it was opened")
-    assert not out.exists()
-
-
 @pytest.mark.parametrize("resume", [[], ["--resume"]])
 def test_a_job_of_a_newer_version_ends_an_older_ones_render(bpy, saved, run, at_frame, tmp_path, resume):
     bpy.ops.wm.open_mainfile(filepath=str(saved))
@@ -244,7 +228,6 @@ def test_what_cannot_be_done_is_one_sentence(bpy, saved, run, save, tmp_path):
         ((saved, "--output", tmp_path / "film.mp4"), "film.mp4", "folder of pictures"),
         ((saved, *out, "--recipe", tmp_path / "r.json"), "--recipe"),
         ((saved, *out, "--weights", tmp_path / "w"), "--weights"),
-        ((saved, *out, "--inbetween", "4"), "--inbetween"),
         ((saved, *out, "--frames", "3:15"), "3:15", "the edit's frames 1:14"),
         ((saved, *out, "--frames", "3:"), "3:"),
         ((tmp_path / "none.blend", *out), "none.blend", "no such file"),

@@ -62,16 +62,17 @@ def window(frame, bars):
     return np.minimum(places, (CUT - 1) * STEPS + STEPS // 2 if frame <= CUT else (COUNT - 1) * STEPS)
 
 
-def test_an_option_in_place_of_the_recipes(run, film, tmp_path, same_pixels):
-    """The recipe's bars stay what they are. Beside the output nothing is written."""
+def test_bars_stay_what_they_are(run, film, tmp_path, same_pixels):
+    """Beside the output nothing is written."""
     first, frames = film
     bars = [1, 0.5, 1]
-    run("render", first, "--output", tmp_path / "out", "--frames", "2:3", "--inbetween", STEPS, recipe=recipe(3, bars))
+    data = recipe(3, bars, inbetween=STEPS)
+    run("render", first, "--output", tmp_path / "out", "--frames", "2:3", recipe=data)
     for frame in (2, 3):
         expected = shown(frames, window(frame, bars), spread(bars, STEPS))
         same_pixels(read_picture(tmp_path / "out" / f"{frame:04d}.png"), expected, 1)
     assert {path.name for path in tmp_path.iterdir()} == {"out", "recipe.json"}
-    run("render", first, "--output", tmp_path / "off", "--frames", 2, "--inbetween", 1, recipe=recipe(3, bars))
+    run("render", first, "--output", tmp_path / "off", "--frames", 2, recipe=recipe(3, bars))
     same_pixels(read_picture(tmp_path / "off" / "0002.png"), shown(frames, (4, 8, 12), bars), 1)
 
 
@@ -141,7 +142,6 @@ def test_a_saved_edit_in_blender(command, film, tmp_path, blender, blenders_pyth
 @pytest.mark.parametrize(
     ("arguments", "data", "sentence"),
     [
-        (["--inbetween", 3], recipe(2, [1, 1]), "invalid choice: '3'"),
         (["--cache", "x"], recipe(2, [1, 1]), "unrecognized arguments: --cache"),
         ([], recipe(2, [1, 1], inbetween=3), "inbetween: 3 is none of "),
         ([], recipe(2, [1, 1], inbetween="auto") | {"version": 1}, 'recipes have "auto" from version 2 on'),

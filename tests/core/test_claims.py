@@ -155,7 +155,7 @@ def test_a_full_disk_leaves_no_claim(tmp_path, monkeypatch):
         raise OSError(28, "No space left on device")
 
     with Claims(tmp_path) as mine:
-        monkeypatch.setattr(claims.os, "write", full)
+        monkeypatch.setattr(claims.socket, "gethostname", full)
         with pytest.raises(OSError, match="No space"):
             mine.take("a")
         monkeypatch.undo()

@@ -1,5 +1,6 @@
 """What Flamenco's built-in job and its like start: a plain Blender with the extension, on a chunk of a saved edit."""
 
+import json
 import os
 import re
 import shlex
@@ -32,8 +33,9 @@ def blender(real_blender, tmp_path_factory):
 @pytest.fixture
 def plain(single, job):
     """The job without Smooth: the Blender of a distribution may lack OpenCV."""
-    options = "--recipe", single.folder / "recipe.json", "--inbetween", 1, "--save", job.edit
-    shutter("render", job.folder / "footage.mp4", *options)
+    recipe = job.folder / "plain.json"
+    recipe.write_text(json.dumps(json.loads((single.folder / "recipe.json").read_text()) | {"inbetween": 1}))
+    shutter("render", job.folder / "footage.mp4", "--recipe", recipe, "--save", job.edit)
     return job
 
 

@@ -7,27 +7,19 @@ import sys
 from argparse import Namespace
 from contextlib import AbstractContextManager
 from pathlib import Path
-from typing import NamedTuple
 
 from bpy.types import Scene
 
-from ...core.farm.job_file import EditVersion
 from ...core.frames.frame_source import FrameSource
-from ...core.messages import UserError, sentence
+from ...core.messages import sentence
 from ...core.model.effect import Effect
-from ...core.model.fields import fields_of
-from ...core.model.frame_state import Options
 from ...core.recipes import recipe_file
 from ...media import open_source
-from ...media.files import stamp
 from ...media.sequence import by_number
-from ..data import versions
 from ..devices import available
 from ..editing import whole_edits
 from ..output import film_output
 from ..rendering import render_job, render_settings
-
-SMOOTH = tuple(map(str, fields_of(Options)["step"].words))  # 1 is off
 
 
 def to_path(text: str) -> Path:
@@ -90,40 +82,10 @@ def files(medium: FrameSource) -> list[Path]:
     return [*files, *(map(beside, range(len(files))) if beside else ())]
 
 
-class Edit(NamedTuple):
-    """An open saved edit.
-
-    Attributes:
-        frames: The chosen timeline frames.
-        whole: All timeline frames.
-        opened: The file's stamp before it was opened.
-    """
-
-    path: Path
-    scene: Scene
-    frames: range
-    whole: range
-    opened: tuple[int, int] | None
-
-    def version(self) -> EditVersion:
-        """Return the version of the edit as it was opened.
-
-        Raises:
-            UserError: It was saved since, so that the key would be another edit's.
-            OSError: It is gone.
-        """
-        current = versions.of_edit(self.scene)
-        if stamp(self.path) != self.opened:
-            raise UserError(f"{self.path}: was saved over while it was opened; start again")
-        return current
-
-
-def open_edit(path: Path, asked: str | None) -> Edit:
-    """Open a saved edit, with frames as for `frames`. UserError: there is no such edit, or frame."""
-    opened = stamp(path)
+def open_edit(path: Path, asked: str | None) -> tuple[Scene, range]:
+    """Open a saved edit. Return its scene and frames as `frames`. UserError: there is no such edit, or frame."""
     scene = whole_edits.open_edit(path)
-    whole = range(scene.frame_start, scene.frame_end + 1)
-    return Edit(path, scene, frames(asked, whole, "edit"), whole, opened)
+    return scene, frames(asked, range(scene.frame_start, scene.frame_end + 1), "edit")
 
 
 def frames(text: str | None, whole: range, what: str = "clip") -> range:

@@ -23,11 +23,10 @@ def add(commands: argparse._SubParsersAction) -> None:
 
 
 def run(arguments: Namespace) -> None:
-    edit = command_line.open_edit(arguments.edit, arguments.frames)
-    film_join.check(arguments.output, [edit.path, *versions.read_files(edit.scene), *versions.sounds()])
-    for fault in external_files.sound_faults(edit.scene, edit.frames):
+    scene, frames = command_line.open_edit(arguments.edit, arguments.frames)
+    film_join.check(arguments.output, [arguments.edit, *versions.read_files(scene), *versions.sounds()])
+    for fault in external_files.sound_faults(scene, frames):
         raise film_output.OutputError(fault)  # Blender would make a silent film
-    film_join.warn_of_other_pictures(arguments.folder, edit.whole)
-    version = edit.version()
+    version = versions.of_edit(scene)
     job_file.guard(arguments.folder, version)
-    film_join.join(edit.scene, arguments.folder, arguments.output, edit.frames, version.key)
+    film_join.join(scene, arguments.folder, arguments.output, frames, version.key)

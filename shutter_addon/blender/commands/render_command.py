@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 from argparse import Namespace
-from dataclasses import replace
 from pathlib import Path
 
 import bpy
@@ -13,9 +12,6 @@ from bpy.types import Scene
 from ...core import atomic_write
 from ...core.farm import job_file
 from ...core.model.effect import Effect
-from ...core.model.fields import fields_of
-from ...core.model.frame_state import Options
-from ...core.model.keyframes import Constant
 from ...core.recipes import recipe
 from ...media.opening import MatteFile
 from ...media.rendered_pictures import is_whole_blend, why_short
@@ -40,7 +36,6 @@ def add(commands: argparse._SubParsersAction) -> None:
     command_line.add_device(parser)
     option("--weights", type=to_path, metavar="DIR", help="also write the mattes of the shutters, as float EXR")
     option("--save", type=to_path, metavar="FILE.blend", help="keep the edit")
-    option("--inbetween", choices=command_line.SMOOTH, help="moments per filmed frame, in place of the recipe's")
     parser.set_defaults(run=run)
 
 
@@ -53,24 +48,23 @@ def run(arguments: Namespace) -> None:
 
 def _render_edit(arguments: Namespace) -> None:
     """Render a saved edit as it is."""
-    for name in ("recipe", "weights", "save", "inbetween"):
+    for name in ("recipe", "weights", "save"):
         if getattr(arguments, name) is not None:
             why = "is for a source and a recipe; a saved edit is rendered as it is"
             raise film_output.OutputError(f"--{name}: {why}")
     output, file_format = arguments.output, arguments.format or "png"
     if output is None:
         raise film_output.OutputError("nothing to do: give --output")
-    edit = command_line.open_edit(arguments.source, arguments.frames)
-    scene, frames = edit.scene, edit.frames
+    scene, frames = command_line.open_edit(arguments.source, arguments.frames)
     scene.frame_start, scene.frame_end = frames[0], frames[-1]
     for fault in external_files.faults(scene, frames, sources=True):
         raise film_output.OutputError(fault)  # Blender would render without it
-    with command_line.using_device(arguments), shared_frames.refuse_changed_footage(scene) as rendered:
-        version = edit.version()
+    with command_line.using_device(arguments):
+        version = versions.of_edit(scene)
         job_file.guard(output, version)
-        shared_frames.check(output, arguments.format, frames, [edit.path, *versions.read_files(scene)])
+        shared_frames.check(output, arguments.format, frames, [arguments.source, *versions.read_files(scene)])
         _check_device(arguments)
-        shared_frames.render(scene, output, file_format, version, rendered, resume=arguments.resume)
+        shared_frames.render(scene, output, file_format, version, resume=arguments.resume)
 
 
 def _render_source(arguments: Namespace) -> None:
@@ -81,14 +75,12 @@ def _render_source(arguments: Namespace) -> None:
         raise film_output.OutputError("--resume: is for a saved edit (.blend)")
     if arguments.output is None and arguments.save is None:
         raise film_output.OutputError("nothing to do: give --output, --save or both")
-    source_recipe = _recipe(arguments)
+    source_recipe = command_line.recipe(arguments.recipe)
     path = arguments.source
     with command_line.open_footage(path) as medium:
         output, file_format = arguments.output, arguments.format or "png"
         if output:
             film_output.check(output, arguments.format, (medium.width, medium.height))
-            if arguments.save and film_output.is_movie(output) and "#" in output.name:
-                raise film_output.OutputError(f"{output}: in a saved edit, Blender takes # for the frames' numbers")
         frames = command_line.frames(arguments.frames, range(1, whole_edits.length(medium, source_recipe) + 1))
         read = path, *command_line.files(medium), arguments.recipe, *_mattes(source_recipe, arguments.recipe.parent)
         film_output.refuse_overwriting(_written(arguments, file_format, frames), read)
@@ -133,15 +125,6 @@ def _mattes(source_recipe: Effect, folder: Path) -> list[Path]:
     return files
 
 
-def _recipe(arguments: Namespace) -> Effect:
-    """Read the recipe, with the chosen number of moments."""
-    found = command_line.recipe(arguments.recipe)
-    if arguments.inbetween is None:
-        return found
-    step = fields_of(Options)["step"].word(arguments.inbetween)
-    return replace(found, options=Constant(replace(found.options.at(1), step=step)))
-
-
 def _save(scene: Scene, path: Path) -> None:
     """Save the edit with relative paths, so that it can be opened on another machine.
 
@@ -155,8 +138,6 @@ def _save(scene: Scene, path: Path) -> None:
                 bpy.ops.wm.save_as_mainfile(filepath=str(part), compress=True, copy=True, relative_remap=False)
             if not is_whole_blend(part):
                 raise film_output.OutputError(f"{path}: could not be saved whole; {why_short(part.parent)}")
-            if path.is_file() and bpy.context.preferences.filepaths.save_version:
-                path.replace(f"{path}1")  # a backup like Blender's own
     except RuntimeError as error:
         raise film_output.OutputError(f"{path}: {film_output.message(error)}") from None
     except OSError as error:

@@ -15,9 +15,8 @@ import bpy
 from bpy.types import Scene
 
 from ...core import threads
-from ...core.farm.job_file import EditVersion, Footage
+from ...core.farm.job_file import EditVersion
 from ...media import MediaError, derived
-from ...media.files import stamp
 from . import external_files, source_media, strips
 
 MANIFEST = Path(__file__).parents[3] / "blender_manifest.toml"
@@ -69,8 +68,12 @@ def _sha256(path: str | Path) -> str:
 def of_edit(scene: Scene) -> EditVersion:
     """Return the version of the edit in the open .blend file. OSError: the file is gone."""
     blend = _sha256(bpy.data.filepath)
-    footage = tuple(map(_footage, _footage_files(scene)))
-    return EditVersion(blend=blend, extension=extension(), blender=blender(), colours=colours(), footage=footage)
+    footage = hashlib.sha256()
+    for files in _footage_files(scene):
+        different = [path for path, _ in groupby(files)]  # a still that is held counts once
+        for path, digest in zip(different, digests(different), strict=True):
+            footage.update(digest or b"missing: " + os.fsencode(path.name))
+    return EditVersion(extension(), blender(), colours(), blend, footage.hexdigest())
 
 
 def read_files(scene: Scene) -> list[Path]:
@@ -81,11 +84,6 @@ def read_files(scene: Scene) -> list[Path]:
 def sounds() -> list[Path]:
     """Return the files of all sounds."""
     return [path for sound in bpy.data.sounds for path in external_files.named(sound)]
-
-
-def stamps(scene: Scene) -> dict[Path, tuple[int, int] | None]:
-    """Return the stamp of each of `read_files`."""
-    return {path: stamp(path) for path in read_files(scene)}
 
 
 def _footage_files(scene: Scene) -> Iterator[list[Path]]:
@@ -100,16 +98,6 @@ def _footage_files(scene: Scene) -> Iterator[list[Path]]:
     for item in (*data.images, *data.movieclips, *data.fonts, *data.cache_files, *data.volumes, *data.libraries):
         if files := external_files.every(item):
             yield files
-
-
-def _footage(files: list[Path]) -> Footage:
-    """Return the digest of files, in order."""
-    files = [path for path, _ in groupby(files)]  # a still that is held counts once
-    content, missing = hashlib.sha256(), ""
-    for path, digest in zip(files, digests(files), strict=True):
-        missing = missing or ("" if digest else path.name)
-        content.update(digest or b"missing: " + os.fsencode(path.name))
-    return Footage(name=files[0].name, files=len(files), content=content.hexdigest(), missing=missing)
 
 
 def digests(files: list[Path]) -> list[bytes | None]:

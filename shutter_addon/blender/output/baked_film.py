@@ -6,7 +6,6 @@ EXR has the same bits. `render` makes them immediately, and `start` in a second 
 
 from __future__ import annotations
 
-import re
 import secrets
 import shutil
 import subprocess
@@ -42,8 +41,6 @@ KINDS: dict[str, Kind] = {"movie": "MOVIE", "exr": "OPEN_EXR"}  # by the command
 _CHANNELS = ["R", "G", "B", "A"]
 _ZSTD = b"\x28\xb5\x2f\xfd"  # the beginning of a compressed file
 _ROOT = Path(__file__).parents[3]  # of the extension, or of the checkout
-_COPY = re.compile(r"[^/\\]+\.bake-[0-9a-f]{8}\.blend")
-_MANIFEST = "copy"  # the file in a log that names the copy
 Picture = Callable[[int], np.ndarray]  # gives that of a frame
 
 
@@ -225,7 +222,7 @@ class BakeJob:
         effect: Identity of the effect.
         strip: Name of its strip.
         copy: The copy of the edit, which the process removes after reading it.
-        log: A part folder beside the film with the process's output and the name of the copy.
+        log: A part folder beside the film with the process's output.
     """
 
     scene: int
@@ -268,11 +265,10 @@ def start(scene: Scene, effect: PropertyGroup, strip: Strip, film: Film) -> Bake
     """Begin to bake a film. EffectError, OSError: it cannot begin."""
     edit = Path(bpy.data.filepath)
     film.place.parent.mkdir(parents=True, exist_ok=True)
-    _clear_up(film.place.parent, edit)
+    atomic_write.clear_up(film.place.parent)
     log = atomic_write.new_part(film.place.parent)
     copy = edit.with_name(f"{edit.stem}.bake-{secrets.token_hex(4)}.blend")  # relative paths stay valid there
     try:
-        (log / _MANIFEST).write_text(copy.name, encoding="utf-8")
         bpy.ops.wm.save_as_mainfile(filepath=str(copy), copy=True, compress=_is_compressed(edit), relative_remap=False)
         options = _options(scene, strip, film)
         with open(log / "out", "wb") as out, open(log / "err", "wb") as err:
@@ -288,17 +284,6 @@ def start(scene: Scene, effect: PropertyGroup, strip: Strip, film: Film) -> Bake
         shutil.rmtree(log, ignore_errors=True)
         raise EffectError(rpt_("the bake cannot begin: {reason}").format(reason=" ".join(str(error).split()))) from None
     return BakeJob(scene.session_uid, effect.identity, strip.name, film, copy, log, process)
-
-
-def _clear_up(folder: Path, edit: Path) -> None:
-    """Remove what killed bakes left: logs, and the copies of an edit that these name."""
-    for left in atomic_write.left_behind(folder):
-        with suppress(OSError):
-            manifest = left / _MANIFEST
-            name = manifest.read_text(encoding="utf-8", errors="replace") if manifest.is_file() else ""
-            if _COPY.fullmatch(name):
-                edit.with_name(name).unlink(missing_ok=True)
-    atomic_write.clear_up(folder)
 
 
 def _options(scene: Scene, strip: Strip, film: Film) -> list[str]:

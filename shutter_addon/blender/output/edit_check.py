@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import os
 import re
 from collections.abc import Iterator
 from contextlib import closing
@@ -21,7 +20,7 @@ from ...core.model.mattes import FileFrame
 from ...media import MediaError
 from ...media.carried_mattes import CarriedMattes
 from ...media.files import check_file
-from ..data import effect_version, requirements, selection, snapshot, source_media, strips
+from ..data import requirements, snapshot, source_media, strips
 from ..rendering import effect_source, job_snapshots, pictures
 from ..rendering.session import RenderContext, RenderSession
 
@@ -32,21 +31,11 @@ class EffectCheck:
 
     Attributes:
         strip: Its name.
-        source: The footage's first file; "" if it cannot be read.
-        size: Width and height of its pictures.
-        window: Filmed frames of the longest window.
-        shutters: Their number.
-        inbetween: Moments per filmed frame; 1 without *Smooth*.
         mattes: The number of outlines' mattes that have to be carried first, by their folder.
         faults, notes: Messages. Notes are about effects that can be rendered, but not as one may expect.
     """
 
     strip: str
-    shutters: int
-    source: str = ""
-    size: tuple[int, int] = (0, 0)
-    window: int = 0
-    inbetween: int = 1
     mattes: dict[Path, int] = field(default_factory=dict)
     faults: list[str] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
@@ -81,7 +70,7 @@ def _shown_effects(film: Scene, frames: range) -> Iterator[tuple]:
 def _effect(session: RenderSession, shown: tuple) -> EffectCheck:
     """Check an effect of `_shown_effects`."""
     scene, effect, strip, frames = shown
-    check = EffectCheck(strip=strip.name, shutters=len(effect.shutters))
+    check = EffectCheck(strip.name)
     if not _check_footage(check, scene, effect, strip):
         return check
     try:
@@ -93,27 +82,27 @@ def _effect(session: RenderSession, shown: tuple) -> EffectCheck:
     if requests:
         renderer = session.renderer(next(iter(requests.values())).source)
         source = renderer.source
-        check.inbetween = source.step
-        check.window = max(request.state.options.window for request in requests.values()) // source.step
         _check_frames(check, renderer, requests)
         _check_mattes(check, source, requests)
-        check.notes += _notes(check, taken, requests, source)
+        check.notes += {sentence: None for request in requests.values() for sentence in pictures.unread(taken, request)}
+        if source.by_blender:
+            check.notes.append(pictures.SLOW_DECODING)
+        if lacking := sum(check.mattes.values()):
+            check.notes.append(f"{lacking} mattes of outlines are not tracked yet: the first render does that")
     return check
 
 
 def _requests(session: RenderSession, taken: snapshot.Snapshot, check: EffectCheck) -> dict[float, Request]:
-    """Return the requests of frames that can be shown. A fault of several frames is noted once."""
+    """Return the requests of frames that can be shown. A fault of several frames is noted at the first."""
     requests, context = {}, RenderContext(session)
-    faults: dict[str, list[str]] = {}
+    faults: dict[str, str] = {}
     for frame in sorted(taken.frames):
         try:
             requests[frame] = session.request(taken, frame, context)
         except effect_source.FAULTS as error:
             kind = re.sub(r"\bframe -?[\d.]+", "", str(error))
-            faults.setdefault(kind, []).append(str(error))
-    for sentences in faults.values():
-        more = f" (and at {len(sentences) - 1} more frames)" if len(sentences) > 1 else ""
-        check.faults.append(sentences[0] + more)
+            faults.setdefault(kind, str(error))
+    check.faults += faults.values()
     return requests
 
 
@@ -129,10 +118,10 @@ def _check_footage(check: EffectCheck, scene: Scene, effect: PropertyGroup, stri
         check.faults.append(str(error))
         return False
     medium.close()
-    check.source, check.size = os.path.normpath(medium.path), (medium.width, medium.height)
+    size = medium.width, medium.height
     saved = effect.scene.render.resolution_x, effect.scene.render.resolution_y
-    if saved != check.size:
-        words = "{}×{}, but was {}×{} when the edit was saved".format(*check.size, *saved)
+    if saved != size:
+        words = "{}×{}, but was {}×{} when the edit was saved".format(*size, *saved)
         check.faults.append(f"{medium.path.name}: is {words}")
     timing = source_media.timing_of(source)
     rate = min(float(medium.fps or math.inf) / timing.scene_fps, 1.0)  # the strip can keep the movie's speed
@@ -151,18 +140,14 @@ def _check_frames(check: EffectCheck, renderer: Renderer, requests: dict[float, 
 
 
 def _unreadable(source: FrameSource, indices: set[int], step: int = 1) -> list[str]:
-    """Return the faults of filmed frames: missing files, else a first or last frame that cannot be decoded."""
-    files, missing = source.files, []
-    if len(files) > 1:
-        for path in sorted({files[index] for index in indices}):
-            try:
-                check_file(path)
-            except MediaError as error:
-                missing.append(str(error))
-    if missing:
-        more = f" (and {len(missing) - 1} more files)" if len(missing) > 1 else ""
-        return [missing[0] + more]
-    faults = []
+    """Return the faults of filmed frames: the first missing file, else ends that cannot be decoded."""
+    files = source.files
+    faults: list[str] = []
+    try:
+        for path in sorted({files[index] for index in indices}) if len(files) > 1 else ():
+            check_file(path)
+    except MediaError as error:
+        return [str(error)]
     for index in dict.fromkeys((min(indices), max(indices))) if indices else ():
         try:
             source.read(index * step)
@@ -193,31 +178,7 @@ def _check_mattes(check: EffectCheck, source: FrameSource, requests: dict[float,
             check.faults.append(str(error))
 
 
-def _notes(
-    check: EffectCheck, taken: snapshot.Snapshot, requests: dict[float, Request], source: FrameSource
-) -> list[str]:
-    notes = list({sentence: None for request in requests.values() for sentence in pictures.unread(taken, request)})
-    if source.by_blender:
-        notes.append(pictures.SLOW_DECODING)
-    if lacking := sum(check.mattes.values()):
-        notes.append(f"{lacking} mattes of outlines are not tracked yet: the first render does that, frame by frame")
-    return notes
-
-
 def left_out(scene: Scene, frames: range) -> list[str]:
     """Return why the sequencer leaves out effects at some of these frames."""
     reasons = [why for shown, why in requirements.left_out(scene) if frame_ranges.common(shown, frames)]
     return list(dict.fromkeys(reasons))
-
-
-def stale_films(scene: Scene, frames: range) -> list[str]:
-    """Return notes on baked strips that are shown at some of these frames although their effect has changed."""
-    found = []
-    for shown, _at in requirements.scenes_at(scene, frames):
-        for strip in strips.effect_strips(shown):
-            films = [each for each in selection.of_bake(shown, strip) if each.type in strips.SOURCES]
-            effect = strips.effect_of(shown, strip.scene)
-            is_shown = any(requirements.is_shown(shown, film, frames) for film in films)
-            if effect and is_shown and effect_version.is_changed(shown, effect, strip):
-                found.append(f'"{strip.name}": the effect has changed since it was baked, and its baked strip is shown')
-    return found

@@ -5,19 +5,15 @@ over hidden footage, which takes several times as long as showing a strip of foo
 a file with the exact levels that Blender would make (core/pixels/shown_levels.py), from a film's second frame on. A
 single picture keeps its floats, since a script can save it with other settings. The edit is restored when the render
 ends, or when a file is saved or loaded, after which the engine renders.
-
-A movie that the command makes of footage and a recipe is known to be such an edit (`feeding`). Only the GPU makes its
-levels, which can differ from Blender's where rounding decides.
 """
 
 from __future__ import annotations
 
 import os
 import tempfile
-from contextlib import AbstractContextManager, ExitStack
+from contextlib import ExitStack
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import ClassVar
 
 import numpy as np
 import OpenImageIO
@@ -26,8 +22,7 @@ from bpy.types import Scene, Strip
 from ...core import atomic_write, stopping
 from ...core.pixels.shown_levels import Display
 from ...media import color
-from ..data import seen_alone, strips, versions
-from ..data.property_copy import for_a_while
+from ..data import seen_alone, strips
 from ..rendering import job_snapshots, pictures, render_job, sessions
 from ..rendering.effect_source import FULL, in_words
 from ..rendering.render_job import Where
@@ -42,7 +37,6 @@ class _Film:
     """The changes of a render.
 
     Attributes:
-        is_own: Whether renders are movies of whole_edits.make_edit.
         scene: session_uid of the edit.
         changed: Restores the edit.
         strip: Name of the file's strip; None: not added yet.
@@ -52,7 +46,6 @@ class _Film:
         has_begun: Whether a frame was rendered.
     """
 
-    is_own: ClassVar[bool] = False
     scene: int
     changed: ExitStack = field(default_factory=ExitStack)
     strip: str | None = None
@@ -63,11 +56,6 @@ class _Film:
 
 
 _running: list[_Film] = []  # at most one
-
-
-def feeding() -> AbstractContextManager[None]:
-    """In this context, renders are movies of whole_edits.make_edit and are fed from their first frame on."""
-    return for_a_while([(_Film, "is_own", True)])
 
 
 def begin(scene: Scene) -> None:
@@ -88,7 +76,7 @@ def before_frame(scene: Scene) -> None:
     film = next((film for film in _running if film.scene == scene.session_uid), None)
     if film is None:
         return
-    if not (film.has_begun or film.is_own):  # a single picture can be saved as floats later
+    if not film.has_begun:  # a single picture can be saved as floats later
         film.has_begun = True
         return
     seen = None if film.has_failed else _seen(film, scene)
@@ -100,9 +88,6 @@ def before_frame(scene: Scene) -> None:
 
 def _seen(film: _Film, scene: Scene) -> tuple[Strip, bool] | None:
     """Return seen_alone.alone at the current frame, if Blender's levels of it are known."""
-    if film.is_own:
-        is_known = not versions.colours()
-        return (strips.effect_strips(scene)[0], False) if is_known else None
     if film.makes_levels is None or render_job.scripts_act():
         film.makes_levels = seen_alone.makes_levels(scene)
     return seen_alone.alone(scene, scene.frame_current, film.strip) if film.makes_levels else None
@@ -113,14 +98,12 @@ def _feed(film: _Film, scene: Scene, strip: Strip, is_blended: bool) -> bool:
     try:
         shown = scene.frame_current - strips.origin(strip) + strip.scene.frame_start
         snapshot, frame = job_snapshots.of(strip.scene, int(shown))
-        transfer = color.blended if is_blended else color.shown
-        display = None if film.is_own else Display(scene.render.dither_intensity, transfer)
-        context = sessions.of_render(render_job.say, levels=film.is_own, display=display)
+        display = Display(scene.render.dither_intensity, color.blended if is_blended else color.shown)
+        context = sessions.of_render(render_job.say, display=display)
         with stopping.once(render_job.stopping):
             source = context.renderer(context.request(snapshot, frame, FULL)).source
             size = scene.render.resolution_x, scene.render.resolution_y
-            is_known = film.is_own or source.alpha == "opaque"  # only over black, transparency is known
-            if not is_known or (source.width, source.height) != size:
+            if source.alpha != "opaque" or (source.width, source.height) != size:
                 return False
             levels = pictures.picture(context, snapshot, frame)
         _file(film, scene).write(levels)

@@ -3,20 +3,16 @@
 from __future__ import annotations
 
 import re
-import tempfile
 from collections.abc import Callable
-from contextlib import nullcontext
 from pathlib import Path
 
-import numpy as np
 from bpy.types import ImageFormatSettings, Scene
 
 from ...core import threads
 from ...core.frames import frame_ranges
-from ...media import image_writing, rendered_pictures
+from ...media import rendered_pictures
 from ...media.rendered_pictures import RenderedPicture
-from ..data import requirements, seen_alone, strips
-from ..rendering import render_job
+from ..data import seen_alone, strips
 from . import film_output
 from .film_output import OutputError
 
@@ -31,49 +27,11 @@ def check(output: Path, read: list[Path]) -> None:
     film_output.refuse_overwriting([output], read)
 
 
-def rehearse(scene: Scene, output: Path, file_format: str, frames: range) -> None:
-    """Join one black picture to a movie that is thrown away. This changes `scene`: do not use it again.
-
-    Raises:
-        OutputError, MediaError, OSError: Frames of this format could not be joined to that movie.
-    """
-    film_output.check(output, None, film_output.size(scene))
-    _refuse_gaps(scene, file_format, frames)
-    with tempfile.TemporaryDirectory() as place:
-        folder, trial = Path(place), Path(place, f"movie{output.suffix}")
-        _write_black(folder / f"{frames[0]:04d}.{file_format}", film_output.size(scene))
-        try:
-            join(scene, folder, trial, frames[:1], "", progress=lambda *_: nullcontext(lambda: None))
-        except OutputError as error:
-            raise type(error)(str(error).replace(str(trial), str(output))) from None
-
-
-def _refuse_gaps(scene: Scene, file_format: str, frames: range) -> None:
-    """Raise OutputError if no strip is shown at some frames: they are transparent, and would be refused."""
-    if file_format == "png" and scene.render.image_settings.color_mode == "RGBA" and _changes_transparency(scene):
-        strips = [strip for strip in scene.sequence_editor.strips_all if strip.type not in ("SOUND", "META")]
-        shown = set().union(*(requirements.shown_frames(scene, strip) for strip in strips))
-        if gaps := [frame for frame in frames if frame not in shown]:
-            words = f"{_are(gaps)} transparent, as no strip is shown, which a film shows otherwise under this view"
-            raise OutputError(f"{words}; render EXR, or without transparency")
-
-
-def _write_black(path: Path, size: tuple[int, int]) -> None:
-    width, height = size
-    if path.suffix == ".exr":
-        image_writing.write_exr(path, np.zeros((height, width, 3), np.float32), ["R", "G", "B"])
-    else:
-        image_writing.write_grey(path, np.zeros((height, width), np.float32))
-
-
-def join(
-    scene: Scene, folder: Path, output: Path, frames: range, key: str, progress: Callable = film_output.progress
-) -> None:
+def join(scene: Scene, folder: Path, output: Path, frames: range, key: str) -> None:
     """Join rendered frames in a folder to a movie, whole or not at all. This changes `scene`: do not use it again.
 
     Args:
         key: Of the edit's version.
-        progress: Like film_output.progress.
 
     Raises:
         OutputError, MediaError: Frames are missing, damaged, different or of another edit, or the movie cannot be
@@ -84,59 +42,31 @@ def join(
     paths = _pictures(folder, frames[:: scene.frame_step])
     size = film_output.size(scene)
     film_output.check(output, None, size)
-    with progress(len(paths), "picture") as looked:
+    with film_output.progress(len(paths), "picture") as looked:
         first = _common(paths, looked, size, key)
     _refuse_transparency(scene, paths, first)
     _cover_edit(scene, paths, first)
     _set_output(scene, output, size)
     film_output.make_folder(output.parent)
-    left = iter(paths[1:])
-    with progress(len(paths), "frame") as moved:
-
-        def rendered() -> None:
-            """End the film if the next picture is gone, since Blender would show a colour in its place."""
-            moved()
-            if (path := next(left, None)) and not path.is_file():
-                raise OutputError(f"{path}: no such file")
-
-        film_output.render_frames(scene, output, rendered)
+    with film_output.progress(len(paths), "frame") as moved:
+        film_output.render_frames(scene, output, moved)
 
 
 def _pictures(folder: Path, frames: range) -> list[Path]:
-    """Return the picture of each frame. OutputError: some are missing, or exist twice."""
-    pictures = _numbered(folder)
-    if not pictures:
-        raise OutputError(f"{folder}: there are no frames, such as 0001.png or 0001.exr")
-    if missing := [frame for frame in frames if frame not in pictures]:
-        raise OutputError(f"{folder}: {_are(missing)} missing")
-    return [pictures[frame] for frame in frames]
-
-
-def _numbered(folder: Path) -> dict[int, Path]:
-    """Return the pictures of a folder by frame. OutputError: it is not a folder, or a frame has two pictures."""
+    """Return the picture of each frame, a file whose name is its number. OutputError: some are missing, or twice."""
+    pictures: dict[int, Path] = {}
     try:
         files = sorted(path for path in folder.iterdir() if path.suffix[1:] in film_output.FORMATS)
     except OSError as error:
         raise OutputError(film_output.in_words(error, folder)) from None
-    pictures: dict[int, Path] = {}
     for path in files:
         if re.fullmatch(r"\d{1,9}", path.stem):
-            if (frame := int(path.stem)) in pictures:
-                raise OutputError(f"{folder}: {pictures[frame].name} and {path.name} are the same frame")
-            pictures[frame] = path
-    return pictures
-
-
-def _are(frames: list[int]) -> str:
-    """Return words for a sentence: "frame 12 is", or "frames 12, 17 to 20 are"."""
-    return f"{frame_ranges.in_words(frames)} {'is' if len(frames) == 1 else 'are'}"
-
-
-def warn_of_other_pictures(folder: Path, frames: range) -> None:
-    """Print a warning about pictures that are not frames of the edit."""
-    if others := [frame for frame in _numbered(folder) if frame not in frames]:
-        words = f"{folder}: {_are(others)} not of the edit, and left out"
-        render_job.say(words)
+            other = pictures.setdefault(int(path.stem), path)
+            if other != path:
+                raise OutputError(f"{folder}: {other.name} and {path.name} are the same frame")
+    if missing := [frame for frame in frames if frame not in pictures]:
+        raise OutputError(f"{folder}: lacks {frame_ranges.in_words(missing)}")
+    return [pictures[frame] for frame in frames]
 
 
 def _common(paths: list[Path], looked: Callable, size: tuple[int, int], key: str) -> RenderedPicture:
@@ -152,39 +82,21 @@ def _common(paths: list[Path], looked: Callable, size: tuple[int, int], key: str
             if picture is None:
                 raise OutputError(f"{path}: is damaged or cut off")
             first = first or picture
-            if difference := _difference(path, picture, paths[0], first):
-                raise OutputError(f"{path}: {difference}")
+            if picture != first or path.suffix != paths[0].suffix:
+                raise OutputError(f"{path}: {_described(picture)}, unlike {paths[0].name}: {_described(first)}")
             looked()
     finally:
         pool.shutdown(cancel_futures=True)
     assert first is not None  # an edit has at least one frame
-    if first.size != size:
-        raise OutputError(f"{paths[0]}: is {_by(first.size)}, but the edit's frames are {_by(size)}")
-    if first.edit not in (None, key):
-        words = f"{first.edit} of the edit; its file, its footage, the extension and Blender here make version {key}"
-        raise OutputError(f"{paths[0]}: is of version {words}")
+    if first.size != size or first.edit not in (None, key):
+        wanted = "{}×{}, version {}".format(*size, key)
+        raise OutputError(f"{paths[0]}: {_described(first)}, unlike the edit: {wanted}")
     return first
 
 
-def _difference(path: Path, picture: RenderedPicture, other: Path, first: RenderedPicture) -> str:
-    """Return how a picture differs from the first one, or ""."""
-    name = other.name
-    if path.suffix != other.suffix:
-        return f"is another format than {name}"
-    if picture.size != first.size:
-        return f"is {_by(picture.size)}, but {name} is {_by(first.size)}"
-    if (picture.channels, picture.samples) != (first.channels, first.samples):
-        words = [f"{each.channels} channels of {each.samples}" for each in (picture, first)]
-        return f"has {words[0]}, but {name} has {words[1]}"
-    if picture.edit == first.edit:
-        return ""
-    if picture.edit and first.edit:
-        return f"is of another version of the edit ({picture.edit}) than {name} ({first.edit})"
-    return "says" + (" " if picture.edit else " not ") + f"of which version of the edit it is, unlike {name}"
-
-
-def _by(size: tuple[int, int]) -> str:
-    return "{}×{}".format(*size)
+def _described(picture: RenderedPicture) -> str:
+    words = "{}×{}, {} channels of {}".format(*picture.size, picture.channels, picture.samples)
+    return f"{words}, version {picture.edit or 'unknown'}"
 
 
 def _refuse_transparency(scene: Scene, paths: list[Path], first: RenderedPicture) -> None:

@@ -7,7 +7,7 @@ import os
 import signal
 import sys
 from collections.abc import Callable, Collection, Iterable, Iterator
-from contextlib import AbstractContextManager, contextmanager, nullcontext, suppress
+from contextlib import AbstractContextManager, contextmanager, suppress
 from pathlib import Path
 from typing import NamedTuple
 
@@ -20,7 +20,6 @@ from ...media.rendered_pictures import is_whole_movie, is_whole_picture, whole_p
 from ..data import strips
 from ..data.property_copy import for_a_while
 from ..rendering import render_job
-from . import edit_feed
 
 INTERRUPTED = 130
 Move = Callable[[Path, Path], object]  # moves a picture to its destination
@@ -212,8 +211,7 @@ def render_made_edit(scene: Scene, output: Path) -> None:
         InterruptedRenderError: The same, by Ctrl-C or a farm's TERM.
     """
     make_folder(output.parent if is_movie(output) else output)
-    feed = edit_feed.feeding() if is_movie(output) and strips.effect_strips(scene) else nullcontext()
-    with progress(scene.frame_end - scene.frame_start + 1, "frame") as moved, _without_sources(scene), feed:
+    with progress(scene.frame_end - scene.frame_start + 1, "frame") as moved, _without_sources(scene):
         render_frames(scene, output, moved)
 
 

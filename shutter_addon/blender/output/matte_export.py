@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import os
 import re
-from collections.abc import Hashable, Iterator
+from collections.abc import Iterator
 from contextlib import closing
 from pathlib import Path
 from typing import Any
@@ -50,13 +50,8 @@ def save(scene: Scene, effect: PropertyGroup, strip: Strip, region: PropertyGrou
         effect_source.FAULTS: The matte cannot be read, or the pictures cannot be written.
         OSError: Their folder cannot be written to.
     """
-    folder.mkdir(parents=True, exist_ok=True)
     _refuse_overwriting([folder], _read_files(scene, effect, strip, strips.matte_regions(effect)))
-    with atomic_write.part_folder(folder) as part:
-        frames = [frame for frame, _key in _write_frames(scene, effect, strip, region, part, suffix)]
-        for frame in frames:
-            os.replace(part / _name(frame, suffix), folder / _name(frame, suffix))
-    return len(frames)
+    return _write(scene, effect, strip, region, folder, strip.left_handle, suffix)
 
 
 def _ramp(region: PropertyGroup) -> RampContent:
@@ -103,8 +98,8 @@ def _content(
     if region.kind == "RAMP":
         return _ramp(region)
     if folder is not None:
-        first = recipe.relative(_write(scene, effect, strip, region, folder), path.parent)
-        return FileContent(path=first, timing="timeline")
+        _write(scene, effect, strip, region, folder, 1)
+        return FileContent(path=recipe.relative(folder / "0001.png", path.parent), timing="timeline")
     file, channel = matte_content.image_path(region), matte_content.channel(region)
     # A recipe's timeline begins with the trimmed strip.
     offset = region.offset + (strips.skipped(strip) if region.timing == "TIMELINE" else 0)
@@ -112,39 +107,35 @@ def _content(
     return FileContent(path=named, channel=channel, offset=offset, timing=region.timing.lower())
 
 
-def _write(scene: Scene, effect: PropertyGroup, strip: Strip, region: PropertyGroup, folder: Path) -> Path:
-    """Write a matte at each timeline frame of the effect strip, or once if it never changes. Return the first path."""
+def _write(
+    scene: Scene,
+    effect: PropertyGroup,
+    strip: Strip,
+    region: PropertyGroup,
+    folder: Path,
+    first: int,
+    suffix: str = "png",
+) -> int:
+    """Write a matte at each timeline frame of the effect strip, numbered from `first`, all or none."""
     folder.mkdir(parents=True, exist_ok=True)
-    with atomic_write.part_folder(folder) as part:
-        written = list(_write_frames(scene, effect, strip, region, part))
-        kept = 1 if len({key for _frame, key in written}) == 1 else len(written)
-        for number, (frame, _key) in enumerate(written[:kept], 1):
-            os.replace(part / _name(frame), folder / _name(number))
-    for file in folder.glob("[0-9]*.png"):  # of an earlier, longer export
-        if file.stem.isdecimal() and int(file.stem) > kept:
-            file.unlink()
-    return folder / _name(1)
-
-
-def _name(number: int, suffix: str = "png") -> str:
-    return f"{number:04d}.{suffix}"
-
-
-def _write_frames(
-    scene: Scene, effect: PropertyGroup, strip: Strip, region: PropertyGroup, folder: Path, suffix: str = "png"
-) -> Iterator[tuple[int, Hashable]]:
-    """Write a matte at each timeline frame of the effect strip. Yield the frame, and a key of the values."""
     frames = range(strip.left_handle, strip.right_handle)
     shown = snapshot.take(scene, effect, strip, frames)
     content = snapshot.matte_content_at(scene, effect, strip, list(effect.regions).index(region), frames)
-    with closing(effect_source.open_source(shown)) as source, closing(MatteValues.of(source)) as values:
+    with (
+        atomic_write.part_folder(folder) as part,
+        closing(effect_source.open_source(shown)) as source,
+        closing(MatteValues.of(source)) as values,
+    ):
         clip = effect_source.clip_of(shown, source)
-        for frame in frames:
+        for number, frame in enumerate(frames, first):
             with translated(rpt_):
                 matte = mattes.Matte(shutter=0, content=content.at(frame))
-            ((key, array),) = values.values((matte,), clip.shown(frame).source_frame, 1)
+            ((_key, array),) = values.values((matte,), clip.shown(frame).source_frame, 1)
+            place = part / f"{number:04d}.{suffix}"
             if suffix == "exr":
-                write_exr(folder / _name(frame, suffix), array[..., None], ["Y"])
+                write_exr(place, array[..., None], ["Y"])
             else:
-                write_grey(folder / _name(frame, suffix), array)
-            yield frame, key
+                write_grey(place, array)
+        for place in sorted(part.iterdir()):
+            os.replace(place, folder / place.name)
+    return len(frames)

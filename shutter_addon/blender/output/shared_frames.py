@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 
@@ -15,7 +14,6 @@ from ...core.farm.claims import Claims
 from ...core.farm.job_file import EditVersion
 from ...core.frames import frame_ranges
 from ...media import rendered_pictures
-from ..data import versions
 from ..rendering import render_job
 from . import film_output
 
@@ -46,37 +44,10 @@ def check_resumable(scene: Scene) -> None:
         raise film_output.OutputError(f"--resume: {words}")
 
 
-@contextmanager
-def refuse_changed_footage(scene: Scene) -> Iterator[Stamps]:
-    """Remove pictures that are rendered in this context if the footage changes meanwhile.
-
-    They carry the key of the earlier footage and would count as finished. Pictures of other processes stay.
-
-    Yields:
-        A dictionary for the pictures and their stamps.
-
-    Raises:
-        OutputError: The footage has changed.
-    """
-    before, rendered = versions.stamps(scene), Stamps()
-    try:
-        yield rendered
-    finally:
-        changed = [path for path, stamp in versions.stamps(scene).items() if stamp != before.get(path)]
-        if changed:
-            for picture, stamp in rendered.items():
-                if rendered_pictures.stamp(picture) == stamp:
-                    picture.unlink(missing_ok=True)
-            raise film_output.OutputError(f"{changed[0]}: was written to while frames were rendered from it")
-
-
-def render(
-    scene: Scene, folder: Path, file_format: str, version: EditVersion, rendered: Stamps, *, resume: bool
-) -> None:
+def render(scene: Scene, folder: Path, file_format: str, version: EditVersion, *, resume: bool) -> None:
     """Render all frames of the edit to pictures that carry the key of its version.
 
     Args:
-        rendered: Gets each picture with its stamp when it is written.
         resume: Skip finished frames, and wait for frames that other processes render, until these finish or give up.
 
     Raises:
@@ -94,9 +65,7 @@ def render(
 
     def move(part: Path, picture: Path) -> None:
         job_file.guard(folder, version)  # again, as the job may have changed
-        stamp = rendered_pictures.stamp(part)
         part.replace(picture)
-        rendered[picture] = stamp
 
     with film_output.progress(len(pictures), "frame") as moved:
         write = partial(film_output.render_frames, scene, folder, moved, move)

@@ -110,16 +110,15 @@ class Claims:
 def _make(path: Path) -> bool:
     """Create a claim; return False if it exists. Its content tells people whose it is, and distinguishes claims."""
     try:
-        file = os.open(path, os.O_CREAT | os.O_EXCL | os.O_WRONLY, 0o666)
+        file = path.open("x", encoding="utf-8")
     except FileExistsError:
         return False
     try:
-        os.write(file, f"{secrets.token_hex(8)} {socket.gethostname()} {os.getpid()}\n".encode()[:_LONGEST])
+        with file:
+            file.write(f"{secrets.token_hex(8)} {socket.gethostname()} {os.getpid()}\n")
     except OSError:
         _remove(path)
         raise
-    finally:
-        os.close(file)
     return True
 
 
