@@ -119,7 +119,7 @@ class GLDevice(Device):
             raise NoDeviceError(f"no OpenGL 4.3: {error}") from None
         self._programs: dict[Pass, tuple[moderngl.ComputeShader, dict[str, Any]]] = {}
         self._blocks: dict[int, moderngl.Buffer] = {}
-        self.name, self.driver = info["GL_RENDERER"], info["GL_VERSION"]
+        self.name = info["GL_RENDERER"]
         self.max_layers = info["GL_MAX_ARRAY_TEXTURE_LAYERS"]
         self.max_size = info["GL_MAX_TEXTURE_SIZE"]
 

@@ -282,7 +282,7 @@ def test_what_fails_beside_blender_is_told_once(bpy):
     """Whatever it is: else the file would be asked for with every look at the preview."""
     file, arrived = CarriedFile(footage=Unreadable(), drawings=((0, outlines.curves(square(0))),)), []
     outline_carrying.carry(file, [0], lambda: arrived.append(True))
-    outline_carrying._running[0].future.exception()  # waits for the thread
+    outline_carrying._mattes.carrying.future.exception()  # waits for the thread
     assert outline_carrying._look() is None  # the timer, which no Blender without a window calls
     assert arrived == [True]
     assert outline_carrying.failure(file) == "internal error: RuntimeError('of a library')"

@@ -129,7 +129,7 @@ def test_where_an_edit_cannot_be_saved_comes_first(command, frames, tmp_path):
 
 @pytest.mark.parametrize(
     ("name", "word"),
-    [("a\\b", "\\"), ("/".join(["l" * 200] * 5), "1000 bytes"), ("l" * 300, "too long"), ("a.mp4/", "is a folder")],
+    [("a\\b", "\\"), ("l" * 300, "too long"), ("a.mp4/", "is a folder")],
 )
 def test_names_that_cannot_be(command, frames, tmp_path, name, word):
     if name.endswith("/"):

@@ -386,7 +386,7 @@ def test_a_hard_cut_changes_no_picture(bpy, edit, render, tmp_path):
     snapshots.begin(edit.session_uid)
     try:
         # What a job of the window reads, which is not to be seen.
-        of_parts = [part for half in (strip, right) for part in snapshots._taken[half.scene.session_uid]]
+        of_parts = [part for half in (strip, right) for part in snapshots.running.taken[half.scene.session_uid]]
         assert [shown for shown, _ in of_parts] == [range(1, 5), range(5, 10)]
         assert of_parts[0][1].timing != of_parts[1][1].timing
         assert max(of_parts[0][1].frames) < 7 < max(of_parts[1][1].frames)

@@ -165,7 +165,7 @@ def test_where_it_ends_is_said(track, tmp_path, shown, last):
     first = write_frames(tmp_path / "two", np.stack([shots[n // 6] for n in range(12)]))
     options = ("--region", "cross", "--frame", 3, "--output", tmp_path / "t.json", "--report", tmp_path / "r.json")
     code, said = track(first, *options, recipe=plain() | shown)
-    assert (code, said) == (0, f"Virtual Shutter: cross: tracked to frame {last}, where the shot ends")
+    assert (code, said) == (0, f"Virtual Shutter: cross: not tracked from frame {last + 1} on: {tracking.SHOT_ENDS}")
     assert json.loads((tmp_path / "r.json").read_text())["stops"] == [{"frame": last + 1, "reason": tracking.SHOT_ENDS}]
     region = recipe_file.load(tmp_path / "t.json").for_picture(4 / 3).regions[1]
     assert [region.opacity.at(frame) for frame in (1, last, last + 1, 99)] == [1, 1, 0, 0]

@@ -195,7 +195,7 @@ def submit(whole, worker):
             code, said = worker(*step)
             assert (code, _without_waiting(said)) == (0, "")
         assert _pictures(node) == _pictures(whole)
-        assert {path.name for path in node.pictures.iterdir() if not path.name.startswith(".part-")} == {
+        assert {path.name for path in node.pictures.iterdir() if not path.name.startswith((".part-", ".claim-"))} == {
             path.name for path in whole.pictures.iterdir()
         }
         assert node.movie.read_bytes() == whole.movie.read_bytes()

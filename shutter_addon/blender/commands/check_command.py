@@ -71,7 +71,7 @@ def _checked(arguments: Namespace, scene: Scene, frames: range) -> tuple[str, li
     else:
         device, notes = available.name(kind), [lesser] if lesser else []
         for check in edit_check.effects(scene, frames):
-            faults += [f'"{check.strip}": {fault}' for fault in check.faults]
+            faults += [f'"{check.strip}": {check.fault}'] if check.fault else []
             notes += [f'"{check.strip}": {note}' for note in check.notes]
             folders += [folder for folder, count in check.mattes.items() if count]
     faults += edit_check.left_out(scene, frames)

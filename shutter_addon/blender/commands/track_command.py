@@ -83,12 +83,7 @@ def run(arguments: Namespace) -> None:
     keyed = source_recipe.with_parts(regions, new if index is None else None)
     _write_track(arguments, keyed, tracked, stops)
     for stop in stops:
-        if stop.fault == tracking.SHOT_ENDS:
-            near = stop.frame - 1 if stop.frame > arguments.frame else stop.frame + 1
-            said = f"{subject}: tracked to frame {near}, where the shot ends"
-        else:
-            said = f"{subject}: not tracked from frame {stop.frame} on: {stop.fault}"
-        render_job.say(said)
+        render_job.say(f"{subject}: not tracked from frame {stop.frame} on: {stop.fault}")
 
 
 def _region_index(arguments: Namespace, source_recipe: Effect) -> int:

@@ -70,10 +70,9 @@ def name(kind: str) -> str:
 
 
 class OpenGL(NamedTuple):
-    """Facts of OpenGL 4.3: its renderer, its driver, the bytes that textures may take; or why there is none."""
+    """Facts of OpenGL 4.3: its renderer, the bytes that textures may take; or why there is none."""
 
     name: str = ""
-    driver: str = ""
     memory: int | None = None
     lacking: str | None = None
 
@@ -90,7 +89,7 @@ def _tried() -> OpenGL:
     except NoDeviceError as error:
         return OpenGL(lacking=str(error))
     device.release()
-    return OpenGL(device.name, device.driver, device.budget.limit)
+    return OpenGL(device.name, device.budget.limit)
 
 
 def _blender_in_background() -> bool:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import re
 from collections.abc import Iterator
 from contextlib import closing
 from dataclasses import dataclass, field
@@ -15,9 +14,8 @@ from ...compute.renderer import Renderer
 from ...compute.request import Request
 from ...core.frames import frame_ranges
 from ...core.frames.frame_source import FrameSource
-from ...core.messages import UserError
+from ...core.messages import EffectError
 from ...core.model.mattes import FileFrame
-from ...media import MediaError
 from ...media.carried_mattes import CarriedMattes
 from ...media.files import check_file
 from ..data import requirements, snapshot, source_media, strips
@@ -32,12 +30,13 @@ class EffectCheck:
     Attributes:
         strip: Its name.
         mattes: The number of outlines' mattes that have to be carried first, by their folder.
-        faults, notes: Messages. Notes are about effects that can be rendered, but not as one may expect.
+        fault: Why the effect cannot be rendered, or None.
+        notes: Messages about an effect that can be rendered, but not as one may expect.
     """
 
     strip: str
     mattes: dict[Path, int] = field(default_factory=dict)
-    faults: list[str] = field(default_factory=list)
+    fault: str | None = None
     notes: list[str] = field(default_factory=list)
 
 
@@ -68,114 +67,78 @@ def _shown_effects(film: Scene, frames: range) -> Iterator[tuple]:
 
 
 def _effect(session: RenderSession, shown: tuple) -> EffectCheck:
-    """Check an effect of `_shown_effects`."""
+    """Check an effect of `_shown_effects`, up to the first fault."""
     scene, effect, strip, frames = shown
-    check = EffectCheck(strip.name)
-    if not _check_footage(check, scene, effect, strip):
-        return check
+    check, context = EffectCheck(strip.name), RenderContext(session)
     try:
+        _check_footage(scene, effect, strip)
         taken = snapshot.take(scene, effect, strip, frames)
-        requests = _requests(session, taken, check)
-    except effect_source.FAULTS as error:
-        check.faults.append(str(error))
-        return check
-    if requests:
-        renderer = session.renderer(next(iter(requests.values())).source)
-        source = renderer.source
-        _check_frames(check, renderer, requests)
-        _check_mattes(check, source, requests)
-        check.notes += {sentence: None for request in requests.values() for sentence in pictures.unread(taken, request)}
-        if source.by_blender:
+        requests = [session.request(taken, frame, context) for frame in sorted(taken.frames)]
+        renderer = session.renderer(requests[0].source)
+        _check_frames(renderer, requests)
+        _check_mattes(check, renderer.source, requests)
+        check.notes += {sentence: None for request in requests for sentence in pictures.unread(taken, request)}
+        if renderer.source.by_blender:
             check.notes.append(pictures.SLOW_DECODING)
         if lacking := sum(check.mattes.values()):
             check.notes.append(f"{lacking} mattes of outlines are not tracked yet: the first render does that")
+    except effect_source.FAULTS as error:
+        check.fault = str(error)
     return check
 
 
-def _requests(session: RenderSession, taken: snapshot.Snapshot, check: EffectCheck) -> dict[float, Request]:
-    """Return the requests of frames that can be shown. A fault of several frames is noted at the first."""
-    requests, context = {}, RenderContext(session)
-    faults: dict[str, str] = {}
-    for frame in sorted(taken.frames):
-        try:
-            requests[frame] = session.request(taken, frame, context)
-        except effect_source.FAULTS as error:
-            kind = re.sub(r"\bframe -?[\d.]+", "", str(error))
-            faults.setdefault(kind, str(error))
-    check.faults += faults.values()
-    return requests
-
-
-def _check_footage(check: EffectCheck, scene: Scene, effect: PropertyGroup, strip: Strip) -> bool:
-    """Return whether the footage can be opened. Note if it has changed since the edit was saved.
+def _check_footage(scene: Scene, effect: PropertyGroup, strip: Strip) -> None:
+    """Raise EffectError or MediaError if the footage is gone, or has changed since the edit was saved.
 
     The effect's scene has the size of the footage then.
     """
-    try:
-        source = strips.source_of(scene, effect, strip)
-        medium = source_media.open_media(source)
-    except UserError as error:
-        check.faults.append(str(error))
-        return False
-    medium.close()
-    size = medium.width, medium.height
-    saved = effect.scene.render.resolution_x, effect.scene.render.resolution_y
-    if saved != size:
-        words = "{}×{}, but was {}×{} when the edit was saved".format(*size, *saved)
-        check.faults.append(f"{medium.path.name}: is {words}")
-    timing = source_media.timing_of(source)
-    rate = min(float(medium.fps or math.inf) / timing.scene_fps, 1.0)  # the strip can keep the movie's speed
-    if not timing.keys and medium.count < int(source.content_duration * rate):
-        words = f"{medium.count} frames, fewer than the {source.content_duration} of strip"
-        check.faults.append(f'{medium.path.name}: has {words} "{source.name}"')
-    return True
+    source = strips.source_of(scene, effect, strip)
+    with closing(source_media.open_media(source)) as medium:
+        size = medium.width, medium.height
+        saved = effect.scene.render.resolution_x, effect.scene.render.resolution_y
+        if saved != size:
+            words = "{}×{}, but was {}×{} when the edit was saved".format(*size, *saved)
+            raise EffectError(f"{medium.path.name}: is {words}")
+        timing = source_media.timing_of(source)
+        rate = min(float(medium.fps or math.inf) / timing.scene_fps, 1.0)  # the strip can keep the movie's speed
+        if not timing.keys and medium.count < int(source.content_duration * rate):
+            words = f"{medium.count} frames, fewer than the {source.content_duration} of strip"
+            raise EffectError(f'{medium.path.name}: has {words} "{source.name}"')
 
 
-def _check_frames(check: EffectCheck, renderer: Renderer, requests: dict[float, Request]) -> None:
+def _check_frames(renderer: Renderer, requests: list[Request]) -> None:
     """Check the files that windows need: all of image sequences, and the first and last frame of a movie."""
     step = renderer.source.step
-    needed: set[int] = set().union(*map(renderer.missing, requests.values()))
-    ends = {end for index in needed for end in (index // step, -(-index // step))}
-    check.faults += _unreadable(renderer.source, ends, step)
+    needed: set[int] = set().union(*map(renderer.missing, requests))
+    _check_readable(renderer.source, {end for index in needed for end in (index // step, -(-index // step))}, step)
 
 
-def _unreadable(source: FrameSource, indices: set[int], step: int = 1) -> list[str]:
-    """Return the faults of filmed frames: the first missing file, else ends that cannot be decoded."""
+def _check_readable(source: FrameSource, indices: set[int], step: int = 1) -> None:
+    """Raise MediaError if files of filmed frames are missing, or the first or last one cannot be decoded."""
     files = source.files
-    faults: list[str] = []
-    try:
-        for path in sorted({files[index] for index in indices}) if len(files) > 1 else ():
-            check_file(path)
-    except MediaError as error:
-        return [str(error)]
-    for index in dict.fromkeys((min(indices), max(indices))) if indices else ():
-        try:
-            source.read(index * step)
-        except UserError as error:
-            faults.append(str(error))
-    return faults
+    for path in sorted({files[index] for index in indices}) if len(files) > 1 else ():
+        check_file(path)
+    for index in {min(indices), max(indices)} if indices else ():
+        source.read(index * step)
 
 
-def _check_mattes(check: EffectCheck, source: FrameSource, requests: dict[float, Request]) -> None:
+def _check_mattes(check: EffectCheck, source: FrameSource, requests: list[Request]) -> None:
     shown: dict = {}
-    for request in requests.values():
+    for request in requests:
         layers = request.state.layers
         of_layers = layers.mattes[request.index - layers.first] if layers else ()
         for matte in (*request.state.mattes, *filter(None, of_layers)):
             if isinstance(matte.content, FileFrame):
                 shown.setdefault(matte.content.file, set()).add((matte.content, request.index // source.step))
     for file, contents in shown.items():
-        try:
-            with closing(file.open()) as medium:
-                indices = {content.index(medium, index) for content, index in contents}
-                indices = {min(max(index, 0), medium.count - 1) for index in indices}
-                if isinstance(medium, CarriedMattes):
-                    lacking = sum(not medium.has(index) for index in indices)
-                    check.mattes[file.folder] = check.mattes.get(file.folder, 0) + lacking
-                else:
-                    check.faults += _unreadable(medium, indices)
-        except UserError as error:
-            check.faults.append(str(error))
+        with closing(file.open()) as medium:
+            indices = {content.index(medium, index) for content, index in contents}
+            indices = {min(max(index, 0), medium.count - 1) for index in indices}
+            if isinstance(medium, CarriedMattes):
+                lacking = sum(not medium.has(index) for index in indices)
+                check.mattes[file.folder] = check.mattes.get(file.folder, 0) + lacking
+            else:
+                _check_readable(medium, indices)
 
 
 def left_out(scene: Scene, frames: range) -> list[str]:

@@ -35,14 +35,13 @@ MOVIES = {
 
 
 class PictureFormat(NamedTuple):
-    """A format: Blender's name, bits per sample, and the samples' name in rendered_pictures."""
+    """A format: Blender's name and bits per sample."""
 
     blender: str
     bits: int
-    samples: str
 
 
-FORMATS = {"png": PictureFormat("PNG", 16, "uint16"), "exr": PictureFormat("OPEN_EXR", 32, "float")}
+FORMATS = {"png": PictureFormat("PNG", 16), "exr": PictureFormat("OPEN_EXR", 32)}
 
 # Metadata about the render itself. A frame's number would have as many digits as the range's last.
 _STAMPS = (
@@ -50,7 +49,6 @@ _STAMPS = (
     *("use_stamp_date", "use_stamp_time", "use_stamp_render_time", "use_stamp_memory", "use_stamp_hostname"),
     *("use_stamp_filename", "use_stamp_sequencer_strip"),
 )
-_LONGEST = 1000  # bytes of a path including the frame's number: Blender truncates at 1023
 
 
 class OutputError(UserError, ValueError):
@@ -136,8 +134,6 @@ def blender_path(path: str) -> str:
     """Return the path with braces escaped, which Blender uses for templates. OutputError: Blender cannot use it."""
     if os.sep == "/" and "\\" in path:
         raise OutputError(f"{path}: Blender cannot write to a path with \\")
-    if len(os.fsencode(path)) > _LONGEST:
-        raise OutputError(f"{path}: Blender cannot write to a path of more than {_LONGEST} bytes")
     return path.replace("{", "{{").replace("}", "}}")
 
 

@@ -58,8 +58,7 @@ def render(scene: Scene, folder: Path, file_format: str, version: EditVersion, *
         check_resumable(scene)
     film_output.set_pictures(scene, file_format, job_file.note(version.key))
     film_output.make_folder(folder)
-    samples = film_output.FORMATS[file_format].samples
-    is_finished = partial(_is_finished, film_output.size(scene), samples, version.key, {})
+    is_finished = partial(_is_finished, version.key, {})
     frames = range(scene.frame_start, scene.frame_end + 1)
     pictures = dict(zip(frames, film_output.pictures_of(folder, file_format, frames), strict=True))
 
@@ -103,7 +102,6 @@ def _render_missing(
                     render_job.say(words)
                 waits = True
                 time.sleep(_PAUSE)
-        claims.clear(map(_name, pictures.values()))
 
 
 def _claim_run(claims: Claims, missing: dict[int, Path], is_finished: Callable) -> dict[int, Path]:
@@ -127,7 +125,7 @@ def _name(picture: Path) -> str:
     return f"{picture.stem}_{picture.suffix[1:]}"
 
 
-def _is_finished(size: tuple[int, int], samples: str, key: str, rejected: Stamps, picture: Path) -> bool:
+def _is_finished(key: str, rejected: Stamps, picture: Path) -> bool:
     """Return whether a picture is undamaged and of this version of the edit.
 
     Args:
@@ -136,8 +134,7 @@ def _is_finished(size: tuple[int, int], samples: str, key: str, rejected: Stamps
     stamp = rendered_pictures.stamp(picture) if picture.is_file() else None  # opening a pipe would wait forever
     if stamp is None or rejected.get(picture) == stamp:
         return False
-    rendered = rendered_pictures.read(picture, key)
-    if rendered is not None and (rendered.size, rendered.samples) == (size, samples):
+    if rendered_pictures.read(picture, key) is not None:
         return True
     rejected[picture] = stamp
     return False

@@ -6,6 +6,8 @@ sources are compared with what they were, because no callback reports them.
 
 from __future__ import annotations
 
+from dataclasses import dataclass, field
+
 import bpy
 from bpy.types import PropertyGroup, Scene, Strip
 
@@ -14,9 +16,23 @@ from ..data import effect_version, snapshot, strips
 from ..data.snapshot import Snapshot
 from ..devices import main_thread
 
-_signatures: dict[int, int] = {}  # by session_uid of the effect scene
-_failed: set[int] = set()  # session_uids of effect scenes of which the sequencer may keep a frame that failed
-_reduced: set[int] = set()  # likewise, a frame of reduced quality for a preview
+
+@dataclass
+class _Frames:
+    """What the sequencer may keep of effects, by session_uid of the effect scene.
+
+    Attributes:
+        signatures: What their frames depend on.
+        failed: Those of which a frame failed.
+        reduced: Those with a frame of reduced quality for a preview.
+    """
+
+    signatures: dict[int, int] = field(default_factory=dict)
+    failed: set[int] = field(default_factory=set)
+    reduced: set[int] = field(default_factory=set)
+
+
+_frames = _Frames()
 
 
 def current(scene: Scene, effect: PropertyGroup, strip: Strip, frame: float) -> Snapshot:
@@ -31,18 +47,18 @@ def current(scene: Scene, effect: PropertyGroup, strip: Strip, frame: float) -> 
 
 def forget() -> None:
     """Forget the effects of a file, before another one is loaded."""
-    _signatures.clear()
+    _frames.signatures.clear()
     revision.changed()
 
 
 def spoil(scene: int) -> None:
     """Note that a picture of an effect scene failed."""
-    _failed.add(scene)
+    _frames.failed.add(scene)
 
 
 def drop_spoilt() -> None:
     """Drop frames that failed: the sequencer would show them again without calling the engine."""
-    _drop(_failed)
+    _drop(_frames.failed)
 
 
 def keep_until_drawn(scene: int) -> None:
@@ -50,13 +66,13 @@ def keep_until_drawn(scene: int) -> None:
 
     Blender would share it with renders, scopes and the color picker, so the draw handler drops it.
     """
-    _reduced.add(scene)
+    _frames.reduced.add(scene)
     main_thread.later(drop_lesser)  # in case the handler is not called
 
 
 def drop_lesser() -> None:
     """Drop reduced frames for previews."""
-    _drop(_reduced)
+    _drop(_frames.reduced)
 
 
 def drop_frames() -> None:
@@ -88,8 +104,8 @@ def invalidate_changed(scene: Scene) -> bool:
             continue
         uid = effect.scene.session_uid
         signature = effect_version.preview_key(scene, effect, strip)
-        if _signatures.setdefault(uid, signature) != signature:
-            _signatures[uid] = signature
+        if _frames.signatures.setdefault(uid, signature) != signature:
+            _frames.signatures[uid] = signature
             strips.invalidate(scene, effect.scene)
             changed = True
     return changed

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
 
 import bpy
 import numpy as np
@@ -24,23 +25,36 @@ from ..data.snapshot import Snapshot
 from . import effect_source, invalidation, render_job, sessions
 from .render_job import Where
 
-# Of the running job, by effect scene: timeline frames and snapshot of each part of a cut strip, or why there is none.
-_taken: dict[int, list[tuple[range, Snapshot]] | Exception] = {}
-# Of the film in the background, by effect scene and strip; None: it was read once, for one frame.
-_films: dict[tuple[int, str], Snapshot | None] = {}
-pictures: dict[int, np.ndarray] = {}  # of the job, the last one by effect scene: shown until the next is made
-_left_out: list[tuple[range, str]] = []  # of the job's film, see requirements.left_out
+
+@dataclass
+class _Film:
+    """What is known of the running job or film, by session_uid of effect scenes.
+
+    Attributes:
+        taken: Of a job: timeline frames and snapshot of each part of a cut strip, or why there is none.
+        read: Of a film in the background, by effect scene and strip; None: it was read once, for one frame.
+        pictures: Of a job: the last ones, shown until the next are made.
+        left_out: Of a job: see requirements.left_out.
+    """
+
+    taken: dict[int, list[tuple[range, Snapshot]] | Exception] = field(default_factory=dict)
+    read: dict[tuple[int, str], Snapshot | None] = field(default_factory=dict)
+    pictures: dict[int, np.ndarray] = field(default_factory=dict)
+    left_out: list[tuple[range, str]] = field(default_factory=list)
+
+
+running = _Film()
 
 
 def begin(film: int) -> None:
     """Read all effects for a job, on the main thread. `film` is the session_uid of the rendered scene."""
-    _taken.clear()
+    end()
     film_scene = strips.scene_of_uid(film)
     for scene, effect, parts in shown_effects(film_scene) if film_scene else ():
-        if effect.scene.session_uid in _taken:  # a copied scene: the first counts, as in strips.find_effect
+        if effect.scene.session_uid in running.taken:  # a copied scene: the first counts, as in strips.find_effect
             continue
         try:
-            _taken[effect.scene.session_uid] = [
+            running.taken[effect.scene.session_uid] = [
                 (
                     range(part.left_handle, part.right_handle),
                     snapshot.take(scene, effect, part, asked_frames(scene, [part], scene == film_scene)),
@@ -48,8 +62,8 @@ def begin(film: int) -> None:
                 for part in parts
             ]
         except effect_source.FAULTS as error:
-            _taken[effect.scene.session_uid] = error
-    look(film)
+            running.taken[effect.scene.session_uid] = error
+    running.left_out += requirements.left_out(film_scene) if film_scene else []
 
 
 def _part_at(parts: list[tuple[range, Snapshot]], scene_frame: float) -> Snapshot:
@@ -60,22 +74,14 @@ def _part_at(parts: list[tuple[range, Snapshot]], scene_frame: float) -> Snapsho
 
 def end() -> None:
     """Forget all snapshots, after a job or a film."""
-    _taken.clear()
-    _films.clear()
-    _left_out.clear()
-    pictures.clear()
+    for known in (running.taken, running.read, running.pictures, running.left_out):
+        known.clear()
     sessions.end_job()
-
-
-def look(film: int) -> None:
-    """Find the frames at which the sequencer leaves effects out: the user may delete a camera during the render."""
-    scene = strips.scene_of_uid(film)
-    _left_out[:] = requirements.left_out(scene) if scene else []
 
 
 def left_out(scene: Scene) -> str | None:
     """Return why the sequencer leaves an effect out of a film's current frame, or None."""
-    reasons = _left_out if render_job.where() is Where.JOB else requirements.left_out(scene)
+    reasons = running.left_out if render_job.where() is Where.JOB else requirements.left_out(scene)
     return next((why for frames, why in reasons if scene.frame_current in frames), None)
 
 
@@ -90,7 +96,7 @@ def of(effect_scene: Scene, scene_frame: float, ended: Callable[[], bool] | None
     """
     uid = effect_scene.session_uid
     if render_job.where() is Where.JOB:
-        parts = _taken.get(uid)
+        parts = running.taken.get(uid)
         taken = _part_at(parts, scene_frame) if isinstance(parts, list) else parts
         if taken is None or (isinstance(taken, Snapshot) and taken.timeline_frame(scene_frame) not in taken.frames):
             taken = render_job.on_main_thread(lambda: _late(uid, scene_frame), ended)
@@ -109,15 +115,15 @@ def of(effect_scene: Scene, scene_frame: float, ended: Callable[[], bool] | None
 def _of_film(scene: Scene, effect: PropertyGroup, strip: Strip, frame: float) -> Snapshot:
     """Return the snapshot of an effect in the background."""
     key, frames = (effect.scene.session_uid, strip.name), {frame, frame + scene.frame_step}
-    is_again = key in _films and not render_job.scripts_act()
-    if is_again and (known := _films[key]) is not None and frame in known.frames:
+    is_again = key in running.read and not render_job.scripts_act()
+    if is_again and (known := running.read[key]) is not None and frame in known.frames:
         return known
     if is_again:
         parts = [part for part in strips.effect_strips(scene) if part.scene == effect.scene]
         frames |= asked_frames(scene, parts, scene.session_uid == render_job.film())
     taken = snapshot.take(scene, effect, strip, frames)
     if render_job.runs():
-        _films[key] = taken if is_again else None
+        running.read[key] = taken if is_again else None
     return taken
 
 

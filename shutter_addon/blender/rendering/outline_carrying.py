@@ -57,15 +57,28 @@ class _Carrying:
                 self.done += 1
 
 
-_wanted: dict[CarriedFile | SubjectFile, set[int]] = {}  # source frames that previews lack
-_failed: dict[CarriedFile | SubjectFile, str] = {}  # why mattes could not be made
-_running: list[_Carrying] = []  # one at most
+@dataclass
+class _Mattes:
+    """The mattes that previews lack.
+
+    Attributes:
+        wanted: Source frames, by file.
+        failed: Why mattes of a file could not be made.
+        carrying: Those that are made.
+    """
+
+    wanted: dict[CarriedFile | SubjectFile, set[int]] = field(default_factory=dict)
+    failed: dict[CarriedFile | SubjectFile, str] = field(default_factory=dict)
+    carrying: _Carrying | None = None
+
+
+_mattes = _Mattes()
 
 
 def want(file: CarriedFile | SubjectFile, frame: int) -> None:
     """Note the source frame of a matte that a preview misses."""
-    if file not in _failed:
-        _wanted.setdefault(file, set()).add(frame)
+    if file not in _mattes.failed:
+        _mattes.wanted.setdefault(file, set()).add(frame)
 
 
 def begin(arrived: Callable[[], None]) -> str | None:
@@ -79,12 +92,12 @@ def begin(arrived: Callable[[], None]) -> str | None:
     Returns:
         Why mattes cannot be made, or None.
     """
-    wanted = {file: frames for file, frames in _wanted.items() if file not in _failed}
-    _wanted.clear()
-    if wanted and not (_running and _running[0].file in wanted):
+    wanted = {file: frames for file, frames in _mattes.wanted.items() if file not in _mattes.failed}
+    _mattes.wanted.clear()
+    if wanted and not (_mattes.carrying and _mattes.carrying.file in wanted):
         file, frames = next(iter(wanted.items()))
         carry(file, list(frames), arrived)
-    return next(iter(_failed.values()), None)
+    return next(iter(_mattes.failed.values()), None)
 
 
 def carry(
@@ -95,52 +108,52 @@ def carry(
     `arrived` is as in `begin`.
     """
     stop()
-    _failed.pop(file, None)
-    _running.append(_Carrying(file=file, frames=frames, arrived=arrived, middle=middle))
+    _mattes.failed.pop(file, None)
+    _mattes.carrying = _Carrying(file=file, frames=frames, arrived=arrived, middle=middle)
     main_thread.later(_look, TICK)
 
 
 def failure(file: CarriedFile | SubjectFile) -> str | None:
     """Return why the mattes of a file could not be made, or None."""
-    return _failed.get(file)
+    return _mattes.failed.get(file)
 
 
 def progress() -> tuple[int, int] | None:
     """Return how many mattes are made, and of how many; None: none are being made."""
-    return (_running[0].done, len(_running[0].frames)) if _running else None
+    carrying = _mattes.carrying
+    return (carrying.done, len(carrying.frames)) if carrying else None
 
 
 def _look() -> float | None:
     """Show what is made, as a timer."""
-    if not _running:
+    if (carrying := _mattes.carrying) is None:
         return None
-    carrying = _running[0]
     preview_areas.redraw(bpy.context)
     if not carrying.future.done():
         if carrying.done >= carrying.soon > carrying.told:  # show drawings as soon as they are corrected
             carrying.told = carrying.done
             carrying.arrived()
         return TICK
-    _running.clear()
+    _mattes.carrying = None
     try:
         carrying.future.result()
     except stopping.StoppedError:
         return None
     except Exception as error:  # otherwise Blender ends the timer, and previews start over again
-        _failed[carrying.file] = in_words(error)
+        _mattes.failed[carrying.file] = in_words(error)
     carrying.arrived()
     return None
 
 
 def stop() -> None:
     """Stop making mattes; finished ones stay."""
-    for carrying in _running:
-        carrying.ended.set()
-    _running.clear()
+    if _mattes.carrying is not None:
+        _mattes.carrying.ended.set()
+        _mattes.carrying = None
 
 
 def forget(*_: object) -> None:
     """Stop and forget everything, when a file is loaded or the extension is disabled."""
     stop()
-    _wanted.clear()
-    _failed.clear()
+    _mattes.wanted.clear()
+    _mattes.failed.clear()

@@ -13,7 +13,7 @@ import time
 from collections.abc import Callable, Iterator
 from concurrent.futures import Future, wait
 from contextlib import AbstractContextManager, contextmanager, suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import Enum
 from functools import partial
 from itertools import chain
@@ -67,6 +67,7 @@ class _Job:
         tell: Called with that sentence in the background.
         cancelling: Whether the small render runs whose error ends it (_cancel).
         waited_for: Whether the window waits for every picture (Where.WAITED_FOR).
+        spent: Names of scenes and cameras of small renders (_cancel).
     """
 
     film: int | None = None
@@ -76,10 +77,10 @@ class _Job:
     tell: Callable[[str], None] = say
     cancelling: bool = False
     waited_for: bool = False
+    spent: list[tuple[str, str]] = field(default_factory=list)
 
 
 _job = _Job()
-_spent: list[tuple[str, str]] = []  # names of scenes and cameras of small renders (_cancel)
 
 
 def begin(scene: Scene) -> bool:
@@ -274,7 +275,7 @@ def _cancel() -> None:
     _job.cancelling = True
     scene = bpy.data.scenes.new("Cancelled")
     camera = bpy.data.objects.new("Cancelled", None)
-    _spent.append((scene.name, camera.name))
+    _job.spent.append((scene.name, camera.name))
     try:
         scene.render.engine = ENGINE
         scene.render.resolution_x = scene.render.resolution_y = 4
@@ -293,8 +294,8 @@ def _remove_spent() -> float | None:
     """
     if bpy.app.is_job_running("RENDER"):
         return _PATIENCE
-    while _spent:
-        scene, camera = _spent.pop()
+    while _job.spent:
+        scene, camera = _job.spent.pop()
         items = (bpy.data.scenes.get(scene), bpy.data.objects.get(camera))
         bpy.data.batch_remove([item for item in items if item is not None])
     return None

@@ -7,12 +7,10 @@ same work. Nothing is lost, since results are written whole and are equal.
 """
 
 import os
-import re
 import secrets
 import socket
 import threading
 import time
-from collections.abc import Iterable
 from contextlib import suppress
 from pathlib import Path
 from typing import Self
@@ -21,10 +19,6 @@ from .. import threads
 
 PATIENCE = 120.0  # seconds without a change after which a claim is abandoned
 BEAT = 10.0  # seconds between touches; network drives can show them a minute late
-
-_NAME = re.compile(r"\.claim-(\w+)-[0-9]+")
-_LONGEST = 256  # bytes of a claim
-_READ = os.O_RDONLY | getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_NONBLOCK", 0)
 
 
 class Claims:
@@ -81,14 +75,6 @@ class Claims:
         for each in range(generation, -1, -1):
             _remove(self._path(name, each))
 
-    def clear(self, names: Iterable[str]) -> None:
-        """Remove claims that killed processes left on finished work."""
-        names = set(names)
-        with suppress(OSError), os.scandir(self._folder) as entries:
-            for entry in entries:
-                if (match := _NAME.fullmatch(entry.name)) and match[1] in names:
-                    _remove(Path(entry.path))
-
     def _path(self, name: str, generation: int) -> Path:
         return self._folder / f".claim-{name}-{generation}"
 
@@ -128,14 +114,11 @@ def _look(path: Path) -> tuple[bytes, int] | int | None:
     It is opened, so that network drives update it.
     """
     try:
-        file = os.open(path, _READ)
-        try:
-            return os.read(file, _LONGEST), os.fstat(file).st_mtime_ns
-        finally:
-            os.close(file)
+        with path.open("rb") as file:
+            return file.read(), os.fstat(file.fileno()).st_mtime_ns
     except FileNotFoundError:
         return None
-    except OSError as error:  # a folder, a link, or another user's: like a claim that nobody touches
+    except OSError as error:  # a folder, or another user's: like a claim that nobody touches
         return error.errno
 
 
