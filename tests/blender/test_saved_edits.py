@@ -125,7 +125,6 @@ def test_resume_renders_what_is_missing_damaged_or_of_another_version(bpy, saved
     (out / "0004.png").write_bytes(content[: len(content) // 2])
     shutil.copy(other / "0005.png", out / "0005.png")
     shutil.copy(tmp_path / "in" / "f0007.png", out / "0007.png")
-    (out / ".claim-0009_png-0").touch()  # of a frame that its holder finished before it was killed
     before = places(out)
     assert run("render", saved, "--output", out, "--resume") == (0, "")
     after = places(out)
