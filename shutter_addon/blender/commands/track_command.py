@@ -83,7 +83,8 @@ def run(arguments: Namespace) -> None:
     keyed = source_recipe.with_parts(regions, new if index is None else None)
     _write_track(arguments, keyed, tracked, stops)
     for stop in stops:
-        render_job.say(f"{subject}: not tracked from frame {stop.frame} on: {stop.fault}")
+        said = f"{subject}: not tracked from frame {stop.frame} on: {stop.fault}"  # not translated
+        render_job.say(said)
 
 
 def _region_index(arguments: Namespace, source_recipe: Effect) -> int:
