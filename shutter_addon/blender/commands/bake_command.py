@@ -68,5 +68,4 @@ def _effect_strip(scene: Scene, name: str) -> tuple[PropertyGroup, Strip]:
     for strip in strips.effect_strips(scene):
         if strip.name == name and (effect := strips.effect_of(scene, strip.scene)) is not None:
             return effect, strip
-    others = ", ".join(f'"{strip.name}"' for strip in strips.effect_strips(scene)[:5]) or "none"
-    raise film_output.OutputError(f'--strip: there is no Shutter strip "{sentence(name, 40)}"; there are: {others}')
+    raise film_output.OutputError(f'--strip: there is no Shutter strip "{sentence(name, 40)}"')

@@ -44,12 +44,7 @@ def add(commands: argparse._SubParsersAction) -> None:
     option("--all-keys", action="store_true", help="a key at every frame, needed or not")
     option("--hold", action="store_true", help="stay opaque where the track has ended: no keys of opacity")
     option("--output", type=to_path, required=True, metavar="R2.json", help="the recipe with the keys")
-    option(
-        "--report",
-        type=to_path,
-        metavar="FILE.json",
-        help="the confidence of each frame, and where tracking ended",
-    )
+    option("--report", type=to_path, metavar="FILE.json", help="each frame's confidence, and where tracking ended")
     parser.set_defaults(run=run)
 
 

@@ -14,13 +14,13 @@ from ...compute.renderer import Renderer
 from ...compute.request import Request
 from ...core.frames import frame_ranges
 from ...core.frames.frame_source import FrameSource
-from ...core.messages import EffectError
 from ...core.model.mattes import FileFrame
 from ...media.carried_mattes import CarriedMattes
 from ...media.files import check_file
 from ..data import requirements, snapshot, source_media, strips
 from ..rendering import effect_source, job_snapshots, pictures
 from ..rendering.session import RenderContext, RenderSession
+from .film_output import OutputError
 
 
 @dataclass
@@ -82,13 +82,13 @@ def _effect(session: RenderSession, shown: tuple) -> EffectCheck:
             check.notes.append(pictures.SLOW_DECODING)
         if lacking := sum(check.mattes.values()):
             check.notes.append(f"{lacking} mattes of outlines are not tracked yet: the first render does that")
-    except effect_source.FAULTS as error:
+    except (OutputError, *effect_source.FAULTS) as error:
         check.fault = str(error)
     return check
 
 
 def _check_footage(scene: Scene, effect: PropertyGroup, strip: Strip) -> None:
-    """Raise EffectError or MediaError if the footage is gone, or has changed since the edit was saved.
+    """Raise a UserError if the footage is gone, or has changed since the edit was saved.
 
     The effect's scene has the size of the footage then.
     """
@@ -98,12 +98,12 @@ def _check_footage(scene: Scene, effect: PropertyGroup, strip: Strip) -> None:
         saved = effect.scene.render.resolution_x, effect.scene.render.resolution_y
         if saved != size:
             words = "{}×{}, but was {}×{} when the edit was saved".format(*size, *saved)
-            raise EffectError(f"{medium.path.name}: is {words}")
+            raise OutputError(f"{medium.path.name}: is {words}")
         timing = source_media.timing_of(source)
         rate = min(float(medium.fps or math.inf) / timing.scene_fps, 1.0)  # the strip can keep the movie's speed
         if not timing.keys and medium.count < int(source.content_duration * rate):
             words = f"{medium.count} frames, fewer than the {source.content_duration} of strip"
-            raise EffectError(f'{medium.path.name}: has {words} "{source.name}"')
+            raise OutputError(f'{medium.path.name}: has {words} "{source.name}"')
 
 
 def _check_frames(renderer: Renderer, requests: list[Request]) -> None:
