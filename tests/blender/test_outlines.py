@@ -250,11 +250,10 @@ def test_to_a_mask_and_back(bpy, chosen):
     assert (edit.frame_current, [area.ui_type for area in bpy.context.window.screen.areas]) == before
     mask = bpy.data.masks["o"]
     assert (mask.frame_start, mask.frame_end) == (1, COUNT)
-    assert mask_reading.key_frames(mask)[-6:] == [2, 4, 6, 8, 10, 12]
-    for number in range(1, COUNT):
-        values = mask_reading.mask_at(mask, 1 + number).values(WIDTH, HEIGHT)
+    first, *others = [shape.values(WIDTH, HEIGHT) for shape in mask_reading.at_frames(mask, range(1, COUNT + 1))]
+    for number, values in enumerate(others, 1):
         assert np.abs(values - covered(number)).mean() < 0.015, number
-    assert mask_reading.mask_at(mask, 1).values(WIDTH, HEIGHT).max() == 0, "before its first drawing"
+    assert first.max() == 0, "before its first drawing"
     again = outline_drawings.from_mask(edit, effect, strip, effect.shutters["S1"], mask)
     index = len(effect.regions) - 1
     assert (again.kind, again.between, effect.active_region) == ("OUTLINE", "STRAIGHT", index)

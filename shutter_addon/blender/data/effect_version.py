@@ -11,7 +11,7 @@ from collections.abc import Callable, Hashable, Iterator
 from dataclasses import replace
 
 import numpy as np
-from bpy.types import FCurve, Mask, PropertyGroup, Scene, Strip
+from bpy.types import FCurve, PropertyGroup, Scene, Strip
 
 from ...core import revision
 from ...core.frames.retiming import StripTiming
@@ -159,7 +159,7 @@ def _setting_names(*kinds: type) -> list[str]:
     return [field.blender for field in fields if field.choices or not isinstance(field.default, str | tuple)]
 
 
-def _curves(owner: Scene | Mask, path: str, start: int | None) -> Iterator[Hashable]:
+def _curves(owner: Scene, path: str, start: int | None) -> Iterator[Hashable]:
     """Yield what the F-curves say whose path starts with `path`, in the order of their paths."""
     found = fcurves.curves_under(owner, path)
     for curve in sorted(found, key=lambda curve: (curve.data_path, curve.array_index)):
@@ -198,18 +198,11 @@ def _matte(region: PropertyGroup, files: Files, start: int | None) -> Iterator[H
             yield timing(part, start or 0)
             yield files(part)
         if region.matte == "MASK" and region.mask is not None:
-            yield from _mask(region.mask)
+            # Blender reports changes of a mask, and many points take long to read.
+            mask = region.mask
+            yield revision.until_change("mask", mask.session_uid, lambda: repr(mask_reading.still(mask)))
     except (MediaError, EffectError) as error:
         yield str(error)
-
-
-def _mask(mask: Mask) -> Iterator[Hashable]:
-    # Blender reports changes of a mask, and many points take long to read.
-    key = mask.session_uid
-    yield mask.frame_start
-    yield revision.until_change("mask", key, lambda: repr(mask_reading.mask_at(mask, mask.frame_start)))
-    yield from mask_reading.motion(mask)
-    yield from _curves(mask, "", None)
 
 
 def timing(strip: Strip, start: int = 0) -> StripTiming:

@@ -32,7 +32,7 @@ from . import mask_reading, preferences, source_media, strips, validation
 from .external_files import absolute
 from .sampled import Sampling
 
-_MOMENTS = 16  # steps from a filmed frame to the next, at which masks are read
+_MOMENTS = 16  # steps from a filmed frame to the next
 
 
 def content(sampling: Sampling, region: PropertyGroup, moves: Moves) -> Channel:
@@ -50,7 +50,7 @@ def content(sampling: Sampling, region: PropertyGroup, moves: Moves) -> Channel:
     if matte == "STRIP":
         return _strip_frames(sampling, region)
     if matte == "MASK":
-        return _mask_shapes(sampling, region)
+        return _mask(region)
     first = strips.origin(sampling.strip) if validation.word(region, "timing") == "TIMELINE" else None
     return mattes.FileFrames(file=image_file(region), offset=validation.number(region, "offset"), first=first)
 
@@ -130,14 +130,10 @@ def _listed(path: Path, _stamp: tuple) -> list[Path]:
         return []
 
 
-def _mask_shapes(sampling: Sampling, region: PropertyGroup) -> Channel:
-    """Return a mask's shapes by frame of the source: its first is the mask's start, as in a Mask strip above it."""
-    mask = region.mask
-    if mask is None:
+def _mask(region: PropertyGroup) -> Channel:
+    if region.mask is None:
         raise EffectError(rpt_("{place}: it has no mask").format(place=validation.place(region)))
-    is_keyed = bool(mask_reading.key_frames(mask))
-    filmed = shown_frame(sampling) if is_keyed else lambda _frame: 0.0
-    return sampling.over(is_keyed, lambda frame: mask_reading.mask_at(mask, mask.frame_start + filmed(frame)))
+    return keyframes.Constant(mask_reading.still(region.mask))
 
 
 def shown_frame(sampling: Sampling) -> Callable[[float], float]:

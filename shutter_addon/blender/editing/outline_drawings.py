@@ -18,6 +18,7 @@ from ...core import revision
 from ...core.messages import EffectError
 from ...core.model import outlines, scribbles
 from ...core.model.keyframes import Ease
+from ...core.model.masks import MaskShape
 from ...core.model.scribbles import mapped
 from ...media import flow, outlining
 from ...media.carried_mattes import CarriedFile, CarriedMattes
@@ -30,6 +31,7 @@ from . import region_edits
 
 Strokes = outlines.Curves | list[np.ndarray]  # each (n, 2), in fractions of the picture
 SURE_SUBJECT = 0.5  # a more confident frame of a subject needs no correction
+_EVEN = 1e-5  # what an even motion of a mask may change from frame to frame, in pictures
 SURE = 0.75  # a more confident frame needs no drawing: its overlap is usually 90 %
 
 
@@ -231,16 +233,16 @@ def to_mask(context: Context, of: tuple[Scene, PropertyGroup, Strip], index: int
 
 
 def from_mask(scene: Scene, effect: PropertyGroup, strip: Strip, shutter: PropertyGroup, mask: Mask) -> PropertyGroup:
-    """Add a region: an outline with a drawing for each keyframe of a mask.
+    """Add a region: an outline with drawings where a mask's motion changes.
 
     Raises:
         EffectError, MediaError: the mask cannot be read, encloses nothing in the strip, or OpenCV is missing.
     """
     size = annotations.picture_size(effect)
-    shapes = {
-        frame: outlining.traced(mask_reading.mask_at(mask, mask.frame_start + number).values(*size))
-        for frame, number in _drawn_frames(scene, effect, strip, mask).items()
-    }
+    shown = snapshot.source_frames(scene, effect, strip, range(strip.left_handle, strip.right_handle))
+    masks = mask_reading.at_frames(mask, [mask.frame_start + number for number in shown.values()])
+    drawn = _where_motion_changes(dict(zip(map(int, shown), masks, strict=True)))
+    shapes = {frame: outlining.traced(shape.values(*size)) for frame, shape in drawn.items()}
     if not any(shapes.values()):
         raise EffectError(rpt_('mask "{mask}" encloses nothing in the strip').format(mask=mask.name))
     region = region_edits.add_region(effect, shutter, "OUTLINE", mask.name)
@@ -328,17 +330,18 @@ def _mask_editor(context: Context, mask: Mask) -> Iterator[None]:
                 yield
 
 
-def _drawn_frames(scene: Scene, effect: PropertyGroup, strip: Strip, mask: Mask) -> dict[int, int]:
-    """Return the timeline frames that get a drawing, with their source frames.
+def _where_motion_changes(shapes: dict[int, MaskShape]) -> dict[int, MaskShape]:
+    """Return those of a mask's shapes by frame between which it moves evenly."""
+    steps = np.diff(np.array([_numbers(shape) for shape in shapes.values()]), axis=0)
+    changes = np.abs(np.diff(steps, axis=0, prepend=1, append=0)).max(axis=1, initial=0)
+    return {frame: shape for (frame, shape), change in zip(shapes.items(), changes, strict=True) if change > _EVEN}
 
-    These are the frames of the mask's keys, and the strip's ends if the mask has keys beyond them.
-    """
-    frames = range(strip.left_handle, strip.right_handle)
-    shown = snapshot.source_frames(scene, effect, strip, frames)
-    wanted = [frame - mask.frame_start for frame in mask_reading.key_frames(mask)] or [0]
-    numbers = {round(min(max(number, min(shown.values())), max(shown.values()))) for number in wanted}
-    nearest = {min(frames, key=lambda frame: abs(shown[frame] - number)): number for number in sorted(numbers)}
-    return {frame: shown[frame] for frame in sorted(nearest)}
+
+def _numbers(shape: MaskShape) -> np.ndarray:
+    """Return the numbers of a mask that may move."""
+    splines = [spline for layer in shape.layers for spline in layer.splines]
+    moving = [np.concatenate([np.ravel(spline.points), spline.weights]) for spline in splines]
+    return np.concatenate([[layer.alpha for layer in shape.layers], *moving])
 
 
 def _in_order(shapes: dict[int, outlines.Curves], aspect: float) -> dict[int, outlines.Curves]:

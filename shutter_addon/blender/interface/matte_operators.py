@@ -88,7 +88,7 @@ def matte_mask(self: Operator, _context: Context, effect: PropertyGroup) -> None
 
 @operator("Outline from Mask", needs.room_for_a_region, _why_no_mask, mask=_MASK)
 def outline_from_mask(self: Operator, _context: Context, effect: PropertyGroup) -> None:
-    """Make an outline of the active shutter with a drawing at each key of a mask"""
+    """Make an outline of the active shutter that moves as a mask does"""
     shutter = selection.active_shutter(effect)
     outline_drawings.from_mask(self.edit, effect, self.effect_strip, shutter, _mask_named(self.mask))
 

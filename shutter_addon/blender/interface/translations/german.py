@@ -168,15 +168,8 @@ MESSAGES = {
     ): "Maske „{mask}“: ein Punkt, eine weiche Kante oder eine Deckkraft ist keine brauchbare Zahl",
     (
         "*",
-        'mask "{mask}": parents of its points are not followed, but a film of its Mask strip can be the matte',
-    ): "Maske „{mask}“: den Eltern ihrer Punkte wird nicht gefolgt, aber ein Film ihres Maskenstreifens kann die Matte"
-    " sein",
-    (
-        "*",
-        'mask "{mask}": its shape keys cannot be read in this version of Blender, but a film of its Mask strip can'
-        " be the matte",
-    ): "Maske „{mask}“: ihre Formschlüssel sind in dieser Version von Blender nicht lesbar, aber ein Film ihres"
-    " Maskenstreifens kann die Matte sein",
+        'mask "{mask}" moves: use "Outline from Mask", or take a film of its Mask strip for the matte',
+    ): "Maske „{mask}“ bewegt sich: Nehmen Sie „Umriss aus Maske“ oder für die Matte einen Film ihres Maskenstreifens",
     (
         "*",
         'strip "{strip}": its retiming keys cannot be read in this version of Blender, so it is shown at an even speed;'
@@ -562,8 +555,8 @@ MESSAGES = {
     ): "Aus dem aktiven Umriss eine Blender-Maske mit Formschlüsseln machen; zuvor wird er verfolgt",
     (
         "*",
-        "Make an outline of the active shutter with a drawing at each key of a mask",
-    ): "Einen Umriss des aktiven Verschlusses machen, der an jedem Schlüssel einer Maske gezeichnet ist",
+        "Make an outline of the active shutter that moves as a mask does",
+    ): "Einen Umriss des aktiven Verschlusses machen, der sich wie eine Maske bewegt",
     ("*", "Every"): "Jedes",
     (
         "*",
