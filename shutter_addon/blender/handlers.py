@@ -115,7 +115,6 @@ def _prepare(film: int, in_job: bool) -> bool:
     invalidation.drop_spoilt()
     invalidation.drop_lesser()
     source_media.look_again()
-    source_media.rest(render_job.runs())
     if not data_format.is_file_newer():
         # In a window the last update has done that, except for views, which no handler reports.
         reconciling.follow_sources(reconciling.tidy() if bpy.app.background else reconciling.gather())
@@ -143,7 +142,6 @@ def _after_render(scene: Scene, *_) -> None:
     edit_feed.end()
     job_snapshots.end()
     render_job.end(scene, alone=not render_job.script_waits(inspect.currentframe()))
-    source_media.rest(render_job.runs())
 
 
 _hooks: list = []  # the sys.excepthook before ours, if ours is installed

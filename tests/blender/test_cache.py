@@ -1,7 +1,5 @@
 """Every change that changes pictures reaches the sequencer's cache of finished frames; playing does not."""
 
-from types import SimpleNamespace
-
 import numpy as np
 import pytest
 from support import effect_of, image_strip, recipe, remembering, request, write_frames
@@ -193,18 +191,6 @@ def test_a_file_replaced_in_the_middle_is_rendered(bpy, edit, effect, render, im
 
 
 @pytest.fixture
-def clock(monkeypatch):
-    """A clock that stands still: a function that sets it forward."""
-    now = [1000.0]
-    monkeypatch.setattr(source_media, "time", SimpleNamespace(monotonic=lambda: now[0]))
-
-    def wait(seconds):
-        now[0] += seconds
-
-    return wait
-
-
-@pytest.fixture
 def asked(monkeypatch):
     """The files of which it was asked whether they are the same."""
     asked, stamp = [], source_media.stamp
@@ -221,24 +207,16 @@ def long(edit, effect, images):
     return source
 
 
-@pytest.mark.usefixtures("long")
-def test_replaced_files_of_a_long_sequence_are_noticed_little_by_little(edit, images, clock, asked):
-    """Each look asks few of its files, and all of them are asked in turn."""
+def test_replaced_files_of_a_sequence_are_noticed_at_a_look(edit, effect, images):
     invalidation.invalidate_changed(edit)
-    for _ in range(10):
-        asked.clear()
-        clock(1)
-        assert not invalidation.invalidate_changed(edit)
-        assert 50 < len(asked) < 110
-    (images.parent / "f0015.png").write_bytes(images.read_bytes() + b"more")
-    assert any(invalidation.invalidate_changed(edit) for _ in range(10) if clock(1) is None)
     (images.parent / "f0016.png").write_bytes(images.read_bytes() + b"more")
+    assert not invalidation.invalidate_changed(edit)
     source_media.look_again()
     assert invalidation.invalidate_changed(edit)
     assert not invalidation.invalidate_changed(edit)
 
 
-@pytest.mark.usefixtures("clock", "long")
+@pytest.mark.usefixtures("long")
 def test_a_redraw_asks_the_ends_of_a_sequence_alone(edit, effect, asked):
     (strip,) = strips.effect_strips(edit)
     invalidation.invalidate_changed(edit)
@@ -249,14 +227,13 @@ def test_a_redraw_asks_the_ends_of_a_sequence_alone(edit, effect, asked):
         assert len(asked) == 4
 
 
-def test_a_film_asks_all_files_before_it_and_then_the_ends_alone(bpy, edit, render, long, clock, asked, monkeypatch):
+def test_a_film_asks_all_files_before_it_and_then_the_ends_alone(bpy, edit, render, long, asked, monkeypatch):
     """However long a picture takes."""
     begin, counts = session.RenderSession.begin_next, []
 
     def begin_next(*arguments):
         counts.append(len(asked))
         asked.clear()
-        clock(60)
         begin(*arguments)
 
     monkeypatch.setattr(session.RenderSession, "begin_next", begin_next)
@@ -267,12 +244,9 @@ def test_a_film_asks_all_files_before_it_and_then_the_ends_alone(bpy, edit, rend
     assert counts[0] >= len(long.elements)
     assert len(counts) >= 5
     assert 2 <= max(counts[1:]) < 10
-    asked.clear()
-    source_media.files_key(long)
-    assert len(asked) == 102
 
 
-@pytest.mark.usefixtures("effect", "clock")
+@pytest.mark.usefixtures("effect")
 def test_what_is_known_of_files_is_bounded(edit, asked):
     source = edit.sequence_editor.strips["images"]
 

@@ -10,7 +10,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from support import source_time, state, write_frames
 
-from shutter_addon.blender.data import fcurves, recipe_import, validation
+from shutter_addon.blender.data import fcurves, recipe_import
 from shutter_addon.blender.editing import add_effect, shutter_edits
 from shutter_addon.blender.output.matte_export import recipe_for
 from shutter_addon.core.messages import EffectError
@@ -434,22 +434,6 @@ def test_names_are_as_long_as_recipes_have_them(effect_on, letter):
     assert len(set(names)) == len(names)
 
 
-@pytest.mark.parametrize("place", ["shutter", "region"])
-def test_a_longer_name_of_a_file_shows_and_is_no_recipe(effect_on, place):
-    edit, effect, strip = effect_on
-    apply(effect_on, BASE)
-    item, name = getattr(effect, f"{place}s")[0], "n" * 70
-    if place == "shutter":
-        for region in effect.regions:
-            region.shutter = name if region.shutter == item.name else region.shutter
-    item.bl_system_properties_get()["name"] = name
-    assert item.name == name
-    assert state(edit, effect, strip, FIRST).bars.any()
-    sentence = f'{place} "{name}": its name has 70 characters, but at most 63 are possible'
-    with pytest.raises(validation.EffectError, match=sentence):
-        export(effect_on)
-
-
 def test_what_no_recipe_can_hold(effect_on):
     edit, effect, _ = effect_on
     with pytest.raises(EffectError, match='"Shutter" has no shutter'):
@@ -464,27 +448,3 @@ def test_what_no_recipe_can_hold(effect_on):
         curve(edit, f"shutters[1].bars[{k}].weight").keyframe_points[1].co[1] = 0
     with pytest.raises(EffectError, match='shutter "Keyed" at frame 47: all bars are zero'):
         export(effect_on)
-
-
-@pytest.mark.parametrize(
-    ("keys", "sentence"),
-    [
-        ([1, 1_048_574], "frame 1048574 of the recipe: a key cannot lie beyond Blender's timeline"),
-        ([1, 1.0000001], "frame 1 of the recipe: so late on the timeline, the next key is on the same frame"),
-    ],
-)
-@pytest.mark.parametrize("part", ["time", "shutters", "regions"])
-def test_keys_that_cannot_lie_there_leave_the_effect_as_it_was(effect_on, part, keys, sentence):
-    """The strip begins at frame 31, and Blender counts frames in float32."""
-    apply(effect_on, BASE)
-    before = export(effect_on)
-    data = {"version": 2, "window": 1, "shutters": [{"name": "A", "bars": [1]}]}
-    if part == "time":
-        data["time"] = [{"frame": frame, "value": 1} for frame in keys]
-    elif part == "shutters":
-        data["shutters"] = [{"name": "A", "keys": [{"frame": frame, "bars": [1]} for frame in keys]}]
-    else:
-        data["regions"] = [{"shutter": "A", "strokes": [[[0, 0]]], "keys": [{"frame": frame} for frame in keys]}]
-    with pytest.raises(EffectError, match=sentence):
-        apply(effect_on, data)
-    assert export(effect_on) == before

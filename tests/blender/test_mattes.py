@@ -10,7 +10,7 @@ import pytest
 from support import effect_of, image_strip, read_picture, recipe, request, sequencer, write_frames
 
 from shutter_addon.blender import command
-from shutter_addon.blender.data import annotations, matte_look, recipe_import, selection, source_media, strips
+from shutter_addon.blender.data import annotations, recipe_import, selection, source_media, strips
 from shutter_addon.blender.interface import region_gizmo
 from shutter_addon.blender.output import matte_export
 from shutter_addon.blender.rendering import invalidation, sessions
@@ -388,26 +388,6 @@ def test_handles_of_a_ramp(bpy, edit, shown, monkeypatch):
         handle = region_gizmo.SHUTTER_GT_region
         pressed = handle.invoke(handle, bpy.context, None)
         assert pressed == {"CANCELLED"}, "a handle that was there a moment ago moves nothing"
-
-
-def test_what_panels_tell(edit, shown, matte):
-    strip, effect, _coefficients = shown(data(region(matte)))
-    one = effect.regions[0]
-
-    def look():
-        return tuple(matte_look.look(edit, effect, strip, one))
-
-    assert look() == (f"{WIDTH} × {HEIGHT}, {COUNT} frames", "", "")
-    one.offset = 1
-    assert look()[2] == "Shorter than the film: its last frame holds"
-    one.matte, one.strip_name = "STRIP", strip_of(edit, matte, 1, 4).name
-    assert look() == (
-        f"{WIDTH} × {HEIGHT}, 4 frames",
-        "",
-        "Ends before the film: its last frame holds",
-    )
-    one.channel = "NAMED"
-    assert look() == ("", 'region "m": its channel has no name', "")
 
 
 def run(*arguments):

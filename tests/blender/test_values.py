@@ -151,14 +151,6 @@ IMPOSSIBLE = {
     ),
     "follow edges": (lambda e: raw(e, "edge_aware", 1.5), 'effect "Shutter": Follow Edges is 1.5, not 0 to 1'),
     "source time": (lambda e: use_time(e, NAN), 'effect "Shutter": Source Time is nan'),
-    "a nan key": (
-        lambda e: key(e.shutters[1].bars[0], "weight", (NAN, 1), (5, 1)),
-        'shutter "Sharp", bar 1: Weight has a keyframe at frame nan',
-    ),
-    "a far key": (
-        lambda e: key(e.regions[0], "location", (1, 0), (3e9, 1)),
-        'region "Face": Location has a keyframe at frame 3e+09, not -1048574 to 1048574',
-    ),
     "nan strokes": (lambda e: draw(e.scene.annotation.layers[0], [(0, NAN)]), 'region "Face": a point of its strokes'),
     "transform": (
         lambda e: setattr(strip_of(e).transform, "offset_x", NAN),

@@ -206,7 +206,7 @@ def choose_strip(region: PropertyGroup, name: str) -> None:
 
 def _is_part(other: Strip, strip: Strip) -> bool:
     """Tell whether two strips of the same identity were cut from one."""
-    return strips.origin(other) == strips.origin(strip) and not _overlap(_content(other), _content(strip))
+    return strips.origin(other) == strips.origin(strip) and not strips.overlap(other, strip)
 
 
 def strips_of(region: PropertyGroup) -> list:
@@ -227,41 +227,20 @@ def strips_of(region: PropertyGroup) -> list:
 
 
 def parts_for(region: PropertyGroup, effect_strip: Strip) -> list:
-    """Return the parts of a region's matte strip, in order. Of copies, the nearest to the effect strip counts.
+    """Return the parts and copies of a region's matte strip above or below the effect strip, else the nearest.
+
+    The part counts that begins nearest to the effect strip, which is the first.
 
     Raises:
         EffectError: There is none.
     """
-    copies: list[list] = []
-    for strip in sorted(strips_of(region), key=lambda strip: (strips.origin(strip), strip.left_handle)):
-        fitting = [parts for parts in copies if not any(_overlap(_content(strip), _content(part)) for part in parts)]
-        # Parts that were moved apart have different origins.
-        same = [parts for parts in fitting if strips.origin(parts[-1]) == strips.origin(strip)]
-        if fitting:
-            (same or fitting)[-1].append(strip)
-        else:
-            copies.append([strip])
-    shown = effect_strip.left_handle, effect_strip.right_handle
-    nearest = min(copies, key=lambda parts: min(_apart(shown, (part.left_handle, part.right_handle)) for part in parts))
-    return sorted(nearest, key=lambda part: part.left_handle)
-
-
-def _content(strip: Strip) -> tuple[float, float]:
-    """Return the first and last frame of a strip's content that it shows."""
-    return strip.left_handle - strips.origin(strip), strip.right_handle - strips.origin(strip)
-
-
-def _overlap(one: tuple[float, float], other: tuple[float, float]) -> bool:
-    return min(one[1], other[1]) > max(one[0], other[0])
-
-
-def _apart(one: tuple[float, float], other: tuple[float, float]) -> tuple[float, float]:
-    """Return the distance of two spans, and for spans that meet, that of their starts."""
-    return max(other[0] - one[1], one[0] - other[1], 0), abs(other[0] - one[0])
+    parts = sorted(strips_of(region), key=lambda part: abs(part.left_handle - effect_strip.left_handle))
+    beside = [part for part in parts if strips.overlap(part, effect_strip)]
+    return beside or [part_at(parts, effect_strip.left_handle)]
 
 
 def part_at(parts: list, frame: float) -> Strip:
-    """Return the part of a cut strip at a timeline frame, or the nearest."""
+    """Return the first of the parts at a timeline frame, or the nearest."""
     return min(parts, key=lambda part: max(part.left_handle - frame, frame - part.right_handle + 1, 0))
 
 

@@ -11,9 +11,8 @@ import numpy as np
 from bpy.app.translations import pgettext_data as data_
 from bpy.app.translations import pgettext_rpt as rpt_
 
-from ...core.messages import EffectError
 from ...core.model import effect as model
-from ...core.model import keyframes, limits
+from ...core.model import keyframes
 from ...core.model.choices import CHANNELS
 from ...core.model.fields import fields_of
 from ...core.model.scribbles import mapped
@@ -32,11 +31,9 @@ def apply(scene, effect, strip, source: model.Effect, folder: Path = Path()) -> 
         folder: Folder of the recipe, to which paths of mattes are relative.
 
     Raises:
-        EffectError: Keys cannot lie there. Nothing has changed.
         MediaError: A matte is missing. Nothing has changed.
     """
     first = strip.left_handle - 1
-    _check_keys(source, first)
     contents = [region.content for region in source.regions if isinstance(region, model.MatteRegion)]
     files = [content for content in contents if isinstance(content, model.FileContent)]
     images = {content: matte_image(folder / content.path, content.channel) for content in files}
@@ -123,30 +120,6 @@ def _kept(name: str) -> str:
         with suppress(ValueError):  # another drive
             return bpy.path.relpath(name)
     return name
-
-
-def _check_keys(source: model.Effect, first: float) -> None:
-    """Raise EffectError where keys would lie beyond Blender's timeline, or on the same frame in float32."""
-    for keys in _keyed(source):
-        frames = np.array([frame + first for frame in keys.frames], dtype=np.float32)
-        if (wrong := np.flatnonzero(np.abs(frames) > limits.MAX_FRAME)).size:
-            sentence = rpt_("frame {frame} of the recipe: a key cannot lie beyond Blender's timeline")
-            raise EffectError(sentence.format(frame=f"{keys.frames[wrong[0]]:.10g}"))
-        if (wrong := np.flatnonzero(np.diff(frames) == 0)).size:
-            sentence = rpt_("frame {frame} of the recipe: so late on the timeline, the next key is on the same frame")
-            raise EffectError(sentence.format(frame=f"{keys.frames[wrong[0]]:.10g}"))
-
-
-def _keyed(source: model.Effect) -> list[keyframes.Keys]:
-    """Return all channels of an effect that have keys."""
-    parts: tuple = source, source.camera, *source.shutters, *source.regions
-    channels = [
-        getattr(part, name) for part in parts for name, each in fields_of(type(part)).items() if each.is_channel
-    ]
-    channels += [part.moves.location for part in (source.camera, *source.regions)]
-    channels += [shutter.bars.channel for shutter in source.shutters]
-    channels += [source.time.numbers] if isinstance(source.time, keyframes.SourceTime) else []
-    return [channel for channel in channels if isinstance(channel, keyframes.Keys)]
 
 
 def clear(scene, effect) -> None:

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from bpy.types import PropertyGroup, Scene, Strip
 
-from ...core.messages import EffectError, UserError
+from ...core.messages import UserError
 from ...core.model import effect as model
 from ...core.model import keyframes
 from ...core.model.fields import Field, fields_of
@@ -96,10 +96,7 @@ class Sampling:
         self, owner: PropertyGroup, path: str, name: str, change: Callable = lambda value: value
     ) -> keyframes.Channel:
         """Return the channel of a float property or vector, with a function applied to each value."""
-        try:
-            keyed = self.curves.of(owner, path, name)
-        except EffectError as error:
-            return keyframes.Constant(error)
+        keyed = self.curves.of(owner, path, name)
         return self.over(
             keyed, lambda frame: change(self.curves.value(owner, path, name, frame)), self.curves.keys(keyed)
         )
@@ -135,8 +132,7 @@ class Sampling:
         if strip is None:
             return keyframes.Constant(None)
         size, path = annotations.picture_size(self.effect), f"{strip.path_from_id()}.transform"
-        found = {name: tried(self.curves.find, f"{path}.{name}") for name in annotations.TRANSFORM}
-        keyed = {name: curve for name, curve in found.items() if curve and not isinstance(curve, EffectError)}
+        keyed = {name: curve for name in annotations.TRANSFORM if (curve := self.curves.find(f"{path}.{name}"))}
 
         def at(frame: float) -> np.ndarray | None:
             moved = {name: curve.evaluate(frame) for name, curve in keyed.items()}
@@ -154,10 +150,7 @@ class Sampling:
         if any(shutter.length == "TIMELINE" for shutter in effect.shutters):
             moments = np.unique(np.add.outer(sorted(self.frames), (-0.5, 0, 0.5))).tolist()
             sampling = Sampling(self.curves, effect, self.strip, moments)
-        try:
-            keyed = self.curves.of(effect, self.path, "source_time")
-        except EffectError as error:
-            return keyframes.Constant(error)
+        keyed = self.curves.of(effect, self.path, "source_time")
         numbers = keyframes.Computed(lambda frame: self.curves.value(effect, self.path, "source_time", frame))
         keys = self.curves.keys(keyed)
         return sampling.over(keyed, keyframes.SourceTime(numbers, keys).at, keys)
@@ -176,9 +169,8 @@ class Sampling:
         numbers = tuple(drawing.frame_number for drawing in drawn)
         frames = numbers if every else self.frames
         needed = {i for frame in frames for i in keyframes.span(numbers, frame)[:2]} if drawn else ()
-        timing = tried(self.curves.find, f"{path}.location")
-        is_curve = timing is not None and not isinstance(timing, EffectError)
-        eases = dict(self.curves.keys([timing])) if is_curve and len(numbers) > 1 else {}
+        timing = self.curves.find(f"{path}.location")
+        eases = dict(self.curves.keys([timing])) if timing and len(numbers) > 1 else {}
         return model.Drawings(
             name=region.name,
             frames=numbers,

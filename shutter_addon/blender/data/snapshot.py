@@ -269,11 +269,8 @@ def check_counts(effect: PropertyGroup) -> None:
 def _options(sampling: Sampling) -> keyframes.Channel:
     """Return the channel of an effect's options; it raises EffectError for an option out of range."""
     fields = fields_of(Options).items()
-    try:
-        found = {name: sampling.curves.find(f"{sampling.path}.{name}") for name, field in fields if field.keyed}
-    except EffectError as error:
-        return keyframes.Constant(error)
-    keyed = {name: curve for name, curve in found.items() if curve is not None}
+    found = {name: sampling.curves.find(f"{sampling.path}.{name}") for name, field in fields if field.keyed}
+    keyed = {name: curve for name, curve in found.items() if curve}
 
     def at(frame: float) -> Options:
         numbers = {name: curve.evaluate(frame) for name, curve in keyed.items()}
@@ -361,14 +358,9 @@ def _any_region(sampling: Sampling, index: int, shutter: int) -> model.Region | 
         content = sampled.tried(lambda: mattes.FileFrames(file=_subject_file(sampling, *drawn.values())))
     else:
         content = sampled.tried(matte_content.content, sampling, region, moves)
-    fields = sampled.tried(sampling.fields, region, path, kind)
-    if isinstance(fields, UserError):  # a choice is wrong: the matte raises that when it is asked for
-        content = content if isinstance(content, UserError) else fields
-        choices = [name for name, each in fields_of(kind).items() if each.choices]
-        fields = sampling.fields(region, path, kind, choices)
     if isinstance(content, UserError):
         content = keyframes.Constant(content)
-    return kind(shutter=shutter, content=content, moves=moves, **drawn, **fields)
+    return kind(shutter=shutter, content=content, moves=moves, **drawn, **sampling.fields(region, path, kind))
 
 
 def _outlines(sampling: Sampling, region: PropertyGroup, drawings: model.Drawings) -> keyframes.Channel:
@@ -441,15 +433,6 @@ def recipe_of(scene: Scene, effect: PropertyGroup, strip: Strip, contents: Seque
     """
     check_counts(effect)
     shown = range(strip.left_handle, strip.right_handle)
-    if not -limits.MAX_FRAME <= shown.start <= shown.stop <= limits.MAX_FRAME:
-        sentence = rpt_('strip "{strip}" lies at frames {first} to {last}, beyond the timeline')
-        raise EffectError(sentence.format(strip=strip.name, first=shown.start, last=shown.stop - 1))
-    drawn = [region for region in strips.drawn_regions(effect) if layers_of(effect, region)]
-    for item in (*effect.shutters, *drawn, *strips.matte_regions(effect)):
-        _check_name(item)
-    for shutter in effect.shutters:
-        for component in shutter.color:
-            validation.number(shutter, "color", component)
     if effect.regions and image_to_picture(strip, picture_size(effect)) is None:
         sentence = rpt_('strip "{strip}" is too small to find its scribbles')
         raise EffectError(sentence.format(strip=strip.name))
@@ -465,11 +448,3 @@ def _keyed(scene: Scene, effect: PropertyGroup) -> set[float]:
     frames = set((np.array(key_frames(curves), np.float32) / pace).tolist())
     layers = (layer for region in effect.regions for layer in layers_of(effect, region))
     return frames.union(float(drawing.frame_number) for layer in layers for drawing in layer.frames)
-
-
-def _check_name(item: PropertyGroup) -> None:
-    """Raise EffectError for a name that is too long for a recipe, from a script or a file of another version."""
-    if len(item.name) > limits.MAX_NAME:
-        sentence = rpt_("{place}: its name has {count} characters, but at most {most} are possible")
-        words = {"place": validation.place(item), "count": len(item.name), "most": limits.MAX_NAME}
-        raise EffectError(sentence.format(**words))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import partial
@@ -23,8 +22,6 @@ from ...media.sequence import by_number
 from . import external_files
 from .struct_dna import LayoutError, memory, read, record, text
 
-_AT_ONCE = 100  # files between a sequence's first and last that are checked at a time
-_REST = 1.0  # seconds between two checks, which are slow on a network drive
 _KEPT = 256
 _TIMES = (
     *("name", "content_start", "content_end", "content_trim_start", "content_trim_end", "left_handle"),
@@ -35,28 +32,8 @@ _SEQUENCE = ("char name[64]", "S64"), ("SeqRetimingHandle *retiming_handles", "u
 _KEY = ("double strip_frame_index", "f8"), ("int flag", "i4"), ("float retiming_factor", "f4")
 
 
-@dataclass
-class _Look:
-    """What is known of a strip's files.
-
-    Attributes:
-        known: Path and stamp of each.
-        next: Index of the next one to check.
-        due: How many have to be checked at once.
-        when: Time of the last check.
-        key: Changes with what is known.
-    """
-
-    known: list
-    next: int
-    due: int
-    when: float = 0.0
-    key: int = 0
-
-
 _specs: Kept[tuple, SourceSpec] = Kept()  # by media_key
-_looks: Kept[tuple, _Look] = Kept()  # by scene and strip, or by image, and number of files
-_resting = False  # while a film renders: all files were checked before
+_looks: Kept[tuple, int] = Kept()  # what `between` returns, by scene and strip or by image, and number of files
 
 
 def media_key(strip: Strip) -> tuple:
@@ -65,7 +42,7 @@ def media_key(strip: Strip) -> tuple:
 
 
 def files_key(strip: Strip) -> tuple:
-    """Return a key of the strip's files: the first and the last as they are now, others as `between` has checked them.
+    """Return a key of the strip's files: the first and the last as they are now, others as look_again found them.
 
     Raises:
         MediaError: It has no files.
@@ -78,28 +55,17 @@ def files_key(strip: Strip) -> tuple:
 
 def look_again() -> None:
     """Have all files checked at the next look."""
-    for look in list(_looks.values()):
-        look.due = len(look.known)
-
-
-def rest(resting: bool) -> None:
-    """While a film renders, check files between a sequence's first and last only after look_again."""
-    global _resting
-    _resting = resting
+    _looks.clear()
 
 
 def forget() -> None:
     """Forget all files, before another file is loaded."""
-    rest(False)
     _looks.clear()
     _specs.clear()
 
 
 def between(place: tuple, count: int, path: Callable[[int], Path]) -> int:
-    """Return a number that changes when a file of a sequence is found to be replaced.
-
-    A hundred files are checked each second, in turn. A missing file changes nothing: frames made from it stay valid,
-    and reading it raises an error.
+    """Return a number that changes when look_again finds that a file of a sequence was replaced.
 
     Args:
         place: Key of the strip or image.
@@ -108,19 +74,7 @@ def between(place: tuple, count: int, path: Callable[[int], Path]) -> int:
     """
     if count < 3:
         return 0
-    look = _looks.ask((*place, count), lambda: _Look(known=[None] * count, next=0, due=count), _KEPT)
-    if not look.due and (_resting or time.monotonic() - look.when < _REST):
-        return look.key
-    changed = False
-    for index in range(look.next, look.next + max(look.due, min(_AT_ONCE, count))):
-        file = path(index % count)
-        current, known = (file, stamp(file)), look.known[index % count]
-        if current != known and (known is None or current[1] is not None or current[0] != known[0]):
-            look.known[index % count], changed = current, True
-    look.next, look.due, look.when = (index + 1) % count, 0, time.monotonic()
-    if changed:
-        look.key = hash(tuple(look.known))
-    return look.key
+    return _looks.ask((*place, count), lambda: hash(tuple(stamp(path(index)) for index in range(count))), _KEPT)
 
 
 def reading(strip: Strip) -> tuple:

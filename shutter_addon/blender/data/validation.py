@@ -18,7 +18,6 @@ from bpy.app.translations import pgettext_rpt as rpt_
 from bpy.types import Property, PropertyGroup
 
 from ...core.messages import EffectError
-from ...core.model.limits import MAX_FRAME
 
 _PLACES = {
     "": n_('effect "{name}"'),
@@ -89,18 +88,6 @@ def word(group: PropertyGroup, name: str, value: float | None = None) -> Any:
         sentence = rpt_("{place}: {property} is none of its choices")
         raise EffectError(sentence.format(place=place(group), property=_called(prop)))
     return identifier
-
-
-def beyond_timeline(frames: np.ndarray) -> np.ndarray:
-    """Return those of the frames (n,) that lie beyond the timeline."""
-    return frames[~(np.abs(frames) <= MAX_FRAME)]
-
-
-def refuse_key(group: PropertyGroup, name: str, frame: float) -> None:
-    """Raise EffectError for a property's key at a frame beyond the timeline."""
-    sentence = rpt_("{place}: {property} has a keyframe at frame {frame}, not {low} to {high}")
-    words = {"place": place(group), "property": _called(group.bl_rna.properties[name]), "frame": f"{frame:.7g}"}
-    raise EffectError(sentence.format(**words, low=-MAX_FRAME, high=MAX_FRAME))
 
 
 def _called(prop: Property) -> str:

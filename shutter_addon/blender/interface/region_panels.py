@@ -7,8 +7,13 @@ from bpy.types import MovieTracking, PropertyGroup, Scene, Strip, UILayout
 
 from ...core.messages import EffectError
 from ...media.pursuit import SURE
+<<<<<<< HEAD
 from ..data import matte_look, selection, strips, validation
 from ..editing import outline_drawings, track_region
+=======
+from ..data import selection, strips, validation
+from ..editing import follow_track, outline_drawings, track_region
+>>>>>>> 78d80302 (Tell less of mattes, check sequences at renders alone)
 from . import needs, track_operators
 from .panel_parts import draw_list, draw_operators, draw_properties, sentence
 
@@ -22,7 +27,7 @@ _BUTTONS = {  # operators of each kind with drawings
 _OF_KIND = {"LINE": "width", "OUTLINE": "between", "RAMP": "ramp"}  # the property that only this kind has
 
 
-def draw_regions(layout: UILayout, scene: Scene, effect: PropertyGroup, strip: Strip) -> None:
+def draw_regions(layout: UILayout, _scene: Scene, effect: PropertyGroup, _strip: Strip) -> None:
     layout.use_property_split = False
     shutter = selection.active_shutter(effect)
     own = [region for region in effect.regions if shutter and region.shutter == shutter.name]
@@ -40,7 +45,7 @@ def draw_regions(layout: UILayout, scene: Scene, effect: PropertyGroup, strip: S
     if region is None:
         return
     if region.kind == "MATTE":
-        _draw_matte(layout, matte_look.look(scene, effect, strip, region), region)
+        _draw_matte(layout, region)
     if region.kind not in strips.LAID:
         layout.prop(region, "opacity")
     if region.kind not in strips.MATTES:
@@ -55,8 +60,8 @@ def draw_regions(layout: UILayout, scene: Scene, effect: PropertyGroup, strip: S
         sentence(layout, str(error), "ERROR")
 
 
-def _draw_matte(layout: UILayout, look: matte_look.Look, region: PropertyGroup) -> None:
-    """Draw the matte's source and settings, and its size or error."""
+def _draw_matte(layout: UILayout, region: PropertyGroup) -> None:
+    """Draw the matte's source and settings."""
     layout.prop(region, "matte")
     if region.matte == "IMAGE":
         layout.template_ID(region, "image", open="image.open")
@@ -71,9 +76,6 @@ def _draw_matte(layout: UILayout, look: matte_look.Look, region: PropertyGroup) 
         layout.prop(region, "channel")
         if region.channel == "NAMED":
             layout.prop(region, "channel_name", text="Name")
-    for text, icon in ((look.fault, "ERROR"), (look.text, "NONE"), (look.note, "INFO")):
-        if text:
-            sentence(layout, text, icon)
 
 
 def _draw_blend(layout: UILayout, region: PropertyGroup) -> None:

@@ -118,10 +118,6 @@ MESSAGES = {
         'Saved "{path}" without data of a newer version of Virtual Shutter',
     ): "„{path}“ gespeichert, ohne das, was eine neuere Version von Virtual Shutter hinzugefügt hat",
     ("*", "{place}: {property} is none of its choices"): "{place}: {property} ist keine der Möglichkeiten",
-    (
-        "*",
-        "{place}: {property} has a keyframe at frame {frame}, not {low} to {high}",
-    ): "{place}: {property} hat ein Schlüsselbild bei Bild {frame}, nicht {low} bis {high}",
     ("*", "{place}: {count} bars, and {window} frames"): "{place}: {count} Balken und {window} Bilder",
     (
         "*",
@@ -131,10 +127,6 @@ MESSAGES = {
         "*",
         "{place}: {count} regions, but at most {most} are possible",
     ): "{place}: {count} Regionen, höchstens {most} sind möglich",
-    (
-        "*",
-        "{place}: its name has {count} characters, but at most {most} are possible",
-    ): "{place}: der Name hat {count} Zeichen, höchstens {most} sind möglich",
     ("*", "An effect can have at most {most} shutters"): "Ein Effekt hat höchstens {most} Verschlüsse",
     ("*", "An effect can have at most {most} regions"): "Ein Effekt hat höchstens {most} Regionen",
     (
@@ -158,10 +150,6 @@ MESSAGES = {
         "*",
         'strip "{strip}" is too small to find its scribbles',
     ): "Streifen „{strip}“ ist zu klein, um seine Markierungen zu finden",
-    (
-        "*",
-        'strip "{strip}" lies at frames {first} to {last}, beyond the timeline',
-    ): "Streifen „{strip}“ liegt bei den Bildern {first} bis {last}, wo keine Zeitleiste ist",
     (
         "*",
         'mask "{mask}": a point, a feather or an opacity is not a usable number',
@@ -814,10 +802,6 @@ MESSAGES = {
     ("*", "Angle"): "Winkel",
     ("*", "Once around the center, clockwise from the top"): "Einmal um die Mitte, im Uhrzeigersinn von oben an",
     ("*", "How bright the shown frame is"): "Wie hell das gezeigte Bild ist",
-    ("*", "{width} × {height}, {count} frames"): "{width} × {height}, {count} Bilder",
-    ("*", "{width} × {height}, one picture"): "{width} × {height}, ein Bild",
-    ("*", "Shorter than the film: its last frame holds"): "Kürzer als der Film: Ihr letztes Bild bleibt stehen",
-    ("*", "Ends before the film: its last frame holds"): "Endet vor dem Film: Sein letztes Bild bleibt stehen",
     ("*", "{place}: it has no matte file"): "{place}: sie hat keine Mattendatei",
     (
         "*",
@@ -1371,14 +1355,6 @@ MESSAGES = {
         "*",
         "Replace the shutters, regions, keyframes and options of the effect with those of a recipe file",
     ): "Verschlüsse, Regionen, Schlüsselbilder und Optionen des Effekts durch die einer Rezeptdatei ersetzen",
-    (
-        "*",
-        "frame {frame} of the recipe: a key cannot lie beyond Blender's timeline",
-    ): "Bild {frame} des Rezepts: ein Schlüsselbild kann nicht außerhalb von Blenders Zeitleiste liegen",
-    (
-        "*",
-        "frame {frame} of the recipe: so late on the timeline, the next key is on the same frame",
-    ): "Bild {frame} des Rezepts: so spät auf der Zeitleiste liegt das nächste Schlüsselbild auf demselben Bild",
     ("Operator", "Export Recipe"): "Rezept exportieren",
     (
         "*",
