@@ -40,7 +40,7 @@ def _after_load(*_) -> None:
     sharp_frame.listen()
     sessions.drop_removed()  # a render job may have opened some while the file was loaded
     if not data_format.is_file_newer():
-        tell(data_format.migrate())
+        data_format.migrate()
         reconciling.tidy()
     shown_annotations.follow()
     tell(data_format.note(bpy.data.scenes))

@@ -75,7 +75,6 @@ def assert_read(edit, strip):
     [
         ("MOVIE", "beside"),
         ("IMAGE", "beside"),
-        ("IMAGE", "strip"),
         ("MOVIE", "project"),
         ("MOVIE", "project's default"),
     ],
@@ -84,8 +83,7 @@ def test_where_blender_puts_them(edit, built, kind, place):
     editor = edit.sequence_editor
     editor.proxy_storage = "PROJECT" if "project" in place else "PER_STRIP"
     editor.proxy_dir = "//of the project" if place == "project" else ""
-    own = {"use_proxy_custom_directory": True, "directory": "//own"} if place == "strip" else {}
-    assert_read(edit, built(kind, **own))
+    assert_read(edit, built(kind))
 
 
 @pytest.mark.parametrize("kind", ["MOVIE", "IMAGE"])
@@ -127,14 +125,6 @@ def test_when_they_are_read(bpy, edit, built, tmp_path, kind):
     for file in (file for file in tmp_path.rglob("BL_proxy/**/*") if file.is_file()):
         file.unlink()
     assert not proxied(edit, strip).from_proxy
-
-
-def test_a_file_of_the_strips_own(edit, built, tmp_path):
-    (file,) = (built("MOVIE"), *tmp_path.rglob("proxy_50.avi"))[1:]
-    file.rename(tmp_path / "mine.avi")
-    strip = edit.sequence_editor.strips[0]
-    strip.proxy.use_proxy_custom_file, strip.proxy.filepath = True, "//mine.avi"
-    assert_read(edit, strip)
 
 
 @pytest.mark.parametrize(

@@ -393,15 +393,6 @@ def test_keyed_bars_of_format_1_do(older):
 TOLD = 'shutter "Long": bars {first} to {last} of the older file are one filmed frame now, and expose other moments'
 
 
-def test_bars_of_format_1_that_cannot_be_kept_are_told(bpy, older, capfd):
-    older(4, "START", 8)
-    said = capfd.readouterr().err
-    assert any(TOLD.format(first=first, last=first + 3) in said for first in (1, 5))
-    bpy.ops.wm.save_mainfile()
-    bpy.ops.wm.open_mainfile(filepath=bpy.data.filepath)
-    assert "older file" not in capfd.readouterr().err
-
-
 @pytest.mark.parametrize("kept", [True, False])
 def test_an_imported_recipe_of_version_1_tells_what_it_lost(bpy, effect, tmp_path, capfd, kept):
     import json

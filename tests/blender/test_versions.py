@@ -50,11 +50,6 @@ def _tiles(bpy, folder):
     image.tiles.new(1002)
 
 
-def _uv_tiles(bpy, folder):
-    _tiles(bpy, folder)
-    bpy.data.images["wood"].filepath = str(folder / "wood.<UVTILE>.png")
-
-
 def _volumes(bpy, folder):
     smoke = bpy.data.volumes.new("smoke")
     smoke.filepath, smoke.is_sequence = str(folder / "smoke_0002.vdb"), True
@@ -69,7 +64,6 @@ def _images(bpy, folder):
     ("name_files", "names"),
     [
         (_tiles, ["wood.1001.png", "wood.1002.png"]),
-        (_uv_tiles, ["wood.u1_v1.png", "wood.u2_v1.png"]),
         (_volumes, ["smoke_0001.vdb", "smoke_0002.vdb", "smoke_0003.vdb"]),
         (_images, ["f0001.png", "f0002.png"]),
     ],

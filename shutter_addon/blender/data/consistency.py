@@ -5,12 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable, Container
 
 import numpy as np
-from bpy.app.translations import pgettext_rpt as rpt_
 from bpy.types import Context, FCurve, PropertyGroup
 
-from ...core.messages import EffectError
 from ...core.model import keyframes, limits, shutters
-from ...core.model.effect import OTHER_MOMENTS, STILL_CAMERA, Shutter
+from ...core.model.effect import STILL_CAMERA, Shutter
 from . import fcurves, strips, validation
 from .annotations import layer_of, layers_of
 from .fcurves import numbers
@@ -88,48 +86,36 @@ def bars(shutter: PropertyGroup) -> np.ndarray:
 def fit_bars(effect: PropertyGroup) -> None:
     """Fit bars after the window's length or position has changed.
 
-    Shutters that keep to a preset get its bars. Others, and keys, keep their shape and share of light.
+    Shutters that keep to a preset get its bars. Others forget theirs; they, and keys, keep their shape and share of
+    light.
     """
     for index, shutter in enumerate(effect.shutters):
-        is_made = _remade(effect, index)
-        if not is_made and len(shutter.bars) not in (0, effect.window):
+        shutter.preset = preset_of(effect, index)
+        if shutter.preset:
+            shutter.preset_position = effect.position
+            made = shutters.preset_bars(shutter.preset, effect.window, effect.position.lower())
+            _change_bars(effect, index, lambda _old, made=made: made)
+        elif len(shutter.bars) not in (0, effect.window):
             _change_bars(effect, index, lambda old: shutters.resample(old, effect.window))
 
 
-def count_filmed(effect: PropertyGroup) -> str | None:
+def count_filmed(effect: PropertyGroup) -> None:
     """Convert an effect of format 1, whose bars counted moments between filmed frames, to bars of filmed frames.
-
-    Returns:
-        A sentence if it exposes other moments now, else None.
 
     Raises:
         EffectError: A value is out of range.
     """
-    steps = int(effect.inbetween)
-    lost = [_count_bars(effect, index, steps) for index in range(len(effect.shutters))]
+    steps, position = int(effect.inbetween), validation.word(effect, "position").lower()
+    for index, shutter in enumerate(effect.shutters):
+        counted = Shutter(
+            name=shutter.name,
+            bars=keyframes.Bars(keyframes.Constant(None)),
+            follow=None if shutter.follow == "NOTHING" else STILL_CAMERA,
+            length=shutter.length.lower(),
+            combine=shutter.combine.lower(),
+        )
+        _change_bars(effect, index, lambda old, counted=counted: counted.filmed(old, steps, position).bars)
     effect.window = -(-effect.window // steps)
-    first = next(filter(None, lost), None)
-    return None if first is None else rpt_(OTHER_MOMENTS).format(**first.words)
-
-
-def _count_bars(effect: PropertyGroup, index: int, steps: int) -> EffectError | None:
-    """Convert the bars of a shutter as in count_filmed."""
-    shutter, keys = effect.shutters[index], []
-    position, interpolation = (validation.word(effect, name).lower() for name in ("position", "interpolation"))
-    counted = Shutter(
-        name=shutter.name,
-        bars=keyframes.Bars(keyframes.Constant(None)),
-        follow=None if shutter.follow == "NOTHING" else STILL_CAMERA,
-        length=shutter.length.lower(),
-        combine=shutter.combine.lower(),
-    )
-
-    def change(old: np.ndarray) -> np.ndarray:
-        keys.append(old)
-        return counted.filmed(old, steps, position).bars
-
-    _change_bars(effect, index, change)
-    return counted.lost(keys, steps, position, interpolation)
 
 
 def preset_of(effect: PropertyGroup, index: int) -> str:
@@ -144,21 +130,6 @@ def preset_of(effect: PropertyGroup, index: int) -> str:
     path = f"{effect.path_from_id()}.shutters[{index}].bars["
     is_kept = np.array_equal(weights, made) and not fcurves.curves_under(effect.id_data, path)
     return shutter.preset if is_kept else ""
-
-
-def _remade(effect: PropertyGroup, index: int) -> bool:
-    """Make the bars of a shutter that keeps to a preset again, for the window.
-
-    Returns:
-        Whether it keeps to one. If not, it forgets which it had.
-    """
-    shutter = effect.shutters[index]
-    shutter.preset = preset_of(effect, index)
-    if shutter.preset:
-        shutter.preset_position = effect.position
-        made = shutters.preset_bars(shutter.preset, effect.window, effect.position.lower())
-        _change_bars(effect, index, lambda _old: made)
-    return bool(shutter.preset)
 
 
 def _change_bars(effect: PropertyGroup, index: int, change: Callable[[np.ndarray], np.ndarray]) -> None:

@@ -4,33 +4,15 @@ Files of a newer format open. Unknown data stays as it is stored, without being 
 automatically.
 """
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Iterable
 
 from bpy.app.translations import pgettext_rpt as rpt_
 
 from . import consistency, strips
 
-
-def _count_filmed() -> Iterator[str | None]:
-    """Migrate to format 2: bars count filmed frames, no moments between them; repeated frames still count."""
-    for scene in _scenes_with_effects():
-        for effect in scene.virtual_shutter.effects if scene.virtual_shutter.format < 2 else ():
-            if effect.inbetween not in ("1", "AUTO"):
-                effect.skip_repeats = False
-                yield consistency.count_filmed(effect)
-
-
 # Raise this with the first change after a release that older versions do not understand: a property, an enum item,
-# another meaning.
+# another meaning. `migrate` leads to it.
 FORMAT = 2
-# Migrations by the format that they lead to, in order. They run when a file is loaded in which anything is older, and
-# leave newer scenes alone. Each yields sentences about what it could not keep.
-MIGRATIONS: tuple[tuple[int, Callable[[], Iterable[str | None]]], ...] = ((2, _count_filmed),)
-
-
-def of_file() -> int:
-    """Return the oldest format of the effects that can be changed; 0 is from before formats had numbers."""
-    return min((scene.virtual_shutter.format for scene in _scenes_with_effects()), default=FORMAT)
 
 
 def is_newer(scene) -> bool:
@@ -57,18 +39,15 @@ def new_effect(scene, number: int):
     return group.effects.add()
 
 
-def migrate() -> str | None:
-    """Migrate the loaded file, and set the format of all scenes with effects. No handler runs before an autosave.
-
-    Returns:
-        A sentence about the first thing that could not be kept, or None.
-    """
-    stored = of_file()
-    lost = [sentence for number, change in MIGRATIONS if stored < number for sentence in change()]
-    for scene in _scenes_with_effects():
-        if scene.virtual_shutter.format != FORMAT:
-            scene.virtual_shutter.format = FORMAT
-    return next(filter(None, lost), None)
+def migrate() -> None:
+    """Migrate the loaded file, and set the format of all scenes with effects. No handler runs before an autosave."""
+    for group in [scene.virtual_shutter for scene in _scenes_with_effects()]:
+        for effect in group.effects if group.format < 2 else ():
+            if effect.inbetween not in ("1", "AUTO"):  # bars count filmed frames now; repeated frames still count
+                effect.skip_repeats = False
+                consistency.count_filmed(effect)
+        if group.format != FORMAT:
+            group.format = FORMAT
 
 
 def stamp_saved(version: str) -> None:
@@ -85,18 +64,11 @@ def note(scenes: Iterable) -> str | None:
     newer = sorted(filter(is_newer, scenes), key=lambda scene: scene.library is not None)
     if not newer:
         return None
-    scene = newer[0]
-    if scene.library is not None:  # nothing tidies linked scenes
-        sentence = rpt_(
-            '"{scene}" was saved by a newer version of Virtual Shutter ({version}): what this one does not know '
-            "is kept, but not shown"
-        )
-    else:
-        sentence = rpt_(
-            '"{scene}" was saved by a newer version of Virtual Shutter ({version}): what this one does not know '
-            "is kept, but not shown, and no effect in this file follows strips that you move, copy or delete"
-        )
-    return sentence.format(scene=scene.name, version=scene.virtual_shutter.version)
+    sentence = rpt_(
+        '"{scene}" was saved by a newer version of Virtual Shutter ({version}): what this one does not know '
+        "is kept, but not shown, and no effect in its file follows strips that you move, copy or delete"
+    )
+    return sentence.format(scene=newer[0].name, version=newer[0].virtual_shutter.version)
 
 
 def _scenes_with_effects() -> list:

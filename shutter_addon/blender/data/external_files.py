@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import bpy
-from bpy.types import ID, Image, Scene, Strip
+from bpy.types import ID, Scene, Strip
 
 from ...core.frames import frame_ranges
 from ...media import MediaError, open_source
@@ -22,7 +22,9 @@ def named(item: ID) -> list[Path]:
     source = getattr(item, "source", "FILE")
     if source in _MADE or item.filepath in ("", "<builtin>") or getattr(item, "packed_file", None):
         return []
-    return [absolute(item, name) for name in (_tiles(item) if source == "TILED" else [item.filepath])]
+    if source == "TILED":
+        return [absolute(item, item.filepath.replace("<UDIM>", str(tile.number))) for tile in item.tiles]
+    return [absolute(item, item.filepath)]
 
 
 def every(item: ID) -> list[Path]:
@@ -34,12 +36,6 @@ def absolute(owner: ID | Strip, path: str) -> Path:
     """Return the absolute path of a file that a data-block or a strip names."""
     library = owner.library if isinstance(owner, bpy.types.ID) else owner.id_data.library
     return Path(bpy.path.abspath(path, library=library))
-
-
-def _tiles(image: Image) -> Iterator[str]:
-    for tile in image.tiles:
-        v, u = divmod(tile.number - 1001, 10)
-        yield image.filepath.replace("<UDIM>", str(tile.number)).replace("<UVTILE>", f"u{u + 1}_v{v + 1}")
 
 
 def _sequence(item: ID, path: Path) -> list[Path]:
@@ -63,7 +59,7 @@ def faults(scene: Scene, frames: range, *, sources: bool) -> list[str]:
         sources: Include the source strips of effects, as far as they are shown themselves.
     """
     sentences = _of_strips(scene, frames, strips.SOURCES, sources=sources)
-    used, data = requirements.used_data(scene, frames) - _clips(scene), bpy.data
+    used, data = requirements.used_data(scene, frames), bpy.data
     for items in (data.images, data.volumes, data.cache_files, data.movieclips, data.fonts):
         sentences += [_words(item, fault) for item in items if item in used for fault in _of_item(item)]
     sentences += [_words(library, fault) for library in data.libraries for fault in _of_item(library)]
@@ -73,12 +69,6 @@ def faults(scene: Scene, frames: range, *, sources: bool) -> list[str]:
 def sound_faults(scene: Scene, frames: range) -> list[str]:
     """Return faults of sound strips, as `faults` does."""
     return _of_strips(scene, frames, ("SOUND",), sources=False)
-
-
-def _clips(scene: Scene) -> set:
-    """Return the clips of strips, which _of_strips looks at."""
-    shown = (strip for each in strips.shown_scenes(scene) for strip in each.sequence_editor.strips_all)
-    return {strip.clip for strip in shown if strip.type == "MOVIECLIP"}
 
 
 def _words(item: ID, fault: str) -> str:
@@ -102,8 +92,7 @@ def _of_strip(strip: Strip, frames: range) -> Iterator[str]:
     elif strip.type == "IMAGE":
         elements = {element.filename for frame in frames if (element := strip.strip_elem_from_frame(frame))}
         folder = absolute(strip, strip.directory)
-        gone = [fault for name in sorted(elements) for fault in _fault(check_file, folder / name)]
-        yield from [gone[0] + (f" (and {len(gone) - 1} more files)" if len(gone) > 1 else "")] if gone else ()
+        yield from [fault for name in sorted(elements) for fault in _fault(check_file, folder / name)][:1]
     elif strip.type == "MOVIECLIP":
         yield from _of_item(strip.clip) if strip.clip else ["it has no clip"]
     elif strip.type == "SOUND":

@@ -6,29 +6,26 @@ Regions know a matte strip by an identity, so that it may be renamed and cut.
 from __future__ import annotations
 
 import uuid
-from collections.abc import Callable
 from contextlib import closing
 from fractions import Fraction
 from functools import lru_cache
 from pathlib import Path
+from typing import Any
 
 import bpy
 from bpy.app.translations import pgettext_rpt as rpt_
 from bpy.types import PropertyGroup, Strip
 
 from ...core.messages import EffectError
-from ...core.model import keyframes, mattes, outlines
+from ...core.model import keyframes, mattes
 from ...core.model.clip import Clip
 from ...core.model.effect import Moves, placed_ramp
 from ...core.model.keyframes import Channel
-from ...media import MediaError
-from ...media.carried_mattes import FOLDER, CarriedFile
+from ...media.carried_mattes import FOLDER
 from ...media.files import stamp
 from ...media.opening import MatteFile
 from ...media.sequence import sequence_files
-from ...media.subject import WIDTH
-from ...media.subject_mattes import Subject, SubjectFile
-from . import mask_reading, preferences, source_media, strips, validation
+from . import mask_reading, source_media, strips, validation
 from .external_files import absolute
 from .sampled import Sampling
 
@@ -59,28 +56,13 @@ def _source(sampling: Sampling) -> Strip:
     return strips.source_of(sampling.effect.id_data, sampling.effect, sampling.strip)
 
 
-def carried_file(effect: PropertyGroup, strip: Strip, drawn: dict[int, outlines.Curves]) -> CarriedFile:
-    """Return the file that gives a tracked outline's mattes, made from its curves by frame of the source.
+def tracked(sampling: Sampling) -> dict[str, Any]:
+    """Return what tracked mattes of the source are made from, and the folder that keeps them.
 
     Raises:
         EffectError, MediaError: There is no source.
     """
-    spec = source_media.spec(strips.source_of(effect.id_data, effect, strip))
-    return CarriedFile(footage=spec, drawings=tuple(sorted(drawn.items())), folder=_folder())
-
-
-def subject_file(
-    effect: PropertyGroup,
-    strip: Strip,
-    strokes: dict[int, outlines.Curves],
-    nots: dict[int, outlines.Curves],
-    drawn: dict[int, outlines.Curves],
-) -> SubjectFile:
-    """Return the file that gives the mattes of a subject under strokes, as carried_file."""
-    spec = source_media.spec(strips.source_of(effect.id_data, effect, strip))
-    subject = Subject(strokes=strokes, nots=nots, width=WIDTH)
-    drawings, model = tuple(sorted(drawn.items())), preferences.model()
-    return SubjectFile(footage=spec, subject=subject, drawings=drawings, folder=_folder(), model=model)
+    return {"footage": source_media.spec(_source(sampling)), "folder": _folder()}
 
 
 def _folder() -> Path:
@@ -110,24 +92,18 @@ def image_path(region: PropertyGroup) -> Path:
 
 
 def image_file(region: PropertyGroup) -> MatteFile:
-    """Return an image matte, ready to be read. EffectError: it has no file."""
+    """Return an image matte, ready to be read.
+
+    Raises:
+        EffectError, MediaError: It has no file.
+    """
     path = image_path(region)
+    is_sequence = region.image.source == "SEQUENCE"
+    stamps: tuple = stamp(path), stamp(path.parent if is_sequence else path)
+    if is_sequence:
+        stamps = *stamps, source_media.stamps((region.image.session_uid, path, stamps), lambda: sequence_files(path))
     files = (path,) if region.image.source == "FILE" else None
-    folder = path.parent if region.image.source == "SEQUENCE" else path
-    stamps: tuple = stamp(path), stamp(folder)
-    if region.image.source == "SEQUENCE":
-        listed = _listed(path, stamps)
-        stamps = *stamps, source_media.between((region.image.session_uid,), len(listed), listed.__getitem__)
     return MatteFile(path=path, channel=channel(region), files=files, stamp=stamps)
-
-
-@lru_cache(64)
-def _listed(path: Path, _stamp: tuple) -> list[Path]:
-    """Return the files of an image sequence, listed again when its folder changes."""
-    try:
-        return sequence_files(path)
-    except MediaError:  # reading it raises this again
-        return []
 
 
 def _mask(region: PropertyGroup) -> Channel:
@@ -136,10 +112,8 @@ def _mask(region: PropertyGroup) -> Channel:
     return keyframes.Constant(mask_reading.still(region.mask))
 
 
-def shown_frame(sampling: Sampling) -> Callable[[float], float]:
-    """Return a function from a timeline frame to the source's frame that it shows.
-
-    Filmed frames count from 0; moments between them are fractions.
+def filmed_frames(sampling: Sampling) -> dict[float, int]:
+    """Return the filmed frame of the source that each timeline frame shows, from 0.
 
     Raises:
         EffectError, MediaError: It cannot be known.
@@ -149,7 +123,7 @@ def shown_frame(sampling: Sampling) -> Callable[[float], float]:
     filmed, fps = (len(spec.files), None) if spec.files else _movie(spec)
     size = 0, 0  # timing does not depend on it
     clip = Clip(*size, filmed, fps=fps, timing=timing).stepped(_MOMENTS if sampling.effect.inbetween != "1" else 1)
-    return lambda frame: clip.shown(frame).source_frame / clip.step
+    return {frame: clip.shown(frame).source_frame // clip.step for frame in sampling.frames}
 
 
 @lru_cache(64)
@@ -196,17 +170,13 @@ def choose_strip(region: PropertyGroup, name: str) -> None:
         return
     known = strip.virtual_shutter_matte
     same = [other for other in editor.strips_all if known and other.virtual_shutter_matte == known]
-    parts = [strip, *(other for other in same if _is_part(other, strip))]
+    cut = [other for other in same if strips.origin(other) == strips.origin(strip) and not strips.overlap(other, strip)]
+    parts = [strip, *cut]
     if len(parts) != len(same):  # it has no identity, or that of the strip that it was copied from
         identity = uuid.uuid4().hex
         for part in parts:
             part.virtual_shutter_matte = identity
     region.strip = strip.virtual_shutter_matte
-
-
-def _is_part(other: Strip, strip: Strip) -> bool:
-    """Tell whether two strips of the same identity were cut from one."""
-    return strips.origin(other) == strips.origin(strip) and not strips.overlap(other, strip)
 
 
 def strips_of(region: PropertyGroup) -> list:

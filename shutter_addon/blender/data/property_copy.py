@@ -1,4 +1,4 @@
-"""Copy property groups as they are stored, with enum numbers that have no item; and set values temporarily."""
+"""Copy property groups as they are stored, and set values temporarily."""
 
 from __future__ import annotations
 
@@ -34,25 +34,11 @@ def plain(struct: bpy_struct) -> dict[str, Any]:
         elif prop.type == "POINTER":
             if value is not None and prop.fixed_type.identifier in POINTED:
                 found[name] = value.session_uid
-        elif name != "co_ui" and not prop.is_skip_save:  # setting co_ui moves a key's handles
-            found[name] = tuple(value) if getattr(prop, "is_array", False) else _stored(struct, name)
+        elif (
+            name != "co_ui" and not prop.is_skip_save and (prop.type, value) != ("ENUM", "")
+        ):  # setting co_ui moves a key's handles
+            found[name] = tuple(value) if getattr(prop, "is_array", False) else value
     return found
-
-
-def _stored(group: bpy_struct, name: str) -> Any:
-    """Return a property's value; for an enum without a valid item, its number."""
-    value = getattr(group, name)
-    if value == "" and group.bl_rna.properties[name].type == "ENUM" and isinstance(group, PropertyGroup):
-        return group.bl_system_properties_get()[name]
-    return value
-
-
-def store(group: bpy_struct, name: str, value: object) -> None:
-    """Set a property to a value from `plain`."""
-    if isinstance(value, int) and group.bl_rna.properties[name].type == "ENUM":
-        group.bl_system_properties_get(do_create=True)[name] = value
-    else:
-        setattr(group, name, value)
 
 
 @contextmanager

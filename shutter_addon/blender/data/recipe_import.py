@@ -1,6 +1,5 @@
 """Write a recipe into Blender's data: shutters, regions, strokes, keys and options."""
 
-import os
 from collections.abc import Callable, Iterable, Sequence
 from contextlib import suppress
 from pathlib import Path
@@ -94,8 +93,6 @@ def matte_image(path: str | Path, channel: str = "luminance"):
         found, count = Path(matte.path), matte.count
     name = _kept(check_name(found))
     is_sequence = found.suffix.lower() in IMAGE_SUFFIXES and count > 1
-    if is_sequence and (known := _sequence_at(name)) is not None:
-        return known
     try:
         image = bpy.data.images.load(name, check_existing=not is_sequence)  # an existing image may be a single one
     except RuntimeError as error:  # the path is too long for Blender
@@ -106,16 +103,8 @@ def matte_image(path: str | Path, channel: str = "luminance"):
     return image
 
 
-def _sequence_at(name: str):
-    """Return the existing image of the sequence at a path, or None."""
-    own = [image for image in bpy.data.images if image.source == "SEQUENCE" and image.library is None]
-    return next((image for image in own if bpy.path.abspath(image.filepath) == bpy.path.abspath(name)), None)
-
-
 def _kept(name: str) -> str:
     """Return a path as Blender stores it: relative to the saved file, if the preferences say so."""
-    if os.name == "posix" and name.startswith("//"):  # Blender would take it as relative
-        name = name[1:]
     if bpy.data.filepath and bpy.context.preferences.filepaths.use_relative_paths:
         with suppress(ValueError):  # another drive
             return bpy.path.relpath(name)

@@ -26,8 +26,9 @@ from ...core.model.fields import fields_of
 from ...core.model.frame_state import Options
 from ...core.recipes import baking
 from ...media.carried_mattes import CarriedFile
-from ...media.subject_mattes import SubjectFile
-from . import matte_content, sampled, source_media, strips, validation
+from ...media.subject import WIDTH
+from ...media.subject_mattes import Subject, SubjectFile
+from . import matte_content, preferences, sampled, source_media, strips, validation
 from .annotations import LAYERS, image_to_picture, layer_of, layers_of, picture_size
 from .fcurves import curves_under, key_frames, leading, progress, stretched
 from .sampled import Frames, Sampling
@@ -231,22 +232,7 @@ def source_frames(scene: Scene, effect: PropertyGroup, strip: Strip, frames: Fra
     Raises:
         EffectError, MediaError: It cannot be known.
     """
-    shown = matte_content.shown_frame(Sampling.of(scene, effect, strip, frames))
-    return {frame: int(shown(frame)) for frame in frames}
-
-
-def last_shown(scene: Scene, effect: PropertyGroup, strip: Strip) -> float:
-    """Return the last source frame that an effect strip shows (matte_content.shown_frame).
-
-    With a Custom Time, about a hundred frames of the strip are looked at.
-
-    Raises:
-        EffectError, MediaError: It cannot be known.
-    """
-    first, last = strip.left_handle, strip.right_handle - 1
-    step = max(1, (last - first) // 100) if effect.use_source_time else max(1, last - first)
-    frames = *range(first, last, step), last
-    return max(map(matte_content.shown_frame(Sampling.of(scene, effect, strip, frames)), frames))
+    return matte_content.filmed_frames(Sampling.of(scene, effect, strip, frames))
 
 
 def camera_at(scene: Scene, effect: PropertyGroup, frames: Frames) -> model.Camera:
@@ -372,13 +358,14 @@ def _outlines(sampling: Sampling, region: PropertyGroup, drawings: model.Drawing
 
 def _carried(sampling: Sampling, drawings: model.Drawings) -> CarriedFile:
     drawn = _by_source_frame(sampling, drawings)
-    return matte_content.carried_file(sampling.effect, sampling.strip, drawn)
+    return CarriedFile(**matte_content.tracked(sampling), drawings=tuple(sorted(drawn.items())))
 
 
 def _subject_file(sampling: Sampling, *marks: model.Drawings) -> SubjectFile:
     """Return the file that gives a subject's mattes. `marks` are from _marks."""
     strokes, nots, drawn = (_by_source_frame(sampling, each) for each in marks)
-    return matte_content.subject_file(sampling.effect, sampling.strip, strokes, nots, drawn)
+    subject, drawings = Subject(strokes=strokes, nots=nots, width=WIDTH), tuple(sorted(drawn.items()))
+    return SubjectFile(**matte_content.tracked(sampling), subject=subject, drawings=drawings, model=preferences.model())
 
 
 def _marks(sampling: Sampling, index: int) -> dict[str, model.Drawings]:
@@ -391,8 +378,8 @@ def _by_source_frame(sampling: Sampling, drawings: model.Drawings) -> dict[int, 
     """Return the curves of drawings by filmed frame of the source. EffectError, MediaError: there is no source."""
     there = replace(sampling, frames=drawings.frames)
     placed = replace(drawings, placement=there.placement)
-    shown = matte_content.shown_frame(there)
-    return {int(shown(frame)): outlines.curves(placed.drawing(i, frame)) for i, frame in enumerate(drawings.frames)}
+    filmed = matte_content.filmed_frames(there).items()
+    return {number: outlines.curves(placed.drawing(i, frame)) for i, (frame, number) in enumerate(filmed)}
 
 
 def _region(sampling: Sampling, index: int, shutter: int) -> model.Region:

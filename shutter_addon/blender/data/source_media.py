@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import ctypes
+from collections.abc import Callable, Hashable, Iterable
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
@@ -20,7 +21,7 @@ from ...media.files import stamp
 from ...media.opening import with_proxy
 from ...media.sequence import by_number
 from . import external_files
-from .struct_dna import LayoutError, memory, read, record, text
+from .struct_dna import LayoutError, read, record
 
 _KEPT = 256
 _TIMES = (
@@ -33,7 +34,7 @@ _KEY = ("double strip_frame_index", "f8"), ("int flag", "i4"), ("float retiming_
 
 
 _specs: Kept[tuple, SourceSpec] = Kept()  # by media_key
-_looks: Kept[tuple, int] = Kept()  # what `between` returns, by scene and strip or by image, and number of files
+_looks: Kept[Hashable, int] = Kept()  # what `stamps` returns
 
 
 def media_key(strip: Strip) -> tuple:
@@ -50,7 +51,7 @@ def files_key(strip: Strip) -> tuple:
     count, path = _files(strip)
     ends = dict.fromkeys((path(0), path(count - 1)))
     place = strip.id_data.session_uid, strip.name
-    return count, *((str(end), stamp(end)) for end in ends), between(place, count, path)
+    return count, *((str(end), stamp(end)) for end in ends), stamps((*place, count), lambda: map(path, range(count)))
 
 
 def look_again() -> None:
@@ -64,17 +65,9 @@ def forget() -> None:
     _specs.clear()
 
 
-def between(place: tuple, count: int, path: Callable[[int], Path]) -> int:
-    """Return a number that changes when look_again finds that a file of a sequence was replaced.
-
-    Args:
-        place: Key of the strip or image.
-        count: Number of its files.
-        path: Function from an index to a file.
-    """
-    if count < 3:
-        return 0
-    return _looks.ask((*place, count), lambda: hash(tuple(stamp(path(index)) for index in range(count))), _KEPT)
+def stamps(place: Hashable, files: Callable[[], Iterable[Path]]) -> int:
+    """Return a number that changes when look_again finds that a file of a sequence was replaced. `place` is its key."""
+    return _looks.ask(place, lambda: hash(tuple(map(stamp, files()))), _KEPT)
 
 
 def reading(strip: Strip) -> tuple:
@@ -244,9 +237,9 @@ def retiming_keys(strip: Strip) -> tuple[RetimingKey, ...] | None:
         kind = record("SeqRetimingHandle", *_KEY)
     except LayoutError:
         return None
-    if text(name)[2:] != strip.name.encode():  # behind the letters SQ
+    if name.partition(b"\0")[0][2:] != strip.name.encode():  # behind the letters SQ
         return None
-    stored = np.frombuffer(memory(first, count * kind.itemsize), kind) if count else ()
+    stored = np.frombuffer(ctypes.string_at(first, count * kind.itemsize), kind) if count else ()
     keys = tuple(RetimingKey(*key.tolist()) for key in stored)
     return keys if are_retiming_keys(keys) else None
 
@@ -255,16 +248,15 @@ def proxy_of(scene: Scene, strip: Strip, percent: int) -> Proxy | None:
     """Return what Blender reads of a strip in previews of a size in percent; None: the footage itself."""
     if strip.type not in ("MOVIE", "IMAGE") or not strip.use_proxy or not getattr(strip.proxy, f"build_{percent}"):
         return None
-    by_strip = scene.sequence_editor.proxy_storage == "PER_STRIP"
-    if by_strip and strip.proxy.use_proxy_custom_file:
-        return _proxy(_absolute(strip.proxy.filepath))
+    if strip.proxy.use_proxy_custom_file or strip.proxy.use_proxy_custom_directory:
+        return None
     if strip.type == "MOVIE":
         movie = external_files.absolute(strip, strip.filepath)
         stream = f"_st{strip.stream_index}" if strip.stream_index else ""
-        return _proxy(_folder(scene, strip, movie.parent) / movie.name / f"proxy_{percent}{stream}.avi")
+        return _proxy(_folder(scene, movie.parent) / movie.name / f"proxy_{percent}{stream}.avi")
     if scene.sequencer_colorspace_settings.name != "sRGB":  # the color space of Blender's proxy pictures
         return None
-    folder = _folder(scene, strip, external_files.absolute(strip, strip.directory)) / "images" / str(percent)
+    folder = _folder(scene, external_files.absolute(strip, strip.directory)) / "images" / str(percent)
     ends = strip.elements[0], strip.elements[-1]
     return _proxy(folder, *(of_image(folder, element.filename) for element in ends))
 
@@ -274,12 +266,10 @@ def of_image(folder: Path, image: str | Path) -> Path:
     return folder / f"{Path(image).name}_proxy.jpg"
 
 
-def _folder(scene: Scene, strip: Strip, beside: Path) -> Path:
-    """Return the folder of the strip's proxies. `beside` is the folder of its footage."""
-    if scene.sequence_editor.proxy_storage == "PROJECT":
-        return _absolute(scene.sequence_editor.proxy_dir or "//BL_proxy")
-    if strip.proxy.use_proxy_custom_directory:
-        return _absolute(strip.proxy.directory)
+def _folder(scene: Scene, beside: Path) -> Path:
+    """Return the folder of proxies. `beside` is the folder of the footage."""
+    if scene.sequence_editor.proxy_storage == "PROJECT":  # Blender finds it from the open file
+        return Path(bpy.path.abspath(scene.sequence_editor.proxy_dir or "//BL_proxy"))
     return beside / "BL_proxy"
 
 
@@ -287,8 +277,3 @@ def _proxy(path: Path, *files: Path) -> Proxy | None:
     """Return a proxy, or None if a file is missing. `files` are those of a folder that are checked."""
     stamps = tuple(map(stamp, files or (path,)))
     return None if None in stamps else Proxy(path, bool(files), stamps)
-
-
-def _absolute(path: str) -> Path:
-    """Return an absolute path: Blender finds proxy folders from the open file, even for a linked strip."""
-    return Path(bpy.path.abspath(path))

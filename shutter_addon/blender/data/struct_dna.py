@@ -46,18 +46,8 @@ def record(name: str, *fields: tuple[str, str]) -> np.dtype:
 
 def read(kind: np.dtype, address: int) -> tuple:
     """Return the fields of a record (`record`) at an address in Blender's memory: numbers, bytes and lists."""
-    fields = np.frombuffer(memory(address, kind.itemsize), kind)[0]
+    fields = np.frombuffer(ctypes.string_at(address, kind.itemsize), kind)[0]
     return tuple(fields[name].tolist() for name in kind.names or ())
-
-
-def memory(address: int, size: int) -> bytes:
-    """Return a copy of bytes of Blender's memory."""
-    return ctypes.string_at(address, size)
-
-
-def text(field: bytes) -> bytes:
-    """Return a text field without padding."""
-    return field.partition(b"\0")[0]
 
 
 @cache

@@ -217,9 +217,9 @@ def to_mask(context: Context, of: tuple[Scene, PropertyGroup, Strip], index: int
     if not any(curves for _frame, curves in keys):
         raise EffectError(rpt_("Nothing is drawn in the outline"))
     size = annotations.picture_size(effect)
-    last = int(snapshot.last_shown(scene, effect, strip))
+    shown = snapshot.source_frames(scene, effect, strip, range(strip.left_handle, strip.right_handle))
     mask = bpy.data.masks.new(effect.regions[index].name)
-    mask.frame_start, mask.frame_end = 1, max(last, keys[-1][0]) + 1
+    mask.frame_start, mask.frame_end = 1, max(*shown.values(), keys[-1][0]) + 1
     chains = outlines.chains(keys, size[0] / size[1])
     try:
         with _mask_editor(context, mask):

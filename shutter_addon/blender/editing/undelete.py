@@ -115,7 +115,7 @@ def _fill(struct: bpy_struct, plain: dict) -> None:
             items = getattr(bpy.data, property_copy.POINTED[prop.fixed_type.identifier])
             setattr(struct, name, next((each for each in items if each.session_uid == value), None))
         elif not struct.is_property_readonly(name):
-            property_copy.store(struct, name, value)
+            setattr(struct, name, value)
 
 
 def _add(collection: bpy_prop_collection, name: str, item: dict) -> bpy_struct:
