@@ -11,7 +11,7 @@ from bpy.types import ID, Scene, Strip
 from ...core.frames import frame_ranges
 from ...media import MediaError, open_source
 from ...media.files import check_file, check_sound
-from ...media.sequence import numbered_alike, sequence_files
+from ...media.sequence import numbered_alike
 from . import requirements, strips
 
 _MADE = "GENERATED", "VIEWER"  # sources of images without a file
@@ -42,11 +42,9 @@ def _sequence(item: ID, path: Path) -> list[Path]:
     if not (getattr(item, "is_sequence", False) or getattr(item, "source", "") == "SEQUENCE"):
         return [path]
     try:
-        # Clips start at the named file. Others may show files before it, too.
-        files = sequence_files(path) if isinstance(item, bpy.types.MovieClip) else numbered_alike(path)
+        return numbered_alike(path) or [path]  # Blender may show files before the named one, too
     except MediaError:
         return [path]
-    return files or [path]
 
 
 def faults(scene: Scene, frames: range, *, sources: bool) -> list[str]:

@@ -419,12 +419,16 @@ def recipe_of(scene: Scene, effect: PropertyGroup, strip: Strip, contents: Seque
         EffectError: The effect cannot be rendered as it stands.
     """
     check_counts(effect)
-    shown = range(strip.left_handle, strip.right_handle)
+    shown, keyed = range(strip.left_handle, strip.right_handle), _keyed(scene, effect)
+    for frame in (shown.start, shown.stop, *keyed):
+        if not abs(frame) <= limits.MAX_FRAME:  # true for NaN
+            sentence = rpt_('strip "{strip}": frame {frame} lies beyond the timeline')
+            raise EffectError(sentence.format(strip=strip.name, frame=f"{frame:.7g}"))
     if effect.regions and image_to_picture(strip, picture_size(effect)) is None:
         sentence = rpt_('strip "{strip}" is too small to find its scribbles')
         raise EffectError(sentence.format(strip=strip.name))
     with translated(rpt_):
-        plain = read(scene, effect, strip, sorted({*shown, *_keyed(scene, effect)}))
+        plain = read(scene, effect, strip, sorted({*shown, *keyed}))
         return baking.baked(plain, shown, contents)
 
 

@@ -148,6 +148,10 @@ MESSAGES = {
     ): "Streifen „{strip}“: eine Zahl seiner Transformation ist nicht endlich",
     (
         "*",
+        'strip "{strip}": frame {frame} lies beyond the timeline',
+    ): "Streifen „{strip}“: Bild {frame} liegt jenseits der Zeitleiste",
+    (
+        "*",
         'strip "{strip}" is too small to find its scribbles',
     ): "Streifen „{strip}“ ist zu klein, um seine Markierungen zu finden",
     (
