@@ -32,7 +32,7 @@ def _forget_file(*_) -> None:
     track_region.data_replaced()
     sessions.forget()
     invalidation.forget()
-    source_media.forget()
+    source_media.look_again()
     reconciling.forget()
 
 
@@ -191,6 +191,6 @@ def unregister() -> None:
     operator_bases.end_all()
     edit_feed.end()
     sessions.forget()
-    source_media.forget()
+    source_media.look_again()
     reconciling.forget()
     undelete.forget()

@@ -253,7 +253,7 @@ def test_what_is_known_of_files_is_bounded(edit, asked):
     def asks(number):
         asked.clear()
         source.name = f"images {number}"
-        source_media.files_key(source)
+        source_media.media_key(source)
         return len(asked)
 
     ends, all_files = 2, 2 + len(source.elements)

@@ -17,7 +17,6 @@ from shutter_addon.blender.rendering import invalidation, sessions
 from shutter_addon.core import revision
 from shutter_addon.core.frames import light
 from shutter_addon.core.recipes import recipe_file, records
-from shutter_addon.media import MediaError
 from shutter_addon.media.image_writing import write_exr
 
 WIDTH, HEIGHT, COUNT = 48, 32, 12
@@ -305,16 +304,6 @@ def test_an_export_spares_what_it_reads(edit, shown, matte, tmp_path):
     with pytest.raises(Exception, match="1 m: its pictures are read by the effect"):
         matte_export.recipe_for(edit, effect, strip, tmp_path / "r.json")
     assert matte_export.recipe_for(edit, effect, strip, tmp_path / "other.json").regions
-
-
-def test_a_path_longer_than_blenders(shown, matte, tmp_path):
-    strip, effect, _coefficients = shown(data(region(matte)))
-    folder = tmp_path / "/".join(["d" * 200] * 6)
-    shutil.copytree(matte.parent, folder)
-    with pytest.raises(MediaError, match=r"m0001\.png: Blender cannot read it"):
-        recipe_import.apply(
-            strip.id_data, effect, strip, recipe_file.parse(json.dumps(data(region(matte.name)))), folder
-        )
 
 
 @pytest.fixture

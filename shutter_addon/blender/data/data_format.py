@@ -60,15 +60,15 @@ def stamp_saved(version: str) -> None:
 
 
 def note(scenes: Iterable) -> str | None:
-    """Return a sentence about the first scene with effects of a newer format, local ones first, or None."""
-    newer = sorted(filter(is_newer, scenes), key=lambda scene: scene.library is not None)
-    if not newer:
+    """Return a sentence about the first scene with effects of a newer format, or None."""
+    newer = next(filter(is_newer, scenes), None)
+    if newer is None:
         return None
     sentence = rpt_(
         '"{scene}" was saved by a newer version of Virtual Shutter ({version}): what this one does not know '
         "is kept, but not shown, and no effect in its file follows strips that you move, copy or delete"
     )
-    return sentence.format(scene=newer[0].name, version=newer[0].virtual_shutter.version)
+    return sentence.format(scene=newer.name, version=newer.virtual_shutter.version)
 
 
 def _scenes_with_effects() -> list:

@@ -62,12 +62,8 @@ def tracked(sampling: Sampling) -> dict[str, Any]:
     Raises:
         EffectError, MediaError: There is no source.
     """
-    return {"footage": source_media.spec(_source(sampling)), "folder": _folder()}
-
-
-def _folder() -> Path:
-    """Return the folder of mattes: beside the saved file, else in Blender's temporary folder, which it clears."""
-    return (Path(bpy.data.filepath).parent if bpy.data.filepath else Path(bpy.app.tempdir)) / FOLDER
+    beside = Path(bpy.data.filepath).parent if bpy.data.filepath else Path(bpy.app.tempdir)  # which Blender clears
+    return {"footage": source_media.spec(_source(sampling)), "folder": beside / FOLDER}
 
 
 def channel(region: PropertyGroup) -> str:

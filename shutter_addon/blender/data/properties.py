@@ -76,10 +76,7 @@ def _property(field: Field, **more: Any) -> object:
 def _region_renamed(region: PropertyGroup, new: str, old: str, is_set: bool) -> str:
     """Return a region's name, cut as in recipes. Blender's own `maxlen` counts bytes instead of characters."""
     new = new[:MAX_NAME]
-    # Finding an item's effect is slow among many, so only where a shutter follows the old name. A region that is not
-    # set yet has no old name.
-    effects = region.id_data.virtual_shutter.effects
-    if is_set and any(shutter.follow_region == old for effect in effects for shutter in effect.shutters):
+    if is_set:  # otherwise it has no old name
         consistency.rename_followed(selection.effect_of_item(region), old, new)
     return new
 

@@ -8,14 +8,12 @@ from typing import Any
 import bpy
 import numpy as np
 from bpy.app.translations import pgettext_data as data_
-from bpy.app.translations import pgettext_rpt as rpt_
 
 from ...core.model import effect as model
 from ...core.model import keyframes
 from ...core.model.choices import CHANNELS
 from ...core.model.fields import fields_of
 from ...core.model.scribbles import mapped
-from ...media import MediaError
 from ...media.files import check_name
 from ...media.opening import MatteFile
 from ...media.sequence import IMAGE_SUFFIXES
@@ -93,11 +91,7 @@ def matte_image(path: str | Path, channel: str = "luminance"):
         found, count = Path(matte.path), matte.count
     name = _kept(check_name(found))
     is_sequence = found.suffix.lower() in IMAGE_SUFFIXES and count > 1
-    try:
-        image = bpy.data.images.load(name, check_existing=not is_sequence)  # an existing image may be a single one
-    except RuntimeError as error:  # the path is too long for Blender
-        sentence = rpt_("{file}: Blender cannot read it ({error})")
-        raise MediaError(sentence.format(file=found.name, error=error)) from None
+    image = bpy.data.images.load(name, check_existing=not is_sequence)  # an existing image may be a single one
     if is_sequence:
         image.source = "SEQUENCE"
     return image

@@ -24,8 +24,6 @@ _PLAIN_RENDER = _UNMARKED | {"use_sequencer": True, "frame_map_old": 100, "frame
 PLAIN_VIEW = {"look": "None", "exposure": 0.0, "gamma": 1.0, "use_curve_mapping": False, "use_white_balance": False}
 STANDARD = PLAIN_VIEW | {"view_transform": "Standard"}
 _LEVELS = {"color_depth": "8", "color_management": "FOLLOW_SCENE"}
-_MODES = "RGB", "RGBA"  # Blender makes grey from light
-_FORMATS = ("FFMPEG", "PNG", "JPEG")
 
 
 def has(item: bpy_struct, values: Mapping[str, object]) -> bool:
@@ -92,8 +90,8 @@ def makes_levels(scene: Scene) -> bool:
         and scene.display_settings.display_device == "sRGB"
         and has(scene.view_settings, STANDARD)
         and has(scene.render.image_settings, _LEVELS)
-        and scene.render.image_settings.file_format in _FORMATS
-        and scene.render.image_settings.color_mode in _MODES
+        and scene.render.image_settings.file_format in ("FFMPEG", "PNG", "JPEG")
+        and scene.render.image_settings.color_mode in ("RGB", "RGBA")  # Blender makes grey from light
         and has(scene.render, _PLAIN_RENDER)
         and scene.frame_subframe == 0
         and not any(has_animation(scene, name) for name in ("view_settings", "render.", "display_settings"))

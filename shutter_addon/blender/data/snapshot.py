@@ -101,7 +101,7 @@ def read(scene: Scene, effect: PropertyGroup, strip: Strip, frames: Frames) -> m
     What is wrong at one frame is raised when that frame is asked for.
 
     Raises:
-        EffectError: It has no shutter, or too many shutters or regions.
+        EffectError, MediaError: It has no shutter, too many shutters or regions, or a matte without content.
     """
     check_counts(effect)
     layers = any(region.is_layer for region in effect.regions)
@@ -328,7 +328,11 @@ def _ways(curves: list, keys: list[float], frames: Frames) -> dict[float, tuple[
 
 
 def _any_region(sampling: Sampling, index: int, shutter: int) -> model.Region | model.MatteRegion:
-    """Return a region of any kind. `shutter` is the index of its shutter."""
+    """Return a region of any kind. `shutter` is the index of its shutter.
+
+    Raises:
+        EffectError, MediaError: A matte has no content.
+    """
     region, path = sampling.effect.regions[index], f"{sampling.path}.regions[{index}]"
     if region.kind not in strips.LAID:
         return _region(sampling, index, shutter)
@@ -338,14 +342,12 @@ def _any_region(sampling: Sampling, index: int, shutter: int) -> model.Region | 
     if region.kind == "OUTLINE":
         drawings = sampling.drawings(index, every=True)
         kind, drawn = model.OutlineRegion, {"drawings": drawings}
-        content = sampled.tried(_outlines, sampling, region, drawings)
+        content = _outlines(sampling, region, drawings)
     elif region.kind == "SUBJECT":
         kind, drawn = model.SubjectRegion, _marks(sampling, index)
-        content = sampled.tried(lambda: mattes.FileFrames(file=_subject_file(sampling, *drawn.values())))
+        content = mattes.FileFrames(file=_subject_file(sampling, *drawn.values()))
     else:
-        content = sampled.tried(matte_content.content, sampling, region, moves)
-    if isinstance(content, UserError):
-        content = keyframes.Constant(content)
+        content = matte_content.content(sampling, region, moves)
     return kind(shutter=shutter, content=content, moves=moves, **drawn, **sampling.fields(region, path, kind))
 
 
@@ -387,19 +389,14 @@ def _region(sampling: Sampling, index: int, shutter: int) -> model.Region:
     layer = layer_of(sampling.effect, region)
     has_outlines_alone = region.kind == "SUBJECT" and not (layer and layer.frames)
     layer_name = "outline_layer" if has_outlines_alone else "layer"
+    word = validation.word(region, "kind").lower()
     return model.Region(
         shutter=shutter,
-        kind=keyframes.Constant(sampled.tried(_scribble, region)),
+        kind=keyframes.Constant({"outline": "lasso", "subject": "line"}.get(word, word)),
         drawings=sampling.drawings(index, layer_name=layer_name),
         moves=sampling.moves(region, path),
         **sampling.fields(region, path, model.Region),
     )
-
-
-def _scribble(region: PropertyGroup) -> str:
-    """Return the kind of the region's strokes: an outline has lassos, a subject lines."""
-    word = validation.word(region, "kind").lower()
-    return {"outline": "lasso", "subject": "line"}.get(word, word)
 
 
 def _camera(sampling: Sampling) -> model.Camera:

@@ -38,31 +38,22 @@ _looks: Kept[Hashable, int] = Kept()  # what `stamps` returns
 
 
 def media_key(strip: Strip) -> tuple:
-    """Return what the strip reads and how; equal keys give the same frames."""
-    return strip.type, *files_key(strip), *reading(strip)
+    """Return what the strip reads and how; equal keys give the same frames.
 
-
-def files_key(strip: Strip) -> tuple:
-    """Return a key of the strip's files: the first and the last as they are now, others as look_again found them.
+    The first and the last file count as they are now, others as look_again found them.
 
     Raises:
         MediaError: It has no files.
     """
     count, path = _files(strip)
-    ends = dict.fromkeys((path(0), path(count - 1)))
-    place = strip.id_data.session_uid, strip.name
-    return count, *((str(end), stamp(end)) for end in ends), stamps((*place, count), lambda: map(path, range(count)))
+    ends = [(str(end), stamp(end)) for end in dict.fromkeys((path(0), path(count - 1)))]
+    others = stamps((strip.id_data.session_uid, strip.name, count), lambda: map(path, range(count)))
+    return strip.type, count, *ends, others, *reading(strip)
 
 
 def look_again() -> None:
     """Have all files checked at the next look."""
     _looks.clear()
-
-
-def forget() -> None:
-    """Forget all files, before another file is loaded."""
-    _looks.clear()
-    _specs.clear()
 
 
 def stamps(place: Hashable, files: Callable[[], Iterable[Path]]) -> int:

@@ -7,7 +7,6 @@ import os
 import tomllib
 from collections.abc import Iterator
 from contextlib import suppress
-from functools import cache
 from itertools import groupby
 from pathlib import Path
 
@@ -42,13 +41,9 @@ def colours() -> str:
     path = os.environ.get("BLENDER_OCIO", os.environ.get("OCIO", ""))
     if path.startswith("ocio://"):
         return path
+    own = Path(bpy.utils.system_resource("DATAFILES", path="colormanagement"), "config.ocio")
     digest = _config_digest(Path(path))
-    return "" if digest == _own_config() else digest
-
-
-@cache
-def _own_config() -> str:
-    return _config_digest(Path(bpy.utils.system_resource("DATAFILES", path="colormanagement")) / "config.ocio")
+    return "" if digest == _config_digest(own) else digest
 
 
 def _config_digest(path: Path) -> str:

@@ -103,13 +103,7 @@ MESSAGES = {
     (
         "*",
         '"{scene}" was saved by a newer version of Virtual Shutter ({version}): what this one does not know '
-        "is kept, but not shown",
-    ): "„{scene}“ wurde von einer neueren Version von Virtual Shutter gespeichert ({version}): Was diese nicht kennt, "
-    "bleibt erhalten, wird aber nicht gezeigt",
-    (
-        "*",
-        '"{scene}" was saved by a newer version of Virtual Shutter ({version}): what this one does not know '
-        "is kept, but not shown, and no effect in this file follows strips that you move, copy or delete",
+        "is kept, but not shown, and no effect in its file follows strips that you move, copy or delete",
     ): "„{scene}“ wurde von einer neueren Version von Virtual Shutter gespeichert ({version}): Was diese nicht kennt, "
     "bleibt erhalten, wird aber nicht gezeigt, und kein Effekt dieser Datei folgt Streifen, die verschoben, kopiert "
     "oder gelöscht werden",
@@ -818,7 +812,6 @@ MESSAGES = {
         "*",
         '{place}: its matte strip "{strip}" is not a movie, image or clip strip',
     ): "{place}: ihr Mattenstreifen „{strip}“ ist kein Film-, Bild- oder Clipstreifen",
-    ("*", "{file}: Blender cannot read it ({error})"): "{file}: Blender kann es nicht lesen ({error})",
     (
         "*",
         "{folder}: its pictures are read by the effect; choose another name for the recipe",
