@@ -46,8 +46,7 @@ def migrate() -> None:
             if effect.inbetween not in ("1", "AUTO"):  # bars count filmed frames now; repeated frames still count
                 effect.skip_repeats = False
                 consistency.count_filmed(effect)
-        if group.format != FORMAT:
-            group.format = FORMAT
+        group.format = FORMAT
 
 
 def stamp_saved(version: str) -> None:

@@ -38,7 +38,7 @@ class Movie:
             raise RuntimeError("Blender knows no such movie")
         frame = self.frame(0)
         strips = bpy.context.scene.sequence_editor_create().strips
-        strip = strips.new_movie("movie", self._path, 1, 1)
+        strip, sound = strips.new_movie("movie", self._path, 1, 1), bpy.data.sounds.load(self._path)
         try:
             return {
                 "size": tuple(self._image.size),
@@ -46,10 +46,11 @@ class Movie:
                 "fps": strip.elements[0].orig_fps,
                 "alpha": self._image.depth in (32, 128),
                 "deep": frame.dtype == np.uint16,
-                "audio": _has_sound(self._path),
+                "audio": sound.channels != "INVALID",
             }
         finally:
             strips.remove(strip)
+            bpy.data.sounds.remove(sound)
 
     def frame(self, index: int) -> np.ndarray:
         """Return a frame as RGBA (H, W, 4), top row first: uint8, or uint16 for deeper movies.
@@ -70,15 +71,6 @@ class Movie:
             return np.multiply(samples[::-1], np.float32(255.5), out=levels, casting="unsafe")
         np.nan_to_num(samples, copy=False)
         return np.rint(samples[::-1].clip(0, 1) * 65535).astype(np.uint16)
-
-
-def _has_sound(path: str) -> bool:
-    try:
-        import aud
-
-        return aud.Sound(path).specs[1] > 0
-    except Exception:  # the file, or this build of Blender, has no sound
-        return False
 
 
 def _answer(

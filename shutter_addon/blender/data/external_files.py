@@ -14,13 +14,11 @@ from ...media.files import check_file, check_sound
 from ...media.sequence import numbered_alike
 from . import requirements, strips
 
-_MADE = "GENERATED", "VIEWER"  # sources of images without a file
-
 
 def named(item: ID) -> list[Path]:
     """Return a data-block's file: several of a tiled image, a sequence's first, none of a packed or generated one."""
     source = getattr(item, "source", "FILE")
-    if source in _MADE or item.filepath in ("", "<builtin>") or getattr(item, "packed_file", None):
+    if source in ("GENERATED", "VIEWER") or item.filepath in ("", "<builtin>") or getattr(item, "packed_file", None):
         return []
     if source == "TILED":
         return [absolute(item, item.filepath.replace("<UDIM>", str(tile.number))) for tile in item.tiles]
@@ -58,19 +56,15 @@ def faults(scene: Scene, frames: range, *, sources: bool) -> list[str]:
     """
     sentences = _of_strips(scene, frames, strips.SOURCES, sources=sources)
     used, data = requirements.used_data(scene, frames), bpy.data
-    for items in (data.images, data.volumes, data.cache_files, data.movieclips, data.fonts):
-        sentences += [_words(item, fault) for item in items if item in used for fault in _of_item(item)]
-    sentences += [_words(library, fault) for library in data.libraries for fault in _of_item(library)]
+    data_blocks = (*data.images, *data.volumes, *data.cache_files, *data.movieclips, *data.fonts)
+    for item in (*filter(used.__contains__, data_blocks), *data.libraries):
+        sentences += [f'{item.bl_rna.name.lower()} "{item.name}": {fault}' for fault in _of_item(item)]
     return list(dict.fromkeys(sentences))
 
 
 def sound_faults(scene: Scene, frames: range) -> list[str]:
     """Return faults of sound strips, as `faults` does."""
     return _of_strips(scene, frames, ("SOUND",), sources=False)
-
-
-def _words(item: ID, fault: str) -> str:
-    return f'{item.bl_rna.name.lower()} "{item.name}": {fault}'
 
 
 def _of_strips(scene: Scene, frames: range, kinds: tuple[str, ...], *, sources: bool) -> list[str]:

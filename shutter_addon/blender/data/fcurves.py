@@ -157,12 +157,11 @@ def set_keys(scene, path: str, index: int, keys: Sequence[tuple[float, float, Ea
     points = new_curve(scene, path, index, group).keyframe_points
     points.add(len(keys))
     points.foreach_set("co", [number for frame, value, _ in keys for number in (frame, value)])
-    for point, (_, _, ease) in zip(points, keys, strict=True):
-        point.interpolation = ease.upper()
-        point.handle_left_type = point.handle_right_type = "FREE"
     # Flat handles of a third of the span give u²(3 − 2u), as core.model.keyframes.eased.
     reach = [(b[0] - a[0]) / 3 for a, b in pairwise(keys)]
-    for point, before, after in zip(points, [1.0, *reach], [*reach, 1.0], strict=True):
+    for point, (_, _, ease), before, after in zip(points, keys, [1.0, *reach], [*reach, 1.0], strict=True):
+        point.interpolation = ease.upper()
+        point.handle_left_type = point.handle_right_type = "FREE"
         point.handle_left = point.co[0] - before, point.co[1]
         point.handle_right = point.co[0] + after, point.co[1]
 

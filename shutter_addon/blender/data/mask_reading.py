@@ -56,9 +56,10 @@ def _shape(mask: bpy.types.Mask) -> MaskShape:
 
 
 def _layer(mask: bpy.types.Mask, layer: bpy.types.MaskLayer) -> MaskLayer:
+    _check(mask, layer.alpha)
     return MaskLayer(
         splines=tuple(_spline(mask, spline) for spline in layer.splines),
-        alpha=float(_checked(mask, layer.alpha)),
+        alpha=layer.alpha,
         holes=layer.use_fill_holes,
         **{name: getattr(layer, name) for name in ("blend", "invert", "falloff", "fill_solver")},
     )
@@ -68,7 +69,7 @@ def _spline(mask: bpy.types.Mask, spline: bpy.types.MaskSpline) -> MaskSpline:
     places = [fcurves.numbers(spline.points, name, size=2) for name in ("handle_left", "co", "handle_right")]
     points, weights = np.stack(places, axis=1), fcurves.numbers(spline.points, "weight")
     feathers = tuple(tuple((f.u, f.weight) for f in point.feather_points) for point in spline.points)
-    _checked(mask, [*points.flat, *weights, *chain(*chain(*feathers))])
+    _check(mask, [*points.flat, *weights, *chain(*chain(*feathers))])
     return MaskSpline(
         points=tuple(tuple(map(tuple, point)) for point in points.tolist()),
         weights=tuple(weights.tolist()),
@@ -79,10 +80,8 @@ def _spline(mask: bpy.types.Mask, spline: bpy.types.MaskSpline) -> MaskSpline:
     )
 
 
-def _checked(mask: bpy.types.Mask, values: ArrayLike) -> np.ndarray:
-    """Return numbers of a mask as an array. EffectError: one is not finite, or too far away."""
-    values = np.asarray(values, np.float64)
-    if not (np.abs(values) <= _FARTHEST).all():
+def _check(mask: bpy.types.Mask, values: ArrayLike) -> None:
+    """Raise EffectError for a number of a mask that is not finite, or too far away."""
+    if not (np.abs(np.asarray(values, np.float64)) <= _FARTHEST).all():
         sentence = rpt_('mask "{mask}": a point, a feather or an opacity is not a usable number')
         raise EffectError(sentence.format(mask=mask.name))
-    return values

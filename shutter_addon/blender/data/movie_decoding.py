@@ -10,16 +10,15 @@ from ...media import blender_movie
 _SCRIPT = Path(__file__).with_name("decoding_process.py")
 
 
-def _command() -> list[str]:
-    """Return the command that runs the script in a Blender without user settings and network."""
-    if not bpy.app.binary_path:  # Blender as a library
-        return [sys.executable, str(_SCRIPT)]
-    alone = ["--background", "--factory-startup", "--offline-mode", "-noaudio"]
-    return [bpy.app.binary_path, *alone, "--python", str(_SCRIPT), "--"]
+# Options of a Blender without user settings and network.
+_ALONE = "--background", "--factory-startup", "--offline-mode", "-noaudio"
 
 
 def register() -> None:
-    blender_movie.lend(_command())
+    if bpy.app.binary_path:
+        blender_movie.lend([bpy.app.binary_path, *_ALONE, "--python", str(_SCRIPT), "--"])
+    else:  # Blender as a library
+        blender_movie.lend([sys.executable, str(_SCRIPT)])
 
 
 def unregister() -> None:

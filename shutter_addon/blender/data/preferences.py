@@ -53,9 +53,8 @@ class ShutterPreferences(bpy.types.AddonPreferences):
     )
 
     def draw(self, _context: Context) -> None:
-        self.layout.prop(self, "device")
-        self.layout.prop(self, "gpu_memory")
-        self.layout.prop(self, "model")
+        for name in ("device", "gpu_memory", "model"):
+            self.layout.prop(self, name)
         self.layout.operator("shutter.copy_report", icon="COPYDOWN")
 
 

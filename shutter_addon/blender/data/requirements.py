@@ -38,16 +38,11 @@ def settings(strip: Strip) -> Iterator[tuple[bpy_struct, str, object]]:
     yield scene.render, "engine", ENGINE
     yield scene.render, "resolution_percentage", 100
     yield scene.render, "use_border", False
-    if _composites(scene):
+    # Blender 5.3 has a list of effects, and deprecates the single tree.
+    if getattr(scene, "compositor_effects", None) or getattr(scene, "compositing_node_group", None):
         yield scene.render, "use_compositing", False
     if not any(layer.use for layer in scene.view_layers):
         yield scene.view_layers[0], "use", True
-
-
-def _composites(scene: Scene) -> bool:
-    """Tell whether the compositor runs. Blender 5.3 has a list of effects, and deprecates the single tree."""
-    effects = getattr(scene, "compositor_effects", None)
-    return scene.compositing_node_group is not None if effects is None else len(effects) > 0
 
 
 def camera(strip: Strip) -> Object | None:
