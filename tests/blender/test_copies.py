@@ -203,15 +203,6 @@ def test_a_duplicated_pair_shows_its_own_clip_wherever_that_is(bpy, edit, add):
     assert (source_of(copy), source_of(strip)) == (own, source)
 
 
-def test_a_strip_of_an_effects_scene_from_the_add_menu_has_its_length(bpy, edit, add):
-    strip = add()
-    added = edit.sequence_editor.strips.new_scene("Added", strip.scene, 4, 30)
-    assert added.right_handle - added.left_handle > 1e6
-    bpy.context.view_layer.update()
-    assert (added.left_handle, added.right_handle) == (30, 50)
-    assert added.scene != strip.scene
-
-
 def test_the_picker_gives_an_effect_to_another_clip(bpy, edit, add, clip, render):
     strip = add(data=recipe(4, [1, 0, 0, 0]))
     old, other = source_of(strip), clip(1, 6, size=(24, 40))

@@ -44,7 +44,7 @@ def test_it_is_what_the_preset_makes_however_it_came_there(effect, name, positio
 
 def test_still_frame_after_sharp_subject_opens_the_shown_one(bpy, effect):
     region_edits.add_region(effect, effect.shutters[1])
-    shutter_edits.sharp_subject(effect, 0)
+    shutter_edits.as_layer(effect, 0, "STILL", "ANGLE_360")
     assert opened(effect) == [3]
     effect.active_shutter = 1
     assert bpy.ops.shutter.preset("EXEC_DEFAULT", True, preset="STILL") == {"FINISHED"}

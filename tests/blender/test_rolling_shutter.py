@@ -150,16 +150,6 @@ def test_one_undo_takes_it_back(bpy, edited):
     assert (effect.inbetween, effect.window, len(effect.shutters), len(effect.regions)) == ("1", 8, 2, 0)
 
 
-def test_milliseconds_are_of_the_footage_s_rate(bpy, edit, edited):
-    strip, effect = edited()
-    edit.render.fps = 25
-    call(bpy, side="TOP", unit="MILLISECONDS", milliseconds=20)
-    np.testing.assert_allclose(moments(strip, effect)[0], expected(0.5, "TOP"), atol=2e-6)
-    with pytest.raises(RuntimeError, match=r"41 ms is longer than a frame of the footage, 40\.0 ms"):
-        call(bpy, side="TOP", unit="MILLISECONDS", milliseconds=41)
-    np.testing.assert_allclose(moments(strip, effect)[0], expected(0.5, "TOP"), atol=2e-6)
-
-
 def test_a_time_map_is_no_repair(bpy, edited):
     _strip, effect = edited()
     effect.position, effect.inbetween = "CENTER", "2"

@@ -36,6 +36,8 @@ def lost(folder):
     if json.loads((folder / "names.json").read_text())["format"] < 2:
         for effect in (effect for scene in values["scenes"].values() for effect in scene["effects"]):
             count_filmed(effect)
+        for annotation in values["annotations"].values():
+            annotation.pop("virtual_shutter_names")
     return list(stored.missing(values, stored.values()))
 
 

@@ -322,6 +322,8 @@ class _Settings:
 class ShutterEffect(_Settings, PropertyGroup):
     shutters: CollectionProperty(type=Shutter)
     regions: CollectionProperty(type=ShutterRegion)
+    # The names of the annotation's layers when regions last followed them, a line each.
+    layer_names: StringProperty(options={"HIDDEN"})
     active_shutter: IntProperty(name="Active Shutter", min=0, update=_shutter_selected, options=UNKEYED)
     active_region: IntProperty(name="Active Region", min=0, update=_region_selected, options=UNKEYED)
 
@@ -375,8 +377,6 @@ def register() -> None:
     bpy.types.ID.virtual_shutter_made = StringProperty(options={"HIDDEN"})
     # The effect's start to which an annotation's drawings belong.
     bpy.types.Annotation.virtual_shutter_start = FloatProperty(options={"HIDDEN"})
-    # The names of layers that regions use, a line each.
-    bpy.types.Annotation.virtual_shutter_names = StringProperty(options={"HIDDEN"})
 
 
 def unregister() -> None:
@@ -384,5 +384,4 @@ def unregister() -> None:
         delattr(bpy.types.Strip, f"virtual_shutter_{name}")
     del bpy.types.ID.virtual_shutter_made
     del bpy.types.Annotation.virtual_shutter_start
-    del bpy.types.Annotation.virtual_shutter_names
     del bpy.types.Scene.virtual_shutter

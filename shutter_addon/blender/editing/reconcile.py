@@ -16,6 +16,7 @@ from __future__ import annotations
 import uuid
 from contextlib import suppress
 from functools import lru_cache
+from itertools import product
 
 import bpy
 import numpy as np
@@ -31,7 +32,6 @@ from . import add_effect, match_source, shown_annotations, undelete
 
 # Settings that an effect scene copies from its edit. Blender crashes if a stereo scene shows one that is not.
 _OF_EDIT = "fps", "fps_base", "use_multiview"
-_names: dict[int, list[str]] = {}  # names of layers at the last update, by session_uid of their annotation
 
 
 def update(updated: Scene | None = None) -> None:
@@ -78,7 +78,6 @@ def gather() -> list[strips.Shown]:
 
 def forget() -> None:
     """Forget annotations and media of a file before another one is loaded."""
-    _names.clear()
     _header.cache_clear()
     shown_annotations.forget()
     undelete.forget_copy()
@@ -203,17 +202,9 @@ def _duplicate(effect: PropertyGroup, strip: Strip, effect_scene: Scene) -> None
     old = old_scene.path_resolve(path)  # looked up again, because adding to a collection moves its items
     copy_properties(old, new)
     new.scene = effect_scene
-    _shorten(strip, [other for other in strips.effect_strips(old_scene) if other.scene == old.scene])
     strip.scene = effect_scene
     _renew_action(scene)
     fcurves.copy_curves(old_scene, path + ".", scene, new.path_from_id() + ".")
-
-
-def _shorten(strip: Strip, same: list[Strip]) -> None:
-    """Give a strip that Blender's Add menu made from an effect scene the length of the effect's own strip."""
-    if strip.right_handle - strip.left_handle == MAX_FRAME:
-        ends = [other.right_handle - strips.origin(other) for other in same if other != strip]
-        strip.right_handle = strip.left_handle + round(min(ends, default=MAX_FRAME))
 
 
 def _remove_effects(scene: Scene) -> None:
@@ -327,33 +318,23 @@ def _is_baked_over(source: Strip) -> bool:
 
 
 def _follow_names(shown: list[strips.Shown]) -> None:
-    """Give regions the new names of their drawings, which are layers of the effect's annotation.
+    """Give regions the new name of a drawing, which is a layer of the effect's annotation.
 
-    Handlers run after the undo push of the user's step. Undoing the step after a rename restores the old name in the
-    region, but not in the annotation, so the annotation stores the names of its regions. Undoing the rename itself
-    leaves the region unchanged, so the previous names are also in memory.
+    An effect stores the names that its regions know, so that undo restores both together, with or without the
+    annotation.
     """
-    before = dict(_names)
-    _names.clear()  # drop removed annotations
     for effect, _strip, _source in shown:
         annotation = effect.scene.annotation
         if annotation is None or annotation.library is not None:
             continue
-        names = [layer.info for layer in annotation.layers]
-        _rename(effect, annotation.virtual_shutter_names.splitlines(), names)
-        _rename(effect, before.get(annotation.session_uid, names), names)
-        _names[annotation.session_uid] = names
-        _give(annotation, "virtual_shutter_names", "\n".join(names))
-
-
-def _rename(effect: PropertyGroup, before: list[str], names: list[str]) -> None:
-    """Rename the region's layer if exactly one of the same number of drawings has a new name."""
-    changed = [(old, new) for old, new in zip(before, names, strict=False) if old != new]
-    if len(before) == len(names) and len(changed) == 1:
-        for region in effect.regions:
-            for name in LAYERS:
-                if getattr(region, name) == changed[0][0]:
-                    setattr(region, name, changed[0][1])
+        before, names = effect.layer_names.splitlines(), [layer.info for layer in annotation.layers]
+        changed = [(old, new) for old, new in zip(before, names, strict=False) if old != new]
+        if len(before) == len(names) and len(changed) == 1:
+            old, new = changed[0]
+            for region, name in product(effect.regions, LAYERS):
+                if getattr(region, name) == old:
+                    setattr(region, name, new)
+        _give(effect, "layer_names", "\n".join(names))
 
 
 def _remove_scenes(updated: Scene | None) -> None:

@@ -5,10 +5,8 @@ And operators of one click: subjects as layers without ghosts, and exposures tha
 
 import numpy as np
 from bpy.app.translations import pgettext_data as data_
-from bpy.app.translations import pgettext_rpt as rpt_
 from bpy.types import PropertyGroup, Scene, Strip
 
-from ...core.messages import EffectError
 from ...core.model import shutters
 from ...media import opencv
 from ..data import fcurves, property_copy, snapshot, validation
@@ -156,24 +154,27 @@ def ramp_between(
 # Layers, and a camera that stands still
 
 
-def sharp_subject(effect: PropertyGroup, index: int, key: bool = False) -> None:
-    """Make a region a sharp layer in front of a long exposure.
+def as_layer(effect: PropertyGroup, index: int, own: str, rest: str, key: bool = False) -> None:
+    """Make a region a layer, alone in its shutter, in front of the default shutter. Neither follows anything.
 
     Args:
+        own: preset of the layer.
+        rest: preset of the default shutter.
         key: insert keyframes for the bars.
     """
-    apply_preset(effect, _as_layer(effect, index), "STILL", key)
-    apply_preset(effect, 0, "ANGLE_360", key)
-
-
-def clean_trail(effect: PropertyGroup, index: int, key: bool = False) -> None:
-    """Make a region a layer with a long exposure in front of a sharp background.
-
-    Args:
-        key: insert keyframes for the bars.
-    """
-    apply_preset(effect, _as_layer(effect, index), "ANGLE_360", key)
-    apply_preset(effect, 0, "STILL", key)
+    region = effect.regions[index]
+    place = effect.shutters.find(region.shutter)
+    if place <= 0 or any(other.shutter == region.shutter for other in effect.regions if other != region):
+        names = {shutter.name for shutter in effect.shutters}
+        shutter = add_shutter(effect, unique(data_("Subject"), names))
+        assign_region(effect, index, shutter)
+        place = len(effect.shutters) - 1
+    effect.regions[index].is_layer = True
+    effect.position = "CENTER"
+    effect.active_shutter = place
+    for i, preset in ((place, own), (0, rest)):
+        effect.shutters[i].follow, effect.shutters[i].length = "NOTHING", "FRAMES"
+        apply_preset(effect, i, preset, key)
 
 
 def panning_shot(effect: PropertyGroup, index: int, key: bool = False) -> None:
@@ -182,7 +183,7 @@ def panning_shot(effect: PropertyGroup, index: int, key: bool = False) -> None:
     Args:
         key: insert keyframes for the bars.
     """
-    sharp_subject(effect, index, key)
+    as_layer(effect, index, "STILL", "ANGLE_360", key)
     region = effect.regions[index]
     region.name = unique(region.name, {other.name for other in effect.regions if other != region})
     follow(effect, 0, "REGION", key)
@@ -192,25 +193,14 @@ def panning_shot(effect: PropertyGroup, index: int, key: bool = False) -> None:
     default.follow_motion, default.follow_smooth = "LOCATION", SMOOTHNESS
 
 
-def can_pan(scene: Scene, effect: PropertyGroup, strip: Strip, index: int) -> bool:
-    """Return whether a region has a motion that reaches the current frame. Otherwise *Panning Shot* tracks it first.
+def is_tracked(scene: Scene, effect: PropertyGroup, strip: Strip, index: int | None) -> bool:
+    """Return whether a region or the camera has a motion that reaches the current frame, which may be in another shot.
 
-    Raises:
-        EffectError: it has keyframes, but no strokes to follow.
+    Otherwise *Panning Shot* and *Stabilize Exposure* track it first.
     """
-    if not MotionKeys(effect, index, "SCALE").reach(scene.frame_current):
-        return False
-    if not snapshot.strokes_at(scene, effect, strip, index, scene.frame_current):
-        raise EffectError(rpt_("the region has no strokes to follow"))
-    return True
-
-
-def can_stand(effect: PropertyGroup) -> bool:
-    """Return whether the camera has a motion that reaches the current frame, which may be in another shot.
-
-    Otherwise *Stabilize Exposure* tracks it first.
-    """
-    return MotionKeys(effect, None, "SCALE").reach(effect.id_data.frame_current)
+    frame = scene.frame_current
+    has_motion = MotionKeys(effect, index, "SCALE").reach(frame)
+    return has_motion and (index is None or bool(snapshot.strokes_at(scene, effect, strip, index, frame)))
 
 
 def tripod(effect: PropertyGroup, key: bool = False) -> None:
@@ -230,23 +220,3 @@ def tripod(effect: PropertyGroup, key: bool = False) -> None:
     follow(effect, index, "CAMERA", key)
     effect.active_shutter = index
     track_region.key_ends(effect, None)  # the window has moved
-
-
-def _as_layer(effect: PropertyGroup, index: int) -> int:
-    """Make a region a layer whose shutter has no other region, and return the index of that shutter.
-
-    Neither this nor the default shutter follows anything.
-    """
-    region = effect.regions[index]
-    place = effect.shutters.find(region.shutter)
-    if place <= 0 or any(other.shutter == region.shutter for other in effect.regions if other != region):
-        names = {shutter.name for shutter in effect.shutters}
-        shutter = add_shutter(effect, unique(data_("Subject"), names))
-        assign_region(effect, index, shutter)
-        place = len(effect.shutters) - 1
-    for shutter in (effect.shutters[0], effect.shutters[place]):
-        shutter.follow, shutter.length = "NOTHING", "FRAMES"
-    effect.regions[index].is_layer = True
-    effect.position = "CENTER"
-    effect.active_shutter = place
-    return place

@@ -76,21 +76,18 @@ def frames_to_track(scene: Scene, strip: Strip, direction: str, until: int = 0) 
 
     Args:
         direction: FORWARD, BACKWARD or BOTH.
-        until: 0: the end of the strip.
+        until: 0, or a frame that does not lie in this direction: the end of the strip.
 
     Raises:
-        EffectError: the current frame is outside of the strip, or `until` is not in this direction.
+        EffectError: the current frame is outside of the strip.
     """
     current, first, last = scene.frame_current, strip.left_handle, strip.right_handle - 1
     if not first <= current <= last:
         raise EffectError(rpt_("the current frame is outside the Shutter strip"))
-    if until and (until == current or direction == ("BACKWARD" if until > current else "FORWARD")):
-        sentence = rpt_("Until is frame {frame}, which does not lie in that direction; 0 is the end of the strip")
-        raise EffectError(sentence.format(frame=until))
-    if until and until < current:
-        first = max(first, until)
-    elif until:
+    if until > current:
         last = min(last, until)
+    elif 0 < until < current:
+        first = max(first, until)
     return range(current if direction == "FORWARD" else first, (current if direction == "BACKWARD" else last) + 1)
 
 

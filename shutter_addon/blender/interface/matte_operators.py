@@ -12,14 +12,13 @@ from bpy.types import Context, Mask, Operator, PropertyGroup
 from bpy_extras.io_utils import ImportHelper
 
 from ...core.messages import EffectError, UserError
-from ...core.model.choices import CONTEXT, RAMPS, READOUT_UNITS, READS, SIDES
+from ...core.model.choices import CONTEXT, RAMPS, READS, SIDES
 from ...core.model.limits import MAX_CHANNEL
 from ..data import matte_content, recipe_import, selection, strips
 from ..editing import outline_drawings, region_edits, rolling_shutter, shutter_edits
 from ..output import matte_export
 from . import needs
 from .operator_bases import OfEffect, chosen_file, kept, operator
-from .panel_parts import draw_properties
 
 
 class SHUTTER_OT_matte_add(OfEffect, ImportHelper, Operator):
@@ -162,13 +161,6 @@ class SHUTTER_OT_rolling_shutter(OfEffect, Operator):
         items=SIDES,
         translation_context=CONTEXT,
     )
-    unit: EnumProperty(
-        name="Unit",
-        description="Unit of the readout",
-        items=READOUT_UNITS,
-        translation_context=CONTEXT,
-        options={"SKIP_SAVE"},
-    )
     readout: FloatProperty(
         name="Readout",
         description="Time from reading the first row to the last, as a percentage of a frame",
@@ -178,28 +170,12 @@ class SHUTTER_OT_rolling_shutter(OfEffect, Operator):
         max=100.0,
         options={"SKIP_SAVE"},
     )
-    milliseconds: FloatProperty(
-        name="Readout",
-        description="Time from the first row to the last, in milliseconds",
-        default=15.0,
-        min=0.1,
-        max=1000.0,
-        soft_max=40.0,
-        options={"SKIP_SAVE"},
-    )
-
-    def draw(self, _context: Context) -> None:
-        self.layout.use_property_split = True
-        draw_properties(self.layout, self, "side", "unit", "readout" if self.unit == "PERCENT" else "milliseconds")
 
     def change(self, _context: Context, effect: PropertyGroup) -> None:
         known = rolling_shutter.of(effect)
         if known is not None and not self.properties.is_property_set("readout"):
             self.readout = 100 * known.readout  # choosing a side in the menu keeps the readout
-        share = self.readout / 100
-        if self.unit == "MILLISECONDS":
-            share = rolling_shutter.share_of(self.edit, effect, self.effect_strip, self.milliseconds)
-        rolling_shutter.repair(self.edit, effect, self.effect_strip, share, self.side)
+        rolling_shutter.repair(self.edit, effect, self.effect_strip, self.readout / 100, self.side)
 
 
 _READS = EnumProperty(

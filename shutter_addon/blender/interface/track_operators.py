@@ -5,7 +5,7 @@ import time
 
 from bpy.app.translations import pgettext_rpt as rpt_
 from bpy.props import EnumProperty, IntProperty
-from bpy.types import Context, Operator, PropertyGroup, Scene, Strip
+from bpy.types import Context, Operator, PropertyGroup
 
 from ...core.model.choices import CONTEXT
 from ..data import selection, validation
@@ -43,14 +43,7 @@ class _Tracks(Beside):
     tick = _TICK
     blocks = True
     is_camera = False
-
-    def is_ready(self, scene: Scene, effect: PropertyGroup, strip: Strip) -> bool:
-        """Return whether tracking is not needed.
-
-        Raises:
-            EffectError: the work after tracking is impossible.
-        """
-        return False
+    once = False  # not again what is tracked already
 
     def ended(self, context: Context) -> None:
         """Do the work after tracking. Esc skips it.
@@ -66,7 +59,7 @@ class _Tracks(Beside):
         moving = selection.moving(effect, index)
         self._target, self._start = track_region.Target.of(effect, index), scene.frame_current
         self._frame, self._done = self._start, set[int]()
-        if self.is_ready(scene, effect, strip):
+        if self.once and shutter_edits.is_tracked(scene, effect, strip, index):
             return self._finish(context)
         self._frames = track_region.frames_to_track(scene, strip, self.direction, moving.track_until)
         options = {"all_keys": moving.track_all_keys, "patience": None if waits else _PATIENCE}
@@ -181,9 +174,7 @@ class SHUTTER_OT_panning_shot(_Tracks, OfEffect, Operator):
     bl_label = "Panning Shot"
     needs = (needs.strokes,)
     direction = "BOTH"
-
-    def is_ready(self, scene: Scene, effect: PropertyGroup, strip: Strip) -> bool:
-        return shutter_edits.can_pan(scene, effect, strip, effect.active_region)
+    once = True
 
     def ended(self, context: Context) -> None:
         shutter_edits.panning_shot(self._target.effect(), self._target.index, bar_edits.auto_key(context))
@@ -196,9 +187,7 @@ class SHUTTER_OT_tripod(_Tracks, OfEffect, Operator):
     needs = (needs.a_shutter,)
     is_camera = True
     direction = "BOTH"
-
-    def is_ready(self, _edit: Scene, effect: PropertyGroup, _strip: Strip) -> bool:
-        return shutter_edits.can_stand(effect)
+    once = True
 
     def ended(self, context: Context) -> None:
         shutter_edits.tripod(self._target.effect(), bar_edits.auto_key(context))
@@ -252,10 +241,10 @@ def follow(self: Operator, _context: Context, effect: PropertyGroup) -> None:
 @operator("Sharp Subject", needs.a_region)
 def sharp_subject(_self: Operator, context: Context, effect: PropertyGroup) -> None:
     """Keep the active region sharp in front of a long exposure of everything else"""
-    shutter_edits.sharp_subject(effect, effect.active_region, bar_edits.auto_key(context))
+    shutter_edits.as_layer(effect, effect.active_region, "STILL", "ANGLE_360", bar_edits.auto_key(context))
 
 
 @operator("Trail", needs.a_region)
 def clean_trail(_self: Operator, context: Context, effect: PropertyGroup) -> None:
     """Make the active region leave a trail in front of everything else, which stays sharp"""
-    shutter_edits.clean_trail(effect, effect.active_region, bar_edits.auto_key(context))
+    shutter_edits.as_layer(effect, effect.active_region, "ANGLE_360", "STILL", bar_edits.auto_key(context))

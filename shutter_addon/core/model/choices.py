@@ -171,11 +171,5 @@ READS = (
 )
 
 
-READOUT_UNITS = (
-    ("PERCENT", "Percent", "Of the time from a filmed frame to the next"),
-    ("MILLISECONDS", "Milliseconds", "A time, as tables of cameras have it"),
-)
-
-
 # Properties whose F-curves the renderer would not read.
 UNKEYED: set[str] = set()

@@ -176,33 +176,13 @@ MESSAGES = {
     ): "Streifen „{strip}“: entzerrte oder stabilisierte Clips werden nicht unterstützt",
     # The effect and its source
     ("Operator", "Match Source"): "An Quelle angleichen",
-    (
-        "*",
-        "Copy transform, crop, flip, color and range of the source to the Shutter strip (strokes stay on the picture)",
-    ): "Dem Verschlussstreifen Transformation, Beschnitt, Spiegelung, Farbe und Bereich seiner Quelle geben "
-    "(Markierungen bleiben auf dem Bild)",
     ("*", "Differs from its source: {what}"): "Weicht von der Quelle ab: {what}",
     ("*", "transform"): "Transformation",
     ("*", "crop"): "Beschnitt",
     ("*", "flip"): "Spiegelung",
     ("*", "color"): "Farbe",
-    ("*", "range"): "Bereich",
     ("*", "The Shutter strip matches its source"): "Der Verschlussstreifen ist wie seine Quelle",
     ("*", "The Shutter strip has no source"): "Der Verschlussstreifen hat keine Quelle mehr",
-    (
-        "*",
-        '"{neighbor}" is in the way: "{strip}" does not have the whole range of its source',
-    ): "„{neighbor}“ ist im Weg: „{strip}“ hat nicht den ganzen Bereich seiner Quelle",
-    ("Operator", "Copy Modifiers"): "Modifikatoren kopieren",
-    (
-        "*",
-        "Copy the modifiers of the source to the Shutter strip, which otherwise shows the file without them",
-    ): "Die Modifikatoren der Quelle auf den Verschlussstreifen kopieren, der die Datei der Quelle zeigt, wie sie ist",
-    ("*", "The effect does not use the modifiers of the source"): "Modifikatoren der Quelle erreichen den Effekt nicht",
-    (
-        "*",
-        "The Shutter strip already has the modifiers of its source",
-    ): "Der Verschlussstreifen hat die Modifikatoren seiner Quelle",
     (
         "*",
         "The effect does not use effect strips of the source: make the Shutter strip their input",
@@ -644,24 +624,11 @@ MESSAGES = {
         "*",
         "Columns are read from the right, like those of a rotated camera",
     ): "Spalten werden von rechts gelesen, wie von einer Kamera, die gedreht war",
-    ("Virtual Shutter", "Unit"): "Einheit",
-    ("*", "Unit of the readout"): "Worin die Auslesezeit gezählt wird",
-    ("Virtual Shutter", "Percent"): "Prozent",
-    (
-        "*",
-        "Of the time from a filmed frame to the next",
-    ): "Der Zeit von einem gefilmten Bild zum nächsten",
-    ("Virtual Shutter", "Milliseconds"): "Millisekunden",
-    ("*", "A time, as tables of cameras have it"): "Eine Zeit, wie sie in Tabellen von Kameras steht",
     ("*", "Readout"): "Auslesezeit",
     (
         "*",
         "Time from reading the first row to the last, as a percentage of a frame",
     ): "Zeit von der ersten Zeile zur letzten, als Anteil der Zeit von einem gefilmten Bild zum nächsten",
-    (
-        "*",
-        "Time from the first row to the last, in milliseconds",
-    ): "Zeit von der ersten Zeile zur letzten, in Millisekunden",
     ("Operator", "Find Readout"): "Auslesezeit finden",
     (
         "*",
@@ -684,10 +651,6 @@ MESSAGES = {
     ("*", "Earlier"): "Früher",
     ("*", "Later"): "Später",
     ("*", "Rolling Shutter"): "Rolling Shutter",
-    (
-        "*",
-        "{time} ms is longer than a frame of the footage, {longest} ms",
-    ): "{time} ms sind länger als ein Bild des Filmmaterials, {longest} ms",
     ("*", "the readout cannot be found here: {why}"): "die Auslesezeit lässt sich hier nicht finden: {why}",
     ("*", "there are too few frames"): "es gibt zu wenige Bilder",
     ("*", "too few straight lines go across the picture"): "zu wenige gerade Linien gehen durch das Bild",
@@ -1177,12 +1140,6 @@ MESSAGES = {
         "*",
         "Make a long exposure as if the camera stood still (tracks the camera unless it has keyframes)",
     ): "Lange belichten, als hätte die Kamera still gestanden (verfolgt sie, wenn sie keine Schlüsselbilder hat)",
-    ("Operator", "Follow Stabilization"): "Der Stabilisierung folgen",
-    (
-        "*",
-        "Key the camera by the 2D stabilization of a movie clip, from its place at this frame",
-    ): "Der Kamera Schlüsselbilder nach der 2D-Stabilisierung eines Filmclips geben, von ihrem Ort in diesem Bild aus",
-    ("*", 'clip "{clip}" has no 2D stabilization'): "Clip „{clip}“ hat keine 2D-Stabilisierung",
     ("*", 'camera of effect "{name}"'): "Kamera des Effekts „{name}“",
     ("*", "Motion of what the camera sees"): "Wie sich bewegt, was die Kamera sieht",
     ("*", "Name of the camera's animation channels"): "Name der Animationskanäle der Kamera",
@@ -1277,12 +1234,6 @@ MESSAGES = {
         "*",
         "Key the active region by a track of a movie clip, from its place at this frame",
     ): "Der aktiven Region Schlüsselbilder nach einer Spur eines Filmclips geben, von ihrem Ort in diesem Bild aus",
-    ("Operator", "Update"): "Aktualisieren",
-    ("Operator", "Update Followed Track"): "Gefolgte Spur aktualisieren",
-    (
-        "*",
-        "Key the active region again after the track that it follows has changed",
-    ): "Der aktiven Region neue Schlüsselbilder nach dem geben, dem sie folgt, nachdem die Spur sich geändert hat",
     ("*", "What the region follows"): "Was die Region verfolgt",
     ("*", "Track"): "Spur",
     (
@@ -1306,19 +1257,12 @@ MESSAGES = {
         "*",
         "Name of the track or plane track that is followed",
     ): "Name der Spur oder Flächenspur, der gefolgt wird",
-    ("*", "Follow From"): "Folgen ab",
-    ("*", "The track has changed"): "Die Spur hat sich geändert",
     ("*", "Choose a clip first"): "Zuerst einen Clip wählen",
-    ("*", "The region does not follow a track"): "Die Region folgt noch keiner Spur",
     ("*", 'clip "{clip}" has no track "{track}"'): "Clip „{clip}“ hat keine Spur „{track}“",
     (
         "*",
         'clip "{clip}" does not begin with the same file as strip "{strip}"',
     ): "Clip „{clip}“ beginnt nicht mit derselben Datei wie Streifen „{strip}“",
-    (
-        "*",
-        "Until is frame {frame}, which does not lie in that direction; 0 is the end of the strip",
-    ): "Bis ist Bild {frame}, das nicht in dieser Richtung liegt; 0 ist das Ende des Streifens",
     (
         "*",
         '"{track}" of clip "{clip}" has no marker at frame {frame}',
