@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import inspect
 import sys
+from collections.abc import Callable
 from functools import partial
 from types import TracebackType
 
@@ -16,7 +17,7 @@ from ..core.messages import sentence
 from .data import data_format, preview_areas, source_media, strips, versions
 from .devices import main_thread
 from .editing import reconcile as reconciling
-from .editing import shown_annotations, track_region, undelete
+from .editing import shown_annotations, track_region
 from .interface import bake_operators, operator_bases, sharp_frame
 from .output import edit_feed
 from .rendering import invalidation, job_snapshots, render_job, sessions, strobing
@@ -144,16 +145,18 @@ def _after_render(scene: Scene, *_) -> None:
     render_job.end(scene, alone=not render_job.script_waits(inspect.currentframe()))
 
 
-_hooks: list = []  # the sys.excepthook before ours, if ours is installed
-
-
-def _uncaught(kind: type[BaseException], error: BaseException, trace: TracebackType | None) -> None:
+def _uncaught(
+    before: Callable[..., object], kind: type[BaseException], error: BaseException, trace: TracebackType | None
+) -> None:
     """Keep errors of the extension for Copy Report.
 
     Blender prints what operators, panels, handlers and timers raise, which calls sys.excepthook. Nothing else gets all.
+
+    Args:
+        before: the hook before this one, which prints them.
     """
     told.exception(error)
-    _hooks[-1](kind, error, trace)
+    before(kind, error, trace)
 
 
 HANDLERS = {
@@ -176,9 +179,7 @@ HANDLERS = {
 def register() -> None:
     for name, function in HANDLERS.items():
         getattr(bpy.app.handlers, name).append(persistent(function))
-    if not _hooks:
-        _hooks.append(sys.excepthook)
-        sys.excepthook = _uncaught
+    sys.excepthook = partial(_uncaught, sys.excepthook)
     # Frames that the sequencer kept lack the effects. While an extension registers, Blender's data is not available.
     main_thread.later(invalidation.drop_frames)
 
@@ -186,11 +187,10 @@ def register() -> None:
 def unregister() -> None:
     for name, function in HANDLERS.items():
         getattr(bpy.app.handlers, name).remove(function)
-    if sys.excepthook is _uncaught:  # otherwise a hook that was installed later still calls it
-        sys.excepthook = _hooks.pop()
+    if isinstance(ours := sys.excepthook, partial) and ours.func is _uncaught:  # not one that was installed later
+        sys.excepthook = ours.args[0]
     operator_bases.end_all()
     edit_feed.end()
     sessions.forget()
     source_media.look_again()
     reconciling.forget()
-    undelete.forget()

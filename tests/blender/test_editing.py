@@ -324,26 +324,6 @@ def test_a_region_without_annotation_has_no_layer(effect):
     assert len(effect.regions) == 0
 
 
-def test_a_layer_of_another_annotation_is_copied(bpy, effect):
-    other = bpy.data.annotations.new("Notes")
-    layer = other.layers.new("Sharp")
-    for frame, count in ((2, 3), (5, 1)):
-        stroke = layer.frames.new(frame).strokes.new()
-        stroke.points.add(count)
-        stroke.points.foreach_set("co", np.arange(3 * count))
-    region_edits.add_region(effect, effect.shutters[1])  # takes the name
-    assert [found.info for found in region_edits.free_layers(effect, other)] == ["Sharp"]
-    region = region_edits.take_layer(effect, effect.shutters[1], layer)
-    assert region.name == region.layer == "Sharp.001"
-    copy = annotations.layer_of(effect, region)
-    for old, new in zip(layer.frames, copy.frames, strict=True):
-        assert new.frame_number == old.frame_number
-        for a, b in zip(old.strokes, new.strokes, strict=True):
-            assert [tuple(p.co[:2]) for p in a.points] == [tuple(p.co[:2]) for p in b.points]  # they are flat
-            assert b.display_mode == "2DSPACE"
-    assert len(other.layers) == 1
-
-
 # What can be keyed
 
 

@@ -201,15 +201,6 @@ def test_without_a_preview_the_user_is_told(bpy, effect, capfd, name):
     assert "Open a sequencer with a preview" in capfd.readouterr().out
 
 
-def test_region_take(bpy, effect, preview, does):
-    preview.annotation = effect.scene.annotation
-    preview.annotation.layers.new("Notes").frames.new(3)
-    effect = does("region_take", layer="Notes")
-    assert [(region.name, region.shutter) for region in effect.regions] == [("Notes", "Sharp")]
-    with pytest.raises(RuntimeError, match="no annotation layer"):
-        call(bpy, "region_take")
-
-
 def test_region_assign(bpy, effect, does):
     region_edits.add_region(effect, effect.shutters[1])
     effect = does("region_assign", shutter="0")
@@ -313,7 +304,6 @@ NO_SOURCE = "The active strip is not a movie, image or clip strip"
 SELECT = "Select a Shutter strip or its source strip"
 NO_SHUTTER = "The effect has no shutter: add one"
 NO_REGION = "The shutter has no region: draw one"
-NO_LAYER = "The preview shows no annotation layer that could become a region"
 LINKED = "The edit is linked from another file"
 ANY_EFFECT = ("smooth_streaks", "shutter_add", "recipe_import", "recipe_export")  # need nothing in it
 ALIKE = {"match_source": "The Shutter strip matches its source"}
@@ -379,10 +369,10 @@ SITUATIONS = {
     sound: (SELECT, dict.fromkeys(MAKES_EFFECT, NO_SOURCE)),
     color: (SELECT, dict.fromkeys(MAKES_EFFECT, NO_SOURCE)),
     plain: (SELECT, dict.fromkeys(MAKES_EFFECT)),
-    not_seen: (None, {"add_effect": NO_SOURCE, "draw": UNSEEN, "region_take": UNSEEN, **ALIKE, **REGION_UNSEEN}),
+    not_seen: (None, {"add_effect": NO_SOURCE, "draw": UNSEEN, **ALIKE, **REGION_UNSEEN}),
     linked: (LINKED, {}),
     no_shutter: (NO_SHUTTER, {"add_effect": NO_SOURCE, **dict.fromkeys(ANY_EFFECT), **ALIKE, **REGION_NEEDED}),
-    no_region: (None, {"add_effect": NO_SOURCE, "region_take": NO_LAYER, **ALIKE, **REGION_NEEDED}),
+    no_region: (None, {"add_effect": NO_SOURCE, **ALIKE, **REGION_NEEDED}),
 }
 
 
@@ -413,14 +403,12 @@ def test_no_more_shutters_than_a_picture_has(bpy, effect, name):
 
 def test_no_more_regions_than_a_picture_has(bpy, effect, preview):
     full = f"An effect can have at most {limits.MAX_REGIONS} regions"
-    preview.annotation = effect.scene.annotation
-    preview.annotation.layers.new("Notes").frames.new(3)
     for number in range(limits.MAX_REGIONS):
         region = effect.regions.add()
         region.name, region.shutter = str(number), effect.shutters[0].name
     # None of the second shutter's: whatever is drawn would be a new one.
     effect.active_shutter = 1
-    for name, settings in (("draw", {}), ("draw", {"new": True}), ("region_take", {"layer": "Notes"})):
+    for name, settings in (("draw", {}), ("draw", {"new": True})):
         with pytest.raises(RuntimeError, match=full):
             call(bpy, name, **settings)
     effect.active_shutter = 0

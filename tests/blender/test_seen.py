@@ -199,14 +199,6 @@ def test_previews_follow_what_is_seen(bpy, edit, effect, previews, tmp_path):
     assert previews[0].annotation is None
 
 
-def test_the_users_annotations_stay_hidden(edit, effect, previews):
-    previews[0].annotation, previews[0].preview_overlay.show_annotation = None, False
-    for annotation in (effect.scene.annotation, None):
-        shown_annotations.give(previews[0], annotation)
-        shown_annotations.follow()
-    assert not previews[0].preview_overlay.show_annotation
-
-
 def test_undo_shows_the_scribbles_again(bpy, edit, effect, previews):
     bpy.ops.ed.undo_push(message="before")
     by_strip(bpy, edit, effect)

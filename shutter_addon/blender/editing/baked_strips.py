@@ -44,19 +44,16 @@ def lay(scene: Scene, strip: Strip, film: Film) -> Strip:
         EffectError: no channel has room.
     """
     owner = strip.parent_meta() or scene.sequence_editor
-    older = [baked for baked in baked_of(scene, strip) if strips.overlap(baked, strip)]
-    home = strip.virtual_shutter_bake.channel if older else strip.channel
+    for older in [baked for baked in baked_of(scene, strip) if strips.overlap(baked, strip)]:
+        owner.strips.remove(older)
+        _move(owner, strip, strip.virtual_shutter_bake.channel)
+    home = strip.channel
     name, start = data_("{strip} Baked").format(strip=strip.name), round(strips.origin(strip)) + film.frames.start
     is_movie = film.kind == "MOVIE"
     files = [_relative(path) for path in ([film.place] if is_movie else film.pictures)]
     baked = add_effect.new_footage(owner.strips, name, files, _channel(scene, strip), start, is_movie)
     baked.left_handle, baked.right_handle = strip.left_handle, strip.right_handle
-    if older:
-        channel = older[0].channel
-        for other in older:
-            owner.strips.remove(other)
-        _move(owner, baked, channel)
-    elif any(home < each.channel < baked.channel and strips.overlap(each, strip) for each in owner.strips):
+    if any(home < each.channel < baked.channel and strips.overlap(each, strip) for each in owner.strips):
         # Strips above the effect have to stay above its film.
         spare = baked.channel
         _move(owner, strip, _channel(scene, strip))

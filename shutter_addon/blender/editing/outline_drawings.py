@@ -7,7 +7,6 @@ from bisect import bisect
 from collections.abc import Iterator
 from contextlib import closing, contextmanager
 from functools import lru_cache
-from typing import NamedTuple
 
 import bpy
 import numpy as np
@@ -33,18 +32,6 @@ Strokes = outlines.Curves | list[np.ndarray]  # each (n, 2), in fractions of the
 SURE_SUBJECT = 0.5  # a more confident frame of a subject needs no correction
 _EVEN = 1e-5  # what an even motion of a mask may change from frame to frame, in pictures
 SURE = 0.75  # a more confident frame needs no drawing: its overlap is usually 90 %
-
-
-class Needed(NamedTuple):
-    """The frame that needs a drawing most.
-
-    Attributes:
-        frame: timeline frame; None: no frame needs one.
-        confidence: of its matte, 0 to 1.
-    """
-
-    frame: int | None
-    confidence: float
 
 
 def curves_now(scene: Scene, effect: PropertyGroup, strip: Strip, index: int) -> outlines.Curves:
@@ -164,8 +151,10 @@ def carried_frames(
     return file, {int(frame): number for frame, number in shown.items()}
 
 
-def next_needed(scene: Scene, effect: PropertyGroup, strip: Strip, index: int) -> Needed:
-    """Return where in the strip another drawing would help a tracked outline most.
+def next_needed(scene: Scene, effect: PropertyGroup, strip: Strip, index: int) -> tuple[int | None, float]:
+    """Return the frame where another drawing would help a tracked outline most, and its confidence, 0 to 1.
+
+    None: no frame needs one, as all have this confidence.
 
     Of the stretches between, before and after the drawings, the least confident one counts. The frame halves its doubt.
 
@@ -183,21 +172,21 @@ def next_needed(scene: Scene, effect: PropertyGroup, strip: Strip, index: int) -
             if number not in drawn and sure < SURE:
                 stretches.setdefault(bisect(drawn, number), []).append((number, frame, sure))
     if not stretches:
-        return Needed(frame=None, confidence=SURE)
+        return None, SURE
     worst = max(stretches.values(), key=lambda stretch: sum(1 - sure for *_, sure in stretch))
     doubts = np.cumsum([1 - sure for *_, sure in worst])
     _number, frame, sure = worst[int(np.searchsorted(doubts, doubts[-1] / 2))]
-    return Needed(frame=frame, confidence=sure)
+    return frame, sure
 
 
-def _least_sure(file: CarriedFile | SubjectFile, shown: dict[int, int]) -> Needed:
+def _least_sure(file: CarriedFile | SubjectFile, shown: dict[int, int]) -> tuple[int | None, float]:
     """The frame of a subject that is least sure of those whose mattes are made."""
     with closing(file.open()) as mattes:
         sure = {frame: sure for frame, number in shown.items() if (sure := mattes.confidence(number)) is not None}
     frame = min(sure, key=sure.__getitem__, default=None)
     if frame is None or sure[frame] >= SURE_SUBJECT:
-        return Needed(frame=None, confidence=SURE_SUBJECT)
-    return Needed(frame=frame, confidence=sure[frame])
+        return None, SURE_SUBJECT
+    return frame, sure[frame]
 
 
 def to_mask(context: Context, of: tuple[Scene, PropertyGroup, Strip], index: int, step: int) -> Mask:

@@ -2,11 +2,11 @@
 
 import numpy as np
 from bpy.app.translations import pgettext_rpt as rpt_
-from bpy.types import Annotation, AnnotationLayer, PropertyGroup
+from bpy.types import AnnotationLayer, PropertyGroup
 
 from ...core.model import limits
 from ..data import fcurves, selection, strips
-from ..data.annotations import LAYERS, NOT_THIS, add_stroke, annotation, layer_of, layers_of, strokes_of
+from ..data.annotations import LAYERS, NOT_THIS, annotation, layer_of, layers_of
 from ..data.consistency import bars, choose_region, color_layers, forget_followed, unique
 from . import motion_keys
 
@@ -109,27 +109,6 @@ def assign_region(effect: PropertyGroup, index: int, shutter: PropertyGroup) -> 
     color_layers(effect, shutter)
     effect.active_region = index
     effect.active_shutter = list(effect.shutters).index(shutter)
-
-
-def take_layer(effect: PropertyGroup, shutter: PropertyGroup, layer: AnnotationLayer) -> PropertyGroup:
-    """Make an annotation layer a region of a shutter. Layers of other annotations are copied."""
-    own = effect.scene.annotation and layer.id_data == effect.scene.annotation
-    region = add_region(effect, shutter, name=layer.info)
-    copy = layer_of(effect, region)
-    for drawing in layer.frames:
-        copied = copy.frames.new(drawing.frame_number)
-        for points in strokes_of(drawing):
-            add_stroke(copied, points)
-    if own:
-        effect.scene.annotation.layers.remove(layer)
-    return region
-
-
-def free_layers(effect: PropertyGroup, annotation: Annotation | None) -> list:
-    """Return the layers of an annotation that belong to no region."""
-    own = effect.regions if annotation == effect.scene.annotation else ()
-    taken = {getattr(region, name) for region in own for name in LAYERS}
-    return [layer for layer in annotation.layers if layer.info not in taken] if annotation else []
 
 
 def key_region(effect: PropertyGroup, index: int) -> None:

@@ -17,7 +17,6 @@ from ..data.annotations import USERS
 from ..rendering import previews
 
 _emptied: set[int] = set()  # addresses of spaces from which an effect's annotation was removed
-_shown: dict[int, bool] = {}  # by address: whether the user's annotations are visible there
 
 
 def follow() -> None:
@@ -59,10 +58,8 @@ def give(space: SpaceSequenceEditor, annotation: Annotation | None) -> None:
     before = space.annotation
     if before is not None and annotation is not None and not is_own(before):
         before.use_fake_user = True  # keeps the user's annotation in the file
-    if before is None or not is_own(before):
-        _shown[space.as_pointer()] = space.preview_overlay.show_annotation
     if annotation is None:
-        space.preview_overlay.show_annotation = _shown.get(space.as_pointer(), True)
+        space.preview_overlay.show_annotation = True
     space.annotation = annotation
     (_emptied.discard if annotation else _emptied.add)(space.as_pointer())
 
@@ -84,7 +81,6 @@ def before_undo(*_: object) -> None:
 def forget() -> None:
     """Forget all previews before another file is loaded."""
     _emptied.clear()
-    _shown.clear()
 
 
 def _spaces() -> Iterator[SpaceSequenceEditor]:

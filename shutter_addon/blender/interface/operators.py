@@ -321,33 +321,6 @@ def _show_annotation(context: Context, effect: PropertyGroup) -> None:
 
 
 @kept
-def _layers(context: Context) -> list[tuple]:
-    active = selection.active(context)
-    return [(layer.info, layer.info, "") for layer in _free_layers(active[1])] if active else []
-
-
-def _free_layers(effect: PropertyGroup) -> list:
-    """Return the layers of the first preview's annotation that are no regions."""
-    previews = preview_areas.previews(bpy.context)
-    return region_edits.free_layers(effect, next((area.spaces.active.annotation for _, area in previews), None))
-
-
-def _why_no_layer(effect: PropertyGroup) -> str | None:
-    return None if _free_layers(effect) else rpt_("The preview shows no annotation layer that could become a region")
-
-
-_LAYER = EnumProperty(name="Layer", items=_layers, translation_context=contexts.no_translation)
-
-
-@operator("Add Region from Annotation Layer", needs.room_for_a_region, _why_no_layer, only_seen=True, layer=_LAYER)
-def region_take(self: Operator, context: Context, effect: PropertyGroup) -> None:
-    """Make an annotation layer of the preview a region of the active shutter"""
-    layer = next(layer for layer in _free_layers(effect) if layer.info == self.layer)
-    region_edits.take_layer(effect, selection.active_shutter(effect), layer)
-    _show_annotation(context, effect)
-
-
-@kept
 def _shutters(context: Context) -> list[tuple]:
     active = selection.active(context)
     return [(str(i), shutter.name, "") for i, shutter in enumerate(active[1].shutters)] if active else []

@@ -93,14 +93,14 @@ class SHUTTER_OT_outline_needed(_Carries, Operator):
 
     def carried(self, context: Context) -> set[str] | None:
         scene, effect, strip = selection.active(context)
-        needed = outline_drawings.next_needed(scene, effect, strip, self._target.index)
-        if needed.frame is None:
+        frame, confidence = outline_drawings.next_needed(scene, effect, strip, self._target.index)
+        if frame is None:
             sentence = rpt_("The confidence is {share:.0f} % or more at all frames")
-            self.report({"INFO"}, sentence.format(share=100 * needed.confidence))
+            self.report({"INFO"}, sentence.format(share=100 * confidence))
             return {"CANCELLED"}
-        scene.frame_set(needed.frame)
+        scene.frame_set(frame)
         sentence = rpt_("Frame {frame}: the confidence is {share:.0f} %")
-        self.report({"INFO"}, sentence.format(frame=needed.frame, share=100 * needed.confidence))
+        self.report({"INFO"}, sentence.format(frame=frame, share=100 * confidence))
         redraw(context)
         return None
 

@@ -97,8 +97,6 @@ def region_menu(layout: UILayout, _context: Context) -> None:
     layout.separator()
     draw_operators(layout, ("time_map", "TIME", "ramp"), ("rolling_shutter", "CAMERA_DATA", "side"))
     draw_operators(layout, ("find_readout", "VIEWZOOM", "reads"))
-    layout.separator()
-    draw_operators(layout, ("region_take", "GREASEPENCIL", "layer"))
 
 
 @menu("shutters", "Shutter Specials")

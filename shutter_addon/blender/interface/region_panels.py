@@ -22,7 +22,7 @@ _TRACKING = "motion", "track_until", "track_all_keys", "track_ends"
 _BUTTONS = {  # operators of each kind with drawings
     "LINE": (("subject_find",), ("outline_it",)),
     "OUTLINE": (("outline_it",), ("outline_needed",)),
-    "SUBJECT": (("subject_outline", "CURVE_BEZCIRCLE"), ("subject_scribble", "IPO_LINEAR")),
+    "SUBJECT": (("subject_scribble", "IPO_LINEAR"),),
 }
 _OF_KIND = {"LINE": "width", "OUTLINE": "between", "RAMP": "ramp"}  # the property that only this kind has
 

@@ -205,7 +205,7 @@ def _look(looking: Operator, effect: PropertyGroup, index: int | None) -> set[st
     frame: int | None = looking.frame
     is_given = looking.properties.is_property_set("frame")
     if index is not None and effect.regions[index].kind == "SUBJECT" and not is_given:
-        frame = outline_drawings.next_needed(looking.edit, effect, looking.effect_strip, index).frame
+        frame = outline_drawings.next_needed(looking.edit, effect, looking.effect_strip, index)[0]
     elif not is_given:
         frame = track_region.next_unsure(effect, index, looking.edit.frame_current)
     if frame is None:

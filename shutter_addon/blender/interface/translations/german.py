@@ -176,6 +176,15 @@ MESSAGES = {
     ): "Streifen „{strip}“: entzerrte oder stabilisierte Clips werden nicht unterstützt",
     # The effect and its source
     ("Operator", "Match Source"): "An Quelle angleichen",
+    (
+        "*",
+        "Copy transform, crop, flip and color of the source to the Shutter strip (strokes stay on the picture)",
+    ): "Dem Verschlussstreifen Transformation, Beschnitt, Spiegelung und Farbe seiner Quelle geben "
+    "(Markierungen bleiben auf dem Bild)",
+    (
+        "*",
+        "The effect does not use the modifiers of the source: copy them to it",
+    ): "Modifikatoren der Quelle erreichen den Effekt nicht: auf ihn kopieren",
     ("*", "Differs from its source: {what}"): "Weicht von der Quelle ab: {what}",
     ("*", "transform"): "Transformation",
     ("*", "crop"): "Beschnitt",
