@@ -1,4 +1,4 @@
-"""Subjects in Blender: drawn, saved, as recipes, rendered, made of outlines, and what is said of bad input."""
+"""Subjects in Blender: drawn, saved, as recipes, rendered, turned into outlines, and what is said of bad input."""
 
 import json
 
@@ -124,12 +124,13 @@ def test_recipe_and_back(edited, tmp_path):
     assert np.allclose(region.keys[0].strokes, drawing, atol=1e-4)
 
 
-def test_from_an_outline(bpy, edited):
-    """By its drawing, which stays; removed, nothing of it stays in the annotation."""
-    turn = np.linspace(0, 2 * np.pi, 40, endpoint=False)
-    circle = np.stack([(60 + RADIUS * np.cos(turn)) / WIDTH, 0.5 + RADIUS * np.sin(turn) / HEIGHT], axis=1)
-    strip, effect = edited("outline", strokes=[circle.tolist()])
+def test_as_an_outline(bpy, edited):
+    """It is drawn where the subject had a stroke; removed, nothing of it stays in the annotation."""
+    strip, effect = edited()
+    assert bpy.ops.shutter.subject_outline() == {"FINISHED"}
     region = effect.regions[0]
+    assert (region.kind, len(annotations.layers_of(effect, region))) == ("OUTLINE", 1)
+    assert overlap(coefficients(strip, effect, 1), 0) > 0.9
     assert bpy.ops.shutter.subject_find() == {"FINISHED"}
     assert (region.kind, region.layer, region.outline_layer) == ("SUBJECT", "", "o")
     assert overlap(coefficients(strip, effect, 1), 0) > 0.9

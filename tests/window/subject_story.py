@@ -72,14 +72,15 @@ def made_sharp():
 
 
 def turned():
-    """By the operator of the button, and undone."""
-    with driver.override("PREVIEW"):
-        bpy.ops.shutter.subject_scribble("INVOKE_DEFAULT", True)
-    yield from driver.until(lambda: region().kind == "LINE", "it is a scribble")
-    yield from story.seen("5_line")
-    driver.key("ctrl+z")
-    yield from driver.until(lambda: region().kind == "SUBJECT", "it is a subject again")
-    yield 1.0
+    """By the operators of the buttons, and undone."""
+    for name, kind in (("subject_outline", "OUTLINE"), ("subject_scribble", "LINE")):
+        with driver.override("PREVIEW"):
+            getattr(bpy.ops.shutter, name)("INVOKE_DEFAULT", True)
+        yield from driver.until(lambda kind=kind: region().kind == kind, f"it is of the kind {kind}")
+        yield from story.seen(f"5_{kind.lower()}")
+        driver.key("ctrl+z")
+        yield from driver.until(lambda: region().kind == "SUBJECT", "it is a subject again")
+        yield 1.0
 
 
 def told():

@@ -51,29 +51,16 @@ class Timed:
 
 
 class Curves:
-    """The F-curves of a scene by path. Each is checked once."""
+    """The F-curves of a scene by path."""
 
     def __init__(self, scene):
-        self._scene, self._pace = scene, stretched(scene)
+        self._pace = stretched(scene)
         found = (c for c in curves_under(scene, "") if not (c.mute or c.is_empty))
         self._curves = {(c.data_path, c.array_index): c if self._pace == 1 else Timed(c, scene) for c in found}
-        self._frames: dict = {}  # frames (n,) of the keys by curve
 
     def find(self, path: str, index: int = 0):
-        """Return the F-curve of a property, or None; muted and empty ones do not count.
-
-        Raises:
-            EffectError: A key lies beyond the timeline.
-        """
-        curve = self._curves.get((path, index))
-        if curve is not None and curve not in self._frames:
-            frames = points_of(curve)[:, 0]
-            beyond = validation.beyond_timeline(frames)
-            if beyond.size:
-                owner, _, name = path.rpartition(".")
-                validation.refuse_key(self._scene.path_resolve(owner), name, beyond[0])
-            self._frames[curve] = frames / self._pace
-        return curve
+        """Return the F-curve of a property, or None; muted and empty ones do not count."""
+        return self._curves.get((path, index))
 
     def of(self, owner, path: str, name: str) -> list:
         """Return the F-curves of a property's components. `path` is the owner's, from the scene."""
@@ -88,7 +75,7 @@ class Curves:
         """
         eases: dict[float, Ease] = {}
         for curve in curves:
-            frames = self._frames[curve].tolist()
+            frames = (points_of(curve)[:, 0] / self._pace).tolist()
             if not eases.keys() >= set(frames):
                 eases = dict(zip(frames, _eases(curve), strict=True)) | eases
         return tuple(sorted(eases.items()))

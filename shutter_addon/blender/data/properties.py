@@ -22,10 +22,6 @@ from bpy.props import (
 from bpy.types import Context, PropertyGroup
 
 from ...core import revision
-<<<<<<< HEAD
-from ...core.messages import EffectError
-=======
->>>>>>> 78d80302 (Tell less of mattes, check sequences at renders alone)
 from ...core.model import effect as model
 from ...core.model.choices import CONTEXT, FOLLOWED, FOLLOWS, KINDS, MATTE_SOURCES, MOTIONS, UNKEYED
 from ...core.model.fields import Field, fields_of
@@ -241,20 +237,7 @@ def _shutter_recolored(shutter: PropertyGroup, _context: Context) -> None:
 
 
 def _window_changed(effect: PropertyGroup, context: Context) -> None:
-<<<<<<< HEAD
-    """Fit bars to the window. Errors of an update callback would only be printed, so this shows them."""
-    try:
-        consistency.fit_bars(effect)
-    except EffectError as error:
-        sentence = str(error)
-        if bpy.app.background:
-            print(sentence, file=sys.stderr)
-        else:
-            show = context.window_manager.popup_menu
-            show(lambda menu, _context: menu.layout.label(text=sentence, translate=False), icon="ERROR")
-=======
     consistency.fit_bars(effect)
->>>>>>> 78d80302 (Tell less of mattes, check sequences at renders alone)
     changed(effect, context)
 
 

@@ -117,22 +117,6 @@ def _is_backward(scene: Scene, effect: PropertyGroup, strip: Strip) -> bool:
     return bool(source_media.timing_of(strips.source_of(scene, effect, strip)).use_reverse_frames)
 
 
-def share_of(scene: Scene, effect: PropertyGroup, strip: Strip, milliseconds: float) -> float:
-    """Convert milliseconds to a fraction of a filmed frame.
-
-    Raises:
-        EffectError: it is longer than a frame.
-        MediaError: the footage cannot be read.
-    """
-    with source_media.open_media(strips.source_of(scene, effect, strip)) as medium:
-        rate = float(medium.fps or scene.render.fps / scene.render.fps_base)
-    share = milliseconds * rate / 1000
-    if share > 1:
-        sentence = rpt_("{time} ms is longer than a frame of the footage, {longest} ms")
-        raise EffectError(sentence.format(time=f"{milliseconds:g}", longest=f"{1000 / rate:.1f}"))
-    return share
-
-
 def find(scene: Scene, effect: PropertyGroup, strip: Strip, side: str) -> tuple[float, str]:
     """Find the readout of a source around the current frame, and the side that is read first.
 

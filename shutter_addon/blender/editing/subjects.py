@@ -1,4 +1,4 @@
-"""Regions that become subjects."""
+"""Regions that become subjects, and what subjects become in turn: outlines and scribbles."""
 
 from contextlib import closing
 
@@ -7,7 +7,7 @@ from bpy.types import PropertyGroup, Scene, Strip
 
 from ...core.messages import EffectError
 from ..data import annotations, snapshot
-from . import outline_drawings
+from . import outline_drawings, region_edits
 
 
 def find(scene: Scene, effect: PropertyGroup, strip: Strip, index: int) -> bool:
@@ -47,3 +47,29 @@ def is_first_stroke(effect: PropertyGroup, region: PropertyGroup) -> bool:
     layer = annotations.layer_of(effect, region)
     drawn = sum(len(drawing.strokes) for drawing in layer.frames) if layer else 0
     return region.finds_subject and region.kind == "LINE" and drawn == 1
+
+
+def to_outline(scene: Scene, effect: PropertyGroup, strip: Strip, index: int) -> bool:
+    """Make a subject an outline, which is drawn where the subject has strokes or drawings.
+
+    Returns:
+        Whether it encloses anything.
+
+    Raises:
+        EffectError, MediaError: Its mattes cannot be made.
+    """
+    region = effect.regions[index]
+    layers = [annotations.layer_of(effect, region, name) for name in ("layer", "outline_layer")]
+    frames = sorted({drawing.frame_number for layer in layers if layer for drawing in layer.frames})
+    file, shown = snapshot.carried_outline(scene, effect, strip, index, frames)
+    with closing(file.open()) as mattes:
+        for frame in frames:
+            mattes.read(shown[frame])
+        curves = {frame: mattes.curves(shown[frame]) for frame in frames}
+    if not any(curves.values()):
+        return False
+    region_edits.remove_layers(effect, region)
+    region.kind = "OUTLINE"
+    for frame, drawn in curves.items():
+        outline_drawings.draw(effect, strip, region, drawn, frame)
+    return True

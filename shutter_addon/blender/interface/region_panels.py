@@ -7,13 +7,8 @@ from bpy.types import MovieTracking, PropertyGroup, Scene, Strip, UILayout
 
 from ...core.messages import EffectError
 from ...media.pursuit import SURE
-<<<<<<< HEAD
-from ..data import matte_look, selection, strips, validation
-from ..editing import outline_drawings, track_region
-=======
 from ..data import selection, strips, validation
-from ..editing import follow_track, outline_drawings, track_region
->>>>>>> 78d80302 (Tell less of mattes, check sequences at renders alone)
+from ..editing import outline_drawings, track_region
 from . import needs, track_operators
 from .panel_parts import draw_list, draw_operators, draw_properties, sentence
 
@@ -22,7 +17,7 @@ _TRACKING = "motion", "track_until", "track_all_keys", "track_ends"
 _BUTTONS = {  # operators of each kind with drawings
     "LINE": (("subject_find",), ("outline_it",)),
     "OUTLINE": (("outline_it",), ("outline_needed",)),
-    "SUBJECT": (("subject_scribble", "IPO_LINEAR"),),
+    "SUBJECT": (("subject_outline", "CURVE_BEZCIRCLE"), ("subject_scribble", "IPO_LINEAR")),
 }
 _OF_KIND = {"LINE": "width", "OUTLINE": "between", "RAMP": "ramp"}  # the property that only this kind has
 

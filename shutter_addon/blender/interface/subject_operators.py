@@ -1,4 +1,4 @@
-"""Operators that make regions subjects, and subjects scribbles; and the first stroke of a new effect, which becomes a
+"""Operators that make regions subjects, outlines and scribbles; and the first stroke of a new effect, which becomes a
 subject by itself."""
 
 import bpy
@@ -28,6 +28,15 @@ def subject_find(self: Operator, _context: Context, effect: PropertyGroup) -> se
 def subject_scribble(_self: Operator, _context: Context, effect: PropertyGroup) -> None:
     """Make the active subject a scribble: its strokes, as wide as the region's width"""
     effect.regions[effect.active_region].kind = "LINE"
+
+
+@operator("Outline", needs.a_subject, only_seen=True)
+def subject_outline(self: Operator, _context: Context, effect: PropertyGroup) -> set[str] | None:
+    """Make the active subject an outline, which is drawn where the subject has strokes"""
+    if not subjects.to_outline(self.edit, effect, self.effect_strip, effect.active_region):
+        report_warning(self, rpt_("The subject has no outline there"))
+        return {"CANCELLED"}
+    return None
 
 
 def pen_is_up(context: Context) -> None:

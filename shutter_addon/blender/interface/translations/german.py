@@ -488,6 +488,12 @@ MESSAGES = {
         "*",
         "Make the active subject a scribble: its strokes, as wide as the region's width",
     ): "Das aktive Motiv zu Strichen machen, so breit wie die Breite der Region",
+    ("Operator", "Outline"): "Umriss",
+    (
+        "*",
+        "Make the active subject an outline, which is drawn where the subject has strokes",
+    ): "Das aktive Motiv zum Umriss machen, der dort gezeichnet ist, wo das Motiv Striche hat",
+    ("*", "The subject has no outline there"): "Das Motiv hat dort keinen Umriss",
     ("*", 'strip "{strip}" has a scale of 0'): "Streifen „{strip}“ ist zu nichts skaliert",
     ("*", "{place}: a linear outline is not tracked"): "{place}: Ein linearer Umriss wird nicht verfolgt",
     ("Operator", "Edit Outline"): "Umriss ausbessern",
