@@ -79,6 +79,8 @@ def _before_save(*_) -> None:
 
 def _update(scene: Scene | None = None, depsgraph: Depsgraph | None = None) -> None:
     revision.changed()
+    if (film := render_job.film()) is not None and bpy.app.is_job_running("RENDER"):
+        job_snapshots.look(film)
     if not render_job.cancelling():
         reconciling.update(scene)
     # Blender redraws previews for most changes, but not for a mask. It may crash if one is drawn while a render ends.

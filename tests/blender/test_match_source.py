@@ -120,11 +120,27 @@ def color(source):
     source.color_multiply, source.color_saturation = 0.5, 0.5
 
 
+def slow_down(source):
+    source.retiming_keys.add(timeline_frame=1)
+    source.retiming_keys[-1].timeline_frame = 81
+
+
+def lengthen(source):
+    source.left_handle, source.right_handle = -4, 51
+
+
+def trim(source):
+    source.left_handle, source.right_handle = 11, 31
+
+
 CHANGES = {
     transform: ["transform"],
     crop: ["crop"],
     flip: ["flip"],
     color: ["color"],
+    slow_down: ["range"],
+    lengthen: ["range"],
+    trim: ["range"],
 }
 
 
@@ -134,7 +150,7 @@ def test_matched_it_shows_what_its_source_shows(bpy, edit, made, shown, change):
     assert words() == []
     change(source)
     assert words() == CHANGES[change]
-    frames = range(1, 41)  # in order: see test_strips.check
+    frames = range(min(source.left_handle, 1), max(source.right_handle, 41))  # in order: see test_strips.check
     plain = shown(source, frames)
     assert apart(shown(strip, frames), plain) > 20
     match(bpy)
@@ -209,6 +225,59 @@ def test_keys_of_the_transform_are_copied(bpy, edit, made, shown):
     assert not fcurves.curves_under(edit, f"{strip.path_from_id()}.transform.rotation")
     fcurves.curves_under(edit, f"{source.path_from_id()}.")[0].keyframe_points[1].co[1] = 11
     assert words() == ["transform"]
+
+
+def test_a_source_that_was_moved_alone_takes_keys_along(bpy, edit, made, shown):
+    keyed = recipe(4, {1: [1, 0, 0, 0], 2: [1, 0, 0, 0], 31: [0, 0, 0, 1]})
+    strip, source = made(keyed)
+    before = shown(strip, [5, 25])
+    source.content_start -= 50
+    match(bpy)
+    after = shown(strip, [-45, -25])
+    assert (strip.left_handle, strip.right_handle) == (-49, -9)
+    assert np.array_equal(after[-45], before[5])
+    assert np.array_equal(after[-25], before[25])
+
+
+def test_never_over_a_neighbor(bpy, edit, made, capfd):
+    strip, source = made()
+    neighbor = edit.sequence_editor.strips.new_effect("Title", "TEXT", strip.channel, 45, length=10)
+    source.left_handle, source.right_handle = -4, 61
+    match(bpy)
+    assert (strip.left_handle, strip.right_handle) == (-4, 45)
+    assert (neighbor.left_handle, neighbor.right_handle) == (45, 55)
+    assert '"Title" is in the way: "Shutter" does not have the whole range of its source' in capfd.readouterr().out
+    assert words() == []
+
+
+def match_both(bpy, edit, *halves):
+    for half in halves:
+        selection.choose(edit, half)
+        match(bpy)
+
+
+def disconnect(bpy, edit, strip):
+    """Blender cuts connected strips together."""
+    for other in edit.sequence_editor.strips:
+        other.select = other == strip
+    with bpy.context.temp_override(sequencer_scene=edit):
+        bpy.ops.sequencer.disconnect()
+
+
+def test_parts_of_a_cut_effect_match_their_own_part(bpy, edit, made, shown, capfd):
+    strip, source = made()
+    disconnect(bpy, edit, source)
+    right = strip.split(21, "SOFT")
+    assert words() == []
+    lengthen(source), transform(source)
+    frames = [-4, 5, 25, 50]
+    plain = shown(source, frames)
+    match_both(bpy, edit, strip, right)
+    assert [(s.left_handle, s.right_handle) for s in (strip, right)] == [(-4, 21), (21, 51)]
+    assert "in the way" not in capfd.readouterr().out
+    assert apart(shown(strip, frames[:2]), {f: plain[f] for f in frames[:2]}) <= LEVELS
+    assert apart(shown(right, frames[2:]), {f: plain[f] for f in frames[2:]}) <= LEVELS
+    assert len(edit.virtual_shutter.effects) == 2
 
 
 DRAWN_TWICE = SCRIBBLED | {
@@ -313,17 +382,27 @@ def test_another_size_of_the_edit(bpy, edit, made, shown):
     assert np.abs(after[8:56, 24:72] - before).max() <= LEVELS
 
 
-def test_modifiers_of_the_source_are_noted_while_the_strip_has_none(bpy, edit, made):
+def test_modifiers_of_the_source_are_copied_where_they_lack(bpy, edit, made, shown):
     strip, source = made()
-    (effect,) = edit.virtual_shutter.effects
-
-    def lacks():
-        bpy.context.view_layer.update()
-        return match_source.shown(effect).lacks_modifiers
-
+    effect = edit.virtual_shutter.effects[0]
+    with pytest.raises(RuntimeError, match="The Shutter strip already has the modifiers of its source"):
+        bpy.ops.shutter.copy_modifiers()
+    strip.modifiers.new("Own", "BRIGHT_CONTRAST")
+    source.modifiers.new("Same", "BRIGHT_CONTRAST").bright = 5
     source.modifiers.new("Off", "MASK").mute = True
-    assert not lacks()
-    source.modifiers.new("On", "BRIGHT_CONTRAST")
-    assert lacks()
-    strip.modifiers.new("Own", "COLOR_BALANCE")
-    assert not lacks()
+    balance = source.modifiers.new("Own", "COLOR_BALANCE")
+    for frame, factor in ((1, 0.3), (31, 1.0)):
+        balance.color_multiply = factor
+        balance.keyframe_insert("color_multiply", frame=frame)
+    assert [m.name for m in match_source.missing_modifiers(strip, source)] == ["Own"]
+    assert bpy.ops.shutter.copy_modifiers("EXEC_DEFAULT", True) == {"FINISHED"}
+    assert [m.type for m in strip.modifiers] == ["BRIGHT_CONTRAST", "COLOR_BALANCE"]
+    assert match_source.missing_modifiers(strip, source) == []
+    assert edit.sequence_editor.active_strip == strip
+    source.modifiers["Same"].bright = 0
+    frames = [1, 16, 31]
+    plain = shown(source, frames)
+    assert apart(shown(strip, frames), plain) <= LEVELS
+    strip.modifiers[1].mute = True
+    assert apart(shown(strip, frames), plain) > 20
+    assert effect == edit.virtual_shutter.effects[0]

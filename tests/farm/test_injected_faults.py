@@ -434,3 +434,38 @@ def test_two_schedulers_at_once(whole, node, submit):
     assert sorted(moved) == sorted(_pictures(whole))
     assert _pictures(node) == _pictures(whole)
     submit(node)
+
+
+PLANT = """
+import sys
+import bpy
+
+edit, marker, kind = sys.argv[1:]
+touch = f"__import__('pathlib').Path({marker!r}).touch()"
+bpy.ops.wm.open_mainfile(filepath=edit)
+if kind == "text":
+    text = bpy.data.texts.new("startup.py")
+    text.write(touch)
+    text.use_module = True
+else:
+    bpy.context.scene["driven"] = 1.0
+    bpy.context.scene.driver_add('["driven"]').driver.expression = f"{touch} or 1.0"
+bpy.ops.wm.save_mainfile()
+bpy.ops.wm.open_mainfile(filepath=edit, use_scripts=True)
+"""
+
+
+@pytest.mark.parametrize("kind", ["text", "driver"])
+def test_scripts_of_a_stranger_are_not_run(whole, node, worker, submit, tmp_path, kind):
+    """Where pictures may depend on one, it is told."""
+    marker = tmp_path / "was run"
+    subprocess.run([sys.executable, "-c", PLANT, node.edit, marker, kind], check=True, capture_output=True)
+    marker.unlink()
+    for step in node.steps():
+        if kind == "text":
+            assert worker(*step) == (0, "")
+        else:
+            _refused(worker(*step), "edit.blend: a driver of the scene", "needs scripts, which are not run")
+        assert not marker.exists()
+    shutil.copytree(whole.folder, node.folder, dirs_exist_ok=True)
+    submit(node)

@@ -1,17 +1,19 @@
-"""Compare an effect strip with its source, and match it on request: transform, crop, flip and color.
+"""Compare an effect strip with its source, and match it on request: transform, crop, flip, color and range.
 
 Strokes keep their place on the picture. What can only be wrong is corrected automatically by reconcile.follow_sources.
 """
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from typing import NamedTuple
 
 import bpy
 import numpy as np
-from bpy.types import AnnotationFrame, FCurve, PropertyGroup, Scene, Strip
+from bpy.app.translations import pgettext_n as n_
+from bpy.types import AnnotationFrame, FCurve, PropertyGroup, Scene, Strip, StripModifier
 
 from ...core import revision
 from ...core.model.scribbles import mapped
@@ -19,6 +21,8 @@ from ..data import fcurves, sampled, strips
 from ..data.annotations import layers_of
 from ..data.property_copy import for_a_while
 from . import add_effect
+
+_RANGE = n_("range")
 
 
 def strip_and_source(effect: PropertyGroup) -> list[Strip]:
@@ -33,7 +37,7 @@ class Shown(NamedTuple):
     Attributes:
         source: its name.
         differences: labels of what `match` would change.
-        lacks_modifiers: the source has modifiers, and the effect strip has none.
+        lacks_modifiers: the source has modifiers that the effect strip lacks.
         has_effects: the source has effect strips.
     """
 
@@ -54,15 +58,25 @@ def _compare(effect: PropertyGroup) -> Shown | None:
     strip, source = pair
     look, wanted = _looks(strip), _looks(source)
     words = [word for word in add_effect.LOOK if look[word] != wanted[word]]
-    lacks_modifiers = not strip.modifiers and not all(modifier.mute for modifier in source.modifiers)
-    return Shown(source.name, words, lacks_modifiers, bool(effects_on(effect.id_data, source)))
+    if _goal(effect, strip, source)[:2] != (strip.left_handle, strip.right_handle):
+        words.append(_RANGE)
+    lacks_modifiers, has_effects = bool(missing_modifiers(strip, source)), bool(effects_on(effect.id_data, source))
+    return Shown(source.name, words, lacks_modifiers, has_effects)
 
 
-def match(effect: PropertyGroup) -> None:
-    """Give the effect strip the look of its source."""
-    strip, source = strip_and_source(effect)
+def match(effect: PropertyGroup) -> Strip | None:
+    """Give the effect strip the look and range of its source.
+
+    Return the neighboring strip that limits the range, or None.
+    """
+    scene, (strip, source) = effect.id_data, strip_and_source(effect)
     with scribbles_kept(effect, strip):
         add_effect.copy_look(source, strip, keys=True)
+    left, right, neighbor = _goal(effect, strip, source)
+    _slip(scene, strip, source, left, right)
+    strip.right_handle = max(strip.right_handle, right)  # otherwise the left handle could not pass it
+    strip.left_handle, strip.right_handle = left, right
+    return neighbor
 
 
 def _looks(strip: Strip) -> dict[str, str]:
@@ -90,6 +104,42 @@ def _keyed(curves: list[FCurve], path: str) -> list:
         for curve in curves
         if curve.data_path.startswith(path)
     )
+
+
+def _goal(effect: PropertyGroup, strip: Strip, source: Strip) -> tuple[int, int, Strip | None]:
+    """Return the handles that an effect strip would get, and the neighboring strip that limits them or None.
+
+    They are those of the source, or of the parts that it was cut into. An edge where another effect of the same source
+    continues stays. Without any room, both handles stay.
+    """
+    parts = (s for s in effect.id_data.sequence_editor.strips_all if s.virtual_shutter_source == effect.source)
+    parts = (s for s in parts if s.type == source.type and strips.origin(s) == strips.origin(source))
+    below = [s for s in parts if s == source or strips.overlap(s, strip)]
+    others = [other for _effect, other, by in strips.with_sources(effect.id_data) if by in below and other != strip]
+    left, right = min(s.left_handle for s in below), max(s.right_handle for s in below)
+    left = strip.left_handle if any(o.left_handle < strip.left_handle for o in others) else left
+    right = strip.right_handle if any(o.right_handle > strip.right_handle for o in others) else right
+    level = (strip.parent_meta() or strip.id_data.sequence_editor).strips
+    beside = [other for other in level if other.channel == strip.channel and other != strip]
+    before = [s for s in beside if s.left_handle < strip.left_handle and s.right_handle > left]
+    after = [s for s in beside if s.left_handle > strip.left_handle and s.left_handle < right]
+    first = max(before, key=lambda other: other.right_handle, default=None)
+    last = min(after, key=lambda other: other.left_handle, default=None)
+    left, right = first.right_handle if first else left, last.left_handle if last else right
+    left, right = (left, right) if left < right else (strip.left_handle, strip.right_handle)
+    return left, right, first or last
+
+
+def _slip(scene: Scene, strip: Strip, source: Strip, left: int, right: int) -> None:
+    """Slip the effect's content and its keyframes with a source that moved as a whole, or that begins before it.
+
+    Before its content begins, an effect strip shows only its first frame.
+    """
+    frames = int(source.content_start - strip.content_start)
+    moved = frames == left - strip.left_handle == right - strip.right_handle
+    if frames and (moved or (frames < 0 and left < strip.content_start)):
+        with add_effect.selecting(scene, [strip]):
+            bpy.ops.sequencer.slip(offset=frames, ignore_connections=True)
 
 
 @contextmanager
@@ -132,16 +182,40 @@ def _move(drawing: AnnotationFrame, change: np.ndarray) -> None:
         stroke.points.foreach_set("co", points.ravel())
 
 
-def append_modifiers(scene: Scene, source: Strip, part: Strip) -> None:
-    """Copy the modifiers of a strip to another, with their keyframes."""
+def missing_modifiers(part: Strip, source: Strip) -> list[StripModifier]:
+    """Return the source's modifiers that the effect strip lacks. The engine reads the file, without modifiers."""
+    own = Counter(modifier.type for modifier in part.modifiers)
+    lacking = []
+    for modifier in (modifier for modifier in source.modifiers if not modifier.mute):
+        own[modifier.type] -= 1
+        if own[modifier.type] < 0:
+            lacking.append(modifier)
+    return lacking
+
+
+def copy_modifiers(effect: PropertyGroup) -> None:
+    """Copy the source's modifiers that the effect strip lacks, with their keyframes."""
+    strip, source = strip_and_source(effect)
+    append_modifiers(effect.id_data, source, strip, missing_modifiers(strip, source))
+
+
+def append_modifiers(scene: Scene, source: Strip, part: Strip, chosen: list[StripModifier] | None = None) -> None:
+    """Copy the modifiers of a strip to another, with their keyframes.
+
+    Args:
+        chosen: copy only these.
+    """
     if not source.modifiers:
         return
     count = len(part.modifiers)
     active = scene.sequence_editor, "active_strip", source
     with for_a_while([active]), add_effect.selecting(scene, [part]):  # it copies all of the active strip
         bpy.ops.sequencer.strip_modifier_copy(type="APPEND")
-    for old, new in zip(source.modifiers, part.modifiers[count:], strict=True):
-        fcurves.copy_curves(scene, f"{old.path_from_id()}.", scene, f"{new.path_from_id()}.")
+    for old, new in list(zip(source.modifiers, part.modifiers[count:], strict=True)):
+        if chosen is None or old in chosen:
+            fcurves.copy_curves(scene, f"{old.path_from_id()}.", scene, f"{new.path_from_id()}.")
+        else:
+            part.modifiers.remove(new)
 
 
 def effects_on(scene: Scene, source: Strip) -> list[Strip]:

@@ -94,9 +94,23 @@ def _why_alike(effect: PropertyGroup) -> str | None:
 
 
 @operator("Match Source", _why_alike)
-def match_source(_self: Operator, _context: Context, effect: PropertyGroup) -> None:
-    """Copy transform, crop, flip and color of the source to the Shutter strip (strokes stay on the picture)"""
-    matching.match(effect)
+def match_source(self: Operator, _context: Context, effect: PropertyGroup) -> None:
+    """Copy transform, crop, flip, color and range of the source to the Shutter strip (strokes stay on the picture)"""
+    if (neighbor := matching.match(effect)) is not None:
+        sentence = rpt_('"{neighbor}" is in the way: "{strip}" does not have the whole range of its source')
+        report_warning(self, sentence.format(neighbor=neighbor.name, strip=self.effect_strip.name))
+
+
+def _why_no_modifiers(effect: PropertyGroup) -> str | None:
+    if (shown := matching.shown(effect)) is not None and shown.lacks_modifiers:
+        return None
+    return rpt_("The Shutter strip already has the modifiers of its source")
+
+
+@operator("Copy Modifiers", _why_no_modifiers)
+def copy_modifiers(_self: Operator, _context: Context, effect: PropertyGroup) -> None:
+    """Copy the modifiers of the source to the Shutter strip, which otherwise shows the file without them"""
+    matching.copy_modifiers(effect)
 
 
 def _why_smooth(effect: PropertyGroup) -> str | None:

@@ -63,7 +63,7 @@ def begin(film: int) -> None:
             ]
         except effect_source.FAULTS as error:
             running.taken[effect.scene.session_uid] = error
-    running.left_out += requirements.left_out(film_scene) if film_scene else []
+    look(film)
 
 
 def _part_at(parts: list[tuple[range, Snapshot]], scene_frame: float) -> Snapshot:
@@ -77,6 +77,12 @@ def end() -> None:
     for known in (running.taken, running.read, running.pictures, running.left_out):
         known.clear()
     sessions.end_job()
+
+
+def look(film: int) -> None:
+    """Find the frames at which the sequencer leaves effects out: the user may delete a camera during the render."""
+    scene = strips.scene_of_uid(film)
+    running.left_out = requirements.left_out(scene) if scene else []
 
 
 def left_out(scene: Scene) -> str | None:
