@@ -17,7 +17,7 @@ from ..core.messages import sentence
 from .data import data_format, preview_areas, source_media, strips, versions
 from .devices import main_thread
 from .editing import reconcile as reconciling
-from .editing import shown_annotations, track_region
+from .editing import shown_annotations, track_region, undelete
 from .interface import bake_operators, operator_bases, sharp_frame
 from .output import edit_feed
 from .rendering import invalidation, job_snapshots, render_job, sessions, strobing
@@ -196,3 +196,4 @@ def unregister() -> None:
     sessions.forget()
     source_media.look_again()
     reconciling.forget()
+    undelete.forget()

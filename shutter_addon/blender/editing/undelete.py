@@ -76,6 +76,11 @@ def _keep(identity: str, effect: PropertyGroup, **more: object) -> None:
     _effects.keep(identity, kept, _MOST)
 
 
+def forget() -> None:
+    """Forget all effects when the extension is disabled."""
+    _effects.clear()
+
+
 def restore(scene: Scene, identity: str) -> Scene | None:
     """Restore a kept effect in a scene and return its effect scene; None: no effect has this identity."""
     if (data := _effects.get(identity)) is None:

@@ -178,20 +178,31 @@ MESSAGES = {
     ("Operator", "Match Source"): "An Quelle angleichen",
     (
         "*",
-        "Copy transform, crop, flip and color of the source to the Shutter strip (strokes stay on the picture)",
-    ): "Dem Verschlussstreifen Transformation, Beschnitt, Spiegelung und Farbe seiner Quelle geben "
+        "Copy transform, crop, flip, color and range of the source to the Shutter strip (strokes stay on the picture)",
+    ): "Dem Verschlussstreifen Transformation, Beschnitt, Spiegelung, Farbe und Bereich seiner Quelle geben "
     "(Markierungen bleiben auf dem Bild)",
-    (
-        "*",
-        "The effect does not use the modifiers of the source: copy them to it",
-    ): "Modifikatoren der Quelle erreichen den Effekt nicht: auf ihn kopieren",
     ("*", "Differs from its source: {what}"): "Weicht von der Quelle ab: {what}",
     ("*", "transform"): "Transformation",
     ("*", "crop"): "Beschnitt",
     ("*", "flip"): "Spiegelung",
     ("*", "color"): "Farbe",
+    ("*", "range"): "Bereich",
     ("*", "The Shutter strip matches its source"): "Der Verschlussstreifen ist wie seine Quelle",
     ("*", "The Shutter strip has no source"): "Der Verschlussstreifen hat keine Quelle mehr",
+    (
+        "*",
+        '"{neighbor}" is in the way: "{strip}" does not have the whole range of its source',
+    ): "„{neighbor}“ ist im Weg: „{strip}“ hat nicht den ganzen Bereich seiner Quelle",
+    ("Operator", "Copy Modifiers"): "Modifikatoren kopieren",
+    (
+        "*",
+        "Copy the modifiers of the source to the Shutter strip, which otherwise shows the file without them",
+    ): "Die Modifikatoren der Quelle auf den Verschlussstreifen kopieren, der die Datei der Quelle zeigt, wie sie ist",
+    ("*", "The effect does not use the modifiers of the source"): "Modifikatoren der Quelle erreichen den Effekt nicht",
+    (
+        "*",
+        "The Shutter strip already has the modifiers of its source",
+    ): "Der Verschlussstreifen hat die Modifikatoren seiner Quelle",
     (
         "*",
         "The effect does not use effect strips of the source: make the Shutter strip their input",
