@@ -17,7 +17,7 @@ from support import write_frames
 
 REPAIR, FIND = 9, 10  # the entries in the menu of regions
 MENU = 210  # where that is below four shutters, in pixels below the sidebar's upper edge
-FIELD = 210, 101  # of the readout in the panel of the last operation, to the right of where that opens, and below
+FIELD = 210, 78  # of the readout in the panel of the last operation, to the right of where that opens, and below
 ADJUSTED = 30
 COUNT, SIZE, READOUT = 16, (360, 640), 0.6
 SHOWN = 10  # the pole is fastest here
