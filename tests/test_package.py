@@ -407,7 +407,7 @@ def test_installed_without_wheels(blender, dist, bunny, recipe, tmp_path):
     blender.run("--command", "shutter", *track, code=2, says=["tracking needs the Python package opencv"])
     assert not (tmp_path / "out").exists()
     smooth_recipe = tmp_path / "smooth.json"
-    smooth_recipe.write_text(json.dumps(json.loads(recipe.read_text()) | {"inbetween": 2}))
+    smooth_recipe.write_text(json.dumps(json.loads(recipe.read_text()) | {"version": 2, "inbetween": 2}))
     smooth = (*command, frames / "0001.png", "--recipe", smooth_recipe, "--output", tmp_path / "out", "--device", "gpu")
     lacking = "moments between frames need the Python package opencv"
     blender.run(*smooth, "--frames", 2, code=2, says=[lacking])

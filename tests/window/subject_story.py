@@ -61,6 +61,7 @@ def stroke_drawn():
 
 
 def made_sharp():
+    story.effect().inbetween = "1"  # layers of moments take a software renderer minutes
     bar = sidebar()
     driver.shot("3_tab")
     driver.click(bar, bar.width * SHARP[0], bar.height - SHARP[1])

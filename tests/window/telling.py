@@ -47,7 +47,7 @@ def tell(story, backend, folder, *, before=(), **given):
     environment = {
         "BACKEND": backend,
         "SCREEN": SCREEN,
-        "GUI_TIMEOUT": "900",  # seconds: a long story on two cores, beside others
+        "GUI_TIMEOUT": "1500",  # seconds: a long story on two cores, beside others
         "SHUTTER_PICTURES": str(folder),
         # A copy: Blender puts proxies beside a movie.
         "SHUTTER_FOOTAGE": str(shutil.copy(ROOT / "assets" / "bigbuckbunny.mp4", folder)),
