@@ -6,6 +6,7 @@ group of them depends on. Other runs leave a group out while its files are as no
 
 import hashlib
 import json
+from functools import cache
 from pathlib import Path
 
 ROOT = Path(__file__).parents[1]
@@ -36,24 +37,24 @@ GROUPS = {
             "tests/window/test_rendered.py::test_preview_and_film_take_turns_where_the_gpu_is_small",
         ],
         [
-            *("tests/window/gpu_*.py", "tests/window/own_gpu_story.py", "tests/window/memory_story.py"),
-            *(
-                "shutter_addon/devices/*.py",
-                "shutter_addon/blender/devices/*.py",
-                "shutter_addon/blender/rendering/*.py",
-            ),
+            "tests/window/gpu_*.py",
+            "tests/window/own_gpu_story.py",
+            "tests/window/memory_story.py",
+            "shutter_addon/devices/*.py",
+            "shutter_addon/blender/devices/*.py",
+            "shutter_addon/blender/rendering/*.py",
         ],
     ),
     "tracking by mouse": (
         ["tests/window/test_tracked.py::test_one_stroke"],
         [
-            *(
-                "tests/window/one_stroke_story.py",
-                "shutter_addon/media/tracking.py",
-                "shutter_addon/media/registration.py",
-            ),
-            *("shutter_addon/blender/editing/track_region.py", "shutter_addon/blender/editing/motion_keys.py"),
-            *("shutter_addon/blender/interface/track_operators.py", "shutter_addon/blender/interface/region_gizmo.py"),
+            "tests/window/one_stroke_story.py",
+            "shutter_addon/media/tracking.py",
+            "shutter_addon/media/registration.py",
+            "shutter_addon/blender/editing/track_region.py",
+            "shutter_addon/blender/editing/motion_keys.py",
+            "shutter_addon/blender/interface/track_operators.py",
+            "shutter_addon/blender/interface/region_gizmo.py",
         ],
     ),
     "Metal": (["tests/compute/test_metal.py"], ["shaders/**/*", "shutter_addon/devices/passes.py"]),
@@ -74,9 +75,14 @@ def fingerprint(group: str) -> str:
     return found.hexdigest()
 
 
+def _noted() -> dict[str, str]:
+    return json.loads(CHECKED.read_text()) if CHECKED.exists() else {}
+
+
+@cache  # for the header and for the tests
 def unchanged() -> set[str]:
     """Return the groups whose files are as they were when their tests last passed."""
-    noted = json.loads(CHECKED.read_text()) if CHECKED.exists() else {}
+    noted = _noted()
     return {group for group in GROUPS if noted.get(group) == fingerprint(group)}
 
 
@@ -92,7 +98,7 @@ def note(outcomes: dict[str, set[str]]) -> None:
     Args:
         outcomes: By the name of each test that was run, what its steps came to.
     """
-    noted = json.loads(CHECKED.read_text()) if CHECKED.exists() else {}
+    noted = _noted()
     for group, (begins, _) in GROUPS.items():
         of_each = [[found for name, found in outcomes.items() if name.startswith(begin)] for begin in begins]
         if all(found and all(each == {"passed"} for each in found) for found in of_each):

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Callable, Hashable, Iterator
-from contextlib import suppress
 from dataclasses import replace
 
 import numpy as np
@@ -83,9 +82,10 @@ def is_changed(scene: Scene, effect: PropertyGroup, strip: Strip) -> bool:
     bake, frames = strip.virtual_shutter_bake, frames_of(strip)
     if frames.start < bake.first or frames.stop > bake.first + bake.count:
         return True  # the strip is longer now
-    with suppress(UserError, MemoryError):
+    try:
         return key(scene, effect, strip, range(bake.first, bake.first + bake.count)) != bake.version
-    return True
+    except (UserError, MemoryError):
+        return True
 
 
 def parts(

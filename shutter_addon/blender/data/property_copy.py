@@ -34,9 +34,9 @@ def plain(struct: bpy_struct) -> dict[str, Any]:
         elif prop.type == "POINTER":
             if value is not None and prop.fixed_type.identifier in POINTED:
                 found[name] = value.session_uid
-        elif (
-            name != "co_ui" and not prop.is_skip_save and (prop.type, value) != ("ENUM", "")
-        ):  # setting co_ui moves a key's handles
+        elif name == "co_ui" or prop.is_skip_save:
+            continue  # setting co_ui moves a key's handles
+        elif (prop.type, value) != ("ENUM", ""):  # a number without an item
             found[name] = tuple(value) if getattr(prop, "is_array", False) else value
     return found
 

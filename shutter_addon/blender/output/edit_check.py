@@ -77,7 +77,7 @@ def _effect(session: RenderSession, shown: tuple) -> EffectCheck:
         renderer = session.renderer(requests[0].source)
         _check_frames(renderer, requests)
         _check_mattes(check, renderer.source, requests)
-        check.notes += {sentence: None for request in requests for sentence in pictures.unread(taken, request)}
+        check.notes += dict.fromkeys(note for request in requests for note in pictures.unread(taken, request))
         if renderer.source.by_blender:
             check.notes.append(pictures.SLOW_DECODING)
         if lacking := sum(check.mattes.values()):
