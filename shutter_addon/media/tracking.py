@@ -7,7 +7,6 @@ last frame in which the subject was surely found.
 from abc import ABC, abstractmethod
 from collections.abc import Collection, Iterator
 from dataclasses import dataclass, replace
-from functools import cache
 from typing import Protocol
 
 import numpy as np
@@ -73,7 +72,7 @@ class Track(ABC):
     def __init__(self, subject: Subject) -> None:
         """Track a subject. Its placement is known at the first frame and at anchors."""
         self._subject = subject
-        self.part = cache(self._part)
+        self._parts: dict[int, tuple[Part, float]] = {}
 
     def follow(
         self,
@@ -114,14 +113,18 @@ class Track(ABC):
         self._check(start)
         return self._both_ways(start, range(min(frames), max(frames) + 1), {*anchors} - {start})
 
-    def _part(self, frame: int) -> tuple[Part, float]:
+    def part(self, frame: int) -> tuple[Part, float]:
         """Return the subject's part of a frame, and the confidence that its corners belong to it.
-
-        `part` keeps it.
 
         Raises:
             TrackingError: there is nothing to follow
         """
+        if frame not in self._parts:
+            self._parts[frame] = self._part(frame)
+        return self._parts[frame]
+
+    def _part(self, frame: int) -> tuple[Part, float]:
+        """Make the result of `part`, which caches it."""
         raise NotImplementedError
 
     def _check(self, frame: int) -> None:
