@@ -1,8 +1,7 @@
-"""Curves around what a matte covers; a proposal of an outline, by colours: of what a stroke runs over, or what a lasso
-is drawn around; and the way along edges from one point of an outline to the next.
+"""Curves around what a matte covers; and a proposal of an outline, by colours: of what a stroke runs over, or what a
+lasso is drawn around.
 
-GrabCut (Rother et al. 2004) tells the colours of the subject from those around it, and keeps to edges. Ways along edges
-are those of Intelligent Scissors (Mortensen and Barrett 1995).
+GrabCut (Rother et al. 2004) tells the colours of the subject from those around it, and keeps to edges.
 """
 
 import numpy as np
@@ -16,10 +15,6 @@ ROUNDS = 6
 # Of what is drawn: beyond that it is no subject; within that it may be; of a lasso, so deep inside it surely is.
 REACH, NEAR, DEEP = 1.0, 0.15, 0.6
 MARGIN = 0.06  # of a lasso's size, by which it may have missed the subject
-# Of ways along edges: pixels around their ends that they may take, and by which a point may have missed an edge; how
-# far apart these are at least, in parts of the picture's height, as what is drawn finer is better left as it is.
-ROOM, MISSED, LONG = 8, 3, 0.05
-CANNY, STEEPEST = (16, 60), 100  # thresholds of edges, and the gradient from which on all are as good
 
 FINE = 4  # contours are followed in mattes so many times as large
 SPOT = 6.0  # pixels: what covers no more of them is no part of a subject
@@ -50,41 +45,6 @@ def proposed(picture: np.ndarray, drawn: np.ndarray, *, encloses: bool) -> Curve
     for way in (cv2.MORPH_OPEN, cv2.MORPH_CLOSE):
         inside = cv2.morphologyEx(inside, way, np.ones((3, 3), np.uint8))
     return traced(inside.astype(np.float32), off=0.75)
-
-
-def along_edges(picture: np.ndarray, start: np.ndarray, end: np.ndarray) -> np.ndarray:
-    """The way (n, 2) from one point (2,) to another along the edges of a picture (H, W, 3) uint8, all in fractions of
-    it, y up; straight where it is short. Both ends go to the edges beside them. MediaError: OpenCV is missing."""
-    opencv.check("outlines are snapped by")
-    height, width = working_shape(picture)
-    size = np.array([width, height])
-    ends = np.stack([start, end])
-    if np.hypot(*((ends[1] - ends[0]) * size)) < LONG * height or not ((ends >= 0) & (ends <= 1)).all():
-        return ends
-    small = cv2.resize(picture, (width, height), interpolation=cv2.INTER_AREA)
-    places = (ends * (1, -1) + (0, 1)) * size - 0.5
-    low = np.clip(np.floor(places.min(axis=0)) - ROOM, 0, size - 1).astype(int)
-    high = np.clip(np.ceil(places.max(axis=0)) + ROOM, 0, size - 1).astype(int)
-    part = np.ascontiguousarray(small[low[1] : high[1] + 1, low[0] : high[0] + 1])
-    first, last = (_at_edge(part, place - low) for place in places)
-    scissors = cv2.segmentation.IntelligentScissorsMB()
-    scissors.setEdgeFeatureCannyParameters(*CANNY)
-    scissors.setGradientMagnitudeMaxLimit(STEEPEST)
-    scissors.applyImage(part)
-    scissors.buildMap(first)
-    way = cv2.approxPolyDP(scissors.getContour(last), 0.75, False)[:, 0]
-    return (way + low + 0.5) / size * (1, -1) + (0, 1)
-
-
-def _at_edge(picture: np.ndarray, place: np.ndarray) -> tuple[int, int]:
-    """The pixel (x, y) near a place where the picture changes most."""
-    grey = cv2.cvtColor(picture, cv2.COLOR_RGB2GRAY).astype(np.float32)
-    steep = np.hypot(cv2.Sobel(grey, -1, 1, 0), cv2.Sobel(grey, -1, 0, 1))
-    x, y = np.clip(np.rint(place).astype(int), 0, np.array(grey.shape[::-1]) - 1)
-    left, top = max(x - MISSED, 0), max(y - MISSED, 0)
-    near = steep[top : y + MISSED + 1, left : x + MISSED + 1]
-    row, column = np.unravel_index(near.argmax(), near.shape)
-    return int(left + column), int(top + row)
 
 
 def _along(drawn: np.ndarray) -> np.ndarray:

@@ -30,9 +30,7 @@ LACKING = [
     ("line", "subject_find", {}, f"subjects are found by {OUTLINE}"),
     ("line", "bake", {"file_format": "MOVIE"}, BAKE),
     ("outline", "track", {}, TRACKING),
-    ("outline", "outline_carry", {}, f"outlines are tracked by {OUTLINE}"),
     ("outline", "outline_needed", {}, f"outlines are tracked by {OUTLINE}"),
-    ("outline", "outline_mask", {}, f"outlines are tracked by {OUTLINE}"),
     ("outline", "outline_draw", {}, f"outlines are tracked by {OUTLINE}"),
 ]
 KINDS = {

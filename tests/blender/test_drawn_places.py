@@ -143,6 +143,6 @@ def test_outlines_stay_as_they_are_drawn(bpy, region):
     drawn_places.begin(effect, strip, 0)
     (curve,) = snapshot.strokes_at(scene, effect, strip, 0, 11)
     assert same([curve * (640, 360) - (320, 180)], FIRST)
-    outline_drawings.draw(effect, strip, region, [curve], 11, adds=True)
+    outline_drawings.draw(effect, strip, region, [curve], 11)
     (curve,) = snapshot.strokes_at(scene, effect, strip, 0, 11)
     assert same([curve * (640, 360) - (320, 180)], FIRST)

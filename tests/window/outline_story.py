@@ -18,7 +18,6 @@ SHOWN = range(55, 86)
 # Of the footage's frames, in pixels: the middle of a box around her, and half of its width and height.
 DRAWN = {62: (397, 239), 78: (316, 226)}
 HALF = 20, 44
-CLICKED = 60
 
 
 def curve(frame):
@@ -102,55 +101,6 @@ def needed():
     yield from driver.until(lambda: not is_carrying() and carrying.progress() is None, "all is carried", 90)
     driver.saw(needed=story.edit().frame_current)
     story.edit().frame_set(FRAME)
-    yield 1.0
-    yield from masked()
-    yield from clicked()
-
-
-def clicked():
-    """A curve is clicked at another frame, point by point, one of which is taken back, and closed; then that is
-    undone."""
-    before = shapes()
-    story.edit().frame_set(CLICKED)
-    yield 0.5
-    with driver.override("PREVIEW"):
-        bpy.ops.shutter.outline_points("INVOKE_DEFAULT", True)
-    yield 0.5
-    x, y = np.array(DRAWN[62]) / (768, 576)
-    points = [(x + 0.025 * np.cos(a), 1 - y + 0.075 * np.sin(a)) for a in np.linspace(0, 2 * np.pi, 7)[:-1]]
-    for number, point in enumerate((*points, (0.6, 0.6))):
-        driver.move(story.preview(), *on_preview(*point))
-        yield 0.3
-        driver.xdotool("click", 1)
-        yield 0.3
-        if number == 4:
-            yield from driver.shot_when_shown("2_clicking")
-    driver.key("BackSpace")
-    yield 0.3
-    driver.move(story.preview(), *on_preview(*points[-1]))
-    yield 0.3
-    driver.key("Return")
-    yield from driver.until(lambda: CLICKED in shapes(), "the curve is a drawing")
-    yield from story.seen("2_clicked")
-    driver.saw(clicked=shapes()[CLICKED])
-    driver.key("ctrl+z")
-    yield from driver.until(lambda: shapes() == before, "it is undone")
-    story.edit().frame_set(FRAME)
-    yield 1.0
-
-
-def masked():
-    """A mask is made in a mask editor, which the preview is for a moment."""
-    with driver.override("PREVIEW"):
-        bpy.ops.shutter.outline_mask("INVOKE_DEFAULT", True)
-    yield from driver.until(lambda: len(bpy.data.masks), "there is a mask", 20)
-    yield from story.seen("2_masked")
-    layers = bpy.data.masks[0].layers
-    driver.saw(mask=[len(layers), min(len(layer.splines[0].points) for layer in layers)])
-    assert story.edit().frame_current == FRAME
-    driver.key("ctrl+z")
-    yield from driver.until(lambda: not len(bpy.data.masks), "it is undone")
-    story.edit().frame_set(FRAME)  # undo has gone to that of the step before
     yield 1.0
 
 

@@ -105,11 +105,6 @@ def test_an_outline(tmp_path):
     assert "Traceback" not in console
     facts = {name: entry[name] for entry in seen for name in entry}
     assert facts["drawings"] == [62, 78]
-    assert facts["mask"][0] >= 1
-    assert facts["mask"][1] >= 12
-    around_her = np.array(facts["clicked"]) * (768, 576)
-    assert len(around_her) > 8, "between points it goes along edges"
-    assert np.abs(around_her - around_her.mean(axis=0)).max(axis=0).tolist() <= [40, 70]
     final = pixels(tmp_path / "final_0070.png")
     with open_source(given["footage"]) as source:
         apart = np.abs(final - source.read(69)[..., :3])

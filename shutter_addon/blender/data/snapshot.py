@@ -216,16 +216,6 @@ def carried_outline(
     return _carried(sampling, sampling.drawings(index, every=True)), shown
 
 
-def drawn_outline(scene: Scene, effect: PropertyGroup, strip: Strip, index: int) -> dict[int, outlines.Curves]:
-    """Return the curves of an outline by the filmed frame on which they are drawn.
-
-    Raises:
-        EffectError, MediaError: It has no source.
-    """
-    sampling = Sampling.of(scene, effect, strip, ())
-    return _by_source_frame(sampling, sampling.drawings(index, every=True))
-
-
 def source_frames(scene: Scene, effect: PropertyGroup, strip: Strip, frames: Frames) -> dict[float, int]:
     """Return the filmed frame of the source that each timeline frame shows.
 

@@ -4,27 +4,23 @@ Annotations have no key types in Blender 5.2, so the Dope Sheet shows generated 
 """
 
 from bisect import bisect
-from collections.abc import Iterator
-from contextlib import closing, contextmanager
+from contextlib import closing
 from functools import lru_cache
 
-import bpy
 import numpy as np
 from bpy.app.translations import pgettext_rpt as rpt_
-from bpy.types import Context, Mask, MaskSpline, PropertyGroup, Scene, Strip
+from bpy.types import Mask, PropertyGroup, Scene, Strip
 
 from ...core import revision
 from ...core.messages import EffectError
 from ...core.model import outlines, scribbles
-from ...core.model.keyframes import Ease
 from ...core.model.masks import MaskShape
 from ...core.model.scribbles import mapped
 from ...media import flow, outlining
 from ...media.carried_mattes import CarriedFile, CarriedMattes
 from ...media.subject_mattes import SubjectFile
-from ..data import annotations, fcurves, mask_reading, snapshot, strips
+from ..data import annotations, mask_reading, snapshot, strips
 from ..data.annotations import layer_of
-from ..data.property_copy import for_a_while
 from ..rendering import effect_source
 from . import region_edits
 
@@ -61,14 +57,11 @@ def shown_curves(scene: Scene, effect: PropertyGroup, strip: Strip, index: int) 
     return revision.until_change("outline", key, lambda: curves_now(scene, effect, strip, index))
 
 
-def draw(
-    effect: PropertyGroup, strip: Strip, region: PropertyGroup, curves: Strokes, frame: int, *, adds: bool = False
-) -> None:
+def draw(effect: PropertyGroup, strip: Strip, region: PropertyGroup, curves: Strokes, frame: int) -> None:
     """Make curves the drawing of a region at a timeline frame.
 
     Args:
         curves: in fractions of the picture.
-        adds: add to the drawing at this frame instead of replacing it.
 
     Raises:
         EffectError: the strip has a scale of 0.
@@ -78,10 +71,9 @@ def draw(
         raise EffectError(rpt_('strip "{strip}" has a scale of 0').format(strip=strip.name))
     name = "outline_layer" if region.kind == "SUBJECT" else "layer"
     layer = layer_of(effect, region, name) or region_edits.new_layer(effect, region, name)
-    there = [drawing for drawing in layer.frames if drawing.frame_number == frame]
-    while there and not adds:
-        layer.frames.remove(there.pop())
-    drawing = there[0] if there else layer.frames.new(frame)
+    for drawing in [drawing for drawing in layer.frames if drawing.frame_number == frame]:
+        layer.frames.remove(drawing)
+    drawing = layer.frames.new(frame)
     for points in curves:
         annotations.add_stroke(drawing, mapped(to_image, np.asarray(points)))
     revision.changed()  # Blender does not report new strokes
@@ -189,38 +181,6 @@ def _least_sure(file: CarriedFile | SubjectFile, shown: dict[int, int]) -> tuple
     return frame, sure[frame]
 
 
-def to_mask(context: Context, of: tuple[Scene, PropertyGroup, Strip], index: int, step: int) -> Mask:
-    """Make a new mask from an outline. Its frames are those of the source.
-
-    Each curve gets a layer with keys of its opacity. Areas that two curves enclose are outside.
-
-    Args:
-        of: scene, effect and strip.
-        step: frames between shape keys of a tracked outline; 0: only its drawings.
-
-    Raises:
-        EffectError, MediaError: nothing is drawn or tracked, or no window is open to write shape keys.
-    """
-    scene, effect, strip = of
-    keys = _keys(scene, effect, strip, index, step)
-    if not any(curves for _frame, curves in keys):
-        raise EffectError(rpt_("Nothing is drawn in the outline"))
-    size = annotations.picture_size(effect)
-    shown = snapshot.source_frames(scene, effect, strip, range(strip.left_handle, strip.right_handle))
-    mask = bpy.data.masks.new(effect.regions[index].name)
-    mask.frame_start, mask.frame_end = 1, max(*shown.values(), keys[-1][0]) + 1
-    chains = outlines.chains(keys, size[0] / size[1])
-    try:
-        with _mask_editor(context, mask):
-            for number, chain in enumerate(chains, 1):
-                _add_layer(mask, f"{mask.name} {number}", chain, size)
-            _insert_keys(context, mask, chains, size)
-    except (EffectError, RuntimeError):
-        bpy.data.masks.remove(mask)
-        raise
-    return mask
-
-
 def from_mask(scene: Scene, effect: PropertyGroup, strip: Strip, shutter: PropertyGroup, mask: Mask) -> PropertyGroup:
     """Add a region: an outline with drawings where a mask's motion changes.
 
@@ -240,83 +200,6 @@ def from_mask(scene: Scene, effect: PropertyGroup, strip: Strip, shutter: Proper
         draw(effect, strip, region, curves, frame)
     return region
 
-
-def _keys(
-    scene: Scene, effect: PropertyGroup, strip: Strip, index: int, step: int
-) -> list[tuple[int, outlines.Curves]]:
-    """Return the curves of an outline at the source frames that get a shape key, ascending."""
-    if not (strips.is_carried(effect.regions[index]) and step):
-        return sorted(snapshot.drawn_outline(scene, effect, strip, index).items())
-    file, _shown = snapshot.carried_outline(scene, effect, strip, index, ())
-    drawn = [frame for frame, _curves in file.drawings]
-    if effect.regions[index].kind == "SUBJECT":
-        drawn += snapshot.source_frames(scene, effect, strip, (strip.left_handle, strip.right_handle - 1)).values()
-    frames = sorted({*drawn, *range(min(drawn), max(drawn), step)}) if drawn else []
-    with closing(file.open()) as mattes:
-        return [(frame, mattes.curves(frame)) for frame in frames]
-
-
-def _add_layer(mask: Mask, name: str, chain: outlines.Chain, size: tuple[int, int]) -> None:
-    """Add a layer with one spline, visible from its first frame until the curve ends."""
-    layer = mask.layers.new(name=name)
-    layer.blend, layer.alpha = "DIFFERENCE", 1.0  # scripted layers begin with an opacity of 0
-    spline = layer.splines.new()
-    spline.points.add(chain.points.shape[1] - len(spline.points))
-    spline.use_cyclic = True
-    for point in spline.points:
-        point.handle_type = "FREE"
-    _place(spline, chain.points[0], size)
-    keys: list[tuple[float, float, Ease]] = [(1.0, 0.0, "constant")] if chain.frames[0] else []
-    keys.append((chain.frames[0] + 1.0, 1.0, "constant"))
-    if chain.gone is not None:
-        keys.append((chain.gone + 1.0, 0.0, "constant"))
-    if len(keys) > 1:
-        fcurves.set_keys(mask, f'layers["{bpy.utils.escape_identifier(layer.name)}"].alpha', 0, keys)
-
-
-def _place(spline: MaskSpline, points: np.ndarray, size: tuple[int, int]) -> None:
-    """Set the points of a spline, given in fractions of the picture, in the mask's space."""
-    flat = np.ascontiguousarray((points - 0.5) * np.array(size) / max(size) + 0.5, np.float32).ravel()
-    for name in ("co", "handle_left", "handle_right"):
-        spline.points.foreach_set(name, flat)
-
-
-def _insert_keys(context: Context, mask: Mask, chains: list[outlines.Chain], size: tuple[int, int]) -> None:
-    """Insert shape keys. Blender's operator keys the selected points at the current frame."""
-    edited = context.window.scene
-    with for_a_while([(edited, "frame_current", edited.frame_current)]):
-        for frame in sorted({frame for chain in chains for frame in chain.frames}):
-            edited.frame_current = frame + 1
-            context.window.view_layer.update()  # the operator would update, too, and reset the points to the last key
-            for layer, chain in zip(mask.layers, chains, strict=True):
-                has_key = frame in chain.frames
-                layer.hide = not has_key
-                for point in layer.splines[0].points:
-                    point.select = has_key
-                if has_key:
-                    _place(layer.splines[0], chain.points[chain.frames.index(frame)], size)
-            bpy.ops.mask.shape_key_insert()
-        for layer in mask.layers:
-            layer.hide = False
-
-
-@contextmanager
-def _mask_editor(context: Context, mask: Mask) -> Iterator[None]:
-    """Turn an area into a mask editor for a moment, because Blender's mask operators need one.
-
-    Raises:
-        EffectError: no window is open.
-    """
-    window = context.window
-    if window is None:
-        raise EffectError(rpt_("Making a mask needs an open Blender window"))
-    area = context.area or window.screen.areas[0]
-    with for_a_while([(area, "ui_type", "IMAGE_EDITOR")]):
-        space = area.spaces.active
-        with for_a_while([(space, "mode", "MASK"), (space, "mask", mask)]):
-            region = next(region for region in area.regions if region.type == "WINDOW")
-            with context.temp_override(window=window, area=area, region=region):
-                yield
 
 
 def _where_motion_changes(shapes: dict[int, MaskShape]) -> dict[int, MaskShape]:

@@ -45,8 +45,8 @@ _GROUPS: dict[str, tuple] = {
     "outline": (
         "Outline",
         [("subject_find",), ("subject_outline",), ("subject_scribble",)],
-        [("outline_it",), ("outline_points",), ("outline_draw",)],
-        [("outline_carry",), ("outline_needed",), ("outline_mask",)],
+        [("outline_it",), ("outline_draw",)],
+        [("outline_needed",)],
     ),
     "track": (
         "Track",

@@ -8,7 +8,7 @@ from bpy.types import MovieTracking, PropertyGroup, Scene, Strip, UILayout
 from ...core.messages import EffectError
 from ...media.pursuit import SURE
 from ..data import selection, strips, validation
-from ..editing import outline_drawings, track_region
+from ..editing import track_region
 from . import needs, track_operators
 from .panel_parts import draw_list, draw_operators, draw_properties, sentence
 
@@ -120,10 +120,6 @@ def draw_tracked(layout: UILayout, effect: PropertyGroup, index: int | None) -> 
         place = row.row()
         place.ui_units_x = 2.5
         place.operator(look, text=str(frame), translate=False).frame = frame
-    wrong = [frame for frame, _reason, is_fault in faults if is_fault]
-    if wrong and index is not None and effect.regions[index].kind not in strips.LAID:
-        button = layout.operator("shutter.outline_it", text="Outline This Subject")
-        button.frame = outline_drawings.nearest(effect, index, wrong[0])
 
 
 def _draw_camera_gaps(layout: UILayout, effect: PropertyGroup) -> None:

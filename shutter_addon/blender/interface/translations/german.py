@@ -434,16 +434,12 @@ MESSAGES = {
         "Tracking the outline: {done} of {total} frames, Esc to stop",
     ): "Der Umriss wird verfolgt: {done} von {total} Frames, Esc hält an",
     ("*", "Shutter Outline"): "Shutter-Umriss",
-    ("Operator", "Track Outline"): "Umriss verfolgen",
-    (
-        "*",
-        "Track the active outline through its strip now (Esc stops and keeps the tracked frames)",
-    ): "Den aktiven Umriss jetzt durch seinen Streifen verfolgen (Esc hält an und behält die verfolgten Bilder)",
     ("Operator", "Next Drawing Needed"): "Nächste nötige Zeichnung",
     (
         "*",
-        "Go to the frame that needs a drawing most, after tracking the outline",
-    ): "Zur Mitte der Frames gehen, in denen der Umriss am unsichersten ist; er wird vorher verfolgt",
+        "Track the active outline through its strip and go to the frame that needs a drawing most (Esc stops)",
+    ): "Den aktiven Umriss durch seinen Streifen verfolgen und zu dem Bild gehen, das eine Zeichnung am nötigsten hat "
+    "(Esc hält an)",
     ("Operator", "Insert Outline Drawing"): "Umrisszeichnung einfügen",
     (
         "*",
@@ -539,32 +535,15 @@ MESSAGES = {
     ): "Punkte um das Motiv klicken (Pfeiltasten, Leertaste), Strg: gerade, Rücktaste: einer weniger, "
     "Eingabe: schließen, Esc: nichts",
     ("*", "A curve needs at least three points"): "Eine Kurve hat mindestens drei Punkte",
-    ("Operator", "Outline to Mask"): "Umriss zu Maske",
     ("Operator", "Outline from Mask"): "Umriss aus Maske",
-    (
-        "*",
-        "Make a Blender mask with shape keys of the active outline, after tracking it",
-    ): "Aus dem aktiven Umriss eine Blender-Maske mit Formschlüsseln machen; zuvor wird er verfolgt",
     (
         "*",
         "Make an outline of the active shutter that moves as a mask does",
     ): "Einen Umriss des aktiven Verschlusses machen, der sich wie eine Maske bewegt",
-    ("*", "Every"): "Jedes",
-    (
-        "*",
-        "Frames between shape keys of a tracked outline; 0 for its drawings only",
-    ): "Bilder von einem Formschlüssel zum nächsten zwischen den Zeichnungen eines verfolgten Umrisses; 0 nur für die"
-    " Zeichnungen",
-    ("*", 'Made the mask "{mask}"'): "Maske „{mask}“ gemacht",
-    ("*", "Nothing is drawn in the outline"): "Im Umriss ist nichts gezeichnet",
     (
         "*",
         'mask "{mask}" encloses nothing in the strip',
     ): "Maske „{mask}“ umschließt im Streifen nichts",
-    (
-        "*",
-        "Making a mask needs an open Blender window",
-    ): "Eine Maske wird in einem Fenster von Blender geschrieben, und es gibt keines",
     (
         "*",
         "Make the active region an outline of the subject that its strokes mark or enclose at this frame",
@@ -1076,11 +1055,6 @@ MESSAGES = {
         "*",
         "From frame {frame} on, near and far move differently or too little is visible: not all can be stabilized",
     ): "Ab Frame {frame} bewegen sich Nah und Fern verschieden, oder es ist zu wenig zu sehen: nicht alles steht still",
-    ("Operator", "Outline This Subject"): "Dieses Motiv umreißen",
-    (
-        "*",
-        "Timeline frame of the strokes; without one, the current frame",
-    ): "Bild der Zeitleiste mit den Strichen; ohne eines das aktuelle",
     ("*", "Tracking stopped at frame {frame}: {fault}"): "Das Verfolgen hielt bei Bild {frame} an: {fault}",
     ("*", "Confidence"): "Sicherheit",
     ("*", "How certain the tracked position is"): "Wie sicher das Verfolgen war, wo es ist",
