@@ -16,7 +16,16 @@ MOST_BYTES = {"README.md": 7_000, "docs/manual.md": 45_000, "docs/developers.md"
 GERMAN = runpy.run_path(ROOT / "shutter_addon" / "blender" / "interface" / "translations" / "german.py")["MESSAGES"]
 # What the pages for editors name of Blender and other programs, in italics as our own labels.
 BLENDERS = {
-    *("2D Stabilization", "Alpha Over", "Cryptomatte", "File Output", "Frame Dropping", "Generated", "Keyframe Type"),
+    *(
+        "2D Stabilization",
+        "Alpha Over",
+        "Annotate Polygon",
+        "Cryptomatte",
+        "File Output",
+        "Frame Dropping",
+        "Generated",
+        "Keyframe Type",
+    ),
     *("Line Width", "Pass Index", "Rendered", "Replace", "Resolution Scale", "Single Image", "Standard", "Sync"),
     *("ACES", "ADX", "AgX", "Khronos PBR Neutral", "Big Buck Bunny"),
 }

@@ -306,10 +306,7 @@ NO_SHUTTER = "The effect has no shutter: add one"
 NO_REGION = "The shutter has no region: draw one"
 LINKED = "The edit is linked from another file"
 ANY_EFFECT = ("smooth_streaks", "shutter_add", "recipe_import", "recipe_export")  # need nothing in it
-ALIKE = {
-    "match_source": "The Shutter strip matches its source",
-    "copy_modifiers": "The Shutter strip already has the modifiers of its source",
-}
+ALIKE = {"match_source": "The Shutter strip matches its source"}
 UNSEEN = "Move the playhead onto the Shutter strip"
 REGION_NEEDED = dict.fromkeys(("erase", "region_assign", "region_remove", "region_move", "region_key"), NO_REGION)
 REGION_UNSEEN = REGION_NEEDED | {"erase": UNSEEN}

@@ -49,11 +49,9 @@ def test_beside_the_picture_there_is_nothing(request_of, point):
     assert probed_at(*request_of(state(np.random.default_rng(0))), point) is None
 
 
-def test_layers_and_what_takes_the_place_of_what_lies_behind(blender_device):
+def test_what_takes_the_place_of_what_lies_behind_layers(blender_device):
     from test_layered import COUNT, SHOWN, SIZE, with_layers
 
-    from shutter_addon.blender.interface.probe_gizmo import probed_at
-    from shutter_addon.compute import plates
     from shutter_addon.media.matte_values import MatteValues
 
     rng, matte = np.random.default_rng(4), np.zeros((COUNT, *SIZE[::-1]))
@@ -62,9 +60,6 @@ def test_layers_and_what_takes_the_place_of_what_lies_behind(blender_device):
     renderer = Renderer(GPUCompositor(blender_device), footage(rng, COUNT, SIZE), MatteValues(*SIZE))
     request = Request(SHOWN, moment)
     renderer.picture(request)
-    behind, before = (probed_at(renderer, request, (0.5, y)) for y in (0.2, 0.8))
-    assert (behind.layers, behind.hole) == ((0.0,), plates.OPEN)
-    assert (before.layers, before.hole) == ((pytest.approx(0.97, abs=1e-4),), plates.TAKEN)
     with renderer.compositor.current():
         texture, block = renderer.drawn_holes(request)
         assert np.array_equal(renderer.compositor.device.read(texture)[0, ..., 0], renderer.holes)

@@ -1,7 +1,6 @@
 """Blender's GPU is not current: a window was closed, and none has been drawn since. Whatever a script, a timer, a modal
 operator or a handler does then, Blender lives, and shows the same picture afterwards. Run inside Blender, by
-test_rendered.py. SHUTTER_FOOTAGE has the source, SHUTTER_RECIPE the effect, SHUTTER_PART which of PARTS is told: all of
-them in one Blender are too many passes for the software renderer of Vulkan."""
+test_rendered.py. SHUTTER_FOOTAGE has the source, SHUTTER_RECIPE the effect."""
 
 # ruff: noqa: E402 (Blender finds the helpers once it knows their folders)
 import os
@@ -131,12 +130,6 @@ def reregistered():
     enable()
 
 
-ACTS = (
-    *(file_opened, home_read, disabled, strip_removed, strip_deleted, deletion_undone, scene_removed, source_changed),
-    *(still_rendered, device_changed, refused_on_blenders_gpu, reregistered),
-)
-
-
 # Who does it
 
 
@@ -199,13 +192,21 @@ def lost():
     return not gpu_guard.is_current()
 
 
+# On each of Blender's backends: how the GPU is lost, who acts then, and what is done.
 PARTS = {
-    "first": (second_window, by_timer, ACTS[:6]),
-    "second": (second_window, by_timer, ACTS[6:]),
-    "rendered": (render_window, by_timer, (file_opened, disabled, strip_removed)),
-    "modal": (second_window, by_modal_operator, (file_opened, strip_deleted, deletion_undone, still_rendered)),
-    "handler": (second_window, by_handler, (strip_removed, scene_removed)),
-    "current": (no_loss, by_timer, (file_opened, reregistered, still_rendered)),
+    "opengl": (
+        *((no_loss, by_timer, act) for act in (reregistered, still_rendered)),
+        *((second_window, by_timer, act) for act in (disabled, strip_removed, source_changed, device_changed)),
+        *((second_window, by_modal_operator, act) for act in (file_opened, strip_deleted, deletion_undone)),
+        *((second_window, by_handler, act) for act in (scene_removed, strip_removed)),
+        (second_window, by_timer, refused_on_blenders_gpu),
+    ),
+    "vulkan": (
+        *((render_window, by_timer, act) for act in (file_opened, disabled)),
+        (second_window, by_timer, home_read),
+        (second_window, by_handler, strip_removed),
+        (second_window, by_modal_operator, still_rendered),
+    ),
 }
 
 
@@ -216,8 +217,7 @@ def story():
     gpu_guard.on()
     yield from again()
     yield from shot_when_shown("before")
-    loss, who, acts = PARTS[os.environ["SHUTTER_PART"]]
-    for act in acts:
+    for loss, who, act in PARTS[os.environ["BACKEND"]]:
         yield from again()
         yield from loss()
         saw(act=act.__name__, lost=lost())

@@ -226,6 +226,7 @@ def begun(shown=SHOWN, draw=drawn):
     movie.left_handle, movie.right_handle = shown.start, shown.stop
     story.edit().frame_set(FRAME)
     yield from story.effect_added()
+    story.effect().inbetween = "1"  # moments take a software renderer long
     story.effect().active_shutter = 1
     yield from draw()
     driver.shot("1_stroke")

@@ -40,6 +40,7 @@ def effect_added():
     line = [[0.45, 0.2], [0.5, 0.8]]
     recipe = {
         "version": 2,
+        "inbetween": 1,
         "window": 8,
         "border": True,
         "shutters": [{"name": "Long", "bars": [1] * 8}, {"name": "Sharp", "bars": [1] + [0] * 7}],

@@ -23,7 +23,7 @@ import support
 import traces
 from driver import OUT, override, play, saw, until, video_editing_opened
 
-FRAMES, ACTIONS, PER_FRAME, SIZE = 90, 200, 3, (64, 96)
+FRAMES, ACTIONS, PER_FRAME, SIZE = 60, 120, 3, (64, 96)
 rendering = partial(bpy.app.is_job_running, "RENDER")
 random_ = random.Random(14)
 

@@ -8,7 +8,7 @@ import numpy as np
 import OpenImageIO
 import pytest
 from screens import TOLERANCE, apart_on_screen, assert_alike, pixels
-from telling import ROOT, backends, linked, needs_window, tell
+from telling import ROOT, linked, needs_window, tell
 
 from shutter_addon.media.rendered_pictures import whole_pictures
 
@@ -109,27 +109,18 @@ def test_renders_that_end_early(tmp_path):
     assert [entry["shown"][0] for entry in seen if "shown" in entry] == [[360, 640, 4]]
 
 
-@pytest.mark.parametrize(
-    ("part", "backend"),
-    [
-        *(("first", backend) for backend in backends("opengl")),
-        *(("second", backend) for backend in backends("vulkan")),
-        *(("rendered", backend) for backend in backends("vulkan")),
-        *(("modal", backend) for backend in backends("opengl")),
-        *(("handler", backend) for backend in backends("vulkan")),
-        *(("current", backend) for backend in backends("opengl")),
-    ],
-)
-def test_blender_lives_where_its_gpu_is_not_current(part, backend, tmp_path):
+@pytest.mark.parametrize("backend", ["opengl", "vulkan"])
+def test_blender_lives_where_its_gpu_is_not_current(backend, tmp_path):
     """Whatever lets go of what it holds there, by whoever; and the preview is the same afterwards."""
     path = tmp_path / "recipe.json"
     line = {"shutter": "Sharp", "strokes": [[[0.2, 0.2], [0.6, 0.9]]], "width": 0.1}
     shutters = [{"name": "Long", "bars": [1] * 6}, {"name": "Sharp", "bars": [1] + [0] * 5}]
     path.write_text(json.dumps({"version": 2, "window": 6, "border": True, "shutters": shutters, "regions": [line]}))
-    seen, console = tell("gpu_life_story.py", backend, linked(tmp_path), recipe=path, part=part)
+    seen, console = tell("gpu_life_story.py", backend, linked(tmp_path), recipe=path)
     assert "Traceback" not in console
-    assert {entry["lost"] for entry in seen} == {part != "current"}
-    assert ("Blender's GPU cannot be used until a window is drawn" in console) == (part == "second")
+    kept = 2 if backend == "opengl" else 0
+    assert [entry["lost"] for entry in seen] == [False] * kept + [True] * (len(seen) - kept)
+    assert ("Blender's GPU cannot be used until a window is drawn" in console) == (backend == "opengl")
     assert not (tmp_path / "refused.png").exists()
     pictures = [pixels(tmp_path / f"{name}.png", (300, 54, 900, 380)) for name in ("before", "after")]
     assert_alike(*pictures, tmp_path / "difference.png", tolerance=0)
@@ -157,7 +148,7 @@ def test_esc_ends_a_render_between_two_passes(backend, hidden, tmp_path):
 
 @pytest.mark.parametrize(("backend", "hidden"), [("opengl", "moderngl"), ("vulkan", "")])
 def test_a_film_shows_what_was_when_it_began(backend, hidden, tmp_path):
-    """200 changes while a film renders, at the end the strip deleted: no frame is another one before, and then the
+    """120 changes while a film renders, at the end the strip deleted: no frame is another one before, and then the
     frames are those without it. So with the source deleted, and a single picture. A film ends where the effect's scene
     is deleted, and by undo, even while it waits for Blender's main thread. On OpenGL, and on Blender's own GPU."""
     seen, console = tell("stress.py", backend, linked(tmp_path), hidden=hidden)
@@ -171,12 +162,12 @@ def test_a_film_shows_what_was_when_it_began(backend, hidden, tmp_path):
     assert console.count('Virtual Shutter: the scene of "Shutter" was deleted') == 1
     pictures = {name: {p.name: pixels(p) for p in (tmp_path / name).iterdir()} for name in films}
     alone, stressed, after = (pictures[name] for name in ("alone", "stressed", "after"))
-    assert len(alone) == len(stressed) == len(after) == 90
+    assert len(alone) == len(stressed) == len(after) == 60
     names = sorted(alone)
     assert_same(pictures["source"], alone, names)
     assert_same(pictures["picture"], alone, ["0020.png"])
-    assert_same(stressed, alone, names[:67])
-    assert_same(stressed, after, names[67:])
+    assert_same(stressed, alone, names[:40])
+    assert_same(stressed, after, names[40:])
     assert not any(np.array_equal(alone[name], after[name]) for name in names)
 
 

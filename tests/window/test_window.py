@@ -22,12 +22,9 @@ def test_bars_between_keys_and_the_extension_disabled(tmp_path):
 
 
 def test_an_effect_without_a_mouse(tmp_path):
-    """By Blender's search, which finds operators in menus, by numbers in dialogs, and by arrow keys."""
-    seen, console = tell("keyboard_story.py", "opengl", linked(tmp_path), packages=packages(tmp_path / "packages"))
+    """By Blender's search, which finds operators in menus, and by numbers in dialogs."""
+    _seen, console = tell("keyboard_story.py", "opengl", linked(tmp_path))
     assert "Traceback" not in console
-    width, height = next(entry["outline"] for entry in seen if "outline" in entry)
-    assert 100 < width < 300
-    assert 100 < height < 300
 
 
 def test_no_exception_reaches_the_console(told):

@@ -13,7 +13,7 @@ from typing import NamedTuple
 import bpy
 import numpy as np
 from bpy.app.translations import pgettext_n as n_
-from bpy.types import AnnotationFrame, FCurve, PropertyGroup, Scene, Strip, StripModifier
+from bpy.types import AnnotationFrame, FCurve, PropertyGroup, Scene, Strip
 
 from ...core import revision
 from ...core.model.scribbles import mapped
@@ -60,7 +60,7 @@ def _compare(effect: PropertyGroup) -> Shown | None:
     words = [word for word in add_effect.LOOK if look[word] != wanted[word]]
     if _goal(effect, strip, source)[:2] != (strip.left_handle, strip.right_handle):
         words.append(_RANGE)
-    lacks_modifiers, has_effects = bool(missing_modifiers(strip, source)), bool(effects_on(effect.id_data, source))
+    lacks_modifiers, has_effects = _lacks_modifiers(strip, source), bool(effects_on(effect.id_data, source))
     return Shown(source.name, words, lacks_modifiers, has_effects)
 
 
@@ -182,29 +182,14 @@ def _move(drawing: AnnotationFrame, change: np.ndarray) -> None:
         stroke.points.foreach_set("co", points.ravel())
 
 
-def missing_modifiers(part: Strip, source: Strip) -> list[StripModifier]:
-    """Return the source's modifiers that the effect strip lacks. The engine reads the file, without modifiers."""
-    own = Counter(modifier.type for modifier in part.modifiers)
-    lacking = []
-    for modifier in (modifier for modifier in source.modifiers if not modifier.mute):
-        own[modifier.type] -= 1
-        if own[modifier.type] < 0:
-            lacking.append(modifier)
-    return lacking
+def _lacks_modifiers(part: Strip, source: Strip) -> bool:
+    """Return whether the effect strip lacks modifiers of the source. The engine reads the file, without modifiers."""
+    wanted = Counter(modifier.type for modifier in source.modifiers if not modifier.mute)
+    return bool(wanted - Counter(modifier.type for modifier in part.modifiers))
 
 
-def copy_modifiers(effect: PropertyGroup) -> None:
-    """Copy the source's modifiers that the effect strip lacks, with their keyframes."""
-    strip, source = strip_and_source(effect)
-    append_modifiers(effect.id_data, source, strip, missing_modifiers(strip, source))
-
-
-def append_modifiers(scene: Scene, source: Strip, part: Strip, chosen: list[StripModifier] | None = None) -> None:
-    """Copy the modifiers of a strip to another, with their keyframes.
-
-    Args:
-        chosen: copy only these.
-    """
+def append_modifiers(scene: Scene, source: Strip, part: Strip) -> None:
+    """Copy the modifiers of a strip to another, with their keyframes."""
     if not source.modifiers:
         return
     count = len(part.modifiers)
@@ -212,10 +197,7 @@ def append_modifiers(scene: Scene, source: Strip, part: Strip, chosen: list[Stri
     with for_a_while([active]), add_effect.selecting(scene, [part]):  # it copies all of the active strip
         bpy.ops.sequencer.strip_modifier_copy(type="APPEND")
     for old, new in list(zip(source.modifiers, part.modifiers[count:], strict=True)):
-        if chosen is None or old in chosen:
-            fcurves.copy_curves(scene, f"{old.path_from_id()}.", scene, f"{new.path_from_id()}.")
-        else:
-            part.modifiers.remove(new)
+        fcurves.copy_curves(scene, f"{old.path_from_id()}.", scene, f"{new.path_from_id()}.")
 
 
 def effects_on(scene: Scene, source: Strip) -> list[Strip]:

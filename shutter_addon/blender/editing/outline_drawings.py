@@ -201,7 +201,6 @@ def from_mask(scene: Scene, effect: PropertyGroup, strip: Strip, shutter: Proper
     return region
 
 
-
 def _where_motion_changes(shapes: dict[int, MaskShape]) -> dict[int, MaskShape]:
     """Return those of a mask's shapes by frame between which it moves evenly."""
     steps = np.diff(np.array([_numbers(shape) for shape in shapes.values()]), axis=0)

@@ -1,5 +1,7 @@
 """Operators and panel that bake an effect to a strip and unbake it."""
 
+from dataclasses import dataclass
+
 import bpy
 from bpy.app.translations import pgettext_iface as iface_
 from bpy.app.translations import pgettext_rpt as rpt_
@@ -21,20 +23,35 @@ FORMATS = (
     ("MOVIE", "Movie", "H.264, for playback: small errors and no transparency"),
     ("OPEN_EXR", "OpenEXR", "A folder of pictures in full precision; playback is slower"),
 )
-_running: list[baked_film.BakeJob] = []  # at most one
-_stopped: list[baked_film.BakeJob] = []  # still finishing a frame
-_failures: dict[str, str] = {}  # by the effect's identity: why its last bake failed
+
+
+@dataclass
+class _Bake:
+    """The bake of this Blender.
+
+    Attributes:
+        job: the last one. Stopped, it may still be finishing a frame.
+        is_running: whether its film is wanted.
+        failure: identity of an effect, and why its bake failed.
+    """
+
+    job: baked_film.BakeJob | None = None
+    is_running: bool = False
+    failure: tuple[str, str] = "", ""
+
+
+_bake = _Bake()
 
 
 def _why_baking(_effect: PropertyGroup) -> str | None:
-    _stopped[:] = [job for job in _stopped if not job.is_over()]
-    return rpt_("An effect is being baked") if _running or _stopped else None
+    is_busy = _bake.is_running or (_bake.job is not None and not _bake.job.is_over())
+    return rpt_("An effect is being baked") if is_busy else None
 
 
 @operator("Bake to Strip", _why_baking, file_format=EnumProperty(name="Format", items=FORMATS))
 def bake(self: Operator, _context: Context, effect: PropertyGroup) -> set[str] | None:
     """Render the effect in the background and add the film as a strip above it. Finished frames are kept"""
-    _failures.pop(effect.identity, None)
+    _bake.failure = "", ""
     baked_strips.check(self.edit, self.effect_strip)
     film = baked_film.film_of(self.edit, effect, self.effect_strip, self.file_format)
     try:
@@ -43,7 +60,8 @@ def bake(self: Operator, _context: Context, effect: PropertyGroup) -> set[str] |
         if film.is_finished():
             baked_strips.lay(self.edit, self.effect_strip, film)
             return None
-        _running.append(baked_film.start(self.edit, effect, self.effect_strip, film))
+        _bake.job = baked_film.start(self.edit, effect, self.effect_strip, film)
+        _bake.is_running = True
     except (film_output.OutputError, OSError) as error:
         raise UserError(film_output.in_words(error, film.place)) from None
     main_thread.later(_look, TICK)
@@ -57,7 +75,7 @@ class SHUTTER_OT_bake_stop(Named, Operator):
 
     @classmethod
     def refusal(cls, _context: Context) -> str | None:
-        return None if _running else rpt_("No effect is being baked")
+        return None if _bake.is_running else rpt_("No effect is being baked")
 
     def execute(self, context: Context) -> set[str]:
         stop()
@@ -77,9 +95,8 @@ def unbake(self: Operator, _context: Context, _effect: PropertyGroup) -> None:
 
 def _look() -> float | None:
     """Add the strip of a finished bake."""
-    if not _running:
+    if (job := _bake.job) is None or not _bake.is_running:
         return None
-    job = _running[0]
     redraw(bpy.context)
     if not job.is_over():
         return TICK
@@ -90,7 +107,7 @@ def _look() -> float | None:
         if (failure := job.failure()) is None:
             failure = _lay(job)
         if failure is not None:
-            _failures[job.effect] = failure
+            _bake.failure = job.effect, failure
     finally:
         stop()
     return None
@@ -113,25 +130,26 @@ def _lay(job: baked_film.BakeJob) -> str | None:
 
 def stop() -> None:
     """End the running bake."""
-    while _running:
-        _stopped.append(job := _running.pop())
-        job.end()
+    if _bake.job is not None and _bake.is_running:
+        _bake.is_running = False
+        _bake.job.end()
 
 
 def forget() -> None:
     """Stop and forget errors, before another file is loaded."""
     stop()
-    _failures.clear()
+    _bake.failure = "", ""
 
 
 def draw_panel(layout: UILayout, scene: Scene, effect: PropertyGroup, strip: Strip) -> None:
-    job = next((job for job in _running if job.effect == effect.identity), None)
-    if job is not None:
+    job = _bake.job
+    if job is not None and _bake.is_running and job.effect == effect.identity:
         row = layout.row(align=True)
         draw_progress(row, job.done(), len(job.film.frames))
         row.operator("shutter.bake_stop", text="", icon="X")
         return
-    if failure := _failures.get(effect.identity):
+    baked, failure = _bake.failure
+    if failure and baked == effect.identity:
         sentence(layout, failure, "ERROR")
     identity = strip.virtual_shutter_bake.identity
     if identity:

@@ -59,7 +59,7 @@ _GROUPS: dict[str, tuple] = {
     ),
     "footage": (
         "Footage",
-        [("source", "NONE", "strip"), ("match_source",), ("copy_modifiers",)],
+        [("source", "NONE", "strip"), ("match_source",)],
         [("smooth_streaks",)],
     ),
     "bake": ("Bake", [("bake",), ("bake_stop",), ("unbake",)]),

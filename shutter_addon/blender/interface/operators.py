@@ -101,18 +101,6 @@ def match_source(self: Operator, _context: Context, effect: PropertyGroup) -> No
         report_warning(self, sentence.format(neighbor=neighbor.name, strip=self.effect_strip.name))
 
 
-def _why_no_modifiers(effect: PropertyGroup) -> str | None:
-    if (shown := matching.shown(effect)) is not None and shown.lacks_modifiers:
-        return None
-    return rpt_("The Shutter strip already has the modifiers of its source")
-
-
-@operator("Copy Modifiers", _why_no_modifiers)
-def copy_modifiers(_self: Operator, _context: Context, effect: PropertyGroup) -> None:
-    """Copy the modifiers of the source to the Shutter strip, which otherwise shows the file without them"""
-    matching.copy_modifiers(effect)
-
-
 def _why_smooth(effect: PropertyGroup) -> str | None:
     return None if effect.inbetween == "1" else rpt_("The exposures are already smooth")
 
@@ -227,13 +215,12 @@ class SHUTTER_OT_bar_set(OfEffect, Operator):
     def invoke(self, context: Context, event: Event) -> set[str]:
         from .bar_editor import bar_under
 
-        effect = selection.active(context)[1]
         is_clicked = event.value == "DOUBLE_CLICK"  # from a menu, the pointer is anywhere
         place = bar_under(context, event.mouse_region_x, event.mouse_region_y) if is_clicked else None
         self.is_pointed_at = place is not None
         if place is not None:
             self.bar = place + 1
-        if self.tried(self._read, effect) == {"CANCELLED"}:
+        if self.tried(self._read, selection.active(context)[1]) == {"CANCELLED"}:
             return {"CANCELLED"}
         title = iface_("Bar {number}").format(number=self.bar) if self.is_pointed_at else ""
         return context.window_manager.invoke_props_dialog(self, width=200, title=title)

@@ -231,8 +231,7 @@ def _notes(context: Context) -> Iterator[tuple[str, Button | None]]:
             what = ", ".join(iface_(word) for word in shown.differences)
             yield iface_("Differs from its source: {what}").format(what=what), ("shutter.match_source", "")
         if shown.lacks_modifiers:
-            words = iface_("The effect does not use the modifiers of the source")
-            yield words, ("shutter.copy_modifiers", "")
+            yield iface_("The effect does not use the modifiers of the source"), None
         if shown.has_effects:
             words = iface_("The effect does not use effect strips of the source: make the Shutter strip their input")
             yield words, None

@@ -5,10 +5,8 @@ from dataclasses import dataclass, replace
 
 import bpy
 import numpy as np
-from bpy.app.translations import pgettext_iface as iface_
 from bpy.types import Context, Event, Gizmo, GizmoGroup, PropertyGroup, Region, Strip
 
-from ...compute import plates
 from ...compute.renderer import Renderer
 from ...compute.request import Request
 from ...core.pixels import compositor
@@ -25,17 +23,10 @@ _MARK = (1.0, 1.0, 1.0, 0.9)
 
 @dataclass(frozen=True)
 class Probed:
-    """A pixel's coefficients (N,), which sum to 1, and the bars (L,) of its shutter.
-
-    Attributes:
-        layers: how much each layer covers the pixel.
-        hole: source of what lies behind the layers, a constant of compute.plates.
-    """
+    """A pixel's coefficients (N,), which sum to 1, and the bars (L,) of its shutter."""
 
     coefficients: np.ndarray
     bars: np.ndarray
-    layers: tuple[float, ...] = ()
-    hole: int = plates.OPEN
 
 
 def probed_at(renderer: Renderer, request: Request, point: Sequence[float]) -> Probed | None:
@@ -52,17 +43,11 @@ def probed_at(renderer: Renderer, request: Request, point: Sequence[float]) -> P
     if not (0 <= column < source.width and 0 <= row < source.height):
         return None
     texture, block = renderer.drawn_coefficients(replace(request, quick=True))
-    values = np.maximum(blender_gpu.texel(texture, column // block, row // block)[: len(request.state.bars)], 0).astype(
-        np.float64
-    )
+    values = blender_gpu.texel(texture, column // block, row // block)[: len(request.state.bars)]
+    values = np.maximum(values, 0).astype(np.float64)
     coefficients = values / values.sum()
-    holes = renderer.holes if request.state.layers else None
-    return Probed(
-        coefficients=coefficients,
-        bars=compositor.mixed_shutter(renderer.slid(request, known=True).state, coefficients),
-        layers=tuple(float(matte[row, column]) for matte in renderer.layer_mattes(request)),
-        hole=plates.OPEN if holes is None else int(holes[row, column]),
-    )
+    state = renderer.slid(request, known=True).state
+    return Probed(coefficients=coefficients, bars=compositor.mixed_shutter(state, coefficients))
 
 
 @dataclass(frozen=True)
@@ -130,7 +115,7 @@ class SHUTTER_GT_probe(Gizmo):
             return
         if probed is not None:
             (point,) = seen.on_region([at])
-            _draw(context.region, point, shown.effect.shutters, probed, _of_layers(shown, probed))
+            _draw(context.region, point, shown.effect.shutters, probed)
 
     def test_select(self, context: Context, location: tuple[int, int]) -> int:
         """Follow the pointer: Blender calls this whenever it moves. No other callback leaves the events to others."""
@@ -140,23 +125,9 @@ class SHUTTER_GT_probe(Gizmo):
         return -1
 
 
-def _of_layers(shown: preview_areas.Shown, probed: Probed) -> list[tuple[str, str]]:
-    """Return lines of text: name and coverage of each layer, and what replaces the background."""
-    regions = [region for region in shown.effect.regions if region.is_layer and region.opacity > 0]
-    lines = [(region.name, f"{share:.1%}") for region, share in zip(regions, probed.layers, strict=False)]
-    words = {plates.TAKEN: iface_("Behind: another frame"), plates.FILLED: iface_("Behind: filled")}
-    return [*lines, (words[probed.hole], "")] if probed.hole in words else lines
-
-
-def _draw(
-    region: Region,
-    point: Sequence[float],
-    shutters: Sequence[PropertyGroup],
-    probed: Probed,
-    of_layers: list[tuple[str, str]],
-) -> None:
+def _draw(region: Region, point: Sequence[float], shutters: Sequence[PropertyGroup], probed: Probed) -> None:
     unit = drawing.ui_scale()
-    place = layout(point, (region.width, region.height), len(shutters) + len(of_layers), unit)
+    place = layout(point, (region.width, region.height), len(shutters), unit)
     colors = np.array([shutter.color for shutter in shutters])
     (x, y), arm = point, 6 * unit
     drawing.lines([(x - arm, y), (x + arm, y)], _MARK, width=1)
@@ -165,10 +136,7 @@ def _draw(
     shares = probed.bars / max(1.0, probed.bars.max())
     drawing.bars(place.bars, shares, (*(probed.coefficients @ colors), 0.95))
     left, _, right, _ = place.bars
-    for bottom, (name, share) in zip(place.lines[len(shutters) :], of_layers, strict=True):
-        drawing.text(left, bottom, name, until=right - 44 * unit)
-        drawing.text(right - 38 * unit, bottom, share)
-    for i, (bottom, shutter, share) in enumerate(zip(place.lines, shutters, probed.coefficients, strict=False)):
+    for i, (bottom, shutter, share) in enumerate(zip(place.lines, shutters, probed.coefficients, strict=True)):
         drawing.swatch(left, bottom - unit, 12 * unit, shutter, i)
         drawing.text(left + 18 * unit, bottom, shutter.name, until=right - 44 * unit)
         drawing.text(right - 38 * unit, bottom, f"{share:.1%}")

@@ -193,16 +193,7 @@ MESSAGES = {
         "*",
         '"{neighbor}" is in the way: "{strip}" does not have the whole range of its source',
     ): "„{neighbor}“ ist im Weg: „{strip}“ hat nicht den ganzen Bereich seiner Quelle",
-    ("Operator", "Copy Modifiers"): "Modifikatoren kopieren",
-    (
-        "*",
-        "Copy the modifiers of the source to the Shutter strip, which otherwise shows the file without them",
-    ): "Die Modifikatoren der Quelle auf den Verschlussstreifen kopieren, der die Datei der Quelle zeigt, wie sie ist",
     ("*", "The effect does not use the modifiers of the source"): "Modifikatoren der Quelle erreichen den Effekt nicht",
-    (
-        "*",
-        "The Shutter strip already has the modifiers of its source",
-    ): "Der Verschlussstreifen hat die Modifikatoren seiner Quelle",
     (
         "*",
         "The effect does not use effect strips of the source: make the Shutter strip their input",
@@ -522,19 +513,6 @@ MESSAGES = {
     ): "Die Region ist keine Matte, keine Rampe, kein Umriss und kein Motiv",
     ("*", 'Saved {count} pictures in "{folder}"'): "{count} Bilder in „{folder}“ gespeichert",
     ("Operator", "Find Outline"): "Umriss finden",
-    ("Operator", "Draw by Points"): "Punktweise zeichnen",
-    (
-        "*",
-        "Draw a curve of the active outline point by point, along the picture's edges (Ctrl for straight lines)",
-    ): "Eine Kurve des aktiven Umrisses Punkt für Punkt an den Kanten des Bildes entlang zeichnen (Strg für gerade"
-    " Linien)",
-    (
-        "*",
-        "Click points around the subject (arrow keys, Space), Ctrl: straight, Backspace: undo point, "
-        "Return: close, Esc: cancel",
-    ): "Punkte um das Motiv klicken (Pfeiltasten, Leertaste), Strg: gerade, Rücktaste: einer weniger, "
-    "Eingabe: schließen, Esc: nichts",
-    ("*", "A curve needs at least three points"): "Eine Kurve hat mindestens drei Punkte",
     ("Operator", "Outline from Mask"): "Umriss aus Maske",
     (
         "*",
@@ -1167,8 +1145,6 @@ MESSAGES = {
         "purple is filled from its surroundings",
     ): "Das Ergebnis, und wo kein belichteter Frame zeigt, was hinter Ebenen liegt: Orange stammt aus einem anderen "
     "Frame, Violett ist aus der Umgebung gefüllt",
-    ("*", "Behind: another frame"): "Dahinter: ein anderer Frame",
-    ("*", "Behind: filled"): "Dahinter: gefüllt",
     ("*", "Nothing"): "Nichts",
     ("*", "Camera"): "Kamera",
     ("*", "What the exposure moves with"): "Womit sich die Belichtung mitbewegt",
