@@ -17,6 +17,7 @@ ROOT = Path(__file__).parents[2]
 WINDOW = os.environ.get("BLENDER_WINDOW", "")
 # Even numbers of pixels around the picture, so that its pixels fall on the screen's.
 SCREEN = "1600x1001x24"
+SMALL = "960x601x24"  # for stories that are not about the interface: drawing it takes a software renderer long
 
 # Not even this machine's own. Who is not root may take it away as the root of a user namespace alone.
 NO_NETWORK = ("unshare", *(() if os.geteuid() == 0 else ("--map-root-user",)), "--net")
@@ -40,13 +41,13 @@ def linked(folder):
     return folder
 
 
-def tell(story, backend, folder, *, before=(), **given):
+def tell(story, backend, folder, *, before=(), screen=SCREEN, **given):
     """Runs a story in Blender's window, with user folders of its own in `folder`; what it noted, and what Blender said
     on the console. before: what its command stands behind, as NO_NETWORK; given: what the story finds in its
     environment as SHUTTER_NAME."""
     environment = {
         "BACKEND": backend,
-        "SCREEN": SCREEN,
+        "SCREEN": screen,
         "GUI_TIMEOUT": "1500",  # seconds: a long story on two cores, beside others
         "SHUTTER_PICTURES": str(folder),
         # A copy: Blender puts proxies beside a movie.

@@ -8,11 +8,19 @@ import numpy as np
 import OpenImageIO
 import pytest
 from screens import TOLERANCE, apart_on_screen, assert_alike, pixels
-from telling import ROOT, linked, needs_window, tell
+from telling import ROOT, SMALL, linked, needs_window, tell
 
 from shutter_addon.media.rendered_pictures import whole_pictures
 
 pytestmark = needs_window
+
+
+def noise(folder, count, size):
+    """The path of the first picture of a sequence of noise."""
+    (folder / "frames").mkdir()
+    for number, frame in enumerate(np.random.default_rng(1).integers(0, 256, (count, *size[::-1], 3), dtype=np.uint8)):
+        OpenImageIO.ImageBuf(frame).write(str(folder / "frames" / f"{number + 1:04d}.png"))
+    return folder / "frames" / "0001.png"
 
 
 def test_without_wheels(tmp_path):
@@ -29,15 +37,12 @@ def test_without_wheels(tmp_path):
 def test_preview_and_film_take_turns_where_the_gpu_is_small(tmp_path):
     """Each has room for the running sums of its window, and both have not."""
     size, megabytes = (480, 270), 34
-    (tmp_path / "frames").mkdir()
-    for number, frame in enumerate(np.random.default_rng(1).integers(0, 256, (20, *size[::-1], 3), dtype=np.uint8)):
-        OpenImageIO.ImageBuf(frame).write(str(tmp_path / "frames" / f"{number + 1:04d}.png"))
     line = {"shutter": "Sharp", "strokes": [[[0.2, 0.2], [0.6, 0.9]]], "width": 0.1}
     shutters = [{"name": "Long", "bars": [1] * 16}, {"name": "Sharp", "bars": [1] + [0] * 15}]
-    path, first = tmp_path / "recipe.json", tmp_path / "frames" / "0001.png"
+    path, first = tmp_path / "recipe.json", noise(tmp_path, 20, size)
     path.write_text(json.dumps({"version": 2, "window": 16, "border": True, "shutters": shutters, "regions": [line]}))
     given = {"footage": first, "recipe": path, "megabytes": megabytes}
-    (*seen, told), console = tell("memory_story.py", "opengl", linked(tmp_path), **given)
+    (*seen, told), console = tell("memory_story.py", "opengl", linked(tmp_path), screen=SMALL, **given)
     assert "Traceback" not in console
     assert f"{megabytes // 4} MB of GPU memory are too little for 16 frames" in told["said"][-1]
     options = ("--recipe", path, "--output", tmp_path / "expected", "--device", "opengl", "--frames", "1:4")
@@ -58,16 +63,13 @@ def test_preview_and_film_take_turns_where_the_gpu_is_small(tmp_path):
 def test_films_on_blenders_own_gpu(tmp_path):
     """In a job of the window, moderngl hidden: as moderngl renders them without a window; ten in a row, and their
     textures take what the first one's took."""
-    (tmp_path / "frames").mkdir()
-    for number, frame in enumerate(np.random.default_rng(1).integers(0, 256, (30, 54, 96, 3), dtype=np.uint8)):
-        OpenImageIO.ImageBuf(frame).write(str(tmp_path / "frames" / f"{number + 1:04d}.png"))
     line = {"name": "Moved", "shutter": "Sharp", "strokes": [[[0.2, 0.2], [0.6, 0.9]]], "width": 0.1}
     line["keys"] = [{"frame": 1}, {"frame": 30, "location": [0.3, 0.1]}]
     shutters = [{"name": "Long", "bars": [1] * 6}, {"name": "Sharp", "bars": [0, 0, 1, 0, 0, 0]}]
-    path, first = tmp_path / "recipe.json", tmp_path / "frames" / "0001.png"
+    path, first = tmp_path / "recipe.json", noise(tmp_path, 30, (96, 54))
     path.write_text(json.dumps({"version": 2, "window": 6, "border": True, "shutters": shutters, "regions": [line]}))
     given = {"footage": first, "recipe": path}
-    seen, console = tell("own_gpu_story.py", "vulkan", linked(tmp_path), **given)
+    seen, console = tell("own_gpu_story.py", "vulkan", linked(tmp_path), screen=SMALL, **given)
     assert "Traceback" not in console
     assert console.count("composing on Blender's own GPU") == 2  # of each file's first film
     reason = "View > Render Sequencer Animation cannot use Blender's own GPU, as Render > Render Animation can"
@@ -116,7 +118,8 @@ def test_blender_lives_where_its_gpu_is_not_current(backend, tmp_path):
     line = {"shutter": "Sharp", "strokes": [[[0.2, 0.2], [0.6, 0.9]]], "width": 0.1}
     shutters = [{"name": "Long", "bars": [1] * 6}, {"name": "Sharp", "bars": [1] + [0] * 5}]
     path.write_text(json.dumps({"version": 2, "window": 6, "border": True, "shutters": shutters, "regions": [line]}))
-    seen, console = tell("gpu_life_story.py", backend, linked(tmp_path), recipe=path)
+    given = {"footage": noise(tmp_path, 30, (192, 108)), "recipe": path}
+    seen, console = tell("gpu_life_story.py", backend, linked(tmp_path), screen=SMALL, **given)
     assert "Traceback" not in console
     kept = 2 if backend == "opengl" else 0
     assert [entry["lost"] for entry in seen] == [False] * kept + [True] * (len(seen) - kept)
@@ -151,7 +154,7 @@ def test_a_film_shows_what_was_when_it_began(backend, hidden, tmp_path):
     """120 changes while a film renders, at the end the strip deleted: no frame is another one before, and then the
     frames are those without it. So with the source deleted, and a single picture. A film ends where the effect's scene
     is deleted, and by undo, even while it waits for Blender's main thread. On OpenGL, and on Blender's own GPU."""
-    seen, console = tell("stress.py", backend, linked(tmp_path), hidden=hidden)
+    seen, console = tell("stress.py", backend, linked(tmp_path), screen=SMALL, hidden=hidden)
     assert ("composing on Blender's own GPU" in console) == bool(hidden)
     assert "Traceback" not in console
     films = {entry["film"]: entry for entry in seen}
