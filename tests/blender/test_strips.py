@@ -5,14 +5,16 @@ import ctypes
 import av
 import numpy as np
 import pytest
-from support import effect_of, image_strip, noise_film, picture_of, recipe, sequencer, write_frames
+from support import effect_of, image_strip, noise_film, picture_of, recipe, request, sequencer, write_frames
 
+from shutter_addon.blender.data import strips
 from shutter_addon.blender.editing import add_effect, shutter_edits
 from shutter_addon.blender.rendering import effect_source
 from shutter_addon.blender.rendering import job_snapshots as snapshots
 from shutter_addon.core.frames import light
 
 LEVELS = 1
+MOST = 20  # pictures of an effect
 SELECTED = 1 << 4  # SEQ_KEY_SELECTED in a retiming key's flag, behind a double: Python cannot select one
 
 
@@ -56,9 +58,7 @@ def effect_on(bpy, edit):
     edit.frame_start, edit.frame_end = -100, 300
 
     def add(source, data=None):
-
-        strip, effect = effect_of(edit, source, data or recipe(4, [1, 0, 0, 0]))
-        return strip, effect
+        return effect_of(edit, source, data or recipe(4, [1, 0, 0, 0]))
 
     return add
 
@@ -67,22 +67,21 @@ def new_movie(edit, path, start=1, channel=1):
     return edit.sequence_editor.strips.new_movie("movie", str(path), channel, start)
 
 
-def new_images(edit, first, start=1, channel=1):
-    strip = image_strip(edit, first, start, channel)
-    return strip
-
-
 def check(edit, render, effect_strips, frames):
-    """The picture with the effect, at frames asked for out of order, equals the picture without."""
+    """The effects show the frames that the plain strips show; so do their pictures, asked for out of order."""
     for strip in effect_strips:
         strip.mute = True
-    # In order: what Blender shows of a slowed strip depends on what it has shown before (see timing.source_frame).
+    # In order: what Blender shows of a slowed strip depends on what it has shown before.
     plain = render(edit, frames)
     for strip in effect_strips:
         strip.mute = False
-    shown = render(edit, [int(frame) for frame in np.random.default_rng(0).permutation(list(frames))])
-    for frame in frames:
-        assert np.abs(shown[frame] - plain[frame]).max() <= LEVELS, f"at frame {frame}"
+        effect = strips.find_effect(strip.scene)[1]
+        for frame in (frame for frame in frames if strip.left_handle <= frame < strip.right_handle):
+            index = request(edit, effect, strip, frame).index
+            assert 4 * index + 5 == pytest.approx(plain[frame][-1, 0, 0], abs=LEVELS), f"at frame {frame}"
+    shown = render(edit, [int(frame) for frame in np.random.default_rng(0).permutation(list(frames))[:MOST]])
+    for frame, picture in shown.items():
+        assert np.abs(picture - plain[frame]).max() <= LEVELS, f"at frame {frame}"
     assert len({p[0, 0, 0] for p in plain.values()}) > len(frames) / 20, "the plain strip shows several frames"
 
 
@@ -176,11 +175,12 @@ def test_retimed_strips_that_are_not_the_first(edit, render, effect_on, movie, r
     ramp.left_handle = ramp_effect.left_handle = 255
     effects = [strip for strip in edit.sequence_editor.strips if strip.type == "SCENE"]
     assert len(effects) == 3
-    frames = [*range(81, 201), *range(255, ramp.right_handle)]
+    frames = [*range(81, 201, 4), *range(255, ramp.right_handle, 4)]
     check(edit, render, effects, frames)
     meta = edit.sequence_editor.strips.new_meta("Meta", 5, 255)
     for strip in (ramp, ramp_effect):
         strip.move_to_meta(meta)
+    meta.right_handle = ramp.right_handle
     check(edit, render, effects, frames)
 
 
@@ -212,7 +212,7 @@ def add_by_operator(bpy, edit, path):
 
 def test_the_window_counts_source_frames_in_playing_order(edit, render, effect_on, images):
     """Two frames on, at a still frame: of a reversed strip, the frame two before."""
-    source = new_images(edit, images)
+    source = image_strip(edit, images)
     source.use_reverse_frames = True
     effect_on(source, recipe(4, [0, 0, 1, 0]))
     shown = render(edit, [1, 10, 19])
@@ -226,7 +226,7 @@ def test_streaks_of_a_new_effect_keep_their_length_up_to_the_clips_ends(edit, re
         return light.to_encoded(light.to_linear(np.array([12 * f + 5 for f in frames]) / 255).mean()) * 255
 
     edit.render.resolution_x = edit.render.resolution_y = 32
-    _, effect = add_effect.add_effect(edit, new_images(edit, images))
+    _, effect = add_effect.add_effect(edit, image_strip(edit, images))
     shutter_edits.start(effect)
     effect.inbetween = "1"
     effect.window, effect.position = 5, "CENTER"
@@ -246,7 +246,7 @@ def test_streaks_of_a_new_effect_keep_their_length_up_to_the_clips_ends(edit, re
 
 
 def test_the_window_reaches_past_a_trim(edit, render, effect_on, images):
-    source = new_images(edit, images)
+    source = image_strip(edit, images)
     source.right_handle = 6
     effect_on(source, recipe(8, [0, 0, 0, 0, 0, 0, 0, 1]))
     assert render(edit, [5])[5][0, 0, 0] == pytest.approx(12 * 11 + 5, abs=1)
@@ -304,7 +304,7 @@ def test_an_effect_moved_with_its_source_takes_its_keys_along(edit, render, effe
 @pytest.mark.parametrize("flips", [(True, False), (False, True), (True, True)])
 def test_scribbles_lie_where_they_are_seen_on_a_mirrored_strip(bpy, edit, render, effect_on, images, flips):
     """Drawn at the upper left of the image: there it is the last frame, whichever part of the source that is."""
-    source = new_images(edit, images)
+    source = image_strip(edit, images)
     source.use_flip_x, source.use_flip_y = flips
     _strip, effect = effect_on(source, recipe(4, [1, 0, 0, 0], [0, 0, 0, 1], border=True))
     region = effect.regions.add()
