@@ -19,8 +19,6 @@ def still_on(edit):
 
     def make(path):
         source = edit.sequence_editor.strips.new_movie("movie", str(path), 1, 1)
-        edit.render.resolution_x = source.elements[0].orig_width
-        edit.render.resolution_y = source.elements[0].orig_height
         strip, _effect = effect_of(edit, source, recipe(16, np.eye(16)[0]))
         edit.render.resolution_x, edit.render.resolution_y = (
             strip.scene.render.resolution_x,
@@ -32,16 +30,15 @@ def still_on(edit):
 
 
 def test_frames_of_big_buck_bunny_in_random_order(edit, render, bunny, still_on):
-    """Every sixth, from all over the film."""
+    """From all over the film."""
     strip = still_on(bunny)
     source = next(s for s in edit.sequence_editor.strips if s.type == "MOVIE")
-    order = 6 * np.random.default_rng(0).permutation(22)
-    for start in range(0, 132, 66):
-        strip.mute, source.mute = True, False
-        plain = render(edit, range(start + 1, start + 67, 6))
-        strip.mute, source.mute = False, True  # or Blender would decode below the effect, and seek as well
-        for frame in (int(i) + 1 for i in order if start <= i < start + 66):
-            assert np.array_equal(render(edit, [frame])[frame], plain[frame]), f"frame {frame}"
+    frames = range(1, 133, 19)
+    strip.mute, source.mute = True, False
+    plain = render(edit, frames)
+    strip.mute, source.mute = False, True  # or Blender would decode below the effect, and seek as well
+    for frame in (int(frame) for frame in np.random.default_rng(0).permutation(frames)):
+        assert np.array_equal(render(edit, [frame])[frame], plain[frame]), f"frame {frame}"
 
 
 TAGGED = {
