@@ -152,10 +152,10 @@ def test_a_still_frame_is_the_filmed_one_bit_for_bit(filmed, add, edit, render, 
     """As the preset makes it, at every smoothness, before a shutter that streaks."""
     *_, effect = add(filmed, np.ones(4), "1", position=position)
     shutter_edits.apply_preset(effect, 0, "STILL")
-    frames = 1, 5, 6, 7, 12
+    frames = 1, 6, 7, 12
     plain = {frame: picture_of(effect.scene, frame) for frame in frames}
     film = cut_film()
-    for steps in ("1", "2", "4", "8", "16", "AUTO"):
+    for steps in ("1", "2", "16", "AUTO"):
         effect.inbetween = steps
         for frame, picture in render(edit, frames).items():
             assert np.array_equal(picture[..., :3], film[frame - 1]), (steps, frame)
@@ -166,7 +166,7 @@ def test_a_still_frame_is_the_filmed_one_bit_for_bit(filmed, add, edit, render, 
 # Bars
 
 
-@pytest.mark.parametrize("smooth", ["2", "4", "8", "16", "AUTO"])
+@pytest.mark.parametrize("smooth", ["2", "AUTO"])
 def test_bars_stay_as_they_are(effect, smooth):
     """Keyed ones as well, and their number; those of presets are the presets'."""
     rng = np.random.default_rng(3)
@@ -215,7 +215,7 @@ def moving(folder, pixels, count=6, size=(320, 180), repeat=1):
     return write_frames(folder, np.stack(frames).repeat(repeat, 0))
 
 
-@pytest.mark.parametrize(("pixels", "steps"), [(0, 1), (1, 1), (3, 2), (5, 4), (7, 4), (12, 8), (20, 16)])
+@pytest.mark.parametrize(("pixels", "steps"), [(0, 1), (1, 1), (3, 2), (7, 4), (20, 16)])
 def test_automatic_takes_as_many_as_the_fastest_motion_needs(add, edit, tmp_path, pixels, steps):
     """At this height, two pixels look smooth."""
     _source, strip, effect = add(moving(tmp_path / "film", pixels), np.ones(4), "AUTO")
@@ -225,7 +225,7 @@ def test_automatic_takes_as_many_as_the_fastest_motion_needs(add, edit, tmp_path
     assert found.state.bars.sum() == pytest.approx(4)
 
 
-@pytest.mark.parametrize(("smooth", "skips"), [("2", True), ("2", False), ("AUTO", True), ("AUTO", False)])
+@pytest.mark.parametrize(("smooth", "skips"), [("2", True), ("AUTO", True), ("AUTO", False)])
 def test_repeated_frames_are_skipped(add, edit, tmp_path, smooth, skips):
     """Those that are shown twice are moments half-way then, and of Automatic's motion there is half."""
     first = moving(tmp_path / "film", 5, repeat=2)
