@@ -132,21 +132,9 @@ def with_camera_elsewhere(bpy, edit, strip):
     strip.scene.collection.objects.unlink(strip.scene.camera)
 
 
-def with_sequencer_input(bpy, edit, strip):
-    strip.scene_input = "SEQUENCER"
-
-
-def with_another_engine(bpy, edit, strip):
-    strip.scene.render.engine = "BLENDER_WORKBENCH"
-
-
 def with_border(bpy, edit, strip):
     strip.scene.render.use_border = True
     strip.scene.render.border_max_x = 0.5
-
-
-def with_half_the_size(bpy, edit, strip):
-    strip.scene.render.resolution_percentage = 50
 
 
 def with_compositing(bpy, edit, strip):
@@ -158,20 +146,23 @@ def with_compositing(bpy, edit, strip):
     strip.scene.render.use_compositing = True
 
 
-def with_no_view_layer(bpy, edit, strip):
-    strip.scene.view_layers[0].use = False
+SETTINGS = {
+    "scene_input": "SEQUENCER",
+    "scene.render.engine": "BLENDER_WORKBENCH",
+    "scene.render.resolution_percentage": 50,
+    "scene.view_layers[0].use": False,
+}
 
 
-CHANGES = [
-    without_camera,
-    with_camera_elsewhere,
-    with_sequencer_input,
-    with_another_engine,
-    with_border,
-    with_half_the_size,
-    with_compositing,
-    with_no_view_layer,
-]
+def with_setting(path):
+    def change(bpy, edit, strip):
+        owner, _, name = path.rpartition(".")
+        setattr(strip.path_resolve(owner) if owner else strip, name, SETTINGS[path])
+
+    return change
+
+
+CHANGES = [without_camera, with_camera_elsewhere, with_border, with_compositing, *map(with_setting, SETTINGS)]
 
 
 @pytest.mark.parametrize("change", CHANGES)

@@ -2,10 +2,19 @@
 
 import ctypes
 
-import av
 import numpy as np
 import pytest
-from support import effect_of, image_strip, noise_film, picture_of, recipe, request, sequencer, write_frames
+from support import (
+    effect_of,
+    image_strip,
+    noise_film,
+    picture_of,
+    recipe,
+    request,
+    sequencer,
+    write_frames,
+    write_movie,
+)
 
 from shutter_addon.blender.data import strips
 from shutter_addon.blender.editing import add_effect, shutter_edits
@@ -21,27 +30,18 @@ SELECTED = 1 << 4  # SEQ_KEY_SELECTED in a retiming key's flag, behind a double:
 @pytest.fixture(scope="module")
 def movie(tmp_path_factory):
     """A movie of 60 frames, 32×32, 24 fps; frame i is a grey of its own."""
-    return make_movie(tmp_path_factory.mktemp("movie") / "grey.mkv", 24)
+    return write_movie(tmp_path_factory.mktemp("movie") / "grey.mkv", greys())
 
 
-def make_movie(path, rate, count=60):
-    with av.open(str(path), "w") as container:
-        stream = container.add_stream("ffv1", rate=rate)
-        stream.width = stream.height = 32
-        stream.pix_fmt = "bgr0"
-        for i in range(count):
-            picture = np.full((32, 32, 3), 4 * i + 5, dtype=np.uint8)
-            picture[:16, :, 0] = 255 - 4 * i
-            container.mux(stream.encode(av.VideoFrame.from_ndarray(picture, format="rgb24")))
-        container.mux(stream.encode())
-    return path
+def greys():
+    frames = np.repeat(np.arange(5, 245, 4, dtype=np.uint8), 32 * 32 * 3).reshape(60, 32, 32, 3)
+    frames[:, :16, :, 0] = 260 - frames[:, :16, :, 0].astype(int)
+    return frames
 
 
 @pytest.fixture(scope="module")
 def images(tmp_path_factory):
-    frames = np.zeros((20, 32, 32, 3), dtype=np.uint8)
-    for i in range(20):
-        frames[i] = 12 * i + 5
+    frames = np.repeat(np.arange(5, 245, 12, dtype=np.uint8), 32 * 32 * 3).reshape(20, 32, 32, 3)
     return write_frames(tmp_path_factory.mktemp("images"), frames)
 
 
@@ -168,7 +168,7 @@ def test_half_of_a_retimed_strip_that_was_cut_hard(edit, render, effect_on, movi
 def test_a_movie_of_240_fps_that_keeps_its_speed(bpy, edit, render, effect_on, tmp_path, fps):
     """As the Add menu adds it, with "Adjust Playback Rate"."""
     edit.render.fps = fps
-    path = str(make_movie(tmp_path / "fast.mkv", 240))
+    path = str(write_movie(tmp_path / "fast.mkv", greys(), rate=240))
     with sequencer(bpy):
         bpy.ops.sequencer.movie_strip_add(
             filepath=path, frame_start=1, channel=1, sound=False, adjust_playback_rate=True, use_framerate=False

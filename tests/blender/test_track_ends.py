@@ -2,8 +2,8 @@
 
 import numpy as np
 import pytest
-from support import request, write_frames
-from test_region_tracking import COUNT, SIZE, active, call, drawn, keys, new_source, picture, texture, track
+from support import call, request, write_frames
+from test_region_tracking import COUNT, SIZE, active, drawn, keys, new_source, picture, texture, track
 
 from shutter_addon.blender.data import fcurves, recipe_import, snapshot
 from shutter_addon.blender.editing import track_region
