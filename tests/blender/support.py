@@ -7,7 +7,6 @@ import sys
 from contextlib import contextmanager
 from pathlib import Path
 
-import av
 import numpy as np
 import OpenImageIO
 
@@ -42,6 +41,8 @@ def write_frames(folder, frames, name="f"):
 
 def write_movie(path, frames, codec="ffv1", pixels="bgr0", rate=24, options=None):
     """Frames (n, H, W, 3) uint8 as a movie; its path."""
+    import av  # which a Blender that runs the other functions may lack
+
     with av.open(str(path), "w") as container:
         stream = container.add_stream(codec, rate=rate, options=options)
         stream.height, stream.width = frames[0].shape[:2]
