@@ -7,9 +7,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import av
 import numpy as np
 import OpenImageIO
+from support import write_movie
 
 COUNT = 30  # frames of footage; of fewer, Blender does not tell whether they keep their own rate
 MOVIES = {
@@ -115,14 +115,7 @@ def _strip(edit: Any, pictures: np.ndarray, kind: str, folder: Path, rate: Any) 
     folder.mkdir(parents=True)
     if kind in MOVIES:
         suffix, codec, pixels = MOVIES[kind]
-        path = folder / f"movie.{suffix}"
-        with av.open(str(path), "w") as container:
-            stream = container.add_stream(codec, rate=rate)
-            stream.height, stream.width = pictures.shape[1:3]
-            stream.pix_fmt = pixels
-            for picture in pictures:
-                container.mux(stream.encode(av.VideoFrame.from_ndarray(picture, format="rgb24")))
-            container.mux(stream.encode())
+        path = write_movie(folder / f"movie.{suffix}", pictures, codec, pixels, rate)
         return strips.new_movie("movie", str(path), 1, 1)
     suffix, samples, channels = IMAGES[kind]
     for i, picture in enumerate(pictures, 1):

@@ -1,6 +1,5 @@
-"""The command with random moments between frames in place of optical flow's, so that the right ones are known."""
+"""Random moments between frames in place of optical flow's, so that the right ones are known."""
 
-import sys
 from itertools import pairwise
 
 import numpy as np
@@ -47,11 +46,3 @@ def spread(bars, steps):
                 start, end = max((step - 0.5) / steps, 0), min((step + 0.5) / steps, 0.5)
                 weights[place * steps + side * step] += weight / len(sides) * (end - start) / 0.5
     return weights
-
-
-if __name__ == "__main__":
-    from shutter_addon.__main__ import main
-    from shutter_addon.media import flow
-
-    flow.Between = Between
-    sys.exit(main())

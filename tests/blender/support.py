@@ -39,6 +39,20 @@ def write_frames(folder, frames, name="f"):
     return folder / f"{name}0001.png"
 
 
+def write_movie(path, frames, codec="ffv1", pixels="bgr0", rate=24, options=None):
+    """Frames (n, H, W, 3) uint8 as a movie; its path."""
+    import av  # which a Blender that runs the other functions may lack
+
+    with av.open(str(path), "w") as container:
+        stream = container.add_stream(codec, rate=rate, options=options)
+        stream.height, stream.width = frames[0].shape[:2]
+        stream.pix_fmt = pixels
+        for frame in frames:
+            container.mux(stream.encode(av.VideoFrame.from_ndarray(frame, format="rgb24")))
+        container.mux(stream.encode())
+    return path
+
+
 def recipe(window, *shutters, regions=(), **options):
     """A recipe as a dictionary; shutters: bars, or a list of (frame, bars) keys."""
     entries = []
@@ -96,6 +110,25 @@ def sequencer(bpy):
     area.type = "SEQUENCE_EDITOR"
     with bpy.context.temp_override(window=window, area=area):
         yield area
+
+
+def call(bpy, name, *arguments, **settings):
+    """Calls an operator as a menu does, with its step of undo."""
+    return getattr(bpy.ops.shutter, name)("EXEC_DEFAULT", True, *arguments, **settings)
+
+
+def does(bpy, seen, name, **settings):
+    """Calls an operator, which changes what `seen` gives; undone and done again, nothing else than that."""
+    bpy.context.view_layer.update()
+    bpy.ops.ed.undo_push(message="before")
+    before = seen(bpy)
+    assert call(bpy, name, **settings) == {"FINISHED"}
+    after = seen(bpy)
+    assert after != before
+    bpy.ops.ed.undo()
+    assert seen(bpy) == before
+    bpy.ops.ed.redo()
+    assert seen(bpy) == after
 
 
 def state(edit, effect, strip, frame):

@@ -2,8 +2,8 @@
 
 import numpy as np
 import pytest
-from support import request, write_frames
-from test_region_tracking import SIZE, active, call, centre, drawn, new_source, picture
+from support import call, request, write_frames
+from test_region_tracking import SIZE, active, centre, drawn, new_source, picture
 
 from shutter_addon.blender.editing import region_edits, shutter_edits
 from shutter_addon.blender.rendering import sessions
@@ -42,7 +42,10 @@ def test_one_click_and_one_undo(bpy, region, name, own, rest):
 def test_a_region_of_the_default_shutter_gets_one_of_its_own(bpy, region):
     effect = active(bpy)[1]
     region_edits.assign_region(effect, 0, effect.shutters[0])
+    shutter_edits.follow(effect, 0, "REGION", False)
+    effect.shutters[0].follow_region = effect.regions[0].name
     call(bpy, "sharp_subject")
+    assert effect.shutters[0].follow == "NOTHING", "what followed follows no more"
     assert effect.regions[0].shutter == "Subject"
     assert bars(effect)["Subject"] == STILL
     assert bars(effect)["Long"] == LONG
@@ -57,24 +60,12 @@ def test_another_region_keeps_its_shutter(bpy, region):
     assert bars(effect)["Sharp"] == STILL, "the frames lie around the shown one now, which it goes on to show"
 
 
-def test_what_followed_follows_no_more(bpy, region):
-    effect = active(bpy)[1]
-    shutter_edits.follow(effect, 0, "REGION", False)
-    effect.shutters[0].follow_region = effect.regions[0].name
-    call(bpy, "sharp_subject")
-    assert effect.shutters[0].follow == "NOTHING"
-
-
-def test_a_still_frame_is_one_frame_of_a_smooth_effect(bpy, region):
-    effect = active(bpy)[1]
-    effect.inbetween = "2"
-    call(bpy, "sharp_subject")
-    assert bars(effect)["Sharp"] == STILL
-
-
 def test_a_layer_is_rendered(bpy, edit, region):
-    """The state has it, in all frames around; without the switch it has none."""
+    """The state has it, in all frames around; without the switch it has none. Of a smooth effect, still is a frame."""
+    active(bpy)[1].inbetween = "2"
     call(bpy, "sharp_subject")
+    assert bars(active(bpy)[1])["Sharp"] == STILL
+    active(bpy)[1].inbetween = "1"
     edit.frame_set(20)
     layers = request(*active(bpy), 20).state.layers
     assert layers.shutters == (1,)

@@ -78,6 +78,7 @@ def test_a_deleted_strip_takes_its_effect_along(bpy, edit, add, render):
 
 
 def test_a_source_that_was_muted_shows_again(bpy, edit, add):
+    """One that the user has muted does not."""
     strip = add()
     source = edit.sequence_editor.strips["images"]
     assert source.mute
@@ -89,11 +90,7 @@ def test_a_source_that_was_muted_shows_again(bpy, edit, add):
     edit.sequence_editor.strips.remove(strip)
     update(bpy)
     assert not source.mute
-
-
-def test_a_source_that_the_user_muted_stays_so(bpy, edit, images):
-    source = edit.sequence_editor.strips.new_image("images", str(images), 1, 1)
-    source.mute = True
+    source.mute = True  # by the user
     strip, _ = add_effect.add_effect(edit, source)
     edit.sequence_editor.strips.remove(strip)
     update(bpy)
@@ -237,22 +234,15 @@ def test_effect_and_source_are_connected_as_the_source_was(edit, add, images):
     assert edit.render.sequencer_gl_preview == "RENDERED"
 
 
-@pytest.fixture
-def library(bpy, edit, add, render, tmp_path):
-    """A saved edit with an effect, and a frame of it."""
+@pytest.mark.parametrize("link", [True, False])
+def test_a_linked_or_appended_edit_renders_the_same(bpy, edit, add, render, tmp_path, link):
+    path, edit.name = str(tmp_path / "library.blend"), "Film"
     add()
     add(101, recipe(4, {101: [0, 1, 0, 0], 111: [0, 0, 1, 0]}))
-    edit.name = "Film"
     pictures = render(edit, [5, 105])
-    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "library.blend"))
+    bpy.ops.wm.save_as_mainfile(filepath=path)
     bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
-    return tmp_path / "library.blend", pictures
-
-
-@pytest.mark.parametrize("link", [True, False])
-def test_a_linked_or_appended_edit_renders_the_same(bpy, library, render, link):
-    path, pictures = library
-    with bpy.data.libraries.load(str(path), link=link) as (_, wanted):
+    with bpy.data.libraries.load(path, link=link) as (_, wanted):
         wanted.scenes = ["Film"]
     film = bpy.data.scenes["Film"]
     update(bpy)

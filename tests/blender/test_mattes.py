@@ -99,11 +99,8 @@ def test_a_file_follows_the_footage(shown, matte):
 
 
 def test_the_timeline_and_an_offset(shown, matte):
-    def change(source):
-        source.left_handle = 4
-
     content = data(region(matte, timing="timeline", offset=2))
-    _strip, _effect, coefficients = shown(content, change)
+    _strip, _effect, coefficients = shown(content, lambda source: setattr(source, "left_handle", 4))
     assert close(coefficients(6), values(6 - 4 + 2) / 255)
     assert close(coefficients(11), values(9) / 255)
 
@@ -204,28 +201,21 @@ def test_sentences_for_what_is_not_there(bpy, edit, shown, matte):
     with pytest.raises(Exception, match=r"m0006\.png"):
         coefficients(6)
     assert close(coefficients(7), values(6) / 255)
-    one.channel = "NAMED"
-    with pytest.raises(Exception, match='region "m": its channel has no name'):
-        coefficients(7)
-    one.channel_name = "Depth.Z"
-    with pytest.raises(Exception, match=r"m0001\.png: has no channel Depth\.Z"):
-        coefficients(7)
-    one.channel, one.image = "RED", None
-    with pytest.raises(Exception, match='region "m": it has no matte file'):
-        coefficients(7)
-    one.image = bpy.data.images.new("generated", 4, 4)
-    with pytest.raises(Exception, match='image "generated" is not a movie, image sequence or picture on disk'):
-        coefficients(7)
-    one.matte = "STRIP"
-    with pytest.raises(Exception, match='region "m": it has no matte strip'):
-        coefficients(7)
-    own = edit.sequence_editor.strips.new_effect("color", "COLOR", 6, 1, length=5)
-    one.strip_name = own.name
-    with pytest.raises(Exception, match='its matte strip "color" is not a movie, image or clip strip'):
-        coefficients(7)
-    one.matte = "MASK"
-    with pytest.raises(Exception, match='region "m": it has no mask'):
-        coefficients(7)
+    generated = bpy.data.images.new("generated", 4, 4)
+    edit.sequence_editor.strips.new_effect("color", "COLOR", 6, 1, length=5)
+    for changed, sentence in (
+        ({"channel": "NAMED"}, 'region "m": its channel has no name'),
+        ({"channel_name": "Depth.Z"}, r"m0001\.png: has no channel Depth\.Z"),
+        ({"channel": "RED", "image": None}, 'region "m": it has no matte file'),
+        ({"image": generated}, 'image "generated" is not a movie, image sequence or picture on disk'),
+        ({"matte": "STRIP"}, 'region "m": it has no matte strip'),
+        ({"strip_name": "color"}, 'its matte strip "color" is not a movie, image or clip strip'),
+        ({"matte": "MASK"}, 'region "m": it has no mask'),
+    ):
+        for name, value in changed.items():
+            setattr(one, name, value)
+        with pytest.raises(Exception, match=sentence):
+            coefficients(7)
     one.opacity = 0
     one.kind = "RAMP"
     assert close(coefficients(7), 0)
@@ -345,12 +335,6 @@ def test_handles_of_a_ramp(bpy, edit, shown, monkeypatch):
         assert pressed == {"CANCELLED"}, "a handle that was there a moment ago moves nothing"
 
 
-def run(*arguments):
-    """The command, within this process, and what it leaves open is closed, as where its own ends."""
-    assert command.main([*arguments]) == 0
-    sessions.forget()
-
-
 def test_weights_are_read_back(bpy, tmp_path, footage):
     """What `--weights` writes gives the same picture as mattes, for each shutter but the default one."""
     stroke = {"name": "s", "shutter": "S1", "strokes": [[[0.3, 0.2], [0.4, 0.9]]]}
@@ -361,7 +345,8 @@ def test_weights_are_read_back(bpy, tmp_path, footage):
     def render(name, content, *more):
         (tmp_path / f"{name}.json").write_text(json.dumps(content))
         where = "--recipe", str(tmp_path / f"{name}.json"), "--output", str(tmp_path / name)
-        run("render", str(footage), "--frames", "2:4", *where, *more)
+        assert command.main(["render", str(footage), "--frames", "2:4", *where, *more]) == 0
+        sessions.forget()  # what the command leaves open is closed, as where its process ends
 
     render("a", content, "--weights", str(tmp_path / "weights"))
     mattes = [
@@ -373,21 +358,6 @@ def test_weights_are_read_back(bpy, tmp_path, footage):
         first, second = (read_picture(tmp_path / folder / f"{frame:04d}.png") for folder in "ab")
         assert np.abs(first - second).max() <= 1
         assert np.ptp(first) > 15
-
-
-@pytest.fixture
-def triangle(bpy, shown, matte):
-    """A mask that is the first region's matte: a triangle."""
-    _strip, effect, _coefficients = shown(data(region(matte)))
-    mask = bpy.data.masks.new("Mask")
-    spline = mask.layers.new().splines.new()
-    spline.points.add(2)
-    for point, co in zip(spline.points, ((0.2, 0.2), (0.8, 0.2), (0.5, 0.7)), strict=True):
-        point.co = co
-        point.handle_left = point.handle_right = co
-    spline.use_cyclic = True
-    effect.regions[0].matte, effect.regions[0].mask = "MASK", mask
-    return mask
 
 
 def test_cut_and_pasted_effects_have_their_mattes(bpy, edit, shown, matte, mask):
@@ -416,8 +386,10 @@ def test_cut_and_pasted_effects_have_their_mattes(bpy, edit, shown, matte, mask)
     assert close((levels - (20 + 10 * asked.index)) / 10, before)
 
 
-def test_a_changed_mask_drops_finished_frames(bpy, edit, matte, triangle):
-    layer = triangle.layers[0]
+def test_a_changed_mask_drops_finished_frames(bpy, edit, shown, matte, mask):
+    _strip, effect, _coefficients = shown(data(region(matte)))
+    effect.regions[0].matte, effect.regions[0].mask = "MASK", mask
+    layer = mask.layers[0]
     point = layer.splines[0].points[0]
     clip = bpy.data.movieclips.load(str(matte))
     clip.tracking.tracks.new(name="T", frame=1)
@@ -426,17 +398,14 @@ def test_a_changed_mask_drops_finished_frames(bpy, edit, matte, triangle):
         parent = point.parent
         parent.id_type, parent.id, parent.parent, parent.sub_parent = "MOVIECLIP", clip, "Camera", "T"
 
-    def keyed():
-        layer.keyframe_insert("alpha", frame=1)
-
     changes = {
         "point": lambda: setattr(point, "co", (0.1, 0.3)),
         "feather": lambda: setattr(point, "weight", 0.1),
         "layer": lambda: setattr(layer, "invert", True),
-        "opacity": keyed,
+        "opacity": lambda: layer.keyframe_insert("alpha", frame=1),
         "still": lambda: layer.keyframe_delete("alpha", frame=1),
         "parent": parented,
-        "removed": lambda: bpy.data.masks.remove(triangle),
+        "removed": lambda: bpy.data.masks.remove(mask),
     }
     invalidation.invalidate_changed(edit)
     for name, change in changes.items():

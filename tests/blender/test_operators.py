@@ -6,7 +6,8 @@ import wave
 
 import numpy as np
 import pytest
-from support import recipe, sequencer
+import support
+from support import call, recipe, sequencer
 
 from shutter_addon import blender
 from shutter_addon.blender.data import annotations, consistency, fcurves, selection
@@ -20,11 +21,6 @@ def operators(bpy):
     from shutter_addon.blender.interface import operators
 
     return operators
-
-
-def call(bpy, name, *arguments, **settings):
-    """Calls an operator as a menu does, with its step of undo."""
-    return getattr(bpy.ops.shutter, name)("EXEC_DEFAULT", True, *arguments, **settings)
 
 
 def effect_now(bpy):
@@ -53,19 +49,10 @@ def state(bpy):
 
 @pytest.fixture
 def does(bpy):
-    """Calls an operator, which changes something; undone and done again, nothing else than that."""
+    """Calls an operator, and takes it back for a while; gives the effect."""
 
     def check(name, **settings):
-        bpy.context.view_layer.update()
-        bpy.ops.ed.undo_push(message="before")
-        before = state(bpy)
-        assert call(bpy, name, **settings) == {"FINISHED"}
-        after = state(bpy)
-        assert after != before
-        bpy.ops.ed.undo()
-        assert state(bpy) == before
-        bpy.ops.ed.redo()
-        assert state(bpy) == after
+        support.does(bpy, state, name, **settings)
         return effect_now(bpy)
 
     return check
@@ -130,35 +117,35 @@ def test_shutters_come_go_and_move(bpy, effect, does):
 
 
 def test_preset(bpy, effect, does):
-    preset = "GAUSSIAN"
-    effect = does("preset", preset=preset)
-    assert consistency.bars(effect.shutters[1]) == pytest.approx(shutters.preset_bars(preset, 8), abs=1e-6)
+    effect = does("preset", preset="GAUSSIAN")
+    assert consistency.bars(effect.shutters[1]) == pytest.approx(shutters.preset_bars("GAUSSIAN", 8), abs=1e-6)
     assert bar_edits.key_state(effect, 1) == [""] * 8
     bpy.context.scene.tool_settings.use_keyframe_insert_auto = True
     effect = does("preset", preset="TRAIL")
     assert bar_edits.key_state(effect, 1) == ["keyed"] * 8
 
 
-def test_bars_are_keyed_unkeyed_and_typed(bpy, effect, does):
+def test_bars_are_keyed_unkeyed_and_typed(bpy, effect, does, capfd):
     effect = does("bars_key")
     assert bar_edits.key_state(effect, 1) == ["keyed"] * 8
     effect = does("bars_unkey")
     assert bar_edits.key_state(effect, 1) == [""] * 8
+    assert call(bpy, "bars_unkey") == {"CANCELLED"}
+    assert "No bar has a keyframe at the current frame" in capfd.readouterr().out
     effect = does("bar_set", bar=3, weight=0.25)
     assert consistency.bars(effect.shutters[1]).tolist() == [1, 0, 0.25, 0, 0, 0, 0, 0]
     with pytest.raises(RuntimeError, match="The shutter has 8 bars"):
         call(bpy, "bar_set", bar=9, weight=0.5)
 
 
-def test_no_key_to_delete(bpy, effect, capfd):
-    assert call(bpy, "bars_unkey") == {"CANCELLED"}
-    assert "No bar has a keyframe at the current frame" in capfd.readouterr().out
-
-
-def test_a_drawn_region_is_one_step_of_undo(bpy, effect, does):
-    """Without a preview: in the background Blender crashes where an operator that chooses a tool makes a step."""
+def test_without_a_preview_a_drawn_region_is_one_step_of_undo(bpy, effect, does, capfd):
+    """With one, Blender crashes in the background where an operator that chooses a tool makes a step."""
     effect = does("draw")
     assert [(region.name, region.kind) for region in effect.regions] == [("Sharp", "LINE")]
+    for name in ("draw", "erase"):
+        capfd.readouterr()
+        assert call(bpy, name) == {"FINISHED"}
+        assert "Open a sequencer with a preview" in capfd.readouterr().out
 
 
 def test_draw_makes_a_region_and_takes_up_the_pen(bpy, effect, preview):
@@ -192,13 +179,6 @@ def test_the_pen_draws_on_the_layer_of_the_active_region(bpy, effect, preview):
     bpy.ops.shutter.draw()
     assert preview.annotation.layers.active_note == effect.regions[0].layer
     assert annotations.layer_of(effect, effect.regions[0]) is not None
-
-
-@pytest.mark.parametrize("name", ["draw", "erase"])
-def test_without_a_preview_the_user_is_told(bpy, effect, capfd, name):
-    region_edits.add_region(effect, effect.shutters[1])
-    assert call(bpy, name) == {"FINISHED"}
-    assert "Open a sequencer with a preview" in capfd.readouterr().out
 
 
 def test_region_assign(bpy, effect, does):
@@ -248,19 +228,17 @@ def refusal(bpy, name, **settings):
     return said
 
 
-# The sentences are core's (tests/core/test_recipe.py).
-BROKEN = {
-    "no text": (b"\xff\xfe\x00", "not a text file"),
-    "a shutter that never opens": (json.dumps(recipe(2, [0, 0])), "never opens"),
-    "a region of no shutter": (json.dumps(RECIPE | {"regions": [REGION | {"shutter": "S7"}]}), "S7"),
-}
-
-
-@pytest.mark.parametrize("kind", BROKEN)
-def test_a_broken_recipe_changes_nothing(bpy, effect, tmp_path, kind):
-    content, sentence = BROKEN[kind]
+@pytest.mark.parametrize(
+    ("content", "sentence"),
+    [
+        (b"\xff\xfe\x00", "not a text file"),
+        (json.dumps(RECIPE | {"regions": [REGION | {"shutter": "S7"}]}).encode(), "S7"),
+    ],
+)
+def test_a_broken_recipe_changes_nothing(bpy, effect, tmp_path, content, sentence):
+    """The sentences are core's (tests/core/test_recipe.py)."""
     path = tmp_path / "broken.json"
-    path.write_bytes(content if isinstance(content, bytes) else content.encode())
+    path.write_bytes(content)
     before = state(bpy)
     said = refusal(bpy, "recipe_import", filepath=str(path))
     assert sentence in said
@@ -392,12 +370,15 @@ def test_what_cannot_be_used_says_why(bpy, operators, edit, effect, tmp_path, si
                     operator()
 
 
-@pytest.mark.parametrize("name", ["shutter_add", "shutter_duplicate"])
-def test_no_more_shutters_than_a_picture_has(bpy, effect, name):
-    while len(effect.shutters) < limits.MAX_SHUTTERS:
+def test_as_few_and_as_many_shutters_as_a_picture_has(bpy, effect):
+    assert call(bpy, "shutter_remove") == {"FINISHED"}
+    with pytest.raises(RuntimeError, match="The last shutter of an effect cannot be removed"):
+        call(bpy, "shutter_remove")
+    for name in ("shutter_add", *["shutter_duplicate"] * (limits.MAX_SHUTTERS - 2)):
         assert call(bpy, name) == {"FINISHED"}
-    with pytest.raises(RuntimeError, match=f"An effect can have at most {limits.MAX_SHUTTERS} shutters"):
-        call(bpy, name)
+    for name in ("shutter_add", "shutter_duplicate"):
+        with pytest.raises(RuntimeError, match=f"An effect can have at most {limits.MAX_SHUTTERS} shutters"):
+            call(bpy, name)
     assert len(effect.shutters) == limits.MAX_SHUTTERS
 
 
@@ -416,10 +397,3 @@ def test_no_more_regions_than_a_picture_has(bpy, effect, preview):
         call(bpy, "draw", new=True)
     assert bpy.ops.shutter.draw() == {"FINISHED"}
     assert len(effect.regions) == limits.MAX_REGIONS
-
-
-def test_the_last_shutter_stays(bpy, effect):
-    assert call(bpy, "shutter_remove") == {"FINISHED"}
-    with pytest.raises(RuntimeError, match="The last shutter of an effect cannot be removed"):
-        call(bpy, "shutter_remove")
-    assert len(effect.shutters) == 1

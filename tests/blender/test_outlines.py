@@ -71,14 +71,19 @@ def covered(index):
     return outlines.coverage(square(index), WIDTH, HEIGHT)
 
 
-def test_carried(edited):
-    """In between and beyond; with the feather, turned inside out."""
+def test_carried(bpy, edited, tmp_path):
+    """In between and beyond; turned inside out. Mattes lie beside a file that was saved."""
     strip, effect = edited(region(1, 9))
     for frame in (1, 3, 5, 8, 10):
         found = coefficients(strip, effect, frame)
         assert np.abs(found - covered(frame - 1)).mean() < 0.01, frame
     effect.regions[0].invert = True
     assert np.abs(coefficients(strip, effect, 5) - (1 - covered(4))).mean() < 0.01
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "edit.blend"))
+    sessions.forget()
+    coefficients(strip, strip.id_data.virtual_shutter.effects[0], 5)
+    names = [path.name[:8] for path in (tmp_path / "virtual_shutter_mattes").glob("*/*.png")]
+    assert sorted(names) == [f"{index:08d}" for index in range(1, 8)]
 
 
 def test_drawings_stay_with_the_footage(edited):
@@ -100,15 +105,6 @@ def test_as_a_layer_it_leaves_no_ghost(edited):
     ahead = covered(5) * (1 - covered(4)) > 0.99
     grounds = [ground(index)[0, :6].mean() for index in (4, 5)]
     assert picture[ahead].mean() < max(grounds) + 4
-
-
-def test_mattes_lie_beside_the_file(bpy, edited, tmp_path):
-    strip, effect = edited(region(1, 9))
-    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "edit.blend"))
-    effect = strip.id_data.virtual_shutter.effects[0]
-    coefficients(strip, effect, 5)
-    names = [path.name[:8] for path in (tmp_path / "virtual_shutter_mattes").glob("*/*.png")]
-    assert sorted(names) == [f"{index:08d}" for index in range(1, 8)]
 
 
 @pytest.fixture

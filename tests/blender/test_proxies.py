@@ -1,10 +1,9 @@
 """Proxies that Blender itself has built, found where it puts them."""
 
-import av
 import numpy as np
 import OpenImageIO
 import pytest
-from support import sequencer, write_frames
+from support import sequencer, write_frames, write_movie
 
 from shutter_addon.blender.data import source_media
 from shutter_addon.blender.data.source_media import proxy_of
@@ -32,20 +31,13 @@ def built(bpy, edit, tmp_path):
             for index in range(2, COUNT + 1):
                 images.elements.append(f"f{index:04d}.png")
             return images
-        with av.open(str(tmp_path / "movie.mp4"), "w") as movie:
-            stream = movie.add_stream("libx264", rate=25, options={"qp": "10"})
-            stream.width, stream.height, stream.pix_fmt = WIDTH, HEIGHT, "yuv420p"
-            for frame in pictures():
-                movie.mux(stream.encode(av.VideoFrame.from_ndarray(frame)))
-            movie.mux(stream.encode())
-        return strips.new_movie("movie", str(tmp_path / "movie.mp4"), 2, 1)
+        path = write_movie(tmp_path / "movie.mp4", pictures(), "libx264", "yuv420p", 25, {"qp": "10"})
+        return strips.new_movie("movie", str(path), 2, 1)
 
-    def build(kind, **settings):
+    def build(kind):
         bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "edit.blend"))
         found = strip(kind)
         found.select = found.use_proxy = found.proxy.build_50 = True
-        for name, value in settings.items():
-            setattr(found.proxy, name, value)
         bpy.ops.render.render()  # after a film that was stopped Blender builds none, until something is rendered
         with sequencer(bpy):
             assert bpy.ops.sequencer.rebuild_proxy() == {"FINISHED"}
@@ -71,18 +63,16 @@ def assert_read(edit, strip):
 
 
 @pytest.mark.parametrize(
-    ("kind", "place"),
+    ("kind", "storage", "folder"),
     [
-        ("MOVIE", "beside"),
-        ("IMAGE", "beside"),
-        ("MOVIE", "project"),
-        ("MOVIE", "project's default"),
+        ("MOVIE", "PER_STRIP", ""),
+        ("IMAGE", "PER_STRIP", ""),
+        ("MOVIE", "PROJECT", "//of the project"),
+        ("MOVIE", "PROJECT", ""),
     ],
 )
-def test_where_blender_puts_them(edit, built, kind, place):
-    editor = edit.sequence_editor
-    editor.proxy_storage = "PROJECT" if "project" in place else "PER_STRIP"
-    editor.proxy_dir = "//of the project" if place == "project" else ""
+def test_where_blender_puts_them(edit, built, kind, storage, folder):
+    edit.sequence_editor.proxy_storage, edit.sequence_editor.proxy_dir = storage, folder
     assert_read(edit, built(kind))
 
 

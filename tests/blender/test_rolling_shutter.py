@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+import support
 from support import image_strip, request, write_frames
 
 from shutter_addon.blender.data import consistency, recipe_import, selection
@@ -74,16 +75,20 @@ def test_each_row_is_shown_when_the_middle_one_was_filmed(bpy, edited, share, si
     assert (effect.inbetween, effect.window, effect.position) == ("8", 8, "CENTER")
 
 
-def test_what_was_there_before_stays_beside_it(bpy, edited):
+def test_what_was_there_before_stays_beside_it_and_one_undo_takes_it_back(bpy, edited):
     _strip, effect = edited()
+    bpy.ops.ed.undo_push(message="before")
     call(bpy, side="TOP", readout=50)
     assert [shutter.name for shutter in effect.shutters] == ["Earlier", "Long", "Sharp", "Later"]
     assert consistency.bars(effect.shutters["Long"]).tolist() == [1] * 8
     assert [consistency.bars(effect.shutters[i]).sum() for i in (0, 2, 3)] == [1, 1, 1]
+    bpy.ops.ed.undo()
+    effect = bpy.context.scene.virtual_shutter.effects[0]
+    assert (effect.inbetween, effect.window, len(effect.shutters), len(effect.regions)) == ("1", 8, 2, 0)
 
 
 def call(bpy, name="rolling_shutter", **settings):
-    return getattr(bpy.ops.shutter, name)("EXEC_DEFAULT", True, **settings)
+    return support.call(bpy, name, **settings)
 
 
 def test_again_it_changes_the_readout(bpy, edited):
@@ -122,32 +127,19 @@ def test_of_footage_that_runs_backward(bpy, edit, edited):
     assert len(effect.regions) == 1
 
 
-def test_a_short_window_becomes_as_long_as_it_takes(bpy, edited):
-    strip, effect = edited()
-    effect.window = 1
-    call(bpy, side="TOP", readout=100)
-    assert effect.window == 3
-    np.testing.assert_allclose(moments(strip, effect)[0], expected(1.0, "TOP"), atol=2e-6)
-
-
-@pytest.mark.parametrize(("window", "steps"), [(32, 8), (33, 4), (128, 2), (200, 1)])
-def test_of_a_long_window_there_are_fewer_moments(bpy, edited, window, steps):
+@pytest.mark.parametrize(
+    ("window", "share", "taken", "steps"), [(1, 1.0, 3, 8), (33, 0.5, 33, 4), (128, 0.5, 128, 2), (200, 0.5, 200, 1)]
+)
+def test_a_short_window_becomes_as_long_as_it_takes_and_a_long_one_has_fewer_moments(
+    bpy, edited, window, share, taken, steps
+):
     """As many as there is room for, and each row is where it was."""
     strip, effect = edited()
     effect.window = window
-    call(bpy, side="TOP", readout=50)
-    assert (effect.inbetween, effect.window) == ("8", window)
+    call(bpy, side="TOP", readout=100 * share)
+    assert (effect.inbetween, effect.window) == ("8", taken)
     assert request(strip.id_data, effect, strip, 8).state.options.step == steps
-    np.testing.assert_allclose(moments(strip, effect)[0], expected(0.5, "TOP"), atol=2e-6)
-
-
-def test_one_undo_takes_it_back(bpy, edited):
-    _strip, effect = edited()
-    bpy.ops.ed.undo_push(message="before")
-    call(bpy, side="TOP", readout=50)
-    bpy.ops.ed.undo()
-    effect = bpy.context.scene.virtual_shutter.effects[0]
-    assert (effect.inbetween, effect.window, len(effect.shutters), len(effect.regions)) == ("1", 8, 2, 0)
+    np.testing.assert_allclose(moments(strip, effect)[0], expected(share, "TOP"), atol=2e-6)
 
 
 def test_a_time_map_is_no_repair(bpy, edited):
@@ -194,17 +186,17 @@ def test_where_nothing_more_fits_it_is_greyed_out(bpy, edited, capfd):
     assert "Traceback" not in "".join(capfd.readouterr())
 
 
-def test_where_it_cannot_be_found_one_sentence_says_so(bpy, edited):
-    _strip, effect = edited(0.4)
-    with pytest.raises(RuntimeError, match="the readout cannot be found here: too few straight lines"):
-        call(bpy, "find_readout", reads="COLUMNS")
-    assert (effect.inbetween, len(effect.shutters)) == ("1", 2)
-
-
-def test_where_there_is_none_nothing_is_repaired(bpy, edited):
-    _strip, effect = edited(0.0)
-    with pytest.raises(RuntimeError, match="moving lines stay upright"):
-        call(bpy, "find_readout", reads="ROWS")
+@pytest.mark.parametrize(
+    ("share", "reads", "sentence"),
+    [
+        (0.4, "COLUMNS", "the readout cannot be found here: too few straight lines"),
+        (0.0, "ROWS", "moving lines stay upright"),
+    ],
+)
+def test_where_it_cannot_be_found_one_sentence_says_so(bpy, edited, share, reads, sentence):
+    _strip, effect = edited(share)
+    with pytest.raises(RuntimeError, match=sentence):
+        call(bpy, "find_readout", reads=reads)
     assert (effect.inbetween, len(effect.shutters)) == ("1", 2)
 
 

@@ -119,9 +119,8 @@ def test_resume_renders_what_is_missing_damaged_or_of_another_version(bpy, saved
     assert run("render", tmp_path / "changed.blend", "--output", other, "--frames", "5")[0] == 0
     assert bits(other)["0005.png"] != whole["0005.png"]
     (out / "0002.png").unlink()
-    content = bytearray((out / "0003.png").read_bytes())
-    content[len(content) // 2] ^= 1
-    (out / "0003.png").write_bytes(content)
+    flip(out / "0003.png")
+    content = (out / "0003.png").read_bytes()
     (out / "0004.png").write_bytes(content[: len(content) // 2])
     shutil.copy(other / "0005.png", out / "0005.png")
     shutil.copy(tmp_path / "in" / "f0007.png", out / "0007.png")

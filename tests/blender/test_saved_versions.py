@@ -59,16 +59,6 @@ def count_filmed(effect):
             shutter["preset"] = ""  # a part of a frame was no still one
 
 
-def test_what_counted_moments_counts_filmed_frames(bpy, folder):
-    """The effect of 0.1.0 that had in-between frames: a box of two filmed frames, and the first of them alone."""
-    if json.loads((folder / "names.json").read_text())["format"] > 1:
-        pytest.skip("bars counted filmed frames")
-    bpy.ops.wm.open_mainfile(filepath=str(folder / "edit.blend"))
-    (effect,) = (each for each in bpy.context.scene.virtual_shutter.effects if each.inbetween != "1")
-    assert (effect.inbetween, effect.window) == ("2", 2)
-    assert [[bar.weight for bar in shutter.bars] for shutter in effect.shutters] == [[1, 1], [0.5, 0]]
-
-
 def test_this_version_has_kept_its_files():
     version = tomllib.loads((ROOT / "blender_manifest.toml").read_text())["version"]
     assert SAVED / version in FOLDERS, "run scripts/save_version.py"

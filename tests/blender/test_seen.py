@@ -76,6 +76,10 @@ def test_of_effects_on_top_of_each_other_the_active_one_is_edited(bpy, edit, eff
     for chosen, expected in ((low, low), (high, high), (source_of(edit, effect), low), (None, high)):
         edit.sequence_editor.active_strip = chosen
         assert seen(edit) == active(bpy) == expected
+    edit.sequence_editor.active_strip = edit.sequence_editor.strips.new_effect("title", "TEXT", 9, 1, length=40)
+    assert active(bpy) is None
+    assert selection.in_picture(bpy.context) is None
+    assert seen(edit) == high
 
 
 def test_what_is_muted_is_not_edited(bpy, edit, effect, tmp_path):
@@ -102,13 +106,6 @@ def test_an_effect_in_a_closed_meta_strip_is_not_edited_in_the_picture(bpy, edit
     assert selection.why_unseen(edit, strip) == "Open the meta strip that the Shutter strip is in"
     edit.sequence_editor.display_stack(meta)
     assert seen(edit) == strip
-
-
-def test_of_a_strip_without_an_effect_nothing_is_active(bpy, edit, effect):
-    edit.sequence_editor.active_strip = edit.sequence_editor.strips.new_effect("title", "TEXT", 9, 1, length=40)
-    assert active(bpy) is None
-    assert selection.in_picture(bpy.context) is None
-    assert seen(edit) == strip_of(edit, effect)
 
 
 @pytest.fixture
@@ -179,12 +176,6 @@ def test_of_a_removed_scene_that_a_strip_brings_back_one_annotation_is_left(bpy,
     assert [strip.scene.camera.data] == list(bpy.data.cameras)
 
 
-def test_drawing_keeps_the_annotation_that_the_preview_had(bpy, edit, effect, previews):
-    previews[0].annotation = drawn = bpy.data.annotations.new("Notes")
-    shown_annotations.give(previews[0], effect.scene.annotation)
-    assert drawn.use_fake_user
-
-
 def test_previews_follow_what_is_seen(bpy, edit, effect, previews, tmp_path):
     other = another(bpy, edit, tmp_path, start=101)
     own = effect.scene.annotation  # it may have moved in memory
@@ -197,6 +188,9 @@ def test_previews_follow_what_is_seen(bpy, edit, effect, previews, tmp_path):
     previews[0].annotation = None  # by the user
     shown_annotations.follow()
     assert previews[0].annotation is None
+    previews[0].annotation = drawn = bpy.data.annotations.new("Notes")
+    shown_annotations.give(previews[0], own)
+    assert drawn.use_fake_user, "the annotation that the preview had is kept"
 
 
 def test_undo_shows_the_scribbles_again(bpy, edit, effect, previews):

@@ -4,16 +4,9 @@ import pickle
 
 import numpy as np
 import pytest
-from support import image_strip, sequencer, state, write_frames
+from support import image_strip, request, sequencer, state, write_frames
 
-from shutter_addon.blender.data import (
-    annotations,
-    fcurves,
-    recipe_import,
-    snapshot,
-    source_media,
-    strips,
-)
+from shutter_addon.blender.data import annotations, fcurves, recipe_import, snapshot, source_media, strips
 from shutter_addon.blender.editing import add_effect, bar_edits, region_edits, shutter_edits
 from shutter_addon.blender.rendering import invalidation
 from shutter_addon.core.messages import EffectError
@@ -139,8 +132,6 @@ def test_a_part_of_a_cut_source_is_read_as_itself(bpy, found):
 
 
 def test_another_smoothness_is_another_source(found):
-    from support import request
-
     edit, effect, strip = found
     sources = []
     for smooth in "1", "4", "8", "1":

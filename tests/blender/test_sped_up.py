@@ -60,6 +60,8 @@ def speed(*keys):
 def test_eight_times_as_fast(edited):
     """Open for four source frames; the streak is as long as a camera's."""
     strip, effect = edited(time=speed((1, 1), (7, 49)))
+    strip.id_data.frame_set(3)
+    assert bar_edits.open_for(strip.id_data, effect, strip, 0) == "Open for 4 of 16 frames here"
     for at in (2, 4):
         index = 8 * (at - 1)
         found = linear(strip, effect, at)
@@ -99,9 +101,3 @@ def test_a_strip_that_blender_retimes_and_reverses(edited):
 def test_the_last_frame_is_blurred_as_those_before(edited):
     strip, effect = edited(time=speed((1, 1), (8, 57)), position="end")
     assert spread(linear(strip, effect, 8)) == pytest.approx(spread(linear(strip, effect, 5)), rel=0.02)
-
-
-def test_how_long_it_is_open_is_told(edited):
-    strip, effect = edited(time=speed((1, 1), (7, 49)))
-    strip.id_data.frame_set(3)
-    assert bar_edits.open_for(strip.id_data, effect, strip, 0) == "Open for 4 of 16 frames here"

@@ -68,13 +68,13 @@ def looked(edit, effect, strip):
     raise AssertionError("it is never done")
 
 
-@pytest.mark.parametrize(("pixels", "is_told"), [(0, False), (1, False), (3, True), (7, True), (20, True)])
+@pytest.mark.parametrize(("pixels", "is_told"), [(1, False), (3, True), (20, True)])
 def test_steps_that_look_like_steps_are_told(add, pixels, is_told):
     found = looked(*add(pixels, np.ones(8)))
     assert found == (pytest.approx(pixels, abs=0.3) if is_told else None)
 
 
-@pytest.mark.parametrize("bars", [[1, 0, 0, 0], [1, 0, 1, 0], [0, 0, 1, 0]])
+@pytest.mark.parametrize("bars", [[1, 0, 1, 0], [0, 0, 1, 0]])
 def test_still_frames_and_separate_ones_have_no_streaks(add, bars):
     assert looked(*add(12, bars)) is None
 

@@ -152,7 +152,8 @@ def test_not_this(bpy, edited):
 
 
 def test_the_least_sure_frame(bpy, edited, monkeypatch):
-    """Next Unsure Frame makes all mattes, and goes to where their confidence is lowest."""
+    """Next Unsure Frame makes all mattes, and goes to where their confidence is lowest. Panning Shot keys the motion of
+    what they cover."""
     strip, effect = edited()
     bpy.ops.shutter.outline_needed()
     file, shown = outline_drawings.carried_frames(strip.id_data, effect, strip, 0)
@@ -163,11 +164,7 @@ def test_the_least_sure_frame(bpy, edited, monkeypatch):
     monkeypatch.setattr(outline_drawings, "SURE_SUBJECT", 1.1)
     assert bpy.ops.shutter.track_look() == {"FINISHED"}
     assert sure[strip.id_data.frame_current] == min(sure.values())
-
-
-def test_tracked_inside_its_matte(bpy, edited):
-    """Panning Shot keys the motion of what the matte covers."""
-    strip, effect = edited()
+    strip.id_data.frame_set(1)
     assert bpy.ops.shutter.panning_shot() == {"FINISHED"}
     strip.id_data.frame_set(6)
     assert abs(effect.regions[0].location[0] - 25 / WIDTH) < 0.01

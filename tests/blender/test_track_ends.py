@@ -2,14 +2,15 @@
 
 import numpy as np
 import pytest
-from support import request, write_frames
-from test_region_tracking import COUNT, SIZE, active, call, drawn, keys, new_source, picture, texture, track
+from support import call, request, write_frames
+from test_region_tracking import COUNT, SIZE, active, drawn, keys, new_source, picture, texture, track
 
 from shutter_addon.blender.data import fcurves, recipe_import, snapshot
 from shutter_addon.blender.editing import track_region
 from shutter_addon.blender.rendering import sessions
 from shutter_addon.core.recipes import recipe_file
 
+LAST = 46  # the last timeline frame of the footage that is covered
 OTHER = texture(*SIZE[::-1]) // 4
 
 
@@ -31,7 +32,8 @@ def between_cuts(bpy, edit, tmp_path):
 @pytest.fixture
 def covered(bpy, edit, tmp_path):
     """From frame 30 on nothing is seen of the subject."""
-    frames = [picture(min(i, COUNT - 1), range(COUNT - 1, 60)) for i in range(60)]
+    count = LAST - 10
+    frames = [picture(min(i, COUNT - 1), range(COUNT - 1, count)) for i in range(count)]
     region = drawn(edit, new_source(edit, write_frames(tmp_path / "covered", frames)))
     yield region
     sessions.forget()
@@ -57,31 +59,53 @@ def without_region(bpy, frame):
 
 
 def test_it_ends_at_the_cuts_before_and_behind(bpy, between_cuts):
+    """And so do recipes of it."""
     bpy.ops.ed.undo_push(message="before")
     assert call(bpy, "track") == {"FINISHED"}
-    assert opacity(bpy, range(11, 47)) == [0.0] * 8 + [1.0] * 20 + [0.0] * 8
-    for frame, is_there in ((14, False), (18, False), (19, True), (30, True), (38, True), (39, False), (46, False)):
+    shares = [0.0] * 8 + [1.0] * 20 + [0.0] * 8
+    assert opacity(bpy, range(11, 47)) == shares
+    for frame, is_there in ((18, False), (19, True), (38, True), (39, False)):
         assert alike(bpy, frame, without_region(bpy, frame)) != is_there, frame
     assert {kind for _frame, _value, kind, _ease in keys(bpy, "opacity")[0]} == {"GENERATED"}
     bpy.ops.ed.undo()
     assert not keys(bpy, "opacity")
     assert not keys(bpy), "it is the same step of undo"
+    bpy.ops.ed.redo()
+    edit, effect, strip = active(bpy)
+    effect.camera.influence = 0.25
+    found = recipe_file.parse(recipe_file.dump(snapshot.recipe_of(edit, effect, strip)))
+    assert found.camera.influence.at(1) == 0.25
+    assert [found.for_picture(1.5).regions[0].opacity.at(frame) for frame in range(1, 37)] == shares
+    recipe_import.apply(edit, effect, strip, found)
+    assert opacity(bpy, range(11, 47)) == shares
+    assert effect.camera.influence == 0.25
 
 
-def test_it_fades_where_the_subject_is_covered_and_the_picture_halfway(bpy, covered):
+def test_it_fades_where_the_subject_is_covered_and_the_picture_halfway(bpy, edit, covered):
+    """Tracked again without Track Ends, nothing is left of the made keys."""
+    _edit, effect, _strip = active(bpy)
+    effect.regions[0].opacity = 0.75
     track(bpy)
-    (first,) = (frame for frame, *_ in track_region.stops(active(bpy)[1], 0))
-    shares = opacity(bpy, range(11, 60))
-    assert shares[first - 11 :] == [0.0] * (60 - first)
-    assert shares[: first - 15] == [1.0] * (first - 15)
-    assert shares[first - 15 : first - 11] == pytest.approx([0.8, 0.6, 0.4, 0.2])
-    (gap,) = track_region.gaps(active(bpy)[1], 0)
+    (first,) = (frame for frame, *_ in track_region.stops(effect, 0))
+    shares = opacity(bpy, range(11, LAST + 1))
+    assert shares[first - 11 :] == [0.0] * (LAST + 1 - first)
+    assert shares[: first - 15] == [0.75] * (first - 15)
+    assert shares[first - 15 : first - 11] == pytest.approx([0.6, 0.45, 0.3, 0.15])
+    (gap,) = track_region.gaps(effect, 0)
     assert gap.first == first
     fading = request(*active(bpy), first - 2).picture()
     assert not alike(bpy, first - 2, without_region(bpy, first - 2))
-    for curve in fcurves.curves_under(active(bpy)[0], f"{active(bpy)[1].regions[0].path_from_id()}.opacity"):
-        curve.mute = True
+    (curve,) = fcurves.curves_under(edit, f"{effect.regions[0].path_from_id()}.opacity")
+    curve.mute = True
     assert not np.array_equal(fading, request(*active(bpy), first - 2).picture())
+    curve.mute = False
+    edit.frame_set(LAST)
+    assert effect.regions[0].opacity == 0
+    edit.frame_set(11)
+    effect.regions[0].track_ends = False
+    track(bpy)
+    assert not keys(bpy, "opacity")
+    assert effect.regions[0].opacity == 0.75
 
 
 def test_tracked_again_the_made_keys_are_replaced_and_the_editors_stay(bpy, edit, covered):
@@ -103,21 +127,6 @@ def test_tracked_again_the_made_keys_are_replaced_and_the_editors_stay(bpy, edit
     assert [key[:3] for key in keys(bpy, "opacity")[0]] == [(13, 0.5, "KEYFRAME")]
 
 
-def test_without_keys_of_the_editors_nothing_is_left_of_the_made_ones(bpy, edit, covered):
-    _edit, effect, _strip = active(bpy)
-    region = effect.regions[0]
-    region.opacity = 0.75
-    track(bpy)
-    assert opacity(bpy, (11, 59)) == [0.75, 0]
-    edit.frame_set(50)
-    assert region.opacity == 0
-    edit.frame_set(11)
-    region.track_ends = False
-    track(bpy)
-    assert not keys(bpy, "opacity")
-    assert region.opacity == 0.75
-
-
 def test_a_subject_that_stays_has_no_keys(bpy, edit, tmp_path):
     drawn(edit, new_source(edit, write_frames(tmp_path / "all", [picture(i) for i in range(COUNT)])))
     track(bpy)
@@ -130,16 +139,3 @@ def test_a_locked_curve_is_refused(bpy, between_cuts):
     curve.lock = True
     with pytest.raises(RuntimeError, match='the F-curve of "Opacity" is locked'):
         call(bpy, "track")
-
-
-def test_recipes_keep_it(bpy, between_cuts):
-    call(bpy, "track")
-    edit, effect, strip = active(bpy)
-    effect.camera.influence = 0.25
-    found = recipe_file.parse(recipe_file.dump(snapshot.recipe_of(edit, effect, strip)))
-    assert found.camera.influence.at(1) == 0.25
-    before = opacity(bpy, range(11, 47))
-    assert [found.for_picture(1.5).regions[0].opacity.at(frame) for frame in range(1, 37)] == before
-    recipe_import.apply(edit, effect, strip, found)
-    assert opacity(bpy, range(11, 47)) == before
-    assert effect.camera.influence == 0.25

@@ -4,6 +4,7 @@ import ast
 import string
 from pathlib import Path
 
+import messages
 import pytest
 
 from shutter_addon.blender.interface.translations import LANGUAGES
@@ -17,8 +18,6 @@ def german(bpy):
 
 
 def test_everything_that_is_said_has_a_german_text_and_nothing_else_has(bpy, german):
-    import messages
-
     shown = messages.of_classes() | messages.of_presets() | messages.of_sources()
     said = shown | messages.of_core() | messages.of_media()
     said = {message for message in said if message[0] != bpy.app.translations.contexts.no_translation}
@@ -44,8 +43,6 @@ SHOWN = {"poll_message_set", "say", "undo_push", "EffectError", "MediaError", "R
 
 def test_no_message_misses_its_translation():
     """`rpt_("…{name}…").format(name=…)` is what can be looked up, and what is shown has been looked up before."""
-    import messages
-
     for path in messages.SOURCES:
         for call in (node for node in ast.walk(ast.parse(path.read_text("utf-8"))) if isinstance(node, ast.Call)):
             name = getattr(call.func, "id", getattr(call.func, "attr", ""))
@@ -65,8 +62,6 @@ def _is_telling(path: Path, node: ast.AST) -> bool:
 
 
 def test_no_refusal_misses_its_translation():
-    import messages
-
     functions = ((path, each) for path in messages.SOURCES for each in ast.walk(ast.parse(path.read_text("utf-8"))))
     telling = [each for path, each in functions if _is_telling(path, each)]
     assert {function.name for function in telling} >= TELLING | {"a_shutter", "a_region", "strokes", "an_outline"}
@@ -81,8 +76,6 @@ def test_no_refusal_misses_its_translation():
 
 def test_texts_are_in_blenders_style(bpy):
     """Title case and no full stop, as Blender's guidelines have it."""
-    import messages
-
     for context, message in messages.of_classes() | messages.of_presets():
         assert not message.endswith("."), message
         assert message[0] == message[0].upper(), message

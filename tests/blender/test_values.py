@@ -3,8 +3,6 @@
 import inspect
 import math
 import random
-import subprocess
-import sys
 from contextlib import suppress
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -273,29 +271,15 @@ def test_editors_can_mend_it(bpy, edit, effect):
     assert picture_of(scene, 4).shape == (24, 40, 4)
 
 
-def test_a_render_of_such_a_file_ends_with_the_sentence(bpy, edit, effect, tmp_path):
+def test_a_render_of_such_a_file_ends_with_the_sentence(bpy, edit, effect, tmp_path, capfd):
     raw(effect, "window", 10**9)
     raw(effect.regions[0], "scale", NAN)
     edit.render.filepath = str(tmp_path / "out.png")
-    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "bad.blend"), copy=True)
-    script = """
-import sys, bpy
-from shutter_addon import blender
-blender.register()
-bpy.ops.wm.open_mainfile(filepath=sys.argv[1])
-print(bpy.ops.render.render(write_still=True))
-"""
-    done = subprocess.run(
-        [sys.executable, "-c", script, str(tmp_path / "bad.blend")],
-        cwd=Path(__file__).parents[2],
-        capture_output=True,
-        text=True,
-        timeout=60,
-        check=False,
-    )
-    assert done.returncode == 0, done.stderr
-    assert "{'CANCELLED'}" in done.stdout
-    assert done.stderr.strip() == 'Virtual Shutter: effect "Shutter": Frames is 1e+09, not 1 to 256'
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "bad.blend"))
+    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "bad.blend"))
+    capfd.readouterr()
+    assert bpy.ops.render.render(write_still=True) == {"CANCELLED"}
+    assert capfd.readouterr().err.strip() == 'Virtual Shutter: effect "Shutter": Frames is 1e+09, not 1 to 256'
     assert not (tmp_path / "out.png").exists()
 
 
@@ -308,7 +292,7 @@ def test_operators_report_it(bpy, edit, effect):
     assert len(effect.shutters) == 2
 
 
-@pytest.mark.parametrize("seed", range(16))
+@pytest.mark.parametrize("seed", range(10))
 def test_random_values(bpy, edit, effect, seed):
     """Whatever properties of a good effect become: a picture or a sentence."""
     rng = random.Random(seed)
