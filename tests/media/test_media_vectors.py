@@ -12,7 +12,6 @@ from shutter_addon.media import MediaError, derived, flow
 from shutter_addon.media.derived import StoredVectors
 from shutter_addon.media.smooth import SmoothSource
 
-
 NAMES = derived._CHANNELS  # a file with others is none of ours
 
 
@@ -69,7 +68,6 @@ def flipped(path):
     data = bytearray(path.read_bytes())
     data[len(data) // 2] ^= 0xFF
     path.write_bytes(data)
-
 
 
 def infinite(path):

@@ -39,7 +39,6 @@ def test_of_a_camera_that_shakes():
     assert readout.of_pictures(list(pictures(0.5, shaken, noise=2))) == pytest.approx(0.5, rel=0.1)
 
 
-
 def test_of_things_that_pass_each_at_its_own_speed():
     """Two scenes, one above the other, whose speeds differ."""
     upper, lower = (list(pictures(0.3, lambda t, s=s: s * np.sin(t / 3))) for s in (30, -18))
