@@ -13,7 +13,7 @@ from shutter_addon.core.model.state_at import state_at
 from shutter_addon.core.pixels import combined
 
 CLIP = Clip(width=160, height=100, count=40)
-STEPS = [1, 2, 4, 8, 16]
+STEPS = [1, 2, 8, 16]
 
 
 def state(shutters, steps, frame=20, direction=1, **options):
@@ -38,10 +38,10 @@ def exposed(shutters, steps, direction=1, **more):
 @pytest.mark.parametrize("direction", [1, -1])
 @pytest.mark.parametrize("position", ["start", "center", "end"])
 @pytest.mark.parametrize("steps", STEPS)
-@pytest.mark.parametrize("window", [1, 4, 7])
-def test_a_still_frame_is_the_filmed_one(window, steps, position, direction):
-    still = {"bars": shutters.preset_bars("STILL", window, position).tolist()}
-    assert exposed([still], steps, direction, position=position) == {19 * steps: 1}
+def test_a_still_frame_is_the_filmed_one(steps, position, direction):
+    for window in (1, 4, 7):
+        still = {"bars": shutters.preset_bars("STILL", window, position).tolist()}
+        assert exposed([still], steps, direction, position=position) == {19 * steps: 1}
 
 
 def test_bars_are_interpolated_before_they_are_spread():
@@ -50,7 +50,7 @@ def test_bars_are_interpolated_before_they_are_spread():
     assert exposed([{"keys": keys}], 8) == pytest.approx({19 * 8 + 8: 1})
 
 
-@pytest.mark.parametrize("last", [10, 11, 12, 13])
+@pytest.mark.parametrize("last", [10, 13])
 def test_what_rounding_leaves_beside_a_sharp_frame_makes_it_no_streak(last):
     """Of a still frame that is keyed from one end of the window to the other, wherever it is a filmed one."""
     bars = np.eye(last)[[0, last - 1]].tolist()
