@@ -58,10 +58,7 @@ def test_feather_points_widen_their_segment(interpolation):
     assert np.abs(value - expected)[above].mean() < 0.004
 
 
-CROSSED = (
-    [(0.1, 0.2), (0.5, 0.2), (0.5, 0.6), (0.1, 0.6)],
-    [(0.3, 0.4), (0.3, 0.9), (0.9, 0.9), (0.9, 0.4)],
-)
+CROSSED = ([(0.1, 0.2), (0.5, 0.2), (0.5, 0.6), (0.1, 0.6)], [(0.3, 0.4), (0.3, 0.9), (0.9, 0.9), (0.9, 0.4)])
 
 
 @pytest.mark.parametrize("holes", [False, True])

@@ -28,7 +28,7 @@ def distance(point, a, b):
     return np.linalg.norm(point - (a + t[..., None] * d), axis=-1)
 
 
-@settings(deadline=None)
+@settings(max_examples=50)
 @given(strokes, sizes, st.floats(0.0, 0.4))
 def test_a_line_covers_what_lies_within_half_its_width(stroke, size, line_width):
     width, height = size
@@ -43,7 +43,7 @@ def test_a_line_covers_what_lies_within_half_its_width(stroke, size, line_width)
     assert np.array_equal((labels == 5)[sure], (nearest < radius)[sure])
 
 
-@settings(deadline=None)
+@settings(max_examples=50)
 @given(strokes, sizes)
 def test_a_lasso_covers_what_it_winds_around(stroke, size):
     width, height = size
@@ -59,7 +59,7 @@ def test_a_lasso_covers_what_it_winds_around(stroke, size):
         assert np.array_equal((labels == 1)[~on_edge], inside[~on_edge])
 
 
-@settings(deadline=5000)
+@settings(deadline=5000, max_examples=40)
 @given(
     st.lists(st.tuples(st.floats(-math.pi, math.pi), st.floats(0, 39), st.floats(0, 1)), min_size=1, max_size=4),
     st.sampled_from([0.0, 0.05, 3.0, 1e6]),
@@ -75,8 +75,7 @@ def test_what_lies_far_outside_costs_nothing(corners, line_width, kind):
     assert labels.shape == (360, 640)
 
 
-@pytest.mark.parametrize("far", [1e3, 1e7, 1e9])
-@pytest.mark.parametrize("line_width", [0.0, 0.1])
+@pytest.mark.parametrize(("far", "line_width"), [(1e3, 0.0), (1e9, 0.0), (1e9, 0.1)])
 def test_a_line_from_far_away_to_far_away(far, line_width):
     """The same as its part near the picture."""
     long = Shape(0, "line", line_width, (np.array([[-far, -far * 0.5], [far, far * 0.5]]) + 0.5,))
@@ -86,7 +85,7 @@ def test_a_line_from_far_away_to_far_away(far, line_width):
 
 
 def test_a_thick_line_of_many_points_is_soon_drawn():
-    stroke = np.random.default_rng(0).random((20_000, 2))
+    stroke = np.random.default_rng(0).random((5_000, 2))
     assert (scribbles.rasterise([Shape(0, "line", 1000.0, (stroke,))], 320, 180) == 1).all()
 
 
@@ -118,6 +117,7 @@ def test_the_thinnest_line_is_tight_for_a_diffusion():
     assert not reached[-1, -30:].any()
 
 
+@settings(max_examples=30)
 @given(strokes, st.integers(2, 20))
 def test_resampling_keeps_the_ends_and_the_spacing(stroke, count):
     points = scribbles.resample(stroke, count)
