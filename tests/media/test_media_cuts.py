@@ -53,13 +53,6 @@ def test_films_without_cuts_have_none(film, bunny):
         assert found(source.read(i) for i in range(source.count)) == []
 
 
-def test_shots_that_are_joined(film):
-    left, right = film[10:20, 40:140, :178], film[90:100, 20:120, 140:318]
-    assert cuts(left, right) == [10]
-    assert cuts(film[:10], noise(10, 1), noise(10, 2, 3), film[120:130]) == [10, 20, 30]
-    assert cuts(film[1:11], film[120:130]) == [10]  # the same camera, the rabbit elsewhere
-
-
 def test_any_type_of_samples_and_light(film):
     frames = np.concatenate([film[:8], noise(8, 6)])
     assert cuts(frames.astype(np.uint16) * 257) == [8]

@@ -87,42 +87,32 @@ def test_moments_go_evenly_across_repeats(shown, noise):
     assert (source.repeats, plain.repeats) == (True, False)
 
 
-def still(_number):
-    return disc(100)
-
-
 def lines(x):
     """Soft lines, moved by so many pixels."""
     rows = 120 + 60 * np.sin((np.arange(WIDTH) + x) / 5)
     return frame(np.broadcast_to(rows[None, :, None], (HEIGHT, WIDTH, 3)) / 255)
 
 
-def slow(number):
-    """A pan by a fifth of a pixel."""
-    return lines(0.2 * number)
+# Of footage without repeats: its pictures by their numbers, and the noise.
+MOVING = {
+    "a pan with noise": (pan, 12),
+    "a still disc": (lambda _number: disc(100), 0),
+    "a still disc with grain": (lambda _number: disc(100), 1),
+    "a still disc with noise": (lambda _number: disc(100), 12),
+    "a pan by a fifth of a pixel": (lambda number: lines(0.2 * number), 0),
+    "the same with noise": (lambda number: lines(0.2 * number), 4),
+    "a pan by less and by more": (lambda number: lines(0.25 * number + 0.05 * (number % 2)), 0),
+    "a pan by half a pixel and by three": (lambda number: lines(1.75 * number - 1.25 * (number % 2)), 0),
+    "a disc that stands still for longer than repeats do": (
+        lambda number: disc(40 + SPEED * (number - min(max(number - 3, 0), MOST))),
+        1,
+    ),
+}
 
 
-def uneven(number):
-    """One by less and by more."""
-    return lines(0.25 * number + 0.05 * (number % 2))
-
-
-def jerky(number):
-    """One by half a pixel, and by three."""
-    return lines(1.75 * number - 1.25 * (number % 2))
-
-
-def stops(number):
-    """A disc that moves, stands still for as long as no repeats do, and goes on."""
-    return disc(40 + SPEED * (number - min(max(number - 3, 0), MOST)))
-
-
-@pytest.mark.parametrize(
-    ("picture", "noise"),
-    [(pan, 12), (still, 0), (still, 1), (still, 12), (slow, 0), (slow, 4), (uneven, 0), (jerky, 0), (stops, 1)],
-)
-def test_footage_without_repeats_keeps_its_bits(picture, noise):
-    film = Film(range(12), picture, noise)
+@pytest.mark.parametrize("name", MOVING)
+def test_footage_without_repeats_keeps_its_bits(name):
+    film = Film(range(12), *MOVING[name])
     repeats = Repeats(film)
     assert [repeats.gap(k) for k in range(12)] == [(k, k + 1) for k in range(12)]
     source, plain = skipping(film), SmoothSource(film, STEP)

@@ -14,8 +14,7 @@ from test_media_steps import Film, shift
 from shutter_addon.core.frames.frame_source import FrameSource
 from shutter_addon.core.frames.planes import as_rgba
 from shutter_addon.core.model.shutters import MAX_WINDOW
-from shutter_addon.media import MediaError, PrefetchSource, open_source, opencv, smooth
-from shutter_addon.media.cuts import ShotSource
+from shutter_addon.media import MediaError, PrefetchSource, opencv, smooth
 from shutter_addon.media.smooth import SmoothSource, steps_for
 
 SPEED = 8  # pixels from a frame to the next
@@ -148,17 +147,6 @@ def test_moments_come_with_the_frames_around_them():
             assert end is frame_
 
 
-def test_of_a_movie(bunny):
-    """Through all that a renderer reads it by."""
-    with open_source(bunny) as movie, ShotSource(PrefetchSource(SmoothSource(movie, 4), planes=True), 4) as source:
-        assert source.count == 4 * (movie.count - 1) + 1
-        alone = SmoothSource(movie, 4)
-        for index in (20, 22, 24):
-            np.testing.assert_array_equal(source.read(index), alone.read(index))
-        for index in (20, 24):
-            np.testing.assert_array_equal(source.read(index), movie.read(index // 4))
-
-
 # How many moments there are
 
 
@@ -182,11 +170,6 @@ def test_as_many_as_are_asked_for_if_a_window_has_room():
 def test_as_many_as_the_fastest_motion_needs(x, wanted):
     """In a picture of 270 rows, copies may be two pixels apart."""
     assert steps_for(speeding(x), "auto", 8) == wanted
-
-
-def test_in_a_large_picture_copies_may_be_farther_apart():
-    """Three pixels of 1080: 11 pixels take 4 steps, which is 8 in a small one."""
-    assert steps_for(speeding(11, size=(1920, 1080)), "auto", 8) == 4
 
 
 @pytest.mark.parametrize(("window", "wanted"), [(16, 16), (20, 8), (60, 4), (128, 2), (200, 1)])
