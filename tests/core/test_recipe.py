@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from made_recipes import comes_back, is_same, key, made
+from made_recipes import comes_back, is_same, made
 
 from shutter_addon.core.model import limits, mattes, scribbles, shutters, windows
 from shutter_addon.core.model.clip import Clip
@@ -73,18 +73,6 @@ def test_mattes_and_ramps():
     assert luminance.content == mattes.FileFrame("RampContent")
     first = parsed.for_picture(1).at(1)
     assert len(first.mattes) == 3  # one of no opacity is none
-
-
-def test_the_contracts_example():
-    parsed = recipe_file.parse(json.dumps(EXAMPLE))
-    assert comes_back(parsed)
-    moment = parsed.for_picture(16 / 9).at(1)
-    assert moment.bars.tolist() == [[1] * 8, [1, 0, 0, 0, 0, 0, 0, 0]]
-    assert moment.shapes[0].shutter == 1
-    assert moment.shapes[0].strokes[0] == pytest.approx(np.array([[0.1, 0.5], [0.4, 0.6]]))
-    later = parsed.for_picture(16 / 9).at(20.5)
-    assert later.bars[1] == pytest.approx([0, 0, 0, 0.5, 0.5, 0, 0, 0])
-    assert parsed.for_picture(1).at(99).bars[1].tolist() == [0, 0, 0, 0, 0, 0, 0, 1]
 
 
 def name_both(data, name):
@@ -325,44 +313,12 @@ def test_saving_touches_no_other_file(tmp_path):
     assert sorted(p.name for p in tmp_path.iterdir()) == ["folder", "others", "r.json", "r.json.part"]
 
 
-def region(**fields):
-    drawn = {"shutter": "A", "strokes": [[[0, 0], [0.2, 0]]], **fields}
-    return made(1, [{"name": "A", "bars": [1]}], [drawn]).for_picture(1).regions[0]
-
-
-def test_a_region_moves_with_the_ease_of_its_key():
-    keys = [key(1, ease="bezier"), key(5, location=(0.4, 0.0), ease="constant")]
-    keys.append(key(9, location=(0.0, 0.0)))
-    moving = region(keys=keys)
-    assert moving.at(2).strokes[0][0] == pytest.approx([0.4 * 0.15625, 0])
-    assert moving.at(8.9).strokes[0][0] == pytest.approx([0.4, 0])
-    assert moving.at(9).strokes[0][0] == pytest.approx([0, 0])
-
-
-def test_redrawn_strokes_follow_one_another():
-    keys = [key(1), key(3, location=(0.0, 0.1)), key(5, strokes=[[(0.0, 1.0), (0.1, 1.0), (0.2, 1.0)]])]
-    drawn = region(keys=keys)
-    assert drawn.at(1).strokes[0] == pytest.approx(np.array([[0, 0], [0.2, 0]]))
-    assert drawn.at(3).strokes[0] == pytest.approx(np.array([[0, 0.6], [0.1, 0.6], [0.2, 0.6]]))
-    assert drawn.at(5).strokes[0] == pytest.approx(np.array([[0, 1], [0.1, 1], [0.2, 1]]))
-
-
 # Recipes of version 1, whose bars counted the moments between filmed frames
 
 
 def first(window, given, **more):
     """The effect of a recipe of version 1."""
     return recipe_file.parse(json.dumps({"version": 1, "window": window, "shutters": given} | more))
-
-
-def test_a_first_recipe_comes_back_as_a_second():
-    keys = [{"frame": 2, "bars": [1, 0, 1]}, {"frame": 5, "bars": [0, 0, 1], "ease": "constant"}]
-    found = first(3, [{"name": "A", "bars": [0, 1, 2]}, {"name": "B", "keys": keys}], inbetween=2, position="end")
-    assert found.bars_at(0, 1).tolist() == [0, 1.5]  # a frame and a half, which ends with the shown one
-    assert [found.bars_at(1, frame).tolist() for frame in (2, 5)] == [[0.5, 0.5], [0, 0.5]]
-    told = json.loads(recipe_file.dump(found))
-    assert (told["version"], told["window"], told["inbetween"]) == (2, 2, 2)
-    assert comes_back(found)
 
 
 def exposes(bars, steps, position, way):

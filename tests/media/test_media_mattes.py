@@ -132,12 +132,7 @@ def test_a_channel_of_another_part(tmp_path):
 
 @pytest.mark.parametrize(
     ("at", "display"),
-    [
-        ((5, 7), (2, 3, 39, 24)),
-        ((-9, -4), (0, 0, 100, 60)),
-        ((90, 50), (0, 0, 100, 60)),
-        ((300, 0), (0, 0, 20, 20)),
-    ],
+    [((5, 7), (2, 3, 39, 24)), ((-9, -4), (0, 0, 100, 60)), ((90, 50), (0, 0, 100, 60)), ((300, 0), (0, 0, 20, 20))],
 )
 def test_a_cropped_exr_lies_in_its_display_window(tmp_path, at, display):
     values = noise(1).astype(np.float32)

@@ -117,33 +117,6 @@ def test_listed_files_are_frames_by_place(tmp_path):
             assert shown(source) == [2, 0, 0, 1]
 
 
-@pytest.mark.parametrize(
-    ("name", "samples", "dtype", "transfer", "tolerance"),
-    [
-        ("a.png", "uint8", np.uint8, "srgb", 0),
-        ("a.png", "uint16", np.uint16, "srgb", 0),
-        ("a.tif", "uint8", np.uint8, "srgb", 0),
-        ("a.tif", "uint16", np.uint16, "srgb", 0),
-        ("a.tif", "float", np.float32, "srgb", 0),
-        ("a.exr", "half", np.float16, "linear", 0),
-        ("a.exr", "float", np.float32, "linear", 0),
-        ("a.dpx", "uint16", np.uint16, "linear", 0),
-        ("a.hdr", "float", np.float32, "linear", 0.01),
-        ("a.bmp", "uint8", np.uint8, "srgb", 0),
-    ],
-)
-def test_samples_are_as_stored(tmp_path, name, samples, dtype, transfer, tolerance):
-    stored = picture(5).astype(np.float64) / 255
-    stored = stored.astype(dtype) if np.dtype(dtype).kind == "f" else (stored * np.iinfo(dtype).max).astype(dtype)
-    with open_source(save_image(tmp_path / name, stored, samples)) as source:
-        frame = source.read(0)
-        assert (source.dtype, source.transfer, source.alpha) == (dtype, transfer, "opaque")
-    assert frame.dtype == dtype
-    assert frame.flags.c_contiguous
-    assert np.abs(frame[..., :3].astype(float) - stored.astype(float)).max() <= tolerance
-    assert (frame[..., 3] == (1 if frame.dtype.kind == "f" else np.iinfo(dtype).max)).all()
-
-
 def test_data_windows_that_differ(tmp_path):
     for n, size in enumerate([(128, 64), (100, 40)]):
         save_image(tmp_path / f"a_{n}.exr", picture(n, *size) / 255, "half", at=(n, n), display=(0, 0, 160, 90))

@@ -11,10 +11,9 @@ import pytest
 from test_carrying import Footage
 
 from shutter_addon.core.model import outlines
-from shutter_addon.media import carrying, flow, subject_mattes
+from shutter_addon.media import subject_mattes
 from shutter_addon.media.errors import MediaError
-from shutter_addon.media.subject import MODEL, Network, covered, found
-from shutter_addon.media.subject import WIDTH as STROKE
+from shutter_addon.media.subject import MODEL, Network
 from shutter_addon.media.subject_mattes import Subject, SubjectFile
 
 WIDTH, HEIGHT, COUNT = 240, 160, 5
@@ -41,13 +40,6 @@ def picture(frame, noise=0, seed=0):
 
 def film(folder, count=COUNT, shows=picture, **what):
     return Footage(folder, count, shows=shows, **what)
-
-
-def is_found(network, shown, line):
-    """Whether a subject lies under a stroke in one picture."""
-    shown = np.ascontiguousarray(shown[..., :3])
-    small = flow.resized(shown, carrying.working_size(*shown.shape[1::-1]))
-    return found(network, small, covered([line], STROKE, small), np.zeros(small.shape[:2], bool)) is not None
 
 
 def stroke(x, top, bottom):
@@ -132,12 +124,6 @@ def test_it_is_quiet_where_nothing_moves(opened):
     shown = [255 * mattes.read(frame) for frame in range(1, 4)]
     around = cv2.dilate(figures(0)[0].astype(np.uint8), np.ones((9, 9))) > 0
     assert max(np.abs(b - a)[around].mean() for a, b in pairwise(shown)) <= 1.5
-
-
-def test_no_subject_under_a_stroke():
-    network, flat = Network(MODEL), np.full((HEIGHT, WIDTH, 4), 128, np.uint8)
-    assert not is_found(network, flat, on_first(0))
-    assert not is_found(network, picture(0), stroke(20, 20, 25))
 
 
 def test_models_that_cannot_be_used(tmp_path):

@@ -1,6 +1,5 @@
 """Tracking against films whose motion is known: a part of one picture moves over another one."""
 
-from dataclasses import replace
 from pathlib import Path
 
 import cv2
@@ -9,7 +8,7 @@ import pytest
 
 from shutter_addon.core.frames import light
 from shutter_addon.core.frames.frame_source import FrameSource
-from shutter_addon.core.model import motions, scribbles
+from shutter_addon.core.model import scribbles
 from shutter_addon.core.model.effect import Drawings, Moves, Region
 from shutter_addon.core.model.keyframes import Constant, Keys
 from shutter_addon.core.model.motions import Similarity
@@ -226,7 +225,7 @@ def figures(ground, ways, bends=0.0):
     frames, (y, x) = [], np.mgrid[:HEIGHT, :WIDTH].astype(np.float32)
     mottled = cv2.GaussianBlur(np.random.default_rng(5).normal(0, 1, (HEIGHT, WIDTH, 3)).astype(np.float32), (0, 0), 2)
     subject = 128 + 45 * mottled / mottled.std()
-    for n in range(40):
+    for n in range(36):
         sway = x + np.float32(bends) * (np.sin(y / 14 + n / 3) - np.sin(y / 14)) * min(n / 10, 1)
         look, mask = (cv2.remap(each, sway, y, cv2.INTER_LINEAR) for each in (subject, ellipse(MIDDLE, (20, 60))))
         frame = ground.astype(np.float32)
@@ -263,21 +262,18 @@ def test_a_subject_that_bends_is_not_lost(ground):
     tracked, faults = followed(source, "line", 0, region=region("line", drawn=UPRIGHT, location=(-80 / WIDTH, 0.0)))
     assert not faults
     assert max(abs(each.placement.location[0] * WIDTH - 4.0 * n + 80) for n, each in tracked.items()) < 12
-    assert len(sure(tracked)) >= 38
+    assert len(sure(tracked)) >= 34
 
 
-@pytest.mark.parametrize(
-    ("sure", "expected"),
-    [
+def test_where_a_subject_is_lost():
+    for sure, expected in [
         ([1.0] * 20, None),
         ([1.0] * 5 + [0.2] * 7 + [1.0] * 8, None),  # covered for a moment
         ([1.0] * 5 + [0.2] * 8 + [1.0] * 7, 15),
         ([1.0] * 17 + [0.2] * 3, 27),
         ([0.2] * 4 + [1.0] * 16, 13),  # backward
-    ],
-)
-def test_where_a_subject_is_lost(sure, expected):
-    assert pursuit.lost(np.arange(10, 30), np.array(sure)) == expected
+    ]:
+        assert pursuit.lost(np.arange(10, 30), np.array(sure)) == expected
 
 
 @pytest.mark.parametrize("kind", EVERY)
@@ -327,20 +323,6 @@ def test_between_two_keys_both_count(subject, ground):
         assert tracked[frame].placement.location[0] == pytest.approx(expected, abs=0.7 / WIDTH)
 
 
-@pytest.mark.parametrize("ease", ["linear", "bezier", "constant"])
-def test_a_shape_that_is_redrawn_meanwhile_stays_on_its_subject(subject, ease):
-    """A still film: the shape's own way from drawing to drawing is made up for."""
-    drawn = [stroke + shift for shift in ((0, 0), (0.15, 0.05)) for stroke in strokes("lasso")]
-    drawings = Drawings("r", (2.0, 9.0), (drawn[:1], drawn[1:]), (ease,) * 2, WIDTH / HEIGHT)
-    given = replace(region("lasso"), drawings=drawings)
-    source = Film([subject if n not in (4, 5) else subject[:, ::-1] for n in range(10)])
-    tracked, _ = followed(source, "lasso", 2, region=given)
-    assert sure(tracked) == set(range(10)) - {4, 5}
-    for frame, each in tracked.items():
-        off = motions.centre(given.drawings.at(frame)) + each.placement.location - motions.centre(drawn[:1])
-        assert np.hypot(*(off * SIZE)) / PIXEL <= 0.5
-
-
 def test_the_order_of_reading_and_threads_change_no_bit(subject, ground, tmp_path):
     source, _ = film(subject, ground, shake, 10, 6)
     first = followed(source, "lasso", 6)
@@ -361,17 +343,6 @@ def test_backward_a_source_is_read_upwards(subject, ground):
     source, _ = film(subject, ground, lambda t: (t,), 10, 9)
     followed(source, "line", 9)
     assert source.reads == [9, *range(9)]
-
-
-def test_what_a_retimed_strip_shows_is_tracked(subject, ground):
-    """Reversed, every frame twice."""
-    source, truth = film(subject, ground, lambda t: (3 * t, 0, t), 8, 7)
-    footage = Footage(source, lambda frame: 7 - (frame - 100) // 2)
-    found = tracking.RegionTrack(region("line")).follow(footage, 100, range(100, 116))
-    tracked = {each.frame: each for each in found}
-    shown = {frame: truth[7 - (frame - 100) // 2] for frame in tracked}
-    assert sorted(tracked) == list(range(100, 116))
-    assert max(errors(tracked, shown, "line").values()) <= 1
 
 
 def test_deep_and_linear_pictures_look_alike(subject):
