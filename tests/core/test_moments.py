@@ -10,7 +10,6 @@ from made_recipes import made
 from shutter_addon.core.model import shutters, windows
 from shutter_addon.core.model.clip import Clip
 from shutter_addon.core.model.state_at import state_at
-from shutter_addon.core.pixels import combined
 
 CLIP = Clip(width=160, height=100, count=40)
 STEPS = [1, 2, 8, 16]
@@ -71,25 +70,6 @@ def test_on_the_timeline_a_shape_has_the_same_time(steps, direction):
     way = SimpleNamespace(at=lambda frame: (20 + direction * 4 * (frame - 20), direction < 0))
     found = state_at(replace(effect, time=way), CLIP.stepped(steps), 20).state
     assert found.bars[0] == pytest.approx(np.repeat([1, 1, 0, 0], steps) / steps)
-
-
-@pytest.mark.parametrize("direction", [1, -1])
-@pytest.mark.parametrize("steps", STEPS)
-@pytest.mark.parametrize("mode", ["lightest", "darkest"])
-def test_trails_of_light_are_as_bright_as_their_lights(mode, steps, direction):
-    """A moment counts as much as the frame that it is nearest to, halfway as the mean of both."""
-    bars = [1, 1, 0, 4, 2, 0, 4]
-    index, found = state([{"bars": bars, "combine": mode}], steps, direction=direction)
-    counts = combined.counts(found.combines[0], found.bars, np.ones(1), "displacement")
-    at = windows.positions(found.options, index, direction)
-    near = [19 * steps + direction * k * steps for k in range(len(bars))]
-    wanted = {}
-    for place in at:
-        beside = [k for k, frame in enumerate(near) if abs(frame - place) <= steps / 2]
-        between = [k for k, frame in enumerate(near) if abs(frame - place) < steps]
-        is_open = all(bars[k] for k in between) and (len(between) == 2 or place in near)
-        wanted[int(place)] = np.mean([bars[k] for k in beside]) / 4 if is_open else 0.0
-    assert dict(zip(map(int, at), counts, strict=True)) == pytest.approx(wanted)
 
 
 @pytest.mark.parametrize("direction", [1, -1])

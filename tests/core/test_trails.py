@@ -84,24 +84,6 @@ def streak(source, frame):
     return 6 * (grey * (1 - grey)).sum()
 
 
-@pytest.mark.parametrize("position", ["start", "center", "end"])
-def test_the_streak_stays_as_long_while_the_subject_speeds_up(position):
-    frames = [25, 31, 36]
-    lengths = [streak(accelerating(0.2, position), frame) for frame in frames]
-    assert lengths == pytest.approx([20] * 3, rel=0.05)
-    first, last = (streak(accelerating(None, position), frame) for frame in (25, 36))
-    assert last > 1.2 * first
-
-
-@pytest.mark.parametrize(("follow", "edges"), [("car", "hold"), ("camera", "shorten")])
-def test_beyond_the_clips_ends_all_stands_still(follow, edges):
-    """At the clip's last frame the exposure has the frames before alone, as many more of them."""
-    state, _ = followed(accelerating(0.1, follow=follow, edges=edges), SOURCE.count)
-    before = np.arange(WINDOW) - state.options.before <= 0
-    span = state.bars[0] / state.bars[0].max()
-    assert (span[before].sum() - 0.5) * SPEEDS[-3] == pytest.approx(10, rel=0.05)
-
-
 @pytest.mark.parametrize("bars", [(1.0,) * WINDOW, (0.0,) * 11 + (1.0, 1.0) + (0.0,) * 11])
 def test_what_slides_is_as_long_at_the_clips_end_and_lies_within(bars):
     source = accelerating(0.3, bars=bars, edges="slide")
