@@ -67,25 +67,6 @@ def kept(made, tmp_path):
     return path
 
 
-@pytest.fixture
-def outside(tmp_path):
-    """Someone's own files."""
-    outside = tmp_path / "outside"
-    outside.mkdir()
-    for name in ("00000001.png", "notes.txt"):
-        (outside / name).write_text("someone's own")
-    return outside
-
-
-def listed(folder):
-    """{path: content} of all in a folder."""
-    return {str(path.relative_to(folder)): path.read_bytes() for path in sorted(folder.rglob("*"))}
-
-
-def a_link_to(target):
-    return lambda path: path.symlink_to(target)
-
-
 def a_socket(path):
     """Bound by a relative path: absolute ones may be too long."""
     before = Path.cwd()
@@ -105,7 +86,7 @@ KINDS = {
     "folder": Path.mkdir,
     "fifo": os.mkfifo,
     "socket": a_socket,
-    "device": a_link_to("/dev/zero"),
+    "device": lambda path: path.symlink_to("/dev/zero"),
     "loop": lambda path: path.symlink_to(path.name),
     "sparse": sparse,
     "bytes": lambda path: path.write_bytes(bytes(range(256)) * 9),
@@ -127,30 +108,13 @@ def test_whatever_lies_in_a_mattes_place_is_not_opened(right, kept, kind, tmp_pa
     assert not kept.is_symlink()
 
 
-@pytest.mark.parametrize("kind", [kind for kind in KINDS if kind != "folder"])
+@pytest.mark.parametrize("kind", ["fifo", "socket", "device", "loop", "bytes"])
 def test_whatever_lies_in_the_folders_place_stays(right, kept, kind, tmp_path):
     """Mattes are kept elsewhere then, for as long as the program runs."""
     shutil.rmtree(kept.parent)
     KINDS[kind](kept.parent)
     np.testing.assert_array_equal(read(tmp_path), right)
     assert kept.parent.is_symlink() or not kept.parent.is_dir()
-
-
-def test_nothing_is_written_through_a_link(right, kept, outside, tmp_path):
-    before = listed(outside)
-    for name in ("00000001.png", "new.png"):
-        kept.unlink()
-        kept.symlink_to(outside / name)
-        np.testing.assert_array_equal(read(tmp_path), right)
-        assert listed(outside) == before
-        assert not kept.is_symlink()
-
-
-def test_a_file_that_has_another_name_as_well_keeps_that_one(right, kept, tmp_path):
-    os.link(kept, tmp_path / "mine.png")
-    kept.write_bytes(kept.read_bytes()[:40])  # of both
-    np.testing.assert_array_equal(read(tmp_path), right)
-    assert (tmp_path / "mine.png").stat().st_size == 40
 
 
 @pytest.mark.parametrize(
@@ -169,6 +133,23 @@ def test_a_picture_of_another_kind_is_never_shown(right, kept, write, tmp_path):
     np.testing.assert_array_equal(read(tmp_path), right)
 
 
+def test_nothing_outside_is_written(right, kept, tmp_path):
+    """Neither through a link nor to a file that has another name as well."""
+    outside = tmp_path / "outside.png"
+    outside.write_text("someone's own")
+    for target in (outside, tmp_path / "new.png"):
+        kept.unlink()
+        kept.symlink_to(target)
+        np.testing.assert_array_equal(read(tmp_path), right)
+        assert not kept.is_symlink()
+    assert outside.read_text() == "someone's own"
+    assert not (tmp_path / "new.png").exists()
+    os.link(kept, tmp_path / "mine.png")
+    kept.write_bytes(kept.read_bytes()[:40])  # of both
+    np.testing.assert_array_equal(read(tmp_path), right)
+    assert (tmp_path / "mine.png").stat().st_size == 40
+
+
 def flip(path, rng):
     data = bytearray(path.read_bytes())
     for _ in range(rng.randrange(1, 9)):
@@ -178,7 +159,7 @@ def flip(path, rng):
 
 def test_damage_of_any_kind_is_made_again(right, kept, tmp_path):
     whole = kept.read_bytes()
-    for seed in range(20):
+    for seed in range(12):
         rng = random.Random(seed)
         kept.write_bytes(whole[: rng.randrange(len(whole))] if seed % 4 == 0 else whole)
         if seed % 4:
