@@ -13,7 +13,6 @@ from shutter_addon.core.model.effect import STILL_CAMERA, Camera, Drawings, Move
 from shutter_addon.core.model.keyframes import Constant, Keys
 from shutter_addon.core.model.motions import Placement, Similarity
 from shutter_addon.media import camera_tracking, open_source, pursuit, tracking
-from shutter_addon.media.cuts import ShotSource
 from shutter_addon.media.footage import Footage
 
 ENDS = np.array([0, WIDTH - 1, 1j * (HEIGHT - 1), WIDTH - 1 + 1j * (HEIGHT - 1)])
@@ -134,14 +133,6 @@ def test_frames_that_show_nothing_of_it_are_bridged_and_many_end_it(monkeypatch)
     assert (max(found), faults) == (3, {4: camera_tracking.UNLIKE})
 
 
-def test_no_motion_crosses_a_cut():
-    shots = [film(8)[0].frames, Film([still("walkers.mp4", n) for n in range(10, 18)]).frames]
-    found, faults = tracked(ShotSource(Film([*shots[0], *shots[1]])), start=10)
-    assert (set(found), faults) == (set(range(16)), {})
-    assert found[7].placement == found[8].placement
-    assert max(error(found, ways(8), 7, frame) for frame in range(8)) < 0.3, "the other shot is tracked by itself"
-
-
 def test_behind_a_jump_it_goes_on_from_where_it_was(monkeypatch):
     """Of a place that no cut is told by. What happened at the jump nobody knows; on both sides all is right."""
     monkeypatch.setattr(tracking, "PATIENCE", 6)
@@ -171,29 +162,6 @@ def test_it_goes_on_from_where_it_is_and_meets_a_key_that_is_right():
 
 def numbers(placement):
     return placement.location, placement.rotation, placement.scale
-
-
-FLAT = Film([np.full((HEIGHT, WIDTH, 3), 90, np.uint8)] * 3)
-ALL = [np.array([(-1, -1), (2, -1), (2, 2), (-1, 2)])]
-
-
-def everywhere():
-    drawings = Drawings("all", (0.0,), (ALL,), ("linear",), WIDTH / HEIGHT)
-    return Region(moves=Moves(), name="all", shutter=0, kind=Constant("lasso"), width=Constant(0.0), drawings=drawings)
-
-
-@pytest.mark.parametrize(
-    ("source", "regions", "start", "fault"),
-    [
-        (FLAT, [], 0, camera_tracking.BARE),
-        (film(2)[0], [everywhere()], 0, camera_tracking.BARE),
-        (Film(FLAT.frames[:1]), [], 0, tracking.ALONE),
-        (FLAT, [], 3, tracking.NOT_SHOWN),
-    ],
-)
-def test_what_cannot_be_tracked_is_one_sentence(source, regions, start, fault):
-    with pytest.raises(tracking.TrackingError, match=f"^{fault}$"):
-        tracked(source, regions, start)
 
 
 @pytest.mark.parametrize("share", [0.5, 1.0])
