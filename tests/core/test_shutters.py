@@ -30,25 +30,6 @@ def mixes(draw):
     return bars, c / c.sum()
 
 
-def brute_quantile(bars, z):
-    """S⁻¹(z), right limit, by walking the accumulation."""
-    total = shutters.accumulation(bars)
-    for k in range(len(bars)):
-        if total[k + 1] > z:
-            return k + (z - total[k]) / (total[k + 1] - total[k])
-    return float(np.flatnonzero(bars)[-1] + 1)
-
-
-@given(bars_lists(), st.floats(0, 0.999))
-def test_knots_hold_every_quantile(bars, z):
-    knots = shutters.knots(bars)
-    piece = min(np.searchsorted(knots.z, z, side="right") - 1, len(knots.start) - 1)
-    u = (z - knots.z[piece]) / (knots.z[piece + 1] - knots.z[piece])
-    times = knots.start[piece] + u * (knots.end[piece] - knots.start[piece])
-    assume(np.abs(knots.z - z).min() > 1e-9)  # at a jump both limits are right
-    assert times == pytest.approx([brute_quantile(b, z) for b in bars], abs=1e-6)
-
-
 def test_a_box_has_two_knots_whatever_its_length():
     for shape in ((1, 200), (3, 64)):
         assert len(shutters.knots(np.ones(shape)).z) == 2
@@ -61,17 +42,6 @@ def test_displacement_keeps_exposure_and_is_a_shutter(mix):
     assert (q >= 0).all()
     assert q.sum() == pytest.approx(c @ bars.sum(axis=1))
     assert shutters.mix_exposure(bars, c) == pytest.approx(q.sum())
-
-
-@given(st.integers(2, 200), st.floats(0, 1))
-def test_between_two_deltas_lies_a_delta_of_width_one(window, u):
-    bars = np.zeros((2, window))
-    bars[0, 0] = bars[1, -1] = 1
-    q = shutters.displace(bars, [1 - u, u])
-    time = u * (window - 1)
-    expected = np.maximum(0, 1 - np.abs(np.arange(window) - time))
-    assert q == pytest.approx(expected, abs=1e-9)
-    assert shutters.mix(bars, [1 - u, u]) == pytest.approx([1 - u, *np.zeros(window - 2), u])
 
 
 @pytest.mark.parametrize(

@@ -113,21 +113,6 @@ def test_shots_end_at_cuts_and_at_the_clips_ends(film):
         assert shots.around(index, index, index) == range(28)
 
 
-def test_a_read_frame_is_handed_over(film):
-    source = Frames(film[:20])
-    shots = ShotSource(source)
-    assert shots.lacking(3, 3, 8) == set(range(3, 9))
-    assert shots.around(3, 3, 8) == range(20)
-    assert source.reads == list(range(3, 9))
-    assert shots.handed() == set(source.reads)
-    assert np.array_equal(shots.read(4), film[4])
-    assert source.reads == list(range(3, 9))
-    assert 4 not in shots.handed()
-    assert shots.lacking(3, 3, 8) == set()
-    shots.read(4)
-    assert source.reads[-1] == 4
-
-
 def test_where_a_frame_cannot_be_read_there_is_no_cut(film):
     frames = [*film[:10], *noise(8, 11)]
     frames[4] = None

@@ -8,7 +8,6 @@ import shutil
 import struct
 import zlib
 
-import av
 import numpy as np
 import pytest
 from footage import COUNT, cut_file, damage_frame, make_movie, movies_that_cannot_be_opened, number, picture, save_image
@@ -38,61 +37,36 @@ def readable(source):
     return good, bad
 
 
-def sound_frames(path):
-    """What a decoder without threads gives of a file, all errors passed over."""
-    frames, error = [], contextlib.suppress(av.error.FFmpegError)
-    with av.open(str(path)) as movie:
-        decoder = movie.streams.video[0].codec_context
-        decoder.thread_type = "NONE"
-        with error:
-            for packet in movie.demux(video=0):
-                with error:
-                    frames += decoder.decode(packet) if packet.size else []
-        with error:
-            frames += decoder.decode(None)
-    return [frame for frame in frames if not frame.is_corrupt]
-
-
-@pytest.fixture
-def in_time():
-    """A hang is a failure. It ends all tests: libraries that wait for a pipe wait on after a signal."""
-    faulthandler.dump_traceback_later(60, exit=True)
-    yield
-    faulthandler.cancel_dump_traceback_later()
-
-
 OTHER = "is no file, but a pipe, a socket or a device"
 
 
 @pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="no pipes by name")
-@pytest.mark.usefixtures("in_time")
-@pytest.mark.parametrize("name", ["clip.mp4", "frame_1.png"])
-def test_a_pipe_or_a_device(tmp_path, name):
-    os.mkfifo(tmp_path / name)
-    assert sentence(tmp_path / name) == f"{name}: {OTHER}"
-    (tmp_path / name).unlink()
-    (tmp_path / name).symlink_to("/dev/zero")
-    assert sentence(tmp_path / name) == f"{name}: {OTHER}"
-
-
-@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="no pipes by name")
-@pytest.mark.usefixtures("in_time")
-def test_a_pipe_in_the_place_of_a_movie_that_was_read(tmp_path, movies):
-    path = tmp_path / "clip.mp4"
+def test_a_pipe_or_a_device(tmp_path, movies, request):
+    """Also in the place of a movie that was read. A hang ends all tests: libraries that wait for a pipe wait on after a
+    signal."""
+    faulthandler.dump_traceback_later(60, exit=True)
+    request.addfinalizer(faulthandler.cancel_dump_traceback_later)
+    for name in ("clip.mp4", "frame_1.png"):
+        os.mkfifo(tmp_path / name)
+        assert sentence(tmp_path / name) == f"{name}: {OTHER}"
+        (tmp_path / name).unlink()
+        (tmp_path / name).symlink_to("/dev/zero")
+        assert sentence(tmp_path / name) == f"{name}: {OTHER}"
+    path = tmp_path / "read.mp4"
     path.write_bytes(movies["open.mp4"][0].read_bytes())
     with open_source(path) as source:
         source.close()
         path.unlink()
         os.mkfifo(path)
-        with pytest.raises(MediaError, match=f"frame 3 of clip.mp4 cannot be decoded: {OTHER}"):
+        with pytest.raises(MediaError, match=f"frame 3 of read.mp4 cannot be decoded: {OTHER}"):
             source.read(3)
 
 
-@pytest.mark.parametrize("name", ["clip.mp4", "frame.png", "notes.txt"])
-def test_not_media(tmp_path, name):
-    (tmp_path / name).write_text("This is a text, not a picture. " * 40)
-    pattern = rf"{name}: (no video stream|cannot be read as (a movie|an image) \(.+\))$"
-    assert re.match(pattern, sentence(tmp_path / name))
+def test_not_media(tmp_path):
+    for name in ("clip.mp4", "frame.png", "notes.txt"):
+        (tmp_path / name).write_text("This is a text, not a picture. " * 40)
+        pattern = rf"{name}: (no video stream|cannot be read as (a movie|an image) \(.+\))$"
+        assert re.match(pattern, sentence(tmp_path / name))
 
 
 def test_movies_that_cannot_be_opened(tmp_path, movies):
@@ -109,26 +83,22 @@ def test_index_outside(movies):
 
 
 @pytest.mark.parametrize(
-    ("suffix", "codec", "options"),
+    ("suffix", "codec", "least", "options"),  # least: hardly fewer frames than a decoder without threads gives
     [
-        ("mp4", "libx264", {"mux": {"movflags": "faststart"}, "options": {"bf": "3", "g": "12"}}),
-        ("mkv", "libx264", {"options": {"bf": "3", "g": "12"}}),
-        ("avi", "mpeg4", {"options": {"bf": "2", "g": "12"}}),
-        ("mov", "qtrle", {"pix_fmt": "rgb24", "mux": {"movflags": "faststart"}}),
+        ("mp4", "libx264", 40, {"mux": {"movflags": "faststart"}, "options": {"bf": "3", "g": "12"}}),
+        ("mkv", "libx264", 48, {"options": {"bf": "3", "g": "12"}}),
+        ("avi", "mpeg4", 30, {"options": {"bf": "2", "g": "12"}}),
+        ("mov", "qtrle", 55, {"pix_fmt": "rgb24", "mux": {"movflags": "faststart"}}),
     ],
 )
-def test_cut_off_movie_keeps_what_it_has(tmp_path, suffix, codec, options):
+def test_cut_off_movie_keeps_what_it_has(tmp_path, suffix, codec, least, options):
     whole = make_movie(tmp_path / f"whole.{suffix}", codec, 100, **options)
-    with open_source(whole) as source:
+    with open_source(whole) as source, open_source(cut_file(whole, tmp_path / f"cut.{suffix}", 0.6)) as cut:
         expected, none = readable(source)
-    assert none == {}
-    path = cut_file(whole, tmp_path / f"cut.{suffix}", 0.6)
-    with open_source(path) as source:
-        good, bad = readable(source)
-        again, _ = readable(source)
-    assert good == again
-    assert len(good) >= len(sound_frames(path)) > 10
-    assert all(expected[index] == shown for index, shown in good.items())
+        good, bad = readable(cut)
+        assert none == {}
+        assert good == readable(cut)[0] == {index: expected[index] for index in good}
+    assert len(good) >= least
     assert bad
     for index, text in bad.items():
         assert re.match(rf"frame {index} of cut\.{suffix} cannot be decoded: (the file is cut off|its data are)", text)

@@ -63,17 +63,6 @@ def test_what_was_filmed_has_the_footage_s_bits(step, dtype):
             np.testing.assert_array_equal(as_rgba(read(index * step)), film.picture(index))
 
 
-@pytest.mark.parametrize("step", [2, 8])
-def test_moments_lie_between_in_even_steps(step):
-    source = SmoothSource(Panned(3), step)
-    for index in range(source.count):
-        made, x = source.read(index), index * SPEED // step
-        assert made.dtype == np.uint8
-        assert off(made, pan(x)) < 1
-        others = [abs(x - SPEED // step), x + SPEED // step]
-        assert off(made, pan(x)) < min(off(made, pan(other)) for other in others) / 2
-
-
 def test_at_a_cut_moments_are_the_nearer_frame():
     """The middle one is the first's, as a source that knows its shots has it."""
     film = Panned(6, cut=3)
