@@ -55,18 +55,6 @@ def test_fitted(size, picture):
     assert np.abs(result - reference(values, *picture)).max() < 1e-5
 
 
-@pytest.mark.parametrize("block", [2, 4])
-@pytest.mark.parametrize("size", [(64, 36), (63, 37), (1, 1)])
-def test_block_means(size, block):
-    values = noise(*size)
-    result = block_means(values, block)
-    assert result.dtype == np.float32
-    rows, columns = range(0, size[1], block), range(0, size[0], block)
-    assert result.shape == (len(rows), len(columns))
-    expected = [[values[y : y + block, x : x + block].mean(dtype=float) for x in columns] for y in rows]
-    assert np.abs(result - expected).max() < 1e-6
-
-
 def test_what_changes_nothing_is_the_same_array():
     values = noise(64, 36)
     assert block_means(values, 1) is fitted(values, 64, 36) is feathered(values, 0) is values
