@@ -9,17 +9,6 @@ from shutter_addon.core.model import shutters, windows
 from shutter_addon.core.model.frame_state import FrameState, Options
 
 
-def state(bars, **options):
-    bars = np.asarray(bars, dtype=np.float64)
-    return FrameState(Options(bars.shape[1], **options), bars)
-
-
-def frames(count, seed=0, size=(3, 4)):
-    pictures = np.random.default_rng(seed).random((count, *size, 4))
-    pictures[..., 3] = 1
-    return pictures
-
-
 def exposed(moment, index, direction, shot):
     """By shutters: how much of each frame they expose."""
     frames = windows.indices(moment.options, index, shot, direction)

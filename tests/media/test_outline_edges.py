@@ -7,7 +7,7 @@ from shutter_addon.core.model import outlines
 from shutter_addon.media import outlining
 
 WIDTH, HEIGHT = 240, 160
-MIDDLE, RADIUS = (0.5, 0.5), 0.3
+RADIUS = 0.3
 
 
 @pytest.fixture
