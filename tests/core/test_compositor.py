@@ -5,20 +5,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from shutter_addon.core.frames import light
 from shutter_addon.core.model import shutters, windows
 from shutter_addon.core.model.frame_state import FrameState, Options
-
-
-def state(bars, **options):
-    bars = np.asarray(bars, dtype=np.float64)
-    return FrameState(Options(bars.shape[1], **options), bars)
-
-
-def frames(count, seed=0, size=(3, 4)):
-    pictures = np.random.default_rng(seed).random((count, *size, 4))
-    pictures[..., 3] = 1
-    return pictures
 
 
 def exposed(moment, index, direction, shot):
@@ -102,9 +90,3 @@ def test_what_a_window_reaches_is_what_its_shutters_expose(exposed, position, st
     state = FrameState(options, np.array([exposed], float))
     shown = positions[np.flatnonzero(exposed)]
     assert windows.reach(state, 20, direction) == (shown.min(), shown.max())
-
-
-def test_light_round_trip():
-    codes = np.linspace(-0.5, 3, 1000)
-    assert light.to_encoded(light.to_linear(codes)) == pytest.approx(codes, abs=1e-7)
-    assert light.to_linear(np.float64(0.5)) == pytest.approx(0.21404114, abs=1e-7)

@@ -2,7 +2,6 @@
 
 import math
 
-import exact_diffusion
 import numpy as np
 import pytest
 
@@ -65,24 +64,3 @@ def test_pictures_of_one_row_or_column(size):
     right, down = conductances(np.zeros((*size, 3)), 1.0, size)
     assert right.shape == (size[0], size[1] - 1)
     assert down.shape == (size[0] - 1, size[1])
-
-
-def test_the_exact_solution_balances_every_free_pixel():
-    rng = np.random.default_rng(4)
-    guide, labels = 0.5 + 0.05 * rng.standard_normal((9, 11, 3)), np.zeros((9, 11), np.uint16)
-    labels[2, 3], labels[7, 8], labels[0, 10] = 1, 2, 3
-    solution = exact_diffusion.solve(labels, 3, guide, 0.8)
-    right, down = conductances(guide, 0.8, labels.shape)
-    flow = np.zeros_like(solution)
-    across, along = right * np.diff(solution, axis=2), down * np.diff(solution, axis=1)
-    flow[:, :, :-1] += across
-    flow[:, :, 1:] -= across
-    flow[:, :-1] += along
-    flow[:, 1:] -= along
-    assert abs(flow[:, labels == 0]).max() < 1e-12
-    np.testing.assert_array_equal(solution[:, labels > 0].T, np.eye(3)[labels[labels > 0] - 1])
-    np.testing.assert_allclose(solution.sum(axis=0), 1, atol=1e-12)
-
-
-def test_without_scribbles_the_exact_solution_is_the_first_shutter():
-    np.testing.assert_array_equal(exact_diffusion.solve(np.zeros((3, 4), np.uint16), 2)[0], 1)

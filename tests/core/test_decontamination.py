@@ -41,22 +41,6 @@ def test_what_is_not_mixed_stays_to_the_bit():
         assert (got >= 0).all()
 
 
-@pytest.mark.parametrize("value", [0, 1])
-def test_a_matte_without_edges_changes_nothing(value):
-    picture = np.random.default_rng(3).random((20, 30, 3)).astype(np.float32)
-    for got in separated(picture, np.full((20, 30), value, np.float32)):
-        assert np.array_equal(got, picture)
-
-
-def test_two_even_colours_are_nearly_found():
-    matte = disc(2)
-    own, behind = np.array([0.9, 0.1, 0.05]), np.array([0.0, 0.3, 0.8])
-    picture = (matte[..., None] * own + (1 - matte[..., None]) * behind).astype(np.float32)
-    for got, expected in zip(separated(picture, matte), (own, behind), strict=True):
-        before, after = (np.abs(each - expected)[(matte > 0) & (matte < 1)].mean() for each in (picture, got))
-        assert after < 0.2 * before
-
-
 @pytest.mark.parametrize("size", [(1, 1), (2, 300), (37, 3)])
 def test_small_pictures(size):
     rng = np.random.default_rng(4)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from shutter_addon.core.messages import EffectError
-from shutter_addon.core.model import effect, keyframes, limits, mattes
+from shutter_addon.core.model import effect, limits, mattes
 from shutter_addon.core.model.frame_state import Options
 from shutter_addon.core.model.keyframes import Bars, Constant, Keys, Samples, SourceTime
 
@@ -127,8 +127,3 @@ def test_strokes_far_off_and_too_many_points_are_refused():
     )
     with pytest.raises(EffectError, match='region "Outline": more than'):
         made(Bars(Constant(FIRST)), [region(half), outline]).at(1)
-
-
-def test_eases_are_those_that_begin_a_span():
-    assert keyframes.eased_span((1.0, 3.0, 5.0), ("linear", "constant", "linear"), 4.9) == (1, 2, 0.0)
-    assert keyframes.eased_span((1.0, 3.0), ("bezier", "linear"), 2.0) == (0, 1, 0.5)

@@ -8,10 +8,9 @@ import numpy as np
 import pytest
 from made_recipes import key
 
-from shutter_addon.core.model import following, motions
+from shutter_addon.core.model import following
 from shutter_addon.core.model.clip import Clip
 from shutter_addon.core.model.keyframes import Constant
-from shutter_addon.core.model.motions import Placement
 from shutter_addon.core.model.state_at import state_at
 
 SOURCE = Clip(width=64, height=48, count=40)
@@ -38,7 +37,6 @@ def followed(*arguments, **given):
 
 
 STRAIGHT = [key(0, (0, 0)), key(100, (1, 0.5))]
-STEP = 0.64 - 0.24j  # pixels a frame, y down
 
 
 def shifts(source, frames, **given):
@@ -99,22 +97,6 @@ def test_what_does_not_move_is_nothing_to_follow(keys):
 def test_a_subject_of_no_size_later_is_a_point():
     keys = [key(0), key(4, scale=0)]
     assert followed(made(keys), 0, 0).at([4])[0][0, 0] == 0
-
-
-def test_in_between_frames_take_the_motion_between():
-    """Four frames of the source to a frame of the timeline."""
-    found = shifts(made(STRAIGHT), range(8, 14), frame=3, index=8, shown=lambda other: 4 * int(other - 1))
-    assert found == pytest.approx(np.arange(6) / 4 * STEP)
-
-
-def test_a_bezier_way_is_straight_between_frames():
-    keys = [key(0, ease="bezier"), key(4, (1, 0))]
-    effect = made(keys).for_picture(4 / 3)
-    halfway = motions.between(*(effect.regions[0].placement(frame) for frame in (1, 2)), 0.5)
-    found = shifts(made(keys), [1], frame=1, index=0, shown=lambda other: 2 * int(other - 1))
-    start = effect.regions[0].placement(1)
-    assert found[0] == pytest.approx((halfway.location[0] - start.location[0]) * 64)
-    assert isinstance(start, Placement)
 
 
 @pytest.mark.parametrize("steps", [1, 8])

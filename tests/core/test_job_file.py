@@ -21,6 +21,7 @@ VERSION = EditVersion("0.1.0", "5.2.0", "", "ab" * 32, "cd" * 32)
     ],
 )
 def test_another_version_is_refused_and_what_differs_is_named(tmp_path, change, told):
+    job_file.guard(tmp_path, VERSION)  # there is none yet
     job_file.write(tmp_path, VERSION)
     job_file.guard(tmp_path, VERSION)
     other = replace(VERSION, **change)
@@ -28,10 +29,6 @@ def test_another_version_is_refused_and_what_differs_is_named(tmp_path, change, 
     with pytest.raises(job_file.JobError) as error:
         job_file.guard(tmp_path, other)
     assert str(error.value).startswith(f"{tmp_path / job_file.NAME}: the job is of another version of {told}")
-
-
-def test_a_folder_without_a_job_takes_all(tmp_path):
-    job_file.guard(tmp_path, VERSION)
 
 
 @pytest.mark.parametrize("content", ["", "{", "[]", "null", '{"version": 1}', '{"version": 1, "edit": 3}'])

@@ -11,7 +11,6 @@ from shutter_addon.core.messages import EffectError
 from shutter_addon.core.model import limits
 from shutter_addon.core.model.clip import Clip
 from shutter_addon.core.model.state_at import state_at
-from shutter_addon.core.pixels import layering
 from shutter_addon.core.recipes import recipe_file
 
 LINE = {"shutter": "S1", "name": "Cup", "strokes": [[[0.2, 0.4], [0.3, 0.6]]], "width": 0.1}
@@ -40,13 +39,6 @@ def test_its_mattes_are_known_in_the_window_and_as_far_as_plates_reach():
     assert at == pytest.approx([0.2 + 0.01 * k for k in found.frames])
 
 
-def test_in_a_slow_source_between_two_timeline_frames():
-    """Each timeline frame passes over two of the source's: what they show lies halfway."""
-    _, found = layers(effect(MOVED | {"layer": True}), 11.0, shown=lambda frame: 2 * (int(frame) - 1))
-    at = {k: state.shapes[0].strokes[0][0, 0] for k, state in zip(found.frames, found.scribbles, strict=True)}
-    assert [at[k] for k in (20, 21, 22)] == pytest.approx([0.3, 0.305, 0.31])
-
-
 def test_it_begins_and_ends_with_its_opacity():
     keys = [{"frame": 1, "value": 0, "ease": "constant"}, {"frame": 20, "value": 0.5}]
     found = effect(LINE | {"layer": True, "opacity": keys})
@@ -72,7 +64,3 @@ def test_too_many_points_are_refused():
     )
     with pytest.raises(EffectError, match="more than"):
         layers(dataclasses.replace(found, regions=(found.regions[0], region)))
-
-
-def test_almost_nothing_of_a_scribble_is_nothing_and_almost_all_is_all():
-    assert layering.matte_of([0.0, 0.2, 0.3, 0.4, 0.5, 0.9, 1.0]) == pytest.approx([0, 0, 0, 0.5, 1, 1, 1])

@@ -13,11 +13,9 @@ SIZES = [  # of the matte, and of the picture
     ((96, 54), (48, 27)),
     ((40, 30), (64, 36)),
     ((90, 90), (64, 36)),
-    ((61, 25), (64, 36)),
     ((64, 27), (64, 36)),
     ((37, 64), (41, 23)),
     ((7, 3), (64, 36)),
-    ((64, 36), (64, 36)),
 ]
 
 
@@ -57,26 +55,9 @@ def test_fitted(size, picture):
     assert np.abs(result - reference(values, *picture)).max() < 1e-5
 
 
-@pytest.mark.parametrize("block", [2, 4])
-@pytest.mark.parametrize("size", [(64, 36), (63, 37), (5, 3), (1, 1)])
-def test_block_means(size, block):
-    values = noise(*size)
-    result = block_means(values, block)
-    assert result.dtype == np.float32
-    rows, columns = range(0, size[1], block), range(0, size[0], block)
-    assert result.shape == (len(rows), len(columns))
-    expected = [[values[y : y + block, x : x + block].mean(dtype=float) for x in columns] for y in rows]
-    assert np.abs(result - expected).max() < 1e-6
-
-
-def test_blocks_of_one():
-    values = noise(8, 8)
-    assert block_means(values, 1) is values
-
-
-def test_the_same_size_is_the_same_array():
+def test_what_changes_nothing_is_the_same_array():
     values = noise(64, 36)
-    assert fitted(values, 64, 36) is values
+    assert block_means(values, 1) is fitted(values, 64, 36) is feathered(values, 0) is values
 
 
 def profile(distance, width):
@@ -84,13 +65,13 @@ def profile(distance, width):
 
 
 @pytest.mark.parametrize("width", [0.5, 1, 2, 5, 10.7, 21.6, 24, 40, 43.3, 86])
-@pytest.mark.parametrize("at", [100, 101, 102, 103])
-def test_a_hard_edge_becomes_the_error_function(width, at):
-    values = np.zeros((203, 4), np.float32)
-    values[at:] = 1
-    expected = [profile(row + 0.5 - at, width) for row in range(203)]
-    for result in (feathered(values, width)[:, 1], feathered(np.ascontiguousarray(values.T), width)[1]):
-        assert np.abs(result - expected).max() < LEVEL
+def test_a_hard_edge_becomes_the_error_function(width):
+    for at in (100, 101, 102, 103):
+        values = np.zeros((203, 4), np.float32)
+        values[at:] = 1
+        expected = [profile(row + 0.5 - at, width) for row in range(203)]
+        for result in (feathered(values, width)[:, 1], feathered(np.ascontiguousarray(values.T), width)[1]):
+            assert np.abs(result - expected).max() < LEVEL
 
 
 @pytest.mark.parametrize("width", [4, 8.5, 18.7, 25, 60])
@@ -102,14 +83,5 @@ def test_the_pictures_edges_go_on(width):
     assert np.abs(feathered(values, width) - large).max() < 1.5 * LEVEL
     white = feathered(np.ones((30, 40), np.float32), width)
     assert 1 - 1e-5 < white.min() <= white.max() <= 1
-
-
-def test_a_feather_of_no_width():
-    values = noise(8, 8)
-    assert feathered(values, 0) is values
-
-
-def test_a_feather_wider_than_the_picture():
-    values = np.zeros((4, 6), np.float32)
-    values[:, 3:] = 1
-    assert np.abs(feathered(values, 600) - 0.5).max() < 0.01
+    half = np.tile(np.float32([0, 0, 0, 1, 1, 1]), (4, 1))
+    assert np.abs(feathered(half, 600) - 0.5).max() < 0.01, "it is wider than the picture"

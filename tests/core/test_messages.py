@@ -4,12 +4,9 @@ from hypothesis import strategies as st
 from shutter_addon.core.messages import LONGEST, sentence, signed
 
 
-def test_short_sentences_stay_as_they_are():
+def test_short_sentences_stay_and_long_ones_keep_the_place_and_the_reason():
     assert sentence('shutters[1].bars: 7 values, "Größe" is 8') == 'shutters[1].bars: 7 values, "Größe" is 8'
     assert signed("film.mp4: no such file") == "Virtual Shutter: film.mp4: no such file"
-
-
-def test_long_ones_keep_the_place_and_the_reason():
     said = signed("regions[3].strokes: " + "x" * 5000 + ", not a number")
     assert len(said) == LONGEST
     assert said.startswith("Virtual Shutter: regions[3].strokes: xxx")

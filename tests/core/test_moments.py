@@ -10,10 +10,9 @@ from made_recipes import made
 from shutter_addon.core.model import shutters, windows
 from shutter_addon.core.model.clip import Clip
 from shutter_addon.core.model.state_at import state_at
-from shutter_addon.core.pixels import combined
 
 CLIP = Clip(width=160, height=100, count=40)
-STEPS = [1, 2, 4, 8, 16]
+STEPS = [1, 2, 8, 16]
 
 
 def state(shutters, steps, frame=20, direction=1, **options):
@@ -38,10 +37,10 @@ def exposed(shutters, steps, direction=1, **more):
 @pytest.mark.parametrize("direction", [1, -1])
 @pytest.mark.parametrize("position", ["start", "center", "end"])
 @pytest.mark.parametrize("steps", STEPS)
-@pytest.mark.parametrize("window", [1, 4, 7])
-def test_a_still_frame_is_the_filmed_one(window, steps, position, direction):
-    still = {"bars": shutters.preset_bars("STILL", window, position).tolist()}
-    assert exposed([still], steps, direction, position=position) == {19 * steps: 1}
+def test_a_still_frame_is_the_filmed_one(steps, position, direction):
+    for window in (1, 4, 7):
+        still = {"bars": shutters.preset_bars("STILL", window, position).tolist()}
+        assert exposed([still], steps, direction, position=position) == {19 * steps: 1}
 
 
 def test_bars_are_interpolated_before_they_are_spread():
@@ -50,7 +49,7 @@ def test_bars_are_interpolated_before_they_are_spread():
     assert exposed([{"keys": keys}], 8) == pytest.approx({19 * 8 + 8: 1})
 
 
-@pytest.mark.parametrize("last", [10, 11, 12, 13])
+@pytest.mark.parametrize("last", [10, 13])
 def test_what_rounding_leaves_beside_a_sharp_frame_makes_it_no_streak(last):
     """Of a still frame that is keyed from one end of the window to the other, wherever it is a filmed one."""
     bars = np.eye(last)[[0, last - 1]].tolist()
@@ -71,25 +70,6 @@ def test_on_the_timeline_a_shape_has_the_same_time(steps, direction):
     way = SimpleNamespace(at=lambda frame: (20 + direction * 4 * (frame - 20), direction < 0))
     found = state_at(replace(effect, time=way), CLIP.stepped(steps), 20).state
     assert found.bars[0] == pytest.approx(np.repeat([1, 1, 0, 0], steps) / steps)
-
-
-@pytest.mark.parametrize("direction", [1, -1])
-@pytest.mark.parametrize("steps", STEPS)
-@pytest.mark.parametrize("mode", ["lightest", "darkest"])
-def test_trails_of_light_are_as_bright_as_their_lights(mode, steps, direction):
-    """A moment counts as much as the frame that it is nearest to, halfway as the mean of both."""
-    bars = [1, 1, 0, 4, 2, 0, 4]
-    index, found = state([{"bars": bars, "combine": mode}], steps, direction=direction)
-    counts = combined.counts(found.combines[0], found.bars, np.ones(1), "displacement")
-    at = windows.positions(found.options, index, direction)
-    near = [19 * steps + direction * k * steps for k in range(len(bars))]
-    wanted = {}
-    for place in at:
-        beside = [k for k, frame in enumerate(near) if abs(frame - place) <= steps / 2]
-        between = [k for k, frame in enumerate(near) if abs(frame - place) < steps]
-        is_open = all(bars[k] for k in between) and (len(between) == 2 or place in near)
-        wanted[int(place)] = np.mean([bars[k] for k in beside]) / 4 if is_open else 0.0
-    assert dict(zip(map(int, at), counts, strict=True)) == pytest.approx(wanted)
 
 
 @pytest.mark.parametrize("direction", [1, -1])

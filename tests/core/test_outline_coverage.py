@@ -1,4 +1,4 @@
-"""What outlines enclose, against places that are asked one by one."""
+"""What outlines enclose, and how they are pulled. tests/differential has how much they cover of a pixel."""
 
 import numpy as np
 import pytest
@@ -9,37 +9,21 @@ from shutter_addon.core import scanlines
 from shutter_addon.core.model import outlines
 
 SQUARE = [[(0.25, 0.25), (0.75, 0.25), (0.75, 0.75), (0.25, 0.75)]]
-FINE = 16  # places across a pixel
-
-
-def asked(strokes, width, height):
-    """The share of FINE places across and LINES down each pixel from which a ray to the right crosses curves an odd
-    number of times."""
-    x = (np.arange(width * FINE) + 0.5) / FINE
-    y = height - (np.arange(height * outlines.LINES) + 0.5) / outlines.LINES
-    inside = np.zeros((len(y), len(x)), bool)
-    for stroke in strokes:
-        points = np.array(stroke) * (width, height)
-        for (x0, y0), (x1, y1) in zip(points, np.roll(points, -1, axis=0), strict=True):
-            for row in np.flatnonzero((y0 > y) != (y1 > y)):
-                inside[row] ^= x < x0 + (y[row] - y0) / (y1 - y0) * (x1 - x0)
-    return inside.reshape(height, outlines.LINES, width, FINE).mean(axis=(1, 3))
-
-
-point = st.tuples(st.floats(-0.5, 1.5), st.floats(-0.5, 1.5))
-
-
-@given(st.lists(st.lists(point, min_size=3, max_size=8), max_size=3))
-def test_any_curves(strokes):
-    found = outlines.coverage(strokes, 12, 7)
-    assert found.dtype == np.float32
-    assert np.abs(found - asked(strokes, 12, 7)).max() <= 8 / FINE  # of as many edges at most, each half a place off
-    assert np.abs(found - asked(strokes, 12, 7)).mean() <= 0.5 / FINE
 
 
 @pytest.mark.parametrize("strokes", [[], [[]], [[(0.5, 0.5)]], [[(0.1, 0.1), (0.9, 0.9)]], [[(2, 2), (3, 2), (3, 3)]]])
 def test_what_encloses_nothing(strokes):
     assert not outlines.coverage(strokes, 16, 9).any()
+
+
+def test_what_they_enclose_twice_is_a_hole():
+    """Of two curves, and of one that crosses itself."""
+    inner = [(0.4, 0.4), (0.6, 0.4), (0.6, 0.6), (0.4, 0.6)]
+    star = [(0.5 + 0.4 * np.sin(k * 0.8 * np.pi), 0.5 + 0.4 * np.cos(k * 0.8 * np.pi)) for k in range(5)]
+    for strokes, place in (([*SQUARE, inner], (13, 10)), ([star], (4, 10))):
+        found = outlines.coverage(strokes, 20, 20)
+        assert found.dtype == np.float32
+        assert found[10, 10] == 0 < 0.8 < found[place]
 
 
 ASPECT = 2.0

@@ -3,9 +3,8 @@
 import numpy as np
 import pytest
 
-from shutter_addon.core.frames.retiming import StripTiming
 from shutter_addon.core.model import mattes
-from shutter_addon.core.model.mattes import FileFrames, Ramp
+from shutter_addon.core.model.mattes import Ramp
 
 WIDTH, HEIGHT = 64, 36
 
@@ -26,20 +25,6 @@ def test_values_stay_within_0_and_1():
         assert found.dtype == np.float32
         assert found.min() >= 0
         assert found.max() <= 1
-
-
-class Opened:
-    width, height, count, fps, step = 8, 8, 20, None, 1
-
-
-def test_which_frame_of_a_file_is_shown():
-    of_source, of_timeline = FileFrames("f", offset=3), FileFrames("f", offset=3, first=101)
-    assert of_source.at(105).index(Opened, 7) == 10
-    assert of_timeline.at(105).index(Opened, 7) == 7
-    assert of_timeline.at(105.5).index(Opened, 7) == 7
-    assert of_source.at(1) == of_source.at(2)  # what does not change with the timeline is equal
-    timing = StripTiming("S", 0, 24.0, 101.0, 121.0, 0, 0, 101, True, 1.0)
-    assert FileFrames("f", timing=timing).at(105).index(Opened, 7) == 15  # it plays in reverse
 
 
 def test_blended_leaves_what_it_is_given():

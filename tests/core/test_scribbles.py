@@ -1,7 +1,6 @@
-"""Scribbles against pixels found one by one."""
+"""Scribbles that are long, thin or far away. tests/differential has what others cover."""
 
 import math
-from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -13,53 +12,9 @@ from shutter_addon.core.model.scribbles import Shape
 
 coordinate = st.floats(-0.3, 1.3)
 strokes = st.lists(st.tuples(coordinate, coordinate), min_size=1, max_size=6).map(np.array)
-sizes = st.tuples(st.integers(1, 40), st.integers(1, 30))
 
 
-def centres(width, height):
-    """Pixel centres (H, W, 2) in pixels, y up."""
-    x, y = np.meshgrid(np.arange(width) + 0.5, height - 0.5 - np.arange(height))
-    return np.stack([x, y], axis=-1)
-
-
-def distance(point, a, b):
-    d = b - a
-    t = np.clip((point - a) @ d / max(d @ d, 1e-12), 0, 1)
-    return np.linalg.norm(point - (a + t[..., None] * d), axis=-1)
-
-
-@settings(deadline=None)
-@given(strokes, sizes, st.floats(0.0, 0.4))
-def test_a_line_covers_what_lies_within_half_its_width(stroke, size, line_width):
-    width, height = size
-    labels = scribbles.rasterise([Shape(4, "line", line_width, (stroke,))], width, height)
-    pixels = stroke * size
-    points = centres(width, height)
-    segments = list(pairwise(pixels)) or [(pixels[0], pixels[0])]
-    nearest = np.min([distance(points, a, b) for a, b in segments], axis=0)
-    radius = max(line_width * height / 2, 0.7072)
-    assert set(np.unique(labels)) <= {0, 5}
-    sure = np.abs(nearest - radius) > 1e-6
-    assert np.array_equal((labels == 5)[sure], (nearest < radius)[sure])
-
-
-@settings(deadline=None)
-@given(strokes, sizes)
-def test_a_lasso_covers_what_it_winds_around(stroke, size):
-    width, height = size
-    labels = scribbles.rasterise([Shape(0, "lasso", 0, (stroke,))], width, height)
-    points, pixels = centres(width, height), stroke * size
-    a, b = pixels, np.roll(pixels, -1, axis=0)
-    start, end = a - points[..., None, :], b - points[..., None, :]
-    cross = start[..., 0] * end[..., 1] - start[..., 1] * end[..., 0]
-    turn = np.arctan2(cross, (start * end).sum(axis=-1)).sum(axis=-1)
-    inside = np.abs(turn) > np.pi
-    on_edge = np.min([distance(points, p, q) for p, q in zip(a, b, strict=True)], axis=0) < 1e-6
-    if (inside & ~on_edge).any():
-        assert np.array_equal((labels == 1)[~on_edge], inside[~on_edge])
-
-
-@settings(deadline=5000)
+@settings(deadline=5000, max_examples=40)
 @given(
     st.lists(st.tuples(st.floats(-math.pi, math.pi), st.floats(0, 39), st.floats(0, 1)), min_size=1, max_size=4),
     st.sampled_from([0.0, 0.05, 3.0, 1e6]),
@@ -75,8 +30,7 @@ def test_what_lies_far_outside_costs_nothing(corners, line_width, kind):
     assert labels.shape == (360, 640)
 
 
-@pytest.mark.parametrize("far", [1e3, 1e7, 1e9])
-@pytest.mark.parametrize("line_width", [0.0, 0.1])
+@pytest.mark.parametrize(("far", "line_width"), [(1e3, 0.0), (1e9, 0.0), (1e9, 0.1)])
 def test_a_line_from_far_away_to_far_away(far, line_width):
     """The same as its part near the picture."""
     long = Shape(0, "line", line_width, (np.array([[-far, -far * 0.5], [far, far * 0.5]]) + 0.5,))
@@ -86,7 +40,7 @@ def test_a_line_from_far_away_to_far_away(far, line_width):
 
 
 def test_a_thick_line_of_many_points_is_soon_drawn():
-    stroke = np.random.default_rng(0).random((20_000, 2))
+    stroke = np.random.default_rng(0).random((5_000, 2))
     assert (scribbles.rasterise([Shape(0, "line", 1000.0, (stroke,))], 320, 180) == 1).all()
 
 
@@ -118,6 +72,7 @@ def test_the_thinnest_line_is_tight_for_a_diffusion():
     assert not reached[-1, -30:].any()
 
 
+@settings(max_examples=30)
 @given(strokes, st.integers(2, 20))
 def test_resampling_keeps_the_ends_and_the_spacing(stroke, count):
     points = scribbles.resample(stroke, count)

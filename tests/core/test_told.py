@@ -23,20 +23,14 @@ def missing(folder):
         check_file(folder / "Qanarix.png")
 
 
-RAISED = r'\d+ s: raise MediaError\(f"\{path.name\}: no such file in \{.*\}"\) \[media/files\.py:\d+\]'
-
-
-def test_an_error_is_kept_once_as_the_line_that_made_it(tmp_path):
+def test_an_error_is_kept_once_as_the_line_that_made_it_and_the_oldest_go(tmp_path, monkeypatch):
+    monkeypatch.setattr(told, "MOST", 2)
     for _ in range(3):
         missing(tmp_path)
     (kept,) = told.last()
-    assert re.fullmatch(RAISED, kept)
-
-
-def test_the_oldest_go(tmp_path, monkeypatch):
-    monkeypatch.setattr(told, "MOST", 2)
+    raised = r'\d+ s: raise MediaError\(f"\{path.name\}: no such file in \{.*\}"\) \[media/files\.py:\d+\]'
+    assert re.fullmatch(raised, kept)
     (tmp_path / "Qanarix.json").write_text('{"version": 1, "window": 4, "shutters": []}')
-    missing(tmp_path)
     with pytest.raises(RecipeError):
         recipe_file.load(tmp_path / "Qanarix.json")
     inner, outer = told.last()
@@ -44,12 +38,15 @@ def test_the_oldest_go(tmp_path, monkeypatch):
     assert 'raise RecipeError(f"{path}: {error}") from None [core/recipes/recipe_file.py:' in outer
     missing(tmp_path)
     assert outer in told.last()
-    assert re.fullmatch(RAISED, told.last()[-1])
+    assert re.fullmatch(raised, told.last()[-1])
 
 
-def test_lines_of_other_code_are_not_kept():
+def test_lines_and_errors_of_other_code_are_not_kept():
     told.record()
     EffectError("Qanarix is gone")
+    with pytest.raises(ValueError, match="invalid") as raised:
+        int("invalid")
+    told.exception(raised.value)
     assert told.last() == []
 
 
@@ -59,13 +56,6 @@ def test_an_error_that_nobody_expected_is_kept_without_what_it_says():
     told.exception(raised.value)
     (kept,) = told.last()
     assert re.fullmatch(r"\d+ s: TypeError \[media/files\.py:\d+ check_file\]", kept)
-
-
-def test_errors_of_others_are_not_kept():
-    with pytest.raises(ValueError, match="invalid") as raised:
-        int("invalid")
-    told.exception(raised.value)
-    assert told.last() == []
 
 
 def test_what_a_thread_raises_that_nobody_waits_for(monkeypatch):

@@ -7,18 +7,15 @@ import numpy as np
 import pytest
 from made_recipes import key, made
 
-from shutter_addon.core.model import trails, windows
+from shutter_addon.core.model import windows
 from shutter_addon.core.model.clip import Clip
 from shutter_addon.core.model.keyframes import Constant
 from shutter_addon.core.model.state_at import state_at
+from shutter_addon.core.model.trails import with_length
 from shutter_addon.core.pixels import compositor
 
 WINDOW = 24
 SOURCE = Clip(width=160, height=100, count=60)
-
-
-def with_length(*arguments):
-    return trails.with_length(*arguments)
 
 
 def open_frames(bars):
@@ -85,24 +82,6 @@ def streak(source, frame):
     picture = compositor.compose(state, [still] * len(frames), frames >= 0, np.ones((1, 1, 400)), moves)
     grey = picture[0, :, 0]
     return 6 * (grey * (1 - grey)).sum()
-
-
-@pytest.mark.parametrize("position", ["start", "center", "end"])
-def test_the_streak_stays_as_long_while_the_subject_speeds_up(position):
-    frames = [25, 29, 33, 36]
-    lengths = [streak(accelerating(0.2, position), frame) for frame in frames]
-    assert lengths == pytest.approx([20] * 4, rel=0.05)
-    grown = [streak(accelerating(None, position), frame) for frame in frames]
-    assert grown[-1] > 1.2 * grown[0]
-
-
-@pytest.mark.parametrize(("follow", "edges"), [("car", "hold"), ("camera", "shorten")])
-def test_beyond_the_clips_ends_all_stands_still(follow, edges):
-    """At the clip's last frame the exposure has the frames before alone, as many more of them."""
-    state, _ = followed(accelerating(0.1, follow=follow, edges=edges), SOURCE.count)
-    before = np.arange(WINDOW) - state.options.before <= 0
-    span = state.bars[0] / state.bars[0].max()
-    assert (span[before].sum() - 0.5) * SPEEDS[-3] == pytest.approx(10, rel=0.05)
 
 
 @pytest.mark.parametrize("bars", [(1.0,) * WINDOW, (0.0,) * 11 + (1.0, 1.0) + (0.0,) * 11])

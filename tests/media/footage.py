@@ -34,17 +34,7 @@ def number(pixels):
 
 
 def make_movie(
-    path,
-    codec,
-    count=COUNT,
-    *,
-    pix_fmt="yuv420p",
-    rate=25,
-    times=None,
-    options=None,
-    mux=None,
-    size=None,
-    **more,
+    path, codec, count=COUNT, *, pix_fmt="yuv420p", rate=25, times=None, options=None, mux=None, size=None, **more
 ):
     """Encodes pictures 0 … count-1 at `times`, in frames of the rate. options, mux: the encoder's and the muxer's.
 
@@ -81,10 +71,7 @@ def _write_silence(out, seconds):
 def copy_movie(source, path, *, later=0, drop=0, stamped=None):
     """Copies the packets but the first `drop`, `later` frames (of the 25ths) later; earlier ones make an edit list.
     stamped: the time of each packet, in frames, by its number, in place of its own"""
-    with (
-        av.open(str(source)) as movie,
-        av.open(str(path), "w", options={"avoid_negative_ts": "disabled"}) as out,
-    ):
+    with av.open(str(source)) as movie, av.open(str(path), "w", options={"avoid_negative_ts": "disabled"}) as out:
         stream = out.add_stream_from_template(movie.streams.video[0])
         shift = round(later / 25 / movie.streams.video[0].time_base)
         for position, packet in enumerate(movie.demux(video=0)):
@@ -266,11 +253,7 @@ def ugly_movies(folder):
     encode("mpeg4.mp4", "mpeg4", options={"bf": "2", "g": "12"})
     encode("mpeg2.mpg", "mpeg2video", None, count=100, options={"bf": "2", "g": "12"})  # many frames to a time stamp
     encode("mpeg2.ts", "mpeg2video", options={"bf": "2", "g": "12"})
-    encode(
-        "vp9.webm",
-        "libvpx-vp9",
-        options={"g": "20", "auto-alt-ref": "1", "lag-in-frames": "16", "cpu-used": "8"},
-    )
+    encode("vp9.webm", "libvpx-vp9", options={"g": "20", "auto-alt-ref": "1", "lag-in-frames": "16", "cpu-used": "8"})
     encode("ntsc.mov", "libx264", rate=Fraction(30000, 1001), options=h264)
     encode("film.mp4", "mpeg4", rate=Fraction(24000, 1001))
     shown = [max(n for n, time in enumerate(VARIABLE) if time <= i) for i in range(VARIABLE[-1] + 1)]
@@ -295,3 +278,35 @@ def ugly_movies(folder):
     ]:
         files[name] = copy_movie(folder / source, folder / name, stamped=stamped), None
     return files
+
+
+def movies_that_cannot_be_opened(folder, movies):
+    """What ends the sentence about each, with its path. movies: ugly_movies"""
+
+    def made(name, codec, change, **options):
+        path = make_movie(folder / name, codec, 5, **options)
+        path.write_bytes(change(path.read_bytes()))
+        return path
+
+    def large(data):
+        where = data.index(b"strf") + 12
+        assert struct.unpack_from("<2i", data, where) == (WIDTH, HEIGHT)
+        return data[:where] + struct.pack("<2i", 30000, 20000) + data[where + 8 :]
+
+    def endless(data):
+        where = data.index(b"\x44\x89\x88") + 3  # the duration, in milliseconds
+        return data[:where] + struct.pack(">d", 1e14) + data[where + 8 :]
+
+    undecodable = make_movie(folder / "undecodable.mkv", "ffv1", 5)
+    with av.open(str(undecodable)) as movie:
+        header = bytes(movie.streams.video[0].codec_context.extradata)
+    undecodable.write_bytes(undecodable.read_bytes().replace(header, header[:-4] + b"\0\0\0\0"))
+    with av.open(str(folder / "song.wav"), "w") as out:
+        _write_silence(out, 1)
+    none, unknown = "no frame of it can be decoded", "its length is unknown; put it into an MP4 or MKV file first"
+    yield "no video stream", folder / "song.wav"
+    yield none, undecodable
+    yield none, cut_file(movies["open.mkv"][0], folder / "head.mkv", 0.12)
+    yield none, made("absurd.avi", "ffv1", large)
+    yield unknown, made("raw.h264", "libx264", bytes, format="h264")
+    yield unknown, made("endless.webm", "libvpx-vp9", endless)

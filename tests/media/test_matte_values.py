@@ -5,8 +5,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 import pytest
 
-from shutter_addon.core.frames.retiming import StripTiming
-from shutter_addon.core.model.mattes import FileFrame, FileFrames, Matte, Ramp
+from shutter_addon.core.model.mattes import FileFrame, Matte, Ramp
 from shutter_addon.media import matte_values
 from shutter_addon.media.errors import MediaError
 from shutter_addon.media.matte_values import MatteValues
@@ -52,13 +51,6 @@ def test_the_matte_of_a_filmed_frame_holds_until_the_next(index, step, offset, f
     (found,) = shown(MatteValues(WIDTH, HEIGHT, step), FileFrame(File("a"), offset), index=index)
     assert found.shape == (HEIGHT, WIDTH)
     assert np.unique(found) == pytest.approx(frame / 10)
-
-
-def test_what_a_strip_of_the_edit_shows():
-    timing = StripTiming("S", 0, 24.0, 11.0, 16.0, 0, 0, 11, True, 1.0)
-    content = FileFrames(File("a"), timing=timing)
-    for frame, expected in ((11, 4), (13, 2), (2, 4), (40, 0)):
-        assert np.unique(shown(MatteValues(WIDTH, HEIGHT), content.at(frame))[0]) == pytest.approx(expected / 10)
 
 
 def test_what_did_not_change_is_not_made_again(monkeypatch):

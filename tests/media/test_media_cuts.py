@@ -27,44 +27,30 @@ def noise(count: int, seed: int, pace: int = 1) -> np.ndarray:
     return np.stack([fine[:, k * pace : k * pace + 320] for k in range(count)])
 
 
-def decided(decide, frames, transfer="srgb") -> list[int]:
+def found(frames, transfer="srgb") -> list[int]:
     pictures = [signature(frame, transfer) for frame in frames]
     sides = [(pictures[max(i - NEIGHBOURS, 0) : i], pictures[i : i + NEIGHBOURS]) for i in range(1, len(pictures))]
-    return [i for i, (before, after) in enumerate(sides, 1) if decide(before, after)]
+    return [i for i, (before, after) in enumerate(sides, 1) if is_cut(before, after)]
 
 
 def cuts(*parts, **kind) -> list[int]:
-    return decided(is_cut, np.concatenate(parts), **kind)
+    return found(np.concatenate(parts), **kind)
 
 
-def lit(frames, gain=1.0, more=0.0):
-    return np.clip(frames * gain + more, 0, 255).astype(np.uint8)
+def test_footage_that_moves_hard_has_no_cuts_and_joined_footage_has_all():
+    """A round of the script that measures it; what it says of shots of one and two frames is in its docstring."""
+    sys.path.insert(0, str(ROOT / "scripts"))
+    import cut_quality
+
+    numbers = cut_quality.measure(1, 3)
+    hard = {"cut: shots of 1 and 2 frames", "cut: on twos and threes"}
+    assert {kind: counts for kind, counts in numbers.items() if counts[1] or (counts[2] and kind not in hard)} == {}
 
 
 def test_films_without_cuts_have_none(film, bunny):
     assert cuts(film) == []
     with open_source(bunny.with_name("pedestrians.avi")) as source:
-        frames = (source.read(i) for i in range(source.count))
-        assert decided(is_cut, frames) == []
-
-
-def test_shots_that_are_joined(film):
-    left, right = film[10:20, 40:140, :178], film[90:100, 20:120, 140:318]
-    assert cuts(left, right) == [10]
-    assert cuts(film[:10], noise(10, 1), noise(10, 2, 3), film[120:130]) == [10, 20, 30]
-    assert cuts(film[1:11], film[120:130]) == [10]  # the same camera, the rabbit elsewhere
-
-
-@pytest.mark.parametrize("length", [3, 4, 5, 8])
-def test_short_shots(film, length):
-    assert cuts(film[:10], noise(length, 3), noise(10, 4)) == [10, 10 + length]
-
-
-@pytest.mark.parametrize("gain", [0.06, 0.15])
-def test_dark_scenes(film, gain):
-    rng = np.random.default_rng(5)
-    frames = np.concatenate([film[:10], film[60:70, :, ::-1]])
-    assert cuts(lit(frames, gain, rng.normal(0, 2, frames.shape))) == [10]
+        assert found(source.read(i) for i in range(source.count)) == []
 
 
 def test_any_type_of_samples_and_light(film):
@@ -75,13 +61,7 @@ def test_any_type_of_samples_and_light(film):
     assert cuts(scene, transfer="linear") == [8]
 
 
-@pytest.mark.parametrize("pace", [4, 16, 40])
-def test_pans_are_no_cuts(pace):
-    wide = np.random.default_rng(7).integers(0, 256, (23, 400, 4)).repeat(8, 0).repeat(8, 1)[:180].astype(np.uint8)
-    assert cuts(np.stack([wide[:, k * pace : k * pace + 320] for k in range(24)])) == []
-
-
-@pytest.mark.parametrize("first", [0, 20, 60, 100])
+@pytest.mark.parametrize("first", [0, 60])
 def test_a_camera_that_jumps_is_no_cut(film, first):
     """By a twentieth of the picture, as where a frame was dropped from a pan, to a fifth."""
     for pace, jump in ((2, 16), (4, 16), (2, 32), (4, 32), (0, 50)):
@@ -104,28 +84,6 @@ def test_cuts_between_pictures_that_are_black_in_part(film, black):
     frames = np.concatenate([film[:10], film[60:70, :, ::-1]])
     frames[black] = 0
     assert cuts(frames) == [10]
-
-
-@pytest.mark.parametrize("length", [1, 2, 3])
-def test_flashes_are_no_cuts(film, length):
-    for more in (80, 200):
-        frames = film[20:44].copy()
-        frames[12 : 12 + length] = lit(frames[12 : 12 + length].astype(int), more=more)
-        assert cuts(frames) == []
-
-
-@pytest.mark.parametrize("length", [3, 12, 24])
-def test_fades_and_dissolves_are_no_cuts(film, length):
-    share = np.clip((np.arange(length + 16) - 8) / length, 0, 1)[:, None, None, None]
-    one, other = film[: length + 16], noise(length + 16, 8)
-    for end in (0, 255, other):
-        assert cuts(lit(one * (1 - share) + end * share)) == []
-        assert cuts(lit(one * share + end * (1 - share))) == []
-
-
-@pytest.mark.parametrize("times", [2, 3])
-def test_motion_on_twos_and_threes_is_no_cut(times):
-    assert cuts(noise(12, 9, 24).repeat(times, 0)) == []
 
 
 def test_small_frames():
@@ -153,21 +111,6 @@ def test_shots_end_at_cuts_and_at_the_clips_ends(film):
         assert shots.around(index, -5, 40) == shot
         assert ShotSource(Frames(frames)).around(index, index - 11, index + 11) == shot
         assert shots.around(index, index, index) == range(28)
-
-
-def test_a_read_frame_is_handed_over(film):
-    source = Frames(film[:20])
-    shots = ShotSource(source)
-    assert shots.lacking(3, 3, 8) == set(range(3, 9))
-    assert shots.around(3, 3, 8) == range(20)
-    assert source.reads == list(range(3, 9))
-    assert shots.handed() == set(source.reads)
-    assert np.array_equal(shots.read(4), film[4])
-    assert source.reads == list(range(3, 9))
-    assert 4 not in shots.handed()
-    assert shots.lacking(3, 3, 8) == set()
-    shots.read(4)
-    assert source.reads[-1] == 4
 
 
 def test_where_a_frame_cannot_be_read_there_is_no_cut(film):
@@ -198,13 +141,3 @@ def test_frames_that_nobody_reads_are_let_go(film):
             shots.around(index, index, index + 3)
             low, high = index - NEIGHBOURS * step, index + 3 + NEIGHBOURS * step
             assert all(low <= i <= high for i in shots.handed())
-
-
-def test_footage_that_moves_hard_has_no_cuts_and_joined_footage_has_all():
-    """A round of the script that measures it; what it says of shots of one and two frames is in its docstring."""
-    sys.path.insert(0, str(ROOT / "scripts"))
-    import cut_quality
-
-    numbers = cut_quality.measure(1, 3)
-    hard = {"cut: shots of 1 and 2 frames", "cut: on twos and threes"}
-    assert {kind: counts for kind, counts in numbers.items() if counts[1] or (counts[2] and kind not in hard)} == {}

@@ -7,7 +7,6 @@ import OpenImageIO
 import pytest
 from footage import COUNT, HEIGHT, WIDTH, cut_file, damage_frame, make_movie, number, picture, rotate_movie, see_through
 
-from shutter_addon.core.frames import light
 from shutter_addon.media import open_source, opening
 
 CLEAR = {"pix_fmt": "argb", "pictures": [see_through(n) for n in range(COUNT)], "array_format": "rgba"}
@@ -51,22 +50,12 @@ def test_frames_are_the_proxys_in_the_footages_size(footage, tmp_path, size, div
 
 
 def test_samples_are_the_footages(tmp_path):
-    """Deep movies, and scene-linear images, whose proxies Blender makes in sRGB."""
+    """Of deep movies; tests/blender/test_proxies.py has images."""
     deep = make_movie(tmp_path / "deep.mkv", "ffv1", pix_fmt="yuv420p10le")
     path = proxy_movie(tmp_path / "proxy.avi")
     with with_proxy(open_source(deep), path) as source, open_source(path) as proxy:
         assert (source.from_proxy, source.dtype) == (True, np.uint16)
         assert np.array_equal(source.read(5), proxy.read(5).astype(np.uint16) * 257)
-    grey = np.full((9, 13, 3), 0.2, np.float32)
-    OpenImageIO.ImageBuf(grey).write(str(tmp_path / "a1.exr"))
-    small = np.full((5, 7, 3), round(float(light.to_encoded(0.5)) * 255), np.uint8)
-    OpenImageIO.ImageBuf(small).write(str(tmp_path / "a1.exr_proxy.jpg"))
-    footage, files = open_source(tmp_path / "a1.exr"), [tmp_path / "a1.exr_proxy.jpg"]
-    with with_proxy(footage, tmp_path, files=files) as source:
-        frame = source.read(0)
-        assert (frame.shape, frame.dtype, source.transfer) == ((9, 13, 4), np.float32, "linear")
-        assert np.abs(frame[..., :3] - 0.5).max() < 0.01
-        assert np.array_equal(frame[..., 3], np.ones((9, 13)))
 
 
 def test_one_that_does_not_fit_is_not_read(footage, tmp_path):

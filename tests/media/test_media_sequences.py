@@ -1,16 +1,15 @@
 """Image sequences: which file an index means, and the samples as the files hold them."""
 
-import os
 import struct
 import zlib
 from pathlib import Path
 
 import numpy as np
 import pytest
-from footage import HEIGHT, WIDTH, number, picture, save_image, see_through
+from footage import number, picture, save_image, see_through
 from OpenImageIO import ImageOutput, ImageSpec
 
-from shutter_addon.media import MediaError, open_source
+from shutter_addon.media import MediaError, open_source, sequence
 from shutter_addon.media.sequence import by_number, numbered_alike
 
 STRAIGHT = {"oiio__UnassociatedAlpha": 1}
@@ -45,21 +44,15 @@ def test_files_are_found_by_number(tmp_path, names, numbers):
         assert source.fps is None
 
 
-@pytest.mark.parametrize(
-    ("name", "number", "wanted"),
-    [
+def test_a_file_by_its_number():
+    for name, frame, wanted in [
         ("a_09.png", 1, "a_10.png"),
         ("s2_t3_09v.tif", 91, "s2_t3_100v.tif"),
         ("7.jp2", 1, "8.jp2"),
         ("x-0100.png", -1, "x-0099.png"),
         ("two\nlines_1.png", 1, "two\nlines_2.png"),
-    ],
-)
-def test_a_file_by_its_number(name, number, wanted):
-    assert by_number(Path("folder 1", name))(number) == Path("folder 1", wanted)
-
-
-def test_a_file_without_a_number():
+    ]:
+        assert by_number(Path("folder 1", name))(frame) == Path("folder 1", wanted)
     assert by_number(Path("folder 1", "still.jp2")) is None
 
 
@@ -86,9 +79,11 @@ def test_gap_holds_the_file_before(tmp_path):
     first = numbered(tmp_path, ["a_03.png", "a_04.png", "a_07.png", "a_09.png"])
     with open_source(first) as source:
         assert shown(source) == [0, 1, 1, 1, 2, 2, 3]
+    with open_source(tmp_path / "a_07.png") as source:  # a sequence starts with the file given
+        assert shown(source) == [2, 2, 3]
 
 
-@pytest.mark.parametrize("stray", ["a_0106.png", "a_20261121.png", f"a_{10**59 + 7}.png"])
+@pytest.mark.parametrize("stray", ["a_0106.png", f"a_{10**59 + 7}.png"])
 def test_a_number_far_off_belongs_to_another_sequence(tmp_path, stray):
     first = numbered(tmp_path, ["a_0003.png", "a_0004.png", stray])
     with open_source(first) as source:
@@ -106,19 +101,12 @@ def test_the_widest_gap(tmp_path):
         assert source.left_out == ""
 
 
-def test_no_longer_than_blender_counts(tmp_path):
-    save_image(tmp_path / "a_0.png", picture(0, 8, 8))
-    for sparse in range(100, 1_048_700, 100):
-        os.link(tmp_path / "a_0.png", tmp_path / f"a_{sparse}.png")
-    with open_source(tmp_path / "a_0.png") as source:
-        assert source.count == 1_048_501
-        assert source.left_out.endswith("too many numbers lie before a_1048600.png")
-
-
-def test_sequence_starts_with_the_file_given(tmp_path):
-    numbered(tmp_path, ["a_03.png", "a_04.png", "a_05.png"])
-    with open_source(tmp_path / "a_04.png") as source:
-        assert shown(source) == [1, 2]
+def test_no_longer_than_blender_counts(tmp_path, monkeypatch):
+    monkeypatch.setattr(sequence, "LONGEST", 1000)
+    first = numbered(tmp_path, ["a_0.png", *(f"a_{number}.png" for number in range(100, 1200, 100))])
+    with open_source(first) as source:
+        assert source.count == 901
+        assert source.left_out.endswith("too many numbers lie before a_1000.png")
 
 
 def test_listed_files_are_frames_by_place(tmp_path):
@@ -129,56 +117,6 @@ def test_listed_files_are_frames_by_place(tmp_path):
             assert shown(source) == [2, 0, 0, 1]
 
 
-@pytest.mark.parametrize(
-    ("name", "samples", "dtype", "transfer", "tolerance"),
-    [
-        ("a.png", "uint8", np.uint8, "srgb", 0),
-        ("a.png", "uint16", np.uint16, "srgb", 0),
-        ("a.tif", "uint8", np.uint8, "srgb", 0),
-        ("a.tif", "uint16", np.uint16, "srgb", 0),
-        ("a.tif", "float", np.float32, "srgb", 0),
-        ("a.exr", "half", np.float16, "linear", 0),
-        ("a.exr", "float", np.float32, "linear", 0),
-        ("a.dpx", "uint16", np.uint16, "linear", 0),
-        ("a.hdr", "float", np.float32, "linear", 0.01),
-        ("a.bmp", "uint8", np.uint8, "srgb", 0),
-    ],
-)
-def test_samples_are_as_stored(tmp_path, name, samples, dtype, transfer, tolerance):
-    stored = picture(5).astype(np.float64) / 255
-    stored = stored.astype(dtype) if np.dtype(dtype).kind == "f" else (stored * np.iinfo(dtype).max).astype(dtype)
-    with open_source(save_image(tmp_path / name, stored, samples)) as source:
-        frame = source.read(0)
-        assert (source.dtype, source.transfer, source.alpha) == (dtype, transfer, "opaque")
-    assert frame.dtype == dtype
-    assert frame.flags.c_contiguous
-    assert np.abs(frame[..., :3].astype(float) - stored.astype(float)).max() <= tolerance
-    assert (frame[..., 3] == (1 if frame.dtype.kind == "f" else np.iinfo(dtype).max)).all()
-
-
-@pytest.mark.parametrize(
-    ("name", "samples", "alpha"),
-    [
-        ("a.png", "uint8", "straight"),
-        ("a.png", "uint16", "straight"),
-        ("a.tif", "uint8", "straight"),
-        ("a.tif", "uint16", "premultiplied"),
-        ("a.exr", "half", "premultiplied"),
-    ],
-)
-def test_colours_are_not_multiplied_by_alpha(tmp_path, name, samples, alpha):
-    stored = see_through(5) / np.float32(255)
-    path = save_image(tmp_path / name, stored, samples, **STRAIGHT)
-    with open_source(path) as source:
-        frame = source.read(0)
-        assert source.alpha == alpha
-    with open_source(path, alpha="straight") as source:
-        assert source.alpha == "straight"
-        assert np.array_equal(source.read(0), frame)
-    scale = 1 if frame.dtype.kind == "f" else np.iinfo(frame.dtype).max
-    assert np.abs(frame.astype(float) / scale - stored).max() < 0.0005
-
-
 def test_data_windows_that_differ(tmp_path):
     for n, size in enumerate([(128, 64), (100, 40)]):
         save_image(tmp_path / f"a_{n}.exr", picture(n, *size) / 255, "half", at=(n, n), display=(0, 0, 160, 90))
@@ -187,27 +125,19 @@ def test_data_windows_that_differ(tmp_path):
         source.read(1)
 
 
-ALPHAS = {
-    "first alone": (1, 0, 0),
-    "last alone": (0, 0, 1),
-    "middle alone": (0, 1, 0),
-    "none": (0, 0, 0),
-}
-
-
-@pytest.mark.parametrize("alphas", ALPHAS)
+@pytest.mark.parametrize("alphas", [(1, 0, 0), (0, 0, 1), (0, 1, 0), (0, 0, 0)])
 @pytest.mark.parametrize("colours", [1, 3])
 @pytest.mark.parametrize("suffix", [".png", ".tif", ".exr"])
 def test_one_file_with_alpha_among_others(tmp_path, suffix, colours, alphas):
-    for n, alpha in enumerate(ALPHAS[alphas]):
+    for n, alpha in enumerate(alphas):
         channels = [*range(colours), 3][: colours + alpha]
         names = {"names": ["RGBA"[i] if colours == 3 else "YYYA"[i] for i in channels]} if suffix == ".exr" else {}
         kind = "half" if suffix == ".exr" else "uint8"
         save_image(tmp_path / f"a_{n}{suffix}", see_through(n)[..., channels] / np.float32(255), kind, **names)
     with open_source(tmp_path / f"a_0{suffix}") as source:
-        assert source.alpha == ("opaque" if alphas == "none" else "premultiplied" if suffix == ".exr" else "straight")
+        assert source.alpha == ("opaque" if not any(alphas) else "premultiplied" if suffix == ".exr" else "straight")
         top = np.iinfo(source.dtype).max if source.dtype.kind == "u" else 1
-        for n, alpha in enumerate(ALPHAS[alphas]):
+        for n, alpha in enumerate(alphas):
             stored = see_through(n)[..., 3] / 255 if alpha else 1
             assert np.abs(source.read(n)[..., 3] / top - stored).max() < 0.001
 
@@ -224,23 +154,10 @@ def test_a_file_that_gets_alpha(tmp_path):
     ("names", "wanted"),
     [
         (["R", "G", "B", "A", "Z"], [0, 1, 2, 3]),
-        (["fog.R", "fog.G", "fog.B", "R", "G", "B"], [3, 4, 5]),
-        (
-            [
-                "V.Normal.X",
-                "V.Glow.R",
-                "V.Glow.G",
-                "V.Glow.B",
-                "V.Combined.R",
-                "V.Combined.G",
-                "V.Combined.B",
-            ],
-            [4, 5, 6],
-        ),
+        (["V.Normal.X", *(f"V.{layer}.{c}" for layer in ("Glow", "Combined") for c in "RGB")], [4, 5, 6]),
         (["Z", "mask.Y"], [1]),
         (["l.R", "l.G", "l.B", "l.A", "R", "G", "B"], [4, 5, 6]),
         (["b.R", "b.G", "b.B", "b.A", "a.R", "a.G", "a.B"], [4, 5, 6]),
-        (["z.Combined.R", "z.Combined.G", "z.Combined.B", "a.R", "a.G", "a.B"], [3, 4, 5]),
         (["Normal.X", "Normal.Y", "Normal.Z", "mask.Y"], [0, 1, 2]),
     ],
 )
@@ -273,23 +190,14 @@ def test_palette_becomes_rgba(tmp_path):
         return struct.pack(">I", len(data)) + name + data + struct.pack(">I", zlib.crc32(name + data))
 
     header = struct.pack(">2I5B", 2, 1, 8, 3, 0, 0, 0)  # 2 × 1 pixels with a palette of red and half clear green
-    chunks = {
-        b"IHDR": header,
-        b"PLTE": b"\xff\0\0\0\xff\0",
-        b"tRNS": b"\xff\x80",
-        b"IDAT": zlib.compress(b"\0\0\1"),
-    }
+    chunks = {b"IHDR": header, b"PLTE": b"\xff\0\0\0\xff\0", b"tRNS": b"\xff\x80", b"IDAT": zlib.compress(b"\0\0\1")}
     data = b"".join(chunk(name, data) for name, data in {**chunks, b"IEND": b""}.items())
     (tmp_path / "a.png").write_bytes(b"\x89PNG\r\n\x1a\n" + data)
     with open_source(tmp_path / "a.png") as source:
         assert source.read(0).tolist() == [[[255, 0, 0, 255], [0, 255, 0, 128]]]
 
 
-def test_other_colour_spaces_become_scene_linear(tmp_path, blender_config):
-    levels = np.linspace(0, 1, WIDTH, dtype=np.float32) * np.ones((HEIGHT, 1), np.float32)
-    path = save_image(tmp_path / "a.png", np.repeat(levels[..., None], 3, axis=2), "uint16")
-    with open_source(path, colorspace="Linear Rec.2020", config=blender_config) as source:
-        assert (source.dtype, source.transfer, source.width) == (np.float32, "linear", WIDTH)
-        assert np.abs(source.read(0)[..., :3] - levels[..., None]).max() < 1e-4  # grey stays grey
+def test_an_unknown_colour_space(tmp_path, blender_config):
+    path = save_image(tmp_path / "a.png", picture(0))
     with pytest.raises(MediaError, match=r"^a.png: unknown colour space Nonsense$"):
         open_source(path, colorspace="Nonsense", config=blender_config)

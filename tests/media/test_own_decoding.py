@@ -3,7 +3,6 @@
 import os
 import select
 import signal
-import struct
 import subprocess
 import sys
 from concurrent.futures import ThreadPoolExecutor
@@ -11,18 +10,16 @@ from contextlib import ExitStack, suppress
 from fractions import Fraction
 from pathlib import Path
 
-import av
 import numpy as np
 import pytest
-from footage import cut_file, damage_frame, make_movie, number, picture, save_image
+from footage import cut_file, damage_frame, make_movie, movies_that_cannot_be_opened, number, picture, save_image
 
 from shutter_addon.media import MediaError, blender_movie, files, open_source
 from shutter_addon.media.blender_movie import BlenderMovie, frame_rate
 from shutter_addon.media.opening import movie_channel, open_channel
 
 ROOT = Path(__file__).parents[2]
-FOLDER = ROOT / "shutter_addon" / "blender" / "data"
-SCRIPT = FOLDER / "decoding_process.py"
+SCRIPT = ROOT / "shutter_addon" / "blender" / "data" / "decoding_process.py"
 SAID = ["path", "width", "height", "count", "fps", "dtype", "transfer", "alpha", "options", "has_audio"]
 # Levels of 65535: of RGB with 16 bits, Blender's own way to floats loses so many.
 DEEP = 33
@@ -60,23 +57,31 @@ def assert_same(path, *, deinterlace=False):
             assert most <= (DEEP if theirs.dtype == np.uint16 else 0), (path.name, index, most)
 
 
-def test_ugly_movies_are_those_that_pyav_decodes(movies):
-    for path, _numbers in movies.values():
+def test_where_no_pipe_may_be_enlarged_movies_are_read(movies, monkeypatch):
+    """As on Linux, for a user who has many large ones."""
+    fcntl = pytest.importorskip("fcntl", reason="other systems have no such call")
+
+    def refused(*_):
+        raise PermissionError
+
+    monkeypatch.setattr(fcntl, "fcntl", refused)
+    blender_movie.lend(None)
+    blender_movie.lend([sys.executable, str(SCRIPT)])
+    path, numbers = movies["b_frames.mp4"]
+    with BlenderMovie(path) as source:
+        assert number(source.read(2)) == numbers[2]
+
+
+def test_movies_are_those_that_pyav_decodes(movies, coloured, deinterlaced):
+    """Colours, depths, alpha and turned ones as well."""
+    for path in (*(path for path, _numbers in movies.values()), *coloured.values()):
         assert_same(path)
-
-
-def test_colours_depths_alpha_and_turned_movies_are_those_that_pyav_decodes(coloured):
-    for path in coloured.values():
-        assert_same(path)
-
-
-def test_deinterlaced_movies_are_those_that_pyav_decodes(deinterlaced):
     for path in deinterlaced.values():
         assert_same(path, deinterlace=True)
 
 
 def test_many_movies_at_a_time_and_names_of_all_kinds(tmp_path):
-    names = ["a b.mp4", "Größe.mp4", "映画 ().mp4", "-x.mp4", "'q'.mp4", "%04d#1.mp4", "10.mp4", "11.mp4", "12.mp4"]
+    names = ["a b.mp4", "Größe.mp4", "映画 ().mp4", "-x.mp4", "'q'.mp4", "%04d#1.mp4", "10.mp4", "11.mp4"]
     with ExitStack() as opened:
         sources = []
         for place, name in enumerate(names):
@@ -85,16 +90,9 @@ def test_many_movies_at_a_time_and_names_of_all_kinds(tmp_path):
             sources.append(opened.enter_context(BlenderMovie(path)))
         for index in (0, 1, 2):
             assert [number(source.read(index)) for source in sources] == [20 * n + index for n in range(len(names))]
-
-
-def test_threads_ask_at_the_same_time(movies):
-    def read(name):
-        with BlenderMovie(movies[name][0]) as source:
-            return [number(source.read(index)) for index in range(source.count)]
-
-    names = ["b_frames.mp4", "open.mkv", "mpeg4.mp4", "ntsc.mov"]
-    with ThreadPoolExecutor(4) as threads:
-        assert list(threads.map(read, names)) == [movies[name][1] for name in names]
+        with ThreadPoolExecutor(4) as threads:
+            first, second = threads.map(lambda source: [number(source.read(n)) for n in (0, 2, 1)], sources[:2])
+        assert (first, second) == ([0, 2, 1], [20, 22, 21])
 
 
 def test_arrays_belong_to_the_caller_and_a_closed_movie_is_read_again(movies):
@@ -122,38 +120,21 @@ def test_another_file_in_its_place_is_one_sentence(tmp_path):
             source.read(3)
 
 
-def hostile(folder, movies):
-    """Files that are no movies, or hardly. Blender may read some of them, as PyAV does."""
-    sound, still = folder / "sound.mp4", folder / "still.mp4"
-    with av.open(str(sound), "w") as out:
-        stream = out.add_stream("aac", rate=8000, layout="mono")
-        frame = av.AudioFrame.from_ndarray(np.zeros((1, 1024), np.float32), format="fltp", layout="mono")
-        frame.sample_rate = 8000
-        out.mux(stream.encode(frame))
-        out.mux(stream.encode())
-    save_image(folder / "still.png", picture(1)).rename(still)
-    absurd = make_movie(folder / "absurd.avi", "ffv1", 5)
-    data = absurd.read_bytes()
-    where = data.index(b"strf") + 12
-    absurd.write_bytes(data[:where] + struct.pack("<2i", 30000, 20000) + data[where + 8 :])
-    noise = folder / "noise.mkv"
-    noise.write_bytes(np.random.default_rng(3).bytes(9000))
-    head = cut_file(movies["open.mkv"][0], folder / "head.mkv", 0.12)
-    damaged = damage_frame(movies["b_frames.mp4"][0], folder / "damaged.mp4", 9)
-    raw = make_movie(folder / "raw.h264", "libx264", format="h264")
-    return sound, still, absurd, noise, head, damaged, raw, cut_file(movies["open.mkv"][0], folder / "cut.mkv", 0.5)
-
-
 def test_hostile_files_are_pictures_or_one_sentence_and_all_else_goes_on(movies, tmp_path):
+    """Blender may read some of them, as PyAV does."""
+    noise, still = tmp_path / "noise.mkv", save_image(tmp_path / "still.png", picture(1)).rename(tmp_path / "still.mp4")
+    noise.write_bytes(np.random.default_rng(3).bytes(9000))
+    damaged = damage_frame(movies["b_frames.mp4"][0], tmp_path / "damaged.mp4", 9)
+    cut = cut_file(movies["open.mkv"][0], tmp_path / "cut.mkv", 0.5)
     refused = {}
-    for path in hostile(tmp_path, movies):
+    for path in (noise, still, damaged, cut, *(path for _, path in movies_that_cannot_be_opened(tmp_path, movies))):
         try:
             with BlenderMovie(path) as source:
                 for index in (0, source.count // 2, source.count - 1):
                     assert source.read(index).shape == (source.height, source.width, 4)
         except MediaError as error:
             refused[path.name] = str(error)
-    assert [*refused] == ["sound.mp4", "still.mp4", "absurd.avi", "noise.mkv", "head.mkv", "raw.h264"]
+    assert [*refused] == ["noise.mkv", "still.mp4", "song.wav", "undecodable.mkv", "head.mkv", "absurd.avi", "raw.h264"]
     for name, sentence in refused.items():
         begins = f"{name}: cannot be read as a movie (Blender ", f"{name}: its length is unknown"
         assert sentence.startswith(begins), sentence
@@ -205,11 +186,62 @@ def test_without_pyav_movies_are_opened_so(coloured):
             opened(stream=1)
 
 
+@linux
+def test_memory_stays_bounded_and_a_blender_that_was_killed_is_followed_by_another(bunny):
+    def resident():
+        return int(Path(f"/proc/{process()}/statm").read_text().split()[1]) * 4096
+
+    with BlenderMovie(bunny) as source:
+        for index in range(10):
+            last = source.read(index)
+        before = resident()
+        for index in range(10, 40):
+            source.read(index)
+        assert resident() - before < 20 * last.nbytes  # 30 kept ones would be 120, as floats
+        os.kill(process(), signal.SIGKILL)
+        assert np.array_equal(source.read(9), last)
+
+
+def test_an_answer_that_nobody_waited_for_is_not_the_next_one(movies, monkeypatch):
+    class Interrupted:
+        def result(self, _timeout):
+            raise KeyboardInterrupt
+
+    path, numbers = movies["b_frames.mp4"]
+    start = blender_movie.threads.start
+    with BlenderMovie(path) as source:
+        assert number(source.read(1)) == numbers[1]
+        monkeypatch.setattr(blender_movie.threads, "start", lambda *given: (start(*given), Interrupted())[1])
+        with pytest.raises(KeyboardInterrupt):
+            source.read(3)
+        monkeypatch.undo()
+        assert number(source.read(7)) == numbers[7]
+
+
+@pytest.mark.skipif(os.name != "posix", reason="processes are stopped by signals there alone")
+def test_a_blender_that_was_stopped_is_followed_by_another(movies, monkeypatch):
+    with BlenderMovie(movies["open.mp4"][0]) as source, ThreadPoolExecutor(1) as pool:
+        before, stopped = source.read(3), process()
+        monkeypatch.setattr(blender_movie, "ANSWERING", 1)
+        monkeypatch.setattr(blender_movie, "ENDING", 0.1)
+        os.kill(stopped, signal.SIGSTOP)
+        try:
+            again = pool.submit(source.read, 3).result(90)
+        finally:
+            with suppress(ProcessLookupError):
+                os.kill(stopped, signal.SIGCONT)
+        assert (again == before).all()
+        assert process() != stopped
+
+
 @pytest.mark.usefixtures("_no_pyav")
 def test_without_a_blender_movies_are_refused(coloured):
     blender_movie.lend(None)
     with pytest.raises(MediaError, match=r"^bt709\.mp4: movies need the Python package PyAV"):
         open_source(coloured["bt709.mp4"])
+
+
+SILENT = [sys.executable, "-c", "import time; time.sleep(600)"]
 
 
 @pytest.mark.parametrize(
@@ -218,23 +250,15 @@ def test_without_a_blender_movies_are_refused(coloured):
         (["/nowhere/blender"], "cannot be started: No such file or directory"),
         ([sys.executable, "-c", "pass"], "has ended"),
         ([sys.executable, "-c", "import sys; print(sys.argv[-1])"], "has ended"),
+        (SILENT, r"is not ready after 4 seconds"),
     ],
 )
-def test_a_blender_that_does_not_answer_is_one_sentence(coloured, command, reason):
+def test_a_blender_that_does_not_answer_is_killed_and_one_sentence(coloured, monkeypatch, command, reason):
+    monkeypatch.setattr(blender_movie, "STARTING", 4)
+    monkeypatch.setattr(blender_movie, "ENDING", 0.1)
     blender_movie.lend(command)
     sentence = rf"^bt709\.mp4: cannot be read as a movie \(the Blender that decodes it {reason}\)$"
     with pytest.raises(MediaError, match=sentence):
-        BlenderMovie(coloured["bt709.mp4"])
-
-
-SILENT = [sys.executable, "-c", "import time; time.sleep(600)"]
-
-
-def test_a_blender_that_is_never_ready_is_killed_and_one_sentence(coloured, monkeypatch):
-    monkeypatch.setattr(blender_movie, "STARTING", 0.3)
-    monkeypatch.setattr(blender_movie, "ENDING", 0.1)
-    blender_movie.lend(SILENT)
-    with pytest.raises(MediaError, match=r"\(the Blender that decodes it is not ready after 0\.3 seconds\)$"):
         BlenderMovie(coloured["bt709.mp4"])
     assert blender_movie._decoder.process is None  # nobody else is told whether one runs
 
@@ -250,21 +274,6 @@ def test_nobody_waits_for_an_answer_that_does_not_come(coloured, monkeypatch):
         blender_movie.lend(None)
         with pytest.raises(MediaError, match=r"\(no Blender decodes it any more\)$"):
             asked.result(20)
-
-
-def test_where_no_pipe_may_be_enlarged_movies_are_read(movies, monkeypatch):
-    """As on Linux, for a user who has many large ones."""
-    fcntl = pytest.importorskip("fcntl", reason="other systems have no such call")
-
-    def refused(*_):
-        raise PermissionError
-
-    monkeypatch.setattr(fcntl, "fcntl", refused)
-    blender_movie.lend(None)
-    blender_movie.lend([sys.executable, str(SCRIPT)])
-    path, numbers = movies["b_frames.mp4"]
-    with BlenderMovie(path) as source:
-        assert number(source.read(2)) == numbers[2]
 
 
 LEAVING = """
@@ -288,71 +297,6 @@ def test_no_blender_is_begun_to_close_a_movie(coloured, tmp_path, monkeypatch):
     source.close()
     source.close()
     assert begun.read_text() == "begun "
-
-
-class InterruptedTestError(BaseException):
-    """As KeyboardInterrupt."""
-
-
-INTERRUPTING = f"""
-import os, signal, sys
-sys.path[:0] = [{str(FOLDER)!r}]
-import decoding_process
-answer = decoding_process._answer
-
-def interrupting(movies, wanted, **which):
-    if wanted == 3:
-        os.kill(os.getppid(), signal.SIGUSR1)
-        while not os.path.exists(sys.argv[1]):
-            pass
-    return answer(movies, wanted, **which)
-
-decoding_process._answer = interrupting
-decoding_process.main()
-"""
-
-
-@linux
-def test_an_answer_that_nobody_waited_for_is_not_the_next_one(movies, tmp_path):
-    def interrupt(*_):
-        (tmp_path / "interrupted").touch()
-        raise InterruptedTestError
-
-    before = signal.signal(signal.SIGUSR1, interrupt)
-    blender_movie.lend([sys.executable, "-c", INTERRUPTING, str(tmp_path / "interrupted")])
-    path, numbers = movies["b_frames.mp4"]
-    try:
-        with BlenderMovie(path) as source:
-            assert number(source.read(1)) == numbers[1]
-            with pytest.raises(InterruptedTestError):
-                source.read(3)
-            assert number(source.read(7)) == numbers[7]
-    finally:
-        signal.signal(signal.SIGUSR1, before)
-
-
-@linux
-def test_a_blender_that_was_killed_is_followed_by_another(movies):
-    path, numbers = movies["b_frames.mp4"]
-    with BlenderMovie(path) as source:
-        source.read(0)
-        os.kill(process(), signal.SIGKILL)
-        assert number(source.read(4)) == numbers[4]
-
-
-@pytest.mark.skipif(os.name != "posix", reason="processes are stopped by signals there alone")
-def test_a_blender_that_was_stopped_is_followed_by_another(movies, monkeypatch):
-    monkeypatch.setattr(blender_movie, "ANSWERING", 20)  # in which another one starts, too
-    with BlenderMovie(movies["open.mp4"][0]) as source, ThreadPoolExecutor(1) as pool:
-        before, stopped = source.read(3), process()
-        os.kill(stopped, signal.SIGSTOP)
-        try:
-            again = pool.submit(source.read, 3).result(90)
-        finally:
-            with suppress(ProcessLookupError):
-                os.kill(stopped, signal.SIGCONT)
-        assert (again == before).all()
-        assert process() != stopped
 
 
 def assert_ends(pid):
@@ -386,17 +330,3 @@ def test_it_ends_with_the_process_that_asked_however_that_ends(movies):
                 parent.send_signal(end)
             parent.stdin.close()
         assert_ends(pid)
-
-
-@linux
-def test_memory_stays_bounded(bunny):
-    def resident():
-        return int(Path(f"/proc/{process()}/statm").read_text().split()[1]) * 4096
-
-    with BlenderMovie(bunny) as source:
-        for index in range(15):
-            source.read(index)
-        before = resident()
-        for index in range(15, 75):
-            source.read(index)
-        assert resident() - before < 20 * source.read(0).nbytes  # 60 kept ones would be 240, as floats

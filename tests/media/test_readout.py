@@ -5,7 +5,7 @@ import pytest
 
 from shutter_addon.media import readout
 
-WIDTH, HEIGHT, COUNT = 320, 240, 24
+WIDTH, HEIGHT, COUNT = 320, 240, 14
 POLES = ((40, 9, 0.02), (90, 14, -0.03), (150, 7, 0.0), (215, 12, 0.05), (270, 10, -0.01), (330, 8, 0.0))
 
 
@@ -24,10 +24,10 @@ def pictures(share, motion=lambda t: 35 * np.sin(t / 3), *, poles=POLES, noise=0
         yield np.clip(np.rint(picture + random.normal(0, noise, picture.shape)), 0, 255).astype(np.uint8)
 
 
-@pytest.mark.parametrize("share", [0.1, 0.2, 0.4, 0.6, 0.8, -0.5])
+@pytest.mark.parametrize("share", [0, 0.1, 0.8, -0.5])
 def test_a_readout_is_found(share):
     found = readout.of_pictures(list(pictures(share, noise=2)))
-    assert found == pytest.approx(share, rel=0.1)
+    assert found == pytest.approx(share, rel=0.05, abs=0.01)
 
 
 def test_of_a_camera_that_shakes():
@@ -37,10 +37,6 @@ def test_of_a_camera_that_shakes():
         return 9 * np.sin(1.1 * t) + 12 * np.sin(0.37 * t + 1) + 5 * np.sin(1.9 * t + 2)
 
     assert readout.of_pictures(list(pictures(0.5, shaken, noise=2))) == pytest.approx(0.5, rel=0.1)
-
-
-def test_where_all_rows_are_read_at_once_it_is_none():
-    assert abs(readout.of_pictures(list(pictures(0.0, noise=2)))) < 0.02
 
 
 def test_of_things_that_pass_each_at_its_own_speed():

@@ -1,19 +1,18 @@
 """Tracking against films whose motion is known: a part of one picture moves over another one."""
 
-from dataclasses import replace
 from pathlib import Path
 
 import cv2
 import numpy as np
 import pytest
 
+from shutter_addon.core.frames import light
 from shutter_addon.core.frames.frame_source import FrameSource
-from shutter_addon.core.model import motions, scribbles
+from shutter_addon.core.model import scribbles
 from shutter_addon.core.model.effect import Drawings, Moves, Region
 from shutter_addon.core.model.keyframes import Constant, Keys
 from shutter_addon.core.model.motions import Similarity
 from shutter_addon.media import open_source, pursuit, tracking
-from shutter_addon.media.cuts import ShotSource
 from shutter_addon.media.footage import Footage
 
 ASSETS = Path(__file__).parents[2] / "assets"
@@ -161,8 +160,9 @@ PATHS = {
 }
 
 
-@pytest.mark.parametrize("kind", EVERY)
-@pytest.mark.parametrize("name", PATHS)
+@pytest.mark.parametrize(
+    ("name", "kind"), [("shake", "line"), ("shake", "lasso"), ("zoom and turn", "lasso"), ("blur", "line")]
+)
 def test_what_is_tracked_lies_within_a_pixel(subject, ground, name, kind):
     path, shutter, least = PATHS[name]
     source, truth = film(subject, ground, path, 24, 10, shutter=shutter)
@@ -184,15 +184,9 @@ def test_a_subject_that_was_covered_is_found_again(subject, ground):
     assert max(off.values()) <= 3  # a straight way across what nobody saw
 
 
-@pytest.fixture(scope="module")
-def passing(subject, ground):
-    """A subject that goes by, covered at the frames 10 to 14, and its true motion since the frame 4."""
-    return film(subject, ground, lambda t: (2.5 * t, 0.5 * t), 24, 4, covered=range(10, 15))
-
-
 def test_a_subject_that_stays_covered_ends_it(subject, ground, monkeypatch):
     monkeypatch.setattr(tracking, "PATIENCE", 6)
-    source, truth = film(subject, ground, lambda t: (2.0 * t,), 24, 2, covered=range(8, 24))
+    source, truth = film(subject, ground, lambda t: (2.0 * t,), 16, 2, covered=range(8, 16))
     tracked, faults = followed(source, "lasso", 2)
     assert faults == {8: pursuit.COVERED}
     assert sorted(tracked) == list(range(8))
@@ -230,7 +224,7 @@ def figures(ground, ways, bends=0.0):
     frames, (y, x) = [], np.mgrid[:HEIGHT, :WIDTH].astype(np.float32)
     mottled = cv2.GaussianBlur(np.random.default_rng(5).normal(0, 1, (HEIGHT, WIDTH, 3)).astype(np.float32), (0, 0), 2)
     subject = 128 + 45 * mottled / mottled.std()
-    for n in range(40):
+    for n in range(36):
         sway = x + np.float32(bends) * (np.sin(y / 14 + n / 3) - np.sin(y / 14)) * min(n / 10, 1)
         look, mask = (cv2.remap(each, sway, y, cv2.INTER_LINEAR) for each in (subject, ellipse(MIDDLE, (20, 60))))
         frame = ground.astype(np.float32)
@@ -267,21 +261,18 @@ def test_a_subject_that_bends_is_not_lost(ground):
     tracked, faults = followed(source, "line", 0, region=region("line", drawn=UPRIGHT, location=(-80 / WIDTH, 0.0)))
     assert not faults
     assert max(abs(each.placement.location[0] * WIDTH - 4.0 * n + 80) for n, each in tracked.items()) < 12
-    assert len(sure(tracked)) >= 38
+    assert len(sure(tracked)) >= 34
 
 
-@pytest.mark.parametrize(
-    ("sure", "expected"),
-    [
+def test_where_a_subject_is_lost():
+    for sure, expected in [
         ([1.0] * 20, None),
         ([1.0] * 5 + [0.2] * 7 + [1.0] * 8, None),  # covered for a moment
         ([1.0] * 5 + [0.2] * 8 + [1.0] * 7, 15),
         ([1.0] * 17 + [0.2] * 3, 27),
         ([0.2] * 4 + [1.0] * 16, 13),  # backward
-    ],
-)
-def test_where_a_subject_is_lost(sure, expected):
-    assert pursuit.lost(np.arange(10, 30), np.array(sure)) == expected
+    ]:
+        assert pursuit.lost(np.arange(10, 30), np.array(sure)) == expected
 
 
 @pytest.mark.parametrize("kind", EVERY)
@@ -295,15 +286,6 @@ def test_a_pattern_that_repeats_itself_is_never_sure(ground, kind):
     tracked, _ = followed(source, kind, 4)
     assert max(errors(tracked, truth, kind).values()) > 10
     assert sure(tracked) == {4}
-
-
-def test_it_ends_at_a_cut_on_both_sides(subject, ground):
-    whole, _ = film(subject, ground, lambda t: (t,), 8, 4)
-    others = [np.roll(ground[:, ::-1], 2 * n, axis=1) for n in range(6)]
-    joined = ShotSource(Film([*(255 - frame for frame in others), *whole.frames, *others]))
-    tracked, faults = followed(joined, "lasso", 10)
-    assert sorted(tracked) == list(range(6, 14))
-    assert faults == {5: tracking.SHOT_ENDS, 14: tracking.SHOT_ENDS}
 
 
 @pytest.mark.parametrize("change", ["location", "rotation"])
@@ -331,31 +313,17 @@ def test_between_two_keys_both_count(subject, ground):
         assert tracked[frame].placement.location[0] == pytest.approx(expected, abs=0.7 / WIDTH)
 
 
-@pytest.mark.parametrize("ease", ["linear", "bezier", "constant"])
-def test_a_shape_that_is_redrawn_meanwhile_stays_on_its_subject(subject, ease):
-    """A still film: the shape's own way from drawing to drawing is made up for."""
-    drawn = [stroke + shift for shift in ((0, 0), (0.15, 0.05)) for stroke in strokes("lasso")]
-    drawings = Drawings("r", (2.0, 9.0), (drawn[:1], drawn[1:]), (ease,) * 2, WIDTH / HEIGHT)
-    given = replace(region("lasso"), drawings=drawings)
-    source = Film([subject if n not in (4, 5) else subject[:, ::-1] for n in range(10)])
-    tracked, _ = followed(source, "lasso", 2, region=given)
-    assert sure(tracked) == set(range(10)) - {4, 5}
-    for frame, each in tracked.items():
-        off = motions.centre(given.drawings.at(frame)) + each.placement.location - motions.centre(drawn[:1])
-        assert np.hypot(*(off * SIZE)) / PIXEL <= 0.5
-
-
 def test_the_order_of_reading_and_threads_change_no_bit(subject, ground, tmp_path):
-    source, _ = film(subject, ground, shake, 14, 6)
+    source, _ = film(subject, ground, shake, 10, 6)
     first = followed(source, "lasso", 6)
     threads = cv2.getNumThreads()
     try:
         cv2.setNumThreads(1)
         cv2.setRNGSeed(5)
         footage = Footage(source, lambda frame: frame)
-        for frame in (13, 3, 8, 0):
+        for frame in (9, 3, 8, 0):
             footage.picture(frame)
-        again = list(tracking.RegionTrack(region("lasso")).follow(footage, 6, range(14)))
+        again = list(tracking.RegionTrack(region("lasso")).follow(footage, 6, range(10)))
     finally:
         cv2.setNumThreads(threads)
     assert again == list(first[0].values())
@@ -367,20 +335,7 @@ def test_backward_a_source_is_read_upwards(subject, ground):
     assert source.reads == [9, *range(9)]
 
 
-def test_what_a_retimed_strip_shows_is_tracked(subject, ground):
-    """Reversed, every frame twice."""
-    source, truth = film(subject, ground, lambda t: (3 * t, 0, t), 8, 7)
-    footage = Footage(source, lambda frame: 7 - (frame - 100) // 2)
-    found = tracking.RegionTrack(region("line")).follow(footage, 100, range(100, 116))
-    tracked = {each.frame: each for each in found}
-    shown = {frame: truth[7 - (frame - 100) // 2] for frame in tracked}
-    assert sorted(tracked) == list(range(100, 116))
-    assert max(errors(tracked, shown, "line").values()) <= 1
-
-
 def test_deep_and_linear_pictures_look_alike(subject):
-    from shutter_addon.core.frames import light
-
     deep = Film([subject.astype(np.uint16) * 257])
     linear = Film([light.to_linear(subject / 255).astype(np.float32)])
     linear.transfer = "linear"
@@ -398,8 +353,7 @@ class CutOut(Film):
         return self.frames[index]
 
 
-@pytest.mark.parametrize("kind", EVERY)
-@pytest.mark.parametrize("dtype", [np.uint8, np.float32])
+@pytest.mark.parametrize(("kind", "dtype"), [("line", np.uint8), ("lasso", np.float32)])
 def test_colours_that_are_hidden_mislead_nobody(subject, ground, kind, dtype):
     """A weak subject that moves; beyond its edge, colours of a still ground with an alpha of 0."""
     weak, mask = cv2.GaussianBlur(subject, (0, 0), 3), ellipse(MIDDLE, RADII)
@@ -418,22 +372,9 @@ def test_colours_that_are_hidden_mislead_nobody(subject, ground, kind, dtype):
     assert max(errors(tracked, truth, kind).values()) <= 0.5
 
 
-FAR = [np.array([[3.0, 3.0], [4.0, 4.0]])]
-
-
-@pytest.mark.parametrize(
-    ("given", "start", "frames", "fault"),
-    [
-        ({}, 9, range(3), tracking.NOT_SHOWN),
-        ({}, 1, range(1, 2), tracking.ALONE),
-        ({"drawn": []}, 1, range(3), tracking.EMPTY),
-        ({"drawn": FAR}, 1, range(3), tracking.OUTSIDE),
-        ({"flat": True}, 1, range(3), tracking.FEW),
-    ],
-)
-def test_what_cannot_be_tracked_is_one_sentence(subject, given, start, frames, fault):
-    flat = np.random.default_rng(0).normal(128, 2, (3, HEIGHT, WIDTH, 3)).round().astype(np.uint8)
-    source = Film(list(flat) if given.pop("flat", False) else [subject] * 3)
-    with pytest.raises(tracking.TrackingError) as raised:
-        tracking.RegionTrack(region("line", **given)).follow(Footage(source, lambda frame: frame), start, frames)
-    assert str(raised.value) == fault
+def test_what_cannot_be_tracked_is_one_sentence(subject):
+    """Where regions have strokes; tests/blender/test_track_command.py has all else."""
+    footage = Footage(Film([subject] * 3), lambda frame: frame)
+    for given, start, fault in ((region("line"), 9, tracking.NOT_SHOWN), (region("line", drawn=[]), 1, tracking.EMPTY)):
+        with pytest.raises(tracking.TrackingError, match=f"^{fault}$"):
+            tracking.RegionTrack(given).follow(footage, start, range(3))
