@@ -72,15 +72,20 @@ def separated(colors: np.ndarray, matte: np.ndarray) -> tuple[np.ndarray, np.nda
     height = len(matte)
     wide, near = max(round(height * WIDE), 2), max(round(height * NEAR), 1)
     box = tuple(_around(mixed.any(axis=1 - axis), wide + near) for axis in (0, 1))
-    picture, m, inside = colors[box], matte[box][..., None].astype(np.float32), mixed[box]
-    first = second = picture
-    for radius in (wide, near):
-        first, second = _surroundings(first, second, m, radius)
-        left = picture - m * first - (1 - m) * second
-        first, second = first + m * left, second + (1 - m) * left
-    own[box][inside] = np.maximum(first, 0)[inside]
-    behind[box][inside] = np.maximum(second, 0)[inside]
+    # Planes of colours (C, h, w), which NumPy sums faster than pixels.
+    picture, m = np.moveaxis(colors[box], -1, 0).copy(), matte[box].astype(np.float32)
+    first, second = _nearer(picture, m, *_surroundings(picture, picture, m, wide, np.ogrid[: len(m), : m.shape[1]]))
+    inside = mixed[box]
+    first, second = _nearer(picture[:, inside], m[inside], *_surroundings(first, second, m, near, inside.nonzero()))
+    own[box][inside] = np.maximum(first, 0).T
+    behind[box][inside] = np.maximum(second, 0).T
     return own, behind
+
+
+def _nearer(picture: np.ndarray, matte: np.ndarray, own: np.ndarray, behind: np.ndarray) -> tuple[np.ndarray, ...]:
+    """Return subject and background colours (C, …) corrected so that they mix to the picture."""
+    left = picture - matte * own - (1 - matte) * behind
+    return own + matte * left, behind + (1 - matte) * left
 
 
 def _around(mixed: np.ndarray, reach: int) -> slice:
@@ -89,26 +94,37 @@ def _around(mixed: np.ndarray, reach: int) -> slice:
     return slice(max(int(places[0]) - reach, 0), int(places[-1]) + reach + 1)
 
 
-def _surroundings(own: np.ndarray, behind: np.ndarray, matte: np.ndarray, radius: int) -> tuple[np.ndarray, np.ndarray]:
-    """Return means (h, w, C) around each pixel of subject colours, weighted by a matte (h, w, 1), and of the others."""
+def _surroundings(
+    own: np.ndarray, behind: np.ndarray, matte: np.ndarray, radius: int, places: Sequence[np.ndarray]
+) -> list[np.ndarray]:
+    """Return means (C, …) around pixels of subject colours (C, h, w), weighted by a matte (h, w), and of the others.
+
+    Args:
+        places: rows and columns of the pixels
+    """
     cell = max(radius // _CELLS, 1)
-    weighted = np.concatenate([own * matte, behind * (1 - matte), matte, 1 - matte], axis=-1)
-    sums = _box_sums(block_sums(weighted, cell, np.float32, beyond="constant"), radius // cell)
-    count = own.shape[-1]
-    totals = np.maximum(sums[..., 2 * count :], 1e-6)
-    means = sums[..., :count] / totals[..., :1], sums[..., count : 2 * count] / totals[..., 1:]
-    height, width = matte.shape[:2]
-    whole = [mean.repeat(cell, 0).repeat(cell, 1)[:height, :width].astype(np.float32) for mean in means]
-    return whole[0], whole[1]
+    rows, columns = (place // cell for place in places)
+    means = []
+    for colors, weight in ((own, matte), (behind, 1 - matte)):
+        sums = _box_sums(_cells(np.concatenate([colors * weight, weight[None]]), cell), radius // cell)
+        means.append((sums[:-1] / np.maximum(sums[-1], 1e-6)).astype(np.float32)[:, rows, columns])
+    return means
+
+
+def _cells(planes: np.ndarray, size: int) -> np.ndarray:
+    """Return sums (C, ⌈h/size⌉, ⌈w/size⌉) over squares of pixels, with nothing beyond the edges."""
+    if size == 1:
+        return planes
+    return np.moveaxis(block_sums(np.moveaxis(planes, 0, -1), size, np.float32, beyond="constant"), -1, 0)
 
 
 def _box_sums(values: np.ndarray, radius: int) -> np.ndarray:
-    """Return sums (h, w, C) float64 over squares of 2 · radius + 1 cells, with nothing beyond the edges."""
-    for axis in (0, 1):
-        length = values.shape[axis]
-        sums = np.cumsum(values, axis=axis, dtype=np.float64)
-        sums = np.concatenate([np.zeros_like(sums.take([0], axis)), sums], axis=axis)
-        places = np.arange(length)
-        ends = np.minimum(places + radius + 1, length), np.maximum(places - radius, 0)
-        values = sums.take(ends[0], axis) - sums.take(ends[1], axis)
+    """Return sums (C, h, w) float64 over squares of 2 · radius + 1 cells, with nothing beyond the edges."""
+    for axis in (1, 2):
+        pads = [(0, 0)] * 3
+        pads[axis] = radius + 1, radius
+        sums = np.cumsum(np.pad(values, pads), axis=axis, dtype=np.float64)
+        ends, starts = [slice(None)] * 3, [slice(None)] * 3
+        ends[axis], starts[axis] = slice(2 * radius + 1, None), slice(None, -2 * radius - 1)
+        values = sums[tuple(ends)] - sums[tuple(starts)]
     return values
