@@ -31,7 +31,6 @@ OLD = b"the film of last night"
 RECIPE = {
     "version": 2,
     "window": 8,
-    "inbetween": 2,
     "shutters": [{"name": "Long", "bars": [1] * 8}, {"name": "Sharp", "bars": [1] + [0] * 7}],
     "regions": [{"name": "side", "shutter": "Sharp", "kind": "matte", "path": "matte.mkv", "channel": "red"}],
 }
@@ -368,7 +367,7 @@ def test_an_edit_that_is_saved_anew_amid_its_job(whole, node, worker, submit):
     """The rest of the job is refused; the new edit's job takes none of the old one's frames for its own."""
     _put(node, whole, range(1, 7))
     recipe = node.folder / "recipe.json"
-    recipe.write_text(json.dumps(RECIPE | {"inbetween": 1}))
+    recipe.write_text(json.dumps(RECIPE | {"light": "encoded"}))
     assert worker("render", node.folder / "film.mkv", "--recipe", recipe, "--save", node.edit) == (0, "")
     _refused(worker(*node.render(CHUNKS[1])), "the job is of another version of the .blend file")
     assert _pictures(node).items() <= _pictures(whole).items()
