@@ -233,18 +233,6 @@ def test_coefficients_stay_on_the_device(gpu_device, shapes, block):
     assert np.array_equal(values[:, y // size, x // size], expected)
 
 
-def test_what_is_missing_is_what_is_read(device):
-    rng = np.random.default_rng(21)
-    for edges in ("hold", "mirror", "shorten"):
-        for index, direction in ((0, 1), (18, 1), (2, -1)):
-            source = footage(rng)
-            moment = state(rng, edges=edges, position="center")
-            renderer = Renderer(device, source)
-            missing = renderer.missing(Request(index, moment, direction))
-            renderer.picture(Request(index, moment, direction))
-            assert set(source.reads) == missing
-
-
 def test_no_new_solve_when_nothing_moved(device, monkeypatch):
     rng = np.random.default_rng(13)
     solves = []
