@@ -169,7 +169,7 @@ def test_what_is_missing_is_what_is_read(device, edges, position, edge_aware):
     moment = state(rng, 5, edges=edges, position=position, edge_aware=edge_aware)
     renderer = Renderer(device, ShotSource(source))
     for index in range(22):
-        renderer.picture(Request(index, moment))
+        renderer.shot(Request(index, moment))  # which finds the cuts
     renderer.release_window()
     for index, direction in ((5, 1), (9, -1), (20, 1)):
         source.reads.clear()
