@@ -27,7 +27,7 @@ runpy.run_path(sys.argv[0], run_name="__main__")
 @pytest.fixture(scope="module")
 def ran(tmp_path_factory):
     file = tmp_path_factory.mktemp("benchmark") / "rows.json"
-    options = "--sizes 45x27 --shutters 2,5 --windows 8 --bars preset,smooth,random --repeats 2 --pixels 300"
+    options = "--sizes 45x27 --shutters 2,5 --windows 8 --bars preset,random --repeats 1 --pixels 100"
     command = [sys.executable, "-c", ALONE, "scripts/benchmark.py", "--json", str(file), *options.split()]
     subprocess.run(command, cwd=ROOT, check=True)
     return json.loads(file.read_text())
@@ -40,7 +40,7 @@ def test_rows(ran):
     composed = [row for row in ran if row["pass"] == "compose"]
     # For each of the cases: ours, a layer, the paper's, what follows and what is combined in three other ways, at
     # either aggregation, and the average.
-    assert len(composed) == 2 * 3 * 15
+    assert len(composed) == 2 * 2 * 15
 
 
 def test_errors(ran):

@@ -1,4 +1,4 @@
-"""The demo's contact sheet: source, scribbles, coefficients and result of frames, and one sentence for bad input."""
+"""The demo's contact sheet: source, scribbles, coefficients and result of frames."""
 
 import subprocess
 import sys
@@ -13,15 +13,11 @@ RECIPE = ASSETS / "bunny.json"
 LONG = 0.2, 0.5, 1.0  # its colour there
 
 
-def run(*arguments):
-    command = [sys.executable, ROOT / "scripts" / "contact_sheet.py", *arguments]
-    return subprocess.run(list(map(str, command)), cwd=ROOT, capture_output=True, text=True, check=False)
-
-
 def test_a_sheet_of_two_frames(bunny, tmp_path):
     """The source stands for the result as well: so the first and the last picture of a row are alike."""
-    done = run(bunny, RECIPE, bunny, tmp_path / "sheet.png", 6, 45)
-    assert done.returncode == 0, done.stderr
+    arguments = bunny, RECIPE, bunny, tmp_path / "sheet.png", 6, 45
+    command = [sys.executable, ROOT / "scripts" / "contact_sheet.py", *map(str, arguments)]
+    subprocess.run(command, cwd=ROOT, check=True)
     assert [path.name for path in tmp_path.iterdir()] == ["sheet.png"]
     sheet = ImageBuf(str(tmp_path / "sheet.png")).get_pixels()
     height = (sheet.shape[0] - stills.GAP) // 2
@@ -32,11 +28,3 @@ def test_a_sheet_of_two_frames(bunny, tmp_path):
         assert np.abs(scribbles - source).mean() > 0.1
         np.testing.assert_allclose(coefficients[100, 10], LONG, atol=0.02)
         assert np.ptp(coefficients, axis=(0, 1)).max() > 0.5, "the face has another shutter"
-
-
-def test_what_is_no_recipe_is_one_sentence(bunny, tmp_path):
-    done = run(bunny, bunny, bunny, tmp_path / "sheet.png", 6)
-    assert done.returncode == 2
-    assert done.stderr.startswith("contact_sheet: ")
-    assert len(done.stderr.splitlines()) == 1
-    assert not list(tmp_path.iterdir())

@@ -1,8 +1,8 @@
 """The gallery: recipes load, items are listed without Blender, and one is made from end to end."""
 
 import dataclasses
+import re
 import runpy
-import subprocess
 import sys
 from pathlib import Path
 
@@ -23,38 +23,31 @@ from shutter_addon.media import open_source
 from shutter_addon.media.matte_values import MatteValues
 
 SCRIPT = str(ROOT / "scripts" / "gallery.py")
-WITHOUT_BPY = """
-import runpy, sys
-sys.modules["bpy"] = None
-sys.argv = sys.argv[1:]
-runpy.run_path(sys.argv[0], run_name="__main__")
-"""
 # Where on the bunny's picture: rows and columns.
 HEAD, ARM, MEADOW = np.s_[130:230, 430:530], np.s_[110:230, 250:330], np.s_[500:700, 900:1200]
 
 
-def listed(*arguments):
-    command = [sys.executable, "-c", WITHOUT_BPY, SCRIPT, *arguments]
-    return subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
-
-
-def test_the_list_needs_no_blender():
-    done = listed()
-    assert done.returncode == 0, done.stderr
-    assert [line.split()[0] for line in done.stdout.splitlines()] == list(NAMES)
-
-
-def test_an_unknown_name_is_one_sentence():
-    done = listed("bunny", "nothing")
-    assert done.returncode == 2
-    assert done.stderr.startswith("gallery: there is no nothing; there are pendulum, ")
-
-
-def test_a_folder_that_cannot_be_made_is_one_sentence(tmp_path):
+@pytest.mark.parametrize(
+    ("arguments", "code", "said"),
+    [
+        ([], 0, "".join(f"{name} .*\n" for name in NAMES)),
+        (["bunny", "nothing"], 2, "gallery: there is no nothing; there are pendulum, .*\n"),
+        (["--output", "file", "bunny"], 2, "gallery: .*file/bunny: Not a directory\n"),
+    ],
+)
+def test_names_need_no_blender(arguments, code, said, tmp_path, monkeypatch, capsys):
+    """The list of items, and a sentence for what is not there."""
     (tmp_path / "file").touch()
-    done = listed("--output", str(tmp_path / "file"), "bunny")
-    assert done.returncode == 2
-    assert done.stderr == f"gallery: {tmp_path}/file/bunny: Not a directory\n"
+    monkeypatch.chdir(tmp_path)
+    for module in [name for name in sys.modules if name.startswith("gallery.")]:
+        monkeypatch.delitem(sys.modules, module)
+    monkeypatch.setitem(sys.modules, "bpy", None)
+    monkeypatch.setattr(sys, "argv", [SCRIPT, *arguments])
+    with pytest.raises(SystemExit) as stop:
+        runpy.run_path(SCRIPT, run_name="__main__")
+    assert (stop.value.code or 0) == code
+    told = capsys.readouterr()
+    assert re.fullmatch(said, told.err if code else told.out)
 
 
 @pytest.mark.parametrize("path", sorted(HERE.glob("*.json")), ids=lambda path: path.stem)

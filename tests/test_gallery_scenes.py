@@ -3,6 +3,8 @@ frames never count."""
 
 import subprocess
 import sys
+from itertools import pairwise
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -35,8 +37,12 @@ from gallery import scenes
 scenes.SIZE = 64, 36
 render_frames = scenes.render_frames
 scenes.render_frames = lambda folder, count, *options: render_frames(folder, 1, *options)
-print(import_module(f"gallery.{sys.argv[2]}").ITEM.footage(Path(sys.argv[1])))
+for name in sys.argv[2:]:
+    print("FOOTAGE", import_module(f"gallery.{name}").ITEM.footage(Path(sys.argv[1]) / name), sep="\\n")
 """
+
+
+SCENES = "pendulum", "sphere", "displacement", "hands", "rolling_shutter", "rolling_repair", "light_trails"
 
 
 def run(code, *arguments):
@@ -56,23 +62,29 @@ def test_a_stopped_render_goes_on(tmp_path):
     assert np.abs(first - last).max() > 0.1, "the ball has moved"
 
 
-@pytest.mark.parametrize(
-    "name", ["pendulum", "sphere", "displacement", "hands", "rolling_shutter", "rolling_repair", "light_trails"]
-)
-def test_a_scene_is_built_and_rendered(name, tmp_path):
-    path = run(FIRST_FRAME, tmp_path, name).splitlines()[-1]
-    picture = ImageBuf(path).get_pixels()[..., :3]
-    assert picture.shape[1] == 64
-    assert picture.std() > 0.02, "there is something to be seen"
+@pytest.fixture(scope="module")
+def footage(tmp_path_factory):
+    """The folder of all footage, and the pictures by name."""
+    names, folder = (*SCENES, "object_matte"), tmp_path_factory.mktemp("scenes")
+    said = run(FIRST_FRAME, folder, *names).splitlines()
+    paths = [path for before, path in pairwise(said) if before == "FOOTAGE"]
+    return folder, {name: ImageBuf(path).get_pixels()[..., :3] for name, path in zip(names, paths, strict=True)}
 
 
-def test_an_objects_matte_is_rendered_beside_it(tmp_path):
+def test_scenes_are_built_and_rendered(footage):
+    for name in SCENES:
+        picture = footage[1][name]
+        assert picture.shape[1] == 64, name
+        assert picture.std() > 0.02, f"there is something to be seen of {name}"
+
+
+def test_an_objects_matte_is_rendered_beside_it(footage):
     """The recipe names its file and its channel. It covers what is red there, in part at its edges."""
-    picture = ImageBuf(run(FIRST_FRAME, tmp_path / "footage", "object_matte").splitlines()[-1]).get_pixels()
+    folder, picture = footage[0] / "object_matte", footage[1]["object_matte"]
     (region,) = recipe_file.load(ROOT / "gallery" / "object_matte.json").regions
     content = region.content
     assert content.channel == f"{object_matte.NAME}.V"
-    values = MatteFile(tmp_path / content.path, content.channel).open().read(0)
+    values = MatteFile(folder / Path(content.path).relative_to("footage"), content.channel).open().read(0)
     assert values.shape == picture.shape[:2]
     assert 0.02 < values.mean() < 0.2
     assert ((values > 0) & (values < 1)).any()

@@ -4,6 +4,7 @@ import ast
 import re
 import subprocess
 import sys
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -11,13 +12,22 @@ import pytest
 PACKAGE = Path(__file__).parents[1] / "shutter_addon"
 
 
+@cache
+def parsed(path):
+    """All nodes of a file's tree."""
+    return list(ast.walk(ast.parse(path.read_text(encoding="utf-8"))))
+
+
+@cache
 def imported(path):
-    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+    found = set()
+    for node in parsed(path):
         if isinstance(node, ast.Import):
-            yield from (name.name.split(".")[0] for name in node.names)
+            found.update(name.name.split(".")[0] for name in node.names)
         elif isinstance(node, ast.ImportFrom):
             dots = "." * node.level
-            yield from ([dots + (node.module or "")] if node.module else [dots + n.name for n in node.names])
+            found.update([dots + node.module] if node.module else [dots + name.name for name in node.names])
+    return found
 
 
 BLENDER = {"bpy", "bpy_extras", "gpu", "mathutils", "bl_ui", "addon_utils"}
@@ -91,7 +101,7 @@ def test_no_two_modules_have_the_same_name():
 def test_no_absolute_import_of_the_package():
     """An installed extension has another name."""
     for path in PACKAGE.rglob("*.py"):
-        assert "shutter_addon" not in set(imported(path)), path
+        assert "shutter_addon" not in imported(path), path
 
 
 def test_they_run_without_bpy():
@@ -116,10 +126,10 @@ def test_one_module_starts_threads():
     """Locks, events and futures may be anywhere; a thread's type may be told, from `threading` by its name."""
     found = []
     for path in PACKAGE.rglob("*.py"):
-        tree = ast.parse(path.read_text(encoding="utf-8"))
-        made = {ast.unparse(node.func).split(".")[-1] for node in ast.walk(tree) if isinstance(node, ast.Call)}
-        taken = {name.name for node in ast.walk(tree) if isinstance(node, ast.ImportFrom) for name in node.names}
-        if (made | taken) & STARTERS or {"multiprocessing", "asyncio", "_thread"} & set(imported(path)):
+        called = [node.func for node in parsed(path) if isinstance(node, ast.Call)]
+        made = {getattr(function, "attr", getattr(function, "id", "")) for function in called}
+        taken = {name.name for node in parsed(path) if isinstance(node, ast.ImportFrom) for name in node.names}
+        if (made | taken) & STARTERS or {"multiprocessing", "asyncio", "_thread"} & imported(path):
             found.append(path.relative_to(PACKAGE).as_posix())
     assert found == ["core/threads.py"]
 

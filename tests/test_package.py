@@ -1,5 +1,6 @@
 """The zips, as users get them: what is in them, installed in a Blender of their own, updated and removed."""
 
+import importlib
 import json
 import os
 import re
@@ -9,8 +10,10 @@ import sys
 import tomllib
 import zipfile
 from contextlib import contextmanager
+from fractions import Fraction
 from pathlib import Path
 
+import av
 import numpy as np
 import OpenImageIO
 import pytest
@@ -37,6 +40,7 @@ SPDX = re.compile(" (?:AND|OR|WITH) ")
 BLENDERS_OWN = ("EGL Error", "system.path")
 # Runs a command (after a folder) that sees the folder read-only; nobody else does, and nothing stays mounted.
 READ_ONLY = ("unshare", "--mount", "sh", "-c", 'mount --bind "$0" "$0" && mount -o remount,bind,ro "$0" && exec "$@"')
+SIZE = 320, 180
 NO_OPENGL = {"LIBGL_DRIVERS_PATH": "/nowhere", "__EGL_VENDOR_LIBRARY_DIRS": "/nowhere"}
 
 
@@ -141,7 +145,13 @@ def test_wheels_that_are_not_to_be_had_are_one_sentence(tmp_path):
     assert done.stderr == f"build: no wheels for Python 3.x on {SYSTEM}, or PyPI is not reached\n"
 
 
-DOWNLOAD = "import sys, build; print(*build.download(sys.argv[1], build.BLENDERS_PYTHON), sep='\\n')"
+# Of two small wheels.
+DOWNLOAD = """
+import sys, build
+build.WHEELS = [each for each in build.WHEELS if each.startswith(("moderngl=", "tqdm="))]
+build.ALSO = {}
+print(*build.download(sys.argv[1], build.BLENDERS_PYTHON), sep="\\n")
+"""
 
 
 def downloading(root, offered):
@@ -151,52 +161,35 @@ def downloading(root, offered):
     return subprocess.Popen(command, env=environment, cwd=root / "scripts", stdout=pipe, stderr=pipe, text=True)
 
 
-@pytest.fixture
-def offered(dist, tmp_path):
-    """A folder of this system's wheels, as they are on PyPI."""
-    (tmp_path / "offered").mkdir()
+def test_downloaded_wheels_are_whole_and_known(dist, tmp_path):
+    """Also where two download at once, or a copy was interrupted."""
+    offered, bare = tmp_path / "offered", tmp_path / "bare"
+    offered.mkdir()
     with downloading(ROOT, "none") as process:
         for path in map(Path, process.stdout.read().split()):
-            shutil.copy(path, tmp_path / "offered")
-    return tmp_path / "offered"
-
-
-@pytest.fixture
-def bare(tmp_path):
-    """A project that has downloaded nothing."""
+            shutil.copy(path, offered)
     for name in ("scripts", "third_party"):
-        shutil.copytree(ROOT / name, tmp_path / "bare" / name)
-    shutil.copy(ROOT / "blender_manifest.toml", tmp_path / "bare")
-    return tmp_path / "bare"
-
-
-def test_two_that_download_at_once_get_whole_wheels(offered, bare):
-    both = [downloading(bare, offered), downloading(bare, offered)]
-    for process in both:
+        shutil.copytree(ROOT / name, bare / name)
+    shutil.copy(ROOT / "blender_manifest.toml", bare)
+    wheels = {path.name: path.read_bytes() for path in offered.iterdir()}
+    for process in [downloading(bare, offered), downloading(bare, offered)]:
         said, _ = process.communicate()
         assert process.returncode == 0
-        assert {path.name: path.read_bytes() for path in map(Path, said.split())} == {
-            path.name: path.read_bytes() for path in offered.iterdir()
-        }
-
-
-def test_a_wheel_that_is_not_the_known_one_is_refused(offered, bare):
-    (wheel,) = offered.glob("tqdm-*.whl")
-    whole = wheel.read_bytes()
-    with zipfile.ZipFile(wheel, "a") as packed:
+        assert {path.name: path.read_bytes() for path in map(Path, said.split())} == wheels
+    kept = next((bare / "build" / "wheels").rglob("tqdm-*.whl"))
+    kept.write_bytes(wheels[kept.name][:1000])
+    with downloading(bare, offered) as process:
+        assert kept.name in process.stdout.read()
+    assert kept.read_bytes() == wheels[kept.name]
+    kept.unlink()
+    with zipfile.ZipFile(offered / kept.name, "a") as packed:
         packed.writestr("tqdm/more.py", "")
     with downloading(bare, offered) as process:
         said = process.stderr.read()
-    assert said == f"build: third_party/wheels.sha256 does not know {wheel.name} as it was downloaded\n"
+    assert said == f"build: third_party/wheels.sha256 does not know {kept.name} as it was downloaded\n"
     assert process.returncode == 2
-    assert not list((bare / "build" / "wheels").iterdir())
-    wheel.write_bytes(whole)
-    with downloading(bare, offered) as process:
-        kept = next(path for path in map(Path, process.stdout.read().split()) if path.name == wheel.name)
-    kept.write_bytes(whole[:1000])  # as an interrupted copy leaves it
-    with downloading(bare, offered) as process:
-        assert kept.name in process.stdout.read()
-    assert kept.read_bytes() == whole
+    assert not kept.exists()
+    assert len(list((bare / "build" / "wheels").iterdir())) == 1
 
 
 def test_a_repository_is_no_output_folder(tmp_path):
@@ -221,52 +214,37 @@ def test_the_wheels_are_what_the_code_needs_and_blender_lacks():
     assert needed - {"numpy", "OpenImageIO", "cattrs"} == WHEELS - {"glcontext"}  # moderngl's own requirement
 
 
-def without(packages, code):
-    """Runs code in plain Python that lacks some packages; what it prints."""
-    hidden = "".join(f"sys.modules[{package!r}] = None\n" for package in packages)
-    return subprocess.run(
-        [sys.executable, "-c", f"import sys\n{hidden}{code}"], cwd=ROOT, capture_output=True, text=True, check=True
-    ).stdout
-
-
-def test_a_movie_without_pyav_is_one_sentence(bunny):
-    code = f"""
+WITHOUT = """
+import sys
+sys.modules |= dict.fromkeys(("av", "cattrs", "moderngl"))
+from shutter_addon.compute.renderer import open_compositor
+from shutter_addon.core.recipes import recipe_file
+from shutter_addon.devices.device import NoDeviceError
 from shutter_addon.media import MediaError, open_source
-for path in ({str(bunny)!r}, "none.mp4"):
+
+assert open_compositor("cpu").name == "NumPy"
+recipe = '{"version": 1, "window": 1, "shutters": [{"name": "S", "bars": [1]}]}'
+for function, argument in (
+    (open_source, "assets/bigbuckbunny.mp4"),
+    (open_source, "none.mp4"),
+    (recipe_file.parse, recipe),
+    (open_compositor, "gpu"),
+):
     try:
-        open_source(path)
-    except MediaError as error:
+        function(argument)
+    except (MediaError, NoDeviceError, recipe_file.RecipeError) as error:
         print(error)
 """
-    movie, none = without(["av"], code).splitlines()
+
+
+def test_what_needs_a_package_that_is_missing_is_one_sentence():
+    command = [sys.executable, "-c", WITHOUT]
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=True)
+    movie, none, recipe, opengl = done.stdout.splitlines()
     assert movie.startswith("bigbuckbunny.mp4: movies need the Python package PyAV")
     assert none.startswith("none.mp4: no such file")
-
-
-def test_a_recipe_without_cattrs_is_one_sentence():
-    code = """
-from shutter_addon.core.recipes import recipe_file
-try:
-    recipe_file.parse('{"version": 1, "window": 1, "shutters": [{"name": "S", "bars": [1]}]}')
-except recipe_file.RecipeError as error:
-    print(error)
-"""
-    assert "recipes need the Python package cattrs" in without(["cattrs"], code)
-
-
-def test_without_moderngl_there_is_no_opengl():
-    code = """
-from shutter_addon.devices.device import NoDeviceError
-from shutter_addon.compute.renderer import open_compositor
-print(open_compositor("cpu").name)
-try:
-    open_compositor("gpu")
-except NoDeviceError as error:
-    print(error)
-"""
-    numpy, forced = without(["moderngl"], code).splitlines()
-    assert numpy == "NumPy"
-    assert forced.startswith("the Python package moderngl cannot be loaded")
+    assert "recipes need the Python package cattrs" in recipe
+    assert opengl.startswith("the Python package moderngl cannot be loaded")
 
 
 class Installation:
@@ -341,6 +319,21 @@ def recipe(tmp_path):
     return path
 
 
+@pytest.fixture(scope="module")
+def film(bunny, tmp_path_factory):
+    """The bunny's first frames, small."""
+    path = tmp_path_factory.mktemp("film") / "bunny.mp4"
+    with av.open(str(bunny)) as movie, av.open(str(path), "w") as out:
+        small = out.add_stream("libx264", rate=25, options={"crf": "12"})
+        small.width, small.height, small.pix_fmt = *SIZE, "yuv420p"
+        for index, frame in zip(range(12), movie.decode(video=0), strict=False):
+            frame = frame.reformat(*SIZE, format="yuv420p")
+            frame.pts, frame.time_base = index, Fraction(1, 25)
+            out.mux(small.encode(frame))
+        out.mux(small.encode())
+    return path
+
+
 def checkout_renders(footage, recipe, output, frames):
     options = ["--recipe", recipe, "--output", output, "--frames", frames]
     command = [sys.executable, "-m", "shutter_addon", "render", footage, *options]
@@ -357,57 +350,62 @@ def assert_alike(folder, expected, count):
         assert np.abs(ours - real).max() <= 1.001 / 255, name
 
 
-def test_installed_with_wheels(blender, blenders_python, bunny, recipe, tmp_path):
-    """A movie, from the zip to rendered frames, and gone again."""
-    folder = tmp_path / "dist"
-    build("--output", folder, "--python", blenders_python, "--system", SYSTEM)
+@pytest.fixture(scope="module")
+def repository(blenders_python, tmp_path_factory):
+    """A repository of the zip for the real Blender, and that zip."""
+    folder, place = tmp_path_factory.mktemp("dist"), tmp_path_factory.mktemp("repository")
+    build("--output", folder, "--python", blenders_python, "--system", SYSTEM, "--repository", place)
     (path,) = folder.glob(f"*-{SYSTEM.replace('-', '_')}.zip")
-    blender.run("--command", "extension", "validate", path)
-    blender.install(path)
+    return place, path
+
+
+def test_installed_with_wheels(blender, repository, film, recipe, tmp_path):
+    """A movie, from the zip to rendered frames, and gone again."""
+    blender.install(repository[1])
     files = blender.files()
     edit = tmp_path / "edit.blend"
     write = f"try: open({str(blender.extension / 'written')!r}, 'w')\nexcept OSError: print('CANNOT BE WRITTEN')"
+    make = ("--python-expr", write, "--python", MAKE_EDIT, "--", film, recipe, edit, NAME, *PACKAGES)
     with blender.read_only():
-        said = blender.run("-b", "--python-expr", write)
+        said = blender.run("-b", "--python-exit-code", 1, *make)
         assert "CANNOT BE WRITTEN" in said or os.name != "posix"
-        blender.run("-b", "--python-exit-code", 1, "--python", MAKE_EDIT, "--", bunny, recipe, edit, NAME, *PACKAGES)
         blender.run("-b", edit, "-o", tmp_path / "real" / "####", "-s", 3, "-e", 5, "-a")
-    checkout_renders(bunny, recipe, tmp_path / "ours", "3:5")
+    checkout_renders(film, recipe, tmp_path / "ours", "3:5")
     assert_alike(tmp_path / "real", tmp_path / "ours", 3)
     assert blender.files() == files
     blender.remove()
 
 
-def test_installed_without_wheels(blender, dist, bunny, recipe, tmp_path):
+def test_installed_without_wheels(blender, dist, film, recipe, tmp_path):
     """Pictures and a movie on Blender's own GPU or with NumPy, with a sentence of what is slow; and sentences, and
     nothing else, of what needs a package."""
     hidden = blender.user / "scripts" / "startup" / "hidden.py"
     hidden.parent.mkdir(parents=True)
     hidden.write_text(f"import sys\nsys.modules |= dict.fromkeys({PACKAGES})\ndef register(): pass\n")
     (path,) = dist[0].glob("*-no_wheels.zip")
-    blender.run("--command", "extension", "validate", path)
     blender.install(path)
-    frames, edits = tmp_path / "frames", tmp_path / "edits"
-    checkout_renders(bunny, recipe, frames, "1:4")
+    frames, edit = tmp_path / "frames", tmp_path / "edit.blend"
+    checkout_renders(film, recipe, frames, "1:4")
     borrowed, decoded = "composing on Blender's own GPU", "Virtual Shutter: a second Blender decodes movies"
-    edits.mkdir()
-    for footage, says in ((frames / "0001.png", []), (bunny, [decoded])):
-        edit, real = edits / f"{footage.stem}.blend", tmp_path / f"real_{footage.stem}"
-        blender.run("-b", "--python-exit-code", 1, "--python", MAKE_EDIT, "--", footage, recipe, edit, NAME)
-        blender.run("-b", edit, "-o", real / "####", "-s", 1, "-e", 2, "-a", says=[borrowed, *says])
-        command, options = ("--command", "shutter", "render"), (footage, "--recipe", recipe, "--output", real)
-        blender.run(*command, *options, "--frames", 3, "--device", "gpu", says=says)
+    make, render = ("-b", "--python-exit-code", 1, "--python", MAKE_EDIT), ("-s", 1, "-e", 2, "-a")
+    pictures, real = tmp_path / "real_pictures", tmp_path / "real"
+    of_pictures = (frames / "0001.png", recipe, tmp_path / "pictures.blend", NAME)
+    blender.run(*make, "-o", pictures / "####", *render, "--", *of_pictures, says=[borrowed])
+    checkout_renders(frames / "0001.png", recipe, tmp_path / "ours", "1:2")
+    assert_alike(pictures, tmp_path / "ours", 2)
+    blender.run(*make, "--", film, recipe, edit, NAME)
+    blender.run("-b", edit, "-o", real / "####", *render, says=[borrowed, decoded])
+    assert "ALL SAY SO" in blender.run("-b", edit, "--python-exit-code", 1, "--python", LACKING, "--", tmp_path, NAME)
+    command, options = ("--command", "shutter", "render"), (film, "--recipe", recipe, "--output", real)
+    blender.run(*command, *options, "--frames", 3, "--device", "gpu", says=[decoded])
     numpy = "composing with NumPy, which is slow"
     blender.run(*command, *options, "--frames", 4, says=[numpy, decoded], environment=NO_OPENGL)
     assert_alike(real, frames, 4)
-    checkout_renders(frames / "0001.png", recipe, tmp_path / "ours", "1:3")
-    assert_alike(tmp_path / "real_0001", tmp_path / "ours", 3)
-    assert "ALL SAY SO" in blender.run("-b", edit, "--python-exit-code", 1, "--python", LACKING, "--", tmp_path, NAME)
-    track = ("track", bunny, "--recipe", recipe, "--region", "R", "--frame", 2, "--output", tmp_path / "out")
+    track = ("track", film, "--recipe", recipe, "--region", "R", "--frame", 2, "--output", tmp_path / "out")
     blender.run("--command", "shutter", *track, code=2, says=["tracking needs the Python package opencv"])
     assert not (tmp_path / "out").exists()
     smooth_recipe = tmp_path / "smooth.json"
-    smooth_recipe.write_text(json.dumps(json.loads(recipe.read_text()) | {"version": 2, "inbetween": 2}))
+    smooth_recipe.write_text(json.dumps(RECIPE | {"version": 2, "inbetween": 2}))
     smooth = (*command, frames / "0001.png", "--recipe", smooth_recipe, "--output", tmp_path / "out", "--device", "gpu")
     lacking = "moments between frames need the Python package opencv"
     blender.run(*smooth, "--frames", 2, code=2, says=[lacking])
@@ -415,24 +413,24 @@ def test_installed_without_wheels(blender, dist, bunny, recipe, tmp_path):
     blender.remove()
 
 
-def test_a_repository_updates(blender, blenders_python, tmp_path):
+def test_a_repository_updates(blender, repository, monkeypatch, tmp_path):
     """Blender subscribes to a folder, installs from it, and gets the next version."""
-    repository, next_root = tmp_path / "repository", tmp_path / "next"
-    options = ("--python", blenders_python, "--system", SYSTEM, "--repository", repository)
-    build("--output", tmp_path / "dist", *options)
+    place = shutil.copytree(repository[0], tmp_path / "repository")
     extension = ("--command", "extension")
-    blender.run(*extension, "repo-add", "--url", f"{(repository / 'index.json').as_uri()}", "ours")
-    blender.run("--online-mode", *extension, "sync")
-    blender.run("--online-mode", *extension, "install", "-e", "virtual_shutter")
-    needless = shutil.ignore_patterns(".*", "assets", "dist", "docs", "out", "tests", "__pycache__")
-    shutil.copytree(ROOT, next_root, ignore=needless)
-    manifest = next_root / "blender_manifest.toml"
-    manifest.write_text(re.sub(r'(?m)^version = ".*"', 'version = "9.9.9"', manifest.read_text()))
-    shutil.copy(next(repository.glob("*.zip")), repository / "virtual_shutter-9.9.9-python3.12-linux_x64.zip")
-    build("--output", tmp_path / "dist", *options, root=next_root)
-    assert len(list(repository.glob("*.zip"))) == 1
-    blender.run("--online-mode", *extension, "sync")
-    blender.run("--online-mode", *extension, "update")
+    blender.run(*extension, "repo-add", "--url", f"{(place / 'index.json').as_uri()}", "ours")
+    blender.run("--online-mode", *extension, "install", "--sync", "-e", "virtual_shutter")
+    following = tmp_path / "virtual_shutter-9.9.9-linux_x64.zip"
+    with zipfile.ZipFile(repository[1]) as packed, zipfile.ZipFile(following, "w") as changed:
+        for name in packed.namelist():
+            content = packed.read(name)
+            if name == "blender_manifest.toml":
+                content = re.sub(rb'(?m)^version = ".*"', b'version = "9.9.9"', content)
+            changed.writestr(name, content)
+    shutil.copy(following, place / "virtual_shutter-9.9.9-python3.12-linux_x64.zip")
+    monkeypatch.syspath_prepend(ROOT / "scripts")
+    importlib.import_module("build").make_repository(place, [following])
+    assert [path.name for path in place.glob("*.zip")] == [following.name]
+    blender.run("--online-mode", *extension, "update", "--sync")
     installed = blender.user / "extensions" / "ours" / "virtual_shutter" / "blender_manifest.toml"
     assert 'version = "9.9.9"' in installed.read_text()
     assert "WHEELS" in blender.run(

@@ -190,25 +190,28 @@ def test_blender_installs_a_zip_in_its_normal_form(released, real_blender, tmp_p
         assert all((extension / name).read_bytes() == packed.read(name) for name in packed.namelist())
 
 
-def test_what_is_not_committed_is_refused(copy):
-    (copy / "shutter_addon" / "new.py").touch()
-    refused(copy, "there are changes that are not committed")
+def without_the_version(folder):
+    (folder / "CHANGELOG.md").write_text(CHANGELOG.replace(f"## {VERSION}\n", "## 0.0.70\n"))
+    commit(folder)
 
 
-def test_a_version_that_the_changelog_lacks_is_refused(copy):
-    (copy / "CHANGELOG.md").write_text(CHANGELOG.replace(f"## {VERSION}\n", "## 0.0.70\n"))
-    commit(copy)
-    refused(copy, f"CHANGELOG.md says nothing of version {VERSION}")
+def without_what_it_saves(folder):
+    shutil.rmtree(folder / "tests" / "saved")
+    commit(folder)
 
 
-def test_a_version_that_has_kept_nothing_is_refused(copy):
-    shutil.rmtree(copy / "tests" / "saved")
-    commit(copy)
-    refused(copy, f"tests/saved/{VERSION} is missing: run scripts/save_version.py")
-
-
-def test_another_version_than_is_meant_is_refused(copy):
-    refused(copy, f"this is version {VERSION}, not 9.9.9", "--version", "9.9.9")
+@pytest.mark.parametrize(
+    ("change", "sentence", "arguments"),
+    [
+        (lambda folder: (folder / "new.py").touch(), "there are changes that are not committed", []),
+        (without_the_version, f"CHANGELOG.md says nothing of version {VERSION}", []),
+        (without_what_it_saves, f"tests/saved/{VERSION} is missing: run scripts/save_version.py", []),
+        (lambda folder: None, f"this is version {VERSION}, not 9.9.9", ["--version", "9.9.9"]),
+    ],
+)
+def test_what_is_no_release_is_refused(copy, change, sentence, arguments):
+    change(copy)
+    refused(copy, sentence, *arguments)
 
 
 def test_a_folder_that_is_there_is_kept(copy, tmp_path):

@@ -111,9 +111,7 @@ def test_a_bill_lists_wheels_and_what_they_bundle(system, zips, bills):
 
 @pytest.mark.parametrize("system", build.SYSTEMS)
 def test_a_bill_is_valid(system, bills):
-    bill = bills[system]
-    assert JsonStrictValidator(SchemaVersion.V1_6).validate_str(bill) is None
-    assert JsonStrictValidator(SchemaVersion.V1_6).validate_str(bill.replace('"file"', '"fille"', 1))
+    assert JsonStrictValidator(SchemaVersion.V1_6).validate_str(bills[system]) is None
 
 
 def test_the_same_zip_gives_the_same_bytes_in_another_process(without, tmp_path):
@@ -122,18 +120,6 @@ def test_the_same_zip_gives_the_same_bytes_in_another_process(without, tmp_path)
     subprocess.run(command, check=True, env={"TZ": "Asia/Tokyo", "PYTHONHASHSEED": "7"})
     assert (tmp_path / "here.json").read_bytes() == (tmp_path / "there.json").read_bytes()
     assert files_of((tmp_path / "here.json").read_text(encoding="utf-8")) == files_in(without)
-
-
-def test_a_file_that_is_added_or_changed_is_told(without, tmp_path):
-    sbom.write(without, tmp_path / "bill.json")
-    listed = files_of((tmp_path / "bill.json").read_text(encoding="utf-8"))
-    more = tmp_path / "more.zip"
-    more.write_bytes(without.read_bytes())
-    with zipfile.ZipFile(more, "a") as packed:
-        packed.writestr("shutter_addon/more.py", "more")
-    assert set(files_in(more)) - set(listed) == {"shutter_addon/more.py"}
-    sbom.write(more, tmp_path / "more.json")
-    assert files_of((tmp_path / "more.json").read_text(encoding="utf-8")) == files_in(more)
 
 
 def test_what_is_no_zip_is_one_sentence(tmp_path):

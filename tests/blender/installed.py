@@ -19,7 +19,7 @@ for wheel in wheels:
     assert ".local" in place, f"{wheel} is not the extension's own: {place}"
 
 edit = bpy.context.scene
-edit.render.resolution_x, edit.render.resolution_y, edit.render.fps = 1280, 720, 25
+edit.render.resolution_x, edit.render.resolution_y, edit.render.fps = 320, 180, 25
 edit.render.dither_intensity = 0
 edit.render.image_settings.color_depth = "16"
 edit.view_settings.view_transform = "Standard"

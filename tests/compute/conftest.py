@@ -2,6 +2,7 @@
 
 import os
 
+import numpy as np
 import pytest
 
 from shutter_addon.devices.device import NoDeviceError
@@ -59,3 +60,34 @@ def gpu_device(request):
     device = GLDevice()
     yield device
     device.release()
+
+
+@pytest.fixture(scope="module")
+def on_moderngl():
+    """Solves for coefficients on moderngl's device: labels, count, and what follows edges."""
+    from shutter_addon.devices.gl import GLDevice
+
+    device = GLDevice()
+    yield from _solving(device)
+    device.release()
+
+
+@pytest.fixture(scope="module")
+def on_blender(blender_device):
+    """The same, on Blender's own GPU."""
+    yield from _solving(blender_device)
+
+
+def _solving(device):
+    from shutter_addon.compute.stages import Stages
+
+    solver = Stages(device)
+
+    def solve(labels, count, *guided, warm=False):
+        with device.current():
+            layers = device.read(solver.solve(labels, count, *guided, warm=warm))
+        return np.moveaxis(layers, 3, 1).reshape(-1, *labels.shape)[:count]
+
+    yield solve
+    with device.current():
+        solver.release()

@@ -7,6 +7,7 @@ from unittest import mock
 import numpy as np
 import pytest
 from test_composition import SHAPES, footage, state
+from test_matting import Values, mattes
 from test_moved import following
 
 from shutter_addon.compute import running_sums, window
@@ -14,7 +15,6 @@ from shutter_addon.compute.gpu import GPUCompositor
 from shutter_addon.compute.renderer import Renderer
 from shutter_addon.compute.request import Request
 from shutter_addon.core.frames.frame_source import FrameSource
-from shutter_addon.core.model.mattes import Matte
 from shutter_addon.devices import device as devices
 from shutter_addon.devices.device import Budget, NoDeviceError
 
@@ -160,25 +160,11 @@ def test_what_follows_fits_too(limited, dtype):
     assert np.abs(small - roomy).max() <= 2**-14  # sums of other parts
 
 
-class Values:
-    """Mattes in memory."""
-
-    def __init__(self, values):
-        self._values = values
-
-    def values(self, mattes, index, block):
-        return [((i, index), self._values[i, ::block, ::block]) for i, _ in enumerate(mattes)]
-
-    def close(self):
-        pass
-
-
 def test_mattes_fit_too(limited):
-    values = np.random.default_rng(6).random((3, *SIZE[::-1])).astype(np.float32)
-    mattes = tuple(Matte(str(i), i, 0.5) for i in range(3))
-    shown = [replace(moment(), mattes=mattes)] * 2
-    roomy, _, _ = rendered(limited(ROOMY), film(), shown, Values(values))
-    small, _, is_short = rendered(limited(PIXELS * HOST), film(), shown, Values(values))
+    source = film()
+    shown = [replace(moment(), mattes=mattes(np.random.default_rng(6), 3))] * 2
+    roomy, _, _ = rendered(limited(ROOMY), source, shown, Values(source))
+    small, _, is_short = rendered(limited(PIXELS * HOST), source, shown, Values(source))
     assert is_short
     assert np.abs(small - roomy).max() <= 2**-14
 

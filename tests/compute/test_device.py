@@ -1,13 +1,12 @@
 """What is written to a device is what it holds, to the bit."""
 
-import inspect
 import sys
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
-from shutter_addon.devices.device import Device, NoDeviceError
+from shutter_addon.devices.device import NoDeviceError
 
 KINDS = {
     "rgba8": np.uint8,
@@ -74,19 +73,6 @@ def test_fours_of_whole_numbers_are_exact_or_refused(gpu_device):
                 gpu_device.write(texture, values, layer)
             assert np.array_equal(gpu_device.read(texture), fours)
         texture.release()
-
-
-def test_it_has_the_methods_and_attributes_of_every_device(gpu_device):
-    for name in Device.__annotations__:
-        assert hasattr(gpu_device, name), name
-    methods = {name: method for name, method in vars(Device).items() if inspect.isfunction(method) and name[0] != "_"}
-    names = "current", "freeing", "texture", "write", "send", "read", "run", "use", "forget", "release", "bring", "drop"
-    assert tuple(methods) == names
-    for name, method in methods.items():
-        wanted, given = (
-            list(inspect.signature(f).parameters.values()) for f in (method, getattr(type(gpu_device), name))
-        )
-        assert [(p.name, p.kind, p.default) for p in given] == [(p.name, p.kind, p.default) for p in wanted], name
 
 
 def test_there_are_limits(gpu_device):

@@ -78,18 +78,6 @@ def test_a_moment_alone(device, size, steps):
         assert (apart > ROUNDED * LEVEL).mean() < 0.1  # OpenCV rounds what lies halfway by weights of its own
 
 
-def test_a_window_that_slides_is_one_that_was_just_opened(device):
-    """Onwards, back and far away: whatever is left on the device of other pairs of frames."""
-    rng = np.random.default_rng(6)
-    source = SmoothSource(film(rng), STEPS)
-    moment, kept = smooth(few_pieces(rng, 3)), Renderer(device, source)
-    for index in (0, 4, 5, 8, 4, 3, 16, 0):
-        own = Renderer(device, SmoothSource(film(np.random.default_rng(6)), STEPS))
-        asked = Request(index, moment)
-        np.testing.assert_array_equal(kept.picture(asked), own.picture(asked))
-        own.release_window()
-
-
 def repeating(steps):
     """A film some of whose frames are shown twice, and one three times."""
     found = film(np.random.default_rng(8))

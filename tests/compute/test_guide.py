@@ -114,22 +114,6 @@ def guided(rng, window=6, strength=1.0, **options):
     return few_pieces(rng, window, shapes=SHAPES, edge_aware=strength, **options)
 
 
-def test_what_was_shown_before_leaves_no_trace():
-    """In any order and direction, with a strength that changes, on and off."""
-    rng, device = np.random.default_rng(50), CPUCompositor()
-    renderer, index = Renderer(device, ShotSource(film(size=(17, 9)))), 4
-    for _ in range(25):
-        index = int(np.clip(index + rng.choice([1, 1, 1, -1, -2, 6, -9]), 0, 21))
-        strength, aggregate = rng.choice([0, 0.3, 1]), int(rng.choice([1, 2]))
-        position = rng.choice(["start", "center", "end"])
-        moment = guided(rng, 6, strength, position=position, aggregate=aggregate, stop_at_cuts=bool(rng.random() < 0.8))
-        direction = 1 if rng.random() > 0.3 else -1
-        fresh = Renderer(device, ShotSource(film(size=(17, 9))))
-        asked = Request(index, moment, direction)
-        assert np.array_equal(renderer.picture(asked), fresh.picture(asked))
-        assert np.array_equal(renderer.coefficients(Request(index, moment)), fresh.coefficients(Request(index, moment)))
-
-
 class Cut(ShotSource):
     """With a cut before frame 7, however alike the shots are."""
 
@@ -188,22 +172,6 @@ def test_frames_of_the_window_are_not_read_again():
     for index in range(12):
         renderer.picture(Request(index, moment))
     assert len(source.reads) == len(set(source.reads))
-
-
-@pytest.mark.parametrize("position", ["start", "center", "end"])
-def test_what_is_missing_is_what_is_read(position):
-    source, moment = film(), guided(np.random.default_rng(54), 4, position=position)
-    renderer = Renderer(CPUCompositor(), ShotSource(source))
-    for index in range(22):
-        renderer.shot(Request(index, moment))  # which finds the cuts
-    renderer.release_window()
-    for index in (5, 9, 20):
-        source.reads.clear()
-        missing = renderer.missing(Request(index, moment))
-        assert missing >= {index}
-        renderer.picture(Request(index, moment))
-        assert set(source.reads) == missing
-        renderer.release_window()
 
 
 def test_in_betweens_that_guide_are_needed():

@@ -130,13 +130,15 @@ def test_mattes_are_shown_with_those_of_layers(device, aggregate):
         assert device.coefficients(without, 3).shape[1] == -(-SIZE[1] // block)
 
 
-def test_running_sums_do_not_depend_on_where_the_window_was(device):
+def test_a_picture_does_not_depend_on_those_before(device):
+    """Neither on where the window was, nor on other mattes or none."""
     rng = np.random.default_rng(5)
-    source = footage(rng, COUNT, SIZE)
-    moment, _ = with_layers(drawn_state(rng, window=6), discs())
+    source, base = footage(rng, COUNT, SIZE), drawn_state(rng, window=6)
+    first, other = (with_layers(base, discs(top=top))[0] for top in (0.5, 0.8))
+    shown = [(index, first) for index in (3, 4, 5, 9, 8)] + [(8, other), (8, plain(first)), (8, first)]
     renderer = Renderer(device, source, MatteValues(*SIZE))
-    passed = [renderer.picture(Request(index, moment)) for index in (3, 4, 5, 9, 8)]
-    for index, picture in zip((3, 4, 5, 9, 8), passed, strict=True):
+    passed = [renderer.picture(Request(*asked)) for asked in shown]
+    for (index, moment), picture in zip(shown, passed, strict=True):
         assert np.array_equal(picture, drawn(device, source, moment, index)[1])
 
 
@@ -153,16 +155,6 @@ def test_a_played_frame_costs_one_new_matte_and_a_scrub_back_none(device):
     file.reads.clear()
     renderer.picture(Request(4, moment))
     assert file.reads == []
-
-
-def test_other_mattes_are_loaded_anew(device):
-    rng = np.random.default_rng(7)
-    source, base = footage(rng, COUNT, SIZE), drawn_state(rng, window=6)
-    first, other = (with_layers(base, discs(top=top))[0] for top in (0.5, 0.8))
-    renderer = Renderer(device, source, MatteValues(*SIZE))
-    for moment in (first, other, plain(first), first):
-        picture = renderer.picture(Request(SHOWN, moment))
-        assert np.array_equal(picture, drawn(device, source, moment)[1])
 
 
 def test_what_was_not_exposed_comes_from_the_nearest_clear_frame(device):

@@ -1,10 +1,9 @@
-"""What previews show of mattes: the shutters' colours with their patterns, the same by both renderers and by NumPy."""
+"""What previews show of mattes: the shutters' colours with their patterns, the same by Blender's GPU and NumPy."""
 
 import numpy as np
 import pytest
 
 from shutter_addon.core.pixels import patterns
-from shutter_addon.devices.passes import read_pass
 
 WIDTH, HEIGHT, BLOCK, SHUTTERS, OPACITY = 48, 36, 4, 9, 0.75
 LEVEL = 1 / 255
@@ -38,40 +37,8 @@ def by_numpy(colors, shares, unit) -> np.ndarray:
     return sum(full[..., [i]] * patterns.painted(colors[i], i, x / unit, y / unit) for i in range(SHUTTERS))
 
 
-def by_moderngl(colors, shares, unit, step="COEFFICIENTS") -> np.ndarray:
-    from shutter_addon.devices.gl import GLDevice
-
-    device = GLDevice()  # which leaves Blender's context current afterwards
-    try:
-        with device.current():
-            return _drawn(device._context, colors, shares, unit, step)  # private: no pass of the device's draws
-    finally:
-        device.release()
-
-
-def _drawn(context, colors, shares, unit, step) -> np.ndarray:
-    import moderngl
-
-    sources = read_pass("show", "QUAD").source, read_pass("show", step).source
-    program = context.program(vertex_shader=sources[0], fragment_shader=sources[1])
-    data = layers(shares)
-    palette = np.ones((1, 1, SHUTTERS, 4), dtype=np.float32)
-    palette[..., :3] = colors
-    for place, values in enumerate((data, palette)):
-        size = values.shape[2], values.shape[1], values.shape[0]
-        context.texture_array(size, 4, values.tobytes(), dtype="f4").use(place)
-    program["size"], program["block"], program["count"] = (WIDTH, HEIGHT), BLOCK, SHUTTERS
-    program["unit"], program["opacity"], program["srgbTarget"] = unit, OPACITY, False
-    program["ModelViewProjectionMatrix"].write(TO_CLIP.T.tobytes())
-    corners = np.hstack([PLACES, CORNERS]).astype(np.float32)
-    target = context.simple_framebuffer((WIDTH, HEIGHT), 4, dtype="f4")
-    target.use()
-    shape = context.vertex_array(program, [(context.buffer(corners.tobytes()), "2f 2f", "corner", "place")])
-    shape.render(moderngl.TRIANGLE_STRIP)
-    return np.frombuffer(target.read(components=4, dtype="f4"), np.float32).reshape(HEIGHT, WIDTH, 4)
-
-
-def by_blender(colors, shares, unit, step="COEFFICIENTS") -> np.ndarray:
+def drawn(colors, shares, unit, step="COEFFICIENTS") -> np.ndarray:
+    """The picture that Blender's GPU draws."""
     import gpu
     from gpu_extras.batch import batch_for_shader
     from mathutils import Matrix
@@ -109,26 +76,22 @@ def by_blender(colors, shares, unit, step="COEFFICIENTS") -> np.ndarray:
     return picture
 
 
+@pytest.mark.usefixtures("blender_device")
 @pytest.mark.parametrize("unit", [1.0, 1.5, 2.0])
-@pytest.mark.parametrize("renderer", [by_moderngl, by_blender])
-def test_a_renderer_draws_the_reference(request, given, renderer, unit):
-    if renderer is by_blender:
-        request.getfixturevalue("blender_device")
+def test_the_reference_is_drawn(given, unit):
     colors, shares = given
-    picture, expected = renderer(colors, shares, unit), by_numpy(colors, shares, unit)
+    picture, expected = drawn(colors, shares, unit), by_numpy(colors, shares, unit)
     assert np.abs(picture[..., :3] - OPACITY * expected).max() <= LEVEL
     assert np.abs(picture[..., 3] - OPACITY).max() <= LEVEL
 
 
+@pytest.mark.usefixtures("blender_device")
 @pytest.mark.parametrize("unit", [1.0, 2.0])
-@pytest.mark.parametrize("renderer", [by_moderngl, by_blender])
-def test_a_line_stands_around_what_a_shutter_gets(request, given, renderer, unit):
+def test_a_line_stands_around_what_a_shutter_gets(given, unit):
     """As wide as a unit of the interface is, in its colour; none around the first one."""
-    if renderer is by_blender:
-        request.getfixturevalue("blender_device")
     colors, shares = given[0], np.zeros_like(given[1])
     shares[:, :6, 0] = shares[:, 6:, 5] = 1
-    picture = renderer(colors, shares, unit, "EDGES")
+    picture = drawn(colors, shares, unit, "EDGES")
     seen = picture[..., 3] > 0
     assert (seen == seen[0]).all()
     columns = np.flatnonzero(seen[0])
@@ -137,7 +100,7 @@ def test_a_line_stands_around_what_a_shutter_gets(request, given, renderer, unit
     assert abs(columns.mean() + 0.5 - 6 * BLOCK) <= 1
     assert np.abs(picture[:, columns, :3] - OPACITY * colors[5]).max() <= LEVEL
     shares[..., 1:] = 0
-    assert not renderer(colors, shares, unit, "EDGES").any()
+    assert not drawn(colors, shares, unit, "EDGES").any()
 
 
 def test_patterns_differ_and_leave_most_of_the_colour():

@@ -1,7 +1,7 @@
 """Random recipes over tiny footage of many kinds, each from a seed alone; knows nothing of the product."""
 
 import json
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
 
 import av
@@ -139,14 +139,12 @@ def make_smooth(seed: int) -> Case:
     add_combining(rng, recipe, len(case.stored), mixed=True)
     direction = -1 if rng.random() < 0.4 else 1
     last = (len(case.stored) - 1) // recipe["inbetween"] * recipe["inbetween"]  # the last filmed frame
-    return Case(
-        seed,
-        json.dumps(recipe, indent=1),
-        case.frame,
-        case.kind,
-        case.stored[: last + 1],
-        min(case.index, last),
-        direction,
+    return replace(
+        case,
+        recipe=json.dumps(recipe, indent=1),
+        stored=case.stored[: last + 1],
+        index=min(case.index, last),
+        direction=direction,
         mattes={},
         again=" --smooth",
     )

@@ -2,7 +2,6 @@
 
 import ast
 import gc
-import itertools
 import json
 from collections import Counter
 from dataclasses import replace
@@ -14,17 +13,16 @@ from cases import KINDS, make, make_smooth
 from compare import PICTURE, DifferenceError, can_be_a_film, check, check_films, check_mixed, open_devices, within
 from reference import DEFAULTS, layers_at, picture, shown
 
-from shutter_addon.compute import cpu, gpu, plates
-from shutter_addon.core.frames import light
-from shutter_addon.core.model import following, keyframes, mattes, scribbles, shutters, trails, windows
+from shutter_addon.compute import gpu
+from shutter_addon.core.model import following, keyframes, scribbles, shutters
 from shutter_addon.core.pixels import combined, compositor, layering
 from shutter_addon.devices import gl
 from shutter_addon.devices.passes import SHADERS
 from shutter_addon.media import matte_values
 
-SEEDS = range(120)
-BATCH = 20
-IN_BLENDER = SEEDS[::8]  # which goes around the kinds of footage
+SEEDS = range(78)  # six for each kind of footage
+BATCH = 13
+IN_BLENDER = range(0, 104, 8)  # one of each kind
 # All passes that compose are run for these. In the last ones a threshold leaves pixels without light, time stands
 # still, and all that a shutter exposes is left out.
 MIXED = *range(13, 30), 10269, 20264, 20279, 51655, 51908, 52493, 52835
@@ -67,10 +65,9 @@ def test_pictures_and_coefficients(devices, first, tmp_path):
     assert not errors, "\n".join(errors)
 
 
-@pytest.mark.parametrize("first", SEEDS[::BATCH])
-def test_pictures_of_moments(devices, first, tmp_path):
+def test_pictures_of_moments(devices, tmp_path):
     """Bars count filmed frames, and what lies between two that are open counts as well."""
-    errors = differences(range(first, first + BATCH), devices, tmp_path, of=make_smooth)
+    errors = differences(SEEDS[: 3 * BATCH], devices, tmp_path, of=make_smooth)
     assert not errors, "\n".join(errors)
 
 
@@ -99,15 +96,12 @@ def test_every_field_with_every_other_on_blenders_gpu(blenders_devices, tmp_path
     assert not errors, "\n".join(errors)
 
 
-@pytest.mark.parametrize("first", SEEDS[::40])
-def test_films(first, tmp_path):
+def test_films(tmp_path):
     """The command, from files to files: F-curves, annotations, source times and Blender's sequencer between them."""
     pytest.importorskip("bpy")
-    found, errors = check_films(
-        [case for case in map(make, SEEDS[first : first + 40]) if can_be_a_film(case)], tmp_path
-    )
+    found, errors = check_films([case for case in map(make, SEEDS[: 4 * BATCH]) if can_be_a_film(case)], tmp_path)
     assert not errors, "\n".join(map(str, errors))
-    assert len(found) > 15
+    assert len(found) > 20
 
 
 def test_the_reference_shares_nothing_with_the_product():
@@ -140,100 +134,22 @@ def test_recipes_have_all_that_a_recipe_may_have():
         seen.update([("edge_aware", type(recipe.get("edge_aware")))])
         for name, about in (("combine", str), ("by_luminance", str), ("threshold", type)):
             seen.update((name, about(shutter[name])) for shutter in recipe["shutters"] if name in shutter)
-        found = picture(recipe, case.frame, case.footage(), case.index, case.direction, mattes=case.matte_samples())
         is_layered = bool(layers_at(recipe, case.frame))
         seen.update([("layer", is_layered)])
-        doubtful[is_layered].append(found.doubtful.mean())
+        if case.seed < 2 * BATCH:
+            given = case.index, case.direction
+            found = picture(recipe, case.frame, case.footage(), *given, mattes=case.matte_samples())
+            doubtful[is_layered].append(found.doubtful.mean())
     values = {"position": 3, "interpolation": 2, "light": 2, "exposure": 2, "edges": 4, "aggregate": 3, "border": 2}
     values |= {"ease": 4, "redrawn": 2, "kind": 5, "shutters": 6, "time": 2, "direction": 2, "footage": len(KINDS)}
     values |= {"ramp": 4, "blend": 2, "timing": 2, "channel": 4}
     values |= {"combine": 3, "by_luminance": 1, "threshold": 2}
     values |= {"follow": 2, "trail": 2, "edge_aware": 3, "layer": 2, "plate_reach": 4, "inbetween": 1}
     assert Counter(name for name, _ in seen) == values
-    assert min(seen.values()) >= 5
+    assert min(seen.values()) >= 3
     assert seen["layer", True] >= 0.4 * len(SEEDS)
-    assert np.mean(doubtful[0]) < 0.02
+    assert np.mean(doubtful[0]) < 0.05
     assert np.mean(doubtful[1]) < 0.35  # nothing is seen behind layers that cover all
-
-
-def test_mixed_recipes_have_every_field_with_every_other():
-    single = "position", "interpolation", "light", "exposure", "edges", "inbetween"
-
-    def fields(recipe):
-        shutters_, regions = recipe["shutters"], recipe["regions"]
-        found = {
-            (name, recipe[name]) for name in ("position", "interpolation", "light", "exposure", "edges", "inbetween")
-        }
-        found |= {name for name in ("time", "camera", "border", "edge_aware", "stop_at_cuts") if recipe.get(name)}
-        found |= {(name, each[name]) for each in shutters_ for name in ("combine", "length") if name in each}
-        found |= {
-            name for each in shutters_ for name in ("follow", "trail", "threshold", "by_luminance") if name in each
-        }
-        found |= {(each["follow_motion"], bool(each["follow_smooth"])) for each in shutters_ if "follow" in each}
-        found |= {each["kind"] for each in regions} | {"layer" for each in regions if each.get("layer")}
-        found |= {("opacity", isinstance(each["opacity"], list)) for each in regions if each["opacity"] != 1}
-        found |= {"influence"} if recipe.get("camera_influence", 1) != 1 else set()
-        found |= {"aggregate"} if recipe["aggregate"] > 1 else set()
-        names = [each["name"] for each in regions]
-        return found | ({"equal names"} if len(set(names)) < len(names) else set())
-
-    pairs, every = set(), set()
-    for recipe in (json.loads(make(seed, mixed=True).recipe) for seed in range(500)):
-        found = fields(recipe)
-        every |= found
-        pairs |= {frozenset(pair) for pair in itertools.combinations(found, 2)}
-    lacking = [
-        (a, b)
-        for a, b in itertools.combinations(every, 2)
-        if frozenset((a, b)) not in pairs and not (a[0] == b[0] and a[0] in single)
-    ]
-    assert len(every) == 48
-    assert not lacking
-
-
-FAULTS = {
-    "an ease": (keyframes, "eased", lambda u, ease: u),
-    "a jump too early": (keyframes, "eased", lambda u, ease: 1.0 if ease == "constant" else eased(u, ease)),
-    "redrawn strokes": (scribbles, "between_strokes", lambda first, second, u, aspect: [*map(np.array, first)]),
-    "lassos left empty": (
-        scribbles,
-        "rasterise",
-        lambda shapes, *size, border: rasterise(outlines(shapes), *size, border=border),
-    ),
-    "no displacement": (shutters, "displace", shutters.mix),
-    "another curve": (light, "to_linear", lambda code: np.sign(code) * np.abs(code) ** 2.2),
-    "an edge twice": (windows, "source_frames", lambda *given: twice(*given)),
-    "nothing followed": (following, "followed", lambda effect, state, *_: state),
-    "a dull filter": (compositor, "seen", lambda frame, places, sharp: seen(frame, places, sharp=False)),
-    "trails of no length": (trails, "with_length", lambda bars, *_: bars),
-    "edges passed over": (
-        cpu.CPUCompositor,
-        "solve",
-        lambda solver, labels, count, *_, warm: solve(solver, labels, count),
-    ),
-    "mattes in another order": (mattes, "blended", lambda c, shown, values: blended(c, shown[::-1], values[::-1])),
-    "hard mattes": (matte_values, "feathered", lambda values, width: values),
-    "outlines of hard edges": (mattes, "coverage", lambda *given: np.round(coverage(*given))),
-    "a ramp that is not turned": (
-        mattes.Ramp,
-        "values",
-        lambda ramp, *size: ramp_values(replace(ramp, rotation=0), *size),
-    ),
-    "ghosts": (layering, "behind", lambda values: np.ones_like(values[0])),
-    "what a camera pans over": (plates, "uncovered", lambda colors, seen, *_: (colors, seen)),
-    "the mean for the median": (combined, "weighted_median", lambda values, weights: mean(values, weights)),
-    "thresholds that let all pass": (combined, "passes", lambda combine, luminance: np.ones_like(luminance)),
-    "soft scribbles": (layering, "matte_of", lambda values: values),
-    "nothing slides": (windows, "slid", lambda state, *_, **__: state),
-    "not normalised": (windows, "source_frames", lambda options, places, shot: places.clip(0, shot.stop - 1)),
-}
-eased, source_frames, solve = keyframes.eased, windows.source_frames, cpu.CPUCompositor.solve
-blended, ramp_values, coverage = mattes.blended, mattes.Ramp.values, mattes.coverage
-rasterise, seen = scribbles.rasterise, compositor.seen
-
-
-def mean(values, weights):
-    return (values * weights).sum(axis=0) / np.maximum(weights.sum(axis=0), 1e-30)
 
 
 def outlines(shapes):
@@ -241,11 +157,23 @@ def outlines(shapes):
     return [replace(shape, kind="line", width=0.0) if shape.kind == "lasso" else shape for shape in shapes]
 
 
-def twice(options, positions, shot):
-    if options.edges != "mirror":
-        return source_frames(options, positions, shot)
-    folded = np.mod(positions, 2 * len(shot))
-    return np.minimum(folded, 2 * len(shot) - 1 - folded)
+eased, rasterise, seen = keyframes.eased, scribbles.rasterise, compositor.seen
+run = gl.GLDevice.run
+# One for each part of a picture: what is wrong then.
+FAULTS = {
+    "an ease": (keyframes, "eased", lambda u, ease: u),
+    "lassos left empty": (
+        scribbles,
+        "rasterise",
+        lambda shapes, *size, border: rasterise(outlines(shapes), *size, border=border),
+    ),
+    "no displacement": (shutters, "displace", shutters.mix),
+    "nothing followed": (following, "followed", lambda effect, state, *_: state),
+    "a dull filter": (compositor, "seen", lambda frame, places, sharp: seen(frame, places, sharp=False)),
+    "hard mattes": (matte_values, "feathered", lambda values, width: values),
+    "ghosts": (layering, "behind", lambda values: np.ones_like(values[0])),
+    "thresholds that let all pass": (combined, "passes", lambda combine, luminance: np.ones_like(luminance)),
+}
 
 
 @pytest.mark.parametrize("fault", FAULTS)
@@ -260,29 +188,10 @@ def test_planted_faults_are_found(monkeypatch, fault, tmp_path):
     assert again.endswith(f"tests/differential/compare.py {place.name.partition('-')[0]} --ways cpu")
 
 
-SMOOTH_FAULTS = {
-    "bars that last until the next frame": lambda bars, steps, **_: shutters.held(bars, steps),
-    "frames alone": lambda bars, steps, backward=False, **_: np.insert(
-        np.zeros((len(bars), steps - 1)), (steps - 1) * backward, bars, axis=1
-    ).ravel(),
-    "nothing in reverse": lambda bars, steps, level=False, **_: smoothed(bars, steps, level=level),
-    "trails of half the light": lambda bars, steps, backward=False, **_: smoothed(bars, steps, backward=backward),
-}
-smoothed = shutters.smoothed
-
-
-@pytest.mark.parametrize("fault", SMOOTH_FAULTS)
-def test_planted_faults_of_moments_are_found(monkeypatch, fault, tmp_path):
-    monkeypatch.setattr(shutters, "smoothed", SMOOTH_FAULTS[fault])
+def test_planted_faults_of_moments_are_found(monkeypatch, tmp_path):
+    monkeypatch.setattr(shutters, "smoothed", lambda bars, steps, **_: shutters.held(bars, steps))
     found = each_difference(range(40), open_devices(["cpu"]), tmp_path, of=make_smooth)
     assert any("/255 off" in error for error in found)
-
-
-MIXED_FAULTS = {
-    "groups that are black": (gpu, "_in_window", lambda state, chosen: state.of(chosen)),  # where that fault was
-    "levels that are not drawn": (gpu, "way_sum", lambda begins, levels: way_sum(begins, False)),
-}
-run, way_sum = gl.GLDevice.run, gpu.way_sum
 
 
 def test_a_texel_that_no_pass_writes_is_seen(monkeypatch, devices, tmp_path):
@@ -295,9 +204,8 @@ def test_a_texel_that_no_pass_writes_is_seen(monkeypatch, devices, tmp_path):
     assert any("nan instead of" in error for error in found)
 
 
-@pytest.mark.parametrize("fault", MIXED_FAULTS)
-def test_planted_faults_of_a_gpu_are_found(monkeypatch, devices, fault, tmp_path):
-    monkeypatch.setattr(*MIXED_FAULTS[fault])
+def test_planted_faults_of_a_gpu_are_found(monkeypatch, devices, tmp_path):
+    monkeypatch.setattr(gpu, "_in_window", lambda state, chosen: state.of(chosen))  # where that fault was
     assert any(each_difference(range(60), {"gpu": devices["gpu"]}, tmp_path, mixed=True))
 
 

@@ -9,10 +9,10 @@ import subprocess
 import numpy as np
 import OpenImageIO
 import pytest
-from farm_job import ROOT, shutter
+from farm_job import RECIPE, ROOT, Job, shrink, shutter
 
 EXTENSION = "bl_ext.user_default.virtual_shutter"
-CHUNKS = (1, 4), (5, 8)
+CHUNKS = (1, 2), (3, 4)
 
 
 @pytest.fixture(scope="module")
@@ -30,12 +30,14 @@ def blender(real_blender, tmp_path_factory):
     return run
 
 
-@pytest.fixture
-def plain(single, job):
-    """The job without Smooth: the Blender of a distribution may lack OpenCV."""
-    recipe = job.folder / "plain.json"
-    recipe.write_text(json.dumps(json.loads((single.folder / "recipe.json").read_text()) | {"inbetween": 1}))
-    shutter("render", job.folder / "footage.mp4", "--recipe", recipe, "--save", job.edit)
+@pytest.fixture(scope="module")
+def plain(bunny, tmp_path_factory):
+    """A job without Smooth: the Blender of a distribution may lack OpenCV."""
+    job = Job(tmp_path_factory.mktemp("plain"))
+    footage, recipe = job.folder / "footage.mp4", job.folder / "recipe.json"
+    shrink(bunny, footage)
+    recipe.write_text(json.dumps(RECIPE | {"inbetween": 1}))
+    shutter("render", footage, "--recipe", recipe, "--save", job.edit)
     return job
 
 
@@ -56,16 +58,17 @@ def test_chunks_have_the_pixels_of_the_command(blender, plain):
     for chunk in CHUNKS:
         done = blender(*task(plain.edit, plain.folder / "plain", *chunk))
         assert done.returncode == 0, done.stderr
-    done = blender("-c", "shutter", "render", plain.edit, "--output", plain.pictures, "--frames", "1:8")
+    done = blender("-c", "shutter", "render", plain.edit, "--output", plain.pictures, "--frames", "1:4")
     assert done.returncode == 0, done.stderr
-    for frame in range(1, 9):
+    for frame in range(1, 5):
         found = levels(plain.folder / "plain" / f"{frame:06d}.png")
         assert np.array_equal(found, levels(plain.pictures / f"{frame:04d}.png")), frame
 
 
 def test_missing_footage_fails_the_task(blender, plain):
     (plain.folder / "footage.mp4").unlink()
-    done = blender(*task(plain.edit, plain.folder / "plain", 1, 4))
+    pictures = plain.folder / "missing"
+    done = blender(*task(plain.edit, pictures, 1, 4))
     assert done.returncode == 2
     assert "Virtual Shutter: footage.mp4: no such file" in done.stderr
-    assert not (plain.folder / "plain").exists()
+    assert not pictures.exists()
