@@ -136,13 +136,6 @@ def test_no_recipe(command_here, frames, tmp_path):
         assert not (tmp_path / "out").exists()
 
 
-@pytest.mark.parametrize("text", ["0:3", "a:b", "1:" + "9" * 5000])
-def test_frames_outside_the_clip(command_here, frames, tmp_path, text):
-    done = command_here(frames, "--output", tmp_path / "out", f"--frames={text}", recipe=STILL, check=False)
-    refused(done, "--frames", text[:18])
-    assert not (tmp_path / "out").exists()
-
-
 @pytest.mark.parametrize(("width", "height"), [(33, 17), (4, 129)])
 def test_odd_sizes(command_here, tmp_path, width, height):
     pictures = np.random.default_rng(0).integers(0, 256, (2, height, width, 3), dtype=np.uint8)
@@ -170,10 +163,14 @@ def test_outputs_that_cannot_be(command_here, frames, tmp_path):
         (["--output", "/proc/out"], "/proc"),
         (["--output", "/proc/film.mp4"], "/proc"),
         (["--output", tmp_path / "a.mp4", "--format", "exr"], "--format"),
+        (["--output", tmp_path / "out", "--frames=0:3"], "--frames: 0:3"),
+        (["--output", tmp_path / "out", "--frames=a:b"], '--frames: "a:b"'),
+        (["--output", tmp_path / "out", "--frames=1:" + "9" * 5000], '--frames: "1:999'),
         ([], "--output"),
         (["--save", "/proc/x.blend"], "/proc"),
     ):
         refused(command_here(frames, *options, recipe=STILL, check=False), word)
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["file", "recipe.json"]
     assert (tmp_path / "file").read_text() == "mine"
 
 
@@ -241,6 +238,6 @@ def test_no_gl(command, frames, tmp_path):
         "LIBGL_DRIVERS_PATH": "/nonexistent",
         "EGL_PLATFORM": "none",
     }
-    done = command(frames, "--output", tmp_path / "out", recipe=STILL, env=env)
+    done = command(frames, "--output", tmp_path / "out", "--frames", "1:2", recipe=STILL, env=env)
     assert "composing with NumPy" in done.stderr
-    assert len(list((tmp_path / "out").iterdir())) == 6
+    assert len(list((tmp_path / "out").iterdir())) == 2

@@ -1,5 +1,7 @@
 """Every change that changes pictures reaches the sequencer's cache of finished frames; playing does not."""
 
+import shutil
+
 import numpy as np
 import pytest
 from support import effect_of, image_strip, recipe, remembering, request, write_frames
@@ -16,10 +18,15 @@ KEYED = recipe(4, {1: [1, 0, 0, 0], 9: [0, 0, 1, 0]}, [1, 1, 1, 1], regions=[MOV
 FRAME = 5
 
 
-@pytest.fixture
-def images(tmp_path):
+@pytest.fixture(scope="module")
+def noise(tmp_path_factory):
     frames = np.random.default_rng(0).integers(0, 256, (30, 32, 32, 3), dtype=np.uint8)
-    return write_frames(tmp_path / "in", frames)
+    return write_frames(tmp_path_factory.mktemp("noise"), frames)
+
+
+@pytest.fixture
+def images(noise, tmp_path):
+    return shutil.copytree(noise.parent, tmp_path / "in") / noise.name
 
 
 @pytest.fixture
