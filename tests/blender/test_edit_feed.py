@@ -121,71 +121,37 @@ def test_bits_are_the_engines(edit, made, compared, name):
     assert compared() == expected
 
 
-def fading(edit, source, strip, folder):
-    strip.blend_alpha = 1.0
-    for frame, value in ((1, 1.0), (COUNT, 0.2)):
-        strip.blend_alpha = value
-        strip.keyframe_insert("blend_alpha", frame=frame)
-    return []
+def keyed(owner, name, values):
+    for frame, value in values.items():
+        setattr(owner, name, value)
+        owner.keyframe_insert(name, frame=frame)
 
 
-def modified(edit, source, strip, folder):
-    strip.modifiers.new("Bright", "BRIGHT_CONTRAST").bright = 20
-    return []
-
-
-def cut(edit, source, strip, folder):
-    strip.split(frame=4, split_method="SOFT")
-    return ALL
-
-
-def above(edit, folder, first, stop):
+def above(edit, folder, first=1, stop=COUNT + 1):
     other = edit.sequence_editor.strips.new_image("above", str(folder / "in" / "f0003.png"), 6, first)
     other.right_handle, other.blend_alpha = stop, 0.4
     return other
 
 
-def titled(edit, source, strip, folder):
-    above(edit, folder, 3, 5)
-    return [2, 5, 6]
-
-
-def title_is_muted(edit, source, strip, folder):
-    above(edit, folder, 3, 5).mute = True
-    return ALL
-
-
-def title_comes(edit, source, strip, folder):
-    title = above(edit, folder, 1, COUNT + 1)
-    for frame, value in ((1, True), (4, False)):
-        title.mute = value
-        title.keyframe_insert("mute", frame=frame)
-    return []
-
-
 def adjusted(edit, source, strip, folder):
     layer = edit.sequence_editor.strips.new_effect("layer", "ADJUSTMENT", 7, 1, length=COUNT)
     layer.modifiers.new("Bright", "BRIGHT_CONTRAST").bright = 20
-    return []
 
 
 def in_a_transition(edit, source, strip, folder):
-    other = above(edit, folder, 1, COUNT + 1)
-    edit.sequence_editor.strips.new_effect("cross", "CROSS", 8, 1, length=COUNT, input1=strip, input2=other)
-    return []
+    inputs = {"input1": strip, "input2": above(edit, folder)}
+    edit.sequence_editor.strips.new_effect("cross", "CROSS", 8, 1, length=COUNT, **inputs)
 
 
 def over_more(edit, source, strip, folder):
     strip.channel = 4
     other = edit.sequence_editor.strips.new_image("below", str(folder / "in" / "f0002.png"), 3, 1)
     other.right_handle = COUNT + 1
-    return ALL
 
 
 def over_another(edit, source, strip, folder):
     over_more(edit, source, strip, folder)
     source.mute = True
-    return []
 
 
 def in_a_meta(edit, source, strip, folder):
@@ -193,7 +159,6 @@ def in_a_meta(edit, source, strip, folder):
     strip.move_to_meta(meta)
     source.move_to_meta(meta)
     meta.right_handle = COUNT + 1
-    return []
 
 
 def two_effects(edit, source, strip, folder):
@@ -206,27 +171,42 @@ def two_effects(edit, source, strip, folder):
     effect.inbetween = "1"
     effect.edges = "SHORTEN"  # an exposure longer than its clip would slide to one place
     second.right_handle = COUNT + 1
-    return ALL
 
 
 def keyed_effect(edit, source, strip, folder):
-    for frame, value in ((1, 0.2), (COUNT, 1.0)):
-        edit.virtual_shutter.effects[0].shutters[0].bars[0].weight = value
-        edit.keyframe_insert("virtual_shutter.effects[0].shutters[0].bars[0].weight", frame=frame)
-    return ALL
+    keyed(edit.virtual_shutter.effects[0].shutters[0].bars[0], "weight", {1: 0.2, COUNT: 1.0})
 
 
-EDITS = [
-    *(fading, modified, cut, titled, title_is_muted, title_comes, adjusted, in_a_transition, in_a_meta),
-    *(over_more, over_another, two_effects, keyed_effect),
-]
+# By name: what changes the edit, its source or the effect's strip, and which frames need no engine then.
+EDITS = {
+    "fading": (lambda edit, source, strip, folder: keyed(strip, "blend_alpha", {1: 1.0, COUNT: 0.2}), []),
+    "modified": (
+        lambda edit, source, strip, folder: setattr(strip.modifiers.new("B", "BRIGHT_CONTRAST"), "bright", 20),
+        [],
+    ),
+    "cut": (lambda edit, source, strip, folder: strip.split(frame=4, split_method="SOFT"), ALL),
+    "titled": (lambda edit, source, strip, folder: above(edit, folder, 3, 5), [2, 5, 6]),
+    "title_is_muted": (lambda edit, source, strip, folder: setattr(above(edit, folder, 3, 5), "mute", True), ALL),
+    "title_comes": (
+        lambda edit, source, strip, folder: keyed(above(edit, folder), "mute", {1: True, 4: False}),
+        [],
+    ),
+    "adjusted": (adjusted, []),
+    "in_a_transition": (in_a_transition, []),
+    "in_a_meta": (in_a_meta, []),
+    "over_more": (over_more, ALL),
+    "over_another": (over_another, []),
+    "two_effects": (two_effects, ALL),
+    "keyed_effect": (keyed_effect, ALL),
+}
 
 
 @pytest.mark.usefixtures("on_numpy")
-@pytest.mark.parametrize("change", EDITS, ids=lambda change: change.__name__)
-def test_bits_are_the_engines_in_another_edit(edit, made, compared, tmp_path, change):
+@pytest.mark.parametrize("name", EDITS)
+def test_bits_are_the_engines_in_another_edit(edit, made, compared, tmp_path, name):
     source, _effect, strip = made()
-    expected = change(edit, source, strip, tmp_path)
+    change, expected = EDITS[name]
+    change(edit, source, strip, tmp_path)
     edit.frame_end = COUNT if expected else 4
     assert compared() == expected
 

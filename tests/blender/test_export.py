@@ -194,15 +194,8 @@ def folder_of(effect_on):
 
 
 @settings(max_examples=20, suppress_health_check=list(HealthCheck))
-@given(valid_recipes())
+@given(valid_recipes() | following_recipes())
 def test_a_recipe_comes_back_as_it_was(effect_on, source):
-    apply(effect_on, source)
-    assert export(effect_on) == source
-
-
-@settings(max_examples=12, suppress_health_check=list(HealthCheck))
-@given(following_recipes())
-def test_what_is_followed_comes_back(effect_on, source):
     apply(effect_on, source)
     assert export(effect_on) == source
 

@@ -74,18 +74,6 @@ def test_the_command_in_a_real_blender_gives_its_exit_code(blender, tmp_path):
     assert "Traceback" not in refused.stderr
 
 
-def test_missing_footage_stops_a_farm(blender, command_here, bunny, tmp_path):
-    """Blender would render the frames without the effect and exit with 0."""
-    footage = tmp_path / "bunny.mp4"
-    footage.write_bytes(bunny.read_bytes())
-    command_here(footage, "--save", tmp_path / "edit.blend", recipe=LONG_AND_SHARP)
-    footage.unlink()
-    done = blender(tmp_path / "edit.blend", "-o", f"{tmp_path}/out/", "-f", "1")
-    assert done.returncode == 2
-    assert "Virtual Shutter: bunny.mp4: no such file" in done.stderr
-    assert not list(tmp_path.glob("out/*"))
-
-
 def test_python_ends_while_an_effect_is_shown(user_folder, bunny, tmp_path):
     """Blender disables the extension when Python's threads take no more work."""
     code = f"""
