@@ -58,10 +58,8 @@ def baked_in(scene):
 def rendered(bpy, scene, folder, frames):
     """The edit's frames as float EXR, by Blender."""
     settings = scene.render.image_settings
-    settings.media_type, settings.file_format, settings.color_depth, settings.exr_codec = (
-        *("IMAGE", "OPEN_EXR"),
-        *("32", "ZIP"),
-    )
+    settings.media_type, settings.file_format = "IMAGE", "OPEN_EXR"
+    settings.color_depth, settings.exr_codec = "32", "ZIP"
     pictures = []
     for frame in frames:
         scene.frame_set(frame)
@@ -274,7 +272,6 @@ def test_the_baked_strip_looks_as_the_effect_strip(bpy, film, tmp_path):
             each.move_to_meta(meta)
     shown = (2, 6)
     before = rendered(bpy, scene, tmp_path / "effect", shown)
-    baked = None
     assert bpy.ops.shutter.bake(file_format="OPEN_EXR") == {"FINISHED"}
     baked = next(each for each in scene.sequence_editor.strips_all if "Baked" in each.name)
     assert baked.parent_meta() == meta

@@ -89,9 +89,8 @@ def test_what_a_job_takes_away_meanwhile_is_not_missed(film, monkeypatch, look):
     is_closed = threading.Event()  # on the session's thread, for which nobody waits
 
     def note(renderer):
-        if (
-            renderer.compositor.name == "NumPy"
-        ):  # on its thread, the other session may still close what tests before had
+        # On its thread, the other session may still close what tests before had.
+        if renderer.compositor.name == "NumPy":
             closed.append(renderer)
             is_closed.set()
         close(renderer)

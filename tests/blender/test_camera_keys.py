@@ -8,13 +8,7 @@ import pytest
 from support import image_strip, request, write_frames
 
 from shutter_addon.blender.data import annotations, consistency, fcurves, selection, snapshot, strips
-from shutter_addon.blender.editing import (
-    add_effect,
-    motion_keys,
-    region_edits,
-    shutter_edits,
-    track_region,
-)
+from shutter_addon.blender.editing import add_effect, motion_keys, region_edits, shutter_edits, track_region
 from shutter_addon.core.model import motions
 from shutter_addon.core.model.motions import Similarity
 from shutter_addon.media import camera_tracking, registration
@@ -62,8 +56,7 @@ def effect(edit, frames):
 
 def new_source(edit, first):
     edit.render.resolution_x, edit.render.resolution_y = SIZE
-    source = image_strip(edit, first, 11)
-    return source
+    return image_strip(edit, first, 11)
 
 
 def new_effect(edit, source):

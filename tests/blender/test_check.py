@@ -287,10 +287,6 @@ def test_an_edit_that_cannot_be_resumed(noise, check):
     assert fault.startswith("--resume: the edit burns metadata into its pictures")
 
 
-def _odd(edit):
-    edit.render.resolution_x = 65
-
-
 @pytest.mark.parametrize(
     ("change", "name", "sentence"),
     [
@@ -299,7 +295,11 @@ def _odd(edit):
         (lambda edit: None, "edit.blend", "edit.blend: none of .mp4"),
         (lambda edit: None, "in/f0001.png/film.mp4", "f0001.png: is a file, not a folder"),
         (lambda edit: None, "folder.mp4", "folder.mp4: is a folder, not a movie"),
-        (_odd, "film.mp4", "film.mp4: a movie has even sizes, not 65×48"),
+        (
+            lambda edit: setattr(edit.render, "resolution_x", 65),
+            "film.mp4",
+            "film.mp4: a movie has even sizes, not 65×48",
+        ),
     ],
 )
 def test_a_movie_that_join_refuses(noise, check, tmp_path, change, name, sentence):
