@@ -41,6 +41,17 @@ def no_exception(capfd):
 
 
 @pytest.fixture
+def on_numpy(bpy):
+    """Composes with NumPy, which starts faster than OpenGL: for tests of what comes before the device."""
+    from shutter_addon.blender.rendering import render_settings, sessions
+
+    sessions.forget()
+    with render_settings.using(device="cpu"):
+        yield
+    sessions.forget()
+
+
+@pytest.fixture
 def edit(bpy):
     """An empty edit, set up to show code values as the source has them."""
     bpy.ops.wm.read_homefile(use_factory_startup=True, use_empty=True)
@@ -93,17 +104,26 @@ def render(bpy, tmp_path, monkeypatch):
 
 
 @pytest.fixture
-def command(tmp_path):
-    """Runs `python -m shutter_addon` in a process of its own; a recipe may be given as a dictionary."""
+def render_words(tmp_path):
+    """The words of the command `render`; a recipe may be given as a dictionary."""
 
-    def run(*arguments, recipe=None, check=True, env=None, **options):
-        arguments = [str(a) for a in arguments]
+    def made(arguments, recipe):
         if recipe is not None:
             path = tmp_path / "recipe.json"
             path.write_text(json.dumps(recipe))
-            arguments += ["--recipe", str(path)]
+            arguments = [*arguments, "--recipe", path]
+        return ["render", *map(str, arguments)]
+
+    return made
+
+
+@pytest.fixture
+def command(render_words):
+    """Runs `python -m shutter_addon render` in a process of its own."""
+
+    def run(*arguments, recipe=None, check=True, env=None, **options):
         done = subprocess.run(
-            [sys.executable, "-m", "shutter_addon", "render", *arguments],
+            [sys.executable, "-m", "shutter_addon", *render_words(arguments, recipe)],
             cwd=ROOT,
             env=os.environ | (env or {}),
             capture_output=True,
@@ -116,6 +136,25 @@ def command(tmp_path):
         return done
 
     return run
+
+
+@pytest.fixture
+def command_here(bpy, render_words, capfd):
+    """Runs the command `render` in this process, which is faster: as `command`, and each time from the start."""
+    from shutter_addon.blender.command import main
+    from shutter_addon.blender.rendering import sessions
+
+    def run(*arguments, recipe=None, check=True):
+        sessions.forget()
+        capfd.readouterr()
+        code = main(render_words(arguments, recipe))
+        done = subprocess.CompletedProcess(arguments, code, *capfd.readouterr())
+        if check:
+            assert done.returncode == 0, done.stderr
+        return done
+
+    yield run
+    sessions.forget()
 
 
 @pytest.fixture(scope="session")

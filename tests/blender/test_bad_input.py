@@ -8,6 +8,7 @@ import signal
 import subprocess
 import sys
 import time
+from pathlib import Path
 
 import av
 import numpy as np
@@ -18,6 +19,7 @@ from shutter_addon.blender.editing import add_effect
 from shutter_addon.media import MediaError, open_source
 from shutter_addon.media.rendered_pictures import whole_pictures
 
+ROOT = Path(__file__).parents[2]
 STILL = recipe(4, [1, 0, 0, 0])
 
 
@@ -47,25 +49,26 @@ def refused(done, *words):
         ("folder", "folder", ["folder"]),
     ],
 )
-def test_no_medium(command, tmp_path, name, content, words):
+def test_no_medium(command_here, tmp_path, name, content, words):
     path = tmp_path / name
     if content == "folder":
         path.mkdir()
     elif content is not None:
         path.write_bytes(content)
-    refused(command(path, "--output", tmp_path / "out", recipe=STILL, check=False), *words)
+    refused(command_here(path, "--output", tmp_path / "out", recipe=STILL, check=False), *words)
     assert not (tmp_path / "out").exists()
 
 
 @pytest.mark.skipif(os.name != "posix", reason="names are bytes on POSIX systems only")
 @pytest.mark.parametrize("option", ["source", "--save"])
-def test_names_that_are_not_utf8(command, frames, tmp_path, option):
+def test_names_that_are_not_utf8(command_here, frames, tmp_path, option):
     odd = tmp_path / os.fsdecode(b"caf\xe9")
     odd.mkdir()
     shutil.copy(frames, odd / "f0001.png")
     source = odd / "f0001.png" if option == "source" else frames
     more = () if option == "source" else (option, odd / "a.blend")
-    refused(command(source, "--output", tmp_path / "out", *more, recipe=STILL, check=False), "caf\\udce9", "not UTF-8")
+    done = command_here(source, "--output", tmp_path / "out", *more, recipe=STILL, check=False)
+    refused(done, "caf\\udce9", "not UTF-8")
     assert sorted(path.name for path in odd.iterdir()) == ["f0001.png"]
     assert not (tmp_path / "out").exists()
 
@@ -83,7 +86,7 @@ def test_a_strip_whose_folder_is_not_utf8(edit, frames, tmp_path):
     assert str(caught.value).endswith("its path is not UTF-8; rename the file, or the folder that is not")
 
 
-def test_a_movie_cut_off_in_the_middle(command, tmp_path):
+def test_a_movie_cut_off_in_the_middle(command_here, tmp_path):
     """Frames before the end are good; a frame that is not there is said, and stops the render."""
     pictures = np.random.default_rng(0).integers(0, 256, (40, 32, 48, 3), dtype=np.uint8)
     with av.open(str(tmp_path / "whole.mkv"), "w") as container:
@@ -96,7 +99,7 @@ def test_a_movie_cut_off_in_the_middle(command, tmp_path):
     (tmp_path / "cut.mkv").write_bytes(data[: len(data) // 2])
     with open_source(tmp_path / "cut.mkv") as source:
         assert source.count == 40
-    done = command(tmp_path / "cut.mkv", "--output", tmp_path / "out", recipe=recipe(1, [1]), check=False)
+    done = command_here(tmp_path / "cut.mkv", "--output", tmp_path / "out", recipe=recipe(1, [1]), check=False)
     refused(done, "cut.mkv", "cannot be decoded")
     finished = sorted((tmp_path / "out").iterdir())
     assert 15 <= len(finished) <= 20
@@ -104,94 +107,85 @@ def test_a_movie_cut_off_in_the_middle(command, tmp_path):
         assert np.array_equal(np.rint(read_picture(path)), picture)
 
 
-def test_damaged_in_the_middle(command, frames, tmp_path):
-    broken = tmp_path / "in"
-    broken.mkdir()
-    for file in frames.parent.iterdir():
-        (broken / file.name).write_bytes(file.read_bytes())
+def test_damaged_in_the_middle(command_here, frames, tmp_path):
+    broken = shutil.copytree(frames.parent, tmp_path / "in")
     file = broken / "f0004.png"
     file.write_bytes(file.read_bytes()[:200])
-    done = command(broken / "f0001.png", "--output", tmp_path / "out", recipe=recipe(1, [1]), check=False)
+    done = command_here(broken / "f0001.png", "--output", tmp_path / "out", recipe=recipe(1, [1]), check=False)
     refused(done, "f0004.png")
     assert sorted(p.name for p in (tmp_path / "out").iterdir()) == ["0001.png", "0002.png", "0003.png"]
     for path in (tmp_path / "out").iterdir():
         assert np.array_equal(np.rint(read_picture(path)), read_picture(frames.parent / f"f{path.name}"))
 
 
-def test_wrong_recipe(command, frames, tmp_path):
-    """Its sentence is that of core; here, it is the only one, with the file's name, and nothing is written."""
-    done = command(frames, "--output", tmp_path / "out", recipe=STILL | {"\ud800\x1b": 1}, check=False)
-    refused(done, "recipe.json", "unknown field \\ud800\\x1b")
-    assert not (tmp_path / "out").exists()
-
-
-def test_no_recipe(command, frames, tmp_path):
+def test_no_recipe(command_here, frames, tmp_path):
+    """The sentence about a field is that of core; here, it is the only one, with the file's name."""
     (tmp_path / "r.json").write_text("{")
+    (tmp_path / "field.json").write_text(json.dumps(STILL | {"\ud800\x1b": 1}))
     os.mkfifo(tmp_path / "pipe")
-    for path in (tmp_path / "r.json", tmp_path / "none.json", tmp_path, tmp_path / "pipe"):
-        done = command(frames, "--recipe", path, "--output", tmp_path / "out", check=False, timeout=60)
-        refused(done, path.name)
-
-
-@pytest.mark.parametrize("text", ["0:3", "a:b", "1:" + "9" * 5000])
-def test_frames_outside_the_clip(command, frames, tmp_path, text):
-    refused(
-        command(frames, "--output", tmp_path / "out", f"--frames={text}", recipe=STILL, check=False),
-        "--frames",
-        text[:18],
-    )
-    assert not (tmp_path / "out").exists()
+    for name, word in (
+        ("r.json", "r.json"),
+        ("none.json", "none.json"),
+        ("", tmp_path.name),
+        ("pipe", "pipe"),
+        ("field.json", "unknown field \\ud800\\x1b"),
+    ):
+        path = tmp_path / name
+        done = command_here(frames, "--recipe", path, "--output", tmp_path / "out", check=False)
+        refused(done, path.name, word)
+        assert not (tmp_path / "out").exists()
 
 
 @pytest.mark.parametrize(("width", "height"), [(33, 17), (4, 129)])
-def test_odd_sizes(command, tmp_path, width, height):
+def test_odd_sizes(command_here, tmp_path, width, height):
     pictures = np.random.default_rng(0).integers(0, 256, (2, height, width, 3), dtype=np.uint8)
     first = write_frames(tmp_path / "in", pictures)
-    data = recipe(
-        2, [1, 0], [1, 1], regions=[{"shutter": "S1", "kind": "lasso", "strokes": [[[0, 0], [1, 0], [1, 1]]]}]
-    )
-    command(first, "--output", tmp_path / "out", recipe=data)
-    done = command(first, "--output", tmp_path / "plain", recipe=recipe(1, [1]))
+    lasso = {"shutter": "S1", "kind": "lasso", "strokes": [[[0, 0], [1, 0], [1, 1]]]}
+    data = recipe(2, [1, 0], [1, 1], regions=[lasso])
+    command_here(first, "--output", tmp_path / "out", recipe=data)
+    command_here(first, "--output", tmp_path / "plain", recipe=recipe(1, [1]))
     assert np.array_equal(np.rint(read_picture(tmp_path / "plain" / "0002.png")), pictures[1])
-    if width % 2:
-        done = command(first, "--output", tmp_path / "film.mp4", recipe=data, check=False)
-        refused(done, "film.mp4", "even sizes")
+    done = command_here(first, "--output", tmp_path / "film.mp4", recipe=data, check=False)
+    refused(done, "film.mp4", "even sizes")
 
 
-def test_a_picture_smaller_than_blender_renders(command, tmp_path):
+def test_a_picture_smaller_than_blender_renders(command_here, tmp_path):
     first = write_frames(tmp_path / "in", np.zeros((1, 1, 1, 3), dtype=np.uint8))
-    refused(command(first, "--output", tmp_path / "out", recipe=STILL, check=False), "1×1", "4×4")
+    refused(command_here(first, "--output", tmp_path / "out", recipe=STILL, check=False), "1×1", "4×4")
 
 
-def test_outputs_that_cannot_be(command, frames, tmp_path):
+def test_outputs_that_cannot_be(command_here, frames, tmp_path):
     (tmp_path / "file").write_text("mine")
-    for output, words in [
-        (tmp_path / "file" / "out", ["file"]),
-        (tmp_path / "file", ["file"]),
-        (tmp_path / "film.gif", ["film.gif", ".mp4"]),
-        ("/proc/out", ["/proc"]),
-        ("/proc/film.mp4", ["/proc"]),
-    ]:
-        refused(command(frames, "--output", output, recipe=STILL, check=False), *words)
+    for options, word in (
+        (["--output", tmp_path / "file" / "out"], "file"),
+        (["--output", tmp_path / "file"], "file"),
+        (["--output", tmp_path / "film.gif"], "film.gif: neither a folder nor one of .mp4"),
+        (["--output", "/proc/out"], "/proc"),
+        (["--output", "/proc/film.mp4"], "/proc"),
+        (["--output", tmp_path / "a.mp4", "--format", "exr"], "--format"),
+        (["--output", tmp_path / "out", "--frames=0:3"], "--frames: 0:3"),
+        (["--output", tmp_path / "out", "--frames=a:b"], '--frames: "a:b"'),
+        (["--output", tmp_path / "out", "--frames=1:" + "9" * 5000], '--frames: "1:999'),
+        ([], "--output"),
+        (["--save", "/proc/x.blend"], "/proc"),
+    ):
+        refused(command_here(frames, *options, recipe=STILL, check=False), word)
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["file", "recipe.json"]
     assert (tmp_path / "file").read_text() == "mine"
-    done = command(frames, "--output", tmp_path / "a.mp4", "--format", "exr", recipe=STILL, check=False)
-    refused(done, "--format")
-    refused(command(frames, recipe=STILL, check=False), "--output")
-    refused(command(frames, "--save", "/proc/x.blend", recipe=STILL, check=False), "/proc")
 
 
 @pytest.mark.parametrize("output", ["out", "film.mp4", "save"])
-def test_a_full_disk(command, frames, tmp_path, output):
+def test_a_full_disk(command_here, frames, tmp_path, output):
     """No file may grow beyond 400 bytes: what Blender gets when the disk is full."""
-
-    def limit():
-        signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
-        resource.setrlimit(resource.RLIMIT_FSIZE, (400, 400))
-
     option = ["--save", tmp_path / "save.blend"] if output == "save" else ["--output", tmp_path / output]
-    env = {"PYTHONDONTWRITEBYTECODE": "1"}
-    # The recipe is written before the limit holds.
-    done = command(frames, *option, recipe=STILL, check=False, preexec_fn=limit, env=env)
+    (tmp_path / "recipe.json").write_text(json.dumps(STILL))
+    before = resource.getrlimit(resource.RLIMIT_FSIZE), signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (400, before[0][1]))
+    try:
+        done = command_here(frames, "--recipe", tmp_path / "recipe.json", *option, check=False)
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, before[0])
+        signal.signal(signal.SIGXFSZ, before[1])
     assert done.returncode == 2, done.stderr
     assert str(option[1]) in done.stderr
     left = [p for p in tmp_path.rglob("*") if p.is_file() and p.name != "recipe.json"]
@@ -199,12 +193,13 @@ def test_a_full_disk(command, frames, tmp_path, output):
 
 
 @pytest.mark.parametrize(("number", "output"), [(signal.SIGINT, "out"), (signal.SIGTERM, "film.mp4")])
-def test_stopped_halfway(bunny, tmp_path, number, output):
+def test_stopped_halfway(render_words, tmp_path, number, output):
     """Finished frames stay, whole, and those of a movie under a name that says so; nothing else does."""
-    (tmp_path / "r.json").write_text(json.dumps(recipe(8, np.ones(8))))
-    options = ["--recipe", tmp_path / "r.json", "--output", tmp_path / output]
-    arguments = [sys.executable, "-m", "shutter_addon", "render", bunny, *options]
-    with subprocess.Popen(list(map(str, arguments)), cwd=bunny.parents[1], stderr=subprocess.PIPE) as process:
+    pictures = np.random.default_rng(0).integers(0, 256, (6, 90, 160, 3), dtype=np.uint8)
+    first = write_frames(tmp_path / "in", pictures)
+    to_and_fro = [{"frame": 1 + 5 * turn, "value": 6 if turn % 2 else 1} for turn in range(200)]
+    arguments = render_words([first, "--output", tmp_path / output], recipe(4, [1] * 4, time=to_and_fro))
+    with subprocess.Popen([sys.executable, "-m", "shutter_addon", *arguments], cwd=ROOT, stderr=-1) as process:
         part = wait_for(lambda: next(tmp_path.rglob(".part-*"), None), process)
         if output == "out":
             wait_for(lambda: len(list(part.parent.glob("*.png"))) >= 3, process)
@@ -213,15 +208,16 @@ def test_stopped_halfway(bunny, tmp_path, number, output):
         os.kill(process.pid, number)
         process.wait(timeout=60)
     assert process.returncode == 130
-    left = sorted(p for p in tmp_path.rglob("*") if p.is_file() and p.name != "r.json")
+    shutil.rmtree(first.parent)
+    left = sorted(p for p in tmp_path.rglob("*") if p.is_file() and p.name != "recipe.json")
     assert not list(tmp_path.rglob(".part-*"))
     if output == "film.mp4":
         assert [path.name for path in left] == ["film.part.mp4"]
-        assert 1 <= whole_pictures(left[0]) < 132
+        assert 1 <= whole_pictures(left[0]) < 996
     else:
-        assert 3 <= len(left) < 132
+        assert 3 <= len(left) < 996
         for path in left:
-            assert read_picture(path).shape == (720, 1280, 3)
+            assert read_picture(path).shape == (90, 160, 3)
 
 
 def wait_for(condition, process, seconds=60):
@@ -236,15 +232,12 @@ def wait_for(condition, process, seconds=60):
 
 
 def test_no_gl(command, frames, tmp_path):
-    """Without GL, NumPy composes and says so; a GPU that was asked for is refused."""
+    """Without GL, NumPy composes and says so."""
     env = {
         "__EGL_VENDOR_LIBRARY_FILENAMES": "/nonexistent",
         "LIBGL_DRIVERS_PATH": "/nonexistent",
         "EGL_PLATFORM": "none",
     }
-    done = command(frames, "--output", tmp_path / "out", recipe=STILL, env=env)
+    done = command(frames, "--output", tmp_path / "out", "--frames", "1:2", recipe=STILL, env=env)
     assert "composing with NumPy" in done.stderr
-    assert len(list((tmp_path / "out").iterdir())) == 6
-    refused(
-        command(frames, "--output", tmp_path / "no", "--device", "gpu", recipe=STILL, env=env, check=False), "OpenGL"
-    )
+    assert len(list((tmp_path / "out").iterdir())) == 2

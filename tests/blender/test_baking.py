@@ -3,12 +3,14 @@
 import os
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 import numpy as np
 import pytest
 from support import noise_film, picture_of, read_picture, sequencer
 
+from shutter_addon.blender import command
 from shutter_addon.blender.data import selection, strips
 from shutter_addon.blender.editing import baked_strips, reconcile
 from shutter_addon.blender.output import baked_film, film_output
@@ -17,7 +19,6 @@ from shutter_addon.core import revision
 from shutter_addon.core.frames import light
 from shutter_addon.media import film_parts
 
-ROOT = Path(__file__).parents[2]
 COUNT, SIZE = 9, (24, 40)
 
 
@@ -57,10 +58,8 @@ def baked_in(scene):
 def rendered(bpy, scene, folder, frames):
     """The edit's frames as float EXR, by Blender."""
     settings = scene.render.image_settings
-    settings.media_type, settings.file_format, settings.color_depth, settings.exr_codec = (
-        *("IMAGE", "OPEN_EXR"),
-        *("32", "ZIP"),
-    )
+    settings.media_type, settings.file_format = "IMAGE", "OPEN_EXR"
+    settings.color_depth, settings.exr_codec = "32", "ZIP"
     pictures = []
     for frame in frames:
         scene.frame_set(frame)
@@ -98,25 +97,17 @@ def test_a_movie_is_off_by_little(bpy, film, tmp_path):
     assert off.mean() <= 1
 
 
-def test_a_movie_has_no_transparency(bpy, film):
-    film(4)
-    with pytest.raises(RuntimeError, match="a movie has no transparency: bake to OpenEXR"):
-        bpy.ops.shutter.bake(file_format="MOVIE")
-
-
-def test_an_edit_that_is_not_saved_is_not_baked(bpy, edit, tmp_path):
-    noise_film(edit, noise(), tmp_path)
-    with pytest.raises(RuntimeError, match="save it first"):
-        bpy.ops.shutter.bake(file_format="OPEN_EXR")
-
-
+@pytest.mark.usefixtures("on_numpy")
 def test_unbake_brings_the_effect_back(bpy, film):
+    """And leaves a copy of what was baked that was moved away."""
     scene, _effect, strip = film()
-    before = sorted(s.name for s in scene.sequence_editor.strips_all)
+    before = {s.name for s in scene.sequence_editor.strips_all}
     baked = bake(bpy)
     place = Path(bpy.path.abspath(baked.directory))
+    copy = scene.sequence_editor.strips.new_image("copy", str(place / "0001.exr"), 9, 200)
+    copy.virtual_shutter_bake.identity = baked.virtual_shutter_bake.identity
     assert bpy.ops.shutter.unbake() == {"FINISHED"}
-    assert sorted(s.name for s in scene.sequence_editor.strips_all) == before
+    assert {s.name for s in scene.sequence_editor.strips_all} == before | {"copy"}
     assert not strip.mute
     assert len(list(place.glob("*.exr"))) == COUNT  # files stay: baked again, they are found
 
@@ -127,9 +118,11 @@ def states(scene, strip):
     return [baked_strips.is_stale(scene, strips.effect_of(scene, part.scene), part) for part in parts]
 
 
+@pytest.mark.usefixtures("on_numpy")
 def test_it_says_that_it_is_stale(bpy, film):
     scene, effect, strip = film()
-    bake(bpy)
+    strip.right_handle = 6
+    baked = bake(bpy)
 
     def stale():
         return states(scene, strip)
@@ -149,8 +142,11 @@ def test_it_says_that_it_is_stale(bpy, film):
     bpy.context.view_layer.update()
     assert strips.origin(strip) == 8
     assert stale() == [False]
+    strip.right_handle = baked.right_handle = strip.right_handle + 4
+    assert stale() == [True], "it is longer"
 
 
+@pytest.mark.usefixtures("on_numpy")
 @pytest.mark.parametrize("kind", ["SOFT", "HARD"])
 def test_both_are_cut_and_nothing_is_lost(bpy, film, tmp_path, kind):
     scene, effect, strip = film()
@@ -169,30 +165,26 @@ def test_both_are_cut_and_nothing_is_lost(bpy, film, tmp_path, kind):
     assert np.abs(rendered(bpy, scene, tmp_path / "after", (3, 6)) - before).max() < 1e-6
 
 
-def test_a_copy_that_was_moved_away_stays(bpy, film):
-    scene, _effect, _strip = film()
-    baked = bake(bpy)
-    copy = scene.sequence_editor.strips.new_image(
-        "copy", str(Path(bpy.path.abspath(baked.directory)) / "0001.exr"), 9, 200
-    )
-    copy.virtual_shutter_bake.identity = baked.virtual_shutter_bake.identity
-    bpy.ops.shutter.unbake()
-    assert "copy" in scene.sequence_editor.strips_all
+@pytest.fixture
+def shutter(capfd):
+    """Runs a command in this process: its exit code, and what it said on both streams."""
+
+    def run(*words):
+        capfd.readouterr()
+        return command.main([*map(str, words)]), *capfd.readouterr()
+
+    return run
 
 
-def shutter(*words):
-    return subprocess.run(
-        [sys.executable, "-m", "shutter_addon", *map(str, words)], cwd=ROOT, capture_output=True, text=True
-    )
-
-
+@pytest.mark.usefixtures("on_numpy")
 @pytest.mark.parametrize("kind", ["exr", "movie"])
-def test_the_command_goes_on_where_it_was_broken_off(bpy, film, tmp_path, kind):
+def test_the_command_goes_on_where_it_was_broken_off(film, tmp_path, shutter, kind):
     film()
-    said = shutter("bake", tmp_path / "edit.blend", "--strip", "Shutter", "--format", kind)
-    assert said.returncode == 0, said.stderr
-    place = Path(said.stdout.splitlines()[-1])
-    counts = [line for line in said.stdout.splitlines() if line.endswith(f" of {COUNT}")]
+    words = ("bake", tmp_path / "edit.blend", "--strip", "Shutter", "--format", kind)
+    code, said, errors = shutter(*words)
+    assert code == 0, errors
+    place = Path(said.splitlines()[-1])
+    counts = [line for line in said.splitlines() if line.endswith(f" of {COUNT}")]
     assert counts == [f"{done} of {COUNT}" for done in range(1, COUNT + 1)]
     assert place.parent == tmp_path / baked_film.FOLDER
     if kind == "movie":
@@ -200,7 +192,7 @@ def test_the_command_goes_on_where_it_was_broken_off(bpy, film, tmp_path, kind):
         assert film_parts.is_whole_movie(place, COUNT)
         assert not place.with_suffix(".parts").exists()
         place.write_bytes(whole[: len(whole) // 2])  # as a full disk leaves it, or a process that was killed
-        assert shutter("bake", tmp_path / "edit.blend", "--strip", "Shutter").returncode == 0
+        assert shutter("bake", tmp_path / "edit.blend", "--strip", "Shutter")[0] == 0
         assert place.read_bytes() == whole
         return
     pictures = sorted(place.iterdir())
@@ -208,26 +200,24 @@ def test_the_command_goes_on_where_it_was_broken_off(bpy, film, tmp_path, kind):
     whole = {path: path.read_bytes() for path in pictures}
     lost.unlink()
     broken.write_bytes(whole[broken][:-50])
-    assert shutter("bake", tmp_path / "edit.blend", "--strip", "Shutter", "--format", kind).returncode == 0
+    assert shutter(*words)[0] == 0
     assert {path: path.read_bytes() for path in place.iterdir()} == whole
     assert pictures[0].stat().st_mtime_ns == kept
 
 
-@pytest.mark.parametrize(
-    ("words", "sentence"),
-    [
+def test_what_cannot_be_baked_is_one_sentence(film, tmp_path, shutter):
+    film()
+    for words, sentence in (
         (["--strip", "Other"], '--strip: there is no Shutter strip "Other"'),
         (["--strip", "Shutter", "--scene", "No"], 'has no scene "No"'),
-    ],
-)
-def test_what_cannot_be_baked_is_one_sentence(film, tmp_path, words, sentence):
-    film()
-    said = shutter("bake", tmp_path / "edit.blend", *words)
-    assert said.returncode == 2
-    assert sentence in said.stderr
-    assert len(said.stderr.splitlines()) == 1
+    ):
+        code, _, errors = shutter("bake", tmp_path / "edit.blend", *words)
+        assert code == 2
+        assert sentence in errors
+        assert len(errors.splitlines()) == 1
 
 
+@pytest.mark.usefixtures("on_numpy")
 def test_it_plays_without_the_extension(bpy, film, tmp_path):
     scene, _effect, _strip = film()
     bake(bpy)
@@ -243,6 +233,7 @@ def test_it_plays_without_the_extension(bpy, film, tmp_path):
     assert (read_picture(tmp_path / "without.exr") == before[0]).all()
 
 
+@pytest.mark.usefixtures("on_numpy")
 def test_a_copy_of_all_of_it_is_unbaked_alone(bpy, film):
     scene, _effect, strip = film()
     bake(bpy)
@@ -263,6 +254,7 @@ def test_a_copy_of_all_of_it_is_unbaked_alone(bpy, film):
     assert states(scene, copied) == [False]
 
 
+@pytest.mark.usefixtures("on_numpy")
 def test_the_baked_strip_looks_as_the_effect_strip(bpy, film, tmp_path):
     """Transform, crop, flip and opacity, keys included, and in a meta strip."""
     scene, _effect, strip = film(4)
@@ -280,7 +272,6 @@ def test_the_baked_strip_looks_as_the_effect_strip(bpy, film, tmp_path):
             each.move_to_meta(meta)
     shown = (2, 6)
     before = rendered(bpy, scene, tmp_path / "effect", shown)
-    baked = None
     assert bpy.ops.shutter.bake(file_format="OPEN_EXR") == {"FINISHED"}
     baked = next(each for each in scene.sequence_editor.strips_all if "Baked" in each.name)
     assert baked.parent_meta() == meta
@@ -291,6 +282,7 @@ def test_the_baked_strip_looks_as_the_effect_strip(bpy, film, tmp_path):
     assert (rendered(bpy, scene, tmp_path / "again", shown) == before).all()
 
 
+@pytest.mark.usefixtures("on_numpy")
 @pytest.mark.parametrize("change", ["location", "weight"])
 def test_keys_that_moved_along_are_no_change_and_others_are(bpy, film, change):
     """Between keys Blender gives other floats at other frames."""
@@ -310,14 +302,7 @@ def test_keys_that_moved_along_are_no_change_and_others_are(bpy, film, change):
     assert states(scene, strip) == [True]
 
 
-def test_a_longer_strip_is_stale(bpy, film):
-    scene, _effect, strip = film()
-    strip.right_handle = 6
-    baked = bake(bpy)
-    strip.right_handle = baked.right_handle = 10
-    assert states(scene, strip) == [True]
-
-
+@pytest.mark.usefixtures("on_numpy")
 @pytest.mark.parametrize("is_deleted", [False, True])
 def test_what_lies_above_stays_above(bpy, film, tmp_path, is_deleted):
     """A title above the effect, with room above it alone; by a second bake as well, and where its strip is deleted."""
@@ -338,20 +323,31 @@ def test_what_lies_above_stays_above(bpy, film, tmp_path, is_deleted):
     assert (rendered(bpy, scene, tmp_path / "again", (4,)) == before).all()
 
 
-@pytest.mark.parametrize("owner", ["strobe", "input"])
-def test_what_cannot_stand_in_is_refused(bpy, film, owner):
-    scene, _effect, strip = film()
-    if owner == "strobe":
-        strip.strobe = 3
-        said = "is retimed, strobed or reversed"
-    else:
-        scene.sequence_editor.strips.new_effect("blur", "GAUSSIAN_BLUR", 5, 1, length=COUNT, input1=strip)
-        said = "is the input of another strip"
+REFUSED = {
+    "is retimed, strobed or reversed": lambda scene, strip: setattr(strip, "strobe", 3),
+    "is the input of another strip": lambda scene, strip: scene.sequence_editor.strips.new_effect(
+        "blur", "GAUSSIAN_BLUR", 5, 1, length=COUNT, input1=strip
+    ),
+    "a movie has no transparency: bake to OpenEXR": lambda scene, strip: None,
+}
+
+
+@pytest.mark.parametrize("said", REFUSED)
+def test_what_cannot_stand_in_is_refused(bpy, film, said):
+    scene, _effect, strip = film(4)
+    REFUSED[said](scene, strip)
     with pytest.raises(RuntimeError, match=said):
-        bpy.ops.shutter.bake(file_format="OPEN_EXR")
+        bpy.ops.shutter.bake(file_format="MOVIE" if "movie" in said else "OPEN_EXR")
     assert not strip.mute
 
 
+def test_an_edit_that_is_not_saved_is_not_baked(bpy, edit, tmp_path):
+    noise_film(edit, noise(), tmp_path)
+    with pytest.raises(RuntimeError, match="save it first"):
+        bpy.ops.shutter.bake(file_format="OPEN_EXR")
+
+
+@pytest.mark.usefixtures("on_numpy")
 def test_a_transparent_source_stays_muted_below_what_was_baked_of_it(bpy, film, tmp_path):
     scene, _effect, strip = film(4)
     bake(bpy)
@@ -400,6 +396,7 @@ def test_a_bake_ends_with_the_blender_that_began_it(bpy, film):
     try:
         while not job.done():
             assert not job.is_over(), job.failure()
+            time.sleep(0.05)
         job.process.stdin.close()  # as when that is killed
         assert job.process.wait(30) == film_output.INTERRUPTED
         assert 0 < job.done() < 2990
@@ -407,6 +404,7 @@ def test_a_bake_ends_with_the_blender_that_began_it(bpy, film):
         job.end()
 
 
+@pytest.mark.usefixtures("on_numpy")
 @pytest.mark.skipif(os.name != "posix", reason="links need no rights there alone")
 @pytest.mark.parametrize(("kind", "name"), [("OPEN_EXR", "0001.exr"), ("MOVIE", "0001.mp4")])
 def test_nothing_is_baked_or_removed_behind_a_link(bpy, film, tmp_path, kind, name):

@@ -48,38 +48,27 @@ def test_nothing_is_begun_for_single_pictures(film, render, composed):
     assert composed == [4, 1, 8]
 
 
-def weigh(edit, source, effect, strip):
-    effect.shutters[0].bars[3].weight = 0.1
+CHANGES = {
+    "weigh": lambda source, effect: setattr(effect.shutters[0].bars[3], "weight", 0.1),
+    "move": lambda source, effect: setattr(effect.regions[0], "location", (0.4, 0.0)),
+    "slip": lambda source, effect: setattr(source, "content_start", -1),
+    "widen": lambda source, effect: setattr(effect, "window", 6),
+    "replace": lambda source, effect: setattr(source.elements[0], "filename", "f0007.png"),
+}
 
 
-def move(edit, source, effect, strip):
-    effect.regions[0].location = (0.4, 0.0)
-
-
-def slip(edit, source, effect, strip):
-    source.content_start -= 2
-
-
-def widen(edit, source, effect, strip):
-    effect.window = 6
-
-
-def replace(edit, source, effect, strip):
-    source.elements[0].filename = "f0007.png"
-
-
-@pytest.mark.parametrize("change", [weigh, move, slip, widen, replace])
+@pytest.mark.parametrize("change", CHANGES)
 def test_a_change_leaves_no_trace(film, render, change):
     """Frame 4 is begun when 2 and 3 are rendered; what is shown after a change is what a fresh start shows."""
-    edit = film[0]
+    edit, source, effect, _strip = film
     before = render(edit, [2, 3, 4], "16")[4]
     render(edit, [2, 3], "16")
-    change(*film)
+    CHANGES[change](source, effect)
     shown = render(edit, [4], "16")[4]
     sessions.forget()
     # Blender keeps the frame that it made last, whatever its settings: another one comes first.
     assert np.array_equal(shown, render(edit, [9, 4], "16")[4])
-    assert change is replace or not np.array_equal(shown, before)
+    assert change == "replace" or not np.array_equal(shown, before)
 
 
 def test_a_frame_that_cannot_be_read_fails_only_when_it_is_shown(film, render, tmp_path):
@@ -100,9 +89,8 @@ def test_what_a_job_takes_away_meanwhile_is_not_missed(film, monkeypatch, look):
     is_closed = threading.Event()  # on the session's thread, for which nobody waits
 
     def note(renderer):
-        if (
-            renderer.compositor.name == "NumPy"
-        ):  # on its thread, the other session may still close what tests before had
+        # On its thread, the other session may still close what tests before had.
+        if renderer.compositor.name == "NumPy":
             closed.append(renderer)
             is_closed.set()
         close(renderer)

@@ -52,11 +52,15 @@ def test_it_ends_with_its_last_step(going):
     assert (operator.ends, operator.leaves, timers) == ("done", 1, [])
 
 
-def test_escape_stops_it_before_the_next_step(going):
+def test_escape_or_a_closed_window_ends_it_before_the_next_step(going):
     operator, context, timers, _bases = going
     operator.begin(context, waits=False)
     assert operator.modal(context, ESCAPE) == {"FINISHED"}
     assert (operator.ends, operator.left, timers) == ("stopped", 3, [])
+    operator.ends, operator.leaves = None, 0
+    operator.begin(context, waits=False)
+    operator.cancel(context)
+    assert (operator.ends, operator.leaves, timers) == (None, 1, [])
 
 
 def test_an_error_that_nobody_expects_lets_go_of_its_timer(going):
@@ -76,10 +80,3 @@ def test_what_a_file_that_is_loaded_has_ended_ends_with_the_next_event(going, mo
     assert timers == []
     assert operator.modal(context, OTHER) == {"FINISHED"}
     assert (operator.ends, operator.left) == ("done", 3)
-
-
-def test_a_window_that_is_closed_ends_it(going):
-    operator, context, timers, _bases = going
-    operator.begin(context, waits=False)
-    operator.cancel(context)
-    assert (operator.ends, operator.leaves, timers) == (None, 1, [])

@@ -8,13 +8,7 @@ import pytest
 from support import image_strip, request, write_frames
 
 from shutter_addon.blender.data import annotations, consistency, fcurves, selection, snapshot, strips
-from shutter_addon.blender.editing import (
-    add_effect,
-    motion_keys,
-    region_edits,
-    shutter_edits,
-    track_region,
-)
+from shutter_addon.blender.editing import add_effect, motion_keys, region_edits, shutter_edits, track_region
 from shutter_addon.core.model import motions
 from shutter_addon.core.model.motions import Similarity
 from shutter_addon.media import camera_tracking, registration
@@ -62,8 +56,7 @@ def effect(edit, frames):
 
 def new_source(edit, first):
     edit.render.resolution_x, edit.render.resolution_y = SIZE
-    source = image_strip(edit, first, 11)
-    return source
+    return image_strip(edit, first, 11)
 
 
 def new_effect(edit, source):
@@ -207,7 +200,7 @@ def test_it_goes_on_behind_a_cut(bpy, edit, tmp_path):
     assert not keys(bpy, "influence")
 
 
-def flash(edit, folder, black=range(20, 50), count=70):
+def flash(edit, folder, black=range(16, 32), count=48):
     """A wall that glides by, a pixel a frame; it is black meanwhile."""
     shots = [np.roll(DARK * 4, 2 * i, axis=1) * np.uint8(i not in black) for i in range(count)]
     source = new_source(edit, write_frames(folder / "black", shots))
@@ -225,16 +218,16 @@ def test_where_the_cameras_motion_is_unknown_exposures_become_short(bpy, edit, t
     frames; behind that it goes on. Without the keys, they would be open throughout."""
     effect = flash(edit, tmp_path)
     call(bpy, "tripod")
-    assert track_region.stops(effect, None) == [(31, camera_tracking.BARE, True)]
-    assert [(gap.first, gap.last) for gap in track_region.gaps(effect, None)] == [(31, 60)]
-    state = {frame: request(*active(bpy), frame).state for frame in range(11, 81)}
+    assert track_region.stops(effect, None) == [(27, camera_tracking.BARE, True)]
+    assert [(gap.first, gap.last) for gap in track_region.gaps(effect, None)] == [(27, 42)]
+    state = {frame: request(*active(bpy), frame).state for frame in range(11, 59)}
     spans = {frame: np.flatnonzero(found.bars[0] > 1e-6) - found.options.before for frame, found in state.items()}
     for frame, span in spans.items():
-        beyond = {frame + k for k in span.tolist()} & set(range(31, 61))
+        beyond = {frame + k for k in span.tolist()} & set(range(27, 43))
         assert beyond <= {frame}, (frame, span)
     lengths = [len(span) for span in spans.values()]
     assert max(abs(np.diff(lengths))) <= 2
-    assert (lengths[5], lengths[25], lengths[-8]) == (8, 1, 8)
+    assert (lengths[5], lengths[22], lengths[-8]) == (8, 1, 8)
     for curve in fcurves.curves_under(edit, f"{effect.camera.path_from_id()}.influence"):
         curve.mute = True
-    assert len(np.flatnonzero(request(*active(bpy), 40).state.bars[0])) == 8
+    assert len(np.flatnonzero(request(*active(bpy), 34).state.bars[0])) == 8

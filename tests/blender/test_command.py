@@ -1,5 +1,6 @@
 """The command, end to end: from footage and a recipe to files, through Blender's sequencer."""
 
+import av
 import numpy as np
 import OpenImageIO
 import pytest
@@ -42,32 +43,32 @@ def test_a_still_frame_gives_the_sequence_back(command, noise, tmp_path, same_pi
         same_pixels(read_picture(tmp_path / "out" / name), frames[i], 1)
 
 
-def test_a_window_stops_at_a_cut(command, tmp_path, same_pixels):
+def test_a_window_stops_at_a_cut(command_here, tmp_path, same_pixels):
     """In chunks as in one go, and not where the recipe says so."""
     rng = np.random.default_rng(3)
     shots = [rng.integers(0, 256, (6, 8, 3), dtype=np.uint8).repeat(8, 0).repeat(8, 1) for _ in range(2)]
     frames = np.stack([np.roll(shots[k // 6], k, axis=1) for k in range(12)])
     first = write_frames(tmp_path / "film", frames)
     data = recipe(4, np.ones(4))
-    command(first, "--output", tmp_path / "whole", recipe=data)
+    command_here(first, "--output", tmp_path / "whole", recipe=data)
     for chunk in ("1:4", "5:5", "6:12"):
-        command(first, "--output", tmp_path / "chunks", "--frames", chunk, recipe=data)
+        command_here(first, "--output", tmp_path / "chunks", "--frames", chunk, recipe=data)
     for k in range(12):
         window = np.minimum(np.arange(k, k + 4), 5 if k < 6 else 11)
         whole, part = (read_picture(tmp_path / way / f"{k + 1:04d}.png") for way in ("whole", "chunks"))
         same_pixels(whole, levels(linear(frames[window]).mean(axis=0)), 1)
         assert np.array_equal(whole, part)
-    command(first, "--output", tmp_path / "off", "--frames", "5", recipe=data | {"stop_at_cuts": False})
+    command_here(first, "--output", tmp_path / "off", "--frames", "5", recipe=data | {"stop_at_cuts": False})
     same_pixels(read_picture(tmp_path / "off" / "0005.png"), levels(linear(frames[4:8]).mean(axis=0)), 1)
 
 
-def test_weights_have_a_channel_for_each_layer(command, noise, tmp_path):
+def test_weights_have_a_channel_for_each_layer(command_here, noise, tmp_path):
     first, _ = noise
     ramp = {"kind": "ramp", "ramp": "linear", "shutter": "S1", "layer": True}
     ends = [{"frame": 1, "value": 0.5, "ease": "constant"}, {"frame": 3, "value": 0}]
     regions = [ramp | {"name": "S0"}, ramp | {"name": "Gone", "opacity": ends}]
     data = recipe(4, [1] * 4, [1, 0, 0, 0], aggregate=2, regions=regions)
-    command(first, "--output", tmp_path / "out", "--weights", tmp_path / "w", "--frames", "2:3", recipe=data)
+    command_here(first, "--output", tmp_path / "out", "--weights", tmp_path / "w", "--frames", "2:3", recipe=data)
     images = [OpenImageIO.ImageBuf(str(tmp_path / "w" / f"000{frame}.exr")) for frame in (2, 3)]
     there, gone = (
         dict(zip(image.spec().channelnames, np.moveaxis(image.get_pixels(), -1, 0), strict=True)) for image in images
@@ -82,61 +83,80 @@ def test_weights_have_a_channel_for_each_layer(command, noise, tmp_path):
 
 
 @pytest.mark.parametrize("layer", [False, True])
-def test_chunks_and_order_change_no_bit(command, noise, tmp_path, layer):
+def test_chunks_and_order_change_no_bit(command_here, noise, tmp_path, layer):
     first, _ = noise
     rng = np.random.default_rng(2)
     moving = line("S1", (0.2, 0.2), (0.4, 0.6), width=0.1)
     moving |= {"keys": [{"frame": 1}, {"frame": 12, "location": [0.4, 0.1], "rotation": 40}], "layer": layer}
     edges = {"edge_aware": 1.0, "border": True, "aggregate": 4} if layer else {}
     data = recipe(6, *rng.random((2, 6)), regions=[line("S0", (0.9, 0.1), (0.9, 0.9)), moving], **edges)
-    command(first, "--output", tmp_path / "whole", recipe=data)
-    for chunk in ("9:12", "5:8", "3", "1:2", "4"):
-        command(first, "--output", tmp_path / "parts", "--frames", chunk, recipe=data)
-    for frame in range(1, 13):
+    command_here(first, "--output", tmp_path / "whole", "--frames", "2:8", recipe=data)
+    for chunk in ("6:8", "4"):
+        command_here(first, "--output", tmp_path / "parts", "--frames", chunk, recipe=data)
+    for frame in (4, 6, 7, 8):
         whole, part = (tmp_path / f / f"{frame:04d}.png" for f in ("whole", "parts"))
         assert np.array_equal(read_picture(whole), read_picture(part))
 
 
-def test_exr_is_scene_linear(command, noise, tmp_path):
+def test_exr_is_scene_linear(command_here, noise, tmp_path):
     first, frames = noise
-    command(first, "--output", tmp_path / "out", "--format", "exr", "--frames", "1", recipe=recipe(4, np.ones(4)))
+    command_here(first, "--output", tmp_path / "out", "--format", "exr", "--frames", "1", recipe=recipe(4, np.ones(4)))
     picture = read_picture(tmp_path / "out" / "0001.exr")
     assert np.abs(picture - linear(frames[:4]).mean(axis=0)).max() < 1e-3
 
 
+@pytest.fixture(scope="module")
+def with_sound(tmp_path_factory):
+    """Ten frames of 160×90 that become brighter, at 25 a second, with a tone."""
+    path = tmp_path_factory.mktemp("sound") / "film.mkv"
+    with av.open(str(path), "w") as container:
+        video, audio = container.add_stream("ffv1", rate=25), container.add_stream("pcm_s16le", rate=48000)
+        audio.layout = "mono"
+        video.width, video.height, video.pix_fmt = 160, 90, "bgr0"
+        for index in range(10):
+            y, x = np.indices((90, 160))
+            picture = np.repeat(((x + y) // 2 + 12 * index)[..., None], 3, axis=-1).astype(np.uint8)
+            container.mux(video.encode(av.VideoFrame.from_ndarray(picture, format="rgb24")))
+        tone = (8000 * np.sin(np.arange(19200) * 0.05)).astype(np.int16)[None]
+        sound = av.AudioFrame.from_ndarray(tone, format="s16", layout="mono")
+        sound.sample_rate, sound.pts = 48000, 0
+        for stream, frame in ((audio, sound), (audio, None), (video, None)):
+            container.mux(stream.encode(frame))
+    return path
+
+
 @pytest.mark.parametrize("ending", [".mp4", ".mov", ".mkv", ".webm", ".avi"])
-def test_movies(command, bunny, tmp_path, ending):
+def test_movies(command_here, with_sound, tmp_path, ending):
     output = tmp_path / f"film{ending}"
-    command(bunny, "--output", output, "--frames", "11:20", recipe=recipe(4, still(4)))
+    command_here(with_sound, "--output", output, "--frames", "3:8", recipe=recipe(4, still(4)))
     assert [p.name for p in tmp_path.iterdir() if p.name.startswith((".", "film"))] == [output.name]
-    with open_source(output) as film, open_source(bunny) as source:
-        # Containers that give the sound's length alone may end a frame later.
-        assert (film.width, film.height, film.fps) == (1280, 720, 25)
-        assert film.count in (10, 11)
+    with open_source(output) as film, open_source(with_sound) as source:
+        late = ending == ".avi"  # Blender's AVI shows the first frame twice
+        assert (film.width, film.height, film.fps) == (160, 90, 25)
+        assert film.count in (6, 7)  # containers that give the sound's length alone may end a frame later
         assert film.has_audio
-        difference = np.abs(film.read(3).astype(float) - source.read(13)).mean()
-        assert difference < 6
+        assert np.abs(film.read(3 + late).astype(float) - source.read(5)).mean() < 4
 
 
-def test_source_time_up_to_the_last_frame_of_the_timeline(command, noise, tmp_path, same_pixels):
+def test_source_time_up_to_the_last_frame_of_the_timeline(command_here, noise, tmp_path, same_pixels):
     """A freeze of more than an hour, a way on behind it, and the last frame that Blender has."""
     first, frames = noise
     keys = {1: 2, 100_100: 2, 100_104: 6, 1_048_574: 12}
     data = recipe(1, [1], time=[{"frame": frame, "value": value} for frame, value in keys.items()])
     for chunk in ("100100:100104", "1048574"):
-        command(first, "--output", tmp_path / "out", "--frames", chunk, recipe=data)
+        command_here(first, "--output", tmp_path / "out", "--frames", chunk, recipe=data)
     shown = {100_100: 2, 100_101: 3, 100_102: 4, 100_103: 5, 100_104: 6, 1_048_574: 12}
     assert len(list((tmp_path / "out").iterdir())) == len(shown)
     for frame, number in shown.items():
         same_pixels(read_picture(tmp_path / "out" / f"{frame:04d}.png"), frames[number - 1], 1)
 
 
-def test_alpha_is_carried(command, tmp_path, same_pixels):
+def test_alpha_is_carried(command_here, tmp_path, same_pixels):
     frames = np.random.default_rng(4).integers(0, 256, (4, 16, 20, 4), dtype=np.uint8)
     frames[:, :8, :, 3] = 255
     frames[:, 12:, :, 3] = 0
     first = write_frames(tmp_path / "in", frames)
-    command(first, "--output", tmp_path / "out", "--frames", "1", recipe=recipe(2, [1, 1]))
+    command_here(first, "--output", tmp_path / "out", "--frames", "1", recipe=recipe(2, [1, 1]))
     picture = read_picture(tmp_path / "out" / "0001.png")
     alpha = frames[:2, ..., 3:].astype(float) / 255
     total = (linear(frames[:2, ..., :3]) * alpha).mean(axis=0)

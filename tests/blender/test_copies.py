@@ -24,7 +24,6 @@ import bpy
 from shutter_addon import blender
 from shutter_addon.blender.data import strips
 from shutter_addon.blender.editing import add_effect, reconcile, shutter_edits
-from shutter_addon.blender.editing import add_effect
 
 blender.register()
 edit = bpy.context.scene

@@ -6,7 +6,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from support import state
 
-from shutter_addon.blender.data import annotations, consistency, fcurves, selection, snapshot, strips
+from shutter_addon.blender.data import annotations, consistency, fcurves, selection, strips
 from shutter_addon.blender.editing import add_effect, bar_edits, region_edits, shutter_edits
 from shutter_addon.core.model import shutters
 
@@ -187,20 +187,6 @@ def test_a_summary_in_words():
     assert bar_edits.summary([0, 1], "LIGHTEST") == "Lightest of 1 frame"
 
 
-@given(st.integers(1, 24), st.sampled_from([(1, 1), (2, 4), (3, 3), (4, 2)]), st.booleans())
-@settings(suppress_health_check=[HealthCheck.function_scoped_fixture], max_examples=20)
-def test_another_window_keeps_shape_and_share_of_light(effect, window, shape, closed):
-    """Edited ones: test_kept_presets.py has the others."""
-    for shutter in effect.shutters:
-        bar_edits.set_bars(shutter, np.repeat([1.0, 0.25][: 2 - closed] + [0.0] * closed, 4))
-    before = [consistency.bars(shutter) for shutter in effect.shutters]
-    effect.window = window
-    for shutter, old in zip(effect.shutters, before, strict=True):
-        assert consistency.bars(shutter) == pytest.approx(shutters.resample(old, window), abs=1e-6)
-        assert consistency.bars(shutter).mean() == pytest.approx(old.mean(), abs=1e-6)
-    effect.window = 8
-
-
 @pytest.mark.parametrize("window", [16, 24, 80])
 def test_another_window_and_back_is_exact(three, window):
     shutter_edits.add_shutter(three)  # without keys
@@ -348,21 +334,6 @@ def test_only_what_renders_by_its_keys_can_be_keyed(effect):
         ("ShutterEffect", "decontaminate"),
         *(("ShutterCamera", name) for name in ("location", "rotation", "scale", "influence", "confidence")),
     }
-
-
-def test_keyed_options_hold_from_their_key_on(effect):
-    edit = effect.id_data
-    for frame, border, edges, aggregate in ((1, False, "HOLD", "1"), (20, True, "SHORTEN", "4")):
-        effect.border, effect.edges, effect.aggregate = border, edges, aggregate
-        effect.stop_at_cuts = not border
-        for name in ("border", "edges", "aggregate", "stop_at_cuts"):
-            effect.keyframe_insert(name, frame=frame)
-    *_, strip = strips.find_effect(effect.scene)
-    frames = (1, 19, 20, 40)
-    read = snapshot.read(edit, effect, strip, frames)
-    found = [read.options.at(frame) for frame in frames]
-    assert [(o.border, o.edges, o.aggregate) for o in found] == [(False, "hold", 1)] * 2 + [(True, "shorten", 4)] * 2
-    assert [o.stop_at_cuts for o in found] == [True, True, False, False]
 
 
 def keyable(group, prop) -> bool:

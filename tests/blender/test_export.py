@@ -193,21 +193,14 @@ def folder_of(effect_on):
     return Path(effect_on[0].sequence_editor.strips["images"].directory).parent
 
 
-@settings(max_examples=60, suppress_health_check=list(HealthCheck))
-@given(valid_recipes())
+@settings(max_examples=20, suppress_health_check=list(HealthCheck))
+@given(valid_recipes() | following_recipes())
 def test_a_recipe_comes_back_as_it_was(effect_on, source):
     apply(effect_on, source)
     assert export(effect_on) == source
 
 
-@settings(max_examples=15, suppress_health_check=list(HealthCheck))
-@given(following_recipes())
-def test_what_is_followed_comes_back(effect_on, source):
-    apply(effect_on, source)
-    assert export(effect_on) == source
-
-
-@settings(max_examples=30, suppress_health_check=list(HealthCheck))
+@settings(max_examples=8, suppress_health_check=list(HealthCheck))
 @given(valid_recipes(), st.floats(-2, 2), st.floats(0.3, 3), st.floats(-300, 300))
 def test_on_a_moved_turned_and_scaled_strip(effect_on, source, rotation, scale, offset):
     t = effect_on[2].transform

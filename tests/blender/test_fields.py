@@ -18,20 +18,16 @@ KINDS = {
     Options: (lambda effect: effect, lambda read: read.options),
     model.Shutter: (lambda effect: effect.shutters[1], lambda read: read.shutters[1]),
     model.Camera: (lambda effect: effect.camera, lambda read: read.camera),
-    model.Region: (lambda effect: effect.regions[0], lambda read: _region(read, 0)),
-    model.MatteRegion: (lambda effect: effect.regions[1], lambda read: _region(read, 1)),
-    model.OutlineRegion: (lambda effect: effect.regions[2], lambda read: _region(read, 2)),
-    model.FileContent: (lambda effect: effect.regions[3], lambda read: _region(read, 3).content),
-    model.RampContent: (lambda effect: effect.regions[1], lambda read: _region(read, 1).content),
+    model.Region: (lambda effect: effect.regions[0], lambda read: read.regions[0]),
+    model.MatteRegion: (lambda effect: effect.regions[1], lambda read: read.regions[1]),
+    model.OutlineRegion: (lambda effect: effect.regions[2], lambda read: read.regions[2]),
+    model.FileContent: (lambda effect: effect.regions[3], lambda read: read.regions[3].content),
+    model.RampContent: (lambda effect: effect.regions[1], lambda read: read.regions[1].content),
 }
 EVERY = [(kind, name) for kind in KINDS for name in fields_of(kind)]
 # Read by functions of their own (blender/data/matte_content.py): they are other words there.
 CONTENT = model.FileContent, model.RampContent
 FIRST, LAST = 1, 9
-
-
-def _region(read: model.Effect, index: int):
-    return read.regions[index]
 
 
 @pytest.fixture
