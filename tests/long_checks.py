@@ -60,7 +60,7 @@ GROUPS = {
     "Metal": (["tests/compute/test_metal.py"], ["shaders/**/*", "shutter_addon/devices/passes.py"]),
     "measures": (
         ["tests/test_measures.py"],
-        ["scripts/*.py", "shaders/**/*", "shutter_addon/core/**/*.py", "shutter_addon/media/flow.py"],
+        ["scripts/*.py", "shaders/**/*", "shutter_addon/co*/**/*.py", "shutter_addon/media/flow.py"],
     ),
 }
 

@@ -121,8 +121,9 @@ class LayeredRenderer:
             own = whole if name[0] >= 0 else coefficients
             drawn[name] = self._compositor.draw(windows[name], replace(part, levels=False), own)
         exposed = [Exposure(drawn[i, False], drawn.get((i, True), drawn[i, False])) for i in range(-1, count)]
-        # Where there is no layer, running sums give the bits of the picture without layers.
-        same = getattr(windows[-1, False], "cover", 0)
+        # Where there is no layer, running sums give the bits of the picture without layers. Moments between separated
+        # frames differ from it on all devices.
+        same = getattr(windows[-1, False], "cover", 0) or self._colors.has_moments
         self._exposed = exposed
         plate = self._plate(request, exposed, shot, lambda: self._gain(parts[-1, False].state, coefficients))
         bottom = Behind(exposed[0], None if same else plain(), plate)

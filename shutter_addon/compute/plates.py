@@ -2,12 +2,13 @@
 frame shows it, taken from other frames or filled from around."""
 
 from collections.abc import Callable, Iterable
+from functools import partial
 from typing import Any, TypeVar
 
 import numpy as np
 
 from ..core.frames.frame_source import FrameSource, SourceWrapper
-from ..core.frames.planes import as_rgba
+from ..core.frames.planes import Decoded, Moment, Pair, as_rgba
 from ..core.memo import Kept
 from ..core.model.frame_state import Layers, Options
 from ..core.pixels import compositor, layering
@@ -59,9 +60,12 @@ class LayerColors:
         """Return a source of frames with the colors of a layer, or with −1 of what lies behind all layers."""
         if layer < 0 and self._uncovers:
             return SourceWrapper(self._source, lambda frame: self._uncovered(frame)[0])
-        if self._separates:
-            return SourceWrapper(self._source, lambda frame: self._separated(frame, layer)[int(layer < 0)])
-        return self._source
+        return SeparatedFrames(self._source, partial(self._colors, layer)) if self._separates else self._source
+
+    @property
+    def has_moments(self) -> bool:
+        """Return whether moments lie between frames with colors of their own."""
+        return self._separates and self._source.step > 1
 
     def weights(self, layer: int) -> Callable[[int], np.ndarray]:
         """Return a function of a frame: how much (H, W) of a layer it shows, or with −1 of what lies behind all."""
@@ -81,6 +85,19 @@ class LayerColors:
 
     def _memo(self, frame: int, name: int | str, make: Callable[[], T]) -> T:
         return self._kept.ask((frame, name), make, TOGETHER * (1 + len(self.layers.shutters)))
+
+    def _colors(self, layer: int, frame: int) -> Decoded:
+        """Return a frame with a layer's colors, or with −1 of what lies behind all. Moments lie between such frames."""
+        moment = self._source.decoded(frame)
+        if not isinstance(moment, Moment):
+            return self._separated(frame, layer)[int(layer < 0)]
+        ends = [number * self._source.step for number in moment.pair]
+
+        def between() -> Pair:
+            return moment.between.with_ends(*(self._separated(end, layer)[int(layer < 0)] for end in ends))
+
+        pair = self._memo(ends[0], f"from {layer} to {ends[1]}", between)
+        return pair.moment(moment.pair, moment.number, moment.steps)
 
     def _separated(self, frame: int, layer: int) -> tuple[np.ndarray, np.ndarray]:
         """Return a frame with a layer's colors, and with those behind it. layer: −1: behind all."""
@@ -143,6 +160,20 @@ class LayerColors:
         """Forget all frames."""
         self._kept.clear()
         self.asked.clear()
+
+
+class SeparatedFrames(SourceWrapper):
+    """A source of frames with a layer's colors. colors: returns what `decoded` gives."""
+
+    def __init__(self, source: FrameSource, colors: Callable[[int], Decoded]) -> None:
+        super().__init__(source)
+        self._colors = colors
+
+    def read(self, index: int) -> np.ndarray:
+        return as_rgba(self.decoded(index))
+
+    def decoded(self, index: int) -> Decoded:
+        return self._colors(index)
 
 
 def nearest_frames(index: int, options: Options, shot: range) -> Iterable[int]:

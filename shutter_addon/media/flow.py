@@ -9,6 +9,7 @@ part of the picture has only as many of these key moments as its motion needs; t
 from __future__ import annotations
 
 from collections.abc import Callable
+from copy import copy
 from functools import cache, cached_property, lru_cache, partial
 
 import numpy as np
@@ -62,6 +63,13 @@ class Between:
             sides = [_carriers(each) for each in np.split((find or found)(*pictures), 2, axis=2)]
             self._sides = sides if _meet(pictures, sides) else None
 
+    def with_ends(self, first: np.ndarray, second: np.ndarray) -> Between:
+        """Return what lies between two other frames that move alike."""
+        other = copy(self)
+        other.ends, other._samples = (first, second), Kept()
+        other.__dict__.pop("_encoded", None)
+        return other
+
     @cached_property
     def _encoded(self) -> list[np.ndarray]:
         return [_encoded(end, self._transfer, self._alpha) for end in self.ends]
@@ -82,7 +90,7 @@ class Between:
         keys = 1 << (steps - 1).bit_length()
         vectors, levels = self._paths.ask(keys, lambda: _of_keys(sides, self.ends[0].shape[:2], keys), _KEPT)
         rgba = partial(self._rgba, vectors, levels, number, steps)
-        return Moment(pair, self.ends, number, steps, vectors, levels, rgba)
+        return Moment(pair, self.ends, number, steps, vectors, levels, self, rgba)
 
     def _rgba(self, vectors: np.ndarray, levels: np.ndarray, number: int, steps: int) -> np.ndarray:
         height, width = self.ends[0].shape[:2]

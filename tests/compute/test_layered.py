@@ -12,13 +12,16 @@ from shutter_addon.compute.gpu import GPUCompositor
 from shutter_addon.compute.renderer import Renderer, open_compositor, open_gl
 from shutter_addon.compute.request import Request
 from shutter_addon.core.frames import light
+from shutter_addon.core.frames.planes import as_rgba
 from shutter_addon.core.model import windows
 from shutter_addon.core.model.frame_state import Following, FrameState, Layers, Options
 from shutter_addon.core.model.mattes import FileFrame, Matte
 from shutter_addon.core.pixels import compositor, layering
 from shutter_addon.core.pixels.layering import separated
 from shutter_addon.devices.device import Budget
+from shutter_addon.media.flow import Between
 from shutter_addon.media.matte_values import MatteValues
+from shutter_addon.media.smooth import SmoothSource
 
 SIZE, COUNT, SHOWN = (37, 23), 20, 9
 
@@ -310,6 +313,33 @@ def test_mixed_pixels_have_the_colours_of_their_own(device, kind, count):
     assert_near(picture, expected, enough)
     without = Renderer(device, source).picture(Request(SHOWN, plain(moment)))
     assert np.array_equal(picture[~covered], without[~covered])
+
+
+def test_moments_lie_between_filmed_frames_with_the_colours_of_a_layer(device, monkeypatch):
+    """Only filmed frames are separated."""
+    from test_drawn_moments import film
+
+    step, rng, done = 4, np.random.default_rng(21), []
+    filmed = film(rng, size=SIZE)
+    filmed.frames, filmed.count = filmed.frames[:5], 5
+    source = SmoothSource(filmed, step)
+    matte = discs()[: source.count]
+    moment, _ = with_layers(state(rng, window=8, step=step), matte)
+    monkeypatch.setattr(layering, "separated", lambda *given: done.append(given) or separated(*given))
+    _, picture = drawn(device, source, moment)
+    assert len(done) == 3
+    each = [separated(*pair) for pair in zip(filmed.linear()[..., :3].astype(np.float32), matte[::step], strict=True)]
+    parts = []
+    for colors in (np.stack([behind for _own, behind in each]), np.stack([own for own, _behind in each])):
+        ends, frames = _encoded(colors, filmed), []
+        for number in range(source.count):
+            k, after = divmod(number, step)
+            between = Between(*filmed.frames[k : k + 2]).with_ends(*ends[k : k + 2]) if after else None
+            frames.append(as_rgba(between.moment((k, k + 1), after, step)) if after else ends[k])
+        parts.append(Footage(np.stack(frames), filmed.transfer))
+    without = dataclasses.replace(moment, options=dataclasses.replace(moment.options, decontaminate=False))
+    expected, enough, _covered = formula(device, parts, without, [matte])
+    assert_near(picture, expected, enough)
 
 
 def _encoded(colors, source):

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TypeAlias
+from typing import Protocol, TypeAlias
 
 import numpy as np
 
@@ -109,6 +109,16 @@ def _chroma_places(chosen: slice, length: int) -> np.ndarray:
     return (np.arange(length)[chosen] * step + step // 2) >> 16
 
 
+class Pair(Protocol):
+    """What lies between two frames."""
+
+    def with_ends(self, first: np.ndarray, second: np.ndarray) -> Pair:
+        """Return what lies between two other frames (H, W, 4) that move alike."""
+
+    def moment(self, pair: tuple[int, int], number: int, steps: int) -> np.ndarray | Moment:
+        """Return a Moment, or the nearer frame if the two have nothing in common."""
+
+
 @dataclass(frozen=True)
 class Moment:
     """A moment between two frames.
@@ -125,6 +135,7 @@ class Moment:
             first frame to the second that passes there, in 1 / UNIT of a pixel from ZERO; and how surely the first and
             the second frame show what follows it, 0 to 255. Between these pixels they are bilinear.
         levels: uint8, one for each tile of TILE pixels, shared by the pair: its key moments are keys / 2^level apart.
+        between: What makes the moments of the pair.
         rgba: Makes the frame, as FrameSource.read gives it.
     """
 
@@ -134,6 +145,7 @@ class Moment:
     steps: int
     vectors: np.ndarray
     levels: np.ndarray
+    between: Pair
     rgba: Callable[[], np.ndarray]
 
     @property
