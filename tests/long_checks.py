@@ -58,6 +58,7 @@ GROUPS = {
         ],
     ),
     "Metal": (["tests/compute/test_metal.py"], ["shaders/**/*", "shutter_addon/devices/passes.py"]),
+    "planted faults": (["tests/differential/test_planted.py"], ["tests/differential/*.py"]),
     "measures": (
         ["tests/test_measures.py"],
         ["scripts/*.py", "shaders/**/*", "shutter_addon/co*/**/*.py", "shutter_addon/media/flow.py"],

@@ -4,7 +4,6 @@ import ast
 import gc
 import json
 from collections import Counter
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -13,12 +12,8 @@ from cases import KINDS, make, make_smooth
 from compare import PICTURE, DifferenceError, can_be_a_film, check, check_films, check_mixed, open_devices, within
 from reference import DEFAULTS, layers_at, picture, shown
 
-from shutter_addon.compute import gpu
-from shutter_addon.core.model import following, keyframes, scribbles, shutters
-from shutter_addon.core.pixels import combined, compositor, layering
 from shutter_addon.devices import gl
 from shutter_addon.devices.passes import SHADERS
-from shutter_addon.media import matte_values
 
 SEEDS = range(78)  # six for each kind of footage
 BATCH = 13
@@ -79,6 +74,8 @@ def test_on_blenders_gpu(blenders_devices, tmp_path):
 def test_every_field_with_every_other(devices, monkeypatch, tmp_path):
     """And all passes that compose are among them, each of which leaves no texel unwritten."""
     seen = set()
+
+    run = gl.GLDevice.run
 
     def noted(device, program, *given, **more):
         seen.add(program.file)
@@ -150,63 +147,6 @@ def test_recipes_have_all_that_a_recipe_may_have():
     assert seen["layer", True] >= 0.4 * len(SEEDS)
     assert np.mean(doubtful[0]) < 0.05
     assert np.mean(doubtful[1]) < 0.35  # nothing is seen behind layers that cover all
-
-
-def outlines(shapes):
-    """Lassos as the thinnest lines."""
-    return [replace(shape, kind="line", width=0.0) if shape.kind == "lasso" else shape for shape in shapes]
-
-
-eased, rasterise, seen = keyframes.eased, scribbles.rasterise, compositor.seen
-run = gl.GLDevice.run
-# One for each part of a picture: what is wrong then.
-FAULTS = {
-    "an ease": (keyframes, "eased", lambda u, ease: u),
-    "lassos left empty": (
-        scribbles,
-        "rasterise",
-        lambda shapes, *size, border: rasterise(outlines(shapes), *size, border=border),
-    ),
-    "no displacement": (shutters, "displace", shutters.mix),
-    "nothing followed": (following, "followed", lambda effect, state, *_: state),
-    "a dull filter": (compositor, "seen", lambda frame, places, sharp: seen(frame, places, sharp=False)),
-    "hard mattes": (matte_values, "feathered", lambda values, width: values),
-    "ghosts": (layering, "behind", lambda values: np.ones_like(values[0])),
-    "thresholds that let all pass": (combined, "passes", lambda combine, luminance: np.ones_like(luminance)),
-}
-
-
-@pytest.mark.parametrize("fault", FAULTS)
-def test_planted_faults_are_found(monkeypatch, fault, tmp_path):
-    """Each makes some pictures wrong, which is told, with what repeats it, and left to be seen."""
-    monkeypatch.setattr(*FAULTS[fault])
-    found = each_difference(range(40), open_devices(["cpu"]), tmp_path)
-    told, again = next(error for error in found if "/255 off" in error).splitlines()
-    place = Path(told.partition("pictures in ")[2])
-    names = sorted(path.name for path in place.iterdir())
-    assert names == ["difference-x64.png", "made.exr", "recipe.json", "right.exr"]
-    assert again.endswith(f"tests/differential/compare.py {place.name.partition('-')[0]} --ways cpu")
-
-
-def test_planted_faults_of_moments_are_found(monkeypatch, tmp_path):
-    monkeypatch.setattr(shutters, "smoothed", lambda bars, steps, **_: shutters.held(bars, steps))
-    found = each_difference(range(40), open_devices(["cpu"]), tmp_path, of=make_smooth)
-    assert any("/255 off" in error for error in found)
-
-
-def test_a_texel_that_no_pass_writes_is_seen(monkeypatch, devices, tmp_path):
-    def half(device, program, extent, **given):
-        rows = max(extent[1] // 2, 1) if program.file.startswith("compose_") else extent[1]
-        run(device, program, (extent[0], rows, *extent[2:]), **given)
-
-    monkeypatch.setattr(gl.GLDevice, "run", half)
-    found = each_difference(MIXED[:4], {"gpu": devices["gpu"]}, tmp_path, mixed=True)
-    assert any("nan instead of" in error for error in found)
-
-
-def test_planted_faults_of_a_gpu_are_found(monkeypatch, devices, tmp_path):
-    monkeypatch.setattr(gpu, "_in_window", lambda state, chosen: state.of(chosen))  # where that fault was
-    assert any(each_difference(range(60), {"gpu": devices["gpu"]}, tmp_path, mixed=True))
 
 
 @pytest.mark.parametrize("value", [np.nan, np.inf, 0.6 / 255])
