@@ -42,7 +42,7 @@ def test_preview_and_film_take_turns_where_the_gpu_is_small(tmp_path):
     path, first = tmp_path / "recipe.json", noise(tmp_path, 20, size)
     path.write_text(json.dumps({"version": 2, "window": 16, "border": True, "shutters": shutters, "regions": [line]}))
     given = {"footage": first, "recipe": path, "megabytes": megabytes}
-    (*seen, told), console = tell("memory_story.py", "opengl", linked(tmp_path), screen=SMALL, **given)
+    (*seen, told), console = tell("memory_story.py", "opengl", linked(tmp_path), **given)
     assert "Traceback" not in console
     assert f"{megabytes // 4} MB of GPU memory are too little for 16 frames" in told["said"][-1]
     options = ("--recipe", path, "--output", tmp_path / "expected", "--device", "opengl", "--frames", "1:4")
