@@ -143,7 +143,7 @@ def test_previews_of_any_size_and_renders_after_them(tmp_path):
         assert_alike(pixels(tmp_path / f"{name}.png"), background, tmp_path / "opengl_difference.png")
 
 
-@pytest.mark.parametrize("backend", backends("vulkan"))
+@pytest.mark.parametrize("backend", backends("opengl"))
 def test_one_look_at_full_quality(backend, tmp_path):
     """From a preview that is composed at half size, by the button at its note: what F12 gives, pixel by pixel. It ends
     by a second click, with the frame, and with a change, and the view is as before."""
