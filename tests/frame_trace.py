@@ -78,6 +78,7 @@ def traced(package: Path, first: str, last: str):
     try:
         yield stops
     finally:
+        sys.monitoring.set_events(_TOOL, 0)  # they would slow the process down for good
         sys.monitoring.free_tool_id(_TOOL)
 
 
