@@ -1,7 +1,7 @@
 """Colors of layers and of what lies behind them, in source frames. And plates: what lies behind layers where no exposed
 frame shows it, taken from other frames or filled from around."""
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Hashable, Iterable
 from functools import partial
 from typing import Any, TypeVar
 
@@ -60,7 +60,7 @@ class LayerColors:
         """Return a source of frames with the colors of a layer, or with −1 of what lies behind all layers."""
         if layer < 0 and self._uncovers:
             return SourceWrapper(self._source, lambda frame: self._uncovered(frame)[0])
-        return SeparatedFrames(self._source, partial(self._colors, layer)) if self._separates else self._source
+        return SourceWrapper(self._source, partial(self._colors, layer)) if self._separates else self._source
 
     @property
     def has_moments(self) -> bool:
@@ -83,7 +83,7 @@ class LayerColors:
     def _uncovers(self) -> bool:
         return self.layers.camera is not None and self._source.alpha == "opaque"
 
-    def _memo(self, frame: int, name: int | str, make: Callable[[], T]) -> T:
+    def _memo(self, frame: int, name: Hashable, make: Callable[[], T]) -> T:
         return self._kept.ask((frame, name), make, TOGETHER * (1 + len(self.layers.shutters)))
 
     def _colors(self, layer: int, frame: int) -> Decoded:
@@ -96,7 +96,7 @@ class LayerColors:
         def between() -> Pair:
             return moment.between.with_ends(*(self._separated(end, layer)[int(layer < 0)] for end in ends))
 
-        pair = self._memo(ends[0], f"from {layer} to {ends[1]}", between)
+        pair = self._memo(ends[0], (layer, ends[1]), between)
         return pair.moment(moment.pair, moment.number, moment.steps)
 
     def _separated(self, frame: int, layer: int) -> tuple[np.ndarray, np.ndarray]:
@@ -160,20 +160,6 @@ class LayerColors:
         """Forget all frames."""
         self._kept.clear()
         self.asked.clear()
-
-
-class SeparatedFrames(SourceWrapper):
-    """A source of frames with a layer's colors. colors: returns what `decoded` gives."""
-
-    def __init__(self, source: FrameSource, colors: Callable[[int], Decoded]) -> None:
-        super().__init__(source)
-        self._colors = colors
-
-    def read(self, index: int) -> np.ndarray:
-        return as_rgba(self.decoded(index))
-
-    def decoded(self, index: int) -> Decoded:
-        return self._colors(index)
 
 
 def nearest_frames(index: int, options: Options, shot: range) -> Iterable[int]:

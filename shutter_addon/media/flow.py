@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from copy import copy
-from functools import cache, cached_property, lru_cache, partial
+from functools import cache, cached_property, lru_cache
 
 import numpy as np
 
@@ -89,16 +89,17 @@ class Between:
             return self.ends[2 * number > steps]
         keys = 1 << (steps - 1).bit_length()
         vectors, levels = self._paths.ask(keys, lambda: _of_keys(sides, self.ends[0].shape[:2], keys), _KEPT)
-        rgba = partial(self._rgba, vectors, levels, number, steps)
-        return Moment(pair, self.ends, number, steps, vectors, levels, self, rgba)
+        return Moment(pair, self.ends, number, steps, vectors, levels, self)
 
-    def _rgba(self, vectors: np.ndarray, levels: np.ndarray, number: int, steps: int) -> np.ndarray:
+    def rgba(self, moment: Moment) -> np.ndarray:
+        """Make the frame of a moment."""
+        vectors, levels, steps = moment.vectors, moment.levels, moment.steps
         height, width = self.ends[0].shape[:2]
         keys = len(vectors) + 1
         level_of = levels.repeat(TILE[1], axis=0).repeat(TILE[0], axis=1)[:height, :width, None]
         frame = np.zeros((), np.float32)
         for level in np.unique(levels).tolist():
-            before, rest = divmod(number << level, steps)
+            before, rest = divmod(moment.number << level, steps)
             shown = self._light(vectors, before * keys >> level)
             if rest:
                 shown = shown + np.float32(rest / steps) * (self._light(vectors, (before + 1) * keys >> level) - shown)

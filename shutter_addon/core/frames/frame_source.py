@@ -10,7 +10,7 @@ from typing import Protocol, Self
 
 import numpy as np
 
-from .planes import Decoded
+from .planes import Decoded, as_rgba
 
 
 class ShotFinder(Protocol):
@@ -123,15 +123,15 @@ class _Forwarded:
 class SourceWrapper(FrameSource):
     """A source around another one, with its attributes and frames unless a subclass changes them."""
 
-    def __init__(self, source: FrameSource, frames: Callable[[int], np.ndarray] | None = None) -> None:
-        """Wrap a source; `frames` replaces its `read`."""
+    def __init__(self, source: FrameSource, frames: Callable[[int], Decoded] | None = None) -> None:
+        """Wrap a source; `frames` replaces its `decoded`, and with it `read`."""
         self._source, self._frames_of = source, frames
 
     def read(self, index: int) -> np.ndarray:
-        return (self._frames_of or self._source.read)(index)
+        return as_rgba(self._frames_of(index)) if self._frames_of else self._source.read(index)
 
     def decoded(self, index: int) -> Decoded:
-        return self.read(index)  # it may differ from the source's
+        return self._frames_of(index) if self._frames_of else self.read(index)  # it may differ from the source's
 
     def want(self, indices: Iterable[int]) -> None:
         self._source.want(indices)

@@ -118,6 +118,9 @@ class Pair(Protocol):
     def moment(self, pair: tuple[int, int], number: int, steps: int) -> np.ndarray | Moment:
         """Return a Moment, or the nearer frame if the two have nothing in common."""
 
+    def rgba(self, moment: Moment) -> np.ndarray:
+        """Make the frame of a moment, as FrameSource.read gives it."""
+
 
 @dataclass(frozen=True)
 class Moment:
@@ -136,7 +139,6 @@ class Moment:
             the second frame show what follows it, 0 to 255. Between these pixels they are bilinear.
         levels: uint8, one for each tile of TILE pixels, shared by the pair: its key moments are keys / 2^level apart.
         between: What makes the moments of the pair.
-        rgba: Makes the frame, as FrameSource.read gives it.
     """
 
     pair: tuple[int, int]
@@ -146,7 +148,10 @@ class Moment:
     vectors: np.ndarray
     levels: np.ndarray
     between: Pair
-    rgba: Callable[[], np.ndarray]
+
+    def rgba(self) -> np.ndarray:
+        """Return the frame, as FrameSource.read gives it."""
+        return self.between.rgba(self)
 
     @property
     def nbytes(self) -> int:
