@@ -30,13 +30,13 @@ class _Bake:
     """The bake of this Blender.
 
     Attributes:
-        job: the last one. Stopped, it may still be finishing a frame.
-        is_running: whether its film is wanted.
+        running: the job whose film is wanted.
+        stopped: the last one that ended; it may still be finishing a frame.
         failure: identity of an effect, and why its bake failed.
     """
 
-    job: baked_film.BakeJob | None = None
-    is_running: bool = False
+    running: baked_film.BakeJob | None = None
+    stopped: baked_film.BakeJob | None = None
     failure: tuple[str, str] = "", ""
 
 
@@ -44,7 +44,7 @@ _bake = _Bake()
 
 
 def _why_baking(_effect: PropertyGroup) -> str | None:
-    is_busy = _bake.is_running or (_bake.job is not None and not _bake.job.is_over())
+    is_busy = _bake.running is not None or (_bake.stopped is not None and not _bake.stopped.is_over())
     return rpt_("An effect is being baked") if is_busy else None
 
 
@@ -60,8 +60,7 @@ def bake(self: Operator, _context: Context, effect: PropertyGroup) -> set[str] |
         if film.is_finished():
             baked_strips.lay(self.edit, self.effect_strip, film)
             return None
-        _bake.job = baked_film.start(self.edit, effect, self.effect_strip, film)
-        _bake.is_running = True
+        _bake.running = baked_film.start(self.edit, effect, self.effect_strip, film)
     except (film_output.OutputError, OSError) as error:
         raise UserError(film_output.in_words(error, film.place)) from None
     main_thread.later(_look, TICK)
@@ -75,7 +74,7 @@ class SHUTTER_OT_bake_stop(Named, Operator):
 
     @classmethod
     def refusal(cls, _context: Context) -> str | None:
-        return None if _bake.is_running else rpt_("No effect is being baked")
+        return None if _bake.running else rpt_("No effect is being baked")
 
     def execute(self, context: Context) -> set[str]:
         stop()
@@ -95,7 +94,7 @@ def unbake(self: Operator, _context: Context, _effect: PropertyGroup) -> None:
 
 def _look() -> float | None:
     """Add the strip of a finished bake."""
-    if (job := _bake.job) is None or not _bake.is_running:
+    if (job := _bake.running) is None:
         return None
     redraw(bpy.context)
     if not job.is_over():
@@ -130,9 +129,9 @@ def _lay(job: baked_film.BakeJob) -> str | None:
 
 def stop() -> None:
     """End the running bake."""
-    if _bake.job is not None and _bake.is_running:
-        _bake.is_running = False
-        _bake.job.end()
+    if (job := _bake.running) is not None:
+        _bake.running, _bake.stopped = None, job
+        job.end()
 
 
 def forget() -> None:
@@ -142,8 +141,8 @@ def forget() -> None:
 
 
 def draw_panel(layout: UILayout, scene: Scene, effect: PropertyGroup, strip: Strip) -> None:
-    job = _bake.job
-    if job is not None and _bake.is_running and job.effect == effect.identity:
+    job = _bake.running
+    if job is not None and job.effect == effect.identity:
         row = layout.row(align=True)
         draw_progress(row, job.done(), len(job.film.frames))
         row.operator("shutter.bake_stop", text="", icon="X")
