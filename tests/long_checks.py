@@ -61,7 +61,10 @@ GROUPS = {
     "planted faults": (["tests/differential/test_planted.py"], ["tests/differential/*.py"]),
     "measures": (
         ["tests/test_measures.py"],
-        ["scripts/*.py", "shaders/**/*", "shutter_addon/co*/**/*.py", "shutter_addon/media/flow.py"],
+        [
+            *("scripts/*.py", "shaders/**/*", "shutter_addon/media/flow.py"),
+            *("shutter_addon/core/**/*.py", "shutter_addon/compute/**/*.py"),
+        ],
     ),
 }
 

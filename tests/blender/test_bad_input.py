@@ -10,10 +10,9 @@ import sys
 import time
 from pathlib import Path
 
-import av
 import numpy as np
 import pytest
-from support import read_picture, recipe, write_frames
+from support import read_picture, recipe, write_frames, write_movie
 
 from shutter_addon.blender.editing import add_effect
 from shutter_addon.media import MediaError, open_source
@@ -89,13 +88,7 @@ def test_a_strip_whose_folder_is_not_utf8(edit, frames, tmp_path):
 def test_a_movie_cut_off_in_the_middle(command_here, tmp_path):
     """Frames before the end are good; a frame that is not there is said, and stops the render."""
     pictures = np.random.default_rng(0).integers(0, 256, (40, 32, 48, 3), dtype=np.uint8)
-    with av.open(str(tmp_path / "whole.mkv"), "w") as container:
-        stream = container.add_stream("ffv1", rate=10)
-        stream.width, stream.height, stream.pix_fmt = 48, 32, "bgr0"
-        for picture in pictures:
-            container.mux(stream.encode(av.VideoFrame.from_ndarray(picture, format="rgb24")))
-        container.mux(stream.encode())
-    data = (tmp_path / "whole.mkv").read_bytes()
+    data = write_movie(tmp_path / "whole.mkv", pictures, rate=10).read_bytes()
     (tmp_path / "cut.mkv").write_bytes(data[: len(data) // 2])
     with open_source(tmp_path / "cut.mkv") as source:
         assert source.count == 40

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from support import noise_film, recipe, write_frames
+from support import noise_film, recipe, write_frames, write_movie
 
 from shutter_addon.blender import command
 from shutter_addon.blender.data import recipe_import, versions
@@ -106,15 +106,8 @@ def test_footage_that_the_frames_do_not_need(noise, check, tmp_path):
 
 
 def _movie(path, count):
-    import av
-
-    with av.open(str(path), "w") as container:
-        stream = container.add_stream("mpeg4", rate=25)
-        stream.width, stream.height, stream.pix_fmt = 64, 48, "yuv420p"
-        for i in range(count):
-            picture = np.random.default_rng(i).integers(0, 256, (48, 64, 3), dtype=np.uint8)
-            container.mux(stream.encode(av.VideoFrame.from_ndarray(picture, format="rgb24")))
-        container.mux(stream.encode())
+    pictures = [np.random.default_rng(i).integers(0, 256, (48, 64, 3), dtype=np.uint8) for i in range(count)]
+    write_movie(path, pictures, "mpeg4", "yuv420p", 25)
 
 
 @pytest.fixture

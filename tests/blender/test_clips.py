@@ -1,9 +1,8 @@
 """Clip strips as sources: what Blender shows of the plain strip, whatever the clip's settings."""
 
-import av
 import numpy as np
 import pytest
-from support import effect_of, picture_of, recipe, sequencer, write_frames
+from support import effect_of, picture_of, recipe, sequencer, write_frames, write_movie
 
 from shutter_addon.blender.editing import add_effect, shutter_edits
 from shutter_addon.blender.rendering import effect_source
@@ -13,15 +12,9 @@ RNG = np.random.default_rng(0)
 
 @pytest.fixture(scope="module")
 def movie(tmp_path_factory):
+    pictures = RNG.integers(0, 256, (20, 8, 12, 3), dtype=np.uint8).repeat(4, 1).repeat(4, 2)
     path = tmp_path_factory.mktemp("movie") / "noise.mkv"
-    with av.open(str(path), "w") as container:
-        stream = container.add_stream("libx264", rate=24, options={"qp": "0"})
-        stream.width, stream.height, stream.pix_fmt = 48, 32, "yuv420p"
-        for _ in range(20):
-            small = RNG.integers(0, 256, (8, 12, 3), dtype=np.uint8).repeat(4, 0).repeat(4, 1)
-            container.mux(stream.encode(av.VideoFrame.from_ndarray(small, format="rgb24")))
-        container.mux(stream.encode())
-    return path
+    return write_movie(path, pictures, "libx264", "yuv420p", options={"qp": "0"})
 
 
 def pngs(folder, channels=3, count=12, samples=np.uint8):

@@ -4,9 +4,9 @@ import json
 import re
 from pathlib import Path
 
-import av
 import frame_trace
 import numpy as np
+from support import write_movie
 
 from shutter_addon.blender.editing import whole_edits
 from shutter_addon.blender.rendering import sessions
@@ -25,14 +25,8 @@ RECIPE = {
 
 
 def film(path):
-    with av.open(str(path), "w") as container:
-        stream = container.add_stream("libx264", rate=25)
-        stream.width, stream.height, stream.pix_fmt = 160, 90, "yuv420p"
-        for index in range(45):
-            picture = np.roll(np.random.default_rng(0).integers(0, 256, (90, 160, 3), np.uint8), index, axis=1)
-            container.mux(stream.encode(av.VideoFrame.from_ndarray(picture, format="rgb24")))
-        container.mux(stream.encode())
-    return path
+    noise = np.random.default_rng(0).integers(0, 256, (90, 160, 3), np.uint8)
+    return write_movie(path, [np.roll(noise, index, axis=1) for index in range(45)], "libx264", "yuv420p", 25)
 
 
 def ways(bpy, footage, frames, tmp_path):
