@@ -114,7 +114,6 @@ def test_layers_of_all_kinds(mask, assert_as_the_strip, seed):
                 dice.choice((0, 0.02, 0.1)),
                 (dice.choice(("AUTO", "VECTOR", "FREE", "ALIGNED", "ALIGNED_DOUBLESIDE")),) * 2,
                 use_cyclic=dice.random() < 0.8,
-                use_fill=dice.random() < 0.8,
                 weight_interpolation=dice.choice(("EASE", "LINEAR")),
             )
     hidden = mask.layers.new(name="hidden")

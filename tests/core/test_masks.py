@@ -101,7 +101,6 @@ def test_no_mask_is_too_odd(polygons, data):
             corners,
             data.draw(st.sampled_from([0, 0.1, -0.1, 2])),
             cyclic=data.draw(st.booleans()),
-            fill=data.draw(st.booleans()),
         )
         for corners in polygons
     ]

@@ -58,7 +58,7 @@ def _shape(mask: bpy.types.Mask) -> MaskShape:
 def _layer(mask: bpy.types.Mask, layer: bpy.types.MaskLayer) -> MaskLayer:
     _check(mask, layer.alpha)
     return MaskLayer(
-        splines=tuple(_spline(mask, spline) for spline in layer.splines),
+        splines=tuple(_spline(mask, spline) for spline in layer.splines if spline.use_fill),
         alpha=layer.alpha,
         holes=layer.use_fill_holes,
         **{name: getattr(layer, name) for name in ("blend", "invert", "falloff", "fill_solver")},
@@ -75,7 +75,6 @@ def _spline(mask: bpy.types.Mask, spline: bpy.types.MaskSpline) -> MaskSpline:
         weights=tuple(weights.tolist()),
         feathers=feathers,
         cyclic=spline.use_cyclic,
-        fill=spline.use_fill,
         weight_interpolation=spline.weight_interpolation,
     )
 

@@ -20,8 +20,6 @@ from ..scanlines import ranges
 _FEWEST, _MOST = 4, 32
 # A spline's direction at a point is taken between points this far before and after it on its segment.
 _REACH = 0.05
-# The round ends of an open spline that is not filled have a point every two pixels, within these limits.
-_CAP_POINTS = 8, 64
 # Pixels that are computed at once: their numbers fit into a processor's cache.
 _BLOCK = 1 << 14
 # Pixels by which quads overlap, so that rounding opens no seam between them.
@@ -63,7 +61,6 @@ class MaskSpline:
     weights: tuple[float, ...]
     feathers: tuple[tuple[tuple[float, float], ...], ...]
     cyclic: bool = True
-    fill: bool = True
     weight_interpolation: str = "EASE"  # EASE | LINEAR
 
 
@@ -108,14 +105,12 @@ def _blend(layer: MaskLayer, below: np.ndarray, value: np.ndarray) -> np.ndarray
 def _layer_value(layer: MaskLayer, width: int, height: int) -> np.ndarray:
     """Return the coverage of a layer's splines: (height, width) float32, the lowest row first."""
     value = np.zeros((height, width), np.float32)
-    outlines = [(spline, _outlines(spline, width, height)) for spline in layer.splines]
-    outlined = [(spline, both) for spline, both in outlines if both is not None]
+    outlines = [_outlines(spline, width, height) for spline in layer.splines]
+    outlined = [both for both in outlines if both is not None]
     if not outlined or layer.alpha == 0:
         return value
-    filled = [edge for spline, (edge, _) in outlined if spline.fill]
-    _fill(value, filled, layer.fill_solver, layer.holes)
-    quads = [_feather_quads(spline, *both, width, height) for spline, both in outlined]
-    feather(value, np.concatenate(quads), _FALLOFFS[layer.falloff])
+    _fill(value, [edge for edge, _ in outlined], layer.fill_solver, layer.holes)
+    feather(value, np.concatenate([_feather_quads(*both) for both in outlined]), _FALLOFFS[layer.falloff])
     return value
 
 
@@ -216,34 +211,9 @@ def _pixel_wide(edge: np.ndarray, feather: np.ndarray, pixel: float) -> np.ndarr
     return np.where(narrow[:, None], edge + np.stack([along[:, 1], -along[:, 0]], axis=1) * pixel, feather)
 
 
-def _feather_quads(spline: MaskSpline, edge: np.ndarray, feather: np.ndarray, width: int, height: int) -> np.ndarray:
+def _feather_quads(edge: np.ndarray, feather: np.ndarray) -> np.ndarray:
     """Return the feather of a spline as quads (n, 4, 2): two corners on the spline (value 1), two outside (0)."""
-    if spline.fill:
-        return _between(edge, feather, closed=True)
-    other = 2 * edge - feather
-    sides = [_between(edge, feather, spline.cyclic), _between(edge, other, spline.cyclic)]
-    if spline.cyclic:
-        return np.concatenate(sides)
-    size = np.array([width, height]) / min(width, height)
-    caps = [_cap(edge[0], feather[0], 1.0, size, width, height), _cap(edge[-1], feather[-1], -1.0, size, width, height)]
-    return np.concatenate(sides + caps)
-
-
-def _between(edge: np.ndarray, feather: np.ndarray, closed: bool) -> np.ndarray:
-    quads = np.stack([edge, np.roll(edge, -1, axis=0), np.roll(feather, -1, axis=0), feather], axis=1)
-    return quads if closed else quads[:-1]
-
-
-def _cap(centre: np.ndarray, start: np.ndarray, turn: float, size: np.ndarray, width: int, height: int) -> np.ndarray:
-    """Return the half disc (n, 4, 2) at an end of an open spline, from a point of its feather."""
-    pixels = np.linalg.norm(start - centre) * min(width, height)
-    count = int(np.clip(pixels // 2, *_CAP_POINTS))
-    angle = turn * np.pi * np.arange(count + 1) / count
-    x, y = (start - centre) * size
-    around = np.stack([x * np.cos(angle) - y * np.sin(angle), x * np.sin(angle) + y * np.cos(angle)], axis=1)
-    rim = centre + around / size
-    middle = np.broadcast_to(centre, rim[1:].shape)
-    return np.stack([middle, middle, rim[:-1], rim[1:]], axis=1)
+    return np.stack([edge, np.roll(edge, -1, axis=0), np.roll(feather, -1, axis=0), feather], axis=1)
 
 
 def _normalized(vectors: np.ndarray) -> np.ndarray:
