@@ -9,7 +9,7 @@ frame, recipe and effect agree within TOLERANCE.
 
 import itertools
 import math
-from collections.abc import Callable, Collection, Container, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from decimal import Decimal
 from functools import cache
@@ -43,6 +43,7 @@ from . import recipe, recipe_file
 # Relative to the largest bar; absolute for fractions of the picture and degrees, relative for keys above 1.
 TOLERANCE = 1e-4
 
+_MARKS = "drawings", "nots", "outlines"  # what is drawn in regions
 # Frames of keys, each with the ease until the next key.
 _Eased = Sequence[tuple[float, Ease]]
 _Fits = Callable[[float, float, float, float], bool]
@@ -61,10 +62,10 @@ def baked(effect: Effect, shown: range, contents: Iterable[FileContent | RampCon
         EffectError: The effect cannot be rendered.
     """
     options = effect.options.at(shown.start)
-    names = _different([shutter.name for shutter in effect.shutters])
+    names = _different(shutter.name for shutter in effect.shutters)
     called, words = _region_names(effect), iter(contents)
     made = [_region(region, name, words, shown) for region, name in zip(effect.regions, called, strict=True)]
-    camera = Camera(moves=_moves(effect.camera, {}, shown), **_said(effect.camera, (), shown))
+    camera = Camera(moves=_moves(effect.camera, {}, shown), **_said(effect.camera, shown))
     # Without strokes, a region does not move anything.
     followed = {id(old): new for old, new in zip(effect.regions, made, strict=True)} | {id(effect.camera): camera}
     shutters = [
@@ -77,12 +78,12 @@ def baked(effect: Effect, shown: range, contents: Iterable[FileContent | RampCon
         options=Constant(options),
         time=_time(effect.time, shown) if effect.time else None,
         camera=camera,
-        **_said(effect, (), shown),
+        **_said(effect, shown),
     )
     return recipe_file.parse(recipe_file.dump(sampled))
 
 
-def _different(names: list[str]) -> list[str]:
+def _different(names: Iterable[str]) -> list[str]:
     """Number repeated names: regions refer to the first."""
     result: list[str] = []
     for name in names:
@@ -111,27 +112,18 @@ def _region_names(effect: Effect) -> list[str]:
 def _shutter(
     effect: Effect, index: int, name: str, follow: Subject | None, interpolation: Interpolation, shown: range
 ) -> Shutter:
-    """Return a shutter with the recipe's keys; unused numbers stay at their first value."""
+    """Return a shutter with the recipe's keys."""
     shutter = effect.shutters[index]
-    unused = set() if follow else {"follow_motion", "follow_smooth", "trail"}
-    if shutter.combine not in ("lightest", "darkest"):
-        unused |= {"by_luminance", "use_threshold", "threshold", "softness"}
-    elif not shutter.use_threshold:
-        unused |= {"threshold", "softness"}
-    said = _said(shutter, unused, shown)
-    if shutter.length == "motion" and not follow:
-        said["length"] = "frames"
+    said = _said(shutter, shown)
     red, green, blue = (_short(component) for component in shutter.color)
     said |= {"name": name, "color": (red, green, blue), "follow": follow}
     return Shutter(bars=_bars(effect, index, interpolation, shown), **said)
 
 
-def _said(part: Any, unused: Container[str], shown: range) -> dict[str, Any]:
-    """Return the fields of a part of an effect, without the unused ones."""
+def _said(part: Any, shown: range) -> dict[str, Any]:
+    """Return the fields of a part of an effect."""
     said: dict[str, Any] = {}
     for name, each in fields_of(type(part)).items():
-        if name in unused:
-            continue
         value = getattr(part, name)
         if each.is_channel:
             value = _number(value, shown) if each.keyed_in_recipe else Constant(_short(value.at(shown.start)))
@@ -216,24 +208,28 @@ def _region(
     region: Region | MatteRegion, name: str, contents: Iterator[FileContent | RampContent], shown: range
 ) -> Region | MatteRegion | None:
     """Return a region with the recipe's keys, or None if nothing is drawn."""
-    said = _said(region, (), shown) | {"name": name}
+    said = _said(region, shown) | {"name": name}
     if isinstance(region, Region):
         said["kind"] = Constant(region.kind.at(shown.start))
-    if isinstance(region, SubjectRegion):
-        return _subject(region, said, shown)
-    if isinstance(region, MatteRegion) and not isinstance(region, OutlineRegion):
+    if isinstance(region, MatteRegion) and not isinstance(region, OutlineRegion | SubjectRegion):
         return replace(region, content=next(contents), moves=_moves(region, {}, shown), **said)
-    assert isinstance(region, Region | OutlineRegion)
-    drawn = _drawings(region.drawings, shown.start)
-    if not drawn:
+    is_subject = isinstance(region, SubjectRegion)
+    marks = {each: _drawings(getattr(region, each), shown.start) for each in _MARKS if hasattr(region, each)}
+    drawn = marks["outlines" if is_subject else "drawings"]
+    if not (marks["drawings"] or drawn):
         return None
-    # A drawing's ease to the next is independent of the region's keys.
-    words = dict(zip(region.drawings.frames, region.drawings.eases, strict=True)) if len(drawn) > 1 else {}
-    words = {number: words[number] for number in drawn if words}
-    moves = _moves(region, words, shown)
-    starts = tuple(_frame(number, shown) for number in drawn)
-    drawings = Drawings(name, starts, tuple(drawn.values()), tuple(words.values()) or ("linear",), 1.0)
-    return replace(region, drawings=drawings, moves=moves, **said)
+    words: dict[float, Ease] = {}
+    if is_subject and region.moves.are_keyed:
+        words = dict.fromkeys(drawn, "linear")
+    elif len(drawn) > 1 and not is_subject:
+        # A drawing's ease to the next is independent of the region's keys.
+        eases = dict(zip(region.drawings.frames, region.drawings.eases, strict=True))
+        words = {number: eases[number] for number in drawn}
+    for each, drawings in marks.items():
+        kept = {number: strokes for number, strokes in drawings.items() if strokes or not is_subject}
+        frames, eased = (_frame(number, shown) for number in kept), (words.get(number, "linear") for number in kept)
+        said[each] = Drawings(name, tuple(frames), tuple(kept.values()), tuple(eased), 1.0)
+    return replace(region, moves=_moves(region, words, shown), **said)
 
 
 def _moves(moving: Subject, words: Mapping[float, Ease], shown: range) -> Moves:
@@ -268,20 +264,6 @@ def _move_keys(moving: Subject, words: Mapping[float, Ease], shown: range) -> _E
 def _place(moving: Subject, frame: float) -> np.ndarray:
     placed = moving.placement(frame)
     return np.array([*placed.location, placed.rotation, placed.scale])
-
-
-def _subject(region: SubjectRegion, said: dict[str, Any], shown: range) -> SubjectRegion | None:
-    """Return a subject with the recipe's keys, or None if nothing is drawn."""
-    marks = {name: _drawings(getattr(region, name), shown.start) for name in ("drawings", "nots", "outlines")}
-    if not (marks["drawings"] or marks["outlines"]):
-        return None
-    words: dict[float, Ease] = dict.fromkeys(marks["outlines"], "linear") if region.moves.are_keyed else {}
-    for name, drawn in marks.items():
-        kept = {number: strokes for number, strokes in drawn.items() if strokes}
-        frames = tuple(_frame(number, shown) for number in kept)
-        eases: tuple[Ease, ...] = tuple("linear" for _ in kept)
-        said[name] = Drawings(region.name, frames, tuple(kept.values()), eases, 1.0)
-    return replace(region, moves=_moves(region, words, shown), **said)
 
 
 def _drawings(drawings: Drawings, frame: float) -> dict[float, list[np.ndarray]]:

@@ -10,7 +10,8 @@ from collections.abc import Callable
 from dataclasses import fields, is_dataclass
 from functools import cache, partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal, get_args, get_origin
+from types import NoneType, UnionType
+from typing import TYPE_CHECKING, Annotated, Any, Literal, Union, get_args, get_origin
 
 from .. import atomic_write
 from ..model import effect as model
@@ -19,7 +20,7 @@ from ..model.fields import fields_of
 from ..model.frame_state import Options
 from . import recipe_check, records
 from .recipe import RecipeError
-from .recipe_check import cut, shown
+from .recipe_check import cut, plain, shown
 
 if TYPE_CHECKING:
     from cattrs import Converter
@@ -149,21 +150,36 @@ def _number(value: Any, _kind: Any) -> float:
     return float(value)
 
 
-def _number_or_keys(converter: Converter, value: Any, kind: Any) -> float | list[records.ValueKey] | None:
-    if value is None and kind != records.Keyable:
+def _within(converter: Converter, value: Any, kind: Any) -> Any:
+    """Structure a number, a text or a list of a limited range or length."""
+    inner, (least, most, empty) = get_args(kind)
+    made = converter.structure(value, inner)
+    if isinstance(made, str | list):
+        if len(made) > most or len(made) < least:
+            many = f"{len(made)}{' characters' * isinstance(made, str)}, the most are {most}"
+            raise ValueError(many if made else empty)
+        wrong = next((c for c in made if c == "\0" or "\ud800" <= c <= "\udfff"), "") if isinstance(made, str) else ""
+        if wrong:
+            raise ValueError(f"U+{ord(wrong):04X} is not allowed in a name")
+    elif not least <= made <= most:
+        raise ValueError(f"{plain(made)} is not {plain(least)} to {plain(most)}")
+    return made
+
+
+def _union(converter: Converter, value: Any, kind: Any) -> Any:
+    """Structure a region, a number or its keys, strokes of the first frame or of several, or what may be null."""
+    first, *others = get_args(kind)
+    if kind == records.AnyRegionRecord:
+        word = value.get("kind", "line") if isinstance(value, dict) else "line"
+        if not isinstance(word, str) or word not in records.KINDS:
+            raise _of_field("kind", f"{shown(word)} is none of {', '.join(records.KINDS)}")
+        return converter.structure(value, records.KINDS[word])
+    if value is None and others[-1] is NoneType:
         return None
-    if isinstance(value, list):
-        return converter.structure(value, list[records.ValueKey])
-    try:
-        return _number(value, kind)
-    except ValueError as error:
-        raise ValueError(f"{error}, nor a list of keys") from None
-
-
-def _strokes(converter: Converter, value: Any, _kind: Any) -> list:
-    """Structure strokes of the first frame, or of several frames."""
-    is_keyed = isinstance(value, list) and value and isinstance(value[0], dict)
-    return converter.structure(value, list[records.StrokesKey] if is_keyed else list[records.Stroke])
+    is_keyed = isinstance(value, list) and (kind != records.Strokes or (value and isinstance(value[0], dict)))
+    if others[0] is NoneType or not is_keyed:
+        return converter.structure(value, first)
+    return converter.structure(value, others[0])
 
 
 def _exactly(wanted: type, name: str) -> Callable[[Any, Any], Any]:
@@ -182,34 +198,37 @@ def _choice(value: Any, kind: Any) -> Any:
     return value
 
 
-def _tuple(kind: Any, converter: Converter) -> Callable[[Any, Any], Any]:
+def _items(converter: Converter, value: Any, kind: Any) -> list | tuple:
+    """Structure a list, or a tuple whose items have one type."""
     inner = get_args(kind)
-
-    def structure(value: Any, _kind: Any) -> Any:
-        if not isinstance(value, list):
-            raise ValueError(f"{shown(value)} is not a list")
-        if len(value) != len(inner):
-            raise ValueError(f"{len(value)} values, not {len(inner)}")
-        return tuple(converter.structure(v, t) for v, t in zip(value, inner, strict=True))
-
-    return structure
-
-
-def _list(converter: Converter, value: Any, kind: Any) -> list:
-    (inner,) = get_args(kind)
     if not isinstance(value, list):
         raise ValueError(f"{shown(value)} is not a list")
-    structure, structured = converter.get_structure_hook(inner), []
+    if get_origin(kind) is tuple and len(value) != len(inner):
+        raise ValueError(f"{len(value)} values, not {len(inner)}")
+    hook = converter.get_structure_hook(inner[0])
+    structured: list[Any] = []
     try:
         for each in value:
-            structured.append(structure(each, inner))
+            made = hook(each, inner[0])
+            if structured and hasattr(made, "frame") and made.frame <= structured[-1].frame:
+                raise _of_field("frame", f"{plain(made.frame)} does not follow {plain(structured[-1].frame)}")
+            structured.append(made)
     except Exception as error:  # stop at the first fault; cattrs would collect millions
         from cattrs.errors import IterableValidationError, IterableValidationNote
 
         index = len(structured)
-        error.add_note(IterableValidationNote(f"index {index}", index, inner))
+        error.add_note(IterableValidationNote(f"index {index}", index, inner[0]))
         raise IterableValidationError("in a list", [error], kind) from None
-    return structured
+    return get_origin(kind)(structured)
+
+
+def _of_field(name: str, message: str) -> Exception:
+    """Return an error about a field of an object."""
+    from cattrs.errors import AttributeValidationNote, ClassValidationError
+
+    error = ValueError(message)
+    error.add_note(AttributeValidationNote("in an object", name, str))
+    return ClassValidationError("in an object", [error], dict)
 
 
 def _dataclass(kind: Any, converter: Converter) -> Callable[[Any, Any], Any]:
@@ -227,20 +246,8 @@ def _dataclass(kind: Any, converter: Converter) -> Callable[[Any, Any], Any]:
     return structure
 
 
-def _one_region(converter: Converter, value: Any, _kind: Any) -> Any:
-    """Structure a region by its field `kind`."""
-    word = value.get("kind", "line") if isinstance(value, dict) else "line"
-    if isinstance(word, str) and word in records.KINDS:
-        return converter.structure(value, records.KINDS[word])
-    from cattrs.errors import AttributeValidationNote, ClassValidationError
-
-    error = ValueError(f"{shown(word)} is none of {', '.join(records.KINDS)}")
-    error.add_note(AttributeValidationNote("in a region", "kind", str))
-    raise ClassValidationError("in a region", [error], records.RegionRecord)
-
-
-def _made_of(origin: Any) -> Callable[[Any], bool]:
-    return lambda kind: get_origin(kind) is origin
+def _made_of(*origins: Any) -> Callable[[Any], bool]:
+    return lambda kind: get_origin(kind) in origins
 
 
 @cache
@@ -263,15 +270,9 @@ def _converter() -> Converter:
     converter.register_structure_hook(str, _exactly(str, "a text"))
     converter.register_structure_hook(bool, _exactly(bool, "true or false"))
     converter.register_structure_hook_func(_made_of(Literal), _choice)
-    converter.register_structure_hook_func(
-        lambda kind: kind in (records.Keyable, records.Keyable | None), partial(_number_or_keys, converter)
-    )
-    converter.register_structure_hook_func(lambda kind: kind == records.Strokes, partial(_strokes, converter))
-    converter.register_structure_hook_func(
-        lambda kind: kind == records.AnyRegionRecord, partial(_one_region, converter)
-    )
-    converter.register_structure_hook_factory(_made_of(tuple), _tuple)
-    converter.register_structure_hook_func(_made_of(list), partial(_list, converter))
+    converter.register_structure_hook_func(_made_of(Annotated), partial(_within, converter))
+    converter.register_structure_hook_func(_made_of(Union, UnionType), partial(_union, converter))
+    converter.register_structure_hook_func(_made_of(list, tuple), partial(_items, converter))
     converter.register_structure_hook_factory(is_dataclass, _dataclass)
     return converter
 

@@ -4,32 +4,53 @@ A record has the fields that the model declares, and special ones: bars, strokes
 is the strip's first. Points are fractions of the picture, y up.
 """
 
-from __future__ import annotations
-
+import math
+from copy import copy
 from dataclasses import dataclass, field, make_dataclass, replace
-from functools import partial
-from typing import Any, Literal
+from functools import cache, partial
+from typing import Annotated, Any, Literal, NamedTuple
 
 import numpy as np
 
 from ..model import effect as model
-from ..model import keyframes, mattes
+from ..model import keyframes, limits, mattes
 from ..model.fields import MISSING, Field, fields_of
 from ..model.frame_state import Options
 from ..model.keyframes import Channel, Constant, Ease, Keys
 from ..model.motions import Placement
 from .recipe import CAMERA
 
+COMBINED = "lightest", "darkest"  # ways to combine frames that have thresholds
 VERSION = 2  # the newest that is read; in version 1, bars counted moments between filmed frames
-Point = tuple[float, float]
-Stroke = list[Point]
+
+
+class Within(NamedTuple):
+    """The range of a number, or of the length of a text or a list; `empty` says what an empty one lacks."""
+
+    least: float
+    most: float
+    empty: str = "empty"
+
+
+def around(most: float) -> Within:
+    """Return the range −most to most."""
+    return Within(-most, most)
+
+
+_NO_KEY = "empty: there is no key"
+_KEYS = Within(0, limits.MAX_KEYS)
+Frame = Annotated[float, around(limits.MAX_FRAME)]
+_SHARE = Annotated[float, Within(0, 1)]
+Coordinate = Annotated[float, around(limits.MAX_DISTANCE)]
+Point = tuple[Coordinate, Coordinate]
+Stroke = Annotated[list[Point], Within(1, math.inf, "empty: a stroke has at least one point")]
 
 
 @dataclass(frozen=True)
 class ValueKey:
     """A number at a frame."""
 
-    frame: float
+    frame: Frame
     value: float
     ease: Ease = "linear"
 
@@ -37,9 +58,16 @@ class ValueKey:
 Keyable = float | list[ValueKey]
 
 
+@cache
+def _keys(least: float, most: float, fewest: int = 0) -> Any:
+    """Return the type of a list of keys whose values are in a range."""
+    value, count = ("value", Annotated[float, Within(least, most)]), Within(fewest, limits.MAX_KEYS, _NO_KEY)
+    return Annotated[list[make_dataclass("ValueKey", [value], bases=(ValueKey,), frozen=True)], count]  # type: ignore[misc]
+
+
 @dataclass(frozen=True)
 class BarsKey:
-    frame: float
+    frame: Frame
     bars: list[float]
     ease: Ease = "linear"
 
@@ -48,10 +76,10 @@ class BarsKey:
 class MoveKey:
     """A placement: location in fractions of the picture, rotation in degrees counter-clockwise."""
 
-    frame: float
+    frame: Frame
     location: Point = (0.0, 0.0)
-    rotation: float = 0.0
-    scale: float = 1.0
+    rotation: Annotated[float, around(limits.MAX_DEGREES)] = 0.0
+    scale: Annotated[float, around(limits.MAX_SCALE)] = 1.0
     ease: Ease = "linear"
 
 
@@ -59,11 +87,12 @@ class MoveKey:
 class StrokesKey:
     """Strokes at a frame."""
 
-    frame: float
+    frame: Frame
     strokes: list[Stroke]
 
 
-Strokes = list[Stroke] | list[StrokesKey]  # of frame 1, or of several frames
+Drawing = tuple[float, list[Stroke], Ease]  # strokes from a frame on, and the ease to the next drawing
+Strokes = list[Stroke] | Annotated[list[StrokesKey], _KEYS]  # of frame 1, or of several frames
 
 
 @dataclass(frozen=True)
@@ -78,8 +107,11 @@ def _type_of(each: Field) -> Any:
     if each.choices:
         return Literal[each.words]
     if isinstance(each.default, tuple):
-        return tuple[float, float, float]
-    return Keyable if each.keyed_in_recipe else type(each.default)
+        return tuple[_SHARE, _SHARE, _SHARE]
+    if each.keyed_in_recipe:
+        return Annotated[float, Within(each.least, each.most)] | _keys(each.least, each.most, 1)
+    kind = type(each.default)
+    return kind if kind is bool else Annotated[kind, Within(each.least, each.most)]
 
 
 def _record(name: str, kinds: tuple[type, ...], **special: tuple[Any, Any]) -> type:
@@ -91,54 +123,49 @@ def _record(name: str, kinds: tuple[type, ...], **special: tuple[Any, Any]) -> t
     """
     said: dict[str, Any] = {name: special[name] for name in ("version", "kind") if name in special}
     said |= {each.recipe: (_type_of(each), each.absent) for each in fields_of(*kinds).values() if each.recipe} | special
-    columns: list[Any] = []
-    for word, (kind, default) in said.items():
-        if default is MISSING:
-            columns.append((word, kind))
-        else:
-            columns.append((word, kind, field(default_factory=partial(_new, default))))
+    columns: list[Any] = [
+        (word, kind) if default is MISSING else (word, kind, field(default_factory=partial(copy, default)))
+        for word, (kind, default) in said.items()
+    ]
     return make_dataclass(name, columns, namespace={"model": kinds[0]}, frozen=True, kw_only=True)
 
 
-def _new(default: Any) -> Any:
-    return list(default) if isinstance(default, list) else default
-
-
+_numbers = fields_of(model.Shutter)
 ShutterRecord: Any = _record(
     "ShutterRecord",
     (model.Shutter,),
     bars=(list[float] | None, None),
-    keys=(list[BarsKey], []),
+    keys=(Annotated[list[BarsKey], _KEYS], []),
     follow=(str | None, None),
-    trail=(Keyable | None, None),
+    trail=(_type_of(_numbers["trail"]) | None, None),
     length=(Literal["bars", "timeline"], "bars"),
-    threshold=(Keyable | None, None),
+    threshold=(_type_of(_numbers["threshold"]) | None, None),
 )
+_MOVES: Any = Annotated[list[MoveKey], _KEYS]
 _OF_REGION: dict[str, Any] = {"shutter": (str, MISSING)}
-_DRAWN: dict[str, Any] = _OF_REGION | {"strokes": (list[Stroke], []), "keys": (list[RegionKey], [])}
-_LAID: dict[str, Any] = _OF_REGION | {"keys": (list[MoveKey], [])}
+_REDRAWN: dict[str, Any] = {"keys": (Annotated[list[RegionKey], _KEYS], [])}
+_DRAWN: dict[str, Any] = _OF_REGION | {"strokes": (list[Stroke], [])} | _REDRAWN
+_LAID: dict[str, Any] = _OF_REGION | {"keys": (_MOVES, [])}
 RegionRecord: Any = _record("RegionRecord", (model.Region,), kind=(Literal["line", "lasso"], "line"), **_DRAWN)
-OutlineRecord: Any = _record("OutlineRecord", (model.OutlineRegion,), kind=(Literal["outline"], MISSING), **_DRAWN)
+OutlineRecord: Any = _record("OutlineRecord", (model.OutlineRegion,), kind=(Literal["outline"], "outline"), **_DRAWN)
 SubjectRecord: Any = _record(
     "SubjectRecord",
     (model.SubjectRegion,),
-    kind=(Literal["subject"], MISSING),
+    kind=(Literal["subject"], "subject"),
     **_OF_REGION,
     strokes=(Strokes, []),
     not_strokes=(Strokes, []),
-    keys=(list[RegionKey], []),
+    **_REDRAWN,
 )
 MatteRecord: Any = _record(
     "MatteRecord",
     (model.MatteRegion, model.FileContent),
-    kind=(Literal["matte"], MISSING),
-    path=(str, MISSING),
-    channel=(str, "luminance"),
+    kind=(Literal["matte"], "matte"),
+    path=(Annotated[str, Within(1, limits.MAX_PATH)], MISSING),
+    channel=(Annotated[str, Within(1, limits.MAX_CHANNEL)], "luminance"),
     **_LAID,
 )
-RampRecord: Any = _record(
-    "RampRecord", (model.MatteRegion, model.RampContent), kind=(Literal["ramp"], MISSING), **_LAID
-)
+RampRecord: Any = _record("RampRecord", (model.MatteRegion, model.RampContent), kind=(Literal["ramp"], "ramp"), **_LAID)
 KINDS = {
     "line": RegionRecord,
     "lasso": RegionRecord,
@@ -153,10 +180,13 @@ RecipeRecord: Any = _record(
     "RecipeRecord",
     (Options, model.Effect, model.Camera),
     version=(Literal[1, 2], MISSING),
-    shutters=(list[ShutterRecord], MISSING),
-    regions=(list[AnyRegionRecord], []),
-    time=(list[ValueKey], []),
-    camera=(list[MoveKey], []),
+    shutters=(
+        Annotated[list[ShutterRecord], Within(1, limits.MAX_SHUTTERS, "empty: the first shutter is the default")],
+        MISSING,
+    ),
+    regions=(Annotated[list[AnyRegionRecord], Within(0, limits.MAX_REGIONS)], []),
+    time=(_keys(-limits.MAX_FRAME, limits.MAX_FRAME), []),
+    camera=(_MOVES, []),
 )
 
 
@@ -240,17 +270,11 @@ def _moves(keys: list, *, drawn: bool = False) -> model.Moves:
 def _region(record: Any, shutter: int) -> model.Region | model.MatteRegion:
     values: dict[str, Any] = _values(record.model, record) | {"shutter": shutter}
     values["moves"] = _moves(record.keys, drawn=isinstance(record, SubjectRecord))
-    if isinstance(record, RegionRecord | OutlineRecord):
-        values["drawings"] = _drawings(record)
+    values |= {name: _drawings(record.name, drawn) for name, drawn in drawn_in(record).items()}
     if isinstance(record, RegionRecord):
         values["kind"] = Constant(record.kind)
-    elif isinstance(record, OutlineRecord):
+    elif isinstance(record, OutlineRecord | SubjectRecord):
         values["content"] = mattes.FileFrames(file=mattes.NoFile())  # Effect.for_picture sets the file
-    elif isinstance(record, SubjectRecord):
-        values["content"] = mattes.FileFrames(file=mattes.NoFile())
-        marks = {"drawings": strokes_at(record.strokes), "nots": strokes_at(record.not_strokes)}
-        marks["outlines"] = [(key.frame, key.strokes) for key in record.keys if key.strokes is not None]
-        values |= {name: _marks(record.name, drawn) for name, drawn in marks.items()}
     elif isinstance(record, MatteRecord):
         file = {"path": record.path, "channel": record.channel}
         values["content"] = model.FileContent(**file, **_values(model.FileContent, record))
@@ -259,41 +283,33 @@ def _region(record: Any, shutter: int) -> model.Region | model.MatteRegion:
     return record.model(**values)
 
 
-def drawings_of(record: Any) -> list[tuple[RegionKey | None, list[Stroke]]]:
-    """Return a region's drawings in time, each as the key that starts it and its strokes.
+def drawn_in(record: Any) -> dict[str, list[Drawing]]:
+    """Return what is drawn in a region's record, by the model's names.
 
-    The region's own strokes are the first drawing, unless its first key has strokes.
+    The own strokes of a scribble or an outline are the first drawing, unless its first key has strokes.
     """
-    drawn: list = [(key, key.strokes) for key in record.keys if key.strokes is not None]
+    drawn = [(key.frame, key.strokes, key.ease) for key in record.keys if getattr(key, "strokes", None) is not None]
+    if isinstance(record, SubjectRecord):
+        return {"drawings": _marks(record.strokes), "nots": _marks(record.not_strokes), "outlines": drawn}
+    if not isinstance(record, RegionRecord | OutlineRecord):
+        return {}
     if not drawn or record.keys[0].strokes is None:
-        drawn.insert(0, (record.keys[0] if record.keys else None, record.strokes))
-    return drawn
+        first = record.keys[0] if record.keys else RegionKey(0.0)
+        drawn.insert(0, (first.frame, record.strokes, first.ease))
+    return {"drawings": drawn}
 
 
-def _drawings(record: Any) -> model.Drawings:
-    drawn = drawings_of(record)
-    return model.Drawings(
-        name=record.name,
-        frames=tuple(key.frame if key else 0.0 for key, _ in drawn),
-        strokes=tuple([np.asarray(stroke, float) for stroke in strokes] for _, strokes in drawn),
-        eases=tuple(key.ease if key else "linear" for key, _ in drawn),
-        aspect=1.0,
-    )
+def _marks(strokes: Any) -> list[Drawing]:
+    """Return the drawings of a subject's strokes."""
+    is_keyed = strokes and isinstance(strokes[0], StrokesKey)
+    keys = strokes if is_keyed else [StrokesKey(1.0, strokes)] if strokes else []
+    return [(key.frame, key.strokes, "linear") for key in keys]
 
 
-def strokes_at(strokes: Any) -> list[tuple[float, list[Stroke]]]:
-    """The frames of a subject's strokes, each with what is drawn there."""
-    if strokes and isinstance(strokes[0], StrokesKey):
-        return [(key.frame, key.strokes) for key in strokes]
-    return [(1.0, strokes)] if strokes else []
-
-
-def _marks(name: str, drawn: list[tuple[float, list[Stroke]]]) -> model.Drawings:
-    """Drawings that stay for themselves: nothing goes from one to the next."""
-    frames = tuple(frame for frame, _strokes in drawn)
-    arrays = tuple([np.asarray(stroke, float) for stroke in strokes] for _frame, strokes in drawn)
-    eases: tuple[Ease, ...] = tuple("linear" for _ in drawn)
-    return model.Drawings(name=name, frames=frames, strokes=arrays, eases=eases, aspect=1.0)
+def _drawings(name: str, drawn: list[Drawing]) -> model.Drawings:
+    strokes = tuple([np.asarray(stroke, float) for stroke in strokes] for _frame, strokes, _ease in drawn)
+    frames, eases = tuple(frame for frame, *_ in drawn), tuple(ease for *_, ease in drawn)
+    return model.Drawings(name=name, frames=frames, strokes=strokes, eases=eases, aspect=1.0)
 
 
 def recipe_of(effect: model.Effect) -> Any:
@@ -329,14 +345,18 @@ def _shutter_record(shutter: model.Shutter) -> Any:
         said["follow"] = shutter.follow.name
     elif shutter.follow:
         said["follow"] = CAMERA
+    else:
+        del said["follow_motion"], said["follow_smooth"]
     if shutter.length == "timeline":
         said["length"] = "timeline"
     if shutter.has_trail:
         said["trail"] = _keyable(shutter.trail)
-    if shutter.use_threshold:
+    chooses = shutter.combine in COMBINED
+    if chooses and shutter.use_threshold:
         said["threshold"] = _keyable(shutter.threshold)
     else:
         del said["softness"]
+    said["by_luminance"] = chooses and shutter.by_luminance
     bars = shutter.bars.channel
     if isinstance(bars, Keys):
         keys = zip(bars.frames, bars.values, bars.eases, strict=True)
@@ -355,43 +375,37 @@ def _move_keys(moves: model.Moves) -> list[dict[str, Any]]:
     return [{"frame": frame, "ease": ease} | dict(zip(names, key, strict=True)) for frame, ease, *key in columns]
 
 
-def _points(stroke: np.ndarray) -> Stroke:
-    return [(x, y) for x, y in stroke.tolist()]
-
-
-def _subject_record(region: model.SubjectRegion, said: dict[str, Any], keys: list[dict[str, Any]]) -> Any:
-    marks = [
-        [(frame, [_points(stroke) for stroke in strokes]) for frame, strokes in zip(d.frames, d.strokes, strict=True)]
-        for d in (region.drawings, region.nots, region.outlines)
-    ]
-    on, off = (
-        drawn[0][1] if [frame for frame, _ in drawn] == [1] else [StrokesKey(*each) for each in drawn]
-        for drawn in marks[:2]
-    )
-    outlines = dict(marks[2])
-    placed = {frame: {"frame": frame} for frame in outlines} | {key["frame"]: key for key in keys}
-    made = [RegionKey(strokes=outlines.get(frame), **placed[frame]) for frame in sorted(placed)]
-    return SubjectRecord(kind="subject", strokes=on, not_strokes=off, keys=made, **said)
+def _strokes_of(drawings: model.Drawings) -> dict[float, list[Stroke]]:
+    """Return strokes by the frames of their drawings."""
+    drawn = ([[(x, y) for x, y in stroke.tolist()] for stroke in strokes] for strokes in drawings.strokes)
+    return dict(zip(drawings.frames, drawn, strict=True))
 
 
 def _region_record(region: Any, shutter: str) -> Any:
     said = _words(type(region), region) | {"shutter": shutter}
-    keys = _move_keys(region.moves)
+    keys = {key["frame"]: key for key in _move_keys(region.moves)}
+    if not isinstance(region, model.Region | model.OutlineRegion | model.SubjectRegion):
+        said |= {"keys": [MoveKey(**key) for key in keys.values()]} | _words(type(region.content), region.content)
+        if isinstance(region.content, model.RampContent):
+            return RampRecord(**said)
+        return MatteRecord(path=region.content.path, channel=region.content.channel, **said)
+    drawn = _strokes_of(region.drawings)
     if isinstance(region, model.SubjectRegion):
-        return _subject_record(region, said, keys)
-    if isinstance(region, model.Region | model.OutlineRegion):
-        frames = region.drawings.frames
-        drawings = [[_points(stroke) for stroke in drawing] for drawing in region.drawings.strokes]
+        said |= {"strokes": _keyed(drawn), "not_strokes": _keyed(_strokes_of(region.nots))}
+        drawn = _strokes_of(region.outlines)
+    else:
         # The region carries the first drawing; keys carry the others.
-        drawn = dict(zip(frames, drawings, strict=True)) if len(frames) > 1 else {}
-        if keys and keys[0]["frame"] == frames[0]:
-            drawn.pop(frames[0], None)
-        said["strokes"] = drawings[0]
-        said["keys"] = [RegionKey(strokes=drawn.get(key["frame"]), **key) for key in keys]
-        if isinstance(region, model.Region):
-            return RegionRecord(kind=region.kind.at(1), **said)
-        return OutlineRecord(kind="outline", **said)
-    said |= {"keys": [MoveKey(**key) for key in keys]} | _words(type(region.content), region.content)
-    if isinstance(region.content, model.RampContent):
-        return RampRecord(kind="ramp", **said)
-    return MatteRecord(kind="matte", path=region.content.path, channel=region.content.channel, **said)
+        first = region.drawings.frames[0]
+        said["strokes"] = drawn[first]
+        if len(drawn) == 1 or first == min(keys):
+            del drawn[first]
+    placed = {frame: {"frame": frame} for frame in drawn} | keys
+    said["keys"] = [RegionKey(strokes=drawn.get(frame), **placed[frame]) for frame in sorted(placed)]
+    if isinstance(region, model.Region):
+        return RegionRecord(kind=region.kind.at(1), **said)
+    return (SubjectRecord if isinstance(region, model.SubjectRegion) else OutlineRecord)(**said)
+
+
+def _keyed(drawn: dict[float, list[Stroke]]) -> Any:
+    """Return a subject's strokes, without keys if they are of frame 1."""
+    return drawn[1] if list(drawn) == [1] else [StrokesKey(*each) for each in drawn.items()]
