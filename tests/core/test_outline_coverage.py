@@ -16,16 +16,6 @@ def test_what_encloses_nothing(strokes):
     assert not outlines.coverage(strokes, 16, 9).any()
 
 
-def test_what_they_enclose_twice_is_a_hole():
-    """Of two curves, and of one that crosses itself."""
-    inner = [(0.4, 0.4), (0.6, 0.4), (0.6, 0.6), (0.4, 0.6)]
-    star = [(0.5 + 0.4 * np.sin(k * 0.8 * np.pi), 0.5 + 0.4 * np.cos(k * 0.8 * np.pi)) for k in range(5)]
-    for strokes, place in (([*SQUARE, inner], (13, 10)), ([star], (4, 10))):
-        found = outlines.coverage(strokes, 20, 20)
-        assert found.dtype == np.float32
-        assert found[10, 10] == 0 < 0.8 < found[place]
-
-
 ASPECT = 2.0
 CIRCLE = tuple((0.5 + 0.1 * np.cos(a), 0.5 + 0.2 * np.sin(a)) for a in np.linspace(0, 2 * np.pi, 40, endpoint=False))
 

@@ -196,7 +196,8 @@ def from_mask(scene: Scene, effect: PropertyGroup, strip: Strip, shutter: Proper
         raise EffectError(rpt_('mask "{mask}" encloses nothing in the strip').format(mask=mask.name))
     region = region_edits.add_region(effect, shutter, "OUTLINE", mask.name)
     region.motion, region.between = "LOCATION", "STRAIGHT"
-    for frame, curves in _in_order(shapes, size[0] / size[1]).items():
+    ordered = outlines.in_order(shapes.values(), size[0] / size[1])
+    for frame, curves in zip(shapes, ordered, strict=True):
         draw(effect, strip, region, curves, frame)
     return region
 
@@ -213,16 +214,3 @@ def _numbers(shape: MaskShape) -> np.ndarray:
     splines = [spline for layer in shape.layers for spline in layer.splines]
     moving = [np.concatenate([np.ravel(spline.points), spline.weights]) for spline in splines]
     return np.concatenate([[layer.alpha for layer in shape.layers], *moving])
-
-
-def _in_order(shapes: dict[int, outlines.Curves], aspect: float) -> dict[int, outlines.Curves]:
-    """Sort the curves of each frame so that matching curves have the same position.
-
-    The interpolation between drawings pairs curves by position. Curves that exist at all frames come first.
-    """
-    chains = outlines.chains(sorted(shapes.items()), aspect)
-    chains.sort(key=lambda chain: -len(chain.frames))
-    return {
-        frame: outlines.curves([chain.points[chain.frames.index(frame)] for chain in chains if frame in chain.frames])
-        for frame in shapes
-    }

@@ -1,29 +1,22 @@
-"""Outlines: closed curves, their coverage of pixels, and chains of curves from frame to frame with a constant number of
-points, as splines with shape keys need."""
+"""Outlines: closed curves, their coverage of pixels, and pairs of curves from drawing to drawing."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import NamedTuple
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 
 from .. import scanlines, stopping
-from . import scribbles
+from . import motions, scribbles
 
 # Lines per row of pixels on which coverage is exact.
 LINES = 8
 _CROSSINGS = 1 << 22  # crossings of curves with lines that are computed at once, in about 300 MB of memory
 _PULLED = 12  # the fewest points on either side of a curve that is pulled
 _NEAR = 0.005  # accuracy of distances to curves, in heights of the picture
-ALIKE = 0.1  # the similarity of two curves, 0 to 1, from which on one continues the other
-FAR = 2.0  # in sums of radii, as of circles: curves that are farther apart have no similarity
-_LINES = 128  # rows of the pictures in which similarity is measured
-_STEP, _POINTS = 0.008, (12, 256)  # the distance of points in heights of the picture; limits of their number
+_POINTS = 256  # of a curve that is paired with others
 
 Curves = tuple[tuple[tuple[float, float], ...], ...]  # hashable strokes: fractions of the picture, y up
-# Inside of a curve: its middle (2,) in heights of the picture, and its coverage (rows, columns), moved to the centre.
-_Shape = tuple[np.ndarray, np.ndarray]
 
 
 def curves(strokes: Sequence[np.ndarray]) -> Curves:
@@ -116,79 +109,33 @@ def _apart(points: np.ndarray, point: tuple[float, float], aspect: float) -> np.
     return np.hypot(*((points - point) * (aspect, 1)).T)
 
 
-class Chain(NamedTuple):
-    """A curve that continues from frame to frame.
-
-    Attributes:
-        frames: Ascending.
-        points: (frames, points, 2) float64, fractions of the picture, y up.
-        gone: The first frame without the curve; None: it stays.
-    """
-
-    frames: tuple[int, ...]
-    points: np.ndarray
-    gone: int | None
-
-
-def chains(drawn: Sequence[tuple[int, Curves]], aspect: float) -> list[Chain]:
-    """Return chains of the curves of ascending frames: a curve continues as the most similar one of the next frame.
+def in_order(drawings: Iterable[Curves], aspect: float) -> list[Curves]:
+    """Return drawings whose similar curves have the same positions and points, by which strokes are paired in between.
 
     Args:
         aspect: The picture's width / height.
     """
-    open_ones: list[list[tuple[int, np.ndarray]]] = []
-    found: list[tuple[list[tuple[int, np.ndarray]], int | None]] = []
-    for frame, curves in drawn:
-        shapes = [_turned(np.asarray(curve, np.float64)) for curve in curves if len(curve) > 2]
-        pairs = _pairs([chain[-1][1] for chain in open_ones], shapes, aspect)
-        found += [(chain, frame) for index, chain in enumerate(open_ones) if index not in pairs]
-        going = [[*open_ones[index], (frame, shapes[to])] for index, to in pairs.items()]
-        new = set(range(len(shapes))) - set(pairs.values())
-        open_ones = going + [[(frame, shapes[index])] for index in sorted(new)]
-    return [_chain(curves, gone, aspect) for curves, gone in (*found, *((chain, None) for chain in open_ones))]
+    before: list[np.ndarray] = []
+    result = []
+    for drawing in drawings:
+        left = [_resampled(_turned(np.asarray(curve, np.float64)), aspect) for curve in drawing if len(curve) > 2]
+        ordered = []
+        for curve in before[: len(left)]:
+            apart = [np.abs(motions.corners([curve]) - motions.corners([other])).max() for other in left]
+            ordered.append(_aligned(curve, left.pop(int(np.argmin(apart))), aspect))
+        before = ordered + left
+        result.append(curves(before))
+    return result
 
 
-def _pairs(before: list[np.ndarray], after: list[np.ndarray], aspect: float) -> dict[int, int]:
-    """Pair similar curves, the most similar ones first; return indices by indices."""
-    shapes = [[_shape(curve, aspect) for curve in curves] for curves in (before, after)]
-    alike = {(i, j): _alike(a, b) for i, a in enumerate(shapes[0]) for j, b in enumerate(shapes[1])}
-    pairs: dict[int, int] = {}
-    for (i, j), share in sorted(alike.items(), key=lambda entry: -entry[1]):
-        if share >= ALIKE and i not in pairs and j not in pairs.values():
-            pairs[i] = j
-    return pairs
-
-
-def _shape(curve: np.ndarray, aspect: float) -> _Shape:
-    middle = (curve.min(axis=0) + curve.max(axis=0)) / 2
-    inside = coverage([curve - middle + 0.5], max(1, round(_LINES * aspect)), _LINES)
-    return middle * (aspect, 1), inside
-
-
-def _alike(one: _Shape, other: _Shape) -> float:
-    """Return the similarity of two shapes, 0 to 1, in area and place."""
-    (middle, inside), (other_middle, other_inside) = one, other
-    reach = sum(np.sqrt(each.sum() / np.pi) / _LINES for each in (inside, other_inside)) * FAR
-    if reach == 0:
-        return 0.0
-    common = np.minimum(inside, other_inside).sum() / np.maximum(inside, other_inside).sum()
-    return float(common * max(0.0, 1 - np.hypot(*(middle - other_middle)) / reach))
+def _resampled(curve: np.ndarray, aspect: float) -> np.ndarray:
+    return scribbles.resample(np.concatenate([curve, curve[:1]]), _POINTS + 1, aspect)[:-1]
 
 
 def _turned(curve: np.ndarray) -> np.ndarray:
     """Return the curve in counter-clockwise order."""
     x, y = curve.T
     return curve if np.dot(x, np.roll(y, -1)) >= np.dot(y, np.roll(x, -1)) else curve[::-1]
-
-
-def _chain(curves: list[tuple[int, np.ndarray]], gone: int | None, aspect: float) -> Chain:
-    closed = [np.concatenate([curve, curve[:1]]) for _frame, curve in curves]
-    longest = max(np.hypot(*(np.diff(curve, axis=0) * (aspect, 1)).T).sum() for curve in closed)
-    count = int(np.clip(np.ceil(longest / _STEP), *_POINTS))
-    points = [scribbles.resample(curve, count + 1, aspect)[:-1] for curve in closed]
-    for before, index in enumerate(range(1, len(points))):
-        points[index] = _aligned(points[before], points[index], aspect)
-    return Chain(tuple(frame for frame, _curve in curves), np.stack(points), gone)
 
 
 def _aligned(before: np.ndarray, curve: np.ndarray, aspect: float) -> np.ndarray:
