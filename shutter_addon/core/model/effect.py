@@ -68,9 +68,14 @@ class Moves:
 
 @dataclass(frozen=True, eq=False)
 class Subject:
-    """Something that a shutter can follow: a region, or the camera."""
+    """Something that a shutter can follow: a region, or the camera.
+
+    Attributes:
+        drawings: Strokes, about whose centre the subject turns and scales. None: about the picture's centre.
+    """
 
     moves: Moves
+    drawings: Drawings | None = None
 
     def placement(self, frame: float) -> Placement:
         """Return the keyed placement at a frame."""
@@ -81,14 +86,24 @@ class Subject:
 
         None where nothing is drawn. EffectError: the strokes are too far outside the picture.
         """
-        return np.array([0.5, 0.5])
+        if (shape := self._shape) is None:
+            return np.array([0.5, 0.5])
+        strokes = shape.at(frame)
+        return motions.centre(strokes) if strokes else None
 
     def corners(self, frame: float) -> np.ndarray:
         """Return the corners (4, 2) of the subject's box at a frame, in fractions of the picture.
 
         (0, 2) where nothing is drawn. EffectError: as for `centre`.
         """
-        return motions.PICTURE
+        if (shape := self._shape) is None:
+            return motions.PICTURE
+        strokes = shape.moved(frame, self.placement(frame))
+        return motions.corners(strokes) if strokes else np.empty((0, 2))
+
+    @property
+    def _shape(self) -> Drawings | None:
+        return self.drawings
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -98,8 +113,7 @@ class AnyRegion(Subject):
     Attributes:
         shutter: Index of the shutter.
         layer: See core/pixels/layering.py.
-        drawings: The strokes; the region moves about their centre. None for mattes and ramps, which move about the
-            picture's centre.
+        drawings: The strokes; None for mattes and ramps.
     """
 
     name: str = fixed("Name", "Name of the region", default="Region", absent="", most=limits.MAX_NAME)
@@ -112,13 +126,6 @@ class AnyRegion(Subject):
         "Expose the region separately, in front of everything else, so that it leaves no ghost",
         blender="is_layer",
     )
-    drawings: Drawings | None = None
-
-    def centre(self, frame: float) -> np.ndarray | None:
-        return self.drawings.centre(frame) if self.drawings else super().centre(frame)
-
-    def corners(self, frame: float) -> np.ndarray:
-        return self.drawings.corners(frame, self.placement(frame)) if self.drawings else super().corners(frame)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -213,14 +220,8 @@ class SubjectRegion(MatteRegion):
     nots: Drawings
     outlines: Drawings
 
-    def centre(self, frame: float) -> np.ndarray | None:
-        return self._placed.centre(frame)
-
-    def corners(self, frame: float) -> np.ndarray:
-        return self._placed.corners(frame, self.placement(frame))
-
     @property
-    def _placed(self) -> Drawings:
+    def _shape(self) -> Drawings:
         return self.drawings if self.drawings.frames else self.outlines
 
     def drawn_at(self, frame: float) -> scribbles.Shape:

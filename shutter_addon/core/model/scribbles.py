@@ -156,16 +156,6 @@ class Drawings:
         """Return strokes like `at`, moved about their centre."""
         return transform(self.at(frame), placed.location, placed.rotation, placed.scale, self.aspect)
 
-    def centre(self, frame: float) -> np.ndarray | None:
-        """Return what Subject.centre returns."""
-        strokes = self.at(frame)
-        return motions.centre(strokes) if strokes else None
-
-    def corners(self, frame: float, placed: Placement) -> np.ndarray:
-        """Return what Subject.corners returns, for a placement at the frame."""
-        strokes = self.moved(frame, placed)
-        return motions.corners(strokes) if strokes else np.empty((0, 2))
-
     def drawing(self, index: int, frame: float) -> list[np.ndarray]:
         """Return the strokes of a drawing as they lie on the picture at a frame. EffectError: as for `at`."""
         if self.placement is None:
