@@ -57,33 +57,19 @@ def is_part(name: str) -> bool:
     return _NAME.fullmatch(name) is not None
 
 
-def left_behind(parent: Path) -> list[Path]:
-    """Return the part folders in `parent` that killed processes left. OSError: it cannot be read or written to."""
-    with os.scandir(parent) as entries:
-        parts = [entry.path for entry in entries if is_part(entry.name) and entry.is_dir(follow_symlinks=False)]
-    if not parts:
-        return []
-    now = _clock(parent)
-    return [Path(part) for part in parts if now - _last_written(part) > LEFT_BEHIND]
-
-
 def clear_up(parent: Path) -> None:
     """Remove part folders that killed processes left, where possible."""
     with suppress(OSError):
-        for left in left_behind(parent):
-            shutil.rmtree(left, ignore_errors=True)
+        parts = [parent / name for name in os.listdir(parent) if is_part(name)]
+        if parts:
+            with part_folder(parent) as folder:  # a network drive's server can have another time than this machine
+                now = folder.lstat().st_mtime
+        for part in parts:
+            if now - _last_written(part) > LEFT_BEHIND:
+                shutil.rmtree(part, ignore_errors=True)
 
 
-def _clock(parent: Path) -> float:
-    """Return the time of the clock that dates files there, in seconds since 1970.
-
-    A network drive's server can have another time than this machine.
-    """
-    with part_folder(parent) as folder:
-        return folder.lstat().st_mtime
-
-
-def _last_written(folder: str) -> float:
+def _last_written(folder: Path) -> float:
     """Return when a folder last changed, in seconds since 1970; infinity if unknown, so that it is never abandoned."""
     try:
         times = [entry.stat(follow_symlinks=False).st_mtime for entry in os.scandir(folder)]

@@ -14,50 +14,42 @@ _MOST = 128  # cached values
 
 
 class Revision:
-    """A counter of changes."""
+    """A counter of changes, and values that are kept until the next one.
 
-    number = 0
+    Attributes:
+        number: While it is equal, only the current frame can have changed.
+    """
+
+    def __init__(self) -> None:
+        self.number = 0
+        self._kept: Kept[tuple, tuple[Any, Exception | None]] = Kept()  # results and errors, by number, subject and key
 
     def changed(self) -> None:
+        """Count a change, or a possible change."""
         self.number += 1
+        self._kept.clear()
+
+    def until_change(self, what: str, key: Hashable, make: Callable[[], T]) -> T:
+        """Return what `make` returns or raises, called once per subject and key until the next change.
+
+        This is for drawing. Operators can follow a change that Blender has not reported yet, and read again.
+        """
+        value, error = self._kept.ask((self.number, what, key), lambda: _outcome(make), _MOST)
+        if error is not None:
+            raise error.with_traceback(None)  # a traceback would grow with every raise
+        return value
+
+    def known(self, what: str, key: Hashable) -> Any:
+        """Return the cached value of `until_change`, or None."""
+        return self._kept.get((self.number, what, key), (None, None))[0]
 
 
-_changes = Revision()
-_kept: Kept[tuple, tuple[bool, Any]] = Kept()  # by number, subject and key: whether `make` succeeded, and its outcome
-
-
-def number() -> int:
-    """Return the counter of changes. While it is equal, only the current frame can have changed."""
-    return _changes.number
-
-
-def changed() -> None:
-    """Count a change, or a possible change."""
-    _changes.changed()
-
-
-def until_change(what: str, key: Hashable, make: Callable[[], T]) -> T:
-    """Return what `make` returns or raises, called once per subject and key until the next change.
-
-    This is for drawing. Operators can follow a change that Blender has not reported yet, and read again.
-    """
-    if next(reversed(_kept), (number(),))[0] != number():
-        _kept.clear()  # outdated
-    good, value = _kept.ask((number(), what, key), lambda: _outcome(make), _MOST)
-    if not good:
-        raise value.with_traceback(None)  # a traceback would grow with every raise
-    return value
-
-
-def known(what: str, key: Hashable) -> Any:
-    """Return the cached value of `until_change`, or None."""
-    good, value = _kept.get((number(), what, key), (False, None))
-    return value if good else None
-
-
-def _outcome(make: Callable[[], object]) -> tuple[bool, Any]:
-    """Return whether a call succeeds, and its result or error."""
+def _outcome(make: Callable[[], object]) -> tuple[Any, Exception | None]:
     try:
-        return True, make()
+        return make(), None
     except Exception as error:
-        return False, error.with_traceback(None)
+        return None, error.with_traceback(None)
+
+
+edit = Revision()  # the open one's
+changed, until_change, known = edit.changed, edit.until_change, edit.known

@@ -7,19 +7,15 @@ from __future__ import annotations
 
 import linecache
 import sys
-import threading
 import time
 import traceback
 from pathlib import Path
-
-from .memo import Kept
 
 MOST = 100  # lines
 _PACKAGE = Path(__file__).parents[1]
 _CALLS = 8  # of a traceback
 _start = time.monotonic()
-_lock = threading.Lock()  # films are rendered on other threads
-_told: Kept[str, float] = Kept()  # by line: seconds since the start, when it told something last
+_lines: list[tuple[str, float]] = []  # with seconds since the start, replaced as a whole: any thread adds to them
 
 
 def record(level: int = 1) -> None:
@@ -42,18 +38,13 @@ def exception(error: BaseException) -> None:
 
 def last() -> list[str]:
     """Return the kept lines with their times, the oldest first."""
-    with _lock:
-        return [f"{seconds:.0f} s: {words}" for words, seconds in _told.items()]
-
-
-def forget() -> None:
-    with _lock:
-        _told.clear()
+    return [f"{seconds:.0f} s: {words}" for words, seconds in _lines]
 
 
 def _keep(words: str) -> None:
-    with _lock:
-        _told.keep(words, time.monotonic() - _start, MOST)
+    global _lines
+    others = [line for line in _lines if line[0] != words]
+    _lines = [*others, (words, time.monotonic() - _start)][-MOST:]
 
 
 def _is_ours(file: str) -> bool:

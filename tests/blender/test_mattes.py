@@ -409,10 +409,10 @@ def test_a_changed_mask_drops_finished_frames(bpy, edit, shown, matte, mask):
     }
     invalidation.invalidate_changed(edit)
     for name, change in changes.items():
-        number = revision.number()
+        number = revision.edit.number
         change()
         bpy.context.view_layer.update()  # whose handler looks for what has changed
-        assert revision.number() > number + 1, name
+        assert revision.edit.number > number + 1, name
         assert not invalidation.invalidate_changed(edit), name
 
 

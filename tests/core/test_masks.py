@@ -33,15 +33,6 @@ def places(size):
     return np.stack([(x - width / 2) / larger + 0.5, (y - height / 2) / larger + 0.5], axis=-1)
 
 
-def winding(corners, points):
-    """How often polygons go around points, by angles."""
-    total = np.zeros(points.shape[:2])
-    for a, b in zip(corners, [*corners[1:], corners[0]], strict=True):
-        (ax, ay), (bx, by) = (np.moveaxis(np.asarray(end) - points, -1, 0) for end in (a, b))
-        total += np.arctan2(ax * by - ay * bx, ax * bx + ay * by)
-    return np.rint(total / (2 * np.pi)).astype(int)
-
-
 @pytest.mark.parametrize("interpolation", ["LINEAR", "EASE"])
 def test_feather_points_widen_their_segment(interpolation):
     size = 200, 200
@@ -56,19 +47,6 @@ def test_feather_points_widen_their_segment(interpolation):
     above = (np.abs(x - 0.5) < 0.23) & (y > 0.65) & (y < 0.8)
     # Between the normals of two points of the outline, values bend a little.
     assert np.abs(value - expected)[above].mean() < 0.004
-
-
-CROSSED = ([(0.1, 0.2), (0.5, 0.2), (0.5, 0.6), (0.1, 0.6)], [(0.3, 0.4), (0.3, 0.9), (0.9, 0.9), (0.9, 0.4)])
-
-
-@pytest.mark.parametrize("holes", [False, True])
-def test_the_sweep_line_fills_each_or_what_an_odd_number_covers(holes):
-    size = 100, 100
-    around = [winding(corners, places(size)) != 0 for corners in CROSSED]
-    expected = around[0] ^ around[1] if holes else around[0] | around[1]
-    splines = [straight(corners[::-1] if k == 0 else corners) for k, corners in enumerate(CROSSED)]
-    value = covered(splines, size, fill_solver="SWEEP_LINE", holes=holes)
-    assert np.abs(value - expected).mean() < 0.03
 
 
 @pytest.mark.parametrize("count", [0, 1, 2])

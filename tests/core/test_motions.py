@@ -49,12 +49,6 @@ def test_the_motion_between_two_placements_is_the_one_that_carried_the_shape(sha
     assert found(point) == pytest.approx(motion(point), rel=1e-7, abs=1e-5)
 
 
-@given(similarities, similarities, st.complex_numbers(max_magnitude=1000))
-def test_motions_follow_one_another_and_go_back(first, second, point):
-    assert second.after(first)(point) == pytest.approx(second(first(point)), abs=1e-6)
-    assert first.inverse()(first(point)) == pytest.approx(point, abs=1e-6)
-
-
 def test_a_rotation_goes_on_where_it_was():
     assert motions.unwound(Placement(rotation=-170), Placement(rotation=185)).rotation == 190
     assert motions.unwound(Placement(rotation=10), Placement(rotation=-3 * 360)).rotation == 10 - 3 * 360

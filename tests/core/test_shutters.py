@@ -22,26 +22,9 @@ def bars_lists(draw, most=4):
     return bars
 
 
-@st.composite
-def mixes(draw):
-    bars = draw(bars_lists())
-    c = draw(arrays(np.float64, len(bars), elements=st.floats(0, 1)))
-    assume(c.sum() > 0.1)
-    return bars, c / c.sum()
-
-
 def test_a_box_has_two_knots_whatever_its_length():
     for shape in ((1, 200), (3, 64)):
         assert len(shutters.knots(np.ones(shape)).z) == 2
-
-
-@given(mixes())
-def test_displacement_keeps_exposure_and_is_a_shutter(mix):
-    bars, c = mix
-    q = shutters.displace(bars, c)
-    assert (q >= 0).all()
-    assert q.sum() == pytest.approx(c @ bars.sum(axis=1))
-    assert shutters.mix_exposure(bars, c) == pytest.approx(q.sum())
 
 
 @pytest.mark.parametrize(
@@ -70,10 +53,6 @@ def test_a_shutter_is_one_as_float32_too():
     for bars in ([1e-6], [1e-7] * 10, [1e6] * 256, [1e-46, 1.0], [0.1, 1e-40]):
         shutters.check_bars(bars)
         shutters.check_bars(np.float32(bars))
-
-
-def test_open_span():
-    assert shutters.open_span([[0, 0, 1, 0], [0, 1, 0, 0]]) == (1, 3)
 
 
 @given(bars_lists(most=1), st.integers(1, 80))
@@ -124,14 +103,6 @@ def test_what_rounding_leaves_opens_no_bar():
     for level in (False, True):
         moments = shutters.smoothed([1e-12, 1.0, 0.0, 1e-13], 8, level=level)
         assert moments == pytest.approx(np.eye(32)[8], abs=1e-9)
-
-
-@given(bars_lists(most=1), STEPS)
-def test_what_is_held_lasts_from_its_frame_to_the_next(bars, steps):
-    found = shutters.held(bars[0], steps)
-    assert len(found) == len(bars[0]) * steps
-    for k, bar in enumerate(bars[0]):
-        assert found[k * steps : (k + 1) * steps] == pytest.approx(np.full(steps, bar / steps))
 
 
 @given(bars_lists(most=1), STEPS, POSITION, st.sampled_from([1, -1]))

@@ -29,14 +29,6 @@ def test_as_it_was_filmed_and_slower_it_is_the_shown_frame():
     np.testing.assert_allclose(exposed(OPEN, 5, step=4), [1.6] * 5 + [0, 0, 0])
 
 
-def test_along_a_ramp_it_is_as_long_as_the_way_goes():
-    """From one speed to another, in the middle of the exposure."""
-    bars = exposed(OPEN, before=98.0, after=104.0, position="center")
-    # Four bars over one frame before the shown one's middle, four over two behind it.
-    np.testing.assert_allclose(bars, [0, 0, 2, 3, 2, 1, 0, 0])
-    assert bars.sum() == pytest.approx(8)
-
-
 def test_speed_that_changes_within_a_frame_counts():
     """Half of a frame at one source frame, the other at three: half open, it is one."""
     places = np.array([98.0, 99.0, 100.0, 101.0, 104.0])

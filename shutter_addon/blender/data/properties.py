@@ -23,7 +23,7 @@ from bpy.types import Context, PropertyGroup
 
 from ...core import revision
 from ...core.model import effect as model
-from ...core.model.choices import CONTEXT, FOLLOWED, FOLLOWS, KINDS, MATTE_SOURCES, MOTIONS, UNKEYED
+from ...core.model.choices import CONTEXT, FOLLOWED, FOLLOWS, KINDS, MATTE_SOURCES, MOTIONS
 from ...core.model.fields import Field, fields_of
 from ...core.model.frame_state import Options
 from ...core.model.limits import MAX_BAR, MAX_CHANNEL, MAX_DEGREES, MAX_DISTANCE, MAX_FRAME, MAX_NAME, MAX_SCALE
@@ -54,7 +54,7 @@ def _property(field: Field, **more: Any) -> object:
     said: dict = {"name": field.label, "description": field.description, "translation_context": field.context}
     if kind is str and not field.choices:
         return StringProperty(**said, default=default, **more)
-    said |= {"update": changed, "options": KEYED if field.keyed else UNKEYED} | more
+    said |= {"update": changed, "options": KEYED if field.keyed else set()} | more
     if field.choices:
         return EnumProperty(**said, items=field.choices, default=str(default).upper())
     said["default"] = default
@@ -86,7 +86,7 @@ def choice(
     **more: str,
 ) -> object:
     """Return an enum property without keys, which by default changes pictures."""
-    return EnumProperty(name=name, description=description, items=items, update=update, options=UNKEYED, **more)
+    return EnumProperty(name=name, description=description, items=items, update=update, options=set(), **more)
 
 
 class TrackStop(PropertyGroup):
@@ -133,20 +133,20 @@ class _Tracked:
     track_until: IntProperty(
         name="Until",
         description="Timeline frame at which tracking stops; 0 is the end of the strip",
-        options=UNKEYED,
+        options=set(),
         translation_context=CONTEXT,
     )
     track_all_keys: BoolProperty(
         name="All Keys",
         description="Keep a key at every tracked frame, in place of those that the motion needs within a pixel",
-        options=UNKEYED,
+        options=set(),
     )
     track_ends: BoolProperty(
         name="Fade Out When Lost",
         description="Track keys a region's opacity, or the camera's influence, so that it fades where the track ends; "
         "a region ends with its shot",
         default=True,
-        options=UNKEYED,
+        options=set(),
     )
 
 
@@ -283,13 +283,13 @@ class _Settings:
     # Its scene's. If that was removed, undo may bring the effect back with a pointer to another scene.
     identity: StringProperty(options={"HIDDEN"})
     source: StringProperty(name="Source", description="Identity of the source strip")
-    start: FloatProperty(name="Start", description="Timeline frame where the effect's content starts", options=UNKEYED)
+    start: FloatProperty(name="Start", description="Timeline frame where the effect's content starts", options=set())
     camera: PointerProperty(name="Camera", description="Motion of what the camera sees", type=ShutterCamera)
     use_source_time: BoolProperty(
         name="Custom Time",
         description="Show the source at the time that is set here, in place of the strip's own timing",
         update=changed,
-        options=UNKEYED,
+        options=set(),
     )
     source_time: FloatProperty(
         name="Source Time",
@@ -307,8 +307,8 @@ class ShutterEffect(_Settings, PropertyGroup):
     regions: CollectionProperty(type=ShutterRegion)
     # The names of the annotation's layers when regions last followed them, a line each.
     layer_names: StringProperty(options={"HIDDEN"})
-    active_shutter: IntProperty(name="Active Shutter", min=0, update=_shutter_selected, options=UNKEYED)
-    active_region: IntProperty(name="Active Region", min=0, update=_region_selected, options=UNKEYED)
+    active_shutter: IntProperty(name="Active Shutter", min=0, update=_shutter_selected, options=set())
+    active_region: IntProperty(name="Active Region", min=0, update=_region_selected, options=set())
 
 
 class ShutterScene(PropertyGroup):

@@ -169,7 +169,3 @@ READS = (
     ("ROWS", "Rows", "Upright lines lean as they move sideways"),
     ("COLUMNS", "Columns", "Level lines lean as they move up and down, with a rotated camera"),
 )
-
-
-# Properties whose F-curves the renderer would not read.
-UNKEYED: set[str] = set()
