@@ -196,14 +196,6 @@ class Renderer:
         with self.compositor.current():
             return self.compositor.labels(self.labels(request)[0].labels), request.state.options.aggregate
 
-    def drawn_holes(self, request: Request) -> tuple[Handle, int]:
-        """Return the picture's holes on a GPU, like drawn_labels; 0 where there is none."""
-        with self.compositor.current():
-            self.draw(request)
-            if self.holes is None or request.state.layers is None:
-                return self.compositor.labels(np.zeros((1, 1), np.uint16)), self._everywhere
-            return self.compositor.labels(self.holes), 1
-
     def labels(self, request: Request) -> list[LabelLayer]:
         """Return labels of the request's scribbles, for each of scribbles.layers."""
         state, size = request.state, grid(self.source, request.state)
@@ -241,12 +233,6 @@ class Renderer:
             return []
         with self.compositor.current():
             return self._layering().mattes.of(request.state.layers, request.index if frame is None else frame)
-
-    @property
-    def holes(self) -> np.ndarray | None:
-        """See LayeredRenderer.holes. They belong to the last picture with layers; top row first."""
-        with self.compositor.current():
-            return self._layered.holes if self._layered else None
 
     def _want(self, request: Request) -> list[int]:
         """See window_frames.want."""

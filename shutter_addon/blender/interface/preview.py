@@ -45,12 +45,6 @@ VIEWS = (
     ("EDGES", "Edges", "The result with a line around the area of each shutter"),
     ("SCRIBBLES", "Scribbles", "The source with the strokes of each shutter"),
     ("COEFFICIENTS", "Mattes", "Each pixel's share of each shutter, in the shutters' colors and patterns"),
-    (
-        "HOLES",
-        "Holes",
-        "The result and the holes behind layers: orange is taken from another frame, "
-        "purple is filled from its surroundings",
-    ),
 )
 
 
@@ -67,7 +61,6 @@ def _redraw_when_still() -> float | None:
     return None
 
 
-_HOLES = (1.0, 0.55, 0.0), (0.75, 0.2, 0.9)  # colors of compute.plates.TAKEN and FILLED
 Colors = Sequence[Sequence[float]]  # display values
 _NAVIGATION = 56  # interface units: Blender's navigation buttons at the right of a preview
 _TICK = 0.25  # seconds
@@ -210,9 +203,6 @@ def _show_picture(context: Context, quad: Quad, shown: Shown, wanted: Drawing, s
     elif settings.view == "COEFFICIENTS":
         _show_coefficients(quad, colors, renderer, request, "COEFFICIENTS", 0.75)
     else:
-        if settings.view == "HOLES":
-            holes = renderer.drawn_holes(replace(request, quick=True, levels=True))
-            _show_scribbles(quad, _HOLES, holes, renderer)
         if settings.view == "EDGES":
             _show_coefficients(quad, colors, renderer, request, "EDGES", 1.0)
         _show_strokes(context, quad, shown, wanted.decision.snapshot)

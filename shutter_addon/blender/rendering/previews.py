@@ -34,7 +34,7 @@ _SLICE = 0.15  # seconds
 _PLAYED = 1.0  # seconds of the only slice of a frame during playback
 _READING_TOOL = "builtin.sample"  # it reads once before its operator runs
 DRAFT_ROWS = 270  # blocks along the shorter side of a draft in which shutters follow edges
-RESULTS = "RESULT", "SPLIT", "EDGES", "HOLES"  # views of the live preview that show the result
+RESULTS = "RESULT", "SPLIT", "EDGES"  # views of the live preview that show the result
 
 
 @dataclass
